@@ -4,7 +4,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: run quick test test-long coverage mutants lint bench bench-peers bench-loops clean
+.PHONY: run quick test test-long coverage mutants lint docs bench bench-peers bench-loops clean
 
 run: $(VENV)/.run
 	$(BIN)/lgvi-warp run examples/paper.toml --out runs/paper
@@ -37,6 +37,10 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# The documentation site, without network: build/site/index.html.
+docs: $(VENV)/.dev
+	$(BIN)/sphinx-build -W --keep-going -q docs build/site
 
 bench: $(VENV)/.dev
 	$(BIN)/python -m benchmarks run

@@ -3,28 +3,36 @@
 from __future__ import annotations
 
 import argparse
+import re
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
+
+from lgvi_warp import __version__
+from lgvi_warp.common.errors import closest
 
 OF = 'position, attitude, velocity, angular_velocity, energy, depth, speed, euler, "position[2]", "norm(velocity)" ...'
 
 
 EPILOG = """examples:
+  lgvi-warp new dive.toml --vehicle remus_100
+  lgvi-warp check dive.toml
   lgvi-warp run examples/paper.toml --out runs/paper
-  lgvi-warp check examples/paper.toml
   lgvi-warp run examples/paper.toml --members 20000 --dtype float32 --set vehicle.mass=120
   lgvi-warp run examples/paper.toml --error 1e-3
   lgvi-warp run examples/paper.toml --members 1000000 --store zarr --out runs/large
   lgvi-warp resume runs/large
+  lgvi-warp view runs/paper
   lgvi-warp tradeoff examples/paper.toml --out runs/tradeoff
   lgvi-warp sensitivity examples/paper.toml --of "position[2]" --out runs/sensitivity
   lgvi-warp stability examples/paper.toml --out runs/stability
   lgvi-warp sweep examples/sweeps/heading_laws.toml --out runs/heading_laws
-  lgvi-warp info
+  lgvi-warp info runs/large
+  lgvi-warp run examples/paper.toml --json -q
 
 exit codes: 0 done; 1 members, files or the disk failed, or info or merge found a run that is not whole; 2 refused: a scene,
 an argument, or what lies in a folder; 130 interrupted, 143 by SIGTERM, 129 by SIGHUP (a second one ends at once). Results
-go to stdout, progress and faults to stderr.
+go to stdout, progress and faults to stderr. The options of every verb: -q, -v, --json, --color.
 """
 
 
@@ -37,7 +45,6 @@ SHARED: dict[str, dict[str, Any]] = {
     "--members": {"metavar": "N", "help": "number of vehicles"},
     "--seed": {"metavar": "N", "help": "seed of what varies"},
     "--set": {"metavar": "KEY=VALUE", "action": "append", "default": [], "help": "replace a key of the scene file"},
-    "--quiet": {"action": "store_true", "help": "no progress and no summary"},
     "--method": {"help": "as for run"},
     "--methods": {"metavar": "A,B", "type": lambda text: [name.strip() for name in text.split(",")]},
     "--step": {"metavar": "S", "help": "time step [s]"},
@@ -53,10 +60,63 @@ SHARED: dict[str, dict[str, Any]] = {
     "--overwrite": {"action": "store_true", "help": "replace a run.zarr that is there"},
 }
 # Arguments of the verbs that write files about a scene's ensemble.
-SCENE = "scene --out --duration --members --seed --set --quiet"
+SCENE = "scene --out --duration --members --seed --set"
 EXECUTOR = "--threads --executor --scheduler"
 WORKERS = "threads, processes or workers (default: all cores)"
 FOLDER = "folder for the files, replaced if they exist (default: {})"
+# Options of every verb, which may stand before it too -> what they are without being given.
+COMMON: dict[tuple[str, ...], dict[str, Any]] = {
+    ("-q", "--quiet"): {"action": "store_true", "help": "no progress and no results but those of --json: faults alone"},
+    ("-v", "--verbose"): {"action": "store_true", "help": "also how it was run, and where an error came from"},
+    ("--json",): {"action": "store_true", "help": "results as one JSON document (docs/reference/json.md)"},
+    ("--color",): {
+        "choices": ("auto", "always", "never"),
+        "help": "colors: auto (default, on a terminal without NO_COLOR), always or never",
+    },
+}
+DEFAULTS = {"quiet": False, "verbose": False, "json": False, "color": "auto"}
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose errors suggest the nearest name.
+
+    Attributes:
+        verbs: Parser of each verb; none for that of a verb itself.
+    """
+
+    verbs: Mapping[str, Parser] = {}
+
+    def error(self, message: str) -> NoReturn:
+        """Print the usage and the fault, and end with exit code 2.
+
+        Args:
+            message: The fault.
+        """
+        if wrong := re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message):
+            names = re.findall(r"[\w-]+", wrong[2])
+            message = f"{message[: wrong.start()]}{wrong[1]!r} is not known; {closest(wrong[1], names)}"
+        super().error(message)
+
+
+def parsed(arguments: Sequence[str] | None = None) -> argparse.Namespace:
+    """Read the command's arguments; a fault, or a help that was asked for, ends the process.
+
+    Args:
+        arguments: The arguments; default None, those of the process.
+
+    Returns:
+        The chosen verb and its options.
+    """
+    top = parser()
+    chosen, unknown = top.parse_known_args(arguments)
+    if unknown:
+        verb = top.verbs[chosen.verb]
+        options = re.findall(r"--[\w-]+", verb.format_help())
+        wrong = [word for word in unknown if word.startswith("-")] or unknown
+        texts = [f"{word!r} is not known" + (f"; {closest(word.partition('=')[0], options)}" if word[:1] == "-" else "")
+                 for word in wrong]  # fmt: skip
+        verb.error("; ".join(texts))
+    return chosen
 
 
 def _add_shared(verb: Any, names: str, **helps: str) -> None:
@@ -66,18 +126,19 @@ def _add_shared(verb: Any, names: str, **helps: str) -> None:
         verb.add_argument(name, **SHARED[name] | ({"help": own_help} if own_help else {}))
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
     """Make the parser of the command's arguments.
 
     Returns:
         A parser with one subparser for each verb.
     """
-    top = argparse.ArgumentParser(
+    top = Parser(
         prog="lgvi-warp",
         description="Simulate many underwater vehicles at once with a Lie group variational integrator.",
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    top.add_argument("--version", action="version", version=f"lgvi-warp {__version__}")
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB")
     _add_run(verbs)
     _add_check(verbs)
@@ -87,24 +148,38 @@ def parser() -> argparse.ArgumentParser:
     _add_sensitivity(verbs)
     _add_stability(verbs)
     _add_sweep(verbs)
-    info = verbs.add_parser(
-        "info", help="what a run's folder holds; without one, the machine, versions, the core's peak"
+    view = _verb(verbs, "view", help="look at a run in the rerun viewer")
+    view.add_argument("dir", metavar="DIR", type=Path, help="the folder of a run, a store, or a result.npz")
+    view.add_argument("--members", metavar="LIST", help="draw these members, as 3,17 (default: a fair choice of 1,000)")
+    view.add_argument("--out", metavar="FILE", type=Path, help="write the recording there, and open no viewer")
+    info = _verb(
+        verbs, "info", help="what a folder of any verb holds; without one, the machine, versions, the core's peak"
     )
-    info.add_argument("dir", nargs="?", **SHARED["dir"])
+    info.add_argument("dir", nargs="?", metavar="DIR", type=Path, help="a folder that a verb wrote, or a store")
     info.set_defaults(scene=None)
-    bench = verbs.add_parser("bench", help="speed of the kernel on this machine, beside the core's peak")
+    bench = _verb(verbs, "bench", help="speed of the kernel on this machine, beside the core's peak")
     bench.add_argument("--members", type=int, default=4096, help="vehicles (default 4096)")
     bench.add_argument("--steps", type=int, default=1000, help="steps (default 1000)")
     _add_warm(verbs)
-    verbs.add_parser(
-        "tune", help="measure how many vehicles a packet should hold on this machine, for runs from now on"
-    )
+    _verb(verbs, "tune", help="measure how many vehicles a packet should hold on this machine, for runs from now on")
+    _add_lists(verbs)
+    for one in dict.fromkeys((top, *verbs.choices.values())):  # an old name has the same parser
+        for names, settings in COMMON.items():
+            one.add_argument(*names, default=argparse.SUPPRESS, **settings)
+    top.verbs = verbs.choices
+    top.set_defaults(**DEFAULTS)
     return top
+
+
+def _verb(verbs: Any, name: str, help: str, **more: Any) -> Parser:
+    """Add a verb, which says in its own help what it does too."""
+    verb: Parser = verbs.add_parser(name, help=help, description=help[0].upper() + help[1:] + ".", **more)
+    return verb
 
 
 def _add_run(verbs: Any) -> None:
     """Add the verb run with its arguments."""
-    run = verbs.add_parser("run", help="run a scene's ensemble: result.npz, fleet.png, fleet.rrd and a summary")
+    run = _verb(verbs, "run", help="run a scene's ensemble: result.npz, fleet.png, fleet.rrd and a summary")
     add = run.add_argument
     _add_shared(run, SCENE, out=FOLDER.format("runs/NAME of the scene"))
     add(
@@ -150,8 +225,10 @@ def _add_run(verbs: Any) -> None:
 
 def _add_tradeoff(verbs: Any) -> None:
     """Add the verb tradeoff with its arguments."""
-    verb = verbs.add_parser(
-        "tradeoff", help="speed against accuracy of every method, step and precision: tradeoff.json, .csv and .png"
+    verb = _verb(
+        verbs,
+        "tradeoff",
+        help="speed against accuracy of every method, step and precision: tradeoff.json, .csv and .png",
     )
     _add_shared(verb, SCENE, out=FOLDER.format("runs/NAME_tradeoff"))
     _add_shared(verb, "--methods", methods="names, such as psi_s,kl8(psi_x) (default: all that fit)")
@@ -161,7 +238,8 @@ def _add_tradeoff(verbs: Any) -> None:
 
 def _add_sensitivity(verbs: Any) -> None:
     """Add the verb sensitivity with its arguments."""
-    verb = verbs.add_parser(
+    verb = _verb(
+        verbs,
         "sensitivity",
         help="which of the varied parameters matter: Sobol indices or Morris screening; .txt, .csv, .json, .png",
     )
@@ -177,17 +255,17 @@ def _add_sensitivity(verbs: Any) -> None:
         help="what to do about groups with a failed member (default refuse)")  # fmt: skip
     _add_shared(
         verb,
-        "--method --step --dtype --duration --seed --threads --set --quiet",
+        "--method --step --dtype --duration --seed --threads --set",
         method="integration method, as of run",
         dtype="float64, float32, or float32_compensated",
         seed="seed of the design",
-        quiet="no progress and no table",
     )
 
 
 def _add_sweep(verbs: Any) -> None:
     """Add the verb sweep with its arguments."""
-    verb = verbs.add_parser(
+    verb = _verb(
+        verbs,
         "sweep",
         help="cases of a controller on the same members: what holds, which is better, the worst members; tables, pictures",
     )
@@ -198,18 +276,19 @@ def _add_sweep(verbs: Any) -> None:
     )
     add("--plan", action="store_true", help="say what the sweep would take, and run nothing")
     add("--record", metavar="N", type=int, default=0, help="run the N worst members again into recordings (default 0)")
-    _add_shared(verb, "--members --seed --quiet")
+    _add_shared(verb, "--members --seed")
     _add_shared(verb, EXECUTOR, threads=WORKERS)
 
 
 def _add_stability(verbs: Any) -> None:
     """Add the verb stability with its arguments."""
-    verb = verbs.add_parser(
+    verb = _verb(
+        verbs,
         "stability",
         help="where methods are accurate, bounded, flagged or fail, over two parameters: .json, .csv and .png",
     )
     add = verb.add_argument
-    _add_shared(verb, "scene --out --duration --seed --set --quiet", out=FOLDER.format("runs/NAME_stability"))
+    _add_shared(verb, "scene --out --duration --seed --set", out=FOLDER.format("runs/NAME_stability"))
     add(
         "--grid",
         choices=("omega", "mass", "drag", "all"),
@@ -226,31 +305,25 @@ def _add_stability(verbs: Any) -> None:
 
 def _add_check(verbs: Any) -> None:
     """Add the verb check with its arguments."""
-    verb = verbs.add_parser(
-        "check", help="whether a scene can run, and what is odd about it and most likely a unit; nothing runs"
+    verb = _verb(
+        verbs, "check", help="whether a scene can run, and what is odd about it and most likely a unit; nothing runs"
     )
-    _add_shared(
-        verb, "scene --method --step --dtype --duration --members --seed --set --quiet", quiet="the exit code alone"
-    )
+    _add_shared(verb, "scene --method --step --dtype --duration --members --seed --set")
 
 
 def _add_warm(verbs: Any) -> None:
     """Add the verb warm with its arguments."""
-    verb = verbs.add_parser("warm", help="compile the kernels of a scene ahead of its runs, several at a time")
+    verb = _verb(verbs, "warm", help="compile the kernels of a scene ahead of its runs, several at a time")
     _add_shared(verb, "scene --methods", methods="names, such as psi_s,rk4 (default: the scene's)")
     names = SHARED["--methods"] | {"help": "float64, float32, float32_compensated (default: the scene's)"}
     verb.add_argument("--dtypes", **names)
-    _add_shared(
-        verb,
-        "--step --duration --set --threads --quiet",
-        threads="processes (default: all cores)",
-        quiet="print nothing",
-    )
+    _add_shared(verb, "--step --duration --set --threads", threads="processes (default: all cores)")
 
 
 def _add_predict(verbs: Any) -> None:
     """Add the verb predict with its arguments."""
-    verb = verbs.add_parser(
+    verb = _verb(
+        verbs,
         "predict",
         aliases=["plan"],
         help="time, memory and disk that a run would take, from a small one on this machine",
@@ -261,24 +334,40 @@ def _add_predict(verbs: Any) -> None:
 
 def _add_store_verbs(verbs: Any) -> None:
     """Add the verbs resume, merge and export with their arguments."""
-    resume = verbs.add_parser("resume", help="go on with a run that was stopped, and mend what is damaged of it")
+    resume = _verb(verbs, "resume", help="go on with a run that was stopped, and mend what is damaged of it")
     _add_shared(resume, f"dir {EXECUTOR}", threads=WORKERS)
     resume.add_argument("--force", action="store_true", help="even on another machine or with other versions")
-    _add_shared(resume, "--quiet")
-    merge = verbs.add_parser("merge", help="put runs of some blocks each (run --blocks) together")
+    merge = _verb(verbs, "merge", help="put runs of some blocks each (run --blocks) together")
     merge.add_argument("dirs", metavar="DIR", type=Path, nargs="+", help="stores, or folders with one each")
     merge.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the whole run")
-    _add_shared(merge, "--overwrite --quiet", quiet="no summary")
-    export = verbs.add_parser("export", help="write a run as one NetCDF or Parquet file")
+    _add_shared(merge, "--overwrite")
+    export = _verb(verbs, "export", help="write a run as one NetCDF or Parquet file")
     _add_shared(export, "dir")
-    page = verbs.add_parser("report", help="one HTML file about a run or a study: report.html")
+    page = _verb(verbs, "report", help="one HTML file about a run or a study: report.html")
     page.add_argument("dir", metavar="DIR", type=Path, help="folder that run, tradeoff, stability or sensitivity wrote")
     page.add_argument(
         "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: DIR/report.html)"
     )
     page.add_argument("--open", action="store_true", help="show it in the browser")
-    _add_shared(page, "--quiet", quiet="no summary")
     export.add_argument("--to", required=True, help="netcdf or parquet")
     export.add_argument(
         "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: beside the store)"
     )
+
+
+def _add_lists(verbs: Any) -> None:
+    """Add the verbs new, list, schema, plot and completion with their arguments."""
+    new = _verb(verbs, "new", help="write a scene file to begin with, with comments")
+    new.add_argument("scene", metavar="SCENE", type=Path, help="the file, which must not be there yet")
+    new.add_argument(
+        "--vehicle", metavar="NAME", default="remus_100", help="as list vehicles has it (default remus_100)"
+    )
+    names = _verb(verbs, "list", help="names of methods, vehicles, terms, or laws of controllers")
+    names.add_argument("of", metavar="WHAT", choices=("methods", "vehicles", "terms", "laws"),
+                       help="methods, vehicles, terms or laws")  # fmt: skip
+    _verb(verbs, "schema", help="print the JSON schema of scene files, for editors")
+    plot = _verb(verbs, "plot", help="draw the pictures of a folder again, from the numbers in it")
+    plot.add_argument("dir", metavar="DIR", type=Path, help="a folder that run or a study wrote")
+    _add_shared(plot, "--out", out="folder for the pictures, replaced if they exist (default: DIR)")
+    completion = _verb(verbs, "completion", help="print what completes the command in a shell")
+    completion.add_argument("shell", metavar="SHELL", choices=("bash", "zsh", "fish"), help="bash, zsh or fish")

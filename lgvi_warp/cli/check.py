@@ -6,6 +6,7 @@ import argparse
 from dataclasses import replace
 from typing import Any
 
+from lgvi_warp.cli.output import tell
 from lgvi_warp.cli.report import controller_lines
 from lgvi_warp.cli.settings import load_scene
 
@@ -29,11 +30,11 @@ def check(chosen: argparse.Namespace) -> int:
     ensemble = Ensemble.from_scene(scene)
     head, messages = _settings(ensemble)
     messages += (*scene.vehicle.warnings, *plausibility.of_ensemble(ensemble).messages(ensemble.members))
-    if not chosen.quiet:
-        print("\n".join([f"scene       {chosen.scene}, {head}", *controller_lines(scene.to_dict())]))
-        for message in messages:
-            print(f"note        {message}")
-        print("result      can run, with notes: nothing is refused for them" if messages else "result      can run")
+    end = "can run, with notes: nothing is refused for them" if messages else "can run"
+    lines = [f"scene       {chosen.scene}, {head}", *controller_lines(scene.to_dict())]
+    lines += [*(f"note        {text}" for text in messages), f"result      {end}"]
+    document = {"scene": chosen.scene, "members": ensemble.members, "notes": messages}
+    tell(chosen, lambda: document, lambda: "\n".join(lines))
     return 0
 
 

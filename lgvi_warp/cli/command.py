@@ -6,24 +6,33 @@ import argparse
 import gc
 import os
 import sys
+import traceback
 from collections.abc import Callable
 
-from lgvi_warp.cli.arguments import parser
+from lgvi_warp.cli.arguments import parsed, parser
 from lgvi_warp.cli.check import check
+from lgvi_warp.cli.completion import completion
+from lgvi_warp.cli.lists import list_names, new, schema
 from lgvi_warp.cli.machine import bench, info, tune
+from lgvi_warp.cli.output import print_faults
+from lgvi_warp.cli.plot import plot
 from lgvi_warp.cli.runs import predict, resume, run
 from lgvi_warp.cli.settings import RUN, out_of
 from lgvi_warp.cli.signals import Ended, Signals, Streams
 from lgvi_warp.cli.stores import export, merge, report
 from lgvi_warp.cli.studies import sensitivity, stability, sweep, tradeoff
+from lgvi_warp.cli.view import view
 from lgvi_warp.cli.warm import warm
 from lgvi_warp.common.errors import SceneError
 
-_VERBS = (
-    run, check, resume, predict, merge, export, report, tradeoff, sensitivity, stability, sweep, info, bench, tune, warm
-)  # fmt: skip
+_VERBS = (run, check, resume, predict, merge, export, tradeoff, sensitivity, stability, sweep, info, bench, tune, warm,
+          new, schema, view, plot, report, completion)  # fmt: skip
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {verb.__name__: verb for verb in _VERBS}
-VERBS["plan"] = predict  # its name before
+# The second is the name of predict before.
+VERBS |= {"list": list_names, "plan": predict}
+
+# Verbs that write no files of the user's.
+READING = ("info", "check", "predict", "plan", "bench", "tune", "warm", "list", "schema", "completion")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -35,8 +44,12 @@ def main(arguments: list[str] | None = None) -> int:
     Returns:
         The exit code, as arguments.EPILOG lists it.
     """
-    with Streams():
-        chosen = parser().parse_args(arguments)
+    with Streams() as streams:
+        if not (sys.argv[1:] if arguments is None else arguments):
+            parser().print_help()
+            return 0
+        chosen = parsed(arguments)
+        streams.color(chosen.color)
         with Signals(lambda: left(chosen)) as signals:
             try:
                 code = VERBS[chosen.verb](chosen)
@@ -73,7 +86,9 @@ def code_of(error: BaseException, chosen: argparse.Namespace, signals: Signals) 
     else:
         raise error
     signals.said = True
-    print(f"lgvi-warp: {text}", file=sys.stderr)
+    if chosen.verbose:
+        traceback.print_exception(error)
+    print_faults([text])
     return code
 
 
@@ -86,7 +101,7 @@ def left(chosen: argparse.Namespace) -> str:
     Returns:
         One sentence, with the way to go on where there is one.
     """
-    if chosen.verb in ("info", "check", "predict", "plan", "bench", "tune", "warm"):
+    if chosen.verb in READING:
         return "nothing was to be written"
     if chosen.verb == "sweep":
         return "finished cells are kept: the same command goes on" if not chosen.plan else "nothing was to be written"

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Iterator
+from typing import Any
 
-from lgvi_warp.cli.stores import info_of_run
+from lgvi_warp.cli.folders import info_of_folder
+from lgvi_warp.cli.output import say, tell
+from lgvi_warp.cli.progress import shown
 from lgvi_warp.engine import widths
 from lgvi_warp.engine.peak import fma_peak
 
@@ -18,30 +22,41 @@ def info(chosen: argparse.Namespace) -> int:
 
     Returns:
         The exit code: 1 for a run that is not complete, otherwise 0.
+
+    Raises:
+        SceneError: The folder holds nothing that a verb wrote.
     """
     if chosen.dir is not None:
-        return info_of_run(chosen.dir)
+        return info_of_folder(chosen)
     from lgvi_warp.common import machine
 
-    described = machine.describe()
-    print(f"cpu         {described['cpu']}, {described['simd']}, {described['threads']} threads{_of_quota()}")
-    if memory := machine.memory_bytes():
-        print(f"memory      {memory / 2**30:.1f} GiB{_of_limit(memory)}")
-    print("versions    " + ", ".join(f"{name} {version}" for name, version in machine.versions().items()))
-    for dtype in ("float64", "float32"):
-        print(f"{dtype}     one core's peak {fma_peak(dtype) / 1e9:.1f} GFMA/s")
-    print("\n".join(_widths()))
+    with shown(chosen.quiet, "measuring"):
+        peaks = {dtype: fma_peak(dtype) for dtype in ("float64", "float32")}
+    packets = {kernel: widths.default_width(*widths.parts(kernel)) for kernel in widths.KERNELS}
+    document = {
+        "machine": machine.describe(),
+        "memory": machine.memory_bytes(),
+        "versions": machine.versions(),
+        "peak": peaks,
+        "packets": {kernel: {"vehicles": width.lanes, "source": width.source} for kernel, width in packets.items()},
+    }
+    tell(chosen, lambda: document, lambda: "\n".join(_machine_lines(document)))
     return 0
 
 
-def _widths() -> Iterator[str]:
-    """Vehicles per packet of each kind of kernel, one line for each thing that chose."""
-    chosen: dict[str, list[str]] = {}
-    for kernel in widths.KERNELS:
-        kind, dtype = widths.parts(kernel)
-        width = widths.default_width(kind, dtype)
-        chosen.setdefault(width.source, []).append(f"{kernel} {width.lanes}")
-    for source, texts in chosen.items():
+def _machine_lines(document: dict[str, Any]) -> Iterator[str]:
+    """The document of info as lines of text."""
+    described, memory = document["machine"], document["memory"]
+    yield f"cpu         {described['cpu']}, {described['simd']}, {described['threads']} threads{_of_quota()}"
+    if memory:
+        yield f"memory      {memory / 2**30:.1f} GiB{_of_limit(memory)}"
+    yield "versions    " + ", ".join(f"{name} {version}" for name, version in document["versions"].items())
+    for dtype, peak in document["peak"].items():
+        yield f"{dtype}     one core's peak {peak / 1e9:.1f} GFMA/s"
+    by_source: dict[str, list[str]] = {}
+    for kernel, width in document["packets"].items():
+        by_source.setdefault(width["source"], []).append(f"{kernel} {width['vehicles']}")
+    for source, texts in by_source.items():
         where = f" ({widths.path()})" if source == "tuned" else ""
         yield f"packets     vehicles, {source}{where}: {', '.join(texts)}"
 
@@ -77,8 +92,11 @@ def bench(chosen: argparse.Namespace) -> int:
     """
     from lgvi_warp.studies.speed import measure
 
+    readings = []
     for line in measure(chosen.members, chosen.steps):
-        print(line, flush=True)
+        readings.append(json.loads(line))
+        say(chosen, line)
+    tell(chosen, lambda: {"readings": readings}, str)
     return 0
 
 
@@ -93,11 +111,13 @@ def tune(chosen: argparse.Namespace) -> int:
     """
     from lgvi_warp.studies import tuning
 
-    best = {}
+    kernels: dict[str, dict[str, Any]] = {}
     for kernel, ns, of_table, fastest in tuning.tune():
         speeds = ", ".join(f"{width}: {one:.2f} ns" for width, one in ns.items())
         remark = "as by the table" if fastest == of_table else f"{of_table} by the table"
-        print(f"{kernel:19} {speeds}: {fastest}, {remark}", flush=True)
-        best[kernel] = fastest
-    print(f"kept in {widths.keep(best)}, for runs from now on; without that file the table counts")
+        say(chosen, f"{kernel:19} {speeds}: {fastest}, {remark}")
+        kernels[kernel] = {"ns": ns, "table": of_table, "best": fastest}
+    path = widths.keep({kernel: one["best"] for kernel, one in kernels.items()})
+    tell(chosen, lambda: {"kernels": kernels, "file": path},
+         lambda: f"kept in {path}, for runs from now on; without that file the table counts")  # fmt: skip
     return 0

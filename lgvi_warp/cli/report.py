@@ -2,57 +2,54 @@
 
 from __future__ import annotations
 
+import argparse
 import contextlib
-import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from lgvi_warp.cli import documents
+from lgvi_warp.cli.output import print_faults, tell
+from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.writing import Written, side_by_side
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.safe_files import size_below
 from lgvi_warp.common.write_lock import write_lock
 
 
-def report(result: Any, out: Path, quiet: bool, begun: float) -> list[str]:
+def report(result: Any, out: Path, chosen: argparse.Namespace, begun: float, failures: Sequence[str] = ()) -> list[str]:
     """Write the files of a finished run and print its summary.
 
     Args:
         result: The run's result.
         out: Folder of the files.
-        quiet: Whether to print nothing.
+        chosen: The command's parsed arguments.
         begun: When the verb began [s], by time.perf_counter.
+        failures: Texts on what failed before; default none.
 
     Returns:
-        One text for each file that could not be written.
+        These, and one text for each file that could not be written.
     """
     from lgvi_warp.runs.store.folder import Folder
 
     if result.store is not None and not Folder(result.store).complete:
-        if not quiet:
-            print(f"members     {result.members:,} of a run in parts, in {result.store}")
-            print(f"next        lgvi-warp merge {out} ... --out DIR, with the folders of the other parts")
-        return []
-    drawn = shown_members(result)
-    written = write(result, drawn, out)
-    if not quiet:
-        print("\n".join([*written.note_lines(), summary(result, drawn, written.files, time.perf_counter() - begun)]))
+        lines = [
+            f"members     {result.members:,} of a run in parts, in {result.store}",
+            f"next        lgvi-warp merge {out} ... --out DIR, with the folders of the other parts",
+        ]
+        drawn, written, text = None, Written([result.store]), lambda: "\n".join(lines)
+    else:
+        with shown(chosen.quiet, "writing"):
+            drawn = shown_members(result)
+            written = write(result, drawn, out)
+        seconds = time.perf_counter() - begun
+        text = lambda: "\n".join(  # noqa: E731
+            [*written.note_lines(), summary(result, drawn, written.files, seconds, chosen.verbose)]
+        )
+    faults = [*written.faults, *failures]
+    tell(chosen, lambda: documents.of_run(result, drawn, written, faults, time.perf_counter() - begun), text)
     print_faults(written.empty)
-    return written.faults
-
-
-def print_faults(faults: list[str]) -> list[str]:
-    """Print faults on stderr.
-
-    Args:
-        faults: One text per fault.
-
-    Returns:
-        The same faults.
-    """
-    for fault in faults:
-        print(f"lgvi-warp: {fault}", file=sys.stderr)
     return faults
 
 
@@ -113,14 +110,9 @@ def write(result: Any, drawn: Any, out: Path) -> Written:
     Returns:
         What was written, and what failed.
     """
-    from lgvi_warp.views.plots import drawable, plot, plot_statistics
-
     written = Written([result.store] if result.store else [])
     writers: dict[str, Callable[[Path], Path]] = {} if result.store else {"result.npz": result.save}
-    if drawn is not None:
-        writers |= {"fleet.png": lambda path: plot(drawn, path), "fleet.rrd": lambda path: _record(result, path)}
-    if drawable(result):
-        writers["statistics.png"] = lambda path: plot_statistics(result, path)
+    writers |= pictures(result, drawn)
     with contextlib.ExitStack() as stack:
         # Runs that end together in one folder write one after another, so that all files are of one of them.
         with contextlib.suppress(OSError):  # a folder that cannot be written: each file reports it
@@ -139,14 +131,38 @@ def _record(result: Any, path: Path) -> Path:
     return path
 
 
-def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
+def pictures(result: Any, drawn: Any) -> dict[str, Callable[[Path], Path]]:
+    """The pictures that a run has.
+
+    Args:
+        result: The run's result.
+        drawn: The members of the picture, from `shown_members`; None for neither picture nor recording.
+
+    Returns:
+        Name of each file -> function of its path that draws it.
+    """
+    from lgvi_warp.views import plots
+
+    drawings: dict[str, Callable[[Path], Path]] = {}
+    if drawn is not None:
+        drawings |= {
+            "fleet.png": lambda path: plots.plot(drawn, path),
+            "fleet.rrd": lambda path: _record(result, path),
+        }
+    if plots.drawable(result):
+        drawings["statistics.png"] = lambda path: plots.plot_statistics(result, path)
+    return drawings
+
+
+def summary(result: Any, drawn: Any, files: list[Path], seconds: float = 0.0, verbose: bool = False) -> str:
     """Summarise a run in a few lines.
 
     Args:
         result: The run's result.
         drawn: The members that the drift is taken of, from `shown_members`.
         files: The files that were written.
-        seconds: Time that the verb took [s].
+        seconds: Time that the verb took [s]; default 0, for a run that was not computed now.
+        verbose: Whether to say how it was run; default False.
 
     Returns:
         The lines as one text.
@@ -159,6 +175,7 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
     lines = [
         *(f"note        {message}" for message in result.messages),
         members_line(result.members, settings),
+        *(how_lines(settings) if verbose else ()),
         *controller_lines(settings["scene"]),
         *_speed(result, seconds),
         "status      " + ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items()),
@@ -185,7 +202,42 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float) -> str:
     if result.statistics:
         lines.append(f"statistics  at {result.time[-1]:g} s, with intervals")
         lines += [f"  {line}" for line in table(result.statistics)]
-    return "\n".join([*lines, *map(file_line, files)])
+    return "\n".join([*lines, *map(file_line, files), *look_lines(files)])
+
+
+def look_lines(files: Sequence[Path]) -> list[str]:
+    """Say how to look at what a run wrote.
+
+    Args:
+        files: The files.
+
+    Returns:
+        One line; none without files.
+    """
+    known = {path.name: path for path in files}
+    ways = [f"rerun {known['fleet.rrd']}"] if "fleet.rrd" in known else []
+    ways += [f"open {path}" for name, path in known.items() if name.endswith(".png")][:1]
+    ways = ways or [f"lgvi-warp info {path.parent}" for path in files[:1]]
+    return [f"look        {', or '.join(ways)}"] if ways else []
+
+
+def how_lines(provenance: dict[str, Any]) -> list[str]:
+    """Say how a run was computed.
+
+    Args:
+        provenance: That of the run.
+
+    Returns:
+        Two lines.
+    """
+    machine = provenance["machine"]
+    versions = ", ".join(f"{name} {version}" for name, version in provenance["versions"].items())
+    seed = provenance["ensemble"].get("seed")
+    return [
+        f"how         seed {seed}, checks {provenance['checks']}, packets of {provenance['width']}, "
+        f"{machine['threads']} threads on {machine['cpu']} ({machine['simd']})",
+        f"versions    {versions}",
+    ]
 
 
 # Quantities that may be conserved -> name in words, unit.

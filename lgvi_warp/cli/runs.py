@@ -8,8 +8,10 @@ import time
 from pathlib import Path
 from typing import Any
 
+from lgvi_warp.cli import documents
+from lgvi_warp.cli.output import print_faults, say, tell
 from lgvi_warp.cli.progress import shown
-from lgvi_warp.cli.report import print_faults, report
+from lgvi_warp.cli.report import report
 from lgvi_warp.cli.settings import block_range, folder, load_scene, store_settings
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.common.errors import Interrupted, MembersFailed, SceneError
@@ -53,13 +55,12 @@ def run(chosen: argparse.Namespace) -> int:
             raise Ended(rescued(error.result, out)) from error
     try:
         warm.join()
-        faults = report(result, out, chosen.quiet, begun) + failures
+        checks = check_error(scene, result, suggested, chosen) if suggested else []
+        faults = report(result, out, chosen, begun, failures + checks)
     except KeyboardInterrupt as error:
         if str(out / RESULT) in str(error):
             raise  # already saved
         raise Ended(rescued(result, out)) from error
-    if suggested:
-        faults += check_error(scene, result, suggested, chosen.quiet)
     return 1 if print_faults(faults) or all_failed(result) else 0
 
 
@@ -133,19 +134,18 @@ def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
     of = chosen.of or "position"
     with shown(chosen.quiet) as progress:
         suggested = suggest(scene, chosen.error, of, methods=methods, threads=chosen.threads, progress=progress)
-    if not chosen.quiet:
-        print(suggested, flush=True)
+    say(chosen, str(suggested))
     return suggested
 
 
-def check_error(scene: Any, result: Any, suggested: Any, quiet: bool) -> list[str]:
+def check_error(scene: Any, result: Any, suggested: Any, chosen: argparse.Namespace) -> list[str]:
     """Print the error of a run, measured by some members at half its step.
 
     Args:
         scene: The scene.
         result: The run's result.
         suggested: The suggestion that it followed.
-        quiet: Whether to print nothing.
+        chosen: The command's parsed arguments.
 
     Returns:
         One fault where the error is above the one asked for, otherwise nothing.
@@ -158,8 +158,7 @@ def check_error(scene: Any, result: Any, suggested: Any, quiet: bool) -> list[st
     text = f"{asked} ({members} members again at half the step, those with the largest errors among them)"
     if not error <= suggested.error:
         return [f"{text}: missed; ask for a smaller one"]
-    if not quiet:
-        print(f"checked     {text}")
+    say(chosen, f"checked     {text}")
     return []
 
 
@@ -205,7 +204,7 @@ def resume(chosen: argparse.Namespace) -> int:
         except MembersFailed as error:
             result, failures = error.result, [str(error)]
     assert result.store is not None
-    faults = report(result, result.store.parent, chosen.quiet, begun) + failures
+    faults = report(result, result.store.parent, chosen, begun, failures)
     return 1 if print_faults(faults) or all_failed(result) else 0
 
 
@@ -224,5 +223,7 @@ def predict(chosen: argparse.Namespace) -> int:
     from lgvi_warp.runs import predict as prediction
 
     scene = load_scene(chosen)
-    print(prediction.predict(scene, threads=chosen.threads, store=store_settings(chosen)))
+    with shown(chosen.quiet, "measuring"):
+        predicted = prediction.predict(scene, threads=chosen.threads, store=store_settings(chosen))
+    tell(chosen, lambda: documents.of_prediction(predicted), lambda: str(predicted))
     return 0

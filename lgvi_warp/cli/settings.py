@@ -127,7 +127,22 @@ def folder(chosen: argparse.Namespace, suffix: str = "") -> Path:
         SceneError: It is a file.
         OSError: It cannot be made or written to.
     """
-    out = out_of(chosen, suffix)
+    return writable(out_of(chosen, suffix))
+
+
+def writable(out: Path) -> Path:
+    """Make a folder, where it is not there, and look whether it can be written.
+
+    Args:
+        out: The folder.
+
+    Returns:
+        The same folder.
+
+    Raises:
+        SceneError: It is a file.
+        OSError: It cannot be made or written to.
+    """
     try:
         out.mkdir(parents=True, exist_ok=True)
     except FileExistsError:

@@ -122,6 +122,9 @@ class Lasting:
         stream: The stream to write to; None for one that was closed before Python started.
     """
 
+    # Whether texts are in colors: "auto", "always" or "never".
+    color = "auto"
+
     def __init__(self, stream: TextIO | None):
         self._stream = stream
 
@@ -177,6 +180,16 @@ class Streams:
         self._before = sys.stdout, sys.stderr
         sys.stdout, sys.stderr = (Lasting(stream) for stream in self._before)
         return self
+
+    @staticmethod
+    def color(choice: str) -> None:
+        """Choose whether texts are in colors.
+
+        Args:
+            choice: "auto", "always" or "never".
+        """
+        for stream in (sys.stdout, sys.stderr):
+            stream.color = choice  # type: ignore[union-attr]
 
     def __exit__(self, *_: Any) -> None:
         with contextlib.suppress(OSError):

@@ -3,31 +3,39 @@
 from __future__ import annotations
 
 import argparse
+import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from lgvi_warp.cli import documents
+from lgvi_warp.cli.folders import text_of
+from lgvi_warp.cli.output import print_faults, tell
 from lgvi_warp.cli.progress import part_of, shown
-from lgvi_warp.cli.report import print_faults
+from lgvi_warp.cli.report import file_line
 from lgvi_warp.cli.settings import folder, load_scene, whole
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.errors import SceneError
 
 
-def finish(written: Written, report: str, quiet: bool) -> int:
+def finish(written: Written, chosen: argparse.Namespace, content: Mapping[str, Any], text: str) -> int:
     """Print a study's report, its files and its notes, and say what failed.
 
     Args:
         written: The study's files.
-        report: The report's text.
-        quiet: Whether to print failures only.
+        chosen: The command's parsed arguments.
+        content: What was found, as in its JSON files, by their names.
+        text: The report.
 
     Returns:
         The exit code: 1 if a file failed, otherwise 0.
     """
-    if not quiet:
-        files = (f"file        {path}" for path in written.files)
-        print("\n".join([report, "", *written.note_lines(), *files]))
+    tell(
+        chosen,
+        lambda: {"content": content} | documents.of_files(written),
+        lambda: "\n".join([text, "", *written.note_lines(), *map(file_line, written.files)]),
+    )
     print_faults(written.empty)
     return 1 if print_faults(written.faults) else 0
 
@@ -46,15 +54,15 @@ def tradeoff(chosen: argparse.Namespace) -> int:
     """
     scene = load_scene(chosen)
     out = folder(chosen, "_tradeoff")
-    from lgvi_warp.studies.tradeoff import report_text
     from lgvi_warp.studies.tradeoff import tradeoff as measure
     from lgvi_warp.views.plots import plot_tradeoff
 
     with shown(chosen.quiet) as progress:
         measurements = measure(scene, of=chosen.of, methods=chosen.methods, seconds=chosen.seconds, progress=progress)
-    written = Written(measurements.save(out))
-    written.draw(plot_tradeoff, measurements, out / "tradeoff.png")
-    return finish(written, report_text(measurements), chosen.quiet)
+    with shown(chosen.quiet, "writing"):
+        written = Written(measurements.save(out))
+        written.draw(plot_tradeoff, measurements, out / "tradeoff.png")
+    return finish(written, chosen, {"tradeoff": measurements.to_dict()}, text_of("tradeoff", measurements))
 
 
 def sensitivity(chosen: argparse.Namespace) -> int:
@@ -84,9 +92,10 @@ def sensitivity(chosen: argparse.Namespace) -> int:
             )  # fmt: skip
     except (uq.FailedMembers, ImportError) as error:
         return len(print_faults([str(error)]))
-    written = Written(indices.save(out))
-    written.draw(plot_sensitivity, indices, out / "sensitivity.png")
-    return finish(written, str(indices), chosen.quiet)
+    with shown(chosen.quiet, "writing"):
+        written = Written(indices.save(out))
+        written.draw(plot_sensitivity, indices, out / "sensitivity.png")
+    return finish(written, chosen, {"sensitivity": indices.to_dict()}, str(indices))
 
 
 def stability(chosen: argparse.Namespace) -> int:
@@ -110,7 +119,7 @@ def stability(chosen: argparse.Namespace) -> int:
     # Seed of the random directions, the only setting of the scene's ensemble that is used here.
     seed = scene.ensemble_settings.seed if scene.ensemble_settings else 0
     out = folder(chosen, "_stability")
-    from lgvi_warp.studies.stability.map import GRIDS, report_text, stability_map
+    from lgvi_warp.studies.stability.map import GRIDS, stability_map
     from lgvi_warp.views.plots import plot_stability
 
     maps = {"stability": (chosen.x or "h", chosen.y or "angular_velocity")}
@@ -118,11 +127,11 @@ def stability(chosen: argparse.Namespace) -> int:
         names = GRIDS if chosen.grid == "all" else (chosen.grid,)
         maps = {f"stability_{name}": GRIDS[name] for name in names}
     t1 = scene.run.duration if chosen.duration is not None else None
-    written, texts = Written(), []
+    written, found = Written(), {}
     with shown(chosen.quiet) as progress:
         for i, (name, (x, y)) in enumerate(maps.items()):
             try:
-                regions = stability_map(
+                found[name] = stability_map(
                     scene, x, y, chosen.methods, points=chosen.points, t1=t1, error=chosen.error, of=chosen.of, seed=seed,
                     progress=part_of(progress, i, len(maps)),
                 )  # fmt: skip
@@ -130,10 +139,10 @@ def stability(chosen: argparse.Namespace) -> int:
                 if not written.files:
                     raise
                 raise Ended(f"{i} of {len(maps)} maps are finished, in {out}") from error
-            written.files += regions.save(out, name)
-            texts.append(report_text(regions))
-            written.draw(plot_stability, regions, out / f"{name}.png")
-    return finish(written, "\n\n".join(texts), chosen.quiet)
+            written.files += found[name].save(out, name)
+            written.draw(plot_stability, found[name], out / f"{name}.png")
+    text = "\n\n".join(text_of("stability", regions) for regions in found.values())
+    return finish(written, chosen, {name: regions.to_dict() for name, regions in found.items()}, text)
 
 
 def sweep(chosen: argparse.Namespace) -> int:
@@ -164,18 +173,21 @@ def sweep(chosen: argparse.Namespace) -> int:
         for name in ("success", "baseline", "confidence", "interval"):
             arguments.pop(name, None)
         asked = {"scene": arguments.pop("scene"), "metrics": arguments.pop("metrics", ())}
-        print(plan_text(made(**asked, **about, settings=arguments), chosen.threads))
+        with shown(chosen.quiet, "measuring"):
+            text = plan_text(made(**asked, **about, settings=arguments), chosen.threads)
+        tell(chosen, lambda: {"plan": text.splitlines()}, lambda: text)
         return 0
     out = folder(chosen, "_sweep")
     executor = {"threads": chosen.threads, "executor": chosen.executor, "scheduler": chosen.scheduler}
     with shown(chosen.quiet) as progress:
         found = run_sweep(**arguments, **executor, out=out, progress=progress)
-    written = Written(found.save(out))
-    for name, draw in pictures(found).items():
-        written.draw(draw, found, out / name)
-    if chosen.record:
-        _record_worst(found, chosen.record, out, written)
-    code = finish(written, str(found), chosen.quiet)
+    with shown(chosen.quiet, "writing"):
+        written = Written(found.save(out))
+        for name, draw in pictures(found).items():
+            written.draw(draw, found, out / name)
+        if chosen.record:
+            _record_worst(found, chosen.record, out, written)
+    code = finish(written, chosen, {"sweep": json.loads((out / "sweep.json").read_text())}, str(found))
     return 1 if all(found.record(cell).refused for cell in found.cells) else code
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import time
 
+from lgvi_warp.cli.output import say, tell
 from lgvi_warp.cli.settings import load_scene
 from lgvi_warp.common import machine
 
@@ -26,13 +27,12 @@ def warm(chosen: argparse.Namespace) -> int:
     begun = time.perf_counter()
     scene = load_scene(chosen)
     plans = kernels.plans_of(scene, chosen.methods or (), chosen.dtypes or ())
-    total = 0.0
+    compiled, total = [], 0.0
     for plan, phases in kernels.warm(plans, chosen.threads or machine.thread_count()):
         total += sum(phases)
-        if not chosen.quiet:
-            there = "" if phases.clang else " (was in the cache)"
-            print(f"{plan.method.name} {plan.dtype}: {phases}{there}", flush=True)
-    if not chosen.quiet:
-        seconds = time.perf_counter() - begun
-        print(f"kernels: {len(plans)}, in {seconds:.2f} s; one after another their phases take {total:.2f} s")
+        compiled.append({"method": plan.method.name, "dtype": plan.dtype, "seconds": phases._asdict()})
+        say(chosen, f"{plan.method.name} {plan.dtype}: {phases}{'' if phases.clang else ' (was in the cache)'}")
+    seconds = time.perf_counter() - begun
+    tell(chosen, lambda: {"kernels": compiled, "seconds": seconds},
+         lambda: f"kernels: {len(plans)}, in {seconds:.2f} s; one after another their phases take {total:.2f} s")  # fmt: skip
     return 0

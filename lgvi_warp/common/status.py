@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import html
 from enum import IntEnum, IntFlag
 from typing import Any
 
 import numpy as np
+
+from lgvi_warp.common.summaries import counted
 
 # Values of `checks` and `on_failure` in solve and in a scene's [run].
 CHECKS = ("none", "safe", "all")
@@ -84,6 +87,14 @@ class StatusArray(np.ndarray):
     def stopped(self) -> np.ndarray:
         """Mask (n,) of the members that an event of the scene stopped."""
         return stopped(self)
+
+    def __repr__(self) -> str:
+        if self.dtype != np.uint8 or self.ndim != 1 or not np.isin(self, list(Status)).all():
+            return super().__repr__()
+        return f"StatusArray of {len(self):,} members: {counted(self.counts()) or 'none'}"
+
+    def _repr_html_(self) -> str:
+        return f"<div>{html.escape(repr(self))}</div>"
 
     def counts(self) -> dict[str, int]:
         """Count members by outcome.

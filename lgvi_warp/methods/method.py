@@ -7,9 +7,11 @@ discrete Moser-Veselov rotation of equation (24), Ab and Ap the two halves of T.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
+from lgvi_warp.common import summaries
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.methods.tableaux import CG3, DOP853, DOPRI5, RK4, RKW3, Tableau
 
 Program = tuple[tuple[str, float], ...]
@@ -114,7 +116,7 @@ HALVES: dict[str, tuple[int, tuple[float, ...]]] = {
 
 
 @dataclass(frozen=True)
-class Method:
+class Method(Summarized):
     """An integration method by name, and how it solves its implicit equations.
 
     Args:
@@ -188,6 +190,13 @@ class Method:
             faults.add("tolerance", self.tolerance, "is not between 0 and 1", "give a relative residual such as 1e-12")
         self._check_steps(faults)
         faults.raise_if_any()
+
+    def summary_rows(self) -> tuple[str, summaries.Rows]:
+        """Order, symmetry and the settings that are not the defaults."""
+        rows = [("order", str(self.order))]
+        rows += [(item.name, str(getattr(self, item.name))) for item in fields(self)[1:]
+                 if getattr(self, item.name) != item.default]  # fmt: skip
+        return f"Method {self.name}", rows
 
     def _check_steps(self, faults: Faults) -> None:
         """Note a fault unless both tolerances or none are set, and for a method that estimates no error."""

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common import summaries
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics import inertia as inertias
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.shape import shape_from
@@ -38,8 +40,8 @@ class Seen(str):
     """A warning that a vehicle raises about its own numbers, and raises again when it is rebuilt from another's fields."""
 
 
-@dataclass(frozen=True, eq=False)
-class Vehicle:
+@dataclass(frozen=True, eq=False, repr=False)
+class Vehicle(Summarized):
     """A rigid body in water, in body axes (x ahead, y to starboard, z down), described in one of two forms.
 
     The simple form is about the centre of gravity: `mass`, `inertia`, `added_mass`. The 6x6 form is about any origin of the
@@ -101,6 +103,12 @@ class Vehicle:
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
             object.__setattr__(self, name, value)
+
+    def summary_rows(self) -> tuple[str, summaries.Rows]:
+        """The numbers with their units, and the warnings."""
+        rows = [(name, summaries.numbers(value, UNITS[name])) for name, value in self.parameters().items()]
+        rows += [("warning", str(text)) for text in self.warnings]
+        return f"Vehicle, {'6x6' if self.full else 'simple'} form", rows
 
     @property
     def full(self) -> bool:

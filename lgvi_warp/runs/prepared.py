@@ -12,6 +12,7 @@ import numpy as np
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, SceneError, refusal, shown
 from lgvi_warp.common.labelled import columns_by_name, is_labelled
+from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import Status, failed
 from lgvi_warp.engine.executors import executor_of
 from lgvi_warp.engine.keepers.observation import observe
@@ -178,13 +179,14 @@ class Prepared:
         self._fleet, self._table, self.names, self._of, self._runner = fleet, table, names, of, runner
         self._levels, self._refuse, self._common_noise = levels, refuse, common_noise
 
+    @shows_progress
     def __call__(
         self,
         X: Any = None,
         *,
         seed: int | None = None,
         members: int | None = None,
-        progress: Callable[[float], None] | None = None,
+        progress: Callable[[float], None] | bool | None = None,
     ) -> Any:
         """Run members with these numbers, from t = 0 to the end.
 
@@ -194,7 +196,8 @@ class Prepared:
                 Without X the members are drawn from the distributions.
             seed: seed of the members that are drawn; default that of the ensemble.
             members: number of members that are drawn, the first ones of the sampling; default those of the ensemble.
-            progress: called with the fraction of the work that is done, in [0, 1].
+            progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is
+                done, in [0, 1].
 
         Returns:
             The quantities, (n,) of a single number and (n, m) of several; a `Result` without `of`.
@@ -205,7 +208,7 @@ class Prepared:
         """
         if X is not None and (seed is not None or members is not None):
             raise SceneError(["X: is given beside seed or members, which draw the numbers; leave out one of them"])
-        return self._answer(self._drawn(seed, members) if X is None else self._members(X), progress)
+        return self._answer(self._drawn(seed, members) if X is None else self._members(X), callback(progress))
 
     def states(
         self,

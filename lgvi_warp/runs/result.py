@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.common import files as durable
-from lgvi_warp.common import npy_files
+from lgvi_warp.common import npy_files, summaries
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.phases import Phases
-from lgvi_warp.common.status import StatusArray, WarningArray
+from lgvi_warp.common.status import Status, StatusArray, WarningArray
+from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.control.controller import terms_of
@@ -25,6 +26,7 @@ from lgvi_warp.physics.fields import FIELDS, TABLE, dims_of
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.runs import member_fields, result_file
 from lgvi_warp.statistics.estimate import Estimates
+from lgvi_warp.statistics.quantity import KNOWN
 
 if TYPE_CHECKING:
     import xarray
@@ -33,6 +35,10 @@ if TYPE_CHECKING:
 
 TIME = {"units": "s", "long_name": "time since the start"}
 END_TIME = {"units": "s", "long_name": "time of the event or of the failure of a member, or the end of the run"}
+
+
+# Most members in the picture of a notebook.
+PICTURED = 20
 
 
 class _Signal:
@@ -45,8 +51,8 @@ class _Signal:
         return self if result is None else result._kept(self._name)
 
 
-@dataclass(frozen=True, eq=False)
-class Result:
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(Summarized):
     """Samples of n members at k times, the status of each member, and the provenance they follow from.
 
     Sample 0 is the initial state. Samples are float64 or float32, as the run's dtype. With float32_compensated everything is
@@ -104,6 +110,40 @@ class Result:
     compile_phases: Phases = field(default=Phases(), compare=False)
     run_seconds: float = field(default=0.0, compare=False)
 
+    def summary_rows(self) -> tuple[str, summaries.Rows]:
+        """Outcomes, settings, fields with their units, statistics and messages."""
+        how, fields = self.provenance, TABLE | {name: signal.field for name, signal in SIGNALS.items()}
+        units = (f"{name} [{fields[name].unit}]" if fields[name].unit != "1" else name for name in self.samples)
+        method = (
+            f"{how['method']['name']}, {how['dtype']}, step {how['step']:g} s, {how['steps']:,} steps" if how else ""
+        )
+        rows = [
+            ("outcomes", summaries.counted(self.status.counts())),
+            ("warnings", summaries.counted(self.warnings.counts())),
+            ("method", method),
+            ("samples", summaries.listed(units)),
+            ("kept", f"samples of {self.kept.members:,} members" if self.kept is not None else ""),
+            ("statistics", summaries.listed(self.statistics)),
+            ("store", str(self.store or "")),
+            *(("message", text) for text in self.messages),
+        ]
+        title = (
+            f"Result of {self.members:,} members at {len(self.time):,} times, {self.time[0]:g} to {self.time[-1]:g} s"
+        )
+        return title, [row for row in rows if row[1]]
+
+    def summary_picture(self) -> str:
+        """Depths of a few members over time; of a run in memory alone, since a store may be slow."""
+        drawn = self if self.samples and self.store is None else self.kept
+        if drawn is None or "position" not in drawn.samples:
+            return ""
+        chosen = np.unique(np.linspace(0, drawn.members - 1, min(drawn.members, PICTURED)).astype(int))
+        few = "" if len(chosen) == self.members else f" of {len(chosen)} of {self.members:,} members"
+        label = f"depth [m], down, over {drawn.time[0]:g} to {drawn.time[-1]:g} s{few}; dashed: did not end ok"
+        return summaries.curves(
+            drawn.time, drawn.depth[:, chosen], np.asarray(drawn.status)[chosen] != Status.OK, label
+        )
+
     def _kept(self, name: str) -> np.ndarray:
         if not self.samples:
             remedy = "give keep='all', or indices of members, which are result.kept then"
@@ -144,6 +184,27 @@ class Result:
     def quaternion_wxyz(self) -> np.ndarray:
         """Unit quaternions of the attitudes, scalar first and not negative, shape (k, n, 4)."""
         return notation.quaternion_from_matrix(self.attitude).astype(self.attitude.dtype)
+
+    def _quantity(self, name: str) -> np.ndarray:
+        """A quantity that statistics know, float64, of the samples that it needs."""
+        quantity = KNOWN[name]
+        samples: Any = {field: self._kept(field) for field in quantity.fields}
+        return np.asarray(quantity.function(samples, None), dtype=np.float64)  # type: ignore[arg-type]
+
+    @property
+    def depth(self) -> np.ndarray:
+        """Depth of the body's origin below the surface [m], float64, shape (k, n)."""
+        return self._quantity("depth")
+
+    @property
+    def speed(self) -> np.ndarray:
+        """Length of the velocity [m/s], float64, shape (k, n)."""
+        return self._quantity("speed")
+
+    @property
+    def euler(self) -> np.ndarray:
+        """Roll, pitch and yaw, R = Rz(yaw) Ry(pitch) Rx(roll) [rad], float64, shape (k, n, 3)."""
+        return self._quantity("euler")
 
     @functools.cached_property
     def energy(self) -> np.ndarray:

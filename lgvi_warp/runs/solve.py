@@ -8,6 +8,7 @@ from typing import Any
 
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, SceneError, shown
+from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.engine.executors import executor_of
 from lgvi_warp.engine.executors.base import Executor
 from lgvi_warp.engine.keepers.observation import Observation, observe
@@ -22,6 +23,7 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 
 
+@shows_progress
 def solve(
     fleet: Ensemble | Scene,
     method: str | Method | None = None,
@@ -34,7 +36,7 @@ def solve(
     width: int | None = None,
     checks: str | None = None,
     on_failure: str | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | bool | None = None,
     statistics: Sequence[Any] | None = None,
     keep: str | Sequence[int] | None = None,
     until: Any = None,
@@ -46,7 +48,7 @@ def solve(
     """Advance every member of the fleet from t = 0 to t1 and return the samples and statistics asked for.
 
     What is left out is taken from the scene's [run] section; the defaults below hold where that says nothing. Nothing is
-    printed. The same inputs give the same bits for any number of threads, on one type of machine.
+    printed unless `progress` says so. The same inputs give the same bits for any number of threads, on one type of machine.
 
     Args:
         fleet: An Ensemble, or a Scene, which stands for its own ensemble (one vehicle if it has none).
@@ -63,7 +65,8 @@ def solve(
         on_failure: "freeze" (default) keeps a member that fails at its last good state. "raise" raises MembersFailed after
             the run. "substep" repeats a step that has no solution in 2, 4, ... 1024 parts, for that member alone: order and
             the symmetry of each step are kept, symplecticity is not.
-        progress: Called with the fraction of the work that is done, in [0, 1], from the threads that do it.
+        progress: True shows a bar on a terminal and in a notebook, lines elsewhere, on stderr; a function is called with the
+            fraction of the work that is done, in [0, 1], from the threads that do it. Default: nothing is shown.
         statistics: Statistics gathered over the members at every sample time during the run, such as lw.Mean("position");
             they are in result.statistics. An empty sequence gathers none, whatever the scene says.
         keep: Members whose samples are kept. "all" (default). "none": memory grows with neither members nor steps.
@@ -108,8 +111,8 @@ def solve(
         survey_all=store is not None, looks=observed.looks)  # fmt: skip
     fields, count = fields_of(save, ensemble.scene.run), threads or machine.thread_count()
     if store is None:
-        return completed(plan, count, observed, fields, progress=progress, executor=runner, partial=True)
+        return completed(plan, count, observed, fields, progress=callback(progress), executor=runner, partial=True)
     only = blocks_there(only, plan)
     into = store if isinstance(store, Store) else Store(store)
-    result = run_stored(plan, into, runner, progress, only, observed, fields)
+    result = run_stored(plan, into, runner, callback(progress), only, observed, fields)
     return result if only is not None else finished(result, plan, observed, fields, count)

@@ -12,10 +12,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from lgvi_warp.common import machine
+from lgvi_warp.common import machine, summaries
 from lgvi_warp.common.errors import Faults, closest, cut, refusal, shown
 from lgvi_warp.common.labelled import columns_by_name, is_labelled, match
 from lgvi_warp.common.real_numbers import column_names
+from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics import notation
 from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.physics.fields import FIELDS
@@ -29,7 +30,7 @@ from lgvi_warp.scene.start import ATTITUDES, NAMES, resolve_attitude
 from lgvi_warp.scene.variations import MATRICES, Target, Variation
 
 
-class Ensemble:
+class Ensemble(Summarized):
     """A scene and what varies in it from member to member.
 
     A member's numbers depend on the seed, its index and the varied names alone, not on the block, subset or order in
@@ -74,6 +75,13 @@ class Ensemble:
             faults.add("vary", vary, "does not map names to distributions", 'give {"vehicle.mass": lw.Normal(...)}')
         faults.raise_if_any()
         self._setup(scene, EnsembleSettings(members, seed, dict(vary or {}), sampling), {})
+
+    def summary_rows(self) -> tuple[str, summaries.Rows]:
+        """Sampling, what varies and the scene's own rows."""
+        varied = [(f"varies {name}", shown(one.to_dict())) for name, one in self.vary.items()]
+        rows = [("sampling", f"{self.sampling.kind}, seed {self.seed}"), *varied]
+        own = self.scene.summary_rows()[1] if isinstance(self.scene, Summarized) else ()
+        return f"Ensemble of {self.members:,} members", [*rows, *(row for row in own if row[0] != "ensemble")]
 
     @classmethod
     def of(cls, scene: SceneLike, settings: EnsembleSettings) -> Ensemble:

@@ -11,11 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common import summaries
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.names import alike, folded
+from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics import terms
+from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.physics.terms import events
-from lgvi_warp.physics.vehicle import Vehicle
+from lgvi_warp.physics.vehicle import UNITS, Vehicle
 from lgvi_warp.sampling.distributions.named import from_dict as distribution_from_dict
 from lgvi_warp.scene.ensemble import Ensemble, check_names
 from lgvi_warp.scene.file import tables_of_file, tables_of_text, with_named_vehicle
@@ -26,8 +29,8 @@ from lgvi_warp.scene.start import Environment, Start
 KINDS = {"vehicle": Vehicle, "environment": Environment, "start": Start, "run": RunSettings}
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
+@dataclass(frozen=True, eq=False, repr=False)
+class Scene(Summarized):
     """One vehicle, its environment, the terms that act on it and the state it starts from.
 
     Weight, buoyancy and restoring moment follow from the vehicle; they are not listed as terms.
@@ -78,6 +81,25 @@ class Scene:
             with faults.including():
                 self._connect()
         faults.raise_if_any()
+
+    def summary_rows(self) -> tuple[str, summaries.Rows]:
+        """The numbers of vehicle and start, and a row for each other section."""
+        water, run, settings = self.environment, self.run.to_dict(), self.ensemble_settings
+        own, start = self.vehicle.parameters().items(), self.start.given().items()
+        rows = [(f"vehicle.{name}", summaries.numbers(value, UNITS[name])) for name, value in own]
+        rows.append(("environment", f"gravity {water.gravity:g} m/s2, water_density {water.water_density:g} kg/m3"))
+        rows += [(f"start.{name}", summaries.numbers(value, TABLE[name].unit)) for name, value in start]
+        rows.append(("terms", summaries.listed(term.key for term in self.terms)))
+        if self.controller is not None:
+            parts = summaries.listed(part.key for part in self.controller.parts)
+            rows.append(("controller", f"every {self.controller.period:g} s: {parts}"))
+        rows.append(("events", summaries.listed(event.key for event in self.events)))
+        if settings is not None:
+            rows.append(("ensemble", f"members {settings.members}, varied: {summaries.listed(settings.vary)}"))
+        rows.append(
+            ("run", ", ".join(f"{name} {value}" for name, value in run.items() if isinstance(value, str | float)))
+        )
+        return "Scene", rows
 
     def _connect(self) -> None:
         """Let terms take the commands of the controller, if there is one; others are by themselves."""

@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common import summaries
+from lgvi_warp.common.errors import closest, shown
+from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.statistics.naming import canonical, free
 from lgvi_warp.statistics.tree import below
 
@@ -126,7 +129,7 @@ class Estimate:
         return xr.Dataset(data, known, attributes | {"settings": json.dumps(self.settings)})
 
 
-class Estimates(Mapping[str, Estimate]):
+class Estimates(Summarized, Mapping[str, Estimate]):
     """The estimates of a run by name, in the order of the statistics; "above 10.0" in a name is found as "above 10".
 
     Args:
@@ -140,6 +143,9 @@ class Estimates(Mapping[str, Estimate]):
     def __getitem__(self, name: str) -> Estimate:
         if name not in self._found and isinstance(name, str):
             name = self._spelled.get(canonical(name), name)
+        if name not in self._found:
+            there = closest(name, self._found) if self._found else "none were asked for: give statistics=[...]"
+            raise KeyError(f"{shown(name)} is no statistic of this run; {there}")
         return self._found[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -147,6 +153,12 @@ class Estimates(Mapping[str, Estimate]):
 
     def __len__(self) -> int:
         return len(self._found)
+
+    def summary_rows(self) -> tuple[str, summaries.Rows]:
+        """Name, unit, shape and last sample time of each."""
+        rows = [(name, f"{' x '.join(map(str, one.value.shape))} values{f' [{one.unit}]' if one.unit != '1' else ''} "
+                 f"({', '.join(one.dims['value'])}), to {one.time[-1]:g} s") for name, one in self.items()]  # fmt: skip
+        return f"Estimates of {len(self)} statistics", rows
 
     @functools.cached_property
     def dataset(self) -> xarray.Dataset:

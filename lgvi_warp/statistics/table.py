@@ -9,6 +9,22 @@ import numpy as np
 from lgvi_warp.statistics.estimate import Estimate, Estimates
 
 
+def entries(estimates: Estimates) -> Iterator[tuple[str, str, float, float, float, int]]:
+    """List the numbers of a run at its end.
+
+    Args:
+        estimates: the estimates of a run.
+
+    Yields:
+        Label, unit ("" for none), value, lower and upper end of the interval, number of members.
+    """
+    for estimate in estimates.values():
+        unit = "" if estimate.unit == "1" or estimate.unit.startswith("products") else estimate.unit
+        members = _MEMBERS.get(estimate.settings["type"], lambda estimate: estimate.count[-1])(estimate)
+        for label, value, lower, upper in _LINES.get(estimate.settings["type"], _entries)(estimate):
+            yield label, unit, float(value), float(lower), float(upper), int(members)
+
+
 def table(estimates: Estimates) -> list[str]:
     """Return one line for each number: its label, its value, its interval, and its number of members.
 
@@ -16,12 +32,9 @@ def table(estimates: Estimates) -> list[str]:
         estimates: the estimates of a run.
     """
     rows = []
-    for estimate in estimates.values():
-        unit = "" if estimate.unit == "1" or estimate.unit.startswith("products") else f" {estimate.unit}"
-        members = _MEMBERS.get(estimate.settings["type"], lambda estimate: estimate.count[-1])(estimate)
-        for label, value, lower, upper in _LINES.get(estimate.settings["type"], _entries)(estimate):
-            ends = f"{lower:.5g} to {upper:.5g}" if np.isfinite(lower) or np.isfinite(upper) else "no interval"
-            rows.append((label, f"{value:.6g}{unit}", ends, f"{int(members):,} members"))
+    for label, unit, value, lower, upper, members in entries(estimates):
+        ends = f"{lower:.5g} to {upper:.5g}" if np.isfinite(lower) or np.isfinite(upper) else "no interval"
+        rows.append((label, f"{value:.6g} {unit}".rstrip(), ends, f"{members:,} members"))
     widths = [max((len(row[i]) for row in rows), default=0) for i in range(3)]
     return ["  ".join([*(text.ljust(width) for text, width in zip(row, widths, strict=False)), row[3]]) for row in rows]
 

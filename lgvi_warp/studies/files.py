@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.tables import write_csv
 
 
@@ -32,6 +35,41 @@ def finite_or_none(value: Any) -> Any:
     if isinstance(value, float | np.floating):
         return float(value) if math.isfinite(value) else None
     return value
+
+
+def numbers(value: Any, missing: float) -> Any:
+    """Undo `finite_or_none`.
+
+    Args:
+        value: None, numbers, texts, and nested tables and lists of them.
+        missing: what stands for None, infinite or NaN.
+
+    Returns:
+        The same with this number in place of None.
+    """
+    if isinstance(value, dict):
+        return {key: numbers(item, missing) for key, item in value.items()}
+    if isinstance(value, list):
+        return [numbers(item, missing) for item in value]
+    return missing if value is None else value
+
+
+@contextlib.contextmanager
+def understood(path: Path) -> Iterator[None]:
+    """Turn what a damaged file raises in the `with` block into a SceneError.
+
+    Args:
+        path: The file that is read.
+
+    Raises:
+        SceneError: It is not what `save` wrote.
+    """
+    try:
+        yield
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        if isinstance(error, SceneError):
+            raise
+        raise SceneError([f"{path}: is damaged, or of another version; run the study again"]) from error
 
 
 class Saved(ABC):

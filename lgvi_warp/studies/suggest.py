@@ -12,6 +12,7 @@ import numpy as np
 
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.executors import check_threads
 from lgvi_warp.engine.executors.threads import ThisThread
@@ -135,6 +136,7 @@ class Suggestion:
         return "\n".join(lines)
 
 
+@shows_progress
 def suggest(
     fleet: Ensemble | Scene,
     error: float = 1e-3,
@@ -144,7 +146,7 @@ def suggest(
     members: int = 128,
     threads: int | None = None,
     seconds: float = 30.0,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | bool | None = None,
 ) -> Suggestion:
     """Find the cheapest method, step and precision that keep an error for every member up to a time.
 
@@ -162,7 +164,8 @@ def suggest(
         members: size of the sample that is searched. Default 128.
         threads: threads of the predicted run. Default: those of this machine.
         seconds: approximate length of the search, without compiling [s]. Default 30.
-        progress: called with the fraction of the work that is done, from 0 to 1.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
+            from 0 to 1.
 
     Returns:
         The cheapest setting, its expected error, its predicted time and memory, and the next best settings.
@@ -178,7 +181,7 @@ def suggest(
     check_threads(faults, threads)
     faults.raise_if_any()
     names = chosen_methods(methods, CANDIDATES)
-    report = progress or void
+    report = callback(progress) or void
     sample = Sample(fleet, t1, members, TIMES)
     taken, refused = sample.accepted(names)
     if not taken:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import math
+import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.engine.executors.threads import ThisThread
 from lgvi_warp.engine.plan import DTYPES, Plan
 from lgvi_warp.methods.method import COMPOSITIONS, PROGRAMS, Method
@@ -21,7 +25,7 @@ from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies import comparison, cost
 from lgvi_warp.studies.compared import QUANTITIES, Compared, compared_in
 from lgvi_warp.studies.comparison import Candidate, Growth, Reference, Sample
-from lgvi_warp.studies.files import Saved, finite_or_none
+from lgvi_warp.studies.files import Saved, finite_or_none, numbers
 from lgvi_warp.studies.speed import void
 
 # Tried in this order; those that a scene refuses are left out.
@@ -157,6 +161,46 @@ class Tradeoff(Saved):
         """
         return finite_or_none(asdict(self) | {"front": [asdict(measurement.setting) for measurement in self.front()]})
 
+    @classmethod
+    def from_dict(cls, content: dict[str, Any]) -> Tradeoff:
+        """Build a trade-off from the content of a JSON file.
+
+        Args:
+            content: as `to_dict` returns it.
+
+        Returns:
+            The trade-off; errors and times that were not finite are infinite, other numbers NaN.
+        """
+        measured = []
+        for one in content["measurements"]:
+            ends = {name: numbers(one[name], math.nan) for name in ("energy_drift", "biases")}
+            known = one | ends | {"setting": Candidate(**one["setting"]), "errors": numbers(one["errors"], math.inf)}
+            measured.append(Measurement(**known))
+        grown = content["growth"]
+        if grown is not None:
+            times = {name: numbers(grown[name], math.inf) for name in ("doubling", "predictable")}
+            curves = {name: np.array(numbers(grown[name], math.nan)) for name in ("times", "curve")}
+            grown = Growth(**grown | times | curves | {"rate": numbers(grown["rate"], math.nan)})
+        kept = {name: value for name, value in content.items() if name != "front"}
+        kept |= {"measurements": tuple(measured), "growth": grown, "messages": tuple(content["messages"])}
+        return cls(**kept | {"reference_error": numbers(content["reference_error"], math.inf)})
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Tradeoff:
+        """Read a trade-off from the JSON file that `save` wrote.
+
+        Args:
+            path: of the file.
+
+        Returns:
+            The trade-off.
+
+        Raises:
+            OSError: where the file cannot be read.
+            ValueError: where it is no JSON.
+        """
+        return cls.from_dict(json.loads(Path(path).read_text()))
+
     def rows(self) -> list[dict[str, Any]]:
         """Flatten the measurements to one record each, as the CSV file has them.
 
@@ -284,6 +328,7 @@ def chosen_methods(methods: Sequence[str] | None, default: Sequence[str] = CANDI
     return tuple(methods)
 
 
+@shows_progress
 def tradeoff(
     fleet: Ensemble | Scene,
     t1: float | None = None,
@@ -291,7 +336,7 @@ def tradeoff(
     methods: Sequence[str] | None = None,
     members: int = 128,
     seconds: float = 45.0,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | bool | None = None,
 ) -> Tradeoff:
     """Measure cost and error of methods, steps, precisions and solvers on the first members of a fleet.
 
@@ -310,7 +355,8 @@ def tradeoff(
         methods: names of the methods to try. Default: all that the scene takes.
         members: size of the sample. Default 128.
         seconds: approximate time to spend [s]; the messages list what is left out then. Default 45.
-        progress: called with the fraction of the work that is done, from 0 to 1.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
+            from 0 to 1.
 
     Returns:
         Measurements of every setting, with their Pareto front.
@@ -324,7 +370,7 @@ def tradeoff(
     faults.raise_if_any()
     names = chosen_methods(methods)
     begun = time.perf_counter()
-    report = progress or void
+    report = callback(progress) or void
     sample = Sample(fleet, t1, members)
     taken, refused = sample.accepted(names)
     if not taken:

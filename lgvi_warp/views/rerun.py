@@ -5,13 +5,15 @@ from __future__ import annotations
 import hashlib
 import os
 import socket
+import subprocess
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from lgvi_warp.common import files as durable
-from lgvi_warp.common.errors import MissingExtra, NothingToDraw
+from lgvi_warp.common.errors import MissingExtra, NothingToDraw, one_line
 from lgvi_warp.views.fleet import identity, title
 from lgvi_warp.views.recording.drawn import Drawn, drawn_of
 from lgvi_warp.views.recording.graphs import COLORS, log_graphs
@@ -22,8 +24,8 @@ from lgvi_warp.views.recording.world import box_of, log_world, scale_of
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
 
-# Time to wait for a viewer [s].
-PATIENCE = 10.0
+# Time to wait for a viewer at an address, and for one to end that cannot start [s].
+PATIENCE, STARTED = 10.0, 3.0
 
 
 def log_rerun(
@@ -84,10 +86,33 @@ def show(result: Result | Mapping[str, Result], *, members: Any = None) -> None:
         ImportError: rerun-sdk is not installed (extra: viz).
         NothingToDraw: No samples were kept, or no member has a finite start.
         SceneError: There are no such members, or the vehicle's mesh cannot be read.
-        OSError: The viewer cannot be started.
+        OSError: The viewer cannot be started, as where there is no display; the message has the path of the recording.
     """
     _rerun()
-    _write(_runs(result, members), lambda recording, first: recording.spawn(default_blueprint=first))
+    # The viewer reads the file after this returns; the system clears its folder for temporary files.
+    path = Path(tempfile.mkdtemp(prefix="lgvi_warp_")) / "fleet.rrd"
+    log_rerun(result, path, members=members)
+    remedy = f"the recording is {path}: open it where there is a display"
+    with path.with_suffix(".log").open("w+") as log:
+        try:
+            viewer = subprocess.Popen([_program(), path], stdin=subprocess.DEVNULL, stdout=log, stderr=log,
+                                      start_new_session=True)  # fmt: skip
+            # One that finds no display ends at once; one that stays, or hands over to a viewer that is open, is well.
+            code = viewer.wait(STARTED)
+        except subprocess.TimeoutExpired:
+            return
+        except OSError as error:
+            raise OSError(f"the viewer cannot be started ({error}); {remedy}") from None
+        if code:
+            log.seek(0)
+            raise OSError(f"the viewer did not start ({one_line(log.read().strip()[-200:])}); {remedy}")
+
+
+def _program() -> Path:
+    """The viewer that comes with rerun-sdk."""
+    import rerun_cli
+
+    return Path(rerun_cli.__file__).with_name("rerun.exe" if os.name == "nt" else "rerun")
 
 
 def _rerun() -> Any:
@@ -112,7 +137,7 @@ def _runs(result: Result | Mapping[str, Result], members: Any) -> list[Drawn]:
 def _write(runs: list[Drawn], connect: Any) -> None:
     """Write a recording of its own to where `connect` leads. Raises OSError."""
     rr = _rerun()
-    names = [identity(run.result) for run in runs]
+    names = [identity(run.source) for run in runs]
     name = names[0] if len(runs) == 1 else hashlib.sha256(" ".join(names).encode()).hexdigest()[:16]
     box = box_of(runs)
     first_layout = layout(runs, box, scale_of(runs[0], box))

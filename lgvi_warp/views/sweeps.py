@@ -10,14 +10,19 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import NothingToDraw
-from lgvi_warp.common.status import failed
+from lgvi_warp.common.status import failed, under_way
+from lgvi_warp.methods.saveat import SaveAt
+from lgvi_warp.statistics import tracking
 from lgvi_warp.studies.sweeps.found import SUCCESS
 from lgvi_warp.studies.sweeps.output import Sweep, against_baseline
 from lgvi_warp.studies.sweeps.setup import END, Cell
 from lgvi_warp.views.plots.canvas import figure_class, save_figure
+from lgvi_warp.views.plots.fans import draw_bands
 
 # Most boxes of one panel, and most members that are drawn as points.
 MOST_BOXES, MOST_POINTS = 40, 4000
+# Most members, and most times, of a fan.
+MOST_PATHS = 200
 
 
 def _ran(found: Sweep) -> list[Cell]:
@@ -214,6 +219,49 @@ def plot_causes(found: Sweep, path: str | os.PathLike[str]) -> Path:
     return save_figure(figure, path, 150)
 
 
+def plot_responses(found: Sweep, path: str | os.PathLike[str], of: str = "", members: int = MOST_PATHS) -> Path:
+    """Draw fans of what is tracked over time, by case at the first point of the grid, of members that are run again.
+
+    Args:
+        found: the sweep.
+        path: of the picture.
+        of: "depth", "heading", "speed", "north" or "east"; by default what the first such metric is of.
+        members: number of members that are run again, the first ones; by default 200.
+
+    Returns:
+        The path.
+
+    Raises:
+        NothingToDraw: all cells were refused, or no metric is of such a number.
+        ImportError: matplotlib is not installed (extra: viz).
+    """
+    first = {name: values[0] for name, values in found.setup.axes.items()}
+    cells = [cell for cell in _ran(found) if cell.point == first]
+    channels = tracking.CHANNELS[False]
+    asked = [str(metric.of) for metric in found.setup.metrics.values() if str(metric.of) in channels]
+    of = of or next(iter(asked), "")
+    if of not in channels or not cells:
+        raise NothingToDraw("no metric is of a number that is tracked over time")
+    channel, count = channels[of], min(members, found.members_count)
+    figure = figure_class()(figsize=(4.5 * len(cells), 4.0), layout="constrained")
+    panels = figure.subplots(1, len(cells), squeeze=False, sharey=True)[0]
+    for panel, cell in zip(panels, cells, strict=True):
+        assert cell.fleet is not None and cell.fleet.scene.controller is not None
+        duration = float(found.setup.settings.get("t1") or cell.fleet.scene.run.duration or 0.0)
+        period = float(cell.fleet.scene.controller.period)
+        every = period * max(1, int(duration / period / MOST_PATHS))
+        save = SaveAt(every=every, fields=(*channel.of_actual, channel.wanted))
+        result = found.again(cell.case.name, range(count), cell.point, save)
+        y, wanted = channel.actual(result.samples), np.median(channel.reference(result.samples), axis=1)
+        draw_bands(panel, result.time, y, under_way(result))
+        panel.plot(result.time, wanted, "k:", linewidth=1.0, label="wanted")
+        panel.set_title(cell.name, fontsize=9)
+        panel.set_xlabel("time [s]")
+    panels[0].set_ylabel(f"{of} [{channel.unit}]: {count} members")
+    panels[0].legend()
+    return save_figure(figure, path, 150)
+
+
 def _point(point: Any) -> str:
     return ", ".join(f"{name} = {value}" for name, value in point.items())
 
@@ -225,4 +273,10 @@ def pictures(found: Sweep) -> dict[str, Callable[[Any, Path], Path]]:
         found: the sweep.
     """
     differences = {"differences.png": plot_differences} if len(found.cases) > 1 else {}
-    return {"success.png": plot_success, "metrics.png": plot_metrics, **differences, "causes.png": plot_causes}
+    return {
+        "success.png": plot_success,
+        "metrics.png": plot_metrics,
+        **differences,
+        "causes.png": plot_causes,
+        "responses.png": plot_responses,
+    }

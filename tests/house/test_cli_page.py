@@ -1,16 +1,17 @@
 """The page on the command has every verb with its options, and no other."""
 
-import argparse
 import re
 
 import pytest
 
-from lgvi_warp.cli import parser
+from lgvi_warp.cli import arguments, parser
 from tests.conftest import ROOT
 
 PAGE = (ROOT / "docs" / "start" / "cli.md").read_text()
-SECTIONS = dict(re.findall(r"^## (\w+)\n(.*?)(?=^## |\Z)", PAGE, re.DOTALL | re.MULTILINE))
-VERBS = next(action for action in parser()._actions if isinstance(action, argparse._SubParsersAction)).choices
+SECTIONS = dict(re.findall(r"^## ([\w ]+)\n(.*?)(?=^## |\Z)", PAGE, re.DOTALL | re.MULTILINE))
+COMMON = SECTIONS.pop("Options of every verb")
+VERBS = parser().verbs
+OF_EVERY = {name for names in arguments.COMMON for name in names}
 # Old names of verbs: their options are those of the new one.
 OLD = {"plan": "predict"}
 
@@ -19,12 +20,18 @@ OLD = {"plan": "predict"}
 def test_every_verb_has_its_options(verb):
     section = SECTIONS[OLD.get(verb, verb)]
     assert verb not in OLD or f"`{verb}`" in section
-    options = {name for action in VERBS[verb]._actions for name in action.option_strings} - {"-h", "--help"}
+    options = {name for action in VERBS[verb]._actions for name in action.option_strings} - {"-h", "--help"} - OF_EVERY
     # Options stand in backticks, commands of the examples do not.
     shown = set(re.findall(r"`(--[\w-]+)", section))
     assert shown == options
     words = {action.metavar for action in VERBS[verb]._actions if not action.option_strings}
     assert all(f"`{word}`" in section for word in words if word)
+
+
+def test_the_options_of_every_verb():
+    assert set(re.findall(r"`(--?[\w-]+)", COMMON)) >= OF_EVERY
+    for verb in VERBS.values():
+        assert {name for action in verb._actions for name in action.option_strings} >= OF_EVERY
 
 
 def test_no_other_verb_is_there():

@@ -1,6 +1,8 @@
-"""The snippets of the pages on sampling and sensitivity run as they stand."""
+"""The snippets of pages run as they stand, where no test of their subject runs them."""
 
 import re
+import shutil
+import tomllib
 
 import matplotlib
 import numpy as np
@@ -42,3 +44,72 @@ def test_python(text, scene, tmp_path, monkeypatch, capsys):
 
 def test_there_are_snippets():
     assert len(snippets("toml")) >= 6 and len(snippets("python")) >= 6
+
+
+REMUS = '[vehicle]\nname = "remus_100"\n'
+ROV = '[vehicle]\nname = "bluerov2_heavy"\n'
+LAW = "[controller]\nperiod = 0.1\n" + "".join(
+    f"[[controller.{section}]]\n{keys}\n"
+    for section, keys in {
+        "guidance": 'type = "set_point"\nheading = 0.5',
+        "laws": 'type = "heading_pid"\nkp = 1.0',
+    }.items()
+)
+# Page -> what stands before each of its snippets in a scene file.
+BEFORE = {
+    "controllers/README.md": [REMUS],
+    "controllers/actuators.md": [REMUS],
+    "controllers/allocation.md": [REMUS + LAW, ROV + LAW],
+    "guide/events.md": [REMUS],
+}
+
+
+def blocks(page, language):
+    """The fenced snippets of a page."""
+    return re.findall(rf"```{language}\n(.*?)```", (ROOT / "docs" / page).read_text(), re.DOTALL)
+
+
+@pytest.mark.parametrize("page", BEFORE)
+def test_snippets_are_parts_of_scenes(page):
+    for before, text in zip(BEFORE[page], blocks(page, "toml"), strict=True):
+        scene = lw.Scene.from_dict(tomllib.loads(before + text))
+        assert scene.events or scene.controller
+
+
+def test_a_vehicle_from_a_file(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(ROOT / "tests" / "data" / "vehicles" / "frame_rov.sdf", "model.sdf")
+    world = '<sdf version="1.9"><world name="ocean"><gravity>0 0 -9.7</gravity></world></sdf>'
+    (tmp_path / "ocean.world").write_text(world)
+    (text,) = blocks("guide/vehicles.md", "python")
+    exec(text, names := {"lw": lw})
+    assert names["scene"].environment.gravity == 9.7 and names["scene"].start.position[2] == 5.0
+
+
+@pytest.mark.slow
+def test_failed_members(monkeypatch, capsys):
+    monkeypatch.chdir(ROOT)
+    page = "guide/failed_members.md"
+    exec(blocks(page, "python")[0], {})
+    printed = "".join(f"    {line}\n" for line in capsys.readouterr().out.splitlines())
+    assert f"```\n\n{printed}\n1." in (ROOT / "docs" / page).read_text()
+
+
+@pytest.mark.slow
+def test_many_calls(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    (text,) = blocks("guide/many_calls.md", "python")
+    exec(text, names := {})
+    assert names["depths"].shape == (2,) and np.all(names["depths"] > 9.0)
+
+
+@pytest.mark.slow
+def test_a_controller_in_python_and_its_signals():
+    (text,) = blocks("controllers/callback.md", "python")
+    exec(text, names := {"lw": lw, "np": np})
+    sections = {"vehicle": {"mass": 20.0, "inertia": [5.0, 8.0, 11.0]}, "run": {"step": 0.05, "duration": 20.0}}
+    terms = {"terms": [{"type": "control_wrench"}], "controller": names["controller"]}
+    scene = lw.Scene.from_dict(sections | terms)
+    (text,) = blocks("controllers/signals.md", "python")
+    exec(text, names := {"lw": lw, "scene": scene})
+    assert names["result"].command.shape == (21, 1, 6) and names["result"].status.counts() == {"ok": 1}

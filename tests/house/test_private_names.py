@@ -17,7 +17,8 @@ FOREIGN = {("named.py", "_histogram")}
 
 
 def is_private(name: str) -> bool:
-    return name.startswith("_") and not name.startswith("__") and name != "_"
+    """One that begins with an underscore, but for those that other programs ask for: __len__, _repr_html_."""
+    return name.startswith("_") and not name.startswith("__") and not name.endswith("_")
 
 
 def own_names(tree: ast.AST) -> set[str]:

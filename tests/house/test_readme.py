@@ -4,7 +4,6 @@ import re
 import runpy
 
 import matplotlib
-import pytest
 
 import lgvi_warp as lw
 from tests.conftest import ROOT
@@ -26,20 +25,12 @@ def test_readme(monkeypatch, capsys):
     assert capsys.readouterr().out == output and output.count("\n") == 3
 
 
-def test_first_dive(tmp_path, monkeypatch, capsys):
+def test_the_first_example(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(ROOT / "examples" / "01_first_dive.py"), run_name="__main__")
     printed = capsys.readouterr().out.splitlines()
-    page = (ROOT / "docs" / "start" / "first_dive.md").read_text()
+    page = (ROOT / "docs" / "start" / "tutorial.md").read_text()
     assert len(printed) == 3 and all(f"\n    {line}\n" in page for line in printed)
-
-
-@pytest.mark.slow
-def test_a_vehicle_of_the_package():
-    code, _ = code_and_output("docs/start/first_dive.md")
-    names = {"lw": lw}
-    exec(code, names)
-    assert names["result"].status.counts() == {"ok": 1}
 
 
 def test_the_methods_of_the_guide():

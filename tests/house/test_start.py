@@ -24,6 +24,7 @@ HEAVY = {
     "pyarrow",
     "SALib",
     "gymnasium",
+    "tqdm",
     "control",
 }
 PRINT = "; import sys, json; print(json.dumps(sorted(sys.modules)))"

@@ -1,6 +1,7 @@
 """What is built for others is whole: it is installed into an empty environment and runs there."""
 
 import os
+import re
 import subprocess
 import sys
 import sysconfig
@@ -13,6 +14,25 @@ import pytest
 from tests.conftest import ROOT
 
 pytestmark = pytest.mark.slow
+# A step of the tutorial: lines for the scene file, Python with what it prints, or a command with what it prints.
+STEP = re.compile(
+    r"^```toml\n([\s\S]*?)^```|^```python\n([\s\S]*?)^```\n\n((?:    .*\n)*)|^    \$ (.*)\n((?:    .*\n)*)",
+    re.MULTILINE,
+)
+# What differs from machine to machine, and from run to run.
+OF_MACHINE = re.compile(r"^(?:speed|kernel) .*\n|\(\d+\.\d MB\)", re.MULTILINE)
+
+
+def as_shown(printed, shown):
+    """Whether a page shows, indented, what was printed; ... stands for any lines."""
+    lines = re.escape(OF_MACHINE.sub("", re.sub("^    ", "", shown, flags=re.MULTILINE)))
+    return re.fullmatch(lines.replace(r"\.\.\.", r"[\s\S]*"), OF_MACHINE.sub("", printed)) is not None
+
+
+def test_what_differs_is_seen():
+    shown = "    file a (0.1 MB)\n    ...\n    speed  1\n    end 3\n"
+    assert as_shown("file a (2.0 MB)\nmore\nspeed  2\nend 3\n", shown)
+    assert not as_shown("file a (2.0 MB)\nmore\nspeed  2\nend 4\n", shown)
 
 
 @pytest.fixture(scope="module")
@@ -84,3 +104,16 @@ def test_an_example_runs(installed):
     )
     listed = installed("python", "-c", "import os; print(*sorted(os.listdir('paper')))").split()
     assert {"result.npz", "fleet.png"} <= set(listed)
+
+
+def test_the_tutorial_prints_what_it_shows(installed):
+    folder = Path(installed("python", "-c", "import os; print(os.getcwd())").strip())
+    scene, code, expected, commands = "", "", "", 0
+    for lines, snippet, output, command, shown in STEP.findall((ROOT / "docs" / "start" / "tutorial.md").read_text()):
+        scene, code, expected = scene + lines + "\n", code + snippet, expected + output
+        (folder / "dive.toml").write_text(scene)
+        if command:
+            assert as_shown(installed(*command.split()), shown), command
+            commands += 1
+    assert as_shown(installed("python", "-c", code), expected)
+    assert commands == 5 and code.count("import") == 1 and (folder / "dive.png").exists()

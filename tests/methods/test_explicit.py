@@ -116,8 +116,13 @@ def test_one_step_with_several_laws(method):
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", WITHOUT_MEMORY)
 def test_one_step_with_each_law(method, name):
-    case = CASES[name]
-    assert difference(*both(test_terms.scene_of(case), test_terms.body_of(case), method, 0.02, 1)) < 1e-13
+    scene, body = test_terms.scene_of(CASES[name]), test_terms.body_of(CASES[name])
+    if method == "cg3" and any(term.memory for term in scene.terms):
+        # Its first stage lies before the start of the step.
+        with pytest.raises(lw.SceneError, match="not known what control_fins remembers"):
+            lw.solve(scene, method, h=0.02, t1=0.02)
+        return
+    assert difference(*both(scene, body, method, 0.02, 1)) < 1e-13
 
 
 @pytest.mark.slow_for("cg3-None*", "rk8*", "rkmk4-drag matrix*")

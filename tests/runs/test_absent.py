@@ -187,7 +187,7 @@ def test_a_varied_member_is_as_if_alone_with_its_numbers(method):
         # And as a scene that has these numbers, to round-off: diagonal matrices are told in another way.
         own = {
             term.key: type(term)(**{
-                f.name: p[f"{term.key}.{f.name}"][member % len(p[f"{term.key}.{f.name}"])] for f in term.number_fields()
+                name: p[f"{term.key}.{name}"][member % len(p[f"{term.key}.{name}"])] for name in term.parameters()
             })
             for term in scene().terms
         }  # fmt: skip

@@ -334,6 +334,38 @@ def test_the_curves_of_a_recording_are_of_those_under_way(sunk, mixed, tmp_path)
     assert "| energy | drift " in said[0] and "| energy | not conserved: wrench do work |" in said[1]
 
 
+def test_a_stored_run_is_recorded_in_pieces_as_one_in_memory(mixed, tmp_path, monkeypatch):
+    from lgvi_warp.views import choice
+
+    stored = lw.solve(divers(SPEEDS), h=0.1, t1=20.0, save=lw.SaveAt(every=1.0), store=lw.Store(tmp_path / "run.zarr"))
+    assert stored.store is not None
+    monkeypatch.setattr(choice, "AT_ONCE", 21 * 3)  # three members at once
+    paths = [lw.log_rerun(one, tmp_path / f"{i}.rrd") for i, one in enumerate((mixed, stored))]
+    for entity, ending in (
+        ("/world/bodies/ok", "translations"), ("/curves/height/median", "scalars"), ("/curves/speed/all", ":values"),
+        ("/curves/energy/median", "scalars"), ("/members/floor", "scalars"),
+    ):  # fmt: skip
+        first, second = (rows(path, entity, ending) for path in paths)
+        assert first.keys() == second.keys() and len(first) == 21
+        for t in first:
+            np.testing.assert_array_equal(np.array(first[t]), np.array(second[t]))
+    assert [entry_of(lw.log_rerun(stored, tmp_path / "2.rrd")).recording_id] == [entry_of(paths[1]).recording_id]
+
+
+def test_statistics_of_all_make_the_fan_where_few_members_were_kept(mixed):
+    from lgvi_warp.views.recording.drawn import LEVELS, drawn_of
+
+    statistics = [lw.Quantiles("depth"), lw.Extremes("depth")]
+    save = lw.SaveAt(every=1.0)
+    lean = lw.solve(divers(SPEEDS), h=0.1, t1=20.0, save=save, keep=[0, 3], statistics=statistics)
+    run = drawn_of(lean)
+    expected = np.quantile(-mixed.position[..., 2], LEVELS, axis=1)
+    np.testing.assert_allclose(run.fans[0].levels[[0, -1]], expected[[0, -1]], rtol=1e-6)
+    between = (run.fans[0].levels[1:-1] >= expected[0] - 1e-6) & (run.fans[0].levels[1:-1] <= expected[-1] + 1e-6)
+    assert between.all() and run.text == "2 of 7 members" and run.members.tolist() == [0, 3]
+    assert run.shares[Status.FLOOR][-1] == pytest.approx(3 / 7)
+
+
 def text_of(path, entity):
     """All text of an entity."""
     return " ".join(

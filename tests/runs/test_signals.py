@@ -18,6 +18,7 @@ from lgvi_warp.cli import command, progress, runs
 from lgvi_warp.cli.signals import Lasting, Signals
 from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.executors.threads import Threads
+from lgvi_warp.engine.plan import Plan
 from tests.conftest import ROOT
 from tests.support.stores import SETTINGS, bits, differing, fleet
 
@@ -34,8 +35,8 @@ from lgvi_warp_command import entry
 if "quick" in os.environ.get("TEST_PROGRESS", ""):
     from lgvi_warp.cli import progress
     class Quick(progress.Progress):
-        def __init__(self, stream):
-            super().__init__(stream)
+        def __init__(self, *given):
+            super().__init__(*given)
             self._interval = 0.0
     progress.Progress = Quick
 entry()
@@ -61,7 +62,7 @@ def until(process, share):
     """Read progress until so much is done."""
     deadline = time.monotonic() + SECONDS
     for line in process.stderr:
-        told = re.match(r" *([0-9.]+)%", line)
+        told = re.match(r"running ([0-9.]+)%", line)
         if told and float(told[1]) >= 100.0 * share:
             return
         assert time.monotonic() < deadline
@@ -71,7 +72,8 @@ def until(process, share):
 def ended(process):
     """Exit code, and what it said on stdout and stderr but for progress."""
     out, err = process.communicate(timeout=SECONDS)
-    return process.returncode, out, [line for line in err.splitlines() if not re.match(r" *[0-9.]+%", line)]
+    said = [line for line in err.splitlines() if not re.match(r"(compiling|running|writing)( |,)", line)]
+    return process.returncode, out, said
 
 
 def check_part(path, total=4096):
@@ -387,6 +389,29 @@ def test_an_interrupt_among_the_pictures_saves_the_result(there, tmp_path, monke
     assert capsys.readouterr().err == text
 
 
+def test_an_interrupt_while_a_kernel_is_compiled_leaves_nothing(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(Plan, "compile", lambda plan: signal.raise_signal(signal.SIGINT))
+    assert cli.main([*SHORT, "--out", str(tmp_path), "--quiet"]) == 130
+    assert capsys.readouterr().err == "lgvi-warp: interrupted; nothing was written\n" and list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_a_signal_while_clang_is_at_work(tmp_path, monkeypatch):
+    """No half file is left, neither in the folder nor in the cache, where the next run finds none in its way."""
+    monkeypatch.setenv("WARP_CACHE_PATH", str(tmp_path / "cache"))
+    out = tmp_path / "out"
+    with begun([*SHORT, "--out", str(out)]) as process:
+        while not (line := process.stderr.readline()).startswith("compiling, 2 s"):
+            assert line.startswith("compiling, ")
+        process.send_signal(signal.SIGINT)
+        code, said, lines = ended(process)
+    assert (code, said, lines) == (130, "", ["lgvi-warp: interrupted; nothing was written"])
+    assert list(out.iterdir()) == []
+    with begun([*SHORT, "--out", str(out), "--quiet"]) as process:
+        assert ended(process) == (0, "", [])
+    assert lw.Result.load(out / "result.npz").members == 20
+
+
 def test_an_interrupt_while_files_are_written_leaves_them_whole(tmp_path, monkeypatch, capsys):
     from lgvi_warp.views import plots
 
@@ -435,6 +460,7 @@ def test_lasting_streams():
         shown._interval = 0.0
         shown(0.5)
         shown(0.6)
+        shown.close()
         assert gone.written == 1 and not stream.isatty()
     with pytest.raises(OSError, match="No space left"):
         Lasting(Gone(28)).write("text")

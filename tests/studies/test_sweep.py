@@ -15,6 +15,7 @@ import lgvi_warp as lw
 from lgvi_warp.cli.command import main
 from lgvi_warp.common.status import failed
 from lgvi_warp.runs.settle import make_plan
+from tests.support.json_page import differing
 
 pytestmark = pytest.mark.kernel
 
@@ -303,10 +304,23 @@ baseline = "stiff"
         "success.png",
         "metrics.png",
         "differences.png",
+        "causes.png",
+        "responses.png",
         "summary.md",
     } <= names
     assert any(name.startswith("worst_") and name.endswith(".rrd") for name in names)
     assert json.loads((out / "sweep.json").read_text())["baseline"] == "stiff"
+    # For programs: the same cells again, the folder, and the plan.
+    capsys.readouterr()
+    for name, code, given in (
+        ("sweep", 0, ["sweep", str(tmp_path / "sweep.toml"), "--out", str(out), "--seed", "4"]),
+        ("info of a folder", 0, ["info", str(out)]),
+        ("sweep with plan", 0, ["sweep", str(tmp_path / "sweep.toml"), "--plan"]),
+    ):
+        assert main([*given, "--json", "-q"]) == code
+        assert differing(json.loads(capsys.readouterr().out), name) == []
+    assert main(["info", str(out)]) == 0 and "# Sweep" in capsys.readouterr().out
+    assert main(["plot", str(out)]) == 0 and "by the same lgvi-warp sweep" in capsys.readouterr().err
     (tmp_path / "sweep.toml").write_text(text.replace('overshoot heading" = { below', 'overshot heading" = { below'))
     assert main(["sweep", str(tmp_path / "sweep.toml"), "--out", str(out)]) == 2
     assert "did you mean 'overshoot heading'" in capsys.readouterr().err
@@ -337,7 +351,7 @@ def test_what_is_asked_wrongly_gets_one_sentence(scene, more, text):
 
 def test_a_grid_of_a_million_cells_is_refused_with_its_time(scene):
     grid = {
-        "controller.delay": [0.02 * i for i in range(100)],
+        "controller.delay": [0.02 * i for i in range(1, 101)],
         "vehicle.mass": list(range(40, 140)),
         "heading_pid.ki": list(range(100)),
     }
@@ -346,7 +360,9 @@ def test_a_grid_of_a_million_cells_is_refused_with_its_time(scene):
 
 
 def test_other_samplings_refuse_what_would_change_the_members(scene):
-    rows = swept(scene, sampling="sobol", cases=CASES[:2], grid=None, members=256).rows()
+    found = swept(scene, sampling="sobol", cases=CASES[:2], grid=None, members=256)
+    rows = found.rows()
+    assert "which a sobol does not give" in str(found) and repr(found) == "Sweep(2 cases, 1 points, 256 members)"
     assert not rows[0]["refused"] and "the other numbers would be others too" in rows[1]["refused"]
 
 

@@ -341,7 +341,15 @@ class Allocation(Part):
     to: str = ""
 
     def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
-        """In addition, knows its actuator."""
+        """The same part, knowing its actuator as well.
+
+        Args:
+            bus: Rows of the memory.
+            others: Terms that take commands, and sensors, by key.
+
+        Returns:
+            A copy.
+        """
         part = super().wired(bus, others)
         object.__setattr__(part, "actuator", others[self.to])
         return part

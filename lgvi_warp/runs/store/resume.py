@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.engine.executors import executor_of
 from lgvi_warp.engine.executors.base import Executor
 from lgvi_warp.engine.keepers.observation import Observing, observation_of
@@ -25,6 +26,7 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 
 
+@shows_progress
 def resume(
     path: str | os.PathLike[str],
     fleet: Ensemble | Scene | None = None,
@@ -32,7 +34,7 @@ def resume(
     executor: str | Executor = "threads",
     threads: int | None = None,
     scheduler: str | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | bool | None = None,
     force: bool = False,
     keepers: Sequence[Keeper] = (),
     statistics: Sequence[Any] | None = None,
@@ -47,7 +49,7 @@ def resume(
         executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
         threads: Number of threads; default all cores.
         scheduler: Address of Dask's scheduler.
-        progress: Called with the fraction of the work that is done, in [0, 1].
+        progress: As in solve.
         force: Whether to continue on another machine or with other versions, where the bits may differ.
         keepers: The keepers that the run was given.
         statistics: The statistics that the run was given. Needed if they are of functions.
@@ -76,7 +78,7 @@ def resume(
         plan, store_of(folder, force), folder.provenance, folder.messages, (*keepers, *observing.keepers), None,
         observing.enough, KeptRun(observed, tuple((observed_content or {}).get("fields", ()))),
     )  # fmt: skip
-    finished_folder = run.run(runner, progress)
+    finished_folder = run.run(runner, callback(progress))
     remarks = messages + went_on(finished_folder)
     result = result_of(finished_folder, None, folder.messages + remarks, plan.ensemble.scene.terms, observing)
     return finished(result, plan, observed, (observed_content or {}).get("fields", ()), threads)

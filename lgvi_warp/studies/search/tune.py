@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.prepared import Prepared, prepare, scene_value
 from lgvi_warp.runs.quantities import OfInterest
@@ -71,6 +72,7 @@ class Tuned:
         return "\n".join(lines)
 
 
+@shows_progress
 def tune(
     fleet: Ensemble | Scene,
     over: Mapping[str, Any],
@@ -81,7 +83,7 @@ def tune(
     fresh: int | None = None,
     restarts: int = 1,
     seed: int = 0,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | bool | None = None,
     **settings: Any,
 ) -> Tuned:
     """Search numbers, such as gains, for which the risk of a fleet is least.
@@ -99,7 +101,8 @@ def tune(
         fresh: Number of fresh members; None, the default, for four times those of the fleet.
         restarts: Number of evolutions; 1 by default.
         seed: Seed of the search; 0 by default.
-        progress: Called with the part of the budget that is used; None, the default, for nobody.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the part of the budget that is used.
+            None, the default, for nobody.
         **settings: As of `lw.prepare`: method, h, t1, save, dtype, threads, ...
 
     Returns:
@@ -126,14 +129,14 @@ def tune(
     faults.raise_if_any()
     assert box is not None
     run = prepare(scene, None, minimise, failed="nan", **settings)
-    costs, asked = _Costs(run, ensemble, box), 0
+    costs, asked, report = _Costs(run, ensemble, box), 0, callback(progress)
 
     def cost(inside: np.ndarray) -> np.ndarray:
         nonlocal asked
         answer = measure(costs(box.values(inside)))
         asked += n * len(inside)
-        if progress:
-            progress(min(1.0, asked / budget))
+        if report:
+            report(min(1.0, asked / budget))
         return np.asarray(answer)
 
     found = search(cost, len(box.names), budget // n, seed, restarts)

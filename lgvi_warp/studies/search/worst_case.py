@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.runs.prepared import prepare
 from lgvi_warp.runs.quantities import OfInterest
 from lgvi_warp.sampling.designs.table import Table
@@ -57,6 +58,7 @@ class WorstCase:
         return f"{self.of} = {self.value:.6g} at {where}: {bound}, after {self.runs} runs; restarts: {each}"
 
 
+@shows_progress
 def worst_case(
     fleet: Scene | Ensemble,
     within: Mapping[str, Any],
@@ -66,7 +68,7 @@ def worst_case(
     budget: int = 20_000,
     restarts: int = 3,
     seed: int = 0,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | bool | None = None,
     **settings: Any,
 ) -> WorstCase:
     """Search numbers within bounds for the member whose quantity is worst.
@@ -83,7 +85,8 @@ def worst_case(
         budget: Number of members that may be run; 20,000 by default.
         restarts: Number of evolutions; 3 by default, fewer where the budget is small.
         seed: Seed of the search; 0 by default.
-        progress: Called with the part of the budget that is used; None, the default, for nobody.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the part of the budget that is used.
+            None, the default, for nobody.
         **settings: As of `lw.prepare`: method, h, t1, save, dtype, threads, ...
 
     Returns:
@@ -104,14 +107,14 @@ def worst_case(
     faults.raise_if_any()
     assert box is not None
     run = prepare(scene, list(box.names), of, failed="nan", common_noise=True, **settings)
-    sign, asked = (-1.0 if worst == "largest" else 1.0), 0
+    sign, asked, report = (-1.0 if worst == "largest" else 1.0), 0, callback(progress)
 
     def cost(inside: np.ndarray) -> np.ndarray:
         nonlocal asked
         values = one_number(run(box.values(inside)))
         asked += len(inside)
-        if progress:
-            progress(min(1.0, asked / budget))
+        if report:
+            report(min(1.0, asked / budget))
         return np.where(np.isnan(values), -np.inf, sign * values)
 
     found = search(cost, len(box.names), budget, seed, restarts, good_enough=-np.finfo(float).max)

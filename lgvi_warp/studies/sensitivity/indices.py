@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.tables import write_csv
-from lgvi_warp.studies.files import finite_or_none
+from lgvi_warp.studies.files import finite_or_none, numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,6 +98,47 @@ class Indices:
         content["rows"] = list(self.rows())
         return finite_or_none(content) | {"provenance": self.provenance}
 
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Indices:
+        """Read a result from the JSON file that `save` wrote.
+
+        Args:
+            path: of the file.
+
+        Returns:
+            Indices of the analysis that the file holds; numbers that were not finite are NaN.
+
+        Raises:
+            OSError: where the file cannot be read.
+            ValueError: where it is no JSON, or of no known analysis.
+        """
+        content = json.loads(Path(path).read_text(encoding="utf-8"))
+        kinds = [kind for kind in cls.__subclasses__() or [cls] if kind.name == content["name"]]
+        if not kinds:
+            raise ValueError(f"{path}: {content['name']!r} is no analysis")
+        return kinds[0]._from(content)
+
+    @classmethod
+    def _from(cls, content: dict[str, Any]) -> Indices:
+        """A result from the content of a JSON file."""
+        shape = len(content["quantities"]), len(content["factors"])
+        arrays = {name: np.full(shape, np.nan) for name in (*cls.columns, *cls.intervals.values())}
+        for row in (row for row in content["rows"] if row["index"] in cls.columns):
+            at = content["quantities"].index(row["quantity"]), content["factors"].index(row["factor"])
+            arrays[row["index"]][at] = numbers(row["value"], np.nan)
+            if row["index"] in cls.intervals:
+                arrays[cls.intervals[row["index"]]][at] = numbers(row["confidence"], np.nan)
+        names = ("samples", "members", "failed", "confidence", "provenance")
+        kept: dict[str, Any] = arrays | {name: content[name] for name in names}
+        kept |= {name: tuple(content[name]) for name in ("factors", "quantities", "messages")}
+        kept |= {name: np.array(numbers(content[name], np.nan), dtype=np.float64) for name in ("mean", "std")}
+        return cls(**kept, **cls._pairs_from(content))
+
+    @classmethod
+    def _pairs_from(cls, content: dict[str, Any]) -> dict[str, Any]:
+        """Further arguments of this analysis."""
+        return {}
+
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write sensitivity.txt, .csv and .json into a folder, which is made if needed.
 
@@ -152,6 +193,19 @@ class SobolIndices(Indices):
             assert self.second is not None and self.second_confidence is not None
             yield {"quantity": self.quantities[q], "factor": self.factors[j], "other": self.factors[k], "index": "second",
                    "value": float(self.second[q, j, k]), "confidence": float(self.second_confidence[q, j, k])}  # fmt: skip
+
+    @classmethod
+    def _pairs_from(cls, content: dict[str, Any]) -> dict[str, Any]:
+        """Indices of two factors together, where the file has them."""
+        rows = [row for row in content["rows"] if row["index"] == "second"]
+        m, d = len(content["quantities"]), len(content["factors"])
+        second, half = (np.full((m, d, d), np.nan) for _ in range(2))
+        for row in rows:
+            q, pair = content["quantities"].index(row["quantity"]), [content["factors"].index(row[name])
+                                                                     for name in ("factor", "other")]  # fmt: skip
+            for j, k in (pair, pair[::-1]):
+                second[q, j, k], half[q, j, k] = (numbers(row[name], np.nan) for name in ("value", "confidence"))
+        return {"second": second if rows else None, "second_confidence": half if rows else None}
 
     def _pairs(self) -> list[tuple[int, int, int]]:
         d = 0 if self.second is None else len(self.factors)

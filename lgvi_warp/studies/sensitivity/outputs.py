@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import failed
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.runs.prepared import PATHS_AT_ONCE, Runner, counted, lost_text, part, samples_for
@@ -46,12 +47,13 @@ class Outputs:
         return lost_text(self.failed, self.counts, remedy)
 
 
+@shows_progress
 def evaluate(
     fleet: Ensemble,
     of: OfInterest | Sequence[OfInterest],
     *,
     common_noise: bool = False,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | bool | None = None,
     save: SaveAt | None = None,
     **settings: Any,
 ) -> Outputs:
@@ -63,7 +65,8 @@ def evaluate(
         fleet: the ensemble.
         of: one or several quantities of interest, as of `sobol`.
         common_noise: whether forces with noise act on every member alike. Default False.
-        progress: called with the fraction of the members that is done, from 0 to 1.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the members that is
+            done, from 0 to 1.
         save: samples to keep of each run. Default: those that the quantities need.
         settings: arguments of `lw.solve` (method, h, t1, dtype, width, checks, on_failure, threads, executor, scheduler).
 
@@ -73,7 +76,7 @@ def evaluate(
     Raises:
         SceneError: for faulty arguments, and where a path is needed and no sampling interval is known.
     """
-    interests = quantities(of)
+    interests, report = quantities(of), callback(progress)
     how = {name: settings.pop(name) for name in ("threads", "executor", "scheduler") if name in settings}
     # The scene's own statistics, keep and until do not apply: every member of the design must run.
     runner = Runner(fleet.scene, {"save": samples_for(fleet.scene, interests, save), **settings}, **how)
@@ -84,7 +87,7 @@ def evaluate(
     values, status, provenance = [], [], {}
     for first in range(0, fleet.members, PATHS_AT_ONCE):
         chosen = np.arange(first, min(first + PATHS_AT_ONCE, fleet.members))
-        group_progress = progress and part(progress, first / fleet.members, (first + len(chosen)) / fleet.members)
+        group_progress = report and part(report, first / fleet.members, (first + len(chosen)) / fleet.members)
         group = fleet.subset(chosen)
         result = runner.run(group, group_progress)
         members = group.select(0, len(chosen)) if looks_at_members else None

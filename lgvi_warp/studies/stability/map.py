@@ -16,6 +16,7 @@ import numpy as np
 
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import Status, failed, stopped
 from lgvi_warp.engine import plan
 from lgvi_warp.runs.provenance import provenance
@@ -276,6 +277,7 @@ def status_name(code: int) -> str:
     return "refused" if code == REFUSED else Status(code).name.lower()
 
 
+@shows_progress
 def stability_map(
     scene: Scene,
     x: Any = "h",
@@ -293,7 +295,7 @@ def stability_map(
     dtype: str | None = None,
     seed: int = 0,
     threads: int | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | bool | None = None,
 ) -> StabilityMap:
     """Run a grid of starts by every method, and classify each cell as accurate, bounded, flagged, failed or silent.
 
@@ -325,7 +327,8 @@ def stability_map(
         dtype: precision. Default: that of the scene.
         seed: of the random turns. Default 0.
         threads: number of threads. Default: those of this machine.
-        progress: called with the fraction of the work that is done, from 0 to 1.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
+            from 0 to 1.
 
     Returns:
         The map.
@@ -333,7 +336,7 @@ def stability_map(
     Raises:
         SceneError: for faulty arguments, all in one message; where the scene takes none of the methods; and where noise acts.
     """
-    begun, report = time.perf_counter(), progress or void
+    begun, report = time.perf_counter(), callback(progress) or void
     dtype = dtype or scene.run.dtype
     names = chosen_methods(methods, METHODS)
     faults = Faults()

@@ -75,7 +75,7 @@ class Compared:
         )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Findings:
     """What a sweep found, without its files.
 
@@ -96,6 +96,11 @@ class Findings:
     baseline: str
     confidence: float
     interval: str
+
+    def __repr__(self) -> str:
+        """Say how much there is."""
+        points = len(self.cells) // len(self.cases)
+        return f"{type(self).__name__}({len(self.cases)} cases, {points} points, {self.members_count:,} members)"
 
     @property
     def cases(self) -> tuple[str, ...]:

@@ -133,6 +133,9 @@ def summary(found: Findings) -> str:
         "## Success",
         "",
     ]
+    kind = found.setup.members.sampling.kind
+    if kind != "random":
+        lines += [f"Intervals are those of independent members, which a {kind} does not give: they need not fit.", ""]
     lines += [f"- {_cell_text(found, cell)}" for cell in found.cells]
     if len(found.cases) > 1:
         lines += ["", "## Rank", ""]

@@ -327,11 +327,11 @@ def again(setup: Setup, cell: Cell, indices: Sequence[int], save: SaveAt | None,
     """
     from lgvi_warp.engine.keepers.observation import Observation
     from lgvi_warp.runs.run import again as run_again
-    from lgvi_warp.runs.settle import make_plan
+    from lgvi_warp.runs.settle import fields_of, make_plan
 
     if cell.fleet is None:
         raise refusal("case", cell.name, "was refused", "run a member of another one")
-    fields = (save or SaveAt()).fields
+    fields = fields_of(save, cell.fleet.scene.run)
     settings = {name: value for name, value in setup.settings.items() if name != "checks"}
     observed = Observation((*setup.metrics.values(),), tuple(int(i) for i in indices))
     plan = make_plan(cell.fleet, save=save, **settings, checks=setup.settings.get("checks"), fields=lambda asked: tuple(

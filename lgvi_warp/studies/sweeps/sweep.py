@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.sweeps.output import Sweep
@@ -16,6 +17,7 @@ from lgvi_warp.studies.sweeps.setup import Cell, Setup, made
 from lgvi_warp.studies.sweeps.success import INTERVALS, success_of
 
 
+@shows_progress
 def sweep(
     scene: Scene | Ensemble | str | os.PathLike[str],
     cases: Any = None,
@@ -34,7 +36,7 @@ def sweep(
     threads: int | None = None,
     executor: Any = "threads",
     scheduler: str | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | bool | None = None,
     **settings: Any,
 ) -> Sweep:
     """Run cases at all points of a grid on the same members, and say what holds and which case is better.
@@ -65,7 +67,7 @@ def sweep(
         threads: As of solve.
         executor: As of solve.
         scheduler: As of solve.
-        progress: Called with the fraction of the work that is done, in [0, 1].
+        progress: As of solve.
         **settings: Further arguments of solve, such as method, h, t1, dtype.
 
     Returns:
@@ -89,7 +91,7 @@ def sweep(
     faults.raise_if_any()
     assert conditions is not None
     records = Records(None if out is None else Path(out))
-    cells = list(_run(setup, records, threads, executor, scheduler, progress))
+    cells = list(_run(setup, records, threads, executor, scheduler, callback(progress)))
     return Sweep(setup, cells, records, conditions, baseline, float(confidence), interval)
 
 

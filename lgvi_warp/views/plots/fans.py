@@ -108,7 +108,7 @@ def draw_fan(axes: Any, result: Result, of: Quantity) -> Survey:
         line = np.where(survey.counted, survey.values, np.nan)[:, 0]
         axes.plot(survey.time, line, color=COLORS[0], marker=marker, label=of.name)
     else:
-        _bands(axes, survey, marker)
+        draw_bands(axes, survey.time, survey.values, survey.counted, low=survey.low, high=survey.high, marker=marker)
     _ends(axes, result, survey)
     axes.set(xlabel="time [s]", ylabel=label_of(of))
     axes.grid(True, alpha=0.3)
@@ -150,15 +150,23 @@ def text_of(survey: Survey, total: int) -> str:
     return text if survey.ranked == survey.total else f"{text}; quantiles of {survey.ranked:,}"
 
 
-def _bands(axes: Any, survey: Survey, marker: str) -> None:
-    """Draw bands between quantiles, and the median."""
+def draw_bands(axes: Any, time: np.ndarray, values: np.ndarray, counted: np.ndarray, **look: Any) -> None:
+    """Draw bands between quantiles of many members against time, and their median.
+
+    Args:
+        axes: Matplotlib axes.
+        time: Times [s], shape (k,).
+        values: A number of each member, shape (k, n).
+        counted: Mask (k, n) of the members that count at each time.
+        **look: Arguments of Axes.plot for the median; and low and high (k,), extremes where they are of more members.
+    """
     levels = sorted({q for band in BANDS for q in band} | {0.5})
-    curves = dict(zip(levels, at_levels(survey.values, survey.counted, levels), strict=True))
-    curves[0.0], curves[1.0] = survey.low, survey.high
+    curves = dict(zip(levels, at_levels(values, counted, levels), strict=True))
+    curves[0.0], curves[1.0] = look.pop("low", curves[0.0]), look.pop("high", curves[1.0])
     for (low, high), color in zip(BANDS, TINTS, strict=True):
         label = "all" if low == 0.0 else f"{high - low:.0%}"
-        axes.fill_between(survey.time, curves[low], curves[high], color=color, linewidth=0, label=label)
-    axes.plot(survey.time, curves[0.5], color="black", linewidth=1.2, marker=marker, label="median")
+        axes.fill_between(time, curves[low], curves[high], color=color, linewidth=0, label=label)
+    axes.plot(time, curves[0.5], color="black", linewidth=1.2, label="median", **look)
 
 
 def _ends(axes: Any, result: Result, survey: Survey) -> None:

@@ -16,7 +16,7 @@ from lgvi_warp.physics.control.signals import CHANNELS
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.outcomes import outcomes
 from lgvi_warp.views import choice as choices
-from lgvi_warp.views.choice import Shown, finite_rows, pieces, shown
+from lgvi_warp.views.choice import Shown, finite_rows, of_members, pieces, shown
 from lgvi_warp.views.fleet import LOOKS, energy_curve
 
 if TYPE_CHECKING:
@@ -69,7 +69,8 @@ class Drawn:
 
     Attributes:
         result: The whole result, whose outcomes are told.
-        choice: Which members and times are drawn.
+        source: The members whose samples were kept: the result itself, or its kept members.
+        choice: Which members of the source and which times are drawn.
         few: The members drawn at the times drawn, in memory.
         label: Name of the run among those that are compared; "" for a single one.
         rgb: Colour of the run among those that are compared; None for colours by outcome.
@@ -83,6 +84,7 @@ class Drawn:
     """
 
     result: Result
+    source: Result
     choice: Shown
     few: Result
     label: str
@@ -96,6 +98,16 @@ class Drawn:
     above: int
 
     @property
+    def text(self) -> str:
+        """How many members are drawn of how many."""
+        return of_members(len(self.choice.members), self.result.members)
+
+    @property
+    def members(self) -> np.ndarray:
+        """Indices of the members drawn, in the whole result, shape (m,)."""
+        return self.choice.members if self.source is self.result else self.result.kept_members[self.choice.members]
+
+    @property
     def time(self) -> np.ndarray:
         """Times drawn [s], shape (f,)."""
         return self.few.time
@@ -104,6 +116,11 @@ class Drawn:
     def position(self) -> np.ndarray:
         """Positions drawn [m], float32, shape (f, m, 3)."""
         return self.few.position.astype(np.float32)
+
+    @property
+    def watered(self) -> bool:
+        """Whether the water has a surface: no member is a metre above it."""
+        return not np.nanmax(self.fans[0].levels, initial=-np.inf) > 1.0
 
     def color(self, code: Status) -> tuple[int, int, int]:
         """Choose the colour of members.
@@ -116,18 +133,19 @@ class Drawn:
         """
         return self.rgb or LOOKS[code].rgb
 
-    def path(self, *parts: str) -> str:
+    def path(self, head: str, *parts: str) -> str:
         """Name an entity of this run.
 
         Args:
-            *parts: Parts of its name.
+            head: First parts of its name, as "curves/height".
+            *parts: The others.
 
         Returns:
-            A path; under the run's label where runs are compared.
+            A path; where runs are compared, with the run's label after the head.
         """
         import rerun as rr
 
-        return str(rr.new_entity_path([*parts[:1], *([self.label] if self.label else []), *parts[1:]]))
+        return str(rr.new_entity_path([*head.split("/"), *([self.label] if self.label else []), *parts]))
 
     def groups(self) -> list[tuple[Status, np.ndarray]]:
         """Divide the members drawn by what became of them until each time.
@@ -157,33 +175,35 @@ def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[in
         NothingToDraw: No samples were kept, or no member has a finite start.
         SceneError: There are no such members.
     """
-    if not result.samples and result.kept is not None:
-        result = result.kept
-    if missing := [name for name in NEEDED if result.samples and name not in result.samples]:
+    source = result.kept if not result.samples and result.kept is not None else result
+    if missing := [name for name in NEEDED if source.samples and name not in source.samples]:
         names = ", ".join(missing)
         raise NothingToDraw(f"{names} were not kept: a recording needs them; add them to SaveAt(fields=...)")
-    choice = shown(result)
+    choice = shown(source)
     if members is not None:
-        choice = dataclasses.replace(choice, members=_of(members, result.members))
-    few = choices.few(result, choice.members, (*FIELDS, *CHANNELS), choice.frames)
+        kept = np.arange(result.members) if source is result else result.kept_members
+        choice = dataclasses.replace(choice, members=_of(members, result.members, kept))
+    few = choices.few(source, choice.members, (*FIELDS, *CHANNELS), choice.frames)
     counted = under_way(few)
-    fans, ranked, above = _survey(result, choice, _directions(few, counted))
+    fans, ranked, above = _survey(source, choice, _directions(few, counted))
+    fans = tuple(_streamed(result, fan, choice.frames) for fan in fans)
     position, count = ranked["position"], ranked["counted"]
     energy = energy_curve(few) if set(FIELDS) <= set(few.samples) else None
     if energy is not None and np.isfinite(energy.values).any():
         levels = at_levels(energy.values, counted, LEVELS)
-        fans = (*fans, Fan("energy", f"{energy.label} of the {choice.text} drawn", "J", levels))
+        title = f"{energy.name} [J] of {of_members(len(choice.members), result.members)}"
+        fans = (*fans, Fan("energy", title, "J", levels))
     depth = np.where(count, position[..., 2], np.nan)
-    low, high = fans[0].levels[[-1, 0]] * -1.0
-    bins = np.linspace(*_range(low, high), 41)
+    finite = depth[np.isfinite(depth)]
+    bins = np.linspace(*_range(finite), 41)
     heights = np.stack([np.histogram(row[np.isfinite(row)], bins)[0] for row in depth])
     shares = _shares(result, choice.frames)
     spread = _spread(position, count)
-    return Drawn(result, choice, few, label, rgb, counted, shares, fans, spread, bins, heights, above)
+    return Drawn(result, source, choice, few, label, rgb, counted, shares, fans, spread, bins, heights, above)
 
 
-def _of(members: Any, total: int) -> np.ndarray:
-    """The user's indices of members, rising, each once; SceneError where there are no such members."""
+def _of(members: Any, total: int, kept: np.ndarray) -> np.ndarray:
+    """Places, among the kept members, of the user's indices, rising, each once; SceneError where there are no such members."""
     indices = np.asarray(members)
     if indices.ndim != 1 or not indices.size or indices.dtype.kind not in "iu":
         raise refusal("members", members, "is no list of members", "give indices: members=[3, 17]")
@@ -192,7 +212,31 @@ def _of(members: Any, total: int) -> np.ndarray:
             raise refusal(
                 "members", int(index), f"is none of the {total:,} members", f"give indices from 0 to {total - 1}"
             )
-    return np.unique(indices)
+    if len(lost := np.setdiff1d(indices, kept)):
+        raise refusal("members", int(lost[0]), "has no samples", f"keep them: keep={[int(index) for index in indices]}")
+    return np.flatnonzero(np.isin(kept, indices))
+
+
+# Fan -> quantity of the run's own statistics, and its sign.
+STREAMED = {"height": ("depth", -1.0), "speed": ("speed", 1.0)}
+
+
+def _streamed(result: Result, fan: Fan, frames: np.ndarray) -> Fan:
+    """A fan of all members from the run's own quantiles and extremes, where no samples of all were kept; else itself."""
+    quantity, sign = STREAMED.get(fan.name, ("", 1.0))
+    levels, told = np.full_like(fan.levels, np.nan), False
+    for estimate in result.statistics.values() if not result.samples else ():
+        kind, whole = estimate.settings["type"], len(estimate.time) == len(result.time)
+        if estimate.settings.get("of") != quantity or kind not in ("quantiles", "extremes") or not whole:
+            continue
+        rows = {0.0: estimate["minimum"], 1.0: estimate["maximum"]} if kind == "extremes" else dict(
+            zip(estimate.coordinates["level"].tolist(), np.moveaxis(estimate.value, 1, 0), strict=True)
+        )  # fmt: skip
+        for level, row in rows.items():
+            at = np.isclose(LEVELS, level if sign > 0.0 else 1.0 - level)
+            levels[at], told = sign * row[frames, 0], True
+    title = f"{fan.title}, by the run's statistics"
+    return dataclasses.replace(fan, title=title, levels=levels) if told else fan
 
 
 def roll_pitch_heading(attitude: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -314,10 +358,9 @@ def _shares(result: Result, frames: np.ndarray) -> dict[Status, np.ndarray]:
     return {code: sums / result.members for code, sums in ({Status.OK: counted.sum(axis=1)} | ended).items()}
 
 
-def _range(low: np.ndarray, high: np.ndarray) -> tuple[float, float]:
-    """Limits of a histogram: those of all times, at least a little apart."""
-    finite = np.isfinite(low)
-    first, last = (float(low[finite].min()), float(high[finite].max())) if finite.any() else (0.0, 1.0)
+def _range(values: np.ndarray) -> tuple[float, float]:
+    """Limits of a histogram of finite values, at least a little apart."""
+    first, last = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
     wide = max(last - first, 1e-3 * max(abs(first), abs(last)), 1e-6)
     return first - 0.01 * wide, last + 0.01 * wide
 

@@ -75,9 +75,9 @@ def hull_of(length: float, diameter: float) -> Hull:
     rows, i = len(forward), np.arange(AROUND)
     first = (np.arange(rows - 1) * AROUND)[:, None]
     here, beside = first + i, first + (i + 1) % AROUND
-    sides = np.stack([here, beside, here + AROUND, beside, beside + AROUND, here + AROUND], axis=-1).reshape(-1, 3)
+    sides = np.stack([here, here + AROUND, beside, beside, here + AROUND, beside + AROUND], axis=-1).reshape(-1, 3)
     back = -0.5 * length
-    fin = np.array([(back + end, 0.0, -0.8 * radius), (back, 0.0, -0.6 * radius), (back, 0.0, -1.9 * radius)])
+    fin = np.array([(back + end, 0.0, -0.8 * radius), (back, 0.0, -0.6 * radius), (back, 0.0, -1.6 * radius)])
     total = rows * AROUND
     faces = np.array([(0, 1, 2), (0, 2, 1)]) + total
     parts = np.repeat((np.arange(rows) < ALONG).astype(int), AROUND)

@@ -7,12 +7,35 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.physics.control.signals import CHANNELS
-from lgvi_warp.views.recording.drawn import Drawn
+from lgvi_warp.views.recording.drawn import Drawn, Fan
 from lgvi_warp.views.recording.world import TIMELINE, Box
 
 # The whole run is played in this time [s].
 PLAYED = 20.0
 BACKGROUND = (9, 24, 38)
+# Where the eye looks: to the north-east, a little down. Half its field of view upward, as a tangent, and the width of the
+# view over its height, on a window of usual size.
+SIGHT = np.array([0.48, 0.82, 0.31]) / np.linalg.norm([0.48, 0.82, 0.31])
+FIELD, ASPECT = 0.9 * np.tan(np.radians(27.5)), 1.3
+
+
+def distance(box: Box, aspect: float) -> float:
+    """How far from the middle of a box the eye must be to see all of it.
+
+    Args:
+        box: The box.
+        aspect: Width of the view over its height.
+
+    Returns:
+        Distance [m].
+    """
+    across = np.cross(SIGHT, (0.0, 0.0, -1.0))
+    across /= np.linalg.norm(across)
+    above = np.cross(across, SIGHT)
+    half = 0.5 * (box.high - box.low)
+    corners = half * np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
+    needed = np.maximum(np.abs(corners @ across) / (FIELD * aspect), np.abs(corners @ above) / FIELD)
+    return float((needed - corners @ SIGHT).max())
 
 
 def layout(runs: list[Drawn], box: Box, scale: int) -> Any:
@@ -32,7 +55,7 @@ def layout(runs: list[Drawn], box: Box, scale: int) -> Any:
     time = runs[0].time
     ends = [max(float(run.time[-1]) for run in runs), min(float(run.time[0]) for run in runs)]
     played = ends[0] - ends[1]
-    worlds = [_world(run, box, scale) for run in runs]
+    worlds = [_world(run, box, scale, ASPECT / len(runs)) for run in runs]
     below = rrb.Horizontal(
         _curve("members", "Members by outcome [%]", _whole(time), (0.0, 102.0), True),
         rrb.TextLogView(
@@ -61,29 +84,40 @@ def _right(runs: list[Drawn]) -> Any:
     for name, group in fans.items():
         limits = _limits(np.concatenate([fan.levels for fan in group], axis=1))
         # All have the same legend; it would cover their curves.
-        views[name] = _curve(f"curves/{name}", group[0].title, whole, limits, name == "height")
+        views[name] = _curve(f"curves/{name}", group[0].title, whole, limits, name == "height", _high(group[0], limits))
     height = views.pop("height")
     energy = views.pop("energy", None)
     motion = rrb.Tabs(views["speed"], *([energy] if energy else []), active_tab=0)
     angles = rrb.Tabs(*(views[name] for name in ("pitch", "roll", "heading")), active_tab=0)
     commands = [_curve_of_channels(whole)] if any(name in runs[0].few.samples for name in CHANNELS) else []
     facts = rrb.Tabs(
-        rrb.TextDocumentView(origin="/run/summary", name="Run"),
+        *(rrb.TextDocumentView(origin=run.path("run/summary"), name=run.label or "Run") for run in runs),
         rrb.BarChartView(origin="/histogram", name="Depths [m] at the cursor"),
-        rrb.TextDocumentView(origin="/run/provenance", name="Provenance"),
+        *(
+            rrb.TextDocumentView(origin=run.path("run/provenance"), name=f"Provenance {run.label}".strip())
+            for run in runs
+        ),
         active_tab=0,
     )
     shares = [2.6, 2.0, 2.0, *[2.0 for _ in commands], 4.0]
     return rrb.Vertical(height, angles, motion, *commands, facts, row_shares=shares)
 
 
-def _curve(origin: str, name: str, whole: Any, limits: tuple[float, float] | None, legend: bool) -> Any:
-    """A view of curves over the whole time."""
+def _high(fan: Fan, limits: tuple[float, float] | None) -> bool:
+    """Whether the median begins in the upper half of its axis."""
+    early = fan.levels[3, : max(1, fan.levels.shape[1] // 5)]
+    return limits is not None and bool(np.nanmean(early) > 0.5 * sum(limits)) if np.isfinite(early).any() else False
+
+
+def _curve(
+    origin: str, name: str, whole: Any, limits: tuple[float, float] | None, legend: bool, below: bool = False
+) -> Any:
+    """A view of curves over the whole time, with the legend above or below them."""
     import rerun.blueprint as rrb
 
     return rrb.TimeSeriesView(
         origin=f"/{origin}", name=name, axis_x=whole, axis_y=rrb.ScalarAxis(range=limits) if limits else None,
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=legend),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftBottom if below else rrb.Corner2D.LeftTop, visible=legend),
     )  # fmt: skip
 
 
@@ -115,16 +149,16 @@ def _whole(time: np.ndarray) -> Any:
     return rrb.TimeAxis(view_range=rrb.TimeRange(start=start, end=end))
 
 
-def _world(run: Drawn, box: Box, scale: int) -> Any:
+def _world(run: Drawn, box: Box, scale: int, aspect: float) -> Any:
     """The view of one run's world: across the fleet's way, from a little above; trails up to the cursor."""
     import rerun.blueprint as rrb
 
     middle = 0.5 * (box.low + box.high)
-    eye = middle + box.size * np.array([-0.41, -0.69, -0.24])
+    eye = middle - distance(box, aspect) * SIGHT
     now = rrb.TimeRangeBoundary.cursor_relative(seconds=0)
     past = rrb.VisibleTimeRange(TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=now)
     hulls = f", hulls {scale} times their size" if scale > 1 else ""
-    name = f"{run.label}: {run.choice.text}" if run.label else run.choice.text
+    name = f"{run.label}: {run.text}" if run.label else run.text
     return rrb.Spatial3DView(
         origin=run.path("world"), name=f"{name}{hulls}, grid {box.grid:g} m", background=BACKGROUND,
         line_grid=rrb.LineGrid3D(visible=False),

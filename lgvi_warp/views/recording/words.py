@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from typing import Any
 
+import numpy as np
+
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.views.choice import of_members
@@ -24,28 +26,13 @@ def log_words(recording: Any, runs: list[Drawn], box: Box, scale: int) -> None:
     """
     import rerun as rr
 
-    tables = {run.label or "run": run.result.provenance for run in runs}
-    content = tables if runs[0].label else runs[0].result.provenance
-    texts = {"summary": summary(runs, box, scale), "provenance": f"```json\n{json.dumps(content, indent=2)}\n```"}
-    for name, text in texts.items():
-        recording.log(f"run/{name}", rr.TextDocument(text, media_type="text/markdown"), static=True, strict=True)
-
-
-def summary(runs: list[Drawn], box: Box, scale: int) -> str:
-    """Summarise runs in a table of ten lines, a column each.
-
-    Args:
-        runs: What is drawn.
-        box: What is in view.
-        scale: How many times their size hulls are drawn.
-
-    Returns:
-        Markdown.
-    """
-    columns = [lines(run, box, scale) for run in runs]
-    head = f"| | {' | '.join(run.label for run in runs)} |\n|---|{'---|' * len(runs)}"
-    rows = [f"| {key} | {' | '.join(column[key] for column in columns)} |" for key in columns[0]]
-    return "\n".join([head, *rows])
+    for run in runs:
+        provenance = f"```json\n{json.dumps(run.result.provenance, indent=2)}\n```"
+        rows = [f"| {key} | {text} |" for key, text in lines(run, box, scale).items()]
+        texts = {"summary": "\n".join(["| | |", "|---|---|", *rows]), "provenance": provenance}
+        for name, text in texts.items():
+            document = rr.TextDocument(text, media_type="text/markdown")
+            recording.log(run.path(f"run/{name}"), document, static=True, strict=True)
 
 
 def lines(run: Drawn, box: Box, scale: int) -> dict[str, str]:
@@ -63,9 +50,13 @@ def lines(run: Drawn, box: Box, scale: int) -> dict[str, str]:
     counts = ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items())
     few = len(run.choice.members) < result.members
     drawn = f"{len(run.choice.members):,} of {result.members:,} drawn" if few else f"{result.members:,}, all drawn"
-    ranked = of_members(len(run.choice.ranked), result.members)
-    one = result.members == 1
-    bands = f", quantiles of {ranked}" if len(run.choice.ranked) < result.members else ", all in the curves"
+    one = run.source.members == 1
+    if run.source is not result:
+        bands = f", curves of the {run.source.members:,} whose samples were kept"
+    elif len(run.choice.ranked) < result.members:
+        bands = f", quantiles of {of_members(len(run.choice.ranked), result.members)}"
+    else:
+        bands = ", all in the curves"
     versions = {**settings.get("versions", {}), **{"rerun": _rerun_version()}}
     method = settings["method"]["name"]
     times = f"{run.time[0]:g} to {run.time[-1]:g} s, {len(run.time)} of {len(result.time)} samples drawn"
@@ -73,7 +64,7 @@ def lines(run: Drawn, box: Box, scale: int) -> dict[str, str]:
         times += "; for the motion between them give SaveAt(every=...), or save_every in [run]"
     _, source = shape_of(settings["scene"], run.few.parameters)
     size = f"{source}, drawn " + (f"{scale} times their size" if scale > 1 else "at their size")
-    member = int(run.choice.members[chosen_member(run)])
+    member = int(run.members[chosen_member(run)])
     seed = settings.get("ensemble", {}).get("seed", "none")
     return {
         "members": drawn + ("" if one else bands),
@@ -113,8 +104,8 @@ def water_text(run: Drawn, box: Box) -> str:
         return f"surface and {floor}; {grid}"
     if not run.above:
         return f"no event at the surface, {floor}; {grid}"
-    many = of_members(run.above, run.result.members)
-    return f"unbounded water: {many} pass{'es' * (run.above == 1 == run.result.members)} above depth 0; {floor}; {grid}"
+    many = of_members(run.above, run.source.members)
+    return f"unbounded water: {many} pass{'es' * (run.source.members == 1)} above depth 0"
 
 
 def energy_text(run: Drawn) -> str:
@@ -129,6 +120,9 @@ def energy_text(run: Drawn) -> str:
     few = run.few
     if not set(FIELDS) <= set(few.samples):
         return "not known: not all of the motion was kept"
+    drift = invariants.drift(few)["energy"]
+    if np.isnan(drift):
+        return "not known: every member drawn failed"
     if "energy" in invariants.conserved(few):
-        return f"drift {invariants.drift(few)['energy']:.2g} J, the largest of the members drawn"
+        return f"drift {drift:.2g} J, the largest of the members drawn"
     return f"not conserved: {', '.join(invariants.at_work(few))} do work"

@@ -21,7 +21,7 @@ CHUNK = 20
 # Scale of a hidden body: an entity without any pose would show a body at the origin.
 UNSEEN = 1e-6
 # A hull is drawn at least this share of the scene long.
-SEEN = 0.025
+SEEN = 0.02
 TRAIL, WATER, SAND, CURRENT = (150, 165, 180, 150), (90, 170, 230, 40), (150, 120, 80, 90), (0, 200, 200)
 # Axes are labelled at the corner of the grid.
 AXES = (("north", (230, 90, 90)), ("east", (90, 200, 90)), ("down", (110, 140, 255)))
@@ -177,7 +177,8 @@ def _poses(
 
     empty = ~visible.any(axis=1)
     posed = visible.copy()
-    posed[empty, finite_rows(position)[empty].argmax(axis=1)] = True
+    posed[empty, 0] = True
+    position, quaternion = (np.nan_to_num(values) for values in (position, quaternion))
     for first in range(0, len(time), CHUNK):
         frames = slice(first, first + CHUNK)
         at = posed[frames]
@@ -226,7 +227,7 @@ def _spread(recording: Any, run: Drawn) -> None:
 
 
 def _planes(recording: Any, run: Drawn, box: Box) -> None:
-    """Log the surface and the floor, with a grid in metres, where they are in view."""
+    """Log the surface and the floor where they are in view, with a grid in metres; unbounded water has no sheet at depth 0."""
     import rerun as rr
 
     margin = 0.08 * box.size
@@ -235,9 +236,14 @@ def _planes(recording: Any, run: Drawn, box: Box) -> None:
     for name, depth, color in planes:
         corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
         both_sides = [(0, 1, 2), (0, 2, 3), (0, 2, 1), (0, 3, 2)]
+        if name == "surface" and not run.watered:
+            continue
         points = [(*corner, depth) for corner in corners]
         sheet = rr.Mesh3D(vertex_positions=points, triangle_indices=both_sides, albedo_factor=color)
         _static(recording, run.path("world", "water", name), sheet)
+    # Without a floor, a grid below the fleet tells sizes.
+    below = [("depth", high[2], TRAIL)] if box.floor is None else []
+    for name, depth, color in [*planes, *below]:
         lines = _grid(low[:2], high[:2], float(depth), box.grid)
         grid = rr.LineStrips3D(lines, colors=[(*color[:3], 120)], radii=rr.Radius.ui_points(0.5))
         _static(recording, run.path("world", "water", f"{name}_grid"), grid)
@@ -258,10 +264,10 @@ def _axes(recording: Any, run: Drawn, box: Box) -> None:
     """Log arrows to the north, to the east and down, at a corner of the box."""
     import rerun as rr
 
-    # The corner farthest from the eye, where they hide nothing.
-    corner = np.array([box.high[0], box.high[1], box.low[2]])
+    # At the left of what the eye sees, where they hide little.
+    corner = np.array([box.high[0], box.low[1], box.low[2]])
     labels, colors = zip(*AXES, strict=True)
-    arrows = rr.Arrows3D(origins=[corner] * 3, vectors=0.08 * box.size * np.eye(3), colors=colors, labels=labels,
+    arrows = rr.Arrows3D(origins=[corner] * 3, vectors=0.12 * box.size * np.eye(3), colors=colors, labels=labels,
                          radii=rr.Radius.ui_points(1.5))  # fmt: skip
     _static(recording, run.path("world", "axes"), arrows)
 

@@ -1,6 +1,5 @@
 """The help of the command and what it does where an option is left out."""
 
-import argparse
 import re
 
 import pytest
@@ -10,8 +9,7 @@ from lgvi_warp.cli.arguments import parser
 
 def options():
     """(verb, option, default, the default that its help tells) of each option whose help tells one."""
-    (verbs,) = (action for action in parser()._actions if isinstance(action, argparse._SubParsersAction))
-    for verb, one in verbs.choices.items():
+    for verb, one in parser().verbs.items():
         for action in one._actions:
             told = re.search(r"\(default:? ([\w.]+)\)", action.help or "")
             if told and action.default is not None:

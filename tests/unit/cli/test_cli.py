@@ -1,6 +1,5 @@
 """The command: what it writes, what it says, and how it refuses."""
 
-import io
 import json
 import subprocess
 import sys
@@ -12,7 +11,6 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp import cli
 from lgvi_warp.cli import command, machine, settings
-from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.runs import all_failed
 from lgvi_warp.engine import widths
 from lgvi_warp.studies import tuning
@@ -179,36 +177,6 @@ def test_bad_arguments_of_stores_are_refused(arguments, words, tmp_path, capsys)
     assert cli.main(["run", PAPER, "--out", str(tmp_path / "out"), *SMALL, *arguments]) == 2
     text = capsys.readouterr().err
     assert all(word in text for word in words) and "Traceback" not in text
-
-
-def test_progress_tells_the_time_left():
-    stream = io.StringIO()
-    progress = cli.Progress(stream)
-    progress._interval = 0.0
-    progress(0.25)
-    progress.close()
-    assert stream.getvalue().startswith(" 25.0%, ") and "s left" in stream.getvalue()
-
-
-class Terminal(io.StringIO):
-    def isatty(self):
-        return True
-
-
-def test_the_progress_line_is_clean_whatever_happens(monkeypatch):
-    """Also before the first step: processes start with nothing done for a while."""
-    stream = Terminal()
-    monkeypatch.setattr(sys, "stderr", stream)
-    with pytest.raises(KeyboardInterrupt), shown(False) as progress:
-        progress._interval = 0.0
-        progress(0.0)
-        progress(0.5)
-        raise KeyboardInterrupt
-    first, second, blank, rest = stream.getvalue().removeprefix("\r").split("\r")
-    assert first.strip() == "0.0%" and second.startswith(" 50.0%, ") and not blank.strip() and not rest
-    assert len(blank) >= max(len(first), len(second))
-    with shown(True) as progress:
-        assert progress is None
 
 
 def test_numbers_may_be_written_as_people_write_them():

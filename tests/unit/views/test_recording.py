@@ -1,26 +1,414 @@
-"""A recording is there whole or not at all."""
+"""Recordings read back: poses, colours, counts and texts are those of the result; each odd run has one that fits."""
 
+import dataclasses
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
 import pytest
 import rerun as rr
+from rerun.chunk import RrdReader
 
 import lgvi_warp as lw
-from tests.support.tools import one, scene_of
+from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.common.status import Status, stop_time, under_way
+from lgvi_warp.statistics.estimate import Estimate, Estimates
+from lgvi_warp.views.recording import drawn, layout, world
+from lgvi_warp.views.recording.graphs import channel_names
+from tests.support.made import made
+from tests.unit.views.test_hull import glb
 
-pytestmark = pytest.mark.kernel
+rr.set_strict_mode(True)
 
 
-@pytest.fixture
-def result():
-    """Two samples of one member."""
-    return lw.solve(one(scene_of((2.0, 2.0, 2.0))), h=0.1, t1=0.1)
+def fleet(n=40, k=31, seed=1, **named):
+    """Members that dive in a bow: some reach the floor, some the surface, some fail; others go on."""
+    rng, time = np.random.default_rng(seed), np.linspace(0.0, 60.0, k)
+    heading, slope = rng.normal(0.5, 0.2, n), rng.normal(0.0, 0.08, n)
+    t = time[:, None]
+    position = np.stack([t * np.cos(heading), t * np.sin(heading), 10.0 + 5.0 * np.sin(t / 9.0) + t * slope], axis=-1)
+    angles = [
+        np.broadcast_to(x, (k, n)) for x in (20.0 * np.sin(t / 3.0), -20.0 * np.cos(t / 9.0), np.degrees(heading))
+    ]
+    attitude = lw.notation.matrix_from_euler_deg(np.stack(angles, axis=-1).reshape(-1, 3)).reshape(k, n, 3, 3)
+    status, end = np.zeros(n, int), np.full(n, np.nan)
+    for code, beyond in ((Status.FLOOR, position[..., 2] > 16.0), (Status.SURFACE, position[..., 2] < 4.0)):
+        reached = beyond.any(axis=0) & (status == 0)
+        status[reached], end[reached] = code, time[beyond.argmax(axis=0)][reached]
+    status[:2], end[:2] = Status.NON_FINITE, 11.0
+    for i in np.flatnonzero(status):
+        position[np.searchsorted(time, end[i]) :, i] = position[np.searchsorted(time, end[i]), i]
+    named.setdefault("scene", SCENE)
+    return made(position, time, status=status, end=end, attitude=attitude, seed=seed, **named)
 
 
-def test_whole(tmp_path, result):
-    assert lw.log_rerun(result, tmp_path / "fleet.rrd") == tmp_path / "fleet.rrd"
+SCENE = lw.Scene.named(
+    "remus_100",
+    events=[{"type": "floor", "depth": 16.0}, {"type": "surface", "depth": 4.0}],
+    terms=[{"type": "current", "velocity": [0.1, -0.2, 0.0]}],
+)
+
+
+def rows(path, entity, ending, recording=None):
+    """Time -> value of a component of an entity."""
+    found = {}
+    reader = RrdReader(path)
+    stream = reader.stream() if recording is None else reader.stream(store=recording)
+    for chunk in stream.filter(content=entity):
+        batch = chunk.to_record_batch()
+        column = next((name for name in batch.schema.names if name.endswith(ending)), None)
+        if column and "sim_time" in batch.schema.names:
+            times = batch.column("sim_time").cast("int64").to_numpy() / 1e9
+            found |= dict(zip(times.tolist(), batch.column(column).to_pylist(), strict=True))
+    return found
+
+
+def text_of(path, entity):
+    """All text of an entity."""
+    return " ".join(
+        str(text)
+        for chunk in RrdReader(path).stream().filter(content=entity)
+        for column in chunk.to_record_batch().columns
+        for text in column.to_pylist()
+    )
+
+
+def entities(path):
+    """Names of the entities in a file."""
+    return {chunk.entity_path for chunk in RrdReader(path).stream()}
+
+
+@pytest.fixture(scope="module")
+def mixed():
+    result = fleet()
+    assert set(result.status.counts()) == {"ok", "non_finite", "surface", "floor"}
+    return result
+
+
+@pytest.fixture(scope="module")
+def path(mixed, tmp_path_factory):
+    return lw.log_rerun(mixed, tmp_path_factory.mktemp("recording") / "fleet.rrd")
+
+
+def test_poses_are_those_of_the_members_shown(mixed, path):
+    choice = lw.shown(mixed)
+    seen = {}
+    for code in ("ok", "non_finite", "surface", "floor"):
+        positions = rows(path, f"/world/bodies/{code}", "translations")
+        turns = rows(path, f"/world/bodies/{code}", "quaternions")
+        scales = rows(path, f"/world/bodies/{code}", "scales")
+        for t in positions:
+            some = [scale[0] == 1.0 for scale in scales[t]] if scales else [True] * len(positions[t])
+            poses = zip(positions[t], turns[t], some, strict=True)
+            seen.setdefault(t, []).extend((*map(float, [*p, *q]), code) for p, q, good in poses if good)
+    for frame, t in zip(choice.frames, mixed.time[choice.frames], strict=True):
+        quaternion = lw.notation.quaternion_from_matrix(mixed.attitude[frame, choice.members])[:, [1, 2, 3, 0]]
+        pose = np.concatenate([mixed.position[frame, choice.members], quaternion], axis=1).astype(np.float32)
+        got = np.array([row[:7] for row in sorted(seen[t])], np.float32)
+        np.testing.assert_array_equal(got, pose[np.lexsort(pose.T[::-1])])
+
+
+def test_colours_change_when_members_end(mixed, path):
+    end, spacing = stop_time(mixed), np.diff(mixed.time).max()
+    for code in (Status.NON_FINITE, Status.SURFACE, Status.FLOOR):
+        scales = rows(path, f"/world/bodies/{code.name.lower()}", "scales")
+        count = {t: sum(scale[0] == 1.0 for scale in scales[t]) for t in scales}
+        for member in np.flatnonzero(mixed.status == code):
+            before, after = (max(t for t in count if t <= end[member] + side) for side in (-1e-9, spacing + 1e-9))
+            ended = (end[mixed.status == code] < after - 1e-9).sum()
+            assert count[after] == ended and count[before] < ended
+        assert count[mixed.time[-1]] == (mixed.status == code).sum()
+
+
+def test_texts_have_the_counts_and_ten_lines(mixed, path):
+    summary = text_of(path, "/run/summary")
+    counts = ", ".join(f"{name} {number:,}" for name, number in mixed.status.counts().items())
+    assert f"| outcome | {counts} |" in summary and "| members | 40, all drawn, all in the curves |" in summary
+    assert summary.count("|\\n| ") == 10
+    assert "surface and floor at 16 m; grid of 10 m" in summary and "seed | 1" in summary
+    log = text_of(path, "/log")
+    first = int(np.flatnonzero(mixed.status == Status.FLOOR)[stop_time(mixed)[mixed.status == Status.FLOOR].argmin()])
+    assert f"first: member {first} at {mixed.failure_time[first]:g} s" in log and "value 1.5" in log
+    assert '"seed": 1' in text_of(path, "/run/provenance")
+
+
+def test_curves_are_quantiles_of_those_under_way(mixed, path):
+    counted = under_way(mixed)
+    for frame in (0, 7, 20, 30):
+        t, depth = mixed.time[frame], mixed.position[frame, counted[frame], 2]
+        assert rows(path, "/curves/height/median", "scalars")[t] == pytest.approx([-np.median(depth)], rel=1e-5)
+        middle, variance = (rows(path, "/curves/height/90_percent", end)[t][0] for end in (":values", "variances"))
+        low, high = np.quantile(-depth, [0.05, 0.95])
+        assert (middle, variance) == pytest.approx((0.5 * (low + high), (0.5 * (high - low)) ** 2), rel=1e-4, abs=1e-6)
+        share = rows(path, "/members/under_way", "scalars")[t]
+        assert share == pytest.approx([100.0 * counted[frame].mean()])
+
+
+def test_two_recordings_together_are_each_as_alone(mixed, path, tmp_path):
+    import rerun_cli
+
+    other = lw.log_rerun(fleet(20, seed=2), tmp_path / "other.rrd")
+    both = tmp_path / "both.rrd"
+    program = str(Path(rerun_cli.__file__).with_name("rerun"))
+    subprocess.run([program, "rrd", "merge", str(path), str(other), "-o", str(both)], check=True, capture_output=True)
+    entries = {entry.recording_id: entry for entry in RrdReader(both).recordings()}
+    assert len(entries) == 2 and len({entry.application_id for entry in entries.values()}) == 2
+    for alone in (path, other):
+        (entry,) = RrdReader(alone).recordings()
+        for entity, ending in (("/world/bodies/ok", "translations"), ("/curves/height/median", "scalars")):
+            assert rows(both, entity, ending, entries[entry.recording_id]) == rows(alone, entity, ending)
+
+
+def test_trails_are_of_the_past(mixed, path):
+    strips = rows(path, "/world/trails", "strips")
+    members = np.unique(np.linspace(0, 39, world.TRAILS).astype(int))
+    for frame in (1, 9, 30):
+        going = under_way(mixed)[frame - 1, members]
+        ends = np.array([strip[1] for strip in strips[mixed.time[frame]]], np.float32)
+        np.testing.assert_array_equal(ends, mixed.position[frame, members[going]].astype(np.float32))
+    assert 0.0 not in strips
+
+
+def test_the_ellipsoid_holds_those_under_way_and_stays_in_the_water():
+    # A fleet that gathers below the surface: its distribution is skew, and a covariance would reach above.
+    rng = np.random.default_rng(3)
+    cloud = rng.normal(size=(2, 4000, 3))
+    cloud[..., 2] = rng.exponential(2.0, size=(2, 4000))
+    spread = drawn.drawn_of(made(cloud)).spread
+    top = spread.center[0, 2] - np.linalg.norm(spread.axes[0][2] * spread.half[0])
+    assert top > -0.2 and cloud[0, :, 2].mean() - 2.8 * cloud[0, :, 2].std() < -3.0
+    along = (cloud[0] - spread.center[0]) @ spread.axes[0] / spread.half[0]
+    np.testing.assert_allclose((np.abs(along) <= 1.0).mean(axis=0), 0.95, atol=0.002)
+    np.testing.assert_allclose(np.linalg.det(spread.axes), 1.0, rtol=1e-6)
+
+
+def test_headings_are_circular():
+    # Around south, which is 180 and -180 degrees: the fan is narrow, and its median goes on through it.
+    angles = np.radians(180.0 + np.linspace(-20.0, 20.0, 41)[None] + np.arange(0.0, 400.0, 20.0)[:, None])
+    attitude = lw.notation.matrix_from_euler_deg(
+        np.stack([0 * angles, 0 * angles, np.degrees(angles)], axis=-1).reshape(-1, 3)
+    ).reshape(20, 41, 3, 3)
+    heading = drawn.drawn_of(made(np.zeros((20, 41, 3)), attitude=attitude)).fans[3]
+    assert heading.name == "heading"
+    np.testing.assert_allclose(heading.levels[-1] - heading.levels[0], 40.0, atol=1e-3)
+    np.testing.assert_allclose(np.diff(heading.levels[3]), 20.0, atol=1e-3)
+
+
+def test_quantiles_are_those_of_numpy():
+    rng = np.random.default_rng(2)
+    values, counted = rng.normal(size=(5, 101)), rng.uniform(size=(5, 101)) < 0.7
+    counted[3] = False
+    got = drawn.at_levels(values, counted, (0.0, 0.1, 0.5, 1.0))
+    for row in (0, 1, 2, 4):
+        np.testing.assert_allclose(
+            got[:, row], np.quantile(values[row, counted[row]], [0.0, 0.1, 0.5, 1.0]), rtol=1e-12
+        )
+    assert np.isnan(got[:, 3]).all()
+
+
+def test_extremes_are_of_all_members_and_quantiles_of_many(monkeypatch):
+    from lgvi_warp.views import choice
+
+    monkeypatch.setattr(choice, "MOST_RANKED", 500)
+    monkeypatch.setattr(choice, "AT_ONCE", 2 * 300)
+    cloud = np.random.default_rng(5).normal(size=(2, 3000, 3))
+    run = drawn.drawn_of(made(cloud))
+    height = run.fans[0].levels
+    np.testing.assert_allclose(
+        height[[0, -1]].T, np.stack([-cloud[..., 2].max(1), -cloud[..., 2].min(1)], axis=1), rtol=1e-6
+    )
+    np.testing.assert_allclose(height[3], -np.median(cloud[:, run.choice.ranked, 2], axis=1), rtol=1e-5)
+    assert run.above == (cloud[..., 2] < 0.0).any(axis=0).sum()
+
+
+def test_the_water_is_said_to_be_unbounded_where_members_leave_it(tmp_path):
+    up = np.linspace(5.0, -0.5, 5)[:, None, None] * np.ones((1, 4, 3))
+    up[:, 0, 2] = 5.0
+    path = lw.log_rerun(made(up), tmp_path / "up.rrd")
+    assert "| unbounded water: 3 of 4 members pass above depth 0 |" in text_of(path, "/run/summary")
+    # Half a metre above the surface a vehicle floats; beyond, there is no surface, but a grid at depth 0.
+    names = [entities(path), entities(lw.log_rerun(made(3.0 * up), tmp_path / "far.rrd"))]
+    assert ["/world/water/surface" in one for one in names] == [True, False]
+    assert all("/world/water/surface_grid" in one and "/world/water/floor" not in one for one in names)
+
+
+def test_forces_balance_the_momentum():
+    # A sphere that a known force accelerates: the third arrow is that force.
+    t = np.linspace(0.0, 2.0, 21)
+    scene = lw.Scene.named("sphere")
+    force = 30.0
+    mass = scene.vehicle.mass + scene.vehicle.added_mass[0, 0]
+    position = np.zeros((21, 1, 3))
+    position[:, 0, 0] = 0.5 * force / mass * t**2
+    forces, points = world.forces_on(drawn.drawn_of(made(position, t)))
+    np.testing.assert_allclose(forces[2:-2, 2], [[force, 0.0, 0.0]] * 17, atol=1e-3)
+    np.testing.assert_allclose(forces[:, 0] + forces[:, 1], 0.0, atol=1e-9)
+    assert points.shape == (3, 3)
+
+
+def test_the_current_is_drawn_as_it_flows(mixed, path):
+    run = drawn.drawn_of(mixed)
+    np.testing.assert_allclose(world.water_at(run, np.zeros((2, 3))), np.broadcast_to([0.1, -0.2, 0.0], (31, 2, 3)))
+    assert "current, up to 0.22 m/s" in text_of(path, "/world/current")
+    assert "/world/current" not in entities(lw.log_rerun(made(np.zeros((2, 1, 3))), path.parent / "still.rrd"))
+
+
+@pytest.mark.parametrize("spans", [(1.0, 1.0, 1.0), (100.0, 3.0, 1.0), (1.0, 200.0, 5.0), (1.0, 1.0, 300.0)])
+@pytest.mark.parametrize("aspect", [1.3, 0.65])
+def test_the_eye_sees_the_whole_box(spans, aspect):
+    box = world.Box(np.zeros(3), np.array(spans), None, False)
+    far = layout.distance(box, aspect)
+    right = np.cross(layout.SIGHT, (0.0, 0.0, -1.0))
+    right /= np.linalg.norm(right)
+    corners = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]) * spans - 0.5 * np.array(spans)
+    depth = corners @ layout.SIGHT + far
+    across, above = corners @ right / depth, corners @ np.cross(right, layout.SIGHT) / depth
+    inside = max(np.abs(across).max() / aspect, np.abs(above).max()) / np.tan(np.radians(27.5))
+    assert (depth > 0.0).all() and inside == pytest.approx(0.9)
+
+
+def test_all_bodies_lie_in_the_box(mixed):
+    for result in (mixed, made(np.zeros((2, 1, 3)) + 5.0), fleet(3, 5)):
+        box = world.box_of([drawn.drawn_of(result)])
+        assert (result.position >= box.low - 1e-5).all() and (result.position <= box.high + 1e-5).all()
+        assert box.size > 0.0 and (box.high > box.low).all()
+
+
+ODD = {
+    "one vehicle": lambda: fleet(1, 60),
+    "two samples": lambda: fleet(30, 2),
+    "one sample": lambda: made(np.zeros((1, 3, 3)) + 5.0),
+    "all failed at once": lambda: made(np.ones((4, 9, 3)), status=np.full(9, 3), end=np.zeros(9)),
+    "all stopped": lambda: made(np.ones((4, 9, 3)), status=np.full(9, 17), end=np.full(9, 1.5)),
+    "lost": lambda: made(np.stack([np.ones((5, 3)), np.full((5, 3), np.nan)]), status=np.full(5, 3), end=np.zeros(5)),
+    "in float32": lambda: fleet(5, 9, dtype=np.float32),
+    "without rates": lambda: bare(fleet(5, 9), "angular_velocity"),
+}
+
+
+def bare(result, *fields):
+    """The same result without some samples."""
+    return dataclasses.replace(result, samples={k: v for k, v in result.samples.items() if k not in fields})
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_odd_runs_have_a_recording_that_fits(name, tmp_path):
+    result = ODD[name]()
+    path = lw.log_rerun(result, tmp_path / "odd.rrd")
+    names, summary = entities(path), text_of(path, "/run/summary")
+    bands = {"/curves/height/all", "/curves/height/90_percent", "/curves/height/50_percent"}
+    assert bool(bands & names) == (result.members > 1)
+    assert ("SaveAt(every=...)" in summary) == (len(result.time) < 3)
+    assert "nan" not in summary and "1 members" not in summary
+    counts = ", ".join(f"{name} {number}" for name, number in result.status.counts().items())
+    assert f"| outcome | {counts} |" in summary
+    poses = [rows(path, one, "translations") for one in names if one.startswith("/world/bodies/")]
+    assert all(np.isfinite(pose).all() for frames in poses for pose in frames.values())
+    assert ("/world/spread" in names) == (result.members > 3)
+    assert ("/curves/energy/median" in names) == (name not in ("without rates", "lost"))
+
+
+def test_members_asked_for_are_drawn(mixed, tmp_path):
+    path = lw.log_rerun(mixed, tmp_path / "few.rrd", members=[17, 3])
+    assert len(rows(path, "/world/bodies/ok", "translations")[0.0]) == 2
+    assert "2 of 40 drawn" in text_of(path, "/run/summary")
+    # Curves stay those of all.
+    assert rows(path, "/members/under_way", "scalars")[0.0] == [100.0]
+
+
+def lean(mixed, **named):
+    """The same run, of which samples of the members 3, 5 and 9 were kept alone."""
+    kept = np.array([3, 5, 9])
+    return dataclasses.replace(mixed, samples={}, kept=mixed.part(kept), kept_members=kept, **named)
+
+
+def test_kept_members_are_drawn_where_no_others_were_kept(mixed, tmp_path):
+    path = lw.log_rerun(lean(mixed), tmp_path / "kept.rrd")
+    assert len(rows(path, "/world/bodies/ok", "translations")[0.0]) == 3
+    summary, counts = text_of(path, "/run/summary"), mixed.status.counts()
+    assert "| 3 of 40 drawn, curves of the 3 whose samples were kept |" in summary
+    # Outcomes are those of all.
+    assert f"| outcome | {', '.join(f'{name} {number}' for name, number in counts.items())} |" in summary
+    assert rows(path, "/members/floor", "scalars")[60.0] == pytest.approx([100.0 * counts["floor"] / 40])
+    assert drawn.drawn_of(lean(mixed), [9, 3]).members.tolist() == [3, 9]
+    with pytest.raises(lw.SceneError, match=r"members = 4: has no samples; keep them: keep=\[4\]"):
+        lw.log_rerun(lean(mixed), tmp_path / "kept.rrd", members=[4])
+
+
+def test_the_runs_own_statistics_make_the_fan_where_no_samples_of_all_were_kept(mixed):
+    depth = mixed.position[..., 2]
+    names = ("component",)
+
+    def estimate(kind, arrays, **coordinates):
+        settings = {"type": kind, "of": "depth"}
+        return Estimate(
+            kind, settings, "m", 0.95, "", {}, arrays, {"time": mixed.time, "component": names} | coordinates
+        )
+
+    levels = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
+    quantiles = np.moveaxis(np.quantile(depth, levels, axis=1), 0, 1)[..., None]
+    extremes = {"minimum": depth.min(axis=1, keepdims=True), "maximum": depth.max(axis=1, keepdims=True)}
+    statistics = Estimates([estimate("quantiles", {"value": quantiles}, level=levels), estimate("extremes", extremes)])
+    height, *others = drawn.drawn_of(lean(mixed, statistics=statistics)).fans
+    expected = np.quantile(-depth, drawn.LEVELS, axis=1)
+    np.testing.assert_allclose(height.levels, expected, rtol=1e-6)
+    assert height.title.endswith("by the run's statistics") and not any("by the run" in fan.title for fan in others)
+    assert np.abs(drawn.drawn_of(lean(mixed)).fans[0].levels - expected).max() > 0.1
+
+
+def test_runs_are_compared_side_by_side(mixed, tmp_path):
+    path = lw.log_rerun({"a": mixed, "b, rk4": fleet(20, seed=2)}, tmp_path / "both.rrd")
+    names = entities(path)
+    assert {"/world/a/bodies/ok", "/curves/height/a/median", "/run/summary/a"} <= names
+    b = next(name for name in names if name.startswith("/world/b") and name.endswith("/bodies/ok"))
+    assert len(rows(path, b, "translations")[0.0]) == 20
+    assert "a: floor, " in text_of(path, "/log/a")
+
+
+def test_channels_have_the_names_and_limits_of_their_actuators(mixed):
+    steered = lw.Scene.load(Path(__file__).parents[3] / "examples" / "scenes" / "remus_100_autopilot.toml")
+    result = made(mixed.position, mixed.time, scene=steered)
+    samples = dict(result.samples) | {"actuator": np.full((31, 40, 2), 0.2), "command": np.full((31, 40, 2), 0.1)}
+    run = drawn.drawn_of(dataclasses.replace(result, samples=samples))
+    (first, limits), (second, _) = channel_names(run)
+    assert (first, second) == ("control_fins[0]", "control_fins[1]")
+    assert limits == pytest.approx([-0.349066, 0.349066], rel=1e-5)
+
+
+def test_a_mesh_is_drawn_times_a_whole_number(tmp_path):
+    mesh = glb(tmp_path / "hull.glb", 0.5)
+    vehicle = dataclasses.replace(lw.Scene.named("sphere").vehicle, shape={"mesh": str(mesh)})
+    result = made(np.array([[[0.0, 0, 5]], [[100.0, 0, 5]], [[200.0, 0, 5]]]), scene=lw.Scene(vehicle))
+    path = lw.log_rerun(result, tmp_path / "mesh.rrd")
+    run = drawn.drawn_of(result)
+    box = world.box_of([run])
+    scale = world.scale_of(run, box)
+    assert (
+        scale == np.ceil(world.SEEN * box.size / 0.5) > 5.0
+        and rows(path, "/world/bodies/ok", "scales")[1.0][0] == [scale] * 3
+    )
+    assert f"drawn {scale} times their size" in text_of(path, "/run/summary")
+    mesh.unlink()
+    with pytest.raises(lw.SceneError, match=r"vehicle\.shape\.mesh = 'hull\.glb': cannot be read"):
+        lw.log_rerun(result, tmp_path / "mesh.rrd")
+
+
+def test_a_recording_goes_to_a_stream(mixed, tmp_path):
+    stream = rr.RecordingStream("mine", recording_id="mine")
+    stream.save(tmp_path / "mine.rrd")
+    assert lw.log_rerun(mixed, to=stream) is None
+    stream.disconnect()
+    assert "| outcome |" in text_of(tmp_path / "mine.rrd", "/run/summary")
+
+
+def test_whole(tmp_path, mixed):
+    assert lw.log_rerun(mixed, tmp_path / "fleet.rrd") == tmp_path / "fleet.rrd"
     assert [path.name for path in tmp_path.iterdir()] == ["fleet.rrd"]
 
 
-def test_a_disk_that_is_full(tmp_path, result, monkeypatch):
+def test_a_disk_that_is_full(tmp_path, mixed, monkeypatch):
     # rerun says so by a RuntimeError when its writer has stopped. What was there before stays.
     old = tmp_path / "fleet.rrd"
     old.write_bytes(b"before")
@@ -30,5 +418,88 @@ def test_a_disk_that_is_full(tmp_path, result, monkeypatch):
 
     monkeypatch.setattr(rr.RecordingStream, "flush", flush)
     with pytest.raises(OSError, match="is the disk full"):
-        lw.log_rerun(result, old)
+        lw.log_rerun(mixed, old)
     assert [path.name for path in tmp_path.iterdir()] == ["fleet.rrd"] and old.read_bytes() == b"before"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "kind", "words"),
+    [
+        ({"members": [40]}, lw.SceneError, "members = 40: is none of the 40 members; give indices from 0 to 39"),
+        ({"members": [-1]}, lw.SceneError, "members = -1: is none of the 40 members"),
+        ({"members": []}, lw.SceneError, "is no list of members"),
+        ({"members": "3"}, lw.SceneError, "is no list of members"),
+        ({"path": None}, ValueError, "give path="),
+        ({"to": "rerun+http://127.0.0.1:9/proxy"}, OSError, 'no viewer answers .*start a viewer with "rerun"'),
+        ({"to": "nowhere"}, OSError, "no viewer answers"),
+    ],
+)
+def test_bad_input_is_one_line_with_the_remedy(mixed, tmp_path, arguments, kind, words):
+    given = {"path": tmp_path / "a.rrd"} | arguments
+    with pytest.raises(kind, match=words) as caught:
+        lw.log_rerun(mixed, **given)
+    assert "\n" not in str(caught.value)
+
+
+def test_nothing_to_draw_is_said(mixed, tmp_path):
+    for result, words in (
+        (dataclasses.replace(mixed, samples={}), "no positions were kept"),
+        (bare(mixed, "attitude"), r"attitude were not kept: .* SaveAt\(fields"),
+        ({}, "there is no result"),
+    ):
+        with pytest.raises(NothingToDraw, match=words):
+            lw.log_rerun(result, tmp_path / "a.rrd")
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("exec sleep 0.5", None),
+        ("exec sleep 30", None),
+        ("echo no display >&2; exit 1", r"did not start \(no display\); the recording is .*fleet.rrd: open it"),
+        (None, "cannot be started .* the recording is"),
+    ],
+)
+def test_show_starts_a_viewer(mixed, tmp_path, monkeypatch, text, words):
+    from lgvi_warp.views import rerun as recordings
+
+    program = tmp_path / "viewer"
+    if text is not None:
+        program.write_text(f'#!/bin/sh\necho "$1" > "{tmp_path}/opened"\n{text}\n')
+        program.chmod(0o755)
+    monkeypatch.setattr(recordings, "_program", lambda: program)
+    monkeypatch.setattr(recordings, "STARTED", 0.7)
+    monkeypatch.setattr(recordings.tempfile, "mkdtemp", lambda prefix: str(tmp_path))
+    if words is None:
+        lw.show(mixed, members=[3])
+        opened = Path((tmp_path / "opened").read_text().strip())
+        assert "1 of 40 drawn" in text_of(opened, "/run/summary")
+    else:
+        with pytest.raises(OSError, match=words):
+            lw.show(mixed)
+
+
+def test_no_viewer_is_loaded_before_it_is_needed():
+    text = "import sys, lgvi_warp as lw; lw.shown, lw.log_rerun, lw.show; print('rerun' in sys.modules)"
+    said = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
+    assert said.stdout == "False\n"
+
+
+def test_2000_members_take_no_second(tmp_path):
+    large = fleet(2000, 200)
+    lw.log_rerun(fleet(3, 5), tmp_path / "warm.rrd")
+    costs = []
+    for _ in range(2):
+        begun = time.process_time()
+        path = lw.log_rerun(large, tmp_path / "large.rrd")
+        costs.append(time.process_time() - begun)
+    assert min(costs) < 1.0 and path.stat().st_size < 8e6
+
+
+@pytest.mark.slow
+def test_100000_members_take_5_seconds(tmp_path):
+    large = fleet(100_000, 200)
+    begun = time.process_time()
+    path = lw.log_rerun(large, tmp_path / "large.rrd")
+    assert time.process_time() - begun < 5.0 and path.stat().st_size < 15e6

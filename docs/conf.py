@@ -1,0 +1,86 @@
+"""The documentation site: `make docs` builds it, without network, from the Markdown pages and the docstrings."""
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+from sphinx import addnodes
+from sphinx.application import Sphinx
+
+DOCS = Path(__file__).parent
+sys.path[:0] = [str(DOCS), str(DOCS.parent), str(DOCS.parent / "kernels")]
+
+from site_parts import pages  # noqa: E402
+
+import lgvi_warp as lw  # noqa: E402
+
+project = "lgvi_warp"
+version = release = lw.__version__
+extensions = ["myst_parser", "sphinx.ext.autodoc"]
+exclude_patterns = ["index.md"]
+html_theme = "furo"
+html_title = f"lgvi_warp {release}"
+html_show_sphinx = html_show_copyright = False
+html_copy_source = False
+add_module_names = False
+autodoc_typehints = "none"
+autodoc_member_order = "bysource"
+maximum_signature_line_length = 100
+myst_heading_anchors = 4
+highlight_language = "none"
+smartquotes = False
+
+# Page -> the pages below it: Markdown pages have no table of contents of their own.
+BELOW = {
+    "guide/terms/README": [f"/guide/terms/{page.stem}" for page in sorted(DOCS.glob("guide/terms/[a-z]*.md"))],
+    "reference/api": [f"/reference/built/{pages.slug(title)}" for title in pages.groups()],
+}
+
+
+def fit_to_site(app: Sphinx, name: str, content: list[str]) -> None:
+    """Append the table of contents of a page that has pages below it, and link to the site's copy of the changelog."""
+    content[0] = content[0].replace("](../../CHANGELOG.md)", "](../reference/built/changelog.md)")
+    if name in BELOW:
+        content[0] += "\n\n```{toctree}\n:hidden:\n\n" + "\n".join(BELOW[name]) + "\n```\n"
+
+
+def document(app: Sphinx, what: str, name: str, subject: Any, options: Any, lines: list[str]) -> None:
+    """Put the types and defaults of parameters into a docstring."""
+    lines[:] = pages.fields(subject, "\n".join(lines))
+
+
+def shorten(
+    app: Sphinx, what: str, name: str, subject: Any, options: Any, signature: str | None, result: str | None
+) -> Any:
+    """Leave out of a signature what a call of the class makes anew; the list of parameters has it."""
+    return (signature.replace("<factory>", "..."), result) if signature else None
+
+
+def link_public_names(app: Sphinx, tree: nodes.document) -> None:
+    """Let each `lw.Name` of the text lead to its entry in the reference."""
+    for literal in list(tree.findall(nodes.literal)):
+        found = re.match(r"lw\.((?:(?:uq|gym|notation)\.)?\w+)", literal.astext())
+        if found and not isinstance(literal.parent, nodes.reference | nodes.title | addnodes.pending_xref):
+            target = {"refdomain": "py", "reftype": "obj", "reftarget": f"lgvi_warp.{found[1]}"}
+            link = addnodes.pending_xref("", refdoc=app.env.docname, refexplicit=True, **target)
+            literal.replace_self(link)
+            link += literal
+
+
+def use_dashes(app: Sphinx, tree: nodes.document) -> None:
+    """Put a dash between a parameter and its text, where Sphinx writes two hyphens."""
+    for text in list(tree.findall(nodes.Text)):
+        if text == " -- ":
+            text.parent.replace(text, nodes.Text(" \N{EN DASH} "))
+
+
+def setup(app: Sphinx) -> None:
+    """Write the reference, then build."""
+    pages.write(DOCS / "reference" / "built")
+    app.connect("source-read", fit_to_site)
+    app.connect("autodoc-process-docstring", document)
+    app.connect("autodoc-process-signature", shorten)
+    app.connect("doctree-read", link_public_names)
+    app.connect("doctree-read", use_dashes)

@@ -1,0 +1,152 @@
+"""The results of verbs as tables for JSON; docs/reference/json.md states their keys."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from lgvi_warp.cli.writing import Written
+
+
+def of_settings(provenance: dict[str, Any]) -> dict[str, Any]:
+    """How a run was computed.
+
+    Args:
+        provenance: That of the run.
+
+    Returns:
+        Method, precision, step, number of steps and end of the run [s], seed, versions and machine.
+    """
+    names = ("dtype", "step", "steps", "versions", "machine")
+    method, duration = provenance["method"], provenance["step"] * provenance["steps"]
+    content = {"method": method["name"], "chosen": method.get("chosen"), "duration": duration}
+    return content | {"seed": provenance["ensemble"].get("seed")} | {name: provenance[name] for name in names}
+
+
+def of_result(result: Any) -> dict[str, Any]:
+    """What became of the members of a run.
+
+    Args:
+        result: Its result.
+
+    Returns:
+        Members by outcome and by warning, messages, statistics at the end of the run, and how it was computed.
+    """
+    divided = result.substeps > 0
+    return {
+        "members": result.members,
+        "settings": of_settings(result.provenance),
+        "outcomes": result.status.counts(),
+        "failed": int(result.status.failed.sum()),
+        "stopped": int(result.status.stopped.sum()),
+        "warnings": result.warnings.counts(),
+        "divided": {"members": int(divided.sum()), "steps": int(result.substeps.sum())},
+        "samples": {"times": len(result.time), "fields": list(result.samples), "kept": len(result.kept_members)},
+        "messages": list(result.messages),
+        "statistics": of_statistics(result.statistics),
+    }
+
+
+def of_statistics(estimates: Any) -> list[dict[str, Any]]:
+    """The estimates of a run at its last sample time.
+
+    Args:
+        estimates: The estimates.
+
+    Returns:
+        A table for each number: label, unit, value, ends of its interval, and number of members behind it.
+    """
+    from lgvi_warp.statistics.table import entries
+
+    return [dict(zip(("label", "unit", "value", "lower", "upper", "members"), entry, strict=True))
+            for entry in entries(estimates)]  # fmt: skip
+
+
+def of_energy(drawn: Any, members: int) -> dict[str, Any] | None:
+    """The drift of what the motion conserves, and the change of energy.
+
+    Args:
+        drawn: The members that it is taken of, as a result; None for none.
+        members: Number of members of the run.
+
+    Returns:
+        Largest change of each quantity over members and samples, the quantities that are conserved, and what does work.
+    """
+    from lgvi_warp.physics import energy as invariants
+
+    if drawn is None:
+        return None
+    drift = invariants.drift(drawn)
+    return {
+        "change": drift,
+        "conserved": sorted(invariants.conserved(drawn)),
+        "at_work": list(invariants.at_work(drawn)),
+        "members": drawn.members,
+        "all": drawn.members == members,
+    }
+
+
+def of_run(result: Any, drawn: Any, written: Written, faults: Sequence[str], seconds: float) -> dict[str, Any]:
+    """A run, as the verbs run and resume print it.
+
+    Args:
+        result: Its result.
+        drawn: The members of the pictures, as a result; None for none.
+        written: The files.
+        faults: One text for each file, check or member that failed.
+        seconds: Time that the verb took [s].
+
+    Returns:
+        The document without its head.
+    """
+    rate = result.members * result.provenance["steps"] / result.run_seconds if result.run_seconds else None
+    return of_result(result) | {
+        "energy": of_energy(drawn, result.members) if result.samples else None,
+        "seconds": {"compile": result.compile_seconds, "run": result.run_seconds, "all": seconds},
+        "vehicle_steps_per_second": rate,
+        **of_files(written, faults),
+    }
+
+
+def of_files(written: Written, faults: Sequence[str] = ()) -> dict[str, Any]:
+    """The files of a verb.
+
+    Args:
+        written: The files, and what failed.
+        faults: Other faults; default none.
+
+    Returns:
+        Paths, faults and notes.
+    """
+    return {
+        "files": [Path(path) for path in written.files],
+        "faults": [*written.faults, *faults],
+        "notes": [*written.empty, *written.note_lines()],
+    }
+
+
+def of_prediction(prediction: Any) -> dict[str, Any]:
+    """A prediction of a run.
+
+    Args:
+        prediction: The prediction.
+
+    Returns:
+        Its numbers by name.
+    """
+    return {**vars(prediction), "seconds": prediction.seconds}
+
+
+def of_store(contents: dict[str, Any]) -> dict[str, Any]:
+    """What a store holds.
+
+    Args:
+        contents: As runs.store.state has it.
+
+    Returns:
+        The same, with how it was computed in place of the provenance.
+    """
+    return {name: value for name, value in contents.items() if name != "provenance"} | {
+        "settings": of_settings(contents["provenance"])
+    }

@@ -1,0 +1,189 @@
+"""What lies in a folder that a verb wrote: for info, and for pictures that are drawn again."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from lgvi_warp.cli import documents
+from lgvi_warp.cli.output import tell
+from lgvi_warp.cli.report import controller_lines, file_line, how_lines, members_line, shown_members, summary
+from lgvi_warp.common.errors import SceneError
+
+# Endings of what verbs write beside the numbers.
+OTHERS = (".png", ".rrd", ".html", ".csv", ".txt", ".nc", ".parquet")
+# Most lines on damage.
+MOST_SAID = 20
+
+
+@dataclass(frozen=True)
+class Content:
+    """Numbers in a folder.
+
+    Args:
+        kind: "store", "result", "tradeoff", "sensitivity", "stability" or "sweep".
+        path: The file, or the store.
+    """
+
+    kind: str
+    path: Path
+
+    def load(self) -> Any:
+        """Read the numbers.
+
+        Returns:
+            A result, or what a study found; of a sweep the content of its file.
+
+        Raises:
+            SceneError: The file is damaged.
+            OSError: It cannot be read.
+        """
+        from lgvi_warp.studies.files import understood
+
+        if self.kind == "store":
+            from lgvi_warp.runs.store.open import open_run
+
+            return open_run(self.path)
+        if self.kind == "result":
+            from lgvi_warp.runs.result import Result
+
+            return Result.load(self.path)
+        with understood(self.path):
+            if self.kind == "sweep":
+                return json.loads(self.path.read_text(encoding="utf-8"))
+            return _study(self.kind).load(self.path)
+
+
+def _study(kind: str) -> Any:
+    """The class of what a study found."""
+    if kind == "tradeoff":
+        from lgvi_warp.studies.tradeoff import Tradeoff
+
+        return Tradeoff
+    if kind == "sensitivity":
+        from lgvi_warp.studies.sensitivity import Indices
+
+        return Indices
+    from lgvi_warp.studies.stability.map import StabilityMap
+
+    return StabilityMap
+
+
+def contents(folder: Path) -> list[Content]:
+    """Look for numbers in a folder.
+
+    Args:
+        folder: A folder that a verb wrote, or a store.
+
+    Returns:
+        What is there; a store is the last.
+
+    Raises:
+        SceneError: The folder holds nothing that a verb wrote.
+    """
+    patterns = {"result": "result*.npz", "tradeoff": "tradeoff.json", "sensitivity": "sensitivity.json",
+                "stability": "stability*.json", "sweep": "sweep.json"}  # fmt: skip
+    found: list[Content] = []
+    if folder.suffix != ".zarr" and folder.is_dir():
+        found = [Content(kind, path) for kind, pattern in patterns.items() for path in sorted(folder.glob(pattern))]
+        stores = list(folder.glob("*.zarr"))
+        if not found and not stores:
+            raise SceneError([f"{folder}: holds nothing that a verb wrote; give the folder of a run or of a study"])
+        if not stores:
+            return found
+    from lgvi_warp.runs.store.open import folder_of
+
+    return [*found, Content("store", folder_of(folder))]
+
+
+def info_of_folder(chosen: argparse.Namespace) -> int:
+    """Print what a folder holds, and what is damaged of it.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 0 if everything is complete and undamaged, otherwise 1.
+
+    Raises:
+        SceneError: The folder holds nothing that a verb wrote, or what it holds is damaged.
+    """
+    parts = [_part(content, chosen) for content in contents(chosen.dir)]
+    others = [path for path in sorted(chosen.dir.glob("*")) if path.suffix in OTHERS and chosen.dir.suffix != ".zarr"]
+    whole = all(document.get("complete", True) for document, _ in parts)
+    tell(
+        chosen,
+        lambda: {"path": chosen.dir, "complete": whole, "holds": [document for document, _ in parts], "files": others},
+        lambda: "\n".join([*(text() for _, text in parts), *map(file_line, others)]),
+    )
+    return 0 if whole else 1
+
+
+def _part(content: Content, chosen: argparse.Namespace) -> tuple[dict[str, Any], Callable[[], str]]:
+    """The document on one content of a folder, and its text."""
+    head = {"kind": content.kind, "path": content.path}
+    if content.kind == "store":
+        from lgvi_warp.runs.store.state import state
+
+        found = state(content.path)
+        return head | documents.of_store(found), lambda: "\n".join(_store_lines(found, chosen))
+    found = content.load()
+    if content.kind == "result":
+        size = file_line(content.path)
+        return head | documents.of_result(
+            found
+        ), lambda: f"{size}\n{summary(found, shown_members(found), [], verbose=chosen.verbose)}"
+    if content.kind == "sweep":
+        return head | {
+            "content": found
+        }, lambda: content.path.with_name("summary.md").read_text(encoding="utf-8").rstrip()
+    report = f"{file_line(content.path)}\n{text_of(content.kind, found)}"
+    return head | {"content": found.to_dict()}, lambda: report
+
+
+def text_of(kind: str, found: Any) -> str:
+    """Describe what a study found.
+
+    Args:
+        kind: "tradeoff", "sensitivity" or "stability".
+        found: What it found.
+
+    Returns:
+        The report of the study.
+    """
+    if kind == "tradeoff":
+        from lgvi_warp.studies.tradeoff import report_text
+
+        return report_text(found)
+    if kind == "stability":
+        from lgvi_warp.studies.stability import map as stability
+
+        return stability.report_text(found)
+    return str(found)
+
+
+def _store_lines(found: dict[str, Any], chosen: argparse.Namespace) -> Iterator[str]:
+    """What a store holds."""
+    provenance = found["provenance"]
+    yield f"run         {found['path']} ({found['bytes'] / 1e6:.1f} MB), lgvi-warp {provenance['versions']['lgvi-warp']}"
+    yield members_line(found["members"], provenance)
+    yield from controller_lines(provenance["scene"])
+    if chosen.verbose:
+        yield from how_lines(provenance)
+    fields = ", ".join(found["fields"])
+    yield f"samples     {found['samples']} times" + (f" of {fields}" if fields else ", not of all members")
+    if found["keepers"]:
+        yield f"parts       {', '.join(found['keepers'])} of each block"
+    if found["kept"]:
+        yield f"kept        {found['kept']:,} members' samples, run again"
+    end = "complete" if found["complete"] else f"not complete: lgvi-warp resume {chosen.dir}"
+    yield f"blocks      {found['finished']} of {found['blocks']} finished; {end}"
+    most = len(found["damage"]) if chosen.verbose else MOST_SAID
+    for text in found["damage"][:most]:
+        yield f"damage      {text}"
+    if (more := len(found["damage"]) - most) > 0:
+        yield f"damage      and {more:,} more files"

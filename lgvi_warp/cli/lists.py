@@ -1,0 +1,177 @@
+"""The verbs list, new and schema: what a scene file may hold."""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import json
+import tomllib
+from typing import Any
+
+from lgvi_warp.cli.output import tell
+from lgvi_warp.common import files as durable
+from lgvi_warp.common.errors import SceneError
+
+# A scene to begin with; {} are filled by `new`.
+SCENE = """# {title}
+# lgvi-warp check {file} says whether it can run and what is odd; lgvi-warp run {file} runs it.
+# SI units, angles in rad unless a key says degrees. Inertial axes: north, east, down; body axes: ahead, starboard, down.
+
+[vehicle]
+name = "{vehicle}"{pad}# lgvi-warp list vehicles; further keys replace single numbers of it, such as
+# buoyancy = {buoyancy}{pad_buoyancy}# N, the weight of the displaced water
+
+# [environment]
+# water_density = 1025.0                 # kg/m3
+
+[start]
+position = [0.0, 0.0, 50.0]              # m: north, east, depth
+euler_deg = [0.0, 0.0, 0.0]              # deg: roll, pitch, yaw
+velocity = [1.0, 0.0, 0.0]               # m/s, body axes
+angular_velocity = [0.0, 0.0, 0.0]       # rad/s, body axes
+
+# Weight and buoyancy always act{terms}.
+# An entry with the type of one of these replaces it; lgvi-warp list terms names all.
+# [[terms]]
+# type = "current"
+# velocity = [0.2, 0.0, 0.0]             # m/s: north, east, down
+
+# What stops a vehicle: surface, floor, box or time.
+[[events]]
+type = "surface"
+[[events]]
+type = "floor"
+depth = 100.0                            # m
+
+# How many vehicles, and what differs between them: any number of this file.
+[ensemble]
+members = 100
+seed = 1
+[ensemble.vary]
+"start.angular_velocity" = {{ normal = {{ std = 0.01 }} }}
+"vehicle.buoyancy" = {{ normal = {{ relative = 0.001 }} }}
+
+[run]
+duration = 60.0                          # s
+step = 0.01                              # s
+save_every = 0.5                         # s between samples
+# method = "psi_x"                       # lgvi-warp list methods; without one it is chosen by what acts
+
+# What is computed over the vehicles at each sample time, with intervals.
+[[run.statistics]]
+type = "mean"
+of = "depth"
+"""
+# Column of the comments.
+COLUMN = 41
+
+
+def new(chosen: argparse.Namespace) -> int:
+    """Run the verb new: write a scene file with comments.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 0.
+
+    Raises:
+        SceneError: The file is there already, or no vehicle has that name.
+    """
+    from lgvi_warp.scene.vehicles.fossen import vehicle_file
+
+    content = tomllib.loads(vehicle_file(chosen.vehicle).read_text(encoding="utf-8"))
+    if chosen.scene.exists():
+        raise SceneError([f"{chosen.scene}: is there already; give another name, or remove it"])
+    types = [term["type"] for term in content.get("terms", ())]
+    name, buoyancy = chosen.vehicle, f"{content['vehicle'].get('buoyancy', 0.0):g}"
+    text = SCENE.format(
+        title=content["source"]["title"], file=chosen.scene.name, vehicle=name,
+        pad=" " * (COLUMN - len(f'name = "{name}"')), buoyancy=buoyancy,
+        pad_buoyancy=" " * (COLUMN - len(f"# buoyancy = {buoyancy}")),
+        terms=f", and of this vehicle: {', '.join(types)}" if types else "",
+    )  # fmt: skip
+    chosen.scene.parent.mkdir(parents=True, exist_ok=True)
+    with durable.placed(chosen.scene) as beside:
+        beside.write_text(text, encoding="utf-8")
+    tell(chosen, lambda: {"file": chosen.scene, "vehicle": name},
+         lambda: f"file        {chosen.scene}\nnext        lgvi-warp check {chosen.scene}")  # fmt: skip
+    return 0
+
+
+def list_names(chosen: argparse.Namespace) -> int:
+    """Run the verb list: names of methods, vehicles, terms, or parts of a controller.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 0.
+    """
+    entries = {"methods": _methods, "vehicles": _vehicles, "terms": _terms, "laws": _laws}[chosen.of]()
+    width = max(map(len, entries))
+    tell(chosen, lambda: {"of": chosen.of, "names": [{"name": name, "text": text} for name, text in entries.items()]},
+         lambda: "\n".join(f"{name:<{width}}  {text}" for name, text in entries.items()))  # fmt: skip
+    return 0
+
+
+def _methods() -> dict[str, str]:
+    """Method -> its order and kind."""
+    from lgvi_warp.methods import method as methods
+
+    kinds = dict.fromkeys(methods.PROGRAMS, "splitting") | dict.fromkeys(
+        methods.TWO_PART, "two parts, for weight alone"
+    )
+    kinds |= dict.fromkeys(methods.GAUSS, "Gauss collocation") | dict.fromkeys(methods.RUNGE_KUTTA, "explicit")
+    for name, (_, stages) in methods.COMPOSITIONS.items():
+        kinds[f"{name}(psi_x)"] = (
+            f"composition of {len(stages)} stages, of psi_x or another symmetric method of order 2"
+        )
+    kinds |= {f"{name}(psi_x)": "composition of the halves of psi_x or another such method" for name in methods.HALVES}
+    return {name: f"order {methods.Method(name).order}, {kind}" for name, kind in kinds.items()}
+
+
+def _vehicles() -> dict[str, str]:
+    """Vehicle -> its title."""
+    from lgvi_warp.scene.vehicles.fossen import vehicle_file, vehicles
+
+    titles = (tomllib.loads(vehicle_file(name).read_text(encoding="utf-8"))["source"]["title"] for name in vehicles())
+    return dict(zip(vehicles(), titles, strict=True))
+
+
+def _terms() -> dict[str, str]:
+    """Type of a term -> what it is."""
+    from lgvi_warp.physics import terms
+
+    implied = {term.type for term in terms.IMPLIED}
+    return {word: _summary(kind) for word, kind in sorted(terms.TYPES.items()) if word not in implied}
+
+
+def _laws() -> dict[str, str]:
+    """Type of a part of a controller -> its list in the scene file, and what it is."""
+    from lgvi_warp.physics.control.base import SECTIONS
+    from lgvi_warp.physics.control.controller import Controller  # noqa: F401  (which makes every part known)
+
+    sections = ("laws", *(section for section in SECTIONS if section != "laws"))
+    kinds = ((section, word, kind) for section in sections for word, kind in sorted(SECTIONS[section].kinds.items()))
+    return {word: f"{section}: {_summary(kind)}" for section, word, kind in kinds}
+
+
+def _summary(kind: Any) -> str:
+    """First line of a class's docstring."""
+    return (inspect.getdoc(kind) or "").partition("\n")[0]
+
+
+def schema(chosen: argparse.Namespace) -> int:
+    """Run the verb schema: print the JSON schema of scene files.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 0.
+    """
+    from lgvi_warp.scene.schema import schema as of_scenes
+
+    print(json.dumps(of_scenes(), indent=1, allow_nan=False))
+    return 0

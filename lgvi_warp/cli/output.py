@@ -1,0 +1,114 @@
+"""What verbs print: text in colors, or one JSON document."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+from lgvi_warp import __version__
+from lgvi_warp.studies.files import finite_or_none
+
+BOLD, RED, YELLOW = "1", "31", "33"
+# Labels of lines that are not bold alone.
+COLORS = {"note": YELLOW, "warnings": YELLOW, "kept": BOLD, "damage": RED}
+
+
+def colored(stream: TextIO) -> bool:
+    """Tell whether colors are wanted.
+
+    Args:
+        stream: Where they would go; its `color` is "always", "never", or "auto", which holds where it has none.
+
+    Returns:
+        With "auto" True on a terminal, unless NO_COLOR is set or TERM is "dumb" (https://no-color.org).
+    """
+    choice: str = getattr(stream, "color", "auto")
+    if choice != "auto":
+        return choice == "always"
+    return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
+def painted(text: str, color: str) -> str:
+    """Wrap a text in the codes of a color.
+
+    Args:
+        text: The text.
+        color: Code of the color.
+
+    Returns:
+        The text between the color and its end.
+    """
+    return f"\x1b[{color}m{text}\x1b[0m"
+
+
+def say(chosen: argparse.Namespace, text: str) -> None:
+    """Print a text on stdout, its labels in colors, unless it is not wanted.
+
+    Args:
+        chosen: The command's parsed arguments.
+        text: Lines, most of which begin with a label and two blanks.
+    """
+    if chosen.quiet or chosen.json or not text:
+        return
+    if colored(sys.stdout):
+        text = re.sub(r"^[a-z]\w*(?=  )", lambda label: painted(label[0], COLORS.get(label[0], BOLD)), text, flags=re.M)
+    print(text, flush=True)
+
+
+def tell(chosen: argparse.Namespace, document: Callable[[], dict[str, Any]], text: Callable[[], str]) -> None:
+    """Print the results of a verb: a text, or one JSON document.
+
+    Args:
+        chosen: The command's parsed arguments.
+        document: Makes the document without its head.
+        text: Makes the text.
+    """
+    if chosen.json:
+        head = {"verb": chosen.verb, "version": __version__}
+        print(json.dumps(plain(head | document()), indent=1, allow_nan=False), flush=True)
+    elif not chosen.quiet:
+        say(chosen, text())
+
+
+def plain(value: Any) -> Any:
+    """Turn a value into what JSON holds.
+
+    Args:
+        value: Numbers, texts, paths, and nested tables, lists and arrays of them.
+
+    Returns:
+        The same in plain types; numbers that are not finite are None.
+    """
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return finite_or_none(value)
+
+
+def print_faults(faults: Iterable[str]) -> list[str]:
+    """Print faults on stderr.
+
+    Args:
+        faults: One text per fault.
+
+    Returns:
+        The same faults.
+    """
+    faults = list(faults)
+    name = painted("lgvi-warp:", RED) if colored(sys.stderr) else "lgvi-warp:"
+    for fault in faults:
+        print(f"{name} {fault}", file=sys.stderr)
+    return faults

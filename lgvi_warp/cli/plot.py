@@ -1,0 +1,65 @@
+"""The verb plot: draw the pictures of a folder again."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from lgvi_warp.cli import documents
+from lgvi_warp.cli.folders import Content, contents
+from lgvi_warp.cli.output import print_faults, tell
+from lgvi_warp.cli.progress import shown
+from lgvi_warp.cli.report import file_line, pictures, shown_members
+from lgvi_warp.cli.settings import writable
+from lgvi_warp.cli.writing import Written
+
+
+def plot(chosen: argparse.Namespace) -> int:
+    """Run the verb plot: draw the pictures of a run or of studies from their numbers.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 1 if a picture failed, otherwise 0.
+
+    Raises:
+        SceneError: The folder holds no numbers, or damaged ones.
+        OSError: The folder for the pictures cannot be written.
+    """
+    found = contents(chosen.dir)
+    home = chosen.dir.parent if chosen.dir.suffix == ".zarr" else chosen.dir
+    out = writable(chosen.out or home)
+    written = Written()
+    with shown(chosen.quiet, "drawing"):
+        for content in found:
+            _draw(content, written, out)
+    tell(chosen, lambda: documents.of_files(written),
+         lambda: "\n".join([*written.note_lines(), *map(file_line, written.files)]))  # fmt: skip
+    print_faults(written.empty)
+    return 1 if print_faults(written.faults) else 0
+
+
+def _draw(content: Content, written: Written, out: Path) -> None:
+    """Draw the pictures of one content of a folder."""
+    numbers: Any = content.load()
+    if content.kind in ("store", "result"):
+        for name, draw in pictures(numbers, shown_members(numbers)).items():
+            written.take(out / name, partial(draw, out / name))
+        return
+    if content.kind == "sweep":
+        written.empty.append(
+            f"{content.path}: its pictures are drawn again by the same lgvi-warp sweep, which runs nothing twice"
+        )
+        return
+    from lgvi_warp.views import plots, sensitivity
+
+    drawings: dict[str, Callable[[Any, Path], Path]] = {
+        "tradeoff": plots.plot_tradeoff,
+        "stability": plots.plot_stability,
+        "sensitivity": sensitivity.plot_sensitivity,
+    }
+    written.draw(drawings[content.kind], numbers, out / content.path.with_suffix(".png").name)

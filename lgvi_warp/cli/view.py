@@ -1,0 +1,82 @@
+"""The verb view: look at a run that is there."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from lgvi_warp.cli.folders import Content, contents
+from lgvi_warp.cli.output import tell
+from lgvi_warp.cli.progress import shown
+from lgvi_warp.cli.report import file_line
+from lgvi_warp.common.errors import MissingExtra, NothingToDraw, SceneError
+
+
+def view(chosen: argparse.Namespace) -> int:
+    """Run the verb view: open a run in the rerun viewer, or write its recording.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 0.
+
+    Raises:
+        SceneError: There is no run, no such member, or nothing to draw.
+        OSError: The viewer cannot be started, or the file cannot be written.
+    """
+    members, result = indices(chosen.members), run_in(chosen.dir)
+    from lgvi_warp.views.rerun import log_rerun, show
+
+    try:
+        with shown(chosen.quiet, "drawing"):
+            if chosen.out is None:
+                show(result, members=members)
+            else:
+                log_rerun(result, chosen.out, members=members)
+    except (MissingExtra, NothingToDraw) as error:
+        raise SceneError([str(error)]) from None
+    files = [] if chosen.out is None else [chosen.out]
+    tell(chosen, lambda: {"files": files}, lambda: "\n".join(map(file_line, files)))
+    return 0
+
+
+def run_in(path: Path) -> Any:
+    """Read the run at a path.
+
+    Args:
+        path: A result.npz, a store, or a folder with one of these.
+
+    Returns:
+        Its result.
+
+    Raises:
+        SceneError: There is none, or it is damaged.
+        OSError: It cannot be read.
+    """
+    found = [Content("result", path)] if path.suffix == ".npz" else contents(path)
+    runs = [content for content in found if content.kind in ("result", "store")]
+    if not runs:
+        raise SceneError([f"{path}: holds a study, and no run; give the folder of a run"])
+    return runs[-1].load()
+
+
+def indices(text: str | None) -> list[int] | None:
+    """Read the indices of members.
+
+    Args:
+        text: Numbers with commas, as "3,17"; None for none.
+
+    Returns:
+        The indices; None for none.
+
+    Raises:
+        SceneError: The text is no list of indices.
+    """
+    if text is None:
+        return None
+    words = [word.strip() for word in text.split(",")]
+    if not all(word.isdigit() for word in words):
+        raise SceneError([f"--members {text}: is no list of members; write --members 3,17"])
+    return [int(word) for word in words]

@@ -1,0 +1,172 @@
+"""Show how far a long call is: in place on a terminal and in a notebook, elsewhere a line every ten seconds."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, ParamSpec, TextIO, TypeVar
+
+from lgvi_warp.common.errors import refusal
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+# Characters of the bar on a terminal.
+BAR = 24
+# Time between two looks at what takes long [s].
+TICK = 1.0
+
+
+class Progress:
+    """Shows what is done now, the fraction done and the time left: in place on a terminal, elsewhere a line every ten seconds.
+
+    Args:
+        stream: Where to write.
+        phase: What is done until the first fraction above 0; default "compiling".
+        in_place: Whether to write over the line before; default None: on a terminal.
+    """
+
+    def __init__(self, stream: TextIO, phase: str = "compiling", in_place: bool | None = None):
+        self._stream, self._phase = stream, phase
+        self._in_place = stream.isatty() if in_place is None else in_place
+        self._interval = 0.1 if self._in_place else 10.0
+        self._start = self._last = time.perf_counter()
+        # The first fraction above 0, from which on the time left is reckoned.
+        self._first = self._fraction = 0.0
+        self._length = 0
+        self._lock, self._closed = threading.Lock(), threading.Event()
+        if self._in_place:
+            self._show(self._start)
+        threading.Thread(target=self._tick, name="progress", daemon=True).start()
+
+    def __call__(self, fraction: float) -> None:
+        """Show the fraction done, at most once per interval.
+
+        Args:
+            fraction: Part of the work that is done, 0 to 1.
+        """
+        now = time.perf_counter()
+        with self._lock:
+            if self._first == 0.0 < fraction:
+                self._phase, self._start, self._first = "running", now, fraction
+            self._fraction = fraction
+            if now - self._last >= self._interval:
+                self._show(now)
+
+    def _show(self, now: float) -> None:
+        """Write the line."""
+        self._last, seconds = now, now - self._start
+        text = f"{self._phase}, {seconds:.0f} s"
+        if self._first > 0.0:
+            done = round(BAR * self._fraction)
+            bar = f" [{'#' * done}{'.' * (BAR - done)}]" if self._in_place else ""
+            text = f"{self._phase}{bar} {self._fraction:.1%}"
+        if self._fraction > self._first:
+            left = seconds * (1.0 - self._fraction) / (self._fraction - self._first)
+            text += f", {left:.0f} s left"
+        padding = " " * (self._length - len(text))
+        self._stream.write(f"\r{text}{padding}" if self._in_place else f"{text}\n")
+        self._stream.flush()
+        self._length = len(text)
+
+    def _tick(self) -> None:
+        """Show what takes long without a fraction."""
+        while not self._closed.wait(TICK):
+            with self._lock, contextlib.suppress(OSError, ValueError):
+                now = time.perf_counter()
+                if not self._closed.is_set() and now - self._last >= self._interval:
+                    self._show(now)
+
+    def close(self) -> None:
+        """Clear the line on the terminal."""
+        self._closed.set()
+        with self._lock:
+            if self._in_place:
+                self._stream.write("\r" + " " * self._length + "\r")
+                self._stream.flush()
+
+
+class NotebookBar:
+    """A bar of tqdm in a notebook.
+
+    Args:
+        tqdm: The class of tqdm's bars.
+    """
+
+    def __init__(self, tqdm: Any):
+        self._bar = tqdm(total=1.0, desc="compiling", bar_format="{desc} {percentage:3.0f}% |{bar}| {remaining} left")
+        self._lock = threading.Lock()
+
+    def __call__(self, fraction: float) -> None:
+        """Show the fraction done.
+
+        Args:
+            fraction: Part of the work that is done, 0 to 1.
+        """
+        with self._lock:
+            if fraction > 0.0 == self._bar.n:
+                self._bar.set_description_str("running")
+            self._bar.update(fraction - self._bar.n)
+
+    def close(self) -> None:
+        """Leave the bar as it is."""
+        self._bar.close()
+
+
+def bar() -> Progress | NotebookBar:
+    """Begin to show the progress of a call: a bar of tqdm in a notebook that has it, otherwise `Progress` on stderr.
+
+    Returns:
+        What is called with fractions, and closed at the end.
+    """
+    notebook = "ipykernel" in sys.modules
+    if notebook:
+        with contextlib.suppress(ImportError):
+            from tqdm.auto import tqdm
+
+            return NotebookBar(tqdm)
+    return Progress(sys.stderr, in_place=notebook or None)
+
+
+def shows_progress(call: Callable[P, R]) -> Callable[P, R]:
+    """Let `progress=True` of a function show its progress; a decorator.
+
+    Args:
+        call: A function with the keyword `progress`, a function of the fraction that is done.
+
+    Returns:
+        The same function, which takes True (a bar on a terminal or in a notebook, lines elsewhere) and False (nothing) too.
+    """
+
+    @functools.wraps(call)
+    def wrapper(*args: P.args, **settings: P.kwargs) -> R:
+        progress = settings.get("progress")
+        if progress is not None and not isinstance(progress, bool) and not callable(progress):
+            raise refusal(
+                "progress", progress, "is no function", "give True, or a function of the fraction that is done"
+            )
+        if progress is not True:
+            return call(*args, **settings)
+        shown = bar()
+        try:
+            return call(*args, **settings | {"progress": shown})  # type: ignore[arg-type]
+        finally:
+            shown.close()
+
+    return wrapper
+
+
+def callback(progress: Callable[[float], None] | bool | None) -> Callable[[float], None] | None:
+    """The function to call with fractions, of what a function with `shows_progress` got.
+
+    Args:
+        progress: The function, False or None.
+
+    Returns:
+        The function; None for none.
+    """
+    return progress if callable(progress) else None

@@ -1,0 +1,140 @@
+"""Short texts and tables of objects, for a prompt and for notebooks."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+# Most lines of a text, most characters of a line, and most entries of an array that are written out.
+LINES, WIDTH, ENTRIES = 20, 96, 6
+
+Rows = Sequence[tuple[str, str]]
+
+
+class Summarized:
+    """An object that shows itself as a title and rows of (label, text)."""
+
+    def summary_rows(self) -> tuple[str, Rows]:
+        """Describe the object.
+
+        Returns:
+            The title, and rows of (label, text).
+        """
+        raise NotImplementedError
+
+    def summary_picture(self) -> str:
+        """Draw the object, for notebooks.
+
+        Returns:
+            SVG; "" for no picture, the default.
+        """
+        return ""
+
+    def __repr__(self) -> str:
+        title, rows = self.summary_rows()
+        rows = _fewer(rows)
+        width = max((len(label) for label, _ in rows), default=0)
+        return "\n".join([_cut(title), *(_cut(f"  {label:<{width}}  {text}") for label, text in rows)])
+
+    def _repr_html_(self) -> str:
+        title, rows = self.summary_rows()
+        cells = "".join(
+            f"<tr><th style='text-align:left'>{html.escape(label)}</th>"
+            f"<td style='text-align:left'>{html.escape(_cut(text))}</td></tr>"
+            for label, text in _fewer(rows)
+        )
+        return f"<div><b>{html.escape(_cut(title))}</b><table>{cells}</table>{self.summary_picture()}</div>"
+
+
+def _fewer(rows: Rows) -> Rows:
+    """The first rows, and how many more there are."""
+    if len(rows) < LINES:
+        return rows
+    return [*rows[: LINES - 2], ("...", f"and {len(rows) - LINES + 2:,} more")]
+
+
+def _cut(line: str) -> str:
+    """A line, cut after WIDTH characters."""
+    line = " ".join(line.splitlines())
+    return line if len(line) <= WIDTH else f"{line[: WIDTH - 3]}..."
+
+
+def listed(names: Iterable[Any], most: int = 8) -> str:
+    """List some names.
+
+    Args:
+        names: The names.
+        most: Number of names that are written out; default 8.
+
+    Returns:
+        The names with commas; "none" for none.
+    """
+    words = [str(name) for name in names]
+    more = f" and {len(words) - most:,} more" if len(words) > most else ""
+    return ", ".join(words[:most]) + more if words else "none"
+
+
+def counted(counts: dict[str, int]) -> str:
+    """Write numbers by name.
+
+    Args:
+        counts: Name -> number.
+
+    Returns:
+        "ok 12, floor 3".
+    """
+    return ", ".join(f"{name} {number:,}" for name, number in counts.items())
+
+
+def numbers(value: Any, unit: str = "") -> str:
+    """Write a number or an array.
+
+    Args:
+        value: A number, or an array of any shape.
+        unit: Its unit; default none.
+
+    Returns:
+        A few digits of each entry; of a matrix its diagonal or its shape.
+    """
+    array = np.asarray(value, dtype=np.float64)
+    after = f" {unit}" if unit not in ("", "1") else ""
+    if array.ndim == 2 and array.shape[0] == array.shape[1] and not np.any(array - np.diag(np.diag(array))):
+        return f"diagonal {numbers(np.diag(array), unit)}"
+    if array.ndim == 0:
+        return f"{array:.6g}{after}"
+    if array.ndim > 1 or array.size > ENTRIES:
+        return f"{' x '.join(map(str, array.shape))} numbers{after}"
+    return f"[{', '.join(f'{entry:.6g}' for entry in array)}]{after}"
+
+
+def curves(time: np.ndarray, values: np.ndarray, marked: np.ndarray, label: str) -> str:
+    """Draw a few curves as SVG; larger values stand lower.
+
+    Args:
+        time: Times (k,).
+        values: Values (k, n); what is not finite is left out.
+        marked: Curves in the second colour (n,).
+        label: What is drawn, with its unit and range.
+
+    Returns:
+        The SVG; "" where nothing is finite or there is one time.
+    """
+    width, height, margin = 260.0, 90.0, 6.0
+    finite = np.isfinite(values)
+    if len(time) < 2 or not finite.any():
+        return ""
+    low, high = values[finite].min(), values[finite].max()
+    x = margin + (width - 2.0 * margin) * (time - time[0]) / (time[-1] - time[0])
+    y = margin + (height - 2.0 * margin) * (values - low) / (high - low if high > low else 1.0)
+    lines = []
+    for i in range(values.shape[1]):
+        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x[finite[:, i]], y[finite[:, i], i], strict=True))
+        style = "#D55E00' stroke-dasharray='4 2" if marked[i] else "#0072B2"
+        lines.append(f"<polyline points='{points}' fill='none' stroke='{style}' stroke-width='1'/>")
+    return (
+        f"<svg width='{width:.0f}' height='{height:.0f}' style='border:1px solid #ccc'>{''.join(lines)}</svg>"
+        f"<br><small>{html.escape(f'{label}: {low:.4g} to {high:.4g}')}</small>"
+    )

@@ -1,0 +1,138 @@
+"""The scene file as a JSON schema, made of the tables that the loader uses, for editors and for other programs."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from lgvi_warp.physics import terms
+from lgvi_warp.physics.control.base import SECTIONS as LISTS
+from lgvi_warp.physics.control.controller import Controller
+from lgvi_warp.physics.fields import TABLE
+from lgvi_warp.physics.terms import events
+from lgvi_warp.physics.terms.base import Term, word_of
+from lgvi_warp.physics.vehicle import Vehicle
+from lgvi_warp.sampling.designs import KINDS as SAMPLINGS
+from lgvi_warp.sampling.distributions.named import KINDS as DISTRIBUTIONS
+from lgvi_warp.sampling.distributions.named import SCIPY, ScipyDistribution, UserDistribution
+from lgvi_warp.scene.scene import SECTIONS
+from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
+from lgvi_warp.scene.start import Environment, Start
+from lgvi_warp.scene.vehicles.fossen import vehicles
+from lgvi_warp.statistics import TYPES as STATISTICS
+from lgvi_warp.statistics.until import Until
+
+Schema = dict[str, Any]
+
+# Annotation of a field -> type in JSON. Any other annotation allows everything.
+WORDS = {"float": "number", "int": "integer", "str": "string", "bool": "boolean"}
+
+
+def schema() -> Schema:
+    """Describe scene files.
+
+    Returns:
+        A JSON schema (draft 2020-12) of the tables of a scene file; terms that were registered are in it.
+    """
+    own_terms = {word: kind for word, kind in terms.TYPES.items() if word not in {term.type for term in terms.IMPLIED}}
+    vary = {word: _table(kind) for word, kind in DISTRIBUTIONS.items() if word != UserDistribution.kind}
+    vary |= {word: {"type": "object"} for word in (*SCIPY, ScipyDistribution.kind)}
+    samplings = {word: _table(kind) if word != "grid" else {"type": "object"} for word, kind in SAMPLINGS.items()}
+    run = {"statistics": _list(STATISTICS), "until": _table(Until)}
+    ensemble: dict[str, Schema] = {
+        "vary": {"type": "object", "additionalProperties": _alone(vary)},
+        "sampling": {"anyOf": [{"enum": sorted(samplings)}, _alone(samplings)]},
+        "indices": _numbers(("k",), {"type": "integer", "minimum": 0}),
+    }
+    start = {name: _numbers(TABLE[name].shape) for name in (item.name for item in dataclasses.fields(Start))}
+    lists = {section: _list(base.kinds, {"faults": "fault"}.get(section)) for section, base in LISTS.items()}
+    sections = {
+        "vehicle": _table(Vehicle, {"name": {"enum": vehicles()}}),
+        "environment": _table(Environment),
+        "start": _table(Start, start),
+        "ensemble": _table(EnsembleSettings, ensemble),
+        "run": _table(RunSettings, run),
+        "terms": _list(own_terms),
+        "events": _list(events.TYPES),
+        "controller": _table(Controller, {"delay": {"type": "number", "minimum": 0}} | lists),
+        "source": {"type": "object"},
+    }
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Scene file of lgvi-warp",
+        "type": "object",
+        "required": ["vehicle"],
+        "additionalProperties": False,
+        "properties": {name: sections[name] for name in SECTIONS},
+    }
+
+
+def _alone(kinds: Mapping[str, Schema]) -> Schema:
+    """A table with one key, the kind."""
+    return {"type": "object", "properties": dict(kinds), "additionalProperties": False, "minProperties": 1,
+            "maxProperties": 1}  # fmt: skip
+
+
+def _list(kinds: Mapping[str, Any], default: str | None = None) -> Schema:
+    """A list of tables, each with its type; default: the type of a table without one."""
+    able = {
+        word: kind for word, kind in kinds.items() if not any("Callable" in str(item.type) for item in _fields(kind))
+    }
+    entries = [
+        _table(kind, {"type": {"const": word}}, () if word == default else ("type",)) for word, kind in able.items()
+    ]
+    return {"type": "array", "items": {"anyOf": entries}}
+
+
+def _fields(kind: Any) -> list[dataclasses.Field[Any]]:
+    """The fields of a class that a file may give."""
+    return [item for item in dataclasses.fields(kind) if item.init]
+
+
+def _table(kind: Any, known: Mapping[str, Schema] | None = None, required: Iterable[str] = ()) -> Schema:
+    """A table with the fields of a class, some of which are known."""
+    texts, known = _meanings(kind), known or {}
+    content: dict[str, Schema] = {name: dict(item) for name, item in known.items()}
+    for item in _fields(kind):
+        name = word_of(item)
+        described = known.get(name) or _value(kind, item)
+        content[name] = described | ({"description": texts[item.name]} if item.name in texts else {})
+    missing = (dataclasses.MISSING, dataclasses.MISSING)
+    needed = [word_of(item) for item in _fields(kind) if (item.default, item.default_factory) == missing]
+    return {"type": "object", "properties": content, "required": [*required, *needed], "additionalProperties": False}
+
+
+def _value(kind: Any, item: dataclasses.Field[Any]) -> Schema:
+    """The value of a field."""
+    if "shape" in item.metadata:
+        bounds = {"minimum": item.metadata["least"], "maximum": item.metadata["most"],
+                  "exclusiveMinimum": item.metadata["above"]}  # fmt: skip
+        number = {"type": "number"} | {name: bound for name, bound in bounds.items() if math.isfinite(bound)}
+        # Where an object has shapes of its own, one number may stand for several.
+        fixed = kind.shape_of is Term.shape_of
+        return _numbers(tuple(size if fixed else "k" for size in item.metadata["shape"]), number)
+    words = str(item.type).replace(" | None", "").split(" | ")
+    if all(word in WORDS for word in words):
+        return {"type": [WORDS[word] for word in words] if len(words) > 1 else WORDS[words[0]]}
+    return {"type": "array"} if words[0].startswith("Sequence") else {}
+
+
+def _numbers(shape: tuple[Any, ...], number: Schema | None = None) -> Schema:
+    """Nested lists of this shape; where a size is a word, a list or one number for all."""
+    number = number or {"type": "number"}
+    if not shape:
+        return number
+    items = {"type": "array", "items": _numbers(shape[1:], number)}
+    if isinstance(shape[0], int):
+        return items | {"minItems": shape[0], "maxItems": shape[0]}
+    return {"anyOf": [number, items | {"minItems": 1}]}
+
+
+def _meanings(kind: Any) -> dict[str, str]:
+    """What the fields of a class mean, by name, from its docstring."""
+    _, _, arguments = (kind.__doc__ or "").partition("Args:\n")
+    found = re.findall(r"^        (\w+): (.*(?:\n {12}.*)*)", arguments.partition("\n\n")[0], re.MULTILINE)
+    return {name: " ".join(text.split()) for name, text in found}

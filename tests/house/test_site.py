@@ -1,0 +1,198 @@
+"""The site: its reference has every public name with each parameter, its pages are whole, its links lead somewhere."""
+
+import dataclasses
+import functools
+import html.parser
+import inspect
+import os
+import re
+import subprocess
+import sys
+import urllib.parse
+from pathlib import Path
+
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.cli.command import VERBS
+from lgvi_warp.physics.terms.base import word_of
+from lgvi_warp.scene.scene import SECTIONS
+from tests.conftest import ROOT
+
+sys.path.append(str(ROOT / "docs"))
+
+from site_parts import documented, pages
+
+NAMES = [name for names in pages.groups().values() for name in names]
+
+
+def undescribed(path, subject):
+    """Parameters of a class or function, and of its public methods, that no docstring describes."""
+    faults = [f"{path}: {item.name}" for item in documented.parameters(subject) if not item.text]
+    for name in documented.methods(subject) if inspect.isclass(subject) else ():
+        method = getattr(subject, name)
+        if inspect.isfunction(method) or inspect.ismethod(method):
+            faults += undescribed(f"{path}.{name}", method)
+    return faults
+
+
+class Base:
+    """A class.
+
+    Args:
+        told: The inherited one,
+            in two lines.
+    """
+
+    def __init__(self, told: int, silent: float = 1.0):
+        pass
+
+
+class Heir(Base):
+    """Another.
+
+    Args:
+        a, b: Two [m].
+        told: As of `Base`; and more.
+
+    Returns:
+        silent: no parameter.
+    """
+
+    def __init__(self, told: int, silent: float, a=(), *, b: "lw.Scene | None" = None):
+        pass
+
+    def method(self, x, *rest):
+        """Does something.
+
+        Args:
+            x: Any.
+        """
+
+
+def test_the_check_sees_what_is_not_described():
+    assert undescribed("Heir", Heir) == ["Heir: silent", "Heir.method: rest"]
+    told, _, a, b = documented.parameters(Heir)
+    assert told.text == "The inherited one, in two lines; and more." and told.note == "int; required"
+    assert (
+        (a.text, b.text) == ("Two [m].",) * 2 and a.note == "default ()" and b.note == "lw.Scene | None; default None"
+    )
+
+
+@pytest.mark.parametrize("name", sorted(lw.__all__))
+def test_each_parameter_is_described(name):
+    assert name in NAMES, f"lw.{name} has no row in docs/reference/api.md"
+    subject = getattr(lw, name)
+    if inspect.ismodule(subject):
+        faults = [fault for inner in pages.in_module(subject) for fault in undescribed(inner, getattr(subject, inner))]
+    else:
+        faults = undescribed(name, subject)
+    assert not faults
+
+
+def test_numbers_have_shape_and_unit():
+    notes = {item.name: item.note for item in documented.parameters(lw.Thrusters)}
+    assert notes["position"] == "numbers, shape (n, 3) [m]; required"
+    assert {item.name: item.note for item in documented.parameters(lw.Tether)}[
+        "rest_length"
+    ] == "number [m]; default 0.0"
+
+
+def test_text_is_shown_as_it_stands():
+    assert pages.escaped("* |v| of `x`s, a*b, lambda_\n  * c") == "* \\|v\\| of \\ ``x``\\ s, a\\*b, lambda\\_\n  * c"
+    assert pages.linked("Scene | Scenes") == "\\ :py:obj:`Scene <lgvi_warp.Scene>`\\  \\| Scenes"
+
+
+def keys_of(text):
+    """First cells of the rows of a table, without its head."""
+    return sorted(re.findall(r"^   \* - ``(\w+)``", text, re.MULTILINE))
+
+
+def test_each_section_and_type_of_the_scene_file_has_its_keys():
+    parts = re.split(r"^(\[.*)\n-+\n", pages.scene_file_page(), flags=re.MULTILINE)
+    sections = dict(zip(parts[1::2], parts[2::2], strict=True))
+    assert sections.keys() == pages.SECTIONS.keys() | pages.TYPES.keys()
+    named = {name.strip("[]").partition(".")[0].partition("]")[0] for name in sections}
+    assert named == set(SECTIONS) - {"source"}  # which is not read
+    for title, kind in pages.SECTIONS.items():
+        assert keys_of(sections[title]) == sorted(item.name for item in dataclasses.fields(kind) if item.init)
+    for title, kinds in pages.TYPES.items():
+        types = re.split(r"^``(\w+)``\n~+\n", sections[title], flags=re.MULTILINE)
+        keys = {word: keys_of(text) for word, text in zip(types[1::2], types[2::2], strict=True)}
+        fields = {word: documented.fields_of(kind) for word, kind in kinds.items() if "lgvi_warp" in kind.__module__}
+        assert keys == {word: sorted(word_of(item) for item in found.values()) for word, found in fields.items()}
+
+
+def test_each_verb_has_its_help():
+    verbs = re.findall(r"^   usage: lgvi-warp ([a-z]+)", pages.command_page(), re.MULTILINE)
+    assert sorted(verbs) == sorted(VERBS.keys() - {"plan"})  # the old name of predict
+
+
+def test_every_page_is_in_the_table_of_contents():
+    listed = set(re.findall(r"^   ([\w/]+)$", (ROOT / "docs" / "index.rst").read_text(), re.MULTILINE))
+    written = {str(page.relative_to(ROOT / "docs").with_suffix("")) for page in (ROOT / "docs").rglob("*.md")}
+    below = {name for name in written if re.match("guide/terms/[a-z]|reference/built/", name)}
+    assert {name for name in listed if "/built/" not in name} == written - below - {"index"}
+
+
+class Page(html.parser.HTMLParser):
+    """The links, and the places where links may lead to, of a page of the site."""
+
+    def __init__(self, path):
+        super().__init__()
+        self.links, self.places = [], set()
+        self.feed(path.read_text())
+
+    def handle_starttag(self, tag, attributes):
+        found = dict(attributes)
+        self.places.add(found.get("id"))
+        self.links += [found[name] for name in ("href", "src") if found.get(name)]
+
+
+def broken_links(site):
+    """Links of a folder of HTML pages that lead to no file, or to no place of its page; and pages from elsewhere."""
+    page_at, faults = functools.cache(Page), []
+    for path in sorted(site.rglob("*.html")):
+        for link in page_at(path).links:
+            parts = urllib.parse.urlsplit(link)
+            goal = (path.parent / urllib.parse.unquote(parts.path)).resolve() if parts.path else path
+            anchor = urllib.parse.unquote(parts.fragment)
+            if parts.scheme or parts.netloc:
+                continue
+            if not goal.exists() or (anchor and goal.suffix == ".html" and anchor not in page_at(goal).places):
+                faults.append(f"{path.relative_to(site)}: {link}")
+    return faults
+
+
+def test_broken_links_are_found(tmp_path):
+    (tmp_path / "a.html").write_text('<p id="x"><a href="b.html#y"></a><a href="#x"></a><a href="https://x.y/z"></a>')
+    (tmp_path / "b.html").write_text('<a href="a.html#no"></a><a href="#y"></a><img src="no.png"><a href="a.html"></a>')
+    assert broken_links(tmp_path) == ["a.html: b.html#y", "b.html: a.html#no", "b.html: #y", "b.html: no.png"]
+
+
+@pytest.mark.slow
+def test_the_site_is_built_without_warnings_and_its_links_lead_somewhere(tmp_path):
+    pytest.importorskip("sphinx")
+    site = tmp_path / "site"
+    # No network: a name that is looked up has no server.
+    offline = os.environ | {name: "http://127.0.0.1:9" for name in ("http_proxy", "https_proxy")}
+    command = [
+        sys.executable,
+        "-m",
+        "sphinx",
+        "-W",
+        "--keep-going",
+        "-q",
+        "-d",
+        str(tmp_path / "trees"),
+        "docs",
+        str(site),
+    ]
+    done = subprocess.run(command, cwd=ROOT, env=offline, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert broken_links(site) == []
+    text = "".join(Path(page).read_text() for page in (site / "reference" / "built").glob("*.html"))
+    missing = [
+        name for name in NAMES if not inspect.ismodule(getattr(lw, name)) and f'id="lgvi_warp.{name}"' not in text
+    ]
+    assert not missing

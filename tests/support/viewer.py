@@ -1,0 +1,123 @@
+"""The rerun viewer without a window: opens recordings, shows any time, and takes pictures of its views."""
+
+import contextlib
+import io
+import re
+import socket
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+TIMELINE = "sim_time"
+# What the viewer says on a machine without a graphics adapter, and what it warns of on one with a software renderer.
+NO_DRIVER = re.compile(
+    r"No graphics adapter|Failed to get render context|Failed to create render state|no adapter", re.I
+)
+EXPECTED = re.compile(r"[Ss]oftware rasterizer|not found for screenshot")
+PATIENCE = 60.0
+
+
+class Viewer:
+    """A viewer that has recordings open."""
+
+    def __init__(self, client):
+        self.client = client
+
+    def open(self, *paths):
+        """Open recordings, one at a time."""
+        for path in paths:
+            self.client.open(str(Path(path).absolute()))
+        end = time.monotonic() + PATIENCE
+        while self.client.get_state().loading and time.monotonic() < end:
+            time.sleep(0.05)
+
+    def pictures(self, when):
+        """A picture (height, width, 3) of each view that is in sight, by class and origin, at a time [s]."""
+        self.client.set_time(TIMELINE, duration=float(when), play_state="paused")
+        time.sleep(0.4)
+        found = {}
+        for view in self.client.get_state().views:
+            try:
+                png = self.client.take_screenshot(view_id=view.view_id)
+            except Exception as error:
+                if "not found" not in str(error).lower():  # a view in a hidden tab
+                    raise
+                continue
+            found[view.view_class, view.origin] = np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)
+        return found
+
+    def complaints(self):
+        """What views report and the log warns of."""
+        views = [f"{view.origin}: {one.summary}" for view in self.client.get_state().views for one in view.reports]
+        logs = [one.message for one in self.client.get_logs() if one.level in ("WARN", "ERROR")]
+        return views + [message for message in logs if not EXPECTED.search(message)]
+
+
+@contextlib.contextmanager
+def viewer(folder, size="1000x700"):
+    """A viewer; skips the test where the machine has no Vulkan driver."""
+    rerun_cli = pytest.importorskip("rerun_cli")
+    from rerun.experimental import ViewerClient
+
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        port = one.getsockname()[1]
+    program = Path(rerun_cli.__file__).with_name("rerun")
+    words = ["--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", size, "--hide-welcome-screen"]
+    log = folder / "viewer.log"
+    with log.open("w") as file:
+        process = subprocess.Popen([str(program), *words, "--memory-limit", "2GB"], stdout=file, stderr=file)
+    try:
+        client = _client(ViewerClient, process, port)
+        if client is None:
+            text = log.read_text()
+            if NO_DRIVER.search(text):
+                pytest.skip("no Vulkan driver: recordings are not looked at; install one, such as mesa-vulkan-drivers")
+            raise RuntimeError(f"the viewer did not start: {text[-800:]}")
+        yield Viewer(client)
+    finally:
+        process.terminate()
+        try:
+            process.wait(10)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _client(kind, process, port):
+    """A client of the viewer; None where it ended. Its port opens before its graphics start."""
+    end = time.monotonic() + PATIENCE
+    while process.poll() is None and time.monotonic() < end:
+        with contextlib.suppress(OSError):
+            socket.create_connection(("127.0.0.1", port), 0.2).close()
+            client = kind.connect(f"rerun+http://127.0.0.1:{port}/proxy")
+            try:
+                client.get_state()
+            except ConnectionError:
+                break
+            return client
+        time.sleep(0.05)
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(10)
+    return None
+
+
+def painted(picture):
+    """Share of pixels that differ from the one on their left: text, lines and bodies do, an empty view does not."""
+    return float((np.abs(np.diff(picture, axis=1)).max(axis=-1) > 12).mean())
+
+
+def moved(first, second):
+    """Share of pixels that differ between two pictures of one view."""
+    return float((np.abs(first - second).max(axis=-1) > 8).mean())
+
+
+def colored(picture, rgb, tolerance=0.06):
+    """Number of pixels whose hue and saturation are those of a colour, whatever the light on it."""
+    bright = np.maximum(picture.max(axis=-1), 1)
+    near = np.abs(picture / bright[..., None] - np.array(rgb) / max(rgb)).max(axis=-1) < tolerance
+    return int((near & (bright > 60)).sum())

@@ -1,0 +1,67 @@
+"""The verb view: a run that is there, in the viewer or as a recording."""
+
+import json
+
+import pytest
+
+from lgvi_warp.cli import main
+from tests.unit.views.test_recording import fleet, text_of
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run")
+    fleet(6, 9).save(folder / "result.npz")
+    return folder
+
+
+@pytest.mark.parametrize("name", ["", "result.npz"])
+def test_a_recording_of_some_members(folder, tmp_path, capsys, name):
+    path = tmp_path / "few.rrd"
+    assert main(["view", str(folder / name), "--members", "3, 5", "--out", str(path)]) == 0
+    assert "2 of 6 drawn" in text_of(path, "/run/summary") and str(path) in capsys.readouterr().out
+
+
+def test_the_viewer_is_started(folder, monkeypatch):
+    seen = []
+    monkeypatch.setattr("lgvi_warp.views.rerun.show", lambda result, members: seen.append((result.members, members)))
+    assert main(["view", str(folder)]) == 0 and main(["view", str(folder), "--members", "0"]) == 0
+    assert seen == [(6, None), (6, [0])]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--members", "6"], "members = 6: is none of the 6 members; give indices from 0 to 5"),
+        (["--members", "a"], "--members a: is no list of members; write --members 3,17"),
+        (["--members", ""], "is no list of members"),
+    ],
+)
+def test_bad_members_are_refused(folder, tmp_path, capsys, arguments, words):
+    assert main(["view", str(folder), "--out", str(tmp_path / "a.rrd"), *arguments]) == 2
+    said = capsys.readouterr().err
+    assert words in said and said.count("\n") == 1 and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "code"), [("none", "is not there", 2), ("none.npz", "No such file", 1), ("study", "no run", 2)]
+)
+def test_a_folder_without_a_run_is_refused(tmp_path, capsys, name, words, code):
+    (tmp_path / "study").mkdir()
+    (tmp_path / "study" / "sweep.json").write_text("{}")
+    assert main(["view", str(tmp_path / name)]) == code
+    said = capsys.readouterr().err
+    assert words in said and said.count("\n") == 1
+
+
+def test_json_names_the_file(folder, tmp_path, capsys):
+    path = tmp_path / "few.rrd"
+    assert main(["view", str(folder), "--out", str(path), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["verb"], document["files"]) == ("view", [str(path)])
+
+
+def test_no_rerun_is_one_line_with_the_remedy(folder, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "rerun", None)
+    assert main(["view", str(folder), "--out", str(tmp_path / "a.rrd")]) == 2
+    assert "pip install 'lgvi-warp[viz]'" in capsys.readouterr().err

@@ -1,0 +1,199 @@
+"""Progress on terminals, in pipes and in notebooks, and `progress=True` of functions."""
+
+import io
+import sys
+import types
+from typing import ClassVar
+
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.cli.progress import shown
+from lgvi_warp.common import progress as module
+from lgvi_warp.common.progress import Progress, callback, shows_progress
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+def at_once(progress):
+    """The same progress, which shows every call."""
+    progress._interval = 0.0
+    return progress
+
+
+def test_lines_name_the_phase_and_the_time_left():
+    stream = io.StringIO()
+    progress = at_once(Progress(stream))
+    progress(0.0)
+    progress(0.25)
+    progress(0.5)
+    progress.close()
+    first, second, third = stream.getvalue().splitlines()
+    assert first == "compiling, 0 s" and second == "running 25.0%" and third == "running 50.0%, 0 s left"
+
+
+def test_the_time_left_follows_from_the_share_since_the_first(monkeypatch):
+    now = [100.0]
+    monkeypatch.setattr(module.time, "perf_counter", lambda: now[0])
+    stream = io.StringIO()
+    progress = at_once(Progress(stream))
+    for now[0], share in ((160.0, 0.1), (170.0, 0.3)):
+        progress(share)
+    progress.close()
+    # 20 % in 10 s, so 70 % in 35 s; the minute of the compiler does not count.
+    assert stream.getvalue().splitlines()[-1] == "running 30.0%, 35 s left"
+
+
+def test_a_pipe_gets_a_line_at_most_every_ten_seconds(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr(module.time, "perf_counter", lambda: now[0])
+    stream = io.StringIO()
+    progress = Progress(stream)
+    for now[0], share in ((1.0, 0.1), (9.0, 0.2), (10.0, 0.3), (15.0, 0.4), (20.5, 0.5)):
+        progress(share)
+    progress.close()
+    assert [line.split(",")[0] for line in stream.getvalue().splitlines()] == ["running 30.0%", "running 50.0%"]
+
+
+def test_what_takes_long_without_a_fraction_is_shown_too():
+    stream, told = Terminal(), module.threading.Event()
+    progress = Progress(stream, "writing")
+    progress._show = lambda now: told.set()
+    assert stream.getvalue() == "\rwriting, 0 s" and told.wait(10.0)
+    progress.close()
+
+
+def test_the_progress_line_is_clean_whatever_happens(monkeypatch):
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    with pytest.raises(KeyboardInterrupt), shown(False) as progress:
+        at_once(progress)
+        progress(0.5)
+        progress(0.75)
+        raise KeyboardInterrupt
+    first, second, third, blank, rest = stream.getvalue().removeprefix("\r").split("\r")
+    assert first == "compiling, 0 s" and "[############............] 50.0%" in second and "75.0%, 0 s left" in third
+    assert not blank.strip() and not rest and len(blank) >= len(third.rstrip())
+    with shown(True) as progress:
+        assert progress is None
+
+
+def test_a_long_line_is_blanked_by_a_short_one():
+    stream = Terminal()
+    progress = at_once(Progress(stream, "a long phase to begin with, and more than a bar of any width"))
+    progress(1.0)
+    progress.close()
+    first, second, _, _ = stream.getvalue().removeprefix("\r").split("\r")
+    assert len(second) == len(first) > len(second.rstrip())
+
+
+@shows_progress
+def work(shares, *, progress=None):
+    """What functions of the library do with their progress."""
+    report = callback(progress) or (lambda share: None)
+    for share in shares:
+        report(share)
+    return progress
+
+
+def test_a_function_is_called_as_before():
+    told = []
+    assert work([0.5, 1.0], progress=told.append) == told.append and told == [0.5, 1.0]
+    assert work([0.5]) is None and work([0.5], progress=None) is None and work.__name__ == "work"
+
+
+def test_true_shows_and_false_is_silent(monkeypatch):
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    assert work([0.5], progress=False) is False and stream.getvalue() == ""
+    work([0.5], progress=True)
+    assert stream.getvalue().startswith("\rcompiling") and stream.getvalue().endswith("\r")
+
+
+def test_true_is_cleaned_up_after_an_error(monkeypatch):
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    with pytest.raises(TypeError):
+        work(None, progress=True)
+    assert stream.getvalue().endswith("\r")
+
+
+@pytest.mark.parametrize("wrong", ["yes", 1.0, 3])
+def test_what_is_no_function_is_refused(wrong):
+    with pytest.raises(lw.SceneError, match=r"progress = .*: is no function; give True"):
+        work([], progress=wrong)
+
+
+class FakeBar:
+    """What `NotebookBar` uses of tqdm."""
+
+    bars: ClassVar[list] = []
+
+    def __init__(self, total, desc, bar_format):
+        self.n, self.words, self.closed = 0.0, [desc], False
+        self.bars.append(self)
+
+    def set_description_str(self, text):
+        self.words.append(text)
+
+    def update(self, more):
+        self.n += more
+
+    def close(self):
+        self.closed = True
+
+
+def test_a_notebook_has_a_bar_of_tqdm(monkeypatch):
+    monkeypatch.setitem(sys.modules, "ipykernel", types.ModuleType("ipykernel"))
+    monkeypatch.setitem(sys.modules, "tqdm", types.ModuleType("tqdm"))
+    monkeypatch.setitem(sys.modules, "tqdm.auto", types.SimpleNamespace(tqdm=FakeBar))
+    work([0.0, 0.25, 0.75], progress=True)
+    (bar,) = FakeBar.bars
+    assert (bar.n, bar.words, bar.closed) == (0.75, ["compiling", "running"], True)
+
+
+def test_a_notebook_without_tqdm_writes_in_place(monkeypatch):
+    stream = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setitem(sys.modules, "ipykernel", types.ModuleType("ipykernel"))
+    monkeypatch.setitem(sys.modules, "tqdm.auto", None)
+    work([0.5], progress=True)
+    assert stream.getvalue().startswith("\rcompiling")
+
+
+def test_the_real_bar_of_tqdm_takes_the_same_calls():
+    tqdm = pytest.importorskip("tqdm")
+    stream = io.StringIO()
+    bar = module.NotebookBar(lambda **settings: tqdm.tqdm(file=stream, mininterval=0.0, **settings))
+    bar(0.5)
+    bar(1.0)
+    bar.close()
+    assert "100%" in stream.getvalue() and "running" in stream.getvalue()
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lw.solve,
+        lw.resume,
+        lw.suggest,
+        lw.tradeoff,
+        lw.stability_map,
+        lw.uq.evaluate,
+        lw.tune,
+        lw.worst_case,
+        lw.Prepared.__call__,
+    ],
+    ids=lambda call: call.__qualname__,
+)
+def test_every_long_call_takes_true(call):
+    with pytest.raises(lw.SceneError, match="progress = 7: is no function"):
+        call(
+            None,
+            *[None] * (2 if call in (lw.tune, lw.worst_case) else call is lw.uq.evaluate),
+            *[1.0] * (call is lw.suggest),
+            progress=7,
+        )

@@ -1,0 +1,104 @@
+"""The JSON schema of scene files: what the loader takes fits it, what the loader refuses as unknown does not."""
+
+import copy
+import tomllib
+
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.cli.lists import SCENE
+from lgvi_warp.scene.schema import schema
+from lgvi_warp.scene.vehicles.fossen import vehicle_file, vehicles
+from tests.conftest import ROOT
+from tests.support.json_schema import faults
+
+SCHEMA = schema()
+FILES = [
+    *sorted((ROOT / "examples").glob("*.toml")),
+    *sorted((ROOT / "examples" / "scenes").glob("*.toml")),
+    *map(vehicle_file, vehicles()),
+]
+PAPER = tomllib.loads((ROOT / "examples" / "paper.toml").read_text())
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
+def test_every_scene_of_the_project_fits(path):
+    assert faults(tomllib.loads(path.read_text()), SCHEMA) == []
+
+
+@pytest.mark.parametrize("name", vehicles())
+def test_what_a_scene_writes_of_itself_fits(name):
+    events = [lw.Floor(depth=100.0), lw.Box(lower=(-1.0, -1.0, 0.0), upper=(9.0, 9.0, 90.0)), lw.StopTime(at=50.0)]
+    run = {"step": 0.01, "duration": 1.0, "statistics": [{"type": "quantiles", "of": "depth"}],
+           "until": {"statistic": "mean depth", "half_width": 0.1}}  # fmt: skip
+    vary = {"vehicle.buoyancy": {"normal": {"relative": 0.01}}, "start.position": {"gamma": {"a": 2.0}}}
+    ensemble = {"members": 4, "vary": vary, "sampling": {"sobol": {"replicates": 2}}}
+    scene = lw.Scene.named(name, start={"position": [0.0, 0.0, 10.0]}, events=events, run=run, ensemble=ensemble)
+    assert faults(scene.to_dict(), SCHEMA) == []
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "place"),
+    [
+        ("vehicle.mas", 1.0, ".vehicle.mas: unknown"),
+        ("vehicle.mass", "heavy", ".vehicle.mass: 'heavy' is no number"),
+        ("start.position", [0.0, 0.0], ".start.position: 2 entries"),
+        ("start.position", [0.0, 0.0, "deep"], ".start.position[2]: 'deep' is no number"),
+        ("environment.gravity", True, ".environment.gravity: True is no number"),
+        ("run.step", [0.1], ".run.step: [0.1] is no number"),
+        ("run.until", {"statistic": "mean depth"}, ".run.until.half_width: missing"),
+        ("terms", [{"type": "current"}], ".terms[0].velocity: missing"),
+        (
+            "terms",
+            [{"type": "tether", "anchor": [0, 0, 0], "stiffness": -1.0}],
+            ".terms[0].stiffness: -1.0 is out of bounds",
+        ),
+        ("events", [{"type": "floor", "deph": 1.0, "depth": 2.0}], ".events[0].deph: unknown"),
+        ("controller", {"laws": []}, ".controller.period: missing"),
+        ("ensemble.sampling", {"sobol": {"replicas": 2}}, ".ensemble.sampling.sobol.replicas: unknown"),
+        ("ensemble.vary", {"vehicle.mass": {"norml": {}}}, ".ensemble.vary.vehicle.mass.norml: unknown"),
+        ("boat", {}, ".boat: unknown"),
+    ],
+)
+def test_what_the_loader_refuses_does_not_fit(key, value, place):
+    content = copy.deepcopy(PAPER)
+    section, dot, name = key.partition(".")
+    if dot:
+        content.setdefault(section, {})[name] = value
+    else:
+        content[section] = value
+    with pytest.raises(lw.SceneError):
+        lw.Scene.from_dict(content)
+    assert place in faults(content, SCHEMA)
+
+
+def test_keys_are_described():
+    mass = SCHEMA["properties"]["vehicle"]["properties"]["mass"]
+    assert mass == {"type": "number", "description": "Dry mass [kg]. Simple form."}
+    floor = next(entry for entry in SCHEMA["properties"]["events"]["items"]["anyOf"]
+                 if entry["properties"]["type"] == {"const": "floor"})  # fmt: skip
+    assert floor["properties"]["depth"]["description"] == "Depth of the floor [m]."
+    assert sorted(floor["required"]) == ["depth", "type"]
+
+
+def test_a_registered_term_is_in_it():
+    before = dict(lw.Term.kinds)
+    try:
+
+        class Anchor(lw.Term):
+            type = "anchor_of_a_test"
+
+        types = [entry["properties"]["type"]["const"] for entry in schema()["properties"]["terms"]["items"]["anyOf"]]
+        assert "anchor_of_a_test" in types and "restoring" not in types and "weight" not in types
+    finally:
+        lw.Term.kinds.clear()
+        lw.Term.kinds.update(before)
+
+
+def test_the_scene_of_new_has_comments_on_every_key():
+    lines = [
+        line
+        for line in SCENE.splitlines()
+        if "=" in line and not line.startswith(("#", "[", '"', "type", "of", "members"))
+    ]
+    assert lines and all("#" in line for line in lines if not line.startswith("seed"))

@@ -170,15 +170,16 @@ from lgvi_warp.studies.sweeps.cases import Case as Case
 from lgvi_warp.studies.sweeps.output import Sweep as Sweep
 from lgvi_warp.studies.sweeps.sweep import sweep as sweep
 from lgvi_warp.studies.tradeoff import tradeoff as tradeoff
+from lgvi_warp.views import plots as plots
 from lgvi_warp.views.choice import shown as shown
 from lgvi_warp.views.plots import plot as plot
+from lgvi_warp.views.plots import plot_sensitivity as plot_sensitivity
 from lgvi_warp.views.plots import plot_stability as plot_stability
 from lgvi_warp.views.plots import plot_statistics as plot_statistics
 from lgvi_warp.views.plots import plot_tradeoff as plot_tradeoff
 from lgvi_warp.views.report import report as report
 from lgvi_warp.views.rerun import log_rerun as log_rerun
 from lgvi_warp.views.rerun import show as show
-from lgvi_warp.views.sensitivity import plot_sensitivity as plot_sensitivity
 
 __version__: str
 

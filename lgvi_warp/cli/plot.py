@@ -55,11 +55,11 @@ def _draw(content: Content, written: Written, out: Path) -> None:
             f"{content.path}: its pictures are drawn again by the same lgvi-warp sweep, which runs nothing twice"
         )
         return
-    from lgvi_warp.views import plots, sensitivity
+    from lgvi_warp.views import plots
 
     drawings: dict[str, Callable[[Any, Path], Path]] = {
         "tradeoff": plots.plot_tradeoff,
         "stability": plots.plot_stability,
-        "sensitivity": sensitivity.plot_sensitivity,
+        "sensitivity": plots.plot_sensitivity,
     }
     written.draw(drawings[content.kind], numbers, out / content.path.with_suffix(".png").name)

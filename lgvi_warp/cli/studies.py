@@ -78,7 +78,7 @@ def sensitivity(chosen: argparse.Namespace) -> int:
         SceneError: The scene or an argument is refused.
     """
     from lgvi_warp.studies import sensitivity as uq
-    from lgvi_warp.views.sensitivity import plot_sensitivity
+    from lgvi_warp.views.plots import plot_sensitivity
 
     scene = load_scene(chosen)
     out = folder(chosen, "_sensitivity")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import Status, under_way
+from lgvi_warp.runs import member_fields
 from lgvi_warp.runs.outcomes import outcomes
 
 if TYPE_CHECKING:
@@ -211,3 +212,41 @@ def _ended(result: Result, rank: np.ndarray, places: int) -> list[int]:
         share = -(-(places - len(chosen)) // (len(groups) - i))
         chosen += group[:share].tolist()
     return chosen
+
+
+def few(
+    result: Result, members: slice | np.ndarray, fields: tuple[str, ...], frames: np.ndarray | None = None
+) -> Result:
+    """Take some members at some times into memory.
+
+    Args:
+        result: The result.
+        members: The members, a slice or indices.
+        fields: Names of the samples to read; those that were not kept are left out.
+        frames: Indices of the samples' times; default None, all.
+
+    Returns:
+        A result of these.
+    """
+    samples = samples_of(result, tuple(name for name in fields if name in result.samples), members, frames)
+    of_members = {item.name: getattr(result, item.name)[members] for item in member_fields.EVERY}
+    time = result.time if frames is None else result.time[frames]
+    parameters = _Part(result.parameters, members)
+    return replace(result, time=time, samples=samples, parameters=parameters, store=None, kept=None, **of_members)
+
+
+class _Part(Mapping[str, np.ndarray]):
+    """Parameters of some members, read when they are used: most pictures use none."""
+
+    def __init__(self, whole: Mapping[str, np.ndarray], members: slice | np.ndarray):
+        self._whole, self._members = whole, members
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        values = self._whole[name]
+        return values[self._members] if len(values) > 1 else values
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._whole)
+
+    def __len__(self) -> int:
+        return len(self._whole)

@@ -75,39 +75,6 @@ def energy_curve(result: Result) -> Curve:
     return Curve("Energy", "E(t) [J]", result.energy)
 
 
-def quantiles(values: np.ndarray, counted: np.ndarray, levels: list[float]) -> np.ndarray:
-    """Quantiles over the members that count at each time.
-
-    Args:
-        values: Numbers of the members, shape (k, n).
-        counted: Mask (k, n) of the members that count; a value that is not finite never does.
-        levels: m numbers from 0 to 1.
-
-    Returns:
-        Quantiles, shape (m, k); NaN at times when no member counts.
-    """
-    counted = counted & np.isfinite(values)
-    values = values.astype(np.float64)
-    if counted.all():
-        return np.asarray(np.quantile(values, levels, axis=1))
-    empty = np.full(len(levels), np.nan)
-    rows = [np.quantile(row[at], levels) if at.any() else empty for row, at in zip(values, counted, strict=True)]
-    return np.stack(rows, axis=1)
-
-
-def evenly(members: np.ndarray, most: int) -> np.ndarray:
-    """Choose members spread evenly over their indices.
-
-    Args:
-        members: Indices, shape (n,).
-        most: The most to choose.
-
-    Returns:
-        Indices, shape (min(most, n),), in the same order.
-    """
-    return members[np.unique(np.linspace(0, len(members) - 1, min(most, len(members))).astype(int))]
-
-
 def title(result: Result) -> str:
     """Title of a picture: members, method and step, and the outcomes where not all ran to the end.
 

@@ -16,7 +16,8 @@ from lgvi_warp.statistics import tracking
 from lgvi_warp.studies.sweeps.found import SUCCESS
 from lgvi_warp.studies.sweeps.output import Sweep, against_baseline
 from lgvi_warp.studies.sweeps.setup import END, Cell
-from lgvi_warp.views.plots import fan, figure_class, save_figure
+from lgvi_warp.views.plots.canvas import figure_class, save_figure
+from lgvi_warp.views.plots.fans import draw_bands
 
 # Most boxes of one panel, and most members that are drawn as points.
 MOST_BOXES, MOST_POINTS = 40, 4000
@@ -252,7 +253,7 @@ def plot_responses(found: Sweep, path: str | os.PathLike[str], of: str = "", mem
         save = SaveAt(every=every, fields=(*channel.of_actual, channel.wanted))
         result = found.again(cell.case.name, range(count), cell.point, save)
         y, wanted = channel.actual(result.samples), np.median(channel.reference(result.samples), axis=1)
-        fan(panel, result.time, y, under_way(result))
+        draw_bands(panel, result.time, y, under_way(result))
         panel.plot(result.time, wanted, "k:", linewidth=1.0, label="wanted")
         panel.set_title(cell.name, fontsize=9)
         panel.set_xlabel("time [s]")

@@ -18,7 +18,6 @@ from lgvi_warp.common.status import Status, StatusArray, failed, stopped
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.runs import outcomes
 from lgvi_warp.views import fleet as looks
-from lgvi_warp.views import plots
 from tests.laws import cases
 
 GRAVITY = 10.0
@@ -67,13 +66,9 @@ def acted_on(result, term):
     return dataclasses.replace(result, terms=(term,), parameters=dict(result.parameters) | numbers)
 
 
-def drawn(result, monkeypatch):
-    """The figure that `lw.plot` makes."""
-    figures = []
-    with monkeypatch.context() as patch:
-        patch.setattr(plots, "save_figure", lambda figure, *_: figures.append(figure))
-        lw.plot(result, "fleet.png")
-    return figures[0]
+def drawn(result):
+    """The figure of a run at a glance."""
+    return lw.plots.summary(result)[0].figure
 
 
 def texts(axes):
@@ -132,8 +127,8 @@ def test_a_run_that_all_sink_is_drawn(sunk, tmp_path):
     assert all(third.std() > 0.05 for third in np.array_split(picture[..., :3], 3, axis=1))
 
 
-def test_the_fan_is_of_those_under_way(mixed, monkeypatch):
-    figure = drawn(mixed, monkeypatch)
+def test_the_fan_is_of_those_under_way(mixed):
+    figure = drawn(mixed)
     depth = figure.axes[0]
     median = next(line for line in depth.lines if line.get_label() == "median").get_ydata()
     path = 5.0 + np.outer(np.arange(21.0), SPEEDS)
@@ -143,14 +138,14 @@ def test_the_fan_is_of_those_under_way(mixed, monkeypatch):
     assert texts(depth)[0] == "under way: 7 at 0 s,\n2 at 20 s"
 
 
-def test_the_fan_ends_where_all_have(sunk, monkeypatch):
-    depth = drawn(sunk, monkeypatch).axes[0]
+def test_the_fan_ends_where_all_have(sunk):
+    depth = drawn(sunk).axes[0]
     median = next(line for line in depth.lines if line.get_label() == "median").get_ydata()
     assert np.isfinite(median[:11]).all() and np.isnan(median[11:]).all()
 
 
-def test_ends_are_marked_and_counted_by_outcome(mixed, monkeypatch):
-    figure = drawn(mixed, monkeypatch)
+def test_ends_are_marked_and_counted_by_outcome(mixed):
+    figure = drawn(mixed)
     depth, _, paths = figure.axes
     assert figure.get_suptitle() == "7 members, psi_s, step 0.1 s: 2 ok, 2 surface, 3 floor"
     assert {"floor (3)", "surface (2)"} <= set(texts(depth)) and {"ok", "floor", "surface"} <= set(texts(paths))
@@ -161,18 +156,18 @@ def test_ends_are_marked_and_counted_by_outcome(mixed, monkeypatch):
     np.testing.assert_allclose(marks(paths, Status.FLOOR)[:, 1], FLOOR, atol=1e-6)
 
 
-def test_failures_are_drawn_until_they_fail(mixed, monkeypatch):
+def test_failures_are_drawn_until_they_fail(mixed):
     some = ending(mixed, [1, 1, 1, 0, 0, 2, 17], [2.0, 2.0, 4.0, np.nan, np.nan, 6.0, 5.0])
-    figure = drawn(some, monkeypatch)
+    figure = drawn(some)
     title = "7 members, psi_s, step 0.1 s: 2 ok, 3 step_too_large, 1 not_converged, 1 floor"
     assert figure.get_suptitle() == title
     assert {"step_too_large (3)", "not_converged (1)", "floor (1)"} <= set(texts(figure.axes[0]))
     # A colour says failure, a marker says which.
     assert len(marks(figure.axes[0], Status.STEP_TOO_LARGE)) == 4
     # What an event stopped at once has its marks.
-    assert len(marks(drawn(ending(mixed, [17] * 7, [0.0] * 7), monkeypatch).axes[0], Status.FLOOR)) == 7
+    assert len(marks(drawn(ending(mixed, [17] * 7, [0.0] * 7)).axes[0], Status.FLOOR)) == 7
     every = ending(mixed, [1] * 7, [3.0] * 7)
-    assert np.isfinite(drawn(every, monkeypatch).axes[0].lines[0].get_ydata()).sum() == 4
+    assert np.isfinite(drawn(every).axes[0].lines[0].get_ydata()).sum() == 4
 
 
 def test_outcomes_look_different():
@@ -216,12 +211,12 @@ ACTING = {
 
 
 @pytest.mark.parametrize("name", ACTING)
-def test_energy_error_only_where_energy_is_conserved(mixed, monkeypatch, name):
+def test_energy_error_only_where_energy_is_conserved(mixed, name):
     term, kept = ACTING[name]
     result = acted_on(mixed, term)
     assert invariants.conserved(result) == kept
     assert invariants.at_work(result) == (() if "energy" in kept else (term.key,))
-    energy = drawn(result, monkeypatch).axes[1]
+    energy = drawn(result).axes[1]
     asked = ("Energy error", "E(t) - E(0) [J]") if "energy" in kept else ("Energy", "E(t) [J]")
     assert (energy.get_title(), energy.get_ylabel()) == asked
     first = next(line for line in energy.lines if line.get_label() == "median").get_ydata()[0]

@@ -14,9 +14,9 @@ from lgvi_warp.common.status import Status, stop_time, under_way
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.control.signals import CHANNELS
 from lgvi_warp.physics.fields import FIELDS
-from lgvi_warp.runs import member_fields
 from lgvi_warp.runs.outcomes import outcomes
-from lgvi_warp.views.choice import Shown, finite_rows, of_members, pieces, samples_of, shown
+from lgvi_warp.views import choice as choices
+from lgvi_warp.views.choice import Shown, finite_rows, of_members, pieces, shown
 from lgvi_warp.views.fleet import LOOKS, energy_curve
 
 if TYPE_CHECKING:
@@ -183,7 +183,7 @@ def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[in
     if members is not None:
         kept = np.arange(result.members) if source is result else result.kept_members
         choice = dataclasses.replace(choice, members=_of(members, result.members, kept))
-    few = _few(source, choice)
+    few = choices.few(source, choice.members, (*FIELDS, *CHANNELS), choice.frames)
     counted = under_way(few)
     fans, ranked, above = _survey(source, choice, _directions(few, counted))
     fans = tuple(_streamed(result, fan, choice.frames) for fan in fans)
@@ -237,20 +237,6 @@ def _streamed(result: Result, fan: Fan, frames: np.ndarray) -> Fan:
             levels[at], told = sign * row[frames, 0], True
     title = f"{fan.title}, by the run's statistics"
     return dataclasses.replace(fan, title=title, levels=levels) if told else fan
-
-
-def _few(result: Result, choice: Shown) -> Result:
-    """The members drawn at the times drawn, in memory."""
-    fields = tuple(name for name in (*FIELDS, *CHANNELS) if name in result.samples)
-    samples = samples_of(result, fields, choice.members, choice.frames)
-    of_members = {item.name: getattr(result, item.name)[choice.members] for item in member_fields.EVERY}
-    parameters = {
-        name: values[choice.members] if len(values) > 1 else values for name, values in result.parameters.items()
-    }
-    time = result.time[choice.frames]
-    return dataclasses.replace(
-        result, time=time, samples=samples, parameters=parameters, store=None, kept=None, **of_members
-    )
 
 
 def roll_pitch_heading(attitude: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

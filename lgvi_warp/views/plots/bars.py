@@ -1,0 +1,84 @@
+"""A picture of a sensitivity analysis: bars with confidence intervals, one panel for each quantity."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.views.plots.canvas import COLORS, hatch, panels, wrapped
+
+if TYPE_CHECKING:
+    from lgvi_warp.studies.sensitivity import Indices
+
+# Most panels: a picture of more cannot be read.
+MOST = 12
+
+
+def sensitivity(found: Indices, *, figure: Any = None, path: str | os.PathLike[str] | None = None) -> np.ndarray:
+    """Draw the indices of each factor as bars with their confidence intervals, a panel for each quantity.
+
+    Args:
+        found: Indices of `lw.uq.sobol` or `lw.uq.morris`; the first 12 quantities that vary are drawn.
+        figure: Matplotlib figure to draw on; default None, one of its own.
+        path: File to write; its ending chooses the format. Default None: none is written.
+
+    Returns:
+        The axes, shape (quantities,).
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        NothingToDraw: No quantity varies.
+        OSError: The file cannot be written.
+    """
+    varied = [q for q in range(len(found.quantities)) if np.isfinite(getattr(found, found.columns[0])[q]).any()]
+    drawn, d = varied[:MOST], len(found.factors)
+    if not drawn:
+        raise NothingToDraw("no quantity varies: there is nothing to draw")
+    columns = min(len(drawn), 3)
+    rows = -(-len(drawn) // columns)
+    size = 3.0 + 4.5 * columns, 2.2 + rows * (1.4 + 0.4 * d)
+    with panels(figure, path, (rows, columns), size, sharey=True) as grid:
+        for axes, q in zip(grid.flat, drawn, strict=False):
+            _bars(axes, found, q)
+        for axes in grid.flat[len(drawn) :]:
+            axes.set_axis_off()
+        grid[0, 0].set_yticks(np.arange(d), found.factors)
+        grid[0, 0].invert_yaxis()
+        figure = grid[0, 0].figure
+        figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
+        failed = f", {found.failed} failed" if found.failed else ""
+        names = [name for q, name in enumerate(found.quantities) if q not in drawn]
+        more = f"; not shown: {', '.join(names)}" if names else ""
+        text = (
+            f"{found.name}, {found.samples} samples, {found.members} members{failed}; {found.confidence:.0%} intervals"
+        )
+        figure.suptitle(wrapped(f"{text}{more}", figure))
+    return grid.ravel()[: len(drawn)]
+
+
+def _bars(axes: Any, found: Indices, q: int) -> None:
+    """Draw the bars of one quantity, the columns of a factor side by side."""
+    places = np.arange(len(found.factors))
+    width = 0.8 / len(found.columns)
+    for i, column in enumerate(found.columns):
+        name = found.intervals.get(column)
+        half = getattr(found, name)[q] if name else None
+        at = places + (i - 0.5 * (len(found.columns) - 1)) * width
+        axes.barh(
+            at,
+            getattr(found, column)[q],
+            width,
+            xerr=half,
+            label=column,
+            color=COLORS[i],
+            hatch=hatch(i),
+            edgecolor="white",
+            linewidth=0.0,
+            error_kw={"capsize": 2.0},
+        )
+    axes.axvline(0.0, color="black", linewidth=0.5)
+    axes.set(title=found.quantities[q], xlabel="part of the variance" if found.name.startswith("Sobol") else "effect")
+    axes.grid(True, axis="x", alpha=0.3)

@@ -1,0 +1,279 @@
+"""What all pictures share: figures, size of text, colours with a second cue, the axis of depth, and files."""
+
+from __future__ import annotations
+
+import os
+import textwrap
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common import files as durable
+from lgvi_warp.common.errors import MissingExtra
+from lgvi_warp.common.status import Status
+from lgvi_warp.views.fleet import LOOKS
+
+# Colours of Okabe & Ito 2008, Color universal design, without the yellow, which is hardly seen on white.
+COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+# With each colour goes a style, so that no two lines differ by colour alone.
+STYLES = ("-", "--", "-.", ":", (0, (7, 1.5)), (0, (4, 1, 1, 1, 1, 1)), (0, (1, 3)))
+MARKERS = "os^vDPX*<>dphH"
+HATCHES = ("", "///", "...", "\\\\\\", "xxx", "---", "+++", "ooo")
+# Tints of the first colour for the bands of a fan, outermost first.
+TINTS = ("#DCEAF4", "#A3C9E2", "#5C9FCC")
+GREY = "#9A9A9A"
+# Points of text to an inch of width: 8.75 pixels where the picture is 700 pixels wide.
+TEXT = 0.9
+LEAST_TEXT = 9.0
+DPI = 100
+
+
+def figure_class() -> Any:
+    """Load Matplotlib's Figure.
+
+    Returns:
+        The class.
+
+    Raises:
+        ImportError: Matplotlib is not installed; the message has the remedy.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ModuleNotFoundError as error:
+        raise MissingExtra("plots", "matplotlib", "viz") from error
+    return Figure
+
+
+def save_figure(figure: Any, path: str | os.PathLike[str], dpi: int = DPI) -> Path:
+    """Write a picture; the file is there whole or not at all.
+
+    Args:
+        figure: A Matplotlib figure.
+        path: The file; its ending chooses the format.
+        dpi: Dots per inch; default 100.
+
+    Returns:
+        The path.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    target = Path(path)
+    with durable.placed(target) as beside:
+        figure.savefig(beside, dpi=dpi, format=target.suffix.removeprefix(".") or "png")
+    return target
+
+
+@contextmanager
+def panel(
+    ax: Any, path: str | os.PathLike[str] | None, size: tuple[float, float] = (8.0, 5.0), projection: str | None = None
+) -> Iterator[Any]:
+    """Give axes to draw on; when the drawing is done, write the file that was asked for.
+
+    Args:
+        ax: The user's axes; None for a figure of one's own.
+        path: The file; None for none.
+        size: Width and height of an own figure [in]; default (8, 5).
+        projection: Projection of own axes; default None, plane.
+
+    Yields:
+        The axes.
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        OSError: The file cannot be written.
+    """
+    figure = figure_class()(figsize=size, layout="constrained") if ax is None else ax.figure
+    with drawing(figure, path, ax is None):
+        yield figure.add_subplot(projection=projection) if ax is None else ax
+
+
+@contextmanager
+def panels(
+    figure: Any,
+    path: str | os.PathLike[str] | None,
+    shape: tuple[int, int],
+    size: tuple[float, float],
+    **options: Any,
+) -> Iterator[np.ndarray]:
+    """Give several axes to draw on; when the drawing is done, write the file that was asked for.
+
+    Args:
+        figure: The user's figure; None for one's own.
+        path: The file; None for none.
+        shape: Numbers of rows and columns.
+        size: Width and height of an own figure [in].
+        **options: Passed to Figure.subplots.
+
+    Yields:
+        The axes, shape (rows, columns).
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        OSError: The file cannot be written.
+    """
+    of_class = figure_class()
+    own = figure is None
+    figure = of_class(figsize=size, layout="constrained") if own else figure
+    with drawing(figure, path, own):
+        yield figure.subplots(*shape, squeeze=False, **options)
+
+
+@contextmanager
+def drawing(figure: Any, path: str | os.PathLike[str] | None, own: bool) -> Iterator[None]:
+    """Draw with text that can be read in a small picture; then write the file.
+
+    Args:
+        figure: Matplotlib's figure.
+        path: The file; None for none.
+        own: Whether the figure is no user's, so that its ticks are sized too.
+    """
+    import matplotlib as mpl
+
+    size = text_size(figure)
+    settings = dict.fromkeys(
+        (
+            "font.size",
+            "axes.labelsize",
+            "legend.fontsize",
+            "legend.title_fontsize",
+            "xtick.labelsize",
+            "ytick.labelsize",
+        ),
+        size,
+    ) | dict.fromkeys(("axes.titlesize", "figure.titlesize"), 1.1 * size)
+    with mpl.rc_context(settings | {"hatch.linewidth": 0.6, "pdf.fonttype": 42}):
+        yield
+        if own:
+            for axes in figure.axes:
+                axes.tick_params(which="both", labelsize=size)
+        if path is not None:
+            save_figure(figure.get_figure(root=True), path)
+
+
+def text_size(figure: Any) -> float:
+    """Find the size of text for a figure.
+
+    Args:
+        figure: Matplotlib's figure.
+
+    Returns:
+        Points.
+    """
+    return max(LEAST_TEXT, TEXT * float(figure.get_figure(root=True).get_figwidth()))
+
+
+def wrapped(text: str, figure: Any, share: float = 1.0) -> str:
+    """Break a text into lines that a figure has room for.
+
+    Args:
+        text: The text.
+        figure: Matplotlib's figure.
+        share: Share of its width; default 1.
+
+    Returns:
+        The text with line breaks.
+    """
+    width = float(figure.get_figure(root=True).get_figwidth())
+    return "\n".join(textwrap.wrap(text, int(share * 72.0 * width / (0.6 * text_size(figure)))))
+
+
+def style(i: int) -> dict[str, Any]:
+    """Colour and line style of the i-th of several lines, pairwise different for 49 of them.
+
+    Args:
+        i: Index from 0.
+
+    Returns:
+        Arguments of Axes.plot.
+    """
+    turn = i // len(COLORS)
+    return {"color": COLORS[i % len(COLORS)], "linestyle": STYLES[(i + turn) % len(STYLES)]}
+
+
+def mark(code: Status) -> dict[str, Any]:
+    """Colour and marker of an outcome; filled markers have a black edge.
+
+    Args:
+        code: The outcome.
+
+    Returns:
+        Arguments of Axes.scatter.
+    """
+    look = LOOKS[code]
+    edge = {"edgecolors": "black", "linewidths": 0.5} if code.stopped else {"linewidths": 1.4}
+    return {"color": look.color, "marker": look.marker} | edge
+
+
+def outcome_style(code: Status) -> dict[str, Any]:
+    """Colour and line style of paths with an outcome.
+
+    Args:
+        code: The outcome.
+
+    Returns:
+        Arguments of Axes.plot.
+    """
+    return {"color": LOOKS[code].color, "linestyle": "-" if code == Status.OK else "--" if code.stopped else ":"}
+
+
+def hatch(i: int) -> str:
+    """Hatch of the i-th of several areas.
+
+    Args:
+        i: Index from 0.
+
+    Returns:
+        Matplotlib's hatch.
+    """
+    return HATCHES[i % len(HATCHES)]
+
+
+# Ground of words on lines.
+PALE = {"facecolor": "white", "alpha": 0.8, "linewidth": 0, "pad": 1.0}
+# The surface and the floor are drawn where they are within this share of the depths shown.
+NEAR = 0.5
+
+
+def point_down(axes: Any, floors: tuple[float, ...] = ()) -> None:
+    """Turn the vertical axis, which has depths [m], downwards; draw the surface, and the floors that are near.
+
+    Where the surface is far above or below what is drawn, a text says how far.
+
+    Args:
+        axes: Matplotlib axes, all else drawn.
+        floors: Depths of floors [m]; default none.
+    """
+    low, high = sorted(axes.get_ylim())
+    reach = NEAR * (high - low)
+    lines = [(0.0, "surface", "#0072B2"), *((depth, "floor", "#7A4A00") for depth in floors)]
+    for depth, name, color in lines:
+        if low - reach <= depth <= high + reach:
+            low, high = min(low, depth - 0.1 * reach), max(high, depth + 0.1 * reach)
+            axes.axhline(depth, color=color, linestyle=(0, (8, 3)), linewidth=1.2, zorder=1.5)
+            axes.text(
+                0.99, depth, name, color=color, ha="right", va="center", transform=axes.get_yaxis_transform(), bbox=PALE
+            )
+        elif name == "surface":
+            far, place = (f"surface {low:.3g} m above", 0.98) if low > 0.0 else (f"surface {-high:.3g} m below", 0.02)
+            axes.text(
+                0.99, place, far, color=color, ha="right", va="top" if low > 0.0 else "bottom", transform=axes.transAxes
+            )
+    axes.set_ylim(high, low)
+
+
+def below(axes: Any, **options: Any) -> None:
+    """Draw the legend below the axes and their label, where it hides nothing.
+
+    Args:
+        axes: Matplotlib axes.
+        **options: Passed to Axes.legend.
+    """
+    from matplotlib.transforms import ScaledTranslation
+
+    lines = ScaledTranslation(0.0, -3.2 * text_size(axes.figure) / 72.0, axes.get_figure(root=True).dpi_scale_trans)
+    place = {"bbox_to_anchor": (0.5, 0.0), "bbox_transform": axes.transAxes + lines, "loc": "upper center"}
+    axes.legend(**place, frameon=False, **options)

@@ -1,0 +1,243 @@
+"""What became of the members, and how their numbers are spread at one time."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import NothingToDraw, refusal
+from lgvi_warp.common.status import Status, stop_time
+from lgvi_warp.runs import outcomes as ended_so
+from lgvi_warp.runs.quantities import quantities
+from lgvi_warp.views.choice import shown
+from lgvi_warp.views.fleet import LOOKS, title
+from lgvi_warp.views.plots.canvas import COLORS, below, hatch, mark, panel, panels, point_down, wrapped
+from lgvi_warp.views.plots.read import DEPTHS, WORDS, at_one_time, estimate_for, floors, some_of, unit_of, with_samples
+
+if TYPE_CHECKING:
+    from lgvi_warp.runs.result import Result
+
+# Times at which shares are drawn where members end.
+TIMES = 400
+MOST_BINS = 40
+# Most members of a scatter plot, and most quantities.
+MOST_POINTS, MOST_PAIRS = 1000, 6
+
+
+def outcomes(result: Result, *, ax: Any = None, path: str | os.PathLike[str] | None = None) -> Any:
+    """Draw the share of the members under way against time, and of those that ended, by outcome.
+
+    It needs no samples: a run with keep="none" and a run in a store have all that is drawn.
+
+    Args:
+        result: A result.
+        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
+        path: File to write; its ending chooses the format. Default None: none is written.
+
+    Returns:
+        The axes.
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        OSError: The file cannot be written.
+    """
+    codes, status, when = ended_so.outcomes(result), np.asarray(result.status), stop_time(result)
+    time = np.unique(np.concatenate([np.linspace(result.time[0], result.time[-1], TIMES), result.time[[0, -1]]]))
+    ended = [code for code in codes if code != Status.OK]
+    counts = {code: np.searchsorted(np.sort(when[status == code]), time, side="right") for code in ended}
+    going = result.members - sum(counts.values(), np.zeros(len(time)))
+    shares = [100.0 * count / result.members for count in (going, *counts.values())]
+    ok = int((status == Status.OK).sum())
+    labels = [f"under way, {ok:,} to the end"] + [_first(result, code, when) for code in ended]
+    with panel(ax, path) as axes:
+        areas = axes.stackplot(time, *shares, colors=[LOOKS[code].color for code in (Status.OK, *ended)], labels=labels)
+        for i, area in enumerate(areas):
+            area.set(hatch=hatch(i), edgecolor="white", linewidth=0.0)
+        axes.set(xlabel="time [s]", ylabel="share of members [%]", xlim=(time[0], time[-1]), ylim=(0.0, 100.0))
+        if ax is None:
+            axes.set_title(wrapped(title(result), axes.figure))
+        below(axes, ncols=1)
+    return axes
+
+
+def _first(result: Result, code: Status, when: np.ndarray) -> str:
+    """An outcome, how many members had it, and when the first had it."""
+    members = np.asarray(result.status) == code
+    return (
+        f"{code.name.lower()}: {int(members.sum()):,} of {result.members:,}, the first at {when[members].min():.4g} s"
+    )
+
+
+def histogram(
+    result: Result,
+    of: Any = "depth",
+    at: float | None = None,
+    *,
+    ax: Any = None,
+    path: str | os.PathLike[str] | None = None,
+) -> Any:
+    """Draw how a number of the members is spread at one time, stacked by what had become of them by then.
+
+    Members that ended are counted at their last state. Depths are on the vertical axis, downwards. Without samples a statistic
+    lw.Histogram of the quantity is drawn.
+
+    Args:
+        result: A result, in memory or in a store.
+        of: A quantity of one number, also over the path: "depth", "max(speed)", a `lw.Quantity`; default "depth".
+        at: Time [s], of which the nearest sample is taken; default None, the last.
+        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
+        path: File to write; its ending chooses the format. Default None: none is written.
+
+    Returns:
+        The axes.
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        NothingToDraw: Nothing of the quantity was kept or gathered, or no member has a finite number.
+        SceneError: The quantity is not known, or has several numbers.
+        OSError: The file cannot be written.
+    """
+    (meaning,) = quantities([of])
+    estimate = None if result.samples else estimate_for(result, meaning.label, ("histogram",))
+    if estimate is not None:
+        statistic, component = estimate
+        frame = _nearest(statistic.time, at)
+        edges, when, unit = statistic.coordinates["edge"], statistic.time[frame], unit_of(meaning.label)
+        outside = int(statistic["below"][frame, component] + statistic["above"][frame, component])
+        label = f"{int(statistic.count[frame]):,} members" + (
+            f", {outside:,} of them outside the bins" if outside else ""
+        )
+        bars = {label: (100.0 * statistic.value[frame, component], COLORS[0])}
+    else:
+        result = with_samples(result)
+        members, frame = shown(result).ranked, _nearest(result.time, at)
+        values, labels, unit = at_one_time(result, meaning, members, frame)
+        if len(labels) > 1:
+            raise refusal("of", of, f"has {len(labels)} components", f"name one: {', '.join(labels)}")
+        when, finite = result.time[frame], np.isfinite(values[:, 0])
+        if not finite.any():
+            raise NothingToDraw(f"no member has a finite {meaning.label}: there is nothing to draw; see result.status")
+        edges = _edges(values[finite, 0])
+        bars = {}
+        for code, group in _groups(result, members, when):
+            share = np.histogram(values[finite & group, 0], edges)[0] * (100.0 / len(members))
+            bars[f"{'under way' if code == Status.OK else code.name.lower()} ({int(group.sum()):,})"] = (
+                share,
+                LOOKS[code].color,
+            )
+    down = meaning.label in DEPTHS
+    with panel(ax, path) as axes:
+        base = np.zeros(len(edges) - 1)
+        for i, (label, (share, color)) in enumerate(bars.items()):
+            look = {
+                "color": color,
+                "hatch": hatch(i),
+                "edgecolor": "white",
+                "linewidth": 0.3,
+                "align": "edge",
+                "label": label,
+            }
+            if down:
+                axes.barh(edges[:-1], share, np.diff(edges), left=base, **look)
+            else:
+                axes.bar(edges[:-1], share, np.diff(edges), bottom=base, **look)
+            base = base + share
+        name, count = f"{meaning.label} [{unit or '1'}]", "share of members [%]"
+        axes.set(xlabel=count if down else name, ylabel=f"{name}, down" if down else count)
+        axes.set_title(wrapped(f"{meaning.label} of {some_of(result, result.members)} at {when:g} s", axes.figure))
+        if down:
+            point_down(axes, floors(result))
+        below(axes, ncols=3)
+    return axes
+
+
+def _edges(values: np.ndarray) -> np.ndarray:
+    """Edges of bins; about numbers that are all the same to a millionth, a range of a thousandth."""
+    low, high = float(values.min()), float(values.max())
+    size = max(abs(low), abs(high), 1e-12)
+    if high - low < 1e-6 * size:
+        low, high = low - 5e-4 * size, high + 5e-4 * size
+    return np.linspace(low, high, int(np.clip(np.sqrt(len(values)), 5, MOST_BINS)) + 1)
+
+
+def _groups(result: Result, members: np.ndarray, when: float) -> list[tuple[Status, np.ndarray]]:
+    """Masks of the members under way at a time, and of those that ended by then, by outcome; only those that occur."""
+    status, ended = np.asarray(result.status)[members], stop_time(result)[members] <= when
+    groups = [
+        (Status.OK, ~ended),
+        *((code, ended & (status == code)) for code in ended_so.outcomes(result) if code != Status.OK),
+    ]
+    return [(code, group) for code, group in groups if group.any()]
+
+
+def pairs(
+    result: Result,
+    of: Sequence[Any] = ("position[0]", "position[1]", "depth", "speed"),
+    *,
+    figure: Any = None,
+    path: str | os.PathLike[str] | None = None,
+) -> np.ndarray:
+    """Draw numbers of the members at the end against each other, coloured by outcome, and how each is spread.
+
+    Args:
+        result: A result with the samples that the quantities need, in memory or in a store.
+        of: Two to six quantities, also over the path, as "max(depth)"; default north, east, depth and speed.
+        figure: Matplotlib figure to draw on; default None, one of its own.
+        path: File to write; its ending chooses the format. Default None: none is written.
+
+    Returns:
+        The axes, shape (m, m) for m numbers.
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        NothingToDraw: Samples that are needed were not kept, or no member has a finite start.
+        SceneError: A quantity is not known, or there are fewer than two numbers or more than six.
+        OSError: The file cannot be written.
+    """
+    result = with_samples(result)
+    choice = shown(result, MOST_POINTS)
+    columns: list[np.ndarray] = []
+    names: list[str] = []
+    for meaning in quantities(list(of)):
+        values, labels, unit = at_one_time(result, meaning, choice.members)
+        columns += list(values.T)
+        names += [f"{WORDS.get(label, label)} [{unit or '1'}]{', down' * (label in DEPTHS)}" for label in labels]
+    m = len(names)
+    if not 2 <= m <= MOST_PAIRS:
+        raise refusal("of", list(of), f"has {m} numbers a member", f"name from 2 to {MOST_PAIRS}")
+    groups = _groups(result, choice.members, float(result.time[-1]))
+    size = max(8.0, 2.6 * m)
+    with panels(figure, path, (m, m), (size, size)) as axes:
+        for i in range(m):
+            for j in range(m):
+                _pair(axes[i, j], columns[j], columns[i], groups, i == j)
+                axes[i, j].set(xlabel=names[j] if i == m - 1 else "", ylabel=names[i] if j == 0 else "")
+                if names[i].endswith("down") and i != j:
+                    axes[i, j].invert_yaxis()
+                axes[i, j].locator_params(nbins=4)
+                axes[i, j].tick_params(labelbottom=i == m - 1, labelleft=i != j and j == 0, axis="both")
+        handles, labels = axes[1, 0].get_legend_handles_labels()
+        axes[0, -1].figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)
+        text = f"{some_of(result, len(choice.members))} at {result.time[-1]:g} s"
+        axes[0, 0].figure.suptitle(wrapped(text, axes[0, 0].figure))
+    return axes
+
+
+def _pair(axes: Any, x: np.ndarray, y: np.ndarray, groups: list[tuple[Status, np.ndarray]], same: bool) -> None:
+    """Draw points of two numbers, or bars of one."""
+    if same:
+        finite = x[np.isfinite(x)]
+        axes.hist(finite, _edges(finite), color=COLORS[0])
+        return
+    for code, group in groups:
+        look = mark(code) if code != Status.OK else {"color": LOOKS[code].color, "marker": "o", "linewidths": 0}
+        label = f"{'under way' if code == Status.OK else code.name.lower()} ({int(group.sum()):,})"
+        axes.scatter(x[group], y[group], s=12, alpha=0.8, label=label, **look)
+
+
+def _nearest(time: np.ndarray, at: float | None) -> int:
+    """Index of the sample nearest to a time; of the last for None."""
+    return len(time) - 1 if at is None else int(np.abs(time - at).argmin())

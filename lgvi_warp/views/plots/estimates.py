@@ -1,0 +1,141 @@
+"""Statistics of a run against time, a panel each."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.views.choice import of_members
+from lgvi_warp.views.fleet import members_of_run
+from lgvi_warp.views.plots.canvas import COLORS, hatch, panels, point_down, style, wrapped
+from lgvi_warp.views.plots.read import DEPTHS, floors, unit_of
+
+if TYPE_CHECKING:
+    from lgvi_warp.runs.result import Result
+    from lgvi_warp.statistics.estimate import Estimate
+
+# Most panels of statistics, and most lines in a panel.
+PANELS, LINES = 12, 12
+
+
+def statistics(result: Result, *, figure: Any = None, path: str | os.PathLike[str] | None = None) -> np.ndarray:
+    """Draw a run's statistics against time, one panel each.
+
+    Quantiles are drawn as a fan, other statistics with their intervals, histograms as colours. Statistics of paths, which have
+    one time, and covariances are left to the table; the picture names them.
+
+    Args:
+        result: A result with statistics; the first 12 that can be drawn are.
+        figure: Matplotlib figure to draw on; default None, one of its own.
+        path: File to write; its ending chooses the format. Default None: none is written.
+
+    Returns:
+        The axes, shape (panels,).
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        NothingToDraw: There is no statistic against time.
+        OSError: The file cannot be written.
+    """
+    drawn = drawable(result)[:PANELS]
+    if not drawn:
+        raise NothingToDraw("no statistic against time was gathered: there is nothing to draw; give statistics=[...]")
+    columns = min(3, len(drawn))
+    rows = -(-len(drawn) // columns)
+    size = max(7.0, 4.6 * columns), 3.9 * rows + 1.0
+    with panels(figure, path, (rows, columns), size) as grid:
+        for axes, estimate in zip(grid.flat, drawn, strict=False):
+            axes.set(title=wrapped(estimate.name, axes.figure, 1.0 / columns), xlabel="time [s]")
+            axes.grid(True, alpha=0.3)
+            _PANEL[estimate.settings["type"]](axes, estimate)
+            _units(axes, result, estimate)
+        for axes in grid.flat[len(drawn) :]:
+            axes.set_axis_off()
+        names = {estimate.name for estimate in drawn}
+        left = [name for name in result.statistics if name not in names]
+        more = f"; not drawn, see the table: {', '.join(left)}" if left else ""
+        text = f"{of_members(result.members, members_of_run(result))}, intervals of {drawn[0].confidence:.0%}{more}"
+        grid[0, 0].figure.suptitle(wrapped(text, grid[0, 0].figure))
+    return grid.ravel()[: len(drawn)]
+
+
+def _units(axes: Any, result: Result, estimate: Estimate) -> None:
+    """Say the unit of the vertical axis, and turn an axis of depths downwards."""
+    components = [str(label) for label in estimate.coordinates.get("component", ())]
+    histogram = estimate.settings["type"] == "histogram"
+    unit = unit_of(components[0]) if histogram else estimate.unit
+    name = components[0] if histogram or len(components) == 1 else ""
+    deep = unit == "m" and bool(components) and all(label in DEPTHS for label in components)
+    axes.set_ylabel(f"{name} [{unit or '1'}]{', down' * deep}".strip())
+    if deep:
+        point_down(axes, floors(result))
+
+
+def drawable(result: Result) -> list[Estimate]:
+    """Select the statistics that `plot_statistics` draws.
+
+    Args:
+        result: A result.
+
+    Returns:
+        Its estimates against time, in the order of the result.
+    """
+    return [
+        estimate
+        for estimate in result.statistics.values()
+        if len(estimate.time) > 1 and estimate.settings["type"] in _PANEL
+    ]
+
+
+def _levels_panel(axes: Any, one: Estimate) -> None:
+    """Draw pairs of quantiles as bands about the middle one, with a colour and a hatch for each component."""
+    levels = one.coordinates["level"]
+    for c in range(min(one.value.shape[2], LINES)):
+        look, values = style(c), one.value[:, :, c]
+        for i in range(len(levels) // 2):
+            label = f"{levels[-1 - i] - levels[i]:.0%}" if c == 0 else None
+            axes.fill_between(one.time, values[:, i], values[:, -1 - i], facecolor=look["color"], alpha=0.15 * (i + 1),
+                              hatch=hatch(c + i), edgecolor=look["color"], linewidth=0, label=label)  # fmt: skip
+        if len(levels) % 2:
+            axes.plot(one.time, values[:, len(levels) // 2], label=one.coordinates["component"][c], **look)
+    axes.legend(loc="best")
+
+
+def _lines_panel(axes: Any, one: Estimate) -> None:
+    """Draw a line for each component, with its interval."""
+    shape = (len(one.time), -1)
+    value, lower, upper = (array.reshape(shape) for array in (one.value, one.lower, one.upper))
+    names = one.coordinates["component"] if one.coordinates["component"].size else np.array([one.name])
+    for c in range(min(value.shape[1], LINES)):
+        look = style(c)
+        axes.plot(one.time, value[:, c], label=names[c] if c < len(names) else None, **look)
+        axes.fill_between(one.time, lower[:, c], upper[:, c], color=look["color"], alpha=0.3, linewidth=0)
+    axes.legend(loc="best")
+
+
+def _extremes_panel(axes: Any, one: Estimate) -> None:
+    """Draw a band from the smallest to the largest value of each component."""
+    for c in range(min(one.value.shape[1], LINES)):
+        color, label = COLORS[c % len(COLORS)], one.coordinates["component"][c]
+        axes.fill_between(one.time, one["minimum"][:, c], one["maximum"][:, c], facecolor=color, alpha=0.3, hatch=hatch(c),
+                          edgecolor=color, linewidth=0, label=label)  # fmt: skip
+    axes.legend(loc="best")
+
+
+def _histogram_panel(axes: Any, one: Estimate) -> None:
+    """Draw the fractions of the first component, bins against time."""
+    time, edge = one.time, one.coordinates["edge"]
+    middle = 0.5 * (time[1:] + time[:-1])
+    drawn = axes.pcolormesh(
+        np.concatenate([time[:1], middle, time[-1:]]), edge, 100.0 * one.value[:, 0].T, cmap="cividis"
+    )
+    axes.grid(False)
+    axes.figure.colorbar(drawn, ax=axes, label="share of members [%]")
+
+
+_LINES = ("mean", "circular_mean", "exceedance", "first_passage", "outcome")
+_PANEL = {"quantiles": _levels_panel, "extremes": _extremes_panel, "histogram": _histogram_panel}
+_PANEL |= dict.fromkeys(_LINES, _lines_panel)

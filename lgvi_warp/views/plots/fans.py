@@ -1,0 +1,253 @@
+"""Fans: one number of all members under way against time, as bands of quantiles; and the same of several runs."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import NothingToDraw, refusal
+from lgvi_warp.common.status import Status, failed, stop_time
+from lgvi_warp.runs.outcomes import outcomes
+from lgvi_warp.statistics.quantity import Quantity
+from lgvi_warp.views.choice import mixed, of_members
+from lgvi_warp.views.fleet import members_of_run, title
+from lgvi_warp.views.plots.canvas import COLORS, TINTS, below, hatch, mark, panel, point_down, style, wrapped
+from lgvi_warp.views.plots.read import (
+    HINT,
+    Survey,
+    estimate_for,
+    floors,
+    is_depth,
+    label_of,
+    quantity_of,
+    survey_of,
+    unbounded_text,
+    with_samples,
+)
+from lgvi_warp.views.recording.drawn import at_levels
+
+if TYPE_CHECKING:
+    from lgvi_warp.runs.result import Result
+    from lgvi_warp.statistics.estimate import Estimate
+
+# Bands of the fan, outermost first: lower quantile, upper quantile.
+BANDS = ((0.0, 1.0), (0.05, 0.95), (0.25, 0.75))
+# Most marks of ended members with the same outcome.
+MARKS = 1000
+# Statistics that can stand for samples, the best first.
+STANDING = ("quantiles", "mean", "extremes")
+
+
+def fan(result: Result, of: Any = "depth", *, ax: Any = None, path: str | os.PathLike[str] | None = None) -> Any:
+    """Draw one number of all members against time: the median and bands of quantiles of those under way at each time.
+
+    Members that an event stopped, or that failed, are marked where they ended. One vehicle is a line. Angles of `euler` are
+    drawn about their mean direction. Without samples the statistics are drawn that were gathered of the quantity.
+
+    Args:
+        result: A result, in memory or in a store.
+        of: Name of the quantity or of one component, as "depth", "speed", "position[0]", or a `lw.Quantity`; default "depth".
+        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
+        path: File to write; its ending chooses the format. Default None: none is written.
+
+    Returns:
+        The axes.
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        NothingToDraw: Nothing of the quantity was kept or gathered, or no member has a finite number.
+        SceneError: The quantity is not known, or has several components.
+        OSError: The file cannot be written.
+    """
+    meaning = quantity_of(of)
+    estimate = None if result.samples else estimate_for(result, meaning.name, STANDING)
+    if estimate is None:
+        result = with_samples(result)
+    with panel(ax, path) as axes:
+        if estimate is None:
+            survey = draw_fan(axes, result, meaning)
+            text, notes = text_of(survey, members_of_run(result)), notes_on(result, survey)
+        else:
+            text = f"{of_members(result.members, members_of_run(result))}, from statistics"
+            notes = []
+            _draw_estimate(axes, *estimate)
+            axes.set(xlabel="time [s]", ylabel=label_of(meaning))
+            if is_depth(meaning):
+                point_down(axes, floors(result))
+        if ax is None:
+            axes.set_title("\n".join(wrapped(line, axes.figure) for line in (title(result), *notes)))
+        if axes.get_legend_handles_labels()[0]:
+            below(axes, ncols=4, title=text)
+    return axes
+
+
+def draw_fan(axes: Any, result: Result, of: Quantity) -> Survey:
+    """Draw a fan, the ends of members, and labels.
+
+    Args:
+        axes: Matplotlib axes.
+        result: A result with samples.
+        of: A quantity of one number.
+
+    Returns:
+        What was drawn.
+
+    Raises:
+        NothingToDraw: Nothing of the quantity was kept, no member has a finite number, or all failed at once.
+    """
+    survey = survey_of(result, of)
+    if failed(result.status).all() and not survey.under_way[1:].any():
+        raise NothingToDraw(
+            "every member failed before the second sample: there is nothing to draw; see result.status and result.failure_time"
+        )
+    marker = "o" if len(survey.time) < 3 else ""
+    if survey.total == 1:
+        line = np.where(survey.counted, survey.values, np.nan)[:, 0]
+        axes.plot(survey.time, line, color=COLORS[0], marker=marker, label=of.name)
+    else:
+        draw_bands(axes, survey.time, survey.values, survey.counted, low=survey.low, high=survey.high, marker=marker)
+    _ends(axes, result, survey)
+    axes.set(xlabel="time [s]", ylabel=label_of(of))
+    axes.grid(True, alpha=0.3)
+    if of.name == "energy error":
+        axes.axhline(0.0, color="black", linewidth=0.5)
+    if is_depth(of):
+        point_down(axes, floors(result))
+    return survey
+
+
+def notes_on(result: Result, survey: Survey) -> list[str]:
+    """Say what a reader of a fan has to know beside it.
+
+    Args:
+        result: The result.
+        survey: What is drawn of it.
+
+    Returns:
+        Lines on members above the surface, and on how to have more than start and end.
+    """
+    few_times = HINT if len(survey.time) < 3 else ""
+    return [note for note in (unbounded_text(result, survey), few_times) if note]
+
+
+def text_of(survey: Survey, total: int) -> str:
+    """Say how many members are in a fan, at its beginning and at its end.
+
+    Args:
+        survey: What is drawn.
+        total: Number of members of the run.
+
+    Returns:
+        A line or two.
+    """
+    first, last = int(survey.under_way[0]), int(survey.under_way[-1])
+    text = of_members(survey.total, total)
+    if (survey.under_way != survey.total).any():
+        text = f"under way: {first:,} at {survey.time[0]:g} s,\n{last:,} at {survey.time[-1]:g} s"
+    return text if survey.ranked == survey.total else f"{text}; quantiles of {survey.ranked:,}"
+
+
+def draw_bands(axes: Any, time: np.ndarray, values: np.ndarray, counted: np.ndarray, **look: Any) -> None:
+    """Draw bands between quantiles of many members against time, and their median.
+
+    Args:
+        axes: Matplotlib axes.
+        time: Times [s], shape (k,).
+        values: A number of each member, shape (k, n).
+        counted: Mask (k, n) of the members that count at each time.
+        **look: Arguments of Axes.plot for the median; and low and high (k,), extremes where they are of more members.
+    """
+    levels = sorted({q for band in BANDS for q in band} | {0.5})
+    curves = dict(zip(levels, at_levels(values, counted, levels), strict=True))
+    curves[0.0], curves[1.0] = look.pop("low", curves[0.0]), look.pop("high", curves[1.0])
+    for (low, high), color in zip(BANDS, TINTS, strict=True):
+        label = "all" if low == 0.0 else f"{high - low:.0%}"
+        axes.fill_between(time, curves[low], curves[high], color=color, linewidth=0, label=label)
+    axes.plot(time, curves[0.5], color="black", linewidth=1.2, label="median", **look)
+
+
+def _ends(axes: Any, result: Result, survey: Survey) -> None:
+    """Mark by outcome where and when members ended before the end of the run."""
+    when, status = stop_time(result), np.asarray(result.status)
+    for code in outcomes(result):
+        if code != Status.OK:
+            members = np.flatnonzero(status == code)
+            drawn = members[np.argsort(mixed(members), kind="stable")[:MARKS]]
+            label = f"{code.name.lower()} ({len(members):,})"
+            axes.scatter(when[drawn], survey.last[drawn], s=24, zorder=3, label=label, **mark(code))
+
+
+def _draw_estimate(axes: Any, estimate: Estimate, component: int) -> None:
+    """Draw one component of a statistic in place of samples: bands of quantiles, a mean with its interval, or extremes."""
+    kind, time = estimate.settings["type"], estimate.time
+    if kind == "quantiles":
+        levels, values = estimate.coordinates["level"], estimate.value[:, :, component]
+        pairs = len(levels) // 2
+        for i in range(pairs):
+            color, label = TINTS[max(0, len(TINTS) - pairs + i)], f"{levels[-1 - i] - levels[i]:.0%}"
+            axes.fill_between(time, values[:, i], values[:, -1 - i], color=color, linewidth=0, label=label)
+        if len(levels) % 2:
+            axes.plot(time, values[:, pairs], color="black", linewidth=1.2, label=f"{levels[pairs]:.0%} quantile")
+    elif kind == "mean":
+        low, high = estimate.lower[:, component], estimate.upper[:, component]
+        axes.fill_between(time, low, high, color=TINTS[1], linewidth=0, label=f"its {estimate.confidence:.0%} interval")
+        axes.plot(time, estimate.value[:, component], color="black", linewidth=1.2, label="mean")
+    else:
+        low, high = estimate["minimum"][:, component], estimate["maximum"][:, component]
+        axes.fill_between(time, low, high, color=TINTS[0], linewidth=0, label="all")
+    axes.grid(True, alpha=0.3)
+
+
+def compare(
+    results: Mapping[str, Result], of: Any = "depth", *, ax: Any = None, path: str | os.PathLike[str] | None = None
+) -> Any:
+    """Draw one number of several runs against time: a median and a band of 90 % of the members under way for each.
+
+    Args:
+        results: Results by label.
+        of: Name of the quantity or of one component, or a `lw.Quantity`; default "depth".
+        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
+        path: File to write; its ending chooses the format. Default None: none is written.
+
+    Returns:
+        The axes.
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        NothingToDraw: Of some run nothing of the quantity was kept, or no member has a finite number.
+        SceneError: There are no results, or the quantity is not known or has several components.
+        OSError: The file cannot be written.
+    """
+    if not results:
+        raise refusal("results", results, "holds no result", "give results by label: {'a': a, 'b': b}")
+    meaning = quantity_of(of)
+    surveys = {label: survey_of(with_samples(result), meaning) for label, result in results.items()}
+    with panel(ax, path) as axes:
+        for i, (label, survey) in enumerate(surveys.items()):
+            low, middle, high = at_levels(survey.values, survey.counted, [0.05, 0.5, 0.95])
+            look = style(i)
+            if survey.total > 1:
+                axes.fill_between(
+                    survey.time,
+                    low,
+                    high,
+                    facecolor=look["color"],
+                    alpha=0.2,
+                    hatch=hatch(i),
+                    edgecolor=look["color"],
+                    linewidth=0,
+                )
+            members = text_of(survey, members_of_run(results[label])).replace("\n", " ")
+            axes.plot(
+                survey.time, middle, marker="o" if len(survey.time) < 3 else "", label=f"{label}: {members}", **look
+            )
+        axes.set(xlabel="time [s]", ylabel=label_of(meaning))
+        axes.grid(True, alpha=0.3)
+        if is_depth(meaning):
+            point_down(axes, tuple({depth for result in results.values() for depth in floors(result)}))
+        several = any(survey.total > 1 for survey in surveys.values())
+        below(axes, title="median, and band of 90 % of the members under way" if several else None)
+    return axes

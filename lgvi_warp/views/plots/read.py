@@ -1,0 +1,339 @@
+"""Numbers that pictures draw: a quantity of the members under way at each time, read in pieces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import NothingToDraw, SceneError, refusal
+from lgvi_warp.common.status import under_way
+from lgvi_warp.physics import energy as invariants
+from lgvi_warp.runs.quantities import OfResult, samples_of
+from lgvi_warp.statistics.functional import quantity
+from lgvi_warp.statistics.quantity import Quantity
+from lgvi_warp.views.choice import AT_ONCE, Shown, few, of_members, shown
+from lgvi_warp.views.fleet import members_of_run
+
+if TYPE_CHECKING:
+    from lgvi_warp.runs.result import Result
+    from lgvi_warp.statistics.estimate import Estimate
+
+# Angles that go around: they are drawn about their mean direction.
+CIRCULAR = ("euler[0]", "euler[2]")
+DEPTHS = ("depth", "position[2]")
+WORDS = {
+    "position[0]": "north",
+    "position[1]": "east",
+    "position[2]": "depth",
+    "velocity_inertial[0]": "velocity north",
+    "velocity_inertial[1]": "velocity east",
+    "velocity_inertial[2]": "velocity down",
+    "energy": "E(t)",
+    "energy error": "E(t) - E(0)",
+    "euler[0]": "roll",
+    "euler[1]": "pitch",
+    "euler[2]": "yaw",
+}
+HINT = "start and end alone were kept: give SaveAt(every=...) for the motion between"
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """One number of the members under way at each time.
+
+    Attributes:
+        of: The quantity.
+        time: Times drawn [s], shape (f,).
+        values: Numbers of the members that quantiles are taken of, shape (f, q).
+        counted: Which of them count, shape (f, q).
+        low: Smallest number of all members, shape (f,); NaN where none counts.
+        high: Largest number of all members, shape (f,).
+        under_way: Number of members under way, shape (f,).
+        last: The last number of every member, shape (n,).
+        above: Number of members that are above the surface at some time; 0 for other quantities than depth.
+        total: Number of members.
+    """
+
+    of: Quantity
+    time: np.ndarray
+    values: np.ndarray
+    counted: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    under_way: np.ndarray
+    last: np.ndarray
+    above: int
+    total: int
+
+    @property
+    def ranked(self) -> int:
+        """Number of members that quantiles are taken of."""
+        return self.values.shape[1]
+
+
+def with_samples(result: Result) -> Result:
+    """Give the result whose samples are drawn.
+
+    Args:
+        result: A result.
+
+    Returns:
+        The result, or the members that it kept.
+
+    Raises:
+        NothingToDraw: No samples were kept.
+    """
+    if result.samples:
+        return result
+    if result.kept is not None:
+        return result.kept
+    raise NothingToDraw(
+        'no samples were kept: there is nothing to draw; give keep="all", or indices of members to keep, '
+        "or draw what the statistics tell: lw.plots.statistics, lw.plots.outcomes"
+    )
+
+
+def check_fields(result: Result, fields: tuple[str, ...], what: str) -> None:
+    """Refuse to draw what was not kept.
+
+    Args:
+        result: A result with samples.
+        fields: Names of the samples that are needed.
+        what: What needs them.
+
+    Raises:
+        NothingToDraw: Some were not kept.
+    """
+    if missing := [name for name in fields if name not in result.samples]:
+        raise NothingToDraw(
+            f"{', '.join(missing)} not kept: {what} needs {'them' if len(missing) > 1 else 'it'}; "
+            "name all in SaveAt(fields=...)"
+        )
+
+
+def quantity_of(of: Any) -> Quantity:
+    """Read a quantity that has one number a member and time.
+
+    Args:
+        of: Its name, as "depth" or "position[2]", or a `lw.Quantity`.
+
+    Returns:
+        The quantity.
+
+    Raises:
+        SceneError: It is not known, or has several numbers.
+    """
+    meaning = quantity("of", of)
+    if meaning.size > 1:
+        raise refusal("of", of, f"has {meaning.size} components", f"name one: {', '.join(meaning.labels)}")
+    return meaning
+
+
+def energy_of(result: Result) -> Quantity:
+    """Energy, as its error where the scene's laws conserve it.
+
+    Args:
+        result: A result.
+
+    Returns:
+        The quantity "energy error", E(t) - E(0), or "energy", E(t) [J].
+    """
+    energy = quantity("of", "energy")
+    if "energy" not in invariants.conserved(result):
+        return energy
+
+    def error(samples: Any, members: Any) -> np.ndarray:
+        values = np.asarray(energy.function(samples, members))
+        return values - values[:1]
+
+    return Quantity("energy error", error, energy.unit, energy.fields)
+
+
+def label_of(of: Quantity) -> str:
+    """Label of an axis: the quantity and its unit.
+
+    Args:
+        of: The quantity.
+
+    Returns:
+        As "speed [m/s]"; depths say that they point down.
+    """
+    name = WORDS.get(of.name, of.name.replace("_", " "))
+    unit = of.unit or "1"
+    return f"{name} [{unit}], down" if is_depth(of) else f"{name} [{unit}]"
+
+
+def is_depth(of: Quantity) -> bool:
+    """Tell whether a quantity is a depth, which is drawn downwards."""
+    return of.name in DEPTHS
+
+
+def floors(result: Result) -> tuple[float, ...]:
+    """Depths of the scene's floors [m]."""
+    return tuple(float(event["depth"]) for event in events(result) if event["type"] == "floor")
+
+
+def events(result: Result) -> list[dict[str, Any]]:
+    """Tables of the scene's events."""
+    return list(result.provenance["scene"].get("events", ()))
+
+
+def unbounded_text(result: Result, survey: Survey) -> str:
+    """Say how many members leave water that has no surface.
+
+    Args:
+        result: The result.
+        survey: Its depths.
+
+    Returns:
+        A line; "" where none does, or where an event ends members at the surface.
+    """
+    if not survey.above or any(event["type"] == "surface" for event in events(result)):
+        return ""
+    who = "the vehicle passes" if survey.total == 1 else f"{survey.above:,} of {survey.total:,} members pass"
+    return f"unbounded water: {who} above depth 0"
+
+
+def survey_of(result: Result, of: Quantity) -> Survey:
+    """Read one number of all members, in pieces: a large run never lies in memory whole.
+
+    Args:
+        result: A result with samples, in memory or in a store.
+        of: The quantity.
+
+    Returns:
+        Its extremes over all members, and its values of those that quantiles are taken of.
+
+    Raises:
+        NothingToDraw: The quantity's samples were not kept, or no member has a finite number.
+    """
+    check_fields(result, of.fields, of.name)
+    choice = shown(result) if "position" in result.samples else everyone(result)
+    frames = choice.frames
+    going = under_way(result)[frames]
+    direction = _direction(result, of, choice)
+    low, high = (np.full(len(frames), np.nan) for _ in range(2))
+    last, rows, counts, above = np.empty(result.members), [], [], 0
+    # Energy reads 18 numbers of a member, and makes as many more.
+    step = max(1, AT_ONCE // len(frames) // (10 if len(of.fields) > 2 else 1))
+    for first in range(0, result.members, step):
+        members = slice(first, min(first + step, result.members))
+        values = numbers(result, of, members, frames)
+        if direction is not None:
+            values = _about(values, direction)
+        counted = going[:, members] & np.isfinite(values)
+        masked = np.where(counted, values, np.nan)
+        low, high = np.fmin(low, np.fmin.reduce(masked, axis=1)), np.fmax(high, np.fmax.reduce(masked, axis=1))
+        above += int((masked < 0.0).any(axis=0).sum()) if is_depth(of) else 0
+        last[members] = values[-1]
+        ranked = choice.ranked[(choice.ranked >= members.start) & (choice.ranked < members.stop)] - members.start
+        rows.append(values[:, ranked])
+        counts.append(counted[:, ranked])
+    if not np.isfinite(low).any():
+        raise NothingToDraw(f"no member has a finite {of.name}: there is nothing to draw; see result.status")
+    values, counted = np.concatenate(rows, axis=1), np.concatenate(counts, axis=1)
+    sums = going.sum(axis=1)
+    return Survey(of, result.time[frames], values, counted, low, high, sums, last, above, result.members)
+
+
+def everyone(result: Result) -> Shown:
+    """All members at all times, where no positions were kept by which some could be chosen."""
+    members = np.arange(result.members)
+    return Shown(members, np.arange(len(result.time)), members, result.members)
+
+
+def numbers(result: Result, of: Quantity, members: slice | np.ndarray, frames: np.ndarray | None = None) -> np.ndarray:
+    """Compute a quantity of some members.
+
+    Args:
+        result: A result with samples.
+        of: A quantity of one number.
+        members: The members, a slice or indices.
+        frames: Indices of the times; default None, all.
+
+    Returns:
+        Numbers, float64, shape (f, m).
+    """
+    part = few(result, members, of.fields, frames)
+    with np.errstate(invalid="ignore"):
+        return of(*samples_of(part))[:, 0].astype(np.float64)
+
+
+def _direction(result: Result, of: Quantity, choice: Shown) -> np.ndarray | None:
+    """Mean direction of an angle at each time [rad], shape (f, 1), continuous in time; None for other quantities."""
+    if of.name not in CIRCULAR:
+        return None
+    angle = numbers(result, of, choice.members, choice.frames)
+    counted = under_way(result)[np.ix_(choice.frames, choice.members)] & np.isfinite(angle)
+    arm = np.where(counted, np.exp(1j * np.where(counted, angle, 0.0)), 0.0).sum(axis=1)
+    return np.unwrap(np.angle(arm))[:, None]
+
+
+def _about(angle: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Angles [rad] within half a turn of a direction."""
+    off = angle - direction
+    return np.asarray(direction + off - 2.0 * np.pi * np.round(off / (2.0 * np.pi)))
+
+
+def at_one_time(
+    result: Result, of: OfResult, members: np.ndarray, frame: int = -1
+) -> tuple[np.ndarray, list[str], str]:
+    """Compute a quantity of interest of some members at one time.
+
+    Args:
+        result: A result with samples.
+        of: The quantity; one that looks over the path does so up to this time.
+        members: Indices of the members, shape (m,).
+        frame: Index of the time; default the last.
+
+    Returns:
+        Numbers (m, c), the names of the c components, and the unit.
+    """
+    check_fields(result, of.fields, of.label)
+    frame = frame % len(result.time)
+    frames = np.arange(frame + 1) if of.over_path or of.is_function else np.array([frame])
+    values = of.values(few(result, members, of.fields, frames))
+    return values, of.labels(values.shape[1]), "" if of.is_function else of.of.unit  # type: ignore[union-attr]
+
+
+def estimate_for(result: Result, of: str, types: tuple[str, ...]) -> tuple[Estimate, int] | None:
+    """Find a statistic of a quantity.
+
+    Args:
+        result: A result.
+        of: Name of the quantity or of one component, as "depth".
+        types: Types of statistics, the best first.
+
+    Returns:
+        The estimate and the index of the component; None where there is none.
+    """
+    names = DEPTHS if of in DEPTHS else (of,)
+    for kind in types:
+        for estimate in result.statistics.values():
+            labels = [str(label) for label in estimate.coordinates.get("component", ())]
+            for name in names:
+                if estimate.settings["type"] == kind and len(estimate.time) > 1 and name in labels:
+                    return estimate, labels.index(name)
+    return None
+
+
+def some_of(result: Result, drawn: int) -> str:
+    """Say how many members are drawn of how many of the run."""
+    return of_members(drawn, members_of_run(result))
+
+
+def unit_of(label: str) -> str:
+    """Find the unit of a quantity by its name.
+
+    Args:
+        label: The name, as "position[2]".
+
+    Returns:
+        The unit; "" for the user's own quantities, which have no other place to say it than their name.
+    """
+    try:
+        return quantity("of", label).unit
+    except SceneError:
+        return ""

@@ -1,0 +1,242 @@
+"""Paths of some members: from the side, from above, in a plane of two quantities, and of their axes on the sphere."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.status import Status, under_way
+from lgvi_warp.views.choice import few, shown
+from lgvi_warp.views.plots.canvas import COLORS, STYLES, below, mark, outcome_style, panel, point_down, wrapped
+from lgvi_warp.views.plots.read import (
+    HINT,
+    check_fields,
+    floors,
+    is_depth,
+    label_of,
+    numbers,
+    quantity_of,
+    some_of,
+    with_samples,
+)
+
+if TYPE_CHECKING:
+    from lgvi_warp.runs.result import Result
+
+MOST_PATHS = 12
+MOST_AXES = 1
+
+
+def paths(result: Result, most: int = MOST_PATHS, *, ax: Any = None, path: str | os.PathLike[str] | None = None) -> Any:
+    """Draw paths of some members from the side: depth against horizontal distance from the mean start.
+
+    Args:
+        result: A result with positions, in memory or in a store.
+        most: The most members to draw, which `lw.shown` chooses; default 12.
+        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
+        path: File to write; its ending chooses the format. Default None: none is written.
+
+    Returns:
+        The axes.
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        NothingToDraw: No positions were kept, or no member has a finite start.
+        OSError: The file cannot be written.
+    """
+    result = with_samples(result)
+    check_fields(result, ("position",), "paths")
+    with panel(ax, path) as axes:
+        draw_paths(axes, result, most)
+        axes.set_title(_title(axes, axes.get_title(), result))
+    return axes
+
+
+def draw_paths(axes: Any, result: Result, most: int = MOST_PATHS) -> None:
+    """Draw paths from the side.
+
+    Args:
+        axes: Matplotlib axes.
+        result: A result with positions.
+        most: The most members to draw; default 12.
+    """
+    choice = shown(result, most)
+    some = few(result, choice.members, ("position",), choice.frames)
+    first = result.samples["position"][0] if result.store is None else some.position[0]
+    start = first[np.isfinite(first).all(axis=-1), :2].mean(axis=0)
+    distance = np.hypot(*np.moveaxis(some.position[..., :2] - start, -1, 0))
+    _lines(axes, some, distance, some.position[..., 2])
+    axes.set(title=f"Paths of {some_of(result, len(choice.members))}",
+             xlabel="horizontal distance [m]", ylabel="depth [m], down")  # fmt: skip
+    point_down(axes, floors(result))
+
+
+def plan_view(
+    result: Result, most: int = MOST_PATHS, *, ax: Any = None, path: str | os.PathLike[str] | None = None
+) -> Any:
+    """Draw paths of some members from above: north up, east to the right, in the same scale.
+
+    Args:
+        result: A result with positions, in memory or in a store.
+        most: The most members to draw, which `lw.shown` chooses; default 12.
+        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
+        path: File to write; its ending chooses the format. Default None: none is written.
+
+    Returns:
+        The axes.
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        NothingToDraw: No positions were kept, or no member has a finite start.
+        OSError: The file cannot be written.
+    """
+    result = with_samples(result)
+    check_fields(result, ("position",), "a view from above")
+    choice = shown(result, most)
+    some = few(result, choice.members, ("position",), choice.frames)
+    with panel(ax, path, (8.0, 6.5)) as axes:
+        _lines(axes, some, some.position[..., 1], some.position[..., 0], start=True)
+        text = f"{some_of(result, len(choice.members))} from above"
+        axes.set(title=_title(axes, text, result), xlabel="east [m]", ylabel="north [m]")
+        axes.set_aspect("equal", adjustable="datalim")
+    return axes
+
+
+def phase(
+    result: Result,
+    of: tuple[Any, Any] = ("depth", "velocity_inertial[2]"),
+    most: int = MOST_PATHS,
+    *,
+    ax: Any = None,
+    path: str | os.PathLike[str] | None = None,
+) -> Any:
+    """Draw paths of some members in the plane of two quantities.
+
+    Args:
+        result: A result with the samples that the quantities need, in memory or in a store.
+        of: The horizontal and the vertical quantity; default depth and the velocity downwards.
+        most: The most members to draw, which `lw.shown` chooses; default 12.
+        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
+        path: File to write; its ending chooses the format. Default None: none is written.
+
+    Returns:
+        The axes.
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        NothingToDraw: Samples that are needed were not kept, or no member has a finite start.
+        SceneError: A quantity is not known, or has several components.
+        OSError: The file cannot be written.
+    """
+    result = with_samples(result)
+    across, upward = (quantity_of(item) for item in of)
+    for meaning in (across, upward):
+        check_fields(result, ("position", *meaning.fields), "a phase portrait")
+    choice = shown(result, most)
+    some = few(result, choice.members, (), choice.frames)
+    x, y = (numbers(result, meaning, choice.members, choice.frames) for meaning in (across, upward))
+    with panel(ax, path) as axes:
+        _lines(axes, some, x, y, start=True)
+        x_label = label_of(across).removesuffix(", down")
+        axes.set(title=_title(axes, some_of(result, len(choice.members)), result), xlabel=x_label,
+                 ylabel=label_of(upward))  # fmt: skip
+        if is_depth(upward):
+            point_down(axes, floors(result))
+    return axes
+
+
+def _title(axes: Any, text: str, result: Result) -> str:
+    """A title, with the hint that start and end alone were kept where that is so."""
+    return "\n".join(wrapped(line, axes.figure) for line in (text, *([HINT] if len(result.time) < 3 else [])))
+
+
+def _lines(axes: Any, some: Result, x: np.ndarray, y: np.ndarray, start: bool = False) -> None:
+    """Draw a line for each member while it is under way, with a mark where it ended; start: mark where it began."""
+    counted = under_way(some)
+    marker = "." if len(some.time) < 3 else ""
+    labelled: set[Status] = set()
+    for i, status in enumerate(np.asarray(some.status)):
+        code, going = Status(int(status)), counted[:, i]
+        label = None if code in labelled else code.name.lower()
+        labelled.add(code)
+        # The last sample is where the member stays: the event lies between two samples.
+        until = min(int(going.sum()) + 1, len(going))
+        axes.plot(x[:until, i], y[:until, i], linewidth=1.1, marker=marker, label=label, **outcome_style(code))
+        if code != Status.OK:
+            axes.scatter(x[-1, i], y[-1, i], s=26, zorder=3, **mark(code))
+    if start:
+        axes.scatter(x[0], y[0], s=22, marker="o", facecolors="white", edgecolors="black", zorder=3, label="start")
+    axes.grid(True, alpha=0.3)
+    if start or labelled != {Status.OK}:
+        below(axes, ncols=4)
+
+
+# Cosine of 30 degrees.
+FAR = 0.866
+BODY_AXES = ("forward (x)", "starboard (y)", "down (z)")
+
+
+def attitude(
+    result: Result, most: int = MOST_AXES, *, ax: Any = None, path: str | os.PathLike[str] | None = None
+) -> Any:
+    """Draw where the body's axes of some members point: their paths on the unit sphere, up at the top.
+
+    Args:
+        result: A result with attitudes, in memory or in a store.
+        most: The most members to draw; default 1.
+        ax: Matplotlib axes with projection="3d" to draw on; default None, those of a figure of its own.
+        path: File to write; its ending chooses the format. Default None: none is written.
+
+    Returns:
+        The axes.
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        NothingToDraw: No attitudes were kept, or no member has a finite start.
+        OSError: The file cannot be written.
+    """
+    result = with_samples(result)
+    check_fields(result, ("position", "attitude"), "attitudes")
+    choice = shown(result, most)
+    some = few(result, choice.members, ("attitude",), choice.frames)
+    # East, north, up: right-handed, with up at the top of the picture.
+    points = np.where(under_way(some)[..., None, None], some.attitude[:, :, (1, 0, 2)], np.nan)
+    points[:, :, 2] *= -1.0
+    with panel(ax, path, (7.0, 6.5), "3d") as axes:
+        _sphere(axes)
+        for k, name in enumerate(BODY_AXES):
+            for i in range(len(choice.members)):
+                line = points[:, i, :, k]
+                look = {"color": COLORS[k], "linestyle": STYLES[k], "linewidth": 1.4}
+                if _coarse(line):
+                    look |= {"linestyle": "", "marker": "osD"[k], "markersize": 3}
+                axes.plot(*line.T, label=name if i == 0 else None, **look)
+                axes.plot(*line[:1].T, "osD"[k], color=COLORS[k], markeredgecolor="black", markersize=8)
+        axes.set_title(f"Where body axes of {some_of(result, len(choice.members))} point; marks: start")
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.04), ncols=3, frameon=False)
+    return axes
+
+
+def _coarse(line: np.ndarray) -> bool:
+    """Whether an axis (f, 3) turns so far between most samples that a line between them says nothing."""
+    cosines = np.sum(line[1:] * line[:-1], axis=-1)
+    return bool(np.median(cosines[np.isfinite(cosines)]) < FAR) if np.isfinite(cosines).any() else False
+
+
+def _sphere(axes: Any) -> None:
+    """Draw the unit sphere with its circles every 30 degrees, and the names of directions."""
+    turn = np.radians(np.arange(0.0, 361.0, 5.0))
+    for angle in np.radians(np.arange(-60.0, 61.0, 30.0)):
+        wide = 1.2 if abs(angle) < 1e-9 else 0.5
+        ring = np.cos(angle) * np.cos(turn), np.cos(angle) * np.sin(turn), np.full(len(turn), np.sin(angle))
+        axes.plot(*ring, color="#BBBBBB", linewidth=wide)
+    for angle in np.radians(np.arange(0.0, 180.0, 30.0)):
+        axes.plot(
+            np.cos(angle) * np.cos(turn), np.sin(angle) * np.cos(turn), np.sin(turn), color="#BBBBBB", linewidth=0.5
+        )
+    for place, name in (((0, 1.2, 0), "north"), ((1.2, 0, 0), "east"), ((0, 0, 1.12), "up"), ((0, 0, -1.15), "down")):
+        axes.text(*place, name, ha="center", va="center")
+    axes.set_box_aspect((1, 1, 1), zoom=1.3)
+    axes.set_axis_off()

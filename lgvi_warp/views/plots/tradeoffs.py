@@ -1,0 +1,151 @@
+"""Speed against accuracy of methods: the front in colour with names at its lines, all others in grey."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.views.plots.canvas import COLORS, GREY, MARKERS, panels, text_size, wrapped
+
+if TYPE_CHECKING:
+    from lgvi_warp.studies.tradeoff import Measurement, Tradeoff
+
+# Precision -> line style and fill of the markers.
+PRECISIONS = {"float64": ("-", "full"), "float32": ("--", "none"), "float32_compensated": (":", "left")}
+# Biases below this many standard errors are chance.
+CHANCE = 1.4
+
+
+def tradeoff(
+    found: Tradeoff, of: str | None = None, *, figure: Any = None, path: str | os.PathLike[str] | None = None
+) -> np.ndarray:
+    """Draw error against cost, with a line for each method and precision, and the biases of statistics.
+
+    Methods with a setting on the front, which are cheapest for some error, are in colour and named at their lines; all others
+    are grey.
+
+    Args:
+        found: Measurements of `lw.tradeoff`.
+        of: Quantity of the errors, "position" and so on; default that of the trade-off.
+        figure: Matplotlib figure to draw on; default None, one of its own.
+        path: File to write; its ending chooses the format. Default None: none is written.
+
+    Returns:
+        The axes of costs and of biases, shape (2,).
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        NothingToDraw: No setting was measured.
+        OSError: The file cannot be written.
+    """
+    of = of or found.of
+    if not found.measurements:
+        raise NothingToDraw("no setting was measured: there is nothing to draw")
+    shown, front = found.shown(of), found.front(of)
+    groups: dict[tuple[str, str], list[Measurement]] = {}
+    for point in sorted(found.measurements, key=lambda point: point.setting.h):
+        groups.setdefault((point.setting.name, point.setting.dtype), []).append(point)
+    best = list(dict.fromkeys(point.setting.name for point in front))
+    with panels(figure, path, (1, 2), (14.0, 7.5), width_ratios=(1.15, 1.0)) as grid:
+        costs, biases = grid[0]
+        named: list[tuple[str, float, float, Any]] = []
+        for (name, dtype), points in groups.items():
+            look = _look(name, dtype, best)
+            errors, prices = _errors_and_costs([point for point in points if point in shown], of)
+            costs.plot(errors, prices, label=f"{name}, {dtype}", **look)
+            biased = [point for point in points if point.biases]
+            values = [point.biases.get(f"{of}_mean", np.nan) for point in biased]
+            biases.plot([point.setting.h for point in biased], values, label=f"{name}, {dtype}", **look)
+            if name in best and errors:
+                named.append((name if dtype == "float64" else f"{name}, {dtype}", errors[0], prices[0], look["color"]))
+        costs.plot(*_errors_and_costs(front, of), color="black", linewidth=6, alpha=0.2, solid_capstyle="round",
+                   label="cheapest for each error", zorder=0)  # fmt: skip
+        _words(costs, biases, found, of, bool(shown))
+        _name(costs, named)
+        _legend(
+            costs.figure, {dtype for _, dtype in groups}, [name for name, _ in groups if name not in best], bool(front)
+        )
+    return grid[0]
+
+
+def _look(name: str, dtype: str, best: list[str]) -> dict[str, Any]:
+    """Colour and marker of a method, line style and fill of a precision."""
+    line, fill = PRECISIONS.get(dtype, ("-.", "bottom"))
+    look: dict[str, Any] = {"linestyle": line, "fillstyle": fill, "linewidth": 1.0}
+    if name not in best:
+        return look | {"color": GREY, "marker": ".", "markersize": 3, "zorder": 1, "alpha": 0.7}
+    i = best.index(name)
+    return look | {"color": COLORS[i % len(COLORS)], "marker": MARKERS[i % len(MARKERS)], "markersize": 6, "zorder": 2}
+
+
+def _errors_and_costs(points: list[Measurement], of: str) -> tuple[list[float], list[float]]:
+    """Coordinates of settings in the picture of costs."""
+    return [point.error(of) for point in points], [point.us_per_vehicle_second for point in points]
+
+
+def _words(costs: Any, biases: Any, found: Tradeoff, of: str, any_shown: bool) -> None:
+    """Label the axes, and say why one is empty."""
+    figure = costs.figure
+    costs.set(xlabel=f"largest error of {of} [{found.units[of]}], up to {found.until:g} s",
+              ylabel="cost [us of a core per vehicle and second]", title="Cost of accuracy")  # fmt: skip
+    biases.set(xlabel="step [s]", ylabel=f"bias / standard error of {found.members} members",
+               title=wrapped(f"Bias of the mean of {of} up to {found.t1:g} s", figure, 0.4))  # fmt: skip
+    for axes, drawn, reason in (
+        (costs, any_shown, "no error of members: noise acts, or the reference is not good enough"),
+        (biases, any(point.biases for point in found.measurements), "no statistics: there is one member"),
+    ):
+        if drawn:
+            axes.set(xscale="log", yscale="log")
+            axes.minorticks_off()
+        else:
+            axes.text(0.5, 0.5, wrapped(reason, figure, 0.35), ha="center", transform=axes.transAxes)
+            axes.set(xticks=[], yticks=[])
+        axes.grid(True, alpha=0.3)
+    if any_shown:
+        costs.invert_xaxis()
+    if any(point.biases for point in found.measurements):
+        biases.axhline(CHANCE, color="black", linewidth=0.8, linestyle=":")
+        biases.text(0.01, CHANCE * 1.1, "chance", transform=biases.get_yaxis_transform())
+    sample = f"{found.members} members, 0 to {found.t1:g} s"
+    figure.suptitle(wrapped(f"{sample}; reference {found.reference}; better is to the right and down", figure))
+
+
+def _name(axes: Any, named: list[tuple[str, float, float, Any]]) -> None:
+    """Write names beside the ends of lines, one above the other where ends are near; named: name, error, cost, colour."""
+    if not named:
+        return
+    axes.margins(x=0.02)
+    low, high = np.log(axes.get_ylim())
+    # Height of a line of text as a share of the axes.
+    height = 1.35 * text_size(axes.figure) / 72.0 / (0.72 * axes.figure.get_figure(root=True).get_figheight())
+    named = sorted(named, key=lambda item: item[2])
+    wanted = np.array([(np.log(cost) - low) / (high - low) for _, _, cost, _ in named])
+    order = np.arange(len(named)) * height
+    places = np.maximum.accumulate(wanted - order) + order
+    # Where the highest would leave the axes, all are moved down as far as is needed.
+    places -= max(0.0, places[-1] - 1.0 + 0.5 * height)
+    places = np.minimum(places, 1.0 - 0.5 * height - order[::-1])
+    for (name, error, cost, color), place in zip(named, places, strict=True):
+        axes.annotate(name, (error, cost), (1.03, place), textcoords="axes fraction", color=color, va="center",
+                      annotation_clip=False, arrowprops={"arrowstyle": "-", "color": color, "linewidth": 0.6,
+                                                         "shrinkA": 0, "shrinkB": 4})  # fmt: skip
+
+
+def _legend(figure: Any, dtypes: set[str], others: list[str], front: bool) -> None:
+    """Explain line styles and grey lines below the panels."""
+    from matplotlib.lines import Line2D
+
+    handles = [
+        Line2D([], [], color="black", linestyle=line, fillstyle=fill, marker="o", label=dtype)
+        for dtype, (line, fill) in PRECISIONS.items()
+        if dtype in dtypes
+    ]
+    if front:
+        handles.append(Line2D([], [], color="black", linewidth=6, alpha=0.2, label="cheapest for each error"))
+    if names := list(dict.fromkeys(others)):
+        text = wrapped(f"not the cheapest: {', '.join(names)}", figure, 0.9)
+        handles.append(Line2D([], [], color=GREY, marker=".", label=text))
+    figure.legend(handles=handles, loc="outside lower center", ncols=4 if len(others) < 4 else 2, frameon=False)

@@ -1,0 +1,393 @@
+"""Pictures by content: what is drawn, how it is labelled, and that it can be read by everybody. No run is solved but one."""
+
+import dataclasses
+import itertools
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from matplotlib.collections import PathCollection
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
+
+import lgvi_warp as lw
+from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.common.status import Status, StatusArray
+from lgvi_warp.studies.comparison import Candidate
+from lgvi_warp.studies.stability.grid import Line
+from lgvi_warp.studies.stability.map import StabilityMap
+from lgvi_warp.studies.tradeoff import Measurement, Tradeoff
+from lgvi_warp.views.plots import canvas
+from lgvi_warp.views.plots.read import quantity_of, survey_of
+from lgvi_warp.views.recording.drawn import at_levels
+
+N, FLOOR = 40, 20.0
+STATISTICS = [
+    lw.Quantiles("depth"),
+    lw.Mean("velocity"),
+    lw.Histogram("depth", bins=10, limits=(0.0, 25.0)),
+    lw.Covariance("position"),
+    lw.PathMaximum("speed"),
+]
+
+
+@pytest.fixture(scope="module")
+def solved():
+    """One run: samples of all members and statistics; some reach the floor, none fails."""
+    vehicle = lw.Vehicle(20.0, (1.0, 1.2, 1.4), (10.0, 10.0, 10.0), 200.0)
+    scene = lw.Scene(vehicle, lw.Environment(gravity=10.0), events=[lw.Floor(depth=FLOOR)])
+    speeds = np.linspace(-0.5, 2.0, N)
+    down, side = np.array([0.0, 0.0, 1.0]), np.array([0.3, 0.0, 0.0])
+    level, turn = np.broadcast_to(np.eye(3), (N, 3, 3)), np.tile([0.0, 0.0, 0.1], (N, 1))
+    fleet = lw.Ensemble.from_states(scene, np.tile(5.0 * down, (N, 1)), level, np.outer(speeds, down) + side, turn)
+    result = lw.solve(fleet, h=0.1, t1=20.0, save=lw.SaveAt(every=1.0), statistics=STATISTICS)
+    assert result.status.counts().keys() == {"ok", "floor"}
+    return result
+
+
+def few(result, members, frames=slice(None)):
+    part = result.part(np.asarray(members))
+    return dataclasses.replace(part, time=part.time[frames], samples={k: v[frames] for k, v in part.samples.items()})
+
+
+def ending(result, codes, times):
+    status = np.array(codes, np.uint8).view(StatusArray)
+    return dataclasses.replace(result, status=status, failure_time=np.array(times), failure_value=np.ones(len(codes)))
+
+
+def measurement(name, h, dtype, cost, error):
+    of = {"position": {"path_max": error}}
+    return Measurement(Candidate(name, h, dtype), cost, 0.0, of, 0.0, {"position_mean": 1.0 / h}, 2, {"position": True})
+
+
+def of_methods():
+    """A trade-off of nine methods in three precisions, of which three are on the front."""
+    points = []
+    for i, name in enumerate(("psi_x", "psi_s", "rk4", "psi", "phi", "rk8", "kl8(psi_x)", "su8_15(psi_x)", "rkn6_11")):
+        for j, dtype in enumerate(("float64", "float32", "float32_compensated")):
+            cost = 0.3 if name in ("psi_x", "psi_s", "kl8(psi_x)") else 5.0
+            for h in (0.01, 0.02, 0.04):
+                order = {"psi_x": 2, "psi_s": 3}.get(name, 6 if i == 6 else 2)
+                least = 0.0 if dtype == "float64" else 1e-7 * (j + 1)
+                points.append(measurement(name, h, dtype, cost * (1 + i) / h, (10 * h) ** order + least))
+    return Tradeoff(tuple(points), "position", 8, 4.0, 4.0, "rk8 at 1e-3 s", {}, None)
+
+
+def of_cells():
+    names = ("psi", "psi_s", "rk4")
+    x = Line("h", "step", "s", True, np.geomspace(0.01, 1.0, 6))
+    y = Line("omega", "angular velocity", "rad/s", True, np.geomspace(0.1, 10.0, 5))
+    classes = {name: np.clip(np.add.outer(np.arange(5), np.arange(6) - 3), 0, 4).astype(np.uint8) for name in names}
+    ratios = {
+        name: {"rotation": np.multiply.outer(y.values, x.values), "munk": np.outer(y.values, x.values) * 3}
+        for name in names
+    }
+    zeros = dict.fromkeys(names, np.zeros((5, 6)))
+    return StabilityMap(
+        x,
+        y,
+        classes,
+        zeros,
+        zeros,
+        zeros,
+        ratios,
+        "position",
+        0.01,
+        3.0,
+        10.0,
+        4,
+        "conservative",
+        "rk8",
+        0,
+        {},
+        unit="m",
+    )
+
+
+def of_factors():
+    d, q = 6, 5
+    values = np.linspace(0.0, 1.0, d * q).reshape(q, d)
+    columns, intervals = ("S1", "ST"), {"S1": "S1_confidence", "ST": "ST_confidence"}
+    return SimpleNamespace(
+        factors=tuple(f"vehicle.inertia[{i}]" for i in range(d)), quantities=tuple(f"max(position[{i}])" for i in range(q)),
+        S1=values, ST=values + 0.1, S1_confidence=values * 0.1, ST_confidence=values * 0.1, columns=columns,
+        intervals=intervals, samples=64, members=900, failed=2, confidence=0.95, name="Sobol indices",
+    )  # fmt: skip
+
+
+ALL_OF_A_RUN = (
+    "summary", "fan", "paths", "plan_view", "phase", "attitude", "outcomes", "histogram", "pairs", "drift", "statistics",
+)  # fmt: skip
+
+
+def pictures(solved):
+    """Every picture, by name, as (function, arguments)."""
+    found = {name: (getattr(lw.plots, name), (solved,)) for name in ALL_OF_A_RUN}
+    found["compare"] = lw.plots.compare, ({"a": solved, "b": few(solved, range(9))}, "speed")
+    found["tradeoff"] = lw.plots.tradeoff, (of_methods(),)
+    found["stability"] = lw.plots.stability, (of_cells(),)
+    found["sensitivity"] = lw.plots.sensitivity, (of_factors(),)
+    found["one vehicle"] = lw.plots.summary, (few(solved, [3]),)
+    found["two samples"] = lw.plots.summary, (few(solved, range(9), [0, -1]),)
+    found["all stopped"] = lw.plots.summary, (ending(solved, [17] * N, [9.0] * N),)
+    found["failures"] = lw.plots.fan, (ending(solved, [1, 2, 3, 6, 17] * 8, [9.0] * N),)
+    return found
+
+
+NAMES = (
+    *ALL_OF_A_RUN,
+    "compare",
+    "tradeoff",
+    "stability",
+    "sensitivity",
+    "one vehicle",
+    "two samples",
+    "all stopped",
+    "failures",
+)
+
+
+@pytest.fixture(scope="module")
+def drawn(solved):
+    """Figures of all pictures, each drawn once."""
+    figures = {}
+    for name, (draw, arguments) in pictures(solved).items():
+        axes = draw(*arguments)
+        figures[name] = np.ravel(axes)[0].figure
+        figures[name].draw_without_rendering()
+    return figures
+
+
+def texts(figure):
+    """All texts that are seen, but for those that Matplotlib leaves out as outside the view."""
+    return [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_is_cut_off(drawn, name):
+    figure = drawn[name]
+    box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
+    assert box.x0 >= -0.01 and box.y0 >= -0.01 and box.x1 <= width + 0.01 and box.y1 <= height + 0.01
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_text_can_be_read_at_700_pixels(drawn, name):
+    figure = drawn[name]
+    pixels = [text.get_fontsize() / 72.0 * 700.0 / figure.get_figwidth() for text in texts(figure)]
+    assert len(pixels) > 5 and min(pixels) >= 8.0
+
+
+# Axes of numbers without a unit, and of names.
+NO_UNIT = {"attitude", "sensitivity", "pairs"}
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in NO_UNIT])
+def test_axes_have_units(drawn, name):
+    for axes in drawn[name].axes:
+        if axes.get_visible() and axes.axison and axes.get_label() != "<colorbar>":
+            for label in (axes.get_xlabel(), axes.get_ylabel()):
+                inner = name == "stability" and not label
+                ratio = "/ standard error" in label
+                logarithm = name == "drift" and label == "largest change since the start"
+                assert inner or ratio or logarithm or ("[" in label and "]" in label), (name, label)
+
+
+def srgb(color):
+    value = np.asarray(to_rgb(color))
+    return np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+
+
+# Machado, Oliveira & Fernandes 2009, A physiologically-based model for simulation of color vision deficiency, severity 1.
+DEFICIENCIES = {
+    "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+    "protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    "tritanopia": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
+}
+
+
+def lab(color, matrix):
+    """CIE 1976 L*a*b* (D65) of a colour as someone with a deficiency sees it."""
+    linear = np.clip(np.asarray(matrix) @ srgb(color), 0.0, 1.0)
+    to_xyz = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
+    t = to_xyz @ linear / np.array([0.9505, 1.0, 1.089])
+    f = np.where(t > (6 / 29) ** 3, np.cbrt(t), t / (3 * (6 / 29) ** 2) + 4 / 29)
+    return np.array([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+
+
+def key(handle):
+    """Style (all but the colour) and colour on white of one key of a legend."""
+    if isinstance(handle, Line2D):
+        return (
+            handle._unscaled_dash_pattern,
+            handle.get_marker(),
+            handle.get_fillstyle(),
+            handle.get_linewidth(),
+        ), handle.get_color()
+    if isinstance(handle, PathCollection):
+        return ("marker", handle.get_paths()[0].vertices.tobytes()), handle.get_facecolor()[0]
+    face = np.asarray(handle.get_facecolor()).ravel()
+    return ("area", handle.get_hatch()), 1.0 - face[3] * (1.0 - face[:3])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_keys_of_a_legend_differ_for_all_eyes(drawn, name):
+    legends = [axes.get_legend() for axes in drawn[name].axes] + drawn[name].legends
+    for legend in filter(None, legends):
+        handles, labels = legend.legend_handles, [text.get_text() for text in legend.get_texts()]
+        assert len(set(labels)) == len(labels) > 0
+        for (one, other), (a, b) in zip(
+            itertools.combinations(handles, 2), itertools.combinations(labels, 2), strict=True
+        ):
+            if type(one) is type(other) and key(one)[0] == key(other)[0]:
+                for matrix in (np.eye(3), *DEFICIENCIES.values()):
+                    distance = np.linalg.norm(lab(key(one)[1], matrix) - lab(key(other)[1], matrix))
+                    assert distance > 10.0, (name, a, b, distance)
+
+
+def test_the_fan_is_of_those_under_way_and_says_how_many(solved, drawn):
+    (axes,) = drawn["fan"].axes
+    going = solved.time[:, None] <= np.where(np.isnan(solved.failure_time), np.inf, solved.failure_time) * (1.0 + 1e-12)
+    depth = np.where(going, solved.position[..., 2], np.nan)
+    median = next(line for line in axes.lines if line.get_label() == "median")
+    np.testing.assert_allclose(median.get_ydata(), np.nanmedian(depth, axis=1))
+    all_of_them = axes.collections[0].get_paths()[0].vertices[:, 1]
+    assert all_of_them.min() == pytest.approx(np.nanmin(depth)) and all_of_them.max() == pytest.approx(np.nanmax(depth))
+    assert axes.get_legend().get_title().get_text() == f"under way: {N} at 0 s,\n{going[-1].sum()} at 20 s"
+    points = next(one for one in axes.collections if one.get_label().startswith("floor")).get_offsets()
+    stopped = np.asarray(solved.status) == Status.FLOOR
+    np.testing.assert_allclose(np.sort(points[:, 0]), np.sort(solved.failure_time[stopped]))
+    assert axes.yaxis_inverted() and {"surface", "floor"} <= {text.get_text() for text in axes.texts}
+    above = int((depth < 0.0).any(axis=0).sum())
+    assert f"unbounded water: {above} of {N} members pass above depth 0" in axes.get_title()
+
+
+def test_one_vehicle_is_a_line_and_two_samples_have_marks_and_a_hint(drawn):
+    depth = drawn["one vehicle"].axes[0]
+    assert not depth.collections and depth.get_legend() is None
+    assert "1 members" not in "".join(text.get_text() for text in texts(drawn["one vehicle"]))
+    two = drawn["two samples"]
+    assert "SaveAt(every=...)" in two.get_suptitle()
+    assert next(line for line in two.axes[0].lines if line.get_label() == "median").get_marker() == "o"
+
+
+def test_a_far_surface_is_told_not_drawn():
+    axes = Figure().subplots()
+    axes.plot([0.0, 1.0], [100.0, 101.0])
+    canvas.point_down(axes, (101.3, 4000.0))
+    assert [text.get_text() for text in axes.texts] == ["surface 100 m above", "floor"]
+    low, high = axes.get_ylim()
+    assert 101.3 < low < 102.0 and 99.0 < high < 100.0
+
+
+def test_angles_are_drawn_about_their_mean_direction(solved):
+    heading = np.linspace(3.0, 3.3, N)[None] + np.linspace(0.0, 9.0, len(solved.time))[:, None]
+    c, s, zero = np.cos(heading), np.sin(heading), np.zeros_like(heading)
+    turned = np.stack([c, -s, zero, s, c, zero, zero, zero, zero + 1.0], axis=-1).reshape(*heading.shape, 3, 3)
+    result = dataclasses.replace(ending(solved, [0] * N, [np.nan] * N), samples={**solved.samples, "attitude": turned})
+    (axes,) = lw.plots.fan(result, "euler[2]").figure.axes
+    median = next(line for line in axes.lines if line.get_label() == "median").get_ydata()
+    np.testing.assert_allclose(np.diff(median), 9.0 / (len(solved.time) - 1), atol=1e-9)
+
+
+def test_statistics_stand_for_samples(solved, drawn):
+    bare = dataclasses.replace(solved, samples={})
+    (axes,) = lw.plots.fan(bare).figure.axes
+    middle = solved.statistics["quantiles depth"].value[:, :, 0]
+    median = next(line for line in axes.lines if line.get_label() == "50% quantile").get_ydata()
+    np.testing.assert_array_equal(median, middle[:, middle.shape[1] // 2])
+    assert axes.get_legend().get_title().get_text() == f"{N} members, from statistics"
+    bars = lw.plots.histogram(bare, at=0.0)
+    assert sum(bar.get_width() for bar in bars.patches) == pytest.approx(100.0) and bars.yaxis_inverted()
+    assert lw.plots.summary(bare)[0].get_title() == "quantiles depth"
+    assert lw.plots.outcomes(bare).get_ylabel() == "share of members [%]"
+    for name in ("paths", "plan_view", "phase", "attitude", "pairs", "drift"):
+        with pytest.raises(NothingToDraw, match=r'keep="all"'):
+            getattr(lw.plots, name)(bare)
+
+
+def test_a_panel_of_statistics_says_unit_direction_and_what_is_left_out(solved, drawn):
+    figure = drawn["statistics"]
+    panels = {axes.get_title(): axes for axes in figure.axes if axes.get_title()}
+    histogram = panels["histogram depth"]
+    assert (
+        histogram.get_ylabel() == "depth [m], down"
+        and histogram.yaxis_inverted()
+        and not panels["mean velocity"].yaxis_inverted()
+    )
+    (bar,) = (axes for axes in figure.axes if axes.get_label() == "<colorbar>")
+    assert bar.axison and bar.get_ylabel() == "share of members [%]"
+    assert "not drawn, see the table: covariance position, mean path_maximum speed" in figure.get_suptitle().replace(
+        "\n", " "
+    )
+
+
+def test_shares_of_outcomes(solved, drawn):
+    (axes,) = drawn["outcomes"].axes
+    stopped = int((np.asarray(solved.status) == Status.FLOOR).sum())
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels[0] == f"under way, {N - stopped} to the end" and labels[1].startswith(
+        f"floor: {stopped} of {N}, the first at "
+    )
+    at_end = axes.collections[0].get_paths()[0].vertices
+    assert at_end[at_end[:, 0] == 20.0, 1].max() == pytest.approx(100.0 * (N - stopped) / N)
+
+
+def test_a_histogram_counts_every_member_once(solved, drawn):
+    (axes,) = drawn["histogram"].axes
+    assert sum(bar.get_width() for bar in axes.patches) == pytest.approx(100.0)
+    speed = lw.plots.histogram(solved, "max(speed)")
+    assert (
+        sum(bar.get_height() for bar in speed.patches) == pytest.approx(100.0)
+        and speed.get_xlabel() == "max(speed) [m/s]"
+    )
+    same = dataclasses.replace(solved, samples={**solved.samples, "position": np.full_like(solved.position, 20.0)})
+    assert sum(bar.get_width() for bar in lw.plots.histogram(same).patches) == pytest.approx(100.0)
+
+
+def test_the_front_is_in_colour_and_named_at_its_lines(drawn):
+    found, figure = of_methods(), drawn["tradeoff"]
+    best = {point.setting.name for point in found.front()}
+    costs, _ = figure.axes[:2]
+    for line in costs.lines:
+        name = line.get_label().split(",")[0]
+        if line.get_label() != "cheapest for each error":
+            assert (line.get_color() == canvas.GREY) == (name not in best), name
+    labels = [text.get_text() for text in costs.texts]
+    assert best < set(labels) and any(label.endswith(", float32_compensated") for label in labels)
+    styles = {line.get_label().split(", ")[1]: line.get_linestyle() for line in costs.lines if ", " in line.get_label()}
+    assert len(set(styles.values())) == 3
+    boxes = [Text.get_window_extent(text) for text in costs.texts]
+    assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+
+
+@pytest.mark.parametrize("ending_of_name", ["svg", "pdf", "png"])
+def test_files_and_axes(solved, tmp_path, ending_of_name):
+    figure = Figure()
+    left, right = figure.subplots(1, 2)
+    path = tmp_path / f"picture.{ending_of_name}"
+    assert lw.plots.fan(solved, "speed", ax=left) is left and not list(tmp_path.iterdir())
+    assert lw.plots.paths(solved, ax=right, path=path) is right and path.stat().st_size > 5000 and len(figure.axes) == 2
+    assert lw.plot(solved, tmp_path / "all.svg") == tmp_path / "all.svg" and len(lw.plot(solved)) == 3
+
+
+def test_refusals_name_the_remedy(solved):
+    with pytest.raises(lw.SceneError, match=r"name one: position\[0\]"):
+        lw.plots.fan(solved, "position")
+    with pytest.raises(NothingToDraw, match="SaveAt"):
+        lw.plots.fan(dataclasses.replace(solved, samples={"position": solved.position}), "speed")
+    with pytest.raises(lw.SceneError, match="from 2 to 6"):
+        lw.plots.pairs(solved, ["depth"])
+    with pytest.raises(lw.SceneError, match="holds no result"):
+        lw.plots.compare({})
+
+
+def test_pieces_give_what_the_whole_gives(solved, monkeypatch):
+    of = quantity_of("speed")
+    whole = survey_of(solved, of)
+    monkeypatch.setattr("lgvi_warp.views.plots.read.AT_ONCE", 7 * len(solved.time))
+    parts = survey_of(solved, of)
+    for name in ("values", "counted", "low", "high", "last"):
+        np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
+    assert at_levels(whole.values, whole.counted, [0.0])[0] == pytest.approx(whole.low)

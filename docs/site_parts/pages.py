@@ -97,11 +97,11 @@ def _entry(name: str) -> Iterator[str]:
 
 
 def in_module(module: Any) -> list[str]:
-    """Public names of a module that are not public names of the package as well."""
+    """Public functions and classes of a module that are not public names of the package as well."""
     if module is lw.gym:
         return ["VectorEnv"]  # made when it is used first
     of_module = [name for name, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__]
-    names = vars(module).get("__all__", of_module)
+    names = [name for name in vars(module).get("__all__", of_module) if callable(getattr(module, name))]
     return sorted(name for name in names if not name.startswith("_") and name not in lw.__all__)
 
 

@@ -380,7 +380,7 @@ def test_the_command_writes_files_that_load_again(tmp_path, capsys):
     from matplotlib.image import imread
 
     picture = imread(tmp_path / "tradeoff.png")
-    assert picture.shape[1] > 1500 and all(third.std() > 0.05 for third in np.array_split(picture[..., :3], 3, axis=1))
+    assert picture.shape[1] > 1200 and all(third.std() > 0.05 for third in np.array_split(picture[..., :3], 3, axis=1))
 
 
 def test_run_with_an_error_chooses_and_checks(tmp_path, capsys):

@@ -65,6 +65,21 @@ def test_it_has_the_bits_of_a_run_in_memory(whole, memory):
     np.testing.assert_array_equal(stored.energy, memory.energy)
 
 
+@pytest.mark.parametrize("into", ["memory", "store"])
+def test_blocks_are_handed_over_in_order_with_the_bits_of_the_run(into, memory, tmp_path):
+    handed = []
+    store = {} if into == "memory" else {"store": tmp_path / "run.zarr"}
+    result = lw.solve(fleet(), **SETTINGS, **store, threads=2, on_block=handed.append)
+    assert len(handed) > 1 and sum(block.members for block in handed) == result.members
+    whole = {name: np.concatenate([block.samples[name] for block in handed], axis=1) for name in FIELDS}
+    for name in FIELDS:
+        assert whole[name].tobytes() == memory.samples[name].tobytes()
+    np.testing.assert_array_equal(np.concatenate([block.status for block in handed]), memory.status)
+    for name, values in memory.parameters.items():
+        if len(values) > 1:
+            np.testing.assert_array_equal(np.concatenate([block.parameters[name] for block in handed]), values)
+
+
 def test_some_members_alone_are_read(whole, memory):
     some = lw.open_run(whole, [5, 1002, 300])
     assert some.position.tobytes() == memory.position[:, [5, 1002, 300]].tobytes() and some.members == 3

@@ -77,6 +77,22 @@ def _series(
     _send(recording, entity, time, rr.Scalars.columns(scalars=np.asarray(values, np.float64)))
 
 
+def log_member(recording: Any, run: Drawn, place: int, member: int) -> None:
+    """Log height and speed of one member while it is under way.
+
+    Args:
+        recording: The stream.
+        run: What is drawn.
+        place: Its place among the members drawn.
+        member: Its index in the run.
+    """
+    speed = np.linalg.norm(run.few.velocity[:, place], axis=-1)
+    for name, values in (("height", -run.position[:, place, 2]), ("speed", speed)):
+        seen_values = np.where(run.counted[:, place], values, np.nan)
+        entity = f"curves/{name}/{member}"
+        _series(recording, entity, run.time, seen_values, f"member {member:,}", LOOKS[Status.OK].rgb, 1.0)
+
+
 def _shares(recording: Any, run: Drawn) -> None:
     """Log which share of all members is under way, and which has ended, by outcome."""
     for code, share in run.shares.items():

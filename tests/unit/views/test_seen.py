@@ -138,6 +138,7 @@ def test_two_recordings_are_seen(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.kernel
 @pytest.mark.parametrize("name", RUNS)
 def test_a_recording_is_seen(name, tmp_path):
     result = RUNS[name]()

@@ -292,6 +292,22 @@ def test_what_was_there_is_told(copy):
     assert result.messages == ("nothing was missing: 4 of 4 blocks were there and whole",) and not result.run_seconds
 
 
+@pytest.mark.parametrize("name", ["blocks/000000256.json", "velocity/c.0.2.0"])
+def test_a_missing_block_is_one_line_with_the_remedy(copy, name, tmp_path, capsys):
+    """Its members would be drawn as if they had failed."""
+    (copy / name).unlink()
+    with pytest.raises(lw.SceneError, match=rf"{name} is missing.*; mend it with `lgvi-warp resume"):
+        lw.open_run(copy)
+    assert f"{name} is missing" in lw.open_run(copy, incomplete=True).messages[-1]
+    for verb in (["view", "--out", str(tmp_path / "a.rrd")], ["plot"], ["report"]):
+        assert cli.main([verb[0], str(copy.parent), *verb[1:]]) == 2
+        said = capsys.readouterr().err
+        assert f"{name} is missing" in said and said.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.zarr"]
+    lw.resume(copy)
+    assert lw.open_run(copy).members == MEMBERS
+
+
 @pytest.mark.parametrize("to", ["netcdf", "parquet"])
 def test_what_is_damaged_is_not_exported(copy, tmp_path, to):
     """What is missing would be exported as NaN."""

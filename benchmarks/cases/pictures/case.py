@@ -66,7 +66,13 @@ def run(quick):
             if stored:
                 call(store_run, n, times, folder)
             seconds, megabytes, memory = call(recording_cost, n, times, folder if stored else None)
-        record = {"picture": "recording", "members": n, "times": times, "stored": stored, "processor_s": round(seconds, 2)}
+        record = {
+            "picture": "recording",
+            "members": n,
+            "times": times,
+            "stored": stored,
+            "processor_s": round(seconds, 2),
+        }
         record |= {"of_limit": round(seconds / most_seconds, 2), "MB": round(megabytes, 1)}
         record |= {"MB_of_limit": round(megabytes / most_megabytes, 2), "memory_GiB": round(memory, 2)}
         yield record | ({"memory_of_limit": round(memory / most_memory, 2)} if most_memory else {})

@@ -11,6 +11,7 @@ from lgvi_warp.common.status import Status
 from lgvi_warp.views import rerun as recordings
 from lgvi_warp.views.fleet import LOOKS
 from lgvi_warp.views.recording import layout, world
+from lgvi_warp.views.recording.hull import FIN
 from tests.conftest import ROOT
 from tests.support.made import made
 from tests.support.viewer import colored, moved, painted, viewer
@@ -51,8 +52,8 @@ def faults_in(window, paths, times, rgbs=None):
     return faults
 
 
-# Of bodies; those of the surface and of the floor's plane have other hues.
-COLORS = [LOOKS[code].rgb for code in (Status.OK, Status.FLOOR, Status.SURFACE, Status.NON_FINITE)]
+# Of bodies, and of the fin, which is seen where light noses hide all else; the surface, the floor and arrows have other hues.
+COLORS = [*(LOOKS[code].rgb for code in (Status.OK, Status.FLOOR, Status.SURFACE, Status.NON_FINITE)), FIN]
 
 
 def many(n=1000):
@@ -88,7 +89,7 @@ def sinking():
     """REMUS 100 vehicles that all sink to the floor."""
     start = lw.Start(position=[0.0, 0.0, 5.0])
     scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 280.0}, events=[lw.Floor(depth=20.0)], start=start)
-    fleet = lw.Ensemble(scene, 60, 1, {"vehicle.mass": lw.Normal(relative=0.001)})
+    fleet = lw.Ensemble(scene, 60, 1, {"vehicle.buoyancy": lw.Normal(std=1.0)})
     return lw.solve(fleet, h=0.05, t1=120.0, save=lw.SaveAt(every=1.0))
 
 

@@ -163,9 +163,9 @@ def parser() -> Parser:
     _add_warm(verbs)
     _verb(verbs, "tune", help="measure how many vehicles a packet should hold on this machine, for runs from now on")
     _add_lists(verbs)
-    for one in dict.fromkeys((top, *verbs.choices.values())):  # an old name has the same parser
+    for verb in dict.fromkeys((top, *verbs.choices.values())):  # an old name has the same parser
         for names, settings in COMMON.items():
-            one.add_argument(*names, default=argparse.SUPPRESS, **settings)
+            verb.add_argument(*names, default=argparse.SUPPRESS, **settings)
     top.verbs = verbs.choices
     top.set_defaults(**DEFAULTS)
     return top

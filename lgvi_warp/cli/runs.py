@@ -201,8 +201,8 @@ def check_error(scene: Any, result: Any, suggested: Any, chosen: argparse.Namesp
     from lgvi_warp.studies.suggest import verified
 
     error, members = verified(Ensemble.from_scene(scene), result, suggested)
-    asked = f"error of {suggested.of} {error:.1e} {suggested.unit}, asked {suggested.error:g}"
-    text = f"{asked} ({members} members again at half the step, those with the largest errors among them)"
+    measured = f"error of {suggested.of} {error:.1e} {suggested.unit}, asked {suggested.error:g}"
+    text = f"{measured} ({members} members again at half the step, those with the largest errors among them)"
     if not error <= suggested.error:
         return [f"{text}: missed; ask for a smaller one"]
     say(chosen, f"checked     {text}")

@@ -26,7 +26,9 @@ from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 from lgvi_warp.scene.start import Environment, Start
 
 # Sections of a scene that are one object each.
-RUN_REMEDY = 'leave it out, and give lw.solve(scene, h=..., t1=..., ...) its settings; or lw.Scene.from_dict({..., "run": {...}})'
+RUN_REMEDY = (
+    'leave it out and give lw.solve(scene, h=..., t1=..., ...) its settings, or lw.Scene.from_dict a table "run"'
+)
 KINDS = {"vehicle": Vehicle, "environment": Environment, "start": Start, "run": RunSettings}
 
 

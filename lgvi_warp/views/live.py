@@ -81,9 +81,9 @@ class Live:
         else:
             box = self._box.joined(box)
         if self._box is None or box.size > GROWTH * self._box.size:
-            whole = replace(run, label="")
-            log_frame(self._recording, whole, box)
-            self._recording.send_blueprint(live_layout(whole, box, self._scale))
+            unlabelled = replace(run, label="")
+            log_frame(self._recording, unlabelled, box)
+            self._recording.send_blueprint(live_layout(unlabelled, box, self._scale))
             self._box = box
 
     def _say(self, total: int) -> None:

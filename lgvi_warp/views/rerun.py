@@ -100,7 +100,10 @@ def _runs(result: Result | Mapping[str, Result], members: Any) -> list[Drawn]:
     if not result:
         raise NothingToDraw("there is no result to draw; give {name: result}")
     colors = [COLORS[i % len(COLORS)] for i in range(len(result))]
-    return [drawn_of(one, members, str(name), rgb) for (name, one), rgb in zip(result.items(), colors, strict=True)]
+    return [
+        drawn_of(compared, members, str(name), rgb)
+        for (name, compared), rgb in zip(result.items(), colors, strict=True)
+    ]
 
 
 def _write(runs: list[Drawn], path: Path | None, address: str | None) -> None:

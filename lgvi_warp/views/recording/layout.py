@@ -64,8 +64,8 @@ def layout(runs: list[Drawn], box: Box, scale: int) -> Any:
             columns=rrb.TextLogColumns(text_log_columns=[TextLogColumn("Body")]),
         ),
     )
-    left = rrb.Vertical(worlds[0] if len(runs) == 1 else rrb.Horizontal(*worlds), below, row_shares=[4, 1.3])
-    return _whole_window(rrb.Horizontal(left, _right(runs), column_shares=[3, 2]), played)
+    world_side = rrb.Vertical(worlds[0] if len(runs) == 1 else rrb.Horizontal(*worlds), below, row_shares=[4, 1.3])
+    return _whole_window(rrb.Horizontal(world_side, _right(runs), column_shares=[3, 2]), played)
 
 
 def live_layout(run: Drawn, box: Box, scale: int) -> Any:
@@ -107,19 +107,21 @@ def _right(runs: list[Drawn]) -> Any:
     """Curves, and the run's facts below them."""
     import rerun.blueprint as rrb
 
-    whole = _whole(runs[0].time)
+    all_times = _whole(runs[0].time)
     names = [fan.name for fan in runs[0].fans]
     fans = {name: [fan for run in runs for fan in run.fans if fan.name == name] for name in names}
     views = {}
     for name, group in fans.items():
         limits = _limits(np.concatenate([fan.levels for fan in group], axis=1))
         # All have the same legend; it would cover their curves.
-        views[name] = _curve(f"curves/{name}", group[0].title, whole, limits, name == "height", _high(group[0], limits))
+        views[name] = _curve(
+            f"curves/{name}", group[0].title, all_times, limits, name == "height", _high(group[0], limits)
+        )
     height = views.pop("height")
     energy = views.pop("energy", None)
     motion = rrb.Tabs(views["speed"], *([energy] if energy else []), active_tab=0)
     angles = rrb.Tabs(*(views[name] for name in ("pitch", "roll", "heading")), active_tab=0)
-    commands = [_curve_of_channels(whole)] if any(name in runs[0].few.samples for name in CHANNELS) else []
+    commands = [_curve_of_channels(all_times)] if any(name in runs[0].few.samples for name in CHANNELS) else []
     facts = rrb.Tabs(
         *(rrb.TextDocumentView(origin=run.path("run/summary"), name=run.label or "Run") for run in runs),
         rrb.BarChartView(origin="/histogram", name="Depths [m] at the cursor"),

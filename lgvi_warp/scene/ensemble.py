@@ -78,10 +78,10 @@ class Ensemble(Summarized):
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
         """Sampling, what varies and the scene's own rows."""
-        varied = [(f"varies {name}", shown(one.to_dict())) for name, one in self.vary.items()]
+        varied = [(f"varies {name}", shown(distribution.to_dict())) for name, distribution in self.vary.items()]
         rows = [("sampling", f"{self.sampling.kind}, seed {self.seed}"), *varied]
-        own = self.scene.summary_rows()[1] if isinstance(self.scene, Summarized) else ()
-        return f"Ensemble of {self.members:,} members", [*rows, *(row for row in own if row[0] != "ensemble")]
+        scene_rows = self.scene.summary_rows()[1] if isinstance(self.scene, Summarized) else ()
+        return f"Ensemble of {self.members:,} members", [*rows, *(row for row in scene_rows if row[0] != "ensemble")]
 
     @classmethod
     def of(cls, scene: SceneLike, settings: EnsembleSettings) -> Ensemble:

@@ -322,6 +322,8 @@ class Ensemble(Summarized):
 
     def _refuse(self, findings: Mapping[str, _Unphysical], looked_at: int) -> None:
         """Raise SceneError if anything was found; looked_at: number of members."""
+        if not findings:
+            return
         drawn = {target.name for variation in self.variations for target in variation.targets}
         faults = Faults()
         for key, finding in findings.items():

@@ -127,10 +127,12 @@ def start(words: Sequence[str | Path], remedy: str) -> None:
     Raises:
         OSError: It cannot be started, as where there is no display.
     """
+    # The command silences the recorder, not the viewer, whose words say why it does not start.
+    environment = {name: value for name, value in os.environ.items() if (name, value) != ("RUST_LOG", "off")}
     with tempfile.TemporaryFile("w+") as log:
         try:
             viewer = subprocess.Popen([program(), *words], stdin=subprocess.DEVNULL, stdout=log, stderr=log,
-                                      start_new_session=True)  # fmt: skip
+                                      start_new_session=True, env=environment)  # fmt: skip
             # One that finds no display ends at once; one that stays, or hands over to a viewer that is open, is well.
             code = viewer.wait(STARTED)
         except subprocess.TimeoutExpired:

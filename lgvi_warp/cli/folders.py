@@ -88,6 +88,8 @@ def contents(folder: Path) -> list[Content]:
     patterns = {"result": "result*.npz", "tradeoff": "tradeoff.json", "sensitivity": "sensitivity.json",
                 "stability": "stability*.json", "sweep": "sweep.json"}  # fmt: skip
     studies: list[Content] = []
+    if folder.suffix != ".zarr" and not folder.exists():
+        raise SceneError([f"{folder}: is not there; give the folder of a run or of a study"])
     if folder.suffix != ".zarr" and folder.is_dir():
         studies = [Content(kind, path) for kind, pattern in patterns.items() for path in sorted(folder.glob(pattern))]
         stores = list(folder.glob("*.zarr"))

@@ -24,8 +24,8 @@ PATIENCE = 60.0
 class Viewer:
     """A viewer that has recordings open."""
 
-    def __init__(self, client):
-        self.client = client
+    def __init__(self, client, address):
+        self.client, self.address = client, address
 
     def open(self, *paths):
         """Open recordings, one at a time."""
@@ -111,7 +111,7 @@ def viewer(folder, size="1000x700"):
             if NO_DRIVER.search(text):
                 pytest.skip("no Vulkan driver: recordings are not looked at; install one, such as mesa-vulkan-drivers")
             raise RuntimeError(f"the viewer did not start: {text[-800:]}")
-        yield Viewer(client)
+        yield Viewer(client, f"rerun+http://127.0.0.1:{port}/proxy")
     finally:
         process.terminate()
         try:

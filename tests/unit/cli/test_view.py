@@ -46,7 +46,8 @@ def test_bad_members_are_refused(folder, tmp_path, capsys, arguments, words):
 
 
 @pytest.mark.parametrize(
-    ("name", "words", "code"), [("none", "is not there", 2), ("none.npz", "No such file", 1), ("study", "no run", 2)]
+    ("name", "words", "code"),
+    [("none", "is not there; give the folder of a run or", 2), ("none.npz", "No such file", 1), ("study", "no run", 2)],
 )
 def test_a_folder_without_a_run_is_refused(tmp_path, capsys, name, words, code):
     (tmp_path / "study").mkdir()

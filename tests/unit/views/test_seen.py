@@ -2,20 +2,24 @@
 
 import dataclasses
 import runpy
+import time
 
 import numpy as np
 import pytest
+import rerun as rr
 
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
 from lgvi_warp.views import rerun as recordings
 from lgvi_warp.views.fleet import LOOKS
+from lgvi_warp.views.live import Live
 from lgvi_warp.views.recording import layout, world
 from lgvi_warp.views.recording.hull import FIN
 from tests.conftest import ROOT
 from tests.support.made import made
 from tests.support.viewer import colored, moved, painted, viewer
 from tests.unit.views.test_hull import glb
+from tests.unit.views.test_live import blocks
 from tests.unit.views.test_recording import SCENE, fleet
 
 # A view without content has a smooth background.
@@ -160,6 +164,24 @@ def test_a_mesh_is_seen(tmp_path):
     scene = dataclasses.replace(SCENE, vehicle=dataclasses.replace(SCENE.vehicle, shape={"mesh": str(mesh)}))
     path = lw.log_rerun(fleet(30, scene=scene), tmp_path / "fleet.rrd")
     assert faults_of([path], (0.0, 30.0, 60.0), tmp_path) == []
+
+
+@pytest.mark.slow
+def test_a_run_that_goes_on_is_seen_to_grow(tmp_path):
+    result, pictures = fleet(60), []
+    with viewer(tmp_path) as window:
+        recording = rr.RecordingStream("live", recording_id="live")
+        recording.connect_grpc(window.address)
+        live = Live(recording)
+        for block in blocks(result, 20, 20, 20):
+            live.add(block)
+            time.sleep(1.0)
+            window.pictures(30.0)  # the camera settles
+            pictures.append(window.pictures(30.0)["3D", "/world"])
+        recording.disconnect()
+        assert window.complaints() == []
+    bodies = [sum(colored(picture, rgb) for rgb in COLORS) for picture in pictures]
+    assert LEAST_BODY < bodies[0] < bodies[1] < bodies[2]
 
 
 BROKEN = {

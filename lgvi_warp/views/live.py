@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 CURVES = 40
 # The view is laid out anew where what is drawn has outgrown it so often.
 GROWTH = 1.5
+# Longest time to wait for the viewer after each block [s].
+PATIENCE = 30.0
 
 
 class Live:
@@ -33,9 +35,16 @@ class Live:
     Of each block as many members are drawn as its share of 1,000, in the order of `lgvi_warp.shown`: by a hash of their index.
     Bodies and paths are coloured by outcome; curves are of single members, since quantiles need all of them.
 
+    A viewer that is closed, or takes nothing for a while, ends the view and not the run.
+
     Args:
         recording: The stream to send to, an rr.RecordingStream.
+
+    Attributes:
+        closed: Whether the viewer was closed.
     """
+
+    closed = False
 
     def __init__(self, recording: Any):
         self._recording = recording
@@ -50,6 +59,16 @@ class Live:
         Args:
             block: Their result; one without positions, attitudes and velocities is counted, not drawn.
         """
+        if self.closed:
+            return
+        try:
+            self._add(block)
+            self._recording.flush(timeout_sec=PATIENCE)
+        except RuntimeError:  # rerun raises it for a viewer that is gone
+            self.closed = True
+
+    def _add(self, block: Result) -> None:
+        """Count the members, and log those that are drawn."""
         total, done = members_of_run(block), self._counts.total()
         self._counts.update(block.status.counts())
         if set(NEEDED) <= set(block.samples):
@@ -57,7 +76,6 @@ class Live:
             share = -(-choice.MOST_BODIES * block.members // total)
             self._draw(block, np.sort(rank[:share]), done)
         self._say(total)
-        self._recording.flush()
 
     def _draw(self, block: Result, places: np.ndarray, first: int) -> None:
         """Draw members at these places of a block that begins with the member `first`."""

@@ -65,28 +65,36 @@ def free_port():
 
 
 @contextlib.contextmanager
+def serving(command, port):
+    """A process that listens at a port of this machine."""
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    end = time.monotonic() + PATIENCE
+    try:
+        while time.monotonic() < end:
+            with contextlib.suppress(OSError):
+                socket.create_connection(("127.0.0.1", port), 0.2).close()
+                break
+            time.sleep(0.05)
+        yield process
+    finally:
+        process.terminate()
+        process.wait()
+
+
+@contextlib.contextmanager
 def receiver(path):
     """The address of rerun's server without a window, which writes what it gets into a file."""
     rerun_cli = pytest.importorskip("rerun_cli")
     port = free_port()
     program = Path(rerun_cli.__file__).with_name("rerun")
     words = ["--bind", "127.0.0.1", "--port", str(port), "--save", str(path)]
-    process = subprocess.Popen([str(program), *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    end = time.monotonic() + PATIENCE
-    while time.monotonic() < end:
-        with contextlib.suppress(OSError):
-            socket.create_connection(("127.0.0.1", port), 0.2).close()
-            break
-        time.sleep(0.05)
-    try:
+    with serving([str(program), *words], port) as process:
         yield f"rerun+http://127.0.0.1:{port}/proxy"
+        end = time.monotonic() + PATIENCE
         size = -1
         while size != (size := path.stat().st_size if path.exists() else 0) or not size:
-            assert time.monotonic() < end
+            assert time.monotonic() < end and process.poll() is None
             time.sleep(0.2)
-    finally:
-        process.terminate()
-        process.wait()
     # A server's file has no table of contents.
     raw = path.rename(path.with_suffix(".raw.rrd"))
     subprocess.run([str(program), "rrd", "merge", str(raw), "-o", str(path)], check=True, capture_output=True)

@@ -14,7 +14,7 @@ from lgvi_warp import cli
 from lgvi_warp.views import viewer
 from lgvi_warp.views.live import Live
 from tests.conftest import ROOT
-from tests.support.viewer import free_port, receiver
+from tests.support.viewer import free_port, receiver, serving
 from tests.unit.views.test_recording import fleet, rows, text_of
 
 
@@ -106,6 +106,22 @@ def test_a_viewer_gets_what_the_file_gets(tmp_path):
         lw.log_rerun(fleet(20), tmp_path / "written.rrd", to=address)
     sent, written = (rows(tmp_path / name, "/world/bodies/ok", "translations") for name in ("sent.rrd", "written.rrd"))
     assert sent == written and len(sent) == 31
+
+
+def test_a_viewer_that_is_closed_ends_the_view_and_not_the_run(tmp_path):
+    port = free_port()
+    command = [str(viewer.program()), "--bind", "127.0.0.1", "--port", str(port), "--save", str(tmp_path / "sent.rrd")]
+    first, second, third = blocks(fleet(30), 10, 10, 10)
+    with serving(command, port) as process:
+        recording = rr.RecordingStream("live", recording_id="live")
+        recording.connect_grpc(f"rerun+http://127.0.0.1:{port}/proxy")
+        live = Live(recording)
+        live.add(first)
+        process.kill()
+        process.wait()
+    live.add(second)
+    assert live.closed
+    live.add(third)
 
 
 @pytest.mark.kernel

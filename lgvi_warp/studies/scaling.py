@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.runs.run import run_plan
@@ -17,7 +19,7 @@ from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.cost import costs
-from lgvi_warp.studies.speed import least, void
+from lgvi_warp.studies.speed import least
 
 # Row of a scene without terms, and row of all its terms together.
 NONE, ALL = "none", "all terms"
@@ -65,7 +67,7 @@ def scaling(
     runs = [(plan, count) for plan in plans for count in counts]
     for plan in plans:
         plan.compile()
-    readings = least([lambda plan=plan, count=count: void(run_plan(plan, count)) for plan, count in runs], rounds)
+    readings = least([functools.partial(_run, *pair) for pair in runs], rounds)
     return [
         {
             "members": plan.ensemble.members,
@@ -75,6 +77,11 @@ def scaling(
         }
         for (plan, count), seconds in zip(runs, readings, strict=True)
     ]
+
+
+def _run(plan: Plan, threads: int) -> None:
+    """Run a plan whole, by so many threads."""
+    run_plan(plan, threads)
 
 
 def rising(base: int, most: int) -> list[int]:
@@ -128,8 +135,8 @@ def term_cost(
     cast = [(NONE, ())] + [(term.key, (term,)) for term in scene.terms]
     if len(scene.terms) > 1:
         cast.append((ALL, tuple(scene.terms)))
-    whole = plan_of(scene, tuple(scene.terms), members, method, step, dtype)
-    plans = [plan_of(scene, terms, members, whole.method, step, dtype) for _, terms in cast]
+    chosen = plan_of(scene, tuple(scene.terms), members, method, step, dtype).method
+    plans = [plan_of(scene, terms, members, chosen, step, dtype) for _, terms in cast]
     nanoseconds = [
         1e3 * cost.us_per_vehicle_second * plan.grid.h for cost, plan in zip(costs(plans, rounds), plans, strict=True)
     ]
@@ -152,7 +159,7 @@ def plan_of(
     method: str | Method | None,
     h: float | None,
     dtype: str | None,
-) -> Any:
+) -> Plan:
     """Plan ten steps of a scene with some terms, without what steers it and what ends it.
 
     Args:

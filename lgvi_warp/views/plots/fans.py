@@ -14,7 +14,7 @@ from lgvi_warp.runs.outcomes import outcomes
 from lgvi_warp.statistics.quantity import Quantity
 from lgvi_warp.views.choice import mixed, of_members
 from lgvi_warp.views.fleet import members_of_run, title
-from lgvi_warp.views.plots.canvas import COLORS, TINTS, below, hatch, mark, panel, point_down, style, wrapped
+from lgvi_warp.views.plots.canvas import COLORS, TINTS, band, below, hatch, mark, panel, point_down, style, wrapped
 from lgvi_warp.views.plots.read import (
     HINT,
     Survey,
@@ -164,7 +164,7 @@ def draw_bands(axes: Any, time: np.ndarray, values: np.ndarray, counted: np.ndar
     curves = dict(zip(levels, at_levels(values, counted, levels), strict=True))
     curves[0.0], curves[1.0] = look.pop("low", curves[0.0]), look.pop("high", curves[1.0])
     for (low, high), color in zip(BANDS, TINTS, strict=True):
-        label = "all" if low == 0.0 else f"{high - low:.0%}"
+        label = "all" if low == 0.0 else band(low, high)
         axes.fill_between(time, curves[low], curves[high], color=color, linewidth=0, label=label)
     axes.plot(time, curves[0.5], color="black", linewidth=1.2, label="median", **look)
 
@@ -187,10 +187,12 @@ def _draw_estimate(axes: Any, estimate: Estimate, component: int) -> None:
         levels, values = estimate.coordinates["level"], estimate.value[:, :, component]
         pairs = len(levels) // 2
         for i in range(pairs):
-            color, label = TINTS[max(0, len(TINTS) - pairs + i)], f"{levels[-1 - i] - levels[i]:.0%}"
+            color, label = TINTS[max(0, len(TINTS) - pairs + i)], band(levels[i], levels[-1 - i])
             axes.fill_between(time, values[:, i], values[:, -1 - i], color=color, linewidth=0, label=label)
         if len(levels) % 2:
-            axes.plot(time, values[:, pairs], color="black", linewidth=1.2, label=f"{levels[pairs]:.0%} quantile")
+            axes.plot(
+                time, values[:, pairs], color="black", linewidth=1.2, label=f"{band(0.0, levels[pairs])} quantile"
+            )
     elif kind == "mean":
         low, high = estimate.lower[:, component], estimate.upper[:, component]
         axes.fill_between(time, low, high, color=TINTS[1], linewidth=0, label=f"its {estimate.confidence:.0%} interval")

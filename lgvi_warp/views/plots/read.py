@@ -95,6 +95,27 @@ def with_samples(result: Result) -> Result:
     )
 
 
+def selected(result: Result, most: int, fields: tuple[str, ...], what: str) -> tuple[Result, Shown, Result]:
+    """Choose the members that a picture draws, and read their samples.
+
+    Args:
+        result: A result.
+        most: The most members to draw.
+        fields: Names of the samples that are needed.
+        what: What needs them.
+
+    Returns:
+        The result that has the samples, the choice, and the samples of those members at the times that are drawn.
+
+    Raises:
+        NothingToDraw: Some were not kept, or no member has a finite start.
+    """
+    result = with_samples(result)
+    check_fields(result, fields, what)
+    choice = shown(result, most)
+    return result, choice, few(result, choice.members, fields, choice.frames)
+
+
 def check_fields(result: Result, fields: tuple[str, ...], what: str) -> None:
     """Refuse to draw what was not kept.
 

@@ -13,6 +13,10 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
+sys.path.append(str(ROOT / "docs"))
+
+from site_parts import movie  # noqa: E402
+
 PICTURES = ROOT / "docs" / "gallery"
 PAGE = ROOT / "docs" / "gallery.md"
 HEAD = """# Gallery
@@ -115,13 +119,15 @@ def page() -> str:
 
 
 def main(chosen: list[str]) -> None:
-    """Run examples, all or those whose numbers are given, and write the page."""
+    """Run examples, all or those whose numbers are given, make the moving picture if it is meant, and write the page."""
     PICTURES.mkdir(exist_ok=True)
     for script in scripts():
         if not chosen or script.name[:2] in chosen:
             with tempfile.TemporaryDirectory() as folder:
                 keep(script, Path(folder), run(script, Path(folder)))
             print(script.name, flush=True)
+    if not chosen or "movie" in chosen:
+        movie.main()
     PAGE.write_text(page())
 
 

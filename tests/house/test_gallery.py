@@ -1,14 +1,16 @@
 """The gallery: twelve short scripts, each with a picture that its present text drew, on a page that has both."""
 
 import sys
+from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from tests.conftest import ROOT
 
 sys.path.append(str(ROOT / "docs"))
 
-from site_parts import gallery
+from site_parts import gallery, movie
 
 SCRIPTS = gallery.scripts()
 # What these print depends on the machine's speed.
@@ -27,6 +29,13 @@ def test_it_is_short_and_its_picture_is_of_its_text(script):
 
 def test_the_page_is_as_the_scripts_and_pictures_say():
     assert gallery.PAGE.read_text() == gallery.page(), "stale: run `make gallery`"
+
+
+def test_the_moving_picture_is_of_its_script():
+    with Image.open(movie.MOVIE) as picture:
+        assert picture.n_frames == movie.FRAMES and picture.size == movie.SIZE
+        assert picture.info["xmp"].decode() == gallery.digest(Path(movie.__file__)), "stale: run `make gallery`"
+    assert movie.MOVIE.stat().st_size < 600_000
 
 
 def test_a_changed_script_is_found(tmp_path):

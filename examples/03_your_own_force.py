@@ -1,7 +1,6 @@
 """Your own force, in one file: a dock that draws vehicles in.
 
-The function runs in the kernel, for all vehicles of a packet at once. `lw.check_law` compares it with its potential before
-anything depends on it. No file of the package changes.
+The function runs in the kernel, for all vehicles of a packet at once. `lw.check_law` compares it with its potential first.
 """
 
 from dataclasses import dataclass
@@ -28,8 +27,7 @@ def dock_law(w: Any, view: Any, p: Any):
 class DockOnDevice:
     """What the kernel takes from this file."""
 
-    POTENTIAL = True
-    law = dock_law
+    POTENTIAL, law = True, dock_law
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -73,7 +71,7 @@ if __name__ == "__main__":
     print(lw.check_law(dock))
     results = {"drag": solve([drag]), "drag and dock": solve([drag, dock])}
     for label, result in results.items():
-        near = distance(result.samples)[-1] < 1.0
-        print(f"{label}: {near.mean():.0%} of the noses within 1 m of the dock after 60 s")
+        near = np.mean(distance(result.samples)[-1] < 1.0)
+        print(f"{label}: {near:.0%} of the noses within 1 m of the dock after 60 s")
     lw.plots.compare(results, lw.Quantity("distance to the dock", distance, "m"), path="03_your_own_force.png")
     print("03_your_own_force.png")

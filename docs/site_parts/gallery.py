@@ -33,8 +33,9 @@ def scripts() -> list[Path]:
 
 
 def digest(script: Path) -> str:
-    """The hash of a script, whatever its line ends."""
-    return hashlib.sha256(script.read_text().encode()).hexdigest()
+    """The hash of a script, whatever its line ends and the line that names its licence."""
+    lines = [line for line in script.read_text().splitlines() if not line.startswith("# SPDX-")]
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 
 def run(script: Path, folder: Path) -> str:

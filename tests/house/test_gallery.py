@@ -40,7 +40,7 @@ def test_the_moving_picture_is_of_its_script():
 
 def test_a_changed_script_is_found(tmp_path):
     changed = tmp_path / SCRIPTS[0].name
-    changed.write_text(SCRIPTS[0].read_text() + "\n")
+    changed.write_text(SCRIPTS[0].read_text() + "x = 1\n")
     assert gallery.notes(changed)["script"] != gallery.digest(changed)
 
 

@@ -51,4 +51,5 @@ def test_the_first_example(tmp_path, monkeypatch, capsys):
 
 def test_the_methods_of_the_guide():
     code, _ = code_and_output("docs/guide/methods.md")
-    exec(code, {"lw": lw})
+    methods = [eval(line, {"lw": lw}) for line in code.splitlines()]
+    assert [method.name for method in methods] == ["psi_s", "psi", "rk8"] and methods[2].adaptive

@@ -15,7 +15,8 @@ from lgvi_warp.runs.quantities import OfResult, quantities
 from lgvi_warp.views.choice import shown
 from lgvi_warp.views.fleet import LOOKS, title
 from lgvi_warp.views.plots.canvas import COLORS, below, hatch, mark, panel, panels, point_down, wrapped
-from lgvi_warp.views.plots.read import DEPTHS, WORDS, at_one_time, estimate_for, floors, some_of, unit_of, with_samples
+from lgvi_warp.views.plots.read import at_one_time, estimate_for, with_samples
+from lgvi_warp.views.plots.words import DEPTHS, WORDS, floors, some_of, unit_of
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result

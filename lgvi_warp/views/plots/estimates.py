@@ -11,7 +11,7 @@ from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views.choice import of_members
 from lgvi_warp.views.fleet import members_of_run
 from lgvi_warp.views.plots.canvas import COLORS, band, hatch, panels, point_down, style, wrapped
-from lgvi_warp.views.plots.read import DEPTHS, floors, unit_of
+from lgvi_warp.views.plots.words import DEPTHS, floors, unit_of
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result

@@ -15,18 +15,8 @@ from lgvi_warp.statistics.quantity import Quantity
 from lgvi_warp.views.choice import mixed, of_members
 from lgvi_warp.views.fleet import members_of_run, title
 from lgvi_warp.views.plots.canvas import COLORS, TINTS, band, below, hatch, mark, panel, point_down, style, wrapped
-from lgvi_warp.views.plots.read import (
-    HINT,
-    Survey,
-    estimate_for,
-    floors,
-    is_depth,
-    label_of,
-    quantity_of,
-    survey_of,
-    unbounded_text,
-    with_samples,
-)
+from lgvi_warp.views.plots.read import Survey, estimate_for, quantity_of, survey_of, unbounded_text, with_samples
+from lgvi_warp.views.plots.words import HINT, floors, is_depth, label_of
 from lgvi_warp.views.recording.drawn import at_levels
 
 if TYPE_CHECKING:

@@ -9,17 +9,8 @@ import numpy as np
 
 from lgvi_warp.common.status import Status, under_way
 from lgvi_warp.views.plots.canvas import COLORS, STYLES, below, mark, outcome_style, panel, point_down, wrapped
-from lgvi_warp.views.plots.read import (
-    HINT,
-    floors,
-    is_depth,
-    label_of,
-    numbers,
-    quantity_of,
-    selected,
-    some_of,
-    with_samples,
-)
+from lgvi_warp.views.plots.read import numbers, quantity_of, selected, with_samples
+from lgvi_warp.views.plots.words import HINT, floors, is_depth, label_of, some_of
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result

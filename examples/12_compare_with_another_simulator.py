@@ -1,8 +1,9 @@
 """Compare with another simulator: the same vehicle in SciPy, by equations written down anew.
 
-Newton and Euler's equations of a body with added mass, weight, buoyancy and drag, with quaternions, by DOP853 to twelve
-digits. The difference of the two programs shrinks with the step as the order of the method says: it is the error of the
-step, and not a difference of the models. Put your simulator in the place of `other`.
+Newton and Euler's equations of a body with added mass, weight, buoyancy and drag, with quaternions, by DOP853 in steps of at
+most 10 ms: its error estimate misses the kinks of |v| v, and in longer steps it is 3.5e-8 m off. The difference of the two
+programs shrinks with the step as the order of the method says: it is the error of the step, and not a difference of the
+models. Put your simulator in the place of `other`.
 """
 
 import numpy as np
@@ -44,7 +45,7 @@ def rates(t, y):
 def other():
     """Position (3,) [m] at the end by SciPy."""
     y = np.concatenate([START["position"], [0.0, 0.0, 0.0, 1.0], START["velocity"], START["angular_velocity"]])
-    return solve_ivp(rates, (0.0, T1), y, "DOP853", rtol=1e-12, atol=1e-12).y[:3, -1]
+    return solve_ivp(rates, (0.0, T1), y, "DOP853", max_step=0.01, rtol=1e-12, atol=1e-12).y[:3, -1]
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import textwrap
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,6 +29,8 @@ GREY = "#9A9A9A"
 # Points of text to an inch of width: 8.75 pixels where the picture is 700 pixels wide.
 TEXT = 0.9
 LEAST_TEXT = 9.0
+# Matplotlib's settings are those of the process, and pictures are drawn side by side in threads; one picture draws in another.
+LOCK = threading.RLock()
 DPI = 100
 
 
@@ -144,7 +147,7 @@ def drawing(figure: Any, path: str | os.PathLike[str] | None, sized: bool) -> It
         ),
         size,
     ) | dict.fromkeys(("axes.titlesize", "figure.titlesize"), 1.1 * size)
-    with mpl.rc_context(settings | {"hatch.linewidth": 0.6, "pdf.fonttype": 42}):
+    with LOCK, mpl.rc_context(settings | {"hatch.linewidth": 0.6, "pdf.fonttype": 42}):
         yield
         if sized:
             for axes in figure.axes:

@@ -39,7 +39,7 @@ class Viewer:
         """A picture (height, width, 3) of each view that is in sight, by class and origin, at a time [s]."""
         self.client.set_time(TIMELINE, duration=float(when), play_state="paused")
         time.sleep(0.4)
-        found = {}
+        shots = {}
         for view in self.client.get_state().views:
             try:
                 png = self.client.take_screenshot(view_id=view.view_id)
@@ -47,13 +47,13 @@ class Viewer:
                 if "not found" not in str(error).lower():  # a view in a hidden tab
                     raise
                 continue
-            found[view.view_class, view.origin] = np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)
-        return found
+            shots[view.view_class, view.origin] = np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)
+        return shots
 
     def complaints(self):
         """What views report and the log warns of."""
-        views = [f"{view.origin}: {one.summary}" for view in self.client.get_state().views for one in view.reports]
-        logs = [one.message for one in self.client.get_logs() if one.level in ("WARN", "ERROR")]
+        views = [f"{view.origin}: {note.summary}" for view in self.client.get_state().views for note in view.reports]
+        logs = [entry.message for entry in self.client.get_logs() if entry.level in ("WARN", "ERROR")]
         return views + [message for message in logs if not EXPECTED.search(message)]
 
 

@@ -279,7 +279,7 @@ def metrics_of(given: Any) -> dict[str, Statistic]:
     faults, metrics = Faults(), dict[str, Statistic]()
     for i, entry in enumerate((*given, TimeToFailure())):
         with faults.including():
-            name, metric = _metric(f"metrics[{i}]", entry)
+            name, metric = metric_of(f"metrics[{i}]", entry)
             if name in metrics and name != END:
                 faults.add(
                     f"metrics[{i}]", name, "is the name of another metric", 'give it a name of its own: name="..."'
@@ -289,8 +289,19 @@ def metrics_of(given: Any) -> dict[str, Statistic]:
     return metrics
 
 
-def _metric(key: str, entry: Any) -> tuple[str, Statistic]:
-    """Name and statistic of one metric."""
+def metric_of(key: str, entry: Any) -> tuple[str, Statistic]:
+    """Return the name and the statistic of one metric.
+
+    Args:
+        key: the argument's name, for messages.
+        entry: "iae depth", lw.IAE("depth"), a table, or an expression over the path.
+
+    Returns:
+        Its name, and the statistic with the number of each member.
+
+    Raises:
+        SceneError: it is none.
+    """
     if isinstance(entry, str):
         word, _, of = entry.partition(" ")
         if word in TYPES:

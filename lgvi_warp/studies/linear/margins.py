@@ -82,16 +82,18 @@ class Margins:
             for name, v in whole.items()
         }
 
-    def curve(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+    def curve(self, name: str, by: str | None = None) -> tuple[np.ndarray, np.ndarray]:
         """The distribution of a margin for a picture: how many members have less.
 
         Args:
             name: "gain_lower", "gain_upper" or "delay".
+            by: "eigenvalues" or "runs"; None, the default, for the first of them that was asked.
 
         Returns:
             (margins of the members that settle as they are, rising; the part of them with at most that much).
         """
-        values = np.sort(self._columns()[name][self.steady])
+        columns = self._columns() if by is None else {"eigenvalues": self.values, "runs": self.by_runs}[by]
+        values = np.sort(columns[name][self.steady])
         return values, np.arange(1, len(values) + 1) / max(1, len(values))
 
     def worst(self, count: int = 10, name: str | None = None) -> np.ndarray:

@@ -184,7 +184,21 @@ def made(
     metrics: Any,
     settings: Mapping[str, Any],
 ) -> Setup:
-    """Return what a sweep would run; see `sweep` for the arguments.
+    """Return what a sweep would run; every argument but the last is as of `sweep`.
+
+    Args:
+        scene: the scene.
+        cases: cases, or numbers by name of a case.
+        grid: values by name of a number.
+        vary: distributions beside the scene's.
+        members: number of members.
+        seed: of the members.
+        sampling: of the members.
+        metrics: metrics, or their names.
+        settings: further arguments of `solve` by name.
+
+    Returns:
+        Cases, grid, members and metrics, checked.
 
     Raises:
         SceneError: arguments are at fault.

@@ -9,6 +9,7 @@ one; the ending chooses the format.
 
 from lgvi_warp.views.plots.bars import sensitivity
 from lgvi_warp.views.plots.canvas import figure_class, save_figure
+from lgvi_warp.views.plots.costs import scaling, term_cost
 from lgvi_warp.views.plots.edges import margins
 from lgvi_warp.views.plots.ends import histogram, outcomes, pairs
 from lgvi_warp.views.plots.estimates import drawable, statistics
@@ -40,9 +41,11 @@ __all__ = [
     "plot_statistics",
     "plot_tradeoff",
     "save_figure",
+    "scaling",
     "sensitivity",
     "stability",
     "statistics",
     "summary",
+    "term_cost",
     "tradeoff",
 ]

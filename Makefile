@@ -61,7 +61,7 @@ bench-peers: .venv-peers/.done
 	touch $@
 
 bench-loops: .venv-loops/.done
-	.venv-loops/bin/python -m benchmarks run loop_peers environments
+	.venv-loops/bin/python -m benchmarks run loop_peers environments sweep_peers
 
 .venv-loops/.done: benchmarks/cases/environments/requirements.txt pyproject.toml
 	$(PYTHON) -m venv .venv-loops

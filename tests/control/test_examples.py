@@ -43,3 +43,10 @@ def test_reallocation_keeps_the_place_when_a_thruster_dies(tmp_path):
 def test_an_integral_takes_the_vehicle_back_to_the_legs(tmp_path):
     plain, integral = printed("waypoints", tmp_path)
     assert number(integral, "m off") < 0.5 * number(plain, "m off")
+
+
+@pytest.mark.slow
+def test_gains_for_the_worst_cost_less_there_and_more_on_average(tmp_path):
+    mean, worst = printed("sweeps/tune_worst_5_percent", tmp_path)
+    assert number(worst, "m s2 in the worst") < 0.9 * number(mean, "m s2 in the worst")
+    assert number(worst, "m s2 on average") > number(mean, "m s2 on average")

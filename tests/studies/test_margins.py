@@ -240,8 +240,9 @@ def test_the_heading_loop_of_remus():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", ["controllers/margins.md", "guide/worst_case.md"])
-def test_the_snippets_of_a_page(page):
+def test_the_snippets_of_a_page(page, tmp_path, monkeypatch):
     pytest.importorskip("control")
+    monkeypatch.chdir(tmp_path)
     names = {"lw": lw, "autopilot": autopilot(), "scene": autopilot()}
     # In a page's ensembles are more members, and budgets are larger, than a test needs.
     short = {"256": "8", "200": "4", "20_000": "200", "save=lw": "budget=300, save=lw"}

@@ -10,6 +10,7 @@ one; the ending chooses the format.
 from lgvi_warp.views.plots.bars import sensitivity
 from lgvi_warp.views.plots.canvas import figure_class, save_figure
 from lgvi_warp.views.plots.costs import scaling, term_cost
+from lgvi_warp.views.plots.edges import margins
 from lgvi_warp.views.plots.ends import histogram, outcomes, pairs
 from lgvi_warp.views.plots.estimates import drawable, statistics
 from lgvi_warp.views.plots.fans import compare, fan
@@ -28,6 +29,7 @@ __all__ = [
     "fan",
     "figure_class",
     "histogram",
+    "margins",
     "outcomes",
     "pairs",
     "paths",

@@ -55,6 +55,8 @@ STEP_ROUND_OFF = 1e-12
 # Limits of one launch: they keep progress current, interrupts prompt and the sample buffer small in long runs.
 SEGMENT_VEHICLE_STEPS = 20_000_000
 SEGMENT_SAMPLE_BYTES = 16_000_000
+# What is gathered at looks before it is reduced: it should stay in the caches.
+GATHERED_BYTES = 4_000_000
 
 
 class NotSurveyed(Exception):  # noqa: N818  (what happened, and no fault of the scene)
@@ -151,25 +153,47 @@ class Plan:
             return make_advance(self.spec)
 
     @functools.cached_property
-    def taken(self) -> TimeGrid:
-        """All samples that are taken: those to keep, and with `looks` those at the controller's looks."""
+    def gathered(self) -> TimeGrid | None:
+        """The controller's looks, where samples are taken at all of them; None without a controller or without `looks`."""
         controller = self.kernel_choice.controller
-        if not self.looks or controller is None:
-            return self.grid
-        return self.grid.with_steps(np.arange(0, self.grid.steps + 1, controller.every(self.grid.h)))
+        return self.grid.looks(controller.every(self.grid.h)) if self.looks and controller is not None else None
 
-    def kept(self, when: slice) -> tuple[slice, np.ndarray]:
-        """Which of some samples that are taken are to keep.
+    @functools.cached_property
+    def look_fields(self) -> dict[str, int]:
+        """What the kernel gathers at a look, in the user's axes: field -> numbers, as of `sample_fields`."""
+        return {name: size for name, size in self.sample_fields.items() if name in self.fields}
+
+    def slots(self, count: int) -> int:
+        """How many looks of a block are gathered at once.
 
         Args:
-            when: slice of the samples that are taken.
+            count: number of members of the block.
 
         Returns:
-            The slice of the grid's samples, and their places within `when`.
+            At least 2, since the first launch begins with a look; 0 where none are gathered.
         """
-        steps, grid = self.taken.sample_steps[when], self.grid.sample_steps
-        first, stop = np.searchsorted(grid, [steps[0], steps[-1] + 1])
-        return slice(int(first), int(stop)), np.searchsorted(steps, grid[first:stop])
+        if self.gathered is None:
+            return 0
+        look_bytes = max(1, sum(self.look_fields.values())) * count * np.dtype(DTYPES[self.dtype]).itemsize
+        return max(2, min(GATHERED_BYTES // look_bytes, len(self.gathered.times)))
+
+    def looks_of(self, k0: int, k1: int) -> slice:
+        """Which looks are gathered once a launch has ended.
+
+        Args:
+            k0: number of steps made before the launch.
+            k1: number of steps made after it.
+
+        Returns:
+            Those after step k0, with that of the start, and no later than step k1. Where a function of the host answers, a
+            look ends in the next launch: those from step k0 on and before step k1, with that of the end.
+        """
+        assert self.gathered is not None
+        bounds = np.array([k0 + 1 if k0 else 0, k1 + 1])
+        if self.asks:
+            bounds = np.array([k0, k1 if k1 < self.grid.steps else k1 + 1])
+        first, stop = np.searchsorted(self.gathered.sample_steps, bounds)
+        return slice(int(first), int(stop))
 
     @functools.cached_property
     def shared(self) -> Shared:
@@ -320,7 +344,7 @@ class Plan:
             A plan for m members.
         """
         subplan = self._copy()
-        for name in ("shared", "idle", "sample_fields", "signal_rows", "taken", "times"):
+        for name in ("shared", "idle", "sample_fields", "look_fields", "signal_rows", "gathered", "times"):
             subplan.__dict__.pop(name, None)
         object.__setattr__(subplan, "ensemble", self.ensemble.subset(indices))
         object.__setattr__(subplan, "fields", ordered(fields))
@@ -528,7 +552,7 @@ class Plan:
             are due.
         """
         stages, leads = (np.array(fractions) * self.grid.h for fractions in self.lengths)
-        due = np.append(self.taken.sample_steps, 2**31 - 1).astype(np.int32)
+        due = np.append(self.grid.sample_steps, 2**31 - 1).astype(np.int32)
         return (
             wp.array(stages, dtype=self.spec.real, device="cpu"),
             wp.array(leads, dtype=self.spec.real, device="cpu"),
@@ -545,7 +569,7 @@ class Plan:
         Returns:
             (s0, s1): samples s0 to s1 - 1 are due after step k0 and no later than step k1.
         """
-        s0, s1 = np.searchsorted(self.taken.sample_steps, (k0, k1), side="right")
+        s0, s1 = np.searchsorted(self.grid.sample_steps, (k0, k1), side="right")
         return int(s0), int(s1)
 
     def segments(self, count: int) -> Iterator[tuple[int, int]]:
@@ -560,7 +584,8 @@ class Plan:
         if self.asks:
             yield from self._periods()
             return
-        due = self.taken.sample_steps
+        due, slots = self.grid.sample_steps, self.slots(count)
+        every = int(self.gathered.sample_steps[1]) if self.gathered and len(self.gathered.times) > 1 else 0
         per_sample = sum(self.sample_fields.values()) * count * np.dtype(DTYPES[self.dtype]).itemsize
         most_samples = max(1, SEGMENT_SAMPLE_BYTES // max(per_sample, 1))
         most_steps = max(CHUNK, SEGMENT_VEHICLE_STEPS // count // CHUNK * CHUNK)
@@ -568,6 +593,9 @@ class Plan:
         while k < self.grid.steps:
             last = self.due(k, k)[1] + most_samples
             k1 = min(k + most_steps, int(due[min(last, len(due)) - 1]))
+            if every:
+                # Up to the last look for which there is a slot before those of earlier ones are taken again.
+                k1 = min(k1, ((k // every + 1) // slots * slots + slots - 1) * every)
             yield k, k1
             k = k1
 

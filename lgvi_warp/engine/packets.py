@@ -145,7 +145,7 @@ class Packets:
         controller = self.plan.kernel_choice.controller
         if controller is None:
             return 0, 0
-        kept = controller.bus.rows + self.plan.notes * sum(NOTED.values())
+        kept = controller.bus.rows + bool(self.plan.notes) * sum(NOTED.values())
         return kept + len(self.plan.signal_rows), kept
 
     def _monitor(self) -> Any:
@@ -165,7 +165,7 @@ class Packets:
         if controller is not None:
             rows = plan.signal_rows
             monitor.every, monitor.commands = controller.every(plan.grid.h), controller.bus.channels
-            monitor.bus, monitor.kept, monitor.noting = controller.bus.rows, self._bus()[1], int(self.plan.notes)
+            monitor.bus, monitor.kept, monitor.noting = controller.bus.rows, self._bus()[1], self.plan.notes
             monitor.signals = wp.array(np.array(rows, np.int32), dtype=wp.int32, device="cpu")
             monitor.first_signals = wp.zeros((self.count, max(1, len(rows))), dtype=Lane, device="cpu")
             monitor.slots = plan.slots(self.count * plan.spec.width)

@@ -16,7 +16,7 @@ import numpy as np
 import warp as wp
 
 from lgvi_kernels import built_in
-from lgvi_kernels.advance.feeding import NOTED
+from lgvi_kernels.advance.feeding import NOTED, NOTES
 from lgvi_kernels.advance.kernel import Advance, make_advance
 from lgvi_kernels.advance.rows import SAMPLE_FIELDS
 from lgvi_kernels.advance.spec import CHUNK, Control, Spec
@@ -56,7 +56,7 @@ STEP_ROUND_OFF = 1e-12
 SEGMENT_VEHICLE_STEPS = 20_000_000
 SEGMENT_SAMPLE_BYTES = 16_000_000
 # What is gathered at looks before it is reduced: it should stay in the caches.
-GATHERED_BYTES = 4_000_000
+GATHERED_BYTES = 8_000_000
 
 
 class NotSurveyed(Exception):  # noqa: N818  (what happened, and no fault of the scene)
@@ -421,9 +421,10 @@ class Plan:
         return controller is not None and controller.callback is not None
 
     @property
-    def notes(self) -> bool:
-        """Whether looks note what they measure, want and demand: where some of it is saved, or the host is asked."""
-        return self.asks or any(SIGNALS[name].group in NOTED for name in self.signals)
+    def notes(self) -> int:
+        """What looks note, as bits (see NOTES): that of which something is saved, and all where the host is asked."""
+        groups = NOTES.keys() if self.asks else {SIGNALS[name].group for name in self.signals}
+        return sum(NOTES[group] for group in groups if group in NOTES)
 
     @functools.cached_property
     def table(self) -> dict[str, Field]:

@@ -37,9 +37,11 @@ CONTROL_NON_FINITE = 8
 
 # What each look notes in rows of the memory, in this order, and how many it takes: the demand X Y Z K M N; the measurement:
 # position, attitude row by row, velocities over ground and through the water, angular velocity, heading; the reference:
-# position, attitude, velocity, angular velocity, heading, speed, angular acceleration. All of it, where any of it is saved or
-# the host is asked: a number of the launch says so, so that what is saved changes no code, and with it no bit.
+# position, attitude, velocity, angular velocity, heading, speed, angular acceleration. All of one of them, where any of it is
+# saved or the host is asked: a number of the launch says so, so that what is saved changes no code, and with it no bit.
 NOTED = {"demand": 6, "measured": 22, "reference": 23}
+# The bits of that number.
+NOTES = {"demand": 1, "measured": 2, "reference": 4}
 MEASURED_ROW = NOTED["demand"]
 REFERENCE_ROW = MEASURED_ROW + NOTED["measured"]
 
@@ -209,11 +211,11 @@ def make_feed(spec, types, method, at_step, opened):
         if wp.static(measure is not None):
             y = measure(y, r, y, c.loop)
         # Each as soon as it is known, so that what is noted alone need not be kept in registers.
-        if monitor.noting > 0:
+        if (monitor.noting & wp.static(NOTES["measured"])) != 0:
             put_measured(y, c.memory, c.packet, monitor.bus + wp.static(MEASURED_ROW))
         if wp.static(guide is not None):
             r = guide(r, r, y, c.loop)
-        if monitor.noting > 0:
+        if (monitor.noting & wp.static(NOTES["reference"])) != 0:
             put_reference(r, c.memory, c.packet, monitor.bus + wp.static(REFERENCE_ROW))
         return y, r
 
@@ -247,7 +249,7 @@ def make_feed(spec, types, method, at_step, opened):
         w = Wrench()
         if wp.static(act is not None):
             w = act(w, r, y, c.loop)
-        if monitor.noting > 0:
+        if (monitor.noting & wp.static(NOTES["demand"])) != 0:
             put3(c.memory, c.packet, monitor.bus, w.force)
             put3(c.memory, c.packet, monitor.bus + 3, w.torque)
         # An allocation may lose what is no number: a limit is a comparison.

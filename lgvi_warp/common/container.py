@@ -8,6 +8,8 @@ Source: Linux kernel, Documentation/admin-guide/cgroup-v2.rst and cgroup-v1/memo
 
 from __future__ import annotations
 
+import functools
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -24,6 +26,12 @@ def cpu_quota(root: Path = ROOT, own: Path = OWN) -> float | None:
     Returns:
         The smallest quota of its groups [CPUs], as 1.5 for 150 ms in each 100 ms; None without a quota.
     """
+    return _cpu_quota(root, own, int(time.monotonic()))
+
+
+@functools.lru_cache(maxsize=1)
+def _cpu_quota(root: Path, own: Path, second: int) -> float | None:
+    """The quota, read from its files at most once a second, since short runs ask for it many times in one."""
     quotas = [_v2_quota(folder) for folder in _folders(root, own, "")]
     quotas += [_v1_quota(folder) for folder in _folders(root, own, "cpu")]
     return min((quota for quota in quotas if quota is not None), default=None)

@@ -66,8 +66,8 @@ class Progress:
             bar = f" [{'#' * done}{'.' * (BAR - done)}]" if self._in_place else ""
             text = f"{self._phase}{bar} {self._fraction:.1%}"
         if self._fraction > self._first:
-            left = seconds * (1.0 - self._fraction) / (self._fraction - self._first)
-            text += f", {left:.0f} s left"
+            remaining = seconds * (1.0 - self._fraction) / (self._fraction - self._first)
+            text += f", {remaining:.0f} s left"
         padding = " " * (self._length - len(text))
         self._stream.write(f"\r{text}{padding}" if self._in_place else f"{text}\n")
         self._stream.flush()

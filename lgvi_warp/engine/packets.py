@@ -55,6 +55,8 @@ class Packets:
         self.out: wp.array | None = None
         self.monitor = self._monitor()
         self._noted = [array.numpy() for array in self._written_by_the_kernel()]
+        # The same memory as NumPy has it, by member: asking an array for it takes longer than what is done with it.
+        self._status, self._failed_step, self._failed_size = (view.reshape(-1) for view in self._noted[:3])
         self._launch: Any = None
         self.refill(members)
 
@@ -221,6 +223,7 @@ class Packets:
         shape = (self.count, max(1, (s1 - s0) * numbers) + waste)
         if self.out is None or self.out.shape != shape:
             self.out = wp.empty(shape, dtype=plan.advance.types.Lane, device="cpu")
+            self._samples = self.out.numpy()
             self._launch = None
         tolerances = plan.method.tolerances(plan.dtype)
         if self._launch is None:
@@ -230,7 +233,7 @@ class Packets:
             for name, value in enumerate((k0, k1, s0), 7 + len(tolerances)):
                 self._launch.set_param_at_index(name, value)
         self._launch.launch()
-        return self.out.numpy()[:, : (s1 - s0) * numbers].reshape(self.count, s1 - s0, numbers, width)
+        return self._samples[:, : (s1 - s0) * numbers].reshape(self.count, s1 - s0, numbers, width)
 
     def _recorded(self, tolerances: Any, k0: int, k1: int, s0: int) -> Any:
         """Record a launch of the kernel without launching it."""
@@ -281,8 +284,8 @@ class Packets:
         none = np.zeros(m, np.uint16), np.zeros(m, np.int64), np.full(m, np.nan)
         warnings: tuple[np.ndarray, np.ndarray, np.ndarray] = self._warnings() if warned else none
         kept = PACE_FIELDS if self.plan.method.adaptive else 0
-        pace = self.state.numpy()[:, STATE_FIELDS + 2 : STATE_FIELDS + kept]
-        code = self._of_members(self.status, np.uint8)
+        pace = self.state_lanes.view[:, STATE_FIELDS + 2 : STATE_FIELDS + kept]
+        code = self._status[:m].astype(np.uint8)
         status, stopped_by = code.copy(), np.zeros(m, np.uint8)
         for number, (event, _) in enumerate(self.plan.kernel_choice.events):
             assert isinstance(event, Event)
@@ -290,8 +293,8 @@ class Packets:
             status[stopped], stopped_by[stopped] = event.status, 1 + number
         return Outcome(
             status,
-            self.failed_step.numpy().reshape(-1)[:m].astype(np.int64),
-            np.sqrt(self.failed_size.numpy().reshape(-1)[:m].astype(np.float64)),
+            self._failed_step[:m].astype(np.int64),
+            np.sqrt(self._failed_size[:m].astype(np.float64)),
             pace.transpose(0, 2, 1).reshape(self.count * self.plan.spec.width, pace.shape[1])[:m].astype(np.int64),
             *warnings,
             self._of_members(self.monitor.substeps, np.int64) if self.plan.spec.substep else np.zeros(m, np.int64),

@@ -185,7 +185,7 @@ class Packing:
         """
         m, frame, spec = self.members, self.frame, self.plan.spec
         attitude, velocity, rate = (_once(x) for x in (m.attitude, m.velocity, m.angular_velocity))
-        turned = not self._shared("axes kept", lambda numbers: bool(np.all(np.eye(3) == numbers[FRAME][0].Q)))
+        turned = not self._shared("axes kept", lambda numbers: bool(np.all(np.eye(3) == numbers[AXES][0].Q)))
         shifted = self._shared("origin moved", lambda numbers: bool(np.any(numbers[AXES][0].origin)))
         R, nu, Om, position = attitude, velocity, rate, m.position
         if turned:

@@ -90,7 +90,7 @@ class Survey:
 
     Attributes:
         turned: axes other than the user's, or forces about another origin (see `PackingContext.aligned`).
-        bent: drag has no exact flow along the kernel's axes.
+        bent: drag acts and has no exact flow along the kernel's axes.
         mass: rank of the mass matrix among SHAPES_OF_MASS.
         coupled: velocities and angular velocities are coupled.
         moved: the origin of the state is not the user's.
@@ -281,7 +281,7 @@ def _seen(
     return Survey(
         **of_axes,
         mass=mass,
-        bent=not shared("exact flow", p, lambda numbers: has_exact_flow(numbers[FRAME][0])),
+        bent=bool(drags) and not shared("exact flow", p, lambda numbers: has_exact_flow(numbers[FRAME][0])),
         felt=frozenset(key for key, yes in felt.items() if yes),
         drag=frozenset().union(*drags.values()),
         rising=frozenset(key for key, yes in rising.items() if yes),

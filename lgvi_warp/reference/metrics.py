@@ -12,27 +12,57 @@ def direction(y: np.ndarray, goal: float) -> float:
 
 
 def overshoot(t: np.ndarray, y: np.ndarray, goal: float) -> float:
-    """How far y goes beyond the goal."""
+    """How far y goes beyond the goal.
+
+    Args:
+        t: times of the looks under way (k,) [s].
+        y: actual numbers at these looks (k,).
+        goal: the wanted number.
+    """
     return max(0.0, float(np.max(direction(y, goal) * (y - goal))))
 
 
 def undershoot(t: np.ndarray, y: np.ndarray, goal: float) -> float:
-    """How far y goes the wrong way."""
+    """How far y goes the wrong way.
+
+    Args:
+        t: times of the looks under way (k,) [s].
+        y: actual numbers at these looks (k,).
+        goal: the wanted number.
+    """
     return max(0.0, float(np.max(direction(y, goal) * (y[0] - y))))
 
 
 def peak(t: np.ndarray, y: np.ndarray, goal: float) -> float:
-    """y where it is farthest in the direction of the step."""
+    """y where it is farthest in the direction of the step.
+
+    Args:
+        t: times of the looks under way (k,) [s].
+        y: actual numbers at these looks (k,).
+        goal: the wanted number.
+    """
     return float(y[np.argmax(direction(y, goal) * y)])
 
 
 def peak_time(t: np.ndarray, y: np.ndarray, goal: float) -> float:
-    """When that is."""
+    """The time at which y is farthest in the direction of the step [s].
+
+    Args:
+        t: times of the looks under way (k,) [s].
+        y: actual numbers at these looks (k,).
+        goal: the wanted number.
+    """
     return float(t[np.argmax(direction(y, goal) * y)])
 
 
 def rise_time(t: np.ndarray, y: np.ndarray, goal: float) -> float:
-    """From the first look with 10 % of the step done to the first one with 90 %."""
+    """From the first look with 10 % of the step done to the first one with 90 %.
+
+    Args:
+        t: times of the looks under way (k,) [s].
+        y: actual numbers at these looks (k,).
+        goal: the wanted number.
+    """
     if goal == y[0]:
         return 0.0
     done = (y - y[0]) / (goal - y[0])
@@ -42,7 +72,14 @@ def rise_time(t: np.ndarray, y: np.ndarray, goal: float) -> float:
 
 
 def settling_time(t: np.ndarray, y: np.ndarray, goal: float, within: float) -> float:
-    """The first look from which on y is within the band."""
+    """The first look from which on y is within the band.
+
+    Args:
+        t: times of the looks under way (k,) [s].
+        y: actual numbers at these looks (k,).
+        goal: the wanted number.
+        within: half the width of the band, in the unit of y.
+    """
     outside = np.flatnonzero(np.abs(y - goal) > within)
     if not len(outside):
         return float(t[0])
@@ -50,29 +87,36 @@ def settling_time(t: np.ndarray, y: np.ndarray, goal: float, within: float) -> f
 
 
 def steady_state_error(t: np.ndarray, e: np.ndarray, end: float, share: float = 0.1) -> float:
-    """The mean error over the last part of the run."""
+    """The mean error over the last part of the run.
+
+    Args:
+        t: times of the looks under way (k,) [s].
+        e: errors at these looks (k,), wanted less actual.
+        end: the end of the run [s].
+        share: the part of the run at its end that counts, 0.1 by default.
+    """
     if t[-1] < end:
         return np.nan
     return float(np.mean(e[t >= end * (1.0 - share) - 1e-9 * end]))
 
 
 def max_error(t: np.ndarray, e: np.ndarray) -> float:
-    """The largest |e|."""
+    """The largest |e| at any look."""
     return float(np.max(np.abs(e)))
 
 
 def iae(t: np.ndarray, e: np.ndarray) -> float:
-    """The integral of |e|."""
+    """The integral of |e| over time."""
     return float(np.trapezoid(np.abs(e), t))
 
 
 def ise(t: np.ndarray, e: np.ndarray) -> float:
-    """The integral of e^2."""
+    """The integral of e^2 over time."""
     return float(np.trapezoid(e**2, t))
 
 
 def itae(t: np.ndarray, e: np.ndarray) -> float:
-    """The integral of t |e|."""
+    """The integral of t |e| over time."""
     return float(np.trapezoid(t * np.abs(e), t))
 
 
@@ -92,12 +136,25 @@ def travel(t: np.ndarray, actuator: np.ndarray) -> float:
 
 
 def saturation_share(t: np.ndarray, command: np.ndarray, limit: np.ndarray) -> float:
-    """The share of time with a command at its limit or beyond; command: (k, channels), limit: (channels,)."""
+    """The share of time with a command at its limit or beyond.
+
+    Args:
+        t: times of the looks under way (k,) [s].
+        command: commands at these looks (k, channels).
+        limit: the limit of each channel (channels,).
+    """
     held = np.any(np.abs(command[:-1]) >= limit * (1.0 - 1e-6), axis=1)
     return float(np.sum(held * np.diff(t)) / (t[-1] - t[0]))
 
 
 def energy(t: np.ndarray, wrench: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray) -> float:
-    """The integral of |power| of a delivered wrench (k, 6)."""
+    """The integral of |power| of a delivered wrench [J].
+
+    Args:
+        t: times of the looks under way (k,) [s].
+        wrench: delivered forces and torques at these looks (k, 6) [N, N m], body axes.
+        velocity: velocities (k, 3) [m/s], body axes.
+        angular_velocity: (k, 3) [rad/s], body axes.
+    """
     power = np.sum(wrench[:, :3] * velocity, axis=1) + np.sum(wrench[:, 3:] * angular_velocity, axis=1)
     return float(np.trapezoid(np.abs(power), t))

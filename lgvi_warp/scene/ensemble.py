@@ -78,10 +78,10 @@ class Ensemble(Summarized):
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
         """Sampling, what varies and the scene's own rows."""
-        varied = [(f"varies {name}", shown(one.to_dict())) for name, one in self.vary.items()]
+        varied = [(f"varies {name}", shown(distribution.to_dict())) for name, distribution in self.vary.items()]
         rows = [("sampling", f"{self.sampling.kind}, seed {self.seed}"), *varied]
-        own = self.scene.summary_rows()[1] if isinstance(self.scene, Summarized) else ()
-        return f"Ensemble of {self.members:,} members", [*rows, *(row for row in own if row[0] != "ensemble")]
+        scene_rows = self.scene.summary_rows()[1] if isinstance(self.scene, Summarized) else ()
+        return f"Ensemble of {self.members:,} members", [*rows, *(row for row in scene_rows if row[0] != "ensemble")]
 
     @classmethod
     def of(cls, scene: SceneLike, settings: EnsembleSettings) -> Ensemble:
@@ -322,6 +322,8 @@ class Ensemble(Summarized):
 
     def _refuse(self, findings: Mapping[str, _Unphysical], looked_at: int) -> None:
         """Raise SceneError if anything was found; looked_at: number of members."""
+        if not findings:
+            return
         drawn = {target.name for variation in self.variations for target in variation.targets}
         faults = Faults()
         for key, finding in findings.items():
@@ -343,12 +345,12 @@ class Ensemble(Summarized):
         faults.raise_if_any()
 
     def _look_at(self, varied: set[str], first: int, stop: int, p: Mapping[str, np.ndarray]) -> dict[str, _Unphysical]:
+        keys = {name.rpartition(".")[0] for name in varied}
         with np.errstate(over="ignore", invalid="ignore"):
             checks = _vehicle_checks(p, varied, self.scene.vehicle.inertia_tolerance)
             for term in self.scene.parts:
-                numbers = self.own(term, p)
-                if any(f"{term.key}.{name}" in varied for name in numbers):
-                    checks |= {f"{term.key}.{name}": bad for name, bad in term.unphysical(numbers).items()}
+                if term.key in keys:
+                    checks |= {f"{term.key}.{name}": bad for name, bad in term.unphysical(self.own(term, p)).items()}
         unphysical = {}
         for key, bad in checks.items():
             bad = np.atleast_1d(bad)
@@ -457,7 +459,7 @@ class Ensemble(Summarized):
         varied = self.varied_names
         return [name for name in self._base if name in varied]
 
-    @property
+    @functools.cached_property
     def varied_names(self) -> set[str]:
         """Names of what members have of their own: drawn, from columns or explicit."""
         targets = [target for variation in self.variations for target in variation.targets]
@@ -528,6 +530,7 @@ class Ensemble(Summarized):
         shared = ((name, ensemble._base[name]) for name in by_member)
         columns = [(Target(name), np.broadcast_to(value, (self._whole, *np.shape(value)))) for name, value in shared]
         ensemble._columns = [*self._columns, *columns]
+        ensemble.__dict__.pop("varied_names", None)
         return ensemble
 
     def with_seed(self, seed: int, members: int | None = None) -> Ensemble:

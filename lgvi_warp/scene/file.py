@@ -97,12 +97,12 @@ def _mesh_in(folder: Path, name: str) -> str:
     try:
         path = (folder / name).resolve()
         inside = path.is_relative_to(folder.resolve())
-        there = inside and path.is_file()
+        is_file = inside and path.is_file()
     except (OSError, ValueError, RuntimeError):  # a name with a null character, or a ring of links
-        inside, there = True, False
+        inside, is_file = True, False
     if not inside or Path(name).is_absolute():
         raise refusal(key, name, "lies outside the scene file's folder", "put the mesh beside the scene file")
-    if not there:
+    if not is_file:
         raise refusal(key, name, "is not there", "put the mesh beside the scene file, or give length and diameter [m]")
     return os.fspath(path)
 

@@ -85,8 +85,8 @@ class Scene(Summarized):
     def summary_rows(self) -> tuple[str, summaries.Rows]:
         """The numbers of vehicle and start, and a row for each other section."""
         water, run, settings = self.environment, self.run.to_dict(), self.ensemble_settings
-        own, start = self.vehicle.parameters().items(), self.start.given().items()
-        rows = [(f"vehicle.{name}", summaries.numbers(value, UNITS[name])) for name, value in own]
+        numbers, start = self.vehicle.parameters().items(), self.start.given().items()
+        rows = [(f"vehicle.{name}", summaries.numbers(value, UNITS[name])) for name, value in numbers]
         rows.append(("environment", f"gravity {water.gravity:g} m/s2, water_density {water.water_density:g} kg/m3"))
         rows += [(f"start.{name}", summaries.numbers(value, TABLE[name].unit)) for name, value in start]
         rows.append(("terms", summaries.listed(term.key for term in self.terms)))

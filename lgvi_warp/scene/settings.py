@@ -134,10 +134,10 @@ class RunSettings:
         Raises:
             SceneError: If the name is not known or an option does not fit the method.
         """
-        own = Method.name if self.method is None else self.method
-        if name is not None and name != own:
+        set_here = Method.name if self.method is None else self.method
+        if name is not None and name != set_here:
             return Method(name)
-        return Method(own, **self.method_options)
+        return Method(set_here, **self.method_options)
 
     @property
     def method_options(self) -> dict[str, Any]:

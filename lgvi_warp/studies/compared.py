@@ -107,13 +107,13 @@ def compared_in(of: Any) -> Compared:
     if isinstance(of, str) and of.strip() in QUANTITIES:
         return Compared(of.strip(), QUANTITIES[of.strip()])
     if isinstance(of, str) and of.strip().startswith(MEAN):
-        whole = compared_in(of.strip().removeprefix(MEAN))
-        if whole.name == "attitude" or whole.mean:
+        entry = compared_in(of.strip().removeprefix(MEAN))
+        if entry.name == "attitude" or entry.mean:
             raise SceneError(
                 [f"of = {of!r}: is no mean of numbers; give the mean of an entry, such as 'mean attitude[2,2]'"]
             )
         return replace(
-            whole, name=MEAN + whole.name, functional=whole.functional or functional("of", whole.name), mean=True
+            entry, name=MEAN + entry.name, functional=entry.functional or functional("of", entry.name), mean=True
         )
     if isinstance(of, list | tuple):
         raise SceneError([f"of = {of!r}: is several quantities; errors are of one of them: give its name"])

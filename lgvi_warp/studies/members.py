@@ -40,7 +40,7 @@ def scene_of(scene: Any) -> Scene:
     Raises:
         SceneError: If it is neither.
     """
-    whole: Any = scene.scene if isinstance(scene, Ensemble) else scene
-    if not isinstance(whole, Scene):
+    scene_itself: Any = scene.scene if isinstance(scene, Ensemble) else scene
+    if not isinstance(scene_itself, Scene):
         raise refusal("scene", scene, "is neither a Scene nor an Ensemble", "give lw.Scene(...)")
-    return whole
+    return scene_itself

@@ -549,13 +549,13 @@ def verified(fleet: Ensemble, result: Result, found: Suggestion) -> tuple[float,
     h = result.provenance["step"]
     steps = np.rint(result.time / h).astype(np.int64)
     # In double precision, so that the error contains the run's round-off too.
-    done, left = comparison.part(result, chosen), 1.0 - 2.0**-plan.method.order
+    done, share = comparison.part(result, chosen), 1.0 - 2.0**-plan.method.order
     if any(isinstance(term, NoisyTerm) for term, _ in plan.kernel_choice.laws):
-        checked_fleet, left = comparison.drawn_every(checked_fleet, h / 2.0, own=False), math.sqrt(1.0 - 2.0**-2)
-        whole = TimeGrid(h, steps, result.time)
-        done = run_plan(Plan(checked_fleet, plan.method, whole, plan.fields, candidate.dtype), 1)
+        checked_fleet, share = comparison.drawn_every(checked_fleet, h / 2.0, own=False), math.sqrt(1.0 - 2.0**-2)
+        grid_of_run = TimeGrid(h, steps, result.time)
+        done = run_plan(Plan(checked_fleet, plan.method, grid_of_run, plan.fields, candidate.dtype), 1)
     half = Plan(checked_fleet, plan.method, TimeGrid(h / 2.0, 2 * steps, result.time), plan.fields, "float64")
     with np.errstate(all="ignore"):
         apart = comparison.distances(done, run_plan(half, 1), found.asked)
         size = comparison.errors(apart, len(result.time) - 1)[found.of]["path_max"]
-    return size / left, len(chosen)
+    return size / share, len(chosen)

@@ -172,18 +172,18 @@ class Tradeoff(Saved):
             The trade-off; errors and times that were not finite are infinite, other numbers NaN.
         """
         measured = []
-        for one in content["measurements"]:
-            ends = {name: numbers(one[name], math.nan) for name in ("energy_drift", "biases")}
-            known = one | ends | {"setting": Candidate(**one["setting"]), "errors": numbers(one["errors"], math.inf)}
-            measured.append(Measurement(**known))
-        grown = content["growth"]
-        if grown is not None:
-            times = {name: numbers(grown[name], math.inf) for name in ("doubling", "predictable")}
-            curves = {name: np.array(numbers(grown[name], math.nan)) for name in ("times", "curve")}
-            grown = Growth(**grown | times | curves | {"rate": numbers(grown["rate"], math.nan)})
-        kept = {name: value for name, value in content.items() if name != "front"}
-        kept |= {"measurements": tuple(measured), "growth": grown, "messages": tuple(content["messages"])}
-        return cls(**kept | {"reference_error": numbers(content["reference_error"], math.inf)})
+        for row in content["measurements"]:
+            ends = {name: numbers(row[name], math.nan) for name in ("energy_drift", "biases")}
+            fields = row | ends | {"setting": Candidate(**row["setting"]), "errors": numbers(row["errors"], math.inf)}
+            measured.append(Measurement(**fields))
+        growth = content["growth"]
+        if growth is not None:
+            times = {name: numbers(growth[name], math.inf) for name in ("doubling", "predictable")}
+            curves = {name: np.array(numbers(growth[name], math.nan)) for name in ("times", "curve")}
+            growth = Growth(**growth | times | curves | {"rate": numbers(growth["rate"], math.nan)})
+        values = {name: entry for name, entry in content.items() if name != "front"}
+        values |= {"measurements": tuple(measured), "growth": growth, "messages": tuple(content["messages"])}
+        return cls(**values | {"reference_error": numbers(content["reference_error"], math.inf)})
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Tradeoff:

@@ -31,6 +31,7 @@ def run(laws, **named):
     return lw.solve(scene(laws), "psi_s", h=H, t1=5.0, save=lw.SaveAt(every=0.5), **named)
 
 
+@pytest.mark.slow
 def test_it_is_the_law_in_the_kernel():
     asked, fused = run([lw.Callback(heading)]), run([lw.HeadingPID(**GAINS)])
     # 250 steps of round-off: the two evaluate the same formula in another order.

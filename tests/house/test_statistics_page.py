@@ -12,9 +12,15 @@ PAGE = (ROOT / "docs" / "guide" / "statistics.md").read_text()
 
 
 def snippets(language):
-    """(line, text) of every fenced snippet of a language."""
-    found = re.finditer(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
-    return [pytest.param(one[1], id=f"line {PAGE[: one.start()].count(chr(10)) + 1}") for one in found]
+    """(line, text) of every fenced snippet of a language; those with events, kernels of their own, are slow."""
+    return [
+        pytest.param(
+            match[1],
+            id=f"line {PAGE[: match.start()].count(chr(10)) + 1}",
+            marks=[pytest.mark.slow] if "events=" in match[1] else [],
+        )
+        for match in re.finditer(rf"```{language}\n(.*?)```", PAGE, re.DOTALL)
+    ]
 
 
 @pytest.mark.parametrize("text", snippets("toml"))

@@ -86,7 +86,7 @@ FIXED = ("command", "polynomial", "polynomial_astern", "table_commands", "lift_a
 EXACT = ("current harmonics", "waves", "Gauss-Markov current", "wrench noise", "stratification")
 
 
-@pytest.mark.slow_but("all together")
+@pytest.mark.slow_but("quadratic drag")
 @pytest.mark.parametrize("name", [name for name in CASES if name != "control fins"])
 def test_every_number_may_vary(name):
     # Members with numbers of their own, in packets, go where a scene with their numbers takes them.

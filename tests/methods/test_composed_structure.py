@@ -10,7 +10,7 @@ START = {"b": (0.0, 0.0, 10.0), "R": TURN.T, "nu": (0.6, 0.6, 0.5), "Om": (0.3, 
 # The kernels of tests/methods/test_composition_orders.py: with weight, however small.
 METHODS = ("ss6_13(psi_s)", "ss6_13(psi_x)", "bm4(psi_x)", "bm6(psi_s)", "rkn6_11", "rkn6_14", "gauss6")
 SWINGING = scene_of(net=1e-13, moment=(0.1, -0.2, -0.5))
-SLOW = ("ss6_13(psi_x)*", "bm6(psi_s)*")
+SLOW = ("ss6_13(psi_x)*", "bm6(psi_s)*", "rkn6_11*", "rkn6_14*")
 
 
 @pytest.mark.slow_for(*SLOW)

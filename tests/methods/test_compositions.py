@@ -108,7 +108,7 @@ def test_halves_with_drag():
     assert difference(last(result), reduced.from_reduced(x)) < ROUND_OFF
 
 
-@pytest.mark.slow_but("*-diagonal-*", "rkn6_14-both full-float32")
+@pytest.mark.slow_but("*-diagonal-*")
 @pytest.mark.parametrize(
     ("shape", "dtype"),
     [("diagonal", "float64"), ("isotropic mass", "float64"), ("both full", "float64"), ("both full", "float32")],

@@ -70,13 +70,13 @@ def twin(laws, method, h, steps):
     return b, R, nu + R.T @ water(look(at_end, body, h), body).velocity, Om
 
 
-# Each method once: psi_x with drag along axes and water that is the same everywhere, psi_w with one law of each other kind
-# (damping, water, of place, of time, that remembers), psi_x with all laws together. Each law alone: test-long.
+# Each method once: psi_w with one law of each other kind (damping, water, of place, of time, that remembers), psi_x with all
+# laws together. Each law alone: test-long.
 SEVERAL = {
     "in harmonics": ("drag", "current harmonics"),
     "in a profile": ("drag matrix", "current profile", "tether", "wrench schedule", "Gauss-Markov current"),
 }
-SHORT = ("psi_x-in harmonics", "psi_x-all together", "psi_x8-None", "psi_w-in a profile")
+SHORT = ("psi_x-all together", "psi_x8-None", "psi_w-in a profile")
 
 
 @pytest.mark.slow_but(*SHORT)

@@ -291,6 +291,7 @@ def test_a_store_holds_them_and_goes_on(whole, tmp_path):
     assert same(whole, loaded) and set(loaded.samples) == set(SAVED)
 
 
+@pytest.mark.slow_for("laws1")
 @pytest.mark.parametrize(
     "laws", [[lw.HeadingPID(kp=KP)], [lw.Callback(lambda t, y, r, members: np.zeros((len(members), 6)))]]
 )

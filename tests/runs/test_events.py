@@ -197,6 +197,7 @@ def test_an_adaptive_method_arrives_within_its_tolerance(method, true):
     assert error(lw.solve(one(FALLING, **FALL), lw.Method(method, rtol=1e-10, atol=1e-12), h=0.5, t1=2.0), true) < 1e-9
 
 
+@pytest.mark.slow_for("float32_compensated")
 @pytest.mark.parametrize("dtype", ["float32", "float32_compensated"])
 def test_single_precision_stands_at_the_event(dtype):
     ensemble = fleet(200, stops(floor=8.0, surface=0.0))
@@ -274,6 +275,7 @@ def test_a_stopped_member_stays_and_the_others_do_not_notice(terms):
         np.testing.assert_allclose(step, share * whole, atol=0.1)
 
 
+@pytest.mark.slow
 def test_an_event_in_a_step_that_was_divided():
     # Too fast a turn for the step: divided steps get on, and arrive.
     b, R, nu, Om = random_states(2, 8, spin=0.1)

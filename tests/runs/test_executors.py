@@ -194,6 +194,7 @@ def test_threads_of_one_dask_worker_share_it(memory):
         assert at_once == [2] and sum(dask.tasks_at_work.values()) == 0 and work.whole == [0]
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:Port .* is already in use")
 def test_the_client_of_a_run_is_not_the_default_one(memory):
     """xarray takes locks of the default client: one that is closed, or of a run, would hold up a caller's own files."""

@@ -217,6 +217,7 @@ def test_method_is_data():
         assert sum(stages) == pytest.approx(1.0, abs=1e-14) and stages == stages[::-1]
 
 
+@pytest.mark.slow
 def test_kernels_compile_for_cuda(tmp_path):
     # sm_90, without a GPU: the same code, one vehicle a packet.
     scene = scene_of(TURN @ np.diag((1.0, 2.0, 3.0)) @ TURN.T, net=1.0, moment=(0.0, 0.0, 1.0))

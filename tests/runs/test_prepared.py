@@ -225,6 +225,7 @@ def test_statistics_are_gathered_by_call(paper):
 OF_CALLS = [tracemalloc.Filter(True, f"*/{name}/*") for name in ("lgvi_warp", "lgvi_kernels", "warp", "numpy")]
 
 
+@pytest.mark.slow
 def test_calls_take_no_more_and_more_memory(paper):
     run = lw.prepare(paper, NAMES, of="depth", h=0.01, t1=0.01)
     X = [numbers(1 + i % 7) for i in range(50)]

@@ -72,7 +72,14 @@ class Part:
         return r
 
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
-        """The demand w (6,) = (X, Y, Z, K, M, N) plus that of a law; unmet (6,): what the last look did not deliver."""
+        """The demand plus that of this law.
+
+        Args:
+            w: Demand of the laws before it (6,) = (X, Y, Z, K, M, N) [N, N m].
+            r: Wanted motion.
+            y: Measured motion.
+            unmet: Part of the last look's demand that was not delivered (6,) [N, N m].
+        """
         return w
 
     def allocate(self, w: Array, actuators: dict[str, Any]) -> Array:
@@ -105,7 +112,13 @@ def pose_errors(r: Reference, y: Measurement) -> tuple[Array, Array, Array, Arra
 
 
 def unhindered(error: Array, unmet: Array, conditional: bool) -> Array:
-    """An error (3,) without the parts of which more would go where some of the demand was not delivered."""
+    """An error without the entries that would demand more of what is not delivered already.
+
+    Args:
+        error: Errors (3,).
+        unmet: Part of the demand that was not delivered (3,).
+        conditional: Whether the law integrates conditionally; if not, the error stays as it is.
+    """
     return np.where(conditional & (unmet * error > 0.0), 0.0, error)
 
 

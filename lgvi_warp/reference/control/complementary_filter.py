@@ -12,7 +12,7 @@ class ComplementaryFilter(Part):
     """Numbers as those of `lw.ComplementaryFilter`."""
 
     def begin(self) -> None:
-        """No reading yet."""
+        """Forget the estimate, before the first reading."""
         self.last: Measurement | None = None
 
     def measure(self, y: Measurement) -> Measurement:

@@ -14,7 +14,7 @@ class DeadReckoning(Part):
     start_error = np.zeros(3)
 
     def begin(self) -> None:
-        """Nowhere yet."""
+        """Forget the place, before the first reading."""
         self.last: np.ndarray | None = None
 
     def measure(self, y: Measurement) -> Measurement:

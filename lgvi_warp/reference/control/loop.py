@@ -51,7 +51,13 @@ class Loop:
         self.sent, self.unmet = [], np.zeros(6)
 
     def look(self, x: State, body: Body, h: float) -> None:
-        """Measure, guide, control and allocate at the start of step x.step."""
+        """Measure, guide, control and allocate at the start of step x.step.
+
+        Args:
+            x: State of the member.
+            body: Its rigid body and its terms.
+            h: Step [s].
+        """
         view = look(x, body, h)
         nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
         u = x.R.T @ water(view, body).velocity

@@ -25,7 +25,13 @@ def angles(R: Array) -> Array:
 
 
 def attitude(roll: float, pitch: float, yaw: float) -> Array:
-    """R (3, 3) of roll, pitch and yaw [rad]."""
+    """The attitude R (3, 3) of three Euler angles.
+
+    Args:
+        roll: Angle about the forward axis [rad].
+        pitch: Angle about the axis to starboard [rad].
+        yaw: Angle about the axis down [rad].
+    """
     about = [np.array(axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
     return exp(yaw * about[2]) @ exp(pitch * about[1]) @ exp(roll * about[0])
 

@@ -24,11 +24,17 @@ class ReferenceModel(Part):
     damping_ratio = rate_limit = None
 
     def begin(self) -> None:
-        """No look has been."""
+        """Forget the filtered motion, before the first look."""
         self.z: Array | None = None
 
     def moved(self, i: int, target: float, period: float) -> Array:
-        """x, x' and x'' of number i a period later, with its target held."""
+        """x, x' and x'' of a number after one period with its target held.
+
+        Args:
+            i: Index of the number.
+            target: Its target.
+            period: Duration [s].
+        """
         assert self.z is not None
         omega, zeta = self.natural_frequency[i], 1.0 if self.damping_ratio is None else self.damping_ratio[i]
         b = 2.0 * zeta + 1.0

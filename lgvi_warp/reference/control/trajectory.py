@@ -36,11 +36,11 @@ class Trajectory(Part):
         if i < 0 or i == len(self.times) - 1:
             return float(values[max(i, 0)]), 0.0, 0.0
         length, u = self.times[i + 1] - self.times[i], t - self.times[i]
-        left, right = self.bends(values)[i : i + 2]
-        slope = (values[i + 1] - values[i]) / length - length * (2.0 * left + right) / 6.0
-        jerk = (right - left) / length
-        value = values[i] + u * slope + u**2 * left / 2.0 + u**3 * jerk / 6.0
-        return float(value), float(slope + u * left + u**2 * jerk / 2.0), float(left + u * jerk)
+        bend, next_bend = self.bends(values)[i : i + 2]
+        slope = (values[i + 1] - values[i]) / length - length * (2.0 * bend + next_bend) / 6.0
+        jerk = (next_bend - bend) / length
+        value = values[i] + u * slope + u**2 * bend / 2.0 + u**3 * jerk / 6.0
+        return float(value), float(slope + u * bend + u**2 * jerk / 2.0), float(bend + u * jerk)
 
     def guide(self, r: Reference, y: Measurement) -> Reference:
         """Position and velocity; heading with its rates; speed."""

@@ -14,7 +14,7 @@ class ControlWrench(Following):
     driven = True
 
     def wrench(self, view: View) -> tuple[Array, Array]:
-        """What the channels are."""
+        """Force and torque of the channels, in body axes."""
         n = self.place(view)
         return n[:3], n[3:]
 

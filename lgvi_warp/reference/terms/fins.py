@@ -21,7 +21,14 @@ class Fins(Law):
         return np.asarray(sum((self.fin_damping(i, angle, view) for i, angle in enumerate(angles)), np.zeros((6, 6))))
 
     def lift_coefficient(self, i: int, uc: float, un: float, V: float) -> float:
-        """slope sin a cos a of fin i, at speeds [m/s] along its chord and normal; V is the size of both."""
+        """slope sin a cos a, with the angle of attack a.
+
+        Args:
+            i: Number of the fin, from 0.
+            uc: Speed along its chord [m/s].
+            un: Speed along its normal [m/s].
+            V: Size of both [m/s].
+        """
         return float(self.lift_slope[i] * uc * un / V**2)
 
     def fin_damping(self, i: int, angle: float, view: View) -> Array:

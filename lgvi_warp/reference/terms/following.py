@@ -57,7 +57,7 @@ class Following(Law):
         if not self.moves:
             return n
         lags, rates = (np.broadcast_to(x, n.shape) for x in (self.time_constant, self.rate_limit))
-        return np.array([chased(*one, s) for one in zip(n, first, last, lags, rates, strict=True)])
+        return np.array([chased(*channel, s) for channel in zip(n, first, last, lags, rates, strict=True)])
 
 
 def chased(n: float, first: float, last: float, lag: float, rate: float, s: float) -> float:
@@ -70,7 +70,7 @@ def chased(n: float, first: float, last: float, lag: float, rate: float, s: floa
     """
     if s <= 0.0:
         return n
-    slope, gap, left = (last - first) / s, first - n, s
+    slope, gap, remaining = (last - first) / s, first - n, s
     band = rate * lag if lag > 0.0 else 0.0
     if rate == 0.0:
         return n
@@ -78,18 +78,18 @@ def chased(n: float, first: float, last: float, lag: float, rate: float, s: floa
         speed = slope - math.copysign(rate, gap) if math.isfinite(rate) else -math.copysign(math.inf, gap)
         closing = -speed * math.copysign(1.0, gap)
         needed = (abs(gap) - band) / closing if closing > 0.0 else math.inf
-        if needed >= left:
-            return last - (gap + speed * left)
-        left, gap = left - needed, math.copysign(band, gap)
+        if needed >= remaining:
+            return last - (gap + speed * remaining)
+        remaining, gap = remaining - needed, math.copysign(band, gap)
     if lag > 0.0:
         # gap' = slope - gap / lag, for as long as the gap is within the band.
         final = slope * lag
-        within = left
+        within = remaining
         if abs(slope) > rate:
             edge = math.copysign(band, slope)
-            within = min(left, lag * math.log((gap - final) / (edge - final)))
+            within = min(remaining, lag * math.log((gap - final) / (edge - final)))
         gap = final + math.exp(-within / lag) * (gap - final)
-        left = left - within
+        remaining = remaining - within
     if abs(slope) > rate:
-        gap += (slope - math.copysign(rate, slope)) * left
+        gap += (slope - math.copysign(rate, slope)) * remaining
     return last - gap

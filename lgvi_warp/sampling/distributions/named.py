@@ -321,7 +321,7 @@ def from_dict(key: str, content: Any) -> Distribution:
     if kind == UserDistribution.kind:
         faults.add(key, values, "is a distribution of your own, which a file does not hold", "give the ensemble again")
     elif not foreign and kind not in KINDS:
-        faults.keys(key, [kind], [*(other for other in KINDS if other != UserDistribution.kind), *SCIPY])
+        faults.keys(key, [kind], [*(name for name in KINDS if name != UserDistribution.kind), *SCIPY])
     elif not isinstance(values, Mapping):
         faults.add(f"{key}.{kind}", values, "is not a table", "write { normal = { std = 1.0 } }")
     elif not foreign:

@@ -1,6 +1,7 @@
 """What a kernel must be able to do is found from all members, a few at a time."""
 
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -40,7 +41,7 @@ def at_once(request, monkeypatch):
 
 
 def test_one_odd_member_decides(at_once):
-    ball = scene_of((2.0, 2.0, 2.0))
+    ball = replace(scene_of((2.0, 2.0, 2.0)), terms=(lw.Drag(),))
     none = seen(fleet(ball))
     assert SHAPES_OF_MASS[none.mass] == "isotropic"
     assert not (none.turned or none.bent or none.coupled or none.moved or none.felt or none.couplings)
@@ -48,6 +49,8 @@ def test_one_odd_member_decides(at_once):
     assert SHAPES_OF_MASS[long.mass] == "diagonal" and not long.bent
     skew = seen(fleet(ball, vehicle__added_mass=[[1.0, 0.3, 0.0], [0.3, 1.0, 0.0], [0.0, 0.0, 1.0]]))
     assert SHAPES_OF_MASS[skew.mass] == "full" and skew.bent and not skew.turned
+    without_drag = fleet(scene_of((2.0, 2.0, 2.0)), vehicle__added_mass=np.ones((3, 3)) + np.eye(3))
+    assert not seen(without_drag).bent
     turned = seen(fleet(ball, vehicle__inertia=[[2.0, 0.3, 0.0], [0.3, 3.0, 0.0], [0.0, 0.0, 4.0]]))
     assert turned.turned and turned.bent
     assert seen(fleet(ball, vehicle__buoyancy=1.0)).buoyant

@@ -174,8 +174,15 @@ class Plan:
         """
         if self.gathered is None:
             return 0
-        look_bytes = max(1, sum(self.look_fields.values())) * count * np.dtype(DTYPES[self.dtype]).itemsize
-        return max(2, min(GATHERED_BYTES // look_bytes, len(self.gathered.times)))
+        return max(2, min(GATHERED_BYTES // max(1, self.look_bytes(count)), len(self.gathered.times)))
+
+    def look_bytes(self, count: int) -> int:
+        """Memory of what is gathered at a look of a block [bytes].
+
+        Args:
+            count: number of members of the block.
+        """
+        return sum(self.look_fields.values()) * count * np.dtype(DTYPES[self.dtype]).itemsize
 
     def looks_of(self, k0: int, k1: int) -> slice:
         """Which looks are gathered once a launch has ended.

@@ -287,7 +287,7 @@ class Plan:
     def _copy(self) -> Plan:
         """The same plan, with nothing chosen anew, as copy.copy would by way of __reduce__."""
         # Copies have these in common: none computes them again.
-        _ = self.shared, self.idle, self.taken, self.table, self.sample_fields, self.signal_rows
+        _ = self.shared, self.idle, self.gathered, self.table, self.sample_fields, self.look_fields, self.signal_rows
         plan = object.__new__(Plan)
         plan.__dict__.update(self.__dict__)
         return plan

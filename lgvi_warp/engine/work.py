@@ -142,12 +142,12 @@ def run_block(
             for block_keeper in block_keepers:
                 block_keeper.take(when, samples)
 
-        def look(looks: slice) -> None:
+        def look(grid: TimeGrid, looks: slice) -> None:
             ends = functools.cache(packets.ended)
             for first in range(looks.start, looks.stop, at_once):
                 when = slice(first, min(first + at_once, looks.stop))
                 values = divided(plan.look_fields, packets.gathered(when), plan.table)
-                samples = samples_of(plan, plan.gathered, when, values, ends)
+                samples = samples_of(plan, grid, when, values, ends)
                 for looker in lookers:
                     looker(when, samples)
 
@@ -169,7 +169,7 @@ def run_block(
                 # The first look of a controller is a part of the first launch.
                 keep_start()
             if plan.gathered and (looks := plan.looks_of(k0, k1)).start < looks.stop:
-                look(looks)
+                look(plan.gathered, looks)
             when = slice(*plan.due(k0, k1))
             if when.start < when.stop and block_keepers:
                 values = unpacked(plan.sample_fields, raw, packets.frame, plan.table)

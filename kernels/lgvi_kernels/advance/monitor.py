@@ -85,8 +85,8 @@ def monitor_struct(width, real, rows, energy, backward, substep, still, loop=Non
     in the first rows of the memory; bus: the first row of what looks note; noting: bits of what they do. signals: rows of the
     memory that are saved with a sample; kept: the first of as many rows, what frozen lanes save; first_signals: what they are
     at the start.
-    looks: what is gathered at looks, (slots times numbers and some to waste, packets), `numbers` rows for each; slots: how many
-    looks it holds, 0 for none gathered; columns: the first number of each of SAMPLE_FIELDS, -1 if not gathered.
+    looks: what is gathered at looks, (slots times numbers and some to waste, packets), `numbers` rows for each; slots: how
+    many looks it holds, 0 for none gathered; columns: the first number of each of SAMPLE_FIELDS, -1 if not gathered.
     """
     Lane, Ints = lane(width, real), int_lane(width)
     fields = {}

@@ -4,7 +4,7 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: run quick test test-long coverage mutants lint docs bench bench-peers bench-loops clean
+.PHONY: run quick test test-long coverage mutants lint docs gallery bench bench-peers bench-loops clean
 
 run: $(VENV)/.run
 	$(BIN)/lgvi-warp run examples/paper.toml --out runs/paper
@@ -42,6 +42,10 @@ lint: $(VENV)/.dev
 docs: $(VENV)/.dev
 	$(BIN)/sphinx-build -W --keep-going -q docs build/site
 
+# The pictures of examples/01 to 12 and docs/gallery.md; ONLY="02 07": of these alone.
+gallery: $(VENV)/.dev
+	$(BIN)/python docs/site_parts/gallery.py $(ONLY)
+
 bench: $(VENV)/.dev
 	$(BIN)/python -m benchmarks run
 
@@ -57,7 +61,7 @@ bench-peers: .venv-peers/.done
 	touch $@
 
 bench-loops: .venv-loops/.done
-	.venv-loops/bin/python -m benchmarks run loop_peers environments
+	.venv-loops/bin/python -m benchmarks run loop_peers environments sweep_peers
 
 .venv-loops/.done: benchmarks/cases/environments/requirements.txt pyproject.toml
 	$(PYTHON) -m venv .venv-loops

@@ -18,7 +18,7 @@ import lgvi_warp as lw  # noqa: E402
 
 project = "lgvi_warp"
 version = release = lw.__version__
-extensions = ["myst_parser", "sphinx.ext.autodoc"]
+extensions = ["myst_nb", "sphinx.ext.autodoc"]
 exclude_patterns = ["index.md"]
 html_theme = "furo"
 html_title = f"lgvi_warp {release}"
@@ -29,6 +29,11 @@ autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 maximum_signature_line_length = 100
 myst_heading_anchors = 4
+# Notebooks run anew in each build, and an error in one is an error of the build.
+nb_execution_mode = "force"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 600
+nb_merge_streams = True
 highlight_language = "none"
 smartquotes = False
 

@@ -1,4 +1,8 @@
-"""A first dive: 1,000 vehicles that differ a little, 60 seconds, a picture and a recording."""
+"""A first dive: 1,000 vehicles that differ a little, 60 seconds, a picture and a recording.
+
+Mass and first turn differ from vehicle to vehicle. The summary shows depth and energy of all, and the paths of a few;
+`rerun 01_first_dive.rrd` plays the recording.
+"""
 
 import lgvi_warp as lw
 
@@ -31,4 +35,4 @@ if __name__ == "__main__":
     depth = result.position[-1, :, 2]
     print(result.status.counts())
     print(f"depth after 60 s: {depth.mean():.2f} m on average, from {depth.min():.2f} to {depth.max():.2f} m")
-    print(lw.plot(result, "first_dive.png"), lw.log_rerun(result, "first_dive.rrd"))
+    print(lw.plot(result, "01_first_dive.png"), lw.log_rerun(result, "01_first_dive.rrd"))

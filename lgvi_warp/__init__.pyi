@@ -158,6 +158,8 @@ from lgvi_warp.studies.linear.margins import Margins as Margins
 from lgvi_warp.studies.linear.margins import margins as margins
 from lgvi_warp.studies.linear.trim import Trim as Trim
 from lgvi_warp.studies.linear.trim import trim as trim
+from lgvi_warp.studies.scaling import scaling as scaling
+from lgvi_warp.studies.scaling import term_cost as term_cost
 from lgvi_warp.studies.search.risk import CVaR as CVaR
 from lgvi_warp.studies.search.tune import Tuned as Tuned
 from lgvi_warp.studies.search.tune import tune as tune

@@ -163,9 +163,9 @@ def parser() -> Parser:
     _add_warm(verbs)
     _verb(verbs, "tune", help="measure how many vehicles a packet should hold on this machine, for runs from now on")
     _add_lists(verbs)
-    for one in dict.fromkeys((top, *verbs.choices.values())):  # an old name has the same parser
+    for verb in dict.fromkeys((top, *verbs.choices.values())):  # an old name has the same parser
         for names, settings in COMMON.items():
-            one.add_argument(*names, default=argparse.SUPPRESS, **settings)
+            verb.add_argument(*names, default=argparse.SUPPRESS, **settings)
     top.verbs = verbs.choices
     top.set_defaults(**DEFAULTS)
     return top
@@ -203,6 +203,12 @@ def _add_run(verbs: Any) -> None:
     add("--checks", help="none, safe (statuses, default) or all (warnings of what arises on the way as well)")
     add("--on-failure", help="freeze a member that fails (default), raise: exit code 1, or substep: divide its step")
     _add_shared(run, "--keep")
+    add("--live", action="store_true", help="show members in the rerun viewer as they are done, then the whole run")
+    add(
+        "--viewer",
+        metavar="ADDRESS",
+        help="with --live: a viewer that is open (default: one on this machine, or a new one)",
+    )
     add("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
     _add_shared(run, EXECUTOR, threads=WORKERS)
     _add_shared(

@@ -87,11 +87,11 @@ def verbs() -> Iterator[Verb]:
     for name, verb in parser().verbs.items():
         options: dict[str, tuple[str, tuple[str, ...] | None]] = {}
         words: tuple[str, ...] = ()
-        for one in verb._actions:
-            values = tuple(map(str, one.choices or ()))
-            for option in one.option_strings:
-                options[option] = (one.help or "", None if one.nargs == 0 else values)
-            words = words if one.option_strings else words + values
+        for action in verb._actions:
+            values = tuple(map(str, action.choices or ()))
+            for option in action.option_strings:
+                options[option] = (action.help or "", None if action.nargs == 0 else values)
+            words = words if action.option_strings else words + values
         yield Verb(name, verb.description or "", options, words)
 
 

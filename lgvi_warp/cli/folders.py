@@ -87,17 +87,19 @@ def contents(folder: Path) -> list[Content]:
     """
     patterns = {"result": "result*.npz", "tradeoff": "tradeoff.json", "sensitivity": "sensitivity.json",
                 "stability": "stability*.json", "sweep": "sweep.json"}  # fmt: skip
-    found: list[Content] = []
+    studies: list[Content] = []
+    if folder.suffix != ".zarr" and not folder.exists():
+        raise SceneError([f"{folder}: is not there; give the folder of a run or of a study"])
     if folder.suffix != ".zarr" and folder.is_dir():
-        found = [Content(kind, path) for kind, pattern in patterns.items() for path in sorted(folder.glob(pattern))]
+        studies = [Content(kind, path) for kind, pattern in patterns.items() for path in sorted(folder.glob(pattern))]
         stores = list(folder.glob("*.zarr"))
-        if not found and not stores:
+        if not studies and not stores:
             raise SceneError([f"{folder}: holds nothing that a verb wrote; give the folder of a run or of a study"])
         if not stores:
-            return found
+            return studies
     from lgvi_warp.runs.store.open import folder_of
 
-    return [*found, Content("store", folder_of(folder))]
+    return [*studies, Content("store", folder_of(folder))]
 
 
 def info_of_folder(chosen: argparse.Namespace) -> int:
@@ -114,13 +116,18 @@ def info_of_folder(chosen: argparse.Namespace) -> int:
     """
     parts = [_part(content, chosen) for content in contents(chosen.dir)]
     others = [path for path in sorted(chosen.dir.glob("*")) if path.suffix in OTHERS and chosen.dir.suffix != ".zarr"]
-    whole = all(document.get("complete", True) for document, _ in parts)
+    undamaged = all(document.get("complete", True) for document, _ in parts)
     tell(
         chosen,
-        lambda: {"path": chosen.dir, "complete": whole, "holds": [document for document, _ in parts], "files": others},
+        lambda: {
+            "path": chosen.dir,
+            "complete": undamaged,
+            "holds": [document for document, _ in parts],
+            "files": others,
+        },
         lambda: "\n".join([*(text() for _, text in parts), *map(file_line, others)]),
     )
-    return 0 if whole else 1
+    return 0 if undamaged else 1
 
 
 def _part(content: Content, chosen: argparse.Namespace) -> tuple[dict[str, Any], Callable[[], str]]:
@@ -129,20 +136,20 @@ def _part(content: Content, chosen: argparse.Namespace) -> tuple[dict[str, Any],
     if content.kind == "store":
         from lgvi_warp.runs.store.state import state
 
-        found = state(content.path)
-        return head | documents.of_store(found), lambda: "\n".join(_store_lines(found, chosen))
-    found = content.load()
+        numbers = state(content.path)
+        return head | documents.of_store(numbers), lambda: "\n".join(_store_lines(numbers, chosen))
+    numbers = content.load()
     if content.kind == "result":
         size = file_line(content.path)
         return head | documents.of_result(
-            found
-        ), lambda: f"{size}\n{summary(found, shown_members(found), [], verbose=chosen.verbose)}"
+            numbers
+        ), lambda: f"{size}\n{summary(numbers, shown_members(numbers), [], verbose=chosen.verbose)}"
     if content.kind == "sweep":
         return head | {
-            "content": found
+            "content": numbers
         }, lambda: content.path.with_name("summary.md").read_text(encoding="utf-8").rstrip()
-    report = f"{file_line(content.path)}\n{text_of(content.kind, found)}"
-    return head | {"content": found.to_dict()}, lambda: report
+    report = f"{file_line(content.path)}\n{text_of(content.kind, numbers)}"
+    return head | {"content": numbers.to_dict()}, lambda: report
 
 
 def text_of(kind: str, found: Any) -> str:

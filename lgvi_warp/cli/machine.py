@@ -113,11 +113,11 @@ def tune(chosen: argparse.Namespace) -> int:
 
     kernels: dict[str, dict[str, Any]] = {}
     for kernel, ns, of_table, fastest in tuning.tune():
-        speeds = ", ".join(f"{width}: {one:.2f} ns" for width, one in ns.items())
+        speeds = ", ".join(f"{width}: {result:.2f} ns" for width, result in ns.items())
         remark = "as by the table" if fastest == of_table else f"{of_table} by the table"
         say(chosen, f"{kernel:19} {speeds}: {fastest}, {remark}")
         kernels[kernel] = {"ns": ns, "table": of_table, "best": fastest}
-    path = widths.keep({kernel: one["best"] for kernel, one in kernels.items()})
+    path = widths.keep({kernel: result["best"] for kernel, result in kernels.items()})
     tell(chosen, lambda: {"kernels": kernels, "file": path},
          lambda: f"kept in {path}, for runs from now on; without that file the table counts")  # fmt: skip
     return 0

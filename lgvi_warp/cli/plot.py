@@ -30,12 +30,12 @@ def plot(chosen: argparse.Namespace) -> int:
         SceneError: The folder holds no numbers, or damaged ones.
         OSError: The folder for the pictures cannot be written.
     """
-    found = contents(chosen.dir)
+    held = contents(chosen.dir)
     home = chosen.dir.parent if chosen.dir.suffix == ".zarr" else chosen.dir
     out = writable(chosen.out or home)
     written = Written()
     with shown(chosen.quiet, "drawing"):
-        for content in found:
+        for content in held:
             _draw(content, written, out)
     tell(chosen, lambda: documents.of_files(written),
          lambda: "\n".join([*written.note_lines(), *map(file_line, written.files)]))  # fmt: skip

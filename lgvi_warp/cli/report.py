@@ -18,7 +18,8 @@ from lgvi_warp.common.safe_files import size_below
 from lgvi_warp.common.write_lock import write_lock
 
 
-def report(result: Any, out: Path, chosen: argparse.Namespace, begun: float, failures: Sequence[str] = ()) -> list[str]:
+def report(result: Any, out: Path, chosen: argparse.Namespace, begun: float, failures: Sequence[str] = (),
+           viewer: str | None = None) -> list[str]:  # fmt: skip
     """Write the files of a finished run and print its summary.
 
     Args:
@@ -27,6 +28,7 @@ def report(result: Any, out: Path, chosen: argparse.Namespace, begun: float, fai
         chosen: The command's parsed arguments.
         begun: When the verb began [s], by time.perf_counter.
         failures: Texts on what failed before; default none.
+        viewer: Address of a viewer that gets the recording too; default None.
 
     Returns:
         These, and one text for each file that could not be written.
@@ -42,7 +44,7 @@ def report(result: Any, out: Path, chosen: argparse.Namespace, begun: float, fai
     else:
         with shown(chosen.quiet, "writing"):
             drawn = shown_members(result)
-            written = write(result, drawn, out)
+            written = write(result, drawn, out, viewer)
         seconds = time.perf_counter() - begun
         text = lambda: "\n".join(  # noqa: E731
             [*written.note_lines(), summary(result, drawn, written.files, seconds, chosen.verbose)]
@@ -99,20 +101,21 @@ def unsaved(result: Any) -> list[str]:
     return [name for name in FIELDS if result.samples and name not in result.samples]
 
 
-def write(result: Any, drawn: Any, out: Path) -> Written:
+def write(result: Any, drawn: Any, out: Path, viewer: str | None = None) -> Written:
     """Write result.npz, fleet.png, fleet.rrd and statistics.png side by side, as far as the run has them.
 
     Args:
         result: The run's result; a stored one is written already.
         drawn: The members of the picture, from `shown_members`; None for neither picture nor recording.
         out: Folder of the files.
+        viewer: Address of a viewer that gets the recording too; default None.
 
     Returns:
         What was written, and what failed.
     """
     written = Written([result.store] if result.store else [])
     writers: dict[str, Callable[[Path], Path]] = {} if result.store else {"result.npz": result.save}
-    writers |= pictures(result, drawn)
+    writers |= pictures(result, drawn, viewer)
     with contextlib.ExitStack() as stack:
         # Runs that end together in one folder write one after another, so that all files are of one of them.
         with contextlib.suppress(OSError):  # a folder that cannot be written: each file reports it
@@ -123,20 +126,22 @@ def write(result: Any, drawn: Any, out: Path) -> Written:
     return written
 
 
-def _record(result: Any, path: Path) -> Path:
-    """Write the recording of a result."""
+def _record(result: Any, path: Path, viewer: str | None) -> Path:
+    """Write the recording of a result, and send it to a viewer where there is one."""
     from lgvi_warp.views.rerun import log_rerun
+    from lgvi_warp.views.viewer import answers
 
-    log_rerun(result, path)
+    log_rerun(result, path, to=viewer if viewer and answers(viewer) else None)
     return path
 
 
-def pictures(result: Any, drawn: Any) -> dict[str, Callable[[Path], Path]]:
+def pictures(result: Any, drawn: Any, viewer: str | None = None) -> dict[str, Callable[[Path], Path]]:
     """The pictures that a run has.
 
     Args:
         result: The run's result.
         drawn: The members of the picture, from `shown_members`; None for neither picture nor recording.
+        viewer: Address of a viewer that gets the recording too; default None.
 
     Returns:
         Name of each file -> function of its path that draws it.
@@ -147,7 +152,7 @@ def pictures(result: Any, drawn: Any) -> dict[str, Callable[[Path], Path]]:
     if drawn is not None:
         drawings |= {
             "fleet.png": lambda path: plots.plot(drawn, path),
-            "fleet.rrd": lambda path: _record(result, path),
+            "fleet.rrd": lambda path: _record(result, path, viewer),
         }
     if plots.drawable(result):
         drawings["statistics.png"] = lambda path: plots.plot_statistics(result, path)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.report import report
 from lgvi_warp.cli.settings import block_range, folder, load_scene, store_settings
 from lgvi_warp.cli.signals import Ended
-from lgvi_warp.common.errors import Interrupted, MembersFailed, SceneError
+from lgvi_warp.common.errors import Interrupted, MembersFailed, MissingExtra, SceneError
 
 # File of a result in memory, and of an interrupted one where that file exists already.
 RESULT, PART = "result.npz", "result_part.npz"
@@ -36,7 +37,7 @@ def run(chosen: argparse.Namespace) -> int:
     begun = time.perf_counter()
     scene = load_scene(chosen)
     store, only = store_settings(chosen), block_range(chosen)
-    out = folder(chosen)
+    address, out = live_address(scene, chosen), folder(chosen)
     warm = _import_in_background()
     from lgvi_warp.runs.solve import solve
 
@@ -47,7 +48,8 @@ def run(chosen: argparse.Namespace) -> int:
         try:
             result = solve(
                 scene, threads=chosen.threads, width=chosen.width, progress=progress, store=store,
-                executor=chosen.executor, scheduler=chosen.scheduler, only=only, **settings,
+                executor=chosen.executor, scheduler=chosen.scheduler, only=only,
+                on_block=live_view(scene, address), **settings,
             )  # fmt: skip
         except MembersFailed as error:
             result, failures = error.result, [str(error)]
@@ -56,12 +58,57 @@ def run(chosen: argparse.Namespace) -> int:
     try:
         warm.join()
         checks = check_error(scene, result, suggested, chosen) if suggested else []
-        faults = report(result, out, chosen, begun, failures + checks)
+        faults = report(result, out, chosen, begun, failures + checks, address)
     except KeyboardInterrupt as error:
         if str(out / RESULT) in str(error):
             raise  # already saved
         raise Ended(rescued(result, out)) from error
     return 1 if print_faults(faults) or all_failed(result) else 0
+
+
+def live_address(scene: Any, chosen: argparse.Namespace) -> str | None:
+    """Find the viewer of --live, before anything runs.
+
+    Args:
+        scene: The scene.
+        chosen: The command's parsed arguments.
+
+    Returns:
+        Its address; None without --live.
+
+    Raises:
+        SceneError: The run keeps nothing to show, or a library is missing.
+        OSError: No viewer answers or starts.
+    """
+    if not chosen.live:
+        if chosen.viewer is not None:
+            raise SceneError([f"--viewer {chosen.viewer}: has no effect without --live; add --live"])
+        return None
+    if not (isinstance(scene.run.keep, str) and scene.run.keep == "all"):
+        raise SceneError(["--live: shows members as they are done, and the run keeps none; add --keep all"])
+    from lgvi_warp.views.viewer import opened
+
+    try:
+        return opened(chosen.viewer)
+    except MissingExtra as error:
+        raise SceneError([str(error)]) from None
+
+
+def live_view(scene: Any, address: str | None) -> Callable[[Any], None] | None:
+    """Open the recording of --live.
+
+    Args:
+        scene: The scene.
+        address: Address of the viewer; None without --live.
+
+    Returns:
+        What takes the members that are done; None without --live.
+    """
+    if address is None:
+        return None
+    from lgvi_warp.views.live import live
+
+    return live(scene, address).add
 
 
 def rescued(result: Any, out: Path) -> str:
@@ -154,8 +201,8 @@ def check_error(scene: Any, result: Any, suggested: Any, chosen: argparse.Namesp
     from lgvi_warp.studies.suggest import verified
 
     error, members = verified(Ensemble.from_scene(scene), result, suggested)
-    asked = f"error of {suggested.of} {error:.1e} {suggested.unit}, asked {suggested.error:g}"
-    text = f"{asked} ({members} members again at half the step, those with the largest errors among them)"
+    measured = f"error of {suggested.of} {error:.1e} {suggested.unit}, asked {suggested.error:g}"
+    text = f"{measured} ({members} members again at half the step, those with the largest errors among them)"
     if not error <= suggested.error:
         return [f"{text}: missed; ask for a smaller one"]
     say(chosen, f"checked     {text}")

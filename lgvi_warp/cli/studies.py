@@ -127,11 +127,11 @@ def stability(chosen: argparse.Namespace) -> int:
         names = GRIDS if chosen.grid == "all" else (chosen.grid,)
         maps = {f"stability_{name}": GRIDS[name] for name in names}
     t1 = scene.run.duration if chosen.duration is not None else None
-    written, found = Written(), {}
+    written, regions_by_name = Written(), {}
     with shown(chosen.quiet) as progress:
         for i, (name, (x, y)) in enumerate(maps.items()):
             try:
-                found[name] = stability_map(
+                regions_by_name[name] = stability_map(
                     scene, x, y, chosen.methods, points=chosen.points, t1=t1, error=chosen.error, of=chosen.of, seed=seed,
                     progress=part_of(progress, i, len(maps)),
                 )  # fmt: skip
@@ -139,10 +139,10 @@ def stability(chosen: argparse.Namespace) -> int:
                 if not written.files:
                     raise
                 raise Ended(f"{i} of {len(maps)} maps are finished, in {out}") from error
-            written.files += found[name].save(out, name)
-            written.draw(plot_stability, found[name], out / f"{name}.png")
-    text = "\n\n".join(text_of("stability", regions) for regions in found.values())
-    return finish(written, chosen, {name: regions.to_dict() for name, regions in found.items()}, text)
+            written.files += regions_by_name[name].save(out, name)
+            written.draw(plot_stability, regions_by_name[name], out / f"{name}.png")
+    text = "\n\n".join(text_of("stability", regions) for regions in regions_by_name.values())
+    return finish(written, chosen, {name: regions.to_dict() for name, regions in regions_by_name.items()}, text)
 
 
 def sweep(chosen: argparse.Namespace) -> int:
@@ -172,23 +172,23 @@ def sweep(chosen: argparse.Namespace) -> int:
         about = {name: arguments.pop(name, None) for name in ("cases", "grid", "vary", "members", "seed", "sampling")}
         for name in ("success", "baseline", "confidence", "interval"):
             arguments.pop(name, None)
-        asked = {"scene": arguments.pop("scene"), "metrics": arguments.pop("metrics", ())}
+        closed_loop = {"scene": arguments.pop("scene"), "metrics": arguments.pop("metrics", ())}
         with shown(chosen.quiet, "measuring"):
-            text = plan_text(made(**asked, **about, settings=arguments), chosen.threads)
+            text = plan_text(made(**closed_loop, **about, settings=arguments), chosen.threads)
         tell(chosen, lambda: {"plan": text.splitlines()}, lambda: text)
         return 0
     out = folder(chosen, "_sweep")
     executor = {"threads": chosen.threads, "executor": chosen.executor, "scheduler": chosen.scheduler}
     with shown(chosen.quiet) as progress:
-        found = run_sweep(**arguments, **executor, out=out, progress=progress)
+        compared = run_sweep(**arguments, **executor, out=out, progress=progress)
     with shown(chosen.quiet, "writing"):
-        written = Written(found.save(out))
-        for name, draw in pictures(found).items():
-            written.draw(draw, found, out / name)
+        written = Written(compared.save(out))
+        for name, draw in pictures(compared).items():
+            written.draw(draw, compared, out / name)
         if chosen.record:
-            _record_worst(found, chosen.record, out, written)
-    code = finish(written, chosen, {"sweep": json.loads((out / "sweep.json").read_text())}, str(found))
-    return 1 if all(found.record(cell).refused for cell in found.cells) else code
+            _record_worst(compared, chosen.record, out, written)
+    code = finish(written, chosen, {"sweep": json.loads((out / "sweep.json").read_text())}, str(compared))
+    return 1 if all(compared.record(cell).refused for cell in compared.cells) else code
 
 
 def _record_worst(found: Any, count: int, out: Path, written: Written) -> None:

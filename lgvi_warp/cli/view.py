@@ -55,8 +55,8 @@ def run_in(path: Path) -> Any:
         SceneError: There is none, or it is damaged.
         OSError: It cannot be read.
     """
-    found = [Content("result", path)] if path.suffix == ".npz" else contents(path)
-    runs = [content for content in found if content.kind in ("result", "store")]
+    held = [Content("result", path)] if path.suffix == ".npz" else contents(path)
+    runs = [content for content in held if content.kind in ("result", "store")]
     if not runs:
         raise SceneError([f"{path}: holds a study, and no run; give the folder of a run"])
     return runs[-1].load()

@@ -48,7 +48,7 @@ class Written:
         except (OSError, ImportError, ValueError) as error:
             self.faults.append(f"{path} was not written: {error}")
 
-    def draw(self, plot: Callable[[Any, Path], Path], found: Any, path: Path) -> None:
+    def draw(self, plot: Callable[[Any, Path], Any], found: Any, path: Path) -> None:
         """Draw a study's picture, or note why it was not drawn.
 
         Args:
@@ -56,7 +56,12 @@ class Written:
             found: What the study found.
             path: The file.
         """
-        self.take(path, lambda: plot(found, path))
+
+        def drawn() -> Path:
+            plot(found, path)
+            return path
+
+        self.take(path, drawn)
 
     def note_lines(self) -> list[str]:
         """Say which libraries are missing for pictures.

@@ -38,7 +38,7 @@ class Looks:
 
     @property
     def depth(self) -> np.ndarray:
-        """Depths (m,) [m]."""
+        """Depths of the members, shape (m,) [m]."""
         return self.position[:, 2]
 
 

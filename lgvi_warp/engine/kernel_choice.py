@@ -101,7 +101,7 @@ def choose_kernel(
     modules = (device_module(part, part.device_in(not facts.turned), built_in) for part in acting_parts)
     control = tuple(zip(acting_parts, modules, strict=True))
     # The host looks at states between launches, which must not be those in the middle of a lead.
-    asked = controller is not None and controller.callback is not None
+    asks_host = controller is not None and controller.callback is not None
     acting = _acting(ensemble, facts, built_in, controller)
     events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
     damping = any(hasattr(module, "damping") for term, module in acting if not isinstance(term, Drag))
@@ -138,9 +138,9 @@ def choose_kernel(
     if method.two_part:
         # B merges with that of the next step exactly, A up to the order of the method.
         lead, maps = method.program[0], method.program[1:]
-        if events or asked:
+        if events or asks_host:
             lead, maps = None, method.program
-    elif events or asked or (lead is not None and lead[0] == "K" and not undone):
+    elif events or asks_host or (lead is not None and lead[0] == "K" and not undone):
         lead, maps = None, program
     conservative = checked and _conservative(facts, acting, built_in)
     # Events, water and the potential are evaluated at the user's origin, or at that of the forces.

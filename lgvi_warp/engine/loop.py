@@ -62,6 +62,7 @@ def run_blocks(
     left: Sequence[Block] | None = None,
     enough: Callable[[int], bool] = lambda members: False,
     merged: Merged | None = None,
+    after: Callable[[Block], None] | None = None,
 ) -> int:
     """Run blocks and merge their results into the keepers, in block order.
 
@@ -74,6 +75,7 @@ def run_blocks(
         enough: asked after each block, with the number of members so far, whether the run may end (default: never); later
             blocks are then dropped.
         merged: updated before and after each merge, for when an exception ends the run.
+        after: called with each block when it is merged; None (default) for nothing.
 
     Returns:
         Index after the last member merged.
@@ -95,6 +97,8 @@ def run_blocks(
                 for keeper, result in zip(work.keepers, results, strict=True):
                     keeper.merge(block, result)
             merged.done = block.stop
+            if after:
+                after(block)
             if enough(block.stop):
                 return block.stop
     return runs[-1].stop

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -35,6 +35,17 @@ class Outcome:
     warning_value: np.ndarray
     substeps: np.ndarray
     event: np.ndarray
+
+    def at(self, members: slice) -> Outcome:
+        """The outcome of some members.
+
+        Args:
+            members: which of them.
+
+        Returns:
+            Views of their entries.
+        """
+        return Outcome(*(getattr(self, field.name)[members] for field in fields(self)))
 
     @classmethod
     def clear(cls, members: int, paces: int) -> Outcome:

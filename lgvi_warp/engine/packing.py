@@ -252,7 +252,7 @@ def rows_shared(plan: Plan) -> bool:
     packing = Packing(plan, plan.ensemble.select(0, 1))
     each = (("law", packing.laws()), ("part", packing.control()))
     sizes = {
-        (kind, i): one.rows.shape[1] for kind, packed in each for i, one in enumerate(packed) if one.rows is not None
+        (kind, i): law.rows.shape[1] for kind, packed in each for i, law in enumerate(packed) if law.rows is not None
     }
     number = 8 if plan.spec.real == wp.float64 else 4
     return sum(sizes.values()) * plan.spec.width * number > LARGE_TABLE and all(map(plan.shared.keeps, sizes))

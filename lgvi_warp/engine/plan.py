@@ -254,13 +254,13 @@ class Plan:
                 continue
             noise_step, draws = float(term.noise_step), term.draws(h)
             if abs(h - draws * noise_step) > STEP_ROUND_OFF * h:
-                whole = round(spacing / noise_step)
+                multiple = round(spacing / noise_step)
                 problem = f"is no whole multiple of {term.key}.noise_step = {noise_step:.9g} s"
-                if whole < 1 or abs(spacing - whole * noise_step) > STEP_ROUND_OFF * spacing:
+                if multiple < 1 or abs(spacing - multiple * noise_step) > STEP_ROUND_OFF * spacing:
                     remedy = f"give a noise_step that divides the {spacing:.9g} s between samples"
                 else:
-                    count = min(divisors(whole), key=lambda count: abs(whole / count * noise_step - h))
-                    remedy = f"use a step of {whole // count * noise_step:.9g} s"
+                    count = min(divisors(multiple), key=lambda count: abs(multiple / count * noise_step - h))
+                    remedy = f"use a step of {multiple // count * noise_step:.9g} s"
                 faults.add("step", h, problem, remedy)
             elif self.grid.steps * draws >= 2**31:
                 problem = f"makes {self.grid.steps * draws:,} draws in this run"
@@ -319,8 +319,8 @@ class Plan:
         Returns:
             False where they need more.
         """
-        seen = survey_of(members.parameters, ensemble, self.method, self.grid.h, self.shared, block)
-        return self._facts.covers(seen)
+        facts = survey_of(members.parameters, ensemble, self.method, self.grid.h, self.shared, block)
+        return self._facts.covers(facts)
 
     def with_neighbours(self, indices: np.ndarray) -> np.ndarray:
         """The members whose run gives these members the bits of the whole run.
@@ -494,16 +494,16 @@ class Plan:
         except Exception as error:
             choice = self.kernel_choice
             acting = (*choice.laws, *choice.events, *choice.parts_of_control)
-            own = [term for term, module in acting if not is_built_in(module)]
-            if not own:
+            of_user = [term for term, module in acting if not is_built_in(module)]
+            if not of_user:
                 raise
             problem = f"one of them does not compile ({type(error).__name__}: {error})"
             remedies = {
                 False: "lw.check_law(term) says where, docs/develop/add_a_force.md how",
                 True: "lw.check_controller(part) says where, docs/develop/add_a_controller.md how",
             }
-            remedy = " and ".join(remedies[kind] for kind in sorted({isinstance(term, Part) for term in own}))
-            raise SceneError([f"law {', '.join(term.key for term in own)}: {problem}; {remedy}"]) from error
+            remedy = " and ".join(remedies[kind] for kind in sorted({isinstance(term, Part) for term in of_user}))
+            raise SceneError([f"law {', '.join(term.key for term in of_user)}: {problem}; {remedy}"]) from error
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the settings alone: a kernel cannot be pickled, and the other process finds it in Warp's cache."""
@@ -533,12 +533,12 @@ class Plan:
         """
         start = time.perf_counter()
         module = self.advance.kernel.module
-        made = time.perf_counter() - start
+        source_seconds = time.perf_counter() - start
         with self._laws_compile():
             phases = kernel_cache.load(module)
         _ = self.dtypes, self.times  # made here, before threads ask for them
         if any(phases):  # not loaded before in this process
-            object.__setattr__(self, "phases", phases._replace(source=made + phases.source))
+            object.__setattr__(self, "phases", phases._replace(source=source_seconds + phases.source))
         return time.perf_counter() - start
 
     @functools.cached_property

@@ -253,20 +253,20 @@ def _seen(
     stop: int,
 ) -> Survey:
     p = framed(method, parameters, shared)
-    frame, scene, own = p[FRAME][0], ensemble.scene, ensemble.own
+    frame, scene, numbers_of = p[FRAME][0], ensemble.scene, ensemble.own
     aligned = shared("aligned", p, lambda numbers: numbers[AXES][0].aligned)
     run = frame, ensemble.indices_of(first, stop), ensemble.seed, h, aligned
 
     def is_felt(term: Term, numbers: Any) -> bool:
         if term not in terms.IMPLIED:
-            return term.present(own(term, numbers))
+            return term.present(numbers_of(term, numbers))
         return any(np.any(value) for value in term.packed({}, context(numbers, *run)).values.values())
 
     def parts(term: Drag, numbers: Any) -> frozenset[str]:
-        return frozenset(term.parts(own(term, numbers)))
+        return frozenset(term.parts(numbers_of(term, numbers)))
 
     def rises(term: Term, numbers: Any) -> bool:
-        return bool(np.any(own(term, numbers)["velocity"][:, 2]))
+        return bool(np.any(numbers_of(term, numbers)["velocity"][:, 2]))
 
     def of_each(name: str, compute: Any, those: Iterable[Term]) -> dict[str, Any]:
         return {t.key: shared((name, t.key), p, functools.partial(compute, t)) for t in those}
@@ -275,7 +275,7 @@ def _seen(
     drags = of_each("drag", parts, (term for term in scene.terms if isinstance(term, Drag)))
     rising = of_each("rises", rises, (term for term in scene.terms if term.type == "current"))
     parts_of_control = scene.controller.parts if scene.controller else ()
-    features = of_each("features", lambda part, numbers: part.features(own(part, numbers)), parts_of_control)
+    features = of_each("features", lambda part, numbers: part.features(numbers_of(part, numbers)), parts_of_control)
     of_axes = shared("facts of axes", p, lambda numbers: _facts(*numbers[AXES]))
     mass = shared("shape of mass", p, lambda numbers: SHAPES_OF_MASS.index(shape_of_mass(numbers[FRAME][0].M)))
     return Survey(

@@ -378,19 +378,22 @@ def _below(prefix: str, content: Mapping[str, np.ndarray]) -> dict[str, np.ndarr
 
 
 class Drawn(Mapping[str, np.ndarray]):
-    """Parameters of the first members of an ensemble, drawn when they are first read: before that they take no memory.
+    """Parameters of members of an ensemble that follow each other, drawn when they are first read.
+
+    Before that they take no memory.
 
     Args:
         ensemble: The ensemble.
-        members: How many of its first members.
+        stop: Index after the last member.
+        first: Index of the first member; default 0.
     """
 
-    def __init__(self, ensemble: Ensemble, members: int):
-        self._ensemble, self._members = ensemble, members
+    def __init__(self, ensemble: Ensemble, stop: int, first: int = 0):
+        self._ensemble, self._first, self._stop = ensemble, first, stop
 
     @functools.cached_property
     def _drawn(self) -> dict[str, np.ndarray]:
-        return self._ensemble.parameters(0, self._members)
+        return self._ensemble.parameters(self._first, self._stop)
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self._drawn[name]

@@ -11,7 +11,7 @@ import numpy as np
 
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Interrupted, MembersFailed
-from lgvi_warp.engine.block import parts
+from lgvi_warp.engine.block import Block, parts
 from lgvi_warp.engine.executors.base import Executor
 from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.keepers.memory import Outcomes, Samples
@@ -91,6 +91,7 @@ def run_plan(
     partial: bool = False,
     known: Callable[[Plan], tuple[dict[str, Any], tuple[str, ...]]] | None = None,
     warned: bool = True,
+    on_block: Callable[[Result], None] | None = None,
 ) -> Result:
     """Run the blocks of a plan, all or as many as its statistics need, and gather the result in memory.
 
@@ -105,6 +106,7 @@ def run_plan(
         known: Function from the plan to provenance and messages, where many runs share them; by default they are made for
             this run.
         warned: Whether the result has warnings; default True.
+        on_block: Called with the result of each block of members as soon as it is finished, in order; default nothing.
 
     Returns:
         The result of all members, or of the first ones where `until` ended the run.
@@ -128,11 +130,15 @@ def run_plan(
         result = _in_memory(plan, n, observed, outcomes, samples, observing if whole else None, fields, known)
         return replace(result, compile_seconds=compile_seconds, compile_phases=plan.phases, run_seconds=run_seconds)
 
+    def after(block: Block) -> None:
+        assert on_block is not None
+        on_block(_of_block(plan, block, outcomes, samples, known))
+
     runner = executor or Threads(threads)
     joined = bool(observing.keepers) or not isinstance(runner, Threads)
     runs, work = parts(total, plan.grid.steps, threads, joined), Work(plan, keepers, warned=warned)
     try:
-        n = run_blocks(work, runs, runner, overall.at, enough=observing.enough, merged=merged)
+        n = run_blocks(work, runs, runner, overall.at, enough=observing.enough, merged=merged, after=on_block and after)
     except KeyboardInterrupt as stop:
         if not (partial and merged.done):
             raise
@@ -165,6 +171,29 @@ def again(
     chosen = plan.with_neighbours(indices)
     result = run_plan(plan.subplan([int(i) for i in chosen], fields), threads or machine.thread_count())
     return indices, result if len(chosen) == len(indices) else result.part(np.searchsorted(chosen, indices))
+
+
+def _of_block(
+    plan: Plan,
+    block: Block,
+    outcomes: Outcomes,
+    samples: Samples | None,
+    known: Callable[[Plan], tuple[dict[str, Any], tuple[str, ...]]] | None,
+) -> Result:
+    """The result of a block's members: their samples and outcomes, without statistics and messages."""
+    content, _ = (provenance(plan, None), ()) if known is None else known(plan)
+    at = slice(block.first, block.stop)
+    of_members = member_fields.of(plan, outcomes.all.at(at))
+    kept = samples.fields if samples and samples.fields else {}
+    return Result(
+        time=plan.grid.times,
+        samples={name: values[:, at] for name, values in kept.items()},
+        **Result.per_member(of_members),
+        parameters=Drawn(plan.ensemble, block.stop, block.first),
+        messages=(),
+        provenance=content | {"members": plan.ensemble.members},
+        terms=tuple(plan.ensemble.scene.terms),
+    )
 
 
 def _in_memory(

@@ -44,6 +44,7 @@ def solve(
     executor: Executor | str = "threads",
     scheduler: str | None = None,
     only: range | None = None,
+    on_block: Callable[[Result], None] | None = None,
 ) -> Result:
     """Advance every member of the fleet from t = 0 to t1 and return the samples and statistics asked for.
 
@@ -80,6 +81,8 @@ def solve(
         scheduler: Address of Dask's scheduler.
         only: With a store, the blocks to run, such as range(0, 100), for a run in parts. The last part may ask for more
             blocks than there are. The result is of the members of these blocks.
+        on_block: Called with the Result of each block of members as soon as it is finished, in order, in the thread that
+            called: to look at a run while it goes on. Default: nothing is called.
 
     Returns:
         A Result, of every member unless `until` or `only` says otherwise.
@@ -112,10 +115,11 @@ def solve(
     fields, count = fields_of(save, ensemble.scene.run), threads or machine.thread_count()
     try:
         if store is None:
-            return completed(plan, count, observed, fields, progress=callback(progress), executor=runner, partial=True)
+            return completed(plan, count, observed, fields, progress=callback(progress), executor=runner, partial=True,
+                             on_block=on_block)  # fmt: skip
         only = blocks_there(only, plan)
         into = store if isinstance(store, Store) else Store(store)
-        result = run_stored(plan, into, runner, callback(progress), only, observed, fields)
+        result = run_stored(plan, into, runner, callback(progress), only, observed, fields, on_block)
         return result if only is not None else finished(result, plan, observed, fields, count)
     finally:
         # Packets and their plan refer to each other: their arrays would stay until Python looks for such circles.

@@ -26,6 +26,9 @@ from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 from lgvi_warp.scene.start import Environment, Start
 
 # Sections of a scene that are one object each.
+RUN_REMEDY = (
+    'leave it out and give lw.solve(scene, h=..., t1=..., ...) its settings, or lw.Scene.from_dict a table "run"'
+)
 KINDS = {"vehicle": Vehicle, "environment": Environment, "start": Start, "run": RunSettings}
 
 
@@ -76,7 +79,9 @@ class Scene(Summarized):
         sound = not faults
         for name, kind in KINDS.items():
             if not isinstance(getattr(self, name), kind):
-                faults.add(name, getattr(self, name), f"is no {kind.__name__}", f"give lw.{kind.__name__}(...)")
+                # Settings of a run have no public class: they are arguments of solve, or a table of a scene file.
+                remedy = RUN_REMEDY if name == "run" else f"give lw.{kind.__name__}(...)"
+                faults.add(name, getattr(self, name), f"is no {kind.__name__}", remedy)
         if sound and isinstance(self.vehicle, Vehicle) and isinstance(self.environment, Environment):
             with faults.including():
                 self._connect()

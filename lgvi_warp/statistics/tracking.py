@@ -188,6 +188,9 @@ _DISTANCES: dict[str, tuple[str, str, tuple[str, ...], Callable[..., np.ndarray]
     "cross_track": ("m", "position", ("reference_position", "reference_velocity"), _cross_track),
 }
 ERRORS = (*CHANNELS[False], *_DISTANCES)
+# What guidance has to want, so that there is an error of tracking: by name of what is tracked.
+NEEDED = {name: (channel.wish or (name,))[0] for name, channel in CHANNELS[False].items()}
+NEEDED |= {"position": "position", "attitude": "attitude", "cross_track": "position"}
 
 
 @functools.cache

@@ -508,7 +508,8 @@ def sweep(
         reference: what errors are measured against; None where noise acts.
         until: index of the last sample that is compared.
         deadline: time.perf_counter() at which runs stop [s]; compiling postpones it.
-        latest: time.perf_counter() after which no further method begins, compiling included [s].
+        latest: time.perf_counter() after which no further method begins, compiling included [s]. The first one always does:
+            a machine that is busy while the reference's kernels are compiled gets few measurements, not none.
         report: called with the fraction of the methods that is done.
 
     Returns:
@@ -524,12 +525,12 @@ def sweep(
     longest = (deadline - time.perf_counter()) / 40.0
     for i, (method, dtype, solver) in enumerate(ladders):
         report(i / len(ladders))
-        if time.perf_counter() > latest:
+        if trials and time.perf_counter() > latest:
             skipped.append(sample.candidate(method, 1, dtype, solver).text)
             continue
         m, best, worse = sample.coarsest(1.0), math.inf, 0
         for k in range(20 if reference else 5):
-            if time.perf_counter() > deadline:
+            if trials and time.perf_counter() > deadline:
                 skipped.append(sample.candidate(method, m, dtype, solver).text + (" at fine steps" if k else ""))
                 break
             trial = tried(sample, sample.candidate(method, m, dtype, solver), reference, until)

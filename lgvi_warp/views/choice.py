@@ -178,10 +178,10 @@ def _survey(result: Result, frames: np.ndarray) -> tuple[np.ndarray, list[int]]:
     counted = under_way(result)[frames]
     for members, samples in pieces(result, ("position",)):
         position = samples["position"] if len(frames) == len(result.time) else samples["position"][frames]
-        whole = finite_rows(position)
-        finite[members] = whole[0]
+        is_finite = finite_rows(position)
+        finite[members] = is_finite[0]
         for axis in range(3):
-            values = np.where(counted[:, members] & whole, position[..., axis], np.nan)
+            values = np.where(counted[:, members] & is_finite, position[..., axis], np.nan)
             for sign, extremes in ((-1, -np.fmin.reduce(values, axis=0)), (1, np.fmax.reduce(values, axis=0))):
                 i = int(np.where(np.isnan(extremes), -np.inf, extremes).argmax())
                 if extremes[i] > best.get((axis, sign), (-np.inf, 0))[0]:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
-import socket
-import subprocess
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-from urllib.parse import urlsplit
 
 from lgvi_warp.common import files as durable
-from lgvi_warp.common.errors import MissingExtra, NothingToDraw, one_line
+from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.views import viewer
 from lgvi_warp.views.fleet import identity, title
 from lgvi_warp.views.recording.drawn import Drawn, drawn_of
 from lgvi_warp.views.recording.graphs import COLORS, log_graphs
@@ -23,9 +22,6 @@ from lgvi_warp.views.recording.world import box_of, log_world, scale_of
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
-
-# Time to wait for a viewer at an address, and for one to end that cannot start [s].
-PATIENCE, STARTED = 10.0, 3.0
 
 
 def log_rerun(
@@ -59,17 +55,18 @@ def log_rerun(
         OSError: The file cannot be written, or no viewer answers at the address.
         ValueError: There is neither a path nor a `to`, or no result.
     """
-    _rerun()
+    viewer.rerun()
     if path is None and to is None:
         raise ValueError('neither path nor to is given: the recording would go nowhere; give path="fleet.rrd"')
     runs = _runs(result, members)
-    if path is not None:
-        with durable.placed(Path(path)) as beside:
-            _write(runs, lambda recording, first: recording.save(beside, default_blueprint=first))
-    if isinstance(to, str):
-        _reach(to)
-        _write(runs, lambda recording, first: recording.connect_grpc(to, default_blueprint=first))
-    elif to is not None:
+    address = to if isinstance(to, str) else None
+    if address is not None:
+        viewer.reach(address)
+    with contextlib.ExitStack() as stack:
+        beside = None if path is None else stack.enter_context(durable.placed(Path(path)))
+        if beside or address:
+            _write(runs, beside, address)
+    if to is not None and address is None:
         _send(to, runs)
         to.flush()
     return None if path is None else Path(path)
@@ -88,40 +85,12 @@ def show(result: Result | Mapping[str, Result], *, members: Any = None) -> None:
         SceneError: There are no such members, or the vehicle's mesh cannot be read.
         OSError: The viewer cannot be started, as where there is no display; the message has the path of the recording.
     """
-    _rerun()
+    viewer.rerun()
     # The viewer reads the file after this returns; the system clears its folder for temporary files.
     path = Path(tempfile.mkdtemp(prefix="lgvi_warp_")) / "fleet.rrd"
     log_rerun(result, path, members=members)
-    remedy = f"the recording is {path}: open it where there is a display"
-    with path.with_suffix(".log").open("w+") as log:
-        try:
-            viewer = subprocess.Popen([_program(), path], stdin=subprocess.DEVNULL, stdout=log, stderr=log,
-                                      start_new_session=True)  # fmt: skip
-            # One that finds no display ends at once; one that stays, or hands over to a viewer that is open, is well.
-            code = viewer.wait(STARTED)
-        except subprocess.TimeoutExpired:
-            return
-        except OSError as error:
-            raise OSError(f"the viewer cannot be started ({error}); {remedy}") from None
-        if code:
-            log.seek(0)
-            raise OSError(f"the viewer did not start ({one_line(log.read().strip()[-200:])}); {remedy}")
-
-
-def _program() -> Path:
-    """The viewer that comes with rerun-sdk."""
-    import rerun_cli
-
-    return Path(rerun_cli.__file__).with_name("rerun.exe" if os.name == "nt" else "rerun")
-
-
-def _rerun() -> Any:
-    """Load rerun. Raises ImportError with the remedy."""
-    try:
-        import rerun
-    except ModuleNotFoundError as error:
-        raise MissingExtra("recordings", "rerun-sdk", "viz") from error
-    return rerun
+    viewer.is_open()
+    viewer.start([path], f"the recording is {path}: open it where there is a display")
 
 
 def _runs(result: Result | Mapping[str, Result], members: Any) -> list[Drawn]:
@@ -131,19 +100,22 @@ def _runs(result: Result | Mapping[str, Result], members: Any) -> list[Drawn]:
     if not result:
         raise NothingToDraw("there is no result to draw; give {name: result}")
     colors = [COLORS[i % len(COLORS)] for i in range(len(result))]
-    return [drawn_of(one, members, str(name), rgb) for (name, one), rgb in zip(result.items(), colors, strict=True)]
+    return [
+        drawn_of(compared, members, str(name), rgb)
+        for (name, compared), rgb in zip(result.items(), colors, strict=True)
+    ]
 
 
-def _write(runs: list[Drawn], connect: Any) -> None:
-    """Write a recording of its own to where `connect` leads. Raises OSError."""
-    rr = _rerun()
+def _write(runs: list[Drawn], path: Path | None, address: str | None) -> None:
+    """Write a recording of its own to a file, to the viewer at an address, or to both at once. Raises OSError."""
+    rr = viewer.rerun()
     names = [identity(run.source) for run in runs]
     name = names[0] if len(runs) == 1 else hashlib.sha256(" ".join(names).encode()).hexdigest()[:16]
     box = box_of(runs)
-    first_layout = layout(runs, box, scale_of(runs[0], box))
     recording = rr.RecordingStream(f"lgvi_warp_{name}", recording_id=name)
+    sinks = ([rr.FileSink(path)] if path else []) + ([rr.GrpcSink(address)] if address else [])
     try:
-        connect(recording, first_layout)
+        recording.set_sinks(*sinks, default_blueprint=layout(runs, box, scale_of(runs[0], box)))
         _send(recording, runs, laid_out=True)
         recording.flush()
         recording.disconnect()
@@ -164,13 +136,3 @@ def _send(recording: Any, runs: list[Drawn], laid_out: bool = False) -> None:
         log_world(recording, run, box, scale_of(run, box))
         log_graphs(recording, run)
     log_words(recording, runs, box, scale)
-
-
-def _reach(address: str) -> None:
-    """Require that something listens at an address. Raises OSError."""
-    parts = urlsplit(address)
-    remedy = 'start a viewer with "rerun", or give to="rerun+http://127.0.0.1:9876/proxy"'
-    try:
-        socket.create_connection((parts.hostname or "", parts.port or 9876), PATIENCE).close()
-    except (OSError, ValueError) as error:
-        raise OSError(f"to = {address!r}: no viewer answers ({error}); {remedy}") from None

@@ -1,9 +1,12 @@
-"""Pictures of sweeps: success by case and over the grid, metrics by case, paired differences, what failures go with."""
+"""Pictures of sweeps: success by case and over the grid, metrics by case, paired differences, what failures go with.
+
+Each draws on `figure=` or on a figure of its own, writes a file where `path` names one, and returns its axes.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,74 +15,101 @@ import numpy as np
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import failed, under_way
 from lgvi_warp.methods.saveat import SaveAt
+from lgvi_warp.runs.quantities import samples_of
 from lgvi_warp.statistics import tracking
 from lgvi_warp.studies.sweeps.found import SUCCESS
 from lgvi_warp.studies.sweeps.output import Sweep, against_baseline
 from lgvi_warp.studies.sweeps.setup import END, Cell
-from lgvi_warp.views.plots.canvas import figure_class, save_figure
+from lgvi_warp.views.plots.canvas import COLORS, GREY, MARKERS, below, panels, point_down, style, wrapped
 from lgvi_warp.views.plots.fans import draw_bands
 
 # Most boxes of one panel, and most members that are drawn as points.
 MOST_BOXES, MOST_POINTS = 40, 4000
 # Most members, and most times, of a fan.
 MOST_PATHS = 200
+# Most fans side by side.
+MOST_COLUMNS = 3
+# Names of cases stand upright where there are more.
+MOST_LEVEL = 6
+QUARTILES = {"whislo": 0.05, "q1": 0.25, "med": 0.5, "q3": 0.75, "whishi": 0.95}
+
+FilePath = str | os.PathLike[str]
 
 
-def _ran(found: Sweep) -> list[Cell]:
-    """The cells that ran; NothingToDraw where none did."""
-    cells = [cell for cell in found.cells if not found.record(cell).refused]
+def _ran(sweep: Sweep, case: str | None = None) -> list[Cell]:
+    """The cells that ran, of all cases or of one; NothingToDraw where no cell of the sweep did."""
+    cells = [cell for cell in sweep.cells if not sweep.record(cell).refused]
     if not cells:
         raise NothingToDraw("all cells were refused")
-    return cells
+    return [cell for cell in cells if case in (None, cell.case.name)]
 
 
-def plot_success(found: Sweep, path: str | os.PathLike[str]) -> Path:
-    """Draw the success of each case with its intervals: over the first axis of the grid, a line for each value of the others.
+def _long(sweep: Sweep) -> list[str]:
+    """Names of the axes of the grid with two values or more."""
+    return [name for name, values in sweep.setup.axes.items() if len(values) > 1]
 
-    With two axes of two or more values each, a map of each case over both is drawn beside, with the interval in each field.
+
+def _short(sweep: Sweep, case: str, point: Mapping[str, Any]) -> str:
+    """A case and a point of the grid in few words: values alone, of axes with several."""
+    return ", ".join([case, *(str(point[name]) for name in _long(sweep))])
+
+
+def _meaning(sweep: Sweep) -> str:
+    """What the words of `_short` stand for."""
+    return ", ".join(["case", *_long(sweep)])
+
+
+def plot_success(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
+    """Draw the success of each case with its intervals: by case, over the axis of the grid, or a map over its first two axes.
+
+    A map has the interval in each field, and is drawn at the first value of any further axis.
 
     Args:
-        found: the sweep.
-        path: of the picture.
+        sweep: the sweep.
+        path: of the picture; default None, which writes none.
+        figure: Matplotlib figure to draw on; default None, one of its own.
 
     Returns:
-        The path.
+        The axes, (panels,).
 
     Raises:
         NothingToDraw: all cells were refused.
         ImportError: matplotlib is not installed (extra: viz).
+        OSError: the file cannot be written.
     """
-    _ran(found)
-    axes = found.setup.axes
-    long = [name for name, values in axes.items() if len(values) > 1][:2]
-    if len(long) == 2:
-        return _maps(found, long, path)
-    figure = figure_class()(figsize=(7.0, 4.5), layout="constrained")
-    panel = figure.add_subplot()
-    if not long:
-        cells = _ran(found)
-        ends = np.array([found.success(cell.case.name, cell.point) for cell in cells])
-        panel.errorbar(range(len(cells)), 100.0 * ends[:, 0], _bars(ends), fmt="o", capsize=4.0)
-        panel.set_xticks(range(len(cells)), [cell.case.name for cell in cells])
-    else:
-        for case in found.cases:
-            cells = [cell for cell in found.cells_of(case) if not found.record(cell).refused]
-            if cells:
-                ends = np.array([found.success(case, cell.point) for cell in cells])
-                places = _places([cell.point[long[0]] for cell in cells])
-                panel.errorbar(places, 100.0 * ends[:, 0], _bars(ends), fmt="o-", capsize=4.0, label=case)
-        values = axes[long[0]]
-        panel.set_xticks(_places(values), [str(value) for value in values])
-        panel.set_xlabel(long[0])
-        panel.legend()
-    panel.set_ylabel(f"passes [%], {found.confidence:.0%} interval")
-    panel.grid(alpha=0.3)
-    return save_figure(figure, path, 150)
+    cells, long = _ran(sweep), _long(sweep)
+    if len(long) >= 2:
+        return _maps(sweep, long, path, figure)
+    with panels(figure, path, (1, 1), (8.0, 5.0)) as grid:
+        axes = grid[0, 0]
+        if long:
+            values = sweep.setup.axes[long[0]]
+            for i, case in enumerate(sweep.cases):
+                _ends(
+                    axes, sweep, _ran(sweep, case), _places(values), long[0], marker=MARKERS[i], label=case, **style(i)
+                )
+            axes.set_xticks(_places(values), [str(value) for value in values])
+            axes.set_xlabel(long[0])
+            axes.legend()
+        else:
+            _ends(axes, sweep, cells, list(map(float, range(len(cells)))), None, marker="o", linestyle="none")
+            turned = 0.0 if len(cells) <= MOST_LEVEL else 90.0
+            axes.set_xticks(range(len(cells)), [cell.case.name for cell in cells], rotation=turned)
+        axes.set_ylabel(f"passes [%], {sweep.confidence:.0%} interval")
+        axes.grid(alpha=0.3)
+    return grid.ravel()
 
 
-def _bars(ends: np.ndarray) -> np.ndarray:
-    """Lengths of error bars below and above [%], of (value, lower, upper)."""
-    return 100.0 * np.maximum(0.0, np.stack([ends[:, 0] - ends[:, 1], ends[:, 2] - ends[:, 0]]))
+def _ends(axes: Any, sweep: Sweep, cells: list[Cell], places: list[float], name: str | None, **look: Any) -> None:
+    """Success of cells with error bars [%]: one a place, or each at the place of its value of an axis of the grid."""
+    if not cells:
+        return
+    if name is not None:
+        values = sweep.setup.axes[name]
+        places = [places[values.index(cell.point[name])] for cell in cells]
+    value, lower, upper = 100.0 * np.array([sweep.success(cell.case.name, cell.point) for cell in cells]).T
+    bars = np.maximum(0.0, [value - lower, upper - value])
+    axes.errorbar(places, value, bars, capsize=4.0, **look)
 
 
 def _places(values: list[Any]) -> list[float]:
@@ -89,190 +119,221 @@ def _places(values: list[Any]) -> list[float]:
     return [float(i) for i in range(len(values))]
 
 
-def _maps(found: Sweep, names: list[str], path: str | os.PathLike[str]) -> Path:
+def _maps(sweep: Sweep, long: list[str], path: FilePath | None, figure: Any) -> np.ndarray:
     """Success over two axes, one map a case, at the first value of any other axis."""
-    x, y = (found.setup.axes[name] for name in names)
-    others = {name: values[0] for name, values in found.setup.axes.items() if name not in names}
-    size = 1.6 + 1.1 * len(x), 1.6 + 0.6 * len(y)
-    figure = figure_class()(figsize=(size[0] * len(found.cases), size[1]), layout="constrained")
-    panels = figure.subplots(1, len(found.cases), squeeze=False)[0]
-    for panel, case in zip(panels, found.cases, strict=True):
-        values = np.full((len(y), len(x)), np.nan)
-        for cell in found.cells_of(case, others):
-            i, j = y.index(cell.point[names[1]]), x.index(cell.point[names[0]])
-            if found.record(cell).refused:
-                panel.text(j, i, "refused", ha="center", va="center", fontsize=7)
-                continue
-            value, lower, upper = found.success(case, cell.point)
-            values[i, j] = 100.0 * value
-            dark = value < 0.5
-            panel.text(j, i, f"{100.0 * value:.1f}\n{100.0 * lower:.1f} to {100.0 * upper:.1f}", ha="center", va="center",
-                       fontsize=7, color="white" if dark else "black")  # fmt: skip
-        panel.imshow(values, origin="lower", vmin=0.0, vmax=100.0, cmap="viridis", aspect="auto")
-        panel.set_xticks(range(len(x)), [str(value) for value in x])
-        panel.set_yticks(range(len(y)), [str(value) for value in y])
-        panel.set_xlabel(names[0])
-        panel.set_ylabel(names[1])
-        panel.set_title(f"{case}: passes [%]", fontsize=9)
-    return save_figure(figure, path, 150)
+    x, y = (sweep.setup.axes[name] for name in long[:2])
+    further = {name: values[0] for name, values in sweep.setup.axes.items() if name not in long[:2]}
+    size = (1.6 + 1.1 * len(x)) * len(sweep.cases), 1.8 + 0.6 * len(y)
+    with panels(figure, path, (1, len(sweep.cases)), size, sharey=True) as grid:
+        for axes, case in zip(grid[0], sweep.cases, strict=True):
+            values = np.full((len(y), len(x)), np.nan)
+            for cell in sweep.cells_of(case, further):
+                i, j = y.index(cell.point[long[1]]), x.index(cell.point[long[0]])
+                words, color = "refused", "black"
+                if not sweep.record(cell).refused:
+                    value, lower, upper = 100.0 * np.array(sweep.success(case, cell.point))
+                    values[i, j] = value
+                    words, color = f"{value:.1f}\n{lower:.1f} to {upper:.1f}", "white" if value < 50.0 else "black"
+                axes.text(j, i, words, ha="center", va="center", fontsize=8, color=color)
+            axes.imshow(values, origin="lower", vmin=0.0, vmax=100.0, cmap="viridis", aspect="auto")
+            axes.set_xticks(range(len(x)), [str(value) for value in x])
+            axes.set_yticks(range(len(y)), [str(value) for value in y])
+            axes.set_xlabel(long[0])
+            axes.set_title(f"{case}: passes [%]")
+        grid[0, 0].set_ylabel(long[1])
+        if remark := ", ".join(f"{name} = {further[name]}" for name in long[2:]):
+            grid[0, 0].figure.suptitle(f"at {remark}")
+    return grid.ravel()
 
 
-def plot_metrics(found: Sweep, path: str | os.PathLike[str]) -> Path:
+def plot_metrics(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
     """Draw boxes of each metric by case, at each point of the grid: quartiles, whiskers at 5 and 95 %.
 
+    Boxes are of members that did not fail and whose number is finite. The first 40 cells that ran are drawn.
+
     Args:
-        found: the sweep.
-        path: of the picture.
+        sweep: the sweep.
+        path: of the picture; default None, which writes none.
+        figure: Matplotlib figure to draw on; default None, one of its own.
 
     Returns:
-        The path.
+        The axes, (metrics,).
 
     Raises:
         NothingToDraw: all cells were refused, or there are no metrics.
         ImportError: matplotlib is not installed (extra: viz).
+        OSError: the file cannot be written.
     """
-    cells = _ran(found)[:MOST_BOXES]
-    names = [name for name in found.metrics if name != END]
+    every = _ran(sweep)
+    cells, names = every[:MOST_BOXES], [name for name in sweep.metrics if name != END]
     if not names:
         raise NothingToDraw("there are no metrics")
-    figure = figure_class()(figsize=(max(6.0, 1.5 + 0.35 * len(cells)), 2.6 * len(names)), layout="constrained")
-    panels = figure.subplots(len(names), 1, squeeze=False)[:, 0]
-    for panel, name in zip(panels, names, strict=True):
-        boxes = []
-        for cell in cells:
-            record = found.record(cell)
-            x = record.numbers[name]
-            good = x[np.isfinite(x) & ~failed(record.status)]
-            levels = np.quantile(good, [0.05, 0.25, 0.5, 0.75, 0.95]) if len(good) else np.full(5, np.nan)
-            boxes.append(dict(zip(("whislo", "q1", "med", "q3", "whishi"), levels, strict=True)))
-        panel.bxp(boxes, showfliers=False)
-        unit = found.unit(name)
-        panel.set_ylabel(name if unit == "1" else f"{name} [{unit}]", fontsize=8)
-        panel.set_xticks(range(1, len(cells) + 1), [""] * len(cells))
-        panel.grid(alpha=0.3, axis="y")
-    panels[-1].set_xticks(range(1, len(cells) + 1), [cell.name for cell in cells], rotation=90, fontsize=7)
-    return save_figure(figure, path, 150)
+    places, size = range(1, len(cells) + 1), (max(7.0, 1.5 + 0.35 * len(cells)), 1.5 + 2.2 * len(names))
+    with panels(figure, path, (len(names), 1), size, sharex=True) as grid:
+        for axes, name in zip(grid[:, 0], names, strict=True):
+            boxes = [_box(sweep, cell, name) for cell in cells]
+            drawn = axes.bxp(boxes, showfliers=False, patch_artist=True, medianprops={"color": "black"})
+            for patch, cell in zip(drawn["boxes"], cells, strict=True):
+                patch.set(facecolor=COLORS[sweep.cases.index(cell.case.name) % len(COLORS)], alpha=0.6)
+            unit = sweep.unit(name)
+            axes.set_ylabel(name if unit == "1" else f"{name}\n[{unit}]")
+            axes.grid(alpha=0.3, axis="y")
+        turned = 0.0 if len(cells) <= MOST_LEVEL else 90.0
+        grid[-1, 0].set_xticks(places, [_short(sweep, cell.case.name, cell.point) for cell in cells], rotation=turned)
+        hidden = f"; {len(every) - len(cells)} more are not shown" if len(every) > len(cells) else ""
+        grid[-1, 0].set_xlabel(_meaning(sweep) + hidden)
+    return grid.ravel()
 
 
-def plot_differences(found: Sweep, path: str | os.PathLike[str]) -> Path:
+def _box(sweep: Sweep, cell: Cell, name: str) -> dict[str, float]:
+    """Quantiles of a metric in a cell, by Matplotlib's names; NaN where no member has one."""
+    record = sweep.record(cell)
+    numbers = record.numbers[name][np.isfinite(record.numbers[name]) & ~failed(record.status)]
+    levels = list(QUARTILES.values())
+    return dict(zip(QUARTILES, np.quantile(numbers, levels) if len(numbers) else np.full(5, np.nan), strict=True))
+
+
+def plot_differences(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
     """Draw the differences of success to the baseline on the same members, with their intervals.
 
     Args:
-        found: the sweep.
-        path: of the picture.
+        sweep: the sweep.
+        path: of the picture; default None, which writes none.
+        figure: Matplotlib figure to draw on; default None, one of its own.
 
     Returns:
-        The path.
+        The axes, (1,).
 
     Raises:
         NothingToDraw: there is nothing to compare.
         ImportError: matplotlib is not installed (extra: viz).
+        OSError: the file cannot be written.
     """
-    rows = [row for row in against_baseline(found) if row.of == SUCCESS]
+    rows = [row for row in against_baseline(sweep) if row.of == SUCCESS]
     if not rows:
         raise NothingToDraw("there is no other case that ran to compare with the baseline")
-    figure = figure_class()(figsize=(7.5, 1.2 + 0.3 * len(rows)), layout="constrained")
-    panel = figure.add_subplot()
-    for i, row in enumerate(rows):
-        d = row.difference
-        bars = [[100.0 * (d.value - d.lower)], [100.0 * (d.upper - d.value)]]
-        panel.errorbar([100.0 * d.value], [i], xerr=bars, fmt="o", capsize=4.0, color="C0" if row.real else "0.6")
-    labels = [f"{row.second}{' at ' + at if (at := _point(row.point)) else ''}" for row in rows]
-    panel.set_yticks(range(len(rows)), labels, fontsize=7)
-    panel.axvline(0.0, color="0.3", linewidth=0.8)
-    panel.set_xlabel(f"passes more than {found.baseline} [points]; grey: not real")
-    panel.grid(alpha=0.3, axis="x")
-    return save_figure(figure, path, 150)
+    with panels(figure, path, (1, 1), (8.0, 1.4 + 0.3 * len(rows))) as grid:
+        axes = grid[0, 0]
+        for real, color, marker, label in ((True, COLORS[0], "o", "real"), (False, GREY, "s", "not real")):
+            places = [i for i, row in enumerate(rows) if bool(row.real) is real]
+            if places:
+                ends = [(row.difference.value, row.difference.lower, row.difference.upper) for row in rows]
+                value, lower, upper = 100.0 * np.array(ends)[places].T
+                bars = np.maximum(0.0, [value - lower, upper - value])
+                axes.errorbar(value, places, xerr=bars, fmt=marker, capsize=4.0, color=color, label=label)
+        axes.set_yticks(range(len(rows)), [_short(sweep, row.second, row.point) for row in rows])
+        axes.set(ylim=(len(rows) - 0.5, -0.5), ylabel=_meaning(sweep))
+        axes.axvline(0.0, color="0.3", linewidth=0.8)
+        axes.set_xlabel(f"passes more than {sweep.baseline} [points], {sweep.confidence:.0%} interval")
+        axes.grid(alpha=0.3, axis="x")
+        below(axes, ncols=2)
+    return grid.ravel()
 
 
-def plot_causes(found: Sweep, path: str | os.PathLike[str]) -> Path:
+def plot_causes(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
     """Draw which members pass over the two inputs that explain most of it, in the cell where most is open.
 
     Args:
-        found: the sweep.
-        path: of the picture.
+        sweep: the sweep.
+        path: of the picture; default None, which writes none.
+        figure: Matplotlib figure to draw on; default None, one of its own.
 
     Returns:
-        The path.
+        The axes, (1,).
 
     Raises:
         NothingToDraw: in no cell some members pass and some do not, or nothing varies.
         ImportError: matplotlib is not installed (extra: viz).
+        OSError: the file cannot be written.
     """
-    open_ = [(abs(found.passed(cell).mean() - 0.5), cell.index, cell) for cell in _ran(found)]
-    off, _, cell = min(open_)
-    rows = found.causes(cell.case.name, cell.point)[:2]
-    if off == 0.5 or not rows:
+    away, _, cell = min((abs(sweep.passed(cell).mean() - 0.5), cell.index, cell) for cell in _ran(sweep))
+    rows = sweep.causes(cell.case.name, cell.point)[:2]
+    if away == 0.5 or not rows:
         raise NothingToDraw("in no case some members pass and some do not, or nothing varies")
-    passed, inputs = found.passed(cell)[:MOST_POINTS], found.inputs(cell)
+    passed, inputs = sweep.passed(cell)[:MOST_POINTS], sweep.inputs(cell)
     x = inputs[rows[0]["input"]][:MOST_POINTS]
     y = inputs[rows[1]["input"]][:MOST_POINTS] if len(rows) > 1 else np.arange(len(x))
-    figure = figure_class()(figsize=(6.5, 5.0), layout="constrained")
-    panel = figure.add_subplot()
-    for chosen, label, color in ((passed, "passes", "C0"), (~passed, "fails", "C3")):
-        panel.plot(x[chosen], y[chosen], ".", color=color, markersize=3.0, label=f"{label}: {int(chosen.sum()):,}")
-    panel.set_xlabel(f"{rows[0]['input']}: explains {100.0 * rows[0]['share']:.3g} % of success")
-    if len(rows) > 1:
-        panel.set_ylabel(f"{rows[1]['input']}: {100.0 * rows[1]['share']:.3g} %")
-    panel.set_title(cell.name, fontsize=9)
-    panel.legend()
-    return save_figure(figure, path, 150)
+    with panels(figure, path, (1, 1), (7.0, 5.5)) as grid:
+        axes = grid[0, 0]
+        for chosen, label, color, marker in ((passed, "passes", COLORS[0], "."), (~passed, "fails", COLORS[1], "x")):
+            axes.plot(
+                x[chosen], y[chosen], marker, color=color, markersize=4.0, label=f"{label}: {int(chosen.sum()):,}"
+            )
+        words = [f"{row['input']}: explains {100.0 * row['share']:.3g} % of success" for row in rows]
+        axes.set(xlabel=words[0], ylabel=words[1] if len(rows) > 1 else "member", title=cell.name)
+        axes.legend()
+    return grid.ravel()
 
 
-def plot_responses(found: Sweep, path: str | os.PathLike[str], of: str = "", members: int = MOST_PATHS) -> Path:
+def plot_responses(
+    sweep: Sweep, path: FilePath | None = None, of: str = "", members: int = MOST_PATHS, *, figure: Any = None
+) -> np.ndarray:
     """Draw fans of what is tracked over time, by case at the first point of the grid, of members that are run again.
 
     Args:
-        found: the sweep.
-        path: of the picture.
-        of: "depth", "heading", "speed", "north" or "east"; by default what the first such metric is of.
+        sweep: the sweep.
+        path: of the picture; default None, which writes none.
+        of: "depth", "heading", "speed", "north" or "east"; or a distance from what is wanted, "position", "attitude" or
+            "cross_track". By default what the first metric of such a number is of.
         members: number of members that are run again, the first ones; by default 200.
+        figure: Matplotlib figure to draw on; default None, one of its own.
 
     Returns:
-        The path.
+        The axes, (cases that ran,).
 
     Raises:
         NothingToDraw: all cells were refused, or no metric is of such a number.
         ImportError: matplotlib is not installed (extra: viz).
+        OSError: the file cannot be written.
     """
-    first = {name: values[0] for name, values in found.setup.axes.items()}
-    cells = [cell for cell in _ran(found) if cell.point == first]
-    channels = tracking.CHANNELS[False]
-    asked = [str(metric.of) for metric in found.setup.metrics.values() if str(metric.of) in channels]
-    of = of or next(iter(asked), "")
-    if of not in channels or not cells:
+    start = {name: values[0] for name, values in sweep.setup.axes.items()}
+    cells = [cell for cell in _ran(sweep) if cell.point == start]
+    tracked = (str(metric.of) for metric in sweep.setup.metrics.values())
+    of = of or next((name for name in tracked if name in tracking.ERRORS), "")
+    if of not in tracking.ERRORS or not cells:
         raise NothingToDraw("no metric is of a number that is tracked over time")
-    channel, count = channels[of], min(members, found.members_count)
-    figure = figure_class()(figsize=(4.5 * len(cells), 4.0), layout="constrained")
-    panels = figure.subplots(1, len(cells), squeeze=False, sharey=True)[0]
-    for panel, cell in zip(panels, cells, strict=True):
-        assert cell.fleet is not None and cell.fleet.scene.controller is not None
-        duration = float(found.setup.settings.get("t1") or cell.fleet.scene.run.duration or 0.0)
-        period = float(cell.fleet.scene.controller.period)
-        every = period * max(1, int(duration / period / MOST_PATHS))
-        save = SaveAt(every=every, fields=(*channel.of_actual, channel.wanted))
-        result = found.again(cell.case.name, range(count), cell.point, save)
-        y, wanted = channel.actual(result.samples), np.median(channel.reference(result.samples), axis=1)
-        draw_bands(panel, result.time, y, under_way(result))
-        panel.plot(result.time, wanted, "k:", linewidth=1.0, label="wanted")
-        panel.set_title(cell.name, fontsize=9)
-        panel.set_xlabel("time [s]")
-    panels[0].set_ylabel(f"{of} [{channel.unit}]: {count} members")
-    panels[0].legend()
-    return save_figure(figure, path, 150)
+    count = min(members, sweep.members_count)
+    columns = min(MOST_COLUMNS, len(cells))
+    rows = -(-len(cells) // columns)
+    with panels(figure, path, (rows, columns), (4.5 * columns, 4.0 * rows), sharex=True, sharey=True) as grid:
+        for axes, cell in zip(grid.flat, cells, strict=False):
+            _response(axes, sweep, cell, of, count)
+            axes.set_title(wrapped(cell.name, axes.figure, 0.9 / columns))
+        for axes in grid.flat[len(cells) :]:
+            axes.set_axis_off()
+        grid[0, 0].figure.supxlabel("time [s]")
+        unit = tracking.error(of, False).unit
+        away = "" if of in tracking.CHANNELS[False] else " from what is wanted"
+        grid[0, 0].figure.supylabel(f"{of}{away} [{unit}]: {count} members")
+        if of == "depth":
+            point_down(grid[0, 0])
+        grid[0, 0].legend()
+    return grid.ravel()[: len(cells)]
 
 
-def _point(point: Any) -> str:
-    return ", ".join(f"{name} = {value}" for name, value in point.items())
+def _response(axes: Any, sweep: Sweep, cell: Cell, of: str, count: int) -> None:
+    """Draw the fan of the first members of a cell, and what is wanted of a number."""
+    assert cell.fleet is not None and cell.fleet.scene.controller is not None
+    duration = float(sweep.setup.settings.get("t1") or cell.fleet.scene.run.duration or 0.0)
+    period = float(cell.fleet.scene.controller.period)
+    every = period * max(1, int(duration / period / MOST_PATHS))
+    channel, error = tracking.CHANNELS[False].get(of), tracking.error(of, False)
+    fields = error.fields if channel is None else (*channel.of_actual, channel.wanted)
+    result = sweep.again(cell.case.name, range(count), cell.point, SaveAt(every=every, fields=fields))
+    numbers = error(*samples_of(result)) if channel is None else channel.actual(result.samples)
+    draw_bands(axes, result.time, numbers.reshape(len(result.time), -1), under_way(result))
+    if channel is not None:
+        wanted = np.median(channel.reference(result.samples), axis=1)
+        axes.plot(result.time, wanted, "k:", linewidth=1.0, label="wanted")
 
 
-def pictures(found: Sweep) -> dict[str, Callable[[Any, Path], Path]]:
+def pictures(sweep: Sweep) -> dict[str, Callable[[Any, Path], Any]]:
     """Return the functions that draw a sweep, by the name of the file; paired differences where there are cases to compare.
 
     Args:
-        found: the sweep.
+        sweep: the sweep.
     """
-    differences = {"differences.png": plot_differences} if len(found.cases) > 1 else {}
+    differences = {"differences.png": plot_differences} if len(sweep.cases) > 1 else {}
     return {
         "success.png": plot_success,
         "metrics.png": plot_metrics,

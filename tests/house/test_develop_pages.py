@@ -22,7 +22,8 @@ def test_example(page, scene, monkeypatch):
         monkeypatch.setitem(table, "psi_k", None)  # what the example of a method adds goes with the test
     for owner, name in ((base, "TYPES"), (Sampling, "kinds")):
         monkeypatch.setattr(owner, name, dict(getattr(owner, name)))
-    exec(example(page), {"scene": scene})
+    exec(example(page), names := {"scene": scene})
+    assert len(names) > 4, "the example defines what the page adds"
 
 
 def test_files_to_touch_exist():

@@ -39,7 +39,9 @@ def test_toml(text, tmp_path):
 @pytest.mark.parametrize("text", snippets("python"))
 def test_python(text, scene, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    exec(text, {"lw": lw, "np": np, "scipy": scipy, "SALib": SALib, "scene": scene})
+    before = {"lw": lw, "np": np, "scipy": scipy, "SALib": SALib, "scene": scene}
+    exec(text, names := dict(before))
+    assert names.keys() - before.keys() - {"__builtins__"}, "a snippet that names nothing shows nothing"
 
 
 def test_there_are_snippets():

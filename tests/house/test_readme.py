@@ -25,6 +25,22 @@ def test_readme(monkeypatch, capsys):
     assert capsys.readouterr().out == output and output.count("\n") == 3
 
 
+def test_the_readme_is_short_and_shows_what_comes_of_it():
+    text = (ROOT / "README.md").read_text()
+    assert len(text.split()) < 1200
+    order = [
+        "fleet.webp",
+        "pip install",
+        "lgvi-warp run",
+        "```python",
+        "accuracy_paper.png",
+        "## What is modelled",
+        "**No:**",
+        "## Citation",
+    ]
+    assert sorted(order, key=text.index) == order
+
+
 def test_the_first_example(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(ROOT / "examples" / "01_first_dive.py"), run_name="__main__")
@@ -35,4 +51,5 @@ def test_the_first_example(tmp_path, monkeypatch, capsys):
 
 def test_the_methods_of_the_guide():
     code, _ = code_and_output("docs/guide/methods.md")
-    exec(code, {"lw": lw})
+    methods = [eval(line, {"lw": lw}) for line in code.splitlines()]
+    assert [method.name for method in methods] == ["psi_s", "psi", "rk8"] and methods[2].adaptive

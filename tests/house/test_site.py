@@ -130,7 +130,8 @@ def test_each_verb_has_its_help():
 
 def test_every_page_is_in_the_table_of_contents():
     listed = set(re.findall(r"^   ([\w/]+)$", (ROOT / "docs" / "index.rst").read_text(), re.MULTILINE))
-    written = {str(page.relative_to(ROOT / "docs").with_suffix("")) for page in (ROOT / "docs").rglob("*.md")}
+    sources = [page for kind in ("*.md", "*.ipynb") for page in (ROOT / "docs").rglob(kind)]
+    written = {str(page.relative_to(ROOT / "docs").with_suffix("")) for page in sources}
     below = {name for name in written if re.match("guide/terms/[a-z]|reference/built/", name)}
     assert {name for name in listed if "/built/" not in name} == written - below - {"index"}
 

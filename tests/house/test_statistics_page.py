@@ -31,7 +31,9 @@ def test_toml(text, tmp_path):
 
 @pytest.mark.parametrize("text", snippets("python"))
 def test_python(text, scene, capsys):
-    exec(text, {"lw": lw, "np": np, "scene": scene})
+    before = {"lw": lw, "np": np, "scene": scene}
+    exec(text, names := dict(before))
+    assert names.keys() - before.keys() - {"__builtins__"}
 
 
 def test_shapes_are_those_of_the_page(scene):

@@ -1,4 +1,4 @@
-"""Laws from a user's own file, those of examples/02_own_law.py: in a run, in a scene file, and as a script."""
+"""Laws from a user's own file, those of examples/laws/own_law.py: in a run, in a scene file, and as a script."""
 
 import importlib.util
 import os
@@ -16,7 +16,7 @@ from lgvi_warp.scene import scene as scenes
 from tests.support.tools import TURN, one
 
 ROOT = Path(__file__).parents[2]
-EXAMPLE = ROOT / "examples" / "02_own_law.py"
+EXAMPLE = ROOT / "examples" / "laws" / "own_law.py"
 STEPS = (0.1, 0.05, 0.025)
 
 

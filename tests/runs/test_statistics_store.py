@@ -63,7 +63,7 @@ def test_statistics_of_damaged_parts_are_refused(whole, tmp_path):
     with pytest.raises(lw.SceneError, match=r"parts/000000256.* has changed; `lgvi-warp resume .*` mends it"):
         lw.open_run(path)
     (path / "blocks" / "000000256.json").unlink()
-    with pytest.raises(lw.SceneError, match=r"blocks/000000256.json is missing or damaged; `lgvi-warp resume"):
+    with pytest.raises(lw.SceneError, match=r"blocks/000000256.json is missing; mend it with `lgvi-warp resume"):
         lw.open_run(path)
 
 

@@ -65,6 +65,21 @@ def test_it_has_the_bits_of_a_run_in_memory(whole, memory):
     np.testing.assert_array_equal(stored.energy, memory.energy)
 
 
+@pytest.mark.parametrize("into", ["memory", "store"])
+def test_blocks_are_handed_over_in_order_with_the_bits_of_the_run(into, memory, tmp_path):
+    handed = []
+    store = {} if into == "memory" else {"store": tmp_path / "run.zarr"}
+    result = lw.solve(fleet(), **SETTINGS, **store, threads=2, on_block=handed.append)
+    assert len(handed) > 1 and sum(block.members for block in handed) == result.members
+    whole = {name: np.concatenate([block.samples[name] for block in handed], axis=1) for name in FIELDS}
+    for name in FIELDS:
+        assert whole[name].tobytes() == memory.samples[name].tobytes()
+    np.testing.assert_array_equal(np.concatenate([block.status for block in handed]), memory.status)
+    for name, values in memory.parameters.items():
+        if len(values) > 1:
+            np.testing.assert_array_equal(np.concatenate([block.parameters[name] for block in handed]), values)
+
+
 def test_some_members_alone_are_read(whole, memory):
     some = lw.open_run(whole, [5, 1002, 300])
     assert some.position.tobytes() == memory.position[:, [5, 1002, 300]].tobytes() and some.members == 3
@@ -275,6 +290,22 @@ def test_what_was_there_is_told(copy):
     assert "went on: 3 of 4 blocks were there and whole, 1 ran" in lw.resume(copy).messages
     result = lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, existing="resume"))
     assert result.messages == ("nothing was missing: 4 of 4 blocks were there and whole",) and not result.run_seconds
+
+
+@pytest.mark.parametrize("name", ["blocks/000000256.json", "velocity/c.0.2.0"])
+def test_a_missing_block_is_one_line_with_the_remedy(copy, name, tmp_path, capsys):
+    """Its members would be drawn as if they had failed."""
+    (copy / name).unlink()
+    with pytest.raises(lw.SceneError, match=rf"{name} is missing.*; mend it with `lgvi-warp resume"):
+        lw.open_run(copy)
+    assert f"{name} is missing" in lw.open_run(copy, incomplete=True).messages[-1]
+    for verb in (["view", "--out", str(tmp_path / "a.rrd")], ["plot"], ["report"]):
+        assert cli.main([verb[0], str(copy.parent), *verb[1:]]) == 2
+        said = capsys.readouterr().err
+        assert f"{name} is missing" in said and said.count("\n") == 1
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.zarr"]
+    lw.resume(copy)
+    assert lw.open_run(copy).members == MEMBERS
 
 
 @pytest.mark.parametrize("to", ["netcdf", "parquet"])

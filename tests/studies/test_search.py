@@ -23,9 +23,9 @@ def rastrigin(inside):
 def test_a_search_among_many_valleys():
     found = search(rastrigin, 2, 2000, 1, 3)
     np.testing.assert_allclose(found.at, 0.6, atol=1e-4)
-    assert found.cost < 1e-5 and len(found.restarts) == 3 and found.asked <= 2000
+    assert found.cost < 1e-5 and len(found.restarts) == 3 and found.runs <= 2000
     again = search(rastrigin, 2, 2000, 1, 3)
-    assert np.array_equal(again.at, found.at) and again.asked == found.asked
+    assert np.array_equal(again.at, found.at) and again.runs == found.runs
 
 
 def test_a_search_finds_a_corner_that_evolution_misses():
@@ -41,7 +41,7 @@ def test_a_search_finds_a_corner_that_evolution_misses():
 
 def test_a_search_ends_where_it_is_good_enough():
     found = search(lambda x: np.where(x[:, 0] > 0.5, -np.inf, x[:, 0]), 1, 10_000, 1, 3, good_enough=-1e300)
-    assert found.cost == -np.inf and found.asked < 100
+    assert found.cost == -np.inf and found.runs < 100
 
 
 def test_infinite_costs_do_not_stop_a_search():
@@ -187,3 +187,31 @@ def test_candidates_meet_the_noise_of_the_members():
     found = run.states(*states, indices=members.indices[twice], seed=fleet.seed)
     expected = np.linalg.norm(lw.solve(fleet, "psi_s", h=PERIOD, t1=20.0).position[-1], axis=1)
     np.testing.assert_array_equal(found, np.tile(expected, 2))
+
+
+@pytest.mark.slow
+def test_searches_by_metrics_of_a_loop():
+    """What is searched for is the metric of a run, at every look; a loop that never settles is infinitely bad."""
+    fleet = lw.Ensemble(regulated(), 4, 3, STARTS)
+    tuned = lw.tune(fleet, OVER, "iae depth", risk=lw.CVaR(0.5), budget=4 * 32, fresh=8, **RUN)
+    K = np.zeros((6, 12))
+    K[2, [2, 8]] = list(tuned.parameters.values())
+    wanted = dataclasses.replace(regulated(lw.StateFeedback(K=K)))
+    iae = lw.IAE("depth", then=[lw.Each()])
+    for members, seed, risk in ((4, 3, tuned.cost), (8, 4, tuned.fresh_cost)):
+        result = lw.solve(lw.Ensemble(wanted, members, seed, STARTS), "psi_s", h=PERIOD, t1=20.0, statistics=[iae])
+        each = result.statistics["each iae depth"].value[0]
+        assert risk == pytest.approx(lw.CVaR(0.5)(each)[0], rel=1e-12)
+    assert tuned.of == "iae depth" and tuned.fresh_before > tuned.fresh_cost
+    within = {"start.position[2]": (-1.0, 2.0)}
+    for of in (lw.MaxError("depth"), {"type": "max_error", "of": "depth"}):
+        far = lw.worst_case(regulated(), within, of, budget=64, **RUN)
+        assert far.value == pytest.approx(2.0, abs=1e-9) and far.of == "max_error depth"
+        assert far.at_bounds == {"start.position[2]": "high"}
+    # Nothing acts: what starts away from its goal never settles.
+    never = lw.worst_case(regulated(), within, "settling_time depth", budget=64, **RUN)
+    assert never.value == np.inf
+    assert str(never).startswith("settling_time depth is infinite, or a member fails: start.position[2]")
+    for of, message in (("iae depht", "depht"), ("mean", "is no metric"), (lw.Mean("depth"), "is no metric")):
+        with pytest.raises(lw.SceneError, match=message):
+            lw.worst_case(regulated(), within, of, budget=64, **RUN)

@@ -250,6 +250,16 @@ def test_all_failing_and_none_failing_say_their_limit(found):
     assert "none of 300 passes" in str(none)
 
 
+def test_a_metric_of_what_a_case_does_not_want_refuses_the_case(scene):
+    level = {"guidance": [{"type": "set_point", "depth": 0.0, "heading": 1.0}]}
+    mixed = swept(scene, grid=None, members=4, cases=[{"name": "place"}, {"name": "level", "replace": level}])
+    place, refused = mixed.rows()
+    assert not place["refused"]
+    assert "metrics = 'way': is of the north, and no guidance of this case wants a position" in refused["refused"]
+    with pytest.raises(lw.SceneError, match="no guidance of this case wants a position"):
+        lw.worst_case(mixed.cells[1].fleet, {"vehicle.mass": (45.0, 55.0)}, "iae north", budget=64)
+
+
 def test_members_that_fail_do_not_pass_and_come_first(scene):
     bad = swept(scene, grid=None, cases=None, vary={**VARY, "start.velocity[0]": lw.Choice([0.0, 1e307], [0.9, 0.1])})
     record = bad.record(bad.cells[0])

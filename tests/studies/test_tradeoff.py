@@ -1,9 +1,13 @@
 """Speed against accuracy: errors that are checked, a front that is one, suggestions that keep what was asked."""
 
+import contextlib
 import csv
 import dataclasses
 import json
 import math
+import os
+import subprocess
+import sys
 from typing import Any, ClassVar
 from unittest import mock
 
@@ -24,6 +28,8 @@ from tests.support.random_scenes import judged, random_scene
 PAPER = str(ROOT / "examples" / "paper.toml")
 SHORT = ["--members", "8", "--duration", "4", "--set", "run.save_every=1.0"]
 METHODS = ("su4(psi_x)", "psi_s")
+# Of several orders: the front has most of them.
+DISTURBED = ("psi", "psi_s", "psi_x", "su4(psi_x)", "kl8(psi_x)", "rk8")
 # A budget that no search here spends: all of them end by themselves, however busy the machine is.
 ENOUGH = 1e4
 
@@ -308,9 +314,50 @@ def test_a_suggestion_in_noise_keeps_the_error(noise_step):
 @pytest.mark.slow
 def test_events_end_what_is_compared(scene, tmp_path):
     falling = dataclasses.replace(scene, events=[{"type": "floor", "depth": 11.0}])
-    found = lw.tradeoff(lw.Ensemble(falling, 1, 1), 4.0, methods=["psi_x"], seconds=60.0)
+    found = lw.tradeoff(lw.Ensemble(falling, 1, 1), 4.0, methods=["psi_x"], seconds=ENOUGH)
     assert found.front()[-1].error() < 1e-6 and found.measurements[0].biases == {}
     assert lw.plot_tradeoff(found, tmp_path / "one.png").stat().st_size > 10_000
+
+
+def test_time_that_is_up_leaves_the_first_method(scene):
+    # As on a busy machine, where the reference's kernels alone take longer to compile than the whole is to take.
+    found = lw.tradeoff(lw.Ensemble(scene, 8, 1), 4.0, methods=METHODS, seconds=1e-6)
+    assert found.front() and found.measurements[0].setting.name == METHODS[0]
+    assert "no time for " in " ".join(found.messages)
+
+
+@contextlib.contextmanager
+def busy(core):
+    """A second process at work on a core."""
+    process = subprocess.Popen([sys.executable, "-c", "while True: pass"])
+    try:
+        os.sched_setaffinity(process.pid, {core})
+        yield
+    finally:
+        process.kill()
+        process.wait()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system pins no process to a core")
+def test_a_busy_core_changes_no_method_of_the_front(scene):
+    fleet = lw.Ensemble(scene, 8, 1, scene.ensemble_settings.vary)
+
+    def names():
+        found = lw.tradeoff(fleet, 4.0, methods=DISTURBED, seconds=ENOUGH)
+        assert all(one.cost_spread >= 1.0 for one in found.measurements)
+        return {one.setting.name for one in found.front()}
+
+    cores = os.sched_getaffinity(0)
+    try:
+        os.sched_setaffinity(0, {max(cores)})
+        quiet = names()
+        assert len(quiet) > 1
+        for _ in range(5):
+            with busy(max(cores)):
+                assert names() == quiet
+    finally:
+        os.sched_setaffinity(0, cores)
 
 
 @pytest.mark.slow

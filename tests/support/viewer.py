@@ -24,8 +24,8 @@ PATIENCE = 60.0
 class Viewer:
     """A viewer that has recordings open."""
 
-    def __init__(self, client):
-        self.client = client
+    def __init__(self, client, address):
+        self.client, self.address = client, address
 
     def open(self, *paths):
         """Open recordings, one at a time."""
@@ -57,15 +57,48 @@ class Viewer:
         return views + [message for message in logs if not EXPECTED.search(message)]
 
 
+def free_port():
+    """A port of this machine that nothing listens at."""
+    with socket.socket() as trial:
+        trial.bind(("127.0.0.1", 0))
+        return trial.getsockname()[1]
+
+
+@contextlib.contextmanager
+def receiver(path):
+    """The address of rerun's server without a window, which writes what it gets into a file."""
+    rerun_cli = pytest.importorskip("rerun_cli")
+    port = free_port()
+    program = Path(rerun_cli.__file__).with_name("rerun")
+    words = ["--bind", "127.0.0.1", "--port", str(port), "--save", str(path)]
+    process = subprocess.Popen([str(program), *words], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        with contextlib.suppress(OSError):
+            socket.create_connection(("127.0.0.1", port), 0.2).close()
+            break
+        time.sleep(0.05)
+    try:
+        yield f"rerun+http://127.0.0.1:{port}/proxy"
+        size = -1
+        while size != (size := path.stat().st_size if path.exists() else 0) or not size:
+            assert time.monotonic() < end
+            time.sleep(0.2)
+    finally:
+        process.terminate()
+        process.wait()
+    # A server's file has no table of contents.
+    raw = path.rename(path.with_suffix(".raw.rrd"))
+    subprocess.run([str(program), "rrd", "merge", str(raw), "-o", str(path)], check=True, capture_output=True)
+
+
 @contextlib.contextmanager
 def viewer(folder, size="1000x700"):
     """A viewer; skips the test where the machine has no Vulkan driver."""
     rerun_cli = pytest.importorskip("rerun_cli")
     from rerun.experimental import ViewerClient
 
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        port = one.getsockname()[1]
+    port = free_port()
     program = Path(rerun_cli.__file__).with_name("rerun")
     words = ["--headless", "--bind", "127.0.0.1", "--port", str(port), "--window-size", size, "--hide-welcome-screen"]
     log = folder / "viewer.log"
@@ -78,7 +111,7 @@ def viewer(folder, size="1000x700"):
             if NO_DRIVER.search(text):
                 pytest.skip("no Vulkan driver: recordings are not looked at; install one, such as mesa-vulkan-drivers")
             raise RuntimeError(f"the viewer did not start: {text[-800:]}")
-        yield Viewer(client)
+        yield Viewer(client, f"rerun+http://127.0.0.1:{port}/proxy")
     finally:
         process.terminate()
         try:
@@ -107,8 +140,9 @@ def _client(kind, process, port):
 
 
 def painted(picture):
-    """Share of pixels that differ from the one on their left: text, lines and bodies do, an empty view does not."""
-    return float((np.abs(np.diff(picture, axis=1)).max(axis=-1) > 12).mean())
+    """Share of pixels that differ from the one on their left or above: text, lines and bodies do, an empty view does not."""
+    left, above = (np.abs(np.diff(picture, axis=axis)).max(axis=-1) > 12 for axis in (1, 0))
+    return float((left[1:] | above[:, 1:]).mean())
 
 
 def moved(first, second):

@@ -16,6 +16,7 @@ import lgvi_warp as lw
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import Status, StatusArray
 from lgvi_warp.studies.comparison import Candidate
+from lgvi_warp.studies.linear.margins import Margins
 from lgvi_warp.studies.stability.grid import Line
 from lgvi_warp.studies.stability.map import StabilityMap
 from lgvi_warp.studies.tradeoff import Measurement, Tradeoff
@@ -391,3 +392,32 @@ def test_pieces_give_what_the_whole_gives(solved, monkeypatch):
     for name in ("values", "counted", "low", "high", "last"):
         np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
     assert at_levels(whole.values, whole.counted, [0.0])[0] == pytest.approx(whole.low)
+
+
+def margins_of(steady):
+    upper = np.array([2.0, 4.0, np.inf, 3.0, np.nan])
+    values = {
+        "gain_upper": np.where(steady, upper, np.nan),
+        "delay": np.where(steady, [0.1, 0.3, 0.2, 0.4, 0.0], np.nan),
+    }
+    return Margins("heading_pid", values, {"gain_upper": 1.1 * upper, "delay": values["delay"]}, np.array(steady), 0.02)
+
+
+def test_margins_are_distributions():
+    axes = lw.plots.margins(margins_of([True, True, True, True, False]))
+    assert [ax.get_xlabel() for ax in axes] == ["upper gain margin, a factor", "delay margin [s]"]
+    curves = {line.get_label(): line for line in axes[0].get_lines()}
+    # One of four margins is infinite: the curve ends at three quarters.
+    assert curves["by eigenvalues"].get_xdata().tolist() == [2.0, 2.0, 3.0, 4.0]
+    assert curves["by eigenvalues"].get_ydata().tolist() == [0.0, 25.0, 50.0, 75.0]
+    np.testing.assert_allclose(curves["by runs"].get_xdata(), [2.2, 2.2, 3.3, 4.4])
+    assert curves["95 % of the members bear 2"].get_xdata()[0] == 2.0
+    assert [line.get_label() for line in axes[1].get_lines()][:1] == ["by eigenvalues"]
+    title = axes[0].figure.get_suptitle()
+    assert title == "heading_pid: margins of 4 members; 1 do not settle as they are"
+
+
+def test_margins_of_nobody_are_no_picture(tmp_path):
+    with pytest.raises(NothingToDraw, match="none of the 5 members settles"):
+        lw.plots.margins(margins_of([False] * 5), path=tmp_path / "margins.png")
+    assert not list(tmp_path.iterdir())

@@ -1,9 +1,9 @@
 """Driven, damped motion: error and cost of each method and step for REMUS 100 with its rudder at 4 degrees.
 
-As published but in the plane, as in examples/03_remus_100.py; the same with its drag 100 and 1000 times as strong; in six
-degrees of freedom with linear damping of its roll, at 80 1/s; and in the plane with a thruster that lags and fins whose rate
-is limited, the rudder to 4 degrees at 5 s and to -4 degrees at 15 s. From 1 to 1.6 m/s; errors are those after 30 s, the
-largest of the members, against rk8 at a tenth of its shortest step here. Last, for each error, the cheapest of these
+As published but in the plane, as in examples/papers/prestero_2001/remus_100.py; the same with its drag 100 and 1000 times as
+strong; in six degrees of freedom with linear damping of its roll, at 80 1/s; and in the plane with a thruster that lags and
+fins whose rate is limited, the rudder to 4 degrees at 5 s and to -4 degrees at 15 s. From 1 to 1.6 m/s; errors are those after
+30 s, the largest of the members, against rk8 at a tenth of its shortest step here. Last, for each error, the cheapest of these
 settings beside the cheapest that a run takes which is given the step alone.
 """
 

@@ -18,6 +18,7 @@ def run(quick):
         result = run_plan(plan, machine.thread_count())
         yield {
             "members": members,
+            "threads": machine.thread_count(),
             "steps": steps,
             "set_up_s": round(set_up, 4),
             "run_s": round(result.run_seconds, 4),

@@ -163,8 +163,8 @@ def observation_of(told: Mapping[str, Any] | None, statistics: Any = None) -> Ob
     observation = Observation(from_list(told.get("statistics", ()) if statistics is None else statistics), keep, until)
     table, expected = observation.to_dict(), {name: value for name, value in told.items() if name != "fields"}
     if table != expected:
-        asked, known = table.get("statistics"), expected.get("statistics")
-        raise SceneError([f"statistics = {asked}: are not the run's, {known}; give those"])
+        wanted, run_had = table.get("statistics"), expected.get("statistics")
+        raise SceneError([f"statistics = {wanted}: are not the run's, {run_had}; give those"])
     return observation
 
 

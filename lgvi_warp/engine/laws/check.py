@@ -322,12 +322,12 @@ def _follow(bench: Bench, step: float) -> Iterator[Check]:
         rows = bank.memory.numpy()
         return np.asarray(rows.transpose(0, 2, 1).reshape(-1, rows.shape[1]))
 
-    whole = remembered((views, FOLLOWED))
+    at_once = remembered((views, FOLLOWED))
     elsewhere = Views(views.attitude[::-1], views.position + 1.0, 1.0 - views.velocity, 1.0 - views.rate, views.time)
     remedy = "leave follow() out: what this law remembers depends on more than the time"
-    yield judged("follow: blind to the state", remembered((elsewhere, FOLLOWED)) - whole, 0.0, views, remedy)
+    yield judged("follow: blind to the state", remembered((elsewhere, FOLLOWED)) - at_once, 0.0, views, remedy)
     earlier = replace(views, time=views.time - 0.25 * FOLLOWED)
-    apart = remembered((earlier, 0.75 * FOLLOWED), (views, 0.25 * FOLLOWED)) - whole
-    limit = ROUNDINGS * EPS * (np.abs(whole).max() + 1e-300)
+    apart = remembered((earlier, 0.75 * FOLLOWED), (views, 0.25 * FOLLOWED)) - at_once
+    limit = ROUNDINGS * EPS * (np.abs(at_once).max() + 1e-300)
     remedy = "advance by the exact solution over view.h, which ends at view.t"
     yield judged("follow: exact", apart, limit, views, remedy)

@@ -132,11 +132,11 @@ def check_controller(
     if not isinstance(part, Part) or part.section not in SECTIONS:
         remedy = "give an object such as lw.HeadingPID(kp=1.0), not its class; lw.check_law checks terms"
         raise SceneError([f"part = {part!r}: is no part of a controller; {remedy}"])
-    whole = _with_part(part, scene or simple_scene())
-    (wired,) = (one for one in whole.controller.parts if one.key == part.key)
+    completed = _with_part(part, scene or simple_scene())
+    (wired,) = (candidate for candidate in completed.controller.parts if candidate.key == part.key)
     numbers = {name: np.asarray(value)[None] for name, value in wired.parameters().items()}
     wired = wired.with_features(frozenset(f"{part.key}.{word}" for word in wired.features(numbers)))
-    bench = PartBench(wired, whole, samples, seed)
+    bench = PartBench(wired, completed, samples, seed)
     with np.errstate(all="ignore"):  # what is not finite is found by its check
         packed, checks = packed_numbers(wired, bench.Params, bench.packed)
         if packed is None or not all(check.ok for check in checks):
@@ -153,8 +153,8 @@ def check_controller(
 
 def _with_part(part: Part, scene: Scene) -> Scene:
     """The scene with the part in its controller; with guidance, a law and an actuator where it has none."""
-    given = scene.controller
-    if given is None:
+    controller = scene.controller
+    if controller is None:
         lists: dict[str, list[Part]] = {section: [] for section in SECTIONS}
         if part.section != "guidance":
             lists["guidance"] = [SetPoint(name="other_guidance", position=(0.0, 0.0, 0.0), heading=0.0, speed=0.0)]
@@ -164,20 +164,20 @@ def _with_part(part: Part, scene: Scene) -> Scene:
             lists["laws"] = [HeadingPID(name="other_law", kp=1.0)]
     else:
         # An allocation that the controller chose by itself has no name of its own, and follows again.
-        lists = {section: [one for one in getattr(given, section) if one.type] for section in SECTIONS}
-    same = [one.key for one in lists[part.section]]
+        lists = {section: [listed for listed in getattr(controller, section) if listed.type] for section in SECTIONS}
+    same = [listed.key for listed in lists[part.section]]
     if part.key in same:
         lists[part.section][same.index(part.key)] = part
     else:
         lists[part.section].append(part)
     if isinstance(part, Allocation):
-        others = [one for one in lists["allocation"] if isinstance(one, Allocation) and one.to != part.to]
+        others = [listed for listed in lists["allocation"] if isinstance(listed, Allocation) and listed.to != part.to]
         lists["allocation"] = [*others, part]
     terms = list(scene.terms)
     if not any(term.channels for term in terms):
         to = getattr(part, "to", "") or (getattr(part, "of", "") if part.section == "faults" else "")
         terms.append(ControlWrench(name=to or ""))
-    period, delay = (given.period, given.delay) if given is not None else (PERIOD, 0.0)
+    period, delay = (controller.period, controller.delay) if controller is not None else (PERIOD, 0.0)
     return replace(scene, terms=terms, controller=Controller(period=period, delay=delay, **lists))
 
 
@@ -247,8 +247,10 @@ def _lanes(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
     name, width = _name(bench), bench.widths[0]
     mixed = np.zeros_like(here.all())
     for stays in (0, width - 1):
-        one = np.arange(bench.count) % width == stays
-        mixed[one] += (bench.answers(packed, bench.looks.but_lane(stays, width)).all() - here.all())[one]
+        lane_that_stays = np.arange(bench.count) % width == stays
+        mixed[lane_that_stays] += (bench.answers(packed, bench.looks.but_lane(stays, width)).all() - here.all())[
+            lane_that_stays
+        ]
     yield judged(f"{name}: lanes apart", mixed, 0.0, bench.looks, "a lane must not look at others")
     alone = bench.answers(packed, bench.looks, 1).all() - here.all()
     limit = ROUNDINGS * EPS * np.abs(here.all()).max()
@@ -259,13 +261,13 @@ def _lanes(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
 
 def _packing(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
     """The same part however its numbers are given, in whatever axes."""
-    own = [f"{bench.part.key}.{name}" for name in bench.part.parameters()]
-    others = bench.parameters | {name: OTHER * bench.parameters[name] for name in own}
+    names = [f"{bench.part.key}.{name}" for name in bench.part.parameters()]
+    others = bench.parameters | {name: OTHER * bench.parameters[name] for name in names}
     odd = np.arange(bench.count) % 2 == 1
     varied = dict(bench.parameters)
-    for name in own:
-        value, other = (np.repeat(numbers[name], bench.count, axis=0) for numbers in (bench.parameters, others))
-        varied[name] = np.where(odd.reshape(-1, *(1,) * (value.ndim - 1)), other, value)
+    for name in names:
+        value, changed = (np.repeat(numbers[name], bench.count, axis=0) for numbers in (bench.parameters, others))
+        varied[name] = np.where(odd.reshape(-1, *(1,) * (value.ndim - 1)), changed, value)
 
     def by_member() -> np.ndarray:
         shared = np.where(odd[:, None], bench.answers(bench.packed(others), bench.looks).looks, here.looks)

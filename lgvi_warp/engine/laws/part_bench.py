@@ -259,7 +259,13 @@ class _Launch:
         return np.array(out.reshape(-1, OUT_FIELDS))
 
     def launch(self, k: int, acts: int, repeats: int) -> None:
-        """Launch the kernel for all packets, some times over."""
+        """Launch the kernel for all packets, some times over.
+
+        Args:
+            k: Number of the look.
+            acts: Whether the part acts at this look, 0 or 1.
+            repeats: How many times over.
+        """
         period, laws = self.bench.period, self.laws
         inputs = [laws.params.array, laws.table.array, self.rows.array, k, k * EVERY, period / EVERY, period, acts]
         with build_lock:

@@ -47,7 +47,7 @@ class LawReport:
 
     @property
     def ok(self) -> bool:
-        """Whether all checks passed."""
+        """Whether every check of the law passed."""
         return all(check.ok for check in self.checks)
 
     def __str__(self) -> str:

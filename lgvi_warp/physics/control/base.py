@@ -56,7 +56,7 @@ class Bus(NamedTuple):
 
     @property
     def channels(self) -> int:
-        """Number of commands."""
+        """Number of commands of all actuators together."""
         return self.unmet
 
     @classmethod
@@ -387,9 +387,9 @@ class Allocation(Part):
         times = [np.full((1, self.actuator.channels), NEVER)]
         for fault in self.losses:
             time = context.parameters[f"{fault.key}.time"]
-            one = np.full((len(time), self.actuator.channels), NEVER)
-            one[:, fault.channel] = first_step(time, context.h)
-            times.append(one)
+            lost_from = np.full((len(time), self.actuator.channels), NEVER)
+            lost_from[:, fault.channel] = first_step(time, context.h)
+            times.append(lost_from)
         return np.asarray(functools.reduce(np.minimum, times))
 
     def check_actuator(self, faults: Faults) -> None:

@@ -52,7 +52,7 @@ class Callback(ControlLaw):
         return {"type": self.type, "function": name} | ({"to": self.to} if self.to else {})
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """Where the answer is."""
+        """The place of the host's answer in the memory."""
         assert self.bus is not None
         return Packed({"answer": self.bus.answer})
 

@@ -54,8 +54,8 @@ class Fault(Sending):
 
     def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
         """In addition, knows its sensor."""
-        part, other = super().wired(bus, others), others[self.of]
-        object.__setattr__(part, "sensor", other if isinstance(other, Sensor) else None)
+        part, measuring = super().wired(bus, others), others[self.of]
+        object.__setattr__(part, "sensor", measuring if isinstance(measuring, Sensor) else None)
         return part
 
     def device_in(self, aligned: bool) -> Any:

@@ -29,7 +29,7 @@ class LoopBegin(ControlLaw):
 
     @property
     def demands(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Those of the laws."""
+        """What the laws demand, whose gain is measured."""
         return tuple(self.asks)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:

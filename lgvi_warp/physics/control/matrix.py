@@ -44,7 +44,7 @@ class AllocationMatrix(Allocation):
         return f"matrix:{'lost' if self.losses else 'all'}"
 
     def reach(self) -> np.ndarray:
-        """The columns of A^+."""
+        """The pseudo-inverse of the matrix, a column for each axis."""
         return np.asarray(np.linalg.pinv(self.matrix))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:

@@ -63,7 +63,7 @@ class Waypoints(Guidance):
 
     @property
     def gives(self) -> tuple[str, ...]:
-        """Everything."""
+        """All that a reference can have."""
         return ("depth", "position", "velocity", "heading", "attitude", "angular_velocity", "speed")
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:

@@ -102,7 +102,7 @@ class ControlFins(Fins):
 
     @property
     def channels(self) -> int:
-        """One for each fin."""
+        """Number of commands, one for each fin."""
         return len(self.limit)
 
     @property

@@ -41,7 +41,7 @@ class ControlWrench(Term):
 
     @property
     def channels(self) -> int:
-        """One for each component."""
+        """Number of commands, one for each component."""
         return 6
 
     @property

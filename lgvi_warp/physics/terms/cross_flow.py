@@ -51,7 +51,16 @@ class CrossFlow(Term):
         return bool(np.any(numbers["diameters"]) and np.any(numbers["drag_coefficient"]))
 
     def braking(self, numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
-        """The derivative across the hull, strip by strip, at the whole speed and all rates together."""
+        """The derivative across the hull, strip by strip, at the whole speed and all rates together.
+
+        Args:
+            numbers: The term's numbers by field, each of shape (n, ...).
+            speeds: Sizes of velocity and angular velocity along and about the body's axes, (n, 6) [m/s, rad/s].
+            water_density: Density of the water, (n,) [kg/m3].
+
+        Returns:
+            Matrices (n, 6, 6) [N s/m, N s, N m s].
+        """
         strength = numbers["drag_coefficient"] * numbers["diameters"]
         stations, breadth = (0.5 * (table[:, 1:] + table[:, :-1]) for table in (numbers["stations"], strength))
         size = water_density[:, None] * breadth * np.diff(numbers["stations"])

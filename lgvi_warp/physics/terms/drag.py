@@ -102,7 +102,16 @@ class Drag(Term):
         return packed_matrix(matrices["linear"], matrices["quadratic"], context)
 
     def braking(self, numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
-        """The derivatives on the diagonal."""
+        """The derivatives on the diagonal.
+
+        Args:
+            numbers: The term's numbers by field, each of shape (n, ...).
+            speeds: Sizes of velocity and angular velocity along and about the body's axes, (n, 6) [m/s, rad/s].
+            water_density: Density of the water, (n,) [kg/m3].
+
+        Returns:
+            Matrices (n, 6, 6) [N s/m, N s, N m s].
+        """
         diagonal = numbers["linear"] + 2.0 * numbers["quadratic"] * speeds
         return np.asarray(diagonal[:, :, None] * np.eye(6))
 
@@ -175,7 +184,16 @@ class DragMatrix(Term):
         return packed_matrix(numbers["linear"], numbers["quadratic"], context)
 
     def braking(self, numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
-        """The derivatives, column by column."""
+        """The derivatives, column by column.
+
+        Args:
+            numbers: The term's numbers by field, each of shape (n, ...).
+            speeds: Sizes of velocity and angular velocity along and about the body's axes, (n, 6) [m/s, rad/s].
+            water_density: Density of the water, (n,) [kg/m3].
+
+        Returns:
+            Matrices (n, 6, 6) [N s/m, N s, N m s].
+        """
         return np.asarray(numbers["linear"] + 2.0 * numbers["quadratic"] * speeds[:, None, :])
 
     def device_in(self, aligned: bool) -> str:

@@ -69,7 +69,16 @@ class Fins(Term):
         return bad
 
     def braking(self, numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
-        """The derivative along each normal, at the whole speed, as if lift and both kinds of drag acted at once."""
+        """The derivative along each normal, at the whole speed, as if lift and both kinds of drag acted at once.
+
+        Args:
+            numbers: The term's numbers by field, each of shape (n, ...).
+            speeds: Sizes of velocity and angular velocity along and about the body's axes, (n, 6) [m/s, rad/s].
+            water_density: Density of the water, (n,) [kg/m3].
+
+        Returns:
+            Matrices (n, 6, 6) [N s/m, N s, N m s].
+        """
         slope = numbers["lift_slope"] + 2.0 * (numbers["drag"] + numbers["drag_normal"])
         size = 0.5 * water_density[:, None] * numbers["area"] * slope * np.linalg.norm(speeds[:, :3], axis=1)[:, None]
         normal = numbers["normal"] / np.linalg.norm(numbers["normal"], axis=-1, keepdims=True)

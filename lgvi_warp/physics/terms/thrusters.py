@@ -134,7 +134,7 @@ class Thrusters(Term):
 
     @property
     def channels(self) -> int:
-        """One for each thruster."""
+        """Number of commands, one for each thruster."""
         return len(self.coefficient)
 
     @property

@@ -15,7 +15,7 @@ import contextlib
 import json
 import os
 from collections.abc import Container, Iterator, Sequence
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -154,6 +154,21 @@ class Folder:
         """List the blocks that have no valid marker."""
         files, marked = self.block_files, safe_files.names(self.path, "blocks")
         return [b for b in self.runs if f"{name_of(b)}.json" not in marked or files.sums(b) is None]
+
+    def lost(self) -> list[str]:
+        """List the files of blocks that are not there; none is read.
+
+        A missing chunk raises no error: it reads as NaN or 0.
+
+        Returns:
+            Their paths below the store.
+        """
+        files, samples = self.block_files, self.layout.times
+        wanted = [f"blocks/{name_of(block)}.json" for block in self.runs]
+        wanted += [key for block in self.runs for column in files.columns for key in column.keys(block, samples)]
+        folders = {str(PurePosixPath(key).parent) for key in wanted}
+        present = {f"{folder}/{name}" for folder in folders for name in safe_files.names(self.path, folder)}
+        return [key for key in wanted if key not in present]
 
     def plan(self, ensemble: Ensemble | None = None) -> Plan:
         """Build the plan of the run again.

@@ -145,7 +145,7 @@ def open_run(
         The result.
 
     Raises:
-        SceneError: If there is no run, or it is not complete.
+        SceneError: If there is no run, or it is not complete, or a file of it is missing.
         IndexError: If there are no such members.
     """
     folder = Folder(folder_of(path))
@@ -156,6 +156,12 @@ def open_run(
         text = f"{folder.path}: is not complete: {missing}"
         if not incomplete:
             raise SceneError([f"{text}; go on with `lgvi-warp resume {folder.path.parent}`, or give incomplete=True"])
+        return result_of(folder, members, (*messages, text))
+    if lost := folder.lost():
+        more = f", and {len(lost) - 1:,} more" if len(lost) > 1 else ""
+        text = f"{folder.path}: {lost[0]} is missing{more}"
+        if not incomplete:
+            raise SceneError([f"{text}; mend it with `lgvi-warp resume {folder.path.parent}`, or give incomplete=True"])
         return result_of(folder, members, (*messages, text))
     observed_content = folder.provenance.get("observed")
     if members is not None or observed_content is None or (statistics is None and observed_content.get("functions")):

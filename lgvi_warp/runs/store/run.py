@@ -44,6 +44,7 @@ class StoredRun:
         enough: Tells whether this many members are enough (see run_blocks).
         last: Last stage of the run; called with this run, its members, the executor and the progress, it returns how many
             blocks it ran.
+        after: Called with each block as soon as it is in the store, in order; default nothing.
     """
 
     plan: Plan
@@ -54,6 +55,7 @@ class StoredRun:
     only: range | None = None
     enough: Callable[[int], bool] = lambda members: False
     last: Callable[[StoredRun, int, Executor, Callable[[float], None] | None], int] = lambda *_: 0
+    after: Callable[[Block], None] | None = None
 
     def run(self, executor: Executor, progress: Callable[[float], None] | None = None) -> Folder:
         """Run the blocks that are missing or damaged.
@@ -173,7 +175,9 @@ class StoredRun:
         overall = RunProgress(n * steps, progress)
         for block in set(runs) - set(left):
             overall.at(block, block.count * steps)
-        members = run_blocks(Work(self.plan, self.keepers, block_files), runs, executor, overall.at, left, self.enough)
+        members = run_blocks(
+            Work(self.plan, self.keepers, block_files), runs, executor, overall.at, left, self.enough, after=self.after
+        )
         if progress and members < runs[-1].stop:
             progress(1.0)
         return members

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from lgvi_warp.engine.block import blocks
+from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.engine.executors.base import Executor
 from lgvi_warp.engine.keepers.observation import Observation, Observing
 from lgvi_warp.engine.plan import Plan
@@ -29,6 +29,7 @@ def run_stored(
     only: range | None = None,
     observed: Observation | None = None,
     fields: Sequence[str] | None = None,
+    on_block: Callable[[Result], None] | None = None,
 ) -> Result:
     """Run the blocks of a plan into a store.
 
@@ -40,6 +41,7 @@ def run_stored(
         only: Indices of the blocks to run; default all.
         observed: What is kept; default the samples of all members. If these are not kept, the store has no samples.
         fields: Names of the fields whose samples are kept; default all of the plan.
+        on_block: Called with the result of each block of members as soon as it is in the store, in order; default nothing.
 
     Returns:
         A result that reads from the store, of the members of the blocks that were asked for.
@@ -56,8 +58,21 @@ def run_stored(
     saved_fields = plan.fields if fields is None else fields
     kept = tuple(name for name in saved_fields if store.fields is None or name in store.fields)
     content = of_store(provenance(plan, observed, kept), plan.ensemble)
+
+    def after(block: Block) -> None:
+        assert on_block is not None
+        on_block(result_of(Folder(into.folder), slice(block.first, block.stop), terms=plan.ensemble.scene.terms))
+
     folder = StoredRun(
-        plan, into, content, messages(plan), observing.keepers, only, observing.enough, KeptRun(observed, kept)
+        plan,
+        into,
+        content,
+        messages(plan),
+        observing.keepers,
+        only,
+        observing.enough,
+        KeptRun(observed, kept),
+        on_block and after,
     ).run(executor, progress)
     runs = blocks(plan.ensemble.members)
     members = None if only is None else slice(runs[only[0]].first, runs[only[-1]].stop)

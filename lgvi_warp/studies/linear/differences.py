@@ -75,8 +75,10 @@ def differences(
     most = max(1, AT_ONCE // (2 * max(count, 1)))
     for first in range(0, len(places), most):
         some = np.arange(first, min(first + most, len(places)))
-        own = {name: values[some] for name, values in (numbers or {}).items()}
-        parts.append(_differences(bench, places[some], about.of(some), k0, steps, moved, seen, motion, own, step))
+        chosen_numbers = {name: values[some] for name, values in (numbers or {}).items()}
+        parts.append(
+            _differences(bench, places[some], about.of(some), k0, steps, moved, seen, motion, chosen_numbers, step)
+        )
     return np.concatenate(parts)
 
 

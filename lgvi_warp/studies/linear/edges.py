@@ -37,7 +37,7 @@ def edges(
         far, near = np.abs(forward(np.asarray(last, float)) - begin), np.abs(forward(guess) - begin)
     up = np.where(np.asarray(last) >= np.asarray(start), 1.0, -1.0)
     good, bad = np.zeros(n), np.full(n, np.inf)
-    asked = np.flatnonzero(np.isfinite(begin))
+    sought = np.flatnonzero(np.isfinite(begin))
     known = np.isfinite(near) & (near < far)
 
     def ask(members: np.ndarray, distance: np.ndarray) -> None:
@@ -54,20 +54,22 @@ def edges(
     centre = np.where(known, near, 0.0)
     while True:
         # Those whose bracket is open above, then those whose guess lay beyond the edge.
-        above = asked[np.isinf(bad[asked]) & (good[asked] < far[asked])]
+        above = sought[np.isinf(bad[sought]) & (good[sought] < far[sought])]
         if not len(above):
             break
         ask(above, rounded(np.minimum(np.maximum(centre, good)[above] + width[above], far[above])))
         width[above] *= 2.0
     width = np.maximum(0.02 * near, least)
     while True:
-        below = asked[known[asked] & (good[asked] == 0.0) & (bad[asked] < np.inf) & (bad[asked] - width[asked] > 0.0)]
+        below = sought[
+            known[sought] & (good[sought] == 0.0) & (bad[sought] < np.inf) & (bad[sought] - width[sought] > 0.0)
+        ]
         if not len(below):
             break
         ask(below, rounded(bad[below] - width[below]))
         width[below] *= 2.0
     while True:
-        open_ = asked[(bad[asked] < np.inf) & (bad[asked] - good[asked] > narrow * (1.0 + 1e-9))]
+        open_ = sought[(bad[sought] < np.inf) & (bad[sought] - good[sought] > narrow * (1.0 + 1e-9))]
         if not len(open_):
             break
         ask(open_, rounded(0.5 * (good + bad)[open_]))

@@ -105,10 +105,10 @@ def _chosen(faults: Faults, key: str, wanted: Sequence[str], known: tuple[str, .
     """Places of names, those of whole vectors too."""
     places: list[int] = []
     for name in wanted:
-        found = [i for i, each in enumerate(known) if each == name or each.startswith(f"{name}[")]
-        if not found:
+        entries = [i for i, each in enumerate(known) if each == name or each.startswith(f"{name}[")]
+        if not entries:
             faults.keys(key, [name], known)
-        places += found
+        places += entries
     return places
 
 
@@ -157,8 +157,8 @@ def linearize(
     if closed and scene.controller is None:
         faults.add("closed", closed, "needs a controller, which this scene has not", "give [controller]")
     if closed and (period is not None or inputs != "commands"):
-        given = "period" if period is not None else "inputs"
-        faults.add(given, period or inputs, "is that of a plant", "leave it out, or closed=True")
+        misplaced = "period" if period is not None else "inputs"
+        faults.add(misplaced, period or inputs, "is that of a plant", "leave it out, or closed=True")
     if not (about is None or isinstance(about, Trim) or (closed and isinstance(about, int | float))):
         remedy = "give what lw.trim returns" + (", or a time in seconds" if closed else ", or leave it out")
         faults.add("about", about, "is no motion", remedy)
@@ -204,10 +204,15 @@ def _plant_model(
         for i in range(count)
     ]
     motion = replace(motion, memory=memory)
-    whole = differences(bench, places, motion, every, every, [*rows, *held_rows], rows, step=step)[0]
+    derivatives = differences(bench, places, motion, every, every, [*rows, *held_rows], rows, step=step)[0]
     n = 12 + len(rows)
     return _model(
-        whole[:, :n], whole[:, n:], every * bench.plan.grid.h, names_of(rows), [r.name for r in held_rows], motion
+        derivatives[:, :n],
+        derivatives[:, n:],
+        every * bench.plan.grid.h,
+        names_of(rows),
+        [r.name for r in held_rows],
+        motion,
     )
 
 
@@ -218,16 +223,16 @@ def _closed_model(scene: Scene, time: float, method: Any, h: float, step: float)
     places, begin = np.zeros(1, np.int64), k * bench.every
     motion = bench.run(places, None, 0, begin)
     rows, after = loop_rows(bench, motion.memory, k)
-    whole = differences(bench, places, motion, begin, bench.every, rows, after, step=step)[0]
+    derivatives = differences(bench, places, motion, begin, bench.every, rows, after, step=step)[0]
     names = names_of(rows)
-    pushed, inputs = np.zeros((len(whole), 0)), list[str]()
+    pushed, inputs = np.zeros((len(derivatives), 0)), list[str]()
     for key, (first, count) in bench.bus.commands.items():  # type: ignore[union-attr]
         for i in range(count):
             acting = [j for j, row in enumerate(rows) if row.key == "" and row.row in command_rows(bench, first + i)]
-            pushed = np.column_stack([pushed, whole[:, [12 + j for j in acting]].sum(axis=1)])
+            pushed = np.column_stack([pushed, derivatives[:, [12 + j for j in acting]].sum(axis=1)])
             inputs.append(f"{key}[{i}]")
-    keep = read(whole)
-    model = _model(whole[np.ix_(keep, keep)], pushed[keep], period, tuple(names[i] for i in keep), inputs, motion)
+    keep = read(derivatives)
+    model = _model(derivatives[np.ix_(keep, keep)], pushed[keep], period, tuple(names[i] for i in keep), inputs, motion)
     return model
 
 
@@ -340,8 +345,8 @@ def _model(
     A: np.ndarray, B: np.ndarray, dt: float, states: tuple[str, ...], inputs: Sequence[str], motion: Motion
 ) -> LinearModel:
     if not (np.all(np.isfinite(A)) and np.all(np.isfinite(B))):
-        what = "has no linear model: a member a little beside it fails within a period"
-        raise refusal("about", "the motion", what, "give another motion, or a shorter step")
+        problem = "has no linear model: a member a little beside it fails within a period"
+        raise refusal("about", "the motion", problem, "give another motion, or a shorter step")
     about = {name: getattr(motion, name)[0] for name in FIELDS}
     C = np.eye(12, len(A))
     return LinearModel(A, B, C, np.zeros((12, B.shape[1])), dt, states, tuple(inputs), about)

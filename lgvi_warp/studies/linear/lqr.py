@@ -50,15 +50,15 @@ class Regulator:
                 remedy = 'give lw.linearize(scene, inputs="wrench"), and .part(...) without what actuators remember'
                 faults.add(f"model.{key}", ", ".join(wrong), "is nothing that a state feedback knows", remedy)
         faults.raise_if_any()
-        whole = np.zeros((6, 12))
+        gains = np.zeros((6, 12))
         rows, columns = (
             [COMPONENTS.index(each) for each in model.inputs],
             [COORDINATES.index(each) for each in model.states],
         )
-        whole[np.ix_(rows, columns)] = self.K
+        gains[np.ix_(rows, columns)] = self.K
         # The law's error of velocity is nu - R^T v_d = d nu - v x d rotation, to first order: K x is the same with this.
-        whole[:, 3:6] += whole[:, 6:9] @ notation.hat(model.about["velocity"])
-        return StateFeedback(K=whole, name=name)
+        gains[:, 3:6] += gains[:, 6:9] @ notation.hat(model.about["velocity"])
+        return StateFeedback(K=gains, name=name)
 
 
 def lqr(model: LinearModel, Q: Any, R: Any) -> Regulator:
@@ -114,7 +114,10 @@ def _not_held(model: LinearModel) -> SceneError:
         and np.linalg.svd(np.hstack([model.A - z * np.eye(n), model.B]), compute_uv=False)[-1] < 1e-7
     ]  # fmt: skip
     which = ", ".join(f"{z:.4g}" for z in stuck) or "none far from the edge"
-    what = f"has no gains that hold every state: poles that no input moves are {which}"
+    problem = f"has no gains that hold every state: poles that no input moves are {which}"
     return refusal(
-        "model", ", ".join(model.inputs), what, "give other inputs, leave states out by .part(...), or weigh them in Q"
+        "model",
+        ", ".join(model.inputs),
+        problem,
+        "give other inputs, leave states out by .part(...), or weigh them in Q",
     )

@@ -73,25 +73,27 @@ class Margins:
         Returns:
             By name, (k,): each the margin of a member; NaN where no member settles.
         """
-        whole = self._columns()
+        columns = self._columns()
         quantiles = np.asarray(of) / 100.0
         return {
             name: np.quantile(v[self.steady], quantiles, method="inverted_cdf")
             if self.steady.any()
             else np.full(len(quantiles), np.nan)
-            for name, v in whole.items()
+            for name, v in columns.items()
         }
 
-    def curve(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+    def curve(self, name: str, by: str | None = None) -> tuple[np.ndarray, np.ndarray]:
         """The distribution of a margin for a picture: how many members have less.
 
         Args:
             name: "gain_lower", "gain_upper" or "delay".
+            by: "eigenvalues" or "runs"; None, the default, for the first of them that was asked.
 
         Returns:
             (margins of the members that settle as they are, rising; the part of them with at most that much).
         """
-        values = np.sort(self._columns()[name][self.steady])
+        columns = self._columns() if by is None else {"eigenvalues": self.values, "runs": self.by_runs}[by]
+        values = np.sort(columns[name][self.steady])
         return values, np.arange(1, len(values) + 1) / max(1, len(values))
 
     def worst(self, count: int = 10, name: str | None = None) -> np.ndarray:
@@ -104,9 +106,9 @@ class Margins:
         Returns:
             Indices (count,), the least first; members that do not settle as they are before all others.
         """
-        whole = self._columns()
-        chosen = name or ("gain_upper" if "gain_upper" in whole else "delay")
-        values = whole[chosen] * (-1.0 if chosen == "gain_lower" else 1.0)
+        columns = self._columns()
+        chosen = name or ("gain_upper" if "gain_upper" in columns else "delay")
+        values = columns[chosen] * (-1.0 if chosen == "gain_lower" else 1.0)
         return np.argsort(np.where(self.steady, values, -np.inf), kind="stable")[:count]
 
     def _columns(self) -> Mapping[str, np.ndarray]:
@@ -316,9 +318,9 @@ def _group(loops: Loops, of: Sequence[str], by: Sequence[str], most: float, long
     """(whether each settles as it is, margins by eigenvalues, margins by runs)."""
     bench, n = loops.study.bench, len(loops.places)
     alive = np.isfinite(loops.motion.position).all(axis=1)
-    every, one, own = np.flatnonzero(alive), np.ones(n), loops.delay
+    every, unity, delays_now = np.flatnonzero(alive), np.ones(n), loops.delay
     h = bench.plan.grid.h
-    last = np.minimum(round(longest / h), (MOST_PERIODS - 1) * bench.every - own)
+    last = np.minimum(round(longest / h), (MOST_PERIODS - 1) * bench.every - delays_now)
     answers: dict[str, dict[str, np.ndarray]] = {way: {} for way in WAYS}
     steady = alive.copy()
     ways: dict[str, Any] = {}
@@ -329,7 +331,7 @@ def _group(loops: Loops, of: Sequence[str], by: Sequence[str], most: float, long
     if "runs" in by and len(every):
         ways["runs"] = loops.settle
     for holds in ways.values():
-        steady[every] &= holds(one[every], own[every], every)
+        steady[every] &= holds(unity[every], delays_now[every], every)
     for way, holds in ways.items():
         known = answers["eigenvalues"]
         start = np.where(steady, 1.0, np.nan)
@@ -337,21 +339,21 @@ def _group(loops: Loops, of: Sequence[str], by: Sequence[str], most: float, long
             guesses = [known.get(name, np.full(n, np.nan)) for name in ("gain_lower", "gain_upper")]
 
             def factors(values: np.ndarray, both: np.ndarray, holds: Any = holds) -> np.ndarray:
-                return np.asarray(holds(values, own[both % n], both % n))
+                return np.asarray(holds(values, delays_now[both % n], both % n))
 
             ends = np.repeat((1.0 / most, most), n)
-            found = edges(factors, np.tile(start, 2), ends, np.concatenate(guesses), NARROW[way])
+            brackets = edges(factors, np.tile(start, 2), ends, np.concatenate(guesses), NARROW[way])
             with np.errstate(invalid="ignore"):
-                middle = np.sqrt(found[:, 0] * found[:, 1])
+                middle = np.sqrt(brackets[:, 0] * brackets[:, 1])
             answers[way]["gain_lower"], answers[way]["gain_upper"] = np.split(middle, 2)
         if "delay" in of:
 
             def delays(values: np.ndarray, some: np.ndarray, holds: Any = holds) -> np.ndarray:
-                return np.asarray(holds(one[some], own[some] + values.astype(np.int64), some))
+                return np.asarray(holds(unity[some], delays_now[some] + values.astype(np.int64), some))
 
             guess = np.rint(known["delay"] / h) if "delay" in known else np.full(n, np.nan)
-            found = edges(delays, start - 1.0, last.astype(float), guess, 1.0, whole=True)
-            held = np.where(np.isinf(found[:, 1]), np.inf, found[:, 0])
+            brackets = edges(delays, start - 1.0, last.astype(float), guess, 1.0, whole=True)
+            held = np.where(np.isinf(brackets[:, 1]), np.inf, brackets[:, 0])
             answers[way]["delay"] = np.where(steady, held * h, np.nan)
     if not ways:
         names = (("gain_lower", "gain_upper") if "gain" in of else ()) + (("delay",) if "delay" in of else ())

@@ -30,10 +30,10 @@ def delayed(bench: Bench, motion: Motion, k: int, steps: np.ndarray) -> Motion:
     """
     bus: Any = bench.bus
     memory = {key: rows.copy() for key, rows in motion.memory.items()}
-    own, count = memory[""], bus.channels
-    commands = own[:, :count]
-    own[:, bus.acting : bus.acting + 2 * count] = np.tile(commands, 2)
-    own[:, bus.acting + 2 * count] = k + steps % bench.every
+    of_bus, count = memory[""], bus.channels
+    commands = of_bus[:, :count]
+    of_bus[:, bus.acting : bus.acting + 2 * count] = np.tile(commands, 2)
+    of_bus[:, bus.acting + 2 * count] = k + steps % bench.every
     memory["controller"] = np.tile(commands, int((steps // bench.every).max()) + 2)
     return Motion(motion.position, motion.attitude, motion.velocity, motion.angular_velocity, memory)
 
@@ -66,14 +66,16 @@ class SampledLoop:
         looks, self._whole = [], np.ones(n, bool)
         for factor in (0.0, 1.0):
             numbers = {FACTOR: zero + factor, DELAY: zero}
-            whole = differences(
+            derivatives = differences(
                 bench, places, still, k, bench.every, [*terms, *acting, *parts], [*terms, *commands, *parts],
                 numbers=numbers)  # fmt: skip
-            whole = self._without_failed(whole)
+            derivatives = self._without_failed(derivatives)
             # A look sees the motion alone: what it does of x is found behind the period that was between.
-            of_motion = np.linalg.solve(np.swapaxes(whole[:, :12, :12], 1, 2), np.swapaxes(whole[:, s:, :12], 1, 2))
-            looks.append(np.concatenate([np.swapaxes(of_motion, 1, 2), whole[:, s:, s + C :]], axis=2))
-        self._P, total = whole[:, :s, :s], whole[:, :s, s : s + C]
+            of_motion = np.linalg.solve(
+                np.swapaxes(derivatives[:, :12, :12], 1, 2), np.swapaxes(derivatives[:, s:, :12], 1, 2)
+            )
+            looks.append(np.concatenate([np.swapaxes(of_motion, 1, 2), derivatives[:, s:, s + C :]], axis=2))
+        self._P, total = derivatives[:, :s, :s], derivatives[:, :s, s : s + C]
         # [u, parts] by [x, parts]: of the laws outside of the loop, and what the loop adds.
         self._look, self._more = looks[0], looks[1] - looks[0]
         self._late = [total]

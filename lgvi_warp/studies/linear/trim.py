@@ -52,7 +52,7 @@ class Trim:
 
     @property
     def free(self) -> tuple[str, ...]:
-        """Names of what was free."""
+        """Names of what was free, in the order of the values."""
         return tuple(self.values)
 
     def __str__(self) -> str:
@@ -61,8 +61,8 @@ class Trim:
         def listed(values: Mapping[str, float]) -> str:
             return ", ".join(f"{name} {value:.6g} {units.get(name, '')}".strip() for name, value in values.items())
 
-        left = f"accelerations below {np.abs(self.residual).max():.1e} m/s2, rad/s2 are left"
-        return f"steady motion: {listed(self.values)}; fixed: {listed(self.fixed)}; {left}"
+        remainder = f"accelerations below {np.abs(self.residual).max():.1e} m/s2, rad/s2 are left"
+        return f"steady motion: {listed(self.values)}; fixed: {listed(self.fixed)}; {remainder}"
 
 
 def trim(
@@ -114,14 +114,14 @@ def trim(
         if np.abs(best.fun).max() < STEADY:
             break
     x = np.zeros(0) if best is None else best.x
-    left = problem.residual(x)
-    if not np.abs(left).max() < STEADY:
-        worst = int(np.argmax(np.abs(left)))
-        what = f"has no steady motion with {', '.join(problem.free) or 'nothing'} free: "
-        what += f"{left[worst]:.3g} of the rate of {COMPONENTS[worst]} is left at the best of them"
+    accelerations = problem.residual(x)
+    if not np.abs(accelerations).max() < STEADY:
+        worst = int(np.argmax(np.abs(accelerations)))
+        problem_text = f"has no steady motion with {', '.join(problem.free) or 'nothing'} free: "
+        problem_text += f"{accelerations[worst]:.3g} of the rate of {COMPONENTS[worst]} is left at the best of them"
         remedy = "let more be free (speed=None), give actuators that can, or other ballast"
-        raise refusal("trim", "" if speed is None else f"speed {speed:g} m/s", what, remedy)
-    return problem.answer(x, left)
+        raise refusal("trim", "" if speed is None else f"speed {speed:g} m/s", problem_text, remedy)
+    return problem.answer(x, accelerations)
 
 
 def step_of(scene: Any, h: float | None) -> float:
@@ -165,8 +165,8 @@ class _Problem:
             if "speed" in fixed:
                 faults.add("fixed", "speed", "is given twice", "leave out one")
             fixed = {**fixed, "speed": speed}
-        asked = names if free is None else tuple(free)
-        chosen = [n for name in asked for n in ([c for c in channels if c.startswith(f"{name}[")] or [name])]
+        wished = names if free is None else tuple(free)
+        chosen = [n for name in wished for n in ([c for c in channels if c.startswith(f"{name}[")] or [name])]
         faults.keys("free", chosen, names)
         faults.keys("fixed", fixed, names)
         if free is not None:
@@ -183,9 +183,11 @@ class _Problem:
         R = self.origin.attitude[0]
         self.heading = float(np.arctan2(R[1, 0], R[0, 0]))
         self.names = names
-        given = scene.start.given()
+        of_start = scene.start.given()
         # A start gives either velocity.
-        self.ahead = float(np.linalg.norm(given["velocity" if "velocity" in given else "velocity_inertial"])) or 1.0
+        self.ahead = (
+            float(np.linalg.norm(of_start["velocity" if "velocity" in of_start else "velocity_inertial"])) or 1.0
+        )
 
     def guess(self, part: float) -> np.ndarray:
         """Where to begin: the speed of the start, and parts of the largest commands."""
@@ -234,7 +236,7 @@ class _Problem:
         return np.where(np.isfinite(rates), rates, 1e6)
 
     def residual(self, x: np.ndarray) -> np.ndarray:
-        """Accelerations (6,)."""
+        """Return the accelerations that are left (6,) with these numbers."""
         return self._rates(x[None])[0]
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
@@ -244,11 +246,11 @@ class _Problem:
         plus, minus = np.split(rates, 2)
         return np.asarray(((plus - minus) / (2.0 * delta[:, None])).T)
 
-    def answer(self, x: np.ndarray, left: np.ndarray) -> Trim:
+    def answer(self, x: np.ndarray, accelerations: np.ndarray) -> Trim:
         """The steady motion with these numbers."""
         motion, plan = self.motions(x[None]), self.bench.plan
         start = Start(position=motion.position[0], attitude=motion.attitude[0], velocity=motion.velocity[0])
         values = dict(zip(self.free, map(float, x), strict=True))
         commands = {key: each for key, each in self.commands(self.values | values).items()}
         fixed = {name: self.values[name] for name in self.names if name not in values}
-        return Trim(start, commands, values, fixed, left, plan.method, plan.grid.h)
+        return Trim(start, commands, values, fixed, accelerations, plan.method, plan.grid.h)

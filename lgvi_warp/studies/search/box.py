@@ -92,19 +92,19 @@ class Box:
 
 @dataclass(frozen=True)
 class Found:
-    """What a search found.
+    """The best candidate of a search.
 
     Attributes:
         at: (d,), place in the unit cube.
         cost: its cost.
         restarts: (r,), the least cost of each evolution.
-        asked: number of candidates that were asked.
+        runs: number of candidates that were tried.
     """
 
     at: np.ndarray
     cost: float
     restarts: np.ndarray
-    asked: int
+    runs: int
 
 
 class _Asked:

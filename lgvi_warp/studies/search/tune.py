@@ -11,14 +11,15 @@ import numpy as np
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.physics.fields import FIELDS
-from lgvi_warp.runs.prepared import Prepared, prepare, scene_value
+from lgvi_warp.runs.prepared import scene_value
 from lgvi_warp.runs.quantities import OfInterest
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
+from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.studies.members import ensemble_of
 from lgvi_warp.studies.search.box import LEAST, POPULATION, Box, search
+from lgvi_warp.studies.search.numbers import Numbers
 from lgvi_warp.studies.search.risk import risk_of
-from lgvi_warp.studies.search.worst_case import one_number
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ class Tuned:
 def tune(
     fleet: Ensemble | Scene,
     over: Mapping[str, Any],
-    minimise: OfInterest,
+    minimise: OfInterest | Statistic | Mapping[str, Any],
     *,
     risk: Any = "mean",
     budget: int = 100_000,
@@ -94,7 +95,8 @@ def tune(
     Args:
         fleet: The members, drawn by distributions; or a Scene, whose [ensemble] is meant.
         over: (low, high), or (low, high, "log"), of each number by name: {"heading_pid.kp": (0.1, 10.0, "log")}.
-        minimise: A quantity of one number of each member, as of `lw.prepare`: the cost.
+        minimise: The cost, one number of each member: a quantity, as of `lw.prepare`; or a metric, as of `lw.sweep`:
+            "iae depth", lw.SettlingTime("depth", within=0.5).
         risk: "mean", the default; the level of a quantity's quantile, such as 0.95; or `lw.CVaR(0.05)`, the mean of the worst
             5 %. A member that fails has an infinite cost.
         budget: Number of members that the search may run, those of all candidates together; 100,000 by default.
@@ -128,53 +130,51 @@ def tune(
         faults.add("fresh", fresh, "is no number of members", "give a whole number, 0 for none")
     faults.raise_if_any()
     assert box is not None
-    run = prepare(scene, None, minimise, failed="nan", **settings)
-    costs, asked, report = _Costs(run, ensemble, box), 0, callback(progress)
+    numbers_of = Numbers(scene, None, "minimise", minimise, settings)
+    costs, runs, report = _Costs(numbers_of, ensemble, box), 0, callback(progress)
 
     def cost(inside: np.ndarray) -> np.ndarray:
-        nonlocal asked
+        nonlocal runs
         answer = measure(costs(box.values(inside)))
-        asked += n * len(inside)
+        runs += n * len(inside)
         if report:
-            report(min(1.0, asked / budget))
+            report(min(1.0, runs / budget))
         return np.asarray(answer)
 
-    found = search(cost, len(box.names), budget // n, seed, restarts)
-    best = box.values(found.at[None])
+    optimum = search(cost, len(box.names), budget // n, seed, restarts)
+    best = box.values(optimum.at[None])
     before = np.array([[float(scene_value(scene, name)) for name in box.names]])
     count = 4 * n if fresh is None else fresh
     drawn = ensemble.sampling.kind == "random" and bool(ensemble.vary) and not ensemble.explicit()
     fresh_costs = np.full(2, np.nan)
     if drawn and count:
-        others = _Costs(run, ensemble.with_seed(ensemble.seed + 1, count), box)
+        others = _Costs(numbers_of, ensemble.with_seed(ensemble.seed + 1, count), box)
         fresh_costs = np.array([float(measure(others(numbers))[0]) for numbers in (best, before)])
     values = dict(zip(box.names, map(float, best[0]), strict=True))
     at_bounds = tuple(
         name for name, v, low, high in zip(box.names, best[0], box.low, box.high, strict=True) if v in (low, high)
     )
-    label = minimise if isinstance(minimise, str) else getattr(minimise, "__name__", str(minimise))
-    runs = found.asked * n + (2 * count if drawn else 0)
     return Tuned(
         parameters=values,
         before=dict(zip(box.names, map(float, before[0]), strict=True)),
-        cost=found.cost,
+        cost=optimum.cost,
         fresh_cost=float(fresh_costs[0]),
         fresh_before=float(fresh_costs[1]),
-        of=label,
+        of=numbers_of.label,
         risk=str(measure),
         members=n,
         fresh=count if drawn else 0,
         at_bounds=at_bounds,
-        restarts=found.restarts,
-        runs=runs,
+        restarts=optimum.restarts,
+        runs=runs + (2 * count if drawn else 0),
     )
 
 
 class _Costs:
     """Costs of candidates (k, d), of each member: (k, members)."""
 
-    def __init__(self, run: Prepared, fleet: Ensemble, box: Box):
-        self._run, self._box, self._members, n = run, box, fleet.select(0, fleet.members), fleet.members
+    def __init__(self, numbers_of: Numbers, fleet: Ensemble, box: Box):
+        self._numbers_of, self._box, self._members, n = numbers_of, box, fleet.select(0, fleet.members), fleet.members
         self._own = {
             name: np.broadcast_to(v, (n, *v.shape[1:]))
             for name in fleet.varied()
@@ -188,6 +188,6 @@ class _Costs:
         states: Any = {name: getattr(members, name)[every] for name in FIELDS}
         parameters = {name: v[every] for name, v in self._own.items()}
         parameters |= dict(zip(self._box.names, np.repeat(candidates, n, axis=0).T, strict=True))
-        answer = self._run.states(**states, parameters=parameters, indices=members.indices[every], seed=members.seed)
-        costs = one_number(answer)
+        noise: Any = {"indices": members.indices[every], "seed": members.seed}
+        costs = self._numbers_of(lambda run: run.states(**states, parameters=parameters, **noise))
         return np.where(np.isnan(costs), np.inf, costs).reshape(k, n)

@@ -11,13 +11,14 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.progress import callback, shows_progress
-from lgvi_warp.runs.prepared import prepare
 from lgvi_warp.runs.quantities import OfInterest
 from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
+from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.studies.members import scene_of
 from lgvi_warp.studies.search.box import LEAST, POPULATION, Box, search
+from lgvi_warp.studies.search.numbers import Numbers
 
 WORST = ("largest", "smallest")
 
@@ -35,6 +36,7 @@ class WorstCase:
         restarts: (r,), the worst value of each evolution: where they differ, more may be found.
         runs: number of members that were run.
         fleet: the member, to run it again.
+        of_metric: whether the quantity is a metric, which is infinite where a loop never gets there; by default False.
     """
 
     parameters: Mapping[str, float]
@@ -45,6 +47,7 @@ class WorstCase:
     restarts: np.ndarray
     runs: int
     fleet: Ensemble
+    of_metric: bool = False
 
     def __str__(self) -> str:
         where = ", ".join(
@@ -52,7 +55,8 @@ class WorstCase:
             for name, value in self.parameters.items()
         )
         if math.isinf(self.value):
-            return f"a member fails: {where}; found in {self.runs} runs"
+            event = f"{self.of} is infinite, or a member fails" if self.of_metric else "a member fails"
+            return f"{event}: {where}; found in {self.runs} runs"
         bound = "a lower bound of the largest" if self.worst == "largest" else "an upper bound of the smallest"
         each = ", ".join(f"{value:.6g}" for value in self.restarts)
         return f"{self.of} = {self.value:.6g} at {where}: {bound}, after {self.runs} runs; restarts: {each}"
@@ -62,7 +66,7 @@ class WorstCase:
 def worst_case(
     fleet: Scene | Ensemble,
     within: Mapping[str, Any],
-    of: OfInterest,
+    of: OfInterest | Statistic | Mapping[str, Any],
     *,
     worst: str = "largest",
     budget: int = 20_000,
@@ -80,7 +84,8 @@ def worst_case(
         fleet: A Scene or an Ensemble, whose scene is meant: numbers that are not searched are the scene's.
         within: (low, high) of each number by name, such as {"vehicle.buoyancy": (297.0, 302.0)}; (low, high, "log") where
             the search should go by the logarithm.
-        of: A quantity of one number, as of `lw.prepare`: "max(depth)", a Quantity, a function of a Result.
+        of: A quantity of one number, as of `lw.prepare`: "max(depth)", a Quantity, a function of a Result; or a metric, as of
+            `lw.sweep`: "overshoot depth", lw.SettlingTime("depth", within=0.5).
         worst: "largest", the default, or "smallest". A member that fails is worse than all others, and ends the search.
         budget: Number of members that may be run; 20,000 by default.
         restarts: Number of evolutions; 3 by default, fewer where the budget is small.
@@ -106,46 +111,26 @@ def worst_case(
         faults.add("budget", budget, "is less than a generation", f"give {least} or more")
     faults.raise_if_any()
     assert box is not None
-    run = prepare(scene, list(box.names), of, failed="nan", common_noise=True, **settings)
-    sign, asked, report = (-1.0 if worst == "largest" else 1.0), 0, callback(progress)
+    numbers_of = Numbers(scene, list(box.names), "of", of, {**settings, "common_noise": True})
+    sign, runs, report = (-1.0 if worst == "largest" else 1.0), 0, callback(progress)
 
     def cost(inside: np.ndarray) -> np.ndarray:
-        nonlocal asked
-        values = one_number(run(box.values(inside)))
-        asked += len(inside)
+        nonlocal runs
+        values = numbers_of(lambda run: run(box.values(inside)))
+        runs += len(inside)
         if report:
-            report(min(1.0, asked / budget))
+            report(min(1.0, runs / budget))
         return np.where(np.isnan(values), -np.inf, sign * values)
 
-    found = search(cost, len(box.names), budget, seed, restarts, good_enough=-np.finfo(float).max)
-    numbers = box.values(found.at[None])[0]
+    best = search(cost, len(box.names), budget, seed, restarts, good_enough=-np.finfo(float).max)
+    numbers = box.values(best.at[None])[0]
     sides = {
         name: "low" if value == low else "high" if value == high else ""
         for name, value, low, high in zip(box.names, numbers, box.low, box.high, strict=True)
     }
     parameters = dict(zip(box.names, map(float, numbers), strict=True))
     member = Ensemble(scene, None, 0, None, Table(values={name: [value] for name, value in parameters.items()}))
-    label = of if isinstance(of, str) else getattr(of, "__name__", str(of))
     # A search by the sign; a failure is infinite whatever is worst.
-    value = math.inf if math.isinf(found.cost) else sign * found.cost
-    return WorstCase(parameters, value, label, worst, sides, sign * found.restarts, found.asked, member)
-
-
-def one_number(values: Any) -> np.ndarray:
-    """The quantity of each member, refused where it has several numbers.
-
-    Args:
-        values: what a prepared run returns.
-
-    Returns:
-        (n,).
-
-    Raises:
-        SceneError: where members have several numbers.
-    """
-    array = np.asarray(values)
-    faults = Faults()
-    if array.ndim != 1:
-        faults.add("of", f"{array.shape[1]} numbers", "is not a single number", "name one of its entries")
-    faults.raise_if_any()
-    return array
+    value = math.inf if math.isinf(best.cost) else sign * best.cost
+    label, of_metric = numbers_of.label, numbers_of.of_metric
+    return WorstCase(parameters, value, label, worst, sides, sign * best.restarts, best.runs, member, of_metric)

@@ -9,6 +9,8 @@ one; the ending chooses the format.
 
 from lgvi_warp.views.plots.bars import sensitivity
 from lgvi_warp.views.plots.canvas import figure_class, save_figure
+from lgvi_warp.views.plots.costs import scaling, term_cost
+from lgvi_warp.views.plots.edges import margins
 from lgvi_warp.views.plots.ends import histogram, outcomes, pairs
 from lgvi_warp.views.plots.estimates import drawable, statistics
 from lgvi_warp.views.plots.fans import compare, fan
@@ -27,6 +29,7 @@ __all__ = [
     "fan",
     "figure_class",
     "histogram",
+    "margins",
     "outcomes",
     "pairs",
     "paths",
@@ -38,9 +41,11 @@ __all__ = [
     "plot_statistics",
     "plot_tradeoff",
     "save_figure",
+    "scaling",
     "sensitivity",
     "stability",
     "statistics",
     "summary",
+    "term_cost",
     "tradeoff",
 ]

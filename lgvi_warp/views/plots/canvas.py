@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import textwrap
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,6 +29,8 @@ GREY = "#9A9A9A"
 # Points of text to an inch of width: 8.75 pixels where the picture is 700 pixels wide.
 TEXT = 0.9
 LEAST_TEXT = 9.0
+# Matplotlib's settings are those of the process, and pictures are drawn side by side in threads; one picture draws in another.
+LOCK = threading.RLock()
 DPI = 100
 
 
@@ -116,20 +119,19 @@ def panels(
         OSError: The file cannot be written.
     """
     of_class = figure_class()
-    own = figure is None
-    figure = of_class(figsize=size, layout="constrained") if own else figure
-    with drawing(figure, path, own):
-        yield figure.subplots(*shape, squeeze=False, **options)
+    target = of_class(figsize=size, layout="constrained") if figure is None else figure
+    with drawing(target, path, figure is None):
+        yield target.subplots(*shape, squeeze=False, **options)
 
 
 @contextmanager
-def drawing(figure: Any, path: str | os.PathLike[str] | None, own: bool) -> Iterator[None]:
+def drawing(figure: Any, path: str | os.PathLike[str] | None, sized: bool) -> Iterator[None]:
     """Draw with text that can be read in a small picture; then write the file.
 
     Args:
         figure: Matplotlib's figure.
         path: The file; None for none.
-        own: Whether the figure is no user's, so that its ticks are sized too.
+        sized: Whether the figure is no user's, so that its ticks are sized too.
     """
     import matplotlib as mpl
 
@@ -145,9 +147,9 @@ def drawing(figure: Any, path: str | os.PathLike[str] | None, own: bool) -> Iter
         ),
         size,
     ) | dict.fromkeys(("axes.titlesize", "figure.titlesize"), 1.1 * size)
-    with mpl.rc_context(settings | {"hatch.linewidth": 0.6, "pdf.fonttype": 42}):
+    with LOCK, mpl.rc_context(settings | {"hatch.linewidth": 0.6, "pdf.fonttype": 42}):
         yield
-        if own:
+        if sized:
             for axes in figure.axes:
                 axes.tick_params(which="both", labelsize=size)
         if path is not None:
@@ -232,6 +234,19 @@ def hatch(i: int) -> str:
     return HATCHES[i % len(HATCHES)]
 
 
+def band(low: float, high: float) -> str:
+    """Name the band between two quantiles.
+
+    Args:
+        low: Lower level, from 0 to 1.
+        high: Upper level.
+
+    Returns:
+        What part of the members it holds, as "90%" or "99.8%".
+    """
+    return f"{100.0 * (high - low):.4g}%"
+
+
 # Ground of words on lines.
 PALE = {"facecolor": "white", "alpha": 0.8, "linewidth": 0, "pad": 1.0}
 # The surface and the floor are drawn where they are within this share of the depths shown.
@@ -259,9 +274,8 @@ def point_down(axes: Any, floors: tuple[float, ...] = ()) -> None:
             )
         elif name == "surface":
             far, place = (f"surface {low:.3g} m above", 0.98) if low > 0.0 else (f"surface {-high:.3g} m below", 0.02)
-            axes.text(
-                0.99, place, far, color=color, ha="right", va="top" if low > 0.0 else "bottom", transform=axes.transAxes
-            )
+            axes.text(0.99, place, far, color=color, ha="right", va="top" if low > 0.0 else "bottom",
+                      transform=axes.transAxes, bbox=PALE)  # fmt: skip
     axes.set_ylim(high, low)
 
 

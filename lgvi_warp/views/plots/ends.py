@@ -11,14 +11,16 @@ import numpy as np
 from lgvi_warp.common.errors import NothingToDraw, refusal
 from lgvi_warp.common.status import Status, stop_time
 from lgvi_warp.runs import outcomes as ended_so
-from lgvi_warp.runs.quantities import quantities
+from lgvi_warp.runs.quantities import OfResult, quantities
 from lgvi_warp.views.choice import shown
 from lgvi_warp.views.fleet import LOOKS, title
 from lgvi_warp.views.plots.canvas import COLORS, below, hatch, mark, panel, panels, point_down, wrapped
-from lgvi_warp.views.plots.read import DEPTHS, WORDS, at_one_time, estimate_for, floors, some_of, unit_of, with_samples
+from lgvi_warp.views.plots.read import at_one_time, estimate_for, with_samples
+from lgvi_warp.views.plots.words import DEPTHS, WORDS, floors, some_of, unit_of
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
+    from lgvi_warp.statistics.estimate import Estimate
 
 # Times at which shares are drawn where members end.
 TIMES = 400
@@ -102,36 +104,12 @@ def histogram(
     """
     (meaning,) = quantities([of])
     estimate = None if result.samples else estimate_for(result, meaning.label, ("histogram",))
-    if estimate is not None:
-        statistic, component = estimate
-        frame = _nearest(statistic.time, at)
-        edges, when, unit = statistic.coordinates["edge"], statistic.time[frame], unit_of(meaning.label)
-        outside = int(statistic["below"][frame, component] + statistic["above"][frame, component])
-        label = f"{int(statistic.count[frame]):,} members" + (
-            f", {outside:,} of them outside the bins" if outside else ""
-        )
-        bars = {label: (100.0 * statistic.value[frame, component], COLORS[0])}
-    else:
-        result = with_samples(result)
-        members, frame = shown(result).ranked, _nearest(result.time, at)
-        values, labels, unit = at_one_time(result, meaning, members, frame)
-        if len(labels) > 1:
-            raise refusal("of", of, f"has {len(labels)} components", f"name one: {', '.join(labels)}")
-        when, finite = result.time[frame], np.isfinite(values[:, 0])
-        if not finite.any():
-            raise NothingToDraw(f"no member has a finite {meaning.label}: there is nothing to draw; see result.status")
-        edges = _edges(values[finite, 0])
-        bars = {}
-        for code, group in _groups(result, members, when):
-            share = np.histogram(values[finite & group, 0], edges)[0] * (100.0 / len(members))
-            bars[f"{'under way' if code == Status.OK else code.name.lower()} ({int(group.sum()):,})"] = (
-                share,
-                LOOKS[code].color,
-            )
+    result = result if estimate else with_samples(result)
+    edges, when, unit, shares = _gathered(*estimate, at) if estimate else _counted(result, meaning, at)
     down = meaning.label in DEPTHS
     with panel(ax, path) as axes:
         base = np.zeros(len(edges) - 1)
-        for i, (label, (share, color)) in enumerate(bars.items()):
+        for i, (label, (share, color)) in enumerate(shares.items()):
             look = {
                 "color": color,
                 "hatch": hatch(i),
@@ -140,10 +118,8 @@ def histogram(
                 "align": "edge",
                 "label": label,
             }
-            if down:
-                axes.barh(edges[:-1], share, np.diff(edges), left=base, **look)
-            else:
-                axes.bar(edges[:-1], share, np.diff(edges), bottom=base, **look)
+            draw, start = (axes.barh, {"left": base}) if down else (axes.bar, {"bottom": base})
+            draw(edges[:-1], share, np.diff(edges), **start, **look)
             base = base + share
         name, count = f"{meaning.label} [{unit or '1'}]", "share of members [%]"
         axes.set(xlabel=count if down else name, ylabel=f"{name}, down" if down else count)
@@ -152,6 +128,40 @@ def histogram(
             point_down(axes, floors(result))
         below(axes, ncols=3)
     return axes
+
+
+# Edges of bins, the time [s], the unit, and by label of a group of members its share [%] in each bin and its colour.
+Shares = tuple[np.ndarray, float, str, dict[str, tuple[np.ndarray, str]]]
+
+
+def _gathered(statistic: Estimate, component: int, at: float | None) -> Shares:
+    """What a statistic lw.Histogram counted at the time nearest to `at`."""
+    frame = _nearest(statistic.time, at)
+    outside = int(statistic["below"][frame, component] + statistic["above"][frame, component])
+    more = f", {outside:,} of them outside the bins" if outside else ""
+    share = 100.0 * statistic.value[frame, component]
+    unit = unit_of(str(statistic.coordinates["component"][component]))
+    shares = {f"{int(statistic.count[frame]):,} members{more}": (share, COLORS[0])}
+    return statistic.coordinates["edge"], float(statistic.time[frame]), unit, shares
+
+
+def _counted(result: Result, of: OfResult, at: float | None) -> Shares:
+    """Members counted in bins at the sample nearest to `at`, by what had become of them."""
+    members, frame = shown(result).ranked, _nearest(result.time, at)
+    values, labels, unit = at_one_time(result, of, members, frame)
+    if len(labels) > 1:
+        raise refusal("of", of.label, f"has {len(labels)} components", f"name one: {', '.join(labels)}")
+    when, finite = float(result.time[frame]), np.isfinite(values[:, 0])
+    if not finite.any():
+        raise NothingToDraw(f"no member has a finite {of.label}: there is nothing to draw; see result.status")
+    edges, shares = _edges(values[finite, 0]), {}
+    for code, group in _groups(result, members, when):
+        share = np.histogram(values[finite & group, 0], edges)[0] * (100.0 / len(members))
+        shares[f"{'under way' if code == Status.OK else code.name.lower()} ({int(group.sum()):,})"] = (
+            share,
+            LOOKS[code].color,
+        )
+    return edges, when, unit, shares
 
 
 def _edges(values: np.ndarray) -> np.ndarray:

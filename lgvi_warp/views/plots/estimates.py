@@ -10,8 +10,8 @@ import numpy as np
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views.choice import of_members
 from lgvi_warp.views.fleet import members_of_run
-from lgvi_warp.views.plots.canvas import COLORS, hatch, panels, point_down, style, wrapped
-from lgvi_warp.views.plots.read import DEPTHS, floors, unit_of
+from lgvi_warp.views.plots.canvas import COLORS, band, hatch, panels, point_down, style, wrapped
+from lgvi_warp.views.plots.words import DEPTHS, floors, unit_of
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
@@ -55,8 +55,8 @@ def statistics(result: Result, *, figure: Any = None, path: str | os.PathLike[st
         for axes in grid.flat[len(drawn) :]:
             axes.set_axis_off()
         names = {estimate.name for estimate in drawn}
-        left = [name for name in result.statistics if name not in names]
-        more = f"; not drawn, see the table: {', '.join(left)}" if left else ""
+        omitted = [name for name in result.statistics if name not in names]
+        more = f"; not drawn, see the table: {', '.join(omitted)}" if omitted else ""
         text = f"{of_members(result.members, members_of_run(result))}, intervals of {drawn[0].confidence:.0%}{more}"
         grid[0, 0].figure.suptitle(wrapped(text, grid[0, 0].figure))
     return grid.ravel()[: len(drawn)]
@@ -96,7 +96,7 @@ def _levels_panel(axes: Any, one: Estimate) -> None:
     for c in range(min(one.value.shape[2], LINES)):
         look, values = style(c), one.value[:, :, c]
         for i in range(len(levels) // 2):
-            label = f"{levels[-1 - i] - levels[i]:.0%}" if c == 0 else None
+            label = band(levels[i], levels[-1 - i]) if c == 0 else None
             axes.fill_between(one.time, values[:, i], values[:, -1 - i], facecolor=look["color"], alpha=0.15 * (i + 1),
                               hatch=hatch(c + i), edgecolor=look["color"], linewidth=0, label=label)  # fmt: skip
         if len(levels) % 2:

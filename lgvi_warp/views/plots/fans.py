@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,19 +15,9 @@ from lgvi_warp.runs.outcomes import outcomes
 from lgvi_warp.statistics.quantity import Quantity
 from lgvi_warp.views.choice import mixed, of_members
 from lgvi_warp.views.fleet import members_of_run, title
-from lgvi_warp.views.plots.canvas import COLORS, TINTS, below, hatch, mark, panel, point_down, style, wrapped
-from lgvi_warp.views.plots.read import (
-    HINT,
-    Survey,
-    estimate_for,
-    floors,
-    is_depth,
-    label_of,
-    quantity_of,
-    survey_of,
-    unbounded_text,
-    with_samples,
-)
+from lgvi_warp.views.plots.canvas import COLORS, TINTS, band, below, hatch, mark, panel, point_down, style, wrapped
+from lgvi_warp.views.plots.read import Survey, estimate_for, quantity_of, survey_of, unbounded_text, with_samples
+from lgvi_warp.views.plots.words import HINT, floors, is_depth, label_of
 from lgvi_warp.views.recording.drawn import at_levels
 
 if TYPE_CHECKING:
@@ -164,7 +155,7 @@ def draw_bands(axes: Any, time: np.ndarray, values: np.ndarray, counted: np.ndar
     curves = dict(zip(levels, at_levels(values, counted, levels), strict=True))
     curves[0.0], curves[1.0] = look.pop("low", curves[0.0]), look.pop("high", curves[1.0])
     for (low, high), color in zip(BANDS, TINTS, strict=True):
-        label = "all" if low == 0.0 else f"{high - low:.0%}"
+        label = "all" if low == 0.0 else band(low, high)
         axes.fill_between(time, curves[low], curves[high], color=color, linewidth=0, label=label)
     axes.plot(time, curves[0.5], color="black", linewidth=1.2, label="median", **look)
 
@@ -187,10 +178,12 @@ def _draw_estimate(axes: Any, estimate: Estimate, component: int) -> None:
         levels, values = estimate.coordinates["level"], estimate.value[:, :, component]
         pairs = len(levels) // 2
         for i in range(pairs):
-            color, label = TINTS[max(0, len(TINTS) - pairs + i)], f"{levels[-1 - i] - levels[i]:.0%}"
+            color, label = TINTS[max(0, len(TINTS) - pairs + i)], band(levels[i], levels[-1 - i])
             axes.fill_between(time, values[:, i], values[:, -1 - i], color=color, linewidth=0, label=label)
         if len(levels) % 2:
-            axes.plot(time, values[:, pairs], color="black", linewidth=1.2, label=f"{levels[pairs]:.0%} quantile")
+            axes.plot(
+                time, values[:, pairs], color="black", linewidth=1.2, label=f"{band(0.0, levels[pairs])} quantile"
+            )
     elif kind == "mean":
         low, high = estimate.lower[:, component], estimate.upper[:, component]
         axes.fill_between(time, low, high, color=TINTS[1], linewidth=0, label=f"its {estimate.confidence:.0%} interval")
@@ -206,6 +199,8 @@ def compare(
 ) -> Any:
     """Draw one number of several runs against time: a median and a band of 90 % of the members under way for each.
 
+    Without samples a run is drawn by its statistics `lw.Quantiles` or `lw.Mean` of the quantity.
+
     Args:
         results: Results by label.
         of: Name of the quantity or of one component, or a `lw.Quantity`; default "depth".
@@ -217,37 +212,69 @@ def compare(
 
     Raises:
         ImportError: Matplotlib is not installed (extra: viz).
-        NothingToDraw: Of some run nothing of the quantity was kept, or no member has a finite number.
+        NothingToDraw: Of some run nothing of the quantity was kept or gathered, or no member has a finite number.
         SceneError: There are no results, or the quantity is not known or has several components.
         OSError: The file cannot be written.
     """
     if not results:
         raise refusal("results", results, "holds no result", "give results by label: {'a': a, 'b': b}")
     meaning = quantity_of(of)
-    surveys = {label: survey_of(with_samples(result), meaning) for label, result in results.items()}
+    curves = {label: _curve_of(result, meaning) for label, result in results.items()}
     with panel(ax, path) as axes:
-        for i, (label, survey) in enumerate(surveys.items()):
-            low, middle, high = at_levels(survey.values, survey.counted, [0.05, 0.5, 0.95])
-            look = style(i)
-            if survey.total > 1:
-                axes.fill_between(
-                    survey.time,
-                    low,
-                    high,
-                    facecolor=look["color"],
-                    alpha=0.2,
-                    hatch=hatch(i),
-                    edgecolor=look["color"],
-                    linewidth=0,
-                )
-            members = text_of(survey, members_of_run(results[label])).replace("\n", " ")
-            axes.plot(
-                survey.time, middle, marker="o" if len(survey.time) < 3 else "", label=f"{label}: {members}", **look
-            )
+        for i, (label, curve) in enumerate(curves.items()):
+            look, marker = style(i), "o" if len(curve.time) < 3 else ""
+            if curve.banded:
+                axes.fill_between(curve.time, curve.low, curve.high, facecolor=look["color"], alpha=0.2, hatch=hatch(i),
+                                  edgecolor=look["color"], linewidth=0)  # fmt: skip
+            axes.plot(curve.time, curve.middle, marker=marker, label=f"{label}: {curve.text}", **look)
         axes.set(xlabel="time [s]", ylabel=label_of(meaning))
         axes.grid(True, alpha=0.3)
         if is_depth(meaning):
             point_down(axes, tuple({depth for result in results.values() for depth in floors(result)}))
-        several = any(survey.total > 1 for survey in surveys.values())
-        below(axes, title="median, and band of 90 % of the members under way" if several else None)
+        sampled = any(curve.banded and not curve.from_statistics for curve in curves.values())
+        below(axes, title="median, and band of 90 % of the members under way" if sampled else None)
     return axes
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """A number of one of several runs against time.
+
+    Attributes:
+        time: Times [s], shape (k,).
+        low: Lower edge of the band, shape (k,).
+        middle: The line, shape (k,).
+        high: Upper edge of the band, shape (k,).
+        text: Of how many members it is, and of what statistic if it is of one.
+        banded: Whether there is a band: one vehicle has none.
+        from_statistics: Whether it is of a statistic, since no samples were kept.
+    """
+
+    time: np.ndarray
+    low: np.ndarray
+    middle: np.ndarray
+    high: np.ndarray
+    text: str
+    banded: bool
+    from_statistics: bool
+
+
+def _curve_of(result: Result, of: Quantity) -> Curve:
+    """The median and the middle 90 % of the members under way, or without samples what quantiles or a mean tell."""
+    estimate = None if result.samples else estimate_for(result, of.name, STANDING[:2])
+    if estimate is None:
+        survey = survey_of(with_samples(result), of)
+        low, middle, high = at_levels(survey.values, survey.counted, [0.05, 0.5, 0.95])
+        text = text_of(survey, members_of_run(result)).replace("\n", " ")
+        return Curve(survey.time, low, middle, high, text, survey.total > 1, False)
+    statistic, component = estimate
+    members = of_members(result.members, members_of_run(result))
+    if statistic.settings["type"] == "mean":
+        edges = statistic.lower[:, component], statistic.value[:, component], statistic.upper[:, component]
+        text = f"{members}, mean and its {statistic.confidence:.0%} interval"
+    else:
+        levels, values = statistic.coordinates["level"], statistic.value[:, :, component]
+        center = int(np.abs(levels - 0.5).argmin())
+        edges = values[:, 0], values[:, center], values[:, -1]
+        text = f"{members}, {band(0.0, levels[center])} quantile, and band of {band(levels[0], levels[-1])}"
+    return Curve(statistic.time, *edges, text, True, True)

@@ -49,6 +49,8 @@ def stability(found: StabilityMap, *, figure: Any = None, path: str | os.PathLik
             axes.set_ylabel(f"{found.y.label} [{found.y.unit}]")
         for axes in grid.flat[n:]:
             axes.set_visible(False)
+        for axes in grid.flat[n - columns : n]:  # with nothing below
+            axes.tick_params(labelbottom=True)
         figure = grid[0, 0].figure
         _legend(figure, drawn)
         scene = f"accurate: {found.of} to {found.error_bound:g} {found.unit} up to {found.error_time:.3g} s"

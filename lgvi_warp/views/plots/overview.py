@@ -11,12 +11,12 @@ from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import under_way
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics.fields import FIELDS
-from lgvi_warp.views.choice import AT_ONCE, few, shown
+from lgvi_warp.views.choice import AT_ONCE
 from lgvi_warp.views.fleet import members_of_run, title
 from lgvi_warp.views.plots.canvas import below, panel, panels, style, wrapped
 from lgvi_warp.views.plots.estimates import statistics
 from lgvi_warp.views.plots.fans import draw_fan, notes_on, text_of
-from lgvi_warp.views.plots.read import check_fields, energy_of, quantity_of, with_samples
+from lgvi_warp.views.plots.read import check_fields, energy_of, quantity_of, selected, with_samples
 from lgvi_warp.views.plots.tracks import draw_paths
 
 if TYPE_CHECKING:
@@ -50,10 +50,10 @@ def summary(result: Result, *, figure: Any = None, path: str | os.PathLike[str] 
         return statistics(result, figure=figure, path=path)
     result = with_samples(result)
     check_fields(result, ("position",), "a summary")
-    whole = set(FIELDS) <= set(result.samples)
-    with panels(figure, path, (1, 3 if whole else 2), (15.0 if whole else 10.0, 5.6)) as grid:
+    with_energy = set(FIELDS) <= set(result.samples)
+    with panels(figure, path, (1, 3 if with_energy else 2), (15.0 if with_energy else 10.0, 5.6)) as grid:
         axes, lines = grid[0], [title(result)]
-        fans = [("Depth", quantity_of("depth"))] + [("", energy_of(result))] * whole
+        fans = [("Depth", quantity_of("depth"))] + [("", energy_of(result))] * with_energy
         for panel_axes, (name, of) in zip(axes, fans, strict=False):
             survey = draw_fan(panel_axes, result, of)
             lines += notes_on(result, survey)
@@ -82,14 +82,11 @@ def drift(result: Result, *, ax: Any = None, path: str | os.PathLike[str] | None
         NothingToDraw: The laws conserve nothing, or fields of the motion were not kept.
         OSError: The file cannot be written.
     """
-    result = with_samples(result)
-    check_fields(result, FIELDS, "the drift")
+    result, choice, some = selected(result, MOST_FOLLOWED, tuple(FIELDS), "the drift")
     kept = sorted(invariants.conserved(result))
     if not kept:
         work = ", ".join(invariants.at_work(result))
         raise NothingToDraw(f"nothing is conserved, since {work} does work: draw lw.plots.fan(result, 'energy')")
-    choice = shown(result, MOST_FOLLOWED)
-    some = few(result, choice.members, FIELDS, choice.frames)
     counted = under_way(some)
     head = f"Drift of {choice.text}" if len(choice.members) < result.members else "Drift"
     with panel(ax, path) as axes:

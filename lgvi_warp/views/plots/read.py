@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import NothingToDraw, SceneError, refusal
+from lgvi_warp.common.errors import NothingToDraw, refusal
 from lgvi_warp.common.status import under_way
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.runs.quantities import OfResult, samples_of
 from lgvi_warp.statistics.functional import quantity
 from lgvi_warp.statistics.quantity import Quantity
-from lgvi_warp.views.choice import AT_ONCE, Shown, few, of_members, shown
-from lgvi_warp.views.fleet import members_of_run
+from lgvi_warp.views.choice import AT_ONCE, Shown, few, shown
+from lgvi_warp.views.plots.words import DEPTHS, events, is_depth
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
@@ -22,21 +22,6 @@ if TYPE_CHECKING:
 
 # Angles that go around: they are drawn about their mean direction.
 CIRCULAR = ("euler[0]", "euler[2]")
-DEPTHS = ("depth", "position[2]")
-WORDS = {
-    "position[0]": "north",
-    "position[1]": "east",
-    "position[2]": "depth",
-    "velocity_inertial[0]": "velocity north",
-    "velocity_inertial[1]": "velocity east",
-    "velocity_inertial[2]": "velocity down",
-    "energy": "E(t)",
-    "energy error": "E(t) - E(0)",
-    "euler[0]": "roll",
-    "euler[1]": "pitch",
-    "euler[2]": "yaw",
-}
-HINT = "start and end alone were kept: give SaveAt(every=...) for the motion between"
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +80,27 @@ def with_samples(result: Result) -> Result:
     )
 
 
+def selected(result: Result, most: int, fields: tuple[str, ...], what: str) -> tuple[Result, Shown, Result]:
+    """Choose the members that a picture draws, and read their samples.
+
+    Args:
+        result: A result.
+        most: The most members to draw.
+        fields: Names of the samples that are needed.
+        what: What needs them.
+
+    Returns:
+        The result that has the samples, the choice, and the samples of those members at the times that are drawn.
+
+    Raises:
+        NothingToDraw: Some were not kept, or no member has a finite start.
+    """
+    result = with_samples(result)
+    check_fields(result, fields, what)
+    choice = shown(result, most)
+    return result, choice, few(result, choice.members, fields, choice.frames)
+
+
 def check_fields(result: Result, fields: tuple[str, ...], what: str) -> None:
     """Refuse to draw what was not kept.
 
@@ -149,35 +155,6 @@ def energy_of(result: Result) -> Quantity:
         return values - values[:1]
 
     return Quantity("energy error", error, energy.unit, energy.fields)
-
-
-def label_of(of: Quantity) -> str:
-    """Label of an axis: the quantity and its unit.
-
-    Args:
-        of: The quantity.
-
-    Returns:
-        As "speed [m/s]"; depths say that they point down.
-    """
-    name = WORDS.get(of.name, of.name.replace("_", " "))
-    unit = of.unit or "1"
-    return f"{name} [{unit}], down" if is_depth(of) else f"{name} [{unit}]"
-
-
-def is_depth(of: Quantity) -> bool:
-    """Tell whether a quantity is a depth, which is drawn downwards."""
-    return of.name in DEPTHS
-
-
-def floors(result: Result) -> tuple[float, ...]:
-    """Depths of the scene's floors [m]."""
-    return tuple(float(event["depth"]) for event in events(result) if event["type"] == "floor")
-
-
-def events(result: Result) -> list[dict[str, Any]]:
-    """Tables of the scene's events."""
-    return list(result.provenance["scene"].get("events", ()))
 
 
 def unbounded_text(result: Result, survey: Survey) -> str:
@@ -317,23 +294,3 @@ def estimate_for(result: Result, of: str, types: tuple[str, ...]) -> tuple[Estim
                 if estimate.settings["type"] == kind and len(estimate.time) > 1 and name in labels:
                     return estimate, labels.index(name)
     return None
-
-
-def some_of(result: Result, drawn: int) -> str:
-    """Say how many members are drawn of how many of the run."""
-    return of_members(drawn, members_of_run(result))
-
-
-def unit_of(label: str) -> str:
-    """Find the unit of a quantity by its name.
-
-    Args:
-        label: The name, as "position[2]".
-
-    Returns:
-        The unit; "" for the user's own quantities, which have no other place to say it than their name.
-    """
-    try:
-        return quantity("of", label).unit
-    except SceneError:
-        return ""

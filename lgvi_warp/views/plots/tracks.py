@@ -8,19 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.common.status import Status, under_way
-from lgvi_warp.views.choice import few, shown
 from lgvi_warp.views.plots.canvas import COLORS, STYLES, below, mark, outcome_style, panel, point_down, wrapped
-from lgvi_warp.views.plots.read import (
-    HINT,
-    check_fields,
-    floors,
-    is_depth,
-    label_of,
-    numbers,
-    quantity_of,
-    some_of,
-    with_samples,
-)
+from lgvi_warp.views.plots.read import numbers, quantity_of, selected, with_samples
+from lgvi_warp.views.plots.words import HINT, floors, is_depth, label_of, some_of
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
@@ -47,7 +37,6 @@ def paths(result: Result, most: int = MOST_PATHS, *, ax: Any = None, path: str |
         OSError: The file cannot be written.
     """
     result = with_samples(result)
-    check_fields(result, ("position",), "paths")
     with panel(ax, path) as axes:
         draw_paths(axes, result, most)
         axes.set_title(_title(axes, axes.get_title(), result))
@@ -62,8 +51,7 @@ def draw_paths(axes: Any, result: Result, most: int = MOST_PATHS) -> None:
         result: A result with positions.
         most: The most members to draw; default 12.
     """
-    choice = shown(result, most)
-    some = few(result, choice.members, ("position",), choice.frames)
+    result, choice, some = selected(result, most, ("position",), "paths")
     first = result.samples["position"][0] if result.store is None else some.position[0]
     start = first[np.isfinite(first).all(axis=-1), :2].mean(axis=0)
     distance = np.hypot(*np.moveaxis(some.position[..., :2] - start, -1, 0))
@@ -92,10 +80,7 @@ def plan_view(
         NothingToDraw: No positions were kept, or no member has a finite start.
         OSError: The file cannot be written.
     """
-    result = with_samples(result)
-    check_fields(result, ("position",), "a view from above")
-    choice = shown(result, most)
-    some = few(result, choice.members, ("position",), choice.frames)
+    result, choice, some = selected(result, most, ("position",), "a view from above")
     with panel(ax, path, (8.0, 6.5)) as axes:
         _lines(axes, some, some.position[..., 1], some.position[..., 0], start=True)
         text = f"{some_of(result, len(choice.members))} from above"
@@ -130,12 +115,9 @@ def phase(
         SceneError: A quantity is not known, or has several components.
         OSError: The file cannot be written.
     """
-    result = with_samples(result)
     across, upward = (quantity_of(item) for item in of)
-    for meaning in (across, upward):
-        check_fields(result, ("position", *meaning.fields), "a phase portrait")
-    choice = shown(result, most)
-    some = few(result, choice.members, (), choice.frames)
+    fields = tuple(dict.fromkeys(("position", *across.fields, *upward.fields)))
+    result, choice, some = selected(result, most, fields, "a phase portrait")
     x, y = (numbers(result, meaning, choice.members, choice.frames) for meaning in (across, upward))
     with panel(ax, path) as axes:
         _lines(axes, some, x, y, start=True)
@@ -197,10 +179,7 @@ def attitude(
         NothingToDraw: No attitudes were kept, or no member has a finite start.
         OSError: The file cannot be written.
     """
-    result = with_samples(result)
-    check_fields(result, ("position", "attitude"), "attitudes")
-    choice = shown(result, most)
-    some = few(result, choice.members, ("attitude",), choice.frames)
+    result, choice, some = selected(result, most, ("position", "attitude"), "attitudes")
     # East, north, up: right-handed, with up at the top of the picture.
     points = np.where(under_way(some)[..., None, None], some.attitude[:, :, (1, 0, 2)], np.nan)
     points[:, :, 2] *= -1.0

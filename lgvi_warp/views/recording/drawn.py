@@ -154,9 +154,9 @@ class Drawn:
             Pairs of a status and a mask (f, m); OK for those under way.
         """
         status = np.asarray(self.few.status)
-        whole = finite_rows(self.few.position)
-        ended = ((code, whole & ~self.counted & (status == code)) for code in outcomes(self.few) if code)
-        return [(Status.OK, whole & self.counted), *ended]
+        is_finite = finite_rows(self.few.position)
+        ended = ((code, is_finite & ~self.counted & (status == code)) for code in outcomes(self.few) if code)
+        return [(Status.OK, is_finite & self.counted), *ended]
 
 
 def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[int, int, int] | None = None) -> Drawn:
@@ -224,19 +224,19 @@ STREAMED = {"height": ("depth", -1.0), "speed": ("speed", 1.0)}
 def _streamed(result: Result, fan: Fan, frames: np.ndarray) -> Fan:
     """A fan of all members from the run's own quantiles and extremes, where no samples of all were kept; else itself."""
     quantity, sign = STREAMED.get(fan.name, ("", 1.0))
-    levels, told = np.full_like(fan.levels, np.nan), False
+    levels, replaced = np.full_like(fan.levels, np.nan), False
     for estimate in result.statistics.values() if not result.samples else ():
-        kind, whole = estimate.settings["type"], len(estimate.time) == len(result.time)
-        if estimate.settings.get("of") != quantity or kind not in ("quantiles", "extremes") or not whole:
+        kind, at_all_times = estimate.settings["type"], len(estimate.time) == len(result.time)
+        if estimate.settings.get("of") != quantity or kind not in ("quantiles", "extremes") or not at_all_times:
             continue
         rows = {0.0: estimate["minimum"], 1.0: estimate["maximum"]} if kind == "extremes" else dict(
             zip(estimate.coordinates["level"].tolist(), np.moveaxis(estimate.value, 1, 0), strict=True)
         )  # fmt: skip
         for level, row in rows.items():
             at = np.isclose(LEVELS, level if sign > 0.0 else 1.0 - level)
-            levels[at], told = sign * row[frames, 0], True
+            levels[at], replaced = sign * row[frames, 0], True
     title = f"{fan.title}, by the run's statistics"
-    return dataclasses.replace(fan, title=title, levels=levels) if told else fan
+    return dataclasses.replace(fan, title=title, levels=levels) if replaced else fan
 
 
 def roll_pitch_heading(attitude: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

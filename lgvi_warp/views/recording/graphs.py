@@ -51,16 +51,16 @@ def _fan(recording: Any, run: Drawn, fan: Fan) -> None:
     """Log the bands of a fan and its median; of one member, its curve."""
     import rerun as rr
 
-    rgb, one = run.rgb or LOOKS[Status.OK].rgb, run.source.members == 1
+    rgb, single = run.rgb or LOOKS[Status.OK].rgb, run.source.members == 1
     bands = BANDS[1:2] if run.label else BANDS
-    for name, low, high, opacity in () if one else bands:
+    for name, low, high, opacity in () if single else bands:
         entity = run.path(f"curves/{fan.name}", name.replace(" %", "_percent"))
         style = rr.Measurements.from_fields(colors=[(*rgb, opacity)], widths=[0.0], names=[name], units=[fan.unit])
         recording.log(entity, style, static=True, strict=True)
         middle, half = 0.5 * (fan.levels[low] + fan.levels[high]), 0.5 * (fan.levels[high] - fan.levels[low])
         _send(recording, entity, run.time, rr.Measurements.columns(values=middle, variances=half**2))
-    name = run.label or ("the member" if one else "median")
-    color = rgb if one or run.label else WHITE
+    name = run.label or ("the member" if single else "median")
+    color = rgb if single or run.label else WHITE
     _series(recording, run.path(f"curves/{fan.name}", "median"), run.time, fan.levels[MEDIAN], name, color)
 
 
@@ -75,6 +75,22 @@ def _series(
     if len(time) < MARKED:
         recording.log(entity, rr.SeriesPoints(names=name, colors=color, marker_sizes=4.0), static=True, strict=True)
     _send(recording, entity, time, rr.Scalars.columns(scalars=np.asarray(values, np.float64)))
+
+
+def log_member(recording: Any, run: Drawn, place: int, member: int) -> None:
+    """Log height and speed of one member while it is under way.
+
+    Args:
+        recording: The stream.
+        run: What is drawn.
+        place: Its place among the members drawn.
+        member: Its index in the run.
+    """
+    speed = np.linalg.norm(run.few.velocity[:, place], axis=-1)
+    for name, values in (("height", -run.position[:, place, 2]), ("speed", speed)):
+        seen_values = np.where(run.counted[:, place], values, np.nan)
+        entity = f"curves/{name}/{member}"
+        _series(recording, entity, run.time, seen_values, f"member {member:,}", LOOKS[Status.OK].rgb, 1.0)
 
 
 def _shares(recording: Any, run: Drawn) -> None:

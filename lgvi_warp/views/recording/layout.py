@@ -52,44 +52,76 @@ def layout(runs: list[Drawn], box: Box, scale: int) -> Any:
     import rerun.blueprint as rrb
     from rerun.blueprint.encodings import TextLogColumn
 
-    time = runs[0].time
     ends = [max(float(run.time[-1]) for run in runs), min(float(run.time[0]) for run in runs)]
     played = ends[0] - ends[1]
-    worlds = [_world(run, box, scale, ASPECT / len(runs)) for run in runs]
+    names = [f"{run.label}: {run.text}" if run.label else run.text for run in runs]
+    worlds = [_world(run, name, box, scale, ASPECT / len(runs)) for run, name in zip(runs, names, strict=True)]
     below = rrb.Horizontal(
-        _curve("members", "Members by outcome [%]", _whole(time), (0.0, 102.0), True),
+        _curve("members", "Members by outcome [%]", _whole(runs[0].time), (0.0, 102.0), True),
         rrb.TextLogView(
             origin="/log",
             name="Outcomes: how many, and the first",
             columns=rrb.TextLogColumns(text_log_columns=[TextLogColumn("Body")]),
         ),
     )
-    left = rrb.Vertical(worlds[0] if len(runs) == 1 else rrb.Horizontal(*worlds), below, row_shares=[4, 1.3])
+    world_side = rrb.Vertical(worlds[0] if len(runs) == 1 else rrb.Horizontal(*worlds), below, row_shares=[4, 1.3])
+    return _whole_window(rrb.Horizontal(world_side, _right(runs), column_shares=[3, 2]), played)
+
+
+def live_layout(run: Drawn, box: Box, scale: int) -> Any:
+    """Lay out the views of a run that goes on: the world on the left, curves of single members on the right.
+
+    Args:
+        run: Members that are drawn.
+        box: What is in view.
+        scale: How many times their size hulls are drawn.
+
+    Returns:
+        A blueprint of the viewer.
+    """
+    import rerun.blueprint as rrb
+
+    titles = {fan.name: fan.title for fan in run.fans}
+    curves = [
+        _curve(f"curves/{name}", f"{titles[name]}, of some members", _whole(run.time), None, False)
+        for name in ("height", "speed")
+    ]
+    words = rrb.TextDocumentView(origin="run/summary", name="Run")
+    right = rrb.Vertical(words, *curves, row_shares=[1, 3, 3])
+    world = _world(run, "Members that are done", box, scale, ASPECT)
+    return _whole_window(rrb.Horizontal(world, right, column_shares=[3, 2]), float(run.time[-1] - run.time[0]))
+
+
+def _whole_window(views: Any, played: float) -> Any:
+    """A blueprint of views, which plays so long a time [s] of a run."""
+    import rerun.blueprint as rrb
+
     panel = rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="playing", loop_mode="all",
                           playback_speed=played / PLAYED if played > 0.0 else 1.0)  # fmt: skip
     return rrb.Blueprint(
-        rrb.Horizontal(left, _right(runs), column_shares=[3, 2]), panel,
-        rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), auto_views=False,
-    )  # fmt: skip
+        views, panel, rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), auto_views=False
+    )
 
 
 def _right(runs: list[Drawn]) -> Any:
     """Curves, and the run's facts below them."""
     import rerun.blueprint as rrb
 
-    whole = _whole(runs[0].time)
+    all_times = _whole(runs[0].time)
     names = [fan.name for fan in runs[0].fans]
     fans = {name: [fan for run in runs for fan in run.fans if fan.name == name] for name in names}
     views = {}
     for name, group in fans.items():
         limits = _limits(np.concatenate([fan.levels for fan in group], axis=1))
         # All have the same legend; it would cover their curves.
-        views[name] = _curve(f"curves/{name}", group[0].title, whole, limits, name == "height", _high(group[0], limits))
+        views[name] = _curve(
+            f"curves/{name}", group[0].title, all_times, limits, name == "height", _high(group[0], limits)
+        )
     height = views.pop("height")
     energy = views.pop("energy", None)
     motion = rrb.Tabs(views["speed"], *([energy] if energy else []), active_tab=0)
     angles = rrb.Tabs(*(views[name] for name in ("pitch", "roll", "heading")), active_tab=0)
-    commands = [_curve_of_channels(whole)] if any(name in runs[0].few.samples for name in CHANNELS) else []
+    commands = [_curve_of_channels(all_times)] if any(name in runs[0].few.samples for name in CHANNELS) else []
     facts = rrb.Tabs(
         *(rrb.TextDocumentView(origin=run.path("run/summary"), name=run.label or "Run") for run in runs),
         rrb.BarChartView(origin="/histogram", name="Depths [m] at the cursor"),
@@ -149,7 +181,7 @@ def _whole(time: np.ndarray) -> Any:
     return rrb.TimeAxis(view_range=rrb.TimeRange(start=start, end=end))
 
 
-def _world(run: Drawn, box: Box, scale: int, aspect: float) -> Any:
+def _world(run: Drawn, name: str, box: Box, scale: int, aspect: float) -> Any:
     """The view of one run's world: across the fleet's way, from a little above; trails up to the cursor."""
     import rerun.blueprint as rrb
 
@@ -158,7 +190,6 @@ def _world(run: Drawn, box: Box, scale: int, aspect: float) -> Any:
     now = rrb.TimeRangeBoundary.cursor_relative(seconds=0)
     past = rrb.VisibleTimeRange(TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=now)
     hulls = f", hulls {scale} times their size" if scale > 1 else ""
-    name = f"{run.label}: {run.text}" if run.label else run.text
     return rrb.Spatial3DView(
         origin=run.path("world"), name=f"{name}{hulls}, grid {box.grid:g} m", background=BACKGROUND,
         line_grid=rrb.LineGrid3D(visible=False),

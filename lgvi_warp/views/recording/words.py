@@ -50,7 +50,7 @@ def lines(run: Drawn, box: Box, scale: int) -> dict[str, str]:
     counts = ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items())
     few = len(run.choice.members) < result.members
     drawn = f"{len(run.choice.members):,} of {result.members:,} drawn" if few else f"{result.members:,}, all drawn"
-    one = run.source.members == 1
+    single = run.source.members == 1
     if run.source is not result:
         bands = f", curves of the {run.source.members:,} whose samples were kept"
     elif len(run.choice.ranked) < result.members:
@@ -67,7 +67,7 @@ def lines(run: Drawn, box: Box, scale: int) -> dict[str, str]:
     member = int(run.members[chosen_member(run)])
     seed = settings.get("ensemble", {}).get("seed", "none")
     return {
-        "members": drawn + ("" if one else bands),
+        "members": drawn + ("" if single else bands),
         "outcome": counts,
         "method": f"{method}, step {settings['step']:g} s, {settings['dtype']}",
         "time": times,
@@ -76,7 +76,7 @@ def lines(run: Drawn, box: Box, scale: int) -> dict[str, str]:
         "energy": energy_text(run),
         "hulls": size,
         "arrows and wires": f"forces on member {member}, the last as means between times drawn"
-        + ("" if one else "; ellipsoid: 95 % of those under way along each of its axes"),
+        + ("" if single else "; ellipsoid: 95 % of those under way along each of its axes"),
         "versions": ", ".join(f"{name} {version}" for name, version in versions.items()),
     }
 

@@ -53,6 +53,18 @@ class Box:
         """Distance between lines of the grid [m], a power of ten."""
         return float(10.0 ** np.floor(np.log10(max(self.high[:2] - self.low[:2]) / 2.0)))
 
+    def joined(self, other: Box) -> Box:
+        """Find the box around this one and another of the same water.
+
+        Args:
+            other: The other one.
+
+        Returns:
+            A box that holds both.
+        """
+        low, high = np.minimum(self.low, other.low), np.maximum(self.high, other.high)
+        return Box(low, high, self.floor, self.surface or other.surface)
+
 
 def box_of(runs: list[Drawn]) -> Box:
     """Find the box around all paths, with the floor and the surface where they are near.
@@ -124,16 +136,27 @@ def log_world(recording: Any, run: Drawn, box: Box, scale: int) -> None:
         box: What is in view.
         scale: How many times their size hulls are drawn.
     """
+    log_frame(recording, run, box)
+    log_bodies(recording, run, scale)
+    _trails(recording, run)
+    _spread(recording, run)
+    _forces(recording, run, box, scale)
+
+
+def log_frame(recording: Any, run: Drawn, box: Box) -> None:
+    """Log what stands around the members of one run: surface, floor, axes and current.
+
+    Args:
+        recording: The stream.
+        run: What is drawn.
+        box: What is in view.
+    """
     import rerun as rr
 
     recording.log(run.path("world"), rr.ViewCoordinates.FRD, static=True, strict=True)
-    _bodies(recording, run, scale)
-    _trails(recording, run)
-    _spread(recording, run)
     _planes(recording, run, box)
     _axes(recording, run, box)
     _current(recording, run, box)
-    _forces(recording, run, box, scale)
 
 
 def _static(recording: Any, entity: str, archetype: Any) -> None:
@@ -146,8 +169,14 @@ def _columns(recording: Any, entity: str, time: np.ndarray, columns: Any) -> Non
     recording.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=time)], columns, strict=True)
 
 
-def _bodies(recording: Any, run: Drawn, scale: int) -> None:
-    """Log a hull for each outcome, and the poses of the members that have had it so far."""
+def log_bodies(recording: Any, run: Drawn, scale: int) -> None:
+    """Log a hull for each outcome, and the poses of the members that have had it so far.
+
+    Args:
+        recording: The stream.
+        run: What is drawn.
+        scale: How many times their size hulls are drawn.
+    """
     import rerun as rr
 
     form, _ = _length(run)
@@ -206,6 +235,22 @@ def _trails(recording: Any, run: Drawn) -> None:
     strips = np.stack([path[:-1], path[1:]], axis=2)[moving]
     columns = rr.LineStrips3D.columns(strips=list(strips)).partition(moving.sum(axis=1))
     _columns(recording, entity, run.time[1:], columns)
+
+
+def log_paths(recording: Any, run: Drawn) -> None:
+    """Log the whole ways of some members, as they are at all times.
+
+    Args:
+        recording: The stream.
+        run: What is drawn.
+    """
+    import rerun as rr
+
+    members = slice(None, None, -(-run.few.members // TRAILS))
+    ways = zip(run.position[:, members].swapaxes(0, 1), run.counted[:, members].T, strict=True)
+    strips = [way[going & finite_rows(way)] for way, going in ways]
+    lines = rr.LineStrips3D(strips, colors=[TRAIL], radii=rr.Radius.ui_points(0.7))
+    _static(recording, run.path("world", "paths"), lines)
 
 
 def _spread(recording: Any, run: Drawn) -> None:

@@ -1,6 +1,8 @@
 """The verb view: a run that is there, in the viewer or as a recording."""
 
 import json
+import subprocess
+import sys
 
 import pytest
 
@@ -44,7 +46,8 @@ def test_bad_members_are_refused(folder, tmp_path, capsys, arguments, words):
 
 
 @pytest.mark.parametrize(
-    ("name", "words", "code"), [("none", "is not there", 2), ("none.npz", "No such file", 1), ("study", "no run", 2)]
+    ("name", "words", "code"),
+    [("none", "is not there; give the folder of a run or", 2), ("none.npz", "No such file", 1), ("study", "no run", 2)],
 )
 def test_a_folder_without_a_run_is_refused(tmp_path, capsys, name, words, code):
     (tmp_path / "study").mkdir()
@@ -59,6 +62,20 @@ def test_json_names_the_file(folder, tmp_path, capsys):
     assert main(["view", str(folder), "--out", str(path), "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert (document["verb"], document["files"]) == ("view", [str(path)])
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform == "win32", reason="files have no limit of size there")
+def test_a_disk_that_is_full_while_recording_is_one_line_and_leaves_no_file(tmp_path):
+    import resource
+
+    fleet(200, 200).save(tmp_path / "result.npz")
+    code = "from lgvi_warp.cli import entry; import sys; sys.argv = ['lgvi-warp', *sys.argv[1:]]; entry()"
+    arguments = [sys.executable, "-c", code, "view", str(tmp_path), "--out", str(tmp_path / "a.rrd"), "-q"]
+    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))  # noqa: E731
+    done = subprocess.run(arguments, capture_output=True, text=True, preexec_fn=limit)
+    assert done.returncode == 1 and "is the disk full, or the folder read-only?" in done.stderr
+    assert done.stderr.count("\n") == 1 and [path.name for path in tmp_path.iterdir()] == ["result.npz"]
 
 
 def test_no_rerun_is_one_line_with_the_remedy(folder, tmp_path, capsys, monkeypatch):

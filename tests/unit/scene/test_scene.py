@@ -131,3 +131,10 @@ def test_other_laws_are_refused_with_the_reason():
 def test_parts_of_the_wrong_kind_are_refused():
     found = faults(lw.Scene, {"mass": 1.0}, environment=9.8, start=None)
     assert [fault.split(" = ")[0] for fault in found] == ["vehicle", "environment", "start"]
+
+
+def test_the_remedy_for_settings_of_a_run_names_what_is_public():
+    (fault,) = faults(lw.Scene, VEHICLE, run={"step": 0.02})
+    assert "lw.solve(scene, h=..., t1=..., ...)" in fault and "lw.RunSettings" not in fault
+    table = lw.Scene(VEHICLE).to_dict() | {"run": {"step": 0.02}}
+    assert lw.Scene.from_dict(table).run.step == 0.02

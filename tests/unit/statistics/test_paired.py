@@ -113,6 +113,23 @@ def test_wilson_covers_95_percent(p, n):
     assert np.mean((lower <= p) & (p <= upper)) >= 0.9455
 
 
+@pytest.mark.parametrize(("least", "most", "low", "high"), [(5.0, 100.0, 0.93, 0.975), (0.02, 5.0, 0.83, 0.99)])
+def test_where_few_are_expected_the_coverage_is_what_the_page_says(least, most, low, high):
+    """Exactly, by the binomial distribution, from p = 1 / 50,000 on, and of 1 - p as of p."""
+    n, p = 1000, np.linspace(least, most, 400) / 1000
+    hits = np.arange(n + 1)
+    weights = stats.binom.pmf(hits, n, p[:, None])
+
+    def coverage(lower, upper, p):
+        return (weights * ((lower <= p[:, None]) & (p[:, None] <= upper))).sum(axis=1)
+
+    wilson = coverage(*intervals.wilson(hits / n, np.full(n + 1, n), 0.95), p)
+    assert low <= wilson.min() and wilson.max() <= high
+    lower, upper = (end[::-1] for end in intervals.wilson(hits / n, np.full(n + 1, n), 0.95))
+    np.testing.assert_allclose(coverage(lower, upper, 1.0 - p), wilson, atol=1e-12)
+    assert coverage(*intervals.clopper_pearson(hits, np.full(n + 1, n), 0.95), p).min() >= 0.95
+
+
 @pytest.mark.parametrize(("both", "first", "second"), [
     (0.45, 0.1, 0.15), (0.93, 0.02, 0.04), (0.975, 0.002, 0.02), (0.01, 0.02, 0.01), (0.5, 0.1, 0.1),
 ])  # fmt: skip

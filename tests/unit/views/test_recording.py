@@ -15,6 +15,8 @@ import lgvi_warp as lw
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import Status, stop_time, under_way
 from lgvi_warp.statistics.estimate import Estimate, Estimates
+from lgvi_warp.views import rerun as recordings
+from lgvi_warp.views import viewer
 from lgvi_warp.views.recording import drawn, layout, world
 from lgvi_warp.views.recording.graphs import channel_names
 from tests.support.made import made
@@ -65,11 +67,13 @@ def rows(path, entity, ending, recording=None):
     return found
 
 
-def text_of(path, entity):
+def text_of(path, entity, recording=None):
     """All text of an entity."""
+    reader = RrdReader(path)
+    stream = reader.stream() if recording is None else reader.stream(store=recording)
     return " ".join(
         str(text)
-        for chunk in RrdReader(path).stream().filter(content=entity)
+        for chunk in stream.filter(content=entity)
         for column in chunk.to_record_batch().columns
         for text in column.to_pylist()
     )
@@ -462,14 +466,13 @@ def test_nothing_to_draw_is_said(mixed, tmp_path):
     ],
 )
 def test_show_starts_a_viewer(mixed, tmp_path, monkeypatch, text, words):
-    from lgvi_warp.views import rerun as recordings
-
     program = tmp_path / "viewer"
     if text is not None:
         program.write_text(f'#!/bin/sh\necho "$1" > "{tmp_path}/opened"\n{text}\n')
         program.chmod(0o755)
-    monkeypatch.setattr(recordings, "_program", lambda: program)
-    monkeypatch.setattr(recordings, "STARTED", 0.7)
+    monkeypatch.setattr(viewer, "program", lambda: program)
+    monkeypatch.setattr(viewer, "STARTED", 0.7)
+    monkeypatch.setattr(viewer, "is_open", lambda: False)
     monkeypatch.setattr(recordings.tempfile, "mkdtemp", lambda prefix: str(tmp_path))
     if words is None:
         lw.show(mixed, members=[3])

@@ -1,6 +1,6 @@
 """REMUS 100 learns to keep its depth: trained as an environment of Gymnasium, then run in the lanes as lw.Policy.
 
-    python examples/07_train_a_policy.py [minutes] [picture]
+    python examples/controllers/train_a_policy.py [minutes] [picture]
 
 A small perceptron looks at the depth error, the pitch, the heave and the pitch rate, and commands the stern planes; a PID in
 the kernel keeps the heading. The learner is CMA-ES (pip install cma): each generation all candidates steer the same vehicles,

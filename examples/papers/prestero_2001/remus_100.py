@@ -1,6 +1,6 @@
 """REMUS 100 with 6x6 inertia: its speed at a held thrust, turning circles, and the rudder steps of Prestero (2001).
 
-    python examples/03_remus_100.py [picture]
+    python examples/papers/prestero_2001/remus_100.py [picture]
 
 Twice, since the hull is unstable in pitch and nothing steers its depth: held in the horizontal plane by an exact
 symmetry (centre of gravity at the origin, no propeller torque), and as published. docs/guide/remus_100.md has the comparison.

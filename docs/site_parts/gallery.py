@@ -1,0 +1,136 @@
+"""Run the examples, keep their pictures, and write docs/gallery.md: `make gallery`, or `make gallery ONLY="02 07"`.
+
+A picture carries the hash of the script that drew it and what the script printed: a stale picture is found in any clone.
+"""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+sys.path.append(str(ROOT / "docs"))
+
+from site_parts import movie  # noqa: E402
+
+PICTURES = ROOT / "docs" / "gallery"
+PAGE = ROOT / "docs" / "gallery.md"
+HEAD = """# Gallery
+
+Twelve scripts of less than 80 lines, `examples/01_first_dive.py` and so on. Each prints its numbers and writes its picture
+into the folder where it is started. How long something took was measured on two shared cores of an AMD EPYC. Examples of
+[controllers](controllers/README.md) are in `examples/controllers/`. Written by `make gallery`; do not edit.
+"""
+
+
+def scripts() -> list[Path]:
+    """The examples of the gallery, in order."""
+    return sorted((ROOT / "examples").glob("[0-9][0-9]_*.py"))
+
+
+def digest(script: Path) -> str:
+    """The hash of a script, whatever its line ends and the line that names its licence."""
+    lines = [line for line in script.read_text().splitlines() if not line.startswith("# SPDX-")]
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
+
+
+def run(script: Path, folder: Path) -> str:
+    """Run an example in a folder.
+
+    Args:
+        script: The example.
+        folder: Where it writes its picture, named as the script is.
+
+    Returns:
+        What it printed.
+    """
+    command = [sys.executable, str(script)]
+    return subprocess.run(command, cwd=folder, check=True, stdout=subprocess.PIPE, text=True).stdout
+
+
+def keep(script: Path, folder: Path, printed: str) -> None:
+    """Put the picture that an example wrote into docs/gallery, with few colours and with where it comes from.
+
+    Args:
+        script: The example.
+        folder: Where it ran.
+        printed: What it printed.
+    """
+    from PIL import Image, PngImagePlugin
+
+    notes = PngImagePlugin.PngInfo()
+    notes.add_itxt("script", digest(script))
+    notes.add_itxt("printed", printed)
+    with Image.open((folder / script.name).with_suffix(".png")) as picture:
+        small = picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+        small.save(PICTURES / f"{script.stem}.png", optimize=True, pnginfo=notes)
+
+
+def notes(script: Path) -> dict[str, str]:
+    """What the picture of an example says of itself.
+
+    Args:
+        script: The example.
+
+    Returns:
+        The hash of the script that drew it, "script", and what that printed, "printed".
+    """
+    from PIL import Image
+
+    with Image.open(PICTURES / f"{script.stem}.png") as picture:
+        return dict(picture.text)
+
+
+def section(script: Path) -> str:
+    """Write the part of the page about one example.
+
+    Args:
+        script: The example.
+
+    Returns:
+        Markdown: heading, picture, caption, what is printed, and the script.
+    """
+    code = script.read_text()
+    title, _, caption = ast.get_docstring(ast.parse(code)).partition(":")
+    printed = "".join(f"    {line}\n" for line in notes(script)["printed"].splitlines())
+    return f"""
+## {int(script.name[:2])}. {title}
+
+![{title}](gallery/{script.stem}.png)
+
+{caption.strip()[0].upper()}{caption.strip()[1:]}
+
+{printed}
+<details><summary><code>examples/{script.name}</code></summary>
+
+```python
+{code}```
+
+</details>
+"""
+
+
+def page() -> str:
+    """Write the page of all examples, from the scripts and the pictures that are kept."""
+    return HEAD + "".join(section(script) for script in scripts())
+
+
+def main(chosen: list[str]) -> None:
+    """Run examples, all or those whose numbers are given, make the moving picture if it is meant, and write the page."""
+    PICTURES.mkdir(exist_ok=True)
+    for script in scripts():
+        if not chosen or script.name[:2] in chosen:
+            with tempfile.TemporaryDirectory() as folder:
+                keep(script, Path(folder), run(script, Path(folder)))
+            print(script.name, flush=True)
+    if not chosen or "movie" in chosen:
+        movie.main()
+    PAGE.write_text(page())
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,90 @@
+"""Draw docs/gallery/fleet.webp, the moving picture of the README, from a recording: `make gallery ONLY=movie`.
+
+The viewer opens the recording of a fleet that sinks to the sea floor, without a window, and is shot at 40 times. That needs a
+Vulkan driver; `apt-get install mesa-vulkan-drivers` has one for the CPU.
+"""
+
+from __future__ import annotations
+
+import io
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "kernels")]
+MOVIE = ROOT / "docs" / "gallery" / "fleet.webp"
+FRAMES, PERIOD = 40, 120  # number, ms
+WINDOW, SIZE = "1100x700", (880, 515)  # pixels of the window, and of the picture
+# The part of the window that is no bar of the viewer: left, top, right, bottom.
+INSIDE = (0, 28, 1100, 672)
+# Seconds that the viewer takes to lay itself out, and to show another time.
+SETTLED, DRAWN = 4.0, 0.3
+
+
+def record(path: Path) -> np.ndarray:
+    """Run 300 REMUS 100 of unknown buoyancy that sink in an unknown current, and write the recording.
+
+    Args:
+        path: The file.
+
+    Returns:
+        The times of the samples [s].
+    """
+    import lgvi_warp as lw
+
+    scene = lw.Scene.named(
+        "remus_100",
+        vehicle={"buoyancy": 285.0},  # N: 14 N less than the weight
+        start={"position": [0.0, 0.0, 5.0], "velocity": [1.5, 0.0, 0.0]},
+        terms=[lw.Current(velocity=[0.0, 0.2, 0.0])],
+        events=[lw.Floor(depth=20.0)],
+    )
+    vary = {"vehicle.buoyancy": lw.Normal(std=1.0), "current.velocity": lw.Normal(std=[0.05, 0.05, 0.0])}
+    result = lw.solve(lw.Ensemble(scene, 300, seed=1, vary=vary), h=0.02, t1=110.0, save=lw.SaveAt(every=1.0))
+    lw.log_rerun(result, path)
+    return np.asarray(result.time)
+
+
+def shoot(path: Path, times: np.ndarray, folder: Path) -> list[Any]:
+    """Take pictures of a recording at some times, in a viewer without a window.
+
+    Args:
+        path: The recording.
+        times: The times [s].
+        folder: Where the viewer writes its log.
+
+    Returns:
+        The pictures.
+    """
+    from PIL import Image
+
+    from tests.support.viewer import TIMELINE, viewer
+
+    frames = []
+    with viewer(folder, WINDOW) as window:
+        window.open(path)
+        time.sleep(SETTLED)
+        for when in times:
+            window.client.set_time(TIMELINE, duration=float(when), play_state="paused")
+            time.sleep(DRAWN)
+            picture = Image.open(io.BytesIO(window.client.take_screenshot())).convert("RGB")
+            frames.append(picture.crop(INSIDE).resize(SIZE, Image.Resampling.LANCZOS))
+    return frames
+
+
+def main() -> None:
+    """Write the moving picture."""
+    from site_parts.gallery import digest
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        times = record(folder / "fleet.rrd")
+        frames = shoot(folder / "fleet.rrd", np.linspace(times[0], times[-1], FRAMES), folder)
+    look = {"duration": PERIOD, "loop": 0, "quality": 70, "method": 6, "xmp": digest(Path(__file__)).encode()}
+    frames[0].save(MOVIE, save_all=True, append_images=frames[1:], **look)
+    print(f"{MOVIE.name}: {len(frames)} frames, {MOVIE.stat().st_size / 1e6:.2f} MB")

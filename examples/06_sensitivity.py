@@ -1,0 +1,31 @@
+"""Sensitivity: which of the inputs that nobody knows exactly matter for where a vehicle ends up.
+
+Sobol indices say what part of the variance each input causes alone (S1) and with all its interactions (ST). Buoyancy decides
+how deep the vehicle is; the current decides how far east it is; together with the start they decide the speed.
+"""
+
+import lgvi_warp as lw
+
+scene = lw.Scene.named(
+    "remus_100",
+    vehicle={"buoyancy": 299.0},  # N: as heavy as the vehicle
+    terms=[lw.Current(velocity=[0.0, 0.2, 0.0])],  # m/s
+    start={"position": [0.0, 0.0, 30.0], "velocity": [1.5, 0.0, 0.0]},
+)
+vary = {
+    "vehicle.buoyancy": lw.Normal(std=0.5),  # N
+    "wrench.force": lw.Normal(std=[0.1, 0.0, 0.0]),  # N: thrust
+    "current.velocity": lw.Normal(std=[0.05, 0.05, 0.0]),  # m/s
+    "start.velocity": lw.Normal(std=[0.1, 0.0, 0.0]),  # m/s
+}
+
+if __name__ == "__main__":
+    found = lw.uq.sobol(
+        scene, ["depth", "position[1]", "speed"], vary=vary, samples=256, second_order=False, h=0.02, t1=30.0
+    )
+    print(f"{found.members:,} members, {found.failed} failed")
+    for quantity, total in zip(found.quantities, found.total, strict=True):
+        shares = [f"{factor} {share:.2f}" for factor, share in zip(found.factors, total, strict=True) if share > 0.02]
+        print(f"{quantity}: {', '.join(shares)}")
+    lw.plots.sensitivity(found, path="06_sensitivity.png")
+    print("06_sensitivity.png")

@@ -1,0 +1,182 @@
+"""Cost of a member's step: against members and threads, and of each term of a scene beside the bare one."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common import machine
+from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.engine.plan import Plan
+from lgvi_warp.methods.method import Method
+from lgvi_warp.physics.terms.base import Term
+from lgvi_warp.runs.run import run_plan
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.studies.cost import costs
+from lgvi_warp.studies.speed import least
+
+# Row of a scene without terms, and row of all its terms together.
+NONE, ALL = "none", "all terms"
+
+
+def scaling(
+    fleet: Ensemble,
+    members: Sequence[int] | None = None,
+    threads: Sequence[int] | None = None,
+    *,
+    method: str | Method | None = None,
+    h: float | None = None,
+    t1: float | None = None,
+    rounds: int = 3,
+) -> list[dict[str, Any]]:
+    """Measure what a member's step costs in whole runs of more and fewer members, by more and fewer threads.
+
+    Runs are timed in turn, by the clock on the wall; the least of several readings counts, since other work on the machine can
+    only lengthen one.
+
+    Args:
+        fleet: The ensemble; its first members run.
+        members: Numbers of members, each at most those of the fleet; default powers of ten, and all.
+        threads: Numbers of threads; default powers of two, and all of this machine.
+        method: Name of the method, or a Method; default that of the scene.
+        h: Step [s]; default `run.step` of the scene.
+        t1: End of the runs [s]; default `run.duration` of the scene.
+        rounds: Number of readings of each run; default 3.
+
+    Returns:
+        A row for each number of members and of threads: "members", "threads", "steps" and "ns_per_vehicle_step" [ns].
+
+    Raises:
+        SceneError: An argument is at fault.
+    """
+    sizes = rising(10, fleet.members) if members is None else sorted(set(members))
+    counts = rising(2, machine.thread_count()) if threads is None else sorted(set(threads))
+    faults = Faults()
+    if not sizes or sizes[0] < 1 or sizes[-1] > fleet.members:
+        faults.add("members", members, "is not within the fleet", f"name numbers from 1 to {fleet.members}")
+    if not counts or counts[0] < 1:
+        faults.add("threads", threads, "holds no number of threads", "name numbers from 1 on")
+    faults.raise_if_any()
+    plans = [make_plan(fleet.subset(np.arange(n)), method, h=h, t1=t1) for n in sizes]
+    runs = [(plan, count) for plan in plans for count in counts]
+    for plan in plans:
+        plan.compile()
+    readings = least([functools.partial(_run, *pair) for pair in runs], rounds)
+    return [
+        {
+            "members": plan.ensemble.members,
+            "threads": count,
+            "steps": plan.grid.steps,
+            "ns_per_vehicle_step": round(1e9 * seconds / (plan.ensemble.members * plan.grid.steps), 3),
+        }
+        for (plan, count), seconds in zip(runs, readings, strict=True)
+    ]
+
+
+def _run(plan: Plan, threads: int) -> None:
+    """Run a plan whole, by so many threads."""
+    run_plan(plan, threads)
+
+
+def rising(base: int, most: int) -> list[int]:
+    """List the powers of a number up to a bound, and the bound.
+
+    Args:
+        base: The number.
+        most: The bound.
+
+    Returns:
+        1, base, base squared and so on below the bound, then the bound.
+    """
+    powers = [1]
+    while powers[-1] * base < most:
+        powers.append(powers[-1] * base)
+    return sorted({*powers, most})
+
+
+def term_cost(
+    scene: Scene,
+    *,
+    method: str | Method | None = None,
+    h: float | None = None,
+    dtype: str | None = None,
+    members: int = 64,
+    rounds: int = 5,
+) -> list[dict[str, Any]]:
+    """Measure what a step costs without terms, with each term of a scene alone, and with all of them.
+
+    The scenes take turns. Costs are processor time of the thread that runs the kernel, the least of several readings. What
+    steers the vehicle, and what ends a run, is left out. Each kernel is compiled once, which takes some seconds.
+
+    Args:
+        scene: The scene.
+        method: Name of the method, or a Method; default the one that the whole scene runs by.
+        h: Step [s]; default `run.step` of the scene.
+        dtype: "float64", "float32" or "float32_compensated"; default that of the scene.
+        members: Number of vehicles that step together; default 64.
+        rounds: Number of readings of each scene; default 5.
+
+    Returns:
+        A row for each scene: "term", "method", "dtype", "ns_per_vehicle_step" [ns], and "more_than_none" [ns], what it costs
+        more than the scene without terms.
+
+    Raises:
+        SceneError: The scene has no terms, or an argument is at fault.
+    """
+    if not scene.terms:
+        raise SceneError(["scene.terms: is empty; give the scene terms whose cost is to be measured"])
+    step = scene.run.step if h is None else h
+    cast = [(NONE, ())] + [(term.key, (term,)) for term in scene.terms]
+    if len(scene.terms) > 1:
+        cast.append((ALL, tuple(scene.terms)))
+    chosen = plan_of(scene, tuple(scene.terms), members, method, step, dtype).method
+    plans = [plan_of(scene, terms, members, chosen, step, dtype) for _, terms in cast]
+    nanoseconds = [
+        1e3 * cost.us_per_vehicle_second * plan.grid.h for cost, plan in zip(costs(plans, rounds), plans, strict=True)
+    ]
+    return [
+        {
+            "term": name,
+            "method": plan.method.name,
+            "dtype": plan.dtype,
+            "ns_per_vehicle_step": round(price, 3),
+            "more_than_none": round(price - nanoseconds[0], 3),
+        }
+        for (name, _), plan, price in zip(cast, plans, nanoseconds, strict=True)
+    ]
+
+
+def plan_of(
+    scene: Scene,
+    terms: tuple[Term, ...],
+    members: int,
+    method: str | Method | None,
+    h: float | None,
+    dtype: str | None,
+) -> Plan:
+    """Plan ten steps of a scene with some terms, without what steers it and what ends it.
+
+    Args:
+        scene: The scene.
+        terms: Its terms.
+        members: Number of members.
+        method: Name of the method, or a Method; None: that of the scene.
+        h: Step [s].
+        dtype: The precision; None: that of the scene.
+
+    Returns:
+        The plan, compiled.
+
+    Raises:
+        SceneError: An argument is at fault.
+    """
+    bare = dataclasses.replace(scene, terms=terms, controller=None, events=(), ensemble_settings=None)
+    plan = make_plan(Ensemble(bare, members, 1), method, h=h, t1=None if h is None else 10.0 * h, dtype=dtype)
+    plan.compile()
+    return plan

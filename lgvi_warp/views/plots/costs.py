@@ -1,0 +1,127 @@
+"""What a member's step costs: against members and threads, and term by term."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.views.plots.canvas import COLORS, MARKERS, below, hatch, panel, panels, style
+
+COST = "ns_per_vehicle_step"
+# The row of a scene without terms, in what `lw.term_cost` and the benchmarks write.
+NONE = "none"
+
+Rows = Iterable[Mapping[str, Any]] | str | os.PathLike[str]
+
+
+def scaling(rows: Rows, *, figure: Any = None, path: str | os.PathLike[str] | None = None) -> np.ndarray:
+    """Draw what a member's step costs against the number of members, and against the number of threads.
+
+    A dotted line says what as many threads would cost if each were as fast as one alone.
+
+    Args:
+        rows: Rows of `lw.scaling`, or a file of JSON lines that `python -m benchmarks run members threads` printed; rows of
+            other measurements are left out.
+        figure: Matplotlib figure to draw on; default None, one of its own.
+        path: File to write; its ending chooses the format. Default None: none is written.
+
+    Returns:
+        The axes of members and of threads, shape (2,).
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        NothingToDraw: There is no row with members, threads and a cost.
+        OSError: A file cannot be read or written.
+    """
+    points = measured(rows, ("members", "threads"), "lw.scaling(fleet)")
+    with panels(figure, path, (1, 2), (12.0, 5.6)) as grid:
+        for axes, across, of_line in ((grid[0, 0], "members", "threads"), (grid[0, 1], "threads", "members")):
+            for i, count in enumerate(sorted({point[of_line] for point in points})):
+                line = sorted((point[across], point[COST]) for point in points if point[of_line] == count)
+                x, y = np.array(line, dtype=float).T
+                label = f"{count:,} {of_line if count != 1 else of_line[:-1]}"
+                axes.plot(x, y, marker=MARKERS[i % len(MARKERS)], label=label, **style(i))
+                if across == "threads" and len(x) > 1:
+                    axes.plot(x, y[0] * x[0] / x, color="black", linestyle=(0, (1, 2)), linewidth=0.8)
+            axes.set(xscale="log", yscale="log", xlabel=f"{across} [1]", ylabel="cost of a member's step [ns]")
+            axes.minorticks_off()
+            axes.grid(True, alpha=0.3)
+            ticks = sorted({point[across] for point in points})
+            if len(ticks) < 8:
+                axes.set_xticks(ticks, [f"{tick:,}" for tick in ticks])
+            below(axes, ncols=3)
+        grid[0, 0].figure.suptitle("Wall time of a whole run over members and steps; dotted: divided by the threads")
+    return grid[0]
+
+
+def term_cost(rows: Rows, *, ax: Any = None, path: str | os.PathLike[str] | None = None) -> Any:
+    """Draw what a step costs with each term alone, beside the scene without terms, which is a line.
+
+    Args:
+        rows: Rows of `lw.term_cost`, or a file of JSON lines that `python -m benchmarks run terms` printed; of several methods
+            the first is drawn, with a bar for each precision.
+        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
+        path: File to write; its ending chooses the format. Default None: none is written.
+
+    Returns:
+        The axes.
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        NothingToDraw: There is no row with a term and a cost.
+        OSError: A file cannot be read or written.
+    """
+    points = measured(rows, ("term", "method", "dtype"), "lw.term_cost(scene)")
+    method = points[0]["method"]
+    points = [point for point in points if point["method"] == method]
+    terms = list(dict.fromkeys(point["term"] for point in points))
+    dtypes = list(dict.fromkeys(point["dtype"] for point in points))
+    thick = 0.8 / len(dtypes)
+    with panel(ax, path, (8.0, 2.2 + 0.42 * len(terms))) as axes:
+        for i, dtype in enumerate(dtypes):
+            prices = {point["term"]: point[COST] for point in points if point["dtype"] == dtype}
+            places = [terms.index(term) + (i - 0.5 * (len(dtypes) - 1)) * thick for term in prices]
+            bars = axes.barh(places, prices.values(), thick, color=COLORS[i], hatch=hatch(i), edgecolor="white", linewidth=0.0,
+                             label=dtype)  # fmt: skip
+            axes.bar_label(bars, fmt="%.3g", padding=3)
+            if NONE in prices:
+                axes.axvline(prices[NONE], linewidth=1.0, **style(i))
+        axes.set(
+            xlabel="cost of a member's step [ns]", ylabel="term [name]", yticks=range(len(terms)), yticklabels=terms
+        )
+        axes.margins(x=0.12)
+        axes.invert_yaxis()
+        axes.grid(True, axis="x", alpha=0.3)
+        if ax is None:
+            axes.set_title(f"{method}, one core; lines: without terms")
+        below(axes, ncols=3)
+    return axes
+
+
+def measured(rows: Rows, keys: tuple[str, ...], remedy: str) -> list[Mapping[str, Any]]:
+    """Take the rows of one kind of measurement.
+
+    Args:
+        rows: Rows, or a file of JSON lines.
+        keys: What a row of that kind has, besides the cost.
+        remedy: What would give such rows.
+
+    Returns:
+        The rows that have all of these keys.
+
+    Raises:
+        NothingToDraw: There are none.
+        OSError: The file cannot be read.
+    """
+    if isinstance(rows, str | os.PathLike):
+        rows = [json.loads(line) for line in Path(rows).read_text().splitlines() if line.startswith("{")]
+    points = [row for row in rows if all(key in row for key in (*keys, COST))]
+    if not points:
+        raise NothingToDraw(f"no row has {', '.join(keys)} and {COST}: there is nothing to draw; give rows of {remedy}")
+    return points

@@ -1,0 +1,80 @@
+"""A picture of margins: how many members of a fleet bear less than so much gain or delay."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.views.plots.canvas import panels, style, wrapped
+
+if TYPE_CHECKING:
+    from lgvi_warp.studies.linear.margins import Margins
+
+LABELS = {
+    "gain_lower": "lower gain margin, a factor",
+    "gain_upper": "upper gain margin, a factor",
+    "delay": "delay margin [s]",
+}
+# The share of members whose margin is marked: one in twenty bears less, or, of a lower margin, more.
+MARKED = 0.05
+
+
+def margins(found: Margins, *, figure: Any = None, path: str | os.PathLike[str] | None = None) -> np.ndarray:
+    """Draw how margins are distributed over the members that settle as they are, a panel for each margin.
+
+    Curves say how many members have at most so much, by eigenvalues and by runs, as far as each was asked for. A line marks
+    what all but one in twenty members bear. Infinite margins lie beyond the right edge: their curve ends below 100 %.
+
+    Args:
+        found: Margins of `lw.margins`.
+        figure: Matplotlib figure to draw on; default None, one of its own.
+        path: File to write; its ending chooses the format. Default None: none is written.
+
+    Returns:
+        The axes, shape (margins,).
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        NothingToDraw: No member settles as it is.
+        OSError: The file cannot be written.
+    """
+    steady = np.asarray(found.steady)
+    if not steady.any():
+        raise NothingToDraw(f"none of the {found.members} members settles as it is: there are no margins to draw")
+    names = list(found.values or found.by_runs)
+    ways = [way for way, values in (("eigenvalues", found.values), ("runs", found.by_runs)) if values]
+    with panels(figure, path, (1, len(names)), (1.0 + 4.5 * len(names), 4.5), sharey=True) as grid:
+        for axes, name in zip(grid[0], names, strict=True):
+            for i, way in enumerate(ways):
+                _curve(axes, *found.curve(name, way), label=f"by {way}", **style(i))
+            _mark(axes, found.curve(name)[0], name)
+            axes.set(xlabel=LABELS[name], ylim=(0.0, 102.0))
+            axes.grid(alpha=0.3)
+            axes.legend()
+        grid[0, 0].set_ylabel("members with at most that [%]")
+        lost = found.members - int(steady.sum())
+        remark = f"; {lost:,} do not settle as they are" if lost else ""
+        title = f"{found.loop}: margins of {found.members - lost:,} members{remark}"
+        grid[0, 0].figure.suptitle(wrapped(title, grid[0, 0].figure))
+    return grid.ravel()
+
+
+def _curve(axes: Any, values: np.ndarray, shares: np.ndarray, **look: Any) -> None:
+    """Draw the part of the members with at most so much (n,), up to the largest finite value."""
+    finite = np.isfinite(values)
+    start = values[finite][:1]
+    x, y = np.concatenate([start, values[finite]]), np.concatenate([0.0 * start, 100.0 * shares[finite]])
+    axes.step(x, y, where="post", **look)
+
+
+def _mark(axes: Any, values: np.ndarray, name: str) -> None:
+    """Mark what all but one in twenty members bear."""
+    level = 1.0 - MARKED if name == "gain_lower" else MARKED
+    edge = float(np.quantile(values, level, method="inverted_cdf"))
+    if np.isfinite(edge):
+        axes.axvline(
+            edge, color="0.3", linestyle=":", label=f"{100.0 * (1.0 - MARKED):g} % of the members bear {edge:.3g}"
+        )

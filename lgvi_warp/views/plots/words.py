@@ -1,0 +1,79 @@
+"""Words of pictures: names and units of quantities, the members drawn of all, floors, and what a reader has to know."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from lgvi_warp.common.errors import SceneError
+from lgvi_warp.statistics.functional import quantity
+from lgvi_warp.statistics.quantity import Quantity
+from lgvi_warp.views.choice import of_members
+from lgvi_warp.views.fleet import members_of_run
+
+if TYPE_CHECKING:
+    from lgvi_warp.runs.result import Result
+
+DEPTHS = ("depth", "position[2]")
+WORDS = {
+    "position[0]": "north",
+    "position[1]": "east",
+    "position[2]": "depth",
+    "velocity_inertial[0]": "velocity north",
+    "velocity_inertial[1]": "velocity east",
+    "velocity_inertial[2]": "velocity down",
+    "energy": "E(t)",
+    "energy error": "E(t) - E(0)",
+    "euler[0]": "roll",
+    "euler[1]": "pitch",
+    "euler[2]": "yaw",
+}
+HINT = "start and end alone were kept: give SaveAt(every=...) for the motion between"
+
+
+def label_of(of: Quantity) -> str:
+    """Label of an axis: the quantity and its unit.
+
+    Args:
+        of: The quantity.
+
+    Returns:
+        As "speed [m/s]"; depths say that they point down.
+    """
+    name = WORDS.get(of.name, of.name.replace("_", " "))
+    unit = of.unit or "1"
+    return f"{name} [{unit}], down" if is_depth(of) else f"{name} [{unit}]"
+
+
+def is_depth(of: Quantity) -> bool:
+    """Tell whether a quantity is a depth, which is drawn downwards."""
+    return of.name in DEPTHS
+
+
+def floors(result: Result) -> tuple[float, ...]:
+    """Depths of the scene's floors [m]."""
+    return tuple(float(event["depth"]) for event in events(result) if event["type"] == "floor")
+
+
+def events(result: Result) -> list[dict[str, Any]]:
+    """Tables of the scene's events."""
+    return list(result.provenance["scene"].get("events", ()))
+
+
+def some_of(result: Result, drawn: int) -> str:
+    """Say how many members are drawn of how many of the run."""
+    return of_members(drawn, members_of_run(result))
+
+
+def unit_of(label: str) -> str:
+    """Find the unit of a quantity by its name.
+
+    Args:
+        label: The name, as "position[2]".
+
+    Returns:
+        The unit; "" for the user's own quantities, which have no other place to say it than their name.
+    """
+    try:
+        return quantity("of", label).unit
+    except SceneError:
+        return ""

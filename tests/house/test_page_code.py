@@ -1,0 +1,134 @@
+"""Every fenced snippet of README and docs is run by a test: here, or in the file that the table names."""
+
+import re
+import shutil
+import tomllib
+
+import matplotlib
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from tests.conftest import ROOT
+
+matplotlib.use("Agg")
+DOCS = ROOT / "docs"
+FENCE = re.compile(r"^```(\w+)\n(.*?)^```\n(?:\n((?:    [^\n]*\n)+))?", re.DOTALL | re.MULTILINE)
+# Page -> the test that runs its snippets. The pages of terms and those below are run here.
+ELSEWHERE = {
+    "README.md": "house/test_readme.py",
+    "docs/controllers/README.md": "house/test_docs.py",
+    "docs/controllers/actuators.md": "house/test_docs.py",
+    "docs/controllers/allocation.md": "house/test_docs.py",
+    "docs/controllers/callback.md": "house/test_docs.py",
+    "docs/controllers/faults.md": "control/test_bad_sensors.py",
+    "docs/controllers/gym.md": "control/test_gym.py",
+    "docs/controllers/margins.md": "studies/test_margins.py",
+    "docs/controllers/metrics.md": "house/test_statistics_page.py",
+    "docs/controllers/sensors.md": "control/test_bad_sensors.py",
+    "docs/controllers/signals.md": "house/test_docs.py",
+    "docs/develop/add_a_method.md": "house/test_develop_pages.py",
+    "docs/develop/add_a_sampling.md": "house/test_develop_pages.py",
+    "docs/develop/add_a_statistic.md": "house/test_develop_pages.py",
+    "docs/gallery.md": "house/test_gallery.py",
+    "docs/guide/events.md": "house/test_docs.py",
+    "docs/guide/failed_members.md": "house/test_docs.py",
+    "docs/guide/is_my_controller_robust.md": "studies/test_sweep_pages.py",
+    "docs/guide/many_calls.md": "house/test_docs.py",
+    "docs/guide/methods.md": "house/test_readme.py",
+    "docs/guide/sampling.md": "house/test_docs.py",
+    "docs/guide/sensitivity.md": "house/test_docs.py",
+    "docs/guide/statistics.md": "house/test_statistics_page.py",
+    "docs/guide/vehicles.md": "house/test_docs.py",
+    "docs/guide/worst_case.md": "studies/test_margins.py",
+    "docs/start/tutorial.md": "house/test_wheel.py",
+}
+TERMS = [f"docs/guide/terms/{path.name}" for path in sorted((DOCS / "guide" / "terms").glob("[a-z]*.md"))]
+PARTS = ["docs/controllers/guidance.md", "docs/controllers/laws.md"]
+OF_A_RESULT = ["docs/guide/pictures.md", "docs/guide/recordings.md"]
+SCRIPTS = [
+    f"docs/guide/{name}.md"
+    for name in (
+        "choose_method_and_step",
+        "compare_with_your_simulator",
+        "current",
+        "notebooks",
+        "resume",
+        "your_vehicle",
+    )
+]
+
+
+def snippets(page, language):
+    """(code, what the page says it prints, or "") of each snippet of a page in a language."""
+    return [
+        (code, re.sub(r"^    ", "", printed, flags=re.MULTILINE))
+        for kind, code, printed in FENCE.findall((ROOT / page).read_text())
+        if kind == language
+    ]
+
+
+def test_each_page_with_code_has_its_test():
+    pages = [ROOT / "README.md", *(page for page in DOCS.rglob("*.md") if page.parent.name != "built")]
+    with_code = {str(page.relative_to(ROOT)) for page in pages if FENCE.search(page.read_text())}
+    run_here = {*TERMS, *PARTS, *OF_A_RESULT, *SCRIPTS}
+    assert with_code - {"docs/guide/terms/README.md"} == ELSEWHERE.keys() | run_here
+    for page, test in ELSEWHERE.items():
+        assert page.rpartition("/")[2].partition(".")[0] in (ROOT / "tests" / test).read_text().replace("glob", ""), (
+            page
+        )
+
+
+@pytest.mark.parametrize("page", TERMS)
+def test_tables_of_terms_are_parts_of_scenes(page):
+    body = {"mass": 123.8, "inertia": [5.0, 6.0, 7.0]}
+    found = [tomllib.loads(code) for code, _ in snippets(page, "toml")]
+    assert found
+    for tables in found:
+        scene = lw.Scene.from_dict(tables | {"vehicle": body | tables.get("vehicle", {})})
+        assert [term.type for term in scene.terms] == [term["type"] for term in tables.get("terms", ())]
+
+
+@pytest.mark.parametrize("page", PARTS)
+def test_parts_of_controllers_fit_a_vehicle(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shapes = {"weights_0": (4, 2), "biases_0": (4,), "weights_1": (1, 4), "biases_1": (1,)}
+    np.savez("policy.npz", **{name: np.zeros(shape) for name, shape in shapes.items()})
+    found = [tomllib.loads(code)["controller"] for code, _ in snippets(page, "toml")]
+    assert len(found) >= 4
+    everything = {"type": "set_point", "heading": 0.0, "speed": 0.5, "position": [0.0, 0.0, 5.0]}
+    held = {"type": "heading_pid", "kp": 1.0}
+    for parts in found:
+        controller = {"period": 0.1, "guidance": [everything], "laws": [held]} | parts
+        scene = lw.Scene.from_dict({"vehicle": {"name": "bluerov2_heavy"}, "controller": controller})
+        for section, tables in parts.items():
+            assert [part.type for part in getattr(scene.controller, section)] == [table["type"] for table in tables]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", SCRIPTS)
+def test_a_script_prints_what_its_page_says(page, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "examples").mkdir()
+    shutil.copy(ROOT / "examples" / "paper.toml", tmp_path / "examples")
+    ((code, expected),) = snippets(page, "python")
+    exec(code, {"__name__": "__main__"})
+    assert capsys.readouterr().out == expected
+
+
+@pytest.mark.slow
+def test_pictures_and_recordings_of_a_result(scene, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shown = []
+    monkeypatch.setattr(lw, "show", lambda *arguments, **named: shown.append(arguments))
+    record, streamed = lw.log_rerun, []
+    # A viewer that is open is not there: what would go to it is noted.
+    monkeypatch.setattr(lw, "log_rerun", lambda *a, to=None, **k: streamed.append(to) if to else record(*a, **k))
+    fleet = lw.Ensemble(scene, 20, seed=1, vary={"start.angular_velocity": lw.Normal(std=0.1)})
+    names = {"lw": lw, "result": lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=0.5))}
+    names |= {"a": names["result"], "b": names["result"]}
+    for page in OF_A_RESULT:
+        for code, _ in snippets(page, "python"):
+            exec(code, names)
+    written = {path.name for path in tmp_path.iterdir()}
+    assert {"speed.pdf", "fleet.svg", "fleet.rrd", "both.rrd"} <= written and len(shown) == len(streamed) == 1

@@ -1,0 +1,101 @@
+"""Pictures of what a member's step costs: their data, labels and refusals; and that the measured rows fit them."""
+
+import json
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import lgvi_warp as lw
+from lgvi_warp.common.errors import NothingToDraw
+
+RUNS = [
+    {"members": n, "threads": k, "steps": 10, "ns_per_vehicle_step": 100.0 / k + 1000.0 / n}
+    for n in (10, 1000, 100_000)
+    for k in (1, 2, 4)
+]
+TERMS = [
+    {
+        "term": name,
+        "method": method,
+        "dtype": dtype,
+        "ns_per_vehicle_step": price * (0.5 if dtype == "float32" else 1.0),
+    }
+    for name, price in {"none": 14.0, "drag": 16.0, "waves": 72.0}.items()
+    for method in ("psi_s", "psi_x")
+    for dtype in ("float64", "float32")
+]
+
+
+def assert_readable(figure):
+    """Nothing is cut off, and no text is smaller than 8 pixels where the picture is 700 wide."""
+    figure.draw_without_rendering()
+    box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
+    assert box.x0 >= -0.01 and box.y0 >= -0.01 and box.x1 <= width + 0.01 and box.y1 <= height + 0.01
+    labels = [label for axes in figure.axes for label in (axes.xaxis.label, axes.yaxis.label, *axes.get_xticklabels())]
+    assert min(label.get_fontsize() for label in labels) / 72.0 * 700.0 / width >= 8.0
+
+
+def test_scaling_has_a_line_for_each_number_and_what_more_threads_could_save():
+    of_members, of_threads = lw.plots.scaling(RUNS)
+    lines = {line.get_label(): line for line in of_members.lines}
+    assert set(lines) == {"1 thread", "2 threads", "4 threads"}
+    np.testing.assert_array_equal(lines["2 threads"].get_xdata(), [10, 1000, 100_000])
+    np.testing.assert_allclose(lines["2 threads"].get_ydata(), [150.0, 51.0, 50.01])
+    dotted = [line for line in of_threads.lines if line.get_label().startswith("_")]
+    np.testing.assert_allclose(dotted[-1].get_ydata(), 100.01 / np.array([1, 2, 4]))
+    assert all("[ns]" in axes.get_ylabel() and axes.get_xscale() == "log" for axes in (of_members, of_threads))
+    assert_readable(of_members.figure)
+
+
+def test_each_term_has_its_bar_beside_the_bare_scene():
+    axes = lw.plots.term_cost(TERMS)
+    widths = [[bar.get_width() for bar in bars] for bars in axes.containers]
+    assert widths == [[14.0, 16.0, 72.0], [7.0, 8.0, 36.0]]  # of the first method alone
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["none", "drag", "waves"] and axes.yaxis_inverted()
+    assert [line.get_xdata()[0] for line in axes.lines] == [14.0, 7.0] and "[ns]" in axes.get_xlabel()
+    assert len({bars[0].get_hatch() for bars in axes.containers}) == 2
+    assert_readable(axes.figure)
+
+
+def test_files_of_the_benchmarks_are_read_and_pictures_written(tmp_path):
+    lines = tmp_path / "rows.jsonl"
+    lines.write_text("a line of text\n" + "".join(json.dumps({"case": "x"} | row) + "\n" for row in RUNS + TERMS))
+    figure = Figure(figsize=(12.0, 5.0), layout="constrained")
+    assert lw.plots.scaling(lines, figure=figure)[0].figure is figure
+    axes = Figure().subplots()
+    assert lw.plots.term_cost(str(lines), ax=axes, path=tmp_path / "terms.svg") is axes and axes.get_title() == ""
+    assert (tmp_path / "terms.svg").stat().st_size > 5000
+
+
+def test_rows_of_another_kind_are_refused():
+    with pytest.raises(NothingToDraw, match=r"give rows of lw.scaling\(fleet\)"):
+        lw.plots.scaling(TERMS)
+    with pytest.raises(NothingToDraw, match=r"give rows of lw.term_cost\(scene\)"):
+        lw.plots.term_cost(RUNS)
+
+
+def test_what_cannot_be_measured_is_refused(scene):
+    with pytest.raises(lw.SceneError, match="terms: is empty"):
+        lw.term_cost(scene, h=0.1)
+    fleet = lw.Ensemble(scene, 10)
+    with pytest.raises(lw.SceneError, match="from 1 to 10") as caught:
+        lw.scaling(fleet, members=[11], threads=[0], h=0.1, t1=1.0)
+    assert len(caught.value.faults) == 2
+
+
+@pytest.mark.kernel
+@pytest.mark.slow
+def test_measured_rows_fit_the_pictures(scene):
+    rows = lw.scaling(lw.Ensemble(scene, 300), threads=[1, 2], h=0.1, t1=1.0, rounds=1)
+    assert [(row["members"], row["threads"]) for row in rows] == [(n, k) for n in (1, 10, 100, 300) for k in (1, 2)]
+    assert all(row["steps"] == 10 and row["ns_per_vehicle_step"] > 1.0 for row in rows)
+    lw.plots.scaling(rows)
+    waves = {"type": "waves", "amplitudes": [0.5], "periods": [8.0], "headings_deg": [0.0]}
+    drag = {"type": "drag", "linear": [1.0] * 6}
+    named = lw.Scene(scene.vehicle, scene.environment, [drag, waves], scene.start)
+    costs = {row["term"]: row for row in lw.term_cost(named, h=0.1)}
+    assert list(costs) == ["none", "drag", "waves", "all terms"] and costs["none"]["more_than_none"] == 0.0
+    # A sum of sines costs more than nothing, and less than with drag beside it, on a machine however busy.
+    assert costs["none"]["ns_per_vehicle_step"] < costs["waves"]["ns_per_vehicle_step"]
+    lw.plots.term_cost(costs.values())

@@ -1,0 +1,199 @@
+"""A run in the viewer while it goes on: members come block by block; a viewer that is none is named with the remedy."""
+
+import contextlib
+import dataclasses
+import socket
+
+import numpy as np
+import pytest
+import rerun as rr
+from rerun.chunk import RrdReader
+
+import lgvi_warp as lw
+from lgvi_warp import cli
+from lgvi_warp.views import viewer
+from lgvi_warp.views.live import Live
+from tests.conftest import ROOT
+from tests.support.viewer import free_port, receiver
+from tests.unit.views.test_recording import fleet, rows, text_of
+
+
+def blocks(result, *sizes):
+    """The results of successive members, as a run hands them over while it goes on."""
+    stop = 0
+    for size in sizes:
+        places = np.arange(stop, stop + size)
+        provenance = result.provenance | {"members": result.members}
+        yield dataclasses.replace(result.part(places), provenance=provenance)
+        stop += size
+
+
+@pytest.fixture(scope="module")
+def grown(tmp_path_factory):
+    """A fleet, and the recording of it that grew by blocks of 30, 30 and 20 members."""
+    result, path = fleet(80), tmp_path_factory.mktemp("live") / "live.rrd"
+    recording = rr.RecordingStream("live", recording_id="live")
+    recording.save(path)
+    live = Live(recording)
+    for block in blocks(result, 30, 30, 20):
+        live.add(block)
+    recording.disconnect()
+    return result, path
+
+
+def test_every_member_is_drawn_once_in_its_outcomes_colour(grown):
+    result, path = grown
+    last_frame = {}
+    for first, stop in ((0, 30), (30, 60), (60, 80)):
+        for code in ("ok", "non_finite", "surface", "floor"):
+            poses = rows(path, f"/world/from_{first}/bodies/{code}", "translations")
+            scales = rows(path, f"/world/from_{first}/bodies/{code}", "scales")
+            if poses:
+                t = max(poses)
+                visible = [scale[0] == 1.0 for scale in scales[t]] if scales else [True] * len(poses[t])
+                last_frame.setdefault(first, []).extend(pose for pose, on in zip(poses[t], visible, strict=True) if on)
+        expected = result.position[-1, first:stop].astype(np.float32)
+        drawn = np.array(sorted(last_frame[first]), np.float32)
+        np.testing.assert_array_equal(drawn, expected[np.lexsort(expected.T[::-1])])
+
+
+def test_the_text_has_the_counts_so_far(grown):
+    result, path = grown
+    text = text_of(path, "/run/summary")
+    assert "30 of 80 members done: " in text and "60 of 80 members done: " in text
+    assert text.index("30 of 80") < text.index("60 of 80") < text.index("'80 members done: ")
+    for name, number in result.status.counts().items():
+        assert f"{name} {number}" in text[text.index("'80 members done: ") :]
+
+
+def test_curves_are_of_single_members_while_under_way(grown):
+    result, path = grown
+    names = {chunk.entity_path for chunk in RrdReader(path).stream().filter(content="/curves/height/**")}
+    members = sorted(int(name.rsplit("/", 1)[1]) for name in names)
+    assert len(members) == 40 and members[0] < 30 < members[-1]
+    member = members[-1]
+    curve = rows(path, f"/curves/height/{member}", "scalars")
+    assert curve[0.0] == pytest.approx([-result.position[0, member, 2]], rel=1e-6)
+
+
+def test_the_view_is_laid_out_anew_when_it_is_outgrown(tmp_path):
+    result = fleet(40)
+    near, far = blocks(result, 20, 20)
+    for offset, layouts in ((0.0, 1), (500.0, 2)):
+        moved = dataclasses.replace(
+            far, samples={**far.samples, "position": far.position + np.array([offset, 0.0, 0.0])}
+        )
+        path = tmp_path / f"{offset:g}.rrd"
+        recording = rr.RecordingStream("live", recording_id="live")
+        recording.save(path)
+        live = Live(recording)
+        for block in (near, moved):
+            live.add(block)
+        recording.disconnect()
+        assert len(RrdReader(path).blueprints()) == layouts
+
+
+def test_members_without_paths_are_counted(tmp_path):
+    recording = rr.RecordingStream("live", recording_id="live")
+    recording.save(tmp_path / "live.rrd")
+    Live(recording).add(dataclasses.replace(fleet(8), samples={}))
+    recording.disconnect()
+    assert "8 members done" in text_of(tmp_path / "live.rrd", "/run/summary")
+
+
+def test_a_viewer_gets_what_the_file_gets(tmp_path):
+    with receiver(tmp_path / "sent.rrd") as address:
+        lw.log_rerun(fleet(20), tmp_path / "written.rrd", to=address)
+    sent, written = (rows(tmp_path / name, "/world/bodies/ok", "translations") for name in ("sent.rrd", "written.rrd"))
+    assert sent == written and len(sent) == 31
+
+
+@pytest.mark.kernel
+def test_run_shows_members_as_they_are_done_then_the_whole_run(tmp_path, capsys):
+    command = [
+        "run",
+        str(ROOT / "examples" / "paper.toml"),
+        "--out",
+        str(tmp_path),
+        "--members",
+        "20",
+        "--duration",
+        "2",
+    ]
+    with receiver(tmp_path / "sent.rrd") as address:
+        assert cli.main([*command, "--set", "run.save_every=0.5", "--live", "--viewer", address]) == 0
+    assert "fleet.rrd" in capsys.readouterr().out and (tmp_path / "fleet.rrd").exists()
+    entries = {entry.recording_id[:5]: entry for entry in RrdReader(tmp_path / "sent.rrd").recordings()}
+    (whole,) = (entry for start, entry in entries.items() if start != "live_")
+    poses = rows(tmp_path / "sent.rrd", "/world/from_0/bodies/ok", "translations", entries["live_"])
+    assert "20 members done: ok 20" in text_of(tmp_path / "sent.rrd", "/run/summary", entries["live_"])
+    assert "| outcome | ok 20 |" in text_of(tmp_path / "sent.rrd", "/run/summary", whole)
+    assert sorted(poses) == [0.0, 0.5, 1.0, 1.5, 2.0] and all(len(frame) == 20 for frame in poses.values())
+
+
+@contextlib.contextmanager
+def mute():
+    """The port of something that listens and says nothing."""
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.listen()
+        yield listener.getsockname()[1]
+
+
+def test_what_is_no_viewer_is_named_with_the_remedy(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(viewer, "STARTED", 0.3)
+    run = ["run", str(ROOT / "examples" / "paper.toml"), "--out", str(tmp_path / "run"), "--live"]
+    with mute() as port:
+        address = f"rerun+http://127.0.0.1:{port}/proxy"
+        assert not viewer.answers(address)
+        with pytest.raises(OSError, match='what answers is no viewer; start a viewer with "rerun"'):
+            lw.log_rerun(fleet(3), to=address)
+        assert cli.main([*run, "--viewer", address]) == 1
+        monkeypatch.setattr(viewer, "ADDRESS", address)
+        for ask in (lambda: lw.show(fleet(3)), lambda: viewer.opened(None)):
+            with pytest.raises(OSError, match="port 9876: is taken by what is no viewer; end that, or start"):
+                ask()
+        assert cli.main(run) == 1
+    said = capsys.readouterr().err
+    assert said.count("\n") == 2 and "is no viewer" in said and not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--viewer", "x"], "--viewer x: has no effect without --live"),
+        (
+            ["--live", "--keep", "none"],
+            "--live: shows members as they are done, and the run keeps none; add --keep all",
+        ),
+    ],
+)
+def test_live_is_refused_where_it_shows_nothing(options, words, tmp_path, capsys):
+    assert cli.main(["run", str(ROOT / "examples" / "paper.toml"), "--out", str(tmp_path / "run"), *options]) == 2
+    said = capsys.readouterr().err
+    assert words in said and said.count("\n") == 1 and not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("echo no display >&2; exit 1", r"did not start \(no display\); run where there is a display"),
+        ("exit 0", "no viewer answers"),
+    ],
+)
+def test_a_viewer_that_does_not_start_is_told_of(tmp_path, monkeypatch, text, words):
+    program = tmp_path / "viewer"
+    program.write_text(f"#!/bin/sh\n{text}\n")
+    program.chmod(0o755)
+    monkeypatch.setattr(viewer, "program", lambda: program)
+    monkeypatch.setattr(viewer, "PATIENCE", 0.3)
+    monkeypatch.setattr(viewer, "ADDRESS", f"rerun+http://127.0.0.1:{free_port()}/proxy")
+    with pytest.raises(OSError, match=words):
+        viewer.opened(None)
+
+
+def test_an_open_viewer_is_used(tmp_path, monkeypatch):
+    with receiver(tmp_path / "sent.rrd") as address:
+        monkeypatch.setattr(viewer, "ADDRESS", address)
+        assert viewer.is_open() and viewer.opened(None) == address and viewer.opened(address) == address
+        lw.log_rerun(fleet(3, 5), to=address)

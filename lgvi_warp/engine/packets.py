@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import accumulate
 from typing import Any
 
@@ -146,7 +147,7 @@ class Packets:
         controller = self.plan.kernel_choice.controller
         if controller is None:
             return 0, 0
-        kept = controller.bus.rows + self.plan.notes * sum(NOTED.values())
+        kept = controller.bus.rows + bool(self.plan.notes) * sum(NOTED.values())
         return kept + len(self.plan.signal_rows), kept
 
     def _monitor(self) -> Any:
@@ -166,9 +167,15 @@ class Packets:
         if controller is not None:
             rows = plan.signal_rows
             monitor.every, monitor.commands = controller.every(plan.grid.h), controller.bus.channels
-            monitor.bus, monitor.kept, monitor.noting = controller.bus.rows, self._bus()[1], int(self.plan.notes)
+            monitor.bus, monitor.kept, monitor.noting = controller.bus.rows, self._bus()[1], self.plan.notes
             monitor.signals = wp.array(np.array(rows, np.int32), dtype=wp.int32, device="cpu")
             monitor.first_signals = wp.zeros((self.count, max(1, len(rows))), dtype=Lane, device="cpu")
+            monitor.slots = plan.slots(self.count * plan.spec.width)
+            monitor.numbers, monitor.columns = sum(plan.look_fields.values()), columns_of(plan.look_fields)
+            if monitor.slots:
+                # An odd number of lanes from row to row: else the rows of a look crowd into a few lines of the cache.
+                shape = (monitor.slots * monitor.numbers + WASTE, self.count | 1)
+                monitor.looks = wp.zeros(shape, dtype=Lane, device="cpu")
         if plan.spec.still:
             monitor.still = wp.zeros((self.count, 3), dtype=Lane, device="cpu")
         return monitor
@@ -235,11 +242,24 @@ class Packets:
         inputs = [*self._arrays()[:4], *(plan.spec.real(tolerance) for tolerance in tolerances)]
         inputs += [wp.float64(plan.grid.h), stage_h, lead_h, k0, k1, s0, sample_step]
         inputs += [self.state, self.memory, self.status, self.failed_step, self.failed_size, self.monitor]
-        sizes = plan.sample_fields
-        firsts = dict(zip(sizes, accumulate(sizes.values(), initial=0), strict=False))
-        inputs += [sum(sizes.values()), wp.vec4i(*(firsts.get(name, -1) for name in SAMPLE_FIELDS)), self.out]
+        inputs += [sum(plan.sample_fields.values()), columns_of(plan.sample_fields), self.out]
         with build_lock:
             return wp.launch(plan.advance.kernel, dim=self.count, inputs=inputs, device="cpu", record_cmd=True)
+
+    def gathered(self, when: slice) -> np.ndarray:
+        """What the last launch gathered at looks.
+
+        Args:
+            when: slice of the looks, which are in slots that follow one another.
+
+        Returns:
+            (looks, members, numbers of a sample), in memory that the next launch overwrites, in the user's axes.
+        """
+        slots, numbers = self.monitor.slots, self.monitor.numbers
+        first = when.start % slots
+        rows = self.monitor.looks.numpy()[first * numbers : (first + when.stop - when.start) * numbers]
+        by_look = rows.reshape(when.stop - when.start, numbers, -1)[..., : self.members.count]
+        return by_look.transpose(0, 2, 1)
 
     def first_signals(self) -> np.ndarray:
         """The signals at t = 0, once the first launch has made them.
@@ -315,3 +335,16 @@ class Packets:
         step = np.where(later, self._of_members(monitor.warned_step, np.int64), 0)
         value = np.where(later, np.sqrt(self._of_members(monitor.warned_size, np.float64)), value)
         return bits | noted, step, value
+
+
+def columns_of(sizes: Mapping[str, int]) -> Any:
+    """Where the kernel writes the motion.
+
+    Args:
+        sizes: numbers of each field of a sample, in their order.
+
+    Returns:
+        The first number of each of SAMPLE_FIELDS; -1 where it is not among them.
+    """
+    firsts = dict(zip(sizes, accumulate(sizes.values(), initial=0), strict=False))
+    return wp.vec4i(*(firsts.get(name, -1) for name in SAMPLE_FIELDS))

@@ -16,7 +16,7 @@ import numpy as np
 import warp as wp
 
 from lgvi_kernels import built_in
-from lgvi_kernels.advance.feeding import NOTED
+from lgvi_kernels.advance.feeding import NOTED, NOTES
 from lgvi_kernels.advance.kernel import Advance, make_advance
 from lgvi_kernels.advance.rows import SAMPLE_FIELDS
 from lgvi_kernels.advance.spec import CHUNK, Control, Spec
@@ -55,6 +55,8 @@ STEP_ROUND_OFF = 1e-12
 # Limits of one launch: they keep progress current, interrupts prompt and the sample buffer small in long runs.
 SEGMENT_VEHICLE_STEPS = 20_000_000
 SEGMENT_SAMPLE_BYTES = 16_000_000
+# What is gathered at looks before it is reduced: it should stay in the caches.
+GATHERED_BYTES = 8_000_000
 
 
 class NotSurveyed(Exception):  # noqa: N818  (what happened, and no fault of the scene)
@@ -151,25 +153,54 @@ class Plan:
             return make_advance(self.spec)
 
     @functools.cached_property
-    def taken(self) -> TimeGrid:
-        """All samples that are taken: those to keep, and with `looks` those at the controller's looks."""
+    def gathered(self) -> TimeGrid | None:
+        """The controller's looks, where samples are taken at all of them; None without a controller or without `looks`."""
         controller = self.kernel_choice.controller
-        if not self.looks or controller is None:
-            return self.grid
-        return self.grid.with_steps(np.arange(0, self.grid.steps + 1, controller.every(self.grid.h)))
+        return self.grid.looks(controller.every(self.grid.h)) if self.looks and controller is not None else None
 
-    def kept(self, when: slice) -> tuple[slice, np.ndarray]:
-        """Which of some samples that are taken are to keep.
+    @functools.cached_property
+    def look_fields(self) -> dict[str, int]:
+        """What the kernel gathers at a look, in the user's axes: field -> numbers, as of `sample_fields`."""
+        return {name: size for name, size in self.sample_fields.items() if name in self.fields}
+
+    def slots(self, count: int) -> int:
+        """How many looks of a block are gathered at once.
 
         Args:
-            when: slice of the samples that are taken.
+            count: number of members of the block.
 
         Returns:
-            The slice of the grid's samples, and their places within `when`.
+            At least 2, since the first launch begins with a look; 0 where none are gathered.
         """
-        steps, grid = self.taken.sample_steps[when], self.grid.sample_steps
-        first, stop = np.searchsorted(grid, [steps[0], steps[-1] + 1])
-        return slice(int(first), int(stop)), np.searchsorted(steps, grid[first:stop])
+        if self.gathered is None:
+            return 0
+        return max(2, min(GATHERED_BYTES // max(1, self.look_bytes(count)), len(self.gathered.times)))
+
+    def look_bytes(self, count: int) -> int:
+        """Memory of what is gathered at a look of a block [bytes].
+
+        Args:
+            count: number of members of the block.
+        """
+        return sum(self.look_fields.values()) * count * np.dtype(DTYPES[self.dtype]).itemsize
+
+    def looks_of(self, k0: int, k1: int) -> slice:
+        """Which looks are gathered once a launch has ended.
+
+        Args:
+            k0: number of steps made before the launch.
+            k1: number of steps made after it.
+
+        Returns:
+            Those after step k0, with that of the start, and no later than step k1. Where a function of the host answers, a
+            look ends in the next launch: those from step k0 on and before step k1, with that of the end.
+        """
+        assert self.gathered is not None
+        bounds = np.array([k0 + 1 if k0 else 0, k1 + 1])
+        if self.asks:
+            bounds = np.array([k0, k1 if k1 < self.grid.steps else k1 + 1])
+        first, stop = np.searchsorted(self.gathered.sample_steps, bounds)
+        return slice(int(first), int(stop))
 
     @functools.cached_property
     def shared(self) -> Shared:
@@ -256,7 +287,7 @@ class Plan:
     def _copy(self) -> Plan:
         """The same plan, with nothing chosen anew, as copy.copy would by way of __reduce__."""
         # Copies have these in common: none computes them again.
-        _ = self.shared, self.idle, self.taken, self.table, self.sample_fields, self.signal_rows
+        _ = self.shared, self.idle, self.gathered, self.table, self.sample_fields, self.look_fields, self.signal_rows
         plan = object.__new__(Plan)
         plan.__dict__.update(self.__dict__)
         return plan
@@ -321,7 +352,7 @@ class Plan:
             A plan for m members.
         """
         subplan = self._copy()
-        for name in ("shared", "idle", "sample_fields", "signal_rows", "taken", "times"):
+        for name in ("shared", "idle", "sample_fields", "look_fields", "signal_rows", "gathered", "times"):
             subplan.__dict__.pop(name, None)
         object.__setattr__(subplan, "ensemble", self.ensemble.subset(indices))
         object.__setattr__(subplan, "fields", ordered(fields))
@@ -398,9 +429,10 @@ class Plan:
         return controller is not None and controller.callback is not None
 
     @property
-    def notes(self) -> bool:
-        """Whether looks note what they measure, want and demand: where some of it is saved, or the host is asked."""
-        return self.asks or any(SIGNALS[name].group in NOTED for name in self.signals)
+    def notes(self) -> int:
+        """What looks note, as bits (see NOTES): that of which something is saved, and all where the host is asked."""
+        groups = NOTES.keys() if self.asks else {SIGNALS[name].group for name in self.signals}
+        return sum(NOTES[group] for group in groups if group in NOTES)
 
     @functools.cached_property
     def table(self) -> dict[str, Field]:
@@ -529,7 +561,7 @@ class Plan:
             are due.
         """
         stages, leads = (np.array(fractions) * self.grid.h for fractions in self.lengths)
-        due = np.append(self.taken.sample_steps, 2**31 - 1).astype(np.int32)
+        due = np.append(self.grid.sample_steps, 2**31 - 1).astype(np.int32)
         return (
             wp.array(stages, dtype=self.spec.real, device="cpu"),
             wp.array(leads, dtype=self.spec.real, device="cpu"),
@@ -546,7 +578,7 @@ class Plan:
         Returns:
             (s0, s1): samples s0 to s1 - 1 are due after step k0 and no later than step k1.
         """
-        s0, s1 = np.searchsorted(self.taken.sample_steps, (k0, k1), side="right")
+        s0, s1 = np.searchsorted(self.grid.sample_steps, (k0, k1), side="right")
         return int(s0), int(s1)
 
     def segments(self, count: int) -> Iterator[tuple[int, int]]:
@@ -561,7 +593,8 @@ class Plan:
         if self.asks:
             yield from self._periods()
             return
-        due = self.taken.sample_steps
+        due, slots = self.grid.sample_steps, self.slots(count)
+        every = int(self.gathered.sample_steps[1]) if self.gathered and len(self.gathered.times) > 1 else 0
         per_sample = sum(self.sample_fields.values()) * count * np.dtype(DTYPES[self.dtype]).itemsize
         most_samples = max(1, SEGMENT_SAMPLE_BYTES // max(per_sample, 1))
         most_steps = max(CHUNK, SEGMENT_VEHICLE_STEPS // count // CHUNK * CHUNK)
@@ -569,6 +602,9 @@ class Plan:
         while k < self.grid.steps:
             last = self.due(k, k)[1] + most_samples
             k1 = min(k + most_steps, int(due[min(last, len(due)) - 1]))
+            if every:
+                # Up to the last look for which there is a slot before those of earlier ones are taken again.
+                k1 = min(k1, ((k // every + 1) // slots * slots + slots - 1) * every)
             yield k, k1
             k = k1
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,7 +23,11 @@ from lgvi_warp.statistics.samples import Fields
 if TYPE_CHECKING:
     from lgvi_warp.engine.packets import Packets
     from lgvi_warp.engine.plan import Plan
+    from lgvi_warp.methods.saveat import TimeGrid
     from lgvi_warp.sampling.members import Members
+
+# Numbers of one kind at the looks that are reduced together.
+NUMBERS_AT_ONCE = 32_768
 
 # Tells status and last own step of each member (see `Fields`).
 Ends = Callable[[], tuple[np.ndarray, np.ndarray]]
@@ -128,20 +133,23 @@ def run_block(
         packets = Packets.of(plan, members)
         block_keepers = [keeper.open(plan, block, members) for keeper in keepers]
 
-        lookers = (
-            [looker for keeper in block_keepers if (looker := getattr(keeper, "look", None))] if plan.looks else []
-        )
+        # So many numbers of each kind that what is made of them stays in the caches.
+        at_once = max(1, NUMBERS_AT_ONCE // block.count)
+        lookers = [looker for keeper in block_keepers if (looker := getattr(keeper, "look", None))]
 
         def keep(when: slice, values: Mapping[str, np.ndarray], ends: Ends) -> None:
-            samples = samples_of(plan, when, values, ends)
-            for look in lookers:
-                look(when, samples)
-            kept, places = plan.kept(when)
-            if kept.start == kept.stop:
-                return
-            samples = samples if plan.taken is plan.grid else samples.at(places)
+            samples = samples_of(plan, plan.grid, when, values, ends)
             for block_keeper in block_keepers:
-                block_keeper.take(kept, samples)
+                block_keeper.take(when, samples)
+
+        def look(grid: TimeGrid, looks: slice) -> None:
+            ends = functools.cache(packets.ended)
+            for first in range(looks.start, looks.stop, at_once):
+                when = slice(first, min(first + at_once, looks.stop))
+                values = divided(plan.look_fields, packets.gathered(when), plan.table)
+                samples = samples_of(plan, grid, when, values, ends)
+                for looker in lookers:
+                    looker(when, samples)
 
         def keep_start() -> None:
             running = np.zeros(block.count, np.uint8), np.zeros(block.count, np.int64)
@@ -160,6 +168,8 @@ def run_block(
             if k0 == 0 and plan.signals:
                 # The first look of a controller is a part of the first launch.
                 keep_start()
+            if plan.gathered and (looks := plan.looks_of(k0, k1)).start < looks.stop:
+                look(plan.gathered, looks)
             when = slice(*plan.due(k0, k1))
             if when.start < when.stop and block_keepers:
                 values = unpacked(plan.sample_fields, raw, packets.frame, plan.table)
@@ -189,7 +199,7 @@ def at_start(plan: Plan, members: Members, packets: Packets) -> dict[str, np.nda
     if not plan.signals:
         return states
     sizes = {name: plan.sample_fields[name] for name in plan.signals}
-    return states | _divided(sizes, packets.first_signals()[:, : members.count], plan.table)
+    return states | divided(sizes, packets.first_signals()[:, : members.count], plan.table)
 
 
 def in_order(runs: Sequence[Block], done: Iterable[tuple[Block, Any]]) -> Iterator[tuple[Block, Any]]:
@@ -225,7 +235,7 @@ def unpacked(
     Returns:
         By field: (samples, members, ...), in the field's unit.
     """
-    samples = _divided(fields, raw, table)
+    samples = divided(fields, raw, table)
     if not np.array_equal(frame.Q, np.broadcast_to(np.eye(3), frame.Q.shape)):
         # Products of contiguous matrices take half the time, and have the same bits.
         back = np.ascontiguousarray(np.swapaxes(frame.Q, -1, -2))
@@ -242,8 +252,17 @@ def unpacked(
     return samples
 
 
-def _divided(fields: Mapping[str, int], raw: np.ndarray, table: Mapping[str, Field]) -> dict[str, np.ndarray]:
-    """Raw samples by field, as of `unpacked`, in the kernel's frame."""
+def divided(fields: Mapping[str, int], raw: np.ndarray, table: Mapping[str, Field]) -> dict[str, np.ndarray]:
+    """Raw samples by field, in the axes that they are in.
+
+    Args:
+        fields: numbers of each field, as of `unpacked`.
+        raw: (samples, members, numbers).
+        table: the fields by name.
+
+    Returns:
+        By field: (samples, members, ...), views where no pairs are summed.
+    """
     samples: dict[str, np.ndarray] = {}
     column = 0
     for name, size in fields.items():
@@ -256,17 +275,18 @@ def _divided(fields: Mapping[str, int], raw: np.ndarray, table: Mapping[str, Fie
     return samples
 
 
-def samples_of(plan: Plan, when: slice, fields: Mapping[str, np.ndarray], ends: Ends) -> Fields:
+def samples_of(plan: Plan, grid: TimeGrid, when: slice, fields: Mapping[str, np.ndarray], ends: Ends) -> Fields:
     """Fields of a block with the times, steps and terms that belong to them.
 
     Args:
         plan: the plan of the run.
-        when: slice of the samples that are taken.
+        grid: the samples to keep, or the looks.
+        when: slice of them.
         fields: values by field, (times, members, ...).
         ends: returns status and last own step of each member (see `Fields`).
 
     Returns:
         The samples as keepers receive them.
     """
-    grid, scene = plan.taken, plan.ensemble.scene
+    scene = plan.ensemble.scene
     return Fields(fields, grid.times[when], grid.sample_steps[when], scene.terms, ends, scene.controller)

@@ -73,19 +73,18 @@ class TimeGrid:
         """Number of steps from the start to the end."""
         return int(self.sample_steps[-1])
 
-    def with_steps(self, steps: np.ndarray) -> TimeGrid:
-        """The same steps with samples after more of them.
+    def looks(self, every: int) -> TimeGrid:
+        """The same steps with samples at the looks of a controller alone.
 
         Args:
-            steps: Numbers of steps (m,), none above those of the run.
+            every: Number of steps between two looks.
 
         Returns:
-            The grid; the times of the samples that there were stay the same.
+            The grid; it ends with the last look.
         """
-        step, together = exact(self.h), np.union1d(self.sample_steps, steps)
-        times = np.array([k * step.numerator / step.denominator for k in together.tolist()])
-        times[np.searchsorted(together, self.sample_steps)] = self.times
-        return TimeGrid(self.h, together.astype(np.int64), times, self.messages)
+        step, steps = exact(self.h), np.arange(0, self.steps + 1, every)
+        times = np.array([k * step.numerator / step.denominator for k in steps.tolist()])
+        return TimeGrid(self.h, steps, times, self.messages)
 
 
 def exact(x: float) -> Fraction:

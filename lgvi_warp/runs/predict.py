@@ -302,9 +302,11 @@ class Sized:
         count = min(len(runs), threads)
         row = sum(plan.sample_fields.values()) * np.dtype(machine.DTYPES[plan.dtype]).itemsize
         segment = min(SEGMENT_SAMPLE_BYTES, row * runs[0].count * len(plan.grid.times))
+        # Those gathered at looks are held once, as the kernel wrote them.
+        looks = plan.slots(runs[0].count) * plan.look_bytes(runs[0].count)
         # A segment's samples are held three times: as the kernel wrote them, in order of members, and as rotated or moved
         # copies. Parts are held twice: their rows, and all joined.
-        each = 3 * segment + 2 * self.statistics.part + self.statistics.taking
+        each = 3 * segment + looks + 2 * self.statistics.part + self.statistics.taking
         if self.store:
             each += self.statistics.file + sum(column.bytes for column in columns(plan, self.store))
         return count * each

@@ -66,7 +66,8 @@ def sizes(plan: Plan, statistics: Sequence[Statistic]) -> Sizes:
 
     values = {name: at(name, times) for name in ("file", "part", "joined", "estimates")}
     # Samples come one launch at a time; sketches are read at_once times together, which bounds the memory.
-    launch = max(s1 - s0 for s0, s1 in (plan.due(*segment) for segment in plan.segments(runs[0].count)))
+    due = (s1 - s0 for s0, s1 in (plan.due(*segment) for segment in plan.segments(runs[0].count)))
+    launch = max(plan.slots(runs[0].count), *due)
     at_once = max(1, SORTED_AT_ONCE * times * 8 // max(values["joined"], 1))
     return Sizes(**values, taking=at("taking", launch), reading=at("reading", min(times, at_once)))
 
@@ -84,8 +85,8 @@ def _of_times(plan: Plan, statistics: Sequence[Statistic], count: int) -> Sizes:
     gathers = keeper.open(plan, block, members)
 
     def take() -> None:
-        samples = samples_of(plan, when, start, packets.ended)
-        for looks_or_not in (gathers.look, gathers.take) if plan.looks else (gathers.take,):
+        samples = samples_of(plan, plan.grid, when, start, packets.ended)
+        for looks_or_not in (gathers.look, gathers.take) if plan.gathered else (gathers.take,):
             looks_or_not(when, samples)
 
     _, taking = _peak(take)

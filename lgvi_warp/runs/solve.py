@@ -113,10 +113,14 @@ def solve(
         ensemble, method, h, t1, save, dtype, width=width, checks=checks, on_failure=on_failure, fields=observed.fields,
         survey_all=store is not None, looks=observed.looks)  # fmt: skip
     fields, count = fields_of(save, ensemble.scene.run), threads or machine.thread_count()
-    if store is None:
-        return completed(plan, count, observed, fields, progress=callback(progress), executor=runner, partial=True,
-                         on_block=on_block)  # fmt: skip
-    only = blocks_there(only, plan)
-    into = store if isinstance(store, Store) else Store(store)
-    result = run_stored(plan, into, runner, callback(progress), only, observed, fields, on_block)
-    return result if only is not None else finished(result, plan, observed, fields, count)
+    try:
+        if store is None:
+            return completed(plan, count, observed, fields, progress=callback(progress), executor=runner, partial=True,
+                             on_block=on_block)  # fmt: skip
+        only = blocks_there(only, plan)
+        into = store if isinstance(store, Store) else Store(store)
+        result = run_stored(plan, into, runner, callback(progress), only, observed, fields, on_block)
+        return result if only is not None else finished(result, plan, observed, fields, count)
+    finally:
+        # Packets and their plan refer to each other: their arrays would stay until Python looks for such circles.
+        plan.idle.clear()

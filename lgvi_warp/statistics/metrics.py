@@ -7,9 +7,10 @@ number, r what is wanted at each look, e = r - y.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -30,22 +31,28 @@ State = dict[str, np.ndarray]
 ROUND_OFF = 1e-9
 
 
-class Looks(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Looks:
     """Some looks in turn at n members, of d numbers, with the look before each.
 
     Args:
         t: their times (k,) [s].
         dt: times since the look before each (k,) [s].
-        before: numbers at the look before each (k, d, n).
+        start: numbers at the look before the first of them (d, n).
         x: numbers (k, d, n).
         alive: which members were still under way (k, n); None if all were.
     """
 
     t: np.ndarray
     dt: np.ndarray
-    before: np.ndarray
+    start: np.ndarray
     x: np.ndarray
     alive: np.ndarray | None
+
+    @functools.cached_property
+    def before(self) -> np.ndarray:
+        """Numbers at the look before each, (k, d, n)."""
+        return np.concatenate([self.start[None], self.x[:-1]])
 
     def rows(self, *arrays: np.ndarray) -> Iterator[tuple[Any, ...]]:
         """Yield for each look its time, its numbers in these arrays, and which members were under way.
@@ -93,12 +100,11 @@ class _Follow(Gatherer):
             }
             self._last, first = x[0], 1
         if k > first:
-            before = np.concatenate([self._last[None], x[:-1]]) if first == 0 else x[:-1]
             step = np.diff(self._time[max(when.start - 1, 0) : when.stop])
-            looks = Looks(t[first:], step, before, x[first:], None if alive is None else alive[first:])
+            looks = Looks(t[first:], step, self._last, x[first:], None if alive is None else alive[first:])
             self._state |= self._metric.follow(self._state, looks)
             self._state["until"] = np.maximum(self._state["until"], looks.of_living(looks.t[:, None], 0.0).max(axis=0))
-            self._last = x[-1].copy()
+        self._last = x[-1].copy()
         self._place = (values.first, values.block, values.size, R)
 
     def end(self, ends: Ends, replicates: int) -> None:
@@ -226,8 +232,9 @@ def accumulated(total: np.ndarray, looks: Looks, parts: np.ndarray) -> np.ndarra
         looks: the looks.
         parts: what each adds (k, n).
     """
-    for part in looks.of_living(parts, 0.0):
-        total = total + part
+    total = total.copy()
+    for addend in looks.of_living(parts, 0.0):
+        total += addend
     return total
 
 
@@ -470,9 +477,10 @@ class SettlingTime(OfCourse):
         return state | {"band": band, "since": np.where(state["step"] <= band, 0.0, np.inf)}
 
     def follow(self, state: State, looks: Looks) -> State:
-        outside, since = np.abs(self.left(state, looks)) > state["band"], state["since"]
+        outside, since = np.abs(self.left(state, looks)) > state["band"], state["since"].copy()
         for t, out, alive in looks.rows(outside):
-            since = np.where(alive, np.where(out, np.inf, np.minimum(since, t)), since)
+            np.minimum(since, t, out=since, where=alive)
+            np.copyto(since, np.inf, where=out & alive)
         return {"since": since}
 
     def finish(self, state: State) -> np.ndarray:

@@ -29,8 +29,8 @@ class _AllOf(Quantity):
     def __call__(self, samples: Fields, members: Members) -> np.ndarray:
         """Return the numbers of all fields, (k, d, n)."""
         k, n = len(samples.time), members.count
-        columns = [samples[name].reshape(k, n, -1) for name in self.fields]
-        return np.ascontiguousarray(np.moveaxis(np.concatenate(columns, axis=2, dtype=np.float64), 2, 1))
+        columns = [np.moveaxis(samples[name].reshape(k, n, -1), 2, 1) for name in self.fields]
+        return np.concatenate(columns, axis=1, dtype=np.float64)
 
 
 def all_of(*names: str) -> Quantity:

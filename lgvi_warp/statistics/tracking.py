@@ -29,7 +29,10 @@ def wrapped(angle: np.ndarray) -> np.ndarray:
     Returns:
         (...,) [rad].
     """
-    return np.asarray(angle - 2.0 * np.pi * np.rint(angle / (2.0 * np.pi)))
+    turns = np.asarray(angle / (2.0 * np.pi))
+    np.rint(turns, out=turns)
+    turns *= 2.0 * np.pi
+    return np.subtract(angle, turns, out=turns)
 
 
 @dataclass(frozen=True)
@@ -94,7 +97,8 @@ class Channel:
         """
         y, goal = self.actual(samples), self._set_point(samples.controller, members)
         goal = self.reference(samples) if goal is None else np.broadcast_to(goal, y.shape)
-        return np.stack([y, goal], axis=-1)
+        # Side by side in memory as they are used: components before members.
+        return np.moveaxis(np.stack([y, goal], axis=1), 1, 2)
 
     def _set_point(self, controller: Any, members: Members) -> np.ndarray | None:
         """What the members' set points want, (1,) or (n,); None where another kind of guidance says it."""

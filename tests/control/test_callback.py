@@ -33,10 +33,14 @@ def run(laws, **named):
 
 @pytest.mark.slow
 def test_it_is_the_law_in_the_kernel():
-    asked, fused = run([lw.Callback(heading)]), run([lw.HeadingPID(**GAINS)])
+    metrics = [lw.IAE("heading"), lw.Effort(), lw.MaxError("attitude")]
+    asked, fused = (run([law], statistics=metrics) for law in (lw.Callback(heading), lw.HeadingPID(**GAINS)))
     # 250 steps of round-off: the two evaluate the same formula in another order.
     assert np.abs(asked.attitude - fused.attitude).max() < 1e-12
     assert np.abs(asked.position - fused.position).max() < 1e-12
+    # Integrals over 5 s of what the two have alike: the command of each look among it, which the host answers after it.
+    for name, estimate in fused.statistics.items():
+        assert estimate.value == pytest.approx(asked.statistics[name].value, rel=1e-10), name
 
 
 def test_commands():

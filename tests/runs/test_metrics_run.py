@@ -1,5 +1,7 @@
 """Metrics in whole runs: those of the twin on kept paths, at all looks whatever is kept, in stores, of members that end."""
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +9,9 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.status import stop_time
+from lgvi_warp.engine import plan as plans
+from lgvi_warp.engine import work
+from lgvi_warp.engine.packets import Packets
 from lgvi_warp.reference import metrics as twin
 from tests.conftest import ROOT
 
@@ -166,3 +171,43 @@ def test_a_scene_without_a_controller_is_told(fleet):
     scene = lw.Scene.named("remus_100", run={"step": 0.01, "duration": 1.0, "method": "psi_x"})
     with pytest.raises(lw.SceneError, match="signal of a controller"):
         lw.solve(scene, statistics=[lw.IAE("depth")])
+
+
+def test_numbers_do_not_depend_on_how_many_looks_are_gathered_at_once(fleet, coarse, monkeypatch):
+    monkeypatch.setattr(plans, "GATHERED_BYTES", 1)
+    monkeypatch.setattr(work, "NUMBERS_AT_ONCE", 1)
+    by_look = lw.solve(fleet, **COARSE, statistics=metrics())
+    assert by_look.position.tobytes() == coarse.position.tobytes()
+    for name, estimate in coarse.statistics.items():
+        assert estimate.value.tobytes() == by_look.statistics[name].value.tobytes(), name
+
+
+def test_metrics_change_no_bit_of_the_run(fleet, coarse):
+    # The same kernel, which gathers nothing.
+    fields = ("position", "reference_heading", "actuator", "demand")
+    without = lw.solve(fleet, **COARSE | {"save": lw.SaveAt(every=4.0, fields=fields)})
+    assert without.position.tobytes() == coarse.position.tobytes()
+    assert without.status.tobytes() == coarse.status.tobytes()
+
+
+@pytest.mark.slow
+def test_metrics_change_no_bit_beside_the_bare_kernel(fleet, coarse):
+    bare = lw.solve(fleet, **COARSE)
+    for name in ("position", "attitude", "velocity", "angular_velocity", "status"):
+        assert getattr(bare, name).tobytes() == getattr(coarse, name).tobytes(), name
+
+
+def test_the_arrays_of_a_run_are_freed_at_its_end(fleet, monkeypatch):
+    packets, make = [], Packets.__init__
+
+    def noted(self, plan, members):
+        make(self, plan, members)
+        packets.append(weakref.ref(self))
+
+    monkeypatch.setattr(Packets, "__init__", noted)
+    gc.disable()
+    try:
+        lw.solve(fleet, **COARSE, statistics=metrics(), keep="none")
+        assert packets and not any(packet() for packet in packets)
+    finally:
+        gc.enable()

@@ -8,6 +8,7 @@ from typing import Any
 
 import warp as wp
 
+from lgvi_kernels.advance.rows import WASTE
 from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
     add,
     any_positive,
@@ -36,9 +37,11 @@ CONTROL_NON_FINITE = 8
 
 # What each look notes in rows of the memory, in this order, and how many it takes: the demand X Y Z K M N; the measurement:
 # position, attitude row by row, velocities over ground and through the water, angular velocity, heading; the reference:
-# position, attitude, velocity, angular velocity, heading, speed, angular acceleration. All of it, where any of it is saved or
-# the host is asked: a number of the launch says so, so that what is saved changes no code, and with it no bit.
+# position, attitude, velocity, angular velocity, heading, speed, angular acceleration. All of one of them, where any of it is
+# saved or the host is asked: a number of the launch says so, so that what is saved changes no code, and with it no bit.
 NOTED = {"demand": 6, "measured": 22, "reference": 23}
+# The bits of that number.
+NOTES = {"demand": 1, "measured": 2, "reference": 4}
 MEASURED_ROW = NOTED["demand"]
 REFERENCE_ROW = MEASURED_ROW + NOTED["measured"]
 
@@ -57,6 +60,8 @@ def make_feed(spec, types, method, at_step, opened):
     velocities, momentum, water_velocity = method.velocities, method.momentum, method.water_velocity
     drifts = superpose(spec.laws, "flow") is not None
     turned, moved, checked = "axes" in spec.parts, "origin" in spec.parts, spec.checked
+    compensated, reports = spec.compensated, control.reports
+    note_actuators = make_note_actuators(spec, types.View, at_step)
 
     @wp.func
     def put3(memory: wp.array2d(dtype=Lane), i: int, row: int, v: Any):
@@ -151,21 +156,66 @@ def make_feed(spec, types, method, at_step, opened):
         put3(memory, i, row + 20, r.angular_acceleration)
 
     @wp.func
+    def put_look(looks: wp.array2d(dtype=Lane), row: int, i: int, v: Any):
+        looks[row, i] = v.x
+        looks[row + 1, i] = v.y
+        looks[row + 2, i] = v.z
+
+    @wp.func
+    def gather_motion(y: Any, x: State, c: Constants, monitor: Monitor):
+        """Write the motion at a look into the look's rows; what is not gathered goes to the last rows."""
+        looks = monitor.looks
+        waste = looks.shape[0] - wp.static(WASTE)
+        start = (y.look % monitor.slots) * monitor.numbers
+        columns = monitor.columns
+        row = wp.where(columns[0] < 0, waste, start + columns[0])
+        put_look(looks, row, c.packet, y.position)
+        if wp.static(compensated):
+            low = (x.b - y.position) + x.b_low
+            if wp.static(moved):
+                low = low + rotate(x, c.inertia.user_origin)
+            put_look(looks, row + 3, c.packet, low)
+        row = wp.where(columns[1] < 0, waste, start + columns[1])
+        put_look(looks, row, c.packet, y.north)
+        put_look(looks, row + 3, c.packet, y.east)
+        put_look(looks, row + 6, c.packet, y.down)
+        put_look(looks, wp.where(columns[2] < 0, waste, start + columns[2]), c.packet, y.velocity)
+        put_look(looks, wp.where(columns[3] < 0, waste, start + columns[3]), c.packet, y.angular_velocity)
+
+    @wp.func(inline=False)
+    def gather_signals(memory: wp.array2d(dtype=Lane), i: int, monitor: Monitor, look: int):
+        """Write the signals at a look behind its motion."""
+        count = monitor.signals.shape[0]
+        start = (look % monitor.slots + 1) * monitor.numbers - count
+        for j in range(count):
+            monitor.looks[start + j, i] = memory[i, monitor.signals[j]]
+
+    @wp.func
+    def gather(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64):
+        """Write the signals after a look, where something is gathered at all of them."""
+        if monitor.slots > 0:
+            if wp.static(reports):
+                note_actuators(x, c, h, k)
+            gather_signals(c.memory, c.packet, monitor, k // monitor.every)
+
+    @wp.func
     def seen(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real):
         """What is measured and what is wanted after k steps, both noted."""
         z = opened(at_step(x, k, h), c, -opening)
         if wp.static(momentum is not None):
             z.p = momentum(z)
         y = truth(z, c, monitor, k, h)
+        if monitor.slots > 0:
+            gather_motion(y, z, c, monitor)
         r = upright(y.position.x)
         if wp.static(measure is not None):
             y = measure(y, r, y, c.loop)
         # Each as soon as it is known, so that what is noted alone need not be kept in registers.
-        if monitor.noting > 0:
+        if (monitor.noting & wp.static(NOTES["measured"])) != 0:
             put_measured(y, c.memory, c.packet, monitor.bus + wp.static(MEASURED_ROW))
         if wp.static(guide is not None):
             r = guide(r, r, y, c.loop)
-        if monitor.noting > 0:
+        if (monitor.noting & wp.static(NOTES["reference"])) != 0:
             put_reference(r, c.memory, c.packet, monitor.bus + wp.static(REFERENCE_ROW))
         return y, r
 
@@ -199,7 +249,7 @@ def make_feed(spec, types, method, at_step, opened):
         w = Wrench()
         if wp.static(act is not None):
             w = act(w, r, y, c.loop)
-        if monitor.noting > 0:
+        if (monitor.noting & wp.static(NOTES["demand"])) != 0:
             put3(c.memory, c.packet, monitor.bus, w.force)
             put3(c.memory, c.packet, monitor.bus + 3, w.torque)
         # An allocation may lose what is no number: a limit is a comparison.
@@ -230,19 +280,24 @@ def make_feed(spec, types, method, at_step, opened):
     def feed(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real):
         """Measure, guide, control, allocate, send."""
         y, r = seen(x, c, monitor, k, h, opening)
-        return acted(x.alarm, y, r, c, monitor)
+        alarm = acted(x.alarm, y, r, c, monitor)
+        gather(x, c, monitor, k, h)
+        return alarm
 
     @wp.func(inline=False)
     def ask(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64, opening: real):
         """Measure and guide."""
         y, r = seen(x, c, monitor, k, h, opening)
+        gather(x, c, monitor, k, h)
         return x.alarm
 
     @wp.func(inline=False)
     def respond(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64):
         """Control, allocate and send, with what the last look noted and the host's answer."""
         y, r = noted(x, c, monitor, k, h)
-        return acted(x.alarm, y, r, c, monitor)
+        alarm = acted(x.alarm, y, r, c, monitor)
+        gather(x, c, monitor, k, h)
+        return alarm
 
     return (ask, respond) if control.asked else (feed, method.step)
 
@@ -251,11 +306,15 @@ def make_note_actuators(spec, View, at_step):
     """(x, c, h, k): the actuators write where they are into the bus (role `report` of their laws); nothing where none does."""
     report = superpose(spec.laws, "report")
 
+    # It takes a view and the laws' numbers alone: all constants of a packet would take longer to pass than to use.
     @wp.func(inline=False)
-    def note_actuators(x: Any, c: Any, h: wp.float64, k: int):
+    def write_report(view: View, params: Any):
         if wp.static(report is not None):
-            view = look(View(), at_step(x, k, h), c, x.b.x.dtype(h))
-            view = report(view, view, c.params)
+            view = report(view, view, params)
+
+    @wp.func
+    def note_actuators(x: Any, c: Any, h: wp.float64, k: int):
+        write_report(look(View(), at_step(x, k, h), c, x.b.x.dtype(h)), c.params)
 
     return note_actuators
 

@@ -82,9 +82,11 @@ def monitor_struct(width, real, rows, energy, backward, substep, still, loop=Non
     energy: rows of ENERGY_FIELDS. backward: the part of h that stages go back at once. substeps: steps that were divided.
     still: R^T u where and when a lane was frozen, three rows.
     loop: of a controller, the struct given, one entry or one a packet; every: steps between its looks; commands: how many are
-    in the first rows of the memory; bus: the first row of what looks note; noting: whether they do. signals: rows of the
+    in the first rows of the memory; bus: the first row of what looks note; noting: bits of what they do. signals: rows of the
     memory that are saved with a sample; kept: the first of as many rows, what frozen lanes save; first_signals: what they are
     at the start.
+    looks: what is gathered at looks, (slots times numbers and some to waste, packets), `numbers` rows for each; slots: how
+    many looks it holds, 0 for none gathered; columns: the first number of each of SAMPLE_FIELDS, -1 if not gathered.
     """
     Lane, Ints = lane(width, real), int_lane(width)
     fields = {}
@@ -104,6 +106,7 @@ def monitor_struct(width, real, rows, energy, backward, substep, still, loop=Non
         fields |= {"loop": wp.array(dtype=loop), "every": wp.int32, "commands": wp.int32, "bus": wp.int32}
         fields |= {"noting": wp.int32, "kept": wp.int32}
         fields |= {"signals": wp.array(dtype=wp.int32), "first_signals": wp.array2d(dtype=Lane)}
+        fields |= {"looks": wp.array2d(dtype=Lane), "slots": wp.int32, "numbers": wp.int32, "columns": wp.vec4i}
     return struct("Monitor", **fields) if fields else struct("NoMonitor", unused=wp.uint8)
 
 

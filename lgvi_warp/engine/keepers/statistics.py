@@ -166,11 +166,12 @@ class _BlockStatistics:
         self._plan, self._replicates, self._times = plan, run.replicates, len(run.time)
         # For statistics of members' ends: the quantity at the last sample.
         self._last: dict[Statistic, np.ndarray] = {}
-        self._looking = plan.looks
-        times = {
-            statistic: plan.taken.times if statistic.looks else run.times_of(statistic) for statistic in run.statistics
-        }
-        self._open = [statistic.open(times[statistic], members.count) for statistic in run.statistics]
+        self._looking = plan.gathered is not None
+        of_looks = plan.gathered.times if plan.gathered else run.time
+        times = (of_looks if statistic.looks else run.times_of(statistic) for statistic in run.statistics)
+        self._open = [
+            statistic.open(time, members.count) for statistic, time in zip(run.statistics, times, strict=True)
+        ]
 
     def take(self, when: slice, samples: Fields) -> None:
         """Pass to each statistic the values of its quantity; statistics of the same quantity share them."""

@@ -170,12 +170,13 @@ def with_lists(scene: Scene, lists: Mapping[str, Any]) -> Scene:
         elif name in SECTIONS and scene.controller is None and "controller" not in lists:
             faults.add(name, "...", "is a list of a controller, which this scene has not", "give the whole controller")
     faults.raise_if_any()
-    whole = {name: value for name, value in lists.items() if name in LISTS}
-    if "terms" in whole:
-        own = terms.from_list(whole["terms"])
-        whole["terms"] = (*(term for term in scene.terms if term.key not in {other.key for other in own}), *own)
-    if whole:
-        scene = replace(scene, **whole)
+    of_scene = {name: value for name, value in lists.items() if name in LISTS}
+    if "terms" in of_scene:
+        replacing = terms.from_list(of_scene["terms"])
+        keys = {term.key for term in replacing}
+        of_scene["terms"] = (*(term for term in scene.terms if term.key not in keys), *replacing)
+    if of_scene:
+        scene = replace(scene, **of_scene)
     parts = {name: value for name, value in lists.items() if name in SECTIONS}
     return replace(scene, controller=replace(scene.controller, **parts)) if parts else scene
 

@@ -104,12 +104,12 @@ class Findings:
 
     @property
     def cases(self) -> tuple[str, ...]:
-        """Names of the cases."""
+        """The names of the cases, in their order."""
         return tuple(case.name for case in self.setup.cases)
 
     @property
     def metrics(self) -> tuple[str, ...]:
-        """Names of the metrics."""
+        """The names of the metrics, in their order."""
         return tuple(self.setup.metrics)
 
     @property
@@ -282,23 +282,23 @@ class Findings:
 
     def _compared(self, a: Cell, b: Cell, quantile: float | None) -> Iterator[Compared]:
         """Compare two cells; nothing where one was refused."""
-        one, other = self.record(a), self.record(b)
-        if one.refused or other.refused:
+        records = self.record(a), self.record(b)
+        if any(record.refused for record in records):
             return
         yield self._of_success(a, b)
-        lost = failed(one.status) | failed(other.status)
+        lost = failed(records[0].status) | failed(records[1].status)
         for name in self.metrics:
             if name == setups.END:
                 continue
-            x, y = (np.where(lost, np.nan, record.numbers[name]) for record in (one, other))
-            both = np.isfinite(x) & np.isfinite(y)
+            x, y = (np.where(lost, np.nan, record.numbers[name]) for record in records)
+            finite = np.isfinite(x) & np.isfinite(y)
             if quantile is None:
                 d, test = paired.means(x, y, self.confidence), "paired t"
-                values = tuple(float(v[both].mean()) if both.any() else np.nan for v in (x, y))
+                values = tuple(float(v[finite].mean()) if finite.any() else np.nan for v in (x, y))
             else:
                 d = paired.quantiles(x, y, quantile, self.confidence, seed=self.setup.members.seed)
                 test = "bootstrap of members"
-                values = tuple(float(np.quantile(v[both], quantile)) if both.any() else np.nan for v in (x, y))
+                values = tuple(float(np.quantile(v[finite], quantile)) if finite.any() else np.nan for v in (x, y))
             yield Compared(a.case.name, b.case.name, a.point, name, (values[0], values[1]), d, test, np.nan, False)
 
     def _of_success(self, a: Cell, b: Cell) -> Compared:
@@ -334,10 +334,10 @@ class Findings:
         p = dict(zip(pairs, paired.holm(np.array([test.p for test in tests])), strict=True))
         rows: list[dict[str, Any]] = []
         for case, share in sorted(shares.items(), key=lambda item: -item[1].mean()):
-            better = [other for other in shares if other != case and share.mean() > shares[other].mean()
-                      and p[(case, other) if (case, other) in p else (other, case)] < 1.0 - self.confidence]  # fmt: skip
-            whole = self._probability(share == 1.0) if single else self._mean_share(share)
-            rows.append({"rank": len(rows) + 1, "case": case, **whole._asdict(), "better_than": ", ".join(better)})
+            worse = [rival for rival in shares if rival != case and share.mean() > shares[rival].mean()
+                     and p[(case, rival) if (case, rival) in p else (rival, case)] < 1.0 - self.confidence]  # fmt: skip
+            passing = self._probability(share == 1.0) if single else self._mean_share(share)
+            rows.append({"rank": len(rows) + 1, "case": case, **passing._asdict(), "better_than": ", ".join(worse)})
         return rows
 
     def _share_test(self, a: np.ndarray, b: np.ndarray, single: bool) -> paired.Difference:
@@ -368,7 +368,7 @@ class Findings:
         if by not in self.metrics:
             raise refusal("by", by, "is no metric of this sweep", closest(str(by), self.metrics))
         cells = [cell for name in ((case,) if case else self.cases) for cell in self.cells_of(name)]
-        found: list[tuple[tuple[float, float, int, int], Cell]] = []
+        ordered: list[tuple[tuple[float, float, int, int], Cell]] = []
         for cell in cells:
             record = self.record(cell)
             if record.refused:
@@ -378,9 +378,9 @@ class Findings:
             # Sorted by what comes first: earlier failures, then larger numbers; members in their order.
             group, rank = np.where(lost, 0.0, 1.0), np.where(lost, ends, -size)
             order = np.lexsort((np.arange(len(lost)), rank, group))[:count]
-            found += [((float(group[i]), float(rank[i]), cell.index, int(i)), cell) for i in order]
-        found.sort(key=lambda item: item[0])
-        return [self._member_row(cell, place[3]) for place, cell in found[:count]]
+            ordered += [((float(group[i]), float(rank[i]), cell.index, int(i)), cell) for i in order]
+        ordered.sort(key=lambda item: item[0])
+        return [self._member_row(cell, place[3]) for place, cell in ordered[:count]]
 
     def _member_row(self, cell: Cell, i: int) -> dict[str, Any]:
         record, inputs = self.record(cell), self.inputs(cell, i, i + 1)
@@ -402,12 +402,12 @@ class Findings:
         numbers: dict[str, np.ndarray] = {}
         for variation in fleet.variations:
             for target in variation.targets:
-                whole = chosen.parameters.get(target.name)
-                if whole is None:
-                    whole = getattr(chosen, target.name.removeprefix("start."), None)
-                if whole is None:
+                drawn = chosen.parameters.get(target.name)
+                if drawn is None:
+                    drawn = getattr(chosen, target.name.removeprefix("start."), None)
+                if drawn is None:
                     continue
-                values = whole if target.index is None else np.moveaxis(whole, 0, -1)[target.index]
+                values = drawn if target.index is None else np.moveaxis(drawn, 0, -1)[target.index]
                 flat = np.broadcast_to(values, (stop - first, *values.shape[1:])).reshape(stop - first, -1)
                 labels = (
                     [target.label] if flat.shape[1] == 1 else [f"{target.label}[{k}]" for k in range(flat.shape[1])]

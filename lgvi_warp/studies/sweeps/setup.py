@@ -90,10 +90,10 @@ class Setup:
         """
         scene = fleet.scene.to_dict()
         scene.pop("ensemble", None)
-        asked = [metric.to_dict() for metric in self.metrics.values()]
+        tables = [metric.to_dict() for metric in self.metrics.values()]
         functions = [metric.of for metric in self.metrics.values() if callable(metric.of)]
         versions = machine.versions()
-        return key_of({"scene": scene, "ensemble": fleet.to_dict(), "metrics": asked, "functions": functions,
+        return key_of({"scene": scene, "ensemble": fleet.to_dict(), "metrics": tables, "functions": functions,
                        "settings": self.settings, "versions": versions})  # fmt: skip
 
     def kept(self, fleet: Ensemble) -> dict[str, Any]:
@@ -102,11 +102,11 @@ class Setup:
         Args:
             fleet: members of a cell.
         """
-        asked, controller = list(self.metrics.values()), fleet.scene.controller
+        metrics, controller = list(self.metrics.values()), fleet.scene.controller
         # Metrics come to looks by themselves; expressions over the path are of the samples.
-        by_samples = controller is not None and not all(metric.looks for metric in asked)
+        by_samples = controller is not None and not all(metric.looks for metric in metrics)
         save = SaveAt(every=float(controller.period) if by_samples else None, fields=())
-        return {"save": save, "statistics": asked, "keep": "none"}
+        return {"save": save, "statistics": metrics, "keep": "none"}
 
     def run(self, fleet: Ensemble, **more: Any) -> Record:
         """Run a cell.
@@ -206,16 +206,16 @@ def made(
     faults = Faults()
     base, together = _given(scene, vary)
     parts: dict[str, Any] = {"cases": (), "axes": {}, "metrics": {}}
-    for name, read, given in (("cases", cases_of, cases), ("axes", grid_of, grid), ("metrics", metrics_of, metrics)):
+    for name, read, value in (("cases", cases_of, cases), ("axes", grid_of, grid), ("metrics", metrics_of, metrics)):
         with faults.including():
-            parts[name] = read(given)
+            parts[name] = read(value)
     for name in ("save", "statistics", "keep", "until", "store", "only"):
         if name in settings:
             faults.add(name, "...", "is what a sweep decides", "leave it out")
     faults.raise_if_any()
     assert isinstance(base.scene, Scene)
-    whole = _fleet(base, members, seed, sampling, together, parts["cases"])
-    setup = Setup(base.scene, members=whole, settings=dict(settings), vary=together, **parts)
+    fleet = _fleet(base, members, seed, sampling, together, parts["cases"])
+    setup = Setup(base.scene, members=fleet, settings=dict(settings), vary=together, **parts)
     count = len(setup.cases) * int(np.prod([len(values) for values in setup.axes.values()], dtype=object))
     if count > MOST_CELLS:
         raise refusal(
@@ -227,10 +227,11 @@ def made(
 def _too_many(setup: Setup, count: int) -> str:
     """What is wrong with so many cells: the time that they would take."""
     try:
-        one = _prediction(setup, None)
+        prediction = _prediction(setup, None)
     except SceneError:
         return f"are {setup.members.members:,} members each"
-    return f"are {setup.members.members:,} members each and would take {_duration(one.advance * count)} on this machine"
+    duration = _duration(prediction.advance * count)
+    return f"are {setup.members.members:,} members each and would take {duration} on this machine"
 
 
 def _prediction(setup: Setup, threads: int | None) -> Prediction:
@@ -256,12 +257,12 @@ def plan_text(setup: Setup, threads: int | None = None) -> str:
     Raises:
         SceneError: the first cell is refused.
     """
-    one, count = _prediction(setup, threads), len(setup.cells)
-    points = count // len(setup.cases)
+    prediction, count = _prediction(setup, threads), len(setup.cells)
+    points, duration = count // len(setup.cases), _duration((prediction.advance + prediction.set_up) * count)
     lines = [f"cells       {count:,}: {len(setup.cases)} cases at {points:,} points of the grid",
              f"members     {setup.members.members:,} of each, the same in all",
-             f"time        about {_duration((one.advance + one.set_up) * count)}, and {one.compile:.1f} s for each kernel",
-             f"memory      {one.memory / 1e6:,.0f} MB",
+             f"time        about {duration}, and {prediction.compile:.1f} s for each kernel",
+             f"memory      {prediction.memory / 1e6:,.0f} MB",
              f"disk        {8 * len(setup.metrics) * setup.members.members * count / 1e6:,.1f} MB"]  # fmt: skip
     return "\n".join(lines)
 
@@ -269,18 +270,18 @@ def plan_text(setup: Setup, threads: int | None = None) -> str:
 def _fleet(
     scene: Any, members: Any, seed: Any, sampling: Any, vary: Mapping[Any, Any], cases: Sequence[Case]
 ) -> Ensemble:
-    """The members of the sweep, of its own scene; what of `vary` only some case has does not vary in it."""
-    own, known = scene.scene, known_names(scene.scene)
+    """The members of the sweep, of its base scene; what of `vary` only some case has does not vary in it."""
+    base, known = scene.scene, known_names(scene.scene)
     elsewhere = [name for name in vary if any(target.name not in known for target in variations.targets(name))]
     if elsewhere:
         others = set[str]()
         for case in cases:
             with contextlib.suppress(SceneError):  # the case will say so itself
-                others |= known_names(case.of(own))
+                others |= known_names(case.of(base))
         elsewhere = [name for name in elsewhere if all(target.name in others for target in variations.targets(name))]
     here = {name: distribution for name, distribution in vary.items() if name not in elsewhere}
     return Ensemble(
-        own,
+        base,
         scene.members if members is None else members,
         scene.seed if seed is None else seed,
         here,

@@ -140,7 +140,7 @@ def predict(
     ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
     statistics, keep, until = (settings.pop(name, None) for name in ("statistics", "keep", "until"))
     scene = ensemble.scene
-    observed = observe(ensemble.members, scene.run, statistics, keep, until, scene.events)
+    observed = observe(ensemble.members, scene.run, statistics, keep, until, scene.events, scene.controller)
     fields = fields_of(settings.get("save"), scene.run)
     plan = make_plan(ensemble, **settings, fields=observed.fields, survey_all=False, looks=observed.looks)
     count = threads or machine.thread_count()

@@ -77,7 +77,7 @@ class Runner:
         scheduler: str | None = None,
     ):
         self.scene, self.settings = scene, dict(settings)
-        self.observed = observe(1, scene.run, statistics, "all", False, scene.events)
+        self.observed = observe(1, scene.run, statistics, "all", False, scene.events, scene.controller)
         self.executor = executor_of(executor, threads, scheduler)
         self.threads = threads or machine.thread_count()
         chosen = self.settings.get("method")

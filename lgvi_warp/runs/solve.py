@@ -100,7 +100,8 @@ def solve(
     faults = Faults()
     observed, runner = Observation(), None
     with faults.including():
-        observed = observe(ensemble.members, ensemble.scene.run, statistics, keep, until, ensemble.scene.events)
+        scene = ensemble.scene
+        observed = observe(ensemble.members, scene.run, statistics, keep, until, scene.events, scene.controller)
     with faults.including():
         runner = executor_of(executor, threads, scheduler)
     if only is not None and store is None:

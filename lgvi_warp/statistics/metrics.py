@@ -8,7 +8,7 @@ number, r what is wanted at each look, e = r - y.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -16,6 +16,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.status import failed
+from lgvi_warp.physics.control.controller import Controller
 from lgvi_warp.statistics import tracking
 from lgvi_warp.statistics.base import Gatherer, Statistic
 from lgvi_warp.statistics.each import Each
@@ -648,3 +649,22 @@ class RMSError(ISE):
 
     def finish(self, state: State) -> np.ndarray:
         return np.where(state["until"] > 0.0, np.sqrt(state["sum"] / state["until"]), state["first"])
+
+
+def check_wanted(faults: Faults, key: str, metrics: Mapping[str, Statistic], controller: Controller | None) -> None:
+    """Add a fault for each metric of what no guidance wants: its errors would be those from zero.
+
+    Args:
+        faults: collects the faults.
+        key: who asks for the metrics.
+        metrics: statistics by name, metrics among them.
+        controller: the controller of the scene; None for none, which is a fault of its own.
+    """
+    if controller is None:
+        return
+    wishes = {wish for part in controller.guidance for wish in part.gives}
+    for name, metric in metrics.items():
+        tracked = metric.quantity.name if isinstance(metric, OfTracking | OfCourse) else None
+        if tracked is not None and tracking.NEEDED[tracked] not in wishes:
+            problem = f"is of the {tracked}, and no guidance of the scene wants a {tracking.NEEDED[tracked]}"
+            faults.add(key, name, problem, "give guidance that wants it, or another metric")

@@ -48,7 +48,9 @@ def fleet():
     """300 vehicles in two blocks, of which some come to the floor: an event stops them."""
     path = ROOT / "examples" / "scenes" / "remus_100_autopilot.toml"
     scene = lw.Scene.load(path, {"start.position": [0.0, 0.0, 3.0], "run.save_every": 4.0})
-    scene = replace(scene, events=[lw.Floor(depth=8.5)])
+    # All that metrics are of is wanted: a place and a speed too, which no law of this loop follows.
+    wishes = [lw.SetPoint(position=[20.0, 5.0, 10.0], heading=0.5, speed=1.5), *scene.controller.guidance[1:]]
+    scene = replace(scene, events=[lw.Floor(depth=8.5)], controller=replace(scene.controller, guidance=wishes))
     vary = {"vehicle.buoyancy": lw.Uniform(low=297.0, high=310.0), "start.position[2]": lw.Uniform(low=7.8, high=8.45)}
     return lw.Ensemble(scene, 300, seed=1, vary=vary | {"heading_pid.kp": lw.Uniform(low=0.7, high=60.0)})
 
@@ -211,3 +213,11 @@ def test_the_arrays_of_a_run_are_freed_at_its_end(fleet, monkeypatch):
         assert packets and not any(packet() for packet in packets)
     finally:
         gc.enable()
+
+
+def test_metrics_of_what_no_guidance_wants_are_refused(fleet):
+    controller = fleet.scene.controller
+    few = replace(controller, guidance=[lw.SetPoint(depth=10.0, heading=0.5), *controller.guidance[1:]])
+    for run in (lw.solve, lw.predict):
+        with pytest.raises(lw.SceneError, match="statistics = 'iae speed': is of the speed, and no guidance .* wants a speed"):
+            run(replace(fleet.scene, controller=few), t1=1.0, statistics=[lw.IAE("depth"), lw.IAE("speed")])

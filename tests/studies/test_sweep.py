@@ -255,8 +255,8 @@ def test_a_metric_of_what_a_case_does_not_want_refuses_the_case(scene):
     mixed = swept(scene, grid=None, members=4, cases=[{"name": "place"}, {"name": "level", "replace": level}])
     place, refused = mixed.rows()
     assert not place["refused"]
-    assert "metrics = 'way': is of the north, and no guidance of this case wants a position" in refused["refused"]
-    with pytest.raises(lw.SceneError, match="no guidance of this case wants a position"):
+    assert "metrics = 'way': is of the north, and no guidance of the scene wants a position" in refused["refused"]
+    with pytest.raises(lw.SceneError, match="no guidance of the scene wants a position"):
         lw.worst_case(mixed.cells[1].fleet, {"vehicle.mass": (45.0, 55.0)}, "iae north", budget=64)
 
 

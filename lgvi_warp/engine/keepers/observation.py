@@ -11,12 +11,14 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import failed, stopped
 from lgvi_warp.engine.keepers.statistics import Gathered
+from lgvi_warp.physics.control.controller import Controller
 from lgvi_warp.physics.control.signals import SIGNALS, ordered
 from lgvi_warp.physics.terms.events import Event
 from lgvi_warp.scene.settings import check_keep
 from lgvi_warp.statistics.base import Statistic, from_list
 from lgvi_warp.statistics.ends import check_outcomes, outcomes
 from lgvi_warp.statistics.estimate import Estimate, Estimates
+from lgvi_warp.statistics.metrics import check_wanted
 from lgvi_warp.statistics.quantity import Quantity
 from lgvi_warp.statistics.until import Until, Watch, from_dict, watch
 
@@ -239,7 +241,13 @@ def watch_fields(until: Until, statistics: Sequence[Statistic]) -> tuple[str, ..
 
 
 def observe(
-    plan_members: int, settings: Any, given: Any, keep: Any, until: Any, events: Sequence[Event] = ()
+    plan_members: int,
+    settings: Any,
+    given: Any,
+    keep: Any,
+    until: Any,
+    events: Sequence[Event] = (),
+    controller: Controller | None = None,
 ) -> Observation:
     """The observation that the arguments of solve describe; those that are None come from the scene's [run].
 
@@ -250,6 +258,7 @@ def observe(
         keep: the argument `keep` of solve.
         until: the argument `until` of solve; False for no condition.
         events: events of the scene (default none).
+        controller: controller of the scene; None (default) for none.
 
     Returns:
         What is to be kept, and when the run stops.
@@ -267,6 +276,7 @@ def observe(
     for statistic in gathered:
         with faults.including():
             check_outcomes(f"{statistic.type}.{'at' if statistic.at else 'of'}", statistic.outcomes, known)
+    check_wanted(faults, "statistics", {statistic.key: statistic for statistic in gathered}, controller)
     with faults.including():
         condition = settings.until if until is None else until
         stop = None if condition is None or condition is False else from_dict(condition)

@@ -14,7 +14,7 @@ from lgvi_warp.runs.prepared import Prepared, prepare
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics import TYPES
 from lgvi_warp.statistics.base import Statistic
-from lgvi_warp.studies.sweeps.setup import check_wanted, metric_of
+from lgvi_warp.studies.sweeps.setup import metric_of
 
 
 class Numbers:
@@ -39,7 +39,6 @@ class Numbers:
         self.of_metric = isinstance(of, Statistic | Mapping) or (isinstance(of, str) and of.partition(" ")[0] in TYPES)
         if self.of_metric:
             self.label, metric = metric_of(key, of)
-            check_wanted(scene, {self.label: metric})
             # A metric comes to every look by itself.
             few: dict[str, Any] = {"save": SaveAt(fields=("position",)), **settings, "statistics": [metric]}
             self.run: Prepared = prepare(scene, names, None, **few)

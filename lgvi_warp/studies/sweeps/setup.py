@@ -18,13 +18,12 @@ from lgvi_warp.runs.result import Result
 from lgvi_warp.runs.solve import solve
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.ensemble import Ensemble
-from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.statistics import TYPES, tracking
+from lgvi_warp.statistics import TYPES
 from lgvi_warp.statistics.base import Statistic, from_list
 from lgvi_warp.statistics.each import Each
 from lgvi_warp.statistics.functional import functional
-from lgvi_warp.statistics.metrics import OfCourse, OfTracking
+from lgvi_warp.statistics.metrics import check_wanted
 from lgvi_warp.statistics.metrics_of_actuators import TimeToFailure
 from lgvi_warp.statistics.then import Then
 from lgvi_warp.studies.sweeps.cases import Case, cases_of, ensemble_of, grid_of, known_names, points_of, with_numbers
@@ -118,32 +117,12 @@ class Setup:
         Raises:
             SceneError: it is refused.
         """
-        check_wanted(fleet.scene, self.metrics)
+        faults = Faults()
+        check_wanted(faults, "metrics", self.metrics, fleet.scene.controller)
+        faults.raise_if_any()
         result = solve(fleet, until=False, **self.kept(fleet), **self.settings, **more)
         numbers = {name: result.statistics[f"each {name}"].value[0, 0] for name in self.metrics}
         return Record(np.asarray(result.status), numbers, tuple(result.messages))
-
-
-def check_wanted(scene: SceneLike, metrics: Mapping[str, Statistic]) -> None:
-    """Refuse metrics of what no guidance wants: their errors would be those from zero.
-
-    Args:
-        scene: the scene.
-        metrics: metrics by name.
-
-    Raises:
-        SceneError: with every such metric.
-    """
-    faults, controller = Faults(), scene.controller
-    wishes = (
-        {wish for part in controller.guidance for wish in part.gives} if controller else set(tracking.NEEDED.values())
-    )
-    for name, metric in metrics.items():
-        tracked = metric.quantity.name if isinstance(metric, OfTracking | OfCourse) else None
-        if tracked is not None and tracking.NEEDED[tracked] not in wishes:
-            problem = f"is of the {tracked}, and no guidance of this case wants a {tracking.NEEDED[tracked]}"
-            faults.add("metrics", name, problem, "give guidance that wants it, or another metric")
-    faults.raise_if_any()
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measure speed, compare with other systems, and write the tables of the docs. Run from the root of the repository.
 
 python -m benchmarks run [CASE...]           speed: JSON lines, each figure a ratio to a peer or a limit of the same run

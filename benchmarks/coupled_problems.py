@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bodies whose M and J are coupled, forces on them, their truth, and the NumPy twin's steps: for tables and tests."""
 
 import numpy as np

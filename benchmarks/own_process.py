@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Calls in a process of their own, whose memory and start are those of nothing else."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the benchmarks print and write: JSON lines, Markdown tables, and the part of a docs' page between its marks."""
 
 import json

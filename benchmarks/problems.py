@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What benchmarks and tests solve: the paper's vehicle in nearly neutral trim with each term alone, and with all; states."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Calls timed in turn by processor time: other work on the machine lengthens it least, and can only lengthen it."""
 
 import time

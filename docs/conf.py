@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The documentation site: `make docs` builds it, without network, from the Markdown pages and the docstrings."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A REMUS 100 mission: three legs, the last ones deeper, in a current that no vehicle knows.
 
 200 vehicles sail by dead reckoning of their course alone: a line of sight with an integral holds them on the legs, although

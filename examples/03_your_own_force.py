@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Your own force, in one file: a dock that draws vehicles in.
 
 The function runs in the kernel, for all vehicles of a packet at once. `lw.check_law` compares it with its potential first.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Waves and a tether: buoys below the surface, moored to the sea floor.
 
 The waves move the water, the water moves the buoys, and the mooring of each pulls where it is taut. The phases of the waves

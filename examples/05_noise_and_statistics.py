@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Noise and statistics: water that wanders, and estimates with intervals that need no samples.
 
 Each of 4,000 vehicles drifts in a current of its own, a random process with a memory of a minute. The statistics are gathered

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sensitivity: which of the inputs that nobody knows exactly matter for where a vehicle ends up.
 
 Sobol indices say what part of the variance each input causes alone (S1) and with all its interactions (ST). Buoyancy decides

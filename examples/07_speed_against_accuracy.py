@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Speed against accuracy: what each method costs for each error, for this scene on this machine.
 
 `lw.tradeoff` runs a sample of the fleet by many methods, steps and precisions against a reference that two runs agree on.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where it breaks: for which steps and rates of turn each method is accurate, bounded, flagged, failed or silently wrong.
 
 Each cell of the map is a few runs from starts turned at random; its class is that of the worst. The lines are limits known

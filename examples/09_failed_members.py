@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Failed members, looked at one by one: which ones failed, why, and what would have helped.
 
 A step of 0.5 s is too long for vehicles that turn fast. A member that fails keeps its last good state; all others go on. The

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A million members: where a fleet ends up, to a millimetre of the mean, in the memory of a few thousand.
 
 Samples of a million members would fill gigabytes. Statistics are gathered while blocks of members run, and `keep="none"`

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compare two runs: the same 300 vehicles, with the same ballast and the same waves, under two depth controllers.
 
 The draws of a member depend on the seed and on its number alone, so that the difference of the two runs, member by member, is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compare with another simulator: the same vehicle in SciPy, by equations written down anew.
 
 Newton and Euler's equations of a body with added mass, weight, buoyancy and drag, with quaternions, by DOP853 in steps of at

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """lgvi_warp: many underwater vehicles at once, by a Lie group variational integrator in Warp kernels on CPU cores."""
 
 import ast as _ast

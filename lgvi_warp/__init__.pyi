@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The public names, one a line: for editors, for type checkers, and for __init__.py, which imports a name when it is used.
 
 from lgvi_warp.common.errors import Interrupted as Interrupted

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Start the command lgvi-warp: a signal ends it with one line even while its libraries are imported."""
 
 import os

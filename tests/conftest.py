@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fixtures: the paper's example, as numbers, as a scene and as the reference's body."""
 
 import contextlib

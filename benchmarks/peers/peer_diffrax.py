@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """diffrax on JAX: Tsit5, Dopri5, Dopri8, with fixed steps and adaptive, compiled, in blocks of members.
 
 A block of members as one array (13, block) with steps in common is what is fastest here; "vmap" gives each member its

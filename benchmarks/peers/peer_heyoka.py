@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """heyoka: adaptive Taylor series, compiled for this machine, one member in each SIMD lane, each lane with its own step.
 
 "batch" keeps one integrator a thread and gives it one packet of members after the other; "ensemble" is heyoka's own

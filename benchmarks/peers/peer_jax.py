@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """JAX without a library: fixed steps written out in a compiled loop, blocks of members as arrays.
 
 RK4 is faster with the state as one array, DOP853 with the 13 numbers apart, where the compiler does not join so much.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """lgvi_warp itself: members in packets of lanes, the plan's own kernel, as lw.solve runs it with its default checks."""
 
 from __future__ import annotations

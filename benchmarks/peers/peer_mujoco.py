@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """MuJoCo's rollout: a free rigid body. It has no added mass, so it runs the problem "rigid"; the net weight is gravity."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Newton: free rigid bodies in one model, single precision. It has no added mass, so it runs the problem "rigid".
 
 Warp's processor device runs a launch on one thread, so more threads are not asked for.

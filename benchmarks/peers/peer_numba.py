@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """numba, one member at a time: RK4 on 13 numbers, and the paper's Psi with equation (24) as its scalar reduction.
 
 What a user of numba writes first: a loop over the members in parallel, small functions that are inlined, constants

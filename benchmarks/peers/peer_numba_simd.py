@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """numba, written for SIMD by hand: members in packets of 8 lanes, and a step as a loop over the lanes that LLVM vectorises.
 
 The body of that loop is a step of a Runge-Kutta method written out, stage by stage and number by number, by a small

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Warp as a competent user writes it: one vehicle a thread, mat33, Newton on the exponential map (cases/ordinary).
 
 Warp's processor device runs a launch on one thread, so more threads are not asked for.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Draw time against error from the lines of run.py, and tabulate the cheapest time of each peer for each error."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The problem that every peer solves: the vehicle of Nordkvist & Sanyal (2010), many members, from 0 to t1.
 
 R' = R hat(Om), b' = R nu, M nu' = M nu x Om + net z, J Om' = J Om x Om + M nu x nu - d x z with z = R^T e3 and d = B r.

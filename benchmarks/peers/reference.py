@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The end that errors are measured from, in extended precision, and how well a second solution agrees with it."""
 
 from __future__ import annotations

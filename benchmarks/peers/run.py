@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The same problem solved by lgvi_warp and by other systems: time against error, one JSON line for each setting.
 
 With --out DIR the lines also go to DIR/peers.jsonl, DIR/peers.png is drawn and its table printed to stderr; --draw DIR

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runge-Kutta methods as their coefficients, and one step of any of them on a tuple of numbers or arrays."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Explicit tableaux and charts of the attitude: right-hand sides a simulated second for an error, in NumPy."""
 
 import sys

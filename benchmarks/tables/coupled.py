@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measure the methods for coupled inertia.
 
 Bodies, starts and truth are those of benchmarks/coupled_problems.py. One step, its structure and the general

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How often the intervals of statistics hold the true value, of so many repetitions with known truth: a Markdown table.
 
 The second table stops each repetition by itself as lw.Until does: looks at blocks of 256 members from `members` on, then

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Energy and momentum over a million steps of every method, beside its cost: a vehicle on a tether."""
 
 import sys

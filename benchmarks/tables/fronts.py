@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measure the fronts of accuracy against time of four scenes, with a picture of each beside the page."""
 
 import sys

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """From 1,000 to 10 million members: time, memory and disk of runs in memory and in a store, beside what was predicted.
 
 With --most 10000000 it takes 16 GB of disk in the folder --dir.

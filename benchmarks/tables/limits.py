@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measure the largest stable step of every method, on motions of one rate: JSON lines, then the table.
 
 A run has one step, so the rate varies: by the speed (Munk oscillation), the arm of buoyancy (restoring oscillation), the drag

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Other systems on the same problem, from the lines of one or more runs of `python -m benchmarks peers`."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Samplings side by side: the error of a mean, the time to check all members and to draw a block, and memory."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measure the solvers of equation (24)."""
 
 from benchmarks.cases.solvers import case

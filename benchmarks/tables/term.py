@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Measure what each term costs, alone and all together."""
 
 from benchmarks.cases.terms import case

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The fastest oscillation that each method bears, by h w: of the Munk moment and of a restoring moment.
 
 They are printed as JSON lines and written into lgvi_warp/methods/stable_steps.csv, which warnings read.

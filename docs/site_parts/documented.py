@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the docstrings say of the public names, and with which types, shapes, units and defaults."""
 
 import dataclasses

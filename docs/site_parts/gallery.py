@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Run the examples, keep their pictures, and write docs/gallery.md: `make gallery`, or `make gallery ONLY="02 07"`.
 
 A picture carries the hash of the script that drew it and what the script printed: a stale picture is found in any clone.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Draw docs/gallery/fleet.webp, the moving picture of the README, from a recording: `make gallery ONLY=movie`.
 
 The viewer opens the recording of a fleet that sinks to the sea floor, without a window, and is shot at 40 times. That needs a

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pages of the reference that the build of the site writes: public names, keys of the scene file, the help of the command."""
 
 import argparse

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """BlueROV2 heavy holds its place in a current; a thruster dies. Does it help that the allocation knows?"""
 
 import sys

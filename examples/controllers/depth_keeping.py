@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """REMUS 100 keeps its depth under waves although nobody knows its ballast: 500 vehicles between neutral and 9 N light."""
 
 import sys

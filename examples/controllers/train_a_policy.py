@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """REMUS 100 learns to keep its depth: trained as an environment of Gymnasium, then run in the lanes as lw.Policy.
 
     python examples/controllers/train_a_policy.py [minutes] [picture]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """REMUS 100 sails from waypoint to waypoint through a current that differs by depth: plain and integral line of sight."""
 
 import sys

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Laws of one's own: a dock that draws vehicles in, and water that grows thick near the sea floor."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Gains of a depth law for the worst 5 % of the vehicles, beside gains for their mean, on vehicles that neither has met.
 
 Ballast differs, and one computer in fourteen answers late: gains that are best on average swing there.

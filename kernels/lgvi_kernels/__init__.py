@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Device code of lgvi_warp: Warp functions and kernels that advance packets of vehicles. It imports Warp alone.
 
 The rooms; each may import from the earlier ones only:

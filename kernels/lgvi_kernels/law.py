@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the author of a law, an event or a controller imports: lanes, their functions, structs, and functions of a View.
 
 A law that writes + - * / between lanes imports `add`, `sub`, `mul`, `div`, `neg` too: Warp looks the operators up by name.

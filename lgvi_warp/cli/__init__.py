@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command lgvi-warp: its arguments, verbs, reports and signals."""
 
 from lgvi_warp.cli.arguments import parser

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Run the command as `python -m lgvi_warp.cli`."""
 
 from lgvi_warp.cli import entry

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command's arguments, verb by verb."""
 
 from __future__ import annotations

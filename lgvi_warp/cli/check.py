@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The verb check: whether a scene can run, and what is odd about it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Run one verb, and turn what it raises into a line on stderr and an exit code."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The verb completion: what completes the command in bash, zsh and fish, made of its parser."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The results of verbs as tables for JSON; docs/reference/json.md states their keys."""
 
 from __future__ import annotations

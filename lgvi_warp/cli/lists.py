@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The verbs list, new and schema: what a scene file may hold."""
 
 from __future__ import annotations

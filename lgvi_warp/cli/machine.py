@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The verbs info, without a folder about this machine, bench and tune."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What verbs print: text in colors, or one JSON document."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The verb plot: draw the pictures of a folder again."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Show on stderr what a command does, and how far it is."""
 
 from __future__ import annotations

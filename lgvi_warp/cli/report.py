@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files and summary of a finished run."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The verbs run, predict and resume."""
 
 from __future__ import annotations

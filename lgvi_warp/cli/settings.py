@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the arguments change of a scene, and which folder and store they name."""
 
 from __future__ import annotations

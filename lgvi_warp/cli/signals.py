@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What ends the command from outside: Ctrl-C, SIGTERM, SIGHUP, and a terminal that is gone."""
 
 from __future__ import annotations

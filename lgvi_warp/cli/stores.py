@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The verbs merge, export and report."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The verbs tradeoff, sensitivity, stability and sweep."""
 
 from __future__ import annotations

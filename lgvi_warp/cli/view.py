@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The verb view: look at a run that is there."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The verb warm: compile the kernels of a scene ahead."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Write the files at a verb's end side by side, whole even at an interrupt, and collect what failed."""
 
 from __future__ import annotations

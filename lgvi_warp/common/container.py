@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Limits that a container or a batch system sets for a process: Linux control groups, versions 2 and 1.
 
 A process's groups are named in /proc/self/cgroup, and their limits are in files below /sys/fs/cgroup. The limits of every

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Faults of a scene, collected into one message: each with its key, its value and the remedy."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files that outlive a crash: written whole, synced, and put into their place by a rename."""
 
 from __future__ import annotations

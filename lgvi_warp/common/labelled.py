@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Read columns by name from a mapping, a data frame, a structured array or an xarray Dataset."""
 
 from __future__ import annotations

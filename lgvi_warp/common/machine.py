@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What this machine can do: SIMD width, threads and memory; and the software's versions for provenance."""
 
 from __future__ import annotations

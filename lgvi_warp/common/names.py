@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names that a scene gives to terms and events: each becomes part of a folder's name in a store, on any file system."""
 
 from __future__ import annotations

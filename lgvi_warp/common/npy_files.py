@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Read arrays in .npy form, one after another in a file or in an .npz archive, of a file of unknown origin.
 
 NumPy's own reader allocates what a header promises before it checks that the file holds it; here the file's size bounds

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How long the parts of a kernel's first use take."""
 
 from typing import NamedTuple

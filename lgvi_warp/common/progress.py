@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Show how far a long call is: in place on a terminal and in a notebook, elsewhere a line every ten seconds."""
 
 from __future__ import annotations

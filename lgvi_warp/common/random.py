@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Random numbers by counter: each member's depend on the seed, its index and a name only."""
 
 from __future__ import annotations

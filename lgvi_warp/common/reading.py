@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Read a file that a user names: regular files only, of bounded size, so that reading ends."""
 
 from __future__ import annotations

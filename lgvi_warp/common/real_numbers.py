@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Read a user's numbers as an array; refuse what is masked, labelled or not real."""
 
 from __future__ import annotations

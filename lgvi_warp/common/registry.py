@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tables of classes by the word that a scene file gives them. Each class adds itself when it is made."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files below a folder of unknown origin: no link is followed, and only plain files are opened.
 
 Each folder on the way is opened relative to its parent, so that a link placed there meanwhile is not followed either.

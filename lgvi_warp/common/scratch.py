@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Temporary names of files and folders that are being written: each names its process, and no two are the same."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Outcome and warnings of each member of a run, each with its remedy."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Short texts and tables of objects, for a prompt and for notebooks."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Write records as tables for other programs."""
 
 from __future__ import annotations

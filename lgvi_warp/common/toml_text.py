@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Read TOML of unknown origin: texts nested deeper or larger than any scene are refused, in bounded time."""
 
 from __future__ import annotations

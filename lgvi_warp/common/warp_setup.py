@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Start Warp without output on stdout or stderr."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A lock beside a file or folder: one writer at a time, from its first look at the target to its end.
 
 The lock is the system's own on an open file (flock), which ends with the process in any case; the file names its holder

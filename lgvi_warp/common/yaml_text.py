@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Read YAML of unknown origin: no objects, no bombs of aliases, and no number that two versions of YAML read differently."""
 
 from __future__ import annotations

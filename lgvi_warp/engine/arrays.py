@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The kernel's arrays of structs and of lanes, written through NumPy; what all members share is written only once."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The exchange with a function of the host at a controller's looks: what it is told, and its answer."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Blocks: runs of consecutive members, the unit of work of executors and stores."""
 
 from __future__ import annotations

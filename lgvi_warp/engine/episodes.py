@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Members that start anew in some lanes while the others go on, between two looks of a controller that asks the host."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Kernels from Warp's cache: compiled once for all processes, and loaded only as they were compiled.
 
     CACHE/wp_NAME_HASH/NAME.cpuTARGET.o          code of one kind of processor

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The kernel's contents: the laws that act and how each enters, and the method's program for them.
 
 Decided once for a run from a survey of all members; the members' own numbers come later, block by block.

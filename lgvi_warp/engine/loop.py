@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The loop of a run: blocks through an executor, or from a store, and their results to the keepers in block order."""
 
 from __future__ import annotations

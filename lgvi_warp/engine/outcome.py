@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The outcome of a block's members: status, failure, warnings and event of each."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A block's members packed into lanes as the kernel's arrays, and the launches that advance them."""
 
 from __future__ import annotations

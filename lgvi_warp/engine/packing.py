@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The numbers of a block's members as the kernel takes them: inertia, laws, events and state, one member a lane.
 
 What all members share is computed and written once for a run; each block, or call, brings what varies alone.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The peak arithmetic rate of one core, measured by a kernel of fused multiply-adds."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The plan of a run: the kernel that holds only what the scene needs, and the launches that make up the run."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Warnings about the step: which the kernel watches for, their limits, and those that a member's start gives."""
 
 from __future__ import annotations

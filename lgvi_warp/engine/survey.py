@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A survey of all members: what their numbers require of a kernel, read in slices so that memory use stays small."""
 
 from __future__ import annotations

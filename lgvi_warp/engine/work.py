@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The work on one block: advance its members through all steps and hand their samples to the keepers."""
 
 from __future__ import annotations

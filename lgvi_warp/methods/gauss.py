@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Gauss collocation of s stages, order 2s: Hairer, Lubich & Wanner, Geometric Numerical Integration, II.1.3."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How large a step each method bears: limits of stability measured by method, or computed.
 
 Limits are in h times the angular frequency of an oscillation (`python -m benchmarks table warning_limits` writes them): the

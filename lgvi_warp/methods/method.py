@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Methods as data: a program of sub-maps with coefficients, composed with itself by stage coefficients.
 
 Sub-maps (mathematics in the README's table): T and K the flows of kinetic energy p.M^-1 p / 2 and of the potential, D the

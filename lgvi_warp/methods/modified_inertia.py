@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The series of the modified inertia of the preprocessed discrete Moser-Veselov rotation, order 8, by the moments of inertia.
 
 J~^-1 = (1 + s) J^-1 + d I: s and d are polynomials in N = h^2 |pi|^2 / 2 and H = h^2 pi.J^-1 pi / 2, whose coefficients are

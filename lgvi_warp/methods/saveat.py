@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """When to keep a sample, and the uniform grid of steps that meets every sample time."""
 
 from __future__ import annotations

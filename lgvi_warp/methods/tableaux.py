@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runge-Kutta methods as data, explicit and linearly implicit, for the kernels and for their twin.
 
 k_i = f(t + c_i h, y + h sum_j a_ij k_j), y <- y + h sum_i b_i k_i; an error estimate is h sum_i e_i k_i. A linearly implicit

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Energy and momenta of a result's samples, in float64."""
 
 from __future__ import annotations

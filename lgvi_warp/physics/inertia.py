@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The inertia of a vehicle about the origins and in the axes that a method needs.
 
 I6 = [[M, C], [C^T, J]], linear part first. E = M^-1 C, Js = J - C^T M^-1 C. Arrays have a leading dimension of 1 (shared by

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Conversion between the user's notation and axes (Fossen's) and the paper's: momenta, principal axes, attitudes.
 
 velocity = nu, angular_velocity = Om, position = b, attitude = R (body to inertial); p = M nu, pi = J Om.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How fast a member moves at its start: the rates that limit the step of a method.
 
 The rates are |J^-1 pi| of its rotation, w of its Munk oscillation and of its restoring oscillation, and (l + 2 q |v|) / I of

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The vehicle's outer shape: how it is drawn. No force depends on it."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The vehicle: a rigid body with added mass, weight and buoyancy."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Programs of sub-maps, run step by step."""
 
 from collections.abc import Callable, Sequence

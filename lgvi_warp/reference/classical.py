@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The classical integrators that the paper compares with, on the continuous equations (1) and (3)."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Gauss collocation, order 2s with s stages, on y = (b, the rows of R, p, pi), of one vehicle with all its laws.
 
 Symmetric; every quadratic invariant is kept to round-off: R^T R, R p without forces, and so on. Symplectic in canonical

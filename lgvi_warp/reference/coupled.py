@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The step for a full 6x6 inertia, of one vehicle, in the symbols of docs/explain/coupled_inertia.md.
 
 I6 = [[M, C], [C^T, J]] at the user's origin O in the user's axes; E = M^-1 C, Js = J - C^T M^-1 C, and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Energy and spatial momenta of one vehicle."""
 
 import numpy as np

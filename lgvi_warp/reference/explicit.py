@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Explicit Runge-Kutta methods on y = (b, two rows of R, p, pi), of one vehicle, with all its laws.
 
 The middle row of R is the cross product of the others. What a law remembers is known at every stage if it depends on the

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lie group methods on SO(3) x R^9, (R; b, p, pi), of one vehicle with all its laws."""
 
 from dataclasses import replace

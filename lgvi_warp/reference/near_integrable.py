@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Splitting into two parts, one of them the free rotation, for conservative laws with U = U_b(b) + U_R(R).
 
 H = A + B, A = pi.J^-1 pi / 2 + U_b(b), B = p.M^-1 p / 2 + U_R(R). Rotation and the kick of U_b commute (one changes R, p,

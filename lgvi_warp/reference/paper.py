@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The integrators of Nordkvist & Sanyal (2010) as printed, one function for each equation.
 
 phi, phi_adjoint, psi: conservative. Phi, Phi_adjoint: with the nonconservative phi and tau of (15), (16).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Random numbers from counters: Philox4x32-10, Salmon, Moraes, Dror & Shaw 2011, and Box & Muller 1958.
 
 A number is a function of its key and counter, nothing is carried along: any member, step and channel can be drawn alone,

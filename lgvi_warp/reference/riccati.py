@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Equation (24) by an algebraic Riccati equation and the matrix sign function: to compare with the other solvers.
 
 J. R. Cardoso & F. Silva Leite (2003), The Moser-Veselov equation, Linear Algebra and its Applications 360: F Jd = A + S with

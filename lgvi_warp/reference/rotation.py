@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Equation (24), Nordkvist & Sanyal 2010: F in SO(3) nearest I with F Jd - Jd F^T = hat(a), Jd = tr(J)/2 I - J.
 
 Five solvers. `newton` is the paper's; `moser_veselov` the explicit solution it quotes; `riccati` that of its [19];

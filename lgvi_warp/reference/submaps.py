@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The sub-maps that every method is a program of (Ab, Ap, T, D, K), on one vehicle."""
 
 import math

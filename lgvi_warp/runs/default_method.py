@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The method of a run for which no one names one, chosen by what acts in the scene and by the step.
 
 Conservative motion keeps its symplectic method. A splitting moves steady motion, and Runge-Kutta methods keep it, so these

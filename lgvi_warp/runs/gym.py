@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`lw.gym.VectorEnv`: thousands of vehicles as one vector environment of Gymnasium, whose steps are a controller's periods."""
 
 from __future__ import annotations

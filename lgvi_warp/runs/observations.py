@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a learner may see: names for numbers of what a controller measures and wants, those of `lw.Policy` among them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How the members of a run ended, in words: a sentence for each status that occurs."""
 
 from __future__ import annotations

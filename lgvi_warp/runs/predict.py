@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Prediction of a run's time, memory and disk space, from a short trial of the same plan on this machine."""
 
 from __future__ import annotations

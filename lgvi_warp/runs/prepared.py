@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`prepare`: a run that is called many times with other numbers, at little more than what its kernel takes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Provenance of a run, and the messages that the user should see about its settings and starts."""
 
 from __future__ import annotations

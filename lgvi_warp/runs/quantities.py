@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Quantities of interest: one or a few numbers of each member of a result, named by a text or computed by a function."""
 
 from __future__ import annotations

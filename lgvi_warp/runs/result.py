@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The result of a run: samples, status of each member, statistics, and the provenance they follow from."""
 
 from __future__ import annotations

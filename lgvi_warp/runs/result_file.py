@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks of the arrays in a result.npz, so that a damaged or foreign file is rejected with one clear line."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs in memory: all blocks of a plan, gathered into a Result."""
 
 from __future__ import annotations

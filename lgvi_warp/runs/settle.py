@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Settling of a run's settings from arguments and scene: its plan, its number of Newton steps, and its blocks."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sizes of statistics on disk and in memory, measured on the parts of one block at a few sample times."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`solve`: from an ensemble and its settings to a result, in memory or in a store."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Kernels compiled ahead of a run, several at a time, each in a process of its own."""
 
 from __future__ import annotations

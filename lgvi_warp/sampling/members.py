@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The parameters and initial states of the members of a run."""
 
 from __future__ import annotations

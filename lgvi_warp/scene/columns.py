@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The columns of a model: their names and order, and those that a user gives by name."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Ensembles: what varies from member to member, and the members' numbers, block by block."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scene files: from a path or a text to tables, with overrides applied and a named vehicle inserted."""
 
 from __future__ import annotations

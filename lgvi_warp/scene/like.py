@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The part of a scene that an ensemble uses, as a protocol."""
 
 from __future__ import annotations

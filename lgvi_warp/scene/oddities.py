@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Odd values of many members: counted, and described by the first member that has one."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Values that are possible yet odd, most often by a wrong unit: messages name them, nothing is refused.
 
 Every check looks at the numbers of many members at once. Members with odd values are counted, and the first is named.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A scene: one vehicle, its environment, the terms that act and the state it starts from."""
 
 from __future__ import annotations

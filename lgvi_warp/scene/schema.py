@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The scene file as a JSON schema, made of the tables that the loader uses, for editors and for other programs."""
 
 from __future__ import annotations

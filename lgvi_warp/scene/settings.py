@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Settings that a scene file holds: its sections [run] and [ensemble]."""
 
 from __future__ import annotations

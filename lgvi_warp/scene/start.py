@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The environment of a scene and the state that its members start from."""
 
 from __future__ import annotations

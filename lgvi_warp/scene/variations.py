@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What varies, by name: the numbers of a scene that a distribution draws, and the unit cube of the sampling points.
 
 A name is that of a number of the scene, "vehicle.mass", of an entry of it, "start.position[2]" or

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Statistics over members, gathered while a run goes: one module for each kind, a table of them for scene files."""
 
 import sys

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Means of quantities on the circle and on SO(3)."""
 
 from __future__ import annotations

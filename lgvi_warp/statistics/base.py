@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The base class of all statistics, and the tables that scene files give them as.
 
 A block of members is reduced to a part: named arrays that summarise these members. Parts of blocks are joined pairwise

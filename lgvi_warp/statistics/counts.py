@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Statistics that count members: histograms, probabilities of a condition, and times of its first passage."""
 
 from __future__ import annotations

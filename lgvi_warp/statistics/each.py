@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The number of every member, where statistics of them are not enough."""
 
 from __future__ import annotations

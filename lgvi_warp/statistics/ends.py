@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How and when the members of a block ended: the data that statistics of outcomes are of."""
 
 from __future__ import annotations

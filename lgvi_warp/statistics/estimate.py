@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Estimates: the values of a statistic with their intervals, by sample time."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Expressions for quantities: a name, a component of it, a norm, and a reduction over the path.
 
 "position[2]" and "norm(velocity)" give numbers of each member at each time; "max(depth)" and "range(norm(velocity))"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Which inputs explain an output, from members at hand: first-order indices by bins, and standardised regression."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Confidence intervals for independent members, and for independent replicates."""
 
 from __future__ import annotations

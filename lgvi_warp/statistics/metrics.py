@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Metrics of a control loop: one number of each member, gathered look by look; definitions are those of control theory.
 
 A look is a sample at a controller's period. With looks at t_0 = 0, t_1, ... a member counts from the first look to the last

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Metrics of what a controller does, of how long members last, and the user's own."""
 
 from __future__ import annotations

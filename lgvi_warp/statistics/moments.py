@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Means, covariances and the moments that their errors follow from; joined by shifts to the common mean (Chan 1979)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names of statistics: one spelling of numbers in them, and variables' names for xarray and NetCDF."""
 
 from __future__ import annotations

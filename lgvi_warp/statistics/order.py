@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Extremes and quantiles: statistics of the members' order."""
 
 from __future__ import annotations

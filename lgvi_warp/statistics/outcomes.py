@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Statistics of how members end: the probability of an outcome by time, and statistics of the time at which it came."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Comparison of two cases on the same members: intervals of differences, tests, and the correction for many of them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Statistics of one number of each member's whole path, such as its maximum."""
 
 from __future__ import annotations

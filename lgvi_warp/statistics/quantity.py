@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Quantities of each member at each sample time: known by name, or functions of the samples."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Reductions of a path to one number, which take its samples one by one."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Samples of a block of members, as statistics and stores receive them."""
 
 from __future__ import annotations

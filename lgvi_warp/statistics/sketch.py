@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A sketch of sorted values: quantiles of any number of values from a few thousand, with a proven bound on the rank.
 
 A tree of buffers after Munro & Paterson (1980) with the coin flips of Karnin, Lang & Liberty (2016). Two sorted buffers

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The estimates of a run at its end, as lines of text."""
 
 from __future__ import annotations

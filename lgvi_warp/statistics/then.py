@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Statistics of one number of each member, such as the maximum of its path or the time of its end."""
 
 from __future__ import annotations

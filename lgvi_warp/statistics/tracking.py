@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a controller wants beside what the vehicle does: depth, heading, speed, place, and the way off the path."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parts of blocks joined pairwise in an order fixed by the blocks' numbers: accurate sums with reproducible bits."""
 
 from __future__ import annotations

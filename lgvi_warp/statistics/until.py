@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stopping rule of a run: it ends when a statistic's interval is narrow enough."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A quantity of a block's members at some sample times, with the intermediate results that several statistics share."""
 
 from __future__ import annotations

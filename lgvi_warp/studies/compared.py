@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The quantity that two results are compared in: any that statistics know, with its unit and its distance."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs of a sample of an ensemble with different settings, and how far apart they are: members, statistics, growth."""
 
 from __future__ import annotations

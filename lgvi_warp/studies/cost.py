@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cost of a method's step on one core: CPU time of the thread that runs it, the least of several readings."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Write what a study found as files for other programs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whose members a study is about: of an Ensemble, or of a Scene and its section [ensemble]."""
 
 from __future__ import annotations

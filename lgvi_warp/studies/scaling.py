@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cost of a member's step: against members and threads, and of each term of a scene beside the bare one."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Speed of the kernel on this machine, next to the peak of the core measured in the same run."""
 
 from __future__ import annotations

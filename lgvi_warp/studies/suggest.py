@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The cheapest setting that keeps a given error: searched on a sample, checked on more members and after the run."""
 
 from __future__ import annotations

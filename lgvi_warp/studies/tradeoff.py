@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Speed against accuracy of every method, step, precision and solver, measured on a sample of an ensemble."""
 
 from __future__ import annotations

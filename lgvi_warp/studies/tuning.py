@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The width of packets by measurement: each kind of kernel at the widths that may suit, in turn on one thread."""
 
 from __future__ import annotations

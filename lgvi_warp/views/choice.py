@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What of a run is shown: which members are drawn, at which times, and which members quantiles are taken of."""
 
 from __future__ import annotations

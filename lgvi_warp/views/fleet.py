@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the picture and the recording of a fleet share: looks of outcomes, the title, and curves of members under way."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A run in the viewer while it goes on: its members come block by block, each through all times."""
 
 from __future__ import annotations

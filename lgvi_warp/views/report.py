@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The report of a run or of a study: one HTML file with pictures, tables, the scene and how to run it again."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recordings of fleets for the rerun viewer: written to a file, sent to a stream or a viewer, or shown at once."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of sweeps: success by case and over the grid, metrics by case, paired differences, what failures go with.
 
 Each draws on `figure=` or on a figure of its own, writes a file where `path` names one, and returns its axes.

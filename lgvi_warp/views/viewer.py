@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The rerun viewer as a process: whether one answers at an address, and how one is started."""
 
 from __future__ import annotations

@@ -1,1 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
 """Controllers: parts against their twins, closed loops, analytic answers."""

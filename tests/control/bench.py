@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a controller measures along motions that are given: the parts of a scene on the device, without steps."""
 
 from typing import Any

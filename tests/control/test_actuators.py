@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Closed loops with actuators as vehicles have them, and their allocation: the kernel against the twin's loop."""
 
 import numpy as np

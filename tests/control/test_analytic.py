@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Closed loops whose answer is known: a single kernel, in whose ensembles all laws act on some member."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sensors, estimators and faults that are wrong get a sentence with key, value and remedy."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A law that is a Python function: the same motion as the law in the kernel, and what it says where it fails."""
 
 import numpy as np

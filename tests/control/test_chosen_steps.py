@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Steps that a method chooses within those of the run, under commands that are held over a period."""
 
 import re

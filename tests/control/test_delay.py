@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Delays of commands, by member: q periods and s steps, exactly; and faults of actuators at their looks."""
 
 import numpy as np

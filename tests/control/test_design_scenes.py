@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The scene files of examples/scenes load and run as they stand: an autopilot with sensors, and a thruster that dies."""
 
 import numpy as np

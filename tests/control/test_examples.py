@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The examples of controllers run as scripts, print three lines, draw their picture, and show what they say."""
 
 import re

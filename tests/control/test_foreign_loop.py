@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The autopilots of another simulator on its own vehicle, as a law of one's own, beside its loop in NumPy."""
 
 import numpy as np

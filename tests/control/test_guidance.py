@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Guidance against its twins, and what it does: waypoints by three methods from one kernel."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Vehicles as an environment of Gymnasium: the motion is that of a run, lane by lane, whenever an episode begins."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The hold of order zero: commands are constant over a period, in every method; loops converge with the method's order."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A closed loop that is killed (SIGKILL) goes on and leaves the bytes of one that was not."""
 
 import random

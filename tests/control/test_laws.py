@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Laws against their twins, each in a member of its own: a single kernel has them all."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The gain and the delay at which a sampled loop turns unstable: by eigenvalues, and by members in lanes."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The closed loop: a look between steps, commands held until the next, whatever the method; against the twin's loop."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The closed loop of benchmarks/cases/loop_peers is one loop, whichever way it is written."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The examples of the pages on laws and guidance are scenes, and each part has a section."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Closed loops with sensors: against the twin, against the discrete Lyapunov equation, and with a sensor that dies."""
 
 import numpy as np

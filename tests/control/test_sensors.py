@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sensors, estimators and faults of sensors: the device against twins, against what is known, and alone in their lanes."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The sweep of benchmarks/cases/sweep_peers is one sweep, whichever way it is written, and its lines are counted fairly."""
 
 import importlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parts of a controller from a user's own file, and check_controller, which says what is wrong with them."""
 
 from dataclasses import dataclass

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The extremes: each case is one member, its setting in numbers, and what must come of it.
 
 A group is one ensemble, which one kernel advances: every member at another extreme. `Status.OK` stands for: as the same map

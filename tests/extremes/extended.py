@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The maps of psi_s and psi_x for many vehicles at once, in NumPy's extended precision (longdouble, 64 bits on x86-64).
 
 What a kernel differs by from these is round-off and nothing else. Free bodies, weight, restoring moment, drag along the axes.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Broken scene files: every one is accepted, or refused with SceneError naming a key; and never anything else.
 
 python -m tests.extremes.fuzz KIND FIRST STOP KERNELS writes one line of JSON per case, so that the last line tells which

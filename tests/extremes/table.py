@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every extreme, what must come of it and what came: writes docs/explain/extremes.md.
 
 python -m tests.extremes.table

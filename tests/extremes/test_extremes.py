@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every extreme is accurate to the bound stated for it, or flagged; never silently wrong."""
 
 import functools

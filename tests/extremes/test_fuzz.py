@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Thousands of broken scene files and --set arguments: accepted or refused by name, never anything else."""
 
 from collections import Counter

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numbers at the edge of what floating point holds: infinite, not a number, subnormal; one sick member, all members."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drag of any strength, 1e5 seconds of falling, 1e8 steps: against exact solutions of the maps, to derived bounds."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """No member's result changes by one bit because another failed: every position in a packet, every way to fail."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Vehicles, states and steps drawn at random over the whole range: invariants hold, or the status says why they do not.
 
 Each example draws a whole ensemble, so that one launch of one kernel tries many members.

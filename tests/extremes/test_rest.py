@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Damped bodies that come to rest: subnormal numbers are zero in the kernel, and kept everywhere else."""
 
 import platform

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Print which part of each room's lines the last `make coverage` ran: `python -m tests.house.coverage_by_room`."""
 
 from collections import Counter

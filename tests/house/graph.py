@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The graph of imports, read from the source: `python -m tests.house.graph` prints rooms, circles and lazy imports.
 
 An import is read as "top" (made when its module is), "lazy" (inside a function) or "typing" (under `if TYPE_CHECKING:`).

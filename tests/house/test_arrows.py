@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The arrows between modules point one way (architecture, Layout), read from the source: lazy imports count as well."""
 
 import ast

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The benchmarks stand without the tests, each can be started by its name, and a table goes between its marks only."""
 
 import ast

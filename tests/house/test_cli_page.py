@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page on the command has every verb with its options, and no other."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The complete examples of the pages on adding a method, a statistic and a sampling run as they stand."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The snippets of pages run as they stand, where no test of their subject runs them."""
 
 import re

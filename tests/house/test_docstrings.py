@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every public method says what it does, or overrides one that does: ruff's D102 would ask it of overrides too."""
 
 import importlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Without the libraries of an extra, what needs them says which extra installs them, and in no other error."""
 
 import sys

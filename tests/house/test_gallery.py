@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The gallery: twelve short scripts, each with a picture that its present text drew, on a page that has both."""
 
 import sys

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Formulas in kernel modules use the lanes' operators: a builtin would be silently slower, and looks the same."""
 
 import ast

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every source file names its licence, that of the package, in its first line."""
 
 import subprocess
@@ -11,7 +12,8 @@ LINE = f"# SPDX-License-Identifier: {PROJECT['license']}"
 
 def without_line(paths):
     """Those files whose head does not name the licence: the first line, or the second below a `#!`."""
-    return [path for path in paths if LINE not in path.read_text().splitlines()[: 2 if path.read_text().startswith("#!") else 1]]
+    heads = ((path, path.read_text().splitlines()[:2]) for path in paths)
+    return [path for path, head in heads if LINE not in (head if "".join(head[:1]).startswith("#!") else head[:1])]
 
 
 def test_every_source_file_names_the_licence():
@@ -26,6 +28,11 @@ def test_the_licence_is_that_of_the_file():
 
 
 def test_a_file_without_the_line_is_found(tmp_path):
-    for name, text in {"a.py": f"{LINE}\n", "b.py": f"#!/usr/bin/env python\n{LINE}\n", "c.py": f'"""x"""\n{LINE}\n', "d.py": ""}.items():
+    for name, text in {
+        "a.py": f"{LINE}\n",
+        "b.py": f"#!/usr/bin/env python\n{LINE}\n",
+        "c.py": f'"""x"""\n{LINE}\n',
+        "d.py": "",
+    }.items():
         (tmp_path / name).write_text(text)
     assert [path.name for path in without_line(sorted(tmp_path.iterdir()))] == ["c.py", "d.py"]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every relative link of README, changelog and docs leads to a file, and every anchor to a heading."""
 
 import re

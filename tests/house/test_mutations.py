@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The faults that `make mutants` puts into the code: in what runs, one at a time, and never in words."""
 
 from tests.support.mutations import mutants, parses

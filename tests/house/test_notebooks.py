@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The notebooks of the site: kept without outputs, and run from the first cell to the last."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every fenced snippet of README and docs is run by a test: here, or in the file that the table names."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """No file uses a private name of another file: `from x import _y`, `x._y`, or object.__setattr__ on another's object."""
 
 import ast

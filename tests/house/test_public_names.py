@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Public names that were replaced: the old ones still work, warn, and name the new ones."""
 
 import pickle

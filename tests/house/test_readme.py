@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The examples of README and of the first pages print what the pages say."""
 
 import re

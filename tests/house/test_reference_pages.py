@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The reference pages say what the code says: statuses, warnings, methods, public names."""
 
 import re

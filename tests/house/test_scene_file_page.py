@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The page on the scene file has every key of every section, with its default, and no other.
 
 python -m tests.house.test_scene_file_page writes its tables of types.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The site: its reference has every public name with each parameter, its pages are whole, its links lead somewhere."""
 
 import dataclasses

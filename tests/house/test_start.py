@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The package loads late: an import of it brings nothing else in, and a scene needs neither SciPy nor Warp."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a case of a law is: its term beside its twin."""
 
 from importlib import import_module

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Each term of a scene beside its twin: what the parity, order and bits tests of tests/laws/test_parity.py run over."""
 
 import numpy as np

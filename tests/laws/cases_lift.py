@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fins, cross-flow drag and body lift beside their twins. Import tests.laws.cases, which includes them, not this."""
 
 import numpy as np

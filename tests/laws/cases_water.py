@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cases of waves, currents that change, noise and stratification. Import tests.laws.cases, which includes them, not this."""
 
 import numpy as np

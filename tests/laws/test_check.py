@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """check_law passes what is right, and says of each wrong law what is wrong and what to do."""
 
 import functools

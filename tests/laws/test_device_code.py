@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Each law's device code alone, beside its twin: all that it adds to a step, at random views; and the distance of each event.
 
 A stepping kernel with all laws at once, in test_parity.py, shows that steps use them as the twin does.

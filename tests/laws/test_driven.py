@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Actuators that a controller drives, each beside its twin: how they follow a command that is held, and how they push."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fins, control fins, cross-flow drag and body lift against what is known exactly, and what they refuse."""
 
 import dataclasses

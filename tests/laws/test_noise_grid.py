@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Noise on a grid of its own: steps that divide one another see one path, whose numbers are those of exact solutions."""
 
 from dataclasses import dataclass, replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The benchmark's peer with all terms does the same work: its states are lw.solve's. And its scenes run."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Steps with every term alone, and with all together: the kernel against its twin, in several methods and both precisions.
 
 A kernel with one law alone shows no more than one with all, beside test_device_code.py: it is left to test-long.

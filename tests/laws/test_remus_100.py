@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """REMUS 100: its speed at a held thrust and its steady turns, against equations of motion written here once more.
 
 In the plane (centre of gravity at the origin, no propeller torque) nothing pushes pitch or roll, and turns are steady;

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Laws from a user's own file, those of examples/laws/own_law.py: in a run, in a scene file, and as a script."""
 
 import importlib.util

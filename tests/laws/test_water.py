@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Waves, currents that change, noise and stratification against exact solutions, known laws and their twins."""
 
 import numpy as np

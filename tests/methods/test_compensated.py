@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compensated float32: round-off of the size of a step's changes instead of the state's, and everything else as before."""
 
 import numpy as np

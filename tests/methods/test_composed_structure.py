@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the compositions keep: linear momentum, reversal of time, and an energy that does not drift."""
 
 import numpy as np

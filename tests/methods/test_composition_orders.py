@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compositions of every kind against the quad-precision truth at t = 5, and what they refuse."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compositions, of whole methods, of their halves and of two parts: the kernel against the twin."""
 
 import numpy as np

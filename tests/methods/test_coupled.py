@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """psi_x, psi_x8 and psi_w with a full 6x6 inertia and every law: the kernel against the twin."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The twin's step for a full 6x6 inertia: the numbers, orders and structure of coupled_inertia.md, and its limits."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Laws against exact solutions: each is stated in its test, and so is why the tolerance is what it is."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The explicit methods, alone and with every law: the kernel against the twin."""
 
 import functools

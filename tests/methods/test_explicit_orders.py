@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Explicit methods against the quad-precision truth: orders, tolerances, and what becomes of members that cannot meet one."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Gauss collocation in the kernel against its twin, against the truth, and where it fails."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The Warp kernel against the NumPy twin: every method and solver, diagonal and full J and M, both precisions."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The linearly implicit method: its coefficients, orders, steady motion, strong damping, and the kernel against the twin."""
 
 import itertools

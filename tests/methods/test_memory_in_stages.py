@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lags and limited rates in Runge-Kutta methods: what laws remember is exact at every stage, so methods keep their orders."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The explicit solution of equation (24) in the kernel: against its twin by eigenvectors, and where that fails."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The benchmark's peer does the same work: its states are the paper example's."""
 
 import numpy as np

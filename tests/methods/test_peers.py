@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every peer of benchmarks/peers solves the problem that lgvi_warp solves: rates and short runs against the NumPy twin."""
 
 import importlib

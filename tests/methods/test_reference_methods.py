@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The twins of the explicit, collocation, Lie group and two-part splitting methods: orders, invariants, agreement."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The twin's solvers of equation (24), F Jd - Jd F^T = hat(a): against the equation, each other and their limits."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Largest stable steps, measured, against linear theory and against the numbers of the Munk oscillation that are known.
 
 Released at rest, .3 rad off broadside, M = (1, 100, 100): the largest stable h w of Phi is 1.41, of Psi 1.50, PsiS 2.13, Psi1

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the discrete maps keep: momenta, orthogonality, reversibility, the symplectic form; exactly the true claims."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The limits that warnings compare with are those that runs show: of the Munk moment, and of a restoring moment.
 
 Reference: the fastest oscillation of 0.3 rad that stays bounded over 1,000 steps (`benchmarks.tables.warning_limits`), against

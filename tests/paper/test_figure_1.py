@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The example that draws the paper's Fig. 1 gives the numbers of its curves: the first 5 s here, all 150 s in test-long."""
 
 import importlib.util

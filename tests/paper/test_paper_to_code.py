@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The table of docs/reference/paper_to_code.md: every name in it exists, and every equation's function says its number."""
 
 import importlib

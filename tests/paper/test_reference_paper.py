@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The twin against the paper's printed equations, the states of its example, and the truth in quadruple precision."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Against the quad-precision solution of the continuous equations, and the numbers of the paper's Fig. 1."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What controllers measure, want, demand and command, and where actuators are: saved with every sample, for every member."""
 
 from dataclasses import dataclass

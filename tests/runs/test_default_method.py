@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The method that a run takes for which no one names one: by what acts, by the step, and told."""
 
 import dataclasses

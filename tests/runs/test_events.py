@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Events stop a member with status and time, and leave its packet alone."""
 
 import numpy as np

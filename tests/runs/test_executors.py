@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Blocks in threads, processes and Dask workers: the same bytes from each, also where a worker is killed on the way."""
 
 import ast

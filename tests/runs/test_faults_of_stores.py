@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Two at once, killed at any moment, a full or unwritable disk: what is left is whole, and nobody else's file is touched."""
 
 import errno

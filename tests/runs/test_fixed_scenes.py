@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Forty fixed runs keep the bits that are recorded of them: a change of structure changes no number."""
 
 import pytest

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Children of every kind run as their parent does, in memory and into stores: the same bits, and none waits for ever."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stores and results of somebody else's: whatever they hold, nothing is executed, nothing is written outside, and a line
 says what is wrong, in little time and memory. The table is tests/support/hostile.py."""
 

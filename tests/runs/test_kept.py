@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Members that are kept after all lie in the store: the bits of a run in memory, killed, damaged, merged and exported."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A kernel cache that is damaged, full, unwritable or left torn: compiled anew, or told; never loaded."""
 
 import errno

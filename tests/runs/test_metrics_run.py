@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Metrics in whole runs: those of the twin on kept paths, at all looks whatever is kept, in stores, of members that end."""
 
 import gc
@@ -219,5 +220,7 @@ def test_metrics_of_what_no_guidance_wants_are_refused(fleet):
     controller = fleet.scene.controller
     few = replace(controller, guidance=[lw.SetPoint(depth=10.0, heading=0.5), *controller.guidance[1:]])
     for run in (lw.solve, lw.predict):
-        with pytest.raises(lw.SceneError, match="statistics = 'iae speed': is of the speed, and no guidance .* wants a speed"):
+        with pytest.raises(
+            lw.SceneError, match=r"statistics = 'iae speed': is of the speed, and no guidance .* wants a speed"
+        ):
             run(replace(fleet.scene, controller=few), t1=1.0, statistics=[lw.IAE("depth"), lw.IAE("speed")])

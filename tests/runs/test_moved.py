@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A run sampled from a CSV file goes on wherever its folder or the file went: what counts is the file's checksum."""
 
 import shutil

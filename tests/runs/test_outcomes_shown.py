@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An outcome is not a failure: pictures, recordings, summaries and exit codes of members that events stopped."""
 
 import dataclasses

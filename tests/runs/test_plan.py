@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Only what a scene has is compiled; a second solve builds nothing; memory follows the samples kept."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What `lgvi-warp predict` says before a run: sizes by arithmetic, so nearly exact; time from a trial, so roughly."""
 
 import os

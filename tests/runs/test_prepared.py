@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A prepared run has the bits of solve, whatever varies, however often and from however many threads it is called."""
 
 import gc

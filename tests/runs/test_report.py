@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The report of a run or of a study: one file, whole, that says what became of the members and how to run them again."""
 
 import re

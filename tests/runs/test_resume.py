@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Killed at any moment (SIGKILL), a run goes on and leaves the bytes of one that was never stopped."""
 
 import random

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Same inputs, same bits: any number of threads, any order of members, alone or among others, after a failure beside."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Signals, terminals that vanish, streams that are closed: one line, what is finished is kept, nothing waits for ever."""
 
 import contextlib

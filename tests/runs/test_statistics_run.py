@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Statistics of runs: exact solutions, equal bits for any number of threads, members that fail or stop, what is kept."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Statistics in a store: the bits of a run in memory, of any executor, killed and gone on with."""
 
 import pickle

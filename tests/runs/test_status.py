@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A member that fails keeps its last good state, its time and the value that crossed; its neighbours notice nothing."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A run in a store: the bits of one in memory, whatever reads it; and how it is refused, damaged, mended and exported."""
 
 import asyncio

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Kernels compiled ahead of a run: those that the run takes, and no others."""
 
 import dataclasses

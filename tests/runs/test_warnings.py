@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Each row of warnings is crossed where it should be and not 5 % below; levels of checks; what a level leaves out."""
 
 import numpy as np

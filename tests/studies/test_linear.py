@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Steady motions, linear models and regulators, beside answers that are known: two kernels."""
 
 import dataclasses

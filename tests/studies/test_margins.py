@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Margins of loops: beside those of the sampled system written by hand, and by runs in lanes; one kernel."""
 
 import dataclasses

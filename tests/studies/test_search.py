@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The worst case within bounds and gains of least risk, beside known ones; the kernel is that of test_linear."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sensitivity: known indices of known functions through the whole machinery, and what happens to members that fail.
 
 All scenes run the paper's kernel with every field kept, which other tests compile as well. An estimate is to lie within 5

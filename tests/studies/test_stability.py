@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stability maps: cells whose class is known, beside the analytic limits; the command and the picture."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sweeps: common random numbers, closed answers, stops and files, worst members to the bit, what is asked wrongly."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The snippets of the pages on metrics and sweeps run as they stand, and so do the examples of sweeps, with fewer members."""
 
 import random

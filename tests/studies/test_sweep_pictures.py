@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of sweeps by content: what is drawn, where, and how it is labelled. The sweep is that of test_sweep."""
 
 import numpy as np

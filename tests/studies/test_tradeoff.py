@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Speed against accuracy: errors that are checked, a front that is one, suggestions that keep what was asked."""
 
 import contextlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Forty runs that keep their bits: results, statistics and stores, over the terms, methods, precisions and ways of running.
 
 Bits depend on the processor's vector instructions and on the versions of Warp and NumPy: the hashes are kept for each

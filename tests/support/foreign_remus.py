@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """REMUS 100 under the depth and heading autopilots of another simulator, written afresh from its equations.
 
 The simulator: T. I. Fossen, Python Vehicle Simulator (github.com/cybergalactic/PythonVehicleSimulator), remus100.py as of May

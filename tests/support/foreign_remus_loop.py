@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The vehicle of `foreign_remus` as a law of one's own, its depth filter as a guidance, and the scene of its loop.
 
 `python -m tests.support.foreign_remus_loop` prints what differs between its loop and the package's.

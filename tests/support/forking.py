@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A program that runs in every way in which Python starts children, and prints what each of them came to.
 
 `python -m tests.support.forking FOLDER WAY ...`: the parent runs first, so that a forked child inherits all that a run leaves.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stores and results that somebody made to do harm, or that were damaged: built from a good one, each by one function."""
 
 import json

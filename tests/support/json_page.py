@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The tables of docs/reference/json.md, and what of a document differs from them."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """As much of JSON schema as the schema of scene files uses."""
 
 KINDS = {

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Closed loops of the twin, from the scene of a closed loop of the package."""
 
 import dataclasses

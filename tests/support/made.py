@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Results made of given paths, without a run: for tests of what is drawn."""
 
 import numpy as np

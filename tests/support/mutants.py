@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Do the tests find faults? Put random one-line faults into the code and count those that no test finds.
 
     python -m tests.support.mutants --record                             once: what each test runs, half an hour on 2 cores

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A pytest plugin for mutants.py: it records what each test runs, or runs chosen tests in a given order.
 
 MUTANTS_RECORD   folder: write there the lines that each test executes (coverage.py), its kernels and its duration

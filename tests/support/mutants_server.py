@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A process of mutants.py that runs pytest again and again, each time in a fork.
 
 It has imported what tests need and is not ours: a process that imported it anew would take most of its time for that. It is

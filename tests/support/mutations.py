@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One-line faults of a Python file, by its syntax tree: what could be mistyped in each line, as text to put in its place."""
 
 import ast

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scenes drawn at random: vehicles, starts, forces, lengths of run and errors to keep."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Righting moments as Gazebo makes them, from robot descriptions: a small computation of its own beside the importers.
 
 `python -m tests.support.righting FOLDER` prints the table of the files in a folder: SDF (a file NAME.world beside

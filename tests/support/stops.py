@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every kind of event at once, one of the user's own among them: tests whose scenes have all share a kernel."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What the tests of stores need: a small run, and whether two folders hold the same bytes."""
 
 import contextlib

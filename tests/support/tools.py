@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What several tests need: vehicles, one-scene ensembles, states of results and of the reference."""
 
 from pathlib import Path

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Work of the simplest kind for executors: it waits, tells how far it is, and leaves a trace of each time it is begun."""
 
 import os

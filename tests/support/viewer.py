@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The rerun viewer without a window: opens recordings, shows any time, and takes pictures of its views."""
 
 import contextlib

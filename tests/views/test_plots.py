@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures by content: what is drawn, how it is labelled, and that it can be read by everybody. No run is solved but one."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """ns per vehicle and simulated second of each method, at the step that makes an error of 1e-2 to 1e-10 at t = 5."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Why the attitude is carried as three rows: psi_s with rows and with a unit quaternion, bare loops, float64, 8 lanes.
 
 Also the drift from orthogonality after all steps, neither renormalised.

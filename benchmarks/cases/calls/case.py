@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What surrounds the kernel: a call of a prepared run, a whole solve and the set-up of a member, beside the kernel alone."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Processor time to compile a kernel over the 10 s that none may take: with an empty cache, and with Clang's header in it."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Closed loops beside the same scene without a controller, by processor time, in turn; callbacks and metrics beside none."""
 
 import time

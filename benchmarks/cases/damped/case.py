@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Driven, damped motion: error and cost of each method and step for REMUS 100 with its rudder at 4 degrees.
 
 As published but in the plane, as in examples/papers/prestero_2001/remus_100.py; the same with its drag 100 and 1000 times as

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Vehicles as environments of Gymnasium, and a law in Python, beside the law in the kernel and environments of others."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Environments of others, each another body and another method: steps of ten integration steps a second of processor time.
 
 None of them is our vehicle: they say what a learner gets elsewhere for a step of an environment, and what that step holds.

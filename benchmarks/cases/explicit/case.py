@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Speed against accuracy on one core: the error of R after some seconds and what a simulated second costs, of each method."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """ns per vehicle and step of every method, dtype and width on one core, beside the core's peak."""
 
 from lgvi_kernels.lanes.arithmetic import WIDTHS

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One closed loop written four ways: in lanes, NumPy, numba, an ordinary Warp kernel; one thread, processor time, in turn.
 
 The geometric PID of problem.py every ten steps of rk4, float64. All ways must end at the same place, or nothing is measured.

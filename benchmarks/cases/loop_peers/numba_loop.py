@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The loop in numba, one vehicle after the other: small functions that are inlined, every number of a state in a register."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The loop over arrays of members in NumPy, as an expert would write it.
 
 A row is one number of all members of a block, so that every operation runs over contiguous memory; results go into arrays

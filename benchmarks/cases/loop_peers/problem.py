@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The closed loop that each way computes: a vehicle in water that goes to a place and stays there, by a geometric PID.
 
 M nu' = M nu x Om + net z - D(nu) + f,  J Om' = J Om x Om + M nu x nu - d x z - D(Om) + tau,  b' = R nu,  R' = R hat(Om),

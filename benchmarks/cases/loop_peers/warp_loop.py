@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The loop as an ordinary Warp kernel, one vehicle a thread, as a competent Warp user would write it.
 
 wp.vec3d and wp.quatd throughout, the loop over looks and steps within the kernel, Warp's default module options.

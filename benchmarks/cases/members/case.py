@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cost of a solve from 1 to 10^6 members with all threads: time per vehicle and step, and memory of the result."""
 
 import time

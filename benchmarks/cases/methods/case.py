@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every method in every precision and at every width, on one core: ns per vehicle and step, and how far off its operations.
 
 A method makes the same operations at every width. A core makes them at a rate that it shows with fused multiply-adds

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The packet kernel against the ordinary one on the same fleet, one core; the ordinary module is compiled first."""
 
 import numpy as np

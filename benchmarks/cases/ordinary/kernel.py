@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The peer: an ordinary Warp kernel, one vehicle a thread, as a competent Warp user would write it.
 
 wp.mat33 and wp.vec3 throughout, equation (24) by the paper's Newton iteration on the exponential map to a tolerance,

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The packet kernel against the ordinary one with all terms at once, one core; the ordinary module is compiled first.
 
 Processor time, the least of all rounds: other work on the machine lengthens it least.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The peer with all terms: an ordinary Warp kernel, one vehicle a thread, as a competent Warp user would write it.
 
 wp.mat33 and wp.vec3 throughout, tables as wp.arrays, Warp's own elementary functions and random numbers, equation (24) by

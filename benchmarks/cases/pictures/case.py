@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Processor time, size and memory of recordings of many members, and of the paper's report, beside what they may cost."""
 
 import tempfile

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The whole process `lgvi-warp run examples/paper.toml` beside a bare process, and the kernel's own time.
 
 Plots and recording are included; the bare process imports warp, matplotlib and rerun. Both caches are warm.

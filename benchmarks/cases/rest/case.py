@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Damped bodies that come to rest: processor time of a step early and late in 400 s, when their rates are next to nothing."""
 
 import time

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The solvers of equation (24): psi_s with each of them, and the quality, range and time of single solves.
 
 Iterating to the tolerance, and with fixed numbers of Newton steps (moser_veselov is explicit: 0 is all of it); the Riccati

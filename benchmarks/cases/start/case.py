@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Processor time of a new Python that imports lgvi_warp, and one that reads a name of it, beside one that imports NumPy."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Statistics of 10^6 members at ten sample times beside the bare kernel, in turn: psi_s, float64, all threads; peak memory.
 
 Mean, covariance, quantiles and extremes of position, together and one by one, beside runs that keep nothing: with the same

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cost and memory as steps grow: time per vehicle and step, and the peak memory of a process that does that run alone."""
 
 from benchmarks import own_process

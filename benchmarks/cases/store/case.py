@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Bytes per second into a store, a whole run into a store, and statistics alone with a store.
 
 Beside them: the same bytes in plain files of the same sizes, each synced; the same run in memory; no store.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The search of lw.suggest: its processor time, and the cost of what it finds beside a search of all methods.
 
 Each shipped vehicle, 128 members under way for 10 s: bluerov2_heavy with its thrusters ahead, remus_100 with its rudder at 4

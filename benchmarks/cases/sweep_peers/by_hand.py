@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What both programs by hand share: numbers of the scene, metrics of a path, and the answer with its intervals."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One sweep written three ways: two TOML files, vectorised NumPy, a loop over a public simulator; lines and seconds.
 
 A vehicle holds its place in a current under two laws, with and without delay; five metrics, success, intervals. NumPy and ours

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The sweep by hand in NumPy: all members of a block at once, a row for each number."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The sweep by hand as a loop over the members of auv_sim_bench, one vehicle after the other; its axes are x, left, up."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """ns per vehicle and step of each term alone and of all together, and of the methods for coupled inertia, on one core.
 
 All scenes of one precision take turns in one run. `more_than_none` is what a term adds to psi_s with weight, buoyancy and

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Thread scaling on 10^5 members: time of one thread over time of n threads and n, the whole solve, start and end kept."""
 
 from lgvi_warp.common import machine

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fig. 1 of Nordkvist & Sanyal (2010): energy error of Psi (Warp kernel) and of Crouch-Grossman 3 (NumPy reference).
 
     python examples/papers/nordkvist_sanyal_2010/figure_1.py [figure_1.png]

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """REMUS 100 with 6x6 inertia: its speed at a held thrust, turning circles, and the rudder steps of Prestero (2001).
 
     python examples/papers/prestero_2001/remus_100.py [picture]

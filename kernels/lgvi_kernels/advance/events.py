@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Events: conditions that stop a member, and where in its step each stops it.
 
 An event is a module of stops with `distance(view, p)`, positive while the member goes on. A step whose end has a distance of

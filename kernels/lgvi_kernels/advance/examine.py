@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A kernel that evaluates one law alone at chosen views: lgvi_warp.law_check compares the values with finite differences."""
 
 import functools

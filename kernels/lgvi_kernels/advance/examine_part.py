@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A kernel that evaluates one part of a controller alone, at looks that are given."""
 
 import functools

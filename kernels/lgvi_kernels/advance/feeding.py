@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The look of a controller: from the state to the commands of its actuators, and the signals that are saved.
 
 Commands are rows of the memory that a look writes and that every step until the next one reads: so a hold of order zero is

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The kernel: a launch makes the steps k0 to k1, in chunks between two looks at the alarms, and writes the samples due.
 
 A chunk with an alarm is made again from its start, one step at a time. So healthy steps pay one test a chunk, and a failing

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A method's step, made of its sub-maps and the scene's laws: which law acts in which map, and how velocities follow."""
 
 from typing import Any, NamedTuple

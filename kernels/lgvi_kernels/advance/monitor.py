@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Checks beside the alarms of each step: rows of warnings, energy that must not grow, strong drag.
 
 A look sees the state at the end of a step, once in so many steps: its code lies outside the loop over the steps, whose

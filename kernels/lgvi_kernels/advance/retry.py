@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Steps that are made again: in equal parts, where a step has no solution; up to an event, where it stops a member.
 
 Both are rare, so their functions are not inlined: the loop over steps keeps its registers.

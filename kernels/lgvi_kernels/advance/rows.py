@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A packet's state and its samples as rows of lanes in arrays."""
 
 from typing import Any

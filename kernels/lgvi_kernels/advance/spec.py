@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Spec, which decides the code of a kernel, and the types that the kernel's functions share."""
 
 import functools

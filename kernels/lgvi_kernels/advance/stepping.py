@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The step of a method with its lead, and the loop over steps that takes the time of a run."""
 
 import functools

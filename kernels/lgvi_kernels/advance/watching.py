@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Looks at a packet now and then: is its energy plausible, and is the step short enough for its motion.
 
 Looks are rare, so their functions are not inlined: mixed with the loop over the steps they would change its schedule and its

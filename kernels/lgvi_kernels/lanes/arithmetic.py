@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lane arithmetic: one Warp thread advances a packet of W vehicles, side by side in SIMD lanes.
 
 A `Lane` is wp.vec(W): one number of W vehicles. A `Lane3` is a struct of three lanes: one 3-vector of W vehicles.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Compiler flags of every kernel here."""
 
 # The lanes are SIMD already: the flags let everything inline into one function, let the compiler join a multiplication

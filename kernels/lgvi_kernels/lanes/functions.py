@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Elementary functions and normal random numbers in lanes, written like the operators of arithmetic.py.
 
 No function calls the C library, which would go lane by lane: arguments are reduced and series summed in Clang's vector

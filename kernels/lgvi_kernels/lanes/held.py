@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Commands that a controller holds over a period, as actuators read them."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """3x3 matrices of a packet, kept as rows, and the 6x6 systems that are made of four of them."""
 
 import functools

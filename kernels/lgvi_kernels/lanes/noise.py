@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Random numbers of a law that is noise: its key, and what the draws of one step of the run add up to.
 
 A law may draw on a grid of its own, finer than the run's steps: then runs of all steps that are multiples of the grid's see

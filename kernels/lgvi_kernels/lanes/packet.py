@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Functions of a whole packet between steps: renormalise, choose between two states lane by lane, find failures."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The core's limit: independent chains of fused multiply-adds and nothing else, to hold a kernel's speed against."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Rotations close to the identity, and systems of three equations."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a packet carries through the steps: the state, the vehicle's constants, and the View that laws see.
 
 Momenta and inertia are kept divided by max J (`scale`): so the quartic of equation (24) stays within float32, and only

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numbers too small for the normal format, below 1e-38 in float32 and 2e-308 in float64, taken as zero by the processor.
 
 A damped body that comes to rest carries rates whose products are that small, and most processors then need many times as

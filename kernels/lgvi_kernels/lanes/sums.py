@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How a change is added to a state: by a plain sum, or by a compensated one, where each number is a sum v + v_low of two.
 
 Compensated (W. Kahan 1965): the change is added to v_low, v takes the digits of the result that it can hold, and v_low keeps

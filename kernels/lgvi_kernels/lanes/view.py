@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What laws do with a View: turn vectors, read their table and memory, find velocities at a point, sum damping."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The laws that a scene may name, one file each: the struct `params(width, real)`, and some functions.
 
 law(w, view, p): force [N] and torque [N m] that depend on position, attitude and time;

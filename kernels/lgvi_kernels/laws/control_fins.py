@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Control fins: fins that turn about their span to a command, within a limit and no faster than a rate."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Control fins with more than control_fins.py has: a driver, a lag, a table of lift, or no angle of the flow."""
 
 import functools

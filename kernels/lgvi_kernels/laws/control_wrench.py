@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An ideal actuator: the wrench that a controller demands, within limits."""
 
 import functools

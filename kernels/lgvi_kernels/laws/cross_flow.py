@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cross-flow drag of a slender hull: -c_i |w| w at each strip, w the flow across the hull's axis."""
 
 import functools

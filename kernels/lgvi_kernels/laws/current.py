@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A steady, uniform current: in its frame nothing changes, and that frame carries the vehicle."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A uniform current that is a sum of harmonics in time, such as tides: u(t) = sum_j a_j cos(omega_j t + phase_j)."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A current that varies with depth: u(b3) by linear interpolation of a table, constant above and below it."""
 
 import functools

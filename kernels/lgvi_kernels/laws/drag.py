@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drag per axis, -(l + q|v|) v, by its exact flow E: v -> v e^-x / (1 + (h q|v|/I) (1 - e^-x)/x), x = h l / I.
 
 E is the solution of I v' = -(l + q|v|) v on one axis, exact at any h, and exact altogether where the axes of drag are

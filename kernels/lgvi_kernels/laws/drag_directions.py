@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drag per axis where the axes of drag are not principal axes of the inertia: one axis after the other, each exactly.
 
 On the velocity w along one axis alone, w -> w e^-y / (1 + h L q|w| (1 - e^-y)/y) with y = h L l, L the axis's mobility,

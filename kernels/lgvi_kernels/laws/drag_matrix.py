@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drag by 6x6 matrices: force_i = -sum_j (linear_ij + quadratic_ij |nu_j|) nu_j, advanced by the linearly implicit step V."""
 
 import functools

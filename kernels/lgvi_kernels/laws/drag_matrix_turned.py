@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drag by 6x6 matrices (drag_matrix) where the axes or the origin are not those of the kernel."""
 
 import functools

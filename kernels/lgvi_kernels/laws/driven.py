@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Actuators that a controller drives: how each follows the command that is held, and where it is."""
 
 from typing import Any, NamedTuple

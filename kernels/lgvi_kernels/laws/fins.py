@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fixed fins: lift and drag of small wings, from the flow in the plane of their chord and normal."""
 
 import functools

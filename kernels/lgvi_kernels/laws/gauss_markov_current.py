@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A uniform current that wanders: a first-order Gauss-Markov (Ornstein-Uhlenbeck) process, u' = -u / tau + noise."""
 
 import functools

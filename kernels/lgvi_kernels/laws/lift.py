@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lift of a hull: force_i = -u sum_j matrix_ij nu_j, u the speed ahead."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Restoring moment: mU = -B r x R^T e3, from the potential U = B r.R^T e3 (section IV of Nordkvist & Sanyal 2010)."""
 
 import functools

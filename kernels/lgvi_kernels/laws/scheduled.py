@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Actuators that follow a schedule with a lag and at a limited rate, both at once."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Buoyancy that varies with depth, B (1 + gradient (d - d0)): here its deviation from B, which weight.py has."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tether: a spring from a fixed anchor to a point of the vehicle, slack below its rest length."""
 
 from typing import Any

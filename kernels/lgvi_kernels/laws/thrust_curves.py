@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How thrust follows from a command: its square, a polynomial or a table, and the inverse of each.
 
 Each curve takes (view, first, size, w): the row where its numbers begin, how many there are of a kind, and the command less

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Thrusters: quadratic thrust curve with dead band and saturation, after a first-order lag."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Thrusters whose thrust is a polynomial of the command, one ahead and one astern; all else is as in thrusters.py."""
 
 import functools

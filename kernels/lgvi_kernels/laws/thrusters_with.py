@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Thrusters with more than thrusters.py has: a driver, a limited rate, other curves, loss by the speed, torque."""
 
 import functools

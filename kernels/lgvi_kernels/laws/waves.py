@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Linear waves in deep water, a sum of components (Faltinsen 1990, table 2.1; Newman 1977, 6.2)."""
 
 import functools

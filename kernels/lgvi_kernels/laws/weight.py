@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Weight less buoyancy: f = net R^T e3, from the potential U = -net b3 (section IV of Nordkvist & Sanyal 2010)."""
 
 import functools

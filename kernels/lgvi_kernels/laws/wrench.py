@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A constant wrench in body axes."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """White noise of force and torque along the user's body axes: the impulse over a step h is S sqrt(h) xi."""
 
 import functools

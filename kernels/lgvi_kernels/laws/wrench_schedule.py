@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A wrench in body axes that follows a table over time."""
 
 import functools

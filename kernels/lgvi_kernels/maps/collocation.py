@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Gauss collocation in the kernel: all of y = (b, the rows of R, p, pi) at once, its stages by fixed-point iteration.
 
 Hairer, Lubich & Wanner, Geometric Numerical Integration, II.1.3 and VIII.6. The stages' slopes K_i stay in the packet's rows

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The sum of laws is a law: an absent term is no code, no parameter and no time."""
 
 import functools

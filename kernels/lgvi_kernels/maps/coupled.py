@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The coupled Moser-Veselov rotation W: the free motion of 1/2 (pi - S p).Js^-1 (pi - S p), S symmetric, Js diagonal.
 
 With Jd = tr(Js)/2 I - Js and Sd = tr(S)/2 I - S, F solves  vee(F Jd - Jd F^T) + h (tr(F Sd) I - F Sd) p = h pi. For S = 0

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """V: laws of the form (force; torque) = -D(nu) (nu; Om), advanced by a linearly implicit step of order 2.
 
 D is frozen at a velocity predicted for the middle of the step; with D frozen, two stages of the L-stable scheme with

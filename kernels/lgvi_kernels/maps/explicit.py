@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runge-Kutta methods on (b, R, p, pi), and on the rotation group: fixed steps, or steps chosen for a tolerance.
 
 k_i = f(t + c_i h, y_i), where y_i comes from y by h a_i1 k_1, h a_i2 k_2, ... and the new state by h b_1 k_1, h b_2 k_2, ...

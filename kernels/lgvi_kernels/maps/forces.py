@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """All laws of a scene at one state and its velocities: the force and torque on the vehicle, and the water's velocity."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The parts of a controller that play one role, as one function."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Linearly implicit Runge-Kutta methods on the same state as the explicit ones: damping decays, however strong it is.
 
 k_i = f(y_i) + h A (g_i1 k_1 + ... + g_ii k_i). Of df/dy the matrix A has only what damping does to the momenta: what it leaves

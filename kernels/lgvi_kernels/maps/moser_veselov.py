@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Equation (24) solved explicitly, after Moser & Veselov (1991), Commun. Math. Phys. 139, 217, without eigenvectors.
 
 X = F Jd satisfies X^2 = hat(a) X + Jd^2, and det(mu^2 I - mu hat(a) - Jd^2) is a cubic in m = mu^2,

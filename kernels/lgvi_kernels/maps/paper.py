@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Phi and Phi* of Nordkvist & Sanyal (2010) with nonconservative forces: equations (10)-(16) and (19)-(23).
 
 Conservative scenes are programs of submaps.py, which are the same maps. Here phi and tau, by (15) and (16) averages over

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Equation (24), Nordkvist & Sanyal 2010: the rotation F nearest to I with F Jd - Jd F^T = hat(a).
 
 Jd = tr(J)/2 I - J with J diagonal (principal axes). a and J may share any common factor: the host divides both by max J,

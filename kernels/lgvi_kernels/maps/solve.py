@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Solving equation (24) in every lane: how many Newton steps, until when, and the alarm where there is no solution."""
 
 import functools

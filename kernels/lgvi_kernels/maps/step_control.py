@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Steps that each packet chooses for a tolerance: error norm, step control, and the status of lanes that fail."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Ab, Ap, T, D, K: the sub-maps of which every method is a program; each advances a packet by h.
 
 p = M nu and pi = J Om, and M and J themselves, carry the factor 1 / max J throughout. R is kept as its rows R0, R1, R2.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The turns of psi_x: the kinetic energy of rotation as a sum of three squares, each solved exactly by a turn or a screw.
 
 In axes where Js is diagonal, 1/2 (pi - E^T p).Js^-1 (pi - E^T p) with E moved to upper triangular form U by the choice of

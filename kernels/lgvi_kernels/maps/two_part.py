@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The parts A and B of a splitting for potentials U_b(b) + U_R(R): both are flows, A to order 8.
 
 A: pi.J^-1 pi / 2 + U_b(b), the free rotation and p <- p + h f. B: p.M^-1 p / 2 + U_R(R), T and pi <- pi + h m.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Moving water: how it carries and pushes a vehicle whose momenta are those relative to the water.
 
 In the frame of the water around it, the vehicle's equations are those of still water, but that frame accelerates and

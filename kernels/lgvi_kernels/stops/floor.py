@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The body's origin sinks to the sea floor."""
 
 from typing import Any

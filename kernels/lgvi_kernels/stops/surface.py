@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The body's origin rises to a depth."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A member reaches the time at which it stops."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Executors: where blocks run, in threads of this process, processes of this machine, or workers of a Dask cluster."""
 
 from __future__ import annotations

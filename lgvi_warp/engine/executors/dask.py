@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Blocks on the workers of a Dask cluster, of one machine or of many; a worker that dies costs the block it was at."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Blocks in processes of one machine, each started afresh (spawn).
 
 When a process dies, Python ends all of them; the blocks they were at run again.

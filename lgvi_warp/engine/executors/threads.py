@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Blocks in threads of one process: a kernel launch releases the interpreter's lock, so threads are enough."""
 
 from __future__ import annotations

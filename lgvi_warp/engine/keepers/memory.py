@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Keepers that hold their results in memory: the outcome of every member, and every sample."""
 
 from __future__ import annotations

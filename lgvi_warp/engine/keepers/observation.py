@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a run keeps of its members, samples, statistics or both, and the condition under which it stops early."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The protocols of keepers: what a run calls to keep something of its members."""
 
 from __future__ import annotations

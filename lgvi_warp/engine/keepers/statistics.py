@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The keeper of statistics: gathers them block by block and joins the blocks in their order."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A law evaluated alone, its numbers packed as for a run, at random views: the means of check_law."""
 
 from __future__ import annotations

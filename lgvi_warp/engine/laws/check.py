@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whether a law is right: its device code at random views, against finite differences and linear algebra."""
 
 from __future__ import annotations

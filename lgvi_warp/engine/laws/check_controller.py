@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whether a part of a controller is right: its device code at random looks, alone and in packets, and against a twin."""
 
 from __future__ import annotations

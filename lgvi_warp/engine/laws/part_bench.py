@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A part of a controller evaluated alone, its numbers packed as for a run, at random looks: the means of check_controller."""
 
 from __future__ import annotations

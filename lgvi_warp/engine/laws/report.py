@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a check of device code finds: single checks, and the report that lists them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a controller is made of, one file each: sensors, guidance, laws, allocation and faults."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The base classes of a controller's parts: numbers as those of terms, and where each part finds what others write."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A law that is a Python function of all members of a block, called once a period."""
 
 from __future__ import annotations

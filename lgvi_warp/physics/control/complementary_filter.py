@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An estimator of the attitude."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A controller: what it looks at, what it wants, how it acts, and how often."""
 
 from __future__ import annotations

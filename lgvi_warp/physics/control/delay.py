@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The delay from a controller's look to its actuators."""
 
 from __future__ import annotations

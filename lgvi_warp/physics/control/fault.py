@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Faults of actuators and of sensors."""
 
 from __future__ import annotations

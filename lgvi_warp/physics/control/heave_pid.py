@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """PID of the depth by a force."""
 
 from __future__ import annotations

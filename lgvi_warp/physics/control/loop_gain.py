@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A factor on the demand of some laws, by which margins are measured: no part of a scene that a user writes."""
 
 from __future__ import annotations

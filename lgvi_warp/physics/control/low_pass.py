@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A filter over what is measured."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Allocation by a matrix of the user's."""
 
 from __future__ import annotations

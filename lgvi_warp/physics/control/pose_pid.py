@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """PID of position and attitude on SE(3)."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sliding mode control of position and attitude."""
 
 from __future__ import annotations

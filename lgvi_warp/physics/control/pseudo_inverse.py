@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Allocation by a weighted pseudo-inverse of the actuators' effect."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sensors: what is measured in place of the truth."""
 
 from __future__ import annotations

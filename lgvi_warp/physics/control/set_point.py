@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Guidance by a set-point."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The signals of a controller that a run may save beside the motion: shape, unit and meaning of each, by name."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """PI of the speed through the water."""
 
 from __future__ import annotations

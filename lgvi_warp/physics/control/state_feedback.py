@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Linear feedback of the whole state."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The terms that a scene may name, one file each: weight, drag, currents, tethers, thrusters, fins, waves and noise."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What actuators have in common that a controller drives, or that follow a schedule with a lag and at a limited rate."""
 
 from __future__ import annotations

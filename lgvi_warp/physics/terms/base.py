@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The base class of every term: numbers with units, checked, any of which may vary by member, and how the kernel gets them."""
 
 from __future__ import annotations

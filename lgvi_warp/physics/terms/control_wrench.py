@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """An ideal actuator, which makes the wrench that a controller demands."""
 
 from __future__ import annotations

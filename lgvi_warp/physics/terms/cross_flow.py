@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cross-flow drag of a slender hull, by strips."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Currents: how the water moves. Momenta are relative to the water, so that drag and lift need no further code."""
 
 from __future__ import annotations

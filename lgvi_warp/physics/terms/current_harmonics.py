@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A uniform current that is a sum of harmonics in time, such as tides."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drag: by its exact flow where the axes allow it, else as a damping matrix; and full 6x6 drag matrices."""
 
 from __future__ import annotations

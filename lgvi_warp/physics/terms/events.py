@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Events: conditions that stop a member. Each has a status of its own, and the run records the time."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A uniform current that varies at random in time, independently for each member."""
 
 from __future__ import annotations

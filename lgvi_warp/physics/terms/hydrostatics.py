@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Weight, buoyancy and restoring moment. They follow from the vehicle, so that no scene needs to list them."""
 
 from __future__ import annotations

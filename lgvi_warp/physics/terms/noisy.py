@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The base class of terms that draw random numbers, once a step or on a grid of their own."""
 
 from __future__ import annotations

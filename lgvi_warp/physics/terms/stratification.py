@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Buoyancy that varies with depth."""
 
 from __future__ import annotations

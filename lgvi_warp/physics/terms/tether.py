@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tether: a spring between a fixed anchor and a point of the vehicle."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Thrusters with a thrust curve (square, polynomial or table), dead band, saturation, lag, and loss by the advance speed."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Linear waves in deep water."""
 
 from __future__ import annotations

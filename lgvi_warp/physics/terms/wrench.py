@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A force and torque in body axes that is constant, or follows a schedule."""
 
 from __future__ import annotations

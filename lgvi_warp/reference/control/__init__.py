@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The parts of a controller of one vehicle, in the user's body axes and about his origin: what each does at a look."""
 
 from dataclasses import dataclass, field

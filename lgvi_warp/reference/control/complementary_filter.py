@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The attitude from rates, and in the long run from a measured attitude."""
 
 from dataclasses import replace

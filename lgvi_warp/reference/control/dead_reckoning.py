@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The position from attitude and velocity."""
 
 from dataclasses import replace

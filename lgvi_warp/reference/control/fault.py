@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A fault of a sensor; those of actuators are in loop.py."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """PID of the heading."""
 
 from lgvi_warp.reference.control import Integral, Measurement, Part, Reference, heading_error

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The closed loop of one vehicle: looks between steps, and the commands that are held until the next one."""
 
 from collections.abc import Callable, Sequence

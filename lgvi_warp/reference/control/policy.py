@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A perceptron as a law."""
 
 from collections.abc import Callable

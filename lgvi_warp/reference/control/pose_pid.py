@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Geometric PID of position and attitude."""
 
 import numpy as np

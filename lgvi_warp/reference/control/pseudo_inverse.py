@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Allocation by a weighted pseudo-inverse."""
 
 from typing import Any

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a sensor reads, as numbers that a part may change."""
 
 from dataclasses import replace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A filter of what is wanted: a reference model of third order."""
 
 from dataclasses import replace

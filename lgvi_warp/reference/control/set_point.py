@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Guidance by a set-point."""
 
 from dataclasses import replace

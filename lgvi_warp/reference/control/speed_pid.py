@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """PI of the speed through the water."""
 
 from lgvi_warp.reference.control import Integral, Measurement, Part, Reference

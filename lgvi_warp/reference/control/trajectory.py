@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Guidance by a trajectory in time."""
 
 from dataclasses import replace

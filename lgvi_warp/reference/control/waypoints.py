@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Guidance along waypoints by line of sight."""
 
 from dataclasses import replace

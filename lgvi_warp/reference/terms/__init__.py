@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Laws of one vehicle, in the user's body axes and about his origin: numbers and the methods of `Law`."""
 
 from dataclasses import dataclass, field

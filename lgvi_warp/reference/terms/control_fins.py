@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Control fins: fins whose deflection follows a command, within a limit, no faster than a rate and after a lag."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cross-flow drag of a slender hull along the body's x axis, by two Gauss points a segment."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Currents: steady and uniform, or by depth."""
 
 import numpy as np

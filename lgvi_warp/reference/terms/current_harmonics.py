@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A uniform current that is a sum of harmonics in time."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Drag per axis, and by 6x6 matrices."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Control fins that a controller drives."""
 
 from lgvi_warp.reference.rotation import Array

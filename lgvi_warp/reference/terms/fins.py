@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fins, fixed and turned by a command: each seen from its own chord and normal."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Actuators that follow commands: of a schedule or of a controller, within a limit, with a lag and at a limited rate."""
 
 import math

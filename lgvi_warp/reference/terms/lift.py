@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lift of a hull in proportion to its speed ahead."""
 
 import numpy as np

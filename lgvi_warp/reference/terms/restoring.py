@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Restoring moment of buoyancy (section IV of Nordkvist & Sanyal 2010)."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Buoyancy that varies with depth: its deviation from the constant."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Tether: a spring from an anchor to a point of the vehicle, slack below its rest length."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Thrusters: a thrust curve with dead band and saturation, after a lag; thrust that falls with the speed, and torque."""
 
 from typing import Any

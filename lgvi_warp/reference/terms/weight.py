@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Weight less buoyancy (section IV of Nordkvist & Sanyal 2010)."""
 
 import numpy as np

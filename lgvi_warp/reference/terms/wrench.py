@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A wrench in body axes, held or by a schedule."""
 
 from collections.abc import Iterator

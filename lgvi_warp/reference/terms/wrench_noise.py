@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """White noise of force and torque in body axes."""
 
 import numpy as np

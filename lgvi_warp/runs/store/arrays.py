@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Creation of a store's arrays with zarr."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`BlockFiles`: the keeper that writes blocks into a store and knows their files, and the format of markers and parts."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Commits of blocks: files are made durable several blocks at a time, while others are computed."""
 
 from __future__ import annotations

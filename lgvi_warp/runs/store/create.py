@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Creation of a store: its folder with all metadata and no blocks."""
 
 from __future__ import annotations

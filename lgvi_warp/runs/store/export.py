@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Export of a run in a store to one NetCDF or Parquet file, piece by piece, whatever its size."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A run on disk: a zarr v3 group, written block by block, each block marked when all of it is safe.
 
     run.zarr/zarr.json            attributes: provenance, recipe, messages, complete

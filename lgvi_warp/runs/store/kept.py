@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Members that are run again for their samples when a run has ended, into the group `kept` of its store.
 
     run.zarr/kept/member/c.0      indices of these members in the run

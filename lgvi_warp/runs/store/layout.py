@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The arrays of a store and their chunks: every block of members is one column of chunks in each array."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Check of what a store says of its arrays and files against what this package writes: names, types, shapes, sizes.
 
 Nothing that a store says is joined to a path, opened or read before this check. zarr gets metadata that is written anew

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`merge`: one store from the parts of a run that were computed separately."""
 
 from __future__ import annotations

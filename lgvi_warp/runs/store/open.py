@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Results that read from a store: opening a run, its statistics and its kept members."""
 
 from __future__ import annotations

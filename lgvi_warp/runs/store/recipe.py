@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recipes: a plan as plain numbers and texts, and back, so that a stored run can go on elsewhere and later."""
 
 from __future__ import annotations

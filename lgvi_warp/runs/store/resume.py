@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`resume`: continue a run in a store that was stopped."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The run loop of a store: what is missing or damaged is run, what is finished is kept."""
 
 from __future__ import annotations

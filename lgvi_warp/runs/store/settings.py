@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`Store`: the folder and the settings of a run that is written to disk."""
 
 from __future__ import annotations

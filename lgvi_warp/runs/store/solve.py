@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs of a plan into a store, as `solve` makes them."""
 
 from __future__ import annotations

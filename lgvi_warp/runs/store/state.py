@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """State of a store: what it holds, what is finished, and what is damaged."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Check of a store's texts: provenance, recipe, messages and shared parameters."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Writer of one block: samples are gathered in chunks, and full chunks are written to disk."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The zarr store that zarr and xarray read through: checked metadata, and chunks of exactly the size they must have."""
 
 from __future__ import annotations

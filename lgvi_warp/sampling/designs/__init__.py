@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How the members' numbers are chosen: designs of the unit cube, tables and grids.
 
 A sampling gives any members by their indices, so that a member is the same in every run that contains it. Distributions turn

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The base class of every sampling, and designs that can be drawn several times independently."""
 
 from __future__ import annotations

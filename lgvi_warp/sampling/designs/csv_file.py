@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Columns of numbers from a CSV file; each cell that is no number is reported with its line and column."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Designs for sensitivity analyses: Saltelli's and Morris's."""
 
 from __future__ import annotations

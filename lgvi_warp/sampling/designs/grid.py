@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A full grid: every combination of given values."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Latin hypercubes, added group by group."""
 
 from __future__ import annotations

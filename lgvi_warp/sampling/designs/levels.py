@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A design of the user's own: points of the unit cube."""
 
 from __future__ import annotations

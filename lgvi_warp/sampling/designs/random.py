@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Independent random numbers."""
 
 from __future__ import annotations

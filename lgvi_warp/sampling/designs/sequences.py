@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scrambled low-discrepancy sequences whose points are found directly from their indices: Sobol's and Halton's."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The unit cube of an ensemble: which names vary, with how many columns each."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Distributions of single numbers, as quantile functions.
 
 Every distribution maps uniform numbers in (0, 1) to values, so that any sampling of the unit cube can feed it.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Joint distributions, of whole quantities or of several: correlated normals, rotations, matrices that stay physical."""
 
 from __future__ import annotations

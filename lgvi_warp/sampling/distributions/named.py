@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Every distribution by its name in a scene file, and those of scipy.stats."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Vehicles from the usual forms of hydrodynamic coefficients, and the vehicles that come with the package.
 
 Every importer returns a plain dict in the scene file's form, {"vehicle": {...}, "environment": {...}, "terms": [...]},

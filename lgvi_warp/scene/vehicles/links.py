@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Links of a robot description, and their lumping into one rigid body."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Plugins of a robot description that give a link's coefficients: gz-sim's Hydrodynamics and that of uuv_simulator."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Poses of robot descriptions: where links, frames and shapes lie in their model, by the rules of SDF and URDF."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Models of SDF and URDF files, as read: links, joints, what plugins give, and the water of the world around them."""
 
 from __future__ import annotations

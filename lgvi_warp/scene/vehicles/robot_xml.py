@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """XML of robot descriptions (SDF, URDF), read in bounded time and memory: nothing is fetched, expanded or executed."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Vehicles from the robot descriptions that Gazebo reads: SDF, and URDF with the plugin of uuv_simulator or Gazebo."""
 
 from __future__ import annotations

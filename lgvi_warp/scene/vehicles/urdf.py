@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Links and joints of a URDF. A xacro, which is a program that writes one, is refused."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Vehicles from a YAML file of coefficients, as robotics packages use."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Members in any motion and with any memory, some steps later: what linear models and margins stand on."""
 
 from __future__ import annotations

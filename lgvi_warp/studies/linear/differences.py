@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Central differences of some steps of many members, in lanes: every number that is moved has two copies of a member."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Where members pass from one answer to the other: all brackets are divided at once."""
 
 from __future__ import annotations

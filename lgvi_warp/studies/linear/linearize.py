@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`linearize`: the linear model of a period about a motion, with hold, lag and method as they are in the run."""
 
 from __future__ import annotations

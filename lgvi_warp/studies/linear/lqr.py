@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`lqr`: gains of the linear quadratic regulator of a linear model."""
 
 from __future__ import annotations

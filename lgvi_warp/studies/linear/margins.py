@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`margins`: how much gain and delay the loop of each member bears, by eigenvalues and by runs in lanes."""
 
 from __future__ import annotations

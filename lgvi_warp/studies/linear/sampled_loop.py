@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The linearised closed loops of many members: for any factor on the demand and any delay, from a few launches."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`trim`: the steady motion of a vehicle, straight and level, and the commands that hold it."""
 
 from __future__ import annotations

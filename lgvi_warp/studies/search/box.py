@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A box of numbers with names, and the search of its least cost: evolution, restarts, corners, and a walk."""
 
 from __future__ import annotations

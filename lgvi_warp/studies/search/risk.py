@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Risks: one cost of many members."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`worst_case`: numbers within bounds for which a quantity is worst."""
 
 from __future__ import annotations

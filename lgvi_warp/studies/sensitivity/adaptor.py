@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A scene as a function of what varies, in the shapes of SALib and scipy."""
 
 from __future__ import annotations

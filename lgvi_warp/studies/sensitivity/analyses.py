@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Sobol indices and Morris' screening of an ensemble, by SALib's designs and estimates."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Results of a sensitivity analysis, as tables and files."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Quantities of interest of an ensemble's members, computed for some thousands of members at a time."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The members of a stability map: what varies along its two axes, and the state and parameters of every cell."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Largest stable steps: what linear theory says of a method.
 
 A limit is a number c of a method over a rate of a member (lgvi_warp.physics.rates), h < c / rate.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs behind a stability map: references, every method's runs, and the errors and energies that they show."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Cases of a sweep: one scene each, made of the sweep's by other numbers, other parts or another vehicle; and the grid."""
 
 from __future__ import annotations

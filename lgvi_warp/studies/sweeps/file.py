@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """SWEEP.toml: the arguments of `sweep` as a file."""
 
 from __future__ import annotations

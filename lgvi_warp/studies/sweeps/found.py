@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a sweep found: success with its intervals, paired comparisons, ranks, the worst members, and tables of all that."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Files of a sweep: tables, its provenance, and a summary in words."""
 
 from __future__ import annotations

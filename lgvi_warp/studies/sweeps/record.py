@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What one case at one point of the grid showed, member by member, in memory or in a file that a resumed sweep finds."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a sweep runs: cases, grid, members and metrics; its cells, and their settings."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Success of a member: conditions on how it ended and on its metrics, and the probability of it with its interval."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`sweep`: cases of a closed loop at all points of a grid, on the same members."""
 
 from __future__ import annotations

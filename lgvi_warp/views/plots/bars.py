@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A picture of a sensitivity analysis: bars with confidence intervals, one panel for each quantity."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A picture of margins: how many members of a fleet bear less than so much gain or delay."""
 
 from __future__ import annotations

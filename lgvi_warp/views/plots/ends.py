@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What became of the members, and how their numbers are spread at one time."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Statistics of a run against time, a panel each."""
 
 from __future__ import annotations

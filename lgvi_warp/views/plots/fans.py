@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Fans: one number of all members under way against time, as bands of quantiles; and the same of several runs."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The pictures under their first names: with a file they give its path, without one the axes."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Stability maps: classes of cells as colours, a panel for each method, with the analytic limits that lie in them."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The first look at a run: depth, energy and a few paths; and the drift of what its laws conserve."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Numbers that pictures draw: a quantity of the members under way at each time, read in pieces."""
 
 from __future__ import annotations

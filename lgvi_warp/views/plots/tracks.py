@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Paths of some members: from the side, from above, in a plane of two quantities, and of their axes on the sphere."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Speed against accuracy of methods: the front in colour with names at its lines, all others in grey."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Words of pictures: names and units of quantities, the members drawn of all, floors, and what a reader has to know."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is drawn of one run: poses of the members shown at the times shown, and curves of all members."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The graphs of a recording: fans, shares by outcome, commands and actuators, the log, and the histogram at the cursor."""
 
 from __future__ import annotations

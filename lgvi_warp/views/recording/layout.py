@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The first layout of the viewer."""
 
 from __future__ import annotations

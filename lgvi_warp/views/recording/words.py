@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The words of a recording: a summary of ten lines, and the provenance."""
 
 from __future__ import annotations

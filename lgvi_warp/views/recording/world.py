@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The world of a recording: hulls, trails, spread, forces, water, surface and floor; x north, y east, z down."""
 
 from __future__ import annotations

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The help of the command and what it does where an option is left out."""
 
 import re

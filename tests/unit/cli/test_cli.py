@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command: what it writes, what it says, and how it refuses."""
 
 import json

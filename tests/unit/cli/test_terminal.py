@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The command for people and for programs: help, faults, colors, completion, lists, and one JSON document for each verb."""
 
 import contextlib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The verb view: a run that is there, in the viewer or as a recording."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Limits of control groups, from trees of files as kernels of both versions show them."""
 
 import os

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Whatever is done with files, and however it ends, no descriptor stays open and no unfinished file lies about."""
 
 import contextlib

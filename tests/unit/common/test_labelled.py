@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Columns that come with names are read by them: every door for tables, and what each refuses."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Names of terms and events become folders of a store: what any file system refuses, drops or takes for another is refused."""
 
 import pytest

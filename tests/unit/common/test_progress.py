@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Progress on terminals, in pipes and in notebooks, and `progress=True` of functions."""
 
 import io

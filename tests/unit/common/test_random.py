@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Random numbers from counters: the generator's published answers, the kernel against its twin, and their statistics.
 
 Statistics are compared within 5 standard errors (a chance of 6e-7 for a right code, and the seeds are fixed: a failure

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Classes add themselves to the table of their kind, under the word of their own body."""
 
 import sys

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What objects show at a prompt and in a notebook: short, with units, whatever their size."""
 
 import re

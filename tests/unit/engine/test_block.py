@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """How members are divided into blocks: stores of all versions depend on it."""
 
 import pytest

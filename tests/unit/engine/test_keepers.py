@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A keeper that another process gets brings nothing of what it has gathered."""
 
 import pickle

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a kernel is asked for, decided before it is compiled."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """`make quick` leaves out what is marked `kernel`: a test without the mark can load none."""
 
 import pytest

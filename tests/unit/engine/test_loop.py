@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The loop over blocks hears an interrupt that comes while its last blocks end."""
 
 from types import SimpleNamespace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a computation reads decides whether its result is shared by all members."""
 
 import copy

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a kernel must be able to do is found from all members, a few at a time."""
 
 import tracemalloc

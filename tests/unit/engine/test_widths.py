@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Vehicles per packet: by the table, as tuned on this machine, or as asked for; files of others are ignored."""
 
 import json

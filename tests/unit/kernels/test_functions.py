@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Elementary functions in lanes, against NumPy in extended precision. "eps" is the spacing of numbers at 1.
 
 The bounds: each function rounds its last addition (1/2 eps) after a correction that is itself right to an eps or two;

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The solves of the rotations: each step of Newton's method squares the error, and what they converge to is the solution.
 
 A wrong derivative still converges, only not so fast; a solve that goes on until it has converged hides it.

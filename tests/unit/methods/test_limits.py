@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The steps that methods bear: the tables against linear theory, and what follows for methods that nobody measured.
 
 The tables hold what runs of 0.3 rad show (tests/methods/test_warning_limits.py, of every method in the long tests). Linear

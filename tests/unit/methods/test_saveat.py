@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The grid of steps meets every sample time and the end."""
 
 import numpy as np

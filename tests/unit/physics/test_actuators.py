@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Actuators and their allocation on the host: what is refused, curves and their inverses, and what actuators can make."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Parts of a controller that are wrong: each says key, value and remedy. No kernel is needed."""
 
 import pickle

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The table of a controller's signals: where each lies in what a look notes, and what its page says."""
 
 import math

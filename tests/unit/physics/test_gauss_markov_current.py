@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A random current starts as it goes on: at zero, or as one number of its stationary spread for each member."""
 
 import numpy as np

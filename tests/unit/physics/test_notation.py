@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The border between the two notations: every way across and back.
 
 Tolerance of the rotations: a handful of products and sums of numbers up to 1 (or 2), each rounded at 1.1e-16: 2e-15.

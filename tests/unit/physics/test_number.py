@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Declared numbers: their bounds, for a scene and by member, and how they are packed where a term says nothing itself."""
 
 from dataclasses import dataclass

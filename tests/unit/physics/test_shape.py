@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The shape of a vehicle is drawn, and nothing else: no dynamics, no kernel, no bits depend on it."""
 
 import os

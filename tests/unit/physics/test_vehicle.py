@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Vehicle: what is kept, what is refused, and that all faults come in one message."""
 
 import dataclasses

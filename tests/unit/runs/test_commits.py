@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Blocks become durable in groups: files before markers, each folder synced once, and what fails is told of its block."""
 
 import errno

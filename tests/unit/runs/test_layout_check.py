@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The layout of a store's arrays: each must fit the others and the run, and be what this package writes."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is known of the machine before a run."""
 
 from pathlib import Path

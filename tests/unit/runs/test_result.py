@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A result keeps what it says, on disk as well, and its energy and momenta are those of the definitions."""
 
 import json

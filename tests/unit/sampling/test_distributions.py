@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Distributions and the uniform numbers that feed them.
 
 Quantiles are compared with scipy.stats at given levels. Sampled moments are compared with the exact ones within

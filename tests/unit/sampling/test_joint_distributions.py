@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Laws of whole quantities and those of scipy: moments against theory, matrices that stay physical, what is refused.
 
 Sampled moments are within 5 standard errors of the exact ones (6e-7 for a right code; seeds are fixed).

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Samplings: marginals, discrepancy, that any block, subset or longer ensemble has the same members, and what is refused.
 
 Kolmogorov-Smirnov: P(sqrt(n) D > x) < 2 exp(-2 x^2); at 2.5 that is 7e-6, and seeds are fixed.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Importers of hydrodynamic coefficients: Fossen's names, SDF, YAML; signs, axes, and every fault at once."""
 
 import sys

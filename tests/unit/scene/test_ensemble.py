@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Ensembles: what varies, that a draw depends on seed, member and name only, and what is refused."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scenes, tables and coefficients from a stranger: refused in a few lines, in bounded time and memory; nothing is written.
 
 Each row of a table below is a file, or an argument, that somebody may meet. docs/guide/what_files_can_do.md says what holds.

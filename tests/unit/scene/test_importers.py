@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Importers of robot descriptions against Gazebo's own equations: restoring forces, inertia, damping; and hostile files."""
 
 import dataclasses

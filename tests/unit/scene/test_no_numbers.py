@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What NumPy would take for numbers without a word: masks, texts, truth values, complex numbers; laws without numbers."""
 
 from fractions import Fraction

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is odd and most likely a unit is said: on both sides of each limit, by members, and never of what is right."""
 
 import math

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Environment, Start, RunSettings, EnsembleSettings, Scene: what is resolved and what is refused."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Scene files: the paper's in full, round trip, overrides, and every fault of every section in one message."""
 
 import tomllib

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The JSON schema of scene files: what the loader takes fits it, what the loader refuses as unknown does not."""
 
 import copy

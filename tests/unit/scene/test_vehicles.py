@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The vehicles that come with the package: sources on every line, sound matrices, and the physics they must have."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One language: each door that takes the name of a quantity reads the same expressions, and refuses with the same words."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Indices from members at hand: against functions whose indices are known, and how often the intervals cover."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Metrics by themselves: analytic step responses, python-control's step_info, members that end, batches, the user's own."""
 
 import numpy as np

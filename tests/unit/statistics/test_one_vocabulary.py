@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """One vocabulary for quantities: what one door knows, all do, by the same words and with the same numbers."""
 
 from types import SimpleNamespace

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Statistics of members' ends against exact counts and the usual estimator of survival, and their coverage."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Intervals of probabilities, and of differences on the same members: against scipy, and how often they cover."""
 
 import numpy as np

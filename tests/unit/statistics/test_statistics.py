@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Each statistic against NumPy's of all members at once, its interval's coverage, and the sketch's bound."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The lines of text that a run prints of its statistics: the numbers of each estimate at the last time, and no others."""
 
 import re

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Costs from readings of a clock that the test makes up: one number a kernel, whatever else the machine does."""
 
 import threading

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is told of a kernel's speed, from times that are given here."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Grids of stability maps, limits by linear theory, maps as files."""
 
 import dataclasses

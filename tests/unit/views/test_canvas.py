@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures that are drawn side by side, in threads, have each their own sizes of text."""
 
 import threading

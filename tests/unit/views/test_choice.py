@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What is shown of a run: a fair choice of members, even times."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Runs side by side, with samples or with statistics alone: the curves say the same."""
 
 import dataclasses

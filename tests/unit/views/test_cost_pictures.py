@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Pictures of what a member's step costs: their data, labels and refusals; and that the measured rows fit them."""
 
 import json

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a vehicle looks like: the hull of its shape, or the user's mesh."""
 
 import json

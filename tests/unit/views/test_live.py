@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A run in the viewer while it goes on: members come block by block; a viewer that is none is named with the remedy."""
 
 import contextlib

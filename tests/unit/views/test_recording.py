@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recordings read back: poses, colours, counts and texts are those of the result; each odd run has one that fits."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Recordings are opened by the viewer without a window: every view shows something, things move, bodies are in sight."""
 
 import dataclasses

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The picture of a stability map whose panels do not fill their rows."""
 
 import numpy as np

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The parts of a controller, one file each: the struct `params(width, real)`, and one function or more.
 
 A controller looks once a period, between two steps. Its parts then act in this order, those of one role in the scene's order:

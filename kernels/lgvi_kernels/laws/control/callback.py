@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A demand that a function of the host writes into the memory, once a look."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The position from measured attitude and velocity."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The way of commands to the actuators takes time: a ring of the commands of the last looks."""
 
 import functools

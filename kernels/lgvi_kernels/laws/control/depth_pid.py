@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """PID of the depth by way of the pitch angle (successive loop closure): a moment about the body's y axis."""
 
 import functools

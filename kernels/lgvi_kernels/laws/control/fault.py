@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A fault of an actuator: from a time on its command is another one."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Integral sliding mode control of the heading."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The integral of a law's error, which stops where the actuators deliver no more (conditional integration)."""
 
 from typing import Any

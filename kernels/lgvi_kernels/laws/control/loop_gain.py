@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A factor on the demand of the laws between two places of a controller's list: how margins are measured."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Allocation by a matrix: each command is a sum of the demand's components."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A perceptron: layers of weighted sums and a function of each."""
 
 import functools

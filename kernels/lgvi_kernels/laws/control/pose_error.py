@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What laws of the pose have in common: errors on SE(3), their integrals, and the balance of weight and buoyancy."""
 
 import functools

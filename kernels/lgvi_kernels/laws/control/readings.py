@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What a sensor reads, as numbers that a part may change: a scalar or a 3-vector of the Measurement."""
 
 import functools

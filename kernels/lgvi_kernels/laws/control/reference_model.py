@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A reference model of third order: what is wanted, led smoothly from the measured state."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """What an allocation leaves of the demand: what its actuators cannot make at all, and what their limits cut off."""
 
 from typing import Any

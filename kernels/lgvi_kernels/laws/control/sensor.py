@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A sensor: what is measured in place of the truth. What no member's sensor has is no code."""
 
 import functools

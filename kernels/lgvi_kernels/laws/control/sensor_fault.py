@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A fault of a sensor: from a time on one number of its reading is another one."""
 
 import functools

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A set-point: a place, a heading and a speed that are wanted all the time."""
 
 import functools

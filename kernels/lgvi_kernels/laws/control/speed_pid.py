@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """PI of the speed through the water, by a force along the body's x axis."""
 
 import functools

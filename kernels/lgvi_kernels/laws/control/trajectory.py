@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A trajectory: position, heading and speed as polynomials of time, piece by piece."""
 
 import functools

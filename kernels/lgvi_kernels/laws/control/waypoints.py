@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Waypoints: legs one after another, and the heading along each by line of sight."""
 
 import functools

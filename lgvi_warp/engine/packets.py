@@ -172,10 +172,11 @@ class Packets:
             monitor.signals = wp.array(np.array(rows, np.int32), dtype=wp.int32, device="cpu")
             monitor.first_signals = wp.zeros((self.count, max(1, len(rows))), dtype=Lane, device="cpu")
             monitor.slots = plan.slots(self.count * plan.spec.width)
-            monitor.numbers, monitor.columns = sum(plan.look_fields.values()), columns_of(plan.look_fields)
+            monitor.numbers, columns = sum(plan.look_fields.values()), columns_at_looks(plan)
+            monitor.columns = wp.array(columns, dtype=wp.int32, device="cpu")
             if monitor.slots:
                 # An odd number of lanes from row to row: else the rows of a look crowd into a few lines of the cache.
-                shape = (monitor.slots * monitor.numbers + WASTE, self.count | 1)
+                shape = (max(1, monitor.slots * monitor.numbers), self.count | 1)
                 monitor.looks = wp.zeros(shape, dtype=Lane, device="cpu")
         if plan.spec.still:
             monitor.still = wp.zeros((self.count, 3), dtype=Lane, device="cpu")
@@ -349,3 +350,24 @@ def columns_of(sizes: Mapping[str, int]) -> Any:
     """
     firsts = dict(zip(sizes, accumulate(sizes.values(), initial=0), strict=False))
     return wp.vec4i(*(firsts.get(name, -1) for name in SAMPLE_FIELDS))
+
+
+def columns_at_looks(plan: Plan) -> np.ndarray:
+    """Where in a look's rows the kernel writes the motion.
+
+    Args:
+        plan: the plan of the run.
+
+    Returns:
+        For each number of SAMPLE_FIELDS in turn its row, int32; -1 where it is not gathered.
+    """
+    columns, row, firsts = [], 0, {}
+    for name, size in plan.look_fields.items():
+        firsts[name], row = row, row + size
+    for name, size in SAMPLE_FIELDS.items():
+        rows = np.full(size, -1)
+        if name in firsts:
+            entries = plan.look_entries.get(name, range(size))
+            rows[list(entries)] = firsts[name] + np.arange(len(entries))
+        columns.append(rows)
+    return np.concatenate(columns).astype(np.int32)

@@ -8,7 +8,7 @@ import dataclasses
 import functools
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import Any
@@ -80,6 +80,8 @@ class Plan:
         survey_all: whether the kernel is chosen by all members (default), or by the first SURVEYED. Then a run looks at the
             others as it comes to them, and begins anew, with all members looked at, if any of them needs more.
         looks: whether samples are taken at all looks of the controller as well, for statistics that want them; default False.
+        read_at_looks: field of the motion -> which of its numbers statistics read at looks, () for all; None (default) for
+            all numbers of all fields.
 
     Attributes:
         kernel_choice: the laws that act and the method's program for them.
@@ -101,6 +103,7 @@ class Plan:
     on_failure: str = "freeze"
     survey_all: bool = True
     looks: bool = False
+    read_at_looks: Mapping[str, tuple[int, ...]] | None = None
     kernel_choice: KernelChoice = field(init=False)
     spec: Spec = field(init=False)
     width_source: str = field(init=False, default="asked for", compare=False)
@@ -161,8 +164,22 @@ class Plan:
 
     @functools.cached_property
     def look_fields(self) -> dict[str, int]:
-        """What the kernel gathers at a look, in the user's axes: field -> numbers, as of `sample_fields`."""
-        return {name: size for name, size in self.sample_fields.items() if name in self.fields}
+        """How many numbers of each field the kernel gathers at a look, in the user's axes; of signals all, as in samples."""
+        sizes = {name: size for name, size in self.sample_fields.items() if name in self.fields}
+        entries = self.look_entries
+        return {name: len(entries.get(name, ())) or size for name, size in sizes.items() if self._reads(name)}
+
+    @functools.cached_property
+    def look_entries(self) -> dict[str, tuple[int, ...]]:
+        """Fields of the motion of which some numbers alone are gathered at looks: field -> these, counted from 0."""
+        entries = {name: numbers for name, numbers in (self.read_at_looks or {}).items() if numbers}
+        if self.spec.compensated:  # a place is a pair of sums
+            entries.pop("position", None)
+        return entries
+
+    def _reads(self, name: str) -> bool:
+        """Whether a field is gathered at looks: a signal always, the motion where a statistic reads it."""
+        return name in SIGNALS or self.read_at_looks is None or name in self.read_at_looks
 
     def slots(self, count: int) -> int:
         """How many looks of a block are gathered at once.
@@ -353,7 +370,16 @@ class Plan:
             A plan for m members.
         """
         subplan = self._copy()
-        for name in ("shared", "idle", "sample_fields", "look_fields", "signal_rows", "gathered", "times"):
+        for name in (
+            "shared",
+            "idle",
+            "sample_fields",
+            "look_fields",
+            "look_entries",
+            "signal_rows",
+            "gathered",
+            "times",
+        ):
             subplan.__dict__.pop(name, None)
         object.__setattr__(subplan, "ensemble", self.ensemble.subset(indices))
         object.__setattr__(subplan, "fields", ordered(fields))

@@ -7,6 +7,7 @@ import functools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -147,7 +148,7 @@ def run_block(
             ends = functools.cache(packets.ended)
             for first in range(looks.start, looks.stop, at_once):
                 when = slice(first, min(first + at_once, looks.stop))
-                values = divided(plan.look_fields, packets.gathered(when), plan.table)
+                values = divided(plan.look_fields, packets.gathered(when), plan.table, plan.look_entries)
                 samples = samples_of(plan, grid, when, values, ends)
                 for looker in lookers:
                     looker(when, samples)
@@ -253,13 +254,19 @@ def unpacked(
     return samples
 
 
-def divided(fields: Mapping[str, int], raw: np.ndarray, table: Mapping[str, Field]) -> dict[str, np.ndarray]:
+def divided(
+    fields: Mapping[str, int],
+    raw: np.ndarray,
+    table: Mapping[str, Field],
+    entries: Mapping[str, Sequence[int]] = MappingProxyType({}),
+) -> dict[str, np.ndarray]:
     """Raw samples by field, in the axes that they are in.
 
     Args:
         fields: numbers of each field, as of `unpacked`.
         raw: (samples, members, numbers).
         table: the fields by name.
+        entries: which numbers of a field there are, counted from 0; by default all. The others are NaN.
 
     Returns:
         By field: (samples, members, ...), views where no pairs are summed.
@@ -271,6 +278,11 @@ def divided(fields: Mapping[str, int], raw: np.ndarray, table: Mapping[str, Fiel
         values = raw[..., column : column + size]
         if size == 2 * math.prod(shape):
             values = np.add(*np.split(values, 2, axis=-1), dtype=np.float64)
+        elif name in entries:
+            # Members side by side in memory, as the kernel gathers them.
+            all_numbers = np.full((len(raw), math.prod(shape), raw.shape[1]), np.nan, raw.dtype).transpose(0, 2, 1)
+            all_numbers[..., list(entries[name])] = values
+            values = all_numbers
         samples[name] = values.reshape(*raw.shape[:2], *shape)
         column += size
     return samples

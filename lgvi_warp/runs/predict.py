@@ -143,7 +143,14 @@ def predict(
     scene = ensemble.scene
     observed = observe(ensemble.members, scene.run, statistics, keep, until, scene.events, scene.controller)
     fields = fields_of(settings.get("save"), scene.run)
-    plan = make_plan(ensemble, **settings, fields=observed.fields, survey_all=False, looks=observed.looks)
+    plan = make_plan(
+        ensemble,
+        **settings,
+        fields=observed.fields,
+        survey_all=False,
+        read_at_looks=observed.read_at_looks(),
+        looks=observed.looks,
+    )
     count = threads or machine.thread_count()
     asked_store = store if isinstance(store, Store) or store is None else Store(store)
     into = settled(asked_store, plan, observed, fields) if asked_store else None

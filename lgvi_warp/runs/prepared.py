@@ -110,7 +110,12 @@ class Runner:
             if plan is not None:
                 return plan.of(fleet)
         plan = make_plan(
-            fleet, **self.settings, fields=self.observed.fields, survey_all=False, looks=self.observed.looks
+            fleet,
+            **self.settings,
+            fields=self.observed.fields,
+            survey_all=False,
+            read_at_looks=self.observed.read_at_looks(),
+            looks=self.observed.looks,
         )
         plan.compile()
         if plan.method.reason:  # chosen once, by the members of the first plan

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -60,6 +60,7 @@ def make_plan(
     fields: Callable[[Sequence[str]], tuple[str, ...]] = tuple,
     survey_all: bool = True,
     looks: bool = False,
+    read_at_looks: Mapping[str, tuple[int, ...]] | None = None,
 ) -> Plan:
     """Settle the settings of a run, from the arguments and, where they are None, from the scene's [run] section.
 
@@ -76,6 +77,7 @@ def make_plan(
         fields: Function from the names of the fields that `save` asks for to those that the kernel writes; default the same.
         survey_all: As of `Plan`; default True.
         looks: As of `Plan`; default False.
+        read_at_looks: As of `Plan`; default None.
 
     Returns:
         The plan, with a fixed number of Newton steps where the method says iterations="auto".
@@ -112,8 +114,8 @@ def make_plan(
         grid = replace(grid, messages=(*grid.messages, text))
     dtype, checks = dtype or settings.dtype, checks or settings.checks
     on_failure = on_failure or settings.on_failure
+    others = fields(save.fields), dtype, width, checks, on_failure, survey_all, looks, read_at_looks
     if method is None and settings.method is None and not settings.method_options:
-        others = fields(save.fields), dtype, width, checks, on_failure, survey_all, looks
         return planned(ensemble, grid.h, lambda one: Plan(ensemble, one, grid, *others))
     chosen = method if isinstance(method, Method) else settings.method_of(method)
     if chosen.iterations == "auto":
@@ -122,7 +124,7 @@ def make_plan(
         number = f"{n} a solve, enough for" if n is not None else f"to the tolerance: {MOST_FIXED} are too few for"
         text = f"Newton steps {number} every member's start at twice the step"
         grid = replace(grid, messages=(*grid.messages, text))
-    return Plan(ensemble, chosen, grid, fields(save.fields), dtype, width, checks, on_failure, survey_all, looks)
+    return Plan(ensemble, chosen, grid, *others)
 
 
 def fields_of(save: SaveAt | None, settings: RunSettings) -> tuple[str, ...]:

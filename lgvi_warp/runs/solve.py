@@ -113,7 +113,8 @@ def solve(
     assert runner is not None
     plan = make_plan(
         ensemble, method, h, t1, save, dtype, width=width, checks=checks, on_failure=on_failure, fields=observed.fields,
-        survey_all=store is not None, looks=observed.looks)  # fmt: skip
+        survey_all=store is not None, looks=observed.looks,
+        read_at_looks=observed.read_at_looks())  # fmt: skip
     fields, count = fields_of(save, ensemble.scene.run), threads or machine.thread_count()
     try:
         if store is None:

@@ -42,6 +42,8 @@ class Quantity:
         labels: names of the d components; by default `name`, for one component.
         needs_limit: whether a condition on it needs a number to compare with; by default False: the function may return
             true or false.
+        entries: (field, numbers) for each field of the motion of which the function reads these alone, counted from 0; at a
+            controller's looks the others are NaN. By default none: it reads whole fields.
     """
 
     name: str
@@ -50,6 +52,7 @@ class Quantity:
     fields: tuple[str, ...] = FIELDS
     labels: tuple[str, ...] = ()
     needs_limit: bool = False
+    entries: tuple[tuple[str, tuple[int, ...]], ...] = ()
 
     def __post_init__(self) -> None:
         if not self.labels:

@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lgvi_warp.common.errors import closest, refusal
 from lgvi_warp.physics.control.signals import ordered
-from lgvi_warp.statistics.quantity import Quantity
+from lgvi_warp.statistics.quantity import Function, Quantity
 
 if TYPE_CHECKING:
     from lgvi_warp.sampling.members import Members
@@ -49,6 +49,7 @@ class Channel:
         entry: index of the wanted number in its signal; None (the default): it is one number.
         wish: what guidance calls it, and what of that is wanted: ("depth", None) or ("position", 0); None for none.
         angle: whether it is an angle, so that differences are wrapped; by default False.
+        entries: which numbers of the first of these samples it reads, counted from 0; by default () for all.
     """
 
     name: str
@@ -59,6 +60,7 @@ class Channel:
     entry: int | None = None
     wish: tuple[str, int | None] | None = None
     angle: bool = False
+    entries: tuple[int, ...] = ()
 
     def difference(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Return a - b, wrapped where these are angles.
@@ -138,13 +140,14 @@ def _channels(measured: bool) -> dict[str, Channel]:
     depth = ("measured_depth", None) if measured else ("position", 2)
     water = ("measured_water_velocity",)
     channels = (
-        Channel("depth", "m", _entry(*depth), depth[:1], "reference_depth", None, ("depth", None)),
-        Channel("heading", "rad", heading, (of_heading,), "reference_heading", None, ("heading", None), angle=True),
+        Channel("depth", "m", _entry(*depth), depth[:1], "reference_depth", None, ("depth", None), entries=(2,)),
+        Channel("heading", "rad", heading, (of_heading,), "reference_heading", None, ("heading", None), True, (0, 3)),
         Channel("speed", "m/s", _entry(*water, 0), water, "reference_speed", None, ("speed", None)),
-        Channel("north", "m", _entry(place, 0), (place,), "reference_position", 0, ("position", 0)),
-        Channel("east", "m", _entry(place, 1), (place,), "reference_position", 1, ("position", 1)),
+        Channel("north", "m", _entry(place, 0), (place,), "reference_position", 0, ("position", 0), entries=(0,)),
+        Channel("east", "m", _entry(place, 1), (place,), "reference_position", 1, ("position", 1), entries=(1,)),
     )
-    return {channel.name: channel for channel in channels}
+    # Signals are gathered whole.
+    return {channel.name: replace(channel, entries=()) if measured else channel for channel in channels}
 
 
 # By whether the actual number is what sensors measure, or the truth.
@@ -207,8 +210,7 @@ def error(name: str, measured: bool) -> Quantity:
         actual = f"measured_{actual}" if measured else actual
         distance = functools.partial(function, **{"attitude" if name == "attitude" else "place": actual})
         return Quantity(name, distance, unit, ordered((actual, *wanted)), needs_limit=True)
-    channel = CHANNELS[measured][name]
-    return Quantity(name, channel.error, channel.unit, ordered((*channel.of_actual, channel.wanted)), needs_limit=True)
+    return _of_channel(CHANNELS[measured][name], CHANNELS[measured][name].error, (name,))
 
 
 @functools.cache
@@ -220,8 +222,14 @@ def course(name: str, measured: bool) -> Quantity:
         measured: whether the number is what sensors measure, or the truth.
     """
     channel = CHANNELS[measured][name]
+    return _of_channel(channel, channel.course, (name, f"goal of {name}"))
+
+
+def _of_channel(channel: Channel, function: Function, labels: tuple[str, ...]) -> Quantity:
+    """Return a function of a channel's actual and wanted number as a quantity."""
     fields = ordered((*channel.of_actual, channel.wanted))
-    return Quantity(name, channel.course, channel.unit, fields, (name, f"goal of {name}"), needs_limit=True)
+    entries = ((channel.of_actual[0], channel.entries),) if channel.entries else ()
+    return Quantity(channel.name, function, channel.unit, fields, labels, needs_limit=True, entries=entries)
 
 
 def check(key: str, of: Any, known: tuple[str, ...]) -> str:

@@ -12,8 +12,10 @@ import lgvi_warp as lw
 from lgvi_warp.common.status import stop_time
 from lgvi_warp.engine import plan as plans
 from lgvi_warp.engine import work
+from lgvi_warp.engine.keepers.observation import Observation
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.reference import metrics as twin
+from lgvi_warp.runs.settle import make_plan
 from tests.conftest import ROOT
 
 pytestmark = pytest.mark.kernel
@@ -224,3 +226,27 @@ def test_metrics_of_what_no_guidance_wants_are_refused(fleet):
             lw.SceneError, match=r"statistics = 'iae speed': is of the speed, and no guidance .* wants a speed"
         ):
             run(replace(fleet.scene, controller=few), t1=1.0, statistics=[lw.IAE("depth"), lw.IAE("speed")])
+
+
+@pytest.mark.slow_for("float32_compensated")
+@pytest.mark.parametrize("dtype", ["float64", "float32_compensated"])
+def test_numbers_do_not_depend_on_what_else_is_read_at_looks(dtype, fleet, coarse):
+    each = {"then": [lw.Each()]}
+    few = [lw.Overshoot("depth", **each), lw.IAE("heading", **each), lw.MaxError("depth", **each)]
+    alone = lw.solve(fleet, **COARSE, statistics=few, keep="none", dtype=dtype)
+    whole = coarse if dtype == "float64" else lw.solve(fleet, **COARSE, statistics=metrics(), keep="none", dtype=dtype)
+    for name in ("each overshoot depth", "each iae heading", "each max_error depth"):
+        np.testing.assert_array_equal(alone.statistics[name].value, whole.statistics[name].value)
+
+
+def test_a_look_gathers_only_the_numbers_that_are_read(fleet):
+    def gathered(*statistics):
+        observed = Observation(statistics, keep="none")
+        plan = make_plan(fleet, t1=1.0, fields=observed.fields, looks=True, read_at_looks=observed.read_at_looks())
+        return plan.look_fields
+
+    assert gathered(lw.IAE("depth"), lw.RMSError("depth")) == {"position": 1, "reference_depth": 1}
+    assert gathered(lw.IAE("depth"), lw.IAE("heading")) == {
+        "position": 1, "attitude": 2, "reference_depth": 1, "reference_heading": 1}  # fmt: skip
+    assert gathered(lw.IAE("north"), lw.IAE("east"))["position"] == 2
+    assert gathered(lw.IAE("depth"), lw.MaxError("position"))["position"] == 3

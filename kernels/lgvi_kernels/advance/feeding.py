@@ -9,7 +9,6 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.advance.rows import WASTE
 from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
     add,
     any_positive,
@@ -157,31 +156,31 @@ def make_feed(spec, types, method, at_step, opened):
         put3(memory, i, row + 20, r.angular_acceleration)
 
     @wp.func
-    def put_look(looks: wp.array2d(dtype=Lane), row: int, i: int, v: Any):
-        looks[row, i] = v.x
-        looks[row + 1, i] = v.y
-        looks[row + 2, i] = v.z
+    def put_look(monitor: Monitor, start: int, j: int, i: int, v: Any):
+        """Write those of numbers j to j + 2 of the motion that are gathered."""
+        if monitor.columns[j] >= 0:
+            monitor.looks[start + monitor.columns[j], i] = v.x
+        if monitor.columns[j + 1] >= 0:
+            monitor.looks[start + monitor.columns[j + 1], i] = v.y
+        if monitor.columns[j + 2] >= 0:
+            monitor.looks[start + monitor.columns[j + 2], i] = v.z
 
     @wp.func
     def gather_motion(y: Any, x: State, c: Constants, monitor: Monitor):
-        """Write the motion at a look into the look's rows; what is not gathered goes to the last rows."""
-        looks = monitor.looks
-        waste = looks.shape[0] - wp.static(WASTE)
+        """Write the motion at a look into the look's rows."""
         start = (y.look % monitor.slots) * monitor.numbers
-        columns = monitor.columns
-        row = wp.where(columns[0] < 0, waste, start + columns[0])
-        put_look(looks, row, c.packet, y.position)
+        put_look(monitor, start, 0, c.packet, y.position)
         if wp.static(compensated):
             low = (x.b - y.position) + x.b_low
             if wp.static(moved):
                 low = low + rotate(x, c.inertia.user_origin)
-            put_look(looks, row + 3, c.packet, low)
-        row = wp.where(columns[1] < 0, waste, start + columns[1])
-        put_look(looks, row, c.packet, y.north)
-        put_look(looks, row + 3, c.packet, y.east)
-        put_look(looks, row + 6, c.packet, y.down)
-        put_look(looks, wp.where(columns[2] < 0, waste, start + columns[2]), c.packet, y.velocity)
-        put_look(looks, wp.where(columns[3] < 0, waste, start + columns[3]), c.packet, y.angular_velocity)
+            # A pair of sums is gathered whole, three numbers and three more.
+            put_look(monitor, start + 3, 0, c.packet, low)
+        put_look(monitor, start, 3, c.packet, y.north)
+        put_look(monitor, start, 6, c.packet, y.east)
+        put_look(monitor, start, 9, c.packet, y.down)
+        put_look(monitor, start, 12, c.packet, y.velocity)
+        put_look(monitor, start, 15, c.packet, y.angular_velocity)
 
     @wp.func(inline=False)
     def gather_signals(memory: wp.array2d(dtype=Lane), i: int, monitor: Monitor, look: int):

@@ -14,6 +14,7 @@ from lgvi_warp.common.status import failed, stopped
 from lgvi_warp.engine.keepers.statistics import Gathered
 from lgvi_warp.physics.control.controller import Controller
 from lgvi_warp.physics.control.signals import SIGNALS, ordered
+from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.events import Event
 from lgvi_warp.scene.settings import check_keep
 from lgvi_warp.statistics.base import Statistic, from_list
@@ -65,6 +66,22 @@ class Observation:
     def looks(self) -> bool:
         """Whether some statistic takes the samples at all looks of a controller."""
         return any(statistic.looks for statistic in self.statistics)
+
+    def read_at_looks(self) -> dict[str, tuple[int, ...]]:
+        """What statistics read of the motion at the looks of a controller.
+
+        Returns:
+            Field -> which of its numbers, counted from 0; () for all.
+        """
+        entries: dict[str, tuple[int, ...]] = {}
+        for quantity in (statistic.quantity for statistic in self.statistics if statistic.looks):
+            few = dict(quantity.entries)
+            for name in quantity.fields:
+                if name in FIELDS:
+                    numbers, known = few.get(name, ()), entries.get(name)
+                    whole_field = not numbers or known == ()
+                    entries[name] = () if whole_field else tuple(sorted({*numbers, *(known or ())}))
+        return entries
 
     def fields(self, asked: Sequence[str]) -> tuple[str, ...]:
         """The sample fields that the kernel must write: those to keep and those that statistics need.

@@ -17,7 +17,7 @@ import numpy as np
 import warp as wp
 
 from lgvi_kernels import built_in
-from lgvi_kernels.advance.feeding import NOTED, NOTES
+from lgvi_kernels.advance.feeding import ALL_NOTES, NOTED, bit
 from lgvi_kernels.advance.kernel import Advance, make_advance
 from lgvi_kernels.advance.rows import SAMPLE_FIELDS
 from lgvi_kernels.advance.spec import CHUNK, Control, Spec
@@ -457,9 +457,9 @@ class Plan:
 
     @property
     def notes(self) -> int:
-        """What looks note, as bits (see NOTES): that of which something is saved, and all where the host is asked."""
-        groups = NOTES.keys() if self.asks else {SIGNALS[name].group for name in self.signals}
-        return sum(NOTES[group] for group in groups if group in NOTES)
+        """What looks note, as bits (see feeding.py): that of which something is saved, and all where the host is asked."""
+        noted = [signal for name in self.signals if (signal := SIGNALS[name]).group in NOTED]
+        return ALL_NOTES if self.asks else sum({bit(signal.group, signal.row) for signal in noted})
 
     @functools.cached_property
     def table(self) -> dict[str, Field]:

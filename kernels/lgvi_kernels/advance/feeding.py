@@ -37,11 +37,23 @@ CONTROL_NON_FINITE = 8
 
 # What each look notes in rows of the memory, in this order, and how many it takes: the demand X Y Z K M N; the measurement:
 # position, attitude row by row, velocities over ground and through the water, angular velocity, heading; the reference:
-# position, attitude, velocity, angular velocity, heading, speed, angular acceleration. All of one of them, where any of it is
-# saved or the host is asked: a number of the launch says so, so that what is saved changes no code, and with it no bit.
+# position, attitude, velocity, angular velocity, heading, speed, angular acceleration.
 NOTED = {"demand": 6, "measured": 22, "reference": 23}
-# The bits of that number.
-NOTES = {"demand": 1, "measured": 2, "reference": 4}
+# Each of these vectors where any of it is saved, or the host is asked: bits of a number of the launch say so, so that what is
+# saved changes no code, and with it no bit. For each row of what is noted, the number of its bit.
+BITS_OF_ROWS = {
+    "demand": (0,) * 6,
+    "measured": (1,) * 3 + (2,) * 9 + (3,) * 3 + (4,) * 3 + (5,) * 3 + (6,),
+    "reference": (7,) * 3 + (8,) * 9 + (9,) * 3 + (10,) * 3 + (11,) + (12,) + (13,) * 3,
+}
+ALL_NOTES = (1 << 14) - 1
+
+
+def bit(group, row):
+    """The bit that says whether a look notes the vector in which this row of a group is."""
+    return 1 << BITS_OF_ROWS[group][row]
+
+
 MEASURED_ROW = NOTED["demand"]
 REFERENCE_ROW = MEASURED_ROW + NOTED["measured"]
 
@@ -131,29 +143,50 @@ def make_feed(spec, types, method, at_step, opened):
         set_element(memory, i, row, 0, arctangent2(element(memory, i, attitude + 3, 0), north))
 
     @wp.func
-    def put_measured(y: Any, memory: wp.array2d(dtype=Lane), i: int, row: int):
-        put3(memory, i, row, y.position)
-        put3(memory, i, row + 3, y.north)
-        put3(memory, i, row + 6, y.east)
-        put3(memory, i, row + 9, y.down)
-        put3(memory, i, row + 12, y.velocity)
-        put3(memory, i, row + 15, y.water_velocity)
-        put3(memory, i, row + 18, y.angular_velocity)
-        if wp.static(control.headings):
-            put_heading(memory, i, row + 3, row + 21)
+    def put_attitude(a: Any, memory: wp.array2d(dtype=Lane), i: int, row: int):
+        put3(memory, i, row, a.north)
+        put3(memory, i, row + 3, a.east)
+        put3(memory, i, row + 6, a.down)
 
     @wp.func
-    def put_reference(r: Any, memory: wp.array2d(dtype=Lane), i: int, row: int):
-        put3(memory, i, row, r.position)
-        put3(memory, i, row + 3, r.north)
-        put3(memory, i, row + 6, r.east)
-        put3(memory, i, row + 9, r.down)
-        put3(memory, i, row + 12, r.velocity)
-        put3(memory, i, row + 15, r.angular_velocity)
+    def put_heading_of(a: Any, memory: wp.array2d(dtype=Lane), i: int, attitude: int, row: int):
+        set_element(memory, i, attitude, 0, a.north.x)
+        set_element(memory, i, attitude + 3, 0, a.east.x)
+        put_heading(memory, i, attitude, row)
+
+    @wp.func
+    def put_measured(y: Any, memory: wp.array2d(dtype=Lane), i: int, row: int, noting: int):
+        if (noting & wp.static(bit("measured", 0))) != 0:
+            put3(memory, i, row, y.position)
+        if (noting & wp.static(bit("measured", 3))) != 0:
+            put_attitude(y, memory, i, row + 3)
+        if (noting & wp.static(bit("measured", 12))) != 0:
+            put3(memory, i, row + 12, y.velocity)
+        if (noting & wp.static(bit("measured", 15))) != 0:
+            put3(memory, i, row + 15, y.water_velocity)
+        if (noting & wp.static(bit("measured", 18))) != 0:
+            put3(memory, i, row + 18, y.angular_velocity)
         if wp.static(control.headings):
-            put_heading(memory, i, row + 3, row + 18)
-        set_element(memory, i, row + 19, 0, r.speed)
-        put3(memory, i, row + 20, r.angular_acceleration)
+            if (noting & wp.static(bit("measured", 21))) != 0:
+                put_heading_of(y, memory, i, row + 3, row + 21)
+
+    @wp.func
+    def put_reference(r: Any, memory: wp.array2d(dtype=Lane), i: int, row: int, noting: int):
+        if (noting & wp.static(bit("reference", 0))) != 0:
+            put3(memory, i, row, r.position)
+        if (noting & wp.static(bit("reference", 3))) != 0:
+            put_attitude(r, memory, i, row + 3)
+        if (noting & wp.static(bit("reference", 12))) != 0:
+            put3(memory, i, row + 12, r.velocity)
+        if (noting & wp.static(bit("reference", 15))) != 0:
+            put3(memory, i, row + 15, r.angular_velocity)
+        if wp.static(control.headings):
+            if (noting & wp.static(bit("reference", 18))) != 0:
+                put_heading_of(r, memory, i, row + 3, row + 18)
+        if (noting & wp.static(bit("reference", 19))) != 0:
+            set_element(memory, i, row + 19, 0, r.speed)
+        if (noting & wp.static(bit("reference", 20))) != 0:
+            put3(memory, i, row + 20, r.angular_acceleration)
 
     @wp.func
     def put_look(monitor: Monitor, start: int, j: int, i: int, v: Any):
@@ -211,12 +244,10 @@ def make_feed(spec, types, method, at_step, opened):
         if wp.static(measure is not None):
             y = measure(y, r, y, c.loop)
         # Each as soon as it is known, so that what is noted alone need not be kept in registers.
-        if (monitor.noting & wp.static(NOTES["measured"])) != 0:
-            put_measured(y, c.memory, c.packet, monitor.bus + wp.static(MEASURED_ROW))
+        put_measured(y, c.memory, c.packet, monitor.bus + wp.static(MEASURED_ROW), monitor.noting)
         if wp.static(guide is not None):
             r = guide(r, r, y, c.loop)
-        if (monitor.noting & wp.static(NOTES["reference"])) != 0:
-            put_reference(r, c.memory, c.packet, monitor.bus + wp.static(REFERENCE_ROW))
+        put_reference(r, c.memory, c.packet, monitor.bus + wp.static(REFERENCE_ROW), monitor.noting)
         return y, r
 
     @wp.func
@@ -249,7 +280,7 @@ def make_feed(spec, types, method, at_step, opened):
         w = Wrench()
         if wp.static(act is not None):
             w = act(w, r, y, c.loop)
-        if (monitor.noting & wp.static(NOTES["demand"])) != 0:
+        if (monitor.noting & wp.static(bit("demand", 0))) != 0:
             put3(c.memory, c.packet, monitor.bus, w.force)
             put3(c.memory, c.packet, monitor.bus + 3, w.torque)
         # An allocation may lose what is no number: a limit is a comparison.

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lgvi_kernels.advance.feeding import NOTED
+from lgvi_kernels.advance.feeding import ALL_NOTES, BITS_OF_ROWS, NOTED, bit
 from lgvi_warp.physics.control.base import Bus
 from lgvi_warp.physics.control.signals import CHANNELS, SAVED, SIGNALS, has_shape, ordered, row_of
 from lgvi_warp.physics.fields import FIELDS
@@ -23,6 +23,15 @@ def test_every_row_that_a_look_notes_is_a_signal():
             if signal.group == group
         ]
         assert set().union(*rows) == set(range(size)), group
+
+
+def test_a_signal_is_noted_by_one_bit():
+    assert {group: len(bits) for group, bits in BITS_OF_ROWS.items()} == NOTED
+    for name, signal in SIGNALS.items():
+        if signal.group in NOTED:
+            rows = range(signal.row, signal.row + math.prod(signal.field.shape))
+            assert len({bit(signal.group, row) for row in rows}) == 1, name
+    assert sum({bit(group, row) for group, bits in BITS_OF_ROWS.items() for row in range(len(bits))}) == ALL_NOTES
 
 
 def test_rows_of_the_memory():

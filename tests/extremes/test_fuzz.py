@@ -18,7 +18,7 @@ SLOW = pytest.mark.slow
     [
         ("files", 500, 0),
         ("set", 100, 0),
-        ("controllers", 300, 0),
+        ("controllers", 150, 0),
         pytest.param("files", 10_000, 4, marks=SLOW),
         pytest.param("set", 4000, 4, marks=SLOW),
         pytest.param("controllers", 5000, 4, marks=SLOW),

@@ -92,6 +92,7 @@ def test_dissipation(name):
         assert np.linalg.eigvalsh(D + D.T)[0] >= -1e-12 * np.abs(D).max()
 
 
+@pytest.mark.slow
 def test_at_rest_fins_do_nothing():
     result = lw.solve(
         one(scene(*(CASES[name].terms[0] for name in ("fins", "cross-flow", "body lift")))), h=0.01, t1=0.1

@@ -101,9 +101,9 @@ LAWS = {
 }
 
 
-@pytest.mark.slow_but("psi_s-drag")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", LAWS)
-@pytest.mark.parametrize("method", ["psi_s", pytest.param("psi_x", marks=SLOW)])
+@pytest.mark.parametrize("method", ["psi_s", "psi_x"])
 def test_laws(name, method):
     # As above, with some ten numbers of the laws rounded as well. One lane, which is sooner compiled.
     scene = lw.Scene(GENERAL.vehicle, GENERAL.environment, terms=LAWS[name])

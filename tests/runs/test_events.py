@@ -192,7 +192,7 @@ def test_the_order_holds_up_to_the_event(method, order, steps, true):
     assert slope([2.0 / n for n in steps], errors) > order - 0.35
 
 
-@pytest.mark.slow_for("rk8")
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["rk5", "rk8"])
 def test_an_adaptive_method_arrives_within_its_tolerance(method, true):
     assert error(lw.solve(one(FALLING, **FALL), lw.Method(method, rtol=1e-10, atol=1e-12), h=0.5, t1=2.0), true) < 1e-9

@@ -136,6 +136,7 @@ def test_a_killed_process_costs_what_is_at_work(tmp_path):
     assert sum(times.values()) <= 8 + 2
 
 
+@pytest.mark.slow
 def test_a_killed_dask_worker_costs_the_block_it_is_at(client, tmp_path):
     from lgvi_warp.engine.executors.dask import Dask
 
@@ -267,7 +268,6 @@ def test_a_killed_dask_worker_costs_its_block_only(client, tmp_path, whole):
     check_killed(killer, tmp_path / "run.zarr", whole)
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_a_killed_dask_worker_in_memory(client, whole):
     from lgvi_warp.engine.executors.dask import Dask

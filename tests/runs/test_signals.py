@@ -220,6 +220,7 @@ def test_closed_streams_lose_nothing(closed, tmp_path):
     assert lw.Result.load(tmp_path / "result.npz").members == 20
 
 
+@pytest.mark.slow
 def test_a_terminal_that_vanished_loses_nothing(tmp_path):
     """Nobody reads stdout and stderr any more: the files are all there."""
     read, write = os.pipe()

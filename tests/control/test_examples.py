@@ -13,7 +13,7 @@ from tests.conftest import ROOT
 def printed(name, folder):
     """The three lines that an example prints; its picture is there."""
     picture = folder / f"{name}.png"
-    command = [sys.executable, ROOT / "examples" / "controllers" / f"{name}.py", picture]
+    command = [sys.executable, ROOT / "examples" / f"{name}.py", picture]
     run = subprocess.run(command, check=True, capture_output=True, text=True, cwd=folder)
     assert picture.stat().st_size > 10_000
     first, second, last = run.stdout.splitlines()
@@ -28,21 +28,21 @@ def number(text, before):
 
 @pytest.mark.slow
 def test_depth_is_kept_whatever_the_ballast(tmp_path):
-    first, second = printed("depth_keeping", tmp_path)
+    first, second = printed("controllers/depth_keeping", tmp_path)
     assert "{'ok': 500}" in first and abs(number(first, "m off")) < number(first, r"m$")
     assert 0.0 < number(second, "% of that time") < number(second, "% of the vehicles") < 50.0
 
 
 @pytest.mark.slow
 def test_reallocation_keeps_the_place_when_a_thruster_dies(tmp_path):
-    unknown, known = printed("dead_thruster", tmp_path)
+    unknown, known = printed("controllers/dead_thruster", tmp_path)
     assert number(known, "cm off") < 0.1 * number(unknown, "cm off")
     assert number(known, "deg off") < 0.1 * number(unknown, "deg off")
 
 
 @pytest.mark.slow
 def test_an_integral_takes_the_vehicle_back_to_the_legs(tmp_path):
-    plain, integral = printed("waypoints", tmp_path)
+    plain, integral = printed("controllers/waypoints", tmp_path)
     assert number(integral, "m off") < 0.5 * number(plain, "m off")
 
 

@@ -53,7 +53,7 @@ def log_rerun(
         ImportError: rerun-sdk is not installed (extra: viz).
         NothingToDraw: No samples were kept, or no member has a finite start.
         SceneError: There are no such members, or the vehicle's mesh cannot be read.
-        OSError: The file cannot be written, or no viewer answers at the address.
+        OSError: The file cannot be written, no viewer answers at the address, or it ends meanwhile; then the file is whole.
         ValueError: There is neither a path nor a `to`, or no result.
     """
     viewer.rerun()
@@ -63,10 +63,23 @@ def log_rerun(
     address = to if isinstance(to, str) else None
     if address is not None:
         viewer.reach(address)
+    ended: OSError | None = None
     with contextlib.ExitStack() as stack:
         beside = None if path is None else stack.enter_context(durable.placed(Path(path)))
-        if beside or address:
-            _write(runs, beside, address)
+        try:
+            if beside or address:
+                _write(runs, beside, address)
+        except OSError as error:
+            if address is None or viewer.answers(address):
+                raise
+            ended = error
+            if beside:
+                # The stream that failed may still have its file open: this is another one.
+                beside.unlink(missing_ok=True)
+                _write(runs, beside, None)
+    if ended is not None:
+        written = "" if path is None else f", which is in {path}: open that"
+        raise OSError(f"to = {address!r}: the viewer ended before it had the recording{written}") from ended
     if to is not None and address is None:
         _send(to, runs)
         to.flush()

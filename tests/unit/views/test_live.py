@@ -12,6 +12,7 @@ from rerun.chunk import RrdReader
 
 import lgvi_warp as lw
 from lgvi_warp import cli
+from lgvi_warp.views import rerun as drawing
 from lgvi_warp.views import viewer
 from lgvi_warp.views.live import Live
 from tests.conftest import ROOT
@@ -123,6 +124,22 @@ def test_a_viewer_that_is_closed_ends_the_view_and_not_the_run(tmp_path):
     live.add(second)
     assert live.closed
     live.add(third)
+
+
+def test_a_viewer_that_ends_while_a_recording_is_sent_leaves_the_file(tmp_path, monkeypatch):
+    send, port, path = drawing._send, free_port(), tmp_path / "fleet.rrd"
+    command = [str(viewer.program()), "--bind", "127.0.0.1", "--port", str(port), "--save", str(tmp_path / "sent.rrd")]
+    with serving(command, port) as process:
+
+        def ended(recording, runs, laid_out=False):
+            process.kill()
+            process.wait()
+            send(recording, runs, laid_out)
+
+        monkeypatch.setattr(drawing, "_send", ended)
+        with pytest.raises(OSError, match="the viewer ended before it had the recording, which is in .*fleet.rrd"):
+            lw.log_rerun(fleet(20), path, to=f"rerun+http://127.0.0.1:{port}/proxy")
+    assert len(rows(path, "/world/bodies/ok", "translations")) == 31
 
 
 @pytest.mark.kernel

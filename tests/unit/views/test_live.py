@@ -137,7 +137,7 @@ def test_a_viewer_that_ends_while_a_recording_is_sent_leaves_the_file(tmp_path, 
             send(recording, runs, laid_out)
 
         monkeypatch.setattr(drawing, "_send", ended)
-        with pytest.raises(OSError, match="the viewer ended before it had the recording, which is in .*fleet.rrd"):
+        with pytest.raises(OSError, match=r"the viewer ended before it had the recording, which is in .*fleet.rrd"):
             lw.log_rerun(fleet(20), path, to=f"rerun+http://127.0.0.1:{port}/proxy")
     assert len(rows(path, "/world/bodies/ok", "translations")) == 31
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from itertools import accumulate
 from typing import Any
@@ -260,7 +261,7 @@ class Packets:
         slots, numbers = self.monitor.slots, self.monitor.numbers
         first = when.start % slots
         rows = self.monitor.looks.numpy()[first * numbers : (first + when.stop - when.start) * numbers]
-        by_look = rows.reshape(when.stop - when.start, numbers, -1)[..., : self.members.count]
+        by_look = rows.reshape(when.stop - when.start, numbers, math.prod(rows.shape[1:]))[..., : self.members.count]
         return by_look.transpose(0, 2, 1)
 
     def first_signals(self) -> np.ndarray:

@@ -250,3 +250,10 @@ def test_a_look_gathers_only_the_numbers_that_are_read(fleet):
         "position": 1, "attitude": 2, "reference_depth": 1, "reference_heading": 1}  # fmt: skip
     assert gathered(lw.IAE("north"), lw.IAE("east"))["position"] == 2
     assert gathered(lw.IAE("depth"), lw.MaxError("position"))["position"] == 3
+
+
+@pytest.mark.parametrize("keep", ["none", "all"])
+def test_a_metric_may_read_nothing_at_looks(keep, fleet, coarse):
+    alone = lw.solve(fleet, **COARSE, statistics=[lw.TimeToFailure()], keep=keep)
+    name = "each time_to_failure"
+    np.testing.assert_array_equal(alone.statistics[name].value, coarse.statistics[name].value)

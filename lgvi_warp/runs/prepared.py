@@ -236,8 +236,8 @@ class Prepared:
             velocity: (n, 3) [m/s], body axes.
             angular_velocity: (n, 3) [rad/s], body axes.
             parameters: arrays (n, ...) by name, as of `Ensemble.from_states`; default None.
-            indices: (n,), whole numbers from 0 that key the noise of each member, such as its index in another ensemble; members with
-                the same index have the same noise. Default None for 0 to n - 1.
+            indices: (n,), whole numbers from 0 that key the noise of each member, such as its index in another ensemble;
+                members with the same index have the same noise. Default None for 0 to n - 1.
             seed: the seed of the noise, a whole number from 0. Default 0.
 
         Returns:
@@ -253,7 +253,8 @@ class Prepared:
         fleet.seed = int(EnsembleSettings(fleet.members, seed).seed)
         if indices is not None:
             keys = np.asarray(indices)
-            if keys.shape != (fleet.members,) or keys.dtype.kind not in "iu" or keys.min() < 0 or keys.max() >= MOST_MEMBERS:
+            whole = keys.shape == (fleet.members,) and keys.dtype.kind in "iu"
+            if not whole or keys.min() < 0 or keys.max() >= MOST_MEMBERS:
                 problem = "are not one whole number from 0 for each member"
                 remedy = f"give an array of shape ({fleet.members},), of numbers below {MOST_MEMBERS}"
                 raise refusal("indices", indices, problem, remedy)

@@ -171,7 +171,7 @@ def test_unphysical_numbers_are_refused(paper):
     X[1, 0] = -1.0
     with pytest.raises(lw.SceneError, match=r"vehicle\.mass of member 1"):
         run(X)
-    for odd in (np.ones((3, 2)), np.ones(3), np.ones((0, 3)), "x", dict.fromkeys(NAMES, [])):
+    for odd in (np.ones((3, 2)), np.ones(3), np.ones((0, 3)), "x", {name: () for name in NAMES}):
         with pytest.raises(lw.SceneError, match="X"):
             run(odd)
     with pytest.raises(lw.SceneError) as caught:

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from lgvi_warp.physics.terms.base import PackingContext
+from lgvi_warp.scene.ensemble import KEPT
 
 Value = TypeVar("Value")
 
@@ -109,6 +110,7 @@ class Shared:
     varied: set[str]
     _kept: dict[Any, Any] = field(default_factory=dict)
     _varying: set[Any] = field(default_factory=set)
+    _last: tuple[Mapping[str, np.ndarray], Any] | None = None
 
     def __call__(self, key: Any, numbers: Mapping[str, np.ndarray], compute: Callable[[Any], Value]) -> Value:
         """A result from memory, or computed.
@@ -132,6 +134,31 @@ class Shared:
         else:
             self._varying.add(key)
         return value
+
+    def of_the_same(self, numbers: Mapping[str, np.ndarray]) -> Any:
+        """What `remember` was given for the members that have these numbers.
+
+        Args:
+            numbers: numbers by name, the same arrays as then and no copies of them.
+
+        Returns:
+            What was remembered; None for other members.
+        """
+        if self._last is None:
+            return None
+        numbers_then, value = self._last
+        same = all(numbers.get(name) is numbers_then.get(name) for name in self.varied)
+        return value if same else None
+
+    def remember(self, numbers: Mapping[str, np.ndarray], value: Any) -> None:
+        """Keep what follows from the numbers of few members until others come: a run looks at them more than once.
+
+        Args:
+            numbers: numbers by name.
+            value: what follows from them.
+        """
+        few = all(len(numbers[name]) <= KEPT for name in self.varied if name in numbers)
+        self._last = (numbers, value) if few else None
 
     def keeps(self, key: Any) -> bool:
         """Whether a computation that ran is shared by all members.

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from lgvi_warp.engine.shared import FRAME, MEMBERS, SEED, Reads, Shared, context
+from lgvi_warp.scene.ensemble import KEPT
 
 NUMBERS = {"a.x": np.ones((1, 3)), "b.y": np.zeros(5)}
 WAYS = {
@@ -57,3 +58,15 @@ def test_a_context_notes_what_it_is_asked_for(name, field):
     reads.names.clear()
     assert vars(asked)[field] is not None and name in reads.names
     assert type(context(NUMBERS, "frame", np.arange(5), 7, 0.01, True)).__name__ == "PackingContext"
+
+
+@pytest.mark.parametrize(("members", "remembers"), [(1, True), (KEPT, True), (KEPT + 1, False)])
+def test_what_follows_from_few_members_is_remembered(members, remembers):
+    shared, mass = Shared({"vehicle.mass", MEMBERS}), np.ones(members)
+    numbers = {"vehicle.mass": mass, "vehicle.buoyancy": np.ones(1)}
+    assert shared.of_the_same(numbers) is None
+    shared.remember(numbers, "frame")
+    assert shared.of_the_same(dict(numbers)) == ("frame" if remembers else None)
+    assert shared.of_the_same(numbers | {"vehicle.mass": mass.copy()}) is None
+    shared.remember({"vehicle.mass": 2.0 * mass}, "another")
+    assert shared.of_the_same(numbers) is None

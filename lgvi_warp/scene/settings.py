@@ -221,7 +221,9 @@ class EnsembleSettings:
         return section(self.members, self.seed, self.vary, self.sampling, self.indices)
 
 
-def section(members: int | None, seed: int, vary: Mapping[str, Any], sampling: Sampling, indices: Any) -> dict[str, Any]:
+def section(
+    members: int | None, seed: int, vary: Mapping[str, Any], sampling: Sampling, indices: Any
+) -> dict[str, Any]:
     """Write the section [ensemble] of a scene file from settings that were checked.
 
     Args:

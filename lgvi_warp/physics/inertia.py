@@ -157,6 +157,11 @@ class Frame:
         """Whether some member's origin of the state is not the user's."""
         return bool(self.origin.any())
 
+    @functools.cached_property
+    def from_forces(self) -> np.ndarray:
+        """Matrices (., 6, 6) that give the user's velocities from those at the origin of the forces, in these axes."""
+        return motion_from(self.forces, self.Q)
+
     @property
     def aligned(self) -> bool:
         """Whether every member's axes are the user's up to order and sense, and the origin of the forces is the user's."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics import vehicle
-from lgvi_warp.physics.inertia import Frame, motion_from
+from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
 ZEROS = (0.0,) * 6
@@ -177,6 +177,8 @@ class DragMatrix(Term):
         """In addition, refuses members whose matrix creates energy."""
         bad = super().unphysical(numbers)
         for kind in ("linear", "quadratic"):
+            if np.array_equal(numbers[kind], getattr(self, kind)[None]):
+                continue  # those of the scene, which `check` let through
             matrices = np.nan_to_num(numbers[kind]) if bad[kind].any() else numbers[kind]
             bad[kind] = bad[kind] | _creates_energy(matrices, kind == "quadratic")[0]
         return bad
@@ -278,7 +280,7 @@ def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, context: PackingCon
         The rows, and which parts are present.
     """
     # X gives the user's velocities from those at the origin of the forces in the kernel's axes.
-    X = motion_from(context.frame.forces, context.frame.Q)
+    X = context.frame.from_forces
     n = max(len(linear), len(quadratic), len(X))
     XT = np.swapaxes(X, 1, 2)
     columns = np.flatnonzero(quadratic.any(axis=0).any(axis=0)).tolist()

@@ -358,7 +358,7 @@ def parted(name: str) -> tuple[str, str | None]:
     """Divide the name of a method.
 
     Args:
-        name: Such as "psi_s" or "yoshida4(psi_s)".
+        name: Such as "psi_s" or "su4(psi_s)".
 
     Returns:
         The method that is composed, and the composition; None where there is none.

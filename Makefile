@@ -4,6 +4,9 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 
+# Processes that tests start load the bytecode that others left.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: run quick test test-long coverage mutants lint docs gallery bench bench-peers bench-loops clean
 
 run: $(VENV)/.run

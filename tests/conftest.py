@@ -3,6 +3,7 @@
 
 import contextlib
 import fnmatch
+import gc
 import json
 from pathlib import Path
 from unittest import mock
@@ -33,6 +34,12 @@ def pytest_collection_modifyitems(items):
         slow_for, slow_but = item.get_closest_marker("slow_for"), item.get_closest_marker("slow_but")
         if (slow_for and matches(case, slow_for)) or (slow_but and not matches(case, slow_but)):
             item.add_marker(pytest.mark.slow)
+
+
+def pytest_collection_finish():
+    """Leave what collecting makes, and imports, out of every collection of garbage from now on: it stays to the end."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)

@@ -17,7 +17,7 @@ def ends(result):
     )
 
 
-@pytest.mark.slow_but("psi_s-float64")
+@pytest.mark.slow
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 @pytest.mark.parametrize("method", ["psi_s", "psi_x", "psi_w", "kl6(psi_s)", "rk8", "rk4"])
 def test_a_period_is_its_steps_under_the_held_wrench(method, dtype):

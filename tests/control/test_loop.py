@@ -95,6 +95,7 @@ def test_the_loop_is_the_twins(method, lag, delay):
     assert np.abs(result.attitude[:, 0] - R[::50]).max() < 1e-10
 
 
+@pytest.mark.slow
 def test_the_loop_settles():
     result = lw.solve(scene(LAG), "psi_s", h=H, t1=60.0, save=lw.SaveAt(every=60.0))
     assert abs(result.position[-1, 0, 2] - WANTED["depth"]) < 0.2

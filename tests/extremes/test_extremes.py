@@ -25,7 +25,7 @@ def truth(name, method):
     return cases.extended_run(GROUPS[name](), method)
 
 
-@pytest.mark.slow_for("forced-psi_x*", "steps of 1e-06*")
+@pytest.mark.slow_for("forced-psi_x*", "forced-psi_s-float32", "turning-psi_x-float32", "steps of 1e-06*")
 @pytest.mark.parametrize("dtype", DTYPES)
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", GROUPS)

@@ -16,8 +16,8 @@ SLOW = pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "cases", "kernels"),
     [
-        ("files", 500, 0),
-        ("set", 100, 0),
+        ("files", 300, 0),
+        ("set", 50, 0),
         ("controllers", 150, 0),
         pytest.param("files", 10_000, 4, marks=SLOW),
         pytest.param("set", 4000, 4, marks=SLOW),

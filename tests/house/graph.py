@@ -5,6 +5,7 @@ An import is read as "top" (made when its module is), "lazy" (inside a function)
 """
 
 import ast
+import functools
 import graphlib
 import sys
 from collections import Counter, defaultdict
@@ -52,23 +53,21 @@ def imports(node, package="", kind="top"):
     return [found for child in ast.iter_child_nodes(node) for found in imports(child, package, below)]
 
 
-def read_modules():
+@functools.cache
+def modules():
     """{module name: its imports} of both packages."""
-    modules = {}
+    found = {}
     for package, root in SOURCE_ROOTS.items():
         for path in sorted((root / package).rglob("*.py")):
             parts = path.relative_to(root).with_suffix("").parts
             own = parts[:-1] if parts[-1] == "__init__" else parts
-            modules[".".join(own)] = imports(ast.parse(path.read_text()), ".".join(parts[:-1]))
-    return modules
-
-
-MODULES = read_modules()
+            found[".".join(own)] = imports(ast.parse(path.read_text()), ".".join(parts[:-1]))
+    return found
 
 
 def module_of(name):
     """The module that an imported name is, or lies in; None for a foreign one."""
-    while name and name not in MODULES:
+    while name and name not in modules():
         name = name.rpartition(".")[0]
     return name or None
 
@@ -77,7 +76,7 @@ def graph(*kinds):
     """{module: the modules that it imports} by imports of these kinds. The face of the package names everything: left out."""
     return {
         module: {module_of(found.name) for found in all_of_it if found.kind in kinds} - {None, module, "lgvi_warp"}
-        for module, all_of_it in MODULES.items()
+        for module, all_of_it in modules().items()
         if module != "lgvi_warp"
     }
 
@@ -105,7 +104,7 @@ def arrows_up():
 
 def loaded_by(module):
     """Modules of ours that importing this one names at once, without those named inside functions."""
-    return {module_of(found.name) for found in MODULES[module] if found.kind == "top"} - {None, module}
+    return {module_of(found.name) for found in modules()[module] if found.kind == "top"} - {None, module}
 
 
 def closure(module):
@@ -114,7 +113,7 @@ def closure(module):
     while waiting:
         one = waiting.pop()
         seen.add(one)
-        waiting |= (loaded_by(one) | ({one.rpartition(".")[0]} & MODULES.keys())) - seen
+        waiting |= (loaded_by(one) | ({one.rpartition(".")[0]} & modules().keys())) - seen
     return seen
 
 
@@ -128,20 +127,22 @@ def reason(module, name):
     if package not in (*SOURCE_ROOTS, "warp"):
         return "takes long to load, or may be absent"
     below = closure(module_of(name)) if package == "lgvi_warp" else ()
-    if package != "lgvi_warp" or any(found.name.split(".")[0] == "warp" for lower in below for found in MODULES[lower]):
+    if package != "lgvi_warp" or any(
+        found.name.split(".")[0] == "warp" for lower in below for found in modules()[lower]
+    ):
         return "leads to Warp, which takes long to load"
     return "needed by some scenes or runs only"
 
 
 def report():
     """Lines on the rooms and their imports."""
-    modules = Counter(module.split(".")[1] for module in MODULES if room(module) is not None)
+    sizes = Counter(module.split(".")[1] for module in modules() if room(module) is not None)
     for floor, rooms in enumerate(ROOMS):
-        yield f"floor {floor}: " + ", ".join(f"{name} ({modules[name]} modules)" for name in rooms)
+        yield f"floor {floor}: " + ", ".join(f"{name} ({sizes[name]} modules)" for name in rooms)
     yield f"circle of modules, all imports counted: {circle('top', 'lazy', 'typing') or 'none'}"
     yield f"arrows up: {arrows_up() or 'none'}"
     late = defaultdict(Counter)
-    for module, all_of_it in MODULES.items():
+    for module, all_of_it in modules().items():
         for found in all_of_it:
             if found.kind == "lazy":
                 late[reason(module, found.name)][module_of(found.name) or found.name.split(".")[0]] += 1

@@ -231,6 +231,7 @@ def test_a_turn_with_roll_stays_steady(rudder):
     assert slope(steps, errors) == pytest.approx(2.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_torque_heels_the_hull():
     # asin(torque / (weight lever)) = -5.32 degrees holds it, and the balance of thrust its speed: neither moves in 2 s,
     # but for the step's shift of the speed, as in test_steady_speed, and what it adds to the pitch.

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a scene does not ask for leaves no code: asserted on the source that Warp generates; and varying compiles nothing."""
 
+import dataclasses
 import re
 
 import numpy as np
@@ -63,6 +64,7 @@ def test_compensation_is_there_only_if_asked_for(method, tmp_path):
             assert (mark in text) == there, (mark, dtype)
 
 
+@pytest.mark.slow
 def test_memory_in_stages_is_there_only_where_it_is_followed(tmp_path):
     # A method that goes back in time keeps a copy of the memory; a splitting follows nothing.
     lagging = scene_of(CASES["thrusters"])
@@ -223,11 +225,13 @@ def test_the_same_bits_for_any_number_of_threads(dtype):
 
 
 def test_a_controller_that_is_absent_is_no_code(tmp_path):
-    plain = lw.Scene.named("remus_100")
     wanted = lw.Controller(period=0.1, guidance=[lw.SetPoint(heading=0.5)], laws=[lw.HeadingPID(kp=1.0)])
+    (fins,) = CASES["control fins"].terms
+    driven = dataclasses.replace(fins, command=None, command_schedule=None, times=None)
+    scenes = {"plain": lw.Scene(BARE, terms=[fins]), "steered": lw.Scene(BARE, terms=[driven], controller=wanted)}
     texts = {}
-    for name, scene in {"plain": plain, "steered": lw.Scene.named("remus_100", controller=wanted)}.items():
+    for name, scene in scenes.items():
         (tmp_path / name).mkdir()
-        texts[name] = source(scene, tmp_path / name, "psi_x")
+        texts[name] = source(scene, tmp_path / name)
     for word in ("feed", "held", "Measurement", "heading_error", "signals"):
         assert word not in texts["plain"] and word in texts["steered"], word

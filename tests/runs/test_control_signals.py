@@ -300,10 +300,12 @@ def test_a_file_knows_which_terms_the_controller_drives(laws, tmp_path):
     """Fins that are driven have no command of their own: energies and pictures of a file must not ask for it."""
     wanted = lw.SetPoint(heading=0.5)
     loop = lw.Controller(period=0.1, guidance=[wanted], laws=laws, allocation=[lw.PseudoInverse(to="control_fins")])
-    driven = lw.Scene.named("remus_100", start={"velocity": [1.54, 0.0, 0.0]}, controller=loop)
-    result = lw.solve(driven, "rk4", h=0.1, t1=0.5)
+    (fins,) = (term for term in lw.Scene.named("remus_100", controller=loop).terms if term.type == "control_fins")
+    start = lw.Start(velocity=[1.54, 0.0, 0.0])
+    driven = lw.Scene(lw.Vehicle(30.0, (0.2, 3.0, 3.0)), terms=[fins], start=start, controller=loop)
+    result = lw.solve(driven, "psi_s", h=0.1, t1=0.5)
     loaded = lw.Result.load(result.save(tmp_path / "result.npz"))
-    lw.solve(driven, "rk4", h=0.1, t1=0.5, store=tmp_path / "run.zarr")
+    lw.solve(driven, "psi_s", h=0.1, t1=0.5, store=tmp_path / "run.zarr")
     for other in (loaded, lw.open_run(tmp_path / "run.zarr")):
         assert other.energy.tobytes() == result.energy.tobytes()
         assert invariants.at_work(other) == invariants.at_work(result)

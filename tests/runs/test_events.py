@@ -243,7 +243,7 @@ TERMS = {
 TERMS["all"] = [table for tables in TERMS.values() for table in tables]
 
 
-@pytest.mark.slow_but("all")
+@pytest.mark.slow
 @pytest.mark.parametrize("terms", TERMS)
 def test_a_stopped_member_stays_and_the_others_do_not_notice(terms):
     b, R, nu, Om = random_states(2, 40)

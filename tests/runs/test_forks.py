@@ -12,8 +12,8 @@ import pytest
 from tests.conftest import ROOT
 from tests.support.forking import CHILDREN
 
-QUICK = ("fork", "fork_within", "celery", "refused")
-LONG = ("pool_fork", "fork_beside", "pool_spawn", "pool_forkserver", "futures_fork", "futures_spawn", "loky")
+QUICK = ("fork_within", "celery", "refused")
+LONG = ("fork", "pool_fork", "fork_beside", "pool_spawn", "pool_forkserver", "futures_fork", "futures_spawn", "loky")
 # A child that waits for ever ends with the group of its parent.
 SECONDS = 120.0
 

@@ -213,8 +213,9 @@ def test_what_is_broken_is_seen(name, tmp_path):
     assert faults_of([broken_path(name, tmp_path)], (0.0, 30.0, 60.0), tmp_path) != []
 
 
+@pytest.mark.slow
 def test_a_fleet_is_seen_and_poses_that_are_not_finite_are_not(tmp_path):
-    # The quick one of this file: one viewer, which also shows that the check finds what is broken.
+    # One viewer for both: what a viewer shows of one recording does not hide faults of the next.
     whole = lw.log_rerun(fleet(60), tmp_path / "fleet.rrd")
     broken = broken_path("poses that are not finite", tmp_path)
     with viewer(tmp_path, size="800x560") as window:

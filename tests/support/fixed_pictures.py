@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What pictures and recordings show, as it was when they were last looked at: every line, colour, text and setting.
+
+`python -m tests.support.fixed_pictures --write` records them anew, after a change that was looked at (`make gallery`, and
+tests/unit/views/test_seen.py). An array is kept as its size, its sum, and a sum in which each place weighs differently.
+"""
+
+import argparse
+import functools
+import json
+import re
+import tempfile
+from collections import defaultdict
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import rerun as rr
+from matplotlib.collections import Collection
+from matplotlib.colors import to_hex
+from matplotlib.image import AxesImage
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from rerun.chunk import RrdReader
+
+import lgvi_warp as lw
+from tests.unit.views.test_cost_pictures import RUNS, TERMS
+from tests.unit.views.test_recording import fleet
+from tests.views.test_plots import of_cells, of_factors, of_methods
+
+FILE = Path(__file__).parents[1] / "data" / "pictures.json"
+ROUND_OFF = 1e-6
+OF_A_RUN = ("summary", "fan", "paths", "plan_view", "phase", "attitude", "outcomes", "histogram", "pairs")
+# Names that are other ones in every recording.
+RANDOM = re.compile(r"[0-9a-f]{8}-[0-9a-f-]{27}|lgvi_warp_[0-9a-f]+|rec_[0-9a-f]+|\b[0-9a-f]{32}\b")
+# Components that hold such names, or times of recording.
+OF_THE_HOUR = ("RowId", "root_container", "start_time", "log_time", "log_tick", "blueprint")
+VERSIONS = re.compile(r"^\| *(versions?|machine).*$", re.MULTILINE)
+
+
+def sums(values):
+    """An array as four numbers: how many are finite, their sum, that of their sizes, and one by place."""
+    flat = np.ma.filled(np.ma.asarray(values, dtype=float), np.nan).ravel()
+    numbers = np.where(np.isfinite(flat), flat, 0.0)
+    weights = np.cos(np.arange(1.0, len(numbers) + 1.0))
+    found = numbers.sum(), np.abs(numbers).sum(), numbers @ weights
+    return [int(np.isfinite(flat).sum()), *(float(f"{number:.9g}") for number in found)]
+
+
+def style(artist):
+    """Colours, line and layer of something drawn."""
+    if isinstance(artist, Line2D):
+        return [to_hex(artist.get_color(), keep_alpha=True), artist.get_linestyle(), str(artist.get_marker()),
+                artist.get_linewidth(), artist.get_markersize(), artist.get_fillstyle()]  # fmt: skip
+    if isinstance(artist, Collection):
+        return [[to_hex(color, keep_alpha=True) for color in colors[:8]] for colors in
+                (artist.get_facecolor(), artist.get_edgecolor())] + [sums(artist.get_linewidths())]  # fmt: skip
+    return [to_hex(artist.get_facecolor(), keep_alpha=True), to_hex(artist.get_edgecolor(), keep_alpha=True),
+            artist.get_hatch(), artist.get_linewidth()]  # fmt: skip
+
+
+def drawn(artist):
+    """One thing drawn: kind, label, style and places."""
+    common = [type(artist).__name__, artist.get_label(), artist.get_zorder(), artist.get_alpha(), artist.get_clip_on()]
+    if isinstance(artist, Line2D):
+        return [*common, style(artist), sums(artist.get_xdata()), sums(artist.get_ydata())]
+    if isinstance(artist, AxesImage):
+        return [*common, artist.get_cmap().name, sums(artist.get_array()), sums(artist.get_extent())]
+    if isinstance(artist, Collection):
+        paths = [path.vertices for path in artist.get_paths()[:50]]
+        places = np.concatenate([path.ravel() for path in paths]) if paths else []
+        return [*common, style(artist), sums(places), sums(artist.get_offsets())]
+    return [*common, style(artist), sums(artist.get_path().vertices), sums(artist.get_transform().get_matrix()[:2, :2])]
+
+
+def written(text):
+    """One text: what it says, how large, and on which side of its place."""
+    return [text.get_text(), text.get_fontsize(), text.get_rotation(), text.get_ha(), text.get_va(), text.get_color()]
+
+
+def of_axes(axes):
+    """Everything on one panel."""
+    legend = axes.get_legend()
+    content = [artist for artist in axes.get_children() if isinstance(artist, Line2D | Collection | AxesImage)]
+    content += [patch for patch in axes.patches if isinstance(patch, Patch)]
+    return {
+        "texts": [written(text) for text in (axes.title, axes.xaxis.label, axes.yaxis.label, *axes.texts)],
+        "scales": [axes.get_xscale(), axes.get_yscale(), axes.axison, axes.get_visible(), str(axes.get_aspect())],
+        "limits": [sums(axes.get_xlim()), sums(axes.get_ylim())],
+        "ticks": [sums(axes.get_xticks()), sums(axes.get_yticks())],
+        "legend": legend and [legend.get_title().get_text(), [text.get_text() for text in legend.get_texts()]],
+        "drawn": [drawn(artist) for artist in content],
+    }
+
+
+def of_figure(figure):
+    """Everything in one picture."""
+    figure.draw_without_rendering()
+    keys = [[text.get_text() for text in legend.get_texts()] for legend in figure.legends]
+    return {
+        "size": figure.get_size_inches().tolist(),
+        "texts": [written(text) for text in figure.texts],
+        "legends": keys,
+        "axes": [of_axes(axes) for axes in figure.axes],
+    }
+
+
+def numbers_in(value):
+    """All numbers in nested lists, and all texts."""
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list | tuple):
+        for entry in value:
+            yield from numbers_in(entry)
+    elif isinstance(value, bool | int | float):
+        yield float(value)
+    elif isinstance(value, bytes):
+        yield from map(float, value)
+    elif value is not None:
+        yield VERSIONS.sub("", RANDOM.sub("*", str(value)))
+
+
+def of_recording(path):
+    """Every component of a recording and of its views: {entity: {component: [texts, sums of the numbers]}}."""
+    reader, found = RrdReader(path), defaultdict(lambda: defaultdict(list))
+    stores = {"": reader.recordings(), "views": reader.blueprints()}
+    for kind, entries in stores.items():
+        for entry in entries:
+            for chunk in reader.stream(store=entry):
+                entity = kind + RANDOM.sub("*", chunk.entity_path)
+                batch = chunk.to_record_batch()
+                for name, column in zip(batch.schema.names, batch.columns, strict=True):
+                    if any(word in name for word in OF_THE_HOUR):
+                        continue
+                    values = column.cast("int64") if name == "sim_time" else column
+                    found[entity][name] += [list(numbers_in(value)) for value in values.to_pylist()]
+    return {
+        entity: {name: content(rows, in_order=bool(entity) and "*" not in entity) for name, rows in columns.items()}
+        for entity, columns in sorted(found.items())
+    }
+
+
+def content(rows, in_order):
+    """Texts and sums of the numbers of one component; those of nameless entities in whatever order."""
+    texts = [value for row in rows for value in row if isinstance(value, str)]
+    numbers = [value for row in rows for value in row if not isinstance(value, str)]
+    return [texts if in_order else sorted(texts), sums(numbers if in_order else sorted(numbers))]
+
+
+@functools.cache
+def pictures():
+    """Every picture by name: the function that draws it, and its arguments."""
+    result = fleet()
+    found = {name: (getattr(lw.plots, name), (result,)) for name in OF_A_RUN}
+    found["fan of the energy"] = lw.plots.fan, (result, "energy")
+    found["one vehicle"] = lw.plots.summary, (fleet(1, 60),)
+    found["compare"] = lw.plots.compare, ({"a": result, "b": fleet(9, 31, 2)}, "speed")
+    found["tradeoff"] = lw.plots.tradeoff, (of_methods(),)
+    found["stability"] = lw.plots.stability, (of_cells(),)
+    found["sensitivity"] = lw.plots.sensitivity, (of_factors(),)
+    found["scaling"] = lw.plots.scaling, (RUNS,)
+    found["term cost"] = lw.plots.term_cost, (TERMS,)
+    return found
+
+
+def picture(name):
+    """What one picture shows."""
+    draw, arguments = pictures()[name]
+    return of_figure(np.ravel(draw(*arguments))[0].figure)
+
+
+def recording(name, folder):
+    """What one recording shows."""
+    return of_recording(lw.log_rerun(RECORDINGS[name](), Path(folder) / "fleet.rrd"))
+
+
+RECORDINGS = {
+    "a fleet": fleet,
+    "one vehicle": lambda: fleet(1, 12),
+    "two runs": lambda: {"a": fleet(9, 7), "b": fleet(12, 7, seed=2)},
+}
+PICTURES = (*OF_A_RUN, "fan of the energy", "one vehicle", "compare", "tradeoff", "stability", "sensitivity", "scaling",
+            "term cost")  # fmt: skip
+
+
+def libraries():
+    """What drawings depend on: the libraries that draw."""
+    return {"matplotlib": ".".join(mpl.__version__.split(".")[:2]), "rerun": rr.__version__}
+
+
+def differing(a, b, where=""):
+    """Places at which two records differ by more than round-off."""
+    if isinstance(a, dict) and isinstance(b, dict):
+        missing = [f"{where}/{key}: only in one" for key in sorted(a.keys() ^ b.keys())]
+        return missing + [found for key in a.keys() & b.keys() for found in differing(a[key], b[key], f"{where}/{key}")]
+    if isinstance(a, list) and isinstance(b, list) and len(a) == len(b):
+        if len(a) == 4 and all(isinstance(x, int | float) for x in (*a, *b)):
+            bound = ROUND_OFF * max(abs(a[2]), abs(b[2])) + 1e-9
+            return [] if a[0] == b[0] and np.allclose(a, b, rtol=0.0, atol=bound) else [f"{where}: {a} is now {b}"]
+        return [found for i, (x, y) in enumerate(zip(a, b, strict=True)) for found in differing(x, y, f"{where}[{i}]")]
+    if isinstance(a, float) and isinstance(b, float | int):
+        return [] if np.isclose(a, b, rtol=ROUND_OFF) else [f"{where}: {a} is now {b}"]
+    return [] if a == b else [f"{where}: {a!r} is now {b!r}"]
+
+
+def everything():
+    """All that is recorded."""
+    with tempfile.TemporaryDirectory() as folder:
+        shown = {name: recording(name, folder) for name in RECORDINGS}
+    return {"libraries": libraries(), "pictures": {name: picture(name) for name in PICTURES}, "recordings": shown}
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--write", action="store_true", help="record what is drawn now")
+    now = json.loads(json.dumps(everything()))
+    known = json.loads(FILE.read_text()) if FILE.exists() else {}
+    print(*differing(known, now), sep="\n")
+    if parser.parse_args().write:
+        FILE.write_text(json.dumps(now, separators=(",", ":")) + "\n")

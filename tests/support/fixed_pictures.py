@@ -6,12 +6,14 @@ tests/unit/views/test_seen.py). An array is kept as its size, its sum, and a sum
 """
 
 import argparse
+import dataclasses
 import functools
 import json
 import re
 import tempfile
 from collections import defaultdict
 from pathlib import Path
+from types import SimpleNamespace
 
 import matplotlib as mpl
 import numpy as np
@@ -24,9 +26,12 @@ from matplotlib.patches import Patch
 from rerun.chunk import RrdReader
 
 import lgvi_warp as lw
+from lgvi_warp.statistics.estimate import Estimates
+from tests.conftest import ROOT
+from tests.unit.statistics.test_statistics import gathered
 from tests.unit.views.test_cost_pictures import RUNS, TERMS
 from tests.unit.views.test_recording import fleet
-from tests.views.test_plots import of_cells, of_factors, of_methods
+from tests.views.test_plots import margins_of, of_cells, of_factors, of_methods
 
 FILE = Path(__file__).parents[1] / "data" / "pictures.json"
 ROUND_OFF = 1e-6
@@ -36,6 +41,8 @@ RANDOM = re.compile(r"[0-9a-f]{8}-[0-9a-f-]{27}|lgvi_warp_[0-9a-f]+|rec_[0-9a-f]
 # Components that hold such names, or times of recording.
 OF_THE_HOUR = ("RowId", "root_container", "start_time", "log_time", "log_tick", "blueprint")
 VERSIONS = re.compile(r"^\| *(versions?|machine).*$", re.MULTILINE)
+STATISTICS = (lw.Quantiles("depth"), lw.Extremes("depth"), lw.Mean("velocity"), lw.Covariance("velocity"),
+              lw.Histogram("depth", bins=5, limits=(0.0, 20.0)))  # fmt: skip
 
 
 def sums(values):
@@ -127,6 +134,8 @@ def of_recording(path):
     for kind, entries in stores.items():
         for entry in entries:
             for chunk in reader.stream(store=entry):
+                if chunk.entity_path.startswith("/run/provenance"):
+                    continue
                 entity = kind + RANDOM.sub("*", chunk.entity_path)
                 batch = chunk.to_record_batch()
                 for name, column in zip(batch.schema.names, batch.columns, strict=True):
@@ -153,6 +162,10 @@ def pictures():
     result = fleet()
     found = {name: (getattr(lw.plots, name), (result,)) for name in OF_A_RUN}
     found["fan of the energy"] = lw.plots.fan, (result, "energy")
+    found["drift"] = lw.plots.drift, (fleet(9, scene=lw.Scene(lw.Scene.named("sphere").vehicle)),)
+    found["summary of members kept"] = lw.plots.summary, (followed(),)
+    found["statistics"] = lw.plots.statistics, (followed(),)
+    found["margins"] = lw.plots.margins, (margins_of([True, True, True, True, False]),)
     found["one vehicle"] = lw.plots.summary, (fleet(1, 60),)
     found["compare"] = lw.plots.compare, ({"a": result, "b": fleet(9, 31, 2)}, "speed")
     found["tradeoff"] = lw.plots.tradeoff, (of_methods(),)
@@ -174,12 +187,38 @@ def recording(name, folder):
     return of_recording(lw.log_rerun(RECORDINGS[name](), Path(folder) / "fleet.rrd"))
 
 
+def estimated(statistic, result):
+    """The estimate that a statistic gathers from the samples of a result."""
+    whole = SimpleNamespace(parameters=result.parameters, count=result.members)
+    samples = type("Samples", (dict,), {"time": result.time, "terms": ()})(result.samples)
+    return gathered(statistic, np.moveaxis(statistic.quantity(samples, whole), 1, 2), time=result.time)[0]
+
+
+def followed():
+    """The fleet with statistics of its own, of which samples of three members were kept alone."""
+    result, kept = fleet(), np.array([3, 5, 9])
+    statistics = Estimates([estimated(statistic, result) for statistic in STATISTICS])
+    few = {"samples": {}, "kept": result.part(kept), "kept_members": kept}
+    return dataclasses.replace(result, statistics=statistics, **few)
+
+
+def steered():
+    """A fleet that a controller steers, with commands and actuators."""
+    scene = lw.Scene.load(ROOT / "examples" / "scenes" / "remus_100_autopilot.toml")
+    result = fleet(9, 7, scene=scene)
+    waves = 0.2 * np.sin(np.arange(7 * 9 * 2.0)).reshape(7, 9, 2)
+    signals = {"actuator": waves, "command": 1.2 * waves}
+    return dataclasses.replace(result, samples=dict(result.samples) | signals)
+
+
 RECORDINGS = {
+    "followed": followed,
+    "steered": steered,
     "a fleet": fleet,
     "one vehicle": lambda: fleet(1, 12),
     "two runs": lambda: {"a": fleet(9, 7), "b": fleet(12, 7, seed=2)},
 }
-PICTURES = (*OF_A_RUN, "fan of the energy", "one vehicle", "compare", "tradeoff", "stability", "sensitivity", "scaling",
+PICTURES = (*OF_A_RUN, "drift", "summary of members kept", "statistics", "margins", "fan of the energy", "one vehicle", "compare", "tradeoff", "stability", "sensitivity", "scaling",
             "term cost")  # fmt: skip
 
 
@@ -200,7 +239,7 @@ def differing(a, b, where=""):
         return [found for i, (x, y) in enumerate(zip(a, b, strict=True)) for found in differing(x, y, f"{where}[{i}]")]
     if isinstance(a, float) and isinstance(b, float | int):
         return [] if np.isclose(a, b, rtol=ROUND_OFF) else [f"{where}: {a} is now {b}"]
-    return [] if a == b else [f"{where}: {a!r} is now {b!r}"]
+    return [] if a == b else [f"{where}: {str(a)[:300]!r} is now {str(b)[:300]!r}"]
 
 
 def everything():

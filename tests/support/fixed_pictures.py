@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What pictures and recordings show, as it was when they were last looked at: every line, colour, text and setting.
+"""What pictures, recordings and reports show, as it was when they were last looked at: every line, colour, text and setting.
 
 `python -m tests.support.fixed_pictures --write` records them anew, after a change that was looked at (`make gallery`, and
 tests/unit/views/test_seen.py). An array is kept as its size, its sum, and a sum in which each place weighs differently.
@@ -26,8 +26,13 @@ from matplotlib.patches import Patch
 from rerun.chunk import RrdReader
 
 import lgvi_warp as lw
+from lgvi_warp.cli import documents, report
+from lgvi_warp.cli.folders import text_of
+from lgvi_warp.cli.writing import Written
+from lgvi_warp.common.status import WarningArray
 from lgvi_warp.statistics.estimate import Estimates
 from tests.conftest import ROOT
+from tests.unit.cli.test_terminal import morris, region, sobol
 from tests.unit.statistics.test_statistics import gathered
 from tests.unit.views.test_cost_pictures import RUNS, TERMS
 from tests.unit.views.test_recording import fleet
@@ -222,6 +227,68 @@ PICTURES = (*OF_A_RUN, "drift", "summary of members kept", "statistics", "margin
             "term cost")  # fmt: skip
 
 
+PROVENANCE = {
+    "checks": "safe",
+    "machine": {"threads": 2, "cpu": "a processor", "simd": "avx2"},
+    "versions": {"numpy": "2"},
+}
+
+
+def ran(result, provenance=None, **values):
+    """The same result, with other numbers, as if a run had ended in it."""
+    return dataclasses.replace(result, provenance=result.provenance | PROVENANCE | (provenance or {}), **values)
+
+
+def summaries():
+    """Results of whose summary each has a line that others have not."""
+    plain, ones = fleet(9), np.arange(9)
+    turning = fleet(9, scene=lw.Scene(lw.Scene.named("sphere").vehicle))
+    rates = 0.1 * np.sin(np.arange(turning.velocity.size)).reshape(turning.velocity.shape)
+    turning = dataclasses.replace(turning, samples=dict(turning.samples) | {"angular_velocity": rates})
+    unmet = dict(steered().samples) | {"unmet": np.where(ones % 3 == 0, 1.0, 0.0)[None, :, None] * np.ones((7, 1, 2))}
+    warned = {"warnings": (2 * (ones % 2)).astype(np.uint16).view(WarningArray), "warning_time": 1.0 * ones}
+    return {
+        "a fleet": ran(plain), "followed": ran(followed()), "steered": ran(steered(), samples=unmet),
+        "divided steps": ran(plain, substeps=ones // 4), "warnings": ran(plain, warning_value=0.5 * ones, **warned),
+        "no velocity": ran(plain, samples={"position": plain.position}, messages=("a remark",)),
+        "none failed": ran(plain, {"observed": {"keep": "failed"}}, samples={}),
+        "conserved": ran(turning),
+    }  # fmt: skip
+
+
+def rounded(text):
+    """The same text, its decimals to six digits."""
+    return re.sub(r"\d+\.\d+(e[+-]\d+)?", lambda number: f"{float(number[0]):.6g}", text)
+
+
+def summed_up(result, folder):
+    """What the command says of a run, in words and as a document."""
+    files = [Path(folder) / name for name in ("result.npz", "fleet.png", "fleet.rrd")]
+    for i, path in enumerate(files):
+        path.write_bytes(b"x" * 10_000 * (i + 1))
+    few = report.shown_members(result)
+    document = documents.of_run(result, few, Written(files), ["a fault"], 2.5)
+    said = [report.summary(result, few, files, 2.5, verbose=True), json.dumps(document, indent=0, default=str)]
+    return [rounded(text.replace(str(folder), "folder")).splitlines() for text in said]
+
+
+def page(result, folder):
+    """The page of a run, without what is in its pictures."""
+    text = lw.report(result, Path(folder) / "report.html").read_text()
+    return rounded(re.sub(r"<svg.*?</svg>|base64,[^\"']*", "*", text, flags=re.DOTALL)).split("\n")
+
+
+def reports(folder):
+    """What is said of runs and studies, by name."""
+    refused = dataclasses.replace(of_methods(), refused={"cg3": "remembers nothing", "psi": "draws no noise"})
+    studies = {"tradeoff": of_methods(), "a refused method": refused, "stability": of_cells(), "a map": region(),
+               "sobol": sobol(), "morris": morris()}  # fmt: skip
+    kinds = {"a refused method": "tradeoff", "a map": "stability", "sobol": "sensitivity", "morris": "sensitivity"}
+    said = {f"summary: {name}": summed_up(result, folder) for name, result in summaries().items()}
+    said |= {f"study: {name}": text_of(kinds.get(name, name), found).splitlines() for name, found in studies.items()}
+    return said | {f"page: {name}": page(summaries()[name], folder) for name in ("followed", "warnings")}
+
+
 def libraries():
     """What drawings depend on: the libraries that draw."""
     return {"matplotlib": ".".join(mpl.__version__.split(".")[:2]), "rerun": rr.__version__}
@@ -245,8 +312,9 @@ def differing(a, b, where=""):
 def everything():
     """All that is recorded."""
     with tempfile.TemporaryDirectory() as folder:
-        shown = {name: recording(name, folder) for name in RECORDINGS}
-    return {"libraries": libraries(), "pictures": {name: picture(name) for name in PICTURES}, "recordings": shown}
+        shown, said = {name: recording(name, folder) for name in RECORDINGS}, reports(folder)
+    drawings = {name: picture(name) for name in PICTURES}
+    return {"libraries": libraries(), "pictures": drawings, "recordings": shown, "reports": said}
 
 
 if __name__ == "__main__":

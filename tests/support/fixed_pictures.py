@@ -90,6 +90,13 @@ def written(text):
     return [text.get_text(), text.get_fontsize(), text.get_rotation(), text.get_ha(), text.get_va(), text.get_color()]
 
 
+def of_legend(legend):
+    """Title and texts of a legend, and its place in percent of the picture."""
+    place, whole = legend.get_window_extent(), legend.get_figure().bbox
+    percent = 100.0 * place.extents / np.tile(whole.size, 2)
+    return [legend.get_title().get_text(), [text.get_text() for text in legend.get_texts()], np.round(percent).tolist()]
+
+
 def of_axes(axes):
     """Everything on one panel."""
     legend = axes.get_legend()
@@ -100,7 +107,7 @@ def of_axes(axes):
         "scales": [axes.get_xscale(), axes.get_yscale(), axes.axison, axes.get_visible(), str(axes.get_aspect())],
         "limits": [sums(axes.get_xlim()), sums(axes.get_ylim())],
         "ticks": [sums(axes.get_xticks()), sums(axes.get_yticks())],
-        "legend": legend and [legend.get_title().get_text(), [text.get_text() for text in legend.get_texts()]],
+        "legend": legend and of_legend(legend),
         "drawn": [drawn(artist) for artist in content],
     }
 
@@ -108,11 +115,10 @@ def of_axes(axes):
 def of_figure(figure):
     """Everything in one picture."""
     figure.draw_without_rendering()
-    keys = [[text.get_text() for text in legend.get_texts()] for legend in figure.legends]
     return {
         "size": figure.get_size_inches().tolist(),
         "texts": [written(text) for text in figure.texts],
-        "legends": keys,
+        "legends": [of_legend(legend) for legend in figure.legends],
         "axes": [of_axes(axes) for axes in figure.axes],
     }
 
@@ -223,8 +229,8 @@ RECORDINGS = {
     "one vehicle": lambda: fleet(1, 12),
     "two runs": lambda: {"a": fleet(9, 7), "b": fleet(12, 7, seed=2)},
 }
-PICTURES = (*OF_A_RUN, "drift", "summary of members kept", "statistics", "margins", "fan of the energy", "one vehicle", "compare", "tradeoff", "stability", "sensitivity", "scaling",
-            "term cost")  # fmt: skip
+PICTURES = (*OF_A_RUN, "drift", "summary of members kept", "statistics", "margins", "fan of the energy", "one vehicle",
+            "compare", "tradeoff", "stability", "sensitivity", "scaling", "term cost")  # fmt: skip
 
 
 PROVENANCE = {

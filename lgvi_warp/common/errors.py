@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 import difflib
 import functools
+import math
 import reprlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
@@ -379,6 +380,8 @@ class Faults:
         Returns:
             The number; None after a fault.
         """
+        if type(value) is float and 0.0 < value < math.inf:
+            return value
         array = self.finite(key, value, (), unit)
         if array is not None and array <= 0.0:
             self.add(key, value, "is not positive", f"give a number above 0 [{unit}]")

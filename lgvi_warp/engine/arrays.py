@@ -37,8 +37,15 @@ def put_rows(target: np.ndarray, rows: np.ndarray) -> None:
         target: (packets or 1, d, width), written in place.
         rows: (1 or m, d).
     """
-    for j in range(rows.shape[1]):
-        put(target[:, j], rows[:, j])
+    packets, d, width = target.shape
+    if len(rows) == 1:
+        target[...] = rows[:, :, None]
+        return
+    whole = len(rows) // width
+    target[:whole] = rows[: whole * width].reshape(whole, width, d).transpose(0, 2, 1)
+    if whole < packets:
+        target[whole, :, : len(rows) - whole * width] = rows[whole * width :].T
+        target[whole, :, len(rows) - whole * width :] = rows[-1][:, None]
 
 
 def fill(target: np.ndarray, value: Any) -> None:
@@ -50,7 +57,7 @@ def fill(target: np.ndarray, value: Any) -> None:
             diagonal and off-diagonal of symmetric matrices, or a mapping of these by name.
     """
     names = target.dtype.names or ()
-    if isinstance(value, Mapping):
+    if isinstance(value, dict):
         for name, entry in value.items():
             fill(target[name], entry)
     elif isinstance(value, tuple):
@@ -75,7 +82,7 @@ def longest(value: Any) -> int:
     Returns:
         1, or the number of members if any number varies.
     """
-    if isinstance(value, Mapping):
+    if isinstance(value, dict):
         return max(map(longest, value.values()), default=1)
     if isinstance(value, tuple):
         return max(map(longest, value))

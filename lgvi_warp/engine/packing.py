@@ -25,7 +25,7 @@ from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Packed, PackingContext, Term
 from lgvi_warp.physics.terms.drag import Drag
 from lgvi_warp.sampling.members import Members
-from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.ensemble import KEPT, Ensemble
 
 Fields = dict[str, Any]
 # A Plan, whose module imports this one.
@@ -186,15 +186,13 @@ class Packing:
         """
         m, frame, spec = self.members, self.frame, self.plan.spec
         attitude, velocity, rate = (_once(x) for x in (m.attitude, m.velocity, m.angular_velocity))
-        turned = not self._shared("axes kept", lambda numbers: bool(np.all(np.eye(3) == numbers[AXES][0].Q)))
-        shifted = self._shared("origin moved", lambda numbers: bool(np.any(numbers[AXES][0].origin)))
+        turned, shifted = self.numbers[AXES][0].turned, self.numbers[AXES][0].shifted
         R, nu, Om, position = attitude, velocity, rate, m.position
         if turned:
             R = attitude @ frame.Q
         if shifted:
-            origin = np.broadcast_to(frame.origin, (m.count, 3))
-            nu = velocity + np.cross(m.angular_velocity, origin)
-            position = position + notation.rotate_out(m.attitude, origin)
+            nu = velocity + notation.cross(rate, frame.origin)
+            position = position + notation.rotate_out(attitude, frame.origin)
         water = self._water_at_start()
         if water is not None:
             nu = nu - water
@@ -250,7 +248,9 @@ def rows_shared(plan: Plan) -> bool:
     Returns:
         True where one number of each row serves all members.
     """
-    packing = Packing(plan, plan.ensemble.select(0, 1))
+    # What few members need is packed once, here.
+    members = plan.ensemble.members
+    packing = Packing(plan, plan.ensemble.select(0, members if members <= KEPT else 1))
     each = (("law", packing.laws()), ("part", packing.control()))
     sizes = {
         (kind, i): law.rows.shape[1] for kind, packed in each for i, law in enumerate(packed) if law.rows is not None
@@ -264,13 +264,9 @@ def _once(values: np.ndarray) -> np.ndarray:
     return values[:1] if values.strides[0] == 0 else values
 
 
-# Places of the entries of a 3x3 matrix off its diagonal, row by row.
-OFF_DIAGONAL = [1, 2, 3, 5, 6, 7]
-
-
 def _diagonal(matrices: np.ndarray) -> np.ndarray | None:
     """Diagonals (n, 3) of matrices (n, 3, 3) that have no other entries; None where one has."""
-    if np.any(matrices.reshape(-1, 9)[:, OFF_DIAGONAL]):
+    if notation.off_diagonal(matrices).any():
         return None
     return np.einsum("nii->ni", matrices)
 

@@ -13,7 +13,7 @@ import numpy as np
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.shared import AXES, FRAME, MEMBERS, Shared, context
 from lgvi_warp.methods.method import Method, middle_axis
-from lgvi_warp.physics import inertia, terms, vehicle
+from lgvi_warp.physics import inertia, notation, terms, vehicle
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.terms.drag import Drag, has_exact_flow
@@ -43,11 +43,10 @@ def shape_of_mass(M: np.ndarray) -> str:
     Returns:
         "isotropic", "diagonal" or "full".
     """
-    off = np.abs(M[:, ~np.eye(3, dtype=bool)]).max(axis=1)
-    diagonal = np.einsum("nii->ni", M)
-    if np.any(off > DIAGONAL * np.abs(diagonal).max(axis=1)):
+    off, diagonal = notation.off_diagonal(M), np.einsum("nii->ni", M)
+    if off.any() and (np.abs(off).max(axis=1) > DIAGONAL * np.abs(diagonal).max(axis=1)).any():
         return "full"
-    return "isotropic" if np.all(diagonal == diagonal[:, :1]) else "diagonal"
+    return "isotropic" if (diagonal == diagonal[:, :1]).all() else "diagonal"
 
 
 def frame_of(method: Method, parameters: Parameters) -> tuple[Frame, np.ndarray, np.ndarray]:
@@ -221,6 +220,9 @@ def framed(method: Method, parameters: Parameters, shared: Shared) -> dict[str, 
     Returns:
         The parameters and, under FRAME, what `frame_of` returns; under AXES the same, but any mass matrix in it.
     """
+    completed: dict[str, Any] | None = shared.completed(parameters)
+    if completed is not None:
+        return completed
     p: dict[str, Any] = dict(parameters)
     if "vehicle.mass" in p:
         # Without coupling the axes do not depend on the mass.
@@ -236,6 +238,7 @@ def framed(method: Method, parameters: Parameters, shared: Shared) -> dict[str, 
         p[AXES] = p[FRAME] = shared(FRAME, p, functools.partial(frame_of, method))
         if not shared.keeps(FRAME):
             shared.varied.update((FRAME, AXES))
+    shared.remember(parameters, p)
     return p
 
 

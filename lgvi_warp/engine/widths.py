@@ -111,10 +111,14 @@ def path() -> Path:
     Returns:
         A path in the folder that holds the kernel caches of all versions of Warp.
     """
+    return _path(os.environ.get("WARP_CACHE_PATH"))
+
+
+@functools.cache
+def _path(folder: str | None) -> Path:
     from warp._src.thirdparty import appdirs
 
-    folder = os.environ.get("WARP_CACHE_PATH") or appdirs.user_cache_dir(appname="warp", appauthor="NVIDIA")
-    return Path(folder) / FILE
+    return Path(folder or appdirs.user_cache_dir(appname="warp", appauthor="NVIDIA")) / FILE
 
 
 def tuned() -> dict[str, int]:

@@ -238,19 +238,19 @@ def unpacked(
         By field: (samples, members, ...), in the field's unit.
     """
     samples = divided(fields, raw, table)
-    if not np.array_equal(frame.Q, np.broadcast_to(np.eye(3), frame.Q.shape)):
+    if frame.turned:
         # Products of contiguous matrices take half the time, and have the same bits.
         back = np.ascontiguousarray(np.swapaxes(frame.Q, -1, -2))
         turns = {"attitude": lambda R: np.ascontiguousarray(R) @ back}
         for name in samples.keys() - {"position", *SIGNALS}:
             turn = turns.get(name, lambda v: notation.rotate_out(frame.Q, v))
             samples[name] = turn(samples[name])
-    if np.any(frame.origin):
+    if frame.shifted:
         o = np.broadcast_to(frame.origin, (raw.shape[1], 3))
         if "position" in samples:
             samples["position"] = samples["position"] - np.einsum("knij,nj->kni", samples["attitude"], o)
         if "velocity" in samples:
-            samples["velocity"] = samples["velocity"] - np.cross(samples["angular_velocity"], o)
+            samples["velocity"] = samples["velocity"] - notation.cross(samples["angular_velocity"], o)
     return samples
 
 

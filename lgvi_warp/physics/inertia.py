@@ -7,6 +7,7 @@ all members) or n. A shift of the origin by d (body axes) leaves M and Js unchan
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -83,9 +84,10 @@ def motion_from(origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
     Returns:
         X (n, 6, 6), which act on (nu, Om).
     """
-    zero = np.zeros(np.broadcast_shapes(Q.shape, hat(origin).shape))
-    turned = zero + Q
-    return np.block([[turned, hat(origin) @ Q], [zero, turned]])
+    X = np.zeros((max(len(Q), len(origin)), 6, 6))
+    X[:, :3, :3] = X[:, 3:, 3:] = Q + 0.0  # without negative zeros
+    X[:, :3, 3:] = hat(origin) @ Q
+    return X
 
 
 def moved(I6: np.ndarray, origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
@@ -145,6 +147,21 @@ class Frame:
     E: np.ndarray
     E_forces: np.ndarray
 
+    @functools.cached_property
+    def turned(self) -> bool:
+        """Whether some member's axes are not the user's."""
+        return bool((np.eye(3) != self.Q).any())
+
+    @functools.cached_property
+    def shifted(self) -> bool:
+        """Whether some member's origin of the state is not the user's."""
+        return bool(self.origin.any())
+
+    @functools.cached_property
+    def from_forces(self) -> np.ndarray:
+        """Matrices (., 6, 6) that give the user's velocities from those at the origin of the forces, in these axes."""
+        return motion_from(self.forces, self.Q)
+
     @property
     def aligned(self) -> bool:
         """Whether every member's axes are the user's up to order and sense, and the origin of the forces is the user's."""
@@ -203,7 +220,7 @@ class Frame:
             Torques (n, ..., 3) [N m].
         """
         arm, torque, force = np.broadcast_arrays(_expanded(self.forces, force), torque, force)
-        return self.vector(torque - np.cross(arm, force))
+        return self.vector(torque - notation.cross(arm, force))
 
 
 def _expanded(origin: np.ndarray, like: np.ndarray) -> np.ndarray:

@@ -37,11 +37,15 @@ class MemberField:
 
 def _failure_time(plan: Plan, outcome: Outcome) -> np.ndarray:
     """Time of the last good state, or of the event [s]; NaN where there was neither."""
+    if not outcome.status.any():
+        return np.full(len(outcome.status), np.nan)
     return np.where(outcome.status != 0, outcome.end_time(plan), np.nan)
 
 
 def _failure_value(plan: Plan, outcome: Outcome) -> np.ndarray:
     """The value that crossed its limit; 0 for an event, NaN without."""
+    if not outcome.status.any():
+        return np.full(len(outcome.status), np.nan)
     size = np.where(stopped(outcome.status), 0.0, outcome.failed_size)
     return np.where(outcome.status != 0, size, np.nan)
 

@@ -18,7 +18,7 @@ from lgvi_warp.common.status import Status, failed
 from lgvi_warp.engine.executors import executor_of
 from lgvi_warp.engine.keepers.observation import observe
 from lgvi_warp.engine.plan import Plan
-from lgvi_warp.engine.shared import MEMBERS, SEED, Shared
+from lgvi_warp.engine.shared import Shared
 from lgvi_warp.engine.survey import survey
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
@@ -100,9 +100,7 @@ class Runner:
         """
         names = frozenset(fleet.varied_names)
         kind = self._kinds.get(names)
-        if kind is None:
-            kind = self._kinds[names] = _Kind(Shared({*names, MEMBERS, SEED}))
-        if self._last is not None:
+        if kind is not None and self._last is not None:
             method, h, dtype = self._last.method, self._last.grid.h, self._last.dtype
             if self._auto:
                 method = replace(method, iterations=enough_iterations(fleet, method, h, dtype))
@@ -120,6 +118,7 @@ class Runner:
         plan.compile()
         if plan.method.reason:  # chosen once, by the members of the first plan
             self.settings["method"] = plan.method
+        kind = self._kinds.setdefault(names, _Kind(plan.shared))
         facts = survey(fleet, plan.method, plan.grid.h, kind.shared, odd=False, most=SURVEYED)
         kind.plans[plan.method, facts.decisive] = self._last = plan
         return plan

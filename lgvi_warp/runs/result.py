@@ -394,7 +394,8 @@ class Drawn(Mapping[str, np.ndarray]):
 
     @functools.cached_property
     def _drawn(self) -> dict[str, np.ndarray]:
-        return self._ensemble.parameters(self._first, self._stop)
+        parameters = self._ensemble.parameters(self._first, self._stop)
+        return {name: values.copy() for name, values in parameters.items()}
 
     def __getitem__(self, name: str) -> np.ndarray:
         return self._drawn[name]

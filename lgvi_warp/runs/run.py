@@ -127,9 +127,8 @@ def run_plan(
     merged = Merged()
 
     def ended(n: int, whole: bool = True) -> Result:
-        run_seconds = time.perf_counter() - start
-        result = _in_memory(plan, n, observed, outcomes, samples, observing if whole else None, fields, known)
-        return replace(result, compile_seconds=compile_seconds, compile_phases=plan.phases, run_seconds=run_seconds)
+        seconds = compile_seconds, time.perf_counter() - start
+        return _in_memory(plan, n, observed, outcomes, samples, observing if whole else None, fields, known, seconds)
 
     def after(block: Block) -> None:
         assert on_block is not None
@@ -206,8 +205,12 @@ def _in_memory(
     observing: Observing | None,
     fields: Sequence[str] | None,
     known: Callable[[Plan], tuple[dict[str, Any], tuple[str, ...]]] | None,
+    seconds: tuple[float, float],
 ) -> Result:
-    """The result of the first n members; observing: their statistics, None if these include other members."""
+    """The result of the first n members, after so many seconds of compiling and of running.
+
+    observing: their statistics, None if these include other members.
+    """
     content, texts = (provenance(plan, observed, fields), messages(plan)) if known is None else known(plan)
     of_members = {name: values[:n] for name, values in member_fields.of(plan, outcomes.all).items()}
     estimates, remarks = Estimates(), tuple[str, ...]()
@@ -226,4 +229,7 @@ def _in_memory(
         provenance=at_end(content, of_members, n, plan.ensemble.members),
         terms=tuple(plan.ensemble.scene.terms),
         statistics=estimates,
+        compile_seconds=seconds[0],
+        compile_phases=plan.phases,
+        run_seconds=seconds[1],
     )

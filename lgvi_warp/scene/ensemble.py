@@ -26,7 +26,7 @@ from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.like import SceneLike
-from lgvi_warp.scene.settings import MOST_MEMBERS, EnsembleSettings
+from lgvi_warp.scene.settings import MOST_MEMBERS, EnsembleSettings, section
 from lgvi_warp.scene.start import ATTITUDES, NAMES, resolve_attitude
 from lgvi_warp.scene.variations import MATRICES, Target, Variation
 
@@ -195,6 +195,7 @@ class Ensemble(Summarized):
         # Positions of these members in the whole ensemble, and the indices that key their noise; None: all, in order.
         self._places: np.ndarray | None = None
         self._indices: np.ndarray | None = None
+        self._few: dict[str, np.ndarray] | None = None
         self.variations = self._described()
         self.space: Space = variations.space(self.seed, self.variations)
         self._whole = self._counted(settings)
@@ -379,10 +380,30 @@ class Ensemble(Summarized):
     def _values(self, first: int, stop: int, start: bool = True) -> dict[str, np.ndarray]:
         """Return the numbers of the members first to stop - 1 by name, with those of the start or without.
 
-        Values that all members share have a leading dimension of 1.
+        Values that all members share have a leading dimension of 1. Those of few members are drawn once and kept: a run
+        reads them several times.
         """
-        scene_values = self._base | (self._start if start and not self._explicit else {})
-        values = {name: np.asarray(value)[None] for name, value in scene_values.items()}
+        if self.members > KEPT:
+            return self._drawn(first, stop, start)
+        if self._few is None:
+            few = self._drawn(0, self.members, True)
+            for name in self.varied_names & few.keys():
+                few[name].flags.writeable = False
+            self._few = few
+        every = self._few.items() if start else ((name, self._few[name]) for name in self._base)
+        if (first, stop) == (0, self.members):
+            return dict(every)
+        return {name: values[first:stop] if len(values) > 1 else values for name, values in every}
+
+    @functools.cached_property
+    def _of_scene(self) -> dict[str, np.ndarray]:
+        """The scene's own numbers by name, with those of the start unless these are given, as arrays (1, ...)."""
+        values = self._base | ({} if self._explicit else self._start)
+        return {name: np.asarray(value)[None] for name, value in values.items()}
+
+    def _drawn(self, first: int, stop: int, start: bool) -> dict[str, np.ndarray]:
+        """Draw what `_values` returns."""
+        values = self._of_scene.copy() if start else {name: self._of_scene[name] for name in self._base}
         if self._explicit:
             rows = slice(first, stop) if self._places is None else self._places[first:stop]
             values |= {name: column[rows] for name, column in self._explicit.items() if start or name in self._base}
@@ -432,14 +453,14 @@ class Ensemble(Summarized):
         values = self._values(first, stop)
         start = {key.removeprefix("start."): values.pop(key) for key in self._start}
         # In one memory layout, on which the order of the sums of a matrix product depends.
-        R = np.broadcast_to(np.ascontiguousarray(self._attitude(start)), (m, 3, 3))
+        R = _of_each(np.ascontiguousarray(self._attitude(start)), m)
         if "velocity_inertial" in start:
             # Written out: the order of the sum, and so its bits, must not depend on the number of members.
             v = start["velocity_inertial"]
             nu = R[:, 0] * v[:, :1] + R[:, 1] * v[:, 1:2] + R[:, 2] * v[:, 2:]
         else:
             nu = start["velocity"]
-        position, nu, Om = (np.broadcast_to(x, (m, 3)) for x in (start["position"], nu, start["angular_velocity"]))
+        position, nu, Om = (_of_each(x, m) for x in (start["position"], nu, start["angular_velocity"]))
         return Members(values, position, R, nu, Om, self.indices_of(first, stop), self.seed)
 
     def _attitude(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -489,12 +510,18 @@ class Ensemble(Summarized):
         if chosen.min() < 0 or chosen.max() >= self.members:
             raise IndexError(f"members {chosen.min()} to {chosen.max()} of {self.members}")
         chosen = chosen.astype(np.int64)
-        ensemble = copy.copy(self)
+        ensemble = self._copy()
         ensemble._places = chosen if self._places is None else self._places[chosen]
         ensemble._indices = None if self._indices is None else self._indices[chosen]
         ensemble.members = len(chosen)
         # Some of these may lie beyond the members that were checked.
         ensemble.checked = len(chosen) if self.checked == self.members else 0
+        return ensemble
+
+    def _copy(self) -> Ensemble:
+        """Return an ensemble with what this one has, but for the numbers that were drawn."""
+        ensemble = copy.copy(self)
+        ensemble._few = None
         return ensemble
 
     def with_columns(self, columns: Mapping[str, np.ndarray]) -> Ensemble:
@@ -509,7 +536,7 @@ class Ensemble(Summarized):
         Raises:
             SceneError: If a member is unphysical.
         """
-        ensemble = copy.copy(self)
+        ensemble = self._copy()
         ensemble._columns = [(target, columns[target.label]) for target, _ in self._columns]
         ensemble._places = ensemble._indices = None
         ensemble._whole = ensemble.members = len(ensemble._columns[0][1])
@@ -526,12 +553,13 @@ class Ensemble(Summarized):
         Returns:
             The ensemble, whose members have the scene's values of these.
         """
-        ensemble = copy.copy(self)
+        ensemble = self._copy()
         ensemble.scene, ensemble._base = scene, scene.parameters()
         shared = ((name, ensemble._base[name]) for name in by_member)
         columns = [(Target(name), np.broadcast_to(value, (self._whole, *np.shape(value)))) for name, value in shared]
         ensemble._columns = [*self._columns, *columns]
-        ensemble.__dict__.pop("varied_names", None)
+        for name in ("varied_names", "_of_scene"):
+            ensemble.__dict__.pop(name, None)
         return ensemble
 
     def with_seed(self, seed: int, members: int | None = None) -> Ensemble:
@@ -548,7 +576,7 @@ class Ensemble(Summarized):
             SceneError: If the sampling cannot have so many members, or a member is unphysical.
         """
         settings = EnsembleSettings(members, seed, self.vary, self.sampling)
-        ensemble = copy.copy(self)
+        ensemble = self._copy()
         ensemble.seed = int(settings.seed)
         ensemble.space = variations.space(ensemble.seed, self.variations)
         if members is not None:
@@ -600,10 +628,12 @@ class Ensemble(Summarized):
             members, seed, vary, sampling and indices as in a scene file, and under "explicit" the names of the numbers
             that were given as arrays.
         """
-        settings = EnsembleSettings(self._whole, self.seed, self.vary, self.sampling, self._places)
-        return settings.to_dict() | ({"explicit": sorted(self._explicit)} if self._explicit else {})
+        content = section(self._whole, self.seed, self.vary, self.sampling, self._places)
+        return content | ({"explicit": sorted(self._explicit)} if self._explicit else {})
 
 
+# Most members whose numbers an ensemble keeps once they are drawn.
+KEPT = 1024
 # Members that are checked together before a run: some tens of megabytes per thread.
 AT_ONCE = 16_384
 # Members that are drawn and checked before a run; the others are checked as the run comes to them.
@@ -626,6 +656,13 @@ def over_members(look: Callable[[int, int], Found], members: int) -> list[Found]
         return [look(0, members)] if members else []
     with ThreadPoolExecutor(min(machine.thread_count(), max(1, len(firsts)))) as pool:
         return list(pool.map(lambda first: look(first, min(first + AT_ONCE, members)), firsts))
+
+
+def _of_each(values: np.ndarray, members: int) -> np.ndarray:
+    """Return values (1 or n, ...) as those of n members, which nobody writes into."""
+    if len(values) == members and not values.flags.writeable:
+        return values
+    return np.broadcast_to(values, (members, *values.shape[1:]))
 
 
 @dataclass
@@ -768,7 +805,9 @@ def _explicit_parameter(faults: Faults, key: str, value: Any, shape: tuple[int, 
 
 def _positive_definite(matrices: np.ndarray) -> np.ndarray:
     """Return which symmetric matrices (n, d, d) are positive definite, by elimination; False where not finite."""
-    d = matrices.shape[-1]
+    d, diagonals = matrices.shape[-1], np.einsum("nii->ni", matrices)
+    if np.count_nonzero(matrices) == np.count_nonzero(diagonals):  # diagonal matrices
+        return np.asarray(((diagonals >= vehicles.LEAST) & np.isfinite(diagonals)).all(axis=1))
     remainder = matrices.copy()
     good = np.isfinite(matrices).all(axis=(1, 2))
     for k in range(d):

@@ -3,12 +3,13 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -222,6 +223,11 @@ class Scene(Summarized):
         Returns:
             Tables by section name. `Scene.from_dict` builds the same scene from them.
         """
+        return cast("dict[str, Any]", _copied(self._tables))
+
+    @functools.cached_property
+    def _tables(self) -> dict[str, Any]:
+        """The tables of `to_dict`, made once: the numbers of a scene never change."""
         content: dict[str, Any] = {
             "vehicle": self.vehicle.to_dict(),
             "environment": self.environment.to_dict(),
@@ -235,6 +241,16 @@ class Scene(Summarized):
         if self.events:
             content["events"] = [event.to_dict() for event in self.events]
         return content | ({"ensemble": self.ensemble_settings.to_dict()} if self.ensemble_settings else {})
+
+
+def _copied(content: Any) -> Any:
+    """Tables and lists of plain values, copied down to the values."""
+    if type(content) is dict:
+        return {key: _copied(value) for key, value in content.items()}
+    if type(content) is not list:
+        return content
+    plain = content and type(content[0]) is float
+    return content.copy() if plain else [_copied(value) for value in content]
 
 
 SECTIONS = ("vehicle", "environment", "start", "ensemble", "run", "terms", "events", "controller", "source")

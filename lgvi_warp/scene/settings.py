@@ -15,6 +15,7 @@ from lgvi_warp.common.real_numbers import holds_words, is_whole
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
 from lgvi_warp.methods.method import Method
 from lgvi_warp.sampling.designs import sampling_of
+from lgvi_warp.sampling.designs.base import Sampling
 from lgvi_warp.sampling.distributions import named as distributions
 
 # Largest ensemble: a kernel keys a member's noise by its index, a signed word of 32 bits.
@@ -217,13 +218,31 @@ class EnsembleSettings:
         Returns:
             The seed and every setting that differs from its default, by name.
         """
-        content: dict[str, Any] = {} if self.members is None else {"members": int(self.members)}
-        content["seed"] = int(self.seed)
-        if self.vary:
-            content["vary"] = {name: distribution.to_dict() for name, distribution in self.vary.items()}
-        if self.sampling.kind != "random":
-            content["sampling"] = self.sampling.to_dict()
-        return content | ({} if self.indices is None else {"indices": np.asarray(self.indices).tolist()})
+        return section(self.members, self.seed, self.vary, self.sampling, self.indices)
+
+
+def section(
+    members: int | None, seed: int, vary: Mapping[str, Any], sampling: Sampling, indices: Any
+) -> dict[str, Any]:
+    """Write the section [ensemble] of a scene file from settings that were checked.
+
+    Args:
+        members: Number of members; None where the sampling says it.
+        seed: Seed of the draws.
+        vary: Distributions by name.
+        sampling: How members are drawn.
+        indices: Indices of the members; None for all.
+
+    Returns:
+        The seed and every setting that differs from its default, by name.
+    """
+    content: dict[str, Any] = {} if members is None else {"members": int(members)}
+    content["seed"] = int(seed)
+    if vary:
+        content["vary"] = {name: distribution.to_dict() for name, distribution in vary.items()}
+    if sampling.kind != "random":
+        content["sampling"] = sampling.to_dict()
+    return content | ({} if indices is None else {"indices": np.asarray(indices).tolist()})
 
 
 def _whole_numbers(value: Any) -> bool:

@@ -207,7 +207,8 @@ def put(values: dict[str, np.ndarray], target: Target, drawn: np.ndarray) -> Non
         values[target.name] = drawn
         return
     array = values[target.name]
-    array = np.array(np.broadcast_to(array, (len(drawn), *array.shape[1:])))
+    array, shared = np.empty((len(drawn), *array.shape[1:]), array.dtype), array
+    array[...] = shared
     every: tuple[Any, ...] = (slice(None),)
     array[every + target.index] = drawn
     if target.name in MATRICES:

@@ -121,7 +121,7 @@ class Functional:
         if self.over_path:
             values = self.inner(samples, members).astype(np.float64, copy=False)
             return self.reduction.over(values, samples.time).T
-        values = np.moveaxis(self.quantity(samples, members).astype(np.float64, copy=False), 1, 2)
+        values = self.quantity(samples, members).astype(np.float64, copy=False).transpose(0, 2, 1)
         return self._applied(self.functions, values)
 
     def as_quantity(self) -> Quantity:

@@ -85,7 +85,7 @@ class Quantity:
             wanted = f"({k}, {n})" if self.size == 1 else f"({k}, {n}, {self.size})"
             raise ValueError(f"quantity {self.name}: gave shape {values.shape}; {wanted} is wanted: times, members")
         real = np.float32 if values.dtype == np.float32 else np.float64
-        return np.ascontiguousarray(np.moveaxis(values.reshape(k, n, self.size), 2, 1), dtype=real)
+        return np.ascontiguousarray(values.reshape(k, n, self.size).transpose(0, 2, 1), dtype=real)
 
 
 def _field(name: str) -> Function:
@@ -219,7 +219,7 @@ def joined(parts: Sequence[Quantity]) -> Quantity:
         return parts[0]
 
     def function(samples: Fields, members: Members) -> np.ndarray:
-        return np.moveaxis(np.concatenate([part(samples, members) for part in parts], axis=1), 1, 2)
+        return np.concatenate([part(samples, members) for part in parts], axis=1).transpose(0, 2, 1)
 
     fields = ordered(name for part in parts for name in part.fields)
     units: Mapping[str, None] = dict.fromkeys(part.unit for part in parts)

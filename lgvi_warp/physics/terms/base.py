@@ -497,6 +497,10 @@ def _amount(shape: tuple[Any, ...]) -> str:
 def _outside(one: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
     """Mask (n,) of the members whose values (n, ...) of a field are not finite, or out of its bounds."""
     flat, meta = values.reshape(len(values), -1), one.metadata
+    if flat.size:
+        low, high = flat.min(), flat.max()  # NaN if any is
+        if meta["least"] <= low and meta["above"] < low and high <= meta["most"] and np.isfinite(high - low):
+            return np.zeros(len(values), bool)
     with np.errstate(invalid="ignore"):
         inside = (flat >= meta["least"]) & (flat <= meta["most"]) & (flat > meta["above"])
     return ~np.all((np.isfinite(flat) | meta["infinite"]) & inside, axis=1)

@@ -10,7 +10,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics import vehicle
-from lgvi_warp.physics.inertia import Frame, motion_from
+from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
 ZEROS = (0.0,) * 6
@@ -177,7 +177,10 @@ class DragMatrix(Term):
         """In addition, refuses members whose matrix creates energy."""
         bad = super().unphysical(numbers)
         for kind in ("linear", "quadratic"):
-            bad[kind] = bad[kind] | _creates_energy(np.nan_to_num(numbers[kind]), kind == "quadratic")[0]
+            if np.array_equal(numbers[kind], getattr(self, kind)[None]):
+                continue  # those of the scene, which `check` let through
+            matrices = np.nan_to_num(numbers[kind]) if bad[kind].any() else numbers[kind]
+            bad[kind] = bad[kind] | _creates_energy(matrices, kind == "quadratic")[0]
         return bad
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
@@ -227,14 +230,21 @@ def _surely_brakes_quadratically(matrices: np.ndarray) -> np.ndarray:
     By |v_i| v_j^2 <= (|v_i|^3 + 2 |v_j|^3)/3, in velocities whose own drag is |v_i|^3. Sufficient only.
     """
     diagonal = np.einsum("nii->ni", matrices)
-    alone = ~np.any(matrices - diagonal[:, :, None] * np.eye(6), axis=(1, 2))
+    brakes = (diagonal >= 0.0).all(axis=1)
+    # Most matrices have few entries beside the diagonal, the same ones in all members.
+    beside = [(i, j) for i, j in np.argwhere(matrices.any(axis=0)).tolist() if i != j]
+    if not beside:
+        return np.asarray(brakes)
+    alone, others = np.ones(len(matrices), bool), np.zeros((len(matrices), 6))
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         size = 1.0 / np.cbrt(diagonal)
-        scaled = np.abs(matrices) * size[:, :, None] * size[:, None, :] ** 2
-        others = (scaled.sum(axis=2) + 2.0 * scaled.sum(axis=1)) / 3.0
-        # The diagonal counts 1 in either sum.
-        outweighs = np.all(others <= 2.0, axis=1)
-    return np.asarray(np.all(diagonal >= 0.0, axis=1) & (alone | outweighs))
+        for i, j in beside:
+            entry = matrices[:, i, j]
+            alone &= entry == 0.0
+            scaled = np.abs(entry) * size[:, i] * size[:, j] ** 2
+            others[:, i] += scaled
+            others[:, j] += 2.0 * scaled
+        return np.asarray(brakes & (alone | (others <= 3.0).all(axis=1)))
 
 
 def _searched(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -270,16 +280,18 @@ def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, context: PackingCon
         The rows, and which parts are present.
     """
     # X gives the user's velocities from those at the origin of the forces in the kernel's axes.
-    X = motion_from(context.frame.forces, context.frame.Q)
+    X = context.frame.from_forces
     n = max(len(linear), len(quadratic), len(X))
-    X = np.broadcast_to(X, (n, 6, 6))
     XT = np.swapaxes(X, 1, 2)
-    values = {"constant": int(np.any(linear))}
-    rows = [(XT @ linear @ X).reshape(n, 36)]
+    columns = np.flatnonzero(quadratic.any(axis=0).any(axis=0)).tolist()
+    rows = np.empty((n, 72 if context.aligned else 36 + 12 * len(columns)))
+    rows[:, :36] = (XT @ linear @ X).reshape(-1, 36)
+    values = {"constant": int(linear.any())}
     if context.aligned:
-        rows.append((XT @ quadratic @ X).reshape(n, 36))
-        return Packed(values | {"quadratic": int(np.any(quadratic))}, np.concatenate(rows, axis=1))
-    columns = [j for j in range(6) if np.any(quadratic[:, :, j])]
-    for j in columns:
-        rows += [X[:, j, :], np.einsum("nij,nj->ni", XT, np.broadcast_to(quadratic[:, :, j], (n, 6)))]
-    return Packed(values | {"count": len(columns)}, np.concatenate(rows, axis=1))
+        rows[:, 36:] = (XT @ quadratic @ X).reshape(-1, 36)
+        return Packed(values | {"quadratic": int(bool(columns))}, rows)
+    XT = np.broadcast_to(XT, (n, 6, 6))
+    for at, j in zip(range(36, rows.shape[1], 12), columns, strict=True):
+        rows[:, at : at + 6] = X[:, j, :]
+        rows[:, at + 6 : at + 12] = np.einsum("nij,nj->ni", XT, np.broadcast_to(quadratic[:, :, j], (n, 6)))
+    return Packed(values | {"count": len(columns)}, rows)

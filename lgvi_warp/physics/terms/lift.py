@@ -8,7 +8,6 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.physics.inertia import motion_from
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
 
@@ -46,7 +45,7 @@ class BodyLift(Term):
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """Rows that measure u (6), and the matrix (36), in the axes and about the origin of the forces."""
-        X = motion_from(context.frame.forces, context.frame.Q)
+        X = context.frame.from_forces
         matrix = np.swapaxes(X, 1, 2) @ numbers["matrix"] @ X
         ahead = np.broadcast_to(X[:, 0, :], (len(matrix), 6))
         return Packed({}, np.concatenate([ahead, matrix.reshape(-1, 36)], axis=1))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from lgvi_warp.engine.shared import FRAME, MEMBERS, SEED, Reads, Shared, context
+from lgvi_warp.scene.ensemble import KEPT
 
 NUMBERS = {"a.x": np.ones((1, 3)), "b.y": np.zeros(5)}
 WAYS = {
@@ -57,3 +58,28 @@ def test_a_context_notes_what_it_is_asked_for(name, field):
     reads.names.clear()
     assert vars(asked)[field] is not None and name in reads.names
     assert type(context(NUMBERS, "frame", np.arange(5), 7, 0.01, True)).__name__ == "PackingContext"
+
+
+@pytest.mark.parametrize(("members", "remembers"), [(1, True), (KEPT, True), (KEPT + 1, False)])
+def test_what_follows_from_few_members_is_remembered(members, remembers):
+    shared, mass = Shared({"vehicle.mass", MEMBERS}), np.ones(members)
+    numbers = {"vehicle.mass": mass, "vehicle.buoyancy": np.ones(1)}
+    assert shared.completed(numbers) is None
+    with_frame = numbers | {FRAME: "frame", MEMBERS: np.arange(members)}
+    shared.remember(numbers, with_frame)
+    assert shared.completed(dict(numbers)) is (with_frame if remembers else None)
+    assert shared.completed(numbers | {"vehicle.mass": mass.copy()}) is None
+    calls = []
+
+    def total(numbers):
+        calls.append(numbers["vehicle.mass"])
+        return numbers["vehicle.mass"].sum() + len(calls)
+
+    # Once for the members that are remembered, and each time for others and for what is keyed by members.
+    once = [shared("total", with_frame, total) for _ in range(3)]
+    assert once == [members + 1.0] * 3 if remembers else [members + 1.0, members + 2.0, members + 3.0]
+    assert shared("total", dict(numbers), total) == members + len(calls)
+    of_members = [shared("of members", with_frame, lambda n: total(n) + n[MEMBERS][0]) for _ in range(2)]
+    assert of_members[1] == of_members[0] + 1
+    shared.remember({"vehicle.mass": 2.0 * mass}, {"vehicle.mass": 2.0 * mass})
+    assert shared.completed(numbers) is None

@@ -8,6 +8,8 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.physics import notation
+from lgvi_warp.runs.result import Drawn
+from lgvi_warp.scene import ensemble as ensembles
 
 FULL = np.array([[5.0, 0.3, 0.1], [0.3, 6.0, -0.2], [0.1, -0.2, 7.0]])
 EVERYTHING = {
@@ -109,6 +111,14 @@ def test_the_scene_file_describes_the_ensemble(scene):
 # Reproducible ------------------------------------------------------------------------------------------------------
 
 
+@pytest.fixture(params=["kept", "drawn anew"])
+def _either_way(request, monkeypatch):
+    """Numbers of few members are drawn once and kept, those of many are drawn each time."""
+    if request.param == "drawn anew":
+        monkeypatch.setattr(ensembles, "KEPT", 0)
+
+
+@pytest.mark.usefixtures("_either_way")
 def test_any_run_gives_the_same_members(scene):
     fleet = lw.Ensemble(scene, 1000, 3, EVERYTHING)
     whole = fleet.select(0, 1000)
@@ -116,10 +126,36 @@ def test_any_run_gives_the_same_members(scene):
         assert_same(fleet.select(first, stop), whole, slice(first, stop))
 
 
+@pytest.mark.usefixtures("_either_way")
 def test_any_order_gives_the_same_members(scene):
     fleet = lw.Ensemble(scene, 100, 3, EVERYTHING)
     order = np.random.default_rng(0).permutation(100)[:30]
     assert_same(fleet.subset(order).select(0, 30), fleet.select(0, 100), order)
+
+
+def test_few_members_are_drawn_once(scene):
+    fleet = lw.Ensemble(scene, 5, 3, EVERYTHING)
+    few, some = fleet.select(0, 5), fleet.select(1, 3)
+    for name in ("vehicle.mass", "vehicle.added_mass"):
+        values = few.parameters[name]
+        assert fleet.parameters(0, 5)[name] is values and not values.flags.writeable
+        np.testing.assert_array_equal(some.parameters[name], values[1:3])
+    assert fleet.with_seed(4).select(0, 5).parameters["vehicle.mass"][0] != few.parameters["vehicle.mass"][0]
+
+
+def test_parameters_of_a_result_are_copies(scene):
+    fleet = lw.Ensemble(scene, 5, 3, EVERYTHING)
+    drawn, masses = Drawn(fleet, 5), fleet.parameters(0, 5)["vehicle.mass"].copy()
+    for name in ("vehicle.mass", "environment.gravity"):
+        drawn[name][...] = 7.0
+    np.testing.assert_array_equal(fleet.parameters(0, 5)["vehicle.mass"], masses)
+    assert not np.any(fleet.parameters(0, 5)["environment.gravity"] == 7.0)
+
+
+def test_a_scene_describes_itself_anew_each_time(scene):
+    scene.to_dict()["vehicle"]["center_of_buoyancy"][0] = 7.0
+    scene.to_dict()["run"].clear()
+    assert scene.to_dict() == dataclasses.replace(scene).to_dict() != {}
 
 
 def test_the_number_of_members_does_not_matter(scene):

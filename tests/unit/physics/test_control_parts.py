@@ -148,3 +148,12 @@ def test_a_policy_lies_beside_its_scene(tmp_path):
         "[[controller.laws]]\ntype = 'policy'\nfile = 'policy.npz'\ninputs = ['depth_error']\noutputs = ['Z']\n"
     )
     assert lw.Scene.load(tmp_path / "scene.toml").controller.laws[0].file == str(tmp_path / "policy.npz")
+
+
+def test_what_wiring_sets_is_not_given():
+    named = {"bus": None, "actuators": {}}
+    for name, value in named.items():
+        with pytest.raises(TypeError, match=name):
+            lw.Controller(period=0.1, laws=[lw.HeadingPID(kp=1.0)], **{name: value})
+    shown = repr(lw.Controller(period=0.1, laws=[lw.HeadingPID(kp=1.0)]))
+    assert not any(f"{name}=" in shown for name in named)

@@ -151,9 +151,6 @@ def test_a_policy_lies_beside_its_scene(tmp_path):
 
 
 def test_what_wiring_sets_is_not_given():
-    named = {"bus": None, "actuators": {}}
-    for name, value in named.items():
+    for name, value in {"bus": None, "actuators": {}}.items():
         with pytest.raises(TypeError, match=name):
             lw.Controller(period=0.1, laws=[lw.HeadingPID(kp=1.0)], **{name: value})
-    shown = repr(lw.Controller(period=0.1, laws=[lw.HeadingPID(kp=1.0)]))
-    assert not any(f"{name}=" in shown for name in named)

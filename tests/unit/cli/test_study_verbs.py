@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The verbs of studies: what their arguments reach, what they write and how they end. No study runs."""
+
+import json
+from types import SimpleNamespace
+
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp import cli
+from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.studies import sensitivity as uq
+from lgvi_warp.studies.stability.map import GRIDS
+from tests.conftest import ROOT
+from tests.unit.cli.test_terminal import region, sobol
+from tests.unit.studies.test_cost import found as tradeoff_of
+
+PAPER = str(ROOT / "examples" / "paper.toml")
+
+
+class Study:
+    """Stands for the function of a study: keeps what it is called with.
+
+    Args:
+        result: What it returns; an error is raised.
+    """
+
+    def __init__(self, result):
+        self.result, self.calls = result, []
+
+    def __call__(self, *values, **settings):
+        self.calls.append((values, settings))
+        result = self.result[len(self.calls) - 1] if isinstance(self.result, list) else self.result
+        if isinstance(result, BaseException):
+            raise result
+        return result
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """The pictures that are drawn: (name of the function, file)."""
+    names = []
+
+    def plot(name):
+        return lambda found, path: (names.append((name, path.name)), path.write_text("a picture"))
+
+    for name in ("tradeoff", "stability", "sensitivity"):
+        monkeypatch.setattr(f"lgvi_warp.views.plots.plot_{name}", plot(name))
+    return names
+
+
+def test_arguments_of_a_tradeoff(tmp_path, monkeypatch, drawn, capsys):
+    measure = Study(tradeoff_of(4.0))
+    monkeypatch.setattr("lgvi_warp.studies.tradeoff.tradeoff", measure)
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["tradeoff", PAPER, "--members", "7", "-q"]) == 0
+    assert capsys.readouterr() == ("", "")
+    more = ["--of", "depth", "--methods", "rk4, psi_s", "--seconds", "3", "--out", "b"]
+    assert cli.main(["tradeoff", PAPER, *more]) == 0
+    ((scene,), settings), (_, others) = measure.calls
+    assert scene.ensemble_settings.members == 7
+    assert settings == {"of": "position", "methods": None, "seconds": 45.0, "progress": None}
+    assert others.pop("progress") is not None
+    assert others == {"of": "depth", "methods": ["rk4", "psi_s"], "seconds": 3.0}
+    assert drawn == [("tradeoff", "tradeoff.png")] * 2
+    for folder in ("runs/paper_tradeoff", "b"):
+        assert sorted(path.name for path in (tmp_path / folder).iterdir()) == [
+            "tradeoff.csv", "tradeoff.json", "tradeoff.png"]  # fmt: skip
+    said = capsys.readouterr().out.split("\n")
+    files = [line.partition(" (")[0] for line in said[-4:-1]]
+    assert said[-5] == "" and files == [f"file        b/tradeoff.{end}" for end in ("json", "csv", "png")]
+
+
+def test_a_picture_that_fails_is_an_exit_code(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("lgvi_warp.studies.tradeoff.tradeoff", Study(tradeoff_of(4.0)))
+    for error, code, text in ((OSError("no room"), 1, "no room"), (NothingToDraw("no rows"), 0, "no rows")):
+        monkeypatch.setattr("lgvi_warp.views.plots.plot_tradeoff", Study(error))
+        assert cli.main(["tradeoff", PAPER, "--out", str(tmp_path), "-q"]) == code
+        picture = tmp_path / "tradeoff.png"
+        assert capsys.readouterr().err == f"lgvi-warp: {picture} was not written: {text}\n"
+
+
+def test_arguments_of_a_sensitivity_study(tmp_path, monkeypatch, drawn, capsys):
+    analyses = {"sobol": Study(sobol()), "morris": Study(sobol())}
+    for name, study in analyses.items():
+        monkeypatch.setattr(uq, name, study)
+    verb = ["sensitivity", PAPER, "--out", str(tmp_path)]
+    assert cli.main([*verb, "-q"]) == 0 and cli.main([*verb, "--first-order", "--samples", "0", "-q"]) == 0
+    assert cli.main([*verb, "--analysis", "morris", "-q"]) == 0
+    more = ["--of", "depth", "--of", "speed", "--samples", "5", "--failed", "drop", "--threads", "3", "--seed", "4"]
+    assert cli.main([*verb, "--analysis", "morris", *more]) == 0
+    (plain, first), (coarse, named) = (study.calls for study in analyses.values())
+    common = {"failed": "refuse", "threads": None, "progress": None}
+    assert plain[0][1] == ["position[2]"] and plain[1] == common | {"samples": 256, "second_order": True}
+    assert first[1] == common | {"samples": 0, "second_order": False}
+    assert coarse[1] == common | {"samples": 64}
+    assert named[0][0].ensemble_settings.seed == 4 and named[0][1] == ["depth", "speed"]
+    assert named[1].pop("progress") is not None
+    assert named[1] == {"failed": "drop", "threads": 3, "samples": 5}
+    assert drawn == [("sensitivity", "sensitivity.png")] * 4
+    said = capsys.readouterr().out
+    assert said.startswith(f"{sobol()}\n\nfile        {tmp_path}/sensitivity.")
+    assert said.count("file  ") == 4 and said.endswith("MB)\n")
+
+
+@pytest.mark.parametrize("error", [uq.FailedMembers("3 members failed"), ImportError("no scipy")])
+def test_a_sensitivity_study_that_fails_is_one_line(tmp_path, monkeypatch, capsys, error):
+    monkeypatch.setattr(uq, "sobol", Study(error))
+    assert cli.main(["sensitivity", PAPER, "--out", str(tmp_path), "-q"]) == 1
+    assert capsys.readouterr() == ("", f"lgvi-warp: {error}\n") and not list(tmp_path.iterdir())
+
+
+def test_arguments_of_a_stability_map(tmp_path, monkeypatch, drawn):
+    study = Study(region())
+    monkeypatch.setattr("lgvi_warp.studies.stability.map.stability_map", study)
+    verb = ["stability", PAPER, "-q", "--out", str(tmp_path)]
+    more = ["--x", "h=0.1:1", "--y", "vehicle.mass", "--methods", "psi", "--points", "5", "--error", "0.5", "--of", "depth"]
+    assert cli.main(verb) == 0 and cli.main([*verb, *more, "--duration", "9", "--seed", "11"]) == 0
+    (plain, named) = study.calls
+    assert plain[0][1:] == ("h", "angular_velocity", None)
+    seed = lw.Scene.load(PAPER).ensemble_settings.seed
+    assert plain[1] == {"points": 24, "t1": None, "error": 0.01, "of": "attitude", "seed": seed, "progress": None}
+    assert named[0][1:] == ("h=0.1:1", "vehicle.mass", ["psi"])
+    assert named[1] == {"points": 5, "t1": 9.0, "error": 0.5, "of": "depth", "seed": 11, "progress": None}
+    assert drawn == [("stability", "stability.png")] * 2
+
+
+def test_a_scene_without_an_ensemble_has_the_seed_0(tmp_path, monkeypatch, drawn):
+    study = Study(region())
+    monkeypatch.setattr("lgvi_warp.studies.stability.map.stability_map", study)
+    scene = tmp_path / "bare.toml"
+    scene.write_text('[vehicle]\nname = "sphere"\n')
+    assert cli.main(["stability", str(scene), "-q", "--x", "speed", "--out", str(tmp_path / "out")]) == 0
+    (values, settings), = study.calls
+    assert settings["seed"] == 0 and values[1:3] == ("speed", "angular_velocity")
+
+
+def test_grids_of_a_stability_study(tmp_path, monkeypatch, drawn, capsys):
+    fractions, whole = [], []
+
+    def study(scene, x, y, methods, progress, **settings):
+        progress(0.5)
+        fractions.append((x, y))
+        return region()
+
+    monkeypatch.setattr("lgvi_warp.studies.stability.map.stability_map", study)
+    closing = SimpleNamespace(close=lambda: None)
+    monkeypatch.setattr("lgvi_warp.cli.progress.Progress", lambda *_: Calling(whole, closing))
+    verb = ["stability", PAPER, "--out", str(tmp_path)]
+    assert cli.main([*verb, "--grid", "mass"]) == 0
+    assert fractions == [GRIDS["mass"]] and whole == [0.5] and drawn == [("stability", "stability_mass.png")]
+    assert cli.main([*verb, "--grid", "all"]) == 0
+    assert fractions[1:] == list(GRIDS.values()) and whole[1:] == pytest.approx([0.5 / 3, 1.5 / 3, 2.5 / 3])
+    assert {path.name for path in tmp_path.glob("*.json")} == {f"stability_{name}.json" for name in GRIDS}
+    # One report for each, and a blank line between them.
+    said = capsys.readouterr().out
+    report = said.partition("\n\nfile")[0]
+    assert said.partition(report)[2].count(f"{report}\n\n") == 3
+    for axis in ("--x", "--y"):
+        assert cli.main([*verb, "--grid", "mass", axis, "h"]) == 2
+        words = "--grid mass: names the same axes as --x and --y; leave out --grid, or both of them"
+        assert capsys.readouterr().err == f"lgvi-warp: {words}\n"
+
+
+class Calling:
+    """A progress that keeps its fractions."""
+
+    def __init__(self, fractions, closing):
+        self.fractions, self.close = fractions, closing.close
+
+    def __call__(self, fraction):
+        self.fractions.append(fraction)
+
+
+def test_an_interrupted_stability_study_says_which_maps_are_finished(tmp_path, monkeypatch, drawn, capsys):
+    interrupted = KeyboardInterrupt()
+    for results, text in (([interrupted], "nothing was written"),
+                          ([region(), region(), interrupted], f"2 of 3 maps are finished, in {tmp_path}")):  # fmt: skip
+        monkeypatch.setattr("lgvi_warp.studies.stability.map.stability_map", Study(results))
+        assert cli.main(["stability", PAPER, "--grid", "all", "--out", str(tmp_path), "-q"]) == 130
+        assert capsys.readouterr().err == f"lgvi-warp: interrupted; {text}\n"
+
+
+class Swept:
+    """What a sweep of three cells found, of which some were refused."""
+
+    def __init__(self, refused):
+        cases = [SimpleNamespace(name=name) for name in "ab"]
+        self.setup = SimpleNamespace(axes={"delay": [1, 2]})
+        self.cells = [SimpleNamespace(case=cases[i // 2], index=i, point={"delay": 1 + i % 2}) for i in range(3)]
+        self.refused, self.runs = refused, []
+
+    def record(self, cell):
+        return SimpleNamespace(refused=self.refused[cell.index])
+
+    def save(self, out):
+        (out / "sweep.json").write_text('{"seed": 3}')
+        return [out / "sweep.json"]
+
+    def worst(self, count):
+        every = [("a", 2, 9), ("b", 1, 4), ("a", 2, 5), ("a", 1, 1)]
+        return [{"case": case, "delay": delay, "member": member} for case, delay, member in every[:count]]
+
+    def cell(self, case, at):
+        return next(cell for cell in self.cells if cell.case.name == case and cell.point == at)
+
+    def again(self, case, members, point):
+        self.runs.append((case, members, point))
+        return f"members {members} of {case}"
+
+    def __str__(self):
+        return "the sweep in words"
+
+
+@pytest.fixture
+def sweep(tmp_path, monkeypatch):
+    """A function of what was refused and of options: exit code, what the sweep was called with, what it found."""
+    file = {"scene": "a scene", "cases": "cases", "members": 40, "seed": 1, "baseline": "a", "metrics": ("m",), "step": 0.1}
+    monkeypatch.setattr("lgvi_warp.studies.sweeps.file.arguments_of_file", lambda path: dict(file, file=path))
+    monkeypatch.setattr("lgvi_warp.views.sweeps.pictures", lambda _: {"a.png": lambda found, path: path.write_text("a")})
+
+    def run(*options, refused=("", "", "")):
+        found = Swept(refused)
+        study = Study(found)
+        monkeypatch.setattr("lgvi_warp.studies.sweeps.sweep.sweep", study)
+        code = cli.main(["sweep", "laws.toml", "--out", str(tmp_path / "out"), *options])
+        return code, study.calls, found
+
+    return run
+
+
+def test_arguments_of_a_sweep(sweep, tmp_path, capsys):
+    code, (((), settings),), _ = sweep("-q", "--members", "1e3", "--seed", "-2", "--threads", "3", "--executor", "dask",
+                                       "--scheduler", "tcp://x")  # fmt: skip
+    assert code == 0 and settings == {
+        "file": "laws.toml", "scene": "a scene", "cases": "cases", "members": 1000, "seed": -2, "baseline": "a",
+        "metrics": ("m",), "step": 0.1, "threads": 3, "executor": "dask", "scheduler": "tcp://x",
+        "out": tmp_path / "out", "progress": None,
+    }  # fmt: skip
+    assert capsys.readouterr() == ("", "") and (tmp_path / "out" / "a.png").read_text() == "a"
+    _, (((), settings),), found = sweep("--members", "many")
+    assert (settings["members"], settings["seed"]) == ("many", 1) and settings["progress"] is not None
+    assert found.runs == []  # nothing is recorded that was not asked for
+    lines = capsys.readouterr().out.split("\n")
+    assert lines[:2] == ["the sweep in words", ""]
+    assert [line.partition(" (")[0] for line in lines[2:]] == [
+        f"file        {tmp_path}/out/sweep.json", f"file        {tmp_path}/out/a.png", ""]  # fmt: skip
+    assert sweep("--json")[0] == 0
+    assert json.loads(capsys.readouterr().out)["content"] == {"sweep": {"seed": 3}}
+
+
+def test_a_sweep_of_refused_cells_alone_failed(sweep):
+    assert sweep("-q", refused=("", "no", "no"))[0] == 0 and sweep("-q", refused=("no",) * 3)[0] == 1
+
+
+def test_the_worst_members_are_recorded_by_cell(sweep, tmp_path, monkeypatch, capsys):
+    recorded = []
+
+    def log(result, path):
+        recorded.append((result, path.name))
+        path.write_text("a recording")
+
+    monkeypatch.setattr("lgvi_warp.views.rerun.log_rerun", log)
+    code, _, found = sweep("--record", "3", "--json")
+    assert code == 0 and found.runs == [("a", [5, 9], {"delay": 2}), ("b", [4], {"delay": 1})]
+    assert recorded == [("members [5, 9] of a", "worst_0001.rrd"), ("members [4] of b", "worst_0002.rrd")]
+    names = [path.rpartition("/")[2] for path in json.loads(capsys.readouterr().out)["files"]]
+    assert names == ["sweep.json", "a.png", "worst_0001.rrd", "worst_0002.rrd"]
+
+
+def test_the_plan_of_a_sweep_runs_nothing(sweep, tmp_path, monkeypatch, capsys):
+    calls = []
+    monkeypatch.setattr("lgvi_warp.studies.sweeps.setup.made", lambda **settings: settings)
+    monkeypatch.setattr("lgvi_warp.studies.sweeps.setup.plan_text", lambda *given: calls.append(given) or "cells 4\ntime 2")
+    code, runs, _ = sweep("--plan", "--threads", "2", "--members", "5")
+    assert code == 0 and runs == [] and capsys.readouterr().out == "cells 4\ntime 2\n" and not (tmp_path / "out").exists()
+    assert calls == [({
+        "scene": "a scene", "metrics": ("m",), "cases": "cases", "grid": None, "vary": None, "members": 5, "seed": 1,
+        "sampling": None, "settings": {"file": "laws.toml", "step": 0.1},
+    }, 2)]  # fmt: skip
+    assert sweep("--plan", "--json")[0] == 0
+    assert json.loads(capsys.readouterr().out)["plan"] == ["cells 4", "time 2"]

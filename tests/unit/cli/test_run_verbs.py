@@ -2,6 +2,7 @@
 """The verbs run, resume and predict: what their arguments reach, and how they end. No kernel runs."""
 
 import dataclasses
+import importlib
 import threading
 from pathlib import Path
 from types import SimpleNamespace
@@ -76,7 +77,7 @@ def test_libraries_are_imported_until_one_is_missing(monkeypatch):
             if name == absent:
                 raise ImportError(name)
 
-        monkeypatch.setattr("importlib.import_module", import_module)
+        monkeypatch.setattr(importlib, "import_module", import_module)
         thread = runs._import_in_background()
         thread.join()
         assert names == tried and isinstance(thread, threading.Thread) and thread.daemon
@@ -242,7 +243,18 @@ def test_arguments_of_resume(solved, tmp_path, monkeypatch, capsys):
 def test_arguments_of_predict(tmp_path, monkeypatch, capsys):
     study = Study(SimpleNamespace(seconds=3.0, members=4))
     monkeypatch.setattr("lgvi_warp.runs.predict.predict", study)
-    options = ["--threads", "2", "--store", "zarr", "--store-dtype", "float32", "--out", str(tmp_path), "--members", "3"]
+    options = [
+        "--threads",
+        "2",
+        "--store",
+        "zarr",
+        "--store-dtype",
+        "float32",
+        "--out",
+        str(tmp_path),
+        "--members",
+        "3",
+    ]
     assert cli.main(["predict", PAPER, "-q"]) == 0 and cli.main(["predict", PAPER, *options]) == 0
     (_, plain), ((scene,), named) = study.calls
     assert plain == {"threads": None, "store": None}

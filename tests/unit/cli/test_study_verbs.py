@@ -114,7 +114,20 @@ def test_arguments_of_a_stability_map(tmp_path, monkeypatch, drawn):
     study = Study(region())
     monkeypatch.setattr("lgvi_warp.studies.stability.map.stability_map", study)
     verb = ["stability", PAPER, "-q", "--out", str(tmp_path)]
-    more = ["--x", "h=0.1:1", "--y", "vehicle.mass", "--methods", "psi", "--points", "5", "--error", "0.5", "--of", "depth"]
+    more = [
+        "--x",
+        "h=0.1:1",
+        "--y",
+        "vehicle.mass",
+        "--methods",
+        "psi",
+        "--points",
+        "5",
+        "--error",
+        "0.5",
+        "--of",
+        "depth",
+    ]
     assert cli.main(verb) == 0 and cli.main([*verb, *more, "--duration", "9", "--seed", "11"]) == 0
     (plain, named) = study.calls
     assert plain[0][1:] == ("h", "angular_velocity", None)
@@ -131,7 +144,7 @@ def test_a_scene_without_an_ensemble_has_the_seed_0(tmp_path, monkeypatch, drawn
     scene = tmp_path / "bare.toml"
     scene.write_text('[vehicle]\nname = "sphere"\n')
     assert cli.main(["stability", str(scene), "-q", "--x", "speed", "--out", str(tmp_path / "out")]) == 0
-    (values, settings), = study.calls
+    ((values, settings),) = study.calls
     assert settings["seed"] == 0 and values[1:3] == ("speed", "angular_velocity")
 
 
@@ -215,9 +228,19 @@ class Swept:
 @pytest.fixture
 def sweep(tmp_path, monkeypatch):
     """A function of what was refused and of options: exit code, what the sweep was called with, what it found."""
-    file = {"scene": "a scene", "cases": "cases", "members": 40, "seed": 1, "baseline": "a", "metrics": ("m",), "step": 0.1}
+    file = {
+        "scene": "a scene",
+        "cases": "cases",
+        "members": 40,
+        "seed": 1,
+        "baseline": "a",
+        "metrics": ("m",),
+        "step": 0.1,
+    }
     monkeypatch.setattr("lgvi_warp.studies.sweeps.file.arguments_of_file", lambda path: dict(file, file=path))
-    monkeypatch.setattr("lgvi_warp.views.sweeps.pictures", lambda _: {"a.png": lambda found, path: path.write_text("a")})
+    monkeypatch.setattr(
+        "lgvi_warp.views.sweeps.pictures", lambda _: {"a.png": lambda found, path: path.write_text("a")}
+    )
 
     def run(*options, refused=("", "", "")):
         found = Swept(refused)
@@ -271,9 +294,13 @@ def test_the_worst_members_are_recorded_by_cell(sweep, tmp_path, monkeypatch, ca
 def test_the_plan_of_a_sweep_runs_nothing(sweep, tmp_path, monkeypatch, capsys):
     calls = []
     monkeypatch.setattr("lgvi_warp.studies.sweeps.setup.made", lambda **settings: settings)
-    monkeypatch.setattr("lgvi_warp.studies.sweeps.setup.plan_text", lambda *given: calls.append(given) or "cells 4\ntime 2")
+    monkeypatch.setattr(
+        "lgvi_warp.studies.sweeps.setup.plan_text", lambda *given: calls.append(given) or "cells 4\ntime 2"
+    )
     code, runs, _ = sweep("--plan", "--threads", "2", "--members", "5")
-    assert code == 0 and runs == [] and capsys.readouterr().out == "cells 4\ntime 2\n" and not (tmp_path / "out").exists()
+    assert (
+        code == 0 and runs == [] and capsys.readouterr().out == "cells 4\ntime 2\n" and not (tmp_path / "out").exists()
+    )
     assert calls == [({
         "scene": "a scene", "metrics": ("m",), "cases": "cases", "grid": None, "vary": None, "members": 5, "seed": 1,
         "sampling": None, "settings": {"file": "laws.toml", "step": 0.1},

@@ -1,0 +1,293 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a folder holds: numbers, pictures and damage, as text and as a document; and its pictures drawn again."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp import cli
+from lgvi_warp.cli import folders, plot, stores, view
+from lgvi_warp.cli.arguments import parsed
+from lgvi_warp.cli.folders import Content, contents
+from lgvi_warp.cli.writing import Written
+from tests.unit.cli.test_run_summary import MACHINE, told
+from tests.unit.cli.test_study_verbs import Study
+from tests.unit.cli.test_terminal import region, sobol
+from tests.unit.studies.test_cost import found as tradeoff_of
+
+
+@pytest.fixture
+def store(tmp_path):
+    """What a store of three blocks says of itself, of which two are finished."""
+    provenance = told().provenance | {"versions": {"lgvi-warp": "1.0"}, "scene": {"controller": {}}}
+    return {
+        "path": tmp_path / "run.zarr", "bytes": 1_260_000, "members": 1200, "provenance": provenance, "fields": ["position"],
+        "samples": 5, "keepers": [], "kept": 0, "blocks": 3, "finished": 2, "complete": False, "damage": [],
+    }  # fmt: skip
+
+
+def lines_of(store, *options):
+    """The lines about a store."""
+    return list(folders._store_lines(store, parsed(["info", "a folder", *options])))
+
+
+def test_lines_of_a_store(store, tmp_path):
+    end = "blocks      2 of 3 finished; not complete: lgvi-warp resume a folder"
+    head = [f"run         {tmp_path}/run.zarr (1.3 MB), lgvi-warp 1.0",
+            "members     1,200, psi_s, float64, step 0.01 s, 100 steps"]  # fmt: skip
+    assert lines_of(store) == [*head, "samples     5 times of position", end]
+    more = store | {"fields": [], "keepers": ["mean", "failed"], "kept": 1500, "complete": True}
+    assert lines_of(more)[2:] == ["samples     5 times, not of all members", "parts       mean, failed of each block",
+                                  "kept        1,500 members' samples, run again",
+                                  "blocks      2 of 3 finished; complete"]  # fmt: skip
+    store["provenance"]["scene"]["controller"] = {"period": 0.5, "laws": [{"type": "pid"}]}
+    said = lines_of(store, "-v")
+    assert said[2] == "controller  looks every 0.5 s; laws pid" and said[3].startswith(
+        "how         seed 1, checks safe"
+    )
+    assert said[4] == "versions    lgvi-warp 1.0" and len(said) == 7
+
+
+@pytest.mark.parametrize(("options", "count", "shown", "more"), [
+    ((), 20, 20, None), ((), 21, 20, 1), ((), 1221, 20, 1201), (("-v",), 1221, 1221, None), ((), 0, 0, None)])  # fmt: skip
+def test_damage_is_listed_to_a_limit(store, options, count, shown, more):
+    store["damage"] = [f"file {i}" for i in range(count)]
+    said = [line for line in lines_of(store, *options) if line.startswith("damage")]
+    expected = [f"damage      file {i}" for i in range(shown)]
+    assert said == expected + ([f"damage      and {more:,} more files"] if more else [])
+
+
+def test_contents_of_a_folder(tmp_path, monkeypatch):
+    names = {"result": ["result.npz", "result_part.npz"], "tradeoff": ["tradeoff.json"],
+             "sensitivity": ["sensitivity.json"], "stability": ["stability.json", "stability_mass.json"],
+             "sweep": ["sweep.json"]}  # fmt: skip
+    expected = [Content(kind, tmp_path / name) for kind, found in names.items() for name in found]
+    for content in expected:
+        content.path.write_text("{}")
+    (tmp_path / "other.json").write_text("{}")
+    assert contents(tmp_path) == expected
+    monkeypatch.setattr("lgvi_warp.runs.store.open.folder_of", lambda path: path / "a.zarr")
+    (tmp_path / "a.zarr").mkdir()
+    assert contents(tmp_path) == [*expected, Content("store", tmp_path / "a.zarr / ".strip(" /"))]
+    alone = tmp_path / "b"
+    (alone / "c.zarr").mkdir(parents=True)
+    assert contents(alone) == [Content("store", alone / "a.zarr")]
+    assert contents(tmp_path / "none.zarr") == [Content("store", tmp_path / "none.zarr" / "a.zarr")]
+    assert contents(tmp_path / "result.npz") == [Content("store", tmp_path / "result.npz" / "a.zarr")]
+    for name, words in (("none", "is not there"), ("c.zarr/..", "holds nothing that a verb wrote")):
+        (tmp_path / "empty").mkdir(exist_ok=True)
+        place = tmp_path / ("empty" if "nothing" in words else name)
+        with pytest.raises(lw.SceneError) as caught:
+            contents(place)
+        assert str(caught.value) == f"{place}: {words}; give the folder of a run or of a study"
+
+
+def test_info_of_a_folder_with_everything(store, tmp_path, monkeypatch, capsys):
+    result = told()
+    result.save(tmp_path / "result.npz")
+    tradeoff_of(4.0).save(tmp_path)
+    (tmp_path / "sweep.json").write_text('{"seed": 3}')
+    (tmp_path / "summary.md").write_text("# A sweep\n\n")
+    for name in ("b.rrd", "a.png", "c.nc", "d.parquet", "e.html", "f.csv", "g.txt", "h.dat"):
+        (tmp_path / name).write_text("x")
+    (tmp_path / "run.zarr").mkdir()
+    monkeypatch.setattr("lgvi_warp.runs.store.open.folder_of", lambda path: tmp_path / "run.zarr")
+    states = Study([store, store | {"complete": True}, store])
+    monkeypatch.setattr("lgvi_warp.runs.store.state.state", states)
+    assert cli.main(["info", str(tmp_path)]) == 1
+    text = capsys.readouterr().out
+    said = [line.partition(" (")[0] for line in text.split("\n")]
+    others = ["a.png", "b.rrd", "c.nc", "d.parquet", "e.html", "f.csv", "g.txt", "tradeoff.csv"]
+    assert said[-9:] == [*(f"file        {tmp_path}/{name}" for name in others), ""]
+    assert said[0] == f"file        {tmp_path}/result.npz" and said[1].startswith("members     4, psi_s")
+    places = [text.index(words) for words in ("tradeoff.json (", "# A sweep\nrun         ", "2 of 3 finished")]
+    assert places == sorted(places)
+    assert "how  " not in text
+    assert cli.main(["info", str(tmp_path), "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["path"] == str(tmp_path) and document["complete"] is True
+    assert [held["kind"] for held in document["holds"]] == ["result", "tradeoff", "sweep", "store"]
+    assert [held["path"] for held in document["holds"]] == [
+        f"{tmp_path}/{name}" for name in ("result.npz", "tradeoff.json", "sweep.json", "run.zarr")]  # fmt: skip
+    assert document["holds"][0]["members"] == 4 and document["holds"][2]["content"] == {"seed": 3}
+    assert document["files"] == [f"{tmp_path}/{name}" for name in others]
+    assert states.calls[0] == ((tmp_path / "run.zarr",), {})
+    (tmp_path / "run.zarr" / "a.png").write_text("x")
+    monkeypatch.setattr(folders, "contents", lambda _: [Content("store", tmp_path / "run.zarr")])
+    assert cli.main(["info", str(tmp_path / "run.zarr"), "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["files"] == []
+
+
+def test_verbose_info_of_a_result_says_how(tmp_path, capsys):
+    told().save(tmp_path / "result.npz")
+    assert cli.main(["info", str(tmp_path), "-v"]) == 0
+    assert f"how         seed 1, checks {MACHINE['checks']}" in capsys.readouterr().out
+
+
+def test_studies_have_their_reports():
+    from lgvi_warp.studies.stability import map as stability
+    from lgvi_warp.studies.tradeoff import report_text
+
+    assert folders.text_of("tradeoff", tradeoff_of(4.0)) == report_text(tradeoff_of(4.0))
+    assert folders.text_of("stability", region()) == stability.report_text(region())
+    assert folders.text_of("sensitivity", sobol()) == str(sobol())
+
+
+def test_pictures_are_drawn_again(tmp_path, monkeypatch, capsys):
+    drawn = []
+    numbers = {"result": "a result", "store": "a store", "sweep": {}, "tradeoff": 1, "stability": 2, "sensitivity": 3}
+    monkeypatch.setattr(Content, "load", lambda self: numbers[self.kind])
+    monkeypatch.setattr(plot, "shown_members", lambda result: f"some of {result}")
+
+    def pictures(result, few):
+        def draw(path):
+            drawn.append((result, few, path.name))
+            path.write_text("x")
+            return path
+
+        return {f"{result[-5:]}.png": draw}
+
+    monkeypatch.setattr(plot, "pictures", pictures)
+    for name in ("tradeoff", "stability", "sensitivity"):
+        monkeypatch.setattr(f"lgvi_warp.views.plots.plot_{name}",
+                            lambda found, path, name=name: (drawn.append((name, found, path.name)), path.touch()))  # fmt: skip
+    names = {"result": "r.npz", "tradeoff": "t.json", "stability": "s_mass.json", "sensitivity": "u.json",
+             "sweep": "sweep.json", "store": "run.zarr"}  # fmt: skip
+    held = [Content(kind, tmp_path / name) for kind, name in names.items()]
+    monkeypatch.setattr(plot, "contents", lambda _: held)
+    for where, words, out in ((tmp_path / "run.zarr", [], tmp_path), (tmp_path, [], tmp_path),
+                              (tmp_path, ["--out", str(tmp_path / "o")], tmp_path / "o")):  # fmt: skip
+        drawn.clear()
+        assert cli.main(["plot", str(where), *words, "--json"]) == 0
+        assert drawn == [("a result", "some of a result", "esult.png"), ("tradeoff", 1, "t.png"),
+                         ("stability", 2, "s_mass.png"), ("sensitivity", 3, "u.png"),
+                         ("a store", "some of a store", "store.png")]  # fmt: skip
+        said = capsys.readouterr()
+        document = json.loads(said.out)
+        assert document["files"] == [f"{out}/{name}" for *_, name in drawn]
+        again = "its pictures are drawn again by the same lgvi-warp sweep, which runs nothing twice"
+        assert document["notes"] == [f"{tmp_path}/sweep.json: {again}"]
+        assert said.err == f"lgvi-warp: {tmp_path}/sweep.json: {again}\n"
+    drawn.clear()
+    assert cli.main(["plot", str(tmp_path)]) == 0
+    files = [line.partition(" (")[0] for line in capsys.readouterr().out.split("\n")]
+    assert files == [*(f"file        {tmp_path}/{name}" for *_, name in drawn), ""]
+    monkeypatch.setattr("lgvi_warp.views.plots.plot_tradeoff", Study(OSError("no room")))
+    assert cli.main(["plot", str(tmp_path), "-q"]) == 1
+    assert f"lgvi-warp: {tmp_path}/t.png was not written: no room\n" in capsys.readouterr().err
+
+
+def test_the_last_run_of_a_folder_is_viewed(monkeypatch):
+    monkeypatch.setattr(Content, "load", lambda self: self)
+    held = [Content("result", Path("a")), Content("store", Path("b")), Content("sweep", Path("c"))]
+    monkeypatch.setattr(view, "contents", lambda _: held)
+    assert view.run_in(Path("x")) == held[1] and view.run_in(Path("x.npz")) == Content("result", Path("x.npz"))
+    held[:2] = []
+    with pytest.raises(lw.SceneError, match=r"^x: holds a study, and no run; give the folder of a run$"):
+        view.run_in(Path("x"))
+
+
+def test_members_to_view_are_a_list():
+    assert view.indices(None) is None and view.indices(" 3, 17") == [3, 17]
+    for text in ("3,,4", "-1", "", "3;4"):
+        with pytest.raises(lw.SceneError, match="is no list of members; write --members 3,17"):
+            view.indices(text)
+
+
+def test_a_viewed_run_says_its_file(tmp_path, monkeypatch, capsys):
+    told().save(tmp_path / "result.npz")
+    logged, shown = [], []
+    log = lambda result, out, members: (logged.append((result.members, members)), out.write_bytes(b"x" * 200_000))  # noqa: E731
+    monkeypatch.setattr("lgvi_warp.views.rerun.log_rerun", log)
+    monkeypatch.setattr("lgvi_warp.views.rerun.show", lambda result, members: shown.append(members))
+    assert cli.main(["view", str(tmp_path), "--out", str(tmp_path / "a.rrd"), "--members", "1,2"]) == 0
+    assert capsys.readouterr().out == f"file        {tmp_path}/a.rrd (0.2 MB)\n" and logged == [(4, [1, 2])]
+    assert cli.main(["view", str(tmp_path), "--json"]) == 0 and shown == [None]
+    assert json.loads(capsys.readouterr().out)["files"] == []
+    for error in (lw_error("no member"), OSError("no display")):
+        monkeypatch.setattr("lgvi_warp.views.rerun.show", Study(error))
+        assert cli.main(["view", str(tmp_path), "-q"]) == (2 if "member" in str(error) else 1)
+        assert capsys.readouterr().err == f"lgvi-warp: {error}\n"
+
+
+def lw_error(text):
+    """A refusal of a picture."""
+    from lgvi_warp.common.errors import NothingToDraw
+
+    return NothingToDraw(text)
+
+
+class Merged:
+    """A store of three blocks."""
+
+    runs = range(3)
+
+    def __init__(self, path, missing, complete=False):
+        self.path, self.missing, self.complete = path, missing, complete
+
+    def unfinished(self):
+        return range(self.missing)
+
+
+def test_merging_says_what_is_missing(tmp_path, monkeypatch, capsys):
+    path = tmp_path / "run.zarr"
+    path.mkdir()
+    (path / "a").write_bytes(b"x" * 100_000)
+    study = Study([Merged(path, 2), Merged(path, 0), Merged(path, 0, True), Merged(path, 1, True)])
+    monkeypatch.setattr("lgvi_warp.runs.store.merge.merge", study)
+    verb, line = ["merge", "a", "b", "--out", "c"], f"file        {path} (0.1 MB)"
+    resume = f"lgvi-warp resume {path} runs them"
+    for text in (f"2 of 3 blocks are in none of the folders; {resume}",
+                 f"the members that it keeps are missing; {resume}, or says why not"):  # fmt: skip
+        assert cli.main(verb) == 1
+        assert capsys.readouterr() == (f"{line}\n", f"lgvi-warp: {path}: {text}\n")
+    assert cli.main([*verb, "--overwrite"]) == 0 and capsys.readouterr() == (f"{line}, complete\n", "")
+    assert cli.main([*verb, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert {name: document[name] for name in ("file", "complete", "blocks", "missing")} == {
+        "file": str(path), "complete": True, "blocks": 3, "missing": 0}  # fmt: skip
+    folders_given = ([Path("a"), Path("b")], Path("c"))
+    assert [values for values, _ in study.calls] == [(*folders_given, False)] * 2 + [
+        (*folders_given, True), (*folders_given, False)]  # fmt: skip
+
+
+def test_a_run_is_exported_and_reported(tmp_path, monkeypatch, capsys):
+    for name in ("a.nc", "report.html", "b.html"):
+        (tmp_path / name).write_bytes(b"x" * 100_000)
+    write, page, opened = Study(tmp_path / "a.nc"), Study([tmp_path / "report.html", tmp_path / "b.html"]), []
+    monkeypatch.setattr("lgvi_warp.runs.store.export.export", write)
+    monkeypatch.setattr("lgvi_warp.views.report.report", page)
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    assert cli.main(["export", "a", "--to", "netcdf", "--out", "b"]) == 0
+    assert capsys.readouterr().out == f"file        {tmp_path}/a.nc (0.1 MB)\n"
+    assert write.calls == [((Path("a"), "netcdf", Path("b")), {})]
+    assert cli.main(["report", "a"]) == 0 and opened == []
+    assert capsys.readouterr().out == f"file        {tmp_path}/report.html (0.1 MB)\n"
+    assert cli.main(["report", "a", "--out", "b", "--open", "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert (document["file"], document["bytes"]) == (f"{tmp_path}/b.html", 100_000)
+    assert opened == [f"file://{tmp_path}/b.html"]
+    assert [values for values, _ in page.calls] == [(Path("a"), Path("a/report.html")), (Path("a"), Path("b"))]
+    assert stores.export(parsed(["export", "a", "--to", "x", "-q"])) == 0 and capsys.readouterr().out == ""
+
+
+def test_files_that_were_written_and_why_not(tmp_path):
+    written = Written()
+    from lgvi_warp.common.errors import MissingExtra
+
+    for name, study in (("a", Study(tmp_path / "a")), ("b", Study(ValueError("odd"))), ("c", Study(lw_error("nothing"))),
+                        ("d", Study(MissingExtra("plots", "matplotlib", "viz"))), ("e", Study(ImportError("broken"))),
+                        ("f", Study(MissingExtra("tables", "pandas", "io"))),
+                        ("g", Study(MissingExtra("plots", "matplotlib", "viz")))):  # fmt: skip
+        written.take(tmp_path / name, study)
+    assert written.files == [tmp_path / "a"] and written.empty == [f"{tmp_path}/c was not written: nothing"]
+    assert written.faults == [f"{tmp_path}/{name}" for name in ("b was not written: odd", "e was not written: broken")]
+    libraries = "not made without matplotlib and pandas; to have pictures: pip install 'lgvi-warp[viz,io]'"
+    assert written.note_lines() == [f"note        d, f, g: {libraries}"] and Written().note_lines() == []
+    with pytest.raises(KeyError):
+        written.take(tmp_path / "h", Study(KeyError("a bug")))
+    calls = []
+    written.draw(lambda *given: calls.append(given), "numbers", tmp_path / "i")
+    assert calls == [("numbers", tmp_path / "i")] and written.files[-1] == tmp_path / "i"

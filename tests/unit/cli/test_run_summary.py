@@ -1,0 +1,308 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the command says of a run that ended, line by line, and which files it writes."""
+
+import dataclasses
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.cli import documents, progress, report
+from lgvi_warp.cli.arguments import parsed
+from lgvi_warp.cli.writing import Written
+from lgvi_warp.common.errors import MissingExtra, NothingToDraw
+from lgvi_warp.common.phases import Phases
+from lgvi_warp.common.status import Status, WarningArray, Warnings
+from tests.support.made import made
+from tests.unit.cli.test_study_verbs import Study
+
+MACHINE = {
+    "checks": "safe",
+    "machine": {"threads": 2, "cpu": "a cpu", "simd": "avx2"},
+    "versions": {"numpy": "2", "warp": "1"},
+}
+
+
+def told(members=4, k=3, provenance=None, **values):
+    """A result of members that sink a little, as if a run had ended in it."""
+    rising = np.arange(float(k))[:, None, None] * np.array([0.0, 0.0, 1.0])
+    result = made(np.broadcast_to(rising, (k, members, 3)).copy(), **values)
+    return dataclasses.replace(result, provenance=result.provenance | MACHINE | (provenance or {}))
+
+
+def summary(result, drawn="same", **options):
+    """The lines of a summary without files."""
+    return report.summary(result, result if drawn == "same" else drawn, [], **options).split("\n")
+
+
+def test_a_plain_run_is_summed_up():
+    result = told()
+    lines = summary(result)
+    assert lines[:2] == ["members     4, psi_s, float64, step 0.01 s, 100 steps", "status      ok 4"]
+    assert lines[2].startswith("drift       ") and lines[2].endswith(" (largest of all members)") and len(lines) == 3
+    verbose = summary(result, verbose=True)
+    assert verbose[1] == "how         seed 1, checks safe, packets of 8, 2 threads on a cpu (avx2)"
+    assert verbose[2] == "versions    numpy 2, warp 1" and verbose[3:] == lines[1:]
+
+
+def test_notes_come_first_and_the_speed_before_the_outcomes():
+    result = dataclasses.replace(told(), messages=("odd", "odder"), run_seconds=0.5, compile_seconds=0.25)
+    lines = summary(result, seconds=1.5)
+    assert lines[:2] == ["note        odd", "note        odder"]
+    assert lines[3] == "speed       800 vehicle-steps per second (0.50 s; kernel loaded in 0.25 s; 1.50 s in all)"
+    assert lines[4] == "status      ok 4"
+    compiled = dataclasses.replace(result, compile_phases=Phases(0.1, 2.0, 0.2))
+    assert summary(compiled)[3:5] == [
+        lines[3].replace("1.50", "0.00"),
+        f"kernel      compiled: {Phases(0.1, 2.0, 0.2)}",
+    ]
+
+
+def test_outcomes_but_ok_have_a_line_each():
+    result = told(status=[Status.OK, Status.FLOOR, Status.NON_FINITE, Status.FLOOR], end=[np.nan, 1.0, 1.0, 2.0])
+    lines = summary(result)
+    (first,) = (i for i, line in enumerate(lines) if line.startswith("status"))
+    said = [line.split(",")[0].split(":")[0] for line in lines if line.startswith("  ")]
+    assert lines[first].count(",") == 2 and len(said) == 2 and not any("  ok" in line for line in said)
+
+
+def test_what_was_not_kept_is_said():
+    kept = dataclasses.replace(told(2), samples={}, kept=told(2))
+    assert summary(kept)[2:] == ["kept        2 members' samples, run again"]
+    failed = told(provenance={"observed": {"keep": "failed"}})
+    failed = dataclasses.replace(failed, samples={})
+    assert summary(failed, None)[2:] == ["kept        no samples: no member failed"]
+    assert summary(dataclasses.replace(failed, provenance=told().provenance), None)[2:] == []
+    whole = told()
+    missing = {name: values for name, values in whole.samples.items() if name in ("position", "attitude")}
+    text = "pictures    none, and no energy: velocity, angular_velocity not saved"
+    assert summary(dataclasses.replace(whole, samples=missing), None)[2:] == [text]
+    assert report.unsaved(whole) == report.unsaved(failed) == []
+
+
+def test_the_energy_is_that_of_the_members_drawn(monkeypatch):
+    result, few = told(), told(3)
+    (line,) = report.energy_lines(result, few)
+    assert line.endswith(" (largest of 3 of 4 members)")
+    from lgvi_warp.physics import energy
+
+    numbers = {"energy": 0.123456, "horizontal_momentum": 2.0, "vertical_angular_momentum": 3e-9}
+    monkeypatch.setattr(energy, "drift", lambda _: numbers)
+    monkeypatch.setattr(energy, "at_work", lambda _: ["drag", "current"])
+    every = "drift       energy 0.12 J, horizontal momentum 2 N s, vertical angular momentum 3e-09 N m s"
+    of_energy = "work        energy changed by up to 0.12 J, through drag, current (largest of all members)"
+    for conserved, text in (({*numbers}, f"{every} (largest of all members)"), ({"horizontal_momentum"}, of_energy),
+                            ({"energy"}, "drift       energy 0.12 J (largest of all members)")):  # fmt: skip
+        monkeypatch.setattr(energy, "conserved", lambda _, conserved=conserved: conserved)
+        assert report.energy_lines(result, result) == [text]
+    monkeypatch.setattr(energy, "drift", lambda _: numbers | {"energy": np.nan})
+    assert report.energy_lines(result, result) == []
+
+
+def test_the_first_member_with_a_warning_is_named():
+    bits = np.array([0, 2, 2, 3, 1], np.uint16).view(WarningArray)
+    times, values = np.array([9.0, 3.0, 2.0, 4.0, 1.5]), np.array([0.0, 1.0, 1.23456, 8.0, 7.0])
+    result = dataclasses.replace(told(5), warnings=bits, warning_time=times, warning_value=values)
+    texts = [f"  {str(warning.name).lower()}: {warning.text} (first: member {member} at {time} s, "
+             f"{warning.value_name} = {value})" for warning, member, time, value in ((Warnings.INERTIA, 4, "1.5", "7"),
+                                                  (Warnings.PRECISION_LOSS, 2, "2", "1.235"))]  # fmt: skip
+    assert report._warning_lines(result) == ["warnings    inertia 2, precision_loss 3", *texts]
+    assert summary(result)[-3:] == report._warning_lines(result)
+    assert report._warning_lines(told()) == []
+
+
+def test_divided_steps_are_counted():
+    result = dataclasses.replace(told(), substeps=np.array([0, 1, 1200, 0]))
+    text = "substeps    1,201 steps of 2 members were divided: those paths are not symplectic"
+    assert text in summary(result) and not any("substeps" in line for line in summary(told()))
+
+
+def test_members_that_ask_for_too_much_are_counted(monkeypatch):
+    unmet = np.zeros((3, 4, 2))
+    unmet[1, 2, 0], unmet[2, 3, 1] = 0.5, -0.5
+    result = told()
+    result = dataclasses.replace(result, samples=dict(result.samples) | {"unmet": unmet})
+    text = "unmet       2 members asked at some sample for more than their actuators deliver"
+    for most, shown in ((72, True), (71, False)):
+        monkeypatch.setattr(report, "MOST_DRAWN", most)
+        assert (text in summary(result)) == shown
+
+
+def test_a_controller_is_one_line():
+    lists = {
+        "sensors": [{"type": "sensor", "name": "compass"}, {"type": "sensor"}],
+        "laws": [{"type": "pid"}], "guidance": [], "faults": [{"type": "stuck", "name": ""}],
+    }  # fmt: skip
+    said = report.controller_lines({"controller": {"period": 0.25, "delay": 0.5, **lists}})
+    assert said == [
+        "controller  looks every 0.25 s, 0.5 s until they act; sensors compass, sensor; laws pid; faults stuck"
+    ]
+    short = report.controller_lines({"controller": {"period": 2.0, "delay": 0.0, "laws": [{"type": "pid"}]}})
+    assert short == ["controller  looks every 2 s; laws pid"] and report.controller_lines({"controller": None}) == []
+
+
+def test_a_chosen_method_has_its_reason():
+    settings = {
+        "method": {"name": "psi_x", "chosen": "since drag acts"},
+        "dtype": "float32",
+        "step": 0.25,
+        "steps": 4000,
+    }
+    text = "members     1,200, psi_x, float32, step 0.25 s, 4,000 steps\nmethod      psi_x, chosen since drag acts"
+    assert report.members_line(1200, settings) == text
+
+
+def test_files_have_their_sizes_and_ways_to_look(tmp_path):
+    (tmp_path / "a.png").write_bytes(b"x" * 1_260_000)
+    store = tmp_path / "run.zarr"
+    store.mkdir()
+    (store / "b").write_bytes(b"x" * 2_000_000)
+    assert report.file_line(tmp_path / "a.png") == f"file        {tmp_path}/a.png (1.3 MB)"
+    assert report.file_line(store) == f"file        {store} (2.0 MB)"
+    names = [Path("o") / name for name in ("result.npz", "fleet.png", "fleet.rrd", "statistics.png")]
+    assert report.look_lines(names) == ["look        rerun o/fleet.rrd, or open o/fleet.png"]
+    assert report.look_lines(names[:2]) == ["look        open o/fleet.png"]
+    assert report.look_lines(names[2:3]) == ["look        rerun o/fleet.rrd"]
+    assert report.look_lines([Path("o/a/run.zarr"), names[0]]) == ["look        lgvi-warp info o/a"]
+    assert report.look_lines([]) == []
+
+
+def test_members_that_are_drawn():
+    result = told()
+    assert report.shown_members(result) is result
+    bare = dataclasses.replace(result, samples={}, kept=None)
+    assert report.shown_members(bare) is None
+    assert report.shown_members(dataclasses.replace(bare, kept=result)) is result
+    few = dataclasses.replace(result, samples={"position": result.position})
+    assert report.shown_members(few) is None
+
+
+def test_of_a_large_store_some_members_are_drawn(monkeypatch):
+    result = dataclasses.replace(told(6), store=Path("run.zarr"))
+    chosen = []
+    monkeypatch.setattr("lgvi_warp.runs.store.open.chosen", lambda whole, members: chosen.append(list(members)))
+    monkeypatch.setattr("lgvi_warp.views.choice.shown", lambda _, most: SimpleNamespace(members=[most, most + 1]))
+    for drawn, expected in ((18 * 3 * 6, list(range(6))), (18 * 3 * 6 - 1, [5, 6]), (18 * 3 * 2, [2, 3]), (1, [1, 2])):
+        monkeypatch.setattr(report, "MOST_DRAWN", drawn)
+        report.shown_members(result)
+        assert chosen[-1] == expected
+
+    def nothing(*_):
+        raise NothingToDraw("no member")
+
+    monkeypatch.setattr("lgvi_warp.views.choice.shown", nothing)
+    report.shown_members(result)
+    assert chosen[-1] == [0]
+
+
+def test_files_that_a_run_has(tmp_path, monkeypatch):
+    result, calls = told(), []
+    plots = "lgvi_warp.views.plots"
+    monkeypatch.setattr(f"{plots}.plot", lambda *given: calls.append(("plot", *given)) or given[1])
+    monkeypatch.setattr(f"{plots}.plot_statistics", lambda *given: calls.append(("statistics", *given)) or given[1])
+    monkeypatch.setattr("lgvi_warp.views.rerun.log_rerun", lambda *given, to: calls.append(("record", *given, to)))
+    monkeypatch.setattr(f"{plots}.drawable", lambda _: True)
+    few = told(2)
+    for viewer, answers, to in ((None, True, None), ("a", True, "a"), ("a", False, None)):
+        monkeypatch.setattr("lgvi_warp.views.viewer.answers", lambda _, answers=answers: answers)
+        drawings = report.pictures(result, few, viewer)
+        calls.clear()
+        assert [draw(Path(name)) for name, draw in drawings.items()] == [
+            Path("fleet.png"), Path("fleet.rrd"), Path("statistics.png")]  # fmt: skip
+        kinds = [("plot", few, Path("fleet.png")), ("record", result, Path("fleet.rrd"), to),
+                 ("statistics", result, Path("statistics.png"))]  # fmt: skip
+        assert all(
+            a is b or a == b for call, kind in zip(calls, kinds, strict=True) for a, b in zip(call, kind, strict=True)
+        )
+    assert list(report.pictures(result, None)) == ["statistics.png"]
+    monkeypatch.setattr(f"{plots}.drawable", lambda _: False)
+    assert report.pictures(result, None) == {}
+    written = report.write(result, None, tmp_path)
+    assert written.files == [tmp_path / "result.npz"] and lw.Result.load(tmp_path / "result.npz").members == 4
+    stored = dataclasses.replace(result, store=tmp_path / "run.zarr")
+    assert report.write(stored, None, tmp_path / "b").files == [tmp_path / "run.zarr"]
+    (tmp_path / "file").touch()
+    (fault,) = report.write(told(), None, tmp_path / "file" / "c").faults
+    assert fault.startswith(f"{tmp_path}/file/c/result.npz was not written: ")
+
+
+def test_the_end_of_a_run_is_told(tmp_path, monkeypatch, capsys):
+    result, written = told(), Written([tmp_path / "fleet.png"], ["a fault"], ["a is empty"])
+    written.missing["a.rrd"] = MissingExtra("recordings", "rerun-sdk", "viz")
+    (tmp_path / "fleet.png").write_bytes(b"x")
+    writing = Study(written)
+    monkeypatch.setattr(report, "write", writing)
+    shown = []
+    monkeypatch.setattr(report, "shown", lambda *given: shown.append(given) or progress.shown(True))
+    chosen = parsed(["run", "scene.toml", "-v"])
+    begun = time.perf_counter() - 5.0
+    result = dataclasses.replace(result, run_seconds=1.0)
+    assert report.report(result, tmp_path, chosen, begun, ["b"], "a viewer") == ["a fault", "b"]
+    assert writing.calls == [((result, result, tmp_path, "a viewer"), {})] and shown == [(False, "writing")]
+    out, err = capsys.readouterr()
+    lines = out.split("\n")
+    assert lines[0].startswith("note        a.rrd: not made without rerun-sdk") and lines[1].startswith("members     4")
+    assert "; 5.0" in out and lines[2].startswith("how  ") and err == "lgvi-warp: a is empty\n"
+    assert lines[-3].startswith("file        ") and lines[-2] == f"look        open {tmp_path}/fleet.png"
+
+
+def test_a_part_of_a_run_is_to_be_merged(tmp_path, monkeypatch, capsys):
+    from lgvi_warp.runs.store import folder
+
+    monkeypatch.setattr(folder, "Folder", lambda path: SimpleNamespace(complete=False))
+    stored = dataclasses.replace(told(1200), store=tmp_path / "run.zarr")
+    assert report.report(stored, tmp_path, parsed(["run", "scene.toml"]), 0.0, ["b"]) == ["b"]
+    merge = f"next        lgvi-warp merge {tmp_path} ... --out DIR, with the folders of the other parts"
+    assert capsys.readouterr() == (f"members     1,200 of a run in parts, in {tmp_path}/run.zarr\n{merge}\n", "")
+
+
+def test_documents_of_a_run_by_hand(tmp_path):
+    result = dataclasses.replace(
+        told(status=[Status.OK, Status.FLOOR, Status.NON_FINITE, Status.FLOOR]), substeps=np.array([0, 1, 5, 0]),
+        run_seconds=0.5, compile_seconds=0.25, messages=("odd",),
+    )  # fmt: skip
+    written = Written([tmp_path / "a"], ["a fault"], ["empty"], {"a.png": MissingExtra("plots", "matplotlib", "viz")})
+    content = documents.of_run(result, told(3), written, ["b"], 2.5)
+    assert content["settings"] == {
+        "method": "psi_s", "chosen": None, "duration": 1.0, "seed": 1, "dtype": "float64", "step": 0.01, "steps": 100,
+        "versions": MACHINE["versions"], "machine": MACHINE["machine"],
+    }  # fmt: skip
+    assert (content["members"], content["failed"], content["stopped"]) == (4, 1, 2)
+    assert content["divided"] == {"members": 2, "steps": 6} and content["messages"] == ["odd"]
+    assert content["samples"] == {"times": 3, "fields": list(result.samples), "kept": 0}
+    assert (
+        content["seconds"] == {"compile": 0.25, "run": 0.5, "all": 2.5} and content["vehicle_steps_per_second"] == 800.0
+    )
+    assert content["faults"] == ["a fault", "b"] and content["files"] == [tmp_path / "a"]
+    assert content["notes"] == ["empty", *written.note_lines()]
+    energy = content["energy"]
+    assert (energy["members"], energy["all"]) == (3, False) and energy["conserved"] == sorted(energy["conserved"])
+    assert documents.of_energy(told(3), 3)["all"] and documents.of_energy(None, 3) is None
+    bare = documents.of_run(dataclasses.replace(result, samples={}, run_seconds=0.0), told(3), written, [], 0.0)
+    assert bare["energy"] is None and bare["vehicle_steps_per_second"] is None
+    stored = documents.of_store({"blocks": 3, "provenance": result.provenance})
+    assert stored == {"blocks": 3, "settings": content["settings"]}
+    named = SimpleNamespace(steps=4)
+    named.seconds = 3.0
+    assert documents.of_prediction(named) == {"steps": 4, "seconds": 3.0}
+
+
+@pytest.mark.parametrize(("quiet", "kind"), [(True, type(None)), (False, progress.Progress)])
+def test_progress_is_shown_and_closed(monkeypatch, quiet, kind):
+    ended, close = [], progress.Progress.close
+    monkeypatch.setattr(progress.Progress, "close", lambda self: (ended.append(self), close(self)))
+    with pytest.raises(ZeroDivisionError), progress.shown(quiet) as shown:
+        assert type(shown) is kind and not ended
+        raise ZeroDivisionError
+    assert ended == ([] if quiet else [shown])
+
+
+def test_the_progress_of_a_part_is_that_of_the_whole():
+    fractions = []
+    assert progress.part_of(None, 0, 2) is None
+    for i in range(4):
+        progress.part_of(fractions.append, i, 4)(0.5)
+    assert fractions == [0.125, 0.375, 0.625, 0.875]

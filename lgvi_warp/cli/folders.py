@@ -138,7 +138,7 @@ def _part(content: Content, chosen: argparse.Namespace) -> tuple[dict[str, Any],
         from lgvi_warp.runs.store.state import state
 
         numbers = state(content.path)
-        return head | documents.of_store(numbers), lambda: "\n".join(_store_lines(numbers, chosen))
+        return head | documents.of_store(numbers), lambda: "\n".join(store_lines(numbers, chosen))
     numbers = content.load()
     if content.kind == "result":
         size = file_line(content.path)
@@ -174,8 +174,16 @@ def text_of(kind: str, found: Any) -> str:
     return str(found)
 
 
-def _store_lines(found: dict[str, Any], chosen: argparse.Namespace) -> Iterator[str]:
-    """What a store holds."""
+def store_lines(found: dict[str, Any], chosen: argparse.Namespace) -> Iterator[str]:
+    """Say what a store holds.
+
+    Args:
+        found: What its state is, as runs.store.state has it.
+        chosen: The command's parsed arguments.
+
+    Yields:
+        Its lines.
+    """
     provenance = found["provenance"]
     yield f"run         {found['path']} ({found['bytes'] / 1e6:.1f} MB), lgvi-warp {provenance['versions']['lgvi-warp']}"
     yield members_line(found["members"], provenance)

@@ -183,11 +183,11 @@ def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[in
     choice = shown(source)
     if members is not None:
         kept = np.arange(result.members) if source is result else result.kept_members
-        choice = dataclasses.replace(choice, members=_of(members, result.members, kept))
+        choice = dataclasses.replace(choice, members=places_of(members, result.members, kept))
     few = choices.few(source, choice.members, (*FIELDS, *CHANNELS), choice.frames)
     counted = under_way(few)
     fans, ranked, above = _survey(source, choice, _directions(few, counted))
-    fans = tuple(_streamed(result, fan, choice.frames) for fan in fans)
+    fans = tuple(streamed(result, fan, choice.frames) for fan in fans)
     position, count = ranked["position"], ranked["counted"]
     energy = energy_curve(few) if set(FIELDS) <= set(few.samples) else None
     if energy is not None and np.isfinite(energy.values).any():
@@ -203,8 +203,20 @@ def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[in
     return Drawn(result, source, choice, few, label, rgb, counted, shares, fans, spread, bins, heights, above)
 
 
-def _of(members: Any, total: int, kept: np.ndarray) -> np.ndarray:
-    """Places, among the kept members, of the user's indices, rising, each once; SceneError where there are no such members."""
+def places_of(members: Any, total: int, kept: np.ndarray) -> np.ndarray:
+    """Find the places of the user's indices among the kept members.
+
+    Args:
+        members: The user's indices.
+        total: Number of members of the run.
+        kept: Indices of the members that have samples, rising.
+
+    Returns:
+        Places, rising, each once.
+
+    Raises:
+        SceneError: There are no such members, or they have no samples.
+    """
     indices = np.asarray(members)
     if indices.ndim != 1 or not indices.size or indices.dtype.kind not in "iu":
         raise refusal("members", members, "is no list of members", "give indices: members=[3, 17]")
@@ -222,8 +234,17 @@ def _of(members: Any, total: int, kept: np.ndarray) -> np.ndarray:
 STREAMED = {"height": ("depth", -1.0), "speed": ("speed", 1.0)}
 
 
-def _streamed(result: Result, fan: Fan, frames: np.ndarray) -> Fan:
-    """A fan of all members from the run's own quantiles and extremes, where no samples of all were kept; else itself."""
+def streamed(result: Result, fan: Fan, frames: np.ndarray) -> Fan:
+    """Take a fan of all members from the run's own quantiles and extremes, where no samples of all were kept.
+
+    Args:
+        result: A result.
+        fan: A fan of the members that were kept.
+        frames: Indices of the times drawn.
+
+    Returns:
+        The fan by the run's statistics; itself where there are none.
+    """
     quantity, sign = STREAMED.get(fan.name, ("", 1.0))
     levels, replaced = np.full_like(fan.levels, np.nan), False
     for estimate in result.statistics.values() if not result.samples else ():

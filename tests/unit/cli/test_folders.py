@@ -30,7 +30,7 @@ def store(tmp_path):
 
 def lines_of(store, *options):
     """The lines about a store."""
-    return list(folders._store_lines(store, parsed(["info", "a folder", *options])))
+    return list(folders.store_lines(store, parsed(["info", "a folder", *options])))
 
 
 def test_lines_of_a_store(store, tmp_path):

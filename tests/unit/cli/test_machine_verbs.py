@@ -4,10 +4,10 @@
 import argparse
 import errno
 import gc
+import inspect
 import io
 import json
 import os
-import signal
 import sys
 from types import SimpleNamespace
 
@@ -71,7 +71,8 @@ packets     vehicles, table: dense float64 8
         assert ("memory      1.0 GiB\n" in said) == bool(memory) and ("memory  " in said) == bool(memory)
     for quota in (4.0, None, 5.0):
         monkeypatch.setattr(container, "cpu_quota", lambda quota=quota: quota)
-        assert machine._of_quota() == ""
+        cli.main(["info"])
+        assert capsys.readouterr().out.startswith("cpu         a cpu, avx2, 4 threads\n")
 
 
 def test_bench_and_tune_in_full(known, tmp_path, monkeypatch, capsys):
@@ -144,10 +145,13 @@ def test_lists_in_full(capsys):
     assert texts["kl8(psi_x)"] == "order 8, composition of 17 stages, of psi_x or another symmetric method of order 2"
     assert texts["bm4(psi_x)"] == "order 4, composition of the halves of psi_x or another such method"
     assert any(text.endswith(", two parts, for weight alone") for text in texts.values())
-    assert list(lists._vehicles()) == lw.vehicles() and lists._vehicles()["sphere"]
-    terms = list(lists._terms())
-    assert terms == sorted(terms) and lists._terms()["drag"] == lists._summary(lw.Drag)
-    laws = lists._laws()
+    names = {}
+    for what in ("vehicles", "terms", "laws"):
+        assert cli.main(["list", what, "--json"]) == 0
+        names[what] = {entry["name"]: entry["text"] for entry in json.loads(capsys.readouterr().out)["names"]}
+    terms, laws = names["terms"], names["laws"]
+    assert list(names["vehicles"]) == lw.vehicles() and names["vehicles"]["sphere"]
+    assert list(terms) == sorted(terms) and terms["drag"] == inspect.getdoc(lw.Drag).partition("\n")[0]
     sections = [text.partition(":")[0] for text in laws.values()]
     assert (
         sections[0] == "laws"
@@ -306,7 +310,7 @@ def test_what_verbs_leave(tmp_path):
 def test_the_console_script_ends_the_process(monkeypatch, end, code):
     codes, ended = [], []
     monkeypatch.setattr(command, "main", Study(end))
-    monkeypatch.setattr(os, "_exit", codes.append)
+    monkeypatch.setattr("os._exit", codes.append)
     monkeypatch.setitem(sys.modules, "lgvi_warp.common.warp_setup", SimpleNamespace(end=lambda: ended.append(True)))
     closed, opened = [], []
 
@@ -330,37 +334,11 @@ def test_the_console_script_ends_the_process(monkeypatch, end, code):
     assert codes == [code, code] and os.environ["RUST_LOG"] == "debug" and len(ended) == 3
 
 
-def test_the_second_signal_ends_the_process_with_a_line(monkeypatch):
-    wrote, ended = [], []
-    monkeypatch.setattr(os, "write", lambda stream, text: wrote.append((stream, text.decode())))
-    monkeypatch.setattr(os, "_exit", ended.append)
-    signals = Signals(lambda: "all is kept")
-    signals._before = {signal.SIGTERM: None, signal.SIGINT: None}
-    assert signals.text == "interrupted" and signals.exit_code == 130
-    for numbers, said in ((bytes([signal.SIGTERM]), []), (bytes([99, signal.SIGTERM, 98, signal.SIGINT]), [True])):
-        reader, writer = os.pipe()
-        with os.fdopen(writer, "wb") as file:
-            file.write(numbers)
-        signals._listen(reader)
-        assert bool(ended) == bool(said)
-    assert ended == [128 + signal.SIGINT] and signals.number == signal.SIGINT
-    assert wrote == [(2, "lgvi-warp: interrupted twice, ended at once; all is kept\n")]
-    signals.said, signals.number = True, signal.SIGTERM
-    signals._end()
-    assert ended[-1] == 143 and len(wrote) == 1 and signals.text == "interrupted by SIGTERM"
-
-
-def test_the_first_signal_alone_interrupts():
-    signals = Signals(str)
-    with pytest.raises(KeyboardInterrupt):
-        signals._hear(signal.SIGTERM, None)
-    signals._hear(signal.SIGINT, None)
-    assert signals.number == signal.SIGTERM
-
-
 def test_a_stream_that_is_gone_is_silent():
     class Gone(io.StringIO):
-        number = errno.EPIPE
+        def __init__(self, number):
+            super().__init__()
+            self.number = number
 
         def write(self, text):
             raise OSError(self.number, "gone")
@@ -368,16 +346,14 @@ def test_a_stream_that_is_gone_is_silent():
         flush = property(lambda self: lambda: self.write(""))
 
     for number in (errno.EPIPE, errno.EIO, errno.ESHUTDOWN):
-        stream = Lasting(Gone())
-        stream._stream.number = number
+        stream = Lasting(Gone(number))
         assert stream.write("abc") == 3 and stream.write("ab") == 2 and not stream.isatty()
         stream.flush()
     for act in (lambda stream: stream.write("a"), lambda stream: stream.flush()):
-        full = Lasting(Gone())
-        full._stream.number = errno.ENOSPC
-        with pytest.raises(OSError, match="gone"):
-            act(full)
-        assert full._stream is not None
+        full = Lasting(Gone(errno.ENOSPC))
+        for _ in range(2):
+            with pytest.raises(OSError, match="gone"):
+                act(full)
     assert Lasting(None).write("ab") == 2 and Lasting(None).isatty() is False
 
 

@@ -3,7 +3,6 @@
 
 import base64
 import dataclasses
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,7 +15,7 @@ from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import Status, WarningArray
 from lgvi_warp.statistics.estimate import Estimate, Estimates
 from lgvi_warp.views import choice, fleet, live, report, rerun, viewer
-from lgvi_warp.views.plots import canvas, ends, fans, read, words
+from lgvi_warp.views.plots import canvas, fans, read, words
 from lgvi_warp.views.recording import drawn
 from lgvi_warp.views.recording import words as told
 from tests.support.made import made
@@ -57,16 +56,6 @@ def test_parameters_of_some_members_are_theirs():
     assert whole.time.tolist() == result.time.tolist() and whole.position[0, :, 2].tolist() == [3.0, 4.0]
 
 
-def test_outcomes_share_places():
-    status = np.array([OK] * 3 + [FLOOR] * 4 + [FAILED] * 2 + [OK])
-    result = sinking(status=status, end=np.where(status != OK, 2.0, np.nan))
-    rank = np.array([9, 8, 7, 6, 5, 4, 3, 2, 1, 0])
-    for places, chosen in ((0, []), (1, [8]), (3, [8, 7, 6]), (5, [8, 7, 6, 5, 4]), (9, [8, 7, 6, 5, 4, 3])):
-        assert choice._ended(result, rank, places) == chosen
-    assert choice.of_members(3, 3000) == "3 of 3,000 members" and choice.of_members(3000, 3000) == "3,000 members"
-    assert choice.of_members(1, 1) == "1 member" and choice.of_members(0, 0) == "0 members"
-
-
 def test_vectors_are_finite_in_all_three():
     rows = np.ones((4, 3))
     rows[0, 0], rows[1, 1], rows[2, 2] = np.nan, np.inf, -np.inf
@@ -102,7 +91,9 @@ def test_a_change_of_any_number_changes_the_identity():
     position[-1, 3, 0] += 1.0
     start = result.position.copy()
     start[0, 3, 0] += 1.0
-    others = [dataclasses.replace(result, time=result.time + 1.0), sinking(status=[FLOOR] * N), sinking(status=[FLOOR] * N, end=np.ones(N)),
+    floor = [FLOOR] * N
+    others = [dataclasses.replace(result, time=result.time + 1.0), sinking(status=floor),
+              sinking(status=floor, end=np.ones(N)),
               dataclasses.replace(result, provenance=result.provenance | {"step": 0.02})]  # fmt: skip
     others += [
         dataclasses.replace(result, samples=dict(result.samples) | {"position": moved}) for moved in (position, start)
@@ -114,49 +105,15 @@ def test_a_change_of_any_number_changes_the_identity():
 # Histograms, fans and refusals -------------------------------------------------------------------------------------------
 
 
-def test_bins_of_a_histogram():
-    same = ends._edges(np.array([2.0, 2.0]))
-    np.testing.assert_allclose(same[[0, -1]], [2.0 - 1e-3, 2.0 + 1e-3])
-    assert len(same) == 6 and len(ends._edges(np.arange(49.0))) == 8
-    assert len(ends._edges(np.arange(1e5))) == ends.MOST_BINS + 1
-    assert ends._edges(np.array([-3.0, 1.0]))[[0, -1]].tolist() == [-3.0, 1.0]
-    zero = ends._edges(np.zeros(3))
-    assert zero[0] < 0.0 < zero[-1] and zero[-1] < 1e-14
-
-
-def test_groups_of_members_at_a_time():
-    status, end = [OK] * 5 + [FLOOR] * 3 + [FAILED] * 2, [np.nan] * 5 + [1.0, 2.0, 3.0, 2.0, 4.0]
-    result = sinking(status=status, end=end)
-    members = np.array([0, 5, 6, 7, 8, 9])
-    groups = {code.name: members[mask].tolist() for code, mask in ends._groups(result, members, 2.0)}
-    assert groups == {"OK": [0, 7, 9], "FLOOR": [5, 6], "NON_FINITE": [8]}
-    edges, when, unit, shares = ends._counted(result, ends.quantities(["depth"])[0], 2.2)
-    assert (when, unit) == (2.0, "m") and edges[[0, -1]].tolist() == [3.0, 12.0]
-    assert {label: color for label, (_, color) in shares.items()} == {
-        "under way (7)": fleet.LOOKS[Status.OK].color, "floor (2)": fleet.LOOKS[Status.FLOOR].color,
-        "non_finite (1)": fleet.LOOKS[Status.NON_FINITE].color}  # fmt: skip
-    assert sorted(round(share.sum()) for share, _ in shares.values()) == [10, 20, 70]
-    assert round(shares["floor (2)"][0].sum()) == 20
-    nowhere = dataclasses.replace(result, samples=dict(result.samples) | {"velocity": np.full((K, N, 3), np.nan)})
-    with pytest.raises(
-        NothingToDraw, match=r"no member has a finite speed: there is nothing to draw; see result\.status"
-    ):
-        ends._counted(nowhere, ends.quantities(["speed"])[0], None)
-    with pytest.raises(lw.SceneError, match="has 3 components"):
-        ends._counted(result, ends.quantities(["position"])[0], None)
-    with pytest.raises(
-        NothingToDraw, match=r"no member has a finite speed: there is nothing to draw; see result\.status"
-    ):
-        read.survey_of(nowhere, read.quantity_of("speed"))
-
-
 def test_a_survey_of_all_members():
     result = sinking(status=[OK] * 9 + [FLOOR], end=[np.nan] * 9 + [2.0])
     survey = read.survey_of(result, read.quantity_of("depth"))
     assert survey.low.tolist() == [1, 2, 3, 4, 5] and survey.high.tolist() == [10, 11, 12, 12, 13]
     assert survey.under_way.tolist() == [10, 10, 10, 9, 9] and survey.last.tolist() == list(range(5, 15))
     assert (survey.above, survey.total, survey.ranked) == (0, N, N)
-    high = dataclasses.replace(result, samples=dict(result.samples) | {"position": result.position - [0.0, 0.0, 3.0]})
+    high = dataclasses.replace(
+        result, samples=dict(result.samples) | {"position": result.position - np.array([0.0, 0.0, 3.0])}
+    )
     assert read.survey_of(high, read.quantity_of("depth")).above == 2
     bodiless = dataclasses.replace(result, samples={"velocity": result.velocity})
     everyone = read.everyone(bodiless)
@@ -212,30 +169,6 @@ def test_a_statistic_of_a_quantity_is_found():
     assert read.estimate_for(result, "energy", ("mean",)) is None
     once = statistic("mean", {"time": np.array([4.0])}, value=np.zeros((1, 2)))
     assert read.estimate_for(bare(sinking(), once), "depth", ("mean",)) is None
-
-
-def test_a_histogram_of_a_statistic():
-    counted = {"value": np.zeros((K, 2, 3)), "below": np.zeros((K, 2)), "above": np.zeros((K, 2))}
-    counted["value"][2, 1] = [0.25, 0.5, 0.125]
-    counted["below"][2, 1], counted["above"][2, 1] = 1000.0, 250.0
-    estimate = statistic("histogram", {"edge": np.arange(4.0)}, **counted)
-    edges, when, unit, shares = ends._gathered(Counted(estimate, counted), 1, 2.4)
-    assert (when, unit, edges.tolist()) == (2.0, "m", [0.0, 1.0, 2.0, 3.0])
-    ((label, (share, color)),) = shares.items()
-    assert label == "9,000 members, 1,250 of them outside the bins" and color == canvas.COLORS[0]
-    assert share.tolist() == [25.0, 50.0, 12.5]
-    assert list(ends._gathered(Counted(estimate, counted), 1, None)[3]) == ["9,000 members"]
-
-
-class Counted:
-    """A histogram of 9000 members."""
-
-    def __init__(self, estimate, arrays):
-        self.time, self.coordinates, self.arrays = estimate.time, estimate.coordinates, arrays
-        self.value, self.count = arrays["value"], np.full(K, 9000.0)
-
-    def __getitem__(self, name):
-        return self.arrays[name]
 
 
 def test_what_cannot_be_drawn_says_why():
@@ -308,7 +241,7 @@ def test_fans_of_statistics_stand_for_members():
     frames = np.array([0, 2, 4])
     depth = np.arange(K)[:, None] + 10.0
     extremes = statistic("extremes", minimum=depth, maximum=depth + 5.0)
-    streamed = drawn._streamed(bare(sinking(), extremes), fan, frames)
+    streamed = drawn.streamed(bare(sinking(), extremes), fan, frames)
     assert streamed.title == "Height, by the run's statistics"
     assert streamed.levels[0].tolist() == [-15.0, -17.0, -19.0] and streamed.levels[-1].tolist() == [
         -10.0,
@@ -317,7 +250,7 @@ def test_fans_of_statistics_stand_for_members():
     ]
     assert np.isnan(streamed.levels[1:-1]).all()
     quantiles = statistic("quantiles", {"level": np.array([0.05, 0.5])}, value=np.stack([depth, depth + 2.0], axis=1))
-    streamed = drawn._streamed(bare(sinking(), quantiles), fan, frames)
+    streamed = drawn.streamed(bare(sinking(), quantiles), fan, frames)
     levels = list(drawn.LEVELS)
     assert streamed.levels[levels.index(0.95)].tolist() == [-10.0, -12.0, -14.0]
     assert streamed.levels[levels.index(0.5)].tolist() == [-12.0, -14.0, -16.0]
@@ -326,19 +259,18 @@ def test_fans_of_statistics_stand_for_members():
     pitch = dataclasses.replace(fan, name="pitch")
     of_mean = bare(sinking(), statistic("mean", value=depth))
     for result, same in ((sampled, fan), (of_mean, fan), (bare(sinking(), extremes), pitch)):
-        assert drawn._streamed(result, same, frames) is same
+        assert drawn.streamed(result, same, frames) is same
 
 
 def test_members_of_a_recording_are_places_among_those_kept():
     kept = np.array([2, 5, 9])
-    assert drawn._of([9, 2, 9], 10, kept).tolist() == [0, 2] and drawn._of(
-        np.array([0, 9]), 10, np.arange(10)
-    ).tolist() == [0, 9]
+    assert drawn.places_of([9, 2, 9], 10, kept).tolist() == [0, 2]
+    assert drawn.places_of(np.array([0, 9]), 10, np.arange(10)).tolist() == [0, 9]
     for members, text in (([10], "members = 10: is none of the 10 members; give indices from 0 to 9"),
                           ([-1, 3], "members = -1: is none of the 10 members"), ([3, 2], "members = 3: has no samples"),
-                          ([], "is no list of members"), ([1.0], "is no list of members"), (3, "is no list of members")):  # fmt: skip
+                          ([], "is no list of members"), ([1.0], "is no list of members"), (3, "is no list")):  # fmt: skip
         with pytest.raises(lw.SceneError, match=text):
-            drawn._of(members, 10, kept)
+            drawn.places_of(members, 10, kept)
 
 
 def test_a_recording_goes_where_it_is_sent(monkeypatch):
@@ -389,6 +321,42 @@ def test_what_a_live_view_says_and_draws(monkeypatch):
         "20 members done: ok 27, floor 3",
     ]
     assert counts == [30.0] * 3 and logged[0][0] == "run/summary" and logged[0][2] == {"static": True, "strict": True}
+
+
+def test_a_live_view_logs_bodies_paths_and_curves_of_each_block(monkeypatch):
+    calls, layouts = [], []
+    for name in ("log_bodies", "log_paths", "log_frame", "log_member"):
+        monkeypatch.setattr(live, name, lambda *given, name=name: calls.append((name, *given)))
+    monkeypatch.setattr(
+        live, "live_layout", lambda run, box, scale: layouts.append((run.label, box.size, scale)) or "laid out"
+    )
+    recording = SimpleNamespace(send_blueprint=lambda layout: calls.append(("layout", layout)))
+    drawing = live.Live(recording)
+    monkeypatch.setattr(live, "CURVES", 5)
+    block = sinking()
+    drawing._draw(block, np.array([2, 5, 7]), 100)
+    assert [name for name, *_ in calls] == ["log_frame", "layout", "log_bodies", "log_paths", *["log_member"] * 3]
+    frame, layout, bodies, paths, *curves = calls
+    run = bodies[2]
+    assert all(given[1] is recording for given in (frame, bodies, paths, *curves)) and layout[1] == "laid out"
+    assert run.label == "from_100" and frame[2].label == "" and paths[2] is run and bodies[3] == layouts[0][2]
+    assert [given[2:] for given in curves] == [(run, 0, 102), (run, 1, 105), (run, 2, 107)]
+    assert run.position[0, :, 2].tolist() == [3.0, 6.0, 8.0] and layouts[0][:2] == ("", frame[3].size)
+    # The next block is of two curves more; the view is laid out anew where it is outgrown alone.
+    calls.clear()
+    drawing._draw(block, np.array([2, 5, 7]), 200)
+    assert [name for name, *_ in calls] == ["log_bodies", "log_paths", "log_member", "log_member"]
+    far = dataclasses.replace(
+        block, samples=dict(block.samples) | {"position": block.position + np.array([500.0, 0.0, 0.0])}
+    )
+    calls.clear()
+    drawing._draw(far, np.array([2]), 300)
+    assert [name for name, *_ in calls] == ["log_frame", "layout", "log_bodies", "log_paths"]
+    assert calls[0][3].low[0] <= 0.0 and calls[0][3].high[0] >= 500.0 and calls[2][3] == layouts[0][2]
+    calls.clear()
+    lost = dataclasses.replace(block, samples=dict(block.samples) | {"position": np.full((K, N, 3), np.nan)})
+    drawing._draw(lost, np.array([2]), 400)
+    assert calls == []
 
 
 def test_a_viewer_that_is_gone_ends_a_live_view(monkeypatch):
@@ -504,16 +472,3 @@ def test_tables_of_a_study(tmp_path):
         assert text.count("<td>") == 200 and "<h2>How it was made</h2><pre>{\n &quot;of&quot;: 3\n}</pre>" in text
     (tmp_path / "stability.csv").write_text("")
     assert "<h2>Table</h2><table></table>" in lw.report(tmp_path, tmp_path / "a.html").read_text()
-
-
-def test_the_folder_of_a_run(tmp_path, monkeypatch):
-    monkeypatch.setattr("lgvi_warp.runs.store.open.open_run", lambda path: f"store of {path}")
-    monkeypatch.setattr(lw.Result, "load", lambda path: f"result of {path}")
-    store = tmp_path / "a.zarr"
-    assert report._run_in(store) == f"store of {store}"
-    with pytest.raises(lw.SceneError, match="holds no run and no study"):
-        report._run_in(tmp_path)
-    (tmp_path / "run.zarr").mkdir()
-    assert report._run_in(tmp_path) == f"store of {tmp_path}"
-    (tmp_path / "result.npz").touch()
-    assert report._run_in(Path(tmp_path)) == f"result of {tmp_path}/result.npz"

@@ -323,13 +323,11 @@ class Findings:
             SceneError: there is no such point.
         """
         shares: dict[str, np.ndarray] = {}
-        single = False
+        single = len(self.cells_of(self.cases[0], at)) == 1
         for case in self.cases:
             cells = self.cells_of(case, at)
-            if any(self.record(cell).refused for cell in cells):
-                continue
-            single = len(cells) == 1
-            shares[case] = np.mean([self.passed(cell) for cell in cells], axis=0)
+            if not any(self.record(cell).refused for cell in cells):
+                shares[case] = np.mean([self.passed(cell) for cell in cells], axis=0)
         pairs = list(itertools.combinations(shares, 2))
         tests = [self._share_test(shares[a], shares[b], single) for a, b in pairs]
         p = dict(zip(pairs, paired.holm(np.array([test.p for test in tests])), strict=True))

@@ -184,11 +184,10 @@ def _salib_distribution(distribution: Any, base: Any, numbers: Mapping[str, Any]
     if distribution.kind == "normal":
         return "norm", [mean, float(numbers["std"] if "std" in numbers else abs(base) * numbers["relative"])]
     if distribution.kind == "uniform":
-        if np.ndim(distribution.high) == 0:
-            low, high = (float(distribution.quantile(np.array([u]), np.array(base)).reshape(-1)[0]) for u in (0.0, 1.0))
-        else:
-            low, high = float(numbers["low"]), float(numbers["high"])
-        return "unif", [low, high]
+        if "low" in numbers:
+            return "unif", [float(numbers["low"]), float(numbers["high"])]
+        half = float(numbers["half_width"] if "half_width" in numbers else abs(base) * numbers["relative"])
+        return "unif", [base - half, base + half]
     if distribution.kind == "lognormal" and float(numbers.get("median", base)) > 0.0:
         return "lognorm", [float(np.log(numbers.get("median", base))), float(numbers["sigma"])]
     return None

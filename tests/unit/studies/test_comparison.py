@@ -498,7 +498,7 @@ def test_the_front_leaves_out_what_is_dearer_and_no_better():
     assert [one.setting.method for one in found.shown()] == ["b", "c", "a", "d"]
     assert [one.setting.method for one in found.front()] == ["b", "a"]
     assert found.front("attitude") == [] and ones[0].error("attitude") == math.inf
-    assert ones[0].error() == 1e-4 and ones[0].error(kind="end_rms") == pytest.approx(5e-6)
+    assert ones[0].cost_spread == 1.0 and ones[0].error() == 1e-4 and ones[0].error(kind="end_rms") == pytest.approx(5e-6)
     assert [row["front"] for row in found.rows()] == [True, True] + [False] * 5
 
 

@@ -13,6 +13,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
 from lgvi_warp.methods.limits import drag_limit
+from lgvi_warp.methods.method import Method
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation, vehicle
 from lgvi_warp.physics.rates import drag_rate, rates
@@ -419,7 +420,7 @@ def test_axes_without_a_range_are_around_the_scenes_number(scene):
     assert half.x.low == 0.5 and half.x.high == pytest.approx(4.0 / half.rate)
     bare = lw.Scene(lw.Vehicle(1.0, (1.0, 1.0, 1.0)), run=RunSettings(step=0.1))
     assert grid_of(bare, "speed", "angular_velocity").x.low == 0.1 and grid_of(bare, "speed", "h").rate == 1.0
-    with pytest.raises(lw.SceneError, match="axis vehicle.buoyancy = None: is not a finite number"):
+    with pytest.raises(lw.SceneError, match=r"axis vehicle\.buoyancy = None: is not a finite number"):
         grid_of(bare, "vehicle.buoyancy", "h")
 
 
@@ -656,3 +657,28 @@ def test_what_drives_a_scene_by_kind(scene):
     assert kind(lw.Current(velocity=[0.0, 0.0, 0.1])) == kind(lw.Wrench(force=[1.0, 0.0, 0.0])) == "driven"
     with pytest.raises(lw.SceneError, match="terms: noise acts, whose path differs from step to step"):
         kind(lw.WrenchNoise(force=[1.0, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize(("name", "first"), [("rkn6_11", "B"), ("rkn6_14", "A")])
+def test_limits_of_methods_of_two_parts(name, first):
+    """The step is a product of shears, turn and kick by turns; its trace leaves 2 at the limit."""
+    stages = Method(name).stages
+    turns = [(i % 2 == 0) == (first == "A") for i in range(len(stages))]
+
+    def half_trace(y):
+        step = np.eye(2)
+        for turn, g in zip(turns, stages, strict=True):
+            shear = np.array([[1.0, g * y], [0.0, 1.0]]) if turn else np.array([[1.0, 0.0], [-g * y, 1.0]])
+            step = shear @ step
+        return 0.5 * abs(np.trace(step))
+
+    for kind in ("munk", "restoring"):
+        limit = oscillation_limit(name, kind)
+        assert max(half_trace(y) for y in np.linspace(0.01, limit - 0.01, 300)) <= 1.0 + 1e-5 < half_trace(limit + 0.01)
+    longest = max(abs(g) for turn, g in zip(turns, stages, strict=True) if turn)
+    assert rotation_limit(name) == pytest.approx(0.5 * math.pi / longest, rel=1e-12)
+
+
+def test_methods_that_iterate_have_no_limit_by_theory():
+    assert math.isnan(oscillation_limit("gauss4")) and math.isnan(rotation_limit("gauss4"))
+    assert rotation_limit("rk4") == oscillation_limit("rk4") and rotation_limit("cg3") == math.inf

@@ -193,7 +193,7 @@ def _add_run(verbs: Any) -> None:
     _add_shared(
         run,
         "--method --step --dtype",
-        method="psi_s, psi_1, psi, phi, phi_adjoint, or a composition such as kl6(psi_s)",
+        method="rk4, rk8, rkw3, psi_s, psi_x ...: see list methods (default: the scene's, else chosen by what acts)",
         dtype="float64, float32, or float32_compensated: sums of two float32",
     )
     add("--solver", help="of equation (24): quartic, cayley, newton or moser_veselov")

@@ -250,6 +250,10 @@ def check_backward_drag(ensemble: Ensemble, choice: KernelChoice, method: Method
         faults.raise_if_any()
 
 
+# Classes of terms with the names of built-in device code that was found to suit them.
+suitable: set[tuple[type, str]] = set()
+
+
 def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) -> Any:
     """The module of a term's device code, checked for what a kernel needs of it.
 
@@ -267,6 +271,8 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
     folder, roles = _folder_and_roles(term)
     page = f"see docs/develop/add_a_{'controller' if isinstance(term, Part) else 'force'}.md"
     module = built_in(folder, device) if isinstance(device, str) else device
+    if isinstance(device, str) and (type(term), device) in suitable:
+        return module
     faults = Faults()
     if module is None:
         faults.add(f"{term.key}.device", device, "is not known", "give a module, or the name of a built-in one")
@@ -285,6 +291,8 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
         if flow not in FLOWS:
             faults.add(f"{term.key}.FLOW", flow, "is not known", closest(str(flow), FLOWS))
     faults.raise_if_any()
+    if isinstance(device, str):
+        suitable.add((type(term), device))
     return module
 
 

@@ -25,7 +25,7 @@ from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Packed, PackingContext, Term
 from lgvi_warp.physics.terms.drag import Drag
 from lgvi_warp.sampling.members import Members
-from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.ensemble import KEPT, Ensemble
 
 Fields = dict[str, Any]
 # A Plan, whose module imports this one.
@@ -248,7 +248,9 @@ def rows_shared(plan: Plan) -> bool:
     Returns:
         True where one number of each row serves all members.
     """
-    packing = Packing(plan, plan.ensemble.select(0, 1))
+    # What few members need is packed once, here.
+    members = plan.ensemble.members
+    packing = Packing(plan, plan.ensemble.select(0, members if members <= KEPT else 1))
     each = (("law", packing.laws()), ("part", packing.control()))
     sizes = {
         (kind, i): law.rows.shape[1] for kind, packed in each for i, law in enumerate(packed) if law.rows is not None

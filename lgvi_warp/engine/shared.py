@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -96,6 +96,14 @@ def context(numbers: Mapping[str, np.ndarray], *run: Any) -> PackingContext:
     return (WatchedContext if isinstance(numbers, Reads) else PackingContext)(numbers, *run)
 
 
+class _Few(NamedTuple):
+    """Numbers of few members as they were given, completed by their frame, and results that follow from these alone."""
+
+    given: Mapping[str, np.ndarray]
+    numbers: Mapping[str, Any]
+    results: dict[Any, Any]
+
+
 @dataclass
 class Shared:
     """Results computed once, as far as they follow from numbers that vary from no member to another.
@@ -109,8 +117,8 @@ class Shared:
 
     varied: set[str]
     _kept: dict[Any, Any] = field(default_factory=dict)
-    _varying: set[Any] = field(default_factory=set)
-    _last: tuple[Mapping[str, np.ndarray], Any] | None = None
+    _varying: dict[Any, bool] = field(default_factory=dict)
+    _last: _Few | None = None
 
     def __call__(self, key: Any, numbers: Mapping[str, np.ndarray], compute: Callable[[Any], Value]) -> Value:
         """A result from memory, or computed.
@@ -125,40 +133,46 @@ class Shared:
         """
         if key in self._kept:
             return self._kept[key]
+        last = self._last
+        results = last.results if last is not None and numbers is last.numbers else {}
+        if key in results:
+            return results[key]
         if key in self._varying:
-            return compute(numbers)
-        reads = Reads(numbers)
-        value = compute(reads)
-        if reads.names.isdisjoint(self.varied):
-            self._kept[key] = value
+            value = compute(numbers)
         else:
-            self._varying.add(key)
+            reads = Reads(numbers)
+            value = compute(reads)
+            if reads.names.isdisjoint(self.varied):
+                self._kept[key] = value
+                return value
+            self._varying[key] = reads.names.isdisjoint((MEMBERS, SEED))
+        if self._varying[key]:
+            results[key] = value
         return value
 
-    def of_the_same(self, numbers: Mapping[str, np.ndarray]) -> Any:
-        """What `remember` was given for the members that have these numbers.
+    def completed(self, numbers: Mapping[str, np.ndarray]) -> Any:
+        """The numbers that `remember` was given for these members.
 
         Args:
             numbers: numbers by name, the same arrays as then and no copies of them.
 
         Returns:
-            What was remembered; None for other members.
+            The completed numbers; None for other members.
         """
-        if self._last is None:
+        last = self._last
+        if last is None or any(numbers.get(name) is not last.given.get(name) for name in self.varied):
             return None
-        numbers_then, value = self._last
-        same = all(numbers.get(name) is numbers_then.get(name) for name in self.varied)
-        return value if same else None
+        return last.numbers
 
-    def remember(self, numbers: Mapping[str, np.ndarray], value: Any) -> None:
+    def remember(self, given: Mapping[str, np.ndarray], numbers: Mapping[str, Any]) -> None:
         """Keep what follows from the numbers of few members until others come: a run looks at them more than once.
 
         Args:
-            numbers: numbers by name.
-            value: what follows from them.
+            given: numbers by name.
+            numbers: the same with what completes them, from which results are computed.
         """
-        few = all(len(numbers[name]) <= KEPT for name in self.varied if name in numbers)
-        self._last = (numbers, value) if few else None
+        few = all(len(given[name]) <= KEPT for name in self.varied if name in given)
+        self._last = _Few(given, numbers, {}) if few else None
 
     def keeps(self, key: Any) -> bool:
         """Whether a computation that ran is shared by all members.

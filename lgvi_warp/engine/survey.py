@@ -220,10 +220,10 @@ def framed(method: Method, parameters: Parameters, shared: Shared) -> dict[str, 
     Returns:
         The parameters and, under FRAME, what `frame_of` returns; under AXES the same, but any mass matrix in it.
     """
+    completed: dict[str, Any] | None = shared.completed(parameters)
+    if completed is not None:
+        return completed
     p: dict[str, Any] = dict(parameters)
-    frames = shared.of_the_same(parameters)
-    if frames is not None:
-        return p | frames
     if "vehicle.mass" in p:
         # Without coupling the axes do not depend on the mass.
         nothing = np.eye(3)[None], np.zeros((1, 3, 3))
@@ -238,7 +238,7 @@ def framed(method: Method, parameters: Parameters, shared: Shared) -> dict[str, 
         p[AXES] = p[FRAME] = shared(FRAME, p, functools.partial(frame_of, method))
         if not shared.keeps(FRAME):
             shared.varied.update((FRAME, AXES))
-    shared.remember(parameters, {FRAME: p[FRAME], AXES: p[AXES]})
+    shared.remember(parameters, p)
     return p
 
 

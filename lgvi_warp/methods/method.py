@@ -7,6 +7,7 @@ discrete Moser-Veselov rotation of equation (24), Ab and Ap the two halves of T.
 
 from __future__ import annotations
 
+import functools
 import re
 from dataclasses import dataclass, field, fields
 
@@ -165,7 +166,7 @@ class Method(Summarized):
 
     def __post_init__(self) -> None:
         faults = Faults()
-        base, composition = self._split()
+        base, composition = parted(str(self.name))
         faults.choice("method", base, PROGRAMS | RUNGE_KUTTA | TWO_PART | GAUSS)
         if composition is not None:
             faults.choice("method composition", composition, COMPOSITIONS | HALVES)
@@ -211,14 +212,10 @@ class Method(Summarized):
             able = " or ".join(name for name, tableau in EXPLICIT.items() if tableau.errors)
             faults.add("rtol, atol", self.name, "estimates no error", f"use {able}, or leave them out")
 
-    def _split(self) -> tuple[str, str | None]:
-        match = re.fullmatch(r"(\w+)\((\w+)\)", str(self.name))
-        return (match[2], match[1]) if match else (str(self.name), None)
-
     @property
     def base(self) -> str:
         """Name of the method that is composed; without a composition, of this one."""
-        return self._split()[0]
+        return parted(str(self.name))[0]
 
     @property
     def program(self) -> Program:
@@ -240,7 +237,7 @@ class Method(Summarized):
     @property
     def halved(self) -> bool:
         """Whether each stage is two halves of different length."""
-        return self._split()[1] in HALVES
+        return parted(str(self.name))[1] in HALVES
 
     @property
     def tableau(self) -> Tableau | None:
@@ -268,7 +265,7 @@ class Method(Summarized):
 
         For two halves, or two parts, the coefficients of both alternate.
         """
-        composition = self._split()[1]
+        composition = parted(str(self.name))[1]
         if self.two_part:
             return palindrome_of_parts(TWO_PART[self.base][2])
         if composition is None:
@@ -309,7 +306,7 @@ class Method(Summarized):
     @property
     def order(self) -> int:
         """Order of convergence in the step."""
-        base, composition = self._split()
+        base, composition = parted(str(self.name))
         if self.two_part:
             return TWO_PART[base][0]
         if self.gauss:
@@ -354,6 +351,20 @@ class Method(Summarized):
         if self.iterations is None:
             return 1e-14 if dtype == "float64" else 1e-6
         return 1e-12 if dtype == "float64" else 1e-5
+
+
+@functools.cache
+def parted(name: str) -> tuple[str, str | None]:
+    """Divide the name of a method.
+
+    Args:
+        name: Such as "psi_s" or "su4(psi_s)".
+
+    Returns:
+        The method that is composed, and the composition; None where there is none.
+    """
+    match = re.fullmatch(r"(\w+)\((\w+)\)", name)
+    return (match[2], match[1]) if match else (name, None)
 
 
 def merged(program: Program) -> tuple[tuple[str, float] | None, Program]:

@@ -36,6 +36,7 @@ from lgvi_warp.scene.columns import as_given, columns_of, names_of, stacked, who
 from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
 from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.scene import Scene
+from lgvi_warp.scene.settings import MOST_MEMBERS, EnsembleSettings
 
 # Members that are run together where quantities look over their paths, which are kept as long as they run.
 PATHS_AT_ONCE = 16_384
@@ -234,25 +235,28 @@ class Prepared:
             velocity: (n, 3) [m/s], body axes.
             angular_velocity: (n, 3) [rad/s], body axes.
             parameters: arrays (n, ...) by name, as of `Ensemble.from_states`; default None.
-            indices: (n,), whole numbers that key the noise of each member, such as its index in another ensemble; members with
-                the same index have the same noise. Default None for 0 to n - 1.
-            seed: the seed of the noise. Default 0.
+            indices: (n,), whole numbers from 0 that key the noise of each member, such as its index in another ensemble;
+                members with the same index have the same noise. Default None for 0 to n - 1.
+            seed: the seed of the noise, a whole number from 0. Default 0.
 
         Returns:
             As of a call.
 
         Raises:
-            SceneError: if an array has a wrong shape or unphysical values.
+            SceneError: if an array has a wrong shape or unphysical values, or the seed is no whole number. States that are not
+                finite are taken: their members fail.
             FailedMembers: if members failed, unless failed="nan".
         """
         given = position, attitude, velocity, angular_velocity, parameters
         fleet = Ensemble.from_states(self._fleet.scene, *given)
-        fleet.seed = seed
+        fleet.seed = int(EnsembleSettings(fleet.members, seed).seed)
         if indices is not None:
             keys = np.asarray(indices)
-            if keys.shape != (fleet.members,) or keys.dtype.kind not in "iu":
-                problem = "are not one whole number for each member"
-                raise refusal("indices", indices, problem, f"give an array of shape ({fleet.members},)")
+            whole = keys.shape == (fleet.members,) and keys.dtype.kind in "iu"
+            if not whole or keys.min() < 0 or keys.max() >= MOST_MEMBERS:
+                problem = "are not one whole number from 0 for each member"
+                remedy = f"give an array of shape ({fleet.members},), of numbers below {MOST_MEMBERS}"
+                raise refusal("indices", indices, problem, remedy)
             fleet.indices = keys.astype(np.int64)
         return self._answer(fleet, None)
 
@@ -297,8 +301,8 @@ class Prepared:
             array = stacked(faults, "X", names, columns) if columns else None
         else:
             array = faults.real("X", X, shape)
-            if array is not None and (array.ndim != 2 or array.shape[1] != len(names) or not len(array)):
-                faults.add("X", "...", f"has shape {array.shape}", shape)
+        if array is not None and (array.ndim != 2 or array.shape[1] != len(names) or not len(array)):
+            faults.add("X", "...", f"has shape {array.shape}", shape)
         if array is not None and self._levels is not None and not np.all((array >= 0.0) & (array <= 1.0)):
             odd = array[~((array >= 0.0) & (array <= 1.0))][0]
             remedy = "give levels, or leave out levels=True to give the numbers"
@@ -407,8 +411,9 @@ def scene_value(scene: Any, name: str) -> np.ndarray:
     """
     (target,) = variations.targets(name)
     known, faults = scene_numbers(scene), Faults("vary.")
-    if variations.known_target(faults, name, "...", target, known) and target.of(known[target.name]).ndim:
-        faults.add(f'"{name}"', "...", "is not a single number", f'name its entries, such as "{name}[0]"')
+    if variations.known_target(faults, name, "...", target, known) and (ndim := target.of(known[target.name]).ndim):
+        entry = f"{name}[{','.join('0' * ndim)}]"
+        faults.add(f'"{name}"', "...", "is not a single number", f'name its entries, such as "{entry}"')
     faults.raise_if_any()
     return target.of(known[target.name])
 

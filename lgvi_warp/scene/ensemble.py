@@ -343,7 +343,8 @@ class Ensemble(Summarized):
                 if finding.shared
                 else f"is unphysical ({finding.count} of {of})"
             )
-            faults.add(f"{key} of member {finding.first}", finding.value, problem, remedy)
+            entry, value = _odd_entry(finding.value)
+            faults.add(f"{key}{entry} of member {finding.first}", value, problem, remedy)
         faults.raise_if_any()
 
     def _look_at(self, varied: set[str], first: int, stop: int, p: Mapping[str, np.ndarray]) -> dict[str, _Unphysical]:
@@ -676,6 +677,15 @@ class _Unphysical:
     count: int
 
 
+def _odd_entry(value: Any) -> tuple[str, Any]:
+    """Return the place of the first entry that is not finite, as in "[1,2]", and the entry; or "" and the value itself."""
+    numbers = np.asarray(value)
+    if not numbers.ndim or np.isfinite(numbers).all():
+        return "", value
+    place = tuple(np.argwhere(~np.isfinite(numbers))[0].tolist())
+    return f"[{','.join(map(str, place))}]", numbers[place]
+
+
 def _is_name(name: Any) -> bool:
     """Return whether this is a text, or a tuple of texts that one distribution draws together."""
     return isinstance(name, str) or (isinstance(name, tuple) and all(isinstance(entry, str) for entry in name))
@@ -798,9 +808,15 @@ def _explicit_parameter(faults: Faults, key: str, value: Any, shape: tuple[int, 
     if array.shape != shape:
         also = f" or {shape[:2]}" if key in MATRICES else ""
         faults.add(key, value, f"has shape {array.shape}", f"give an array of shape {shape}{also}")
-    elif key in MATRICES and np.any(np.abs(array - np.swapaxes(array, 1, 2)) > 1e-9 * np.abs(array).max()):
+    elif key in MATRICES and _skew(array):
         faults.add(key, "...", "holds a matrix that is not symmetric", "give symmetric matrices")
     return array
+
+
+def _skew(matrices: np.ndarray) -> bool:
+    """Return whether one of the matrices (n, d, d) is not symmetric; those that are not finite are judged elsewhere."""
+    with np.errstate(invalid="ignore"):
+        return bool(np.any(np.abs(matrices - np.swapaxes(matrices, 1, 2)) > 1e-9 * np.abs(matrices).max()))
 
 
 def _positive_definite(matrices: np.ndarray) -> np.ndarray:

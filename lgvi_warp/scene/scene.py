@@ -247,7 +247,10 @@ def _copied(content: Any) -> Any:
     """Tables and lists of plain values, copied down to the values."""
     if type(content) is dict:
         return {key: _copied(value) for key, value in content.items()}
-    return [_copied(value) for value in content] if type(content) is list else content
+    if type(content) is not list:
+        return content
+    plain = content and type(content[0]) is float
+    return content.copy() if plain else [_copied(value) for value in content]
 
 
 SECTIONS = ("vehicle", "environment", "start", "ensemble", "run", "terms", "events", "controller", "source")

@@ -259,6 +259,18 @@ class Sample:
         grid = TimeGrid(candidate.h, self.index * m, self.times)
         return Plan(ensemble or self.ensemble, candidate.resolved(), grid, FIELDS, candidate.dtype)
 
+    def plan_to_price(self, candidate: Candidate) -> Plan:
+        """Make the plan of a run of a setting outside the comparison.
+
+        Args:
+            candidate: method, step, precision and solver.
+
+        Returns:
+            The plan, by the kernel of `plan`. Noise that has no noise_step in the scene is drawn once a step.
+        """
+        sample = self.on_grid(round(float(self.spacing) / candidate.h)) if self.draws else self
+        return sample.plan(candidate)
+
     def run(self, candidate: Candidate, ensemble: Ensemble | None = None) -> Result:
         """Run a setting on one thread.
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.plan import Plan
+from lgvi_warp.physics.terms.noisy import NoisyTerm
 
 # Approximate length of a launch that is timed [s].
 TIMED = 2e-3
@@ -191,8 +192,8 @@ def timed(calls: Sequence[Callable[[], object]], rounds: int) -> np.ndarray:
 def work_grows(plan: Plan) -> bool:
     """Tell whether a longer step is more work.
 
-    It is where a step iterates to a tolerance (the quartic's few Newton steps aside), and where each packet chooses
-    its own steps.
+    It is where a step iterates to a tolerance (the quartic's few Newton steps aside), where each packet chooses its own
+    steps, and where a step takes several draws of noise.
 
     Args:
         plan: the plan.
@@ -202,7 +203,8 @@ def work_grows(plan: Plan) -> bool:
     """
     spec, letters = plan.spec, {letter for letter, _ in plan.spec.maps}
     newton = spec.explicit is None and spec.adaptive and (spec.solver != "quartic" or "W" in letters)
-    return bool(spec.gauss) or spec.averages is not None or newton or plan.method.adaptive
+    draws = any(isinstance(term, NoisyTerm) and term.draws(plan.grid.h) > 1 for term, _ in plan.kernel_choice.laws)
+    return bool(spec.gauss) or spec.averages is not None or newton or draws or plan.method.adaptive
 
 
 def disagreement(spreads: Sequence[tuple[str, float]]) -> str | None:

@@ -387,7 +387,7 @@ class Ladders:
         """
         sample, reference, of, target = self.sample, self.reference, self.of, self.target
         m, before, worse = sample.coarsest(2.0), math.inf, 0
-        plan = sample.plan(sample.candidate(method, m, dtype))
+        plan = sample.plan_to_price(sample.candidate(method, m, dtype))
         self.deadline += plan.compile()
         per_step = step_cost(plan)
         cheapest = min((price for price, _ in self.priced), default=math.inf)
@@ -405,6 +405,9 @@ class Ladders:
                 return None
             before = size
             m = sample.allowed(2 * m)
+            if cost.work_grows(plan):
+                plan = sample.plan_to_price(sample.candidate(method, m, dtype))
+                per_step = step_cost(plan)
         return math.inf
 
     @property

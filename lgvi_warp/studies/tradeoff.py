@@ -283,9 +283,7 @@ def tried(sample: Sample, candidate: Candidate, reference: Reference | None, unt
             errors = comparison.errors(comparison.distances(result, reference.result, reference.asked), until)
             if not all(np.isfinite(norms["path_max"]) for norms in errors.values()):
                 errors = {}
-    if sample.draws:
-        plan = sample.on_grid(round(float(sample.spacing) / candidate.h)).plan(candidate)
-    return Trial(candidate, plan, result, errors, cpu_seconds)
+    return Trial(candidate, sample.plan_to_price(candidate), result, errors, cpu_seconds)
 
 
 def costs(plans: Sequence[Plan], rounds: int = 5) -> list[float]:

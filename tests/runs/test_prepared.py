@@ -3,6 +3,7 @@
 
 import gc
 import pickle
+import re
 import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 
@@ -147,6 +148,12 @@ def test_states_may_be_given(paper):
     mass = {"vehicle.mass": np.linspace(120.0, 124.0, 4)}
     expected = lw.solve(lw.Ensemble.from_states(paper, *states, mass), **SETTINGS)
     np.testing.assert_array_equal(run.states(*states, mass), expected.position[-1])
+    for keys in ([1, 2], [1.0, 2.0, 3.0, 4.0], [-1, 0, 1, 2], [2**31, 0, 1, 2]):
+        with pytest.raises(lw.SceneError, match=r"indices = .*below 2147483648"):
+            run.states(*states, indices=keys)
+    for seed in (-1, 1.5, None):
+        with pytest.raises(lw.SceneError, match="seed = "):
+            run.states(*states, seed=seed)
 
 
 def test_failed_members_are_refused_or_have_no_number(paper):
@@ -164,12 +171,20 @@ def test_unphysical_numbers_are_refused(paper):
     X[1, 0] = -1.0
     with pytest.raises(lw.SceneError, match=r"vehicle\.mass of member 1"):
         run(X)
-    for odd in (np.ones((3, 2)), np.ones(3), np.ones((0, 3)), "x"):
+    for odd in (np.ones((3, 2)), np.ones(3), np.ones((0, 3)), "x", {name: () for name in NAMES}):
         with pytest.raises(lw.SceneError, match="X"):
             run(odd)
     with pytest.raises(lw.SceneError) as caught:
         lw.prepare(paper, ["vehicle.mas"], of="dept", failed="no", h=0.1, t1=1.0)
     assert all(word in str(caught.value) for word in ("dept", "failed"))
+
+
+def test_whole_numbers_are_refused_with_the_name_of_an_entry(paper):
+    for name, entry in (("start.position", "start.position[0]"), ("drag_matrix.linear", "drag_matrix.linear[0,0]")):
+        scene = lw.Scene(paper.vehicle, paper.environment, terms=[lw.DragMatrix(linear=np.eye(6))], start=paper.start)
+        with pytest.raises(lw.SceneError, match=rf'such as "{re.escape(entry)}"'):
+            lw.prepare(scene, [name], of="depth", **SETTINGS)
+        lw.Ensemble(scene, 1, 0, {entry: lw.Uniform(1.0, 2.0)})
 
 
 def test_other_members_may_need_another_kernel():

@@ -306,6 +306,8 @@ def test_a_suggestion_in_noise_keeps_the_error(noise_step):
     fleet = noisy_fleet(dataclasses.replace(CURRENT, noise_step=noise_step))
     found = lw.suggest(fleet, 0.02, t1=4.0, methods=["psi_x"], seconds=ENOUGH)
     assert "all runs see one path" in str(found) and found.expected <= 0.02
+    # Half the cost of float64, whatever number of draws the longest steps take.
+    assert found.setting.dtype == "float32"
     result = lw.solve(fleet, t1=4.0, threads=1, **found.settings)
     error, members = suggestion.verified(fleet, result, found)
     # Another path, and the largest of 32 members: not the same error, but one of its size.

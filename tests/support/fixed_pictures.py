@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What pictures and recordings show, as it was when they were last looked at: every line, colour, text and setting.
+"""What pictures, recordings and reports show, as it was when they were last looked at: every line, colour, text and setting.
 
 `python -m tests.support.fixed_pictures --write` records them anew, after a change that was looked at (`make gallery`, and
 tests/unit/views/test_seen.py). An array is kept as its size, its sum, and a sum in which each place weighs differently.
 """
 
 import argparse
+import dataclasses
 import functools
 import json
 import re
 import tempfile
 from collections import defaultdict
 from pathlib import Path
+from types import SimpleNamespace
 
 import matplotlib as mpl
 import numpy as np
@@ -24,9 +26,17 @@ from matplotlib.patches import Patch
 from rerun.chunk import RrdReader
 
 import lgvi_warp as lw
+from lgvi_warp.cli import documents, report
+from lgvi_warp.cli.folders import text_of
+from lgvi_warp.cli.writing import Written
+from lgvi_warp.common.status import WarningArray
+from lgvi_warp.statistics.estimate import Estimates
+from tests.conftest import ROOT
+from tests.unit.cli.test_terminal import morris, region, sobol
+from tests.unit.statistics.test_statistics import gathered
 from tests.unit.views.test_cost_pictures import RUNS, TERMS
 from tests.unit.views.test_recording import fleet
-from tests.views.test_plots import of_cells, of_factors, of_methods
+from tests.views.test_plots import margins_of, of_cells, of_factors, of_methods
 
 FILE = Path(__file__).parents[1] / "data" / "pictures.json"
 ROUND_OFF = 1e-6
@@ -36,6 +46,8 @@ RANDOM = re.compile(r"[0-9a-f]{8}-[0-9a-f-]{27}|lgvi_warp_[0-9a-f]+|rec_[0-9a-f]
 # Components that hold such names, or times of recording.
 OF_THE_HOUR = ("RowId", "root_container", "start_time", "log_time", "log_tick", "blueprint")
 VERSIONS = re.compile(r"^\| *(versions?|machine).*$", re.MULTILINE)
+STATISTICS = (lw.Quantiles("depth"), lw.Extremes("depth"), lw.Mean("velocity"), lw.Covariance("velocity"),
+              lw.Histogram("depth", bins=5, limits=(0.0, 20.0)))  # fmt: skip
 
 
 def sums(values):
@@ -78,6 +90,13 @@ def written(text):
     return [text.get_text(), text.get_fontsize(), text.get_rotation(), text.get_ha(), text.get_va(), text.get_color()]
 
 
+def of_legend(legend):
+    """Title and texts of a legend, and its place in percent of the picture."""
+    place, whole = legend.get_window_extent(), legend.get_figure().bbox
+    percent = 100.0 * place.extents / np.tile(whole.size, 2)
+    return [legend.get_title().get_text(), [text.get_text() for text in legend.get_texts()], np.round(percent).tolist()]
+
+
 def of_axes(axes):
     """Everything on one panel."""
     legend = axes.get_legend()
@@ -88,7 +107,7 @@ def of_axes(axes):
         "scales": [axes.get_xscale(), axes.get_yscale(), axes.axison, axes.get_visible(), str(axes.get_aspect())],
         "limits": [sums(axes.get_xlim()), sums(axes.get_ylim())],
         "ticks": [sums(axes.get_xticks()), sums(axes.get_yticks())],
-        "legend": legend and [legend.get_title().get_text(), [text.get_text() for text in legend.get_texts()]],
+        "legend": legend and of_legend(legend),
         "drawn": [drawn(artist) for artist in content],
     }
 
@@ -96,11 +115,10 @@ def of_axes(axes):
 def of_figure(figure):
     """Everything in one picture."""
     figure.draw_without_rendering()
-    keys = [[text.get_text() for text in legend.get_texts()] for legend in figure.legends]
     return {
         "size": figure.get_size_inches().tolist(),
         "texts": [written(text) for text in figure.texts],
-        "legends": keys,
+        "legends": [of_legend(legend) for legend in figure.legends],
         "axes": [of_axes(axes) for axes in figure.axes],
     }
 
@@ -127,6 +145,8 @@ def of_recording(path):
     for kind, entries in stores.items():
         for entry in entries:
             for chunk in reader.stream(store=entry):
+                if chunk.entity_path.startswith("/run/provenance"):
+                    continue
                 entity = kind + RANDOM.sub("*", chunk.entity_path)
                 batch = chunk.to_record_batch()
                 for name, column in zip(batch.schema.names, batch.columns, strict=True):
@@ -153,6 +173,10 @@ def pictures():
     result = fleet()
     found = {name: (getattr(lw.plots, name), (result,)) for name in OF_A_RUN}
     found["fan of the energy"] = lw.plots.fan, (result, "energy")
+    found["drift"] = lw.plots.drift, (fleet(9, scene=lw.Scene(lw.Scene.named("sphere").vehicle)),)
+    found["summary of members kept"] = lw.plots.summary, (followed(),)
+    found["statistics"] = lw.plots.statistics, (followed(),)
+    found["margins"] = lw.plots.margins, (margins_of([True, True, True, True, False]),)
     found["one vehicle"] = lw.plots.summary, (fleet(1, 60),)
     found["compare"] = lw.plots.compare, ({"a": result, "b": fleet(9, 31, 2)}, "speed")
     found["tradeoff"] = lw.plots.tradeoff, (of_methods(),)
@@ -174,13 +198,101 @@ def recording(name, folder):
     return of_recording(lw.log_rerun(RECORDINGS[name](), Path(folder) / "fleet.rrd"))
 
 
+def estimated(statistic, result):
+    """The estimate that a statistic gathers from the samples of a result."""
+    whole = SimpleNamespace(parameters=result.parameters, count=result.members)
+    samples = type("Samples", (dict,), {"time": result.time, "terms": ()})(result.samples)
+    return gathered(statistic, np.moveaxis(statistic.quantity(samples, whole), 1, 2), time=result.time)[0]
+
+
+def followed():
+    """The fleet with statistics of its own, of which samples of three members were kept alone."""
+    result, kept = fleet(), np.array([3, 5, 9])
+    statistics = Estimates([estimated(statistic, result) for statistic in STATISTICS])
+    few = {"samples": {}, "kept": result.part(kept), "kept_members": kept}
+    return dataclasses.replace(result, statistics=statistics, **few)
+
+
+def steered():
+    """A fleet that a controller steers, with commands and actuators."""
+    scene = lw.Scene.load(ROOT / "examples" / "scenes" / "remus_100_autopilot.toml")
+    result = fleet(9, 7, scene=scene)
+    waves = 0.2 * np.sin(np.arange(7 * 9 * 2.0)).reshape(7, 9, 2)
+    signals = {"actuator": waves, "command": 1.2 * waves}
+    return dataclasses.replace(result, samples=dict(result.samples) | signals)
+
+
 RECORDINGS = {
+    "followed": followed,
+    "steered": steered,
     "a fleet": fleet,
     "one vehicle": lambda: fleet(1, 12),
     "two runs": lambda: {"a": fleet(9, 7), "b": fleet(12, 7, seed=2)},
 }
-PICTURES = (*OF_A_RUN, "fan of the energy", "one vehicle", "compare", "tradeoff", "stability", "sensitivity", "scaling",
-            "term cost")  # fmt: skip
+PICTURES = (*OF_A_RUN, "drift", "summary of members kept", "statistics", "margins", "fan of the energy", "one vehicle",
+            "compare", "tradeoff", "stability", "sensitivity", "scaling", "term cost")  # fmt: skip
+
+
+PROVENANCE = {
+    "checks": "safe",
+    "machine": {"threads": 2, "cpu": "a processor", "simd": "avx2"},
+    "versions": {"numpy": "2"},
+}
+
+
+def ran(result, provenance=None, **values):
+    """The same result, with other numbers, as if a run had ended in it."""
+    return dataclasses.replace(result, provenance=result.provenance | PROVENANCE | (provenance or {}), **values)
+
+
+def summaries():
+    """Results of whose summary each has a line that others have not."""
+    plain, ones = fleet(9), np.arange(9)
+    turning = fleet(9, scene=lw.Scene(lw.Scene.named("sphere").vehicle))
+    rates = 0.1 * np.sin(np.arange(turning.velocity.size)).reshape(turning.velocity.shape)
+    turning = dataclasses.replace(turning, samples=dict(turning.samples) | {"angular_velocity": rates})
+    unmet = dict(steered().samples) | {"unmet": np.where(ones % 3 == 0, 1.0, 0.0)[None, :, None] * np.ones((7, 1, 2))}
+    warned = {"warnings": (2 * (ones % 2)).astype(np.uint16).view(WarningArray), "warning_time": 1.0 * ones}
+    return {
+        "a fleet": ran(plain), "followed": ran(followed()), "steered": ran(steered(), samples=unmet),
+        "divided steps": ran(plain, substeps=ones // 4), "warnings": ran(plain, warning_value=0.5 * ones, **warned),
+        "no velocity": ran(plain, samples={"position": plain.position}, messages=("a remark",)),
+        "none failed": ran(plain, {"observed": {"keep": "failed"}}, samples={}),
+        "conserved": ran(turning),
+    }  # fmt: skip
+
+
+def rounded(text):
+    """The same text, its decimals to six digits."""
+    return re.sub(r"\d+\.\d+(e[+-]\d+)?", lambda number: f"{float(number[0]):.6g}", text)
+
+
+def summed_up(result, folder):
+    """What the command says of a run, in words and as a document."""
+    files = [Path(folder) / name for name in ("result.npz", "fleet.png", "fleet.rrd")]
+    for i, path in enumerate(files):
+        path.write_bytes(b"x" * 10_000 * (i + 1))
+    few = report.shown_members(result)
+    document = documents.of_run(result, few, Written(files), ["a fault"], 2.5)
+    said = [report.summary(result, few, files, 2.5, verbose=True), json.dumps(document, indent=0, default=str)]
+    return [rounded(text.replace(str(folder), "folder")).splitlines() for text in said]
+
+
+def page(result, folder):
+    """The page of a run, without what is in its pictures."""
+    text = lw.report(result, Path(folder) / "report.html").read_text()
+    return rounded(re.sub(r"<svg.*?</svg>|base64,[^\"']*", "*", text, flags=re.DOTALL)).split("\n")
+
+
+def reports(folder):
+    """What is said of runs and studies, by name."""
+    refused = dataclasses.replace(of_methods(), refused={"cg3": "remembers nothing", "psi": "draws no noise"})
+    studies = {"tradeoff": of_methods(), "a refused method": refused, "stability": of_cells(), "a map": region(),
+               "sobol": sobol(), "morris": morris()}  # fmt: skip
+    kinds = {"a refused method": "tradeoff", "a map": "stability", "sobol": "sensitivity", "morris": "sensitivity"}
+    said = {f"summary: {name}": summed_up(result, folder) for name, result in summaries().items()}
+    said |= {f"study: {name}": text_of(kinds.get(name, name), found).splitlines() for name, found in studies.items()}
+    return said | {f"page: {name}": page(summaries()[name], folder) for name in ("followed", "warnings")}
 
 
 def libraries():
@@ -200,14 +312,15 @@ def differing(a, b, where=""):
         return [found for i, (x, y) in enumerate(zip(a, b, strict=True)) for found in differing(x, y, f"{where}[{i}]")]
     if isinstance(a, float) and isinstance(b, float | int):
         return [] if np.isclose(a, b, rtol=ROUND_OFF) else [f"{where}: {a} is now {b}"]
-    return [] if a == b else [f"{where}: {a!r} is now {b!r}"]
+    return [] if a == b else [f"{where}: {str(a)[:300]!r} is now {str(b)[:300]!r}"]
 
 
 def everything():
     """All that is recorded."""
     with tempfile.TemporaryDirectory() as folder:
-        shown = {name: recording(name, folder) for name in RECORDINGS}
-    return {"libraries": libraries(), "pictures": {name: picture(name) for name in PICTURES}, "recordings": shown}
+        shown, said = {name: recording(name, folder) for name in RECORDINGS}, reports(folder)
+    drawings = {name: picture(name) for name in PICTURES}
+    return {"libraries": libraries(), "pictures": drawings, "recordings": shown, "reports": said}
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures and recordings show what they showed when they were last looked at (tests/support/fixed_pictures.py)."""
+"""Pictures, recordings and reports show what they showed when they were last looked at (tests/support/fixed_pictures.py)."""
 
 import json
 
@@ -27,6 +27,16 @@ def test_a_picture_shows_what_it_showed(name):
 @pytest.mark.parametrize("name", RECORDINGS)
 def test_a_recording_shows_what_it_showed(name, tmp_path):
     check(KNOWN["recordings"][name], fixed_pictures.recording(name, tmp_path))
+
+
+@pytest.fixture(scope="module")
+def said(tmp_path_factory):
+    return fixed_pictures.reports(tmp_path_factory.mktemp("reports"))
+
+
+@pytest.mark.parametrize("name", KNOWN["reports"])
+def test_a_report_says_what_it_said(name, said):
+    check(KNOWN["reports"][name], said[name])
 
 
 def test_a_difference_is_found_and_round_off_is_none():

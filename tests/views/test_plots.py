@@ -24,6 +24,7 @@ from lgvi_warp.studies.tradeoff import Measurement, Tradeoff
 from lgvi_warp.views.plots import canvas
 from lgvi_warp.views.plots.read import quantity_of, survey_of
 from lgvi_warp.views.recording.drawn import at_levels
+from tests.support.made import made
 
 N, FLOOR = 40, 20.0
 STATISTICS = [
@@ -422,3 +423,11 @@ def test_margins_of_nobody_are_no_picture(tmp_path):
     with pytest.raises(NothingToDraw, match="none of the 5 members settles"):
         lw.plots.margins(margins_of([False] * 5), path=tmp_path / "margins.png")
     assert not list(tmp_path.iterdir())
+
+
+def test_a_drift_of_nothing_names_what_does_work():
+    pushed = lw.Scene(
+        lw.Scene.named("sphere").vehicle, terms=[lw.Wrench(force=[1.0, 2.0, 3.0], torque=[1.0, 2.0, 3.0])]
+    )
+    with pytest.raises(NothingToDraw, match=r"nothing is conserved, since wrench does work: draw lw\.plots\.fan"):
+        lw.plots.drift(made(np.arange(18.0).reshape(3, 2, 3), scene=pushed))

@@ -9,13 +9,14 @@ import re
 import shutil
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
-from lgvi_warp.cli import arguments, command, machine, output, signals
+from lgvi_warp.cli import arguments, command, machine, output, progress, signals
 from lgvi_warp.common.phases import Phases
 from lgvi_warp.engine import widths
 from lgvi_warp.runs import predict as prediction
@@ -330,7 +331,15 @@ def test_documents_of_kernels_and_predictions(monkeypatch, capsys):
     numbers = prediction.Prediction(5, 4, 3, 2, 0.1, 0.2, 0.3, 0.4, 5, 6, None, 7)
     monkeypatch.setattr(prediction, "predict", lambda *given, **settings: numbers)
     assert document(["plan", PAPER], capsys)["seconds"] == 0.2 + 0.4
-    assert cli.main(["predict", PAPER, "-q"]) == 0 and capsys.readouterr().out == ""
+    phases = []
+
+    def began(stream, phase):
+        phases.append(phase)
+        return SimpleNamespace(close=lambda: phases.append("closed"))
+
+    monkeypatch.setattr(progress, "Progress", began)
+    assert cli.main(["predict", PAPER, "-q"]) == 0 and capsys.readouterr().out == "" and not phases
+    assert cli.main(["predict", PAPER]) == 0 and phases == ["measuring", "closed"]
 
 
 @pytest.mark.kernel

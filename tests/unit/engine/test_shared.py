@@ -64,9 +64,22 @@ def test_a_context_notes_what_it_is_asked_for(name, field):
 def test_what_follows_from_few_members_is_remembered(members, remembers):
     shared, mass = Shared({"vehicle.mass", MEMBERS}), np.ones(members)
     numbers = {"vehicle.mass": mass, "vehicle.buoyancy": np.ones(1)}
-    assert shared.of_the_same(numbers) is None
-    shared.remember(numbers, "frame")
-    assert shared.of_the_same(dict(numbers)) == ("frame" if remembers else None)
-    assert shared.of_the_same(numbers | {"vehicle.mass": mass.copy()}) is None
-    shared.remember({"vehicle.mass": 2.0 * mass}, "another")
-    assert shared.of_the_same(numbers) is None
+    assert shared.completed(numbers) is None
+    with_frame = numbers | {FRAME: "frame", MEMBERS: np.arange(members)}
+    shared.remember(numbers, with_frame)
+    assert shared.completed(dict(numbers)) is (with_frame if remembers else None)
+    assert shared.completed(numbers | {"vehicle.mass": mass.copy()}) is None
+    calls = []
+
+    def total(numbers):
+        calls.append(numbers["vehicle.mass"])
+        return numbers["vehicle.mass"].sum() + len(calls)
+
+    # Once for the members that are remembered, and each time for others and for what is keyed by members.
+    once = [shared("total", with_frame, total) for _ in range(3)]
+    assert once == [members + 1.0] * 3 if remembers else [members + 1.0, members + 2.0, members + 3.0]
+    assert shared("total", dict(numbers), total) == members + len(calls)
+    of_members = [shared("of members", with_frame, lambda n: total(n) + n[MEMBERS][0]) for _ in range(2)]
+    assert of_members[1] == of_members[0] + 1
+    shared.remember({"vehicle.mass": 2.0 * mass}, {"vehicle.mass": 2.0 * mass})
+    assert shared.completed(numbers) is None

@@ -148,3 +148,9 @@ def test_a_policy_lies_beside_its_scene(tmp_path):
         "[[controller.laws]]\ntype = 'policy'\nfile = 'policy.npz'\ninputs = ['depth_error']\noutputs = ['Z']\n"
     )
     assert lw.Scene.load(tmp_path / "scene.toml").controller.laws[0].file == str(tmp_path / "policy.npz")
+
+
+def test_what_wiring_sets_is_not_given():
+    for name, value in {"bus": None, "actuators": {}}.items():
+        with pytest.raises(TypeError, match=name):
+            lw.Controller(period=0.1, laws=[lw.HeadingPID(kp=1.0)], **{name: value})

@@ -583,3 +583,9 @@ def test_a_law_defined_twice_as_in_a_notebook(tmp_path):
         )
         results.append(lw.solve(lw.Scene(from_table(MATRIX).vehicle, terms=[Lift(k=1.0)]), h=0.01, t1=0.1).position)
     assert np.array_equal(*results)
+
+
+@pytest.mark.parametrize("given", ["drag", 3, None, {"type": "drag"}])
+def test_terms_that_are_no_list_are_refused_as_such(given):
+    with pytest.raises(lw.SceneError, match=r"terms = .*is no list"):
+        lw.Scene(lw.Vehicle(20.0, (1.0, 1.2, 1.4)), terms=given)

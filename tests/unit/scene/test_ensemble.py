@@ -252,6 +252,8 @@ def test_bad_parameters_are_refused(scene):
     assert "not symmetric" in found({"vehicle.inertia": skew})[0]
     indefinite = np.stack([FULL, FULL - 6.0 * np.eye(3), FULL])
     assert "vehicle.inertia of member 1" in found({"vehicle.inertia": indefinite})[0]
+    indefinite[1, 1, 2] = indefinite[1, 2, 1] = np.inf
+    assert "vehicle.inertia[1,2] of member 1 = inf: " in found({"vehicle.inertia": indefinite})[0]
     assert "not numeric" in found({"vehicle.mass": "heavy"})[0]
 
 
@@ -330,7 +332,7 @@ def test_all_bad_laws_come_in_one_message(scene):
         ("environment.gravity", lw.Normal(relative=1.0), "environment.gravity"),
         ("vehicle.mass", lw.LogNormal(sigma=1e5), "vehicle.mass"),  # 0 or infinite
         ("vehicle.buoyancy", lw.LogNormal(sigma=1e5), "vehicle.buoyancy"),
-        ("vehicle.inertia", lw.LogNormal(sigma=1e5), "vehicle.inertia"),
+        ("vehicle.inertia", lw.LogNormal(sigma=1e5), "vehicle.inertia[0,0]"),
     ],
 )
 def test_unphysical_draws_are_counted_and_shown(scene, name, law, key):

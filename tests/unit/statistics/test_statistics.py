@@ -6,6 +6,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.statistics import TYPES, intervals, sketch
+from lgvi_warp.statistics.base import from_list
 from lgvi_warp.statistics.estimate import Estimate, Estimates
 from lgvi_warp.statistics.tree import Tree
 from lgvi_warp.statistics.until import watch
@@ -906,3 +907,14 @@ def test_coverage_of_runs_that_stop_by_themselves():
         # Stopping costs some coverage where looks begin early and the distribution is skewed (docs/guide/statistics.md).
         assert held >= (0.93 if least >= 1024 and law == "normal" else 0.9), (law, least, held)
         assert held <= 0.97
+
+
+def test_two_statistics_have_two_names():
+    twice = [lw.Mean("depth"), {"type": "mean", "of": "depth"}]
+    with pytest.raises(
+        lw.SceneError, match=r"statistics = 'mean depth': is the name of 2 statistics; give each a name"
+    ):
+        from_list(twice)
+    assert len(from_list([lw.Mean("depth"), {"type": "mean", "of": "depth", "name": "other"}])) == 2
+    # What is not of anything yet has no name to differ by.
+    assert len(from_list(twice, whole=False)) == 2

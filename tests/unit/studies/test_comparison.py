@@ -498,7 +498,9 @@ def test_the_front_leaves_out_what_is_dearer_and_no_better():
     assert [one.setting.method for one in found.shown()] == ["b", "c", "a", "d"]
     assert [one.setting.method for one in found.front()] == ["b", "a"]
     assert found.front("attitude") == [] and ones[0].error("attitude") == math.inf
-    assert ones[0].cost_spread == 1.0 and ones[0].error() == 1e-4 and ones[0].error(kind="end_rms") == pytest.approx(5e-6)
+    assert (
+        ones[0].cost_spread == 1.0 and ones[0].error() == 1e-4 and ones[0].error(kind="end_rms") == pytest.approx(5e-6)
+    )
     assert [row["front"] for row in found.rows()] == [True, True] + [False] * 5
 
 
@@ -766,8 +768,8 @@ def test_a_reference_too_rough_for_members(scene):
     assert tradeoffs.reaches_nothing(bad, of)
     with pytest.raises(lw.SceneError) as caught:
         tradeoffs.trusted_until(bad, of)
-    assert str(caught.value) == ("no reference: a and b differ by 0.012 m after 0.8 s; give a shorter t1 (--duration), or more "
-                                 "seconds")  # fmt: skip
+    assert str(caught.value) == ("no reference: a and b differ by 0.012 m after 0.8 s; give a shorter t1 (--duration), or "
+                                 "more seconds")  # fmt: skip
     noisy = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[CURRENT]), 2), 4.0, samples=5).on_grid(16)
     text = "noise acts: all runs see one path of it, drawn every 0.05 s; errors by paths are of order 1"
     assert tradeoffs.noise_text(noisy) == text

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import lgvi_warp as lw
 from lgvi_warp.studies import cost
 from lgvi_warp.studies import tradeoff as tradeoffs
 from lgvi_warp.studies.comparison import Candidate, Sample
@@ -176,3 +177,15 @@ def test_time_of_other_threads_does_not_count():
 def test_which_steps_are_more_work_when_longer(scene, method, grows):
     sample = Sample(scene, 1.0, 1)
     assert cost.work_grows(sample.plan(sample.candidate(method, 4))) is grows
+
+
+@pytest.mark.parametrize("noise_step", [None, 0.0125])
+def test_steps_of_several_draws_are_more_work(scene, noise_step):
+    noise = lw.WrenchNoise(force=[1.0, 1.0, 1.0], noise_step=noise_step)
+    sample = Sample(lw.Scene(scene.vehicle, scene.environment, terms=[noise], start=scene.start), 1.0, 1).on_grid(4)
+    candidates = [sample.candidate("psi_x", m) for m in (1, 4)]
+    # Every run of the comparison draws on one grid; a run outside it as the scene says.
+    assert [cost.work_grows(sample.plan(one)) for one in candidates] == [True, False]
+    priced = [sample.plan_to_price(one) for one in candidates]
+    assert [cost.work_grows(plan) for plan in priced] == [noise_step is not None, False]
+    assert len({plan.spec for plan in priced} | {sample.plan(one).spec for one in candidates}) == 1

@@ -36,8 +36,9 @@ def test_costs_by_members_and_threads(clock, monkeypatch):
 
     monkeypatch.setattr(scaling, "run_plan", run_plan)
     rows = lw.scaling(speed.fleet(64), [64, 8, 8], [2, 1, 2], method="psi_s", h=0.01, t1=1.0, rounds=2)
+    pairs = [(n, k) for n in (8, 64) for k in (1, 2)]
     assert rows == [{"members": n, "threads": k, "steps": 100,
-                     "ns_per_vehicle_step": round((1e3 + n * 100) / k / (n * 100), 3)} for n in (8, 64) for k in (1, 2)]  # fmt: skip
+                     "ns_per_vehicle_step": round((1e3 + n * 100) / k / (n * 100), 3)} for n, k in pairs]  # fmt: skip
     assert runs == [(8, 1), (8, 2), (64, 1), (64, 2)] * 2
 
 
@@ -88,8 +89,9 @@ def test_what_each_term_costs(clock, monkeypatch):
     run = dataclasses.replace(scene.run, method="rk4", step=0.05)
     rows = lw.term_cost(dataclasses.replace(scene, run=run, events=[{"type": "floor", "depth": 20.0}]))
     assert {row["method"] for row in rows} == {"rk4"} and asked[-1][1] == 5
-    assert all(plan.grid.h == 0.05 and plan.ensemble.members == 64 and plan.dtype == "float64" and not plan.ensemble.scene.events
-               for plan in asked[-1][0])  # fmt: skip
+    for plan in asked[-1][0]:
+        assert plan.grid.h == 0.05 and plan.ensemble.members == 64 and plan.dtype == "float64"
+        assert not plan.ensemble.scene.events
     with pytest.raises(
         lw.SceneError, match=r"scene\.terms: is empty; give the scene terms whose cost is to be measured"
     ):
@@ -172,9 +174,9 @@ def test_costs_that_are_unsure_are_read_again(monkeypatch):
 def test_disagreement_is_above_its_bound():
     assert cost.disagreement([("a", 1.3)]) is None and cost.disagreement([]) is None
     text = cost.disagreement([("b", 1.31), ("a", 2.0), ("b", 4.0), ("b", 3.0)])
-    assert text == ("readings of cost disagree: their median is above the least, which is taken, for b (4 times), a (2 times); "
-                    "other programs run at the same time, and costs that lie closer are not told apart; run again on an idle "
-                    "machine")  # fmt: skip
+    assert text == ("readings of cost disagree: their median is above the least, which is taken, for b (4 times), a (2 "
+                    "times); other programs run at the same time, and costs that lie closer are not told apart; run again "
+                    "on an idle machine")  # fmt: skip
     assert " and 1 more; " in cost.disagreement([(f"m{i}", 2.0 + i) for i in range(7)])
     assert " more" not in cost.disagreement([(f"m{i}", 2.0 + i) for i in range(6)])
     head = "CPU time of one thread, the least of several readings; their median is at most "

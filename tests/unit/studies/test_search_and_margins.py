@@ -82,7 +82,11 @@ def test_bounds_that_are_none(bounds, words):
 
 def test_risks_at_their_ends():
     costs = np.array([[4.0, 1.0, 3.0, 2.0]])
-    assert lw.CVaR(0.25)(costs).tolist() == [4.0] and lw.CVaR(0.5)(costs).tolist() == [3.5] and lw.CVaR()(costs).tolist() == [4.0]
+    assert (
+        lw.CVaR(0.25)(costs).tolist() == [4.0]
+        and lw.CVaR(0.5)(costs).tolist() == [3.5]
+        and lw.CVaR()(costs).tolist() == [4.0]
+    )
     assert lw.CVaR(0.375)(costs)[0] == pytest.approx((4.0 + 0.5 * 3.0) / 1.5) and lw.CVaR(1.0)(costs)[0] == 2.5
     assert lw.CVaR().share == 0.05 and str(lw.CVaR(0.125)) == "mean of the worst 12.5 %"
     assert risk._Quantile(0.25)(costs).tolist() == [1.0] and risk._Quantile(0.26)(costs).tolist() == [2.0]
@@ -90,7 +94,9 @@ def test_risks_at_their_ends():
         faults = Faults()
         assert str(risk.risk_of(faults, wrong)) == "mean" and faults
     for wrong in (0.0, 1.1, -1.0):
-        with pytest.raises(lw.SceneError, match=r"CVaR\.share = .*: is no part; give a number in \(0, 1\], such as 0\.05"):
+        with pytest.raises(
+            lw.SceneError, match=r"CVaR\.share = .*: is no part; give a number in \(0, 1\], such as 0\.05"
+        ):
             lw.CVaR(wrong)
     given = lw.CVaR(0.3)
     assert risk.risk_of(Faults(), given) is given
@@ -121,7 +127,10 @@ class Told:
 def test_numbers_of_quantities_and_of_metrics(monkeypatch):
     told = Told(monkeypatch, lambda X: np.array([1.0, np.inf]))
     plain = numbers.Numbers(SCENE, ["a"], "of", "max(depth)", {"h": 0.1})
-    assert (plain.label, plain.of_metric) == ("max(depth)", False) and plain(lambda run: run(None)).tolist() == [1.0, np.inf]
+    assert (plain.label, plain.of_metric) == ("max(depth)", False) and plain(lambda run: run(None)).tolist() == [
+        1.0,
+        np.inf,
+    ]
     assert told.asked == [((SCENE, ["a"], "max(depth)"), {"failed": "nan", "h": 0.1})]
     assert numbers.Numbers(SCENE, None, "of", test_risks_at_their_ends, {}).label == "test_risks_at_their_ends"
     with pytest.raises(lw.SceneError, match="of = '3 numbers': is not a single number; name one of its entries"):
@@ -133,9 +142,10 @@ def test_numbers_of_quantities_and_of_metrics(monkeypatch):
         ((arguments, settings),) = told.asked
         assert arguments == (SCENE, None, None) and settings["h"] == 0.1 and settings["save"].fields == ("position",)
         assert [one.key for one in settings["statistics"]] == ["iae depth"]
-        result = SimpleNamespace(status=np.array([0, lw.Status.NON_FINITE, lw.Status.FLOOR], np.uint8),
-                                 statistics={"each iae depth": SimpleNamespace(value=np.array([[[1.0, 2.0, np.inf]]]))})  # fmt: skip
-        np.testing.assert_array_equal(metric(lambda run: result), [1.0, np.nan, np.inf])  # noqa: B023
+        each = SimpleNamespace(value=np.array([[[1.0, 2.0, np.inf]]]))
+        status = np.array([0, lw.Status.NON_FINITE, lw.Status.FLOOR], np.uint8)
+        result = SimpleNamespace(status=status, statistics={"each iae depth": each})
+        np.testing.assert_array_equal(metric(lambda run: result), [1.0, np.nan, np.inf])
 
 
 def test_the_worst_case_of_a_sum(monkeypatch):
@@ -143,10 +153,22 @@ def test_the_worst_case_of_a_sum(monkeypatch):
     shares = []
     found = worst_case.worst_case(SCENE, OVER, "depth", budget=400, seed=2, progress=shares.append, h=0.1)
     assert found.parameters == {"vehicle.mass": 4.0, "drag.linear[0]": 1.0} and found.value == 4.0
-    assert found.at_bounds == {"vehicle.mass": "high", "drag.linear[0]": "low"} and (found.of, found.worst) == ("depth", "largest")
+    assert found.at_bounds == {"vehicle.mass": "high", "drag.linear[0]": "low"} and (found.of, found.worst) == (
+        "depth",
+        "largest",
+    )
     ((scene, names, of), settings) = told.asked[0]
-    assert (scene, names, of) == (SCENE, list(OVER), "depth") and settings == {"failed": "nan", "h": 0.1, "common_noise": True}
-    assert shares == sorted(shares) and shares[-1] == found.runs / 400 and len(found.restarts) == 3 and found.restarts.max() <= 4.0
+    assert (scene, names, of) == (SCENE, list(OVER), "depth") and settings == {
+        "failed": "nan",
+        "h": 0.1,
+        "common_noise": True,
+    }
+    assert (
+        shares == sorted(shares)
+        and shares[-1] == found.runs / 400
+        and len(found.restarts) == 3
+        and found.restarts.max() <= 4.0
+    )
     assert found.fleet.members == 1 and found.fleet.select(0, 1).parameters["vehicle.mass"] == 4.0
     least = worst_case.worst_case(lw.Ensemble(SCENE, 3, 1), OVER, "depth", worst="smallest", budget=400)
     assert least.value == 1.0 - 2.0 and least.parameters == {"vehicle.mass": 1.0, "drag.linear[0]": 100.0}
@@ -164,7 +186,9 @@ def test_the_worst_case_of_a_sum(monkeypatch):
 def test_worst_cases_in_words():
     one = worst_case.WorstCase({"a": 1.23456789, "b": 2.0}, 3.0, "depth", "largest", {"a": "", "b": "high"},
                                np.array([3.0, 2.5]), 64, None)  # fmt: skip
-    assert str(one) == ("depth = 3 at a = 1.23457, b = 2 (high): a lower bound of the largest, after 64 runs; restarts: 3, 2.5")
+    assert str(one) == (
+        "depth = 3 at a = 1.23457, b = 2 (high): a lower bound of the largest, after 64 runs; restarts: 3, 2.5"
+    )
     assert ": an upper bound of the smallest, after" in str(dataclasses.replace(one, worst="smallest"))
     lost = dataclasses.replace(one, value=math.inf)
     assert str(lost) == "a member fails: a = 1.23457, b = 2 (high); found in 64 runs"
@@ -183,10 +207,16 @@ def test_tuning_meets_the_same_members_and_then_fresh_ones(monkeypatch):
     found = tune.tune(fleet, OVER, "depth", budget=5 * 300, seed=3, progress=shares.append, h=0.1)
     depth = fleet.select(0, 5).position[:, 2]
     assert list(found.parameters.values()) == pytest.approx([2.5, 10.0], rel=1e-3)
-    assert found.cost == pytest.approx((depth**2).mean(), rel=1e-5) and found.before == {"vehicle.mass": 2.0, "drag.linear[0]": 1.0}
+    assert found.cost == pytest.approx((depth**2).mean(), rel=1e-5) and found.before == {
+        "vehicle.mass": 2.0,
+        "drag.linear[0]": 1.0,
+    }
     others = lw.Ensemble(SCENE, 20, 8, STARTS).select(0, 20).position[:, 2]
     assert found.fresh_cost == pytest.approx((others**2).mean(), rel=1e-5) and (found.members, found.fresh) == (5, 20)
-    assert found.fresh_before == pytest.approx((others**2).mean() + 0.25 + 1.0) and found.optimism == found.fresh_cost - found.cost
+    assert (
+        found.fresh_before == pytest.approx((others**2).mean() + 0.25 + 1.0)
+        and found.optimism == found.fresh_cost - found.cost
+    )
     assert (found.of, found.risk, found.at_bounds) == ("depth", "mean", ()) and len(found.restarts) == 1
     searched = sum(len(position) for position, *_ in told.asked[1:]) - 2 * 20
     assert found.runs == searched + 40 and shares[-1] == min(1.0, searched / 1500) and searched <= 1500
@@ -200,9 +230,14 @@ def test_tuning_meets_the_same_members_and_then_fresh_ones(monkeypatch):
     assert worst.cost == pytest.approx((depth**2).max() + 0.25, rel=1e-4) and worst.runs <= 600
     alone = tune.tune(lw.Ensemble(SCENE, 5, 7), OVER, "depth", budget=100)
     assert alone.fresh == 0 and math.isnan(alone.fresh_before)
-    lost = Told(monkeypatch, lambda depth, parameters, indices, seed: np.where(parameters["vehicle.mass"] > 2.0, np.nan, 1.0))
+    lost = Told(
+        monkeypatch, lambda depth, parameters, indices, seed: np.where(parameters["vehicle.mass"] > 2.0, np.nan, 1.0)
+    )
     assert tune.tune(fleet, OVER, "depth", budget=200).parameters["vehicle.mass"] <= 2.0 and lost.asked
-    for budget, words in ((79, "budget = 79: is less than a generation of all members; give 80 or more"), (1e3, "budget = 1000.0")):
+    for budget, words in (
+        (79, "budget = 79: is less than a generation of all members; give 80 or more"),
+        (1e3, "budget = 1000.0"),
+    ):
         with pytest.raises(lw.SceneError) as caught:
             tune.tune(fleet, OVER, "depth", budget=budget)
         assert words in str(caught.value)
@@ -214,7 +249,9 @@ def test_tuning_meets_the_same_members_and_then_fresh_ones(monkeypatch):
 
 
 def test_tuned_numbers_in_words():
-    one = tune.Tuned({"a": 1.5, "b": 2.0}, {"a": 1.0, "b": 3.0}, 4.0, 4.5, 9.0, "depth", "mean", 5, 20, (), np.ones(1), 100)
+    one = tune.Tuned(
+        {"a": 1.5, "b": 2.0}, {"a": 1.0, "b": 3.0}, 4.0, 4.5, 9.0, "depth", "mean", 5, 20, (), np.ones(1), 100
+    )
     assert str(one) == ("mean of depth: a = 1.5 (was 1), b = 2 (was 3)\n4 over the 5 members of the search, 4.5 over 20 fresh "
                         "ones (optimism 0.5); the scene's numbers: 9; 100 runs")  # fmt: skip
     bound = dataclasses.replace(one, at_bounds=("a", "b"))
@@ -232,11 +269,17 @@ def test_margins_in_words_and_by_member():
     lines = str(found).splitlines()
     assert lines[:2] == ["heading_pid: margins of 4 members", "1 of them do not settle as they are; the others:"]
     assert lines[2].split() == ["0", "%", "5", "%", "25", "%", "50", "%", "75", "%", "95", "%", "100", "%"]
-    assert lines[4].split() == ["gain_upper", "2", "2", "2", "4", "8", "8", "8"] and lines[5].split()[:3] == ["delay", "s", "0.1"]
+    assert lines[4].split() == ["gain_upper", "2", "2", "2", "4", "8", "8", "8"] and lines[5].split()[:3] == [
+        "delay",
+        "s",
+        "0.1",
+    ]
     assert found.percentiles([50.0])["delay"].tolist() == [0.2] and found.members == 4
     x, share = found.curve("gain_upper")
     assert x.tolist() == [2.0, 4.0, 8.0] and share == pytest.approx([1 / 3, 2 / 3, 1.0])
-    assert found.curve("delay", "runs")[0].tolist() == [1.0, 2.0, 3.0] and found.curve("delay", "eigenvalues")[0][0] == 0.1
+    assert (
+        found.curve("delay", "runs")[0].tolist() == [1.0, 2.0, 3.0] and found.curve("delay", "eigenvalues")[0][0] == 0.1
+    )
     assert found.worst().tolist() == [2, 0, 3, 1] and found.worst(2, "delay").tolist() == [2, 1]
     assert found.worst(name="gain_lower").tolist() == [2, 0, 1, 3]
     runs = Margins("all laws", {}, {"delay": np.array([0.2, 0.1])}, np.array([True, True]), 0.01)
@@ -259,9 +302,13 @@ def test_edges_are_found_from_any_guess(guess):
     found = edges(holds, np.ones(4), last, np.full(4, guess), 1e-3)
     inner, outer = found.T
     assert inner[0] < 3.3 <= outer[0] < inner[0] * np.exp(1.0011e-3) and outer[3] <= 0.2 < inner[3]
-    assert inner[1] <= 1.0000001 <= outer[1] < np.exp(1.0011e-3) and outer[2] == np.inf and inner[2] == pytest.approx(40.0)
+    assert (
+        inner[1] <= 1.0000001 <= outer[1] < np.exp(1.0011e-3) and outer[2] == np.inf and inner[2] == pytest.approx(40.0)
+    )
     assert inner[3] / outer[3] < np.exp(1.0011e-3)
-    whole = edges(lambda values, members: values <= 7.0, np.zeros(2), np.array([100.0, 5.0]), np.full(2, guess), 1.0, whole=True)
+    whole = edges(
+        lambda values, members: values <= 7.0, np.zeros(2), np.array([100.0, 5.0]), np.full(2, guess), 1.0, whole=True
+    )
     assert whole.tolist() == [[7.0, 8.0], [5.0, np.inf]]
     nobody = edges(holds, np.full(4, np.nan), last, np.full(4, guess), 1e-3)
     assert np.isnan(nobody).all()
@@ -320,7 +367,13 @@ def test_the_size_of_a_command_is_its_part_of_the_limit(monkeypatch):
         third = np.minimum(3 * np.arange(looks) // looks, 2)
         side = np.where(np.arange(looks) % 2 == 0, 0.5, -0.5)[:, None, None]
         command = side * np.array([[[100.0, 1.0]], [[50.0, 1.1]], [[10.0, 1.2]]])[third]
-        watch(5, {"angular_velocity": side * np.array([1.0, 0.5, 0.1])[third][:, None, None] * np.ones(3), "command": command})
+        watch(
+            5,
+            {
+                "angular_velocity": side * np.array([1.0, 0.5, 0.1])[third][:, None, None] * np.ones(3),
+                "command": command,
+            },
+        )
         return motion
 
     bench.run = run

@@ -56,16 +56,44 @@ def test_a_table_in_words():
     ]
     lines = str(effects()).splitlines()
     assert lines[0] == "Morris screening: 8 samples, 48 members, 1 failed"
-    assert lines[4].split() == ["factor", "mu_star", "mu", "sigma"] and lines[5].split() == ["a", "0.5", "+-", "0.05", "-0.5", "1.5"]
+    assert lines[4].split() == ["factor", "mu_star", "mu", "sigma"] and lines[5].split() == [
+        "a",
+        "0.5",
+        "+-",
+        "0.05",
+        "-0.5",
+        "1.5",
+    ]
     assert not any("with" in line for line in str(sobol_indices(second=False)).splitlines())
 
 
 def test_records_of_every_index():
     rows = list(sobol_indices().rows())
     assert len(rows) == 2 * 2 * 2 + 2
-    assert rows[0] == {"quantity": "depth", "factor": "a", "other": "", "index": "first", "value": 0.5, "confidence": 0.05}
-    assert rows[3] == {"quantity": "depth", "factor": "bc", "other": "", "index": "total", "value": 0.5, "confidence": 0.05}
-    assert rows[8] == {"quantity": "depth", "factor": "a", "other": "bc", "index": "second", "value": 0.3, "confidence": 0.2}
+    assert rows[0] == {
+        "quantity": "depth",
+        "factor": "a",
+        "other": "",
+        "index": "first",
+        "value": 0.5,
+        "confidence": 0.05,
+    }
+    assert rows[3] == {
+        "quantity": "depth",
+        "factor": "bc",
+        "other": "",
+        "index": "total",
+        "value": 0.5,
+        "confidence": 0.05,
+    }
+    assert rows[8] == {
+        "quantity": "depth",
+        "factor": "a",
+        "other": "bc",
+        "index": "second",
+        "value": 0.3,
+        "confidence": 0.2,
+    }
     assert [row["quantity"] for row in rows[8:]] == ["depth", "energy"]
     rows = list(effects().rows())
     assert [row["index"] for row in rows[:3]] == ["mu_star", "mu", "sigma"] and rows[1]["value"] == -0.5
@@ -86,7 +114,9 @@ def test_an_analysis_comes_back_from_its_files(made, tmp_path):
         one, other = getattr(found, field.name), getattr(again, field.name)
         assert np.array_equal(one, other, equal_nan=True) if isinstance(one, np.ndarray) else one == other, field.name
     content = json.loads(paths[2].read_text())
-    assert content["mean"] == [1.23456789, None] and content["provenance"] == {"seed": 3} and content["name"] == found.name
+    assert (
+        content["mean"] == [1.23456789, None] and content["provenance"] == {"seed": 3} and content["name"] == found.name
+    )
     (tmp_path / "x.json").write_text(json.dumps(content | {"name": "heat"}))
     with pytest.raises(ValueError, match=r"x\.json: 'heat' is no analysis"):
         Indices.load(tmp_path / "x.json")
@@ -123,15 +153,28 @@ def test_indices_are_saltellis_of_a_sum_and_a_product():
     """q = x + y, of variances 1/12 and 4/12; r = (x - 1/2) (m - 2), which is all of the pair."""
     fleet, made = of_design(Saltelli(True), 128, lambda x, y, m: (x + y, (x - 0.5) * (m - 2.0)))
     found = analyses.sobol_of(fleet, made, confidence=0.9, resamples=10)
-    assert found.factors == ("start.position[0]", "start.position[1]", "vehicle.mass") and found.quantities == ("q", "r")
-    assert found.first[0] == pytest.approx([0.2, 0.8, 0.0], abs=0.03) and found.total[0] == pytest.approx([0.2, 0.8, 0.0], abs=0.03)
-    assert found.first[1] == pytest.approx([0.0, 0.0, 0.0], abs=0.1) and found.total[1] == pytest.approx([1.0, 0.0, 1.0], abs=0.1)
-    assert found.second[1, 0, 2] == found.second[1, 2, 0] == pytest.approx(1.0, abs=0.1) and np.isnan(found.second[0, 1, 1])
+    assert found.factors == ("start.position[0]", "start.position[1]", "vehicle.mass") and found.quantities == (
+        "q",
+        "r",
+    )
+    assert found.first[0] == pytest.approx([0.2, 0.8, 0.0], abs=0.03) and found.total[0] == pytest.approx(
+        [0.2, 0.8, 0.0], abs=0.03
+    )
+    assert found.first[1] == pytest.approx([0.0, 0.0, 0.0], abs=0.1) and found.total[1] == pytest.approx(
+        [1.0, 0.0, 1.0], abs=0.1
+    )
+    assert found.second[1, 0, 2] == found.second[1, 2, 0] == pytest.approx(1.0, abs=0.1) and np.isnan(
+        found.second[0, 1, 1]
+    )
     assert found.second_confidence[1, 2, 0] == found.second_confidence[1, 0, 2] > 0.0
     assert (found.samples, found.members, found.failed, found.confidence) == (128, 128 * 8, 0, 0.9)
-    assert found.mean == pytest.approx([1.5, 0.0], abs=0.01) and found.std == pytest.approx(made.values.std(axis=0, ddof=1))
+    assert found.mean == pytest.approx([1.5, 0.0], abs=0.01) and found.std == pytest.approx(
+        made.values.std(axis=0, ddof=1)
+    )
     wide = analyses.sobol_of(fleet, made, confidence=0.99, resamples=10)
-    assert (wide.first_confidence[0, :2] > 1.3 * found.first_confidence[0, :2]).all() and np.array_equal(wide.first, found.first)
+    assert (wide.first_confidence[0, :2] > 1.3 * found.first_confidence[0, :2]).all() and np.array_equal(
+        wide.first, found.first
+    )
     alone, few = of_design(Saltelli(False), 64, lambda x, y, m: (x + y,))
     without = analyses.sobol_of(alone, few, resamples=10)
     assert without.second is None and without.second_confidence is None and without.members == 64 * 5
@@ -163,11 +206,16 @@ def test_groups_with_failures_are_refused_or_left_out():
     made = outputs.Outputs(values, ("q",), lost, {"OK": 9, "NON_FINITE": 1, "SURFACE": 2}, {})
     with pytest.raises(outputs.FailedMembers) as caught:
         analyses._whole_groups(made, 4, "refuse")
-    assert "mend what fails (see result.status of lw.solve), or use the whole groups alone: failed=\"drop\"" in str(caught.value)
+    assert 'mend what fails (see result.status of lw.solve), or use the whole groups alone: failed="drop"' in str(
+        caught.value
+    )
     Y, messages = analyses._whole_groups(made, 4, "drop")
     assert Y[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 8.0, 9.0, 10.0, 11.0]
     assert "the 1 of 3 groups that they are in were left out, and what remains may not be typical" in messages[0]
-    assert messages[1] == "2 of 12 members were stopped by events: their numbers are those at the stop" and len(messages) == 2
+    assert (
+        messages[1] == "2 of 12 members were stopped by events: their numbers are those at the stop"
+        and len(messages) == 2
+    )
     with pytest.raises(outputs.FailedMembers, match="1 groups of the design are whole, too few for an estimate"):
         analyses._whole_groups(outputs.Outputs(values, ("q",), lost, {}, {}), 6, "drop")
     whole = outputs.Outputs(values, ("q",), np.zeros(12, bool), {"OK": 12}, {})
@@ -209,8 +257,12 @@ def test_what_an_analysis_asks_for_reaches_its_runs():
         return outputs.Outputs(x, ("q",), np.zeros(fleet.members, bool), {}, {})
 
     with mock.patch.object(analyses, "evaluate", evaluate):
-        sobol = analyses.sobol(BARE, "depth", samples=4, vary=VARY, seed=5, second_order=False, confidence=0.8, resamples=7, h=0.1)
-        morris = analyses.morris(BARE, "depth", samples=6, levels=6, vary=VARY, seed=5, confidence=0.8, resamples=7, t1=2.0)
+        sobol = analyses.sobol(
+            BARE, "depth", samples=4, vary=VARY, seed=5, second_order=False, confidence=0.8, resamples=7, h=0.1
+        )
+        morris = analyses.morris(
+            BARE, "depth", samples=6, levels=6, vary=VARY, seed=5, confidence=0.8, resamples=7, t1=2.0
+        )
         pairs = analyses.sobol(BARE, "depth", samples=4, vary=VARY)
         screened = analyses.morris(BARE, "depth", vary=VARY)
     (first, of, settings), (second, *_, more), (third, *_), (fourth, *_) = asked
@@ -243,14 +295,18 @@ def test_outputs_are_of_all_groups_of_members(monkeypatch):
     monkeypatch.setattr(outputs, "PATHS_AT_ONCE", 4)
     fleet = lw.Ensemble(BARE, 10, 3, VARY)
     found = outputs.evaluate(fleet, quantity, progress=shares.append, threads=2, h=0.1, executor="processes")
-    assert runs[0][0] is fleet.scene and runs[0][2] == {"threads": 2, "executor": "processes"} and runs[0][1]["h"] == 0.1
+    assert (
+        runs[0][0] is fleet.scene and runs[0][2] == {"threads": 2, "executor": "processes"} and runs[0][1]["h"] == 0.1
+    )
     assert [list(group.indices) for group in runs[1:]] == [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9]]
     assert found.values[:, 0].tolist() == list(range(10)) and found.labels == ("quantity[0]", "quantity[1]")
     assert np.flatnonzero(found.failed).tolist() == [5, 9] and found.provenance["run"] == 4
     assert found.provenance["ensemble"] == fleet.to_dict() and shares == pytest.approx([0.2, 0.6, 0.9])
     assert "again" in found.text("again")
     runs.clear()
-    outputs.evaluate(fleet, lambda result: np.zeros((result.group.members, 1)), common_noise=True, progress=lambda part: None)
+    outputs.evaluate(
+        fleet, lambda result: np.zeros((result.group.members, 1)), common_noise=True, progress=lambda part: None
+    )
     assert all((group.indices == 0).all() for group in runs[1:]) and [group.members for group in runs[1:]] == [4, 4, 2]
 
 
@@ -262,7 +318,9 @@ def test_distributions_in_salibs_words():
         one = SimpleNamespace(bases=(np.array(base),), distribution=distribution)
         return [adaptor._salib_distribution(*each) for each in adaptor.ScalarModel._single_distributions(one)]
 
-    assert told(lw.Normal(std=0.5)) == [("norm", [2.0, 0.5])] and told(lw.Normal(mean=1.0, std=0.5)) == [("norm", [1.0, 0.5])]
+    assert told(lw.Normal(std=0.5)) == [("norm", [2.0, 0.5])] and told(lw.Normal(mean=1.0, std=0.5)) == [
+        ("norm", [1.0, 0.5])
+    ]
     assert told(lw.Normal(relative=0.1), -2.0) == [("norm", [-2.0, 0.2])]
     assert told(lw.Uniform(low=1.0, high=3.0)) == [("unif", [1.0, 3.0])]
     assert told(lw.Uniform(half_width=0.5)) == [("unif", [1.5, 2.5])]
@@ -304,7 +362,9 @@ def test_a_model_describes_its_columns(monkeypatch):
 
 def test_a_model_is_called_in_two_shapes(monkeypatch):
     monkeypatch.setattr(Plan, "compile", lambda plan: 0.0)
-    model = adaptor.model(BARE, {"vehicle.mass": lw.Normal(std=0.1)}, "depth", method="psi_s", h=0.1, t1=1.0, progress="p")
+    model = adaptor.model(
+        BARE, {"vehicle.mass": lw.Normal(std=0.1)}, "depth", method="psi_s", h=0.1, t1=1.0, progress="p"
+    )
     asked = []
 
     def prepared(X, progress):

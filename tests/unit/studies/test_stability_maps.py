@@ -314,7 +314,8 @@ def test_the_report_of_a_map_in_words():
         "reference   two runs; not in 2 cells",
         "refused     gauss4: no, rk4: why",
         "",
-        "cells               accurate   bounded   flagged    failed    silent   limit of h over angular_velocity, least to most",
+        "cells               accurate   bounded   flagged    failed    silent   limit of h over angular_velocity, "
+        "least to most",
         "psi_s                      2         1         2         0         1   2 to 2 s",
     ]
     plain = report_text(dataclasses.replace(made_map([[2, 0, 0], [2, 0, 0]]), messages=()))
@@ -601,8 +602,8 @@ def test_a_map_of_runs_made_by_hand(scene):
 
     with mock.patch.object(runs, "run_plan", run_plan), mock.patch.object(runs.Plan, "compile", lambda plan: 0.0):
         found = lw.stability_map(damped, ("h", 0.1, 0.4), ("angular_velocity", 0.5, 2.0), ["psi_s", "gauss4", "rk4"],
-                                 points=(3, 2), directions=2, t1=3.0, error_time=1.0, error=0.1, of="position", energy_bound=4.0,
-                                 seed=5, dtype="float32", threads=1, progress=shares.append)  # fmt: skip
+                                 points=(3, 2), directions=2, t1=3.0, error_time=1.0, error=0.1, of="position",
+                                 energy_bound=4.0, seed=5, dtype="float32", threads=1, progress=shares.append)  # fmt: skip
     assert found.classes["psi_s"].tolist() == [[0, 1, 2]] * 2 and found.classes["rk4"].tolist() == [[0, 0, 3]] * 2
     assert found.statuses["rk4"].tolist() == [[0, 0, 3]] * 2 and list(found.refused) == ["gauss4"]
     assert (

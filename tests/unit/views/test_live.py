@@ -12,6 +12,7 @@ from rerun.chunk import RrdReader
 
 import lgvi_warp as lw
 from lgvi_warp import cli
+from lgvi_warp.common.status import under_way
 from lgvi_warp.views import rerun as drawing
 from lgvi_warp.views import viewer
 from lgvi_warp.views.live import Live
@@ -73,9 +74,13 @@ def test_curves_are_of_single_members_while_under_way(grown):
     names = {chunk.entity_path for chunk in RrdReader(path).stream().filter(content="/curves/height/**")}
     members = sorted(int(name.rsplit("/", 1)[1]) for name in names)
     assert len(members) == 40 and members[0] < 30 < members[-1]
-    member = members[-1]
-    curve = rows(path, f"/curves/height/{member}", "scalars")
-    assert curve[0.0] == pytest.approx([-result.position[0, member, 2]], rel=1e-6)
+    counted = under_way(result)
+    assert not counted[:, members].all()
+    for member in members:
+        curve = rows(path, f"/curves/height/{member}", "scalars")
+        times, heights = result.time[counted[:, member]], -result.position[counted[:, member], member, 2]
+        seen = {time: height for time, (height,) in curve.items() if np.isfinite(height)}
+        assert seen == pytest.approx(dict(zip(times.tolist(), heights, strict=True)), rel=1e-6)
 
 
 def test_the_view_is_laid_out_anew_when_it_is_outgrown(tmp_path):

@@ -403,7 +403,11 @@ def test_a_mesh_is_drawn_times_a_whole_number(tmp_path):
 def test_a_recording_goes_to_a_stream(mixed, tmp_path):
     stream = rr.RecordingStream("mine", recording_id="mine")
     stream.save(tmp_path / "mine.rrd")
+    flushed, flush = [], stream.flush
+    stream.flush = lambda **named: flushed.append(flush(**named))
     assert lw.log_rerun(mixed, to=stream) is None
+    # All is with the viewer when the call returns.
+    assert len(flushed) == 1
     stream.disconnect()
     assert "| outcome |" in text_of(tmp_path / "mine.rrd", "/run/summary")
 

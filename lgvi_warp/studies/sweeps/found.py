@@ -519,13 +519,19 @@ class Findings:
                 ("case", *axes),
                 np.array(values, dtype=object if name == "refused" else np.float64).reshape(shape),
             )
-        return xr.Dataset(data, {"case": list(self.cases), **{name: _labels(values) for name, values in axes.items()}})
+        return xr.Dataset(
+            data, {"case": list(self.cases), **{name: coordinates(values) for name, values in axes.items()}}
+        )
 
 
 def _median(x: np.ndarray) -> float:
     return float(np.median(x)) if len(x) else np.nan
 
 
-def _labels(values: Sequence[Any]) -> list[Any]:
-    """Values of an axis as coordinates: numbers and texts as they are, others as texts."""
+def coordinates(values: Sequence[Any]) -> list[Any]:
+    """Return values of an axis as coordinates: numbers and texts as they are, others as texts.
+
+    Args:
+        values: the values.
+    """
     return [value if isinstance(value, int | float | str) else str(value) for value in values]

@@ -89,7 +89,9 @@ def test_risks_at_their_ends():
     )
     assert lw.CVaR(0.375)(costs)[0] == pytest.approx((4.0 + 0.5 * 3.0) / 1.5) and lw.CVaR(1.0)(costs)[0] == 2.5
     assert lw.CVaR().share == 0.05 and str(lw.CVaR(0.125)) == "mean of the worst 12.5 %"
-    assert risk._Quantile(0.25)(costs).tolist() == [1.0] and risk._Quantile(0.26)(costs).tolist() == [2.0]
+    assert risk.risk_of(Faults(), 0.25)(costs).tolist() == [1.0] and risk.risk_of(Faults(), 0.26)(costs).tolist() == [
+        2.0
+    ]
     for wrong in (0.0, 1.0, 1, "means"):
         faults = Faults()
         assert str(risk.risk_of(faults, wrong)) == "mean" and faults

@@ -141,7 +141,7 @@ def test_ten_pairs_are_named_those_above_their_interval():
 
 def of_design(design, samples, quantity):
     """An ensemble of a design, and outputs that are a function of its numbers."""
-    fleet = analyses._designed(BARE, VARY, 3, design, samples)
+    fleet = analyses.designed(BARE, VARY, 3, design, samples)
     drawn = fleet.select(0, fleet.members)
     values = quantity(drawn.position[:, 0], drawn.position[:, 1], drawn.parameters["vehicle.mass"])
     values = np.stack(values, axis=1)
@@ -195,7 +195,7 @@ def test_a_quantity_that_does_not_vary_has_no_indices():
     assert np.isnan(found.first[1]).all() and np.isfinite(found.first[0]).all()
     assert found.messages == ("r does not vary: it has no indices",)
     messages = []
-    assert analyses._varying(np.array([[0.0, 1.0, 1.0], [0.0, 1.0 + 2e-14, 1.0 + 5e-15]]), "abc", messages) == [1]
+    assert analyses.varying(np.array([[0.0, 1.0, 1.0], [0.0, 1.0 + 2e-14, 1.0 + 5e-15]]), "abc", messages) == [1]
     assert messages == ["a does not vary: it has no indices", "c does not vary: it has no indices"]
 
 
@@ -205,11 +205,11 @@ def test_groups_with_failures_are_refused_or_left_out():
     lost[5] = True
     made = outputs.Outputs(values, ("q",), lost, {"OK": 9, "NON_FINITE": 1, "SURFACE": 2}, {})
     with pytest.raises(outputs.FailedMembers) as caught:
-        analyses._whole_groups(made, 4, "refuse")
+        analyses.whole_groups(made, 4, "refuse")
     assert 'mend what fails (see result.status of lw.solve), or use the whole groups alone: failed="drop"' in str(
         caught.value
     )
-    Y, messages = analyses._whole_groups(made, 4, "drop")
+    Y, messages = analyses.whole_groups(made, 4, "drop")
     assert Y[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 8.0, 9.0, 10.0, 11.0]
     assert "the 1 of 3 groups that they are in were left out, and what remains may not be typical" in messages[0]
     assert (
@@ -217,9 +217,9 @@ def test_groups_with_failures_are_refused_or_left_out():
         and len(messages) == 2
     )
     with pytest.raises(outputs.FailedMembers, match="1 groups of the design are whole, too few for an estimate"):
-        analyses._whole_groups(outputs.Outputs(values, ("q",), lost, {}, {}), 6, "drop")
+        analyses.whole_groups(outputs.Outputs(values, ("q",), lost, {}, {}), 6, "drop")
     whole = outputs.Outputs(values, ("q",), np.zeros(12, bool), {"OK": 12}, {})
-    assert analyses._whole_groups(whole, 4, "refuse")[1] == []
+    assert analyses.whole_groups(whole, 4, "refuse")[1] == []
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
@@ -230,22 +230,22 @@ def test_groups_with_failures_are_refused_or_left_out():
     ((2, 1.0, 2, "drop"), "confidence = 1.0: is not between 0 and 1"), ((2, 0.9, 2, "keep"), "failed = 'keep'"),
 ])  # fmt: skip
 def test_settings_of_an_analysis_that_are_none(arguments, words):
-    analyses._check(2, 0.5, np.int64(2), "refuse")
+    analyses.check_settings(2, 0.5, np.int64(2), "refuse")
     with pytest.raises(lw.SceneError) as caught:
-        analyses._check(*arguments)
+        analyses.check_settings(*arguments)
     assert words in str(caught.value)
 
 
 def test_a_design_takes_what_varies_and_the_seed_unless_given(scene):
     fleet = lw.Ensemble(BARE, 5, 7, VARY)
-    own = analyses._designed(fleet, None, None, Saltelli(True), 4)
+    own = analyses.designed(fleet, None, None, Saltelli(True), 4)
     assert (own.seed, own.members, set(own.vary)) == (7, 4 * 8, set(VARY)) and own.scene is fleet.scene
-    other = analyses._designed(fleet, {"vehicle.mass": VARY["vehicle.mass"]}, 9, Saltelli(False), 4)
+    other = analyses.designed(fleet, {"vehicle.mass": VARY["vehicle.mass"]}, 9, Saltelli(False), 4)
     assert (other.seed, other.members, list(other.vary)) == (9, 4 * 3, ["vehicle.mass"])
-    paper = analyses._designed(scene, None, None, Morris(4), 3)
+    paper = analyses.designed(scene, None, None, Morris(4), 3)
     assert paper.seed == scene.ensemble_settings.seed and set(paper.vary) == set(scene.ensemble_settings.vary)
     with pytest.raises(lw.SceneError, match=r"scene = 3: is neither a Scene nor an Ensemble; give lw\.Scene"):
-        analyses._designed(3, None, None, Saltelli(True), 4)
+        analyses.designed(3, None, None, Saltelli(True), 4)
 
 
 def test_what_an_analysis_asks_for_reaches_its_runs():
@@ -316,7 +316,7 @@ def test_outputs_are_of_all_groups_of_members(monkeypatch):
 def test_distributions_in_salibs_words():
     def told(distribution, base=2.0):
         one = SimpleNamespace(bases=(np.array(base),), distribution=distribution)
-        return [adaptor._salib_distribution(*each) for each in adaptor.ScalarModel._single_distributions(one)]
+        return [adaptor.salib_distribution(*each) for each in adaptor.entries_of(one)]
 
     assert told(lw.Normal(std=0.5)) == [("norm", [2.0, 0.5])] and told(lw.Normal(mean=1.0, std=0.5)) == [
         ("norm", [1.0, 0.5])

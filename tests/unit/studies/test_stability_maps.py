@@ -483,7 +483,7 @@ def test_references_are_refined_where_they_do_not_agree(scene):
         text = runs.make_references(grid, [one], "position", 1e-3, 1, shares.append)
     rate = max(values.max() for values in grid.rates().values())
     finer = math.ceil(h * rate / 0.2)
-    first, second = runs._precise(grid)
+    first, second = runs.precise_pair(grid)
     assert (
         text == f"{second} against {first}, steps that turn by 0.2 rad or less, halved until they agree"
         and shares == [1.0]
@@ -502,8 +502,8 @@ def test_a_scene_without_a_precise_method_has_no_map(scene):
     with mock.patch.object(runs, "refusals", lambda grid, names, dtype: dict.fromkeys(names, "no")), pytest.raises(
         lw.SceneError, match=r"method: the scene takes none of kl8\(psi_x\), .* for a reference"
     ):  # fmt: skip
-        runs._precise(grid)
-    assert runs._precise(grid) == ("kl8(psi_x)", "rk8")
+        runs.precise_pair(grid)
+    assert runs.precise_pair(grid) == ("kl8(psi_x)", "rk8")
 
 
 def test_parts_of_a_reference_are_put_in_their_places():
@@ -512,9 +512,9 @@ def test_parts_of_a_reference_are_put_in_their_places():
         made(path, attitude=np.tile(np.eye(3), (2, 3, 1, 1))),
         made(path[:, :2] + 1.0, status=[0, Status.NON_FINITE], end=[np.nan, 0.5]),
     )
-    assert runs._joined(None, part, np.array([0, 1])) is part
+    assert runs.joined(None, part, np.array([0, 1])) is part
     before = whole.energy
-    joined = runs._joined(whole, part, np.array([2, 0]))
+    joined = runs.joined(whole, part, np.array([2, 0]))
     assert joined is whole and joined.position[0, :, 0].tolist() == [1.0, 0.0, 1.0]
     assert list(joined.status) == [Status.NON_FINITE, 0, 0] and joined.failure_time[0] == 0.5
     assert joined.energy is not before
@@ -538,7 +538,7 @@ def test_errors_and_growth_of_a_run_are_written_down():
         return Found(np.full(3, -1.0), np.full(3, -1.0), np.full(3, REFUSED), np.zeros(3, bool))
 
     seen = found()
-    runs._judge(result, one, np.arange(3), seen, of, "conservative")
+    runs.judge(result, one, np.arange(3), seen, of, "conservative")
     # Members 2, 0 and 1 of the map; the last failed, and the error counts up to its time alone.
     assert seen.error.tolist() == [0.0, np.inf, 0.5] and seen.status.tolist() == [0, Status.NON_FINITE, 0]
     assert seen.warned.tolist() == [True, False, False]
@@ -546,19 +546,19 @@ def test_errors_and_growth_of_a_run_are_written_down():
     assert seen.growth[0] == pytest.approx(max(growth[1], 0.21 / 0.1)) and seen.growth[2] == growth[0]
     assert seen.growth[1] == np.inf
     damped = found()
-    runs._judge(result, one, np.arange(3), damped, of, "dissipative")
+    runs.judge(result, one, np.arange(3), damped, of, "dissipative")
     assert damped.growth[2] == invariants.energy_growth(result, dissipative=True)[0]
     driven = found()
-    runs._judge(result, one, np.arange(3), driven, of, "driven")
+    runs.judge(result, one, np.arange(3), driven, of, "driven")
     size = np.maximum(invariants.kinetic_energy(reference).max(axis=0), 1e-300)
     change = np.abs(result.energy[:3] - reference.energy).max(axis=0) / size
     assert driven.growth[2] == change[0] > 0.0
     bare = found()
-    runs._judge(result, dataclasses.replace(one, reference=None), np.arange(3), bare, of, "conservative")
+    runs.judge(result, dataclasses.replace(one, reference=None), np.arange(3), bare, of, "conservative")
     assert bare.error.tolist() == [-1.0] * 3 and bare.growth.tolist() == seen.growth.tolist()
     stopped = made(moved, t, status=[Status.FLOOR, 0, 0], end=[1.5, np.nan, np.nan])
     early = found()
-    runs._judge(stopped, one, np.arange(3), early, of, "conservative")
+    runs.judge(stopped, one, np.arange(3), early, of, "conservative")
     assert early.error.tolist() == [0.0, 0.25, 0.5]
 
 

@@ -16,7 +16,7 @@ from lgvi_warp.statistics import paired
 from lgvi_warp.statistics.given_data import explained
 from lgvi_warp.studies.sweeps import cases, output, setup, success
 from lgvi_warp.studies.sweeps.file import arguments_of_file
-from lgvi_warp.studies.sweeps.found import _labels
+from lgvi_warp.studies.sweeps.found import coordinates
 from lgvi_warp.studies.sweeps.record import Record, Records, key_of
 
 N = 40
@@ -121,7 +121,7 @@ def test_the_table_has_the_rows_by_case_and_axis(gridded, found):
     assert table["iae heading mean"].values == pytest.approx(
         np.array([[1.0, 2.0], [1.0, 1.0]]) + MASS.mean(), rel=1e-12)  # fmt: skip
     assert list(found.table["refused"].values)[:2] == ["", ""] and np.isnan(found.table["success"].values[2])
-    assert _labels([[{"type": "drag"}], 1.5, 2, "a"]) == ["[{'type': 'drag'}]", 1.5, 2, "a"]
+    assert coordinates([[{"type": "drag"}], 1.5, 2, "a"]) == ["[{'type': 'drag'}]", 1.5, 2, "a"]
 
 
 def test_rows_of_a_comparison(found):
@@ -416,7 +416,7 @@ def test_files_hold_the_tables(found, tmp_path):
 def test_what_json_cannot_hold_is_written_as_text():
     values = [np.array([1.0, 2.0]), np.float64(3.0), np.inf, 1, "a", True, None, {"type": "drag"}, (1, 2)]
     plain = [[1.0, 2.0], 3.0, "inf", 1, "a", True, None, "{'type': 'drag'}", "(1, 2)"]
-    assert [output._plain(value) for value in values] == plain
+    assert [output.plain(value) for value in values] == plain
 
 
 # Cases
@@ -733,10 +733,10 @@ def test_a_plan_in_words():
     (fleet,), asked = predict.call_args
     assert asked["threads"] == 2 and asked["h"] == 0.01 and asked["keep"] == "none"
     assert fleet.scene.controller.delay == 0.02 and fleet.members == 2000
-    durations = [setup._duration(seconds) for seconds in (119.0, 120.0, 7200.0, 3 * 86400.0, 6.3e7, 6.2e7)]
+    durations = [setup.duration_text(seconds) for seconds in (119.0, 120.0, 7200.0, 3 * 86400.0, 6.3e7, 6.2e7)]
     assert durations == ["1.2e+02 s", "2 minutes", "2 hours", "3 days", "2 years", "7.2e+02 days"]
     with mock.patch.object(setup, "_prediction", return_value=prediction):
-        assert setup._too_many(one, 45) == "are 2,000 members each and would take 3 minutes on this machine"
+        assert setup.too_many_text(one, 45) == "are 2,000 members each and would take 3 minutes on this machine"
 
 
 # Files of sweeps

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import copy
 import functools
 import operator
 from collections.abc import Callable, Mapping, Sequence
@@ -519,9 +518,14 @@ class Ensemble(Summarized):
         ensemble.checked = len(chosen) if self.checked == self.members else 0
         return ensemble
 
+    def __getstate__(self) -> dict[str, Any]:
+        # Another process draws the numbers itself: they are not sent.
+        return {name: None if name == "_few" else value for name, value in vars(self).items() if name != "_of_scene"}
+
     def _copy(self) -> Ensemble:
         """Return an ensemble with what this one has, but for the numbers that were drawn."""
-        ensemble = copy.copy(self)
+        ensemble = object.__new__(Ensemble)
+        ensemble.__dict__.update(self.__dict__)
         ensemble._few = None
         return ensemble
 

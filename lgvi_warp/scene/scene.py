@@ -225,6 +225,9 @@ class Scene(Summarized):
         """
         return cast("dict[str, Any]", _copied(self._tables))
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_tables"}
+
     @functools.cached_property
     def _tables(self) -> dict[str, Any]:
         """The tables of `to_dict`, made once: the numbers of a scene never change."""

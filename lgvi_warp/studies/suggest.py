@@ -377,13 +377,19 @@ class Ladders:
                 continue
             if new and (not new_kernels or LEAST_FLOAT32 * (known.get("float64") or 0.0) > least):
                 continue
-            known[dtype] = self._longest(method, dtype)
+            known[dtype] = self.longest(method, dtype)
             self._compiled.add(specs[method, dtype])
 
-    def _longest(self, method: str, dtype: str) -> float | None:
-        """Find the longest step, and return its cost [us of one core per vehicle and second].
+    def longest(self, method: str, dtype: str) -> float | None:
+        """Find the longest step that keeps the target.
 
-        It is infinite where steps that might keep the target are too dear, and None where the errors cease to fall.
+        Args:
+            method: name of the method.
+            dtype: precision.
+
+        Returns:
+            Its cost [us of one core per vehicle and second]; infinite where steps that might keep the target are too dear, and
+            None where the errors cease to fall.
         """
         sample, reference, of, target = self.sample, self.reference, self.of, self.target
         m, before, worse = sample.coarsest(2.0), math.inf, 0

@@ -182,7 +182,7 @@ def test_a_search_compiles_only_what_may_be_cheaper(scene, monkeypatch):
                 ladders.priced.append((price, None))
             return price
 
-        monkeypatch.setattr(ladders, "_longest", longest)
+        monkeypatch.setattr(ladders, "longest", longest)
         ladders.climb(methods, **settings)
         return climbs
 

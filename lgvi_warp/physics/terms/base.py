@@ -499,7 +499,8 @@ def _outside(one: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
     flat, meta = values.reshape(len(values), -1), one.metadata
     if flat.size:
         low, high = flat.min(), flat.max()  # NaN if any is
-        if meta["least"] <= low and meta["above"] < low and high <= meta["most"] and np.isfinite(high - low):
+        finite = np.isfinite(low) and np.isfinite(high)
+        if finite and meta["least"] <= low and meta["above"] < low and high <= meta["most"]:
             return np.zeros(len(values), bool)
     with np.errstate(invalid="ignore"):
         inside = (flat >= meta["least"]) & (flat <= meta["most"]) & (flat > meta["above"])

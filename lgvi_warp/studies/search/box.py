@@ -88,7 +88,8 @@ class Box:
         """
         low, high = (np.log(np.where(self.log, end, 1.0)) for end in (self.low, self.high))
         curved, straight = np.exp(low + inside * (high - low)), self.low + inside * (self.high - self.low)
-        return np.clip(np.where(self.log, curved, straight), self.low, self.high)
+        within = np.clip(np.where(self.log, curved, straight), self.low, self.high)
+        return np.where(inside <= 0.0, self.low, np.where(inside >= 1.0, self.high, within))
 
 
 @dataclass(frozen=True)

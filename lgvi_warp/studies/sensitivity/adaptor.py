@@ -74,8 +74,8 @@ class ScalarModel:
         faults = Faults("vary.")
         bounds, kinds = [], []
         for variation in self._variations:
-            for distribution in self._single_distributions(variation):
-                described = _salib_distribution(*distribution)
+            for distribution in entries_of(variation):
+                described = salib_distribution(*distribution)
                 if described is None:
                     faults.add(f'"{variation.key}"', variation.distribution, "is unknown to SALib", "use levels=True")
                     break
@@ -85,17 +85,6 @@ class ScalarModel:
             faults.add("names", list(self.names), "have no distributions", "map names to distributions")
         faults.raise_if_any()
         return {"num_vars": len(self.names), "names": list(self.names), "bounds": bounds, "dists": kinds}
-
-    @staticmethod
-    def _single_distributions(one: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarray]]]:
-        """List (distribution, the scene's value, the distribution's numbers) of each entry of a variation."""
-        (base,) = one.bases
-        distribution = one.distribution
-        numbers = {name: np.broadcast_to(value, base.shape).reshape(-1)
-                   for name, value in distribution.numbers_by_name().items()
-                   if np.ndim(value) <= base.ndim and distribution.kind != "choice"}  # fmt: skip
-        return [(distribution, value, {name: column[i] for name, column in numbers.items()})
-                for i, value in enumerate(np.reshape(base, -1))]  # fmt: skip
 
     @property
     def distributions(self) -> list[Any]:
@@ -177,18 +166,44 @@ class _Column:
         raise KeyError(label)
 
 
-def _salib_distribution(distribution: Any, base: Any, numbers: Mapping[str, Any]) -> tuple[str, list[float]] | None:
-    """Translate a distribution to SALib's (name, bounds); None where SALib has none for it."""
+def entries_of(one: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarray]]]:
+    """List the distributions of the single entries of a variation.
+
+    Args:
+        one: the variation.
+
+    Returns:
+        (distribution, the scene's value, the distribution's numbers) of each entry.
+    """
+    (base,) = one.bases
+    distribution = one.distribution
+    numbers = {name: np.broadcast_to(value, base.shape).reshape(-1)
+               for name, value in distribution.numbers_by_name().items()
+               if np.ndim(value) <= base.ndim and distribution.kind != "choice"}  # fmt: skip
+    return [(distribution, value, {name: column[i] for name, column in numbers.items()})
+            for i, value in enumerate(np.reshape(base, -1))]  # fmt: skip
+
+
+def salib_distribution(distribution: Any, base: Any, numbers: Mapping[str, Any]) -> tuple[str, list[float]] | None:
+    """Translate a distribution to SALib's (name, bounds).
+
+    Args:
+        distribution: the distribution.
+        base: the scene's value.
+        numbers: the distribution's numbers by name.
+
+    Returns:
+        Name and bounds; None where SALib has none for it.
+    """
     base = float(base)
     mean = float(numbers.get("mean", base))
     if distribution.kind == "normal":
         return "norm", [mean, float(numbers["std"] if "std" in numbers else abs(base) * numbers["relative"])]
     if distribution.kind == "uniform":
-        if np.ndim(distribution.high) == 0:
-            low, high = (float(distribution.quantile(np.array([u]), np.array(base)).reshape(-1)[0]) for u in (0.0, 1.0))
-        else:
-            low, high = float(numbers["low"]), float(numbers["high"])
-        return "unif", [low, high]
+        if "low" in numbers:
+            return "unif", [float(numbers["low"]), float(numbers["high"])]
+        half = float(numbers["half_width"] if "half_width" in numbers else abs(base) * numbers["relative"])
+        return "unif", [base - half, base + half]
     if distribution.kind == "lognormal" and float(numbers.get("median", base)) > 0.0:
         return "lognorm", [float(np.log(numbers.get("median", base))), float(numbers["sigma"])]
     return None

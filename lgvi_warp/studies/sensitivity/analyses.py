@@ -63,9 +63,9 @@ def sobol(
         SceneError: for faulty arguments, all in one message.
         FailedMembers: where members failed and the indices cannot be computed from the others.
     """
-    _check(samples, confidence, resamples, failed)
+    check_settings(samples, confidence, resamples, failed)
     design = Saltelli(second_order)
-    fleet = _designed(scene, vary, seed, design, samples)
+    fleet = designed(scene, vary, seed, design, samples)
     outputs = evaluate(fleet, of, **settings)
     return sobol_of(fleet, outputs, confidence=confidence, resamples=resamples, failed=failed)
 
@@ -93,12 +93,12 @@ def sobol_of(
     design = fleet.sampling
     assert isinstance(design, Saltelli)
     factors = tuple(label for label, _ in fleet.space.factors)
-    Y, messages = _whole_groups(outputs, design.group_size(fleet.space), failed)
+    Y, messages = whole_groups(outputs, design.group_size(fleet.space), failed)
     m, d = Y.shape[1], len(factors)
     estimates = {name: np.full((m, d), np.nan) for name in ("S1", "S1_conf", "ST", "ST_conf")}
     estimates |= {name: np.full((m, d, d), np.nan) for name in ("S2", "S2_conf")}
     problem = {"num_vars": d, "names": list(factors), "bounds": [[0.0, 1.0]] * d}
-    for q in _varying(Y, outputs.labels, messages):
+    for q in varying(Y, outputs.labels, messages):
         S = analyze(problem, Y[:, q].copy(), calc_second_order=design.second_order, num_resamples=resamples,
                     conf_level=confidence, seed=fleet.seed + 1)  # fmt: skip
         for name in estimates.keys() & S.keys():
@@ -150,8 +150,8 @@ def morris(
         SceneError: for faulty arguments, all in one message.
         FailedMembers: where members failed and the effects cannot be computed from the others.
     """
-    _check(samples, confidence, resamples, failed)
-    fleet = _designed(scene, vary, seed, Morris(levels), samples)
+    check_settings(samples, confidence, resamples, failed)
+    fleet = designed(scene, vary, seed, Morris(levels), samples)
     outputs = evaluate(fleet, of, **settings)
     return morris_of(fleet, outputs, confidence=confidence, resamples=resamples, failed=failed)
 
@@ -180,14 +180,14 @@ def morris_of(
     assert isinstance(design, Morris)
     group = design.group_size(space)
     kept = _good_rows(outputs, group, failed)
-    Y, messages = _whole_groups(outputs, group, failed)
+    Y, messages = whole_groups(outputs, group, failed)
     X = design.design(space, np.arange(fleet.members))[kept]
     # A step moves the level by p / 2 of the cube's p parts, where SALib divides by another length.
     scale = design.levels / (design.levels - 1.0)
     factors = tuple(label for label, _ in space.factors)
     names = ("mu", "mu_star", "sigma", "mu_star_conf")
     estimates = {name: np.full((Y.shape[1], len(factors)), np.nan) for name in names}
-    for q in _varying(Y, outputs.labels, messages):
+    for q in varying(Y, outputs.labels, messages):
         S = analyze(salib_problem(space), X, Y[:, q].copy(), num_resamples=resamples, conf_level=confidence,
                     num_levels=design.levels, seed=fleet.seed)  # fmt: skip
         order = [list(S["names"]).index(label) for label, _ in space.factors]
@@ -223,7 +223,18 @@ def _common(
     }
 
 
-def _check(samples: Any, confidence: Any, resamples: Any, failed: Any) -> None:
+def check_settings(samples: Any, confidence: Any, resamples: Any, failed: Any) -> None:
+    """Refuse settings of an analysis that are at fault.
+
+    Args:
+        samples: number of groups or paths, at least 2.
+        confidence: level of the intervals, between 0 and 1.
+        resamples: number of the bootstrap's resamples, at least 2.
+        failed: "refuse" or "drop".
+
+    Raises:
+        SceneError: with every fault.
+    """
     faults = Faults()
     for name, value in (("samples", samples), ("resamples", resamples)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 2:
@@ -235,8 +246,22 @@ def _check(samples: Any, confidence: Any, resamples: Any, failed: Any) -> None:
     faults.raise_if_any()
 
 
-def _designed(scene: Any, vary: Any, seed: int | None, design: Sampling, samples: int) -> Ensemble:
-    """Build the ensemble of a design with this number of groups."""
+def designed(scene: Any, vary: Any, seed: int | None, design: Sampling, samples: int) -> Ensemble:
+    """Build the ensemble of a design with this number of groups.
+
+    Args:
+        scene: a Scene or an Ensemble.
+        vary: name -> distribution; None for those of the scene.
+        seed: of the design; None for that of the scene.
+        design: the design.
+        samples: number of its groups.
+
+    Returns:
+        The ensemble.
+
+    Raises:
+        SceneError: it is neither a Scene nor an Ensemble.
+    """
     if isinstance(scene, Ensemble):
         scene, known, known_seed = scene.scene, scene.vary, scene.seed
     elif isinstance(scene, Scene):
@@ -282,8 +307,20 @@ def _good_rows(outputs: Outputs, group: int, failed: str) -> np.ndarray:
     return np.repeat(good, group)
 
 
-def _whole_groups(outputs: Outputs, group: int, failed: str) -> tuple[np.ndarray, list[str]]:
-    """Select the quantities of groups without a failure; write messages about the other groups."""
+def whole_groups(outputs: Outputs, group: int, failed: str) -> tuple[np.ndarray, list[str]]:
+    """Select the quantities of groups without a failure; write messages about the other groups.
+
+    Args:
+        outputs: quantities of the members.
+        group: number of members of a group.
+        failed: "refuse" or "drop".
+
+    Returns:
+        (quantities, messages).
+
+    Raises:
+        FailedMembers: where members failed and too few groups are left.
+    """
     kept = _good_rows(outputs, group, failed)
     messages = []
     if not kept.all():
@@ -297,8 +334,17 @@ def _whole_groups(outputs: Outputs, group: int, failed: str) -> tuple[np.ndarray
     return outputs.values[kept], messages
 
 
-def _varying(Y: np.ndarray, labels: Sequence[str], messages: list[str]) -> list[int]:
-    """List the quantities that vary; write messages about those that do not."""
+def varying(Y: np.ndarray, labels: Sequence[str], messages: list[str]) -> list[int]:
+    """List the quantities that vary; write messages about those that do not.
+
+    Args:
+        Y: the quantities (n, m).
+        labels: their names.
+        messages: to which messages are added.
+
+    Returns:
+        Columns of those that vary.
+    """
     constant = np.ptp(Y, axis=0) <= CONSTANT * np.abs(Y).max(axis=0)
     messages += [f"{labels[int(q)]} does not vary: it has no indices" for q in np.flatnonzero(constant)]
     return [int(q) for q in np.flatnonzero(~constant)]

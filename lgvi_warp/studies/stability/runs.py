@@ -215,7 +215,7 @@ def make_references(
         SceneError: where the scene takes none of the precise methods.
     """
     compared = compared_in(of)
-    first, second = _precise(grid)
+    first, second = precise_pair(grid)
     rates = np.max(list(grid.rates().values()), axis=0)
     done = 0
     with ThreadPoolExecutor(threads) as pool:
@@ -230,8 +230,18 @@ def make_references(
     return f"{second} against {first}, steps that turn by {FINE:g} rad or less, halved until they agree"
 
 
-def _precise(grid: StabilityGrid) -> tuple[str, str]:
-    """Choose the two best methods that the scene takes."""
+def precise_pair(grid: StabilityGrid) -> tuple[str, str]:
+    """Choose the two best methods that the scene takes.
+
+    Args:
+        grid: cells of the map.
+
+    Returns:
+        Their names.
+
+    Raises:
+        SceneError: where it takes none.
+    """
     names = list(itertools.islice((name for name in PRECISE if not refusals(grid, [name], "float64")), 2))
     if not names:
         raise SceneError([f"method: the scene takes none of {', '.join(PRECISE)} for a reference"])
@@ -259,7 +269,7 @@ def _reference(
             # The step is too long for a stage that goes backward.
             finer *= 2
             continue
-        column.reference = _joined(column.reference, b, open_)
+        column.reference = joined(column.reference, b, open_)
         column.verified[open_] = good
         open_ = open_[~good]
         finer *= 2
@@ -267,8 +277,17 @@ def _reference(
             break
 
 
-def _joined(whole: Result | None, part: Result, at: np.ndarray) -> Result:
-    """Replace the members `at` of the whole result by those of the part; the part alone where there is no whole."""
+def joined(whole: Result | None, part: Result, at: np.ndarray) -> Result:
+    """Replace members of a result by those of another one.
+
+    Args:
+        whole: the result, which is changed; None for none.
+        part: other members.
+        at: their places in the whole.
+
+    Returns:
+        The whole; the part alone where there is no whole.
+    """
     if whole is None:
         return part
     for name, values in part.samples.items():
@@ -315,7 +334,7 @@ def run_method(
                 column_of(column, at[half:])
             return
         with np.errstate(all="ignore"):
-            _judge(run_plan(run, 1), column, at, findings, of, judged)
+            judge(run_plan(run, 1), column, at, findings, of, judged)
 
     with ThreadPoolExecutor(threads) as pool:
         jobs = [pool.submit(column_of, step_column, np.arange(len(step_column.members))) for step_column in columns]
@@ -324,8 +343,17 @@ def run_method(
     return findings, why[0] if why else ""
 
 
-def _judge(result: Result, column: Column, at: np.ndarray, found: Found, of: Compared, judged: str) -> None:
-    """Write down the errors, energies, statuses and warnings of a run of some members of a column."""
+def judge(result: Result, column: Column, at: np.ndarray, found: Found, of: Compared, judged: str) -> None:
+    """Write down the errors, energies, statuses and warnings of a run of some members of a column.
+
+    Args:
+        result: of the run.
+        column: the members' column, with its reference.
+        at: places of the members in it.
+        found: where it is written.
+        of: quantity that errors are of.
+        judged: how energies are judged, as of the function `judged`.
+    """
     members = column.members[at]
     found.status[members] = np.asarray(result.status)
     warnings = getattr(result, "warnings", None)

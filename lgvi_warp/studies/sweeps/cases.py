@@ -207,7 +207,7 @@ def with_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
         if target.index is None:
             place[attribute] = value
             continue
-        start = np.array(getattr(scene.start, attribute) if key == "start" else base[target.name], dtype=np.float64)
+        start = scene.start.given().get(attribute) if key == "start" else base[target.name]
         whole = np.array(place.get(attribute, start), dtype=np.float64)
         try:
             whole[target.index] = value

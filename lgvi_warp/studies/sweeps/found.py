@@ -323,13 +323,11 @@ class Findings:
             SceneError: there is no such point.
         """
         shares: dict[str, np.ndarray] = {}
-        single = False
+        single = len(self.cells_of(self.cases[0], at)) == 1
         for case in self.cases:
             cells = self.cells_of(case, at)
-            if any(self.record(cell).refused for cell in cells):
-                continue
-            single = len(cells) == 1
-            shares[case] = np.mean([self.passed(cell) for cell in cells], axis=0)
+            if not any(self.record(cell).refused for cell in cells):
+                shares[case] = np.mean([self.passed(cell) for cell in cells], axis=0)
         pairs = list(itertools.combinations(shares, 2))
         tests = [self._share_test(shares[a], shares[b], single) for a, b in pairs]
         p = dict(zip(pairs, paired.holm(np.array([test.p for test in tests])), strict=True))
@@ -521,13 +519,19 @@ class Findings:
                 ("case", *axes),
                 np.array(values, dtype=object if name == "refused" else np.float64).reshape(shape),
             )
-        return xr.Dataset(data, {"case": list(self.cases), **{name: _labels(values) for name, values in axes.items()}})
+        return xr.Dataset(
+            data, {"case": list(self.cases), **{name: coordinates(values) for name, values in axes.items()}}
+        )
 
 
 def _median(x: np.ndarray) -> float:
     return float(np.median(x)) if len(x) else np.nan
 
 
-def _labels(values: Sequence[Any]) -> list[Any]:
-    """Values of an axis as coordinates: numbers and texts as they are, others as texts."""
+def coordinates(values: Sequence[Any]) -> list[Any]:
+    """Return values of an axis as coordinates: numbers and texts as they are, others as texts.
+
+    Args:
+        values: the values.
+    """
     return [value if isinstance(value, int | float | str) else str(value) for value in values]

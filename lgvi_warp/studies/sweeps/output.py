@@ -90,7 +90,7 @@ def provenance(found: Findings) -> dict[str, Any]:
         found: the sweep.
     """
     setup = found.setup
-    cells = [{"case": cell.case.name, "at": {name: _plain(value) for name, value in cell.point.items()}, "key": cell.key,
+    cells = [{"case": cell.case.name, "at": {name: plain(value) for name, value in cell.point.items()}, "key": cell.key,
               "fixed": list(cell.fixed), "refused": found.record(cell).refused, "messages": list(found.record(cell).messages)}
              for cell in found.cells]  # fmt: skip
     scene = setup.scene.to_dict()
@@ -98,11 +98,16 @@ def provenance(found: Findings) -> dict[str, Any]:
     metrics = {name: metric.to_dict() | {"unit": found.unit(name)} for name, metric in setup.metrics.items()}
     return {"scene": scene, "ensemble": setup.members.to_dict(), "metrics": metrics, "success": found.conditions.to_dict(),
             "baseline": found.baseline, "confidence": found.confidence, "interval": found.interval,
-            "settings": {name: _plain(value) for name, value in setup.settings.items()}, "cells": cells,
+            "settings": {name: plain(value) for name, value in setup.settings.items()}, "cells": cells,
             "versions": machine.versions()}  # fmt: skip
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """Return a value as JSON can hold it: plain types, others as text.
+
+    Args:
+        value: the value.
+    """
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, float) and not np.isfinite(value):

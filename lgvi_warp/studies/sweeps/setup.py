@@ -199,18 +199,29 @@ def made(
     count = len(setup.cases) * int(np.prod([len(values) for values in setup.axes.values()], dtype=object))
     if count > MOST_CELLS:
         raise refusal(
-            "grid", f"{count:,} cells", _too_many(setup, count), f"give at most {MOST_CELLS:,} cells, or vary a number"
+            "grid",
+            f"{count:,} cells",
+            too_many_text(setup, count),
+            f"give at most {MOST_CELLS:,} cells, or vary a number",
         )
     return setup
 
 
-def _too_many(setup: Setup, count: int) -> str:
-    """What is wrong with so many cells: the time that they would take."""
+def too_many_text(setup: Setup, count: int) -> str:
+    """Say what is wrong with so many cells: the time that they would take.
+
+    Args:
+        setup: the sweep.
+        count: number of its cells.
+
+    Returns:
+        The end of a sentence.
+    """
     try:
         prediction = _prediction(setup, None)
     except SceneError:
         return f"are {setup.members.members:,} members each"
-    duration = _duration(prediction.advance * count)
+    duration = duration_text(prediction.advance * count)
     return f"are {setup.members.members:,} members each and would take {duration} on this machine"
 
 
@@ -220,7 +231,12 @@ def _prediction(setup: Setup, threads: int | None) -> Prediction:
     return predict(fleet, threads=threads, **setup.kept(fleet), **setup.settings)
 
 
-def _duration(seconds: float) -> str:
+def duration_text(seconds: float) -> str:
+    """Return a time in words.
+
+    Args:
+        seconds: the time [s].
+    """
     for unit, size in (("years", 3.15e7), ("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
         if seconds >= 2.0 * size:
             return f"{seconds / size:.2g} {unit}"
@@ -238,7 +254,7 @@ def plan_text(setup: Setup, threads: int | None = None) -> str:
         SceneError: the first cell is refused.
     """
     prediction, count = _prediction(setup, threads), len(setup.cells)
-    points, duration = count // len(setup.cases), _duration((prediction.advance + prediction.set_up) * count)
+    points, duration = count // len(setup.cases), duration_text((prediction.advance + prediction.set_up) * count)
     lines = [f"cells       {count:,}: {len(setup.cases)} cases at {points:,} points of the grid",
              f"members     {setup.members.members:,} of each, the same in all",
              f"time        about {duration}, and {prediction.compile:.1f} s for each kernel",

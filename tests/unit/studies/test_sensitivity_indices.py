@@ -1,0 +1,380 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Indices and effects from numbers made by hand: estimates, tables, files, what is left out, what SALib is told."""
+
+import csv
+import dataclasses
+import json
+from types import SimpleNamespace
+from unittest import mock
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.engine.plan import Plan
+from lgvi_warp.sampling.designs.designs import Morris, Saltelli
+from lgvi_warp.studies.sensitivity import adaptor, analyses, outputs
+from lgvi_warp.studies.sensitivity.indices import Indices, MorrisEffects, SobolIndices
+
+BARE = lw.Scene(lw.Vehicle(1.0, (1.0, 1.0, 1.0)))
+VARY = {"start.position[0]": lw.Uniform(low=0.0, high=1.0), "start.position[1]": lw.Uniform(low=0.0, high=2.0),
+        "vehicle.mass": lw.Uniform(low=1.0, high=3.0)}  # fmt: skip
+FIELDS = {"factors": ("a", "bc"), "quantities": ("depth", "energy"), "mean": np.array([1.23456789, np.nan]),
+          "std": np.array([0.12345, 2.0]), "samples": 8, "members": 48, "failed": 1, "confidence": 0.9,
+          "messages": ("one",), "provenance": {"seed": 3}}  # fmt: skip
+TABLE = np.array([[0.5, 0.25], [0.125, np.nan]])
+
+
+def sobol_indices(second=True, **more):
+    pairs = np.array([[[np.nan, 0.3], [0.3, np.nan]], [[np.nan, 0.05], [0.05, np.nan]]])
+    both = {"second": pairs, "second_confidence": 0.2 + 0.0 * pairs} if second else dict.fromkeys(
+        ("second", "second_confidence"))  # fmt: skip
+    return SobolIndices(**FIELDS | more, first=TABLE, first_confidence=0.1 * TABLE, total=2.0 * TABLE,
+                        total_confidence=0.2 * TABLE, **both)  # fmt: skip
+
+
+def effects():
+    return MorrisEffects(**FIELDS, mu_star=TABLE, mu_star_confidence=0.1 * TABLE, mu=-TABLE, sigma=3.0 * TABLE)
+
+
+def test_a_table_in_words():
+    assert str(sobol_indices()).splitlines() == [
+        "Sobol indices: 8 samples, 48 members, 1 failed",
+        "note: one",
+        "",
+        "depth: mean 1.23457, standard deviation 0.123",
+        "  factor                  first                  total",
+        "  a                 0.5 +- 0.05               1 +- 0.1",
+        "  bc              0.25 +- 0.025            0.5 +- 0.05",
+        "  a with bc: second 0.3 +- 0.2",
+        "",
+        "energy: mean nan, standard deviation 2",
+        "  factor                  first                  total",
+        "  a              0.125 +- 0.013          0.25 +- 0.025",
+        "  bc                 nan +- nan             nan +- nan",
+        "+- is half the 90% interval",
+    ]
+    lines = str(effects()).splitlines()
+    assert lines[0] == "Morris screening: 8 samples, 48 members, 1 failed"
+    assert lines[4].split() == ["factor", "mu_star", "mu", "sigma"] and lines[5].split() == [
+        "a",
+        "0.5",
+        "+-",
+        "0.05",
+        "-0.5",
+        "1.5",
+    ]
+    assert not any("with" in line for line in str(sobol_indices(second=False)).splitlines())
+
+
+def test_records_of_every_index():
+    rows = list(sobol_indices().rows())
+    assert len(rows) == 2 * 2 * 2 + 2
+    assert rows[0] == {
+        "quantity": "depth",
+        "factor": "a",
+        "other": "",
+        "index": "first",
+        "value": 0.5,
+        "confidence": 0.05,
+    }
+    assert rows[3] == {
+        "quantity": "depth",
+        "factor": "bc",
+        "other": "",
+        "index": "total",
+        "value": 0.5,
+        "confidence": 0.05,
+    }
+    assert rows[8] == {
+        "quantity": "depth",
+        "factor": "a",
+        "other": "bc",
+        "index": "second",
+        "value": 0.3,
+        "confidence": 0.2,
+    }
+    assert [row["quantity"] for row in rows[8:]] == ["depth", "energy"]
+    rows = list(effects().rows())
+    assert [row["index"] for row in rows[:3]] == ["mu_star", "mu", "sigma"] and rows[1]["value"] == -0.5
+    assert rows[0]["confidence"] == 0.05 and np.isnan(rows[1]["confidence"]) and len(rows) == 12
+
+
+@pytest.mark.parametrize("made", [sobol_indices, lambda: sobol_indices(second=False), effects])
+def test_an_analysis_comes_back_from_its_files(made, tmp_path):
+    found = made()
+    paths = found.save(tmp_path / "new")
+    assert [path.name for path in paths] == ["sensitivity.txt", "sensitivity.csv", "sensitivity.json"]
+    assert paths[0].read_text() == f"{found}\n"
+    with paths[1].open() as file:
+        assert [row["index"] for row in csv.DictReader(file)] == [row["index"] for row in found.rows()]
+    again = Indices.load(paths[2])
+    assert type(again) is type(found) and json.loads(paths[2].read_text()) == found.to_dict()
+    for field in dataclasses.fields(found):
+        one, other = getattr(found, field.name), getattr(again, field.name)
+        assert np.array_equal(one, other, equal_nan=True) if isinstance(one, np.ndarray) else one == other, field.name
+    content = json.loads(paths[2].read_text())
+    assert (
+        content["mean"] == [1.23456789, None] and content["provenance"] == {"seed": 3} and content["name"] == found.name
+    )
+    (tmp_path / "x.json").write_text(json.dumps(content | {"name": "heat"}))
+    with pytest.raises(ValueError, match=r"x\.json: 'heat' is no analysis"):
+        Indices.load(tmp_path / "x.json")
+
+
+def test_ten_pairs_are_named_those_above_their_interval():
+    d = 6
+    second = np.full((1, d, d), np.nan)
+    for number, (j, k) in enumerate((j, k) for j in range(d) for k in range(j + 1, d)):
+        second[0, j, k] = second[0, k, j] = 0.01 * number
+    many = sobol_indices(factors=tuple("abcdef"), quantities=("depth",), mean=np.ones(1), std=np.ones(1))
+    many = dataclasses.replace(many, second=second, second_confidence=np.full((1, d, d), 0.02), **{
+        name: np.zeros((1, d)) for name in ("first", "total", "first_confidence", "total_confidence")})  # fmt: skip
+    pairs = [line.split(":")[0].strip() for line in str(many).splitlines() if " with " in line]
+    assert len(pairs) == 10 and pairs[0] == "e with f" and pairs[-1] == "b with c"
+    few = dataclasses.replace(many, second_confidence=np.full((1, d, d), 0.13))
+    assert [line.split(":")[0].strip() for line in str(few).splitlines() if " with " in line] == ["e with f"]
+
+
+# Estimates
+
+
+def of_design(design, samples, quantity):
+    """An ensemble of a design, and outputs that are a function of its numbers."""
+    fleet = analyses.designed(BARE, VARY, 3, design, samples)
+    drawn = fleet.select(0, fleet.members)
+    values = quantity(drawn.position[:, 0], drawn.position[:, 1], drawn.parameters["vehicle.mass"])
+    values = np.stack(values, axis=1)
+    lost = np.zeros(fleet.members, bool)
+    return fleet, outputs.Outputs(values, ("q", "r")[: values.shape[1]], lost, {"OK": fleet.members}, {"seed": 3})
+
+
+def test_indices_are_saltellis_of_a_sum_and_a_product():
+    """q = x + y, of variances 1/12 and 4/12; r = (x - 1/2) (m - 2), which is all of the pair."""
+    fleet, made = of_design(Saltelli(True), 128, lambda x, y, m: (x + y, (x - 0.5) * (m - 2.0)))
+    found = analyses.sobol_of(fleet, made, confidence=0.9, resamples=10)
+    assert found.factors == ("start.position[0]", "start.position[1]", "vehicle.mass") and found.quantities == (
+        "q",
+        "r",
+    )
+    assert found.first[0] == pytest.approx([0.2, 0.8, 0.0], abs=0.03) and found.total[0] == pytest.approx(
+        [0.2, 0.8, 0.0], abs=0.03
+    )
+    assert found.first[1] == pytest.approx([0.0, 0.0, 0.0], abs=0.1) and found.total[1] == pytest.approx(
+        [1.0, 0.0, 1.0], abs=0.1
+    )
+    assert found.second[1, 0, 2] == found.second[1, 2, 0] == pytest.approx(1.0, abs=0.1) and np.isnan(
+        found.second[0, 1, 1]
+    )
+    assert found.second_confidence[1, 2, 0] == found.second_confidence[1, 0, 2] > 0.0
+    assert (found.samples, found.members, found.failed, found.confidence) == (128, 128 * 8, 0, 0.9)
+    assert found.mean == pytest.approx([1.5, 0.0], abs=0.01) and found.std == pytest.approx(
+        made.values.std(axis=0, ddof=1)
+    )
+    wide = analyses.sobol_of(fleet, made, confidence=0.99, resamples=10)
+    assert (wide.first_confidence[0, :2] > 1.3 * found.first_confidence[0, :2]).all() and np.array_equal(
+        wide.first, found.first
+    )
+    alone, few = of_design(Saltelli(False), 64, lambda x, y, m: (x + y,))
+    without = analyses.sobol_of(alone, few, resamples=10)
+    assert without.second is None and without.second_confidence is None and without.members == 64 * 5
+
+
+def test_effects_of_a_linear_quantity_are_its_slopes():
+    """Per side of the cube: 1 of x, 2 of y, and -3 times 2 of the mass."""
+    for levels in (4, 6):
+        fleet, made = of_design(Morris(levels), 16, lambda x, y, m: (x + y - 3.0 * m,))
+        found = analyses.morris_of(fleet, made, resamples=10)
+        assert found.mu[0] == pytest.approx([1.0, 2.0, -6.0]) and found.mu_star[0] == pytest.approx([1.0, 2.0, 6.0])
+        assert found.sigma[0] == pytest.approx([0.0] * 3, abs=1e-9) and (found.samples, found.members) == (16, 64)
+
+
+def test_a_quantity_that_does_not_vary_has_no_indices():
+    fleet, made = of_design(Saltelli(False), 16, lambda x, y, m: (x, 1e6 + 1e-9 * y))
+    found = analyses.sobol_of(fleet, made, resamples=5)
+    assert np.isnan(found.first[1]).all() and np.isfinite(found.first[0]).all()
+    assert found.messages == ("r does not vary: it has no indices",)
+    messages = []
+    assert analyses.varying(np.array([[0.0, 1.0, 1.0], [0.0, 1.0 + 2e-14, 1.0 + 5e-15]]), "abc", messages) == [1]
+    assert messages == ["a does not vary: it has no indices", "c does not vary: it has no indices"]
+
+
+def test_groups_with_failures_are_refused_or_left_out():
+    values = np.arange(12.0)[:, None]
+    lost = np.zeros(12, bool)
+    lost[5] = True
+    made = outputs.Outputs(values, ("q",), lost, {"OK": 9, "NON_FINITE": 1, "SURFACE": 2}, {})
+    with pytest.raises(outputs.FailedMembers) as caught:
+        analyses.whole_groups(made, 4, "refuse")
+    assert 'mend what fails (see result.status of lw.solve), or use the whole groups alone: failed="drop"' in str(
+        caught.value
+    )
+    Y, messages = analyses.whole_groups(made, 4, "drop")
+    assert Y[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 8.0, 9.0, 10.0, 11.0]
+    assert "the 1 of 3 groups that they are in were left out, and what remains may not be typical" in messages[0]
+    assert (
+        messages[1] == "2 of 12 members were stopped by events: their numbers are those at the stop"
+        and len(messages) == 2
+    )
+    with pytest.raises(outputs.FailedMembers, match="1 groups of the design are whole, too few for an estimate"):
+        analyses.whole_groups(outputs.Outputs(values, ("q",), lost, {}, {}), 6, "drop")
+    whole = outputs.Outputs(values, ("q",), np.zeros(12, bool), {"OK": 12}, {})
+    assert analyses.whole_groups(whole, 4, "refuse")[1] == []
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    ((1, 0.9, 10, "drop"), "samples = 1: is not a whole number from 2; give 2 or more"),
+    ((True, 0.9, 10, "drop"), "samples = True: is not a whole number from 2"),
+    ((2, 0.9, 1.5, "drop"), "resamples = 1.5: is not a whole number from 2"),
+    ((2, 0.0, 2, "drop"), "confidence = 0.0: is not between 0 and 1; give a level, such as 0.95"),
+    ((2, 1.0, 2, "drop"), "confidence = 1.0: is not between 0 and 1"), ((2, 0.9, 2, "keep"), "failed = 'keep'"),
+])  # fmt: skip
+def test_settings_of_an_analysis_that_are_none(arguments, words):
+    analyses.check_settings(2, 0.5, np.int64(2), "refuse")
+    with pytest.raises(lw.SceneError) as caught:
+        analyses.check_settings(*arguments)
+    assert words in str(caught.value)
+
+
+def test_a_design_takes_what_varies_and_the_seed_unless_given(scene):
+    fleet = lw.Ensemble(BARE, 5, 7, VARY)
+    own = analyses.designed(fleet, None, None, Saltelli(True), 4)
+    assert (own.seed, own.members, set(own.vary)) == (7, 4 * 8, set(VARY)) and own.scene is fleet.scene
+    other = analyses.designed(fleet, {"vehicle.mass": VARY["vehicle.mass"]}, 9, Saltelli(False), 4)
+    assert (other.seed, other.members, list(other.vary)) == (9, 4 * 3, ["vehicle.mass"])
+    paper = analyses.designed(scene, None, None, Morris(4), 3)
+    assert paper.seed == scene.ensemble_settings.seed and set(paper.vary) == set(scene.ensemble_settings.vary)
+    with pytest.raises(lw.SceneError, match=r"scene = 3: is neither a Scene nor an Ensemble; give lw\.Scene"):
+        analyses.designed(3, None, None, Saltelli(True), 4)
+
+
+def test_what_an_analysis_asks_for_reaches_its_runs():
+    asked = []
+
+    def evaluate(fleet, of, **settings):
+        asked.append((fleet, of, settings))
+        x = fleet.select(0, fleet.members).position[:, :1]
+        return outputs.Outputs(x, ("q",), np.zeros(fleet.members, bool), {}, {})
+
+    with mock.patch.object(analyses, "evaluate", evaluate):
+        sobol = analyses.sobol(
+            BARE, "depth", samples=4, vary=VARY, seed=5, second_order=False, confidence=0.8, resamples=7, h=0.1
+        )
+        morris = analyses.morris(
+            BARE, "depth", samples=6, levels=6, vary=VARY, seed=5, confidence=0.8, resamples=7, t1=2.0
+        )
+        pairs = analyses.sobol(BARE, "depth", samples=4, vary=VARY)
+        screened = analyses.morris(BARE, "depth", vary=VARY)
+    (first, of, settings), (second, *_, more), (third, *_), (fourth, *_) = asked
+    assert (of, settings, more) == ("depth", {"h": 0.1}, {"t1": 2.0}) and (first.seed, second.seed) == (5, 5)
+    assert not first.sampling.second_order and third.sampling.second_order and second.sampling.levels == 6
+    assert (sobol.confidence, morris.confidence, pairs.confidence, screened.confidence) == (0.8, 0.8, 0.95, 0.95)
+    assert (sobol.members, morris.members, fourth.members, fourth.sampling.levels) == (4 * 5, 6 * 4, 64 * 4, 4)
+
+
+def test_outputs_are_of_all_groups_of_members(monkeypatch):
+    """Three runs of at most four members; one member fails, one is not finite."""
+    runs, shares = [], []
+
+    class Runner:
+        def __init__(self, scene, settings, **how):
+            runs.append((scene, settings, how))
+
+        def run(self, group, progress):
+            runs.append(group)
+            progress(0.5)
+            status = np.zeros(group.members, np.uint8)
+            status[group.indices == 5] = lw.Status.NON_FINITE
+            return SimpleNamespace(group=group, members=group.members, status=status, provenance={"run": len(runs)})
+
+    def quantity(result):
+        place = result.group.indices.astype(float)
+        return np.stack([place, np.where(place == 9.0, np.inf, -place)], axis=1)
+
+    monkeypatch.setattr(outputs, "Runner", Runner)
+    monkeypatch.setattr(outputs, "PATHS_AT_ONCE", 4)
+    fleet = lw.Ensemble(BARE, 10, 3, VARY)
+    found = outputs.evaluate(fleet, quantity, progress=shares.append, threads=2, h=0.1, executor="processes")
+    assert (
+        runs[0][0] is fleet.scene and runs[0][2] == {"threads": 2, "executor": "processes"} and runs[0][1]["h"] == 0.1
+    )
+    assert [list(group.indices) for group in runs[1:]] == [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9]]
+    assert found.values[:, 0].tolist() == list(range(10)) and found.labels == ("quantity[0]", "quantity[1]")
+    assert np.flatnonzero(found.failed).tolist() == [5, 9] and found.provenance["run"] == 4
+    assert found.provenance["ensemble"] == fleet.to_dict() and shares == pytest.approx([0.2, 0.6, 0.9])
+    assert "again" in found.text("again")
+    runs.clear()
+    outputs.evaluate(
+        fleet, lambda result: np.zeros((result.group.members, 1)), common_noise=True, progress=lambda part: None
+    )
+    assert all((group.indices == 0).all() for group in runs[1:]) and [group.members for group in runs[1:]] == [4, 4, 2]
+
+
+# Adaptors
+
+
+def test_distributions_in_salibs_words():
+    def told(distribution, base=2.0):
+        one = SimpleNamespace(bases=(np.array(base),), distribution=distribution)
+        return [adaptor.salib_distribution(*each) for each in adaptor.entries_of(one)]
+
+    assert told(lw.Normal(std=0.5)) == [("norm", [2.0, 0.5])] and told(lw.Normal(mean=1.0, std=0.5)) == [
+        ("norm", [1.0, 0.5])
+    ]
+    assert told(lw.Normal(relative=0.1), -2.0) == [("norm", [-2.0, 0.2])]
+    assert told(lw.Uniform(low=1.0, high=3.0)) == [("unif", [1.0, 3.0])]
+    assert told(lw.Uniform(half_width=0.5)) == [("unif", [1.5, 2.5])]
+    assert told(lw.Uniform(half_width=[0.5, 1.0]), [0.0, 2.0]) == [("unif", [-0.5, 0.5]), ("unif", [1.0, 3.0])]
+    assert told(lw.Uniform(relative=[0.5, 0.25]), [-2.0, 4.0]) == [("unif", [-3.0, -1.0]), ("unif", [3.0, 5.0])]
+    assert told(lw.Uniform(low=[1.0, 2.0], high=[3.0, 5.0]), [0.0, 0.0]) == [("unif", [1.0, 3.0]), ("unif", [2.0, 5.0])]
+    ((name, (log, sigma)),) = told(lw.LogNormal(median=3.0, sigma=0.2))
+    assert (name, sigma) == ("lognorm", 0.2) and log == pytest.approx(np.log(3.0))
+    assert told(lw.LogNormal(sigma=0.2))[0][1][0] == pytest.approx(np.log(2.0))
+    assert told(lw.LogNormal(sigma=0.2), -2.0) == [None] and told(lw.Choice([1.0, 2.0])) == [None]
+
+
+def test_a_model_describes_its_columns(monkeypatch):
+    monkeypatch.setattr(Plan, "compile", lambda plan: 0.0)
+    settings = {"method": "psi_s", "h": 0.1, "t1": 1.0}
+    vary = {"vehicle.mass": lw.Normal(std=0.1), "start.position": lw.Uniform(half_width=[1.0, 2.0, 3.0])}
+    model = adaptor.model(BARE, vary, "depth", **settings)
+    names = ["vehicle.mass", "start.position[0]", "start.position[1]", "start.position[2]"]
+    assert list(model.names) == names and model.problem == {"num_vars": 4, "names": names, "bounds": [
+        [1.0, 0.1], [-1.0, 1.0], [-2.0, 2.0], [-3.0, 3.0]], "dists": ["norm", "unif", "unif", "unif"]}  # fmt: skip
+    u = np.array([[0.25, 0.5], [0.75, 1.0]])
+    ends = [distribution.ppf(u) for distribution in model.distributions]
+    assert ends[0].shape == (2, 2) and ends[0][0, 1] == 1.0 and np.isfinite(ends[0]).all()
+    for i, width in enumerate((1.0, 2.0, 3.0)):
+        np.testing.assert_allclose(ends[i + 1], width * (2.0 * u - 1.0), atol=1e-12)
+    levels = adaptor.model(BARE, vary, "depth", levels=True, **settings)
+    np.testing.assert_array_equal(levels.distributions[0].ppf([0.1, 0.2]), [0.1, 0.2])
+    problem = levels.problem
+    assert problem["num_vars"] == 4 and problem["bounds"] == [[0.0, 1.0]] * 4 and problem["names"] == names
+    bare = adaptor.model(BARE, ["vehicle.mass"], "depth", **settings)
+    with pytest.raises(lw.SceneError, match=r"vary\.names = .*: have no distributions; map names to distributions"):
+        _ = bare.problem
+    with pytest.raises(lw.SceneError, match="vary: names alone have no distributions; map names to distributions"):
+        _ = bare.distributions
+    odd = adaptor.model(BARE, {"vehicle.mass": lw.Choice([1.0, 2.0])}, "depth", **settings)
+    with pytest.raises(lw.SceneError, match=r"is unknown to SALib; use levels=True"):
+        _ = odd.problem
+
+
+def test_a_model_is_called_in_two_shapes(monkeypatch):
+    monkeypatch.setattr(Plan, "compile", lambda plan: 0.0)
+    model = adaptor.model(
+        BARE, {"vehicle.mass": lw.Normal(std=0.1)}, "depth", method="psi_s", h=0.1, t1=1.0, progress="p"
+    )
+    asked = []
+
+    def prepared(X, progress):
+        asked.append((X, progress))
+        return np.arange(6).reshape(3, 2)
+
+    model._prepared = prepared
+    X = np.ones((3, 1))
+    assert model(X).shape == (3, 2) and asked[-1] == (X, "p")
+    np.testing.assert_array_equal(model.scipy(X.T), np.arange(6).reshape(3, 2).T)
+    np.testing.assert_array_equal(asked[-1][0], X)
+    table = {"vehicle.mass": np.ones(3)}
+    assert model.scipy(table).shape == (2, 3) and asked[-1][0] is table

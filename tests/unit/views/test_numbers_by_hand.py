@@ -62,6 +62,11 @@ def test_vectors_are_finite_in_all_three():
     assert choice.finite_rows(rows).tolist() == [False, False, False, True]
 
 
+def test_the_hash_is_that_of_the_paper():
+    # The first numbers of SplitMix64 from the seed 0.
+    assert choice.mixed(np.arange(3)).tolist() == [0xE220A8397B1DCDAF, 0x6E789E6AA1B965F4, 0x06C45D188009454F]
+
+
 def test_frames_are_the_nearest():
     time = np.array([0.0, 1.0, 2.0, 3.4, 3.6, 10.0])
     assert choice.frames_of(time, 3).tolist() == [0, 4, 5] and choice.frames_of(time, 6).tolist() == list(range(6))

@@ -524,7 +524,7 @@ class Ensemble(Summarized):
 
     def _copy(self) -> Ensemble:
         """Return an ensemble with what this one has, but for the numbers that were drawn."""
-        ensemble = object.__new__(Ensemble)
+        ensemble = object.__new__(type(self))
         ensemble.__dict__.update(self.__dict__)
         ensemble._few = None
         return ensemble

@@ -149,6 +149,7 @@ def choose_kernel(
     contents = {"rates": explicit,
                 "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
                 "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
+                "shear": flow == "varying", "lever": flow == "varying" and facts.lever,
                 "origin": bool(elsewhere and (facts.moved or facts.forces_moved)),
                 "axes": controller is not None and facts.turned_axes}  # fmt: skip
     return KernelChoice(

@@ -108,6 +108,8 @@ class Packing:
             fields |= modified_inertia.fields(frame.J / scale[:, None])
         if "water" in parts:
             fields |= _water(numbers, frame)
+        if "shear" in parts:
+            fields |= _shear(numbers, frame, "lever" in parts)
         if "axes" in parts:
             fields["axes"] = frame.Q
         if "origin" in parts:
@@ -283,6 +285,16 @@ def _water(numbers: Any, frame: Frame) -> Fields:
     lever = displaced[:, None] * center - (dry[:, None] * vehicle.center_of_mass(numbers))
     excess = displaced - dry
     return {"excess": excess, "excess_lever": frame.vector(lever - excess[:, None] * frame.forces)}
+
+
+def _shear(numbers: Any, frame: Frame, lever: bool) -> Fields:
+    """What water that varies in space acts on: the body's own mass and the added mass, about the user's origin."""
+    dry, added = vehicle.dry_mass(numbers), vehicle.added_blocks(numbers)
+    fields: Fields = {"dry": dry, "added": symmetric(inertia.in_axes(frame.Q, added.M))}
+    if lever:
+        fields["dry_lever"] = frame.vector(dry[:, None] * vehicle.center_of_mass(numbers))
+        fields["added_coupling"] = inertia.in_axes(frame.Q, added.C)
+    return fields
 
 
 def symmetric(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

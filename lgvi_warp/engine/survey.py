@@ -107,6 +107,7 @@ class Survey:
         delayed: the commands of a controller are delayed.
         features: what the device code of a controller's parts must have, as "key.feature".
         turned_axes: axes other than the user's, even if only in their order or sense.
+        lever: the rigid body's centre is not at the user's origin, or added mass couples velocities and rates there.
     """
 
     turned: bool
@@ -127,6 +128,7 @@ class Survey:
     delayed: bool = False
     turned_axes: bool = False
     features: frozenset[str] = frozenset()
+    lever: bool = False
 
     @property
     def decisive(self) -> tuple[Any, ...]:
@@ -293,6 +295,7 @@ def _seen(
         buoyant=shared("buoyant", p, lambda numbers: bool(np.any(numbers["vehicle.buoyancy"]))),
         delayed="controller.delay" in p
         and shared("delayed", p, lambda numbers: bool(np.any(numbers["controller.delay"] > 0.0))),
+        lever=shared("lever", p, vehicle.lopsided),
         features=frozenset(f"{key}.{word}" for key, words in features.items() for word in words),
         odd=of_numbers(scene, p, first, stop, shared) if odd else Oddities({}),
     )

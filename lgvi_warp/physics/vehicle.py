@@ -413,3 +413,29 @@ def center_of_mass(p: Numbers) -> np.ndarray:
         rigid = p["vehicle.rigid_body_mass_matrix"]
         return np.asarray(-inertias.vee(rigid[:, :3, 3:]) / rigid[:, 0, 0, None])
     return np.zeros((1, 3))
+
+
+def added_blocks(p: Numbers) -> inertias.Blocks:
+    """Added mass about the user's origin.
+
+    Args:
+        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+
+    Returns:
+        Its blocks, (1 or n, 3, 3) each; those of the coupling and of the rates are zero for a vehicle in the simple form.
+    """
+    if "vehicle.rigid_body_mass_matrix" in p:
+        return inertias.blocks(p["vehicle.added_mass_matrix"])
+    return inertias.Blocks(p["vehicle.added_mass"], np.zeros((1, 3, 3)), np.zeros((1, 3, 3)))
+
+
+def lopsided(p: Numbers) -> bool:
+    """Whether some member's mass acts elsewhere than at the user's origin, or its added mass couples velocities and rates there.
+
+    Args:
+        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+
+    Returns:
+        False where a force at the origin gives no torque.
+    """
+    return bool(np.any(center_of_mass(p)) or np.any(added_blocks(p).C))

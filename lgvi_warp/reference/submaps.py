@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from lgvi_warp.reference.rotation import Array, Solver, cross, newton
+from lgvi_warp.reference.rotation import Array, Solver, cross, hat, newton
 from lgvi_warp.reference.terms import STILL, Flow, Law, View
 from lgvi_warp.reference.terms.drag import Drag
 
@@ -36,6 +36,8 @@ class Body:
 
     excess: displaced mass less mass [kg], and excess_lever (3,) [kg m], the same times their levers: water that
     accelerates pushes them.
+    mass [kg], and mass_lever (3,) [kg m], mass times the centre of mass: those of the dry body, of which M and C less
+    these are the added mass. Water that varies in space pushes the two differently.
     C (3, 3) [kg m], the coupling of M and J, for K alone: the other sub-maps of this file want it zero.
     """
 
@@ -44,6 +46,8 @@ class Body:
     terms: tuple[Law, ...] = ()
     excess: float = 0.0
     excess_lever: Array = field(default_factory=lambda: np.zeros(3))
+    mass: float = 0.0
+    mass_lever: Array = field(default_factory=lambda: np.zeros(3))
     member: int = 0
     C: Array = field(default_factory=lambda: np.zeros((3, 3)))
 
@@ -173,7 +177,9 @@ def remembered(x: State, body: Body, h: float, second: bool) -> State:
 
 
 def damping(x: State, body: Body, h: float, nu: Array, Om: Array, flow: Flow) -> Array:
-    """D (6, 6): the sum of the damping laws, and M R^T G R for water that varies in space.
+    """D (6, 6): the sum of the damping laws, and what water that varies in space does.
+
+    With X = R^T G R: force -m X nu - X^T (A11 nu + A12 Om), torque -m hat(r_g) X nu (Lamb 1932, art. 137; Galper & Miloh 1994).
 
     Args:
         x, body, h: State at the start; inertia and laws; step [s].
@@ -182,7 +188,10 @@ def damping(x: State, body: Body, h: float, nu: Array, Om: Array, flow: Flow) ->
     """
     views = tuple(replace(view, nu=nu, Om=Om) for view in look(x, body, h))
     total = sum((term.damping(view) for term, view in zip(body.terms, views, strict=True)), np.zeros((6, 6)))
-    total[:, :3] += body.I6[:, :3] @ x.R.T @ flow.gradient @ x.R
+    X = x.R.T @ flow.gradient @ x.R
+    rigid = np.hstack([body.mass * np.eye(3), -hat(body.mass_lever)])
+    total[:3] += X.T @ (body.I6[:3] - rigid)
+    total[:, :3] += rigid.T @ X
     return np.asarray(total)
 
 

@@ -37,7 +37,7 @@ def body_of(case):
     laws = (Weight(net=v.mass * GRAVITY - v.buoyancy), Restoring(moment=v.buoyancy * v.center_of_buoyancy), *case.laws)
     excess = v.buoyancy / GRAVITY - v.mass
     lever = v.buoyancy / GRAVITY * v.center_of_buoyancy
-    return Body(v.mass_matrix, v.inertia, laws, excess, lever)
+    return Body(v.mass_matrix, v.inertia, laws, excess, lever, v.mass)
 
 
 def both(case, method, h, steps, dtype="float64", **named):

@@ -47,7 +47,7 @@ def body_of(laws):
     own = {"buoyancy": BUOYANCY, "center_of_buoyancy": LIFT}
     laws = tuple(Stratification(**vars(law) | own) if isinstance(law, Stratification) else law for law in laws)
     laws = (Weight(net=WEIGHT - BUOYANCY), Restoring(moment=moment), *laws)
-    return Body(M, J, laws, displaced - MASS, displaced * LIFT - MASS * CENTER, C=C)
+    return Body(M, J, laws, displaced - MASS, displaced * LIFT - MASS * CENTER, MASS, MASS * CENTER, C=C)
 
 
 def twin(laws, method, h, steps):

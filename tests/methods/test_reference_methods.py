@@ -37,7 +37,7 @@ EXPLICIT = {"rk4": tableaux.RK4, "rk5": tableaux.DOPRI5, "rk8": tableaux.DOP853}
 
 
 def body_of(*terms, excess=0.0):
-    return Body(0.5 * (M + M.T), J, terms, excess, np.array([0.02, -0.1, 0.05]))
+    return Body(0.5 * (M + M.T), J, terms, excess, np.array([0.02, -0.1, 0.05]), 0.6, np.array([0.01, 0.05, -0.02]))
 
 
 def begin(body, speed=1.0):

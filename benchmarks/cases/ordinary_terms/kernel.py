@@ -34,6 +34,8 @@ def make_ordinary(real):
         moment: vec3
         excess: real
         excess_lever: vec3
+        mass: real
+        added: mat33
         # drag: linear and quadratic matrices as blocks
         linear_11: mat33
         linear_12: mat33
@@ -321,7 +323,7 @@ def make_ordinary(real):
 
     @wp.func
     def damping(v: vec3, w: vec3, shear: mat33, angle: angles, c: Parameters):
-        """(force; torque) = -D (v; w): all laws that see velocities; shear: M R^T G R."""
+        """(force; torque) = -D (v; w): all laws that see velocities; shear: m X + X^T A, X = R^T G R."""
         D = Damping()
         by_v = wp.diag(vec3(wp.abs(v[0]), wp.abs(v[1]), wp.abs(v[2])))
         by_w = wp.diag(vec3(wp.abs(w[0]), wp.abs(w[1]), wp.abs(w[2])))
@@ -437,7 +439,8 @@ def make_ordinary(real):
             p = p + half * f
             q = q + half * m
             # damping, linearly implicit
-            shear = c.M * (wp.transpose(A) * flow.gradient * A)
+            X = wp.transpose(A) * flow.gradient * A
+            shear = c.mass * X + wp.transpose(X) * c.added
             D = damping(c.M_inverse * p, c.J_inverse * q, shear, angle, c)
             v, u = solve6(factorise(D, half, c), p, q)
             D = damping(v, u, shear, angle, c)
@@ -479,7 +482,8 @@ def parameters(scene, h):
     displaced = vehicle.buoyancy / g
     found = {"M": M, "M_inverse": np.linalg.inv(M), "J": J, "J_inverse": np.linalg.inv(J),
              "net": vehicle.mass * g - vehicle.buoyancy, "moment": vehicle.buoyancy * vehicle.center_of_buoyancy,
-             "excess": displaced - vehicle.mass, "excess_lever": displaced * vehicle.center_of_buoyancy}  # fmt: skip
+             "excess": displaced - vehicle.mass, "excess_lever": displaced * vehicle.center_of_buoyancy,
+             "mass": vehicle.mass, "added": vehicle.added_mass}  # fmt: skip
     drag = laws["drag_matrix"]
     for name, matrix in (("linear", drag.linear), ("quadratic", drag.quadratic), ("lift", laws["body_lift"].matrix)):
         for i, j in ((0, 0), (0, 1), (1, 0), (1, 1)):

@@ -134,7 +134,7 @@ def make_method(spec):
     laws = spec.laws
     law, flow, evolve = (superpose(laws, role) for role in ("law", "flow", "evolve"))
     varies = spec.flow in ("uniform", "varying")
-    shear = make_shear(matrix3_struct(width, real), coupled, shifted) if spec.flow == "varying" else None
+    shear = make_shear(matrix3_struct(width, real), "lever" in spec.parts, shifted) if "shear" in spec.parts else None
     damping = make_damping(laws, shear)
     prepare, exact = None, None
     if spec.drag and spec.explicit is None:

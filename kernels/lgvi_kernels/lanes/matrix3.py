@@ -51,6 +51,15 @@ def combine(a: Any, s: Any, b: Any):
 
 
 @wp.func
+def plus(a: Any, b: Any):
+    """a + b."""
+    a.row0 = a.row0 + b.row0
+    a.row1 = a.row1 + b.row1
+    a.row2 = a.row2 + b.row2
+    return a
+
+
+@wp.func
 def difference(a: Any, b: Any):
     """a - b."""
     a.row0 = a.row0 - b.row0

@@ -131,7 +131,9 @@ def inertia_struct(width, real, mass, parts=()):
     "dense": the inertia at the origin of the forces as M and J (and C where coupled), for velocity-dependent laws;
     "origin": the user's origin from that of the state, and from that of the forces, where events and water are taken;
     "modified": 1 / J, and the coefficients of the series s (shrink) and d (shift) of the modified inertia;
-    "water": displaced mass less mass, and displaced mass times its lever less mass times its own, by max J;
+    "water": displaced mass less mass, and displaced mass times its lever less mass times its own;
+    "shear": dry mass, and added mass of translation;
+    "lever": dry mass times its lever, and added mass A12, about the user's origin;
     "axes": the kernel's body axes in the user's, 3x3.
     """
     Lane, Lane3 = lane(width, real), lane3(width, real)
@@ -156,6 +158,10 @@ def inertia_struct(width, real, mass, parts=()):
         fields |= {"inverse_J": Lane3, "shrink": Series, "shift": Series}
     if "water" in parts:
         fields |= {"excess": Lane, "excess_lever": Lane3}
+    if "shear" in parts:
+        fields |= {"dry": Lane, "added": Symmetric3}
+    if "lever" in parts:
+        fields |= {"dry_lever": Lane3, "added_coupling": Matrix3}
     if "origin" in parts:
         fields |= {"user_origin": Lane3, "user_origin_forces": Lane3}
     if "axes" in parts:

@@ -3,16 +3,22 @@
 
 In the frame of the water around it, the vehicle's equations are those of still water, but that frame accelerates and
 changes as the vehicle moves through it. With u the water's velocity, G = du/db and Du/Dt = du/dt + G u:
-the force (rho V - m) R^T Du/Dt (Fossen 2021, 10.3, for a uniform current), and in water that varies in space
--M R^T G R nu, since the vehicle enters water of another velocity (Thomasson & Woolsey 2013, without the water's rotation).
+the force (rho V - m) R^T Du/Dt (Fossen 2021, 10.3, for a uniform current), and in water that varies in space, with
+X = R^T G R, m the dry mass and A11, A12 the added mass,
+
+    force = -m X nu - X^T (A11 nu + A12 Om),   torque = -m r_g x X nu
+
+The body enters water of another velocity, of which its own momentum knows nothing; the momentum of the fluid that it sets
+in motion is turned and stretched by the water (Taylor 1928; Lamb 1932, art. 137; Galper & Miloh 1994). It follows from the
+fluid's Lagrangian (nu, Om).A6 (nu, Om) / 2 with nu = R^T (v - u(b)), for a body that is small beside the water's lengths.
 """
 
 from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, cross, div, mul, ones, vec3  # noqa: F401
-from lgvi_kernels.lanes.matrix3 import combine, product, symmetric, transposed
+from lgvi_kernels.lanes.arithmetic import add, cross, mul, vec3  # noqa: F401
+from lgvi_kernels.lanes.matrix3 import combine, plus, product, symmetric, transposed
 from lgvi_kernels.lanes.view import to_body
 
 
@@ -32,12 +38,12 @@ def acceleration_wrench(w: Any, view: Any, inertia: Any, water: Any):
 
 
 @wp.func
-def gradient_in_body(m: Any, view: Any, water: Any):
-    """R^T G R, written into m: column j is R^T G (R e_j)."""
+def slopes_in_body(m: Any, view: Any, water: Any):
+    """X^T of X = R^T G R, written into m: row j is R^T G (R e_j)."""
     m.row0 = to_body(view, along(water, vec3(view.north.x, view.east.x, view.down.x)))
     m.row1 = to_body(view, along(water, vec3(view.north.y, view.east.y, view.down.y)))
     m.row2 = to_body(view, along(water, vec3(view.north.z, view.east.z, view.down.z)))
-    return transposed(m)
+    return m
 
 
 @wp.func
@@ -49,24 +55,36 @@ def about(m: Any, r: Any):
     return m
 
 
-def make_shear(Matrix3, coupled, shifted):
-    """The damping matrix of the water's variation in space. shifted: the water is taken at the user's origin."""
+@wp.func
+def levered(r: Any, m: Any):
+    """hat(r) m: the torque of m, a force that acts at the point r."""
+    return transposed(about(transposed(m), r))
+
+
+def make_shear(Matrix3, lever, shifted):
+    """The damping matrix of the water's variation in space.
+
+    lever: the rigid body's centre is not at the user's origin, or added mass couples there (else no torque follows);
+    shifted: the user's origin, where the water is taken, is not that of the forces.
+    """
 
     @wp.func
     def shear(D: Any, view: Any, inertia: Any, water: Any):
-        """D + I6 (R^T G R, 0): force M R^T G R nu and, where M and J are coupled, torque C^T R^T G R nu."""
-        # M and C are divided by max J, D is not.
-        scale = ones(inertia.mean) / inertia.inverse_scale
-        X = gradient_in_body(Matrix3(), view, water)
-        MX = product(symmetric(Matrix3(), inertia.M), X)
-        D.force_velocity = combine(D.force_velocity, scale, MX)
-        if wp.static(shifted):
-            D.force_rate = combine(D.force_rate, scale, about(MX, inertia.user_origin_forces))
-        if wp.static(coupled):
-            CX = product(transposed(inertia.C), X)
-            D.torque_velocity = combine(D.torque_velocity, scale, CX)
+        """D + the matrix of the force m X nu + X^T (A11 nu + A12 Om) and the torque m hat(r_g) X nu at the user's origin."""
+        XT = slopes_in_body(Matrix3(), view, water)
+        X = transposed(XT)
+        force = combine(product(XT, symmetric(Matrix3(), inertia.added)), inertia.dry, X)
+        D.force_velocity = plus(D.force_velocity, force)
+        if wp.static(lever):
+            torque = levered(inertia.dry_lever, X)
+            force_rate = product(XT, inertia.added_coupling)
             if wp.static(shifted):
-                D.torque_rate = combine(D.torque_rate, scale, about(CX, inertia.user_origin_forces))
+                r = inertia.user_origin_forces
+                torque = plus(torque, levered(r, force))
+                D.torque_rate = plus(D.torque_rate, plus(about(torque, r), levered(r, force_rate)))
+                force_rate = plus(force_rate, about(force, r))
+            D.force_rate = plus(D.force_rate, force_rate)
+            D.torque_velocity = plus(D.torque_velocity, torque)
         return D
 
     return shear

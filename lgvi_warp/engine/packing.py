@@ -109,7 +109,7 @@ class Packing:
         if "water" in parts:
             fields |= _water(numbers, frame)
         if "shear" in parts:
-            fields |= _shear(numbers, frame, "lever" in parts)
+            fields |= _shear(numbers, frame, self.plan.spec.mass == "full", "lever" in parts)
         if "axes" in parts:
             fields["axes"] = frame.Q
         if "origin" in parts:
@@ -287,10 +287,11 @@ def _water(numbers: Any, frame: Frame) -> Fields:
     return {"excess": excess, "excess_lever": frame.vector(lever - excess[:, None] * frame.forces)}
 
 
-def _shear(numbers: Any, frame: Frame, lever: bool) -> Fields:
+def _shear(numbers: Any, frame: Frame, full: bool, lever: bool) -> Fields:
     """What water that varies in space acts on: the body's own mass and the added mass, about the user's origin."""
     dry, added = vehicle.dry_mass(numbers), vehicle.added_blocks(numbers)
-    fields: Fields = {"dry": dry, "added": symmetric(inertia.in_axes(frame.Q, added.M))}
+    M = symmetric(inertia.in_axes(frame.Q, added.M))
+    fields: Fields = {"dry": dry, "added": M if full else M[0]}
     if lever:
         fields["dry_lever"] = frame.vector(dry[:, None] * vehicle.center_of_mass(numbers))
         fields["added_coupling"] = inertia.in_axes(frame.Q, added.C)

@@ -159,7 +159,7 @@ def inertia_struct(width, real, mass, parts=()):
     if "water" in parts:
         fields |= {"excess": Lane, "excess_lever": Lane3}
     if "shear" in parts:
-        fields |= {"dry": Lane, "added": Symmetric3}
+        fields |= {"dry": Lane, "added": Symmetric3 if mass == "full" else Lane3}
     if "lever" in parts:
         fields |= {"dry_lever": Lane3, "added_coupling": Matrix3}
     if "origin" in parts:

@@ -18,7 +18,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes.arithmetic import add, cross, mul, vec3  # noqa: F401
-from lgvi_kernels.lanes.matrix3 import combine, plus, product, symmetric, transposed
+from lgvi_kernels.lanes.matrix3 import combine, plus, product, transposed
 from lgvi_kernels.lanes.view import to_body
 
 
@@ -43,6 +43,15 @@ def slopes_in_body(m: Any, view: Any, water: Any):
     m.row0 = to_body(view, along(water, vec3(view.north.x, view.east.x, view.down.x)))
     m.row1 = to_body(view, along(water, vec3(view.north.y, view.east.y, view.down.y)))
     m.row2 = to_body(view, along(water, vec3(view.north.z, view.east.z, view.down.z)))
+    return m
+
+
+@wp.func
+def by_symmetric(m: Any, s: Any):
+    """m s, s symmetric or diagonal."""
+    m.row0 = s * m.row0
+    m.row1 = s * m.row1
+    m.row2 = s * m.row2
     return m
 
 
@@ -73,7 +82,7 @@ def make_shear(Matrix3, lever, shifted):
         """D + the matrix of the force m X nu + X^T (A11 nu + A12 Om) and the torque m hat(r_g) X nu at the user's origin."""
         XT = slopes_in_body(Matrix3(), view, water)
         X = transposed(XT)
-        force = combine(product(XT, symmetric(Matrix3(), inertia.added)), inertia.dry, X)
+        force = combine(by_symmetric(XT, inertia.added), inertia.dry, X)
         D.force_velocity = plus(D.force_velocity, force)
         if wp.static(lever):
             torque = levered(inertia.dry_lever, X)

@@ -344,6 +344,7 @@ class FirstPassage(Condition, Counted):
     """
 
     type: ClassVar[str] = "first_passage"
+    since: ClassVar[frozenset[str]] = frozenset({"stopped"})
     of_numbers: ClassVar[bool] = False
 
     levels: Any = (0.05, 0.5, 0.95)

@@ -111,6 +111,7 @@ class Outcome(OfEnds):
     """
 
     type: ClassVar[str] = "outcome"
+    since: ClassVar[frozenset[str]] = frozenset({"kind"})
 
     levels: Any = (0.05, 0.5, 0.95)
 

@@ -6,6 +6,8 @@ import pytest
 from scipy import stats
 
 import lgvi_warp as lw
+from lgvi_warp.engine.block import blocks
+from lgvi_warp.engine.keepers.statistics import Gathered
 from lgvi_warp.statistics.base import from_list
 from lgvi_warp.statistics.ends import Ends, check_outcomes, outcomes
 from lgvi_warp.statistics.estimate import Estimates
@@ -237,6 +239,42 @@ def test_first_passage_knows_when_a_member_was_stopped():
     (found,) = statistic.estimates([gathers.close()], TIMES)
     # A piece is 0.25 s.
     assert found["passage_time"][0] == pytest.approx(2.5, abs=0.25) and found.value.tolist() == [0, 0, 1, 1, 1, 1]
+
+
+@pytest.mark.parametrize("replicates", [1, 2])
+def test_first_passage_takes_stopped_members_for_what_they_are(replicates):
+    """Of 100 members 50 are stopped elsewhere at 1 s, 26 fail at 5 s and 24 pass at 7 s: of the 50 all would have passed."""
+    statistic = lw.FirstPassage(lw.Quantity("x", lambda s, m: None, "m", (), ("x",)), above=2.5, levels=(0.4, 0.6))
+    end = np.repeat([1.0, 5.0, 10.0], [50, 26, 24])
+    x = np.where((np.arange(100) >= 76) & (TIMES[:, None] >= 7.0), 3.0, 2.0)[:, None]
+    good = (np.arange(100) < 50) | (np.arange(100) >= 76) | (TIMES[:, None] < 5.0)
+    ends = Ends(np.repeat([SURFACE, FAILED, OK], [50, 26, 24]), np.repeat([2, 0, 0], [50, 26, 24]), end, EVENTS)
+    gathers = statistic.open(TIMES, 100)
+    gathers.take(dealt(x, good, 0, 0, 100, replicates) if replicates > 1 else Values(x, good), slice(0, 6))
+    gathers.end(ends, replicates)
+    parts = [gathers.close()]
+    (found,) = (
+        statistic.estimates(parts, TIMES) if replicates == 1 else statistic.estimates_of_replicates(parts, TIMES, replicates)
+    )
+    np.testing.assert_allclose(found.value, [0, 0, 0, 0, 0.5, 0.5], rtol=1e-15)
+    assert found["stopped"].tolist() == [0, 50, 0, 0, 0, 0] and found["lost"].tolist() == [0, 0, 0, 26, 0, 0]
+    assert found["passage_time"][0] < 8.0 and found["passage_time"][1] == np.inf and found["censored"] == 0
+    (outcome,) = gathered(lw.Outcome("floor"), Ends(
+        np.where(ends.status == OK, FLOOR, ends.status), np.where(ends.status == OK, 1, ends.event), end, EVENTS))  # fmt: skip
+    assert outcome.value[-1] == pytest.approx(found.value[-1], rel=1e-15)
+
+
+def test_parts_and_estimates_of_an_earlier_version_are_refused():
+    (found,) = gathered(lw.Outcome("floor"), ends_of(100))
+    arrays, text = Estimates([found]).to_arrays()
+    assert Estimates.from_arrays(arrays, text)["outcome floor"]["alone"].tobytes() == found["alone"].tobytes()
+    del arrays["0/alone"]
+    with pytest.raises(ValueError, match="'outcome floor' is of an earlier version"):
+        Estimates.from_arrays(arrays, text)
+    gather = Gathered(TIMES, 100, [lw.Outcome("floor")])
+    old = {"members": np.array([1]), "time": np.array([1.0]), "so": np.array([True]), "replicate": np.zeros(1, np.int32)}
+    with pytest.raises(ValueError, match="'outcome floor' is of an earlier version"):
+        gather.merge(blocks(100)[0], [old])
 
 
 def test_from_a_scene_file():

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from lgvi_warp.cli.report import file_line
 from lgvi_warp.cli.settings import folder, load_scene, whole
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.cli.writing import Written
-from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.errors import SceneError, refusal
 
 
 def finish(written: Written, chosen: argparse.Namespace, content: Mapping[str, Any], text: str) -> int:
@@ -84,7 +84,9 @@ def sensitivity(chosen: argparse.Namespace) -> int:
     scene = load_scene(chosen)
     out = folder(chosen, "_sensitivity")
     samples = {"sobol": 256, "morris": 64}[chosen.analysis] if chosen.samples is None else chosen.samples
-    options: dict[str, Any] = {"second_order": not chosen.first_order} if chosen.analysis == "sobol" else {}
+    options: dict[str, Any] = {}
+    if chosen.analysis == "sobol":
+        options = {"second_order": not chosen.first_order, "replicates": chosen.replicates, "groups": _groups(chosen.group)}
     try:
         with shown(chosen.quiet) as progress:
             indices: uq.Indices = getattr(uq, chosen.analysis)(
@@ -97,6 +99,17 @@ def sensitivity(chosen: argparse.Namespace) -> int:
         written = Written(indices.save(out))
         written.draw(plot_sensitivity, indices, out / "sensitivity.png")
     return finish(written, chosen, {"sensitivity": indices.to_dict()}, str(indices))
+
+
+def _groups(given: Sequence[str]) -> dict[str, list[str]]:
+    """Groups of factors as the command has them: "NAME=FACTOR,FACTOR". Raises SceneError."""
+    groups = {}
+    for text in given:
+        name, _, members = text.partition("=")
+        if not name or not members:
+            raise refusal("--group", text, "names no factors", 'give "start=start.position,start.velocity"')
+        groups[name] = members.split(",")
+    return groups
 
 
 def stability(chosen: argparse.Namespace) -> int:

@@ -37,7 +37,7 @@ def names_of(faults: Faults, vary: Any) -> tuple[str, ...]:
 
 
 def as_given(fleet: Ensemble) -> list[Variation]:
-    """List what varies in the order of `vary`.
+    """List what varies in the order of `vary`, and then what the sampling itself varies.
 
     Args:
         fleet: the ensemble.
@@ -45,8 +45,8 @@ def as_given(fleet: Ensemble) -> list[Variation]:
     Returns:
         Its variations.
     """
-    by_key = {variation.key: variation for variation in fleet.variations}
-    return [by_key[key] for key in fleet.vary]
+    place = {key: number for number, key in enumerate(fleet.vary)}
+    return sorted(fleet.variations, key=lambda variation: place.get(variation.key, len(place)))
 
 
 def columns_of(space: Space, key: str) -> range:

@@ -99,6 +99,8 @@ class Statistic:
     type: ClassVar[str] = ""
     # Names of a part's arrays that are the same for all sample times.
     shared: ClassVar[frozenset[str]] = frozenset()
+    # Names of a part's arrays that parts of an earlier version lack; these cannot be read.
+    since: ClassVar[frozenset[str]] = frozenset()
     # Value of `of` where none is given; None: it must be given.
     default: ClassVar[str | None] = None
     # Whether it reads one number of each member at one time, so that it can follow a path or an end.

@@ -247,6 +247,7 @@ class _Passages(Gatherer):
         self._passed = np.full(count, len(time), np.int64)
         # Fraction of the time from the sample before to the sample that shows the passage.
         self._share = np.ones(count)
+        self._stopped = np.full(count, len(time), np.int64)
         self._known = np.zeros(count, np.int64)
         self._before: np.ndarray | None = None
         self._replicates = 1
@@ -284,32 +285,41 @@ class _Passages(Gatherer):
         self._share[now] = (limit - before) / (x[at, now] - before)
 
     def end(self, ends: Ends, replicates: int) -> None:
-        """Correct passages of stopped members, which reached their last state before the second sample."""
+        """Correct passages of stopped members, which reached their last state before the second sample; note the others.
+
+        Those that count with the state that they stopped in, and had not passed in it, never will.
+        """
         end = ends.time.reshape(-1, replicates).T.ravel()
         stopped = ends.are(STOPPED).reshape(-1, replicates).T.ravel()
+        never = stopped & (self._passed == self._times) & (self._known == self._times)
+        self._stopped[never] = np.searchsorted(self._time, end[never])
         now = np.flatnonzero((self._passed > 0) & (self._passed < self._times) & stopped)
         before, at = self._time[self._passed[now] - 1], self._time[self._passed[now]]
         self._share[now] *= np.clip((end[now] - before) / (at - before), 0.0, 1.0)
 
     def close(self) -> Part:
-        """Return how many members pass in each piece of time, and how many are lost before passing."""
+        """Return how many members pass in each piece of time, are lost before passing, and are stopped before passing."""
         R, length = self._replicates, self._times + 1
         row = np.repeat(np.arange(R), len(self._passed) // R) * length
         piece = np.clip(np.floor(self._share * PIECES), 0, PIECES - 1).astype(np.int64)
         passed = np.bincount((row + self._passed) * PIECES + piece, minlength=R * length * PIECES)
-        open_ = self._passed == self._times
-        lost = np.bincount((row + self._known)[open_], minlength=R * length)
-        return {"passed": passed.reshape(R, length, PIECES), "lost": lost.reshape(R, length)}
+        stopped = self._stopped < self._times
+        open_ = (self._passed == self._times) & ~stopped
+        lost, over = (np.bincount((row + at)[which], minlength=R * length).reshape(R, length)
+                      for at, which in ((self._known, open_), (self._stopped, stopped)))  # fmt: skip
+        return {"passed": passed.reshape(R, length, PIECES), "lost": lost, "stopped": over}
 
 
 @dataclass(frozen=True, eq=False)
 class FirstPassage(Condition, Counted):
     """Time until a condition first holds, as the samples show it.
 
-    The probability is Kaplan & Meier's estimate: a member that fails before it passes counts until its last good
-    sample; NaN where no member is known at any time. Interval: Wilson's with the number of members whose fraction has
-    the variance of a beta product (Fay, Brittain & Proschan 2013), which accounts for few members at risk; its upper
-    end is 1 where none is.
+    The probability is Aalen & Johansen's estimate. A member that an event stopped in a state in which the condition does
+    not hold never passes; with stopped="left_out" it is taken for lost, as if it would have passed like the others. A
+    member that fails before it passes counts until its last good sample; NaN where no member is known at any time. If
+    none fails, the probability is the fraction of all members. Interval: Wilson's with the number of members whose
+    fraction has the variance of a beta product (Fay, Brittain & Proschan 2013), which accounts for few members at risk;
+    its upper end reaches up to what is not known where none is.
 
     A member passes between the sample before and the sample that shows it, where the line between the two crosses the
     limit; a quantity without a limit, which is true or false, passes at the sample that shows it. A passage that comes
@@ -320,8 +330,9 @@ class FirstPassage(Condition, Counted):
     * value (k,): probability to have passed by each time; survival is 1 - value.
     * passed (k,): number of members that pass at each time.
     * lost (k,): number of members that failed before each time without having passed.
+    * stopped (k,): number of members that an event stopped at each time, or since the one before, without having passed.
     * count (k,): number of members at risk of passing at each time.
-    * censored: number of members that were good to the end and did not pass.
+    * censored: number of members that were under way to the end and did not pass.
     * passage_time (levels,) [s]: time by which that fraction has passed, infinite if it never has; passage_time_lower,
       passage_time_upper from the interval of value.
 
@@ -333,6 +344,7 @@ class FirstPassage(Condition, Counted):
     """
 
     type: ClassVar[str] = "first_passage"
+    since: ClassVar[frozenset[str]] = frozenset({"stopped"})
     of_numbers: ClassVar[bool] = False
 
     levels: Any = (0.05, 0.5, 0.95)
@@ -349,12 +361,13 @@ class FirstPassage(Condition, Counted):
         return _Passages(self, time, count)
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return the estimate of Kaplan & Meier (1958)."""
+        """Return the estimate of Aalen & Johansen (1978)."""
         curve = Curve.of(part)
         lower, upper = curve.ends(*intervals.wilson(curve.value, curve.members, self.confidence))
-        passed, lost = curve.passed.sum(axis=1), part["lost"][0]
+        passed, lost, stopped = part["passed"][0, :-1].sum(axis=1), part["lost"][0], part["stopped"][0, :-1]
         arrays = {"value": curve.value[:, -1], "lower": lower[:, -1], "upper": upper[:, -1]}
-        arrays |= {"survival": curve.survival[:, -1], "passed": passed, "lost": lost[:-1], "count": curve.risk}
+        arrays |= {"survival": 1.0 - curve.value[:, -1], "passed": passed, "lost": lost[:-1], "stopped": stopped}
+        arrays |= {"count": curve.risk}
         dims = along(arrays, "time")
         arrays |= {"censored": lost[-1]}
         dims["censored"] = ()
@@ -406,18 +419,19 @@ def check_levels(faults: Faults, levels: Any) -> None:
 
 
 class Curve:
-    """Kaplan & Meier's curve at the end of each piece of the times before the samples.
+    """Probability to have passed, by Aalen & Johansen (1978), at the end of each piece of the times before the samples.
 
-    A member that is lost is known up to the sample before, and is at risk in no later piece.
+    A member that ends otherwise passes no more; if none does, this is Kaplan & Meier's curve (1958). A member that is lost
+    is known up to the sample before, and is at risk in no later piece.
 
     Args:
         passed: (k, pieces), number of members that pass in each piece.
+        others: (k, pieces), number of members that end otherwise in each piece.
         lost: (k,), number of members that are lost before each time.
         total: number of all members.
 
     Attributes:
-        survival: (k, pieces), estimated probability not to have passed.
-        value: (k, pieces), 1 less survival.
+        value: (k, pieces), estimated probability to have passed; the fraction of all members as long as none is lost.
         risk: (k,), number of members at risk of passing at each sample time.
         left: (k, pieces), number of members still at risk at the end of each piece.
         members: (k, pieces), number of independent members that would give the same variance.
@@ -430,52 +444,84 @@ class Curve:
         Args:
             part: the part of all members, of one replicate.
         """
-        return cls(part["passed"][0, :-1], part["lost"][0, :-1], int(part["passed"][0].sum()))
+        passed = part["passed"][0, :-1]
+        others = np.zeros_like(passed)
+        # They stop within the time before a sample: the last of its pieces counts them.
+        others[:, -1] = part["stopped"][0, :-1]
+        return cls(passed, others, part["lost"][0, :-1], int(part["passed"][0].sum()))
 
-    def __init__(self, passed: np.ndarray, lost: np.ndarray, total: int):
-        self.passed = passed
-        at = self.passed.sum(axis=1)
-        self.risk = total - np.cumsum(lost) - (np.cumsum(at) - at)
+    def __init__(self, passed: np.ndarray, others: np.ndarray, lost: np.ndarray, total: int):
+        now, so_far = (np.cumsum(counts, axis=1) for counts in (passed, passed + others))
+        self.risk = total - np.cumsum(lost) - _before(so_far[:, -1])
         n = self.risk[:, None]
-        so_far = np.cumsum(self.passed, axis=1)
         self.left = n - so_far
-        survival = _so_far(1.0 - so_far / np.maximum(n, 1), np.multiply)
-        self.survival = survival if self.risk[0] else np.full_like(survival, np.nan)
-        self.value = 1.0 - self.survival
-        self.members = self._members(n, self.left)
+        stay = 1.0 - so_far / np.maximum(n, 1)
+        under_way = np.concatenate([[1.0], np.cumprod(stay[:, -1])[:-1]])[:, None]
+        # As long as none is lost, the sum is the fraction of all members, but for round-off.
+        whole = np.cumsum(lost)[:, None] == 0
+        fraction, value = _added(passed) / max(total, 1), _added(under_way * passed / np.maximum(n, 1))
+        self.value = np.where(self.risk[0] > 0, np.where(whole, fraction, value), np.nan)
+        self.members = np.where(whole, float(total), self._members(n, now, so_far))
+        self._otherwise = np.maximum(1.0 - under_way * stay - self.value, 0.0)
 
     @staticmethod
-    def _members(n: np.ndarray, left: np.ndarray) -> np.ndarray:
-        """Number of members whose fraction has the variance of a product of beta variables, one for each time.
+    def _members(n: np.ndarray, now: np.ndarray, so_far: np.ndarray) -> np.ndarray:
+        """Number of members whose fraction has the variance of a sum over Dirichlet variables, one for each time.
 
-        After m of n passed, survival lies between products of Beta(n - m + 1, m) over all times, without and with a
-        last Beta(left, 1), as it does between Clopper & Pearson's limits (Fay, Brittain & Proschan 2013, Biostatistics
-        14). Between the two is a last Beta(left + 1/2, 1/2). If no member is lost, the product is then Jeffreys' Beta(n
-        - m + 1/2, m + 1/2), and the number is that of all members. Where few are at risk Greenwood's variance is far
-        too small.
+        Where x of n members pass and o end otherwise, the shares of those that pass, end otherwise and stay are
+        Dirichlet(x, o, n - x - o + 1), and of the last ones Beta(1/2, left + 1/2) pass. If none ends otherwise, this is
+        between the two beta products of Fay, Brittain & Proschan (2013, Biostatistics 14), as Jeffreys' interval is between
+        Clopper & Pearson's limits; if none is lost, it is Jeffreys' Beta(m + 1/2, n - m + 1/2), and the number is that of
+        all members. Where few are at risk the variance of Greenwood's kind is far too small.
+
+        Args:
+            n: (k, 1), members at risk at each time.
+            now: (k, pieces), members that passed since the time before.
+            so_far: (k, pieces), members that passed or ended otherwise since the time before.
         """
-        mean = _so_far(np.log1p((left - n) / (n + 1.0)), np.add) + np.log1p(-0.5 / (left + 1.0))
-        # log(1 + variance / mean^2) of a Beta(a, b) is log(1 + b / (a (a + b + 1))).
-        spread = _so_far(np.log1p((n - left) / ((left + 1.0) * (n + 2.0))), np.add)
-        spread = spread + np.log1p(0.5 / ((left + 0.5) * (left + 2.0)))
+        # Means, variances and covariance of S, the probability to be under way, and of F, to have passed.
+        size = n + 1.0
+        q, p = now / size, (size - so_far) / size
+        var_q, cov, var_p = (c / (size + 1.0) for c in (q * (1.0 - q), -q * p, p * (1.0 - p)))
+        spread = np.log1p(var_p / (p * p))
+        S = np.concatenate([[1.0], np.cumprod(p[:, -1])[:-1]])[:, None]
+        var_S = S * S * np.expm1(_before(spread[:, -1]))[:, None]
+        S2 = var_S + S * S
+        cov_step = S2 * cov + var_S * q * p
+        cov_FS = S * _before((cov_step / (S * p))[:, -1])[:, None]
+        var_step = 2.0 * cov_FS * q + S2 * var_q + var_S * q * q
+        # At the end of each piece.
+        F, var_F = (_before(step[:, -1])[:, None] + step for step in (S * q, var_step))
+        cov_FS, S2 = cov_FS * p + cov_step, S2 * (p * p + var_p)
+        S, var_S = S * p, var_S * p * p + (var_S + S * S) * var_p
+        # The last step, of those that are left.
+        left = n - so_far
+        r = 0.5 / (left + 1.0)
+        var_F = var_F + 2.0 * cov_FS * r + S2 * r * (1.0 - r) / (left + 2.0) + var_S * r * r
+        F = F + S * r
         # For a Beta(a, b) mean (1 - mean) / variance is a + b + 1, which is the number of members plus two.
-        return np.asarray(np.maximum(-np.expm1(mean) / (np.exp(mean) * np.expm1(spread)) - 2.0, 0.0))
+        return np.asarray(np.maximum(F * (1.0 - F) / var_F - 2.0, 0.0))
 
     def ends(self, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return an interval widened where nothing is known.
+        """Return an interval that contains the value, widened where nothing is known.
 
-        The upper end is 1 after the last member at risk, who may pass at once; without any member the interval is 0 to
-        1.
+        After the last member at risk all that were lost may pass at once; without any member the interval is 0 to 1.
 
         Args:
             lower: (k, pieces), lower end.
             upper: (k, pieces), upper end.
         """
         nobody = not self.risk[0]
-        return np.where(nobody, 0.0, lower), np.where(nobody | (self.left <= 0), 1.0, upper)
+        most = np.minimum(1.0, 1.0 - self._otherwise + (upper - self.value))
+        upper = np.where(nobody, 1.0, np.where(self.left <= 0, most, upper))
+        return np.fmin(np.where(nobody, 0.0, lower), self.value), np.fmax(upper, self.value)
 
 
-def _so_far(steps: np.ndarray, join: np.ufunc) -> np.ndarray:
-    """Accumulate steps within each time (k, pieces) from the start: all earlier times, then the last one so far."""
-    totals = join.accumulate(np.concatenate([[join.identity], steps[:-1, -1]]))
-    return np.asarray(join(totals[:, None], steps))
+def _added(steps: np.ndarray) -> np.ndarray:
+    """Sum of all steps (k, pieces) up to the end of each piece."""
+    return np.asarray(_before(steps.sum(axis=1))[:, None] + np.cumsum(steps, axis=1))
+
+
+def _before(steps: np.ndarray) -> np.ndarray:
+    """Sum of the steps (k,) before each time."""
+    return np.concatenate([np.zeros(1, steps.dtype), np.cumsum(steps)[:-1]])

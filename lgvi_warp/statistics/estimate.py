@@ -28,6 +28,10 @@ Dims = dict[str, tuple[str, ...]]
 WORDS = ("name", "settings", "unit", "confidence", "interval", "dims")
 
 
+# Type of a statistic -> an array that its estimates lack where an earlier version gathered them, and their value another meaning.
+SINCE = {"outcome": "alone", "first_passage": "stopped"}
+
+
 def along(names: Iterable[str], *dims: str) -> Dims:
     """Return the same dimensions for several arrays.
 
@@ -199,6 +203,9 @@ class Estimates(Summarized, Mapping[str, Estimate]):
         Args:
             arrays: the named arrays.
             text: the JSON text.
+
+        Raises:
+            ValueError: an estimate is of an earlier version, in which its value meant something else.
         """
         estimates = []
         for i, words in enumerate(json.loads(text)):
@@ -206,6 +213,8 @@ class Estimates(Summarized, Mapping[str, Estimate]):
             coordinates = below(estimate_arrays, "coordinates/")
             words["dims"] = {name: tuple(dims) for name, dims in words["dims"].items()}
             values = {name: array for name, array in estimate_arrays.items() if not name.startswith("coordinates/")}
+            if SINCE.get(words["settings"]["type"], "value") not in values:
+                raise ValueError(f"{words['name']!r} is of an earlier version, which took other events for censoring")
             estimates.append(Estimate(**words, arrays=values, coordinates=coordinates))
         return cls(estimates)
 

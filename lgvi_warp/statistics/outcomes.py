@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.base import Gatherer, Statistic
 from lgvi_warp.statistics.counts import Curve, Histogram, by_replicates, check_levels
-from lgvi_warp.statistics.ends import Ends
+from lgvi_warp.statistics.ends import FAILED, Ends
 from lgvi_warp.statistics.estimate import Estimate, along
 from lgvi_warp.statistics.moments import Mean, estimate
 from lgvi_warp.statistics.order import Quantiles
@@ -22,8 +22,8 @@ from lgvi_warp.statistics.then import Then
 from lgvi_warp.statistics.tree import Part
 from lgvi_warp.statistics.values import Values
 
-# How a member ended: by the outcome asked for, otherwise, or not before the end of the run.
-SO, OTHERWISE, NOT = 1.0, 2.0, 0.0
+# How a member ended: not before the end of the run, by the outcome asked for, otherwise, or by a failure.
+NOT, SO, OTHERWISE, LOST = 0.0, 1.0, 2.0, 3.0
 
 # Largest number of times, beside the sample times, at which curves of replicates are compared.
 MOST_TIMES = 4096
@@ -71,7 +71,7 @@ class _Endings(Gatherer):
         self._part = {
             "members": np.full(len(time), time.shape[1], np.int64),
             "time": time[replicate, member],
-            "so": kind[replicate, member] == SO,
+            "kind": kind[replicate, member].astype(np.uint8),
             "replicate": replicate.astype(np.int32),
         }
 
@@ -82,21 +82,27 @@ class _Endings(Gatherer):
 
 @dataclass(frozen=True, eq=False)
 class Outcome(OfEnds):
-    """Probability that a member has ended by an outcome by each time, of those that nothing else stopped before.
+    """Probability that a member has ended by an outcome by each time.
 
-    The probability is Kaplan & Meier's estimate: a member that ends otherwise counts until then (it is censored). If no
-    member ends otherwise, it is the fraction of all members. Interval: Wilson's with the number of members whose
-    fraction has the variance of a beta product (see FirstPassage). Times are those of the events, not of samples.
+    The probability is Aalen & Johansen's estimate (1978), the cumulative incidence: a member that another event stopped
+    does not end so any more; one that fails counts until then (it is censored), unless the outcome is a failure. If none
+    fails, it is the fraction of all members. The probabilities of all events and of "ok", which comes at the end of the
+    run, have the sum 1. Interval: Wilson's with the number of members whose fraction has the variance of a Dirichlet
+    product: that of all members if none fails. Times are those of the events, not of samples.
 
     Arrays of the estimate, beside lower and upper:
 
     * value (k,): the probability; survival is 1 - value.
-    * fraction (k,): members that have ended by the outcome, as a fraction of all members, including those that ended
-      otherwise; fraction_lower, fraction_upper: Wilson's interval.
-    * ended, otherwise (k,): number of members that have ended by the outcome, and otherwise, by each time.
+    * alone (k,): Kaplan & Meier's estimate (1958), in which other events censor too: the probability if nothing else
+      stopped members, provided that those that it stopped would have gone on like the others: this no run can show, and
+      rarely holds (what surfaces does not sink); alone_lower, alone_upper.
+    * fraction (k,): members that have ended by the outcome, as a fraction of all members, including those that failed;
+      fraction_lower, fraction_upper: Wilson's interval.
+    * ended, otherwise, failed (k,): number of members that have ended by the outcome, otherwise, and of the latter by a
+      failure, by each time.
     * count (k,): number of members at risk at each time.
-    * end_time (levels,) [s]: time by which that fraction has ended, infinite if it never has; end_time_lower,
-      end_time_upper from the interval of value.
+    * end_time (levels,) [s]: time by which that fraction of the members has ended so, infinite if it never has;
+      end_time_lower, end_time_upper from the interval of value.
 
     Args:
         of: "floor", "surface", the name of any event of the scene, "stopped" (by any event), a failure, or "failed" (by
@@ -105,6 +111,7 @@ class Outcome(OfEnds):
     """
 
     type: ClassVar[str] = "outcome"
+    since: ClassVar[frozenset[str]] = frozenset({"kind"})
 
     levels: Any = (0.05, 0.5, 0.95)
 
@@ -118,70 +125,97 @@ class Outcome(OfEnds):
 
     def at_ends(self, ends: Ends, last: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
         """Return time [s] and kind of each end."""
-        over = ends.status != 0
-        kind = np.where(ends.are(self.quantity.name), SO, np.where(over, OTHERWISE, NOT))
+        kind = np.select([ends.are(self.quantity.name), ends.are(FAILED), ends.status != 0], [SO, LOST, OTHERWISE], NOT)
         return np.stack([ends.time, kind])[None], None
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
         # Join the ends of both sets of members, one after the other.
-        ends = {name: np.concatenate([left[name], right[name]]) for name in ("time", "so", "replicate")}
+        ends = {name: np.concatenate([left[name], right[name]]) for name in ("time", "kind", "replicate")}
         return {"members": left["members"] + right["members"]} | ends
 
     def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
         # The ends of the members of one replicate.
         chosen = part["replicate"] == replicate
-        ends = {name: part[name][chosen] for name in ("time", "so", "replicate")}
+        ends = {name: part[name][chosen] for name in ("time", "kind", "replicate")}
         return {"members": part["members"][replicate : replicate + 1]} | ends
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return the estimate of Kaplan & Meier (1958), from the times of all ends."""
-        at = np.union1d(time, part["time"][part["so"]])
-        curve = _curve(part, at)
-        return self._estimate(part, at, curve, intervals.wilson(curve.value, curve.members, self.confidence), time)
+        """Return the estimate of Aalen & Johansen (1978), from the times of all ends."""
+        at = np.union1d(time, _steps_of(part))
+        curves = _curves(part, at)
+        ends = [intervals.wilson(curve.value, curve.members, self.confidence) for curve in curves]
+        return self._estimate(part, at, curves, ends, time)
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
         # Probabilities with intervals from the spread of the replicates' curves.
         overall = self.whole(parts)
-        ends = np.unique(overall["time"][overall["so"]])
-        at = np.union1d(time, ends[:: 1 + len(ends) // MOST_TIMES])
-        curve = _curve(overall, at)
-        curves = np.stack([_curve(self.of_replicate(overall, r, replicates), at).value for r in range(replicates)])
-        ends_of = intervals.probability_of_replicates(curve.value, curves, curve.members, self.confidence)
-        result = self._estimate(overall, at, curve, ends_of, time)
+        steps = np.unique(_steps_of(overall))
+        at = np.union1d(time, steps[:: 1 + len(steps) // MOST_TIMES])
+        curves = _curves(overall, at)
+        each = [_curves(self.of_replicate(overall, r, replicates), at) for r in range(replicates)]
+        ends = [
+            intervals.probability_of_replicates(
+                curve.value, np.stack([one[i].value for one in each]), curve.members, self.confidence
+            )
+            for i, curve in enumerate(curves)
+        ]
+        result = self._estimate(overall, at, curves, ends, time)
         return [result.with_interval(by_replicates(replicates), {})]
 
     def _estimate(
-        self, part: Part, at: np.ndarray, curve: Curve, ends: tuple[np.ndarray, np.ndarray], time: np.ndarray
+        self, part: Part, at: np.ndarray, curves: Sequence[Curve], ends: Sequence[Pair], time: np.ndarray
     ) -> Estimate:
-        """The estimate from the curve at the times `at` (m,) [s], which contain the sample times."""
-        lower, upper = (end[:, 0] for end in curve.ends(*ends))
-        rows = np.searchsorted(at, time)
-        members = int(part["members"].sum())
-        kinds = part["so"], ~part["so"]
-        ended, otherwise = (np.searchsorted(np.sort(part["time"][kind]), time, "right") for kind in kinds)
-        fraction = ended / max(members, 1)
-        # If no member ended otherwise before, the product equals this fraction except for round-off.
-        value = np.where(otherwise == 0, fraction, curve.value[rows, 0]) if members else curve.value[rows, 0]
-        low, high = intervals.wilson(fraction, np.full(len(time), members), self.confidence)
-        arrays = {"value": value, "lower": np.fmin(lower[rows], value), "upper": np.fmax(upper[rows], value)}
-        arrays |= {"survival": 1.0 - value, "fraction": fraction, "fraction_lower": low, "fraction_upper": high}
-        arrays |= {"ended": ended, "otherwise": otherwise, "count": members - ended - otherwise}
-        dims = along(arrays, "time")
+        """The estimate from the curves at the times `at` (m,) [s], which contain the sample times."""
+        rows, members = np.searchsorted(at, time), int(part["members"].sum())
+        arrays: Part = {}
+        for name, curve, interval in zip(("value", "alone"), curves, ends, strict=True):
+            names = (name, *(f"{name}_{end}".removeprefix("value_") for end in ("lower", "upper")))
+            numbers = (curve.value, *curve.ends(*interval))
+            arrays |= {key: values[:, 0] for key, values in zip(names, numbers, strict=True)}
         levels = np.asarray(self.levels, dtype=np.float64)
-        curves = {"end_time": curve.value[:, 0], "end_time_lower": upper, "end_time_upper": lower}
-        arrays |= (times := {name: _reached(values, levels, at) for name, values in curves.items()})
-        text = "Wilson with the variance of the beta product"
-        return estimate(self, text, dims | along(times, "level"), arrays, time, {"level": levels}, "1", labels=())
+        reached = {"end_time": arrays["value"], "end_time_lower": arrays["upper"], "end_time_upper": arrays["lower"]}
+        times = {name: _reached(values, levels, at) for name, values in reached.items()}
+        arrays = {name: values[rows] for name, values in arrays.items()}
+        ended, others, failed = (
+            np.searchsorted(np.sort(part["time"][part["kind"] == kind]), time, "right")
+            for kind in (SO, OTHERWISE, LOST)
+        )
+        fraction = ended / max(members, 1)
+        low, high = intervals.wilson(fraction, np.full(len(time), members), self.confidence)
+        arrays |= {"survival": 1.0 - arrays["value"]}
+        arrays |= {"fraction": fraction, "fraction_lower": low, "fraction_upper": high}
+        arrays |= {"ended": ended, "otherwise": others + failed, "failed": failed}
+        arrays |= {"count": members - ended - others - failed}
+        dims = along(arrays, "time")
+        text = "Wilson with the variance of the Dirichlet product"
+        dims |= along(times, "level")
+        return estimate(self, text, dims, arrays | times, time, {"level": levels}, "1", labels=())
 
 
-def _curve(part: Part, at: np.ndarray) -> Curve:
-    """Kaplan & Meier's curve at rising times `at` [s]; an end between two of them counts at the second one."""
-    so = np.searchsorted(at, part["time"][part["so"]])
-    passed = np.bincount(so, minlength=len(at))[: len(at), None]
-    # A member that ends otherwise at one of the times is at risk at that time, and at no later one.
-    late = np.searchsorted(at, part["time"][~part["so"]], "right")
-    lost = np.bincount(late, minlength=len(at))[: len(at)]
-    return Curve(passed, lost, int(part["members"].sum()))
+Pair = tuple[np.ndarray, np.ndarray]
+
+
+def _steps_of(part: Part) -> np.ndarray:
+    """Times [s] at which the curves step. Between them the order of other ends matters only if members fail."""
+    lost = bool((part["kind"] == LOST).any())
+    return np.asarray(part["time"][part["kind"] != LOST if lost else part["kind"] == SO])
+
+
+def _curves(part: Part, at: np.ndarray) -> tuple[Curve, Curve]:
+    """Aalen & Johansen's curve at rising times `at` [s], and Kaplan & Meier's, in which other events censor too.
+
+    An end between two of the times counts at the second one.
+    """
+    so, others = (_counted(at, part["time"][part["kind"] == kind], "left")[:, None] for kind in (SO, OTHERWISE))
+    # A member that is censored at one of the times is at risk at that time, and at no later one.
+    lost, not_so = (_counted(at, part["time"][which], "right") for which in (part["kind"] == LOST, part["kind"] != SO))
+    members = int(part["members"].sum())
+    return Curve(so, others, lost, members), Curve(so, np.zeros_like(so), not_so, members)
+
+
+def _counted(at: np.ndarray, times: np.ndarray, side: Literal["left", "right"]) -> np.ndarray:
+    """How many of the times [s] fall to each of `at`; those after the last one fall to none."""
+    return np.bincount(np.searchsorted(at, times, side), minlength=len(at))[: len(at)]
 
 
 def _reached(curve: np.ndarray, levels: np.ndarray, at: np.ndarray) -> np.ndarray:

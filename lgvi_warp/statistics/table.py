@@ -86,7 +86,7 @@ def _passage(one: Estimate) -> Iterator[Line]:
 
 def _outcome(one: Estimate) -> Iterator[Line]:
     yield one.name, one.value[-1], one.lower[-1], one.upper[-1]
-    if one["otherwise"][-1]:
+    if one["failed"][-1]:
         lower, upper = (float(one[f"fraction_{end}"][-1]) for end in ("lower", "upper"))
         yield f"{one.name}: of all members", float(one["fraction"][-1]), lower, upper
     yield from _times(one, "end_time")

@@ -23,7 +23,7 @@ DOORS = {
         "SALib.sample",
         "uq",
     ),
-    "sensitivity": (lambda: analyses.salib("sobol"), "SALib.analyze.sobol", "uq"),
+    "sensitivity": (lambda: analyses.salib(), "SALib.analyze.morris", "uq"),
     "datasets of statistics": (lambda: ESTIMATE.dataset, "xarray", "store"),
     "stores: checksums": (needed, "google_crc32c", "store"),
     "stores: xarray": (needed, "xarray", "store"),

@@ -102,9 +102,76 @@ def test_several_events_by_their_names():
         and s["outcome surface"]["ended"][-1] == counts["surface"]
     )
     assert s["outcome stopped"].value[-1] == (counts["floor"] + counts["surface"]) / 1000
-    # Those that rise are no more at risk of sinking: of the others more would have sunk than of all did.
-    assert s["outcome sea floor"].value[-1] > s["outcome sea floor"]["fraction"][-1] == counts["floor"] / 1000
+    # Those that rise do not sink; had nothing stopped them, they would have sunk as often as the others.
+    assert s["outcome sea floor"]["alone"][-1] > s["outcome sea floor"].value[-1] == counts["floor"] / 1000
     assert s["mean depth at surface"].value[0, 0] == pytest.approx(17.0, abs=1e-12)
+
+
+def test_an_own_monte_carlo_with_three_competing_events():
+    """An upright vehicle moves up or down at constant acceleration to the surface or the floor, unless its time is over first.
+
+    The truth draws its own numbers, 400,000 times, and solves the quadratic.
+    """
+    depth, surface, floor, t1, n, many = 20.0, 17.0, 26.0, 40.0, 2000, 400_000
+    scene = lw.Scene.named("nordkvist_sanyal", start={"position": [0, 0, depth]}, vehicle={"buoyancy": 1212.5},
+                           events=stops(floor=floor, surface=surface, at=20.0))  # fmt: skip
+    vary = {"vehicle.buoyancy": lw.Normal(std=3.0), "start.velocity[2]": lw.Normal(std=0.1),
+            "time.at": lw.Uniform(low=2.0, high=80.0)}  # fmt: skip
+    asked = [lw.Outcome(name) for name in ("floor", "surface", "time", "ok")] + [lw.FirstPassage("depth", above=floor)]
+    result = lw.solve(lw.Ensemble(scene, n, 1, vary), **SETTINGS | {"statistics": asked})
+
+    rng = np.random.default_rng(5)
+    a = (123.8 * 9.8 - rng.normal(1212.5, 3.0, many)) / (123.8 + 75.0)
+    w, time = rng.normal(0.0, 0.1, many), rng.uniform(2.0, 80.0, many)
+
+    def first(level):
+        roots = np.stack([(-w + sign * np.sqrt(w * w + 2.0 * a * (level - depth) + 0j)) / a for sign in (-1.0, 1.0)])
+        return np.where((roots.imag == 0.0) & (roots.real > 0.0), roots.real, np.inf).min(axis=0)
+
+    ends = np.stack([first(floor), first(surface), time, np.full(many, t1)])
+    kind, end = ends.argmin(axis=0), ends.min(axis=0)
+    s, sum_of = result.statistics, 0.0
+    for i, name in enumerate(("floor", "surface", "time", "ok")):
+        found = s[f"outcome {name}"]
+        true = np.array([((kind == i) & (end <= t)).mean() for t in found.time])
+        # Five standard deviations of both numbers; of 1 / n, none of which either may see.
+        error = 5.0 * np.sqrt((true * (1.0 - true) + 1.0 / n) * (1.0 / n + 1.0 / many))
+        assert (np.abs(found.value - true) < error).all(), name
+        assert 0.05 < true[-1] < 0.6 and found.value[-1] == (found["ended"][-1] / n)
+        sum_of += found.value[-1]
+    assert sum_of == pytest.approx(1.0, abs=1e-15)
+    assert s["first_passage depth above 26"].value[-1] == s["outcome floor"].value[-1] < s["outcome floor"]["alone"][-1]
+    # The half of the members never reaches the floor, and no time is said for it.
+    assert np.isfinite(s["outcome floor"]["end_time"][0]) and s["outcome floor"]["end_time"][2] == np.inf
+
+
+FAST = {"start.angular_velocity": lw.Normal(std=(40.0, 5.0, 0.02))}
+TEN = {
+    "none": {}, "floor": {"floor": 26.0}, "floor and surface": {"floor": 26.0, "surface": 17.0},
+    "near": {"floor": 20.5, "surface": 19.5}, "box": {"floor": 26.0, "lower": (-1.0,) * 2 + (0.0,), "upper": (1.0, 1.0, 40.0)},
+    "time": {"floor": 26.0, "surface": 17.0, "at": 20.0}, "far": {"radius": 1.0, "surface": 17.0},
+    "all": {"floor": 24.0, "surface": 17.0, "lower": (-1e6, -1e6, 0.0), "upper": (2.0, 1e6, 30.0), "radius": 1.5, "at": 30.0},
+    "some fail": {"floor": 26.0, "surface": 17.0} | FAST, "some fail, and soon over": {"at": 20.0, "surface": 17.0} | FAST,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", TEN)
+def test_the_sum_over_outcomes_and_ok_is_1_over_ten_scenes(name, monkeypatch):
+    monkeypatch.setitem(events.TYPES, FarAway.type, FarAway)
+    limits = {key: value for key, value in TEN[name].items() if key not in FAST}
+    one = fleet(256, stops(**limits))
+    one = lw.Ensemble(one.scene, 256, 1, dict(one.vary) | {key: TEN[name][key] for key in FAST if key in TEN[name]})
+    kinds = ("surface", "floor", "box", "time", "far", "ok")
+    asked = [lw.Outcome(kind) for kind in (*kinds, "stopped", "failed")]
+    result = lw.solve(one, **SETTINGS | {"statistics": asked})
+    s, counts = result.statistics, result.status.counts()
+    for kind in ("surface", "floor", "box", "time", "ok"):
+        assert s[f"outcome {kind}"]["ended"][-1] == counts.get(kind, 0)
+    assert sum(s[f"outcome {kind}"].value[-1] for kind in kinds) == pytest.approx(1.0, abs=1e-13)
+    of_events = sum(s[f"outcome {kind}"].value for kind in kinds[:-1])
+    np.testing.assert_allclose(of_events, s["outcome stopped"].value, atol=1e-13)
+    failed = np.asarray(result.status.failed).sum()
+    assert s["outcome failed"].value[-1] == failed / 256 and (failed > 20) == ("fail" in name)
 
 
 def test_replicates_of_a_design():

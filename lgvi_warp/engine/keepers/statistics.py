@@ -68,7 +68,13 @@ class Gathered:
         Args:
             block: the block.
             part: for each statistic, arrays by name.
+
+        Raises:
+            ValueError: a stored part is of an earlier version.
         """
+        for statistic, statistic_part in zip(self.statistics, part, strict=True):
+            if statistic.since - statistic_part.keys():
+                raise ValueError(f"{statistic.key!r} is of an earlier version, which took other events for censoring")
         # Squares of a failing member may overflow: the statistic reports it, so no warning from NumPy.
         with np.errstate(invalid="ignore", over="ignore"):
             for tree, statistic_part in zip(self.trees, part, strict=True):

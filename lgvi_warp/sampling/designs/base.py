@@ -156,6 +156,18 @@ def inside(cube: np.ndarray) -> np.ndarray:
     return np.asarray(cube)
 
 
+def check_replicates(faults: Faults, replicates: Any) -> None:
+    """Add a fault where a number of replicates is no power of two from 1 to 64.
+
+    Args:
+        faults: Collects the faults.
+        replicates: The number.
+    """
+    if not is_whole(replicates, 1, MOST_REPLICATES) or replicates & (replicates - 1):
+        remark = f"is no power of two from 1 to {MOST_REPLICATES}"
+        faults.add("replicates", replicates, remark, "give 8, 16, 32 or 64")
+
+
 @dataclass(frozen=True)
 class Replicated(Sampling):
     """A design that can be drawn R times independently: member i is point i // R of replicate i mod R.
@@ -175,8 +187,7 @@ class Replicated(Sampling):
     def __post_init__(self) -> None:
         R = self.replicates
         faults = Faults(f"ensemble.sampling.{self.kind}.")
-        if not is_whole(R, 1, MOST_REPLICATES) or R & (R - 1):
-            faults.add("replicates", R, f"is no power of two from 1 to {MOST_REPLICATES}", "give 8, 16, 32 or 64")
+        check_replicates(faults, R)
         self.check_own(faults)
         faults.raise_if_any()
         object.__setattr__(self, "replicates", int(R))

@@ -4,17 +4,21 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.common.errors import Faults, closest, refusal
 from lgvi_warp.common.random import generator
 from lgvi_warp.common.real_numbers import is_whole
-from lgvi_warp.sampling.designs.base import Drawn, Sampling
+from lgvi_warp.sampling.designs.base import Drawn, Sampling, check_replicates
 from lgvi_warp.sampling.designs.sequences import sobol_points
 from lgvi_warp.sampling.designs.space import Space
+
+
+Factors = tuple[tuple[str, tuple[int, ...]], ...]
 
 
 @dataclass(frozen=True)
@@ -27,36 +31,93 @@ class Saltelli(Sampling):
 
     Args:
         second_order: Whether second-order indices follow, True by default; without them groups have d + 2 members.
+        replicates: R, the number of sequences, scrambled independently, a group of each in turn; 1 by default.
+        groups: Name -> names of factors that are taken for one, "current.velocity" for all its entries; by default none.
 
     Raises:
-        SceneError: Where second_order is neither True nor False.
+        SceneError: Where a setting is wrong. The message lists every fault.
     """
 
     second_order: bool = True
+    replicates: int = 1
+    groups: Any = ()
     kind: ClassVar[str] = "saltelli"
 
     def __post_init__(self) -> None:
         faults = Faults("ensemble.sampling.saltelli.")
         faults.choice("second_order", self.second_order, (True, False))
+        check_replicates(faults, self.replicates)
+        given, example = self.groups, 'give {"start": ["start.position", "start.velocity"]}'
+        pairs = list(given.items() if isinstance(given, Mapping) else given if isinstance(given, list | tuple) else [given])
+        if not all(isinstance(pair, list | tuple) and len(pair) == 2 and isinstance(pair[0], str) for pair in pairs):
+            faults.add("groups", given, "is no mapping of names to lists of factors", example)
+            pairs = []
+        for name, members in pairs:
+            if not isinstance(members, list | tuple) or not members or not all(isinstance(m, str) for m in members):
+                faults.add(f"groups.{name}", members, "is no list of names of factors", example)
         faults.raise_if_any()
+        object.__setattr__(self, "replicates", int(self.replicates))
+        object.__setattr__(self, "groups", tuple((name, tuple(members)) for name, members in pairs))
+
+    def to_dict(self) -> Any:
+        """The sampling as a scene file has it."""
+        content = super().to_dict()
+        if self.groups:
+            content[self.kind]["groups"] = {name: list(members) for name, members in self.groups}
+        return content
+
+    def factors(self, space: Space) -> Factors:
+        """Label and columns of each factor, a group in the place of its first member.
+
+        Args:
+            space: The cube: which names vary, with how many columns each.
+        """
+        group_of = {label: name for name, members in self.groups for member in members for label in _labels(space, member)}
+        joined: dict[str, tuple[int, ...]] = {}
+        for label, columns in space.factors:
+            name = group_of.get(label, label)
+            joined[name] = (*joined.get(name, ()), *columns)
+        return tuple(joined.items())
 
     def group_size(self, space: Space) -> int:
         """Members in a group: 2 d + 2, or d + 2 without second-order indices."""
-        return (2 if self.second_order else 1) * len(space.factors) + 2
+        return (2 if self.second_order else 1) * len(self.factors(space)) + 2
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
-        # Also a fault where nothing varies.
+        # Also a fault where nothing varies, where groups have what does not vary, or share it.
         if not space.factors:
             faults.add("sampling", self.kind, "has nothing that varies", "give [ensemble.vary]")
             return
+        known, taken = [label for label, _ in space.factors], dict[str, str]()
+        for name, group in self.groups:
+            for member in group:
+                if not (labels := _labels(space, member)):
+                    faults.add(f"groups.{name}", member, "does not vary by itself", closest(member, known))
+                for label in labels:
+                    if taken.setdefault(label, name) != name:
+                        faults.add(f"groups.{name}", label, f"is in {taken[label]!r} as well", "keep it in one of them")
+            if name in known and name not in group:
+                faults.add("groups", name, "is the name of a factor that is not in it", "give the group another name")
         super().check(faults, space, members)
+
+    def replicate_of(self, groups: np.ndarray) -> np.ndarray:
+        """Which sequence each group is of.
+
+        Args:
+            groups: Indices of groups, (n,).
+        """
+        return groups % self.replicates
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
         """Levels of point A where the member has the factor of A, else of point B."""
-        point, row = np.divmod(members, self.group_size(space))
-        chosen, place = np.unique(point, return_inverse=True)
-        D = space.dimensions
-        AB = sobol_points(space.seed, "saltelli", 2 * D, chosen)[place.reshape(-1)]
+        group, row = np.divmod(members, self.group_size(space))
+        chosen, place = np.unique(group, return_inverse=True)
+        replicate, D = self.replicate_of(chosen), space.dimensions
+        AB = np.empty((len(chosen), 2 * D))
+        for r in np.unique(replicate):
+            mine, name = replicate == r, "saltelli" if r == 0 else f"saltelli {r}"
+            AB[mine] = sobol_points(space.seed, name, 2 * D, chosen[mine] // self.replicates)
+        AB = AB[place.reshape(-1)]
         return space.split(np.where(self.rows(space)[row], AB[:, D:], AB[:, :D]))
 
     def rows(self, space: Space) -> np.ndarray:
@@ -68,11 +129,17 @@ class Saltelli(Sampling):
         Returns:
             Mask (group size, dimensions).
         """
-        from_B = np.zeros((len(space.factors), space.dimensions), dtype=bool)
-        for number, (_, columns) in enumerate(space.factors):
+        factors = self.factors(space)
+        from_B = np.zeros((len(factors), space.dimensions), dtype=bool)
+        for number, (_, columns) in enumerate(factors):
             from_B[number, list(columns)] = True
         nothing = np.zeros((1, space.dimensions), dtype=bool)
         return np.concatenate([nothing, from_B, *([~from_B] if self.second_order else []), ~nothing])
+
+
+def _labels(space: Space, name: str) -> list[str]:
+    """The factors that a name means: the one of this label, or the entries of this number."""
+    return [label for label, _ in space.factors if label == name or label.startswith(f"{name}[")]
 
 
 @dataclass(frozen=True)

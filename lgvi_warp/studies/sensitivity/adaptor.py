@@ -18,6 +18,7 @@ from lgvi_warp.scene import variations
 from lgvi_warp.scene.columns import as_given, columns_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
+from lgvi_warp.studies.sensitivity.outputs import known_arguments
 
 
 class ScalarModel:
@@ -209,6 +210,7 @@ def salib_distribution(distribution: Any, base: Any, numbers: Mapping[str, Any])
     return None
 
 
+@known_arguments()
 def model(
     scene: Scene,
     vary: Mapping[Any, Any] | Sequence[str],
@@ -236,5 +238,6 @@ def model(
 
     Raises:
         SceneError: for faulty arguments, all in one message.
+        TypeError: for an argument that does not exist.
     """
     return ScalarModel(scene, vary, of, levels, failed, settings)

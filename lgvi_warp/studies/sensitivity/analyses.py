@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sobol indices and Morris' screening of an ensemble, by SALib's designs and estimates."""
+"""Sobol indices and Morris' screening of an ensemble; the latter by SALib's design and estimates."""
 
 from __future__ import annotations
 
@@ -12,18 +12,21 @@ from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import Status
 from lgvi_warp.runs.quantities import OfInterest
 from lgvi_warp.sampling.designs.base import Sampling
-from lgvi_warp.sampling.designs.designs import Morris, Saltelli, salib_problem
+from lgvi_warp.sampling.designs.designs import Factors, Morris, Saltelli, salib_problem
+from lgvi_warp.scene.columns import as_given, columns_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.settings import EnsembleSettings
+from lgvi_warp.studies.sensitivity.estimates import sobol_estimates
 from lgvi_warp.studies.sensitivity.indices import MorrisEffects, SobolIndices
-from lgvi_warp.studies.sensitivity.outputs import FailedMembers, Outputs, evaluate
+from lgvi_warp.studies.sensitivity.outputs import FailedMembers, Outputs, evaluate, known_arguments
 
 FAILED = ("refuse", "drop")
 # A quantity whose range is below this part of its size varies by round-off alone.
 CONSTANT = 1e-14
 
 
+@known_arguments(resamples="intervals are no longer of a bootstrap: give replicates=8")
 def sobol(
     scene: Scene | Ensemble,
     of: OfInterest | Sequence[OfInterest],
@@ -32,54 +35,63 @@ def sobol(
     vary: Mapping[Any, Any] | None = None,
     seed: int | None = None,
     second_order: bool = True,
+    replicates: int = 8,
+    groups: Mapping[str, Sequence[str]] | None = None,
     confidence: float = 0.95,
-    resamples: int = 100,
     failed: str = "refuse",
     **settings: Any,
 ) -> SobolIndices:
-    """Estimate Sobol indices of quantities of interest, by Saltelli's design and SALib's estimates.
+    """Estimate Sobol indices of quantities of interest, by Saltelli's design and estimates.
 
-    The factors vary independently; a joint distribution counts as one factor. Source: Saltelli et al. (2010), Computer
-    Physics Communications 181.
+    The factors vary independently; a joint distribution counts as one factor. The design is of independently scrambled Sobol
+    sequences, whose spread gives the intervals. Source: Saltelli et al. (2010), Computer Physics Communications 181.
 
     Args:
         scene: a Scene, with what varies in its ensemble or in `vary`; or an Ensemble, for its scene, vary and seed.
-        of: "position[2]" or "depth" (at the end), "max(energy)" (over the path), a lw.Quantity, a function of a Result to
-            (n,) or (n, m), or several of these.
-        samples: N, best a power of two; N (2 d + 2) members are run for d factors, N (d + 2) without second_order. Default
-            1024.
+        of: "position[2]" or "depth" (at the end), "max(energy)" (over the path), "outcome floor", a lw.Quantity, a function of
+            a Result to (n,) or (n, m), or several of these.
+        samples: N, a multiple of `replicates`, best a power of two; N (2 d + 2) members are run for d factors, N (d + 2)
+            without second_order. Default 1024.
         vary: name -> distribution. Default: that of the scene or the ensemble.
         seed: of the design. Default: that of the scene or the ensemble.
         second_order: whether to estimate indices of pairs as well. Default True.
-        confidence: level of the bootstrap's intervals, between 0 and 1. Default 0.95.
-        resamples: number of the bootstrap's resamples. Default 100.
+        replicates: R, the number of sequences, a power of two to 64; with 1 there are no intervals. More make intervals more
+            reliable and estimates a little less exact. Default 8.
+        groups: name -> names of what is one factor together: {"start": ["start.position", "start.velocity"]}. Default none.
+        confidence: level of the intervals, between 0 and 1: Student's t of the replicates. Default 0.95.
         failed: "refuse" for an error where members fail, "drop" to use the groups without a failed member. Default "refuse".
         settings: arguments of `lw.solve` (method, h, t1, save, dtype, threads, progress) and of `evaluate`.
 
     Returns:
-        First-order and total indices of every factor, and second-order indices of pairs.
+        First-order and total indices of every factor, in the order of `vary`, and second-order indices of pairs.
 
     Raises:
         SceneError: for faulty arguments, all in one message.
+        TypeError: for an argument that does not exist.
         FailedMembers: where members failed and the indices cannot be computed from the others.
     """
-    check_settings(samples, confidence, resamples, failed)
-    design = Saltelli(second_order)
+    faults = Faults()
+    with faults.including():
+        check_settings(samples, confidence, failed)
+    with faults.including():
+        design = Saltelli(second_order, replicates, groups or ())
+    if not faults and samples % replicates:
+        near = samples // replicates * replicates
+        ways = " or ".join(str(number) for number in (near, near + replicates) if number)
+        faults.add("samples", samples, f"is no multiple of replicates = {replicates}", f"give {ways}")
+    faults.raise_if_any()
     fleet = designed(scene, vary, seed, design, samples)
     outputs = evaluate(fleet, of, **settings)
-    return sobol_of(fleet, outputs, confidence=confidence, resamples=resamples, failed=failed)
+    return sobol_of(fleet, outputs, confidence=confidence, failed=failed)
 
 
-def sobol_of(
-    fleet: Ensemble, outputs: Outputs, *, confidence: float = 0.95, resamples: int = 100, failed: str = "refuse"
-) -> SobolIndices:
+def sobol_of(fleet: Ensemble, outputs: Outputs, *, confidence: float = 0.95, failed: str = "refuse") -> SobolIndices:
     """Estimate Sobol indices from outputs that are already there.
 
     Args:
         fleet: the ensemble that was run, with Saltelli's design.
         outputs: its quantities of interest.
-        confidence: level of the bootstrap's intervals, between 0 and 1. Default 0.95.
-        resamples: number of the bootstrap's resamples. Default 100.
+        confidence: level of the intervals, between 0 and 1. Default 0.95.
         failed: "refuse" or "drop", as of `sobol`. Default "refuse".
 
     Returns:
@@ -87,35 +99,41 @@ def sobol_of(
 
     Raises:
         FailedMembers: where members failed and the indices cannot be computed from the others.
-        ImportError: without SALib.
     """
-    analyze = salib("sobol")
     design = fleet.sampling
     assert isinstance(design, Saltelli)
-    factors = tuple(label for label, _ in fleet.space.factors)
-    Y, messages = whole_groups(outputs, design.group_size(fleet.space), failed)
+    factors, group = design.factors(fleet.space), design.group_size(fleet.space)
+    order = _order(fleet, factors)
+    Y, messages = whole_groups(outputs, group, failed)
+    whole = np.flatnonzero(_good_rows(outputs, group, failed)[::group])
     m, d = Y.shape[1], len(factors)
-    estimates = {name: np.full((m, d), np.nan) for name in ("S1", "S1_conf", "ST", "ST_conf")}
-    estimates |= {name: np.full((m, d, d), np.nan) for name in ("S2", "S2_conf")}
-    problem = {"num_vars": d, "names": list(factors), "bounds": [[0.0, 1.0]] * d}
+    first, first_half, total, total_half = (np.full((m, d), np.nan) for _ in range(4))
+    second, second_half = (np.full((m, d, d), np.nan) for _ in range(2))
     for q in varying(Y, outputs.labels, messages):
-        S = analyze(problem, Y[:, q].copy(), calc_second_order=design.second_order, num_resamples=resamples,
-                    conf_level=confidence, seed=fleet.seed + 1)  # fmt: skip
-        for name in estimates.keys() & S.keys():
-            estimates[name][q] = S[name]
-    for name in ("S2", "S2_conf"):  # SALib gives what is above the diagonal
-        estimates[name] = np.where(np.isnan(estimates[name]), np.swapaxes(estimates[name], 1, 2), estimates[name])
+        found = sobol_estimates(Y[:, q].reshape(-1, group), design.replicate_of(whole), design.second_order, confidence)
+        (first[q], first_half[q]), (total[q], total_half[q]) = ([part[order] for part in one] for one in found[:2])
+        if found.second is not None:
+            second[q], second_half[q] = (part[np.ix_(order, order)] for part in found.second)
+    if len(np.unique(design.replicate_of(whole))) < 2:
+        messages.append("there are no intervals: they are of the spread of replicates, and there is one")
     return SobolIndices(
-        **_common(factors, outputs, Y, design.group_size(fleet.space), confidence, messages),
-        first=estimates["S1"],
-        first_confidence=estimates["S1_conf"],
-        total=estimates["ST"],
-        total_confidence=estimates["ST_conf"],
-        second=estimates["S2"] if design.second_order else None,
-        second_confidence=estimates["S2_conf"] if design.second_order else None,
+        **_common(tuple(factors[i][0] for i in order), outputs, Y, group, confidence, messages),
+        first=first,
+        first_confidence=first_half,
+        total=total,
+        total_confidence=total_half,
+        second=second if design.second_order else None,
+        second_confidence=second_half if design.second_order else None,
     )
 
 
+def _order(fleet: Ensemble, factors: Factors) -> list[int]:
+    """Places of the factors in the order of `vary`."""
+    columns = [column for variation in as_given(fleet) for column in columns_of(fleet.space, variation.key)]
+    return sorted(range(len(factors)), key=lambda i: min(map(columns.index, factors[i][1])))
+
+
+@known_arguments()
 def morris(
     scene: Scene | Ensemble,
     of: OfInterest | Sequence[OfInterest],
@@ -150,7 +168,7 @@ def morris(
         SceneError: for faulty arguments, all in one message.
         FailedMembers: where members failed and the effects cannot be computed from the others.
     """
-    check_settings(samples, confidence, resamples, failed)
+    check_settings(samples, confidence, failed, resamples)
     fleet = designed(scene, vary, seed, Morris(levels), samples)
     outputs = evaluate(fleet, of, **settings)
     return morris_of(fleet, outputs, confidence=confidence, resamples=resamples, failed=failed)
@@ -175,7 +193,7 @@ def morris_of(
         FailedMembers: where members failed and the effects cannot be computed from the others.
         ImportError: without SALib.
     """
-    analyze = salib("morris")
+    analyze = salib()
     design, space = fleet.sampling, fleet.space
     assert isinstance(design, Morris)
     group = design.group_size(space)
@@ -184,20 +202,20 @@ def morris_of(
     X = design.design(space, np.arange(fleet.members))[kept]
     # A step moves the level by p / 2 of the cube's p parts, where SALib divides by another length.
     scale = design.levels / (design.levels - 1.0)
-    factors = tuple(label for label, _ in space.factors)
+    factors = [space.factors[i] for i in _order(fleet, space.factors)]
     names = ("mu", "mu_star", "sigma", "mu_star_conf")
     estimates = {name: np.full((Y.shape[1], len(factors)), np.nan) for name in names}
     for q in varying(Y, outputs.labels, messages):
         S = analyze(salib_problem(space), X, Y[:, q].copy(), num_resamples=resamples, conf_level=confidence,
                     num_levels=design.levels, seed=fleet.seed)  # fmt: skip
-        order = [list(S["names"]).index(label) for label, _ in space.factors]
+        order = [list(S["names"]).index(label) for label, _ in factors]
         for name, values in estimates.items():
             values[q] = np.ma.filled(np.ma.masked_invalid(np.ma.array(S[name], dtype=float)), np.nan)[order] * scale
-    for number, (_, columns) in enumerate(space.factors):
+    for number, (_, columns) in enumerate(factors):
         if len(columns) > 1:  # a step moves several numbers, and has no sense of its own
             estimates["mu"][:, number] = estimates["sigma"][:, number] = np.nan
     return MorrisEffects(
-        **_common(factors, outputs, Y, group, confidence, messages),
+        **_common(tuple(label for label, _ in factors), outputs, Y, group, confidence, messages),
         mu_star=estimates["mu_star"],
         mu_star_confidence=estimates["mu_star_conf"],
         mu=estimates["mu"],
@@ -223,14 +241,14 @@ def _common(
     }
 
 
-def check_settings(samples: Any, confidence: Any, resamples: Any, failed: Any) -> None:
+def check_settings(samples: Any, confidence: Any, failed: Any, resamples: Any = 2) -> None:
     """Refuse settings of an analysis that are at fault.
 
     Args:
         samples: number of groups or paths, at least 2.
         confidence: level of the intervals, between 0 and 1.
-        resamples: number of the bootstrap's resamples, at least 2.
         failed: "refuse" or "drop".
+        resamples: number of the bootstrap's resamples, at least 2; default: none are drawn.
 
     Raises:
         SceneError: with every fault.
@@ -274,24 +292,17 @@ def designed(scene: Any, vary: Any, seed: int | None, design: Sampling, samples:
     return Ensemble(scene, samples * design.group_size(first.space), chosen[1], chosen[0], design)
 
 
-def salib(name: str) -> Callable[..., Any]:
-    """The function of SALib that analyses a design.
-
-    Args:
-        name: module of `SALib.analyze`: "sobol" or "morris".
-
-    Returns:
-        Its `analyze`.
+def salib() -> Callable[..., Any]:
+    """SALib's analysis of Morris' design.
 
     Raises:
         ImportError: SALib is not installed; the message names the extra.
     """
     try:
-        from importlib import import_module
-
-        return getattr(import_module(f"SALib.analyze.{name}"), "analyze")  # noqa: B009
+        from SALib.analyze.morris import analyze
     except ImportError as error:
         raise ImportError("sensitivity needs SALib: pip install 'lgvi-warp[uq]'") from error
+    return analyze  # type: ignore[no-any-return]
 
 
 def _good_rows(outputs: Outputs, group: int, failed: str) -> np.ndarray:

@@ -3,12 +3,15 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
+from lgvi_warp.common.errors import closest
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import failed
 from lgvi_warp.methods.saveat import SaveAt
@@ -16,6 +19,37 @@ from lgvi_warp.runs.prepared import PATHS_AT_ONCE, Runner, counted, lost_text, p
 from lgvi_warp.runs.prepared import FailedMembers as FailedMembers
 from lgvi_warp.runs.quantities import OfInterest, quantities
 from lgvi_warp.scene.ensemble import Ensemble
+
+
+# Arguments that every entry of lw.uq hands on to its runs.
+SETTINGS = ("method", "h", "t1", "save", "dtype", "width", "checks", "on_failure", "common_noise", "threads", "executor",
+            "scheduler", "progress")  # fmt: skip
+P, R = ParamSpec("P"), TypeVar("R")
+
+
+def known_arguments(**gone: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """Refuse arguments that neither the function nor its runs have, by the function's own name.
+
+    Args:
+        gone: name of an argument that it had once -> what to give now.
+
+    Returns:
+        A decorator.
+    """
+
+    def decorated(function: Callable[P, R]) -> Callable[P, R]:
+        named = [p.name for p in inspect.signature(function).parameters.values() if p.kind is not p.VAR_KEYWORD]
+        known = list(dict.fromkeys((*named, *SETTINGS)))
+
+        @functools.wraps(function)
+        def checked(*arguments: P.args, **settings: P.kwargs) -> R:
+            for name in settings.keys() - known:
+                raise TypeError(f"lw.uq.{function.__name__}() has no argument {name!r}; {gone.get(name) or closest(name, known)}")
+            return function(*arguments, **settings)
+
+        return checked
+
+    return decorated
 
 
 @dataclass(frozen=True)
@@ -48,6 +82,7 @@ class Outputs:
         return lost_text(self.failed, self.counts, remedy)
 
 
+@known_arguments()
 @shows_progress
 def evaluate(
     fleet: Ensemble,

@@ -14,6 +14,7 @@ from lgvi_warp.common.errors import closest, refusal
 from lgvi_warp.common.status import failed, stopped
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.runs.result import Result
+from lgvi_warp.scene.columns import as_given
 from lgvi_warp.statistics import paired
 from lgvi_warp.statistics.given_data import explained
 from lgvi_warp.studies.sweeps import setup as setups
@@ -388,7 +389,7 @@ class Findings:
                 **{name: float(x[0]) for name, x in inputs.items()}}  # fmt: skip
 
     def inputs(self, cell: Cell, first: int = 0, stop: int | None = None) -> dict[str, np.ndarray]:
-        """Return what varies among the members of a cell, one number a name.
+        """Return what varies among the members of a cell, one number a name, in the order of `vary`.
 
         Args:
             cell: one of `cells`, not refused.
@@ -399,7 +400,7 @@ class Findings:
         fleet, stop = cell.fleet, cell.fleet.members if stop is None else stop
         chosen = fleet.select(first, stop)
         numbers: dict[str, np.ndarray] = {}
-        for variation in fleet.variations:
+        for variation in as_given(fleet):
             for target in variation.targets:
                 drawn = chosen.parameters.get(target.name)
                 if drawn is None:

@@ -87,17 +87,22 @@ def test_arguments_of_a_sensitivity_study(tmp_path, monkeypatch, drawn, capsys):
     verb = ["sensitivity", PAPER, "--out", str(tmp_path)]
     assert cli.main([*verb, "-q"]) == 0 and cli.main([*verb, "--first-order", "--samples", "0", "-q"]) == 0
     assert cli.main([*verb, "--analysis", "morris", "-q"]) == 0
+    grouped = ["--replicates", "4", "--group", "start=start.position,start.velocity"]
+    assert cli.main([*verb, *grouped, "-q"]) == 0 and cli.main([*verb, "--group", "start", "-q"]) == 2
+    assert "--group = 'start': names no factors" in capsys.readouterr().err
     more = ["--of", "depth", "--of", "speed", "--samples", "5", "--failed", "drop", "--threads", "3", "--seed", "4"]
     assert cli.main([*verb, "--analysis", "morris", *more]) == 0
-    (plain, first), (coarse, named) = (study.calls for study in analyses.values())
+    (plain, first, together), (coarse, named) = (study.calls for study in analyses.values())
     common = {"failed": "refuse", "threads": None, "progress": None}
-    assert plain[0][1] == ["position[2]"] and plain[1] == common | {"samples": 256, "second_order": True}
-    assert first[1] == common | {"samples": 0, "second_order": False}
+    plainly = common | {"samples": 256, "second_order": True, "replicates": 8, "groups": {}}
+    assert plain[0][1] == ["position[2]"] and plain[1] == plainly
+    assert first[1] == plainly | {"samples": 0, "second_order": False}
+    assert together[1] == plainly | {"replicates": 4, "groups": {"start": ["start.position", "start.velocity"]}}
     assert coarse[1] == common | {"samples": 64}
     assert named[0][0].ensemble_settings.seed == 4 and named[0][1] == ["depth", "speed"]
     assert named[1].pop("progress") is not None
     assert named[1] == {"failed": "drop", "threads": 3, "samples": 5}
-    assert drawn == [("sensitivity", "sensitivity.png")] * 4
+    assert drawn == [("sensitivity", "sensitivity.png")] * 5
     said = capsys.readouterr().out
     assert said.startswith(f"{sobol()}\n\nfile        {tmp_path}/sensitivity.")
     assert said.count("file  ") == 4 and said.endswith("MB)\n")

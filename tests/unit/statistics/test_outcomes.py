@@ -6,6 +6,8 @@ import pytest
 from scipy import stats
 
 import lgvi_warp as lw
+from lgvi_warp.engine.block import blocks
+from lgvi_warp.engine.keepers.statistics import Gathered
 from lgvi_warp.statistics.base import from_list
 from lgvi_warp.statistics.ends import Ends, check_outcomes, outcomes
 from lgvi_warp.statistics.estimate import Estimates
@@ -53,34 +55,79 @@ def gathered(statistic, ends, block=256, order=None, replicates=1, last=None):
     return statistic.estimates_of_replicates(tree.parts(), time, replicates)
 
 
+def incidence(ends, status, t):
+    """Aalen & Johansen's sum over the ends until t, as a loop over their times."""
+    under_way, passed = 1.0, 0.0
+    for now in np.unique(ends.time[(ends.status != OK) & (ends.time <= t)]):
+        risk, here = (ends.time >= now).sum(), ends.time == now
+        passed += under_way * (here & (ends.status == status)).sum() / risk
+        under_way *= 1.0 - (here & np.isin(ends.status, [FLOOR, SURFACE])).sum() / risk
+    return passed
+
+
 @pytest.mark.parametrize("step", [0.0, 0.5])
-def test_an_outcome_is_kaplan_and_meiers(step):
+def test_an_outcome_is_aalen_and_johansens(step):
     # With a step many members end at the same times, some of them at sample times.
     ends = ends_of(1000, step=step)
     (found,) = gathered(lw.Outcome("floor"), ends)
-    floor = ends.status == FLOOR
-    curve = stats.ecdf(stats.CensoredData.right_censored(ends.time, ~floor)).cdf
-    np.testing.assert_allclose(found.value, curve.evaluate(TIMES), rtol=1e-12)
-    np.testing.assert_array_equal(found["ended"], [(floor & (ends.time <= t)).sum() for t in TIMES])
-    otherwise = (ends.status != OK) & ~floor
-    np.testing.assert_array_equal(found["otherwise"], [(otherwise & (ends.time <= t)).sum() for t in TIMES])
+    floor, lost = ends.status == FLOOR, ends.status == FAILED
+    np.testing.assert_allclose(found.value, [incidence(ends, FLOOR, t) for t in TIMES], rtol=1e-12)
+    for name, which in {"ended": floor, "otherwise": (ends.status != OK) & ~floor, "failed": lost}.items():
+        np.testing.assert_array_equal(found[name], [(which & (ends.time <= t)).sum() for t in TIMES])
     np.testing.assert_array_equal(found["fraction"], found["ended"] / 1000)
     np.testing.assert_array_equal(found.count, 1000 - found["ended"] - found["otherwise"])
     assert (found.lower <= found.value).all() and (found.value <= found.upper).all()
     # The time of each level: the first end at which the curve reaches it.
+    times = np.unique(ends.time[floor])
+    curve = np.array([incidence(ends, FLOOR, t) for t in times])
     for level, time in zip(found.coordinates["level"], found["end_time"], strict=True):
-        reached = curve.quantiles[curve.probabilities >= level]
-        assert time == (reached.min() if len(reached) else np.inf)
+        assert time == (times[curve >= level].min() if (curve >= level).any() else np.inf)
+    # If nothing else stopped members: Kaplan & Meier's.
+    alone = stats.ecdf(stats.CensoredData.right_censored(ends.time, ~floor)).cdf
+    np.testing.assert_allclose(found["alone"], alone.evaluate(TIMES), rtol=1e-12)
+    assert (found["alone_lower"] <= found["alone"]).all() and (found["alone"] <= found["alone_upper"]).all()
 
 
-def test_without_others_an_outcome_is_a_fraction_with_wilsons_interval():
-    ends = ends_of(700, rates=(0.1, 0.0, 0.0))
+@pytest.mark.parametrize("rates", [(0.1, 0.05, 0.02), (0.1, 0.05, 0.0), (0.0, 0.1, 0.2), (0.2, 0.0, 0.2)])
+@pytest.mark.parametrize("replicates", [1, 4])
+def test_the_sum_over_outcomes_and_ok_is_1(rates, replicates):
+    # What fails does so before the end of the run: at 9.9 s at the latest.
+    ends = ends_of(1024, rates=rates, step=0.3)
+    each = [gathered(lw.Outcome(name), ends, replicates=replicates)[0] for name in ("floor", "top", "ok")]
+    assert sum(one.value[-1] for one in each) == pytest.approx(1.0, abs=1e-12)
+    (stopped,) = gathered(lw.Outcome("stopped"), ends, replicates=replicates)
+    np.testing.assert_allclose(each[0].value + each[1].value, stopped.value, rtol=1e-12)
+    (failed,) = gathered(lw.Outcome("failed"), ends, replicates=replicates)
+    np.testing.assert_array_equal(failed.value, failed["fraction"])
+    if not rates[2]:
+        assert sum(one["fraction"][-1] for one in each) == 1.0
+
+
+@pytest.mark.parametrize("rates", [(0.1, 0.0, 0.0), (0.1, 0.3, 0.0)])
+def test_without_failures_an_outcome_is_a_fraction_with_wilsons_interval(rates):
+    ends = ends_of(700, rates=rates)
     (found,) = gathered(lw.Outcome("floor"), ends)
     hits = np.array([((ends.status == FLOOR) & (ends.time <= t)).sum() for t in TIMES])
     np.testing.assert_array_equal(found.value, hits / 700)
     for hit, low, high in zip(hits, found.lower, found.upper, strict=True):
         wilson = stats.binomtest(int(hit), 700).proportion_ci(0.95, "wilson")
         np.testing.assert_allclose((low, high), wilson, rtol=1e-10, atol=1e-15)
+    np.testing.assert_array_equal(found["fraction_upper"], found.upper)
+    if not rates[1]:
+        np.testing.assert_array_equal(found["alone"], found.value)
+
+
+def test_all_that_are_left_fail():
+    """Of 100 members 20 sink, 50 rise, and then 30 fail: these may sink or rise, all of them."""
+    time = np.repeat([1.0, 1.5, 3.0], [20, 50, 30])
+    ends = Ends(np.repeat([FLOOR, SURFACE, FAILED], [20, 50, 30]), np.repeat([1, 2, 0], [20, 50, 30]), time, EVENTS)
+    (found,) = gathered(lw.Outcome("floor"), ends)
+    assert found.value.tolist() == [0.0, 0.2, 0.2, 0.2, 0.2, 0.2]
+    wilson = stats.binomtest(20, 100).proportion_ci(0.95, "wilson")
+    assert found.upper[1] == pytest.approx(wilson.high) and 0.3 + wilson.high <= found.upper[-1] < 1.0
+    assert found.lower[1] == pytest.approx(wilson.low) and found.lower[-1] <= wilson.low
+    (alone,) = gathered(lw.Outcome("floor"), part_of(ends, slice(70, 100)))
+    assert (alone.value[-1], alone.lower[-1], alone.upper[-1]) == (0.0, 0.0, 1.0)
 
 
 def test_words_for_outcomes():
@@ -153,14 +200,24 @@ def test_replicates_give_the_value_of_all_and_an_interval_of_their_spread():
     assert (ratio > 0.4).all() and (ratio < 2.5).all()
 
 
-@pytest.mark.parametrize("rates", [(0.1, 0.05, 0.02), (0.01, 0.3, 0.0)])
+@pytest.mark.parametrize("rates", [(0.1, 0.05, 0.02), (0.01, 0.3, 0.0), (0.1, 0.1, 0.2), (0.03, 0.2, 0.1)])
 def test_coverage(rates):
-    # Of 1,000 intervals of 95 % at the end: 5 standard deviations are 3.4 %, and few at risk make them hold more often.
-    true, hold = -np.expm1(-rates[0] * TIMES[-1]), 0
+    """Floor, surface and failure come at constant rates a, b, c: a / (a + b) (1 - exp(-(a + b) t)) have sunk at t."""
+    a, both = rates[0], rates[0] + rates[1]
+    true, alone = -a / both * np.expm1(-both * TIMES[-1]), -np.expm1(-a * TIMES[-1])
+    values, sizes, hold, alone_hold = [], [], 0, 0
     for seed in range(1000):
-        (found,) = gathered(lw.Outcome("floor"), ends_of(100, seed, rates))
+        (found,) = gathered(lw.Outcome("floor"), ends_of(200, seed, rates))
         hold += found.lower[-1] <= true <= found.upper[-1]
-    assert hold / 1000.0 > 0.915
+        # The clocks of the three are independent here, which `alone` takes for granted.
+        alone_hold += found["alone_lower"][-1] <= alone <= found["alone_upper"][-1]
+        values.append(found.value[-1])
+        sizes.append(found.upper[-1] - found.lower[-1])
+    # Of 1,000 intervals of 95 %: 5 standard deviations are 3.4 %; few ends, as of 7, make them hold a little more often.
+    assert 0.915 < hold / 1000.0 < 0.985 and alone_hold / 1000.0 > 0.915
+    # The interval is as wide as 1,000 estimates are spread, which are known to 1 / sqrt(2000); Wilson's adds up to some percent
+    # where the normal interval would reach below 0.
+    assert np.mean(sizes) == pytest.approx(2.0 * 1.96 * np.std(values), rel=0.12)
 
 
 def test_nobody():
@@ -182,6 +239,42 @@ def test_first_passage_knows_when_a_member_was_stopped():
     (found,) = statistic.estimates([gathers.close()], TIMES)
     # A piece is 0.25 s.
     assert found["passage_time"][0] == pytest.approx(2.5, abs=0.25) and found.value.tolist() == [0, 0, 1, 1, 1, 1]
+
+
+@pytest.mark.parametrize("replicates", [1, 2])
+def test_first_passage_takes_stopped_members_for_what_they_are(replicates):
+    """Of 100 members 50 are stopped elsewhere at 1 s, 26 fail at 5 s and 24 pass at 7 s: of the 50 all would have passed."""
+    statistic = lw.FirstPassage(lw.Quantity("x", lambda s, m: None, "m", (), ("x",)), above=2.5, levels=(0.4, 0.6))
+    end = np.repeat([1.0, 5.0, 10.0], [50, 26, 24])
+    x = np.where((np.arange(100) >= 76) & (TIMES[:, None] >= 7.0), 3.0, 2.0)[:, None]
+    good = (np.arange(100) < 50) | (np.arange(100) >= 76) | (TIMES[:, None] < 5.0)
+    ends = Ends(np.repeat([SURFACE, FAILED, OK], [50, 26, 24]), np.repeat([2, 0, 0], [50, 26, 24]), end, EVENTS)
+    gathers = statistic.open(TIMES, 100)
+    gathers.take(dealt(x, good, 0, 0, 100, replicates) if replicates > 1 else Values(x, good), slice(0, 6))
+    gathers.end(ends, replicates)
+    parts = [gathers.close()]
+    (found,) = (
+        statistic.estimates(parts, TIMES) if replicates == 1 else statistic.estimates_of_replicates(parts, TIMES, replicates)
+    )
+    np.testing.assert_allclose(found.value, [0, 0, 0, 0, 0.5, 0.5], rtol=1e-15)
+    assert found["stopped"].tolist() == [0, 50, 0, 0, 0, 0] and found["lost"].tolist() == [0, 0, 0, 26, 0, 0]
+    assert found["passage_time"][0] < 8.0 and found["passage_time"][1] == np.inf and found["censored"] == 0
+    (outcome,) = gathered(lw.Outcome("floor"), Ends(
+        np.where(ends.status == OK, FLOOR, ends.status), np.where(ends.status == OK, 1, ends.event), end, EVENTS))  # fmt: skip
+    assert outcome.value[-1] == pytest.approx(found.value[-1], rel=1e-15)
+
+
+def test_parts_and_estimates_of_an_earlier_version_are_refused():
+    (found,) = gathered(lw.Outcome("floor"), ends_of(100))
+    arrays, text = Estimates([found]).to_arrays()
+    assert Estimates.from_arrays(arrays, text)["outcome floor"]["alone"].tobytes() == found["alone"].tobytes()
+    del arrays["0/alone"]
+    with pytest.raises(ValueError, match="'outcome floor' is of an earlier version"):
+        Estimates.from_arrays(arrays, text)
+    gather = Gathered(TIMES, 100, [lw.Outcome("floor")])
+    old = {"members": np.array([1]), "time": np.array([1.0]), "so": np.array([True]), "replicate": np.zeros(1, np.int32)}
+    with pytest.raises(ValueError, match="'outcome floor' is of an earlier version"):
+        gather.merge(blocks(100)[0], [old])
 
 
 def test_from_a_scene_file():

@@ -9,7 +9,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.scene.settings import RunSettings
-from lgvi_warp.studies.linear import margins as study
+from lgvi_warp.studies.linear import loops as study
 from lgvi_warp.studies.linear.edges import edges
 from lgvi_warp.studies.linear.sampled_loop import SampledLoop
 from tests.conftest import ROOT
@@ -130,7 +130,7 @@ def test_a_loop_that_does_not_settle_has_no_margins():
     found = lw.margins(loops, None, "gain", about=1.0, method="psi_s", h=H)
     assert found.steady.tolist() == [True, False] and found.loop == "all laws"
     assert np.isnan(found.values["gain_upper"][1]) and np.isfinite(found.values["gain_upper"][0])
-    assert "1 of them do not settle" in str(found) and set(found.values) == {"gain_lower", "gain_upper"}
+    assert found.why.tolist() == ["", "does not settle"] and "1 of them have none" in str(found) and set(found.values) == {"gain_lower", "gain_upper"}
     assert found.worst(1).tolist() == [1]
 
 
@@ -186,12 +186,13 @@ def test_what_is_no_scene():
 
 def test_a_copy_that_fails_does_not_settle(fleet):
     """Beside a motion at the edge of what a step can solve, one of two copies is beyond it."""
-    loops = study.Study(fleet, None, 1.0, 10.0, 1e-3, "psi_s", H).at(np.arange(2))
-    motion = loops.motion.of(np.arange(2))
+    members = study.Study(fleet, None, 80.0, 80.0, 10.0, 1e-3, "psi_s", H)
+    (loops,), why = members.loops(np.arange(2))
+    motion, bus = loops.motion, members.bench.bus
     motion.angular_velocity[1] = (0.0, 0.0, 2.0 / H)
-    bus = loops.study.bench.bus
+    assert why.tolist() == ["", ""]
     assert bus.rows == bus.answer + 6  # in which the demand of other laws is kept while those of the loop act
-    sampled = SampledLoop(loops.study.bench, np.arange(2), motion, loops.study.begin)
+    sampled = SampledLoop(members.bench, np.arange(2), motion, loops.begin)
     assert sampled.stable(np.ones(2), loops.delay, np.arange(2)).tolist() == [True, False]
 
 
@@ -222,8 +223,9 @@ def test_a_factor_of_1_changes_nothing(loop):
     """Laws with integrals of their own, whose demands are added: the factor is that of one, or of both."""
     scene = dataclasses.replace(autopilot(), start=lw.Start(velocity=(1.54, 0.0, 0.0), position=(0.0, 0.0, 1.0)))
     fleet = lw.Ensemble(scene, 3, 1, {"heading_pid.ki": lw.Uniform(0.1, 0.3), "depth_pid.ki": lw.Uniform(0.01, 0.03)})
-    motion = study.Study(fleet, loop, 20.0, 10.0, 1e-3, None, 0.01).at(np.arange(3)).motion
-    expected = lw.solve(fleet, t1=20.0)
+    (loops,), why = study.Study(fleet, loop, 599.9, 599.9, 10.0, 1e-3, None, 0.01).loops(np.arange(3))
+    motion, expected = loops.motion, lw.solve(fleet, t1=600.0)
+    assert why.tolist() == [""] * 3
     # Without the merged lead the steps are the same but for round-off, 2000 times eps, which an unstable vehicle multiplies.
     np.testing.assert_allclose(motion.position, expected.position[-1], atol=1e-10)
     np.testing.assert_allclose(motion.attitude, expected.attitude[-1], atol=1e-10)

@@ -402,7 +402,8 @@ def margins_of(steady):
         "gain_upper": np.where(steady, upper, np.nan),
         "delay": np.where(steady, [0.1, 0.3, 0.2, 0.4, 0.0], np.nan),
     }
-    return Margins("heading_pid", values, {"gain_upper": 1.1 * upper, "delay": values["delay"]}, np.array(steady), 0.02)
+    why = np.where(steady, "", "does not settle").astype(object)
+    return Margins("heading_pid", values, {"gain_upper": 1.1 * upper, "delay": values["delay"]}, why, 0.02)
 
 
 def test_margins_are_distributions():
@@ -416,11 +417,11 @@ def test_margins_are_distributions():
     assert curves["95 % of the members bear 2"].get_xdata()[0] == 2.0
     assert [line.get_label() for line in axes[1].get_lines()][:1] == ["by eigenvalues"]
     title = axes[0].figure.get_suptitle()
-    assert title == "heading_pid: margins of 4 members; 1 do not settle as they are"
+    assert title == "heading_pid: margins of 4 members; 1 have none (1: does not settle)"
 
 
 def test_margins_of_nobody_are_no_picture(tmp_path):
-    with pytest.raises(NothingToDraw, match="none of the 5 members settles"):
+    with pytest.raises(NothingToDraw, match=r"none of the 5 members has margins \(5: does not settle\)"):
         lw.plots.margins(margins_of([False] * 5), path=tmp_path / "margins.png")
     assert not list(tmp_path.iterdir())
 

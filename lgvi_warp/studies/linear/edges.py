@@ -62,9 +62,8 @@ def edges(
         width[above] *= 2.0
     width = np.maximum(0.02 * near, least)
     while True:
-        below = sought[
-            known[sought] & (good[sought] == 0.0) & (bad[sought] < np.inf) & (bad[sought] - width[sought] > 0.0)
-        ]
+        below = sought[known[sought] & (good[sought] == 0.0) & (bad[sought] < np.inf)]
+        below = below[bad[below] > width[below]]
         if not len(below):
             break
         ask(below, rounded(bad[below] - width[below]))

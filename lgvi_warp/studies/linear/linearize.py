@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -304,23 +304,33 @@ def remembered(bench: Bench, memory: Mapping[str, np.ndarray], terms: bool) -> l
     return rows
 
 
-def check_parts(controller: Any, what: str) -> None:
-    """Refuse parts of a controller that no linear model of one period has.
+# What of a sensor changes from look to look by chance, in whatever motion.
+RANDOM = ("noise", "drift")
+
+
+def check_parts(controller: Any, what: str, refused: Collection[str] | None = None) -> None:
+    """Refuse parts of a controller that no linear model of one period has, or that let no motion be steady.
 
     Args:
         controller: the controller.
-        what: who needs the model.
+        what: who needs it.
+        refused: numbers of sensors that are refused; None (default) for all but the bias, of which there is no linear model.
 
     Raises:
-        SceneError: where a sensor draws random numbers, rounds, is late or reads at some looks only. All are named.
+        SceneError: where a sensor has such a number: draws random numbers, rounds, is late or reads at some looks only. All
+            are named.
     """
+    problem = (
+        f"lets no motion be steady, as {what} need it"
+        if refused
+        else (f"has no linear model of one period, which {what} needs")
+    )
     faults = Faults()
     for part in controller.sensors:
         if isinstance(part, Sensor):
             numbers = {name: np.asarray(value)[None] for name, value in part.parameters().items()}
             for word in part.features(numbers):
-                if word != "bias":
-                    problem = f"has no linear model of one period, which {what} needs"
+                if word in refused if refused else word != "bias":
                     faults.add(f"{part.key}.{word}", getattr(part, word), problem, "leave it out of this scene")
     faults.raise_if_any()
 

@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,14 +13,13 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.methods.method import Method
 from lgvi_warp.physics.control.delay import MOST_PERIODS
-from lgvi_warp.physics.control.loop_gain import FACTOR, with_factor
-from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.studies.linear.bench import Bench, Motion, calm
+from lgvi_warp.studies.linear.bench import calm
 from lgvi_warp.studies.linear.edges import edges
-from lgvi_warp.studies.linear.linearize import check_parts
-from lgvi_warp.studies.linear.sampled_loop import DELAY, SampledLoop, delayed
+from lgvi_warp.studies.linear.linearize import RANDOM, check_parts
+from lgvi_warp.studies.linear.loops import IDLE, LEAST_LOOKS, UNSETTLED, Loops, Study
+from lgvi_warp.studies.linear.sampled_loop import SampledLoop
 from lgvi_warp.studies.linear.trim import step_of
 from lgvi_warp.studies.members import ensemble_of
 
@@ -28,12 +28,6 @@ OF, WAYS = ("gain", "delay"), ("eigenvalues", "runs")
 GROUP = 2048
 # Width of the last brackets, in the logarithm of the factor: of eigenvalues, and of runs, which judge to some 0.4 %.
 NARROW = {"eigenvalues": 1e-6, "runs": 2e-3}
-# The envelope of a loop that settles shrinks at least so much from the second third of a run to the last.
-SHRINKS = 0.97
-# What swings by less than this part of its first third has settled: what is left is round-off.
-SETTLED = 1e-6
-# Looks of a run below which its thirds show no envelope.
-LEAST_LOOKS = 30
 PERCENTILES = (0.0, 5.0, 25.0, 50.0, 75.0, 95.0, 100.0)
 UNITS = {"gain_lower": "", "gain_upper": "", "delay": "s"}
 
@@ -42,7 +36,7 @@ UNITS = {"gain_lower": "", "gain_upper": "", "delay": "s"}
 class Margins:
     """Margins of a loop by member.
 
-    Each is NaN for a member whose loop does not settle as it is, or that failed.
+    Each is NaN for a member whose loop does not settle as it is, of which `why` tells more.
 
     Attributes:
         loop: key of the law; "all laws" for the whole controller.
@@ -50,20 +44,48 @@ class Margins:
             (0 and infinite where it bears all that were asked); "delay", the largest delay [s] beside the loop's own, in whole
             steps.
         by_runs: the same, as runs show them; without those that were not asked.
-        steady: (n,), whether the loop settles as it is.
+        why: (n,), why a member has none: "does not settle", "at its limit: thrusters[3]" where a motion stays there, "moves
+            nothing" where its commands have no effect, "failed"; "" where it has.
         step: step of the runs [s], to which delays are known.
     """
 
     loop: str
     values: Mapping[str, np.ndarray]
     by_runs: Mapping[str, np.ndarray]
-    steady: np.ndarray
+    why: np.ndarray
     step: float
+
+    @property
+    def steady(self) -> np.ndarray:
+        """Whether the loop settles as it is, (n,)."""
+        return np.asarray(self.why == "")
+
+    @property
+    def reasons(self) -> dict[str, int]:
+        """How many members have no margins, by the reason."""
+        return dict(Counter(each for each in self.why.tolist() if each).most_common())
 
     @property
     def members(self) -> int:
         """The number of members, n."""
-        return len(self.steady)
+        return len(self.why)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The margins as plain values, for JSON.
+
+        Returns:
+            "loop", "step", "why", and under "eigenvalues" and "runs" lists by name; None for NaN, "inf" for infinite ones.
+        """
+
+        def plain(value: float) -> float | str | None:
+            return value if np.isfinite(value) else None if np.isnan(value) else str(value)
+
+        ways = {
+            way: {name: [plain(v) for v in column.tolist()] for name, column in columns.items()}
+            for way, columns in zip(WAYS, (self.values, self.by_runs), strict=True)
+            if columns
+        }
+        return {"loop": self.loop, "step": self.step, "why": self.why.tolist(), **ways}
 
     def percentiles(self, of: Sequence[float] = PERCENTILES) -> dict[str, np.ndarray]:
         """How margins are distributed over the members that settle as they are.
@@ -112,14 +134,18 @@ class Margins:
         values = columns[chosen] * (-1.0 if chosen == "gain_lower" else 1.0)
         return np.argsort(np.where(self.steady, values, -np.inf), kind="stable")[:count]
 
+    @property
+    def told(self) -> str:
+        """The reasons in words, the most frequent first."""
+        return "; ".join(f"{count:,}: {why}" for why, count in self.reasons.items())
+
     def _columns(self) -> Mapping[str, np.ndarray]:
         return self.values or self.by_runs
 
     def __str__(self) -> str:
         lines = [f"{self.loop}: margins of {self.members} members"]
-        lost = int((~self.steady).sum())
-        if lost:
-            lines.append(f"{lost} of them do not settle as they are; the others:")
+        if self.reasons:
+            lines.append(f"{sum(self.reasons.values())} of them have none ({self.told}); the others:")
         lines.append(f"{'':16}" + "".join(f"{f'{p:g} %':>10}" for p in PERCENTILES))
         for name, row in self.percentiles().items():
             lines.append(f"{f'{name} {UNITS[name]}'.strip():16}" + "".join(f"{value:10.4g}" for value in row))
@@ -133,6 +159,7 @@ def margins(
     *,
     by: Sequence[str] = ("eigenvalues",),
     about: float = 60.0,
+    settle: float = 1200.0,
     seconds: float = 240.0,
     tilt: float = 1e-3,
     most: float = 100.0,
@@ -142,12 +169,18 @@ def margins(
 ) -> Margins:
     """Find how much gain and delay the loop of each member bears.
 
-    By eigenvalues: those of the sampled loop about the motion that the member has after `about` seconds. It is affine in the
-    factor on the law's demand, and each delay within a period is linearised: so all brackets are halved without a run.
+    A member's loop is looked at in the motion that it has after `about` seconds. That must be steady: velocities, rates, the
+    vertical and the commands are the same to 1e-6 a period later, and no command is at its limit. Else the member goes on for
+    twice the time, and again, up to `settle`. Then it is turned aside, and must come back in a run. Where one of this is not
+    so, it has no margins, and `why` says which.
+
+    By eigenvalues: those of the sampled loop about that motion. It is affine in the factor on the law's demand, and each delay
+    within a period is linearised: so all brackets are halved without a run. Neutral modes that no law sees do not count.
 
     By runs: every member has a factor, or a delay, of its own in a lane; each run divides all brackets at once. From the same
     motion, turned by `tilt`, a loop settles if what its rates and commands swing shrinks from the second to the last
-    third of the run. The error is not judged: a slow integral hides a small fast limit cycle in it.
+    third of the run, is less than in the first, and less than 10 tilts. Where it shrinks by little, a run of 1.5 times the
+    length is judged as well. The error is not judged: a slow integral hides a small fast limit cycle in it.
 
     Where the answer changes more than once, the edge is one of them.
 
@@ -157,6 +190,7 @@ def margins(
         of: "gain", "delay", or both, the default. A delay is that of all commands.
         by: "eigenvalues", the default, "runs", or both.
         about: Time after which the loop is looked at [s]; 60 by default.
+        settle: Longest time that a member is given to be steady [s]; 1200 by default.
         seconds: Length of the runs [s]; 240 by default.
         tilt: Angle by which they begin aside, about each axis of the body [rad]; 0.001 by default.
         most: Largest factor, and one over the least; 100 by default.
@@ -178,7 +212,7 @@ def margins(
         faults.choice("of", word, OF)
     for word in by:
         faults.choice("by", word, WAYS)
-    for name, value in {"about": about, "seconds": seconds, "longest": longest, "tilt": tilt}.items():
+    for name, value in {"about": about, "settle": settle, "seconds": seconds, "longest": longest, "tilt": tilt}.items():
         faults.positive(name, value)
     faults.number("most", most, "", 1.0)
     if scene.controller is None:
@@ -194,148 +228,45 @@ def margins(
     calm(scene, "margins")
     if "eigenvalues" in by:
         check_parts(scene.controller, 'margins by="eigenvalues"')
-    h = step_of(scene, h)
-    study = Study(ensemble, loop, about, seconds, tilt, method, h)
-    parts = []
-    for first in range(0, ensemble.members, GROUP):
-        places = np.arange(first, min(first + GROUP, ensemble.members))
-        parts.append(_group(study.at(places), of, by, most, longest))
-    steady = np.concatenate([part[0] for part in parts])
-    values, by_runs = (
-        {name: np.concatenate([part[i][name] for part in parts]) for name in parts[0][i]} for i in (1, 2)
-    )
-    return Margins(loop or "all laws", values, by_runs, steady, study.bench.plan.grid.h)
+    else:
+        check_parts(scene.controller, "margins", RANDOM)
+    study = Study(ensemble, loop, about, settle, seconds, tilt, method, step_of(scene, h))
+    names = (("gain_lower", "gain_upper") if "gain" in of else ()) + (("delay",) if "delay" in of else ())
+    n = ensemble.members
+    answers: Answers = {way: {name: np.full(n, np.nan) for name in names} if way in by else {} for way in WAYS}
+    why: np.ndarray = np.full(n, "", dtype=object)
+    for first in range(0, n, GROUP):
+        places = np.arange(first, min(first + GROUP, n))
+        some, why[places] = study.loops(places)
+        for loops in some:
+            why[loops.places], found = _group(loops, of, by, most, longest)
+            for way, name in ((way, name) for way in by for name in names):
+                answers[way][name][loops.places] = found[way][name]
+    return Margins(loop or "all laws", answers["eigenvalues"], answers["runs"], why, study.bench.plan.grid.h)
 
 
-class Study:
-    """Members whose factor and delay are their own.
-
-    Args:
-        fleet: the members.
-        loop: key of the law; None for all laws.
-        about: time after which loops are looked at [s].
-        seconds: length of the runs [s].
-        tilt: angle by which runs begin aside [rad].
-        method: as of `lw.solve`.
-        h: step [s].
-
-    Attributes:
-        bench: what makes the steps.
-        begin: steps until loops are looked at.
-        steps: steps of a run.
-    """
-
-    def __init__(
-        self, fleet: Ensemble, loop: str | None, about: float, seconds: float, tilt: float, method: Any, h: float
-    ):
-        scene: Any = fleet.scene
-        controller, period = scene.controller, float(scene.controller.period)
-        # With some delay in the scene, commands may be delayed in any lane.
-        laws = with_factor(controller.laws, loop)
-        acted = replace(controller, laws=laws, delay=controller.delay if controller.delay > 0.0 else period)
-        looks = [max(1, round(time / period)) for time in (about, seconds)]
-        inside = fleet.in_scene(replace(scene, controller=acted, events=()), (FACTOR, DELAY))
-        self.own_delay = "controller.delay" in fleet.varied_names
-        self.fleet, self.tilt, self.nominal = fleet, tilt, float(controller.delay)
-        self.bench = Bench(inside, method, h, sum(looks) * period, period, (*FIELDS, "command"))
-        self.begin, self.steps = (count * self.bench.every for count in looks)
-        actuators = controller.actuators.values()
-        self.limits = np.concatenate([np.maximum(term.limit, 1e-12) for term in actuators])
-
-    def at(self, places: np.ndarray) -> Loops:
-        """The loops of some members.
-
-        Args:
-            places: (n,), which members.
-
-        Returns:
-            Their loops, at their steady motions.
-        """
-        return Loops(self, places)
+# Margins (n,) by name, by way.
+Answers = dict[str, dict[str, np.ndarray]]
 
 
-class Loops:
-    """Loops at their steady motions, to be asked whether they settle with other numbers.
-
-    Args:
-        study: the members.
-        places: (n,), which of them.
-
-    Attributes:
-        delay: (n,), their own delays, in steps.
-        motion: their motions after `study.begin` steps; NaN where a member failed.
-    """
-
-    def __init__(self, study: Study, places: np.ndarray):
-        self.study, self.places, bench = study, places, study.bench
-        n, h = len(places), bench.plan.grid.h
-        delay = study.fleet.subset(places).parameters(0, n)[DELAY] if study.own_delay else study.nominal
-        self.delay = np.broadcast_to(np.rint(np.asarray(delay) / h).astype(np.int64), (n,))
-        numbers = {FACTOR: np.ones(n), DELAY: self.delay * h}
-        self.motion: Motion = bench.run(places, None, 0, study.begin, numbers)
-
-    def settle(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> np.ndarray:
-        """Whether loops settle, by a run.
-
-        Args:
-            factor: (m,), factors on the demand.
-            steps: (m,), delays in steps.
-            some: (m,), which of the members.
-
-        Returns:
-            (m,).
-        """
-        bench, k0, k1 = self.study.bench, self.study.begin, self.study.begin + self.study.steps
-        m, third = len(some), self.study.steps // (3 * bench.every)
-        numbers = {FACTOR: factor, DELAY: steps * bench.plan.grid.h}
-        by = np.zeros((m, 12))
-        by[:, 3:6] = self.study.tilt
-        motion = delayed(bench, self.motion.of(some), k0, steps).moved(by)
-        highest, lowest = np.full((3, m, 3 + len(self.study.limits)), -np.inf), None
-        lowest = -highest
-        first = bench.plan.due(k0, k0)[1]
-
-        def watch(sample: int, values: Mapping[str, np.ndarray]) -> None:
-            signals = np.concatenate([values["angular_velocity"], values["command"] / self.study.limits], axis=2)
-            window = np.minimum((sample - first + np.arange(len(signals))) // max(1, third), 2)
-            for w in np.unique(window):
-                at = window == w
-                highest[w] = np.fmax(highest[w], signals[at].max(axis=0))
-                lowest[w] = np.fmin(lowest[w], signals[at].min(axis=0))
-
-        after = bench.run(self.places[some], motion, k0, k1, numbers, watch)
-        swing = highest - lowest
-        well = np.isfinite(after.position).all(axis=1)
-        for each in (swing[..., :3], swing[..., 3:]):
-            size = np.linalg.norm(each, axis=2)
-            well &= (size[2] < SHRINKS * size[1]) | (size[1] < SETTLED * size[0])
-        return well
-
-
-Group = tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray]]
-
-
-def _group(loops: Loops, of: Sequence[str], by: Sequence[str], most: float, longest: float) -> Group:
-    """(whether each settles as it is, margins by eigenvalues, margins by runs)."""
-    bench, n = loops.study.bench, len(loops.places)
-    alive = np.isfinite(loops.motion.position).all(axis=1)
-    every, unity, delays_now = np.flatnonzero(alive), np.ones(n), loops.delay
-    h = bench.plan.grid.h
+def _group(
+    loops: Loops, of: Sequence[str], by: Sequence[str], most: float, longest: float
+) -> tuple[np.ndarray, Answers]:
+    """(why a loop has no margins, margins by way and by name)."""
+    bench, n, delays_now = loops.study.bench, len(loops.places), loops.delay
+    every, unity, h = np.arange(n), np.ones(n), bench.plan.grid.h
     last = np.minimum(round(longest / h), (MOST_PERIODS - 1) * bench.every - delays_now)
-    answers: dict[str, dict[str, np.ndarray]] = {way: {} for way in WAYS}
-    steady = alive.copy()
-    ways: dict[str, Any] = {}
-    if "eigenvalues" in by and len(every):
-        sampled = SampledLoop(bench, loops.places[every], loops.motion.of(every), loops.study.begin)
-        where = np.cumsum(alive) - 1
-        ways["eigenvalues"] = lambda factor, steps, some: sampled.stable(factor, steps, where[some])
-    if "runs" in by and len(every):
-        ways["runs"] = loops.settle
-    for holds in ways.values():
-        steady[every] &= holds(unity[every], delays_now[every], every)
+    answers: Answers = {way: {} for way in WAYS}
+    why: np.ndarray = np.where(loops.return_to_it(), "", UNSETTLED).astype(object)
+    ways: dict[str, Any] = {"runs": loops.settle} if "runs" in by else {}
+    if "eigenvalues" in by:
+        sampled = SampledLoop(bench, loops.places, loops.motion, loops.begin)
+        ways = {"eigenvalues": sampled.stable} | ways
+        why[(why == "") & ~sampled.moves] = IDLE
+        why[(why == "") & ~sampled.stable(unity, delays_now, every)] = UNSETTLED
+    start = np.where(why == "", 1.0, np.nan)
     for way, holds in ways.items():
         known = answers["eigenvalues"]
-        start = np.where(steady, 1.0, np.nan)
         if "gain" in of:
             guesses = [known.get(name, np.full(n, np.nan)) for name in ("gain_lower", "gain_upper")]
 
@@ -355,10 +286,5 @@ def _group(loops: Loops, of: Sequence[str], by: Sequence[str], most: float, long
             guess = np.rint(known["delay"] / h) if "delay" in known else np.full(n, np.nan)
             brackets = edges(delays, start - 1.0, last.astype(float), guess, 1.0, whole=True)
             held = np.where(np.isinf(brackets[:, 1]), np.inf, brackets[:, 0])
-            answers[way]["delay"] = np.where(steady, held * h, np.nan)
-    if not ways:
-        names = (("gain_lower", "gain_upper") if "gain" in of else ()) + (("delay",) if "delay" in of else ())
-        answers = {way: {name: np.full(n, np.nan) for name in names} for way in by} | {
-            w: {} for w in WAYS if w not in by
-        }
-    return steady, answers["eigenvalues"], answers["runs"]
+            answers[way]["delay"] = np.where(why == "", held * h, np.nan)
+    return why, answers

@@ -15,6 +15,12 @@ from lgvi_warp.studies.linear.linearize import remembered
 DELAY = "controller.delay"
 # Matrices whose eigenvalues are sought at once, by the number of their entries.
 ENTRIES = 4_000_000
+# Differences err by some 1e-10: what a law sees or moves by less than this, of numbers of size 1, it does not.
+SEES = 1e-7
+# An eigenvalue so near to the unit circle is on it.
+ON_CIRCLE = 1e-9
+# What no law sees may grow by this a period: three neutral modes in a row, such as rate, angle and place, are known to no better.
+NEUTRAL = 1e-3
 
 
 def delayed(bench: Bench, motion: Motion, k: int, steps: np.ndarray) -> Motion:
@@ -52,6 +58,7 @@ class SampledLoop:
 
     Attributes:
         every: steps between two looks.
+        moves: (n,), whether the demand of the loop moves anything.
     """
 
     def __init__(self, bench: Bench, places: np.ndarray, motion: Motion, k: int):
@@ -86,6 +93,40 @@ class SampledLoop:
             late = differences(bench, places, later, k, bench.every, acting, terms, motion=False, numbers=numbers)
             self._late.append(self._without_failed(late))
         self._C, self._s, self._m = C, s, len(parts)
+        self.moves = np.abs(total @ self._more[:, :C]).max(axis=(1, 2)) > 0.0
+        self._axes, self._seen = self._decomposed()
+
+    def _decomposed(self) -> tuple[np.ndarray, np.ndarray]:
+        """Axes of motion and parts (n, s + m, s + m), those first that laws see, by singular values; and how many they see.
+
+        What they do not see acts on nothing that they do see: with any factor and delay it goes its own way.
+        """
+        s, m, C = self._s, self._m, self._C
+        size = s + m
+        axes, seen = np.tile(np.eye(size), (len(self._P), 1, 1)), np.full(len(self._P), size)
+        for i in np.flatnonzero(self._whole):
+            steps = np.zeros((size, size))
+            steps[:s, :s] = self._P[i]
+            now, more = (_of_states(look, self._P[i]) for look in (self._look[i], self._more[i]))
+            steps[s:] = now[C:]
+            rows = np.concatenate([now[:C], more])
+            lengths = np.linalg.norm(rows, axis=1, keepdims=True)
+            rows = rows[lengths[:, 0] > SEES] / lengths[lengths > SEES, None]
+            basis = np.zeros((0, size))
+            while len(rows) and len(basis) < size:
+                # Twice: what is left of a small row is no more across the others than round-off lets it be.
+                for _ in range(2):
+                    rows = rows - rows @ basis.T @ basis
+                _, sizes, across = np.linalg.svd(rows, full_matrices=False)
+                rows = across[sizes > SEES]
+                basis = np.concatenate([basis, rows])
+                rows = rows @ steps
+            seen[i] = len(basis)
+            others = np.linalg.svd(basis)[2][len(basis) :] if len(basis) else np.eye(size)
+            axes[i] = np.concatenate([basis, others])
+            free = np.abs(np.linalg.eigvals(others @ steps @ others.T)).max(initial=0.0)
+            self._whole[i] &= free <= 1.0 + NEUTRAL
+        return axes, seen
 
     def _without_failed(self, derived: np.ndarray) -> np.ndarray:
         """The same, with other numbers for members of which a copy failed: their loops do not settle."""
@@ -102,15 +143,24 @@ class SampledLoop:
             some: (m,), which of the members.
 
         Returns:
-            (m,): whether all eigenvalues are within the unit circle, of states that something depends on.
+            (m,): whether all eigenvalues are within the unit circle, of what laws see; and what they do not see does not grow.
         """
         answer = np.zeros(len(some), bool)
         for q in np.unique(steps // self.every):
             at = np.flatnonzero(steps // self.every == q)
             size = self._s + self._m + self._C * (q + 2)
             for each in np.array_split(at, max(1, len(at) * size**2 // ENTRIES)):
-                answer[each] = _settles(self._matrices(factor[each], int(q), steps[each] % self.every, some[each]))
+                A = self._matrices(factor[each], int(q), steps[each] % self.every, some[each])
+                for count in np.unique(self._seen[some[each]]):
+                    alike = self._seen[some[each]] == count
+                    answer[each[alike]] = _settles(self._of_seen(A[alike], some[each][alike], int(count)))
         return answer & self._whole[some]
+
+    def _of_seen(self, A: np.ndarray, some: np.ndarray, count: int) -> np.ndarray:
+        """The loops' matrices of what laws see, and of commands."""
+        axes, base = self._axes[some][:, :count], self._s + self._m
+        rows = np.concatenate([axes @ A[:, :base], A[:, base:]], axis=1)
+        return np.concatenate([rows[:, :, :base] @ np.swapaxes(axes, 1, 2), rows[:, :, base:]], axis=2)
 
     def _matrices(self, factor: np.ndarray, q: int, late: np.ndarray, some: np.ndarray) -> np.ndarray:
         """The loops' matrices: motion and actuators, parts, commands from the newest to the oldest."""
@@ -131,16 +181,13 @@ class SampledLoop:
         return A
 
 
+def _of_states(look: np.ndarray, P: np.ndarray) -> np.ndarray:
+    """What a look does (rows, 12 + m) of the motion at it and of parts, by states (s) and parts a period before."""
+    return np.concatenate([look[:, :12] @ P[:12], look[:, 12:]], axis=1)
+
+
 def _settles(A: np.ndarray) -> np.ndarray:
-    """Whether eigenvalues (m, n, n) are within the unit circle: without states, such as a place, that nothing depends on."""
-    used = np.any(A != 0.0, axis=0)
-    keep = np.arange(A.shape[1])
-    while True:
-        others = used[np.ix_(keep, keep)] & ~np.eye(len(keep), dtype=bool)
-        some = keep[others.any(axis=0)]
-        if len(some) == len(keep):
-            break
-        keep = some
-    if not len(keep):
+    """Whether eigenvalues (m, n, n) are within the unit circle."""
+    if not A.shape[1]:
         return np.ones(len(A), bool)
-    return np.asarray(np.abs(np.linalg.eigvals(A[:, keep[:, None], keep])).max(axis=1) < 1.0)
+    return np.asarray(np.abs(np.linalg.eigvals(A)).max(axis=1) < 1.0 - ON_CIRCLE)

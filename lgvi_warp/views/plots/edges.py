@@ -24,7 +24,7 @@ MARKED = 0.05
 
 
 def margins(found: Margins, *, figure: Any = None, path: str | os.PathLike[str] | None = None) -> np.ndarray:
-    """Draw how margins are distributed over the members that settle as they are, a panel for each margin.
+    """Draw how margins are distributed over the members that have them, a panel for each margin.
 
     Curves say how many members have at most so much, by eigenvalues and by runs, as far as each was asked for. A line marks
     what all but one in twenty members bear. Infinite margins lie beyond the right edge: their curve ends below 100 %.
@@ -39,12 +39,12 @@ def margins(found: Margins, *, figure: Any = None, path: str | os.PathLike[str] 
 
     Raises:
         ImportError: Matplotlib is not installed (extra: viz).
-        NothingToDraw: No member settles as it is.
+        NothingToDraw: No member has margins; the message says why.
         OSError: The file cannot be written.
     """
     steady = np.asarray(found.steady)
     if not steady.any():
-        raise NothingToDraw(f"none of the {found.members} members settles as it is: there are no margins to draw")
+        raise NothingToDraw(f"none of the {found.members} members has margins ({found.told}): there is nothing to draw")
     names = list(found.values or found.by_runs)
     ways = [way for way, values in (("eigenvalues", found.values), ("runs", found.by_runs)) if values]
     with panels(figure, path, (1, len(names)), (1.0 + 4.5 * len(names), 4.5), sharey=True) as grid:
@@ -57,7 +57,7 @@ def margins(found: Margins, *, figure: Any = None, path: str | os.PathLike[str] 
             axes.legend()
         grid[0, 0].set_ylabel("members with at most that [%]")
         lost = found.members - int(steady.sum())
-        remark = f"; {lost:,} do not settle as they are" if lost else ""
+        remark = f"; {lost:,} have none ({found.told})" if lost else ""
         title = f"{found.loop}: margins of {found.members - lost:,} members{remark}"
         grid[0, 0].figure.suptitle(wrapped(title, grid[0, 0].figure))
     return grid.ravel()

@@ -2,6 +2,7 @@
 """Searches whose members' numbers are made up, and margins of loops whose runs are."""
 
 import dataclasses
+import json
 import math
 from types import SimpleNamespace
 
@@ -10,8 +11,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.studies.linear import margins as loops
-from lgvi_warp.studies.linear.bench import Motion
+from lgvi_warp.studies.linear import loops
 from lgvi_warp.studies.linear.edges import edges
 from lgvi_warp.studies.linear.margins import Margins
 from lgvi_warp.studies.search import box, numbers, risk, tune, worst_case
@@ -267,9 +267,21 @@ def test_margins_in_words_and_by_member():
     values = {"gain_lower": np.array([0.5, 0.25, np.nan, 0.125]), "gain_upper": np.array([2.0, 8.0, np.nan, 4.0]),
               "delay": np.array([0.3, 0.1, np.nan, 0.2])}  # fmt: skip
     by_runs = {name: 10.0 * column for name, column in values.items()}
-    found = Margins("heading_pid", values, by_runs, np.array([True, True, False, True]), 0.01)
+    found = Margins("heading_pid", values, by_runs, np.array(["", "", "at its limit: fins[1]", ""], dtype=object), 0.01)
     lines = str(found).splitlines()
-    assert lines[:2] == ["heading_pid: margins of 4 members", "1 of them do not settle as they are; the others:"]
+    assert lines[:2] == [
+        "heading_pid: margins of 4 members",
+        "1 of them have none (1: at its limit: fins[1]); the others:",
+    ]
+    assert found.steady.tolist() == [True, True, False, True] and found.reasons == {"at its limit: fins[1]": 1}
+    plain = found.to_dict()
+    assert plain["why"] == ["", "", "at its limit: fins[1]", ""] and plain["eigenvalues"]["gain_upper"] == [
+        2.0,
+        8.0,
+        None,
+        4.0,
+    ]
+    assert json.loads(json.dumps(plain, allow_nan=False))["runs"]["delay"] == [3.0, 1.0, None, 2.0]
     assert lines[2].split() == ["0", "%", "5", "%", "25", "%", "50", "%", "75", "%", "95", "%", "100", "%"]
     assert lines[4].split() == ["gain_upper", "2", "2", "2", "4", "8", "8", "8"] and lines[5].split()[:3] == [
         "delay",
@@ -284,9 +296,12 @@ def test_margins_in_words_and_by_member():
     )
     assert found.worst().tolist() == [2, 0, 3, 1] and found.worst(2, "delay").tolist() == [2, 1]
     assert found.worst(name="gain_lower").tolist() == [2, 0, 1, 3]
-    runs = Margins("all laws", {}, {"delay": np.array([0.2, 0.1])}, np.array([True, True]), 0.01)
-    assert runs.worst(1).tolist() == [1] and "settle" not in str(runs) and runs.curve("delay")[0].tolist() == [0.1, 0.2]
-    none = Margins("all laws", {"delay": np.full(2, np.nan)}, {}, np.zeros(2, bool), 0.01)
+    runs = Margins("all laws", {}, {"delay": np.array([0.2, np.inf])}, np.array(["", ""], dtype=object), 0.01)
+    assert (
+        runs.worst(1).tolist() == [0] and "none" not in str(runs) and runs.curve("delay")[0].tolist() == [0.2, np.inf]
+    )
+    assert runs.to_dict()["runs"] == {"delay": [0.2, "inf"]} and "eigenvalues" not in runs.to_dict()
+    none = Margins("all laws", {"delay": np.full(2, np.nan)}, {}, np.array(["failed", "failed"], dtype=object), 0.01)
     assert np.isnan(none.percentiles()["delay"]).all() and len(none.percentiles()["delay"]) == 7
     assert [len(column) for column in none.curve("delay")] == [0, 0]
 
@@ -316,74 +331,20 @@ def test_edges_are_found_from_any_guess(guess):
     assert np.isnan(nobody).all()
 
 
-class Bench:
-    """Stands for the bench of two actuators: signals that swing by given sizes in each third of a run."""
-
-    every = 2
-
-    def __init__(self, rates, commands):
-        self.rates, self.commands, self.asked = rates, commands, []
-        self.plan = SimpleNamespace(grid=SimpleNamespace(h=0.1), due=lambda k0, k1: (0, 5))
-
-    def run(self, places, motion, k0, k1, values, watch):
-        self.asked.append((places, motion, k0, k1, values))
-        looks = (k1 - k0) // self.every
-        third = np.minimum(3 * np.arange(looks) // looks, 2)
-        side = np.where(np.arange(looks) % 2 == 0, 0.5, -0.5)[:, None, None]
-        rate = side * np.array(self.rates)[:, third].T[:, :, None] * np.ones(3)
-        command = side * np.array(self.commands)[:, third].T[:, :, None] * np.array([10.0, 0.0])
-        for first in range(0, looks, 4):
-            some = slice(first, first + 4)
-            watch(5 + first, {"angular_velocity": rate[some], "command": command[some]})
-        return motion
-
-
-@pytest.mark.parametrize(("rates", "commands", "settles"), [
-    ((1.0, 0.8, 0.7), (1.0, 0.8, 0.7), True), ((1.0, 0.8, 0.78), (1.0, 0.8, 0.7), False),
-    ((1.0, 0.8, 0.7), (1.0, 0.8, 0.8), False), ((1.0, 1e-7, 1e-7), (1.0, 1e-7, 2e-7), True),
-    ((1.0, 2e-6, 2e-6), (1.0, 1e-7, 1e-7), False),
+@pytest.mark.parametrize(("thirds", "settles", "near"), [
+    ((1.0, 0.8, 0.6), True, False), ((1.0, 0.8, 0.7), True, True), ((1.0, 0.8, 0.78), False, True),
+    ((1.0, 3e-7, 3e-7), True, True), ((1.0, 2e-6, 2e-6), False, True),
+    # It grows until something holds it, where it swings by chance a little less; or shrinks to what is no more small.
+    ((0.01, 3.0, 2.8), False, True), ((1.0, 1.3, 1.1), False, True), ((300.0, 30.0, 10.0), False, False),
+    # Nothing but round-off swings, or nothing at all, or no number is left.
+    ((0.0, 0.0, 0.0), True, False), ((1e-12, 1e-12, 2e-12), True, False), ((np.inf, np.nan, np.nan), False, False),
 ])  # fmt: skip
-def test_loops_settle_where_their_envelope_shrinks(monkeypatch, rates, commands, settles):
-    bench, n = Bench([rates, (1.0, 0.5, 0.1)], [commands, (1.0, 0.5, 0.1)]), 2
-    monkeypatch.setattr(loops, "delayed", lambda bench, motion, k0, steps: motion)
-    study = SimpleNamespace(bench=bench, begin=4, steps=60, tilt=0.01, limits=np.array([10.0, 5.0]))
-    one = loops.Loops.__new__(loops.Loops)
-    one.study, one.places = study, np.array([7, 8, 9])
-    eye = np.tile(np.eye(3), (3, 1, 1))
-    one.motion = Motion(np.zeros((3, 3)), eye, np.zeros((3, 3)), np.zeros((3, 3)), {})
-    some = np.array([2, 0])
-    assert one.settle(np.array([1.0, 2.0]), np.array([3, 4]), some).tolist() == [settles, True]
-    ((places, motion, k0, k1, values),) = bench.asked
-    assert places.tolist() == [9, 7] and (k0, k1) == (4, 64) and len(motion.position) == n
-    assert values[loops.FACTOR].tolist() == [1.0, 2.0] and values[loops.DELAY] == pytest.approx([0.3, 0.4])
-    angle = np.arccos(0.5 * (np.trace(motion.attitude, axis1=1, axis2=2) - 1.0))
-    assert angle == pytest.approx([0.01 * math.sqrt(3.0)] * 2, rel=1e-6)
+def test_loops_settle_where_their_envelope_shrinks(thirds, settles, near):
+    found = loops.shrinks(np.array([thirds, (1.0, 0.5, 0.1)]).T, 0.1)
+    assert [each.tolist() for each in found] == [[settles, True], [near, False]]
 
 
-def test_the_size_of_a_command_is_its_part_of_the_limit(monkeypatch):
-    """A large actuator's command shrinks, a small one's grows: of its limit the small one swings more."""
-    bench = Bench([(1.0, 0.5, 0.1)], [(1.0, 1.0, 1.0)])
-
-    def run(places, motion, k0, k1, values, watch):
-        looks = (k1 - k0) // 2
-        third = np.minimum(3 * np.arange(looks) // looks, 2)
-        side = np.where(np.arange(looks) % 2 == 0, 0.5, -0.5)[:, None, None]
-        command = side * np.array([[[100.0, 1.0]], [[50.0, 1.1]], [[10.0, 1.2]]])[third]
-        watch(
-            5,
-            {
-                "angular_velocity": side * np.array([1.0, 0.5, 0.1])[third][:, None, None] * np.ones(3),
-                "command": command,
-            },
-        )
-        return motion
-
-    bench.run = run
-    monkeypatch.setattr(loops, "delayed", lambda bench, motion, k0, steps: motion)
-    one = loops.Loops.__new__(loops.Loops)
-    one.study = SimpleNamespace(bench=bench, begin=4, steps=60, tilt=0.01, limits=np.array([1000.0, 1.0]))
-    one.places = np.array([0])
-    one.motion = Motion(np.zeros((1, 3)), np.eye(3)[None], np.zeros((1, 3)), np.zeros((1, 3)), {})
-    assert not one.settle(np.ones(1), np.zeros(1, int), np.array([0]))[0]
-    one.study.limits = np.array([1.0, 1000.0])
-    assert one.settle(np.ones(1), np.zeros(1, int), np.array([0]))[0]
+def test_a_command_is_at_its_limit_where_it_could_be_more():
+    command = np.array([[0.0, 0.35, -0.35, 0.34, 1e5, np.nan]])
+    limits = np.array([[0.0, 0.35, 0.35, 0.35, np.inf, 0.35]])
+    assert loops.at_limit(command, limits).tolist() == [[False, True, True, False, False, False]]

@@ -1,0 +1,258 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Loops of many members at their steady motions: which have one, why others have none, and whether a run settles."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.physics.control.loop_gain import FACTOR, with_factor
+from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.studies.linear.bench import Bench, Motion
+from lgvi_warp.studies.linear.sampled_loop import DELAY, delayed
+
+# Why a member has no margins; "" where it has.
+UNSETTLED, FAILED, IDLE, LIMITED = "does not settle", "failed", "moves nothing", "at its limit: "
+# What repeats after a period to this, in m/s, rad/s and parts of 1, is steady.
+REPEATS = 1e-6
+# A command so near to its limit, as a part of it, is at it.
+AT_LIMIT = 1e-9
+# The envelope of a loop that settles shrinks at least so much from the second third of a run to the last.
+SHRINKS = 0.97
+# Where it shrinks by less than this the edge is near, and a run of 1.5 times the length is judged as well.
+NEAR = 0.8
+# What swings by less than this part of its first third, or of the tilt, has settled: what is left is round-off.
+SETTLED = 1e-6
+# What swings by more tilts than this in the last third, or ends so far aside, has not settled.
+TILTS = 10.0
+# Looks of a run below which its thirds show no envelope.
+LEAST_LOOKS = 30
+
+
+class Study:
+    """Members whose factor and delay are their own.
+
+    Args:
+        fleet: the members.
+        loop: key of the law; None for all laws.
+        about: time after which loops are looked at [s].
+        settle: longest time after which those are that settle later [s].
+        seconds: length of the runs [s].
+        tilt: angle by which runs begin aside [rad].
+        method: as of `lw.solve`.
+        h: step [s].
+
+    Attributes:
+        bench: what makes the steps.
+        begin: steps until loops are looked at.
+        last: steps until they are looked at last.
+        looks: looks of a run.
+    """
+
+    def __init__(
+        self,
+        fleet: Ensemble,
+        loop: str | None,
+        about: float,
+        settle: float,
+        seconds: float,
+        tilt: float,
+        method: Any,
+        h: float,
+    ):
+        scene: Any = fleet.scene
+        controller, period = scene.controller, float(scene.controller.period)
+        # With some delay in the scene, commands may be delayed in any lane.
+        laws = with_factor(controller.laws, loop)
+        acted = replace(controller, laws=laws, delay=controller.delay if controller.delay > 0.0 else period)
+        first, looks = (max(1, round(time / period)) for time in (about, seconds))
+        last = max(first, round(settle / period))
+        inside = fleet.in_scene(replace(scene, controller=acted, events=()), (FACTOR, DELAY))
+        self.fleet, self.tilt, self.nominal = fleet, tilt, float(controller.delay)
+        length = (last + 1 + looks + looks // 2) * period
+        self.bench = Bench(inside, method, h, length, period, (*FIELDS, "command"))
+        self.begin, self.last, self.looks = first * self.bench.every, last * self.bench.every, looks
+        self.channels = {key: term.channels for key, term in controller.actuators.items()}
+
+    def loops(self, places: np.ndarray) -> tuple[list[Loops], np.ndarray]:
+        """The loops of some members, at their steady motions.
+
+        Those whose motion does not repeat after `about`, or that are at a limit, go on for twice the time, and again.
+
+        Args:
+            places: (n,), which members.
+
+        Returns:
+            Loops of the members that settle, those after the same time together; and (n,), why others do not, "" for these.
+        """
+        bench, n, found = self.bench, len(places), list[Loops]()
+        own = self.fleet.subset(places).parameters(0, n)
+        h = bench.plan.grid.h
+        delay = np.broadcast_to(np.rint(np.asarray(own.get(DELAY, self.nominal)) / h).astype(np.int64), (n,))
+        limits = np.concatenate([np.broadcast_to(own[f"{key}.limit"], (n, c)) for key, c in self.channels.items()], 1)
+        why: np.ndarray = np.full(n, UNSETTLED, dtype=object)
+        left, due = np.arange(n), self.begin
+        while True:
+            # Each time from the start: of commands that are on their way, members remember as many as those beside them.
+            latest: deque[np.ndarray] = deque(maxlen=2)
+            numbers = {FACTOR: np.ones(len(left)), DELAY: delay[left] * h}
+            end = due + bench.every
+            motion = bench.run(places[left], None, 0, end, numbers, lambda _, values: latest.extend(_told(values)[-2:]))
+            steady = (_apart(latest[1], latest[0], limits[left]) <= REPEATS).all(axis=1)
+            limited = at_limit(latest[1][:, 9:], limits[left])
+            alive = np.isfinite(motion.position).all(axis=1)
+            why[left] = [self._reason(*each) for each in zip(alive, steady, limited, strict=True)]
+            well = why[left] == ""
+            if well.any():
+                some = left[well]
+                those = places[some], delay[some], limits[some], motion.of(well), latest[1][well]
+                found.append(Loops(self, *those, end))
+            left = left[~well & alive]
+            if due == self.last or not len(left):
+                return found, why
+            due = min(2 * due, self.last)
+
+    def _reason(self, alive: bool, steady: bool, limited: np.ndarray) -> str:
+        if not (alive and steady):
+            return UNSETTLED if alive else FAILED
+        names = [f"{key}[{i}]" for key, count in self.channels.items() for i in range(count)]
+        at = ", ".join(name for name, bad in zip(names, limited, strict=True) if bad)
+        return f"{LIMITED}{at}" if at else ""
+
+
+def _told(values: Mapping[str, np.ndarray]) -> np.ndarray:
+    """What must repeat, of samples: velocities, rates, down and commands, (k, m, 9 + channels)."""
+    down = values["attitude"][..., 2, :]
+    return np.concatenate([values["velocity"], values["angular_velocity"], down, values["command"]], axis=-1)
+
+
+def at_limit(command: np.ndarray, limits: np.ndarray) -> np.ndarray:
+    """Which commands (m, channels) are at their limits: not those that can be nothing but 0.
+
+    Args:
+        command: the commands.
+        limits: the largest ones.
+
+    Returns:
+        (m, channels).
+    """
+    return np.asarray((limits > 0.0) & (np.abs(command) >= limits * (1.0 - AT_LIMIT)))
+
+
+def _apart(told: np.ndarray, other: np.ndarray, limits: np.ndarray) -> np.ndarray:
+    """How far what must repeat is apart (m, 9 + channels): of what is large, as a part of its size."""
+    size = np.maximum(1.0, np.abs(other))
+    size[:, 9:] = np.minimum(size[:, 9:], np.maximum(limits, np.finfo(float).tiny))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.abs(told - other) / size)
+
+
+class Loops:
+    """Loops at their steady motions, to be asked whether they settle with other numbers.
+
+    Args:
+        study: the members.
+        places: (n,), which of them.
+        delay: (n,), their own delays, in steps.
+        limits: (n, channels), the largest commands.
+        motion: their motions.
+        told: (n, 9 + channels), velocities, rates, down and commands of these.
+        begin: steps made until then.
+    """
+
+    def __init__(
+        self,
+        study: Study,
+        places: np.ndarray,
+        delay: np.ndarray,
+        limits: np.ndarray,
+        motion: Motion,
+        told: np.ndarray,
+        begin: int,
+    ):
+        self.study, self.places, self.delay = study, places, delay
+        self.limits, self.motion, self.told, self.begin = np.maximum(limits, 1e-12), motion, told, begin
+
+    def return_to_it(self) -> np.ndarray:
+        """Whether loops as they are come back to their motions, by a run.
+
+        Returns:
+            (n,).
+        """
+        every = np.arange(len(self.places))
+        well, last = self._judged(np.ones(len(every)), self.delay, every)
+        near = _apart(last, self.told, self.limits) <= TILTS * self.study.tilt
+        return np.asarray(well & near.all(axis=1))
+
+    def settle(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> np.ndarray:
+        """Whether loops settle, by a run.
+
+        Args:
+            factor: (m,), factors on the demand.
+            steps: (m,), delays in steps.
+            some: (m,), which of the members.
+
+        Returns:
+            (m,).
+        """
+        return self._judged(factor, steps, some)[0]
+
+    def _judged(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Whether loops settle, and what `_told` tells after the run."""
+        looks = self.study.looks
+        settled, near, last = self._run(factor, steps, some, looks)
+        again = np.flatnonzero(settled & near)
+        if len(again):
+            settled[again] = self._run(factor[again], steps[again], some[again], looks + looks // 2)[0]
+        return settled, last
+
+    def _run(
+        self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray, looks: int
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Whether loops settle in so many looks, whether they shrink by little, and what `_told` tells at the end."""
+        bench, tilt, limits, m = self.study.bench, self.study.tilt, self.limits[some], len(some)
+        k0, k1 = self.begin, self.begin + looks * bench.every
+        by = np.zeros((m, 12))
+        by[:, 3:6] = tilt
+        motion = delayed(bench, self.motion.of(some), k0, steps).moved(by)
+        highest, first = np.full((3, m, 3 + limits.shape[1]), -np.inf), bench.plan.due(k0, k0)[1]
+        lowest, last = -highest, np.zeros((m, 9 + limits.shape[1]))
+
+        def watch(sample: int, values: Mapping[str, np.ndarray]) -> None:
+            signals = np.concatenate([values["angular_velocity"], values["command"] / limits], axis=2)
+            third = np.minimum((sample - first + np.arange(len(signals))) // (looks // 3), 2)
+            for w in np.unique(third):
+                highest[w] = np.fmax(highest[w], signals[third == w].max(axis=0))
+                lowest[w] = np.fmin(lowest[w], signals[third == w].min(axis=0))
+            last[:] = _told(values)[-1]
+
+        after = bench.run(self.places[some], motion, k0, k1, {FACTOR: factor, DELAY: steps * bench.plan.grid.h}, watch)
+        settled = np.isfinite(after.position).all(axis=1) & ~at_limit(last[:, 9:], limits).any(axis=1)
+        near, swing = np.zeros(m, bool), highest - lowest
+        for sizes in (np.linalg.norm(swing[..., :3], axis=2), np.linalg.norm(swing[..., 3:], axis=2)):
+            well, little = shrinks(sizes, tilt)
+            settled &= well
+            near |= little
+        return settled, near, last
+
+
+def shrinks(swing: np.ndarray, tilt: float) -> tuple[np.ndarray, np.ndarray]:
+    """Whether what swings settles.
+
+    Args:
+        swing: (3, m), how far in each third of a run.
+        tilt: the angle by which the run began aside [rad].
+
+    Returns:
+        ((m,) whether it settles, (m,) whether it shrinks by little).
+    """
+    first, second, last = swing
+    still = last <= SETTLED * tilt
+    with np.errstate(invalid="ignore"):
+        less = (last < SHRINKS * second) | (second < SETTLED * first)
+    return still | (less & (last < first) & (last < TILTS * tilt)), ~still & (last > NEAR * second)

@@ -13,6 +13,7 @@ from lgvi_warp.engine.keepers.observation import Observation
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.scene import plausibility
 from lgvi_warp.scene.ensemble import AT_ONCE, SURVEYED
+from lgvi_warp.scene.functions import functions_of, identities
 
 
 def messages(plan: Plan) -> tuple[str, ...]:
@@ -61,6 +62,8 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
         "versions": machine.versions(),
         "machine": machine.describe() | {"width_source": plan.width_source},
     }
+    own = identities(functions_of(plan.ensemble, observed.statistics if observed is not None else ()))
+    content |= {"functions": own} if own else {}
     if observed is not None and observed != Observation():
         kept = {} if observed.samples else {"fields": list(plan.fields if fields is None else fields)}
         content["observed"] = observed.to_dict() | kept

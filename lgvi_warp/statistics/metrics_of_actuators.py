@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest, refusal
+from lgvi_warp.common.identity import check_version
 from lgvi_warp.common.real_numbers import NotReal, real_results
 from lgvi_warp.physics.control.signals import CHANNELS, SAVED, SIGNALS, ordered
 from lgvi_warp.physics.fields import TABLE
@@ -257,6 +258,8 @@ class OwnMetric(Metric):
         fields: names of the samples that the function reads, as for lw.SaveAt.
         last: function of the last state that returns the metric (n,); by default the state itself.
         unit_of: unit of the metric, a text; by default "1".
+        version: what tells the functions from others in sweeps and stores, a text or a number, changed whenever they do; by
+            default None: what their code says.
     """
 
     type: ClassVar[str] = "own_metric"
@@ -264,12 +267,14 @@ class OwnMetric(Metric):
     fields: Any = ("position",)
     last: Callable[[np.ndarray], np.ndarray] | None = None
     unit_of: str = "1"
+    version: Any = None
 
     def check(self, faults: Faults) -> None:
         """Note fields that there are not."""
         super().check(faults)
         for name in self.fields:
             faults.choice("fields", name, SAVED)
+        check_version(faults, self.version)
 
     def meant(self) -> Quantity:
         """Return the samples that the function reads."""

@@ -128,11 +128,18 @@ def _write(runs: list[Drawn], path: Path | None, address: str | None) -> None:
     box = box_of(runs)
     recording = rr.RecordingStream(f"lgvi_warp_{name}", recording_id=name)
     sinks = ([rr.FileSink(path)] if path else []) + ([rr.GrpcSink(address)] if address else [])
-    try:
+
+    def written() -> None:
         recording.set_sinks(*sinks, default_blueprint=layout(runs, box, scale_of(runs[0], box)))
         _send(recording, runs, laid_out=True)
         recording.flush()
         recording.disconnect()
+
+    try:
+        if address:
+            viewer.watched(written, address)
+        else:
+            written()
     except RuntimeError as error:
         # rerun raises it for a writer that could not start or continue, and prints the reason on stderr.
         text = f"the recording could not be written ({error}); is the disk full, or the folder read-only?"

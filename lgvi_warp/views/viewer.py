@@ -7,8 +7,9 @@ import os
 import socket
 import subprocess
 import tempfile
+import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -20,10 +21,14 @@ PORT = 9876
 ADDRESS = f"rerun+http://127.0.0.1:{PORT}/proxy"
 # Time to wait for a viewer at an address, and for one to end that cannot start [s].
 PATIENCE, STARTED = 10.0, 3.0
-# What a client of HTTP/2 sends first, and the empty table of settings that follows (RFC 9113, sections 3.4 and 6.5).
-GREETING = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes((0, 0, 0, 4, 0, 0, 0, 0, 0))
-# Length of a frame's head, and the place and number of the type of one with settings.
-HEAD, TYPE, SETTINGS = 9, 3, 4
+# What a client of HTTP/2 sends first (RFC 9113, section 3.4).
+GREETING = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
+# Length of a frame's head (section 4.1), and numbers of types of frames (section 6).
+HEAD, DATA, HEADERS, RESET, SETTINGS, GOODBYE = 9, 0, 1, 3, 4, 7
+END_STREAM, END_HEADERS = 1, 4
+# The call by which recordings come to a viewer. One of no message changes nothing, and is answered by an empty one.
+CALL = "/rerun.sdk_comms.v1alpha1.MessageProxyService/WriteMessages"
+EMPTY_ANSWER = bytes(5)
 
 
 def rerun() -> Any:
@@ -106,16 +111,75 @@ def is_open() -> bool:
 
 
 def _greeted(address: str) -> bool:
-    """Whether what listens at an address speaks HTTP/2, as viewers do. Raises OSError where nothing listens."""
+    """Whether what listens at an address takes recordings, as viewers do. Raises OSError where nothing listens."""
     parts = urlsplit(address)
-    with socket.create_connection((parts.hostname or "", parts.port or PORT), PATIENCE) as connection:
-        connection.settimeout(STARTED)
+    place = parts.hostname or "", parts.port or PORT
+    names = {":method": "POST", ":scheme": "http", ":path": CALL, ":authority": f"{place[0]}:{place[1]}",
+             "content-type": "application/grpc", "te": "trailers"}  # fmt: skip
+    # Each as it is, without a table of known ones (RFC 7541, section 6.2.2).
+    head = b"".join(b"\0" + _text(name) + _text(value) for name, value in names.items())
+    asked = _frame(SETTINGS, 0, 0), _frame(HEADERS, END_HEADERS, 1, head), _frame(DATA, END_STREAM, 1)
+    with socket.create_connection(place, PATIENCE) as connection:
         try:
-            connection.sendall(GREETING)
-            head = connection.recv(HEAD)
+            connection.sendall(GREETING + b"".join(asked))
+            return any(content == EMPTY_ANSWER for kind, content in _frames(connection) if kind == DATA)
         except OSError:
             return False
-    return len(head) == HEAD and head[TYPE] == SETTINGS
+
+
+def _text(text: str) -> bytes:
+    if len(text) > 126:  # its length would take more than a byte (RFC 7541, section 5.1)
+        raise ValueError("the name is too long")
+    return bytes((len(text),)) + text.encode()
+
+
+def _frame(kind: int, flags: int, stream: int, content: bytes = b"") -> bytes:
+    return len(content).to_bytes(3, "big") + bytes((kind, flags)) + stream.to_bytes(4, "big") + content
+
+
+def _frames(connection: socket.socket) -> Iterator[tuple[int, bytes]]:
+    """Types and contents of the frames of an answer, up to its end and for as long as `STARTED`."""
+    end, read = time.monotonic() + STARTED, b""
+    while (left := end - time.monotonic()) > 0.0:
+        connection.settimeout(left)
+        more = connection.recv(2**14)
+        read += more
+        while len(read) >= HEAD and len(read) >= (size := HEAD + int.from_bytes(read[:3], "big")):
+            kind, ended = read[3], read[4] & END_STREAM and read[3] in (DATA, HEADERS)
+            yield kind, read[HEAD:size]
+            read = read[size:]
+            if ended or kind in (RESET, GOODBYE):
+                return
+        if not more or len(read) > 2**15:
+            return
+
+
+def watched(send: Callable[[], None], address: str) -> None:
+    """Send to a viewer for as long as it answers: rerun would wait without end for one that does not.
+
+    Args:
+        send: sends everything.
+        address: of the viewer.
+
+    Raises:
+        OSError: the viewer does not answer any more.
+    """
+    raised: list[BaseException] = []
+
+    def sending() -> None:
+        try:
+            send()
+        except BaseException as error:
+            raised.append(error)
+
+    thread = threading.Thread(target=sending, name="viewer", daemon=True)
+    thread.start()
+    while thread.is_alive():
+        thread.join(PATIENCE)
+        if thread.is_alive() and not answers(address):
+            raise OSError(f"to = {address!r}: the viewer does not answer any more")
+    if raised:
+        raise raised[0]
 
 
 def start(words: Sequence[str | Path], remedy: str) -> None:

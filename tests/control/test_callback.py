@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A law that is a Python function: the same motion as the law in the kernel, and what it says where it fails."""
 
+import threading
+
 import numpy as np
 import pytest
 
@@ -93,15 +95,130 @@ def mended(t, y, r, members):
 
 
 def test_a_stopped_run_goes_on_with_the_mended_function(tmp_path):
+    """It is another function than the run began with: that is refused, or taken and told."""
     settings, mended.now = dict(method="psi_s", h=H, t1=1.0, threads=1), False
     with pytest.raises(RuntimeError, match="no solution"):
         lw.solve(scene([lw.Callback(mended)], 300), **settings, store=tmp_path / "run.zarr")
     with pytest.raises(lw.SceneError, match=r"lw\.resume\(path, fleet\)"):
         lw.resume(tmp_path / "run.zarr")
     mended.now = True
-    resumed = lw.resume(tmp_path / "run.zarr", scene([lw.Callback(mended)], 300), threads=1)
+    fleet = scene([lw.Callback(mended)], 300)
+    with pytest.raises(lw.SceneError, match=r"functions\.laws\.callback is .*force=True"):
+        lw.resume(tmp_path / "run.zarr", fleet, threads=1)
+    resumed = lw.resume(tmp_path / "run.zarr", fleet, threads=1, force=True)
+    assert any("continued although functions.laws.callback is" in text for text in resumed.messages)
     whole = lw.solve(scene([lw.Callback(heading)], 300), **settings)
     assert np.array_equal(resumed.position, whole.position)
+
+
+@pytest.mark.parametrize("version", [None, "1"])
+def test_a_run_goes_on_with_its_function_alone(tmp_path, version):
+    """A function of the same name, gain and all but one number in a closure is another one, unless its version is given."""
+    path, settings = tmp_path / "run.zarr", dict(method="psi_s", h=H, t1=0.2, threads=1)
+    first, same, other = (scene([lw.Callback(turning(k), version=version)], 300) for k in (1.0, 1.0, 2.0))
+    lw.solve(first, **settings, store=lw.Store(path), only=range(1))
+    if version is None:
+        for existing in (lambda: lw.resume(path, other), lambda: lw.solve(other, **settings, store=lw.Store(path, existing="resume"))):
+            with pytest.raises(lw.SceneError, match=r"functions\.laws\.callback is .*go on with the functions"):
+                existing()
+    resumed = lw.resume(path, same if version is None else other, threads=1)
+    assert not any("functions" in text or "version" in text for text in resumed.messages)
+    assert (version is None) == np.array_equal(resumed.position, lw.solve(first, **settings).position)
+
+
+def test_a_function_that_cannot_be_compared_is_noted(tmp_path):
+    path, settings, lock = tmp_path / "run.zarr", dict(method="psi_s", h=H, t1=0.2, threads=1), threading.Lock()
+
+    def locked(t, y, r, members):
+        with lock:
+            return heading(t, y, r, members)
+
+    fleet = scene([lw.Callback(locked)], 300)
+    lw.solve(fleet, **settings, store=lw.Store(path), only=range(1))
+    assert any("laws.callback" in text and "version" in text for text in lw.resume(path, fleet).messages)
+
+
+def turning(k):
+    """A law whose gain is in a closure."""
+
+    def law(t, y, r, members):
+        return k * heading(t, y, r, members)
+
+    return law
+
+
+def shares(cases, folder=None, metrics=("iae heading",), **more):
+    """Metrics by case of a sweep of the scene; and how often each case asked its function."""
+    settings = dict(metrics=list(metrics), h=H, t1=0.5, method="psi_s", out=folder, **more)
+    found = lw.sweep(scene([lw.Callback(heading)], 4), cases, **settings)
+    return {case.name: found.values(case.name, list(found.metrics)[0]) for case in found.setup.cases}
+
+
+def truth(function):
+    """The metric of a run with this function, outside any sweep."""
+    metric = lw.IAE("heading", then=[lw.Each()])
+    return lw.solve(scene([lw.Callback(function)], 4), "psi_s", h=H, t1=0.5, keep="none", statistics=[metric]).statistics[
+        "each iae heading"].value[0, 0]  # fmt: skip
+
+
+def replacing(**functions):
+    """Cases of other functions."""
+    return [lw.Case(name, replace={"laws": [lw.Callback(function)]}) for name, function in functions.items()]
+
+
+@pytest.mark.parametrize("on_disk", [False, True])
+def test_a_sweep_runs_each_function(tmp_path, on_disk):
+    """Functions of one name: closures of a factory, and lambdas."""
+    folder = tmp_path if on_disk else None
+    weak, strong, lazy = turning(0.1), turning(0.3), lambda t, y, r, members: 0.0 * heading(t, y, r, members)
+    busy = lambda t, y, r, members: 0.2 * heading(t, y, r, members)  # noqa: E731
+    functions = dict(weak=weak, strong=strong, lazy=lazy, busy=busy)
+    for _ in range(2):  # once more what is in the folder
+        found = shares(replacing(**functions), folder)
+        for name, function in functions.items():
+            np.testing.assert_array_equal(found[name], truth(function), err_msg=name)
+    assert len({values.tobytes() for values in found.values()}) == 4
+
+
+def test_a_sweep_goes_on_with_what_is_the_same(tmp_path):
+    """A second call runs no cell of the same functions, and every cell of another one."""
+    known = {}
+    for gains, new in (((0.1, 0.2), 2), ((0.1, 0.2), 0), ((0.1, 0.3), 1), ((0.3, 0.1), 0)):
+        shares(replacing(one=turning(gains[0]), other=turning(gains[1])), tmp_path)
+        files = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "cells").iterdir()}
+        assert len(files) == len(known) + new and files.items() >= known.items()
+        known = files
+
+
+def test_a_sweep_shares_nothing_in_doubt(tmp_path):
+    lock = threading.Lock()
+
+    def locked(k):
+        def law(t, y, r, members):
+            with lock:
+                return k * heading(t, y, r, members)
+
+        return law
+
+    functions = dict(one=locked(1.0), other=locked(2.0))
+    for folder in (None, tmp_path, tmp_path):
+        found = shares(replacing(**functions), folder)
+        for name, function in functions.items():
+            np.testing.assert_array_equal(found[name], truth(function), err_msg=name)
+    assert not list(tmp_path.rglob("*.npz"))
+
+
+def test_a_changed_metric_is_run_anew(tmp_path):
+    """What a function of `OwnMetric` names, holds and leaves at the end."""
+
+    def of(k, method):
+        return lambda state, look: getattr(np, method)(look["position"][:, 0] if state is None else state, k)
+
+    metrics = [lw.OwnMetric(of(k, method), name="own", last=last) for k, method, last in (
+        (1.0, "maximum", None), (1.0, "minimum", None), (2.0, "maximum", None), (1.0, "maximum", np.negative))]  # fmt: skip
+    # The states begin at 0: max(0, 1), min(0, 1), max(0, 2), -max(0, 1).
+    for metric, value in zip(metrics, (1.0, 0.0, 2.0, -1.0), strict=True):
+        assert shares([{"name": "one"}], tmp_path, [metric])["one"] == pytest.approx(np.full(4, value), abs=1e-3)
 
 
 SMC = dict(lambda_=0.4, boundary=0.1, k_sigma=0.05, k_d=0.5, nomoto_time=1.5, anti_windup="none")

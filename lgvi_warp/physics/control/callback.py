@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.common.identity import check_version
 from lgvi_warp.physics.control.base import Allocation, ControlLaw
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext
 
@@ -29,6 +30,8 @@ class Callback(ControlLaw):
         function: The function; it must be picklable where other processes run it.
         to: Key of a term: then the function returns the commands of its channels, (m, channels), and no law or allocation
             acts on them. None, the default, for demands.
+        version: What tells the function from others in sweeps and stores, a text or a number, changed whenever the function
+            does. None, the default: what its code says. Give one where it reads files, or holds what cannot be compared.
     """
 
     type: ClassVar[str] = "callback"
@@ -36,9 +39,17 @@ class Callback(ControlLaw):
 
     function: Callable[..., Any] | None = None
     to: str | None = None
+    version: Any = None
 
-    def __init__(self, function: Callable[..., Any] | None = None, *, to: str | None = None, name: str = "") -> None:
-        for key, value in (("function", function), ("to", to), ("name", name)):
+    def __init__(
+        self,
+        function: Callable[..., Any] | None = None,
+        *,
+        to: str | None = None,
+        version: str | int | float | None = None,
+        name: str = "",
+    ) -> None:
+        for key, value in (("function", function), ("to", to), ("version", version), ("name", name)):
             object.__setattr__(self, key, value)
         super().__post_init__()
 
@@ -46,11 +57,13 @@ class Callback(ControlLaw):
         """Adds a fault where there is no function."""
         if not callable(self.function):
             faults.add("function", self.function, PROBLEM if self.function is None else "is no function", REMEDY)
+        check_version(faults, self.version)
 
     def to_dict(self) -> dict[str, Any]:
         """Its type and the name of its function, which a scene file cannot hold."""
         name = getattr(self.function, "__qualname__", repr(self.function))
-        return {"type": self.type, "function": name} | ({"to": self.to} if self.to else {})
+        given = {"to": self.to or None, "version": self.version}
+        return {"type": self.type, "function": name} | {key: value for key, value in given.items() if value is not None}
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The place of the host's answer in the memory."""

@@ -61,6 +61,7 @@ class Folder:
         found: Blocks that this process found finished.
         ran: Blocks that this process ran.
         ran_kept: Blocks of kept members that this process ran.
+        noted: What cannot be promised of going on with it.
 
     Raises:
         SceneError: If there is no store, or its metadata is damaged.
@@ -90,6 +91,7 @@ class Folder:
             self.layout = store_check.layout_of(content, int(self.recipe["members"]))
         # Blocks that this process found finished, those that it ran, and those of kept members that it ran.
         self.found, self.ran, self.ran_kept = 0, 0, 0
+        self.noted: tuple[str, ...] = ()
 
     def _root(self) -> Any:
         """Read the root's metadata. Raises ValueError, SceneError, OSError."""

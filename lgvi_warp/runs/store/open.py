@@ -25,6 +25,8 @@ from lgvi_warp.runs.store.folder import KEPT, ROOT, Folder
 from lgvi_warp.runs.store.kept import keep_of, members_kept
 from lgvi_warp.runs.store.layout import KEPT_MEMBER, MEMBER
 from lgvi_warp.runs.store.layout_check import understood
+from lgvi_warp.runs.store.recipe import noted_functions
+from lgvi_warp.scene.functions import functions_of, identities
 from lgvi_warp.statistics.estimate import Estimates
 
 if TYPE_CHECKING:
@@ -169,7 +171,9 @@ def open_run(
         return result_of(folder, members, messages)
     with understood(folder.path / ROOT):
         observed = observation_of(observed_content, statistics)
-    return result_of(folder, None, messages, observing=gathered(folder, observed))
+    now = {"functions": identities(functions_of(None, observed.statistics))}
+    noted = noted_functions(folder.provenance, now)
+    return result_of(folder, None, (*messages, *noted), observing=gathered(folder, observed))
 
 
 def times_of(folder: Folder) -> np.ndarray:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.identity import UNKNOWN, comparable
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics.fields import FIELDS
@@ -194,20 +195,43 @@ def same_run(
     Returns:
         A text for each difference: the key and both values.
     """
+    found = [*differences(_comparable(stored), _comparable(now)), *_functions(stored, now)[0]]
     return [
         f"{key} is {first!r} in {name} and {second!r} {f'in {other}' if other else 'here'}"
-        for key, first, second in differences(_comparable(stored), _comparable(now))
+        for key, first, second in found
     ]
 
 
+# What is said of functions whose code does not tell which they are.
+UNTOLD = "cannot be compared with what the run began with; give it a version, as lw.Callback(function, version=1)"
+
+
+def _functions(stored: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[list[tuple[str, str, str]], list[str]]:
+    """The user's functions that differ between two provenances, as of `differences`; and those that cannot be compared."""
+    there, here = stored.get("functions", {}), now.get("functions", {})
+    differ, untold = list[tuple[str, str, str]](), list[str]()
+    for name in dict.fromkeys([*there, *here]):
+        one, other = there.get(name, UNKNOWN), here.get(name, UNKNOWN)
+        if not comparable(one, other):
+            untold.append(name)
+        elif one != other:
+            differ.append((f"functions.{name}", one, other))
+    return differ, untold
+
+
 def _comparable(provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """Provenance without what changes no bit: threads, Python, the scene's [ensemble], [run] and shape, a file's place."""
+    """Provenance without what changes no bit: threads, Python, the scene's [ensemble], [run] and shape, a file's place.
+
+    The user's functions are compared elsewhere.
+    """
     scene = {key: value for key, value in provenance["scene"].items() if key not in ("ensemble", "run")}
     scene["vehicle"] = {key: value for key, value in scene["vehicle"].items() if key != "shape"}
     machine = {key: value for key, value in provenance["machine"].items() if key in ("cpu", "simd")}
     versions = {key: value for key, value in provenance["versions"].items() if key != "python"}
     ensemble = _without_place(provenance["ensemble"])
-    return {**provenance, "scene": scene, "machine": machine, "versions": versions, "ensemble": ensemble}
+    compared = {**provenance, "scene": scene, "machine": machine, "versions": versions, "ensemble": ensemble}
+    compared.pop("functions", None)
+    return compared
 
 
 def _without_place(ensemble: Mapping[str, Any]) -> dict[str, Any]:
@@ -239,7 +263,7 @@ def differences(there: Any, here: Any, key: str = "") -> Iterator[tuple[str, Any
 def refuse_another(path: Any, stored: Mapping[str, Any], now: Mapping[str, Any], force: bool) -> tuple[str, ...]:
     """Check that two provenances are of the same run.
 
-    Only machine and versions can be forced: another scene or method makes another run.
+    Only machine, versions and the user's functions can be forced: another scene or method makes another run.
 
     Args:
         path: The store, which the message names.
@@ -248,17 +272,38 @@ def refuse_another(path: Any, stored: Mapping[str, Any], now: Mapping[str, Any],
         force: Whether to accept another machine or other versions.
 
     Returns:
-        Messages on differences that were accepted.
+        Messages on differences that were accepted, and on functions that cannot be compared.
 
     Raises:
         SceneError: If they are of different runs.
     """
     mismatches = same_run(stored, json.loads(json.dumps(now)))
-    machine = [text for text in mismatches if text.startswith(("machine.", "versions.", "kernel"))]
-    if mismatches and (not force or len(machine) < len(mismatches)):
+    forcible = [text for text in mismatches if text.startswith(("machine.", "versions.", "kernel", "functions."))]
+    if mismatches and (not force or len(forcible) < len(mismatches)):
         problem, remedy = "is another run", "give --overwrite, or another folder"
-        if len(machine) == len(mismatches):
+        if len(forcible) == len(mismatches):
             problem = "the same bits cannot be promised"
-            remedy = "go on where it began, or give --force and take it that some differ"
+            where = "with the functions that it had" if "functions." in " ".join(mismatches) else "where it began"
+            remedy = f"go on {where}, or give --force (force=True) and take it that some differ"
         raise SceneError(f"{path}: {text}: {problem}; {remedy}" for text in mismatches)
-    return tuple(f"continued although {text}" for text in mismatches)
+    return tuple(f"continued although {text}" for text in mismatches) + tuple(
+        f"went on with {name}, which {UNTOLD}" for name in _functions(stored, now)[1]
+    )
+
+
+def noted_functions(stored: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[str, ...]:
+    """Say which functions of a finished run's statistics are others than those that it was given.
+
+    Args:
+        stored: Provenance in the store.
+        now: "functions" of the statistics that are given now.
+
+    Returns:
+        The messages.
+    """
+    here = now["functions"]
+    there = {name: text for name, text in stored.get("functions", {}).items() if name in here}
+    differ, untold = _functions({"functions": there}, now)
+    return tuple(f"{name} is another function than the run had" for name, _, _ in differ) + tuple(
+        f"{name} {UNTOLD}" for name in untold
+    )

@@ -70,7 +70,7 @@ def resume(
     with understood(folder.path / ROOT):
         observed = observation_of(observed_content, statistics)
     observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
-    now = of_store(provenance(plan), plan.ensemble)
+    now = of_store(provenance(plan, observed), plan.ensemble)
     now |= {} if observed_content is None else {"observed": observed_content}
     messages = refuse_another(folder.path, folder.provenance, now, force)
     runner = executor_of(executor, threads, scheduler)

@@ -75,7 +75,7 @@ class StoredRun:
         check_keepers(self.keepers)
         path = self.store.folder
         with self._alone():
-            self._begin()
+            noted = self._begin()
             block_files = BlockFiles(path, columns(self.plan, self.store))
             block_files.remove_unfinished()
             self._mend()
@@ -86,6 +86,7 @@ class StoredRun:
             finally:
                 block_files.remove_unfinished()
             folder = Folder(path, self.store.whole)
+            folder.noted = noted
             folder.ran = sum(block.first < members for block in missing)
             folder.found = sum(block.first < members for block in self._runs()) - folder.ran
             beyond = [] if self.only else [block for block in self._runs() if block.first >= members]
@@ -113,8 +114,8 @@ class StoredRun:
         runs = blocks(self.plan.ensemble.members)
         return runs if self.only is None else [runs[i] for i in self.only]
 
-    def _begin(self) -> None:
-        """Make the folder, or check that what lies there is this run."""
+    def _begin(self) -> tuple[str, ...]:
+        """Make the folder, or check that what lies there is this run, and say what of it cannot be promised."""
         path, store = self.store.folder, self.store
         exists = os.path.lexists(path) and bool(os.listdir(path) if path.is_dir() else True)
         if exists and store.existing == "refuse":
@@ -125,15 +126,16 @@ class StoredRun:
         if exists and store.existing == "resume":
             safe_files.refuse_links(path)
             folder = Folder(path, store.whole)
-            refuse_another(path, folder.provenance, self.provenance, store.force)
+            noted = refuse_another(path, folder.provenance, self.provenance, store.force)
             recipe = folder.recipe
             for present, wanted in ((recipe["store"], store.layout()), (recipe["keepers"], names_of(self.keepers))):
                 if present != wanted:
                     raise SceneError([f"{path}: stores {present}, not {wanted}; ask for the same, or overwrite"])
-            return
+            return noted
         refuse_foreign(path)
         with explained(store.whole):
             create(store, self.plan, self.provenance, self.messages, self.keepers)
+        return ()
 
     def _mend(self) -> None:
         """Write those files anew that belong to no block and are damaged."""

@@ -77,7 +77,7 @@ def run_stored(
     ).run(executor, progress)
     runs = blocks(plan.ensemble.members)
     members = None if only is None else slice(runs[only[0]].first, runs[only[-1]].stop)
-    remarks = went_on(folder)
+    remarks = folder.noted + went_on(folder)
     result = result_of(folder, members, messages(plan) + remarks, plan.ensemble.scene.terms, observing)
     if remarks:
         return result  # what was measured is not the whole run

@@ -89,6 +89,8 @@ def check(attributes: Mapping[str, Any], provenance: Any, recipe: Any, messages:
         raise NotOursError(f"attribute {unknown[0][:60]!r} is not known")
     for table, rules, name in ((provenance, PROVENANCE, "provenance"), (recipe, RECIPE, "recipe")):
         _rules(name, table, rules, required=True)
+    if not _of_texts(provenance.get("functions", {})):
+        raise NotOursError("provenance.functions is no table of texts")
     if "observed" in provenance:
         _rules("observed", provenance["observed"], OBSERVED, required=False)
     if not _texts(messages) or not isinstance(shared, dict) or not all(is_text(name) for name in shared):

@@ -103,17 +103,18 @@ class Records:
             return self._kept.get(key)
         return Record.load(self.path(key))
 
-    def put(self, key: str, record: Record) -> None:
+    def put(self, key: str, record: Record, lasting: bool = True) -> None:
         """Keep a record. Refusals stay in memory: what a case lacks may be mended before the sweep goes on.
 
         Args:
             key: that of the cell.
             record: the record.
+            lasting: whether another call may take it for its own; default True.
 
         Raises:
             OSError: it cannot be written.
         """
-        if self.folder is None or record.refused:
+        if self.folder is None or record.refused or not lasting:
             self._kept[key] = record
         else:
             record.save(self.path(key))
@@ -141,9 +142,4 @@ def key_of(content: Mapping[str, Any]) -> str:
 def _plain(value: Any) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
-    code = getattr(value, "__code__", None)
-    if code is None:
-        return repr(value)
-    # Constants that are code themselves are shown by their place in memory.
-    numbers = [constant for constant in code.co_consts if isinstance(constant, int | float | str | bytes)]
-    return [value.__qualname__, code.co_code.hex(), repr(numbers)]
+    return repr(value)

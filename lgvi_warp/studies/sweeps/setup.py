@@ -6,19 +6,21 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, SceneError, refusal
+from lgvi_warp.common.identity import UNKNOWN
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.runs.predict import Prediction, predict
 from lgvi_warp.runs.result import Result
 from lgvi_warp.runs.solve import solve
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.functions import Own, ToldApart, functions_of
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics import TYPES
 from lgvi_warp.statistics.base import Statistic, from_list
@@ -48,6 +50,7 @@ class Setup:
         metrics: metrics by name, each with the number of every member.
         settings: arguments of `solve`.
         vary: distributions by name, those of numbers that only some cases have among them.
+        told: which functions of the user's it has met.
     """
 
     scene: Scene
@@ -57,6 +60,7 @@ class Setup:
     metrics: dict[str, Statistic]
     settings: dict[str, Any]
     vary: dict[Any, Any]
+    told: ToldApart = field(default_factory=ToldApart)
 
     @property
     def cells(self) -> list[tuple[Case, dict[str, Any]]]:
@@ -91,10 +95,33 @@ class Setup:
         scene = fleet.scene.to_dict()
         scene.pop("ensemble", None)
         tables = [metric.to_dict() for metric in self.metrics.values()]
-        functions = [metric.of for metric in self.metrics.values() if callable(metric.of)]
+        functions = {place: self.told.name(own) for place, own in self.functions(fleet).items()}
         versions = machine.versions()
         return key_of({"scene": scene, "ensemble": fleet.to_dict(), "metrics": tables, "functions": functions,
                        "settings": self.settings, "versions": versions})  # fmt: skip
+
+    def functions(self, fleet: Ensemble) -> dict[str, Own]:
+        """Return the user's functions that a cell's numbers depend on, by their place.
+
+        Args:
+            fleet: its members.
+        """
+        return functions_of(fleet, self.metrics.values())
+
+    def unknown(self, fleet: Ensemble) -> list[str]:
+        """Return the places of functions that another call cannot tell from others.
+
+        Args:
+            fleet: members of a cell.
+        """
+        return [place for place, own in self.functions(fleet).items() if self.told.name(own)[0] == UNKNOWN]
+
+    def note_functions(self) -> None:
+        """Look at the functions of all cases before any of them runs, since what they hold may change as they run."""
+        for case in self.cases:
+            with contextlib.suppress(SceneError):  # the case will say so itself
+                fleet, _ = self.fleet(case, {name: values[0] for name, values in self.axes.items()})
+                self.key(fleet)
 
     def kept(self, fleet: Ensemble) -> dict[str, Any]:
         """Return the arguments of `solve` for what a run keeps: metrics alone, all of them at looks.

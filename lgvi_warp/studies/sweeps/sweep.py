@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,9 @@ from lgvi_warp.studies.sweeps.output import Sweep
 from lgvi_warp.studies.sweeps.record import Record, Records
 from lgvi_warp.studies.sweeps.setup import Cell, Setup, made
 from lgvi_warp.studies.sweeps.success import INTERVALS, success_of
+
+# Said of a cell whose function holds what cannot be compared.
+NOT_KEPT = "cannot be told from other functions, so this cell runs in every call; give it a version, as version=1"
 
 
 @shows_progress
@@ -64,7 +68,8 @@ def sweep(
         confidence: Confidence level of all intervals, between 0 and 1; by default 0.95.
         interval: Of probabilities: "wilson" (default) or "clopper_pearson".
         out: Folder. What is finished is kept there, so that the same call goes on after a stop, with the same bytes; cells
-            whose numbers, metrics or settings have changed run anew.
+            whose numbers, metrics, functions or settings have changed run anew. Functions of yours are told apart by their
+            code and what that leads to; by `version` where lw.Callback and lw.OwnMetric have one.
         threads: As of solve.
         executor: As of solve.
         scheduler: As of solve.
@@ -101,6 +106,7 @@ def _run(
 ) -> Iterator[Cell]:
     """Run the cells that are not recorded yet, and note those that are refused."""
     total = len(setup.cells)
+    setup.note_functions()
     for i, (case, point) in enumerate(setup.cells):
         share = progress and (lambda part, i=i: progress((i + part) / total))
         fleet, key, fixed = None, f"refused {i}", list[str]()
@@ -108,9 +114,10 @@ def _run(
             fleet, fixed = setup.fleet(case, point)
             key = setup.key(fleet)
             if records.get(key) is None:
-                records.put(
-                    key, setup.run(fleet, threads=threads, executor=executor, scheduler=scheduler, progress=share)
-                )
+                record = setup.run(fleet, threads=threads, executor=executor, scheduler=scheduler, progress=share)
+                unknown = setup.unknown(fleet) if records.folder is not None else []
+                messages = *record.messages, *(f"{place}: {NOT_KEPT}" for place in unknown)
+                records.put(key, replace(record, messages=messages), lasting=not unknown)
         except SceneError as error:
             records.put(key, Record.of_refusal(" ".join(str(error).split())))
         if share:

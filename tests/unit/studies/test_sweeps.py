@@ -634,9 +634,11 @@ def test_keys_are_of_all_that_decides_the_numbers(found):
               one.key(found.cells[1].fleet), replace(one, settings={"h": 0.01}).key(fleet),
               replace(one, metrics=setup.metrics_of(["iae heading"])).key(fleet)]  # fmt: skip
     assert len({key, *others}) == 6
-    twice, thrice = (lambda x: 2.0 * x), (lambda x: 3.0 * x)
-    keys = [key_of({"functions": [function]}) for function in (twice, (lambda x: 2.0 * x), thrice, max)]
-    assert keys[0] == keys[1] and len(set(keys)) == 3
+    twice, thrice = (lambda state, look: 2.0 * look["depth"]), (lambda state, look: 3.0 * look["depth"])
+    metrics = [lw.OwnMetric(function, name="own", fields=("position",), **more) for function, more in (
+        (twice, {}), (thrice, {}), (twice, {"last": np.sin}), (twice, {"last": np.cos}), (twice, {"version": 1}))]  # fmt: skip
+    keys = [replace(one, metrics=setup.metrics_of([metric])).key(fleet) for metric in (*metrics, metrics[0])]
+    assert keys[0] == keys[-1] and len(set(keys)) == 5
     arrays = [key_of({"x": values}) for values in (np.array([1.0, 2.0]), [1.0, 2.0], np.array([1.0, 3.0]))]
     assert arrays[0] == arrays[1] != arrays[2]
     assert key_of({"a": 1, "b": 2}) == key_of({"b": 2, "a": 1}) and key_of({"x": np.float64(1.0)}) == key_of({"x": 1.0})

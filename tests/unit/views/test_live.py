@@ -3,7 +3,9 @@
 
 import contextlib
 import dataclasses
+import signal
 import socket
+import threading
 
 import numpy as np
 import pytest
@@ -170,19 +172,44 @@ def test_run_shows_members_as_they_are_done_then_the_whole_run(tmp_path, capsys)
     assert sorted(poses) == [0.0, 0.5, 1.0, 1.5, 2.0] and all(len(frame) == 20 for frame in poses.values())
 
 
+# What peers that are no viewer say to whoever comes: nothing; settings of HTTP/2 and nothing more; settings and an answer that
+# is refused, or is a page; goodbye; too much.
+SETTINGS, ENDED = bytes((0, 0, 0, 4, 0, 0, 0, 0, 0)), bytes((0, 0, 1, 1, 5, 0, 0, 0, 1, 0x88))
+PEERS = {
+    "silent": b"", "HTTP/2": SETTINGS, "other calls": SETTINGS + ENDED, "goodbye": SETTINGS + bytes((0, 0, 8, 7, *[0] * 13)),
+    "page": SETTINGS + bytes((0, 0, 1, 1, 4, 0, 0, 0, 1, 0x88, 0, 0, 5, 0, 1, 0, 0, 0, 1)) + b"<html",
+    "HTTP/1": b"HTTP/1.1 400 Bad Request\r\n\r\n", "endless": bytes(2**17), "frames without end": SETTINGS * 20_000,
+}  # fmt: skip
+
+
 @contextlib.contextmanager
-def mute():
-    """The port of something that listens and says nothing."""
+def peer(words):
+    """The port of something that listens, says these words to all, and hears them out."""
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         listener.listen()
+
+        def hear(connection):
+            with connection, contextlib.suppress(OSError):
+                connection.sendall(words)
+                while connection.recv(2**16):
+                    pass
+
+        def greet():
+            with contextlib.suppress(OSError):
+                while True:
+                    threading.Thread(target=hear, args=(listener.accept()[0],), daemon=True).start()
+
+        threading.Thread(target=greet, daemon=True).start()
         yield listener.getsockname()[1]
+        listener.shutdown(socket.SHUT_RDWR)
 
 
-def test_what_is_no_viewer_is_named_with_the_remedy(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("words", PEERS.values(), ids=PEERS)
+def test_what_is_no_viewer_is_named_with_the_remedy(tmp_path, monkeypatch, capsys, words):
     monkeypatch.setattr(viewer, "STARTED", 0.3)
     run = ["run", str(ROOT / "examples" / "paper.toml"), "--out", str(tmp_path / "run"), "--live"]
-    with mute() as port:
+    with peer(words) as port:
         address = f"rerun+http://127.0.0.1:{port}/proxy"
         assert not viewer.answers(address)
         with pytest.raises(OSError, match='what answers is no viewer; start a viewer with "rerun"'):
@@ -195,6 +222,25 @@ def test_what_is_no_viewer_is_named_with_the_remedy(tmp_path, monkeypatch, capsy
         assert cli.main(run) == 1
     said = capsys.readouterr().err
     assert said.count("\n") == 2 and "is no viewer" in said and not (tmp_path / "run").exists()
+
+
+def test_a_viewer_that_falls_silent_ends_the_sending(tmp_path, monkeypatch):
+    """It is stopped while the recording is on its way: its port is open, and nobody answers."""
+    monkeypatch.setattr(viewer, "STARTED", 0.3)
+    monkeypatch.setattr(viewer, "PATIENCE", 1.0)
+    send, port, path = drawing._send, free_port(), tmp_path / "fleet.rrd"
+    command = [str(viewer.program()), "--bind", "127.0.0.1", "--port", str(port), "--save", str(tmp_path / "sent.rrd")]
+    with serving(command, port) as process:
+
+        def stopped(recording, runs, laid_out=False):
+            process.send_signal(signal.SIGSTOP)
+            send(recording, runs, laid_out)
+
+        monkeypatch.setattr(drawing, "_send", stopped)
+        with pytest.raises(OSError, match=r"the viewer ended before it had the recording, which is in .*fleet.rrd"):
+            lw.log_rerun(fleet(20), path, to=f"rerun+http://127.0.0.1:{port}/proxy")
+        process.send_signal(signal.SIGCONT)
+    assert len(rows(path, "/world/bodies/ok", "translations")) == 31
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Python functions and classes of the user's own that a run depends on, and which they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import fields
+from types import MethodType
+from typing import Any, NamedTuple
+
+from lgvi_warp.common.identity import identity
+from lgvi_warp.physics.control.base import SECTIONS
+from lgvi_warp.physics.control.callback import Callback
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.statistics.quantity import Quantity
+
+
+class Own(NamedTuple):
+    """A function or a class of the user's.
+
+    Args:
+        function: it itself.
+        version: what the user says it is; None where nothing is said.
+    """
+
+    function: Any
+    version: Any
+
+
+def functions_of(fleet: Ensemble | None, statistics: Iterable[Statistic] = ()) -> dict[str, Own]:
+    """List the user's functions and classes that a run depends on, which no table can hold.
+
+    Args:
+        fleet: the members; None for statistics alone.
+        statistics: what is gathered.
+
+    Returns:
+        Each by its place, as "laws.callback"; empty for a run of what the package has.
+    """
+    found = {} if fleet is None else dict(_of_fleet(fleet))
+    for i, statistic in enumerate(statistics):
+        version = getattr(statistic, "version", None)
+        place = f"statistics[{i}] {statistic.key}"
+        found |= {f"{place}{part}": Own(function, version) for part, function in _of_statistic(statistic)}
+    return found
+
+
+def identities(found: dict[str, Own]) -> dict[str, str]:
+    """Return which functions these are, by place.
+
+    Args:
+        found: what `functions_of` lists.
+    """
+    return {place: identity(*own) for place, own in found.items()}
+
+
+class ToldApart:
+    """Names functions for one call: by what they are and, of those that seem the same, by which object each is."""
+
+    def __init__(self) -> None:
+        # By place in memory, with the function, so that no other one gets the place.
+        self._names: dict[tuple[Any, ...], tuple[Own, tuple[str, int]]] = {}
+
+    def name(self, own: Own) -> tuple[str, int]:
+        """Return what a function is, as it was when it was met first, and which one of its kind in this call.
+
+        Args:
+            own: the function.
+        """
+        function = own.function
+        parts = (function.__self__, function.__func__) if isinstance(function, MethodType) else (function,)
+        key = (*map(id, parts), own.version)
+        if key not in self._names:
+            what = identity(*own)
+            number = sum(known == what for _, (known, _) in self._names.values())
+            self._names[key] = own, (what, number)
+        return self._names[key][1]
+
+
+def _of_fleet(fleet: Ensemble) -> Iterator[tuple[str, Own]]:
+    scene = fleet.scene
+    lists: dict[str, Iterable[Any]] = {"terms": scene.terms, "events": scene.events}
+    if scene.controller is not None:
+        lists |= {name: getattr(scene.controller, name) for name in SECTIONS}
+    for name, parts in lists.items():
+        for part in parts:
+            if isinstance(part, Callback):
+                yield f"{name}.{part.key}", Own(part.function, part.version)
+            if _is_own(type(part)):
+                yield f"{name}.{part.key} class", Own(type(part), None)
+    for name, law in {"sampling": fleet.sampling, **fleet.vary}.items():
+        if _is_own(type(law)):
+            yield f"{name} class", Own(type(law), None)
+
+
+def _of_statistic(value: Any, place: str = "") -> Iterator[tuple[str, Any]]:
+    """Functions in a statistic's arguments, by their place in it."""
+    if isinstance(value, Statistic | Quantity):
+        if _is_own(type(value)):
+            yield f"{place} class", type(value)
+        for field in fields(value):
+            yield from _of_statistic(getattr(value, field.name), f"{place}.{field.name}")
+    elif isinstance(value, list | tuple):
+        for i, entry in enumerate(value):
+            yield from _of_statistic(entry, f"{place}[{i}]")
+    elif callable(value) and not str(getattr(value, "__module__", "")).startswith("lgvi_warp."):
+        yield place, value
+
+
+def _is_own(kind: type) -> bool:
+    return not kind.__module__.startswith("lgvi_warp.")

@@ -24,6 +24,7 @@ from lgvi_warp.runs.default_method import h_rates, is_damped
 from lgvi_warp.runs.result import Result
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.runs.step_error import rates
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies import comparison, cost
@@ -485,7 +486,7 @@ class Ladders:
     def limited_by_damping(self) -> bool:
         """Whether the cheapest setting's step is no longer small beside the fastest damping; True where there is none."""
         trials = self.cheapest()
-        return not trials or h_rates(self.sample.ensemble, trials[0].candidate.h)["drag"] > STIFF
+        return not trials or h_rates(rates(self.sample.ensemble), trials[0].candidate.h)["drag"] > STIFF
 
     def cheapest(self) -> list[Trial]:
         """The trials that keep the target, the cheapest first; those above 1.5 times the cheapest cost are left out."""

@@ -20,7 +20,7 @@ from lgvi_warp.scene.ensemble import Ensemble
 
 # Parts of a method's limits that a step may use, since rates grow. Oscillations need none: psi_s and psi_x cease to be
 # stable at a shorter step than rk4, rk8 and rkw3 do (methods/stable_steps.csv).
-SHARES = {"drag": 0.75, "rotation": 0.5}
+SHARES = {"drag": 0.9, "rotation": 0.5}
 # Largest h (l + 2 q |v|) / I that rkw3 is trusted with: of quadratic drag it knows that at the step's start.
 MOST_IMPLICIT = 1000.0
 # Error over the length of the path that a cheaper method may have, and above which a run says so.
@@ -53,7 +53,7 @@ def planned(ensemble: Ensemble, grid: TimeGrid, plan_of: Callable[[Method, tuple
     found = rates(ensemble)
     for method in choices(ensemble, grid.h, found):
         try:
-            return plan_of(method, messages(method, found, grid.h, grid.h * grid.steps))
+            return plan_of(method, messages(method, found, grid.h, max(AHEAD, grid.h * grid.steps)))
         except SceneError as error:
             fault = error
     raise fault
@@ -102,7 +102,7 @@ def messages(method: Method, found: Rates, h: float, t1: float) -> tuple[str, ..
         method: The method that was chosen.
         found: The rates of the motion.
         h: Step [s].
-        t1: End [s].
+        t1: End [s]. A step is judged by no less than AHEAD, as the choice is.
 
     Returns:
         One sentence where the error is above 1 % of the path, otherwise nothing.

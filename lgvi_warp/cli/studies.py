@@ -48,7 +48,7 @@ def tradeoff(chosen: argparse.Namespace) -> int:
         chosen: The command's parsed arguments.
 
     Returns:
-        The exit code: 1 if a file failed, otherwise 0.
+        The exit code: 1 if a file failed or a method of --methods has no measurement, otherwise 0.
 
     Raises:
         SceneError: The scene or an argument is refused.
@@ -63,7 +63,9 @@ def tradeoff(chosen: argparse.Namespace) -> int:
     with shown(chosen.quiet, "writing"):
         written = Written(measurements.save(out))
         written.draw(plot_tradeoff, measurements, out / "tradeoff.png")
-    return finish(written, chosen, {"tradeoff": measurements.to_dict()}, text_of("tradeoff", measurements))
+    code = finish(written, chosen, {"tradeoff": measurements.to_dict()}, text_of("tradeoff", measurements))
+    missing = [f"--methods {name}: has no measurement: {why}" for name, why in measurements.missing.items()]
+    return 1 if print_faults(missing) else code
 
 
 def sensitivity(chosen: argparse.Namespace) -> int:

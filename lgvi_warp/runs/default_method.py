@@ -1,37 +1,32 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The method of a run for which no one names one, chosen by what acts in the scene and by the step.
+"""The method of a run for which no one names one, chosen by what acts in the scene and by the error at the step.
 
 Conservative motion keeps its symplectic method. A splitting moves steady motion, and Runge-Kutta methods keep it, so these
-advance damped scenes, as long as the step is stable for them.
+advance damped scenes: the cheapest whose step is stable and whose error is small, as the rates of the motion tell.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
-
-import numpy as np
 
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.engine.plan import Plan, damping_terms
 from lgvi_warp.methods.limits import drag_limit, rotation_limit
 from lgvi_warp.methods.method import Method
-from lgvi_warp.physics import vehicle
-from lgvi_warp.physics.terms.base import Term
-from lgvi_warp.physics.terms.hydrostatics import net
+from lgvi_warp.methods.saveat import TimeGrid
+from lgvi_warp.runs.step_error import LOOKED_AT, Rates, path_error, rates
 from lgvi_warp.scene.ensemble import Ensemble
 
-# The first members stand for all.
-LOOKED_AT = 32
-# Least speed of a vehicle under way [m/s], and the part of it that counts as speed along, and rate about, every axis.
-UNDER_WAY = 1.0
-ASIDE = 0.05
-# A net weight drives along any axis, and turns about none.
-FORCES = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 # Parts of a method's limits that a step may use, since rates grow. Oscillations need none: psi_s and psi_x cease to be
 # stable at a shorter step than rk4, rk8 and rkw3 do (methods/stable_steps.csv).
-SHARES = {"drag": 0.75, "rotation": 0.5}
+SHARES = {"drag": 0.9, "rotation": 0.5}
 # Largest h (l + 2 q |v|) / I that rkw3 is trusted with: of quadratic drag it knows that at the step's start.
 MOST_IMPLICIT = 1000.0
+# Error over the length of the path that a cheaper method may have, and above which a run says so.
+ALLOWED = 0.01
+# The choice looks so far ahead, whatever the length of the run: a longer run begins with the bits of a shorter one [s].
+AHEAD = 30.0
 # For damped scenes, the cheapest step first (`python -m benchmarks run damped`).
 DAMPED = {
     "rk4": "since the scene is damped",
@@ -41,13 +36,13 @@ DAMPED = {
 OTHERWISE = ("psi_x", "psi_s")
 
 
-def planned(ensemble: Ensemble, h: float, plan_of: Callable[[Method], Plan]) -> Plan:
+def planned(ensemble: Ensemble, grid: TimeGrid, plan_of: Callable[[Method, tuple[str, ...]], Plan]) -> Plan:
     """Plan a run with the first method that takes it.
 
     Args:
         ensemble: The members.
-        h: Step [s].
-        plan_of: Function from a method to the plan of the run.
+        grid: Steps and end of the run.
+        plan_of: Function from a method, and what the user should know of its step, to the plan of the run.
 
     Returns:
         The plan; its method says why it was chosen.
@@ -55,20 +50,22 @@ def planned(ensemble: Ensemble, h: float, plan_of: Callable[[Method], Plan]) -> 
     Raises:
         SceneError: If none takes it.
     """
-    for method in choices(ensemble, h):
+    found = rates(ensemble)
+    for method in choices(ensemble, grid.h, found):
         try:
-            return plan_of(method)
+            return plan_of(method, messages(method, found, grid.h, max(AHEAD, grid.h * grid.steps)))
         except SceneError as error:
             fault = error
     raise fault
 
 
-def choices(ensemble: Ensemble, h: float) -> Iterator[Method]:
+def choices(ensemble: Ensemble, h: float, found: Rates | None = None) -> Iterator[Method]:
     """List the methods for a run, the best first.
 
     Args:
         ensemble: The members.
         h: Step [s].
+        found: The rates of the motion; default None: they are computed.
 
     Yields:
         A method, which the scene may refuse.
@@ -77,13 +74,62 @@ def choices(ensemble: Ensemble, h: float) -> Iterator[Method]:
         yield Method("psi_s", reason="since nothing damps the motion")
         yield Method("psi_x", reason="since nothing damps the motion, and psi_s does not take the scene")
         return
-    numbers = h_rates(ensemble, h)
-    for name, reason in DAMPED.items():
-        if stable(Method(name), numbers):
-            yield Method(name, reason=reason)
+    found = found or rates(ensemble)
+    numbers = h_rates(found, h)
+    for name in ranked({name: path_error(Method(name), found, h, AHEAD) for name in DAMPED if stable(Method(name), numbers)}):
+        yield Method(name, reason=DAMPED[name])
     for name in OTHERWISE:
         if name == OTHERWISE[-1] or stable(Method(name), numbers):
             yield Method(name, reason="since the scene is damped, and Runge-Kutta methods do not take it at this step")
+
+
+def ranked(errors: dict[str, float]) -> list[str]:
+    """Rank methods by their errors at a step.
+
+    Args:
+        errors: Name -> error over the length of the path [1], the cheapest first.
+
+    Returns:
+        Those whose error is allowed, the cheapest first; then the others, the least error first.
+    """
+    return sorted(errors, key=lambda name: 0.0 if errors[name] <= ALLOWED else errors[name])
+
+
+def messages(method: Method, found: Rates, h: float, t1: float) -> tuple[str, ...]:
+    """Tell that a step is too long to follow the path.
+
+    Args:
+        method: The method that was chosen.
+        found: The rates of the motion.
+        h: Step [s].
+        t1: End [s]. A step is judged by no less than AHEAD, as the choice is.
+
+    Returns:
+        One sentence where the error is above 1 % of the path, otherwise nothing.
+    """
+    if path_error(method, found, h, t1) <= ALLOWED:
+        return ()
+    text = f"step h = {h:g} s is long for this motion: by its rates {method.name} may be off by more than 1 % of the path"
+    shorter = next((h / n for n in (2, 5, 10, 20, 50, 100) if best_error(method, found, h / n, t1) <= ALLOWED), math.nan)
+    remedy = f"h = {shorter:.3g} s keeps that" if shorter > 0.0 else "shorten it"
+    return (f"{text}; {remedy}, or ask for an error: lw.suggest, --error",)
+
+
+def best_error(method: Method, found: Rates, h: float, t1: float) -> float:
+    """The error at a shorter step, by the method itself or one of those for damped scenes.
+
+    Args:
+        method: The method at the step that was asked for.
+        found: The rates of the motion.
+        h: The shorter step [s].
+        t1: End [s].
+
+    Returns:
+        Error over the length of the path [1]; infinite where none is stable.
+    """
+    numbers = h_rates(found, h)
+    others = [Method(name) for name in DAMPED] if found.drag != 0.0 else [method]
+    return min((path_error(one, found, h, t1) for one in others if stable(one, numbers)), default=math.inf)
 
 
 def stable(method: Method, numbers: dict[str, float]) -> bool:
@@ -116,50 +162,14 @@ def is_damped(ensemble: Ensemble) -> bool:
     return any(term.present(ensemble.own(term, parameters)) for term in terms)
 
 
-@np.errstate(over="ignore", invalid="ignore")
-def h_rates(ensemble: Ensemble, h: float) -> dict[str, float]:
-    """Compute the step times the rates of the fastest of the first members under way.
+def h_rates(found: Rates, h: float) -> dict[str, float]:
+    """Multiply the rates of the fastest of the first members by the step.
 
     Args:
-        ensemble: The members.
+        found: The rates.
         h: Step [s].
 
     Returns:
         "drag" and "rotation" -> number [1]; drag as large as rkw3 takes where a term does not tell how it brakes.
     """
-    members = ensemble.select(0, min(LOOKED_AT, ensemble.members))
-    p, terms = members.parameters, damping_terms(ensemble.scene.terms)
-
-    speeds = np.abs(np.concatenate([members.velocity, members.angular_velocity], axis=1))
-    drag = MOST_IMPLICIT
-    if all(type(term).braking is not Term.braking for term in terms):
-
-        def matrices(at: np.ndarray) -> np.ndarray:
-            total = np.zeros((1, 6, 6))
-            for term in terms:
-                total = total + term.braking(ensemble.own(term, p), at, p["environment.water_density"])
-            return total
-
-        linear, both = (np.einsum("nii->ni", matrices(np.full((1, 6), size))) for size in (0.0, 1.0))
-        force = sum((term.drive() for term in ensemble.scene.terms), np.zeros(6)) + abs(net(p))[:, None] * FORCES
-        speeds = np.maximum(speeds, terminal_speeds(force, linear, 0.5 * (both - linear)))
-        speeds = np.maximum(speeds, ASIDE * np.maximum(np.linalg.norm(speeds[:, :3], axis=1, keepdims=True), UNDER_WAY))
-        rates = np.linalg.solve(vehicle.inertia6(p), matrices(speeds))
-        # Drag beyond float64 brakes faster than any step.
-        drag = float(h * np.abs(np.linalg.eigvals(rates)).max()) if np.isfinite(rates).all() else np.inf
-    return {"drag": drag, "rotation": float(h * np.linalg.norm(members.angular_velocity, axis=1).max())}
-
-
-def terminal_speeds(force: np.ndarray, linear: np.ndarray, quadratic: np.ndarray) -> np.ndarray:
-    """Speeds at which drag along an axis balances a force.
-
-    Args:
-        force: Sizes of force and torque, (n, 6) [N, N m].
-        linear: Linear drag, (n, 6) [N s/m, N m s].
-        quadratic: Quadratic drag, (n, 6) [N s2/m2, N m s2].
-
-    Returns:
-        Speeds (n, 6) [m/s, rad/s]; 0 where nothing brakes.
-    """
-    root = linear + np.sqrt(linear**2 + 4.0 * np.maximum(quadratic, 0.0) * force)
-    return np.divide(2.0 * force, root, out=np.zeros(np.broadcast_shapes(force.shape, root.shape)), where=root > 0.0)
+    return {"drag": MOST_IMPLICIT if found.drag is None else h * found.drag, "rotation": h * found.rotation}

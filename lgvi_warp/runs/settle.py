@@ -116,7 +116,11 @@ def make_plan(
     on_failure = on_failure or settings.on_failure
     others = fields(save.fields), dtype, width, checks, on_failure, survey_all, looks, read_at_looks
     if method is None and settings.method is None and not settings.method_options:
-        return planned(ensemble, grid.h, lambda one: Plan(ensemble, one, grid, *others))
+
+        def plan_of(method: Method, told: tuple[str, ...]) -> Plan:
+            return Plan(ensemble, method, replace(grid, messages=(*grid.messages, *told)), *others)
+
+        return planned(ensemble, grid, plan_of)
     chosen = method if isinstance(method, Method) else settings.method_of(method)
     if chosen.iterations == "auto":
         chosen = replace(chosen, iterations=enough_iterations(ensemble, chosen, grid.h, dtype))

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import copy
 import math
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -16,6 +15,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import failed as failed_members
 from lgvi_warp.common.status import stop_time
+from lgvi_warp.engine.executors.threads import ThisThread
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods import saveat
 from lgvi_warp.methods.method import Method
@@ -28,6 +28,7 @@ from lgvi_warp.runs.result import Result
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
+from lgvi_warp.studies.budget import Budget, rounded_up
 from lgvi_warp.studies.compared import QUANTITIES, Compared, compared_in
 
 # Error at which a trajectory is no longer meaningful [m or rad].
@@ -272,7 +273,7 @@ class Sample:
         return sample.plan(candidate)
 
     def run(self, candidate: Candidate, ensemble: Ensemble | None = None) -> Result:
-        """Run a setting on one thread.
+        """Run a setting in this thread, whose processor time is then the run's.
 
         Args:
             candidate: method, step, precision and solver.
@@ -284,7 +285,7 @@ class Sample:
         Raises:
             SceneError: where the scene refuses the method.
         """
-        return run_plan(self.plan(candidate, ensemble), 1)
+        return run_plan(self.plan(candidate, ensemble), 1, executor=ThisThread())
 
     def accepted(
         self, methods: Sequence[str], dtype: str = "float64", most: int | None = None
@@ -422,6 +423,8 @@ class Reference:
         sample: members, times and noise of the two runs, on which others are compared with them.
         asked: quantity of the errors, where it is none of QUANTITIES.
         methods: names of the methods of the two runs.
+        more: where the time was over before the runs agreed, about how much would have done [s]; infinite where it cannot be
+            told. 0 where they agree no better however long they run.
     """
 
     result: Result
@@ -430,6 +433,7 @@ class Reference:
     sample: Sample
     asked: Compared | None = None
     methods: tuple[str, ...] = ()
+    more: float = 0.0
 
     def error(self, of: str, until: int = -1) -> float:
         """Return the reference's own error.
@@ -533,7 +537,7 @@ def make_reference(
         sample: members and times.
         of: quantity whose agreement counts. Default "position".
         goal: difference at which to stop [unit of `of`]. Default 0: as small as it gets.
-        seconds: approximate time to spend, without compiling [s]. Default 15.
+        seconds: processor time to spend, without compiling [s]. Default 15.
         methods: two names in place of the best ones that the scene takes.
         report: called with the fraction of the time that is spent.
 
@@ -557,9 +561,9 @@ def make_reference(
     if noisy and not methods:
         names = sample.accepted(PRECISE_IN_NOISE, most=2)[0]
     first, second = (names[0], names[-1]) if methods else paired(names)
-    begun = time.perf_counter()
+    budget = Budget(seconds)
     best: Reference | None = None
-    worse, m = 0, sample.coarsest(0.5)
+    worse, m, gain = 0, sample.coarsest(0.5), 1.0
     # In noise half the step halves the difference, but for the chance of another path.
     stalled = 0.9 if noisy else 0.5
     if noisy:
@@ -573,26 +577,66 @@ def make_reference(
         elif noisy:
             finer = 2 * m
             sample = sample.on_grid(finer)
+        for name, steps in ((first, m), (second, finer)):
+            with budget.free():
+                sample.plan(sample.candidate(name, steps)).compile()
+        before = budget.spent
         with np.errstate(all="ignore"):
             runs = extrapolated(sample, first, m), extrapolated(sample, second, finer)
             disagreement = agreement(*runs, compared)
-        end = disagreement[of][-1]
+        end, last = disagreement[of][-1], budget.spent - before
         if best is None or end < best.error(of):
             worse = worse + 1 if best and end > stalled * best.error(of) and end < LOST else 0
+            gain = best.error(of) / max(end, 1e-300) if best else 1.0
             text = f"{second} at h = {sample.h(finer):.4g} s against {first} at h = {sample.h(m):.4g} s"
             best = Reference(runs[1], text, disagreement, sample, compared, (first, second))
         else:
             worse += best.error(of) < LOST
-        begun += sum(run.compile_seconds for run in runs)
-        # The coarser runs of an extrapolation take 3/4 of the finest one's time.
-        last, spent = 1.75 * sum(run.run_seconds for run in runs), time.perf_counter() - begun
         if report:
-            report(min(1.0, spent / seconds))
-        if best.error(of) <= goal or worse >= 2 or spent + 2.0 * last > seconds or fixed:
+            report(min(1.0, budget.spent / seconds))
+        if best.error(of) <= goal or worse >= 2 or fixed:
+            break
+        if budget.spent + 2.0 * last > seconds:
+            best = replace(best, more=budget.spent + more_seconds(best.error(of), goal, gain, last))
             break
         m *= 2
     assert best is not None
     return best
+
+
+def more_seconds(error: float, goal: float, gain: float, last: float) -> float:
+    """Predict how long it takes to refine two runs to a goal.
+
+    Args:
+        error: how far they are apart [any unit].
+        goal: how far they may be apart [same unit].
+        gain: factor by which the last refinement brought them together.
+        last: processor time of the last two runs [s].
+
+    Returns:
+        Processor time of all refinements to come, each twice as long as the one before [s]; infinite where it cannot be told.
+    """
+    if not (math.isfinite(error) and goal > 0.0 and 1.5 < gain < math.inf):
+        return math.inf
+    halvings = math.ceil(math.log(error / goal) / math.log(gain))
+    return 2.0 * last * (2.0**halvings - 1.0)
+
+
+def time_over(seconds: float, more: float, share: float) -> tuple[str, str]:
+    """Say that the time of a search was over, and how much would do.
+
+    Args:
+        seconds: time that was given [s].
+        more: processor time that the reference needs [s]; infinite where it cannot be told.
+        share: part of a search's time that its reference gets.
+
+    Returns:
+        (cause, remedy).
+    """
+    cause = f"{seconds:g} s were over"
+    if not math.isfinite(more):
+        return cause, "give more seconds"
+    return cause, f"seconds={rounded_up(max(more / share, 2.0 * seconds)):g} would do"
 
 
 @dataclass(frozen=True)

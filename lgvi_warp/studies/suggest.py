@@ -4,8 +4,7 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -25,10 +24,12 @@ from lgvi_warp.runs.default_method import h_rates, is_damped
 from lgvi_warp.runs.result import Result
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.runs.step_error import rates
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies import comparison, cost
 from lgvi_warp.studies import tradeoff as tradeoffs
+from lgvi_warp.studies.budget import Budget, rounded_up
 from lgvi_warp.studies.compared import Compared, compared_in
 from lgvi_warp.studies.comparison import Candidate, Reference, Sample
 from lgvi_warp.studies.speed import void
@@ -62,8 +63,14 @@ STIFFLY_DAMPED, STIFF = ("psi_x", "rkw3"), 2.0
 LEAST_FLOAT32 = 0.4
 # Number of members that the choice is checked on.
 CHECKED = 1024
+# The largest errors that tell how errors fall off: a 64th of the members, at least 8; below 40 members none tell.
+TAIL, FEWEST_IN_TAIL, FEWEST = 64, 8, 40
+# Chance that another fleet, as large and drawn alike, has a larger error than is expected.
+CHANCE = 0.1
 # Number of members that a finished run is checked on.
 CONFIRMED = 64
+# Part of a search's time that a reference gets.
+SHARE = 0.4
 # Number of settings in the last comparison of costs, and of readings of each cost.
 FINALISTS = 4
 ROUNDS = 7
@@ -81,7 +88,8 @@ class Suggestion:
         error: error asked for [`unit`].
         of: name of the quantity that the error is of.
         unit: unit of that quantity.
-        expected: largest error over members and path, on the members checked [`unit`].
+        expected: largest error over members and path that one fleet in ten exceeds which is as large and drawn alike: that of the
+            members checked, carried on to the size of the fleet by how the largest ones fall off [`unit`].
         us_per_vehicle_second: microseconds of one core per vehicle and simulated second.
         run_seconds: predicted run time of all members on `threads` threads, without compiling [s].
         threads: threads that `run_seconds` assumes.
@@ -151,8 +159,8 @@ def suggest(
 ) -> Suggestion:
     """Find the cheapest method, step and precision that keep an error for every member up to a time.
 
-    The search runs a sample of members; its best settings are then checked on up to 1024 members, and their steps
-    shortened where needed. Where noise acts, all runs of the search see one path of it, drawn every noise_step of the scene
+    The search runs a sample of members; its best settings are then checked on up to 1024 members. Their largest errors are
+    carried on to the size of the fleet by a Pareto tail, and steps shortened where that is too large. Where noise acts, all runs of the search see one path of it, drawn every noise_step of the scene
     or, without one, finer than any step that is tried; a run of the setting draws at its own steps.
 
     Args:
@@ -164,7 +172,7 @@ def suggest(
         methods: names of the methods to try. Default: a few by what acts in the scene, the others where these fail.
         members: size of the sample that is searched. Default 128.
         threads: threads of the predicted run. Default: those of this machine.
-        seconds: approximate length of the search, without compiling [s]. Default 30.
+        seconds: processor time of the search, about and without compiling [s]. Default 30.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
             from 0 to 1.
 
@@ -190,11 +198,11 @@ def suggest(
     if sample.noise(taken[0]) == "free":
         problem = f"error = {error:g}: noise acts, whose path differs from step to step, so members have no error"
         raise SceneError([f"{problem}; use lgvi-warp tradeoff, which compares statistics"])
-    reference = checked_reference(sample, compared, error, 0.4 * seconds, taken)
+    reference = checked_reference(sample, compared, error, seconds, taken)
     sample = reference.sample
     report(0.3)
-    deadline = time.perf_counter() + 0.6 * seconds
-    ladders = Ladders(sample, reference, compared, error / SAFETY, deadline)
+    budget = Budget((1.0 - SHARE) * seconds)
+    ladders = Ladders(sample, reference, compared, error / SAFETY, budget, methods is not None)
     few = taken if methods else short_list(sample, taken)
     ladders.climb(few, lambda part: report(0.3 + 0.4 * part))
     if not methods:
@@ -205,18 +213,27 @@ def suggest(
     trials = ladders.cheapest()
     if not trials:
         problem = f"error = {error:g} {compared.unit} of {compared.name}: no step of {', '.join(taken)} kept it"
-        raise SceneError([f"{problem}; ask for a larger error, a shorter t1, or give more seconds"])
+        if budget.over:
+            cause = f"{seconds:g} s were over before a step was short enough; try seconds={rounded_up(4.0 * seconds):g}"
+            raise SceneError([f"{cause}. {problem}; or ask for a larger error or a shorter t1"])
+        raise SceneError([f"{problem}; ask for a larger error or a shorter t1"])
     more = sample.more(CHECKED) if sample.whole.members > sample.members else sample
     if more is not sample:
-        reference = checked_reference(more, compared, error, 0.4 * seconds, taken)
+        reference = checked_reference(more, compared, error, seconds, taken)
         more = reference.sample
     goal = error / SAFETY**0.5
-    final = [refined(more, trial.candidate, reference, compared.name, goal) for trial in trials[:FINALISTS]]
-    final = [trial for trial in final if trial.error(compared.name) <= error] or final[:1]
-    priced = list(zip(final, cost.costs([trial.plan for trial in final], rounds=ROUNDS), strict=True))
-    text = cost.disagreement([(trial.candidate.text, price.spread) for trial, price in priced])
+    size = sample.whole.members
+    final = [refined(more, trial.candidate, reference, compared.name, goal, size) for trial in trials[:FINALISTS]]
+    final = [(trial, apart) for trial, apart in final if apart <= error] or final[:1]
+    priced = list(zip(final, cost.costs([trial.plan for trial, _ in final], rounds=ROUNDS), strict=True))
+    text = cost.disagreement([(trial.candidate.text, price.spread) for (trial, _), price in priced])
     priced.sort(key=lambda pair: pair[1].us_per_vehicle_second)
-    best, price = priced[0]
+    (best, expected), price = priced[0]
+    notes = [text] if text else []
+    notes += [noise_text(more)] if more.draws else []
+    notes += [f"{name} is left out: {why}" for name, why in refused.items() if methods]
+    if expected > error:
+        notes.append(f"no step was found that keeps {error:g} {compared.unit}: {expected:.1e} is expected of the best")
     ensemble = sample.whole
     used = min(threads or machine.thread_count(), len(blocks(ensemble.members)))
     report(1.0)
@@ -226,7 +243,7 @@ def suggest(
         error=float(error),
         of=compared.name,
         unit=compared.unit,
-        expected=best.error(compared.name),
+        expected=expected,
         us_per_vehicle_second=price.us_per_vehicle_second,
         run_seconds=seconds_of(ensemble, best.candidate, sample.t1) / used,
         threads=used,
@@ -236,13 +253,27 @@ def suggest(
         reference=reference.text,
         reference_error=reference.error(compared.name),
         rivals=tuple(
-            (rival.candidate, rival_price.us_per_vehicle_second, rival.error(compared.name))
-            for rival, rival_price in priced[1:]
+            (rival.candidate, rival_price.us_per_vehicle_second, apart) for (rival, apart), rival_price in priced[1:]
         ),
         worst=worst_of(best, reference, compared.name),
         asked=compared,
-        messages=(*([text] if text else ()), *([noise_text(more)] if more.draws else ())),
+        messages=tuple(notes),
     )
+
+
+def errors_of(one: Trial, reference: Reference, of: str) -> np.ndarray:
+    """Largest error over the path of each member of a trial.
+
+    Args:
+        one: the trial.
+        reference: what errors are measured against.
+        of: name of the quantity.
+
+    Returns:
+        Errors (n,) [its unit].
+    """
+    apart = comparison.distances(one.result, reference.result, reference.asked)[of]
+    return np.asarray(np.max(np.where(np.isnan(apart), 0.0, apart), axis=0))
 
 
 def worst_of(one: Trial, reference: Reference, of: str, members: int = CONFIRMED // 2) -> tuple[int, ...]:
@@ -257,9 +288,29 @@ def worst_of(one: Trial, reference: Reference, of: str, members: int = CONFIRMED
     Returns:
         Indices of the members, the largest error first.
     """
-    apart = comparison.distances(one.result, reference.result, reference.asked)[of]
-    largest = np.max(np.where(np.isnan(apart), 0.0, apart), axis=0)
-    return tuple(int(i) for i in np.argsort(-largest)[:members])
+    return tuple(int(i) for i in np.argsort(-errors_of(one, reference, of))[:members])
+
+
+def largest_in_fleet(errors: np.ndarray, members: int) -> float:
+    """Carry the largest error of some members on to a fleet.
+
+    The largest ones fall off as a power of their rank (Hill 1975), which gives the error that a fleet exceeds with a chance of
+    CHANCE (Weissman 1978). Tails that end are fallen off faster: for them it is too large, never too small.
+
+    Args:
+        errors: of the members that were checked, drawn as those of the fleet are (n,).
+        members: size of the fleet.
+
+    Returns:
+        The error, at least the largest one.
+    """
+    n = len(errors)
+    falling = np.sort(errors)[::-1]
+    k = max(FEWEST_IN_TAIL, n // TAIL)
+    if n < FEWEST or falling[k] <= 0.0:
+        return float(falling[0])
+    exponent = float(np.mean(np.log(falling[:k] / falling[k])))
+    return float(max(falling[0], falling[k] * (k * max(members, n) / (n * CHANCE)) ** exponent))
 
 
 def checked_reference(sample: Sample, of: Compared, error: float, seconds: float, taken: Sequence[str]) -> Reference:
@@ -269,29 +320,29 @@ def checked_reference(sample: Sample, of: Compared, error: float, seconds: float
         sample: members and times.
         of: quantity that the error is of.
         error: error asked for [unit of `of`].
-        seconds: approximate time to spend, without compiling [s].
+        seconds: processor time of the whole search, of which the reference gets a part [s].
         taken: methods that the scene takes; one of them measures how errors grow, for the message.
 
     Returns:
         The reference.
 
     Raises:
-        SceneError: where the two best runs differ by more than a tenth of the error; it names the time up to which they
-            agree.
+        SceneError: where the two best runs differ by more than a tenth of the error. It says first why: the time was over, and
+            how much would do; or shorter steps agree no better, and the time up to which they agree.
     """
-    reference = comparison.make_reference(sample, of, goal=error / 30.0, seconds=seconds)
-    if reference.error(of.name) > 0.1 * error:
-        until = sample.times[reference.reaches(of.name, 0.1 * error)]
-        unit = of.unit
-        problem = f"error = {error:g} {unit} of {of.name} up to {sample.t1:g} s cannot be checked: {reference.text} differ by "
-        problem += (
-            f"{reference.error(of.name):.1e} {unit}; {growth_text(growth_of(reference.sample, taken, reference))}"
-        )
-        remedy = (
-            f"ask for t1 (--duration) up to {until:g} s, " if until > 0.0 else "ask for a shorter t1 (--duration), "
-        )
-        raise SceneError([f"{problem}; {remedy}for a larger error, or give more seconds"])
-    return reference
+    reference = comparison.make_reference(sample, of, goal=error / 30.0, seconds=SHARE * seconds)
+    apart = reference.error(of.name)
+    if apart <= 0.1 * error:
+        return reference
+    problem = f"error = {error:g} {of.unit} of {of.name} up to {sample.t1:g} s cannot be checked"
+    differ = f"{reference.text} differ by {apart:.1e} {of.unit}"
+    if reference.more:
+        cause, remedy = comparison.time_over(seconds, reference.more, SHARE)
+        raise SceneError([f"{cause}; {remedy}. {problem} yet: {differ}; or ask for a larger error or a shorter t1"])
+    until = sample.times[reference.reaches(of.name, 0.1 * error)]
+    remedy = f"ask for t1 (--duration) up to {until:g} s" if until > 0.0 else "ask for a shorter t1 (--duration)"
+    grows = growth_text(growth_of(reference.sample, taken, reference))
+    raise SceneError([f"{problem}: {differ}, and agree no better with shorter steps; {grows}; {remedy}, or for a larger error"])
 
 
 def short_list(sample: Sample, taken: Sequence[str]) -> list[str]:
@@ -318,37 +369,38 @@ def short_list(sample: Sample, taken: Sequence[str]) -> list[str]:
 class Ladders:
     """A search for the longest step of each method and precision that keeps the target.
 
-    The step is halved until the error is below the target, then lengthened by the slope of the errors. A method is
-    given up where its steps cost twice what the cheapest setting so far does, and a precision where the other one is better.
+    Each method runs one coarse step first. Then the steps are halved in turn until the error is below the target, and
+    lengthened by the slope of the errors. A method is given up where its steps cost twice what the cheapest setting so far
+    does, and a precision where the other one is better.
 
     Args:
         sample: members and times.
         reference: what errors are measured against.
         asked: quantity that the error is of.
         target: largest error allowed [unit of `asked`].
-        deadline: time.perf_counter() at which to stop [s]; compiling postpones it.
+        budget: processor time to spend; compiling is free.
+        named: whether the methods were asked for by name: then each runs one step however little time there is. Default False.
 
     Attributes:
         priced: (microseconds of one core per vehicle and second, trial) of each setting that keeps the target.
+        looked_at: names of the methods that ran a step, or whose steps cost too much for one.
     """
 
-    def __init__(self, sample: Sample, reference: Reference, asked: Compared, target: float, deadline: float):
-        self.sample, self.reference, self.of, self.target, self.deadline = (
-            sample,
-            reference,
-            asked.name,
-            target,
-            deadline,
-        )
+    def __init__(
+        self, sample: Sample, reference: Reference, asked: Compared, target: float, budget: Budget, named: bool = False
+    ):
+        self.sample, self.reference, self.of, self.target = sample, reference, asked.name, target
+        self.budget, self.named = budget, named
         # A precision whose round-off is near the target is not tried.
         size = asked.largest(reference.result)
         coarse = [name for name in PRECISIONS if target > 4.0 * comparison.ROUND_OFF[name] * size]
         self.dtypes = coarse or ["float64"]
         self.priced: list[tuple[float, Trial]] = []
+        self.looked_at: set[str] = set()
         self._compiled = {sample.plan(sample.candidate(name, 1)).spec for name in reference.methods}
 
     def climb(self, methods: Sequence[str], report: Callable[[float], None] = void, new_kernels: bool = True) -> None:
-        """Search some methods, in this order.
+        """Search some methods: a step of each in turn.
 
         Args:
             methods: their names.
@@ -360,32 +412,46 @@ class Ladders:
             for method in methods
             for dtype in sorted(self.dtypes)
         }
-        compiled = {ladder for ladder, spec in specs.items() if spec in self._compiled}
-        others = [ladder for ladder in specs if ladder not in compiled]
-        methods_compiled = {method for method, _ in compiled}
         # What costs no compiling comes first, and last what the other precision of the method may spare.
-        others.sort(key=lambda ladder: ladder[0] in methods_compiled)
-        prices: dict[str, dict[str, float | None]] = {method: {} for method in methods}
-        for i, (method, dtype) in enumerate((*sorted(compiled, key=list(specs).index), *others)):
-            report(i / len(specs))
-            if time.perf_counter() > self.deadline and self.priced:
-                return
-            new, known = (method, dtype) not in compiled, prices[method]
+        order = {
+            method: sorted(sorted(self.dtypes), key=lambda dtype: specs[method, dtype] not in self._compiled)
+            for method in methods
+        }
+        first = sorted(methods, key=lambda method: specs[method, order[method][0]] not in self._compiled)
+        climbing = {method: self._method(method, order[method], specs, new_kernels) for method in first}
+        while climbing:
+            for method in list(climbing):
+                asked = self.named and method not in self.looked_at
+                if (self.budget.over and self.priced and not asked) or next(climbing[method], None) is None:
+                    climbing.pop(method).close()
+                report(1.0 - len(climbing) / len(methods))
+
+    def _method(
+        self, method: str, dtypes: Sequence[str], specs: dict[tuple[str, str], Any], new_kernels: bool
+    ) -> Generator[Trial, None, None]:
+        """Search the precisions of a method, one after the other; yields each trial but the last of a precision."""
+        known: dict[str, float | None] = {}
+        for dtype in dtypes:
+            new = specs[method, dtype] not in self._compiled
             least = min((price for price, _ in self.priced), default=math.inf)
             # A step in float32 is cheaper, and its error is no smaller: float64 is for what round-off stopped.
             if known.get("float32") is not None or known.get("float64", 0.0) in (None, math.inf):
                 continue
             if new and (not new_kernels or LEAST_FLOAT32 * (known.get("float64") or 0.0) > least):
                 continue
-            known[dtype] = self.longest(method, dtype)
             self._compiled.add(specs[method, dtype])
+            self.looked_at.add(method)
+            known[dtype] = yield from self.longest(method, dtype)
 
-    def longest(self, method: str, dtype: str) -> float | None:
+    def longest(self, method: str, dtype: str) -> Generator[Trial, None, float | None]:
         """Find the longest step that keeps the target.
 
         Args:
             method: name of the method.
             dtype: precision.
+
+        Yields:
+            Each trial that misses the target and is followed by one of half the step.
 
         Returns:
             Its cost [us of one core per vehicle and second]; infinite where steps that might keep the target are too dear, and
@@ -394,12 +460,11 @@ class Ladders:
         sample, reference, of, target = self.sample, self.reference, self.of, self.target
         m, before, worse = sample.coarsest(2.0), math.inf, 0
         plan = sample.plan_to_price(sample.candidate(method, m, dtype))
-        self.deadline += plan.compile()
+        with self.budget.free():
+            plan.compile()
         per_step = step_cost(plan)
-        cheapest = min((price for price, _ in self.priced), default=math.inf)
-        while per_step / sample.h(m) < 2.0 * cheapest:
-            trial = tried(sample, sample.candidate(method, m, dtype), reference)
-            self.deadline += trial.result.compile_seconds
+        while per_step / sample.h(m) < 2.0 * min((price for price, _ in self.priced), default=math.inf):
+            trial = tried(sample, sample.candidate(method, m, dtype), reference, budget=self.budget)
             size = trial.error(of)
             if size <= target:
                 best = lengthened(sample, trial, m, before, reference, of, target)
@@ -407,20 +472,21 @@ class Ladders:
                 self.priced.append((step_cost(best.plan) / best.candidate.h, best))
                 return self.priced[-1][0]
             worse = worse + 1 if size > 0.8 * before and before < 0.1 else 0
-            if worse >= 2 or m > 10**7 or time.perf_counter() > self.deadline or m == sample.allowed(2 * m):
+            if worse >= 2 or m > 10**7 or self.budget.over or m == sample.allowed(2 * m):
                 return None
             before = size
             m = sample.allowed(2 * m)
             if cost.work_grows(plan):
                 plan = sample.plan_to_price(sample.candidate(method, m, dtype))
                 per_step = step_cost(plan)
+            yield trial
         return math.inf
 
     @property
     def limited_by_damping(self) -> bool:
         """Whether the cheapest setting's step is no longer small beside the fastest damping; True where there is none."""
         trials = self.cheapest()
-        return not trials or h_rates(self.sample.ensemble, trials[0].candidate.h)["drag"] > STIFF
+        return not trials or h_rates(rates(self.sample.ensemble), trials[0].candidate.h)["drag"] > STIFF
 
     def cheapest(self) -> list[Trial]:
         """The trials that keep the target, the cheapest first; those above 1.5 times the cheapest cost are left out."""
@@ -476,8 +542,10 @@ def lengthened(
     return good
 
 
-def refined(sample: Sample, candidate: Candidate, reference: Reference, of: str, target: float) -> Trial:
-    """Run a setting on a sample and shorten its step until it keeps the target.
+def refined(
+    sample: Sample, candidate: Candidate, reference: Reference, of: str, target: float, members: int
+) -> tuple[Trial, float]:
+    """Run a setting on a sample and shorten its step until a whole fleet keeps the target.
 
     Args:
         sample: members and times.
@@ -485,21 +553,22 @@ def refined(sample: Sample, candidate: Candidate, reference: Reference, of: str,
         reference: what errors are measured against.
         of: name of the quantity.
         target: largest error allowed [unit of `of`].
+        members: size of the fleet.
 
     Returns:
-        The last trial; after six shorter steps it may still miss the target.
+        The last trial, and the largest error expected in the fleet [unit of `of`]; after six shorter steps it may still miss the
+        target.
     """
     m = sample.allowed(round(float(sample.spacing) / candidate.h))
-    trial = tried(sample, replace(candidate, h=sample.h(m)), reference)
     order = 1 if sample.draws else Method(candidate.method).order
-    for _ in range(6):
-        size = trial.error(of)
-        if size <= target or m == sample.draws:
+    for left in reversed(range(7)):
+        trial = tried(sample, sample.candidate(candidate.method, m, candidate.dtype), reference)
+        size = largest_in_fleet(errors_of(trial, reference, of), members) if trial.errors else math.inf
+        if size <= target or m == sample.draws or not left:
             break
         factor = min((size / target) ** (1.0 / order) * 1.02, 2.0) if np.isfinite(size) else 1.5
         m = sample.allowed(max(m + 1, math.ceil(m * factor)))
-        trial = tried(sample, sample.candidate(candidate.method, m, candidate.dtype), reference)
-    return trial
+    return trial, size
 
 
 def seconds_of(fleet: Ensemble, candidate: Candidate, t1: float, members: int = 256) -> float:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
@@ -24,6 +25,7 @@ from lgvi_warp.runs.result import Result
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies import comparison, cost
+from lgvi_warp.studies.budget import Budget
 from lgvi_warp.studies.compared import QUANTITIES, Compared, compared_in
 from lgvi_warp.studies.comparison import Candidate, Growth, Reference, Sample
 from lgvi_warp.studies.files import Saved, finite_or_none, numbers
@@ -43,6 +45,8 @@ COMPENSATED = ("psi_x", "psi_s", "su4(psi_x)", "kl6(psi_x)")
 DECIDING = ("position", "attitude")
 # Errors shown are at least this many times the reference's own.
 TRUST = 10.0
+# Part of a trade-off's time that its reference gets.
+SHARE = 0.3
 # A series of halved steps ends where another setting is as accurate in this many times less time.
 HOPELESS = 10.0
 
@@ -104,6 +108,7 @@ class Tradeoff(Saved):
         messages: notes for the user.
         seconds: time that the measurement took [s].
         units: quantity -> unit of its errors.
+        missing: method that was asked for by its name and has no measurement -> why.
     """
 
     measurements: tuple[Measurement, ...]
@@ -118,6 +123,7 @@ class Tradeoff(Saved):
     messages: tuple[str, ...] = ()
     seconds: float = 0.0
     units: dict[str, str] = field(default_factory=lambda: dict(QUANTITIES))
+    missing: dict[str, str] = field(default_factory=dict)
     study: ClassVar[str] = "tradeoff"
 
     def shown(self, of: str | None = None, kind: str = "path_max") -> list[Measurement]:
@@ -235,7 +241,7 @@ class Trial:
         plan: its plan, by which its cost is measured: noise without a noise_step of the scene is drawn once a step.
         result: the result at the sample's times.
         errors: quantity -> kind -> error; empty where a member failed or there is no reference.
-        cpu_seconds: CPU time of the run, without compiling [s].
+        cpu_seconds: processor time of the run, without compiling [s].
     """
 
     candidate: Candidate
@@ -256,7 +262,13 @@ class Trial:
         return self.errors[of]["path_max"] if self.errors else math.inf
 
 
-def tried(sample: Sample, candidate: Candidate, reference: Reference | None, until: int = -1) -> Trial:
+def tried(
+    sample: Sample,
+    candidate: Candidate,
+    reference: Reference | None,
+    until: int = -1,
+    budget: Budget | None = None,
+) -> Trial:
     """Run a setting on a sample and measure its errors.
 
     Args:
@@ -264,6 +276,7 @@ def tried(sample: Sample, candidate: Candidate, reference: Reference | None, unt
         candidate: method, step, precision and solver.
         reference: what errors are measured against; None for no errors.
         until: index of the last sample that is compared. Default: the last of all.
+        budget: what compiling does not count in. Default: none.
 
     Returns:
         The trial.
@@ -272,7 +285,8 @@ def tried(sample: Sample, candidate: Candidate, reference: Reference | None, unt
         SceneError: where the scene refuses the setting.
     """
     plan = sample.plan(candidate)
-    compile_seconds = plan.compile()
+    with budget.free() if budget else contextlib.nullcontext():
+        compile_seconds = plan.compile()
     with np.errstate(all="ignore"):
         begun = cost.thread_seconds()
         result = replace(comparison.run_plan(plan, 1, executor=ThisThread()), compile_seconds=compile_seconds)
@@ -351,9 +365,11 @@ def tradeoff(
         of: quantity that decides how far the reference is good enough: any that statistics know ("position", "attitude",
             "depth", "position[2]", "speed", "euler", ...), or a lw.Quantity. Errors of position, attitude, velocity,
             angular_velocity and energy are measured as well. Default "position".
-        methods: names of the methods to try. Default: all that the scene takes.
+        methods: names of the methods to try; each has a setting measured, or is named in `missing`. Default: all that the
+            scene takes.
         members: size of the sample. Default 128.
-        seconds: approximate time to spend [s]; the messages list what is left out then. Default 45.
+        seconds: processor time to spend [s]: kernels that are compiled may take as much again. One coarse setting of every
+            method comes first, then each step is halved in turn; the messages list what is left out. Default 45.
         progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
             from 0 to 1.
 
@@ -368,7 +384,7 @@ def tradeoff(
     faults.positive("seconds", seconds)
     faults.raise_if_any()
     names = chosen_methods(methods)
-    begun = time.perf_counter()
+    begun, whole = time.perf_counter(), Budget(seconds)
     report = callback(progress) or void
     sample = Sample(fleet, t1, members)
     taken, refused = sample.accepted(names)
@@ -382,7 +398,7 @@ def tradeoff(
         finest = tried(sample, sample.candidate(taken[0], 32 * sample.coarsest(0.5)), None).result
     else:
         reference = comparison.make_reference(
-            sample, compared, seconds=0.3 * seconds, report=lambda fraction: report(0.2 * fraction)
+            sample, compared, seconds=SHARE * seconds, report=lambda fraction: report(0.2 * fraction)
         )
         sample, finest = reference.sample, reference.result
         if noise == "grid":
@@ -393,14 +409,15 @@ def tradeoff(
         )
         reference = None
     if reference:
-        until = trusted_until(reference, compared)
+        until = trusted_until(reference, compared, seconds)
         growth = growth_of(sample, taken, reference)
         if until < len(sample.times) - 1:
             text = f"errors of single members are up to {sample.times[until]:g} s, where the reference still agrees"
             messages.append(f"{text} with itself; beyond it only statistics are meaningful")
-    deadline = time.perf_counter() + 0.6 * seconds
-    latest = begun + seconds
-    trials, skipped = sweep(sample, taken, reference, until, deadline, latest, lambda part: report(0.2 + 0.6 * part))
+    budget = Budget(0.6 * seconds)
+    trials, skipped = sweep(
+        sample, taken, reference, until, budget, whole, lambda part: report(0.2 + 0.6 * part), methods is not None
+    )
     if skipped:
         messages.append(
             f"no time for {', '.join(skipped)}: run again, the kernels are compiled now, or give more seconds"
@@ -422,7 +439,27 @@ def tradeoff(
         messages=tuple(messages),
         seconds=time.perf_counter() - begun,
         units=QUANTITIES | {compared.name: compared.unit},
+        missing=without_reading(names, measured, refused) if methods else {},
     )
+
+
+def without_reading(names: Sequence[str], measured: Sequence[Measurement], refused: dict[str, str]) -> dict[str, str]:
+    """Name the methods that were asked for and have no measurement.
+
+    Args:
+        names: of the methods.
+        measured: the measurements.
+        refused: method -> why the scene does not take it.
+
+    Returns:
+        Method -> why it has none.
+    """
+    there = {measurement.setting.method for measurement in measured}
+    return {
+        name: refused.get(name, "members failed at every step that was tried")
+        for name in dict.fromkeys(names)
+        if name not in there
+    }
 
 
 def growth_of(sample: Sample, taken: Sequence[str], reference: Reference) -> Growth:
@@ -468,12 +505,13 @@ def reaches_nothing(reference: Reference, of: Compared) -> bool:
     return reference.reaches(of.name, comparison.LOST / (TRUST * TRUST)) < 1
 
 
-def trusted_until(reference: Reference, of: Compared) -> int:
+def trusted_until(reference: Reference, of: Compared, seconds: float) -> int:
     """Find the last sample at which errors below 1e-2 can be measured.
 
     Args:
         reference: its own errors decide.
         of: quantity that they are of.
+        seconds: time of the whole trade-off, for the message [s].
 
     Returns:
         Index of the sample.
@@ -486,8 +524,34 @@ def trusted_until(reference: Reference, of: Compared) -> int:
         apart = reference.own[of.name][1]
         end = reference.result.time[1]
         problem = f"no reference: {reference.text} differ by {apart:.2g} {of.unit} after {end:g} s"
-        raise SceneError([f"{problem}; give a shorter t1 (--duration), or more seconds"])
+        if reference.more:
+            cause, remedy = comparison.time_over(seconds, reference.more, SHARE)
+            raise SceneError([f"{cause}; {remedy}. There is {problem}; or give a shorter t1 (--duration)"])
+        raise SceneError([f"{problem}, and agree no better with shorter steps; give a shorter t1 (--duration)"])
     return until
+
+
+@dataclass
+class Series:
+    """Steps of one setting, each half of the one before.
+
+    Attributes:
+        method: name of the method.
+        dtype: precision.
+        solver: (name, iterations) of the solver of equation (24).
+        m: number of steps in the sample's spacing.
+        best: least error of the steps so far, the larger of position [m] and attitude [rad].
+        worse: number of steps in a row that gained little.
+        rungs: number of steps tried.
+    """
+
+    method: str
+    dtype: str
+    solver: tuple[str, int | None]
+    m: int
+    best: float = math.inf
+    worse: int = 0
+    rungs: int = 0
 
 
 def sweep(
@@ -495,60 +559,103 @@ def sweep(
     methods: Sequence[str],
     reference: Reference | None,
     until: int,
-    deadline: float,
-    latest: float,
+    budget: Budget,
+    whole: Budget,
     report: Callable[[float], None],
+    named: bool = False,
 ) -> tuple[list[Trial], list[str]]:
-    """Run every method, precision and solver with steps halved until round-off or the time ends each series.
+    """Run every method, precision and solver: each at a coarse step first, then in turn at half the step before.
 
     Args:
         sample: members and times.
         methods: names of the methods, in this order.
         reference: what errors are measured against; None where noise acts.
         until: index of the last sample that is compared.
-        deadline: time.perf_counter() at which runs stop [s]; compiling postpones it.
-        latest: time.perf_counter() after which no further method begins, compiling included [s]. The first one always does:
-            a machine that is busy while the reference's kernels are compiled gets few measurements, not none.
-        report: called with the fraction of the methods that is done.
+        budget: of the runs.
+        whole: of the whole study, compiling included: once it is over, nothing is compiled that is not asked for by name.
+        report: called with the fraction of the time or of the first settings that is done.
+        named: whether the methods were asked for by name: then each begins, however long its kernel compiles.
 
     Returns:
         (trials, skipped): the trials, and the names of the settings that there was no time for.
     """
-    plain: tuple[str, int | None] = ("quartic", None)
-    ladders = [(name, dtype, plain) for name in methods for dtype in PRECISIONS]
-    ladders += [(SOLVED_BY, "float64", solved) for solved in SOLVERS if SOLVED_BY in methods]
-    summed, _ = sample.accepted([name for name in COMPENSATED if name in methods], "float32_compensated")
-    ladders += [(name, "float32_compensated", plain) for name in summed]
+    waiting = series_of(sample, methods)
     trials: list[Trial] = []
     skipped: list[str] = []
-    longest = (deadline - time.perf_counter()) / 40.0
-    for i, (method, dtype, solver) in enumerate(ladders):
-        report(i / len(ladders))
-        if trials and time.perf_counter() > latest:
-            skipped.append(sample.candidate(method, 1, dtype, solver).text)
+    begun: set[str] = set()
+    count = len(waiting)
+    for i, one in enumerate(list(waiting)):
+        report(0.5 * i / count)
+        asked = named and one.method not in begun
+        if trials and not asked and (whole.over or budget.over):
+            waiting.remove(one)
+            skipped.append(sample.candidate(one.method, one.m, one.dtype, one.solver).text)
             continue
-        m, best, worse = sample.coarsest(1.0), math.inf, 0
-        for k in range(20 if reference else 5):
-            if trials and time.perf_counter() > deadline:
-                skipped.append(sample.candidate(method, m, dtype, solver).text + (" at fine steps" if k else ""))
-                break
-            trial = tried(sample, sample.candidate(method, m, dtype, solver), reference, until)
-            trials.append(trial)
-            deadline += trial.result.compile_seconds
-            if m == sample.allowed(2 * m):
-                break
-            m = sample.allowed(2 * m)
-            if reference is None:
-                continue
-            error = max(trial.error(of) for of in DECIDING)
-            worse = worse + 1 if error > 0.8 * best and best < 0.1 else 0
-            best = min(best, error)
-            noise = TRUST * max(reference.error(of, until) for of in DECIDING)
-            if worse >= 2 or error < noise or trial.cpu_seconds > longest or hopeless(trial, trials):
-                break
+        begun.add(one.method)
+        if not halved(sample, one, trials, reference, until, budget):
+            waiting.remove(one)
+    while waiting:
+        for one in list(waiting):
+            report(0.5 + 0.5 * min(1.0, budget.spent / budget.seconds))
+            if budget.over:
+                waiting.remove(one)
+                skipped.append(sample.candidate(one.method, one.m, one.dtype, one.solver).text + " at fine steps")
+            elif not halved(sample, one, trials, reference, until, budget):
+                waiting.remove(one)
     if reference is not None:
-        between(sample, trials, reference, until, deadline)
+        between(sample, trials, reference, until, budget)
     return trials, skipped
+
+
+def series_of(sample: Sample, methods: Sequence[str]) -> list[Series]:
+    """List the series of settings, the default precision of every method first.
+
+    Args:
+        sample: members and times.
+        methods: names of the methods, in this order.
+
+    Returns:
+        The series, at their coarsest steps.
+    """
+    plain: tuple[str, int | None] = ("quartic", None)
+    settings = [(name, dtype, plain) for dtype in PRECISIONS for name in methods]
+    settings += [(SOLVED_BY, "float64", solved) for solved in SOLVERS if SOLVED_BY in methods]
+    summed, _ = sample.accepted([name for name in COMPENSATED if name in methods], "float32_compensated")
+    settings += [(name, "float32_compensated", plain) for name in summed]
+    return [Series(*setting, sample.coarsest(1.0)) for setting in settings]
+
+
+def halved(
+    sample: Sample, one: Series, trials: list[Trial], reference: Reference | None, until: int, budget: Budget
+) -> bool:
+    """Run the next step of a series.
+
+    Args:
+        sample: members and times.
+        one: the series, which goes on to half the step.
+        trials: all trials so far; the new one is appended.
+        reference: what errors are measured against; None where noise acts.
+        until: index of the last sample that is compared.
+        budget: of the runs.
+
+    Returns:
+        Whether a shorter step is worth a run.
+    """
+    trial = tried(sample, sample.candidate(one.method, one.m, one.dtype, one.solver), reference, until, budget)
+    trials.append(trial)
+    one.rungs += 1
+    finer = sample.allowed(2 * one.m)
+    if finer == one.m or one.rungs == (20 if reference else 5):
+        return False
+    one.m = finer
+    if reference is None:
+        return True
+    error = max(trial.error(of) for of in DECIDING)
+    one.worse = one.worse + 1 if error > 0.8 * one.best and one.best < 0.1 else 0
+    one.best = min(one.best, error)
+    noise = TRUST * max(reference.error(of, until) for of in DECIDING)
+    longest = budget.seconds / 40.0
+    return not (one.worse >= 2 or error < noise or trial.cpu_seconds > longest or hopeless(trial, trials))
 
 
 def hopeless(one: Trial, trials: Sequence[Trial]) -> bool:
@@ -566,7 +673,7 @@ def hopeless(one: Trial, trials: Sequence[Trial]) -> bool:
     return math.isfinite(error) and any(max(rival.error(of) for of in DECIDING) < error for rival in rivals)
 
 
-def between(sample: Sample, trials: list[Trial], reference: Reference, until: int, deadline: float) -> None:
+def between(sample: Sample, trials: list[Trial], reference: Reference, until: int, budget: Budget) -> None:
     """Add trials near the Pareto front, at steps between those already tried.
 
     Args:
@@ -574,7 +681,7 @@ def between(sample: Sample, trials: list[Trial], reference: Reference, until: in
         trials: all trials so far; new ones are appended.
         reference: what errors are measured against.
         until: index of the last sample that is compared.
-        deadline: time.perf_counter() after which none is added [s].
+        budget: of the runs; once it is over none is added.
     """
     ranked = sorted((trial.cpu_seconds, trial.error(DECIDING[0]), i) for i, trial in enumerate(trials))
     best, near = math.inf, list[Trial]()
@@ -587,9 +694,9 @@ def between(sample: Sample, trials: list[Trial], reference: Reference, until: in
         m = round(float(sample.spacing) / trial.candidate.h)
         for step in {round(m / math.sqrt(2.0)), round(m * math.sqrt(2.0))} - {0}:
             candidate = replace(trial.candidate, h=sample.h(sample.allowed(step)))
-            if candidate not in tried_already and time.perf_counter() < deadline:
+            if candidate not in tried_already and not budget.over:
                 tried_already.add(candidate)
-                trials.append(tried(sample, candidate, reference, until))
+                trials.append(tried(sample, candidate, reference, until, budget))
 
 
 def measurements(
@@ -651,7 +758,8 @@ def report_text(found: Tradeoff) -> str:
         Messages, sample, reference, predictability, the front as a table, and biases.
     """
     unit = found.units[found.of]
-    lines = [f"note        {message}" for message in found.messages]
+    lines = [f"missing     {name}: {why}" for name, why in found.missing.items()]
+    lines += [f"note        {message}" for message in found.messages]
     lines.append(f"sample      {found.members} members, 0 to {found.t1:g} s, {len(found.measurements)} settings in "
                  f"{found.seconds:.0f} s")  # fmt: skip
     if found.reference_error:
@@ -669,7 +777,8 @@ def report_text(found: Tradeoff) -> str:
     if front:
         header = ("us/vehicle/s", "method", "precision", "step [s]", f"{found.of} [{unit}]", "rms")
         heads = "{:>12}  {:<18}{:<20}{:>10}{:>15}{:>10}".format(*header)
-        lines += ["", f"Cheapest settings for each error ({found.of}, largest over members and path):",
+        without = f"; nothing of {', '.join(found.missing)}" if found.missing else ""
+        lines += ["", f"Cheapest settings for each error ({found.of}, largest over members and path{without}):",
                   heads + ("{:>18}".format("energy drift [J]") if kept else "")]  # fmt: skip
     for measurement in front:
         s = measurement.setting

@@ -200,10 +200,10 @@ class Thrusters(Term):
         return np.asarray(self.coefficient * ahead - self.coefficient_astern * astern)
 
     def drive(self) -> np.ndarray:
-        """The largest thrusts of the schedule, as if all pushed the same way."""
+        """The largest force and torque of all thrusters together, over the times of the schedule."""
         along = self.direction / np.linalg.norm(self.direction, axis=1, keepdims=True)
         wrenches = np.concatenate([along, np.cross(self.position, along)], axis=1)
-        return np.asarray(np.abs(self.thrust(self.command_schedule)).max(axis=0) @ np.abs(wrenches))
+        return np.asarray(np.abs(self.thrust(self.command_schedule) @ wrenches).max(axis=0))
 
     def command_for(self, thrust: Any) -> np.ndarray:
         """The smallest commands that give these thrusts.

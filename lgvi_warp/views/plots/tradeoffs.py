@@ -111,7 +111,8 @@ def _words(costs: Any, biases: Any, found: Tradeoff, of: str, any_shown: bool) -
         biases.axhline(CHANCE, color="black", linewidth=0.8, linestyle=":")
         biases.text(0.01, CHANCE * 1.1, "chance", transform=biases.get_yaxis_transform())
     sample = f"{found.members} members, 0 to {found.t1:g} s"
-    figure.suptitle(wrapped(f"{sample}; reference {found.reference}; better is to the right and down", figure))
+    without = f"no reading of {', '.join(found.missing)}; " if found.missing else ""
+    figure.suptitle(wrapped(f"{without}{sample}; reference {found.reference}; better is to the right and down", figure))
 
 
 def _name(axes: Any, named: list[tuple[str, float, float, Any]]) -> None:

@@ -17,7 +17,7 @@ from lgvi_kernels.advance.monitor import ENERGY_FIELDS
 from lgvi_kernels.advance.rows import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS, WASTE
 from lgvi_kernels.lanes.arithmetic import int_lane
 from lgvi_warp.common.warp_setup import build_lock
-from lgvi_warp.engine.arrays import Lanes, LawArrays, Structs, nested
+from lgvi_warp.engine.arrays import Group, Lanes, LawArrays, Structs
 from lgvi_warp.engine.outcome import Outcome
 from lgvi_warp.engine.packing import Packing
 from lgvi_warp.engine.plan import Plan
@@ -37,7 +37,7 @@ class Packets:
         count: number of packets.
         frame: axes and origins that the kernel works in.
         scale: (1 or m,) [kg m^2], number that momenta are divided by in the kernel; 1 for methods that need none.
-        inertia, laws, events: numbers of the vehicle, of its laws and of the events.
+        inertia, laws: numbers of the vehicle; of its laws, of a controller's parts and of the events.
         state_lanes: states, (packets, fields of a state).
     """
 
@@ -47,8 +47,9 @@ class Packets:
         self.count = -(-members.count // width)
         structs = (types.Inertia, types.Params, types.Events, types.Limits, *([types.Loop] if types.Loop else []))
         inertia, params, events, limits, *loop = zip(structs, plan.dtypes, strict=True)
-        self.inertia, self.events, self._limits = (Structs(*kind) for kind in (inertia, events, limits))
-        self.laws = LawArrays(self.count, *params, types.Lane, types.Number, *loop)
+        self._controlled = bool(loop)
+        self.inertia, self._limits = (Structs(*kind) for kind in (inertia, limits))
+        self.laws = LawArrays(self.count, (params, *loop, events), types.Lane, types.Number)
         self.state_lanes = Lanes(self.count, plan.spec.state_fields, types.Lane)
         self._rows = np.empty((self.count * width, plan.spec.state_fields))
         self.status = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
@@ -99,14 +100,14 @@ class Packets:
         self.frame, self.scale = packing.frame, packing.scale
         shared, before = plan.shared.keeps, self._arrays() if self._launch else []
         self.inertia.write(self.count, [((), packing.inertia(), shared("inertia"))])
-        laws, events, parts = packing.laws(), packing.events(), packing.control()
-        known = [shared((kind, i)) for kind, each in (("law", laws), ("part", parts)) for i in range(len(each))]
+        each = {"law": packing.laws(), "part": packing.control(), "event": packing.events()}
+        if not self._controlled:
+            del each["part"]
+        groups = [Group(packed, [shared((kind, i)) for i in range(len(packed))]) for kind, packed in each.items()]
         bus, _ = self._bus()
-        everything = [*laws, *parts]
-        self.laws.write(everything, known, packing.scratch(everything, bus), len(parts), bus)
-        if self.laws.loop is not None:
-            self.monitor.loop = self.laws.loop.array
-        self.events.write(self.count, nested(events, [shared(("event", i)) for i in range(len(events))]))
+        self.laws.write(groups, packing.scratch([law for group in groups for law in group.packed], bus), bus)
+        if self._controlled:
+            self.monitor.loop = self.laws.structs[1].array
         if plan.spec.looks:
             self._limits.write(self.count, [((), self._watched_limits(), False)])
             self.monitor.limits = self._limits.array
@@ -135,8 +136,8 @@ class Packets:
     def _arrays(self) -> list[Any]:
         """The kernel's arrays that `refill` may replace, its first arguments in front."""
         laws, limits = self.laws, self._limits.array
-        arrays = [self.inertia.array, laws.params.array, self.events.array, laws.table.array, self.memory, limits]
-        return arrays + ([laws.loop.array] if laws.loop else [])
+        params, *loop, events = (structs.array for structs in laws.structs)
+        return [self.inertia.array, params, events, laws.table.array, self.memory, limits, *loop]
 
     def _written_by_the_kernel(self) -> list[Any]:
         monitor, spec = self.monitor, self.plan.spec

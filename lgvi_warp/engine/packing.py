@@ -166,7 +166,7 @@ class Packing:
         """Rows of the memory that the method keeps for itself.
 
         Args:
-            laws: what each term packs, and each part of the controller.
+            laws: what each term packs, each part of the controller, and each event.
             bus: rows of the memory before theirs (default 0).
 
         Returns:
@@ -238,7 +238,7 @@ LARGE_TABLE = 16_384
 
 
 def rows_shared(plan: Plan) -> bool:
-    """Whether all members share the rows of the laws and of the controller's parts, and these are many.
+    """Whether all members share the rows of the laws, of the controller's parts and of the events, and these are many.
 
     Few rows have a copy for each lane, whoever shares them: so one kernel serves scenes in which other numbers vary.
 
@@ -251,7 +251,7 @@ def rows_shared(plan: Plan) -> bool:
     # What few members need is packed once, here.
     members = plan.ensemble.members
     packing = Packing(plan, plan.ensemble.select(0, members if members <= KEPT else 1))
-    each = (("law", packing.laws()), ("part", packing.control()))
+    each = (("law", packing.laws()), ("part", packing.control()), ("event", packing.events()))
     sizes = {
         (kind, i): law.rows.shape[1] for kind, packed in each for i, law in enumerate(packed) if law.rows is not None
     }

@@ -16,12 +16,20 @@ from lgvi_kernels.advance.feeding import NOTED
 from lgvi_kernels.advance.monitor import ENERGY_FIELDS
 from lgvi_kernels.advance.rows import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS, WASTE
 from lgvi_kernels.lanes.arithmetic import int_lane
+from lgvi_warp.common.status import Warnings
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine.arrays import Group, Lanes, LawArrays, Structs
 from lgvi_warp.engine.outcome import Outcome
 from lgvi_warp.engine.packing import Packing
 from lgvi_warp.engine.plan import Plan
-from lgvi_warp.engine.step_warnings import at_start, munk_factor, row_limits
+from lgvi_warp.engine.step_warnings import (
+    at_start,
+    departure,
+    leaves_rotations,
+    munk_factor,
+    orthogonality_limit,
+    row_limits,
+)
 from lgvi_warp.physics.terms.events import Event
 from lgvi_warp.sampling.members import Members
 
@@ -97,7 +105,7 @@ class Packets:
         """
         plan, self.members = self.plan, members
         packing = Packing(plan, members)
-        self.frame, self.scale = packing.frame, packing.scale
+        self.frame, self.scale, self._packing = packing.frame, packing.scale, packing
         shared, before = plan.shared.keeps, self._arrays() if self._launch else []
         self.inertia.write(self.count, [((), packing.inertia(), shared("inertia"))])
         each = {"law": packing.laws(), "part": packing.control(), "event": packing.events()}
@@ -329,11 +337,14 @@ class Packets:
             momentum = self._rows[: self.members.count, 12:15] * self.scale[:, None]
             none = np.zeros(self.members.count, np.uint16), np.zeros(0)
             checked = self.plan.checks != "none"
-            self._warned = at_start(self.plan, self.members, self.frame, momentum) if checked else none
+            self._warned = (
+                at_start(self.plan, self.members, self.frame, momentum, self._packing.water) if checked else none
+            )
         bits, value = self._warned
         step = np.zeros(len(bits), np.int64)
+        value = value if len(value) else np.full(len(bits), np.nan)
         if not self.plan.spec.looks:
-            return bits, step, value if len(value) else np.full(len(bits), np.nan)
+            return self._with_departed(bits, step, value)
         monitor = self.monitor
         noted = self._of_members(monitor.warned, np.uint16)
         # The kernel's warning is more serious if its highest bit is above all bits of the start.
@@ -341,6 +352,22 @@ class Packets:
         step = np.where(later, self._of_members(monitor.warned_step, np.int64), 0)
         value = np.where(later, np.sqrt(self._of_members(monitor.warned_size, np.float64)), value)
         return bits | noted, step, value
+
+    def _with_departed(
+        self, bits: np.ndarray, step: np.ndarray, value: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The same with a warning of the members whose last attitude is no rotation, where a method lets R depart.
+
+        One look at the end is enough: R departs further with each step of such a method.
+        """
+        if self.plan.checks == "none" or not leaves_rotations(self.plan):
+            return bits, step, value
+        size = departure(self.state_lanes.view[:, :9])[: len(bits)]
+        warning = np.uint16(Warnings.ORTHOGONALITY)
+        over = size > orthogonality_limit(self.plan)
+        first = over & (warning > bits)
+        made = np.where(self._status[: len(bits)] == 0, self._launched[1], self._failed_step[: len(bits)])
+        return bits | warning * over, np.where(first, made, step), np.where(first, size, value)
 
 
 def columns_of(sizes: Mapping[str, int]) -> Any:

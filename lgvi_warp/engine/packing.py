@@ -193,7 +193,7 @@ class Packing:
         if shifted:
             nu = velocity + notation.cross(rate, frame.origin)
             position = position + notation.rotate_out(attitude, frame.origin)
-        water = self._water_at_start()
+        water = self.water
         if water is not None:
             nu = nu - water
         if turned:
@@ -220,7 +220,8 @@ class Packing:
         else:
             rows[:, STATE_FIELDS:] = 0.0
 
-    def _water_at_start(self) -> np.ndarray | None:
+    @functools.cached_property
+    def water(self) -> np.ndarray | None:
         """R^T u (m, 3) [m/s]: velocity of the water in the user's body axes where each member starts; None for none."""
         m = self.members
         total: Any = None

@@ -14,6 +14,7 @@ from lgvi_kernels.law import (  # noqa: F401
     add,
     below,
     div,
+    dot,
     gather1,
     gather3,
     lane,
@@ -332,3 +333,47 @@ def test_an_event_with_rows_stops_at_the_table(knots):
             middle = 0.5 * (low + high)
             low, high = (middle, high) if left(middle) > 0.0 else (low, middle)
         assert abs(result.failure_time[i] - high) < 1e-10
+
+
+@wp.func
+def nose_distance(view: Any, p: Any):
+    return p.depth - view.b.z - dot(view.down, p.nose)
+
+
+class NoseDevice:
+    distance = nose_distance
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Nose(lw.Event):
+    """The floor, where a point of the body touches it."""
+
+    type: ClassVar[str] = "nose"
+    device: ClassVar[Any] = NoseDevice
+    depth: Any = lw.number((), "m")
+    nose: Any = lw.number((3,), "m", axes="point")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class NoseAsItStands(Nose):
+    """The same, which forgets that the kernel's axes may be others."""
+
+    type: ClassVar[str] = "nose_as_it_stands"
+
+    def packed(self, numbers, context):
+        return lw.Packed({"depth": numbers["depth"], "nose": numbers["nose"]})
+
+
+def test_a_point_of_the_body_is_that_of_an_event_in_all_axes():
+    point = dict(depth=60.0, nose=[0.8, 0.1, -0.05])
+    assert lw.check_law(Nose(**point)).ok
+    wrong = lw.check_law(NoseAsItStands(**point))
+    assert [check.name for check in wrong.checks if not check.ok] == ["distance: any axes"]
+    # A coupled body, whose forces act about another origin than the user's, at rest but for its sinking.
+    C = np.array([[0.0, 4.0, 0.0], [-4.0, 0.0, 6.0], [0.0, -6.0, 0.0]])
+    matrix = np.block([[20.0 * np.eye(3), C], [C.T, np.diag([6.0, 9.0, 8.0])]])
+    body = lw.Vehicle(rigid_body_mass_matrix=matrix, weight=196.0, buoyancy=196.0)
+    scene = lw.Scene(body, events=[Nose(**point)])
+    result = lw.solve(one(scene, b=(0.0, 0.0, 58.0), nu=(0.0, 0.0, 1.0), Om=(0.2, 0.1, 0.0)), "psi_x", h=0.01, t1=5.0)
+    touch = result.position[-1, 0, 2] + result.attitude[-1, 0, 2] @ point["nose"]
+    assert result.status.counts() == {"condition": 1} and abs(touch - 60.0) < 1e-9

@@ -14,7 +14,13 @@ START = lw.Start([0.0, 0.0, 10.0], rotation_vector=[1.0, 2.0, 3.0], velocity_ine
 
 def vehicle():
     """That of Nordkvist & Sanyal (2010), ballasted to a weight of 0.24 N in water: in a minute it hardly sinks."""
-    return lw.Vehicle(123.8, [5.46, 5.29, 5.72], [65.0, 70.0, 75.0], 1213.0, [0.0, 0.0, -0.007])
+    return lw.Vehicle(
+        123.8,
+        inertia=[5.46, 5.29, 5.72],
+        added_mass=[65.0, 70.0, 75.0],
+        buoyancy=1213.0,
+        center_of_buoyancy=[0.0, 0.0, -0.007],
+    )
 
 
 def full_matrix(seed, diagonal, beside):

@@ -22,7 +22,7 @@ START = {"position": [0.0, 0.0, 20.0], "velocity": [1.2, 0.1, -0.1], "angular_ve
 T1, STEPS = 20.0, (0.2, 0.1, 0.05, 0.025)  # s
 
 scene = lw.Scene(
-    lw.Vehicle(MASS, INERTIA, ADDED, BUOYANCY, CENTER),
+    lw.Vehicle(MASS, inertia=INERTIA, added_mass=ADDED, buoyancy=BUOYANCY, center_of_buoyancy=CENTER),
     environment=lw.Environment(gravity=GRAVITY),
     start=lw.Start(**START),
     terms=[lw.Drag(linear=LINEAR, quadratic=QUADRATIC)],

@@ -72,7 +72,13 @@ def make_problem(members: int, t1: float, name: str = "vehicle") -> Problem:
     start, vehicle = fleet.select(0, members), fleet.scene.vehicle
     buoyancy, lever = vehicle.buoyancy, vehicle.center_of_buoyancy
     if name == "rigid":
-        vehicle = Vehicle(vehicle.mass, np.diag(vehicle.inertia), [0.0, 0.0, 0.0], buoyancy, [0.0, 0.0, 0.0])
+        vehicle = Vehicle(
+            vehicle.mass,
+            inertia=np.diag(vehicle.inertia),
+            added_mass=[0.0, 0.0, 0.0],
+            buoyancy=buoyancy,
+            center_of_buoyancy=[0.0, 0.0, 0.0],
+        )
         lever = np.zeros(3)
     states = (start.position, start.attitude, start.velocity, start.angular_velocity)
     ensemble = Ensemble.from_states(Scene(vehicle, Environment(gravity=GRAVITY), start=fleet.scene.start), *states)

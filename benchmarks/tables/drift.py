@@ -19,7 +19,7 @@ METHODS = ("psi_s", "psi_1", "psi_x", "psi_x8", "psi", "phi", "su4(psi_s)", "su4
 
 def scene():
     """The vehicle, weightless, on its tether."""
-    vehicle = lw.Vehicle(123.8, J, M - 123.8, 0.0)
+    vehicle = lw.Vehicle(123.8, inertia=J, added_mass=M - 123.8, buoyancy=0.0)
     return lw.Scene(vehicle, lw.Environment(gravity=0.0), [terms.Tether(anchor=[0.0, 0.0, 0.0], stiffness=20.0)])
 
 

@@ -31,7 +31,9 @@ def remus():
 
 def light():
     """A plate of 2 kg that moves 200 kg of water across itself and tumbles, 10 s."""
-    vehicle = lw.Vehicle(2.0, [0.6, 1.0, 1.4], [2.0, 20.0, 200.0], 19.6, [0.0, 0.0, -0.01])
+    vehicle = lw.Vehicle(
+        2.0, inertia=[0.6, 1.0, 1.4], added_mass=[2.0, 20.0, 200.0], buoyancy=19.6, center_of_buoyancy=[0.0, 0.0, -0.01]
+    )
     start = lw.Start(rotation_vector=[0.3, 0.2, 0.1], velocity=[0.5, 0.1, 0.3], angular_velocity=[0.5, 0.8, 0.3])
     return lw.Ensemble(lw.Scene(vehicle, lw.Environment(gravity=9.8), start=start), 256, 1, SPREAD), 10.0
 

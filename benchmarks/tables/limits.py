@@ -61,7 +61,9 @@ def munk_run(method, hw, angle, steps=STEPS, samples=SAMPLES):
     n = len(hw)
     R = tilted(n, 2, angle)
     p = R[:, 1, :] * (hw / np.sqrt(1.0 - 0.01))[:, None]
-    scene = lw.Scene(lw.Vehicle(0.5, (1.0, 1.0, 1.0), np.array(MASS) - 0.5), lw.Environment(gravity=0.0))
+    scene = lw.Scene(
+        lw.Vehicle(0.5, inertia=(1.0, 1.0, 1.0), added_mass=np.array(MASS) - 0.5), lw.Environment(gravity=0.0)
+    )
     fleet = lw.Ensemble.from_states(scene, still(n), R, p / MASS, still(n))
     return run(fleet, method, steps, samples)
 
@@ -69,7 +71,9 @@ def munk_run(method, hw, angle, steps=STEPS, samples=SAMPLES):
 def restoring(method, hw, angle):
     """Released at rest, tilted, no speed and no added mass: w = sqrt(B |r| / J), B = 9.8 N, J = 1."""
     n = len(hw)
-    scene = lw.Scene(lw.Vehicle(1.0, (1.0, 1.0, 1.0), None, 9.8), lw.Environment(gravity=9.8))
+    scene = lw.Scene(
+        lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0), added_mass=None, buoyancy=9.8), lw.Environment(gravity=9.8)
+    )
     arm = np.outer(hw**2 / 9.8, [0.0, 0.0, -1.0])
     states = (still(n), tilted(n, 0, angle), still(n), still(n))
     fleet = lw.Ensemble.from_states(scene, *states, {"vehicle.center_of_buoyancy": arm})
@@ -79,7 +83,7 @@ def restoring(method, hw, angle):
 def drag(method, numbers, _):
     """Linear drag of a body of mass 1 that moves straight: whether its speed stays below the start's."""
     n = len(numbers)
-    vehicle = lw.Vehicle(1.0, (1.0, 1.0, 1.0), None, 0.0)
+    vehicle = lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0), added_mass=None, buoyancy=0.0)
     scene = lw.Scene(vehicle, lw.Environment(gravity=0.0), terms=[lw.Drag(linear=[1.0, 0, 0, 0, 0, 0])])
     linear = np.outer(numbers, np.eye(6)[0])
     velocity = np.tile([1.0, 0.0, 0.0], (n, 1))
@@ -92,7 +96,7 @@ def drag(method, numbers, _):
 def rotation(method, numbers, _):
     """Steady spin about the axis of the largest inertia: whether no status was given and R has not grown tenfold."""
     n = len(numbers)
-    scene = lw.Scene(lw.Vehicle(1.0, (0.6, 0.8, 1.0)), lw.Environment(gravity=0.0))
+    scene = lw.Scene(lw.Vehicle(1.0, inertia=(0.6, 0.8, 1.0)), lw.Environment(gravity=0.0))
     fleet = lw.Ensemble.from_states(scene, still(n), tilted(n, 0, 0.0), still(n), np.outer(numbers, np.eye(3)[2]))
     result = run(fleet, method)
     with np.errstate(invalid="ignore"):

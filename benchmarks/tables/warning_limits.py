@@ -24,7 +24,7 @@ GRAVITY = 9.8
 
 def munk(w):
     """Members whose momentum, across the light axis, is 0.3 rad off its stable direction; J = I."""
-    vehicle = lw.Vehicle(0.5, (1.0, 1.0, 1.0), MASSES - 0.5, 0.5 * GRAVITY)
+    vehicle = lw.Vehicle(0.5, inertia=(1.0, 1.0, 1.0), added_mass=MASSES - 0.5, buoyancy=0.5 * GRAVITY)
     R = np.broadcast_to(notation.matrix_from_rotation_vector(np.array([0.0, 0.0, ANGLE])), (len(w), 3, 3))
     P = np.zeros((len(w), 3))
     P[:, 1] = w / np.sqrt(1.0 / MASSES[0] - 1.0 / MASSES[1])
@@ -36,7 +36,9 @@ def munk(w):
 
 def restoring(w):
     """Spheres at rest whose buoyancy acts above the centre of gravity, 0.3 rad off; J = I."""
-    vehicle = lw.Vehicle(1.0, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), GRAVITY, (0.0, 0.0, -0.1))
+    vehicle = lw.Vehicle(
+        1.0, inertia=(1.0, 1.0, 1.0), added_mass=(1.0, 1.0, 1.0), buoyancy=GRAVITY, center_of_buoyancy=(0.0, 0.0, -0.1)
+    )
     R = np.broadcast_to(notation.matrix_from_rotation_vector(np.array([ANGLE, 0.0, 0.0])), (len(w), 3, 3))
     zero = np.zeros((len(w), 3))
     arm = zero.copy()

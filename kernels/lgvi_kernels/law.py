@@ -8,6 +8,7 @@ Only the minus before a 3-vector is written neg(v): for an operator of one opera
 from lgvi_kernels.lanes.arithmetic import (
     absolute,
     add,
+    below,
     cross,
     div,
     dot,
@@ -21,6 +22,7 @@ from lgvi_kernels.lanes.arithmetic import (
     positive,
     sub,
     vec3,
+    whole,
 )
 from lgvi_kernels.lanes.functions import (
     arctangent2,
@@ -45,6 +47,8 @@ from lgvi_kernels.lanes.view import (
     add_outer,
     add_rows,
     command,
+    gather1,
+    gather3,
     heading_error,
     make_pursuit,
     middle_of_half,
@@ -66,6 +70,7 @@ __all__ = [
     "add_outer",
     "add_rows",
     "arctangent2",
+    "below",
     "clamp",
     "command",
     "cosine",
@@ -75,6 +80,8 @@ __all__ = [
     "dot",
     "exponential",
     "fused",
+    "gather1",
+    "gather3",
     "greatest",
     "heading_error",
     "hyperbolic_tangent",
@@ -110,4 +117,5 @@ __all__ = [
     "vec3",
     "velocity_at",
     "wandered",
+    "whole",
 ]

@@ -165,6 +165,19 @@ def closest(word: Any, known: Iterable[str]) -> str:
     return f"did you mean {near[0]!r}?" if near else f"known: {', '.join(names[:MOST_KNOWN])}{more}"
 
 
+def among(value: Any, known: Iterable[Any]) -> bool:
+    """Tell whether a value is one of those known, whatever the user gave: arrays and tables too.
+
+    Args:
+        value: What the user gave.
+        known: Names, numbers or truth values.
+
+    Returns:
+        Whether it equals one of them and has its type.
+    """
+    return any(type(value) is type(k) and value == k for k in known)
+
+
 class _Brief(reprlib.Repr):
     """repr() of a value of any size, no longer than a message shows: memory and time do not grow with the value."""
 
@@ -311,7 +324,7 @@ class Faults:
             Whether the value is allowed.
         """
         known = list(known)
-        good = any(value == k and type(value) is type(k) for k in known)
+        good = among(value, known)
         if not good:
             self.add(key, value, "is not known", lambda: closest(value, known))
         return good

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping, Sequence
-from typing import Any
+import itertools
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 import warp as wp
 
+from lgvi_kernels.maps.bounded import BOUNDS, FIELDS
 from lgvi_warp.physics.terms.base import Packed
 
 
@@ -166,22 +168,32 @@ class Lanes:
         self.view = view if view.ndim == 3 else view[:, :, None]
 
 
+class Group(NamedTuple):
+    """What several terms packed: those of one of the kernel's structs, which nests their numbers.
+
+    Attributes:
+        packed: what each term packed.
+        shared: for each, whether all members share it, and earlier calls brought the same.
+    """
+
+    packed: Sequence[Packed]
+    shared: Sequence[bool]
+
+
 class LawArrays:
     """The numbers of a kernel's laws: their structs, their rows of a table, and what they remember.
 
     Args:
         packets: number of packets.
-        struct: Warp's struct of the laws' numbers.
-        dtype: its NumPy type.
+        kinds: for each group of laws, such as the terms, a controller's parts, and the events, Warp's struct of its numbers
+            and the struct's NumPy type.
         Lane: Warp's type of a lane.
         Number: what the table holds: lanes (default), or numbers that all members share.
-        loop: Warp's struct of the numbers of a controller's parts, with its NumPy type; None (default) without a controller.
 
     Attributes:
-        params: the structs.
+        structs: the structs of each group.
         table: rows that the laws read.
         memory: what laws and method remember from step to step; the second half is a backup.
-        loop: the structs of a controller's parts; None without one.
         places: where in table and memory each law's rows lie, and how many there are; None before `write`.
         remembered: rows of the memory that each law has, without scratch rows.
     """
@@ -190,54 +202,45 @@ class LawArrays:
     memory: Lanes
     remembered: list[slice]
 
-    def __init__(
-        self,
-        packets: int,
-        struct: Any,
-        dtype: np.dtype,
-        Lane: Any,
-        Number: Any = None,
-        loop: tuple[Any, np.dtype] | None = None,
-    ):
+    def __init__(self, packets: int, kinds: Sequence[tuple[Any, np.dtype]], Lane: Any, Number: Any = None):
         self._packets, self._Lane, self._Number = packets, Lane, Number or Lane
-        self.params = Structs(struct, dtype)
-        self.loop = Structs(*loop) if loop else None
+        self.structs = [Structs(*kind) for kind in kinds]
+        self._bounded = [_bounded(dtype) for _, dtype in kinds]
         self.places: Any = None
 
-    def write(
-        self, laws: Sequence[Packed], shared: Sequence[bool], scratch: int = 0, parts: int = 0, bus: int = 0
-    ) -> None:
+    def write(self, groups: Sequence[Group], scratch: int = 0, bus: int = 0) -> None:
         """Write what the terms packed, and the parts of a controller.
 
         Args:
-            laws: what each term packed, then each part.
-            shared: for each, whether all members share it, and earlier calls brought the same.
+            groups: one for each of `kinds`.
             scratch: rows that the method remembers for itself (default 0).
-            parts: how many of them are parts of a controller (default 0).
             bus: rows of the memory before theirs (default 0).
         """
+        laws = [law for group in groups for law in group.packed]
         rows = [_present(law.rows) for law in laws]
         starts = [part for law in laws for part in (_present(law.memory), np.zeros((1, law.work)))]
         row, memory, places = 1, bus, []
         self.remembered = []
         for law, part in zip(laws, rows, strict=True):
-            work = memory + memory_rows(law) - law.work
+            work, end = memory + memory_rows(law) - law.work, memory + memory_rows(law)
             wanted = ("first", row, law.rows), ("memory", memory, law.memory), ("work", work, law.work or None)
-            places.append({name: place for name, place, part in wanted if part is not None})
+            own = {name: place for name, place, part in wanted if part is not None}
+            # The table's first row is none's: it is 0, and what a law without rows reads.
+            size = part.shape[1]
+            ends = (row, row + size - 1) if size else (0, 0)
+            places.append((own, dict(zip(BOUNDS, (*ends, memory, end - 1, bus), strict=True))))
             self.remembered.append(slice(memory, work))
-            row, memory = row + part.shape[1], memory + memory_rows(law)
+            row, memory = row + size, end
         moved = self.places != (places, row, memory)
         if moved:
             # A law may have as many rows as its members need: those after it, though shared, then lie elsewhere.
-            self.params.forget()
-            if self.loop is not None:
-                self.loop.forget()
+            for structs in self.structs:
+                structs.forget()
             self.places = places, row, memory
-        n = len(laws) - parts
-        self.params.write(self._packets, nested(laws[:n], shared[:n], places[:n]))
-        if self.loop is not None:
-            self.loop.write(self._packets, nested(laws[n:], shared[n:], places[n:]))
-        self._write_table(rows, shared, row, moved)
+        left = iter(places)
+        for structs, bounded, group in zip(self.structs, self._bounded, groups, strict=True):
+            structs.write(self._packets, _nested(group, bounded, list(itertools.islice(left, len(group.packed)))))
+        self._write_table(rows, [known for group in groups for known in group.shared], row, moved)
         self._write_memory(starts, bus, memory + scratch, moved)
 
     def _write_table(self, each: list[np.ndarray], shared: Sequence[bool], size: int, moved: bool) -> None:
@@ -263,6 +266,15 @@ class LawArrays:
         view[:, half:] = view[:, :half]
 
 
+def _bounded(dtype: np.dtype) -> list[bool]:
+    """Of each law of a struct, whether bounds stand beside its numbers."""
+    found: list[bool] = []
+    while "own" in (dtype.names or ()):
+        found.append(dtype["own"].names == FIELDS)
+        dtype = dtype["rest"]
+    return found
+
+
 def memory_rows(law: Packed) -> int:
     """Rows of the memory that a law has, its scratch rows among them.
 
@@ -279,20 +291,18 @@ def _present(rows: np.ndarray | None) -> np.ndarray:
     return np.zeros((1, 0)) if rows is None else rows
 
 
-def nested(
-    each: Sequence[Packed], shared: Sequence[bool], places: Sequence[Mapping[str, int]] = ()
+def _nested(
+    group: Group, bounded: Sequence[bool], places: Sequence[tuple[dict[str, int], dict[str, int]]]
 ) -> list[tuple[tuple[str, ...], Any, bool]]:
-    """The numbers of several laws or events as parts of the kernel's struct, which holds those of the first, and the rest.
+    """The numbers of a group as parts of the kernel's struct, which holds those of the first law, and the rest.
 
-    Args:
-        each: what the terms packed.
-        shared: for each, whether all members share it.
-        places: for each, further whole numbers by field (default none).
-
-    Returns:
-        Parts as of `Structs.write`.
+    places: for each law where its rows are, as fields of its own, and its bounds.
     """
-    return [
-        ((*("rest",) * i, "own"), {**packed.values, **(places[i] if places else {})}, known)
-        for i, (packed, known) in enumerate(zip(each, shared, strict=True))
-    ]
+    parts: list[tuple[tuple[str, ...], Any, bool]] = []
+    each = zip(group.packed, group.shared, bounded, places, strict=True)
+    for i, (packed, known, held, (own, bounds)) in enumerate(each):
+        path = (*("rest",) * i, "own")
+        parts.append((path + FIELDS[:1] * held, {**packed.values, **own}, known))
+        if held:
+            parts.append((path + FIELDS[1:], bounds, known))
+    return parts

@@ -189,8 +189,7 @@ class Episodes:
 def _lanes_of(packets: Packets) -> list[np.ndarray]:
     """The arrays in which lanes have numbers, (packets, ..., width), or (1, ..., width or 1) where members share them."""
     laws = packets.laws
-    structs = (each for each in (packets.inertia, laws.params, packets.events, laws.loop) if each is not None)
-    lanes = [leaf for each in structs for leaf in _leaves(each.view)]
+    lanes = [leaf for each in (packets.inertia, *laws.structs) for leaf in _leaves(each.view)]
     lanes += [each.view for each in (laws.table, laws.memory, packets.state_lanes)]
     return lanes + [each.numpy() for each in (packets.status, packets.failed_step, packets.failed_size)]
 

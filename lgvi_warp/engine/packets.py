@@ -16,12 +16,20 @@ from lgvi_kernels.advance.feeding import NOTED
 from lgvi_kernels.advance.monitor import ENERGY_FIELDS
 from lgvi_kernels.advance.rows import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS, WASTE
 from lgvi_kernels.lanes.arithmetic import int_lane
+from lgvi_warp.common.status import Warnings
 from lgvi_warp.common.warp_setup import build_lock
-from lgvi_warp.engine.arrays import Lanes, LawArrays, Structs, nested
+from lgvi_warp.engine.arrays import Group, Lanes, LawArrays, Structs
 from lgvi_warp.engine.outcome import Outcome
 from lgvi_warp.engine.packing import Packing
 from lgvi_warp.engine.plan import Plan
-from lgvi_warp.engine.step_warnings import at_start, munk_factor, row_limits
+from lgvi_warp.engine.step_warnings import (
+    at_start,
+    departure,
+    leaves_rotations,
+    munk_factor,
+    orthogonality_limit,
+    row_limits,
+)
 from lgvi_warp.physics.terms.events import Event
 from lgvi_warp.sampling.members import Members
 
@@ -37,7 +45,7 @@ class Packets:
         count: number of packets.
         frame: axes and origins that the kernel works in.
         scale: (1 or m,) [kg m^2], number that momenta are divided by in the kernel; 1 for methods that need none.
-        inertia, laws, events: numbers of the vehicle, of its laws and of the events.
+        inertia, laws: numbers of the vehicle; of its laws, of a controller's parts and of the events.
         state_lanes: states, (packets, fields of a state).
     """
 
@@ -47,8 +55,9 @@ class Packets:
         self.count = -(-members.count // width)
         structs = (types.Inertia, types.Params, types.Events, types.Limits, *([types.Loop] if types.Loop else []))
         inertia, params, events, limits, *loop = zip(structs, plan.dtypes, strict=True)
-        self.inertia, self.events, self._limits = (Structs(*kind) for kind in (inertia, events, limits))
-        self.laws = LawArrays(self.count, *params, types.Lane, types.Number, *loop)
+        self._controlled = bool(loop)
+        self.inertia, self._limits = (Structs(*kind) for kind in (inertia, limits))
+        self.laws = LawArrays(self.count, (params, *loop, events), types.Lane, types.Number)
         self.state_lanes = Lanes(self.count, plan.spec.state_fields, types.Lane)
         self._rows = np.empty((self.count * width, plan.spec.state_fields))
         self.status = wp.zeros(self.count, dtype=int_lane(width), device="cpu")
@@ -96,17 +105,17 @@ class Packets:
         """
         plan, self.members = self.plan, members
         packing = Packing(plan, members)
-        self.frame, self.scale = packing.frame, packing.scale
+        self.frame, self.scale, self._packing = packing.frame, packing.scale, packing
         shared, before = plan.shared.keeps, self._arrays() if self._launch else []
         self.inertia.write(self.count, [((), packing.inertia(), shared("inertia"))])
-        laws, events, parts = packing.laws(), packing.events(), packing.control()
-        known = [shared((kind, i)) for kind, each in (("law", laws), ("part", parts)) for i in range(len(each))]
+        each = {"law": packing.laws(), "part": packing.control(), "event": packing.events()}
+        if not self._controlled:
+            del each["part"]
+        groups = [Group(packed, [shared((kind, i)) for i in range(len(packed))]) for kind, packed in each.items()]
         bus, _ = self._bus()
-        everything = [*laws, *parts]
-        self.laws.write(everything, known, packing.scratch(everything, bus), len(parts), bus)
-        if self.laws.loop is not None:
-            self.monitor.loop = self.laws.loop.array
-        self.events.write(self.count, nested(events, [shared(("event", i)) for i in range(len(events))]))
+        self.laws.write(groups, packing.scratch([law for group in groups for law in group.packed], bus), bus)
+        if self._controlled:
+            self.monitor.loop = self.laws.structs[1].array
         if plan.spec.looks:
             self._limits.write(self.count, [((), self._watched_limits(), False)])
             self.monitor.limits = self._limits.array
@@ -135,8 +144,8 @@ class Packets:
     def _arrays(self) -> list[Any]:
         """The kernel's arrays that `refill` may replace, its first arguments in front."""
         laws, limits = self.laws, self._limits.array
-        arrays = [self.inertia.array, laws.params.array, self.events.array, laws.table.array, self.memory, limits]
-        return arrays + ([laws.loop.array] if laws.loop else [])
+        params, *loop, events = (structs.array for structs in laws.structs)
+        return [self.inertia.array, params, events, laws.table.array, self.memory, limits, *loop]
 
     def _written_by_the_kernel(self) -> list[Any]:
         monitor, spec = self.monitor, self.plan.spec
@@ -328,11 +337,14 @@ class Packets:
             momentum = self._rows[: self.members.count, 12:15] * self.scale[:, None]
             none = np.zeros(self.members.count, np.uint16), np.zeros(0)
             checked = self.plan.checks != "none"
-            self._warned = at_start(self.plan, self.members, self.frame, momentum) if checked else none
+            self._warned = (
+                at_start(self.plan, self.members, self.frame, momentum, self._packing.water) if checked else none
+            )
         bits, value = self._warned
         step = np.zeros(len(bits), np.int64)
+        value = value if len(value) else np.full(len(bits), np.nan)
         if not self.plan.spec.looks:
-            return bits, step, value if len(value) else np.full(len(bits), np.nan)
+            return self._with_departed(bits, step, value)
         monitor = self.monitor
         noted = self._of_members(monitor.warned, np.uint16)
         # The kernel's warning is more serious if its highest bit is above all bits of the start.
@@ -340,6 +352,22 @@ class Packets:
         step = np.where(later, self._of_members(monitor.warned_step, np.int64), 0)
         value = np.where(later, np.sqrt(self._of_members(monitor.warned_size, np.float64)), value)
         return bits | noted, step, value
+
+    def _with_departed(
+        self, bits: np.ndarray, step: np.ndarray, value: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The same with a warning of the members whose last attitude is no rotation, where a method lets R depart.
+
+        One look at the end is enough: R departs further with each step of such a method.
+        """
+        if self.plan.checks == "none" or not leaves_rotations(self.plan):
+            return bits, step, value
+        size = departure(self.state_lanes.view[:, :9])[: len(bits)]
+        warning = np.uint16(Warnings.ORTHOGONALITY)
+        over = size > orthogonality_limit(self.plan)
+        first = over & (warning > bits)
+        made = np.where(self._status[: len(bits)] == 0, self._launched[1], self._failed_step[: len(bits)])
+        return bits | warning * over, np.where(first, made, step), np.where(first, size, value)
 
 
 def columns_of(sizes: Mapping[str, int]) -> Any:

@@ -168,7 +168,7 @@ class Packing:
         """Rows of the memory that the method keeps for itself.
 
         Args:
-            laws: what each term packs, and each part of the controller.
+            laws: what each term packs, each part of the controller, and each event.
             bus: rows of the memory before theirs (default 0).
 
         Returns:
@@ -195,7 +195,7 @@ class Packing:
         if shifted:
             nu = velocity + notation.cross(rate, frame.origin)
             position = position + notation.rotate_out(attitude, frame.origin)
-        water = self._water_at_start()
+        water = self.water
         if water is not None:
             nu = nu - water
         if turned:
@@ -222,7 +222,8 @@ class Packing:
         else:
             rows[:, STATE_FIELDS:] = 0.0
 
-    def _water_at_start(self) -> np.ndarray | None:
+    @functools.cached_property
+    def water(self) -> np.ndarray | None:
         """R^T u (m, 3) [m/s]: velocity of the water in the user's body axes where each member starts; None for none."""
         m = self.members
         total: Any = None
@@ -240,7 +241,7 @@ LARGE_TABLE = 16_384
 
 
 def rows_shared(plan: Plan) -> bool:
-    """Whether all members share the rows of the laws and of the controller's parts, and these are many.
+    """Whether all members share the rows of the laws, of the controller's parts and of the events, and these are many.
 
     Few rows have a copy for each lane, whoever shares them: so one kernel serves scenes in which other numbers vary.
 
@@ -253,7 +254,7 @@ def rows_shared(plan: Plan) -> bool:
     # What few members need is packed once, here.
     members = plan.ensemble.members
     packing = Packing(plan, plan.ensemble.select(0, members if members <= KEPT else 1))
-    each = (("law", packing.laws()), ("part", packing.control()))
+    each = (("law", packing.laws()), ("part", packing.control()), ("event", packing.events()))
     sizes = {
         (kind, i): law.rows.shape[1] for kind, packed in each for i, law in enumerate(packed) if law.rows is not None
     }

@@ -10,9 +10,10 @@ from __future__ import annotations
 import functools
 import re
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 from lgvi_warp.common import summaries
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.errors import Faults, among
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.methods.tableaux import CG3, DOP853, DOPRI5, RK4, RKW3, Tableau
 
@@ -181,14 +182,18 @@ class Method(Summarized):
                            f"use {composition}(psi_s)")  # fmt: skip
         faults.choice("solver", self.solver, SOLVERS)
         n = self.iterations
-        if n not in (None, "auto") and (isinstance(n, bool) or not isinstance(n, int) or not 0 <= n <= 100):
+        if (
+            n is not None
+            and not among(n, ("auto",))
+            and (isinstance(n, bool) or not isinstance(n, int) or not 0 <= n <= 100)
+        ):
             remedy = 'give a number of Newton steps, "auto", or None to iterate to the tolerance'
             faults.add("iterations", n, "is not a whole number from 0 to 100", remedy)
         for name in ("alpha", "beta"):
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 <= value <= 1.0:
+            if not isinstance(value, int | float) or isinstance(value, bool) or not 0.0 <= value <= 1.0:
                 faults.add(name, value, "is not a number from 0 to 1", "give the weight of the old configuration")
-        if self.tolerance is not None and not 0.0 < self.tolerance < 1.0:
+        if self.tolerance is not None and not _between_0_and_1(self.tolerance):
             faults.add("tolerance", self.tolerance, "is not between 0 and 1", "give a relative residual such as 1e-12")
         self._check_steps(faults)
         faults.raise_if_any()
@@ -204,7 +209,7 @@ class Method(Summarized):
         """Note a fault unless both tolerances or none are set, and for a method that estimates no error."""
         tolerances = {name: value for name in ("rtol", "atol") if (value := getattr(self, name)) is not None}
         for name, value in tolerances.items():
-            if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < 1.0:
+            if not _between_0_and_1(value):
                 faults.add(name, value, "is not between 0 and 1", "give a tolerance such as 1e-9")
         if len(tolerances) == 1:
             faults.add(*tolerances.popitem(), "is given alone", "give both rtol and atol, or none for a fixed step")
@@ -351,6 +356,11 @@ class Method(Summarized):
         if self.iterations is None:
             return 1e-14 if dtype == "float64" else 1e-6
         return 1e-12 if dtype == "float64" else 1e-5
+
+
+def _between_0_and_1(value: Any) -> bool:
+    """Whether a value is a number above 0 and below 1."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < 1.0
 
 
 @functools.cache

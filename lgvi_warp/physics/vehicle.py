@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 import numpy as np
@@ -46,7 +46,8 @@ class Vehicle(Summarized):
     """A rigid body in water, in body axes (x ahead, y to starboard, z down), described in one of two forms.
 
     The simple form is about the centre of gravity: `mass`, `inertia`, `added_mass`. The 6x6 form is about any origin of the
-    body: `rigid_body_mass_matrix`, `added_mass_matrix`, `weight`, `center_of_gravity`. Matrices are stored in full.
+    body: `rigid_body_mass_matrix`, `added_mass_matrix`, `weight`, `center_of_gravity`. Matrices are stored in full. All but
+    `mass` are given by name: three numbers of inertia look like three of added mass.
 
     Args:
         mass: Dry mass [kg]. Simple form.
@@ -74,6 +75,7 @@ class Vehicle(Summarized):
     """
 
     mass: float | None = None
+    _: KW_ONLY
     inertia: Any = None
     added_mass: Any = None
     buoyancy: float = 0.0

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from lgvi_warp.common.errors import SceneError, refusal
+from lgvi_warp.common.errors import SceneError, among, refusal
 from lgvi_warp.common.reading import file_text
 from lgvi_warp.common.toml_text import parsed
 
@@ -159,8 +159,10 @@ def with_named_vehicle(content: Mapping[str, Any]) -> Mapping[str, Any]:
         The tables with the vehicle, its terms and its water; the argument itself if it names no vehicle.
 
     Raises:
-        SceneError: If no vehicle has that name.
+        SceneError: If no vehicle has that name, or the content is no table.
     """
+    if not isinstance(content, Mapping):
+        raise refusal("scene", content, "is no table", "give tables by section name, as of a scene file")
     table = content.get("vehicle")
     if not isinstance(table, Mapping) or "name" not in table:
         return content
@@ -175,8 +177,8 @@ def with_named_vehicle(content: Mapping[str, Any]) -> Mapping[str, Any]:
             merged[section].pop("name", None)
     terms = content.get("terms", [])
     if isinstance(terms, list | tuple):
-        names = {_name_of(term) for term in terms}
-        merged["terms"] = [term for term in known.get("terms", []) if _name_of(term) not in names] + list(terms)
+        names = [_name_of(term) for term in terms]
+        merged["terms"] = [term for term in known.get("terms", []) if not among(_name_of(term), names)] + list(terms)
     return merged
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.errors import Faults, SceneError, ragged
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.real_numbers import holds_words, is_whole
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
@@ -37,7 +37,8 @@ def check_keep(faults: Faults, key: str, keep: Any, members: int | None = None) 
     if isinstance(keep, str):
         faults.choice(key, keep, KEEP)
         return
-    indices = np.asarray(keep) if isinstance(keep, list | tuple | np.ndarray | range) else np.array(None)
+    listed = isinstance(keep, list | tuple | np.ndarray | range) and not ragged(keep)
+    indices = np.asarray(keep if listed else None)
     is_list = indices.ndim == 1 and indices.size > 0 and indices.dtype.kind in "iu" and not np.ma.is_masked(keep)
     if not is_list or np.any(indices < 0):
         faults.add(key, keep, "names no members", f"give {', '.join(map(repr, KEEP))}, or a list of indices from 0")

@@ -51,7 +51,13 @@ def example() -> Scene:
     Returns:
         A Scene of its vehicle and start.
     """
-    vehicle = Vehicle(123.8, [5.46, 5.29, 5.72], [65.0, 70.0, 75.0], 1215.8, [0.0, 0.0, -0.007])
+    vehicle = Vehicle(
+        123.8,
+        inertia=[5.46, 5.29, 5.72],
+        added_mass=[65.0, 70.0, 75.0],
+        buoyancy=1215.8,
+        center_of_buoyancy=[0.0, 0.0, -0.007],
+    )
     start = Start([0.0, 0.0, 10.0], rotation_vector=[1.0, 2.0, 3.0], velocity_inertial=[0.1, 0.2, 1.0],
                   angular_velocity=[0.3, 0.2, 0.1])  # fmt: skip
     return Scene(vehicle, Environment(gravity=9.8), start=start)

@@ -19,7 +19,13 @@ FIELDS = 21
 
 def scene(sensors, faults=(), period=0.1, **law):
     """A vehicle with these sensors and a law that needs nothing of them."""
-    vehicle = lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 196.0, (0.0, 0.0, -0.02))
+    vehicle = lw.Vehicle(
+        20.0,
+        inertia=(1.5, 4.0, 4.5),
+        added_mass=(5.0, 22.0, 25.0),
+        buoyancy=196.0,
+        center_of_buoyancy=(0.0, 0.0, -0.02),
+    )
     laws, guidance = [lw.HeadingPID(**{"kp": 1.0} | law)], [lw.SetPoint(heading=0.0)]
     controller = lw.Controller(period=period, sensors=sensors, guidance=guidance, laws=laws, faults=faults)
     return lw.Scene(vehicle, lw.Environment(9.8), [lw.ControlWrench()], controller=controller)

@@ -158,7 +158,9 @@ class Recorder(Loop):
 def twin(name, method, i, steps):
     """Positions at the looks, and what these did not deliver, of the twin's loop of member i."""
     actuators, allocation, faults = SCENES[name][0](LOST[i])
-    vehicle = lw.Vehicle(MASS, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), BUOYANCY, CENTER)
+    vehicle = lw.Vehicle(
+        MASS, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=BUOYANCY, center_of_buoyancy=CENTER
+    )
     laws = (
         Weight(net=MASS * GRAVITY - BUOYANCY),
         Restoring(moment=BUOYANCY * np.array(CENTER)),
@@ -190,7 +192,9 @@ def solved(name, method, h, steps, every):
         allocation=allocation,
         faults=faults,
     )
-    vehicle = lw.Vehicle(MASS, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), BUOYANCY, CENTER)
+    vehicle = lw.Vehicle(
+        MASS, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=BUOYANCY, center_of_buoyancy=CENTER
+    )
     water = lw.Environment(gravity=GRAVITY, water_density=DENSITY)
     terms = [lw.Drag(linear=LINEAR, quadratic=QUADRATIC), *terms, lw.Wrench(force=AHEAD)]
     scene = lw.Scene(vehicle, water, terms, lw.Start(**STATE), controller)

@@ -37,7 +37,7 @@ def scene(period=PERIOD, position=NONE, heading=0.0, **words):
         lw.HeadingPID(kp=0.0),
     ]
     controller = lw.Controller(period=period, guidance=[lw.SetPoint(position=position, heading=heading)], laws=laws)
-    vehicle = lw.Vehicle(MASS, INERTIA, NONE, MASS * GRAVITY, NONE)
+    vehicle = lw.Vehicle(MASS, inertia=INERTIA, added_mass=NONE, buoyancy=MASS * GRAVITY, center_of_buoyancy=NONE)
     return lw.Scene(
         vehicle, lw.Environment(gravity=GRAVITY), [lw.ControlWrench(limit=FAR), lw.Wrench()], controller=controller
     )
@@ -119,7 +119,9 @@ def test_feedforward_is_that_of_the_scene_whatever_a_member_is():
              "pose_pid.kr": (20.0, 20.0, 20.0), "pose_pid.kw": (30.0, 30.0, 30.0)}  # fmt: skip
     of_scene = {"vehicle.buoyancy": buoyancy, "vehicle.center_of_buoyancy": center}
     known = scene(feedforward="restoring")
-    known = dataclasses.replace(known, vehicle=lw.Vehicle(MASS, INERTIA, NONE, buoyancy, center))
+    known = dataclasses.replace(
+        known, vehicle=lw.Vehicle(MASS, inertia=INERTIA, added_mass=NONE, buoyancy=buoyancy, center_of_buoyancy=center)
+    )
     R = Rotation.from_euler("xyz", (0.3, -0.4, 0.5)).as_matrix()
     states = np.zeros((2, 3)), np.array([np.eye(3), R]), np.zeros((2, 3)), np.zeros((2, 3))
     members = [gains | of_scene | {"vehicle.buoyancy": buoyancy + 4.0}, OTHERS | of_scene]

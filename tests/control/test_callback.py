@@ -14,7 +14,7 @@ H, GAINS = 0.02, dict(kp=3.0, kd=2.0)
 def scene(laws, members=20, **more):
     """A body with a heading law and an ideal actuator; members that differ."""
     controller = lw.Controller(period=5 * H, guidance=[lw.SetPoint(heading=0.8)], laws=laws, **more)
-    vehicle = lw.Vehicle(10.0, (1.0, 2.0, 3.0))
+    vehicle = lw.Vehicle(10.0, inertia=(1.0, 2.0, 3.0))
     terms = [lw.ControlWrench(limit=2.0), lw.Drag(linear=(1.0, 2.0, 2.0, 0.1, 0.1, 0.1), quadratic=(0.0,) * 6)]
     plain = lw.Scene(vehicle, terms=terms, controller=controller)
     vary = {"start.angular_velocity": lw.Normal(std=0.1), "start.velocity": lw.Normal(std=0.2)}

@@ -14,7 +14,9 @@ DELAYS = np.array([0, 1, 4, 5, 7, 10, 22, 48])
 
 def members(delays, times=np.inf):
     """Members with these delays in steps, and with a fault from these times on: one kernel for all."""
-    vehicle = lw.Vehicle(20.0, (1.5, 4.0, J), (5.0, 22.0, 25.0), 196.0, (0.0, 0.0, -0.02))
+    vehicle = lw.Vehicle(
+        20.0, inertia=(1.5, 4.0, J), added_mass=(5.0, 22.0, 25.0), buoyancy=196.0, center_of_buoyancy=(0.0, 0.0, -0.02)
+    )
     guidance = [lw.SetPoint(heading=0.3)]
     faults = [lw.Fault(of="control_wrench", channel=5, gain=0.5, offset=0.05)]
     controller = lw.Controller(period=EVERY * H, guidance=guidance, laws=[lw.HeadingPID(kp=KP, kd=KD)], faults=faults)

@@ -249,7 +249,7 @@ def test_bad_input(case):
 
 def test_bad_input_to_calls(env):
     with pytest.raises(lw.SceneError, match="has no controller"):
-        environment(lw.Scene(lw.Vehicle(10.0, (1.0, 2.0, 3.0))))
+        environment(lw.Scene(lw.Vehicle(10.0, inertia=(1.0, 2.0, 3.0))))
     env.reset()
     with pytest.raises(ValueError, match=r"have shape \(20, 2\); give \(20, 1\)"):
         env.step(np.zeros((N, 2)))
@@ -274,7 +274,7 @@ def falling():
         laws=LAW,
     )
     terms = [lw.ControlWrench(limit=2.0, time_constant=0.1)]
-    vehicle = lw.Vehicle(10.0, (1.0, 2.0, 3.0), buoyancy=10.0 * 9.80665 - 5.0)
+    vehicle = lw.Vehicle(10.0, inertia=(1.0, 2.0, 3.0), buoyancy=10.0 * 9.80665 - 5.0)
     plain = lw.Scene(vehicle, terms=terms, controller=controller, events=[lw.Floor(depth=5.0)])
     fleet = lw.Ensemble(plain, N, 3, {"start.position[2]": lw.Uniform(low=0.0, high=4.9)})
     names = ["depth", "velocity[2]"]

@@ -85,7 +85,13 @@ def scene(tmp_path_factory):
         lw.ReferenceModel(natural_frequency=(1.0, 1.2, 0.8, 1.5), damping_ratio=(1.0, 0.8, 1.2, 1.0),
                           rate_limit=(0.6, 0.5, 0.4, 0.5)),
     ]  # fmt: skip
-    vehicle = lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 20.5 * 9.8, (0.01, 0.005, -0.02))
+    vehicle = lw.Vehicle(
+        20.0,
+        inertia=(1.5, 4.0, 4.5),
+        added_mass=(5.0, 22.0, 25.0),
+        buoyancy=20.5 * 9.8,
+        center_of_buoyancy=(0.01, 0.005, -0.02),
+    )
     terms = [
         lw.Drag(linear=(3.0, 4.0, 5.0, 0.3, 0.4, 0.5), quadratic=(10.0, 30.0, 40.0, 1.0, 2.0, 3.0)),
         lw.ControlWrench(limit=LIMIT),
@@ -192,7 +198,13 @@ def test_guidance_keeps_what_others_want():
     places = lw.Trajectory(times=(0.0, 3.0), positions=[(0, 0, 3), (2, 1, 4)])
     for guidance in ([point, places], [places, point]):
         gains = {**dict.fromkeys(("kp", "kd"), (20.0, 25.0, 30.0)), **dict.fromkeys(("kr", "kw"), (6.0, 7.0, 8.0))}
-        vehicle = lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 20.5 * 9.8, (0.01, 0.005, -0.02))
+        vehicle = lw.Vehicle(
+            20.0,
+            inertia=(1.5, 4.0, 4.5),
+            added_mass=(5.0, 22.0, 25.0),
+            buoyancy=20.5 * 9.8,
+            center_of_buoyancy=(0.01, 0.005, -0.02),
+        )
         controller = lw.Controller(period=EVERY * H, guidance=guidance, laws=[lw.PosePID(**gains)])
         way = lw.Scene(vehicle, lw.Environment(gravity=9.8), [lw.ControlWrench(limit=LIMIT)], controller=controller)
         given = states(1)

@@ -40,7 +40,9 @@ def scene(lag, delay=0.0, faults=(), **more):
         allocation=[lw.AllocationMatrix(to="control_wrench", matrix=MATRIX)],
         faults=faults,
     )
-    vehicle = lw.Vehicle(MASS, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), BUOYANCY, CENTER)
+    vehicle = lw.Vehicle(
+        MASS, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=BUOYANCY, center_of_buoyancy=CENTER
+    )
     terms = [lw.Drag(linear=LINEAR, quadratic=QUADRATIC), lw.ControlWrench(limit=LIMIT, time_constant=lag),
              lw.Wrench(force=(15.0, 0.0, 0.0))]  # fmt: skip
     return lw.Scene(vehicle, lw.Environment(gravity=GRAVITY), terms, lw.Start(**STATE), controller, **more)
@@ -50,7 +52,9 @@ def twin(method, lag, steps, delay=0, faults=()):
     """Positions (steps + 1, 3) and attitudes of the twin's loop."""
     from lgvi_warp.reference.terms.wrench import Wrench
 
-    vehicle = lw.Vehicle(MASS, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), BUOYANCY, CENTER)
+    vehicle = lw.Vehicle(
+        MASS, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=BUOYANCY, center_of_buoyancy=CENTER
+    )
     actuator = ControlWrench(limit=np.array(LIMIT), time_constant=np.array(lag))
     laws = (
         Weight(net=MASS * GRAVITY - BUOYANCY),

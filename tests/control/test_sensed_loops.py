@@ -41,7 +41,9 @@ VARIED = {"cell.noise": np.array([0.0, 0.02, 0.1]), "compass.latency": np.array(
 
 
 def body():
-    return lw.Vehicle(MASS, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), BUOYANCY, CENTER)
+    return lw.Vehicle(
+        MASS, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=BUOYANCY, center_of_buoyancy=CENTER
+    )
 
 
 def steered(sensors, faults=()):
@@ -124,7 +126,13 @@ def test_the_variance_under_white_noise_is_that_of_the_lyapunov_equation():
     controller = lw.Controller(
         period=PERIOD, sensors=sensors, guidance=[lw.SetPoint(heading=0.0)], laws=[lw.HeadingPID(kp=KP, kd=KD)]
     )
-    vehicle = lw.Vehicle(MASS, (1.5, 4.0, J), (5.0, 22.0, 25.0), BUOYANCY, (0.0, 0.0, -0.02))
+    vehicle = lw.Vehicle(
+        MASS,
+        inertia=(1.5, 4.0, J),
+        added_mass=(5.0, 22.0, 25.0),
+        buoyancy=BUOYANCY,
+        center_of_buoyancy=(0.0, 0.0, -0.02),
+    )
     scene = lw.Scene(vehicle, lw.Environment(GRAVITY), [lw.ControlWrench()], controller=controller)
     members = 4096
     result = lw.solve(lw.Ensemble(scene, members, 3), "psi_s", h=0.05, t1=60.0, save=lw.SaveAt(every=10.0))

@@ -57,7 +57,7 @@ def test_energy_never_grows_by_a_drag_matrix(dtype):
     D = np.sqrt(I6) @ D @ np.sqrt(I6)
     m = len(D)
     scene = lw.Scene(
-        lw.Vehicle(10.0, (1.0,) * 3, buoyancy=98.0),
+        lw.Vehicle(10.0, inertia=(1.0,) * 3, buoyancy=98.0),
         lw.Environment(9.8),
         [lw.DragMatrix(linear=np.eye(6), quadratic=np.eye(6))],
     )
@@ -82,7 +82,7 @@ def test_a_linear_drag_matrix_step(kappa):
     # Two stages with gamma = 1 - 1/sqrt(2) on v' = -z v / h: v <- v (1 + (2 gamma - 1) z) / (1 + gamma z)^2.
     h, M = 0.1, 10.0
     scene = lw.Scene(
-        lw.Vehicle(M, (1.0,) * 3, buoyancy=98.0),
+        lw.Vehicle(M, inertia=(1.0,) * 3, buoyancy=98.0),
         lw.Environment(9.8),
         [lw.DragMatrix(linear=np.eye(6), quadratic=np.eye(6))],
     )

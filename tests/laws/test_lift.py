@@ -20,7 +20,13 @@ from tests.laws.test_parity import STATE, VEHICLE, both
 from tests.support.tools import difference, last, one, random_states, slope
 
 WING = dict(position=[[0.0, 0.0, 0.0]], chord=[[1.0, 0.0, 0.0]], normal=[[0.0, 0.0, -1.0]], area=0.01, lift_slope=3.0)
-HEAVY = lw.Vehicle(1000.0, (900.0, 900.0, 900.0), (0.0, 0.0, 0.0), 9800.0, (0.0, 0.0, 0.0))
+HEAVY = lw.Vehicle(
+    1000.0,
+    inertia=(900.0, 900.0, 900.0),
+    added_mass=(0.0, 0.0, 0.0),
+    buoyancy=9800.0,
+    center_of_buoyancy=(0.0, 0.0, 0.0),
+)
 
 
 def scene(*given, vehicle=HEAVY):
@@ -73,7 +79,13 @@ def test_lift_does_no_work():
         D = law.damping(view(velocity))
         assert abs(velocity @ D @ velocity) <= 1e-14 * np.abs(D).max() * (velocity @ velocity)
     fins = terms.Fins(**(FINS | {"drag": 0.0, "drag_normal": 0.0}))
-    ball = lw.Vehicle(20.0, (2.0, 2.0, 2.0), (0.0, 0.0, 0.0), 20.0 * 9.8, (0.0, 0.0, 0.0))
+    ball = lw.Vehicle(
+        20.0,
+        inertia=(2.0, 2.0, 2.0),
+        added_mass=(0.0, 0.0, 0.0),
+        buoyancy=20.0 * 9.8,
+        center_of_buoyancy=(0.0, 0.0, 0.0),
+    )
     fleet = one(scene(fins, *UNFELT, vehicle=ball), *random_states(4, 8))
     result = lw.solve(fleet, "psi_s", h=0.01, t1=5.0, save=lw.SaveAt(at=list(np.linspace(0.0, 5.0, 51))))
     energy = 10.0 * np.sum(result.velocity**2, axis=2) + np.sum(result.angular_velocity**2, axis=2)
@@ -134,7 +146,13 @@ def test_without_a_rate_limit_nothing_is_kept():
 def test_a_cylinder_falls_at_its_terminal_speed():
     # sqrt(2 W / (rho Cd D L)); kick and drag in turn settle a little off it, of order 2 in the step.
     hull = terms.CrossFlow(stations=[-0.8, 0.1, 0.7], diameters=[0.2, 0.2, 0.2], drag_coefficient=1.1)
-    body = lw.Vehicle(30.0, (1.0, 5.0, 5.0), (5.0, 30.0, 30.0), 30.0 * 9.8 - 40.0, (0.0, 0.0, 0.0))
+    body = lw.Vehicle(
+        30.0,
+        inertia=(1.0, 5.0, 5.0),
+        added_mass=(5.0, 30.0, 30.0),
+        buoyancy=30.0 * 9.8 - 40.0,
+        center_of_buoyancy=(0.0, 0.0, 0.0),
+    )
     # The hull's middle is 0.05 m off the origin, which would turn it: its reflection is added.
     other = terms.CrossFlow(name="b", stations=[-0.7, 0.8], diameters=[0.2, 0.2], drag_coefficient=1.1)
     terminal = np.sqrt(2.0 * 40.0 / (2.0 * DENSITY * 1.1 * 0.2 * 1.5))
@@ -227,7 +245,13 @@ def test_members_that_differ(key, varied):
         own = {name: numbers[f"{key}.{name}"][i] for name in spread if f"{key}.{name}" in numbers}
         if "command" in own:
             own |= {"command_schedule": own["command"][None]}
-        vehicle = lw.Vehicle(20.0, inertia[i], (5.0, 22.0, 25.0), VEHICLE.buoyancy, VEHICLE.center_of_buoyancy)
+        vehicle = lw.Vehicle(
+            20.0,
+            inertia=inertia[i],
+            added_mass=(5.0, 22.0, 25.0),
+            buoyancy=VEHICLE.buoyancy,
+            center_of_buoyancy=VEHICLE.center_of_buoyancy,
+        )
         alone = lw.solve(
             one(scene(dataclasses.replace(term, **own), vehicle=vehicle), **STATE), "psi_s", h=0.01, t1=0.2
         )

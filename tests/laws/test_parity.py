@@ -21,7 +21,13 @@ from tests.laws.cases import CASES, together
 from tests.support.tools import difference, from_state, last, one, slope
 
 GRAVITY = 9.8
-VEHICLE = lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 21.5 * GRAVITY, (0.01, 0.005, -0.02))
+VEHICLE = lw.Vehicle(
+    20.0,
+    inertia=(1.5, 4.0, 4.5),
+    added_mass=(5.0, 22.0, 25.0),
+    buoyancy=21.5 * GRAVITY,
+    center_of_buoyancy=(0.01, 0.005, -0.02),
+)
 STATE = {"b": (0.4, -0.3, 8.0), "R": lw.notation.matrix_from_rotation_vector(np.array([0.3, -0.4, 0.8])),
          "nu": (1.2, 0.3, -0.2), "Om": (0.3, -0.4, 0.5)}  # fmt: skip
 

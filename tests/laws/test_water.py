@@ -69,7 +69,7 @@ def test_a_vehicle_at_rest_in_accelerating_water_stays_with_it():
 def test_a_heavy_vehicle_is_pushed_by_accelerating_water():
     # (m + A) dv/dt = (rho V + A) du/dt for a sphere without drag, so v = u (rho V + A) / (m + A), u(0) = 0.
     term = terms.CurrentHarmonics(amplitudes=[[0.4, 0.0, 0.0]], periods=[6.0], phases=[-0.5 * np.pi])
-    heavy = lw.Vehicle(3.0, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0), 2.0 * GRAVITY)
+    heavy = lw.Vehicle(3.0, inertia=(1.0, 1.0, 1.0), added_mass=(1.0, 1.0, 1.0), buoyancy=2.0 * GRAVITY)
     result = lw.solve(one(lw.Scene(heavy, lw.Environment(GRAVITY), terms=[term])), "psi_s", h=0.01, t1=4.5)
     # The force of each step's middle: an error of (omega h)^2 / 24.
     assert result.velocity[-1, 0, 0] == pytest.approx(-0.4 * 3.0 / 4.0, rel=1e-5)
@@ -136,7 +136,7 @@ def test_frequency_of_encounter(course_deg):
     omega = 2.0 * np.pi / period
     k, course = omega**2 / GRAVITY, np.radians(course_deg)
     encounter = abs(omega - k * speed * np.cos(course))
-    light = lw.Vehicle(2.0, (1.0, 1.0, 1.0), (0.0, 0.0, 0.0), 2.0 * GRAVITY)
+    light = lw.Vehicle(2.0, inertia=(1.0, 1.0, 1.0), added_mass=(0.0, 0.0, 0.0), buoyancy=2.0 * GRAVITY)
     wave = terms.Waves(amplitudes=[a], periods=[period], headings_deg=[0.0], phases=[0.3])
     fleet = one(lw.Scene(light, lw.Environment(GRAVITY), terms=[wave]), b=(0.0, 0.0, depth),
                 nu=speed * np.array([np.cos(course), np.sin(course), 0.0]))  # fmt: skip
@@ -356,7 +356,7 @@ def test_faults_name_key_value_and_remedy(message):
 
 
 def test_waves_want_gravity():
-    drifter = lw.Vehicle(2.0, (1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
+    drifter = lw.Vehicle(2.0, inertia=(1.0, 1.0, 1.0), added_mass=(1.0, 1.0, 1.0))
     here = lw.Scene(drifter, lw.Environment(gravity=0.0), terms=[terms.Waves(**WAVES)])
     with pytest.raises(
         lw.SceneError, match=r"environment.gravity = 0.*leaves the length of waves unknown.*give gravity"

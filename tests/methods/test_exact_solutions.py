@@ -16,7 +16,13 @@ WRENCH, CURRENT = terms.Wrench(force=(1e-30, 0.0, 0.0), torque=ARM), terms.Curre
 
 def sphere(net=NET, center=ARM):
     """A body of 20 kg whose added mass is the same on every axis, to round-off."""
-    return lw.Vehicle(20.0, (0.4, 0.4, 0.4), (10.0, 10.0, 10.0 + 2.0**-48), 20.0 * GRAVITY - net, center)
+    return lw.Vehicle(
+        20.0,
+        inertia=(0.4, 0.4, 0.4),
+        added_mass=(10.0, 10.0, 10.0 + 2.0**-48),
+        buoyancy=20.0 * GRAVITY - net,
+        center_of_buoyancy=center,
+    )
 
 
 def drag_of(linear=DRAG, quadratic=DRAG):
@@ -71,7 +77,7 @@ def test_steady_helix(method):
     size = np.sqrt((J[0] - J[2]) / (1.0 / M[0] - 1.0 / M[2]))
     Om = np.array([a, 0.0, c])
     nu = size * Om / M
-    vehicle = lw.Vehicle(10.0, J, M - 10.0, 10.0 * GRAVITY - NET, ARM)
+    vehicle = lw.Vehicle(10.0, inertia=J, added_mass=M - 10.0, buoyancy=10.0 * GRAVITY - NET, center_of_buoyancy=ARM)
     steps, errors = np.array([0.1, 0.05, 0.025]), []
     for h in steps:
         r = run(vehicle, [], {"nu": nu, "Om": Om}, h, 2.0, method)
@@ -102,7 +108,13 @@ def test_equilibrium_pitch_of_a_trim_moment(method):
 def test_a_steady_current_only_carries(method):
     # In the frame of the water everything is as in still water: positions differ by u t, velocities by R^T u.
     u = np.array([0.3, -0.2, 0.05])
-    vehicle = lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 19.9 * GRAVITY, (0.01, 0.005, -0.02))
+    vehicle = lw.Vehicle(
+        20.0,
+        inertia=(1.5, 4.0, 4.5),
+        added_mass=(5.0, 22.0, 25.0),
+        buoyancy=19.9 * GRAVITY,
+        center_of_buoyancy=(0.01, 0.005, -0.02),
+    )
     drag = terms.Drag(linear=(3.0, 4.0, 5.0, 0.3, 0.4, 0.5), quadratic=(10.0, 30.0, 40.0, 1.0, 2.0, 3.0))
     R = lw.notation.matrix_from_rotation_vector(np.array([0.3, -0.4, 0.8]))
     nu, Om = np.array([1.2, 0.3, -0.2]), (0.3, -0.4, 0.5)
@@ -119,7 +131,13 @@ def test_a_steady_current_only_carries(method):
 def test_a_neutral_body_at_rest_goes_with_accelerating_water():
     # rho V = m: the water's acceleration pushes the body as it pushes the water. R = I, M anisotropic: no relative motion.
     schedule = terms.CurrentProfile(depths=(0.0, 100.0), velocities=((0.5, 0.0, 0.0), (0.5, 0.0, 0.0)))
-    vehicle = lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 20.0 * GRAVITY - NET, ARM)
+    vehicle = lw.Vehicle(
+        20.0,
+        inertia=(1.5, 4.0, 4.5),
+        added_mass=(5.0, 22.0, 25.0),
+        buoyancy=20.0 * GRAVITY - NET,
+        center_of_buoyancy=ARM,
+    )
     r = run(vehicle, [schedule], {"b": (0.0, 0.0, 10.0), "nu": (0.5, 0.0, 0.0)}, 0.05, 10.0, width=1)
     assert np.abs(r.position[-1, 0] - (5.0, 0.0, 10.0)).max() < 1e-12
 

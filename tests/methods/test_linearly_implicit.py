@@ -178,7 +178,9 @@ def falling():
     def run(linear, quadratic, h, steps, method=METHOD, speed=0.0):
         drag = {"type": "drag_matrix", "linear": linear * np.eye(6), "quadratic": quadratic * np.eye(6)}
         scene = lw.Scene(
-            lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 150.0), lw.Environment(gravity=9.8), [drag]
+            lw.Vehicle(20.0, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=150.0),
+            lw.Environment(gravity=9.8),
+            [drag],
         )
         fleet = one(scene, nu=(0.0, 0.0, speed))
         return lw.solve(fleet, method, h=h, t1=steps * h, save=lw.SaveAt(every=h)).velocity[:, 0]

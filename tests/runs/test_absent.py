@@ -32,7 +32,7 @@ NOT_THERE = (
     "decay3",
     "to_body",
 )
-BARE = lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 20.0 * 9.8)
+BARE = lw.Vehicle(20.0, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=20.0 * 9.8)
 
 
 def source(scene, folder, method="psi_s", dtype="float64", **settings):
@@ -195,8 +195,8 @@ def test_a_varied_member_is_as_if_alone_with_its_numbers(method):
             for term in scene().terms
         }  # fmt: skip
         vehicle = lw.Vehicle(
-            p["vehicle.mass"][member], p["vehicle.inertia"][member], VEHICLE.added_mass, VEHICLE.buoyancy,
-            VEHICLE.center_of_buoyancy,
+            p["vehicle.mass"][member], inertia=p["vehicle.inertia"][member], added_mass=VEHICLE.added_mass, buoyancy=VEHICLE.buoyancy,
+            center_of_buoyancy=VEHICLE.center_of_buoyancy,
         )  # fmt: skip
         by_hand = lw.Scene(
             vehicle, lw.Environment(gravity=p["environment.gravity"][member]), list(own.values()), scene().start

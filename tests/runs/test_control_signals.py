@@ -302,7 +302,7 @@ def test_a_file_knows_which_terms_the_controller_drives(laws, tmp_path):
     loop = lw.Controller(period=0.1, guidance=[wanted], laws=laws, allocation=[lw.PseudoInverse(to="control_fins")])
     (fins,) = (term for term in lw.Scene.named("remus_100", controller=loop).terms if term.type == "control_fins")
     start = lw.Start(velocity=[1.54, 0.0, 0.0])
-    driven = lw.Scene(lw.Vehicle(30.0, (0.2, 3.0, 3.0)), terms=[fins], start=start, controller=loop)
+    driven = lw.Scene(lw.Vehicle(30.0, inertia=(0.2, 3.0, 3.0)), terms=[fins], start=start, controller=loop)
     result = lw.solve(driven, "psi_s", h=0.1, t1=0.5)
     loaded = lw.Result.load(result.save(tmp_path / "result.npz"))
     lw.solve(driven, "psi_s", h=0.1, t1=0.5, store=tmp_path / "run.zarr")

@@ -25,7 +25,7 @@ from tests.support.tools import (
 )
 
 GRAVITY = 10.0
-VEHICLE = lw.Vehicle(20.0, (1.0, 1.2, 1.4), (10.0, 10.0, 10.0), 20.0 * GRAVITY)
+VEHICLE = lw.Vehicle(20.0, inertia=(1.0, 1.2, 1.4), added_mass=(10.0, 10.0, 10.0), buoyancy=20.0 * GRAVITY)
 # Gravity and a righting moment, so that paths are curved.
 HEAVY = vehicle(M=(18.0, 20.0, 25.0), J=(1.0, 1.2, 1.4), net=9.0, moment=(0.0, 0.0, -3.0))
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")
@@ -282,7 +282,7 @@ def test_an_event_in_a_step_that_was_divided():
     b, R, nu, Om = random_states(2, 8, spin=0.1)
     Om[:4] *= 400.0
     scene = lw.Scene(
-        lw.Vehicle(20.0, (1.0, 1.2, 1.4), (0.0, 0.0, 0.0), 20.0 * GRAVITY),
+        lw.Vehicle(20.0, inertia=(1.0, 1.2, 1.4), added_mass=(0.0, 0.0, 0.0), buoyancy=20.0 * GRAVITY),
         lw.Environment(gravity=GRAVITY),
         events=[lw.Floor(depth=2.0), lw.Surface(depth=-2.0)],
     )

@@ -23,7 +23,7 @@ from tests.laws import cases
 
 GRAVITY = 10.0
 # Neutrally buoyant with M = m I: each goes straight on at its speed, as in test_events, whose kernel this is.
-VEHICLE = lw.Vehicle(20.0, (1.0, 1.2, 1.4), (10.0, 10.0, 10.0), 20.0 * GRAVITY)
+VEHICLE = lw.Vehicle(20.0, inertia=(1.0, 1.2, 1.4), added_mass=(10.0, 10.0, 10.0), buoyancy=20.0 * GRAVITY)
 FLOOR = 8.0
 SPEEDS = np.array([1.0, 0.5, 0.25, 0.1, 0.0, -0.4, -1.0])
 # From depth 5 in 20 s: three sink to the floor after 3, 6 and 12 s, two surface after 12.5 and 5 s, two go on.

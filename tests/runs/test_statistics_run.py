@@ -266,7 +266,7 @@ def spinning():
     states[2] = states[2].copy()
     states[2][7, 0] = np.nan
     scene = lw.Scene(
-        lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 0.0),
+        lw.Vehicle(20.0, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=0.0),
         lw.Environment(gravity=0.0),
         [lw.Wrench(torque=(1.0, 0.0, 0.0))],
     )
@@ -331,7 +331,13 @@ def test_what_is_left_out_is_said_with_its_reason(spinning):
 def grounding(n=300):
     """Members that sink, some of them to the sea floor."""
     scene = lw.Scene(
-        lw.Vehicle(10.0, (1.0, 2.0, 2.5), (20.0, 20.0, 21.0), 50.0, (0.0, 0.0, -1e-9)),
+        lw.Vehicle(
+            10.0,
+            inertia=(1.0, 2.0, 2.5),
+            added_mass=(20.0, 20.0, 21.0),
+            buoyancy=50.0,
+            center_of_buoyancy=(0.0, 0.0, -1e-9),
+        ),
         lw.Environment(gravity=9.8),
         events=stops(floor=1.0),
     )

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status, Warnings
@@ -157,6 +158,94 @@ def test_orthogonality():
     R = coarse.attitude[-1, 0]
     assert coarse.warnings.counts() == {"orthogonality": 1} and fine.warnings.counts() == {}
     np.testing.assert_allclose(coarse.warning_value[0], np.abs(R.T @ R - np.eye(3)).max(), rtol=1e-6)
+
+
+def shrunk(z, steps):
+    """|R R^T - I| of a turn of z a step about a fixed axis, by the polynomial of rk4 on the imaginary axis."""
+    growth = abs(1.0 + 1j * z - z**2 / 2.0 - 1j * z**3 / 6.0 + z**4 / 24.0)
+    return 1.0 - growth ** (2 * steps)
+
+
+@pytest.mark.parametrize("kept", [
+    {},
+    {"keep": "none", "statistics": [lw.Mean("position")]},
+    {"keep": [1]},
+    {"save": lw.SaveAt(every=12.8)},
+])  # fmt: skip
+def test_an_attitude_that_is_no_rotation_is_told_by_default(kept):
+    # Of two members one turns fast. The method is the one that is chosen where drag acts; this drag acts on no turn.
+    scene = scene_of(**PLAIN)
+    scene = lw.Scene(scene.vehicle, scene.environment, terms=[lw.Drag(linear=[1e-9] * 3 + [0.0] * 3)])
+    h, steps = 0.4, 128
+    fleet = one(scene, Om=[[0.0, 0.0, 0.5], [0.0, 0.0, 1.0]])
+    result = lw.solve(fleet, None, h=h, t1=steps * h, **kept)
+    assert result.provenance["method"]["name"] == "rk4"
+    assert result.warnings.counts() == {"orthogonality": 1} and warned(result, Warnings.ORTHOGONALITY) == [False, True]
+    np.testing.assert_allclose(result.warning_value[1], shrunk(0.4, steps), rtol=1e-4)
+    np.testing.assert_allclose(result.warning_time[1], steps * h)
+    assert lw.solve(fleet, None, h=h, t1=steps * h, checks="none", **kept).warnings.counts() == {}
+
+
+def test_an_attitude_of_a_member_that_stopped_is_told_of_where_it_stopped(tmp_path):
+    scene = scene_of(**PLAIN)
+    scene = lw.Scene(scene.vehicle, scene.environment, events=[lw.StopTime(at=20.0)])
+    fleet = one(scene, Om=[[0.0, 0.0, 1.0]] * 5)
+    in_memory = lw.solve(fleet, "rk4", h=0.4, t1=80.0)
+    stored = lw.solve(fleet, "rk4", h=0.4, t1=80.0, store=tmp_path / "run.zarr")
+    for result in (in_memory, stored, lw.open_run(tmp_path / "run.zarr")):
+        # 50 whole steps; the event ends the last one, which shrinks R by less than a whole one does.
+        assert result.warnings.counts() == {"orthogonality": 5}
+        assert shrunk(0.4, 49) < result.warning_value[0] <= shrunk(0.4, 50) * (1.0 + 1e-9)
+        assert 19.5 < result.warning_time[0] <= 20.0
+
+
+@pytest.mark.parametrize("checks", ["safe", "all"])
+@pytest.mark.parametrize("method", ["psi_x", pytest.param("psi_w", marks=pytest.mark.slow)])
+def test_stiff_drag_of_splittings(method, checks):
+    # h (l + 2 q|v|) / I of surge, M = 2; the speed is that through the water, whose current is a third of it.
+    h, v, M, q = 0.1, 1.5, 2.0, 1.0
+    scene = scene_of((M, M, M), (30.0, 30.0, 30.0))
+    for part in BOTH:
+        linear = part * step_warnings.SPLIT_DRAG_NUMBER * M / h - 2.0 * q * v
+        laws = [terms.Drag(linear=[linear] * 6, quadratic=[q] * 6), lw.Current(velocity=[0.5, 0.0, 0.0])]
+        stiff = lw.Scene(scene.vehicle, scene.environment, terms=laws)
+        result = lw.solve(one(stiff, nu=[v + 0.5, 0.0, 0.0]), method, h=h, t1=h, checks=checks)
+        assert warned(result, Warnings.DRAG_STIFF) == [part > 1.0]
+        if part > 1.0:
+            value = part * step_warnings.SPLIT_DRAG_NUMBER
+            assert (result.warning_time[0], result.warning_value[0]) == (0.0, pytest.approx(value))
+
+
+def rates_of_a_body(M, J, linear):
+    """y' of R row by row, nu and Om, with drag along the axes and no other force: Kirchhoff's equations."""
+
+    def rates(t, y):
+        R, nu, Om = y[:9].reshape(3, 3), y[9:12], y[12:]
+        hat = np.array([[0.0, -Om[2], Om[1]], [Om[2], 0.0, -Om[0]], [-Om[1], Om[0], 0.0]])
+        force = np.cross(M * nu, Om) - linear[:3] * nu
+        torque = np.cross(J * Om, Om) + np.cross(M * nu, nu) - linear[3:] * Om
+        return np.concatenate([(R @ hat).ravel(), force / M, torque / J])
+
+    return rates
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["psi_s", "psi_x", "psi_w"])
+def test_a_splitting_loses_order_where_its_drag_is_called_stiff(method):
+    M, J, nu, Om = np.array([32.0, 55.0, 60.0]), np.array([0.6, 2.4, 2.7]), [0.8, -0.6, 0.5], [0.4, -0.3, 0.6]
+    h, orders = 0.1, {}
+    for number in (2.0, 80.0):
+        linear = number / h * np.array([0.9 * 32.0] * 3 + [0.6] + [0.0, 0.0])
+        start = np.concatenate([np.eye(3).ravel(), nu, Om])
+        truth = solve_ivp(rates_of_a_body(M, J, linear), (0.0, 2.0), start, "Radau", rtol=1e-10, atol=1e-12).y[:9, -1]
+        body = lw.Vehicle(30.0, inertia=J, added_mass=M - 30.0, buoyancy=0.0)
+        scene = lw.Scene(body, lw.Environment(gravity=0.0), terms=[lw.Drag(linear=linear)])
+        runs = [lw.solve(one(scene, nu=nu, Om=Om), method, h=step, t1=2.0) for step in (h, h / 2.0, h / 4.0)]
+        assert [warned(run, Warnings.DRAG_STIFF) for run in runs] == [[number / n > 5.0] for n in (1, 2, 4)]
+        errors = [np.abs(run.attitude[-1, 0].ravel() - truth).max() for run in runs]
+        orders[number] = np.log2(np.divide(errors[:-1], errors[1:]))
+    # Order 2, as it should be, and less than 1.5 in stiff drag.
+    assert (np.abs(orders[2.0] - 2.0) < 0.25).all() and (orders[80.0] < 1.5).all(), orders
 
 
 def test_inertia_that_no_rigid_body_has():

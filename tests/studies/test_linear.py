@@ -25,7 +25,9 @@ LAGS = (LAG, 0.0, 0.0, 0.0, 0.0, LAG)
 def hover(drag=DRAG, buoyancy=BUOYANCY, center=CENTER, lags=LAGS, velocity=NONE):
     """A body with drag, whose actuator lags in X and N alone."""
     terms = [lw.ControlWrench(limit=1e3, time_constant=lags), lw.Drag(quadratic=drag)]
-    vehicle = lw.Vehicle(MASS, INERTIA, (5.0, 22.0, 25.0), buoyancy, center)
+    vehicle = lw.Vehicle(
+        MASS, inertia=INERTIA, added_mass=(5.0, 22.0, 25.0), buoyancy=buoyancy, center_of_buoyancy=center
+    )
     return lw.Scene(vehicle, lw.Environment(GRAVITY), terms, lw.Start(velocity=velocity))
 
 

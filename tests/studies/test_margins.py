@@ -24,7 +24,9 @@ def scene(delay=0.0, laws=(), **gains):
     controller = lw.Controller(
         period=PERIOD, delay=delay, guidance=[lw.SetPoint(heading=0.0)], laws=[law, *laws],
         allocation=[lw.AllocationMatrix(to="control_wrench", matrix=np.eye(6))])  # fmt: skip
-    vehicle = lw.Vehicle(20.0, (5.0, 8.0, J), (0.0, 0.0, 0.0), 200.0, (0.0, 0.0, 0.0))
+    vehicle = lw.Vehicle(
+        20.0, inertia=(5.0, 8.0, J), added_mass=(0.0, 0.0, 0.0), buoyancy=200.0, center_of_buoyancy=(0.0, 0.0, 0.0)
+    )
     return lw.Scene(vehicle, lw.Environment(10.0), [lw.ControlWrench()], controller=controller)
 
 

@@ -332,7 +332,7 @@ def test_a_quantity_that_is_not_finite_is_a_failure(scene):
 
 def test_members_that_reach_the_surface_count_with_where_they_arrive():
     """Neutral bodies that rise at their own speeds: at t1 each is where it is, or has been stopped at the surface."""
-    body = lw.Vehicle(20.0, (1.0, 1.2, 1.4), (10.0, 10.0, 10.0), 20.0 * 9.8)
+    body = lw.Vehicle(20.0, inertia=(1.0, 1.2, 1.4), added_mass=(10.0, 10.0, 10.0), buoyancy=20.0 * 9.8)
     start = lw.Start(position=(0.0, 0.0, 5.0), velocity=(0.3, 0.0, -1.0))
     rising = lw.Scene(body, lw.Environment(gravity=9.8), start=start, events=[lw.Surface()])
     names, settings = ["start.position[2]", "start.velocity[2]"], {"h": 0.1, "t1": 4.0}

@@ -275,7 +275,13 @@ CURRENT = lw.GaussMarkovCurrent(standard_deviation=[0.2, 0.2, 0.05], time_consta
 
 def noisy_fleet(term):
     """A vehicle that this noise alone drives."""
-    vehicle = lw.Vehicle(100.0, [50.0, 60.0, 70.0], [5.0, 6.0, 7.0], 981.0, [0.0, 0.0, -0.01])
+    vehicle = lw.Vehicle(
+        100.0,
+        inertia=[50.0, 60.0, 70.0],
+        added_mass=[5.0, 6.0, 7.0],
+        buoyancy=981.0,
+        center_of_buoyancy=[0.0, 0.0, -0.01],
+    )
     return lw.Ensemble(lw.Scene(vehicle, lw.Environment(gravity=9.81), [term]), 32, 1)
 
 

@@ -17,9 +17,9 @@ def random_scene(seed):
     slender = np.exp(rng.uniform(-0.7, 0.7, 3))
     inertia = mass * size**2 * (slender.sum() - slender) / 3.0
     buoyancy = mass * 9.81 * (1.0 + rng.normal(scale=0.01))
-    vehicle = lw.Vehicle(
-        mass, mass * rng.uniform(0.1, 1.0, 3), inertia, buoyancy, [0.0, 0.0, -size * rng.uniform(0.0, 0.1)]
-    )
+    added_mass = mass * rng.uniform(0.1, 1.0, 3)
+    center = [0.0, 0.0, -size * rng.uniform(0.0, 0.1)]
+    vehicle = lw.Vehicle(mass, inertia=inertia, added_mass=added_mass, buoyancy=buoyancy, center_of_buoyancy=center)
     terms = []
     if rng.random() < 0.3:
         terms.append(lw.Current(velocity=rng.normal(scale=0.3, size=3)))

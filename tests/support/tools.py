@@ -46,7 +46,7 @@ def vehicle(M=(1.0, 2.0, 3.0), J=(1.0, 2.0, 2.5), net=0.0, moment=(0.0, 0.0, 0.0
     mass = 0.5 * np.linalg.eigvalsh(M)[0]
     buoyancy = mass * GRAVITY - net
     center = np.asarray(moment) / buoyancy if np.any(moment) else (0.0, 0.0, 0.0)
-    return lw.Vehicle(mass, J, M - mass * np.eye(3), buoyancy, center)
+    return lw.Vehicle(mass, inertia=J, added_mass=M - mass * np.eye(3), buoyancy=buoyancy, center_of_buoyancy=center)
 
 
 def scene_of(*arguments, **named):
@@ -57,7 +57,13 @@ def scene_of(*arguments, **named):
 def free_scene(M=(1.0, 2.0, 3.0), J=(1.0, 2.0, 2.5)):
     """A scene with forces far below round-off: the body moves freely, by the same kernel as that of `scene_of`."""
     heavy = vehicle(M, J)
-    free = lw.Vehicle(heavy.mass, J, heavy.added_mass, 3e-30 * heavy.mass, (0.0, 0.0, -1e-3))
+    free = lw.Vehicle(
+        heavy.mass,
+        inertia=J,
+        added_mass=heavy.added_mass,
+        buoyancy=3e-30 * heavy.mass,
+        center_of_buoyancy=(0.0, 0.0, -1e-3),
+    )
     return lw.Scene(free, lw.Environment(gravity=1e-30))
 
 

@@ -39,7 +39,7 @@ STATISTICS = [
 @pytest.fixture(scope="module")
 def solved():
     """One run: samples of all members and statistics; some reach the floor, none fails."""
-    vehicle = lw.Vehicle(20.0, (1.0, 1.2, 1.4), (10.0, 10.0, 10.0), 200.0)
+    vehicle = lw.Vehicle(20.0, inertia=(1.0, 1.2, 1.4), added_mass=(10.0, 10.0, 10.0), buoyancy=200.0)
     scene = lw.Scene(vehicle, lw.Environment(gravity=10.0), events=[lw.Floor(depth=FLOOR)])
     speeds = np.linspace(-0.5, 2.0, N)
     down, side = np.array([0.0, 0.0, 1.0]), np.array([0.3, 0.0, 0.0])

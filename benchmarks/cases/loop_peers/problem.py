@@ -69,7 +69,13 @@ class Problem:
             guidance=[lw.SetPoint(position=GOAL, heading=HEADING)],
             laws=[lw.PosePID(**GAINS, integral_limit=LIMITS, feedforward="restoring")],
         )
-        vehicle = lw.Vehicle(123.8, [5.46, 5.29, 5.72], [65.0, 70.0, 75.0], 1213.0, [0.002, -0.001, -0.007])
+        vehicle = lw.Vehicle(
+            123.8,
+            inertia=[5.46, 5.29, 5.72],
+            added_mass=[65.0, 70.0, 75.0],
+            buoyancy=1213.0,
+            center_of_buoyancy=[0.002, -0.001, -0.007],
+        )
         environment, terms = lw.Environment(gravity=problems.GRAVITY), [problems.drag(), lw.ControlWrench()]
         scene = lw.Scene(vehicle, environment, terms, problems.START, controller)
         return lw.Ensemble(scene, self.members, 1, VARY)

@@ -35,7 +35,9 @@ def methods(base="psi_s"):
 
 def free_body(J):
     """A free body, of which psi_1 makes one solve a step and a drift."""
-    vehicle = lw.Vehicle(10.0, list(J), [0.0, 0.0, 0.0], 98.0, [0.0, 0.0, 0.0])
+    vehicle = lw.Vehicle(
+        10.0, inertia=list(J), added_mass=[0.0, 0.0, 0.0], buoyancy=98.0, center_of_buoyancy=[0.0, 0.0, 0.0]
+    )
     return lw.Scene(vehicle, lw.Environment(gravity=9.8))
 
 

@@ -9,6 +9,7 @@ import warp as wp
 from lgvi_kernels.lanes.arithmetic import add, lane, mul, sub, vec3  # noqa: F401
 from lgvi_kernels.lanes.packet import put
 from lgvi_kernels.lanes.state import damping_struct, flow_struct, view_struct, wrench_struct
+from lgvi_kernels.maps.bounded import bounded_law
 from lgvi_kernels.maps.compose import params_of, plays, superpose
 
 # Numbers of a view in `views[packet, field]`: R row by row, b, nu, Om.
@@ -30,6 +31,7 @@ class Examine(NamedTuple):
 @functools.cache
 def make_examine(module, numbers, width, real):
     """Build (without compiling) the kernel that evaluates this module's functions."""
+    module = bounded_law(module, width, real)
     Lane, View, Params = lane(width, real), view_struct(width, real), params_of((module,), (numbers,), width, real)
     Wrench, Damping, Flow = (make(width, real) for make in (wrench_struct, damping_struct, flow_struct))
     law, damping, flow, evolve = (superpose((module,), role) for role in ("law", "damping", "flow", "evolve"))

@@ -22,6 +22,7 @@ from lgvi_kernels.lanes.flags import CPU_FLAGS
 from lgvi_kernels.lanes.packet import failures, renormalise, turned_too_far
 from lgvi_kernels.lanes.subnormals import flush_subnormals, put_back
 from lgvi_kernels.lanes.sums import at_rest, choose
+from lgvi_kernels.maps.bounded import bounded_spec
 from lgvi_kernels.maps.compose import superpose
 
 # Where every step is a sample, steps between two looks at the energy: this is how late a failure may be seen.
@@ -38,6 +39,7 @@ class Advance(NamedTuple):
 @functools.cache
 def make_advance(spec):
     """Build (without compiling) the kernel for this Spec."""
+    spec = bounded_spec(spec)
     width, real, checked = spec.width, spec.real, spec.checked
     types, stepping, watching, retry = make_types(spec), make_stepping(spec), make_watching(spec), make_retry(spec)
     Lane, Number, Ints, Alarm, Monitor = types.Lane, types.Number, types.Ints, types.Alarm, types.Monitor

@@ -96,6 +96,57 @@ def _native_shared(width, real):
     return f"{native_head(width, real, '')} V R = V() + {place}; wp::vec_t<{width}, S> r; memcpy(&r, &R, sizeof(V)); return r;"
 
 
+def _native_own(width, real, statement):
+    """C++ that reads or writes a lane r at its place among the rows that a law may see; where there is none, nothing."""
+    kind = f"wp::vec_t<{width}, wp::{real.__name__}>"
+    place = f"{kind}* place = ({kind}*)rows.rows.data + ((wp::int64)entry * rows.rows.shape[1] + at);"
+    return f"{kind} r = {kind}(); {_OWN_ROW} if (at <= last) {{ {place} {statement} }}"
+
+
+def _native_own_shared(width, real):
+    """C++ that reads one number, of a row that a law may see, into all lanes."""
+    kind = f"wp::vec_t<{width}, wp::{real.__name__}>"
+    number = f"((wp::{real.__name__}*)rows.rows.data)[(wp::int64)entry * rows.rows.shape[1] + at]"
+    return f"{_OWN_ROW} return at <= last ? {kind}({number}) : {kind}();"
+
+
+def _native_gather(width, real, shared):
+    """C++ that reads, for each lane, the row of its own index among those that a law may see."""
+    kind, number = f"wp::vec_t<{width}, wp::{real.__name__}>", f"wp::{real.__name__}"
+    value = f"(({number}*)rows.rows.data)[begin + at]" if shared else f"(({kind}*)rows.rows.data)[begin + at][j]"
+    each = f"const int step = index[j]; {_OWN_ROW.replace('offset', 'offset + step')} if (at <= last) r[j] = {value};"
+    begin = "const wp::int64 begin = (wp::int64)entry * rows.rows.shape[1];"
+    return f"{kind} r = {kind}(); {begin} for (int j = 0; j < {width}; ++j) {{ {each} }} return r;"
+
+
+# C++: the row `at` that a law sees for the one it asks for, and the last one that it may see; there is none if at > last.
+_OWN_ROW = (
+    "wp::int64 at = (wp::int64)row + offset, last = rows.last; if (at >= 0 && at < rows.common) last = at;"
+    " else at = at < rows.first ? rows.first : at > last && last >= rows.first ? last : at;"
+)
+
+
+def _native_whole(width, real):
+    """C++ of the whole numbers at or below those of a lane; what is no number, or beyond int32, becomes an end of int32."""
+    floor = "__builtin_floorf" if real == wp.float32 else "__builtin_floor"
+    value = f"v >= (S)-2147483648.0 ? (v < (S)2147483648.0 ? (int){floor}(v) : 2147483647) : -2147483647 - 1"
+    each = f"for (int j = 0; j < {width}; ++j) {{ const S v = a[j]; r[j] = {value}; }}"
+    return f"typedef wp::{real.__name__} S; wp::vec_t<{width}, wp::int32> r; {each} return r;"
+
+
+def _native_below(width, real):
+    """C++ of floor, lane by lane."""
+    floor = "__builtin_floorf" if real == wp.float32 else "__builtin_floor"
+    kind = f"wp::vec_t<{width}, wp::{real.__name__}>"
+    return f"{kind} r; for (int j = 0; j < {width}; ++j) r[j] = {floor}(a[j]); return r;"
+
+
+def _native_integers(width, expression):
+    """C++ of a sum or product of whole numbers, lane by lane, which wraps around."""
+    each = f"const unsigned x = {expression[0]}, y = b[j]; r[j] = (int)(x {expression[1]} y);"
+    return f"wp::vec_t<{width}, wp::int32> r; for (int j = 0; j < {width}; ++j) {{ {each} }} return r;"
+
+
 def _vec3_maker(width, real):
     """The constructor of one type of Lane3."""
     # An overload cannot name its type by itself: its body is compiled after the loop below, when _L3 is the last type.
@@ -108,10 +159,38 @@ def _vec3_maker(width, real):
     return make
 
 
+@functools.cache
+def own_rows(kind):
+    """Type of the rows of an array that a law may see: those from `first` to `last`, and the first `common` ones, which all see.
+
+    A read of any other row reads the nearest of the law's own; where it has none, 0. A write goes there too, or nowhere.
+    kind: what the array holds.
+    """
+    rows = {"rows": wp.array2d(dtype=kind), **dict.fromkeys(("first", "last", "common"), wp.int32)}
+    return wp.struct(type("OwnRows", (), {"__annotations__": rows, "__module__": __name__}))
+
+
 # Definitions of one name at module level become overloads of one Warp function; inside a factory they would not.
+for _width in WIDTHS:
+    _I = int_lane(_width)
+
+    @wp.func_native(_native_integers(_width, ("a[j]", "+")))
+    def add(a: _I, b: _I) -> _I: ...
+
+    @wp.func_native(_native_integers(_width, ("a[j]", "-")))
+    def sub(a: _I, b: _I) -> _I: ...
+
+    @wp.func_native(_native_integers(_width, ("a[j]", "*")))
+    def mul(a: _I, b: _I) -> _I: ...
+
+    @wp.func_native(_native_integers(_width, ("s", "*")))
+    def mul(s: wp.int32, b: _I) -> _I: ...
+
+
 for _real in REALS:
     for _width in WIDTHS:
         _R, _L, _L3, _S3 = _real, lane(_width, _real), lane3(_width, _real), symmetric3(_width, _real)
+        _I, _OwnLanes, _OwnNumbers = int_lane(_width), own_rows(_L), own_rows(_R)
         _make = _vec3_maker(_width, _real)
         _native_here = functools.partial(native_code, _width, _real)
 
@@ -175,6 +254,46 @@ for _real in REALS:
             """rows[entry, row + offset] = value."""
             ...
 
+        @wp.func_native(_native_own(_width, _real, "memcpy(&r, place, sizeof(r));") + " return r;")
+        def element(rows: _OwnLanes, entry: int, row: int, offset: int) -> _L: ...
+
+        @wp.func_native(_native_own(_width, _real, "memcpy(&r, place, sizeof(r));") + " return r;")
+        def entry_of(like: _L, rows: _OwnLanes, entry: int, row: int, offset: int) -> _L: ...
+
+        @wp.func_native(_native_own_shared(_width, _real))
+        def entry_of(like: _L, rows: _OwnNumbers, entry: int, row: int, offset: int) -> _L: ...
+
+        @wp.func_native(_native_own(_width, _real, "memcpy(place, &value, sizeof(r));"))
+        def set_element(rows: _OwnLanes, entry: int, row: int, offset: int, value: _L): ...
+
+        @wp.func_native(_native_gather(_width, _real, False))
+        def gathered(like: _L, rows: _OwnLanes, entry: int, row: int, offset: int, index: _I) -> _L:
+            """The row + offset + index of each lane."""
+            ...
+
+        @wp.func_native(_native_gather(_width, _real, True))
+        def gathered(like: _L, rows: _OwnNumbers, entry: int, row: int, offset: int, index: _I) -> _L: ...
+
+        @wp.func
+        def pieces_of(rows: wp.array2d(dtype=_L), first: int, count: int, head: int, each: int):
+            """How many pieces of a table to read: as many as are asked for."""
+            return count
+
+        @wp.func
+        def pieces_of(rows: _OwnLanes, first: int, count: int, head: int, each: int):
+            """No more than the law's own rows hold behind `first` and the `head` rows of the first value, of `each` rows."""
+            return wp.min(count, (rows.last - wp.clamp(first, rows.first, rows.last) + 1 - head) // each)
+
+        @wp.func_native(_native_whole(_width, _real))
+        def whole(a: _L) -> _I:
+            """The whole number at or below each, as an index; what is no number, or beyond int32, becomes an end of int32."""
+            ...
+
+        @wp.func_native(_native_below(_width, _real))
+        def below(a: _L) -> _L:
+            """The whole number at or below each."""
+            ...
+
         @wp.func
         def vec3(x: _L, y: _L, z: _L):
             return wp.static(_make)(x, y, z)
@@ -218,6 +337,18 @@ for _real in REALS:
         @wp.func
         def positive(a: _L, b: _L3, c: _L3):
             return vec3(positive(a, b.x, c.x), positive(a, b.y, c.y), positive(a, b.z, c.z))
+
+
+for _real in REALS:
+    _OwnNumbers = own_rows(_real)
+
+    @wp.func
+    def pieces_of(rows: wp.array2d(dtype=_real), first: int, count: int, head: int, each: int):
+        return count
+
+    @wp.func
+    def pieces_of(rows: _OwnNumbers, first: int, count: int, head: int, each: int):
+        return wp.min(count, (rows.last - wp.clamp(first, rows.first, rows.last) + 1 - head) // each)
 
 
 @wp.func

@@ -9,7 +9,7 @@ import functools
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import lane, lane3, symmetric3
+from lgvi_kernels.lanes.arithmetic import lane, lane3, own_rows, symmetric3
 
 
 @functools.cache
@@ -99,20 +99,21 @@ def table_number(width, real, shared):
 
 
 @functools.cache
-def view_struct(width, real, shared=False):
+def view_struct(width, real, shared=False, bounded=False):
     """What a law may read: the only argument that grows when laws need more, so their signatures stay.
 
     north, east, down: R^T e1, R^T e2, R^T e3, the inertial axes in body axes; b [m], inertial.
     nu [m/s], Om [rad/s]: velocities relative to the water, body axes; only damping laws see them.
     t [s], h [s]: time and length of this kick; step: its number; second: 0 in the first half of a kick, 1 in the second.
     table, memory: rows at [packet, row], for laws with arrays of numbers and for laws that remember; shared: see table_number.
+    bounded: of them, those alone that one law may see (see own_rows).
     """
     Lane, Lane3 = lane(width, real), lane3(width, real)
     directions = {"north": Lane3, "east": Lane3, "down": Lane3, "b": Lane3, "nu": Lane3, "Om": Lane3}
     times = {"t": real, "h": real, "step": wp.int32, "second": wp.int32}
-    table = wp.array2d(dtype=table_number(width, real, shared))
-    rows = {"table": table, "memory": wp.array2d(dtype=Lane), "packet": wp.int32, "entry": wp.int32}
-    return struct("View", **directions, **times, **rows)
+    kinds = {"table": table_number(width, real, shared), "memory": Lane}
+    rows = {name: own_rows(kind) if bounded else wp.array2d(dtype=kind) for name, kind in kinds.items()}
+    return struct("BoundedView" if bounded else "View", **directions, **times, **rows, packet=wp.int32, entry=wp.int32)
 
 
 @functools.cache

@@ -14,9 +14,11 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
     dot,
     element,
     entry_of,
+    gathered,
     mul,
     neg,
     ones,
+    pieces_of,
     positive,
     set_element,
     sub,
@@ -67,6 +69,23 @@ def row3(view: Any, row: int):
 
 
 @wp.func
+def gather1(view: Any, row: int, index: Any):
+    """The number of row `row + index` of the law's table, each lane at an index of its own; index: whole numbers (see whole)."""
+    return gathered(view.b.x, view.table, view.entry, row, 0, index)
+
+
+@wp.func
+def gather3(view: Any, row: int, index: Any):
+    """Three rows from `row + index` on, as a vector, each lane at an index of its own."""
+    like = view.b.x
+    t = view.table
+    i = view.entry
+    return vec3(
+        gathered(like, t, i, row, 0, index), gathered(like, t, i, row, 1, index), gathered(like, t, i, row, 2, index)
+    )
+
+
+@wp.func
 def remembered(view: Any, row: int):
     """One number that the law remembers."""
     return element(view.memory, view.packet, row, 0)
@@ -92,7 +111,7 @@ def table1(view: Any, first: int, count: int, x: Any):
     """A table's value at x: row `first` holds the first value, then 3 rows a knot: knot, 1 / distance, difference."""
     # A sum over all segments: nothing to search, and each lane may be in a segment of its own.
     value = row1(view, first)
-    for i in range(count):
+    for i in range(pieces_of(view.table, first, count, 1, 3)):
         at = first + 1 + 3 * i
         value = fused(ramp(view, at, x), entry_of(x, view.table, view.entry, at, 2), value)
     return value
@@ -102,7 +121,7 @@ def table1(view: Any, first: int, count: int, x: Any):
 def table3(view: Any, first: int, count: int, x: Any):
     """table1 for vectors: 3 rows for the first value, then 5 rows a knot: knot, 1 / distance, 3 differences."""
     value = row3(view, first)
-    for i in range(count):
+    for i in range(pieces_of(view.table, first, count, 3, 5)):
         at = first + 3 + 5 * i
         change = vec3(
             entry_of(x, view.table, view.entry, at, 2),
@@ -172,7 +191,7 @@ def make_pursuit(solved):
         # Times count back from t: within one piece its length is then h to the last digit.
         time_left = h * unity
         value = entry_of(limit, table, entry, first, 0)
-        for i in range(count):
+        for i in range(pieces_of(table, first, count, 1, 3)):
             at = first + 1 + 3 * i
             since = t * unity - entry_of(limit, table, entry, at, 0)
             steepness = entry_of(limit, table, entry, at, 1)

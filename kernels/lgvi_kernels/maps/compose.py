@@ -10,6 +10,7 @@ from lgvi_kernels.lanes.arithmetic import lane, lane3
 from lgvi_kernels.lanes.look import delayed_key, held_key
 from lgvi_kernels.lanes.noise import noise_key
 from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.maps.bounded import BoundedLaw, bounds_struct
 
 
 def plays(law, role):
@@ -59,6 +60,8 @@ def params_of(laws, numbers, width, real):
         own = make(width, real, *(field_type(kind, width, real) for _, kind in numbers[0]))
     else:
         own = numbers_struct(laws[0], numbers[0], width, real)
+    if isinstance(laws[0], BoundedLaw):
+        own = struct("BoundedParams", own=own, bounds=bounds_struct())
     return struct("Params", own=own, rest=params_of(laws[1:], numbers[1:], width, real))
 
 

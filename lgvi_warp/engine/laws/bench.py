@@ -16,7 +16,7 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import register_width
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
-from lgvi_warp.engine.arrays import Lanes, LawArrays, put_rows
+from lgvi_warp.engine.arrays import Group, Lanes, LawArrays, put_rows
 from lgvi_warp.engine.kernel_choice import declared
 from lgvi_warp.physics import inertia, notation, vehicle
 from lgvi_warp.physics.inertia import Frame
@@ -109,7 +109,13 @@ def simple_scene() -> Scene:
     Returns:
         A vehicle of 20 kg, slightly heavy, whose inertias all differ and whose centre of buoyancy is off all axes.
     """
-    body = Vehicle(20.0, (5.0, 22.0, 25.0), (1.5, 4.0, 4.5), 190.0, (0.01, 0.005, -0.02))
+    body = Vehicle(
+        20.0,
+        inertia=(1.5, 4.0, 4.5),
+        added_mass=(5.0, 22.0, 25.0),
+        buoyancy=190.0,
+        center_of_buoyancy=(0.01, 0.005, -0.02),
+    )
     return Scene(body, Environment())
 
 
@@ -186,8 +192,8 @@ class Bank:
     def __init__(self, bench: Bench, context: PackingContext, views: Views):
         self.bench, self.count = bench, bench.count // bench.width
         packed = bench.term.packed(Ensemble.own(bench.term, context.parameters), context)
-        self.laws = LawArrays(self.count, bench.examine.Params, bench.Params, bench.examine.Lane)
-        self.laws.write([packed], [False])
+        self.laws = LawArrays(self.count, [(bench.examine.Params, bench.Params)], bench.examine.Lane)
+        self.laws.write([Group([packed], [False])])
         self.run_device(views, 0)
 
     @property
@@ -226,7 +232,7 @@ class Bank:
         put_rows(lanes.view, rows)
         times = wp.array(views.time[::width], dtype=wp.float64, device="cpu")
         out = wp.zeros((self.count, OUT_FIELDS), dtype=Lane, device="cpu")
-        inputs = [self.laws.params.array, self.laws.table.array, lanes.array, times, wp.float64(h), STEP, second]
+        inputs = [self.laws.structs[0].array, self.laws.table.array, lanes.array, times, wp.float64(h), STEP, second]
         inputs += [self.laws.memory.array, out]
         with build_lock:
             wp.launch(self.bench.examine.kernel, dim=self.count, inputs=inputs, device="cpu")

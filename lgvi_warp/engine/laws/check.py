@@ -38,6 +38,7 @@ def check_law(
       derivatives of `potential`, and `energy` adds the same potential.
     * `damping`: nu . D nu >= 0. With `dissipative = False` the least power is reported and is no fault.
     * `follow`: what it leaves in the memory depends on the time alone, and is the same by two parts of the time as at once.
+    * `distance`: the same in all body axes.
     * `flow`: rate and gradient are the derivatives of the velocity, `water` gives the same velocity, and FLOW fits it.
 
     Args:
@@ -140,6 +141,21 @@ def _packing(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
     # Weight and restoring moment keep their promise together, not each.
     if not any(isinstance(bench.term, type(implied)) for implied in terms.IMPLIED):
         yield from _axes(bench, here)
+        yield from _event_axes(bench, here)
+
+
+def _event_axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
+    """The same distance from a frame with other axes; an event sees the body's origin in all of them."""
+    if "distance" not in here:
+        return
+    turned_views = replace(bench.views, attitude=bench.views.attitude @ TURN)
+    turned = _tried(bench, bench.context(bench.parameters, True), turned_views, "in other axes of the body")
+    if isinstance(turned, str):
+        yield Check("distance: any axes", np.inf, 0.0, False, turned)
+        return
+    limit = ROUNDINGS * EPS * np.abs(here["distance"]).max() * 100.0
+    remedy = "turn vectors and points of the body by context.frame.vector() in packed()"
+    yield judged("distance: any axes", turned["distance"] - here["distance"], limit, bench.views, remedy)
 
 
 def _tried(bench: Bench, context: PackingContext, views: Views, where: str) -> dict[str, np.ndarray] | str:

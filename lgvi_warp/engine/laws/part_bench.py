@@ -19,7 +19,7 @@ from lgvi_warp.common import warp_setup
 from lgvi_warp.common.machine import register_width
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_choice
-from lgvi_warp.engine.arrays import Lanes, LawArrays, memory_rows, put_rows
+from lgvi_warp.engine.arrays import Group, Lanes, LawArrays, memory_rows, put_rows
 from lgvi_warp.engine.laws import bench
 from lgvi_warp.engine.laws.bench import packing_context, short, sizes
 from lgvi_warp.physics import notation
@@ -241,8 +241,9 @@ class _Launch:
     def __init__(self, part: PartBench, packed: Any, looks: RandomLooks, width: int):
         self.examine, self.looks, self.bench = part.kernels[width], looks, part
         Lane, self.packets = self.examine.Lane, part.count // width
-        self.laws = LawArrays(self.packets, self.examine.Params, np.dtype(self.examine.Params.numpy_dtype()), Lane)
-        self.laws.write([packed], [False], GUARD, 0, part.bus.rows)
+        kind = self.examine.Params, np.dtype(self.examine.Params.numpy_dtype())
+        self.laws = LawArrays(self.packets, [kind], Lane)
+        self.laws.write([Group([packed], [False])], GUARD, part.bus.rows)
         self.end = part.bus.rows + memory_rows(packed)
         # Behind the part's rows are no numbers, so that what it reads or writes there shows.
         rows = self.laws.memory.view
@@ -268,7 +269,7 @@ class _Launch:
             repeats: How many times over.
         """
         period, laws = self.bench.period, self.laws
-        inputs = [laws.params.array, laws.table.array, self.rows.array, k, k * EVERY, period / EVERY, period, acts]
+        inputs = [laws.structs[0].array, laws.table.array, self.rows.array, k, k * EVERY, period / EVERY, period, acts]
         with build_lock:
             wp.launch(self.examine.kernel, self.packets * repeats, [*inputs, laws.memory.array, self.out], device="cpu")
 

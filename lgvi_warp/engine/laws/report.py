@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from lgvi_kernels.maps import bounded
 from lgvi_warp.physics.terms.base import Packed, Term
 
 EPS = float(np.finfo(np.float64).eps)
@@ -133,8 +134,10 @@ def packed_numbers(term: Term, Params: np.dtype, pack: Callable[[], Any]) -> tup
         remedy = "write packed(self, numbers, context) that returns lw.Packed({name: numbers}), names as in params()"
         return None, [Check("packed", 1.0, 0.0, False, f"{text}; {remedy}")]
     places = {"first": packed.rows is not None, "memory": packed.memory is not None, "work": packed.work}
+    own = Params["own"]
+    fields = (own["own"] if own.names == bounded.FIELDS else own).names
     filled = set(packed.values) | {name for name, present in places.items() if present}
-    wanted = set(Params["own"].names or ()) - {"unused"}
+    wanted = set(fields or ()) - {"unused"}
     wrong = [f"{name} is not in packed().values" for name in sorted(wanted - filled)]
     wrong += [f"{name} is no field of params()" for name in sorted(filled - wanted - places.keys())]
     return packed, [Check("numbers", len(wrong), 0.0, not wrong, "; ".join(wrong))]

@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.common.errors import Faults, among
 from lgvi_warp.common.npy_files import of_npz
 from lgvi_warp.physics.control.base import ControlLaw, Numbers, Packed, PackingContext
 from lgvi_warp.physics.terms.base import number
@@ -147,11 +147,9 @@ def _named(faults: Faults, key: str, given: Any, known: dict[str, Any]) -> list[
         faults.add(key, given, "is no list of names", f"give some of {', '.join(known)}")
         return []
     for i, name in enumerate(given):
-        if name not in known:
-            faults.add(f"{key}[{i}]", name, "is not known", closest(str(name), known))
-        elif name in given[:i]:
+        if faults.choice(f"{key}[{i}]", name, known) and among(name, given[:i]):
             faults.add(f"{key}[{i}]", name, "is named twice", "leave one of them out")
-    return [name for name in given if name in known]
+    return [name for name in given if among(name, known)]
 
 
 def _read(faults: Faults, file: Any) -> list[tuple[np.ndarray, np.ndarray]]:

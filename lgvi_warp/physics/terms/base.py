@@ -360,7 +360,9 @@ class Term:
             name = type(self).__name__
             raise NotImplementedError(f"{name} must define packed(numbers, context): see docs/develop/add_a_force.md")
         frame = context.frame
-        turned: dict[str | None, Any] = {"vector": frame.vector, "point": frame.point, None: np.asarray}
+        # An event sees the body's origin, whatever that of the forces is.
+        point = frame.point if self.acts else frame.vector
+        turned: dict[str | None, Any] = {"vector": frame.vector, "point": point, None: np.asarray}
         return Packed(
             {item.name: turned[item.metadata["axes"]](numbers[word_of(item)]) for item in self.number_fields()}
         )

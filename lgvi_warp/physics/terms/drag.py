@@ -251,8 +251,11 @@ def _searched(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.nda
     """As `_creates_energy`, for matrices that no inequality decides."""
     limit = -1e-9 * np.abs(matrices).max(axis=(1, 2))
     if not quadratic:
-        values, vectors = np.linalg.eigh(matrices + np.swapaxes(matrices, 1, 2))
-        return values[:, 0] < limit, vectors[:, :, 0]
+        # Divided by a power of two, which keeps all digits, lest two of the largest numbers add up to none.
+        part = np.exp2(-np.frexp(np.abs(matrices).max(axis=(1, 2)))[1].astype(float))
+        scaled = part[:, None, None] * matrices
+        values, vectors = np.linalg.eigh(scaled + np.swapaxes(scaled, 1, 2))
+        return values[:, 0] < part * limit, vectors[:, :, 0]
     directions = np.random.default_rng(0).normal(size=(4000, 6))
     directions = np.concatenate([np.eye(6), directions / np.abs(directions).max(axis=1, keepdims=True)])
     products = np.einsum("ki,kj->kij", directions, np.abs(directions) * directions).reshape(-1, 36)

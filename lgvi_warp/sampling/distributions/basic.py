@@ -150,9 +150,21 @@ def varies_nothing(distribution: Distribution, bases: Sequence[np.ndarray]) -> s
     return "sigma" if has_sigma else None
 
 
+def floats(values: Any) -> np.ndarray:
+    """Read numbers that were checked as float64: whole ones of any size among them.
+
+    Args:
+        values: a number, lists of numbers, or an array.
+
+    Returns:
+        An array of their shape.
+    """
+    return np.asarray(values, dtype=np.float64)
+
+
 def _width(std: Spread | None, relative: Spread | None, base: np.ndarray) -> np.ndarray:
     """The absolute spread: as given, or as a fraction of the scene's value."""
-    return np.asarray(std) if std is not None else np.abs(base) * np.asarray(relative)
+    return floats(std) if std is not None else np.abs(base) * floats(relative)
 
 
 @dataclass(frozen=True)
@@ -175,7 +187,7 @@ class Normal(Distribution):
         """Values mean + std * Phi^-1(u)."""
         from scipy.special import ndtri
 
-        mean = base if self.mean is None else np.asarray(self.mean)
+        mean = base if self.mean is None else floats(self.mean)
         return mean + _width(self.std, self.relative, base) * ndtri(u)
 
 
@@ -206,7 +218,7 @@ class Uniform(Distribution):
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
         """Values low + (high - low) u, or the same about the scene's value."""
         if self.high is not None:
-            return np.asarray(self.low) + (np.asarray(self.high) - np.asarray(self.low)) * u
+            return floats(self.low) + (floats(self.high) - floats(self.low)) * u
         return base + _width(self.half_width, self.relative, base) * (2.0 * u - 1.0)
 
 
@@ -228,9 +240,9 @@ class LogNormal(Distribution):
         """Values median * exp(sigma * Phi^-1(u))."""
         from scipy.special import ndtri
 
-        median = base if self.median is None else np.asarray(self.median)
+        median = base if self.median is None else floats(self.median)
         with np.errstate(over="ignore"):  # the ensemble refuses what is too large, or the run marks it
-            return median * np.exp(np.asarray(self.sigma) * ndtri(u))
+            return median * np.exp(floats(self.sigma) * ndtri(u))
 
 
 @dataclass(frozen=True)
@@ -259,7 +271,7 @@ class TruncatedNormal(Distribution):
         """Normal quantiles at levels between those of the bounds; upper tails by symmetry, which keeps their digits."""
         from scipy.special import log_ndtr, ndtr, ndtri, ndtri_exp
 
-        mean = base if self.mean is None else np.asarray(self.mean)
+        mean = base if self.mean is None else floats(self.mean)
         std = _width(self.std, self.relative, base)
         scale = np.where(std > 0.0, std, 1.0)
         low, high, width = self._bounds()
@@ -284,7 +296,7 @@ class TruncatedNormal(Distribution):
         """low, high and width, infinite where not given; width is 3 if none is given."""
         width = 3.0 if self.width is None and self.low is None and self.high is None else self.width
         open_ended = ((self.low, -np.inf), (self.high, np.inf), (width, np.inf))
-        low, high, width = (np.asarray(default if value is None else value) for value, default in open_ended)
+        low, high, width = (floats(default if value is None else value) for value, default in open_ended)
         return low, high, width
 
 
@@ -354,7 +366,7 @@ class Choice(Distribution):
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
         """The value whose part of (0, 1), in proportion to its weight, contains u."""
-        values = np.asarray(self.values, dtype=np.float64)
-        weights = np.ones(len(values)) if self.weights is None else np.asarray(self.weights, dtype=np.float64)
+        values = floats(self.values)
+        weights = np.ones(len(values)) if self.weights is None else floats(self.weights)
         ends = np.cumsum(weights)[:-1] / weights.sum()
         return values[np.searchsorted(ends, u, side="right")]

@@ -11,7 +11,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics import inertia, notation
-from lgvi_warp.sampling.distributions.basic import Distribution, Spread
+from lgvi_warp.sampling.distributions.basic import Distribution, Spread, floats
 
 # The fraction of a matrix's largest entry that a negative eigenvalue may reach by round-off.
 ROUND_OFF = 1e-12
@@ -241,7 +241,7 @@ class CorrelatedNormal(JointLaw):
         if len(L) != u.shape[1]:
             L = L[0, 0] * np.eye(u.shape[1])
         scene = np.concatenate([np.reshape(base, -1) for base in bases])
-        drawn = (scene if self.mean is None else np.asarray(self.mean)) + combined(L, normals(u))
+        drawn = (scene if self.mean is None else floats(self.mean)) + combined(L, normals(u))
         parts = np.split(drawn, np.cumsum([base.size for base in bases])[:-1], axis=1)
         return [entries.reshape(len(u), *base.shape) for entries, base in zip(parts, bases, strict=True)]
 
@@ -370,7 +370,7 @@ class PositiveDefinite(JointLaw):
         T = np.zeros((len(u), d, d))
         diagonal = np.arange(d)
         with np.errstate(over="ignore", invalid="ignore"):  # the ensemble refuses what is too large
-            T[:, diagonal, diagonal] = np.exp(0.5 * np.asarray(self.sigma) * z[:, :d])
+            T[:, diagonal, diagonal] = np.exp(0.5 * floats(self.sigma) * z[:, :d])
             if self.off_diagonal:
                 rows, columns = np.tril_indices(d, -1)
                 T[:, rows, columns] = self.off_diagonal * z[:, d:]

@@ -157,9 +157,9 @@ class Bench:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Keys of the terms and the parts that act, in the order of their rows."""
+        """Keys of the terms and the parts that act, and of the events, in the order of their rows."""
         choice = self.plan.kernel_choice
-        return tuple(term.key for term, _ in (*choice.laws, *choice.parts_of_control))
+        return tuple(term.key for term, _ in (*choice.laws, *choice.parts_of_control, *choice.events))
 
     def start(self, places: np.ndarray, numbers: Mapping[str, np.ndarray] | None = None) -> Motion:
         """The motions of members at t = 0, and what they remember before the first look.

@@ -15,7 +15,7 @@ from tests.support.tools import one, vehicle
 @pytest.mark.parametrize("buoyancy", [0.0, 10.0])
 def test_water_that_accelerates_pushes_by_the_displaced_mass(name, gravity, buoyancy):
     """Buoyancy over gravity is the displaced mass: without gravity nobody knows it, unless nothing is displaced."""
-    body = lw.Vehicle(2.0, (1.0, 2.0, 2.5), np.zeros((3, 3)), buoyancy)
+    body = lw.Vehicle(2.0, inertia=(1.0, 2.0, 2.5), added_mass=np.zeros((3, 3)), buoyancy=buoyancy)
     scene = lw.Scene(body, lw.Environment(gravity=gravity), terms=list(CASES[name].terms))
     if gravity == 0.0 and buoyancy > 0.0:
         with pytest.raises(lw.SceneError, match=r"environment\.gravity = 0.*displaced mass unknown.*give gravity"):

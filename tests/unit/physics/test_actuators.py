@@ -21,7 +21,7 @@ HEADING, DEPTH = lw.HeadingPID(kp=5.0), lw.DepthPID(kp=0.1, kp_pitch=5.0)
 
 
 def scene(terms, **controller):
-    vehicle = lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0), 196.0)
+    vehicle = lw.Vehicle(20.0, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=196.0)
     return lw.Scene(vehicle, terms=terms, controller=lw.Controller(period=0.1, **WANTED, **controller))
 
 

@@ -28,7 +28,7 @@ BODY = "[vehicle]\nmass = 30.0\ninertia = [0.2, 3.0, 3.0]\nbuoyancy = 290.0\n"
 )
 def test_a_wrong_shape_is_refused(shape, words):
     with pytest.raises(lw.SceneError) as caught:
-        lw.Vehicle(30.0, (0.2, 3.0, 3.0), shape=shape)
+        lw.Vehicle(30.0, inertia=(0.2, 3.0, 3.0), shape=shape)
     assert words in str(caught.value) and all(";" in fault for fault in caught.value.faults)
 
 
@@ -48,7 +48,7 @@ def test_the_vehicles_of_the_package_have_one_that_holds_their_water(name):
 
 def test_it_is_no_part_of_the_dynamics():
     plain, shaped = (
-        make_plan(lw.Ensemble(lw.Scene(lw.Vehicle(30.0, (0.2, 3.0, 3.0), shape=shape)), 2), h=0.1, t1=1.0)
+        make_plan(lw.Ensemble(lw.Scene(lw.Vehicle(30.0, inertia=(0.2, 3.0, 3.0), shape=shape)), 2), h=0.1, t1=1.0)
         for shape in (None, {"length": 2.0, "diameter": 0.3})
     )
     assert plain.kernel_hash == shaped.kernel_hash and plain.spec == shaped.spec

@@ -519,7 +519,7 @@ def test_numbers_of_the_wrong_shape():
 
 def test_what_is_no_fleet():
     for make in (lw.solve, lw.Ensemble):
-        (fault,) = refused(make, lw.Vehicle(1.0, 1.0 * np.ones(3), np.ones(3), 0.0))
+        (fault,) = refused(make, lw.Vehicle(1.0, inertia=1.0 * np.ones(3), added_mass=np.ones(3), buoyancy=0.0))
         assert "give lw.Scene(" in fault
     (fault,) = refused(lw.Ensemble, from_table(MATRIX), 5, 0, [1])
     assert "vary = [1]" in fault and "lw.Normal" in fault
@@ -588,4 +588,4 @@ def test_a_law_defined_twice_as_in_a_notebook(tmp_path):
 @pytest.mark.parametrize("given", ["drag", 3, None, {"type": "drag"}])
 def test_terms_that_are_no_list_are_refused_as_such(given):
     with pytest.raises(lw.SceneError, match=r"terms = .*is no list"):
-        lw.Scene(lw.Vehicle(20.0, (1.0, 1.2, 1.4)), terms=given)
+        lw.Scene(lw.Vehicle(20.0, inertia=(1.0, 1.2, 1.4)), terms=given)

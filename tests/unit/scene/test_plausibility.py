@@ -246,7 +246,7 @@ def test_of_very_many_samples_the_last_are_looked_at(monkeypatch):
 @pytest.mark.kernel
 def test_a_result_says_what_is_odd():
     fleet = lw.Ensemble(
-        lw.Scene(lw.Vehicle(10.0, [1.0, 2.0, 2.5], buoyancy=200.0), start=lw.Start([0.0, 0.0, 1.0])),
+        lw.Scene(lw.Vehicle(10.0, inertia=[1.0, 2.0, 2.5], buoyancy=200.0), start=lw.Start([0.0, 0.0, 1.0])),
         20,
         vary={"start.velocity": lw.Uniform(low=[0.0, 0.0, 0.0], high=[60.0, 0.1, 0.1])},
     )

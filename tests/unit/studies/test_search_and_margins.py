@@ -17,7 +17,7 @@ from lgvi_warp.studies.linear.margins import Margins
 from lgvi_warp.studies.search import box, numbers, risk, tune, worst_case
 from lgvi_warp.studies.search.box import Box
 
-SCENE = lw.Scene(lw.Vehicle(2.0, (1.0, 1.0, 1.0)), terms=[lw.Drag(linear=[1.0] * 6)])
+SCENE = lw.Scene(lw.Vehicle(2.0, inertia=(1.0, 1.0, 1.0)), terms=[lw.Drag(linear=[1.0] * 6)])
 STARTS = {"start.position[2]": lw.Normal(std=1.0)}
 OVER = {"vehicle.mass": (1.0, 4.0), "drag.linear[0]": (1.0, 100.0, "log")}
 

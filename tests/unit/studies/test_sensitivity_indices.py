@@ -20,7 +20,7 @@ from lgvi_warp.studies.sensitivity import adaptor, analyses, outputs
 from lgvi_warp.studies.sensitivity.estimates import sobol_estimates
 from lgvi_warp.studies.sensitivity.indices import Indices, MorrisEffects, SobolIndices
 
-BARE = lw.Scene(lw.Vehicle(1.0, (1.0, 1.0, 1.0)))
+BARE = lw.Scene(lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0)))
 VARY = {"start.position[0]": lw.Uniform(low=0.0, high=1.0), "start.position[1]": lw.Uniform(low=0.0, high=2.0),
         "vehicle.mass": lw.Uniform(low=1.0, high=3.0)}  # fmt: skip
 FIELDS = {"factors": ("a", "bc"), "quantities": ("depth", "energy"), "mean": np.array([1.23456789, np.nan]),

@@ -90,7 +90,7 @@ def test_other_starts_keep_their_size(scene):
 
 
 def test_a_start_at_rest_is_given_a_direction():
-    scene = lw.Scene(lw.Vehicle(1.0, (1.0, 1.0, 1.0)), run=RunSettings(step=0.1))
+    scene = lw.Scene(lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0)), run=RunSettings(step=0.1))
     grid = grid_of(scene, ("speed", 1.0, 4.0), ("angular_velocity", 0.5, 4.0), h=0.1)
     assert np.allclose(
         np.linalg.norm(by_cell(grid, grid.state["velocity"]), axis=-1), np.array([1, 2, 4])[None, :, None]
@@ -170,7 +170,7 @@ def test_bad_axes_are_refused(scene, x, y, words):
 
 
 def test_drag_that_is_zero_at_the_start_cannot_be_scaled():
-    scene = lw.Scene(lw.Vehicle(1.0, (1.0, 1.0, 1.0)), terms=[lw.Drag(quadratic=[1.0] * 6)])
+    scene = lw.Scene(lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0)), terms=[lw.Drag(quadratic=[1.0] * 6)])
     with pytest.raises(lw.SceneError, match="zero at the scene's start"):
         grid_of(scene, "h", "drag_number")
 
@@ -419,14 +419,14 @@ def test_axes_without_a_range_are_around_the_scenes_number(scene):
     assert (scaled.x.low, scaled.x.high) == (0.1, 10.0) and (scaled.y.low, scaled.y.high) == (0.01, 100.0)
     half = grid_of(scene, Axis("h", low=0.5), "vehicle.mass", h=0.1)
     assert half.x.low == 0.5 and half.x.high == pytest.approx(4.0 / half.rate)
-    bare = lw.Scene(lw.Vehicle(1.0, (1.0, 1.0, 1.0)), run=RunSettings(step=0.1))
+    bare = lw.Scene(lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0)), run=RunSettings(step=0.1))
     assert grid_of(bare, "speed", "angular_velocity").x.low == 0.1 and grid_of(bare, "speed", "h").rate == 1.0
     with pytest.raises(lw.SceneError, match=r"axis vehicle\.buoyancy = None: is not a finite number"):
         grid_of(bare, "vehicle.buoyancy", "h")
 
 
 def test_a_vehicle_without_added_mass_gets_that_of_a_slender_body():
-    scene = lw.Scene(lw.Vehicle(2.0, (1.0, 1.0, 1.0)), run=RunSettings(step=0.1))
+    scene = lw.Scene(lw.Vehicle(2.0, inertia=(1.0, 1.0, 1.0)), run=RunSettings(step=0.1))
     grid = grid_of(scene, ("added_mass_ratio", 0.5, 1.0), ("vehicle.mass", 2.0, 4.0), (2, 2), 1)
     added = grid.varied["vehicle.added_mass"].reshape(2, 2, 3, 3)
     assert np.allclose(added[0, 0], np.diag([0.0, 1.0, 1.0])) and np.allclose(added[1, 1], np.diag([0.0, 4.0, 4.0]))

@@ -450,7 +450,7 @@ def test_cases_that_are_none_are_refused_all_at_once(given, faults):
 
 
 def test_a_case_changes_numbers_lists_vehicle_and_scene():
-    other = lw.Vehicle(60.0, [4.0, 5.0, 6.0], buoyancy=588.0)
+    other = lw.Vehicle(60.0, inertia=[4.0, 5.0, 6.0], buoyancy=588.0)
     assert cases.Case("a", vehicle={"mass": 51.0}).of(SCENE).vehicle.mass == 51.0
     assert cases.Case("a", vehicle=other).of(SCENE).vehicle is other
     assert cases.Case("a", scene=BARE).of(SCENE).controller is None

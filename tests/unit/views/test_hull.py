@@ -42,7 +42,7 @@ def test_nose_and_fin_tell_the_attitude():
 
 def test_without_a_shape_the_hull_holds_the_displaced_water():
     scene = lw.Scene(
-        lw.Vehicle(30.0, (0.2, 3.0, 3.0), buoyancy=300.0), lw.Environment(gravity=10.0, water_density=1000.0)
+        lw.Vehicle(30.0, inertia=(0.2, 3.0, 3.0), buoyancy=300.0), lw.Environment(gravity=10.0, water_density=1000.0)
     )
     parameters = {name: np.asarray(value, dtype=float)[None] for name, value in scene.parameters().items()}
     shape, words = hulls.shape_of(scene.to_dict(), parameters)

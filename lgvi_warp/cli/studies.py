@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -159,6 +158,7 @@ def sweep(chosen: argparse.Namespace) -> int:
         SceneError: The sweep file or an argument is refused.
     """
     from lgvi_warp.studies.sweeps.file import arguments_of_file
+    from lgvi_warp.studies.sweeps.output import provenance
     from lgvi_warp.studies.sweeps.setup import made, plan_text
     from lgvi_warp.studies.sweeps.sweep import sweep as run_sweep
     from lgvi_warp.views.sweeps import pictures
@@ -188,7 +188,7 @@ def sweep(chosen: argparse.Namespace) -> int:
             written.draw(draw, compared, out / name)
         if chosen.record:
             _record_worst(compared, chosen.record, out, written)
-    code = finish(written, chosen, {"sweep": json.loads((out / "sweep.json").read_text())}, str(compared))
+    code = finish(written, chosen, {"sweep": provenance(compared)}, str(compared))
     return 1 if all(compared.record(cell).refused for cell in compared.cells) else code
 
 

@@ -100,11 +100,9 @@ def contents(folder: Path) -> list[Content]:
     if folder.suffix != ".zarr" and not folder.exists():
         raise SceneError([f"{folder}: is not there; give the folder of a run or of a study"])
     if folder.suffix != ".zarr" and folder.is_dir():
-        studies = [
-            Content(kind, inside(folder, path.name))
-            for kind, pattern in patterns.items()
-            for path in sorted(folder.glob(pattern))
-        ]
+        studies = [Content(kind, path) for kind, pattern in patterns.items() for path in sorted(folder.glob(pattern))]
+        for content in studies:
+            inside(folder, content.path.name)
         stores = list(folder.glob("*.zarr"))
         if not studies and not stores:
             raise SceneError([f"{folder}: holds nothing that a verb wrote; give the folder of a run or of a study"])

@@ -17,6 +17,7 @@ from lgvi_warp.cli.settings import folder, load_scene, whole
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.reading import file_json
 
 
 def finish(written: Written, chosen: argparse.Namespace, content: Mapping[str, Any], text: str) -> int:
@@ -158,7 +159,6 @@ def sweep(chosen: argparse.Namespace) -> int:
         SceneError: The sweep file or an argument is refused.
     """
     from lgvi_warp.studies.sweeps.file import arguments_of_file
-    from lgvi_warp.studies.sweeps.output import provenance
     from lgvi_warp.studies.sweeps.setup import made, plan_text
     from lgvi_warp.studies.sweeps.sweep import sweep as run_sweep
     from lgvi_warp.views.sweeps import pictures
@@ -188,7 +188,7 @@ def sweep(chosen: argparse.Namespace) -> int:
             written.draw(draw, compared, out / name)
         if chosen.record:
             _record_worst(compared, chosen.record, out, written)
-    code = finish(written, chosen, {"sweep": provenance(compared)}, str(compared))
+    code = finish(written, chosen, {"sweep": file_json(out / "sweep.json")}, str(compared))
     return 1 if all(compared.record(cell).refused for cell in compared.cells) else code
 
 

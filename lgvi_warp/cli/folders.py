@@ -4,8 +4,8 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,8 @@ from lgvi_warp.cli import documents
 from lgvi_warp.cli.output import tell
 from lgvi_warp.cli.report import controller_lines, file_line, how_lines, members_line, shown_members, summary
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.reading import file_json, file_text, understood
+from lgvi_warp.common.safe_files import inside
 
 # Endings of what verbs write beside the numbers.
 OTHERS = (".png", ".rrd", ".html", ".csv", ".txt", ".nc", ".parquet")
@@ -43,8 +45,6 @@ class Content:
             SceneError: The file is damaged.
             OSError: It cannot be read.
         """
-        from lgvi_warp.studies.files import understood
-
         if self.kind == "store":
             from lgvi_warp.runs.store.open import open_run
 
@@ -53,10 +53,18 @@ class Content:
             from lgvi_warp.runs.result import Result
 
             return Result.load(self.path)
-        with understood(self.path):
-            if self.kind == "sweep":
-                return json.loads(self.path.read_text(encoding="utf-8"))
-            return _study(self.kind).load(self.path)
+        if self.kind == "sweep":
+            with self.understood():
+                return file_json(self.path)
+        return _study(self.kind).load(self.path)
+
+    def understood(self) -> AbstractContextManager[None]:
+        """Turn what the numbers raise where they are shown or drawn into a fault of their file.
+
+        Returns:
+            A context manager, which raises SceneError.
+        """
+        return understood(self.path, "not what a verb wrote", "write it again, or see where by -v")
 
 
 def _study(kind: str) -> Any:
@@ -84,7 +92,7 @@ def contents(folder: Path) -> list[Content]:
         What is there; a store is the last.
 
     Raises:
-        SceneError: The folder holds nothing that a verb wrote.
+        SceneError: The folder holds nothing that a verb wrote, or a link leads out of it.
     """
     patterns = {"result": "result*.npz", "tradeoff": "tradeoff.json", "sensitivity": "sensitivity.json",
                 "stability": "stability*.json", "sweep": "sweep.json"}  # fmt: skip
@@ -93,6 +101,8 @@ def contents(folder: Path) -> list[Content]:
         raise SceneError([f"{folder}: is not there; give the folder of a run or of a study"])
     if folder.suffix != ".zarr" and folder.is_dir():
         studies = [Content(kind, path) for kind, pattern in patterns.items() for path in sorted(folder.glob(pattern))]
+        for content in studies:
+            inside(folder, content.path.name)
         stores = list(folder.glob("*.zarr"))
         if not studies and not stores:
             raise SceneError([f"{folder}: holds nothing that a verb wrote; give the folder of a run or of a study"])
@@ -140,17 +150,19 @@ def _part(content: Content, chosen: argparse.Namespace) -> tuple[dict[str, Any],
         numbers = state(content.path)
         return head | documents.of_store(numbers), lambda: "\n".join(store_lines(numbers, chosen))
     numbers = content.load()
-    if content.kind == "result":
-        size = file_line(content.path)
-        return head | documents.of_result(
-            numbers
-        ), lambda: f"{size}\n{summary(numbers, shown_members(numbers), [], verbose=chosen.verbose)}"
-    if content.kind == "sweep":
-        return head | {
-            "content": numbers
-        }, lambda: content.path.with_name("summary.md").read_text(encoding="utf-8").rstrip()
-    report = f"{file_line(content.path)}\n{text_of(content.kind, numbers)}"
-    return head | {"content": numbers.to_dict()}, lambda: report
+    with content.understood():
+        if content.kind == "sweep":
+            text = file_text(inside(content.path.parent, "summary.md"), "summary").rstrip()
+            return head | {"content": numbers}, lambda: text
+        if content.kind == "result":
+            document, text = (
+                documents.of_result(numbers),
+                summary(numbers, shown_members(numbers), [], verbose=chosen.verbose),
+            )
+        else:
+            document, text = {"content": numbers.to_dict()}, text_of(content.kind, numbers)
+    report = f"{file_line(content.path)}\n{text}"
+    return head | document, lambda: report
 
 
 def text_of(kind: str, found: Any) -> str:

@@ -6,12 +6,12 @@ from __future__ import annotations
 import argparse
 import inspect
 import json
-import tomllib
+import os
 from typing import Any
 
 from lgvi_warp.cli.output import tell
-from lgvi_warp.common import files as durable
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.files import place_of, write_text
 
 # A scene to begin with; {} are filled by `new`.
 SCENE = """# {title}
@@ -79,10 +79,10 @@ def new(chosen: argparse.Namespace) -> int:
     Raises:
         SceneError: The file is there already, or no vehicle has that name.
     """
-    from lgvi_warp.scene.vehicles.fossen import vehicle_file
+    from lgvi_warp.scene.vehicles.fossen import vehicle_tables
 
-    content = tomllib.loads(vehicle_file(chosen.vehicle).read_text(encoding="utf-8"))
-    if chosen.scene.exists():
+    content = vehicle_tables(chosen.vehicle)
+    if os.path.lexists(place_of(chosen.scene)):
         raise SceneError([f"{chosen.scene}: is there already; give another name, or remove it"])
     types = [term["type"] for term in content.get("terms", ())]
     name, buoyancy = chosen.vehicle, f"{content['vehicle'].get('buoyancy', 0.0):g}"
@@ -93,8 +93,7 @@ def new(chosen: argparse.Namespace) -> int:
         terms=f", and of this vehicle: {', '.join(types)}" if types else "",
     )  # fmt: skip
     chosen.scene.parent.mkdir(parents=True, exist_ok=True)
-    with durable.placed(chosen.scene) as beside:
-        beside.write_text(text, encoding="utf-8")
+    write_text(chosen.scene, text)
     tell(chosen, lambda: {"file": chosen.scene, "vehicle": name},
          lambda: f"file        {chosen.scene}\nnext        lgvi-warp check {chosen.scene}")  # fmt: skip
     return 0
@@ -134,9 +133,9 @@ def _methods() -> dict[str, str]:
 
 def _vehicles() -> dict[str, str]:
     """Vehicle -> its title."""
-    from lgvi_warp.scene.vehicles.fossen import vehicle_file, vehicles
+    from lgvi_warp.scene.vehicles.fossen import vehicle_tables, vehicles
 
-    titles = (tomllib.loads(vehicle_file(name).read_text(encoding="utf-8"))["source"]["title"] for name in vehicles())
+    titles = (vehicle_tables(name)["source"]["title"] for name in vehicles())
     return dict(zip(vehicles(), titles, strict=True))
 
 

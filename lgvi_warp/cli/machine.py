@@ -4,13 +4,13 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Iterator
 from typing import Any
 
 from lgvi_warp.cli.folders import info_of_folder
 from lgvi_warp.cli.output import say, tell
 from lgvi_warp.cli.progress import shown
+from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.engine import widths
 from lgvi_warp.engine.peak import fma_peak
 
@@ -95,7 +95,7 @@ def bench(chosen: argparse.Namespace) -> int:
 
     readings = []
     for line in measure(chosen.members, chosen.steps):
-        readings.append(json.loads(line))
+        readings.append(parsed(line))
         say(chosen, line)
     tell(chosen, lambda: {"readings": readings}, str)
     return 0

@@ -15,6 +15,7 @@ from typing import Any, TextIO
 import numpy as np
 
 from lgvi_warp import __version__
+from lgvi_warp.common.errors import printable
 from lgvi_warp.studies.files import finite_or_none
 
 BOLD, RED, YELLOW = "1", "31", "33"
@@ -59,6 +60,8 @@ def say(chosen: argparse.Namespace, text: str) -> None:
     """
     if chosen.quiet or chosen.json or not text:
         return
+    # Names and texts of a file may hold what a terminal obeys.
+    text = printable(text, "\n")
     if colored(sys.stdout):
         text = re.sub(r"^[a-z]\w*(?=  )", lambda label: painted(label[0], COLORS.get(label[0], BOLD)), text, flags=re.M)
     print(text, flush=True)
@@ -111,5 +114,5 @@ def print_faults(faults: Iterable[str]) -> list[str]:
     faults = list(faults)
     name = painted("lgvi-warp:", RED) if colored(sys.stderr) else "lgvi-warp:"
     for fault in faults:
-        print(f"{name} {fault}", file=sys.stderr)
+        print(name, printable(fault, "\n"), file=sys.stderr)
     return faults

@@ -48,8 +48,9 @@ def _draw(content: Content, written: Written, out: Path) -> None:
     """Draw the pictures of one content of a folder."""
     numbers: Any = content.load()
     if content.kind in ("store", "result"):
-        for name, draw in pictures(numbers, shown_members(numbers)).items():
-            written.take(out / name, partial(draw, out / name))
+        with content.understood():
+            for name, draw in pictures(numbers, shown_members(numbers)).items():
+                written.take(out / name, partial(draw, out / name))
         return
     if content.kind == "sweep":
         written.empty.append(
@@ -63,4 +64,5 @@ def _draw(content: Content, written: Written, out: Path) -> None:
         "stability": plots.plot_stability,
         "sensitivity": plots.plot_sensitivity,
     }
-    written.draw(drawings[content.kind], numbers, out / content.path.with_suffix(".png").name)
+    with content.understood():
+        written.draw(drawings[content.kind], numbers, out / content.path.with_suffix(".png").name)

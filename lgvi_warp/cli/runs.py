@@ -14,9 +14,11 @@ from lgvi_warp.cli import documents
 from lgvi_warp.cli.output import print_faults, say, tell
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.report import report
-from lgvi_warp.cli.settings import block_range, folder, load_scene, store_settings
+from lgvi_warp.cli.settings import RUN, block_range, folder, load_scene, store_settings
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.common.errors import Interrupted, MembersFailed, MissingExtra, SceneError
+from lgvi_warp.common.files import place_of
+from lgvi_warp.common.safe_files import inside
 
 # File of a result in memory, and of an interrupted one where that file exists already.
 RESULT, PART = "result.npz", "result_part.npz"
@@ -39,6 +41,10 @@ def run(chosen: argparse.Namespace) -> int:
     scene = load_scene(chosen)
     store, only = store_settings(chosen), block_range(chosen)
     address, out = live_address(scene, chosen), folder(chosen)
+    if store is None:
+        place_of(out / RESULT, out)
+    else:
+        inside(out, RUN)
     warm = _import_in_background()
     from lgvi_warp.runs.solve import solve
 

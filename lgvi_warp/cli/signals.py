@@ -55,7 +55,8 @@ class Signals:
                 self._before[number] = before
                 signal.signal(number, self._hear)
         reader, self._writer = os.pipe()
-        os.set_blocking(self._writer, False)
+        if hasattr(os, "set_blocking"):  # Windows has it from Python 3.12 on, and does not ask for it
+            os.set_blocking(self._writer, False)
         self._wakeup = signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
         self._unraisable, sys.unraisablehook = sys.unraisablehook, self._again
         threading.Thread(target=self._listen, args=(reader,), name="lgvi_warp_signals", daemon=True).start()

@@ -8,6 +8,7 @@ import argparse
 from lgvi_warp.cli.output import print_faults, tell
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.report import file_line
+from lgvi_warp.common.files import place_of
 
 
 def merge(chosen: argparse.Namespace) -> int:
@@ -73,6 +74,8 @@ def report(chosen: argparse.Namespace) -> int:
 
     from lgvi_warp.views.report import report as write_report
 
+    if chosen.out is None:
+        place_of(chosen.dir / "report.html", chosen.dir)
     with shown(chosen.quiet, "drawing"):
         path = write_report(chosen.dir, chosen.out or chosen.dir / "report.html")
     tell(chosen, lambda: {"file": path, "bytes": path.stat().st_size}, lambda: file_line(path))

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from lgvi_warp.cli.settings import folder, load_scene, whole
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.errors import SceneError, refusal
+from lgvi_warp.common.reading import file_json
 
 
 def finish(written: Written, chosen: argparse.Namespace, content: Mapping[str, Any], text: str) -> int:
@@ -203,7 +203,7 @@ def sweep(chosen: argparse.Namespace) -> int:
             written.draw(draw, compared, out / name)
         if chosen.record:
             _record_worst(compared, chosen.record, out, written)
-    code = finish(written, chosen, {"sweep": json.loads((out / "sweep.json").read_text())}, str(compared))
+    code = finish(written, chosen, {"sweep": file_json(out / "sweep.json")}, str(compared))
     return 1 if all(compared.record(cell).refused for cell in compared.cells) else code
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from lgvi_warp.cli.folders import Content, contents
 from lgvi_warp.cli.output import tell
@@ -27,11 +26,12 @@ def view(chosen: argparse.Namespace) -> int:
         SceneError: There is no run, no such member, or nothing to draw.
         OSError: The viewer cannot be started, or the file cannot be written.
     """
-    members, result = indices(chosen.members), run_in(chosen.dir)
+    members, content = indices(chosen.members), run_in(chosen.dir)
+    result = content.load()
     from lgvi_warp.views.rerun import log_rerun, show
 
     try:
-        with shown(chosen.quiet, "drawing"):
+        with shown(chosen.quiet, "drawing"), content.understood():
             if chosen.out is None:
                 show(result, members=members)
             else:
@@ -43,24 +43,23 @@ def view(chosen: argparse.Namespace) -> int:
     return 0
 
 
-def run_in(path: Path) -> Any:
-    """Read the run at a path.
+def run_in(path: Path) -> Content:
+    """Find the run at a path.
 
     Args:
         path: A result.npz, a store, or a folder with one of these.
 
     Returns:
-        Its result.
+        The run.
 
     Raises:
-        SceneError: There is none, or it is damaged.
-        OSError: It cannot be read.
+        SceneError: There is none.
     """
     held = [Content("result", path)] if path.suffix == ".npz" else contents(path)
     runs = [content for content in held if content.kind in ("result", "store")]
     if not runs:
         raise SceneError([f"{path}: holds a study, and no run; give the folder of a run"])
-    return runs[-1].load()
+    return runs[-1]
 
 
 def indices(text: str | None) -> list[int] | None:

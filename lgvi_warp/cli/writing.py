@@ -12,6 +12,7 @@ from typing import Any
 
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw
+from lgvi_warp.common.files import place_of
 
 # Longest delay of a signal that arrives just before the main thread begins to wait [s].
 PERIOD = 0.2
@@ -34,13 +35,14 @@ class Written:
     missing: dict[str, MissingExtra] = field(default_factory=dict)
 
     def take(self, path: Path, write: Callable[[], Path]) -> None:
-        """Write a file, or note why it was not written.
+        """Write a file into a folder, or note why it was not written.
 
         Args:
-            path: The file.
+            path: The file; no link leads it out of its folder.
             write: Writes it and returns its path.
         """
         try:
+            place_of(path, path.parent)
             self.files.append(write())
         except MissingExtra as error:
             self.missing[path.name] = error
@@ -104,6 +106,7 @@ def side_by_side(writers: Mapping[Path, Callable[[Path], Path]]) -> dict[Path, F
     def make(path: Path) -> Path:
         begun.append(path)
         try:
+            place_of(path, path.parent)
             finished.append(writers[path](path))
         finally:
             ended.append(path)

@@ -248,8 +248,20 @@ def one_line(fault: str) -> str:
     Returns:
         The text without control characters; of a long one, its beginning and its end.
     """
-    text = fault if len(fault) <= HEAD + END else f"{fault[:HEAD]} ... {fault[-END:]}"
-    return text if text.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+    return printable(fault if len(fault) <= HEAD + END else f"{fault[:HEAD]} ... {fault[-END:]}")
+
+
+def printable(text: str, kept: str = "") -> str:
+    """Show control characters, which a terminal would obey, as text.
+
+    Args:
+        text: Any text.
+        kept: Characters that stay as they are; default none.
+
+    Returns:
+        The text, each of them as its code.
+    """
+    return text if text.isprintable() else "".join(c if c.isprintable() or c in kept else ascii(c)[1:-1] for c in text)
 
 
 def ragged(value: Any) -> bool:

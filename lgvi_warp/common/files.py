@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import safe_files, scratch
+from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.safe_files import named
 from lgvi_warp.common.scratch import UNFINISHED
 
@@ -77,7 +78,8 @@ def sync_file(beside: Path, target: Path) -> None:
     Raises:
         OSError: The file cannot be synced.
     """
-    descriptor = os.open(beside, os.O_RDONLY)
+    # Windows syncs only what is open for writing.
+    descriptor = os.open(beside, os.O_RDWR)
     try:
         with named(target):
             os.fsync(descriptor)
@@ -109,12 +111,12 @@ def sync_folder(folder: Path) -> None:
     Raises:
         OSError: The folder cannot be synced.
     """
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        with contextlib.suppress(PermissionError):
+    with contextlib.suppress(PermissionError):  # Windows opens no folders
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
             os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 class Files:
@@ -305,23 +307,45 @@ def remove_unfinished(folders: Iterable[Path]) -> None:
                 path.unlink(missing_ok=True)
 
 
-@contextlib.contextmanager
-def placed(path: str | os.PathLike[str]) -> Iterator[Path]:
-    """Write a file under a temporary name, and put it in its place at the end of the `with` block.
-
-    An existing file stays whole until then; after an error the new one is removed. Unfinished files of killed writers of the
-    same file are removed too.
+def place_of(path: str | os.PathLike[str], root: str | os.PathLike[str] | None = None) -> Path:
+    """Find where a file is to be written: a link that the user names is followed, and only a plain file is replaced.
 
     Args:
         path: The file.
+        root: Folder that it may not leave by a link, since its name is not the user's; default None, it may.
+
+    Returns:
+        Its path without links.
+
+    Raises:
+        SceneError: A folder, device, pipe or socket is there, or a link leads out of the folder.
+    """
+    target = Path(os.path.realpath(path)) if root is None else safe_files.inside(root, Path(path).relative_to(root))
+    with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+        if there := safe_files.kind(os.lstat(target).st_mode):
+            raise SceneError([f"{path}: {there}, which is not replaced; give the name of a file"])
+    return target
+
+
+@contextlib.contextmanager
+def placed(path: str | os.PathLike[str], root: str | os.PathLike[str] | None = None) -> Iterator[Path]:
+    """Write a file under a temporary name, and put it in its place at the end of the `with` block.
+
+    An existing file stays whole until then; after an error the new one is removed. Unfinished files of killed writers of the
+    same file are removed too. Every file that a user has goes through here.
+
+    Args:
+        path: The file.
+        root: Folder that it may not leave by a link, since its name is not the user's; default None, it may.
 
     Yields:
         The temporary path to write to.
 
     Raises:
+        SceneError: What is there is no plain file, or lies outside the folder.
         OSError: The file cannot be made durable or put in its place.
     """
-    target = Path(path)
+    target = place_of(path, root)
     scratch.sweep(target)
     beside = scratch.beside(target)
     try:
@@ -332,6 +356,26 @@ def placed(path: str | os.PathLike[str]) -> Iterator[Path]:
         sync_folder(target.parent)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def write_text(path: str | os.PathLike[str], text: str, root: str | os.PathLike[str] | None = None) -> Path:
+    """Write a text file in UTF-8; it is there whole or not at all.
+
+    Args:
+        path: The file.
+        text: Its text.
+        root: As of `placed`.
+
+    Returns:
+        The path.
+
+    Raises:
+        SceneError: What is there is no plain file, or lies outside the folder.
+        OSError: The file cannot be written.
+    """
+    with placed(path, root) as beside, beside.open("x", encoding="utf-8", newline="\n") as file:
+        file.write(text)
+    return Path(path)
 
 
 def put_folder(beside: Path, target: Path) -> None:

@@ -103,6 +103,18 @@ def memory_bytes() -> int | None:
     return min(known, default=None)
 
 
+def resident() -> int:
+    """Memory of this process.
+
+    Returns:
+        Resident memory [bytes]; 0 where the system does not tell.
+    """
+    try:
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    except (OSError, ValueError):
+        return 0
+
+
 def versions() -> dict[str, str]:
     """Versions of the software that a result depends on.
 

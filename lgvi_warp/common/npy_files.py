@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Read arrays in .npy form, one after another in a file or in an .npz archive, of a file of unknown origin.
+"""Read arrays in .npy form, one after another in a file or in an .npz archive, of a file of unknown origin; and write such.
 
 NumPy's own reader allocates what a header promises before it checks that the file holds it; here the file's size bounds
 every array. Only numbers, truth values and texts are read: nothing is unpickled.
@@ -11,15 +11,15 @@ import contextlib
 import io
 import math
 import os
-import stat
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
-from lgvi_warp.common import safe_files
+from lgvi_warp.common import files as durable
+from lgvi_warp.common import reading, safe_files
 
 KINDS = "biufU"
 # Most bytes of an .npz's list of files, and most arrays: a result has some tens, with statistics some hundreds.
@@ -130,18 +130,37 @@ def of_npz(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
         Name -> array.
 
     Raises:
-        ValueError: It is no such file, or is damaged.
+        ValueError: It is no regular file, no such file, or is damaged.
         OSError: It cannot be read.
     """
-    with open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)), "rb", buffering=0) as raw:
-        stats = os.fstat(raw.fileno())
-        if not stat.S_ISREG(stats.st_mode):
-            raise ValueError(safe_files.kind(stats.st_mode))
+    with reading.opened(path, "NumPy file") as raw:
         try:
-            with _Careful(raw) as file, zipfile.ZipFile(file) as archive:
-                return _arrays(archive, file, stats.st_size)
+            with _Careful(raw) as file, zipfile.ZipFile(file) as archive:  # type: ignore[arg-type]
+                return _arrays(archive, file, os.fstat(raw.fileno()).st_size)
         except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError, OverflowError) as error:
             raise ValueError(f"is torn or no .npz file ({error})") from None
+
+
+def write_npz(
+    path: str | os.PathLike[str], arrays: Mapping[str, Any], root: str | os.PathLike[str] | None = None
+) -> Path:
+    """Write arrays to an .npz file; it is there whole or not at all, and the same arrays give the same bytes.
+
+    Args:
+        path: The file.
+        arrays: Name -> array, or text.
+        root: As of `files.placed`.
+
+    Returns:
+        The path.
+
+    Raises:
+        SceneError: What is there is no plain file, or lies outside the folder.
+        OSError: The file cannot be written.
+    """
+    with durable.placed(path, root) as beside, beside.open("xb") as file:
+        np.savez(file, **arrays)
+    return Path(path)
 
 
 def _arrays(archive: zipfile.ZipFile, file: _Careful, size: int) -> dict[str, np.ndarray]:

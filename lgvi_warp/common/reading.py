@@ -1,28 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Read a file that a user names: regular files only, of bounded size, so that reading ends."""
+"""Read any file of a user's: regular files only, of bounded size, so that reading ends.
+
+A path that the user names may be a link. What is found in a folder goes through `safe_files.inside` first.
+"""
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
-import stat
+import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, BinaryIO
 
-from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common import safe_files
+from lgvi_warp.common.errors import NothingToDraw, SceneError
 
 # Largest size of each kind of file [bytes]. Scenes and coefficients (YAML, XML) are written by hand or by a script; parsers
-# read one or two megabytes a second of TOML, and a tenth of that of YAML. A table may hold millions of numbers.
-MOST_BYTES = {"scene file": 1 << 20, "YAML file": 128 << 10, "CSV file": 512 << 20}
+# read one or two megabytes a second of TOML, and a tenth of that of YAML. A table may hold millions of numbers; arrays are
+# read as long as the file is.
+MOST_BYTES = {"scene file": 1 << 20, "YAML file": 128 << 10, "CSV file": 512 << 20, "JSON file": safe_files.MOST_JSON,
+              "NumPy file": sys.maxsize}  # fmt: skip
 MOST_OTHERS = 16 << 20
 PATHS = {"scene file": "give the path of a TOML file", "CSV file": "give the path of a CSV file"}
 OTHER_PATHS = "give the path of a file, or its text"
-
-KINDS = (
-    (stat.S_ISDIR, "is a folder"),
-    (stat.S_ISFIFO, "is a named pipe"),
-    (stat.S_ISCHR, "is a device"),
-    (stat.S_ISBLK, "is a device"),
-    (stat.S_ISSOCK, "is a socket"),
-)
 
 
 class UnreadableError(ValueError):
@@ -38,12 +40,35 @@ class UnreadableError(ValueError):
         self.what, self.remedy = what, remedy
 
 
+@contextlib.contextmanager
+def opened(path: str | os.PathLike[str], kind: str) -> Iterator[BinaryIO]:
+    """Open a regular file for reading.
+
+    Args:
+        path: The file.
+        kind: What it is, such as "scene file"; a file larger than such files may be is refused before it is read.
+
+    Yields:
+        The unbuffered file.
+
+    Raises:
+        UnreadableError: It is no regular file, or is too large.
+        OSError: The system refuses it.
+    """
+    # Checked before it is opened, since opening a device may have effects. Nothing here waits for a pipe's other end.
+    _refuse(os.stat(path), kind)
+    flags = (getattr(os, name, 0) for name in ("O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
+    with open(os.open(path, os.O_RDONLY | sum(flags)), "rb", buffering=0) as file:
+        _refuse(os.fstat(file.fileno()), kind)
+        yield file
+
+
 def file_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
     """Read all bytes of a regular file.
 
     Args:
         path: The file.
-        kind: What it is, such as "scene file"; a file larger than such files may be is refused before it is read.
+        kind: What it is, as of `opened`.
 
     Returns:
         The bytes.
@@ -53,26 +78,21 @@ def file_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
     """
     remedy, most = PATHS.get(kind, OTHER_PATHS), MOST_BYTES.get(kind, MOST_OTHERS)
     try:
-        # Checked before it is opened, since opening a device may have effects. Nothing here waits for a pipe's other end.
-        _refuse(os.stat(path), kind)
-        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_CLOEXEC", 0))
-        with os.fdopen(descriptor, "rb") as file:
-            _refuse(os.fstat(descriptor), kind)
-            content = file.read(most + 1)
+        with opened(path, kind) as file:
+            content = io.BufferedReader(file).read(most + 1)  # type: ignore[type-var]
     except (OSError, ValueError, TypeError) as error:
         if isinstance(error, UnreadableError):
             raise
         raise UnreadableError(str(getattr(error, "strerror", None) or error), remedy) from None
-    if content is None or len(content) > most:
+    if len(content) > most:
         raise UnreadableError("never ends", remedy)
     return content
 
 
 def _refuse(found: os.stat_result, kind: str) -> None:
     """Raise UnreadableError for a file that is not regular, or too large."""
-    for is_kind, problem in KINDS:
-        if is_kind(found.st_mode):
-            raise UnreadableError(problem, PATHS.get(kind, OTHER_PATHS))
+    if problem := safe_files.kind(found.st_mode):
+        raise UnreadableError(problem, PATHS.get(kind, OTHER_PATHS))
     most = MOST_BYTES.get(kind, MOST_OTHERS)
     if found.st_size > most:
         problem = f"has {found.st_size / 1e6:,.1f} MB, more than the {most / 1e6:,.1f} MB that a {kind} may have"
@@ -130,6 +150,51 @@ def file_text(path: str | os.PathLike[str], kind: str) -> str:
         return text_of(content)
     except UnreadableError as error:
         raise SceneError([f"{kind} {_name(path)}: {error}, or {PATHS.get(kind, OTHER_PATHS)}"]) from None
+
+
+def file_json(path: str | os.PathLike[str]) -> Any:
+    """Read a JSON file.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Its content.
+
+    Raises:
+        ValueError: It is no regular file, is too large or nested too deep, or is not JSON in UTF-8.
+        OSError: It cannot be read.
+    """
+    with opened(path, "JSON file") as file:
+        return safe_files.parsed(text_of(io.BufferedReader(file).read(safe_files.MOST_JSON)))  # type: ignore[type-var]
+
+
+@contextlib.contextmanager
+def understood(path: str | os.PathLike[str], what: str, remedy: str) -> Iterator[None]:
+    """Turn what the content of a file raises in the `with` block into a fault of the file.
+
+    Args:
+        path: The file, which the message names.
+        what: What is wrong with it if it is not damaged, as "of another version".
+        remedy: How to get another one.
+
+    Raises:
+        SceneError: In place of any error that the content of the file causes.
+    """
+    name = os.fspath(path)
+    try:
+        yield
+    except NothingToDraw:
+        raise
+    except SceneError as error:
+        raise error if all(name in text for text in error.faults) else error.prefixed(f"{name}: ") from error
+    except UnreadableError as error:
+        raise SceneError([f"{name}: {error.what}; {remedy}"]) from error
+    except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
+        reason = " ".join(str(error).split())[:200] or type(error).__name__
+        raise SceneError([f"{name}: is damaged, or {what}: {reason}; {remedy}"]) from error
+    except MemoryError:
+        raise SceneError([f"{name}: does not fit into memory; read it on a larger machine"]) from None
 
 
 def _name(path: str | os.PathLike[str]) -> str:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files below a folder of unknown origin: no link is followed, and only plain files are opened.
+"""Files below a folder of unknown origin: no link out of it is followed, and only plain files are opened.
 
-Each folder on the way is opened relative to its parent, so that a link placed there meanwhile is not followed either.
+In a store there are no links at all: each folder on the way is opened relative to its parent, so that a link placed there
+meanwhile is not followed either.
 """
 
 from __future__ import annotations
@@ -17,8 +18,9 @@ from typing import Any, BinaryIO
 
 from lgvi_warp.common.errors import SceneError
 
-# Most bytes of a JSON file: a store's has a few kilobytes, with millions of indices some tens of megabytes.
-MOST_JSON = 64_000_000
+# Most bytes of a JSON file: a store's has a few kilobytes, with millions of indices some tens of megabytes; and most tables
+# and lists within each other: a scene has up to 24, which a study's file holds in some more.
+MOST_JSON, MOST_NESTED = 64_000_000, 64
 BY_DESCRIPTOR = os.open in os.supports_dir_fd and os.rename in os.supports_dir_fd and hasattr(os, "O_NOFOLLOW")
 _PLAIN = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0)
 _FOLDER = getattr(os, "O_DIRECTORY", 0) | os.O_RDONLY | _PLAIN
@@ -35,7 +37,17 @@ def refused(path: Path, what: str) -> SceneError:
         The error, with its remedy.
     """
     remedy = "take it away, and what it leads to is left alone" if what == "is a link" else "take it away"
-    return SceneError([f"{path}: {what}, where a store has plain files and folders only; {remedy}"])
+    return SceneError([f"{path}: {what}, where a run has plain files and folders only; {remedy}"])
+
+
+KINDS = {
+    stat.S_IFLNK: "is a link",
+    stat.S_IFDIR: "is a folder",
+    stat.S_IFIFO: "is a named pipe",
+    stat.S_IFCHR: "is a device",
+    stat.S_IFBLK: "is a device",
+    stat.S_IFSOCK: "is a socket",
+}
 
 
 def kind(mode: int) -> str:
@@ -45,9 +57,29 @@ def kind(mode: int) -> str:
         mode: Its mode, as os.stat gives it.
 
     Returns:
-        "is a link", "is a folder" or "is a device, pipe or socket".
+        "is a link", "is a named pipe" and so on; "" for a plain file.
     """
-    return "is a link" if stat.S_ISLNK(mode) else "is a folder" if stat.S_ISDIR(mode) else "is a device, pipe or socket"
+    return "" if stat.S_ISREG(mode) else KINDS.get(stat.S_IFMT(mode), "is no plain file")
+
+
+def inside(root: str | os.PathLike[str], name: str | os.PathLike[str]) -> Path:
+    """Find a file that lies in a folder, or will, where its links lead; one that leads out of the folder is refused.
+
+    Args:
+        root: The folder; a link to it is followed.
+        name: Path of the file from there.
+
+    Returns:
+        Its path without links; it need not exist.
+
+    Raises:
+        SceneError: It lies outside.
+    """
+    home, path = (Path(os.path.realpath(one)) for one in (root, Path(root) / name))
+    if not path.is_relative_to(home):
+        remedy = "put a copy in its place, or name that file yourself"
+        raise SceneError([f"{Path(root) / name}: leads out of its folder, to {path}; {remedy}"])
+    return path
 
 
 @contextlib.contextmanager
@@ -201,9 +233,16 @@ def parsed(text: str | bytes) -> Any:
         ValueError: It is not JSON, or is nested too deep.
     """
     try:
-        return json.loads(text)
+        content = json.loads(text)
     except RecursionError:
         raise ValueError("is nested too deep") from None
+    level = [content]
+    for _ in range(MOST_NESTED):
+        level = [value for value in level if isinstance(value, dict | list)]
+        if not level:
+            return content
+        level = [item for value in level for item in (value.values() if isinstance(value, dict) else value)]
+    raise ValueError("is nested too deep")
 
 
 @contextlib.contextmanager

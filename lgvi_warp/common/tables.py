@@ -12,22 +12,26 @@ from typing import Any
 from lgvi_warp.common import files as durable
 
 
-def write_csv(rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[str]) -> Path:
+def write_csv(
+    rows: Sequence[Mapping[str, Any]], path: str | os.PathLike[str], root: str | os.PathLike[str] | None = None
+) -> Path:
     """Write records to a CSV file; it is there whole or not at all.
 
     Args:
         rows: Records, with one column for every key that some record has.
         path: The file.
+        root: As of `files.placed`.
 
     Returns:
         Its path.
 
     Raises:
+        SceneError: What is there is no plain file, or lies outside the folder.
         OSError: The file cannot be written.
     """
     target = Path(path)
     names = list(dict.fromkeys(key for row in rows for key in row))
-    with durable.placed(target) as beside, beside.open("x", newline="", encoding="utf-8") as file:
+    with durable.placed(target, root) as beside, beside.open("x", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, names)
         writer.writeheader()
         writer.writerows(rows)

@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lgvi_warp.common.reading import file_text
 from lgvi_warp.methods.method import FORCED, Method
 from lgvi_warp.methods.tableaux import Tableau
 
@@ -32,7 +33,7 @@ STEP, MOST = 1e-3, 30.0
 # The rows (method, largest stable h w of the Munk moment, and of the restoring moment) of methods and compositions. Gauss
 # collocation has none: a status reports where its iteration fails.
 STABLE_STEPS = Path(__file__).with_name("stable_steps.csv")
-_ROWS = [line.split(",") for line in STABLE_STEPS.read_text().splitlines()[1:]]
+_ROWS = [line.split(",") for line in file_text(STABLE_STEPS, "CSV file").splitlines()[1:]]
 MUNK = {method: float(munk) for method, munk, _ in _ROWS}
 RESTORING = {method: float(restoring) for method, _, restoring in _ROWS}
 

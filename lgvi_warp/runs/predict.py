@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-import os
 import shutil
 import tempfile
 import time
@@ -178,7 +177,7 @@ def predict(
         set_up=set_up,
         advance=step * steps * more,
         write=write,
-        memory=resident() + memory(runs, count),
+        memory=machine.resident() + memory(runs, count),
         disk=metadata + sum(sized.disk for sized in runs),
         free_memory=machine.memory_bytes(),
         free_disk=shutil.disk_usage(place).free,
@@ -411,15 +410,3 @@ def disk_speed(folder: Path, threads: int) -> float:
         start = time.perf_counter()
         list(pool.map(write, range(threads)))
         return len(data) * threads / (time.perf_counter() - start)
-
-
-def resident() -> int:
-    """Memory of this process.
-
-    Returns:
-        Resident memory [bytes]; 0 where the system does not tell.
-    """
-    try:
-        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-    except (OSError, ValueError):
-        return 0

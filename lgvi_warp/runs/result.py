@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.common import files as durable
 from lgvi_warp.common import npy_files, summaries
-from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.phases import Phases
+from lgvi_warp.common.reading import understood
 from lgvi_warp.common.status import Status, StatusArray, WarningArray
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics import energy as invariants
@@ -305,9 +304,7 @@ class Result(Summarized):
             arrays |= {f"kept/{name}": value for name, value in self.kept.samples.items()}
             arrays |= {"kept/members": self.kept_members}
             arrays |= {f"kept/parameters/{name}": value for name, value in self.kept.parameters.items()}
-        with durable.placed(path) as beside, beside.open("xb") as file:
-            np.savez(file, **arrays, **texts)  # type: ignore[arg-type]
-        return Path(path)
+        return npy_files.write_npz(path, arrays | texts)
 
     @classmethod
     def per_member(cls, arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
@@ -339,13 +336,9 @@ class Result(Summarized):
             OSError: If the file cannot be read.
             SceneError: If it is damaged, or no result (SceneError is a ValueError).
         """
-        try:
-            with result_file.understood(path):
-                content = npy_files.of_npz(path)
-                texts = result_file.checked(content)
-                return cls._from(content, texts)
-        except MemoryError:
-            raise SceneError([f"{path}: does not fit into memory; read it on a larger machine"]) from None
+        with understood(path, "no result of lgvi-warp", "run the scene again, or ask for the file anew"):
+            content = npy_files.of_npz(path)
+            return cls._from(content, result_file.checked(content))
 
     @classmethod
     def _from(cls, content: Mapping[str, np.ndarray], texts: Mapping[str, Any]) -> Result:

@@ -3,42 +3,16 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.physics.control.signals import IN_FILES, has_shape
 from lgvi_warp.runs import member_fields
 
 TEXTS = ("messages", "provenance", "statistics")
-
-
-@contextlib.contextmanager
-def understood(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Turn errors that arise while a result is read into faults of its file.
-
-    Args:
-        path: The file, which the message names.
-
-    Yields:
-        Nothing; the file is read in this context.
-
-    Raises:
-        SceneError: In place of any error that the content of the file causes.
-    """
-    try:
-        yield
-    except SceneError as error:
-        raise SceneError(f"{os.fspath(path)}: {text}" for text in error.faults) from error
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError, ArithmeticError, RecursionError) as error:
-        reason = " ".join(str(error).split())[:200] or type(error).__name__
-        remedy = "run the scene again, or ask for the file anew"
-        raise SceneError([f"{os.fspath(path)}: is damaged, or no result of lgvi-warp: {reason}; {remedy}"]) from error
 
 
 def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:

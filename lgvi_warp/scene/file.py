@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import tomllib
 from collections.abc import Mapping
@@ -11,6 +12,7 @@ from typing import Any
 
 from lgvi_warp.common.errors import SceneError, among, refusal
 from lgvi_warp.common.reading import file_text
+from lgvi_warp.common.safe_files import inside
 from lgvi_warp.common.toml_text import parsed
 
 
@@ -95,15 +97,12 @@ def _below(folder: Path, law: Any) -> Any:
 def _mesh_in(folder: Path, name: str) -> str:
     """Return the path of a mesh; raise SceneError if it leaves the folder of the scene, through a link too."""
     key = "vehicle.shape.mesh"
-    try:
-        path = (folder / name).resolve()
-        inside = path.is_relative_to(folder.resolve())
-        is_file = inside and path.is_file()
-    except (OSError, ValueError, RuntimeError):  # a name with a null character, or a ring of links
-        inside, is_file = True, False
-    if not inside or Path(name).is_absolute():
+    path = None
+    with contextlib.suppress(OSError, ValueError):  # a link out of the folder, or a name with a null character
+        path = inside(folder, name)
+    if "\0" not in name and (path is None or Path(name).is_absolute()):
         raise refusal(key, name, "lies outside the scene file's folder", "put the mesh beside the scene file")
-    if not is_file:
+    if path is None or not path.is_file():
         raise refusal(key, name, "is not there", "put the mesh beside the scene file, or give length and diameter [m]")
     return os.fspath(path)
 
@@ -166,9 +165,9 @@ def with_named_vehicle(content: Mapping[str, Any]) -> Mapping[str, Any]:
     table = content.get("vehicle")
     if not isinstance(table, Mapping) or "name" not in table:
         return content
-    from lgvi_warp.scene.vehicles.fossen import vehicle_file
+    from lgvi_warp.scene.vehicles.fossen import vehicle_tables
 
-    known = tomllib.loads(vehicle_file(str(table["name"])).read_text(encoding="utf-8"))
+    known = vehicle_tables(str(table["name"]))
     merged = dict(content)
     for section in ("vehicle", "environment"):
         section_table = content.get(section, {})

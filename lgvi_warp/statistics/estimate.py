@@ -13,6 +13,7 @@ import numpy as np
 
 from lgvi_warp.common import summaries
 from lgvi_warp.common.errors import closest, shown
+from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.statistics.naming import canonical, free
 from lgvi_warp.statistics.tree import below
@@ -208,7 +209,7 @@ class Estimates(Summarized, Mapping[str, Estimate]):
             ValueError: an estimate is of an earlier version, in which its value meant something else.
         """
         estimates = []
-        for i, words in enumerate(json.loads(text)):
+        for i, words in enumerate(parsed(text)):
             estimate_arrays = below(arrays, f"{i}/")
             coordinates = below(estimate_arrays, "coordinates/")
             words["dims"] = {name: tuple(dims) for name, dims in words["dims"].items()}

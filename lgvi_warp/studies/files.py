@@ -3,18 +3,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
 import os
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.files import write_text
+from lgvi_warp.common.reading import file_json, understood
 from lgvi_warp.common.tables import write_csv
 
 
@@ -55,22 +55,16 @@ def numbers(value: Any, missing: float) -> Any:
     return missing if value is None else value
 
 
-@contextlib.contextmanager
-def understood(path: Path) -> Iterator[None]:
-    """Turn what a damaged file raises in the `with` block into a SceneError.
+def of_study(path: str | os.PathLike[str]) -> AbstractContextManager[None]:
+    """Turn what the content of a study's file raises in the `with` block into a fault of the file.
 
     Args:
-        path: The file that is read.
+        path: of the file.
 
-    Raises:
-        SceneError: It is not what `save` wrote.
+    Returns:
+        A context manager, which raises SceneError.
     """
-    try:
-        yield
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        if isinstance(error, SceneError):
-            raise
-        raise SceneError([f"{path}: is damaged, or of another version; run the study again"]) from error
+    return understood(path, "of another version", "run the study again")
 
 
 class Saved(ABC):
@@ -135,5 +129,36 @@ class Saved(ABC):
         """
         target, name = Path(folder), name or self.study
         target.mkdir(parents=True, exist_ok=True)
-        (target / f"{name}.json").write_text(self.to_json())
-        return [target / f"{name}.json", self.to_csv(target / f"{name}.csv")]
+        text = write_text(target / f"{name}.json", self.to_json(), target)
+        return [text, write_csv(self.rows(), target / f"{name}.csv", target)]
+
+    @classmethod
+    @abstractmethod
+    def from_dict(cls, content: dict[str, Any]) -> Self:
+        """Build it from the content of a JSON file.
+
+        Args:
+            content: as `to_dict` returns it.
+
+        Returns:
+            What the study found.
+        """
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Self:
+        """Read it from the JSON file that `save` wrote.
+
+        Args:
+            path: of the file.
+
+        Returns:
+            What the study found.
+
+        Raises:
+            OSError: where the file cannot be read.
+            SceneError: where it is no regular file, is damaged, or of another version.
+        """
+        with of_study(path):
+            found = cls.from_dict(file_json(path))
+            found.rows(), found.to_json()  # what cannot be shown is refused here
+            return found

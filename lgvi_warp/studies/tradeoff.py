@@ -4,13 +4,10 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
-import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -191,22 +188,6 @@ class Tradeoff(Saved):
         values = {name: entry for name, entry in content.items() if name != "front"}
         values |= {"measurements": tuple(measured), "growth": growth, "messages": tuple(content["messages"])}
         return cls(**values | {"reference_error": numbers(content["reference_error"], math.inf)})
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Tradeoff:
-        """Read a trade-off from the JSON file that `save` wrote.
-
-        Args:
-            path: of the file.
-
-        Returns:
-            The trade-off.
-
-        Raises:
-            OSError: where the file cannot be read.
-            ValueError: where it is no JSON.
-        """
-        return cls.from_dict(json.loads(Path(path).read_text()))
 
     def rows(self) -> list[dict[str, Any]]:
         """Flatten the measurements to one record each, as the CSV file has them.

@@ -6,6 +6,7 @@ from __future__ import annotations
 import base64
 import csv
 import html
+import io
 import json
 import os
 import tempfile
@@ -13,11 +14,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from lgvi_warp.common import files as durable
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw, SceneError
+from lgvi_warp.common.files import place_of, write_text
+from lgvi_warp.common.reading import file_bytes, file_json, file_text, understood
+from lgvi_warp.common.safe_files import inside
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.runs.outcomes import outcome_text, outcomes
 from lgvi_warp.statistics.table import table
+from lgvi_warp.studies.files import of_study
 from lgvi_warp.views.fleet import LOOKS, title
 from lgvi_warp.views.plots import drawable, plot, plot_statistics
 
@@ -59,12 +63,18 @@ def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]
         OSError: The file cannot be written.
     """
     if isinstance(result, str | os.PathLike):
-        folder = Path(result)
-        study = next((name for name in STUDIES if (folder / f"{name}.json").is_file()), None)
+        return _of_folder(Path(result), path)
+    return _write(path, _name(result.provenance), _of_run(result))
+
+
+def _of_folder(folder: Path, path: str | os.PathLike[str]) -> Path:
+    """Write the page of what a folder holds. Raises SceneError where that is damaged."""
+    with understood(folder, "not what a verb wrote", "write it again"):
+        study = next((name for name in STUDIES if os.path.lexists(folder / f"{name}.json")), None)
         if study is not None:
             return _write(path, f"{study.capitalize()} of {folder.resolve().name}", _of_study(folder, study))
         result = _run_in(folder)
-    return _write(path, _name(result.provenance), _of_run(result))
+        return _write(path, _name(result.provenance), _of_run(result))
 
 
 def _run_in(folder: Path) -> Result:
@@ -72,8 +82,8 @@ def _run_in(folder: Path) -> Result:
     from lgvi_warp.runs.result import Result
     from lgvi_warp.runs.store.open import open_run
 
-    if (folder / "result.npz").is_file():
-        return Result.load(folder / "result.npz")
+    if os.path.lexists(folder / "result.npz"):
+        return Result.load(inside(folder, "result.npz"))
     if (folder / "run.zarr").exists() or folder.suffix == ".zarr":
         return open_run(folder)
     fault = "holds no run and no study"
@@ -88,12 +98,10 @@ def _name(provenance: Mapping[str, Any]) -> str:
 
 def _write(path: str | os.PathLike[str], name: str, parts: Iterator[str]) -> Path:
     """Write a page; it is there whole or not at all."""
-    target = Path(path)
     heading = html.escape(name)
     head = f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{heading}</title><style>{STYLE}</style></head>'
-    with durable.placed(target) as beside:
-        Path(beside).write_text(f"{head}<body><h1>{heading}</h1>{''.join(parts)}</body></html>\n", encoding="utf-8")
-    return target
+    place_of(path)  # before anything is drawn
+    return write_text(path, f"{head}<body><h1>{heading}</h1>{''.join(parts)}</body></html>\n")
 
 
 def _of_run(result: Result) -> Iterator[str]:
@@ -144,12 +152,12 @@ def _picture(draw: Callable[[Any, Path], Path], result: Result) -> str:
                 return _pixels(draw(result, Path(folder) / "picture.png"))
         except NothingToDraw as reason:
             return _paragraph(str(reason))
-        text = drawn.read_text(encoding="utf-8")
+        text = file_text(drawn, "picture")
     return text[text.index("<svg") :]
 
 
 def _pixels(path: Path) -> str:
-    code = base64.b64encode(path.read_bytes()).decode()
+    code = base64.b64encode(file_bytes(path, "picture")).decode()
     return f'<img alt="{html.escape(path.stem)}" src="data:image/png;base64,{code}">'
 
 
@@ -198,18 +206,21 @@ def toml_of(content: Mapping[str, Any]) -> str:
 
 def _of_study(folder: Path, study: str) -> Iterator[str]:
     """The parts of a study's page: its pictures, its table, and its settings."""
+    held = inside(folder, f"{study}.json")
+    with of_study(held):
+        content = file_json(held)
+        short = {key: value for key, value in content.items() if not isinstance(value, list)}
     for path in sorted(folder.glob("*.png")):
-        yield _section(path.stem.replace("_", " ").capitalize(), _pixels(path))
+        yield _section(path.stem.replace("_", " ").capitalize(), _pixels(inside(folder, path.name)))
     rows_of = folder / f"{study}.csv"
-    if rows_of.is_file():
-        with rows_of.open(newline="", encoding="utf-8") as stream:
-            head, *rows = list(csv.reader(stream)) or [[]]
+    if os.path.lexists(rows_of):
+        text = file_text(inside(folder, rows_of.name), "CSV file")
+        with of_study(rows_of):
+            head, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
         more = (
             f"The first {MOST_ROWS:,} of {len(rows):,} rows; {rows_of.name} has all." if len(rows) > MOST_ROWS else ""
         )
         yield _section("Table", _paragraph(more) + _table(head, rows[:MOST_ROWS]))
-    content = json.loads((folder / f"{study}.json").read_text(encoding="utf-8"))
-    short = {key: value for key, value in content.items() if not isinstance(value, list)}
     yield _section("How it was made", _preformatted(json.dumps(short, indent=1)))
 
 

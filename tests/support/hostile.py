@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stores and results that somebody made to do harm, or that were damaged: built from a good one, each by one function."""
+"""Stores, results, studies and sweeps that somebody made to do harm, or that were damaged: built from a good one, each by one
+function."""
 
 import json
 import os
@@ -490,3 +491,179 @@ def _flip(path):
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 1
     path.write_bytes(data)
+
+
+# Folders of studies, sweeps and results: base, how it is harmed, and what `lgvi-warp info` says of it, None where it says
+# nothing against it.
+
+OUT = "leads out of its folder"
+STUDIES = ("tradeoff", "sensitivity", "stability", "sweep")
+
+
+def nested(depth):
+    return b'{"a": ' + b"[" * depth + b"]" * depth + b"}"
+
+
+def named(name):
+    """One more file, of a name that a file system allows."""
+    return lambda path, home: (path / name).write_text("x")
+
+
+def told_otherwise(name, /, **changes):
+    """The content of a JSON file has other values."""
+
+    def harm(path, home):
+        content = json.loads((path / name).read_text())
+        (path / name).write_text(json.dumps(content | changes))
+
+    return harm
+
+
+def beside_itself(name):
+    """A link to a file of the same folder."""
+
+    def harm(path, home):
+        (path / name).rename(path / "real")
+        (path / name).symlink_to("real")
+
+    return harm
+
+
+def loop(name):
+    def harm(path, home):
+        (path / name).unlink()
+        (path / name).symlink_to(name)
+
+    return harm
+
+
+def numbers_of(study):
+    """What is wrong with the file of a study's numbers."""
+    file = f"{study}.json"
+    return {
+        "a link to a secret": (link(file, "secret"), OUT),
+        "a link to zeros": (link(file, "/dev/zero"), OUT),
+        "a link that leads nowhere": (link(file, "nothing"), "lgvi-warp:"),
+        "a link to itself": (loop(file), "lgvi-warp:"),
+        "a link beside it": (beside_itself(file), None),
+        "a pipe": (special(file, os.mkfifo), "is a named pipe"),
+        "a socket": (special(file, bound), "is a socket"),
+        "a folder": (special(file, os.mkdir), "is a folder"),
+        "50 GB": (sized(file, 50 * 10**9), "more than the 64.0 MB"),
+        "nested 200,000 deep": (content(file, nested(200_000)), "is nested too deep"),
+        "nested 900 deep": (content(file, nested(900)), "is nested too deep"),
+        "a list": (content(file, b"[]"), None if study == "sweep" else "is damaged"),
+        "a number": (content(file, b"3"), None if study == "sweep" else "is damaged"),
+        "a number of 5,000 digits": (content(file, b"9" * 5000), "is damaged"),
+        "no JSON": (content(file, b"time,depth\n"), "is damaged"),
+        "not UTF-8": (content(file, bytes(range(256))), "is no text in UTF-8"),
+        "empty": (content(file, b""), "is damaged"),
+        "half": (lambda path, home: os.truncate(path / file, (path / file).stat().st_size // 2), "is damaged"),
+    }
+
+
+FOLDERS = {
+    f"{study}: {what}": (study, *made) for study in STUDIES for what, made in numbers_of(study).items()
+} | {
+    "tradeoff: other names": ("tradeoff", told_otherwise("tradeoff.json", of=["\x1b[2J"]), None),
+    "tradeoff: messages are a number": ("tradeoff", told_otherwise("tradeoff.json", messages=7), "is damaged"),
+    "tradeoff: units write on the terminal": ("tradeoff", told_otherwise("tradeoff.json", messages=["\x1b]0;x\x07"]), None),
+    "tradeoff: the table is a link": ("tradeoff", link("tradeoff.csv", "secret"), None),
+    "tradeoff: the table is a pipe": ("tradeoff", special("tradeoff.csv", os.mkfifo), None),
+    "tradeoff: the table has a long field": ("tradeoff", content("tradeoff.csv", b"a" * 200_000), None),
+    "tradeoff: the table is no text": ("tradeoff", content("tradeoff.csv", bytes(range(256))), None),
+    "tradeoff: the table has zero bytes": ("tradeoff", content("tradeoff.csv", b"a,b\n\0,\0\n"), None),
+    "tradeoff: the table has 50 GB": ("tradeoff", sized("tradeoff.csv", 50 * 10**9), None),
+    "tradeoff: a picture is a link": ("tradeoff", link("x.png", "secret"), None),
+    "tradeoff: a picture is a link to zeros": ("tradeoff", link("x.png", "/dev/zero"), None),
+    "tradeoff: a picture is a pipe": ("tradeoff", special("x.png", os.mkfifo), None),
+    "tradeoff: a picture has 50 GB": ("tradeoff", sized("x.png", 50 * 10**9), None),
+    "tradeoff: a name writes on the terminal": ("tradeoff", named("\x1b]0;x\x07\x1b[2J.png"), None),
+    "tradeoff: a name of two lines": ("tradeoff", named("a\nb.csv"), None),
+    "sensitivity: 10^5 names each": (
+        "sensitivity",
+        told_otherwise("sensitivity.json", quantities=["q"] * 10**5, factors=["f"] * 10**5),
+        "rows for 100,000 quantities",
+    ),
+    "sensitivity: another analysis": ("sensitivity", told_otherwise("sensitivity.json", name="evil_module"), "is no analysis"),
+    "stability: texts for numbers": ("stability", told_otherwise("stability.json", classes={"psi": [["x"]]}), "is damaged"),
+    "stability: a class nobody knows": ("stability", told_otherwise("stability.json", classes={"psi": [[9**9, 3]]}), None),
+    "stability: no methods": ("stability", told_otherwise("stability.json", classes={}), None),
+    "sweep: the summary writes on the terminal": ("sweep", content("summary.md", b"\x1b]0;x\x07\x1b[2J\xc2\x9b2J"), None),
+    "sweep: the summary is a link": ("sweep", link("summary.md", "secret"), OUT),
+    "sweep: the summary is a pipe": ("sweep", special("summary.md", os.mkfifo), "is a named pipe"),
+    "sweep: the summary has 50 GB": ("sweep", sized("summary.md", 50 * 10**9), "more than the 16.8 MB"),
+    "sweep: no summary": ("sweep", lambda path, home: (path / "summary.md").unlink(), "No such file"),
+    "result: a link to a secret": ("result", link("result.npz", "secret"), OUT),
+    "result: a link to zeros": ("result", link("result.npz", "/dev/zero"), OUT),
+    "result: a pipe": ("result", special("result.npz", os.mkfifo), "is a named pipe"),
+    "result: a folder": ("result", special("result.npz", os.mkdir), "is a folder"),
+    "result: a part is a link": ("result", link("result_part.npz", "secret"), OUT),
+    "result: a store is a link": ("result", link("run.zarr", "work"), "is a link"),
+    "result: a store is a pipe": ("result", special("run.zarr", os.mkfifo), "run.zarr"),
+    "result: a term of a module": (
+        "result",
+        lambda path, home: told(scene={"terms": [{"type": "evil_module.run"}]})(path / "result.npz", home),
+        "terms[0].type",
+    ),
+    "result: a step that is a text": (
+        "result",
+        lambda path, home: told(versions=7, ensemble=[], machine="\x1b[2J")(path / "result.npz", home),
+        None,
+    ),
+}  # fmt: skip
+
+# What lies in the place of a file that a verb writes: how it gets there, and whether the file is written.
+PLACES = {
+    "a link to the user's file": (link, "notes.txt", False),
+    "a link to nothing of the user's": (link, "new.txt", False),
+    "a link to a device": (link, "/dev/null", False),
+    "a link to a pipe": (link, "pipe", False),
+    "a pipe": (special, os.mkfifo, False),
+    "a socket": (special, bound, False),
+    "a folder": (special, os.mkdir, False),
+}
+
+
+def cell(**changes):
+    """A cell with other arrays; None leaves one out."""
+    return lambda path, home: changed(**changes)(path, home)
+
+
+def words(**changes):
+    def harm(path, home):
+        def other(old):
+            return np.frombuffer(json.dumps(json.loads(old.tobytes()) | changes).encode(), np.uint8)
+
+        changed(words=other)(path, home)
+
+    return harm
+
+
+# Each file of a cell of a sweep: how it is damaged. All of them are run anew, with the same bytes.
+CELLS = {
+    **{f"torn at {part}": torn(part) for part in (0.0, 0.001, 0.5, 0.999)},
+    "no .npz": content("", b"time,depth\n"),
+    "changed within": lambda path, home: _flip(path),
+    "a compressed bomb": zipped({"words.npy": bytes(4 * 10**8)}, zipfile.ZIP_DEFLATED),
+    "a pickle": zipped({"words.npy": pickled}),
+    "73 TiB": zipped({"words.npy": npy(HUGE), "status.npy": npy(HUGE), "numbers.npy": npy(HUGE)}),
+    "words of 10^15 times nothing": zipped({"words.npy": npy(EMPTY_TYPE)}),
+    "fewer members": cell(status=lambda old: old[:-1], numbers=lambda old: old[:, :-1]),
+    "no members": cell(status=lambda old: old[:0], numbers=lambda old: old[:, :0]),
+    "a status of texts": cell(status=lambda old: old.astype(str)),
+    "a status nobody knows": cell(status=lambda old: np.full_like(old, 250)),
+    "another status": cell(status=lambda old: old + np.uint8(1)),
+    "numbers of three dimensions": cell(numbers=lambda old: old[None]),
+    "numbers of another length": cell(numbers=lambda old: old[:, :3]),
+    "numbers of NaN": cell(numbers=lambda old: np.full_like(old, np.nan)),
+    "one number is another": cell(numbers=lambda old: old + (np.arange(old.size) == 0).reshape(old.shape)),
+    "other metrics": words(metrics=["evil_module"]),
+    "metrics that are none": words(metrics=7),
+    "other messages": words(messages=["\x1b[2J all is well"]),
+    "messages that are none": words(messages={"a": 1}),
+    "another checksum": words(crc32=0),
+    "no checksum": words(crc32=None),
+    "words nested 200,000 deep": cell(words=np.frombuffer(b"[" * 200_000, np.uint8)),
+    "no words": cell(words=None),
+}

@@ -55,12 +55,12 @@ def export(path: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | 
     if not folder.complete:
         raise SceneError([f"{folder.path}: is not complete; go on with `lgvi-warp resume {folder.path.parent}` first"])
     target = Path(out) if out is not None else folder.path.with_suffix(FORMATS[to])
-    if target.is_dir():
-        raise SceneError([f"out = {target}: is a folder; give the name of a file"])
+    root = None if out is not None else folder.path.parent
+    durable.place_of(target, root)
     check_whole(folder)
     target.parent.mkdir(parents=True, exist_ok=True)
     try:
-        with durable.placed(target) as beside:
+        with durable.placed(target, root) as beside:
             {"netcdf": _netcdf, "parquet": _parquet}[to](folder, beside)
     except ImportError as error:
         raise SceneError([f"to = {to!r}: {error}; install it: pip install 'lgvi-warp[export]'"]) from error

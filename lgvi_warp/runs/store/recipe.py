@@ -14,6 +14,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.identity import UNKNOWN, comparable
+from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics.fields import FIELDS
@@ -277,7 +278,7 @@ def refuse_another(path: Any, stored: Mapping[str, Any], now: Mapping[str, Any],
     Raises:
         SceneError: If they are of different runs.
     """
-    mismatches = same_run(stored, json.loads(json.dumps(now)))
+    mismatches = same_run(stored, parsed(json.dumps(now)))
     forcible = [text for text in mismatches if text.startswith(("machine.", "versions.", "kernel", "functions."))]
     if mismatches and (not force or len(forcible) < len(mismatches)):
         problem, remedy = "is another run", "give --overwrite, or another folder"

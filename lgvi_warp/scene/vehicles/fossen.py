@@ -21,6 +21,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, closest
 from lgvi_warp.common.reading import MOST_BYTES, MOST_OTHERS, file_text
+from lgvi_warp.common.toml_text import parsed
 from lgvi_warp.physics.notation import hat
 from lgvi_warp.physics.vehicle import LITTLE, ROUND_OFF, shortage
 
@@ -60,6 +61,21 @@ def vehicle_file(name: str) -> Path:
     if name not in (known := vehicles()):
         raise SceneError([f"vehicle file {name!r}: is not known; {closest(name, known)}"])
     return Path(str(resources.files("lgvi_warp.scene") / "vehicles" / f"{name}.toml"))
+
+
+def vehicle_tables(name: str) -> dict[str, Any]:
+    """Read a vehicle's file.
+
+    Args:
+        name: One of the names that `vehicles()` lists.
+
+    Returns:
+        Its tables by name.
+
+    Raises:
+        SceneError: If no vehicle has that name.
+    """
+    return parsed(file_text(vehicle_file(name), "scene file"), name)
 
 
 # What every form becomes --------------------------------------------------------------------------------------------

@@ -12,8 +12,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common.files import write_text
+from lgvi_warp.common.reading import file_json
 from lgvi_warp.common.tables import write_csv
-from lgvi_warp.studies.files import finite_or_none, numbers
+from lgvi_warp.studies.files import finite_or_none, numbers, of_study
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,21 +113,28 @@ class Indices:
 
         Raises:
             OSError: where the file cannot be read.
-            ValueError: where it is no JSON, or of no known analysis.
+            SceneError: where it is no regular file, is damaged, or of no known analysis.
         """
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-        kinds = [kind for kind in cls.__subclasses__() or [cls] if kind.name == content["name"]]
-        if not kinds:
-            raise ValueError(f"{path}: {content['name']!r} is no analysis")
-        return kinds[0]._from(content)
+        with of_study(path):
+            content = file_json(path)
+            kinds = [kind for kind in cls.__subclasses__() or [cls] if kind.name == content["name"]]
+            if not kinds:
+                raise ValueError(f"{content['name']!r} is no analysis")
+            found = kinds[0]._from(content)
+            str(found), list(found.rows())  # what cannot be shown is refused here
+            return found
 
     @classmethod
     def _from(cls, content: dict[str, Any]) -> Indices:
         """A result from the content of a JSON file."""
+        places = _places(content)
         shape = len(content["quantities"]), len(content["factors"])
+        rows = [row for row in content["rows"] if row["index"] in cls.columns]
+        if len(rows) != shape[0] * shape[1] * len(cls.columns):
+            raise ValueError(f"has {len(rows):,} rows for {shape[0]:,} quantities and {shape[1]:,} factors")
         arrays = {name: np.full(shape, np.nan) for name in (*cls.columns, *cls.intervals.values())}
-        for row in (row for row in content["rows"] if row["index"] in cls.columns):
-            at = content["quantities"].index(row["quantity"]), content["factors"].index(row["factor"])
+        for row in rows:
+            at = places["quantities"][row["quantity"]], places["factors"][row["factor"]]
             arrays[row["index"]][at] = numbers(row["value"], np.nan)
             if row["index"] in cls.intervals:
                 arrays[cls.intervals[row["index"]]][at] = numbers(row["confidence"], np.nan)
@@ -155,10 +164,15 @@ class Indices:
         target = Path(folder)
         target.mkdir(parents=True, exist_ok=True)
         paths = [target / f"sensitivity.{ending}" for ending in ("txt", "csv", "json")]
-        paths[0].write_text(f"{self}\n", encoding="utf-8")
-        write_csv(list(self.rows()), paths[1])
-        paths[2].write_text(json.dumps(self.to_dict(), indent=1), encoding="utf-8")
+        write_text(paths[0], f"{self}\n", target)
+        write_csv(list(self.rows()), paths[1], target)
+        write_text(paths[2], json.dumps(self.to_dict(), indent=1), target)
         return paths
+
+
+def _places(content: dict[str, Any]) -> dict[str, dict[str, int]]:
+    """Places of the names of quantities and of factors."""
+    return {key: {name: i for i, name in enumerate(content[key])} for key in ("quantities", "factors")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,14 +213,20 @@ class SobolIndices(Indices):
     def _pairs_from(cls, content: dict[str, Any]) -> dict[str, Any]:
         """Indices of two factors together, where the file has them."""
         rows = [row for row in content["rows"] if row["index"] == "second"]
-        m, d = len(content["quantities"]), len(content["factors"])
+        if not rows:
+            return {"second": None, "second_confidence": None}
+        places, m, d = _places(content), len(content["quantities"]), len(content["factors"])
+        if 2 * len(rows) != m * d * (d - 1):
+            raise ValueError(f"has {len(rows):,} rows of pairs for {m:,} quantities and {d:,} factors")
         second, half = (np.full((m, d, d), np.nan) for _ in range(2))
         for row in rows:
-            q, pair = content["quantities"].index(row["quantity"]), [content["factors"].index(row[name])
-                                                                     for name in ("factor", "other")]  # fmt: skip
+            q, pair = (
+                places["quantities"][row["quantity"]],
+                [places["factors"][row[name]] for name in ("factor", "other")],
+            )
             for j, k in (pair, pair[::-1]):
                 second[q, j, k], half[q, j, k] = (numbers(row[name], np.nan) for name in ("value", "confidence"))
-        return {"second": second if rows else None, "second_confidence": half if rows else None}
+        return {"second": second, "second_confidence": half}
 
     def _pairs(self) -> list[tuple[int, int, int]]:
         d = 0 if self.second is None else len(self.factors)

@@ -3,14 +3,11 @@
 
 from __future__ import annotations
 
-import json
 import math
-import os
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -216,22 +213,6 @@ class StabilityMap(Saved):
         kept["ratios"] = {method: {limit: _array(values, np.float64) for limit, values in by_limit.items()}
                           for method, by_limit in content["ratios"].items()}  # fmt: skip
         return cls(**kept | {"messages": tuple(content["messages"])})
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> StabilityMap:
-        """Read a map from the JSON file that `save` wrote.
-
-        Args:
-            path: of the file.
-
-        Returns:
-            The map.
-
-        Raises:
-            OSError: where the file cannot be read.
-            ValueError: where it is no JSON.
-        """
-        return cls.from_dict(json.loads(Path(path).read_text()))
 
     def rows(self) -> list[dict[str, Any]]:
         """Flatten the map to one record for each method and cell, as the CSV file has them.

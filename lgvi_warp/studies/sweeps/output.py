@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common import files as durable
 from lgvi_warp.common import machine
+from lgvi_warp.common.files import write_text
 from lgvi_warp.common.tables import write_csv
 from lgvi_warp.studies.files import finite_or_none
 from lgvi_warp.studies.sweeps.found import SUCCESS, Compared, Findings
@@ -59,13 +59,9 @@ class Sweep(Findings):
         tables["causes"] = [{"case": cell.case.name, **cell.point, "of": of, **row} for cell in self.cells
                             if not self.record(cell).refused for of in (SUCCESS, *self.metrics) if of != END
                             for row in self.causes(cell.case.name, cell.point, of)]  # fmt: skip
-        files = [write_csv(rows, target / f"{name}.csv") for name, rows in tables.items()]
+        files = [write_csv(rows, target / f"{name}.csv", target) for name, rows in tables.items()]
         texts = {"sweep.json": json.dumps(finite_or_none(provenance(self)), indent=1), "summary.md": summary(self)}
-        for name, text in texts.items():
-            with durable.placed(target / name) as beside:
-                beside.write_text(text, encoding="utf-8")
-            files.append(target / name)
-        return files
+        return files + [write_text(target / name, text, target) for name, text in texts.items()]
 
     def __str__(self) -> str:
         """Return the sweep in words."""

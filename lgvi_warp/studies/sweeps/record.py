@@ -5,15 +5,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-import zipfile
-from collections.abc import Mapping
+import os
+import zlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common import files as durable
+from lgvi_warp.common.files import place_of
+from lgvi_warp.common.npy_files import of_npz, write_npz
+from lgvi_warp.common.safe_files import inside, parsed
+from lgvi_warp.common.status import Status
 
 # Folder of the records, within that of the sweep.
 FOLDER = "cells"
@@ -44,36 +48,59 @@ class Record:
         """
         return cls(np.zeros(0, np.uint8), {}, (), text)
 
-    def save(self, path: Path) -> None:
+    def save(self, path: Path, root: Path) -> None:
         """Write the record; the file is there whole or not at all, and the same record has the same bytes.
 
         Args:
-            path: of the file.
+            path: of the file; its name is the key of the cell.
+            root: folder of the sweep, which no link leads out of.
 
         Raises:
+            SceneError: what is there is no plain file, or lies outside the folder.
             OSError: it cannot be written.
         """
-        path.parent.mkdir(parents=True, exist_ok=True)
+        place_of(path, root).parent.mkdir(parents=True, exist_ok=True)
         names = list(self.numbers)
-        words = np.frombuffer(json.dumps({"metrics": names, "messages": self.messages}).encode(), np.uint8)
         table = np.array([self.numbers[name] for name in names], np.float64).reshape(len(names), len(self.status))
-        with durable.placed(path) as beside, beside.open("xb") as file:
-            np.savez(file, words=words, status=self.status, numbers=table)
+        crc = _checksum(path, names, self.messages, self.status, table)
+        said = {"metrics": names, "messages": self.messages, "crc32": crc}
+        words = np.frombuffer(json.dumps(said).encode(), np.uint8)
+        write_npz(path, {"words": words, "status": self.status, "numbers": table}, root)
 
     @classmethod
-    def load(cls, path: Path) -> Record | None:
-        """Return the record of a file; None where there is none, or none that is whole.
+    def load(cls, path: Path, metrics: Sequence[str], members: int) -> Record | None:
+        """Return the record of a file; None where there is none, or none that is whole and of this cell.
 
         Args:
-            path: of the file.
+            path: of the file; its name is the key of the cell.
+            metrics: their names.
+            members: their number.
         """
         try:
-            with np.load(path, allow_pickle=False) as file:
-                words = json.loads(file["words"].tobytes())
-                table, status = file["numbers"], file["status"]
-            return cls(status, dict(zip(words["metrics"], table, strict=True)), tuple(words["messages"]))
-        except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile):
+            arrays = of_npz(path)
+            words = parsed(arrays["words"].tobytes())
+            table, status, messages = arrays["numbers"], arrays["status"], words["messages"]
+            whole = (
+                (table.dtype, table.shape) == (np.float64, (len(metrics), members))
+                and (status.dtype, status.shape) == (np.uint8, (members,))
+                and bool(np.isin(status, [*Status]).all())
+                and words["metrics"] == list(metrics)
+                and all(isinstance(text, str) for text in messages)
+                and words["crc32"] == _checksum(path, metrics, messages, status, table)
+            )
+            if not whole:
+                return None
+            return cls(status, dict(zip(metrics, table, strict=True)), tuple(messages))
+        except (OSError, ValueError, KeyError, TypeError):
             return None
+
+
+def _checksum(
+    path: Path, metrics: Sequence[str], messages: Sequence[str], status: np.ndarray, table: np.ndarray
+) -> int:
+    """The checksum of a record, and of the cell that it is of."""
+    said = json.dumps([path.name, list(metrics), list(messages)]).encode()
+    return zlib.crc32(table.tobytes(), zlib.crc32(status.tobytes(), zlib.crc32(said)))
 
 
 @dataclass
@@ -82,10 +109,24 @@ class Records:
 
     Args:
         folder: folder of the sweep; None (default): they are kept in memory.
+        metrics: names of the metrics of each record; default none.
+        members: number of members of each record; default 0.
     """
 
     folder: Path | None = None
+    metrics: Sequence[str] = ()
+    members: int = 0
     _kept: dict[str, Record] = field(default_factory=dict)
+
+    def check(self) -> None:
+        """Look at what a folder holds already, before anything is run.
+
+        Raises:
+            SceneError: a link leads out of the folder, or what is there is no plain file.
+        """
+        if self.folder is not None and (cells := inside(self.folder, FOLDER)).is_dir():
+            for name in os.listdir(cells):
+                place_of(self.folder / FOLDER / name, self.folder)
 
     def __getitem__(self, key: str) -> Record:
         """Return the record of a key, which there must be."""
@@ -101,7 +142,7 @@ class Records:
         """
         if key in self._kept or self.folder is None:
             return self._kept.get(key)
-        return Record.load(self.path(key))
+        return Record.load(self.path(key), self.metrics, self.members)
 
     def put(self, key: str, record: Record, lasting: bool = True) -> None:
         """Keep a record. Refusals stay in memory: what a case lacks may be mended before the sweep goes on.
@@ -117,7 +158,7 @@ class Records:
         if self.folder is None or record.refused or not lasting:
             self._kept[key] = record
         else:
-            record.save(self.path(key))
+            record.save(self.path(key), self.folder)
 
     def path(self, key: str) -> Path:
         """Return the file of a record.

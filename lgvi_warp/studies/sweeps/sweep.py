@@ -96,7 +96,8 @@ def sweep(
         conditions = success_of(success, tuple(setup.metrics))
     faults.raise_if_any()
     assert conditions is not None
-    records = Records(None if out is None else Path(out))
+    records = Records(None if out is None else Path(out), list(setup.metrics), setup.members.members)
+    records.check()
     cells = list(_run(setup, records, threads, executor, scheduler, callback(progress)))
     return Sweep(setup, cells, records, conditions, baseline, float(confidence), interval)
 

@@ -3,15 +3,15 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.common.reading import file_text
+from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.views.plots.canvas import COLORS, MARKERS, below, hatch, panel, panels, style
 
 COST = "ns_per_vehicle_step"
@@ -121,7 +121,7 @@ def measured(rows: Rows, keys: tuple[str, ...], remedy: str) -> list[Mapping[str
         OSError: The file cannot be read.
     """
     if isinstance(rows, str | os.PathLike):
-        rows = [json.loads(line) for line in Path(rows).read_text().splitlines() if line.startswith("{")]
+        rows = [parsed(line) for line in file_text(rows, "cost file").splitlines() if line.startswith("{")]
     points = [row for row in rows if all(key in row for key in (*keys, COST))]
     if not points:
         raise NothingToDraw(f"no row has {', '.join(keys)} and {COST}: there is nothing to draw; give rows of {remedy}")

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import struct
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import refusal
 from lgvi_warp.common.reading import UnreadableError, file_bytes
+from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.physics import vehicle
 from lgvi_warp.physics.shape import Shape, shape_from
 
@@ -145,7 +145,7 @@ def mesh_of(path: str) -> Mesh:
         magic, version, _, size, kind = struct.unpack_from("<4sIIII", content)
         if (magic, version, kind) != (b"glTF", 2, JSON_CHUNK):
             raise ValueError
-        tables = json.loads(content[20 : 20 + size])
+        tables = parsed(content[20 : 20 + size])
         parts = [*tables.get("buffers", ()), *tables.get("images", ())]
         outside = any("uri" in part and not str(part["uri"]).startswith("data:") for part in parts)
         used = {mesh_part["attributes"]["POSITION"] for mesh in tables["meshes"] for mesh_part in mesh["primitives"]}

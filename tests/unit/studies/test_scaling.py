@@ -251,6 +251,11 @@ class Study(files.Saved):
     def rows(self):
         return [{"x": 1.5, "y": "a"}]
 
+    @classmethod
+    def from_dict(cls, content):
+        assert content == {"x": 1.5}
+        return cls()
+
 
 def test_a_study_writes_two_files(tmp_path):
     paths = Study().save(tmp_path / "new" / "folder")
@@ -267,13 +272,13 @@ def test_a_study_writes_two_files(tmp_path):
 
 def test_a_damaged_file_is_said_to_be_damaged(tmp_path):
     for error in (ValueError("a"), KeyError("b"), TypeError("c"), AttributeError("d")):
-        with pytest.raises(lw.SceneError) as caught, files.understood(tmp_path / "x.json"):
+        with pytest.raises(lw.SceneError) as caught, files.of_study(tmp_path / "x.json"):
             raise error
-        assert str(caught.value) == f"{tmp_path / 'x.json'}: is damaged, or of another version; run the study again"
-        assert caught.value.__cause__ is error
-    with pytest.raises(lw.SceneError, match="itself"), files.understood(tmp_path):
+        head = f"{tmp_path / 'x.json'}: is damaged, or of another version"
+        assert str(caught.value) == f"{head}: {error}; run the study again" and caught.value.__cause__ is error
+    with pytest.raises(lw.SceneError, match="itself"), files.of_study(tmp_path):
         raise lw.SceneError(["itself"])
-    with pytest.raises(OSError, match="gone"), files.understood(tmp_path):
+    with pytest.raises(OSError, match="gone"), files.of_study(tmp_path):
         raise OSError("gone")
 
 

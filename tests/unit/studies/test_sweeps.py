@@ -645,12 +645,13 @@ def test_keys_are_of_all_that_decides_the_numbers(found):
 
 
 def test_records_are_kept_in_files_and_refusals_in_memory(tmp_path):
-    records = Records(tmp_path)
     shown = record(ends={3: (Status.NON_FINITE, 2.5)}, messages=("slow", "late"))
+    records = Records(tmp_path, list(shown.numbers), len(shown.status))
     records.put("a", shown)
     records.put("b", Record.of_refusal("no"))
     assert [path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.npz")] == ["cells/a.npz"]
-    again = Records(tmp_path)
+    again = Records(tmp_path, list(shown.numbers), len(shown.status))
+    again.check()
     read = again["a"]
     assert read.messages == ("slow", "late") and read.refused == "" and list(read.numbers) == list(shown.numbers)
     np.testing.assert_array_equal(read.status, shown.status)

@@ -18,8 +18,8 @@ from lgvi_warp.common.status import Status, stop_time, under_way
 from lgvi_warp.statistics.estimate import Estimate, Estimates
 from lgvi_warp.views import rerun as recordings
 from lgvi_warp.views import viewer
+from lgvi_warp.views.commands import channels
 from lgvi_warp.views.recording import drawn, layout, world
-from lgvi_warp.views.recording.graphs import channel_names
 from tests.support.made import made
 from tests.unit.views.test_hull import glb
 
@@ -377,9 +377,10 @@ def test_channels_have_the_names_and_limits_of_their_actuators(mixed):
     result = made(mixed.position, mixed.time, scene=steered)
     samples = dict(result.samples) | {"actuator": np.full((31, 40, 2), 0.2), "command": np.full((31, 40, 2), 0.1)}
     run = drawn.drawn_of(dataclasses.replace(result, samples=samples))
-    (first, limits), (second, _) = channel_names(run)
-    assert (first, second) == ("control_fins[0]", "control_fins[1]")
-    assert limits == pytest.approx([-0.349066, 0.349066], rel=1e-5)
+    first, second = channels(run.few)
+    assert (first.name, second.name) == ("control_fins[0]", "control_fins[1]")
+    assert first.limits(np.array([0.1, -0.2])) == pytest.approx([-0.349066, 0.349066], rel=1e-5)
+    assert first.limits(np.array([0.01])) == ()
 
 
 def test_a_mesh_is_drawn_times_a_whole_number(tmp_path):

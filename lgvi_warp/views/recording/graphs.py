@@ -18,6 +18,8 @@ from lgvi_warp.views.recording.world import TIMELINE
 
 # Bands of a fan, outermost first: name, places of its levels, and opacity.
 BANDS = (("all", 0, 6, 60), ("90 %", 1, 5, 110), ("50 %", 2, 4, 170))
+# Bands are paler than bodies under way: they are seen through.
+PALE = (120, 180, 255)
 MEDIAN, WHITE, GREY, FAULT = LEVELS.index(0.5), (255, 255, 255), (130, 130, 130), (255, 200, 60)
 # Fewer samples than this are drawn with a marker each.
 MARKED = 3
@@ -52,7 +54,7 @@ def _fan(recording: Any, run: Drawn, fan: Fan) -> None:
     """Log the bands of a fan and its median; of one member, its curve."""
     import rerun as rr
 
-    rgb, single = run.rgb or LOOKS[Status.OK].rgb, run.source.members == 1
+    rgb, single = run.rgb or PALE, run.source.members == 1
     bands = BANDS[1:2] if run.label else BANDS
     for name, low, high, opacity in () if single else bands:
         entity = run.path(f"curves/{fan.name}", name.replace(" %", "_percent"))
@@ -61,7 +63,7 @@ def _fan(recording: Any, run: Drawn, fan: Fan) -> None:
         middle, half = 0.5 * (fan.levels[low] + fan.levels[high]), 0.5 * (fan.levels[high] - fan.levels[low])
         _send(recording, entity, run.time, rr.Measurements.columns(values=middle, variances=half**2))
     name = run.label or ("the member" if single else "median")
-    color = rgb if single or run.label else WHITE
+    color = run.color(Status.OK) if single or run.label else WHITE
     _series(recording, run.path(f"curves/{fan.name}", "median"), run.time, fan.levels[MEDIAN], name, color)
 
 
@@ -94,13 +96,25 @@ def log_member(recording: Any, run: Drawn, place: int, member: int) -> None:
         _series(recording, entity, run.time, seen_values, f"member {member:,}", LOOKS[Status.OK].rgb, 1.0)
 
 
+# Marks of outcomes on the curves of a run that is compared, which are all in its colour; failures have one together.
+MARKERS = {Status.SURFACE: "up", Status.FLOOR: "down", Status.BOX: "square", Status.TIME: "circle", Status.CONDITION: "diamond"}
+MOST_MARKS = 12
+
+
 def _shares(recording: Any, run: Drawn) -> None:
     """Log which share of all members is under way, and which has ended, by outcome."""
+    import rerun as rr
+
     for code, share in run.shares.items():
         name = code.name.lower() if code else "under way"
         label = f"{run.label}: {name}" if run.label else name
         entity = run.path("members", name.replace(" ", "_"))
         _series(recording, entity, run.time, 100.0 * share, label, run.color(code))
+        if code and run.label:
+            at, marks = frames_of(run.time, MOST_MARKS), f"{entity}/marks"
+            style = rr.SeriesPoints(names=label, colors=run.color(code), markers=MARKERS.get(code, "cross"), marker_sizes=5.0)
+            recording.log(marks, style, static=True, strict=True)
+            _send(recording, marks, run.time[at], rr.Scalars.columns(scalars=100.0 * share[at]))
 
 
 def _channels(recording: Any, run: Drawn) -> None:

@@ -61,6 +61,8 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
         "versions": machine.versions(),
         "machine": machine.describe() | {"width_source": plan.width_source},
     }
+    if plan.ensemble.scene.source:
+        content["source"] = dict(plan.ensemble.scene.source)
     if observed is not None and observed != Observation():
         kept = {} if observed.samples else {"fields": list(plan.fields if fields is None else fields)}
         content["observed"] = observed.to_dict() | kept

@@ -70,8 +70,8 @@ def example():
 
 @pytest.fixture(scope="session")
 def scene():
-    """The paper's vehicle and start."""
-    return lw.Scene.load(ROOT / "examples" / "paper.toml")
+    """The paper's vehicle and start; the example starts deeper, below a surface."""
+    return lw.Scene.load(ROOT / "examples" / "paper.toml", {"start.position": [0.0, 0.0, 10.0]})
 
 
 @pytest.fixture(scope="session")

@@ -68,6 +68,7 @@ class Vehicle(Summarized):
             all are among the messages of a run.
         shape: How the vehicle is drawn, a table with `length` and `diameter` [m] or with `mesh`, the path of a .glb file; by
             default a hull of the displaced volume. No part of the dynamics.
+        title: What the vehicle is called in summaries and reports; by default the name of a vehicle of the package.
 
     Raises:
         SceneError: Where a number is not finite, not positive, of the wrong shape, not symmetric or not positive definite.
@@ -87,6 +88,7 @@ class Vehicle(Summarized):
     inertia_tolerance: float = 0.0
     warnings: Sequence[str] = ()
     shape: Any = None
+    title: str | None = None
 
     def __post_init__(self) -> None:
         faults = Faults("vehicle.")
@@ -101,6 +103,8 @@ class Vehicle(Summarized):
         values["warnings"] = (*user_warnings, *map(Seen, values["warnings"]))
         with faults.including():
             values["shape"] = shape_from(self.shape)
+        if self.title is not None and not isinstance(self.title, str):
+            faults.add("title", self.title, "is no text", 'give title = "my glider", or leave it out')
         faults.raise_if_any()
         for name, value in values.items():
             if isinstance(value, np.ndarray):
@@ -109,7 +113,8 @@ class Vehicle(Summarized):
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
         """The numbers with their units, and the warnings."""
-        rows = [(name, summaries.numbers(value, UNITS[name])) for name, value in self.parameters().items()]
+        rows = [("title", self.title)] if self.title else []
+        rows += [(name, summaries.numbers(value, UNITS[name])) for name, value in self.parameters().items()]
         rows += [("warning", str(text)) for text in self.warnings]
         return f"Vehicle, {'6x6' if self.full else 'simple'} form", rows
 
@@ -222,7 +227,7 @@ class Vehicle(Summarized):
 
         Returns:
             Numbers by name; 3x3 matrices that are diagonal as their diagonal. Of the warnings, only those of the user. The
-            shape, where there is one.
+            shape and the title, where there are any.
         """
         content = {}
         for name, value in self.parameters().items():
@@ -231,7 +236,8 @@ class Vehicle(Summarized):
         user_warnings = [text for text in self.warnings if not isinstance(text, Seen)]
         content |= {"inertia_tolerance": self.inertia_tolerance} if self.inertia_tolerance else {}
         content |= {"warnings": user_warnings} if user_warnings else {}
-        return content | ({"shape": self.shape.to_dict()} if self.shape else {})
+        content |= {"shape": self.shape.to_dict()} if self.shape else {}
+        return content | ({"title": self.title} if self.title else {})
 
 
 def _texts(faults: Faults, given: Any) -> tuple[str, ...]:

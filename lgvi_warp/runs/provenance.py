@@ -64,6 +64,8 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
     }
     own = identities(functions_of(plan.ensemble, observed.statistics if observed is not None else ()))
     content |= {"functions": own} if own else {}
+    if plan.ensemble.scene.source:
+        content["source"] = dict(plan.ensemble.scene.source)
     if observed is not None and observed != Observation():
         kept = {} if observed.samples else {"fields": list(plan.fields if fields is None else fields)}
         content["observed"] = observed.to_dict() | kept

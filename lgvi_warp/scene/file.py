@@ -29,8 +29,26 @@ def tables_of_file(path: str | os.PathLike[str], overrides: Mapping[str, Any] | 
     Raises:
         SceneError: If the file cannot be read, is no TOML, or an override does not fit.
     """
+    return tables_and_text(path, overrides)[0]
+
+
+def tables_and_text(
+    path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None
+) -> tuple[dict[str, Any], str]:
+    """Read a scene file (TOML) as tables and as it was written.
+
+    Args:
+        path: Path of the file.
+        overrides: Values by dotted key ("vehicle.mass") that replace those of the file in the tables; by default none.
+
+    Returns:
+        Tables by section name, and the text of the file.
+
+    Raises:
+        SceneError: If the file cannot be read, is no TOML, or an override does not fit.
+    """
     text = file_text(path, "scene file")
-    return tables_of_text(text, overrides, os.fspath(path), Path(path).parent)
+    return tables_of_text(text, overrides, os.fspath(path), Path(path).parent), text
 
 
 def tables_of_text(
@@ -174,6 +192,7 @@ def with_named_vehicle(content: Mapping[str, Any]) -> Mapping[str, Any]:
         if isinstance(section_table, Mapping):
             merged[section] = known.get(section, {}) | section_table
             merged[section].pop("name", None)
+    merged["vehicle"].setdefault("title", table["name"])
     terms = content.get("terms", [])
     if isinstance(terms, list | tuple):
         names = [_name_of(term) for term in terms]

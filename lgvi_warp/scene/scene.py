@@ -9,6 +9,7 @@ import os
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -23,7 +24,7 @@ from lgvi_warp.physics.terms import events
 from lgvi_warp.physics.vehicle import UNITS, Vehicle
 from lgvi_warp.sampling.distributions.named import from_dict as distribution_from_dict
 from lgvi_warp.scene.ensemble import Ensemble, check_names
-from lgvi_warp.scene.file import tables_of_file, tables_of_text, with_named_vehicle
+from lgvi_warp.scene.file import tables_and_text, tables_of_text, with_named_vehicle
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 from lgvi_warp.scene.start import Environment, Start
 
@@ -63,6 +64,8 @@ class Scene(Summarized):
     ensemble_settings: EnsembleSettings | None = None
     events: Sequence[Any] = ()
     ensemble_is_checked: bool = field(default=False, init=False, repr=False)
+    # The file that it was read from: its name, its text and what replaced keys of it; a scene that was changed has none.
+    source: Mapping[str, Any] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         faults = Faults()
@@ -93,7 +96,8 @@ class Scene(Summarized):
         """The numbers of vehicle and start, and a row for each other section."""
         water, run, settings = self.environment, self.run.to_dict(), self.ensemble_settings
         numbers, start = self.vehicle.parameters().items(), self.start.given().items()
-        rows = [(f"vehicle.{name}", summaries.numbers(value, UNITS[name])) for name, value in numbers]
+        rows = [("vehicle", self.vehicle.title)] if self.vehicle.title else []
+        rows += [(f"vehicle.{name}", summaries.numbers(value, UNITS[name])) for name, value in numbers]
         rows.append(("environment", f"gravity {water.gravity:g} m/s2, water_density {water.water_density:g} kg/m3"))
         rows += [(f"start.{name}", summaries.numbers(value, TABLE[name].unit)) for name, value in start]
         rows.append(("terms", summaries.listed(term.key for term in self.terms)))
@@ -182,7 +186,11 @@ class Scene(Summarized):
         Raises:
             SceneError: If the file cannot be read or its content is wrong; the message lists every fault.
         """
-        return from_dict(tables_of_file(path, overrides))
+        content, text = tables_and_text(path, overrides)
+        scene = from_dict(content)
+        changes = {key: value if isinstance(value, str) else repr(value) for key, value in (overrides or {}).items()}
+        object.__setattr__(scene, "source", {"file": Path(path).name, "text": text, "changes": changes})
+        return scene
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Scene:

@@ -16,10 +16,11 @@ from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views import viewer
 from lgvi_warp.views.fleet import identity, title
 from lgvi_warp.views.recording.drawn import Drawn, drawn_of
+from lgvi_warp.views.recording.eye import ASPECT
 from lgvi_warp.views.recording.graphs import COLORS, log_graphs
 from lgvi_warp.views.recording.layout import layout
 from lgvi_warp.views.recording.words import log_words
-from lgvi_warp.views.recording.world import box_of, log_world, scale_of
+from lgvi_warp.views.recording.world import Box, box_of, log_world, scale_of
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
@@ -130,7 +131,7 @@ def _write(runs: list[Drawn], path: Path | None, address: str | None) -> None:
     sinks = ([rr.FileSink(path)] if path else []) + ([rr.GrpcSink(address)] if address else [])
 
     def written() -> None:
-        recording.set_sinks(*sinks, default_blueprint=layout(runs, box, scale_of(runs[0], box)))
+        recording.set_sinks(*sinks, default_blueprint=layout(runs, box, _scales(runs, box)))
         _send(recording, runs, laid_out=True)
         recording.flush()
         recording.disconnect()
@@ -146,14 +147,19 @@ def _write(runs: list[Drawn], path: Path | None, address: str | None) -> None:
         raise OSError(text) from error
 
 
+def _scales(runs: list[Drawn], box: Box) -> list[int]:
+    """How many times their size hulls are drawn, of each run in a view of its own."""
+    return [scale_of(run, box, ASPECT / len(runs)) for run in runs]
+
+
 def _send(recording: Any, runs: list[Drawn], laid_out: bool = False) -> None:
     """Log all of the runs, and their layout where the stream has none."""
     box = box_of(runs)
-    scale = scale_of(runs[0], box)
+    scales = _scales(runs, box)
     if not laid_out:
-        recording.send_blueprint(layout(runs, box, scale))
+        recording.send_blueprint(layout(runs, box, scales))
     recording.send_recording_name(title(runs[0].result) if len(runs) == 1 else " | ".join(run.label for run in runs))
-    for run in runs:
-        log_world(recording, run, box, scale_of(run, box))
+    for run, scale in zip(runs, scales, strict=True):
+        log_world(recording, run, box, scale)
         log_graphs(recording, run)
-    log_words(recording, runs, box, scale)
+    log_words(recording, runs, box, scales)

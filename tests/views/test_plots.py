@@ -267,19 +267,22 @@ def test_the_fan_is_of_those_under_way_and_says_how_many(solved, drawn):
 
 
 def test_one_vehicle_is_a_line_and_two_samples_have_marks_and_a_hint(drawn):
-    depth = drawn["one vehicle"].axes[0]
+    depth = drawn["one vehicle"].axes[1]
     assert not depth.collections and depth.get_legend() is None
     assert "1 members" not in "".join(text.get_text() for text in texts(drawn["one vehicle"]))
     two = drawn["two samples"]
     assert "SaveAt(every=...)" in two.get_suptitle()
-    assert next(line for line in two.axes[0].lines if line.get_label() == "median").get_marker() == "o"
+    assert next(line for line in two.axes[1].lines if line.get_label() == "median").get_marker() == "o"
 
 
 def test_a_far_surface_is_told_not_drawn():
     axes = Figure().subplots()
     axes.plot([0.0, 1.0], [100.0, 101.0])
-    canvas.point_down(axes, (101.3, 4000.0))
-    assert [text.get_text() for text in axes.texts] == ["surface 100 m above", "floor"]
+    canvas.point_down(axes, {"floor": (101.3, 4000.0)})
+    assert [text.get_text() for text in axes.texts] == ["floor", "surface\n100 m\nabove"]
+    # Both stand beside the axes, and the one above the other.
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert all(box.x0 > axes.bbox.x1 for box in boxes) and boxes[0].y1 < boxes[1].y0
     low, high = axes.get_ylim()
     assert 101.3 < low < 102.0 and 99.0 < high < 100.0
 
@@ -372,7 +375,7 @@ def test_files_and_axes(solved, tmp_path, ending_of_name):
     path = tmp_path / f"picture.{ending_of_name}"
     assert lw.plots.fan(solved, "speed", ax=left) is left and not list(tmp_path.iterdir())
     assert lw.plots.paths(solved, ax=right, path=path) is right and path.stat().st_size > 5000 and len(figure.axes) == 2
-    assert lw.plot(solved, tmp_path / "all.svg") == tmp_path / "all.svg" and len(lw.plot(solved)) == 3
+    assert lw.plot(solved, tmp_path / "all.svg") == tmp_path / "all.svg" and len(lw.plot(solved)) == 4
 
 
 def test_refusals_name_the_remedy(solved):

@@ -221,12 +221,13 @@ def _functions(stored: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[list[
 
 
 def _comparable(provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """Provenance without what changes no bit: threads, Python, the scene's [ensemble], [run] and shape, a file's place.
+    """Provenance without what changes no bit: threads, Python, the scene's [ensemble], [run], shape, title and text, places.
 
     The user's functions are compared elsewhere.
     """
+    provenance = {key: value for key, value in provenance.items() if key != "source"}
     scene = {key: value for key, value in provenance["scene"].items() if key not in ("ensemble", "run")}
-    scene["vehicle"] = {key: value for key, value in scene["vehicle"].items() if key != "shape"}
+    scene["vehicle"] = {key: value for key, value in scene["vehicle"].items() if key not in ("shape", "title")}
     machine = {key: value for key, value in provenance["machine"].items() if key in ("cpu", "simd")}
     versions = {key: value for key, value in provenance["versions"].items() if key != "python"}
     ensemble = _without_place(provenance["ensemble"])

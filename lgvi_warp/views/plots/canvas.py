@@ -6,9 +6,10 @@ from __future__ import annotations
 import os
 import textwrap
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -248,36 +249,69 @@ def band(low: float, high: float) -> str:
     return f"{100.0 * (high - low):.4g}%"
 
 
-# Ground of words on lines.
-PALE = {"facecolor": "white", "alpha": 0.8, "linewidth": 0, "pad": 1.0}
 # The surface and the floor are drawn where they are within this share of the depths shown.
 NEAR = 0.5
 
 
-def point_down(axes: Any, floors: tuple[float, ...] = ()) -> None:
+def point_down(axes: Any, floors: Mapping[str, Iterable[float]] = MappingProxyType({})) -> None:
     """Turn the vertical axis, which has depths [m], downwards; draw the surface, and the floors that are near.
 
-    Where the surface is far above or below what is drawn, a text says how far.
+    Their names stand beside the axes, where no data are. Where the surface is far above or below what is drawn, a text says how
+    far.
 
     Args:
         axes: Matplotlib axes, all else drawn.
-        floors: Depths of floors [m]; default none.
+        floors: Depths [m] by what is said of them, as {"floor": [20.0]}; default none.
     """
     low, high = sorted(axes.get_ylim())
     reach = NEAR * (high - low)
-    lines = [(0.0, "surface", "#0072B2"), *((depth, "floor", "#7A4A00") for depth in floors)]
-    for depth, name, color in lines:
-        if low - reach <= depth <= high + reach:
-            low, high = min(low, depth - 0.1 * reach), max(high, depth + 0.1 * reach)
-            axes.axhline(depth, color=color, linestyle=(0, (8, 3)), linewidth=1.2, zorder=1.5)
-            axes.text(
-                0.99, depth, name, color=color, ha="right", va="center", transform=axes.get_yaxis_transform(), bbox=PALE
-            )
-        elif name == "surface":
-            far, place = (f"surface {low:.3g} m above", 0.98) if low > 0.0 else (f"surface {-high:.3g} m below", 0.02)
-            axes.text(0.99, place, far, color=color, ha="right", va="top" if low > 0.0 else "bottom",
-                      transform=axes.transAxes, bbox=PALE)  # fmt: skip
+    lines = [(0.0, "surface", "#0072B2"), *((depth, name, "#7A4A00") for name in floors for depth in floors[name])]
+    near = [line for line in lines if low - reach <= line[0] <= high + reach]
+    for depth, _, color in near:
+        low, high = min(low, depth - 0.1 * reach), max(high, depth + 0.1 * reach)
+        axes.axhline(depth, color=color, linestyle=(0, (8, 3)), linewidth=1.2, zorder=1.5)
     axes.set_ylim(high, low)
+    texts = [(1.0 - (depth - low) / (high - low), name, color) for depth, name, color in near]
+    if lines[0] not in near:
+        far = f"{low:.3g} m\nabove" if low > 0.0 else f"{-high:.3g} m\nbelow"
+        texts.append((float(low > 0.0), f"surface\n{far}", lines[0][2]))
+    texts.sort()
+    places = apart(axes, [place for place, *_ in texts], [text.count("\n") + 1 for _, text, _ in texts])
+    for place, (_, text, color) in zip(places, texts, strict=True):
+        axes.text(1.01, place, text, color=color, ha="left", va="center", transform=axes.transAxes)
+
+
+def apart(axes: Any, wanted: Sequence[float], lines: Sequence[int]) -> np.ndarray:
+    """Move texts beside axes up and down, as little as keeps one from another.
+
+    Args:
+        axes: Matplotlib axes.
+        wanted: Heights of their middles that they would have, shares of the axes, rising.
+        lines: How many lines each has.
+
+    Returns:
+        Heights, rising.
+    """
+    high = 0.8 * axes.get_position().height * axes.get_figure(root=True).get_figheight()
+    half = 0.5 * 1.35 * text_size(axes.figure) / 72.0 / high * np.asarray(lines, dtype=float)
+    # Where each would stand if all below it stood side by side from the bottom.
+    order = np.cumsum(2.0 * half) - half
+    places = np.maximum.accumulate(np.maximum(np.asarray(wanted), half) - order) + order
+    # Where the highest would leave the axes, all are moved down as far as is needed.
+    return np.minimum(places, 1.0 - order[-1:] - half[-1:] + order) if len(order) else places
+
+
+def widen(axis: Any) -> None:
+    """Show at least a ten-thousandth of the numbers' size: the labels of a narrower range cannot be told apart.
+
+    Args:
+        axis: Matplotlib's axis, all drawn.
+    """
+    low, high = sorted(axis.get_view_interval())
+    least = 1e-4 * max(abs(low), abs(high))
+    if high - low < least:
+        middle = 0.5 * (low + high)
+        axis.axes.set(**{f"{axis.axis_name}lim": (middle - 0.5 * least, middle + 0.5 * least)})
 
 
 def below(axes: Any, **options: Any) -> None:

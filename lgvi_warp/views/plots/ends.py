@@ -15,7 +15,7 @@ from lgvi_warp.runs import outcomes as ended_so
 from lgvi_warp.runs.quantities import OfResult, quantities
 from lgvi_warp.views.choice import shown
 from lgvi_warp.views.fleet import LOOKS, title
-from lgvi_warp.views.plots.canvas import COLORS, below, hatch, mark, panel, panels, point_down, wrapped
+from lgvi_warp.views.plots.canvas import COLORS, below, hatch, mark, panel, panels, point_down, widen, wrapped
 from lgvi_warp.views.plots.read import at_one_time, estimate_for, with_samples
 from lgvi_warp.views.plots.words import DEPTHS, WORDS, floors, some_of, unit_of
 
@@ -47,6 +47,20 @@ def outcomes(result: Result, *, ax: Any = None, path: str | os.PathLike[str] | N
         ImportError: Matplotlib is not installed (extra: viz).
         OSError: The file cannot be written.
     """
+    with panel(ax, path) as axes:
+        draw_outcomes(axes, result)
+        if ax is None:
+            axes.set_title(wrapped(title(result), axes.figure))
+    return axes
+
+
+def draw_outcomes(axes: Any, result: Result) -> None:
+    """Draw the shares of the members under way and of those that ended, with a legend.
+
+    Args:
+        axes: Matplotlib axes.
+        result: A result.
+    """
     codes, status, when = ended_so.outcomes(result), np.asarray(result.status), stop_time(result)
     time = np.unique(np.concatenate([np.linspace(result.time[0], result.time[-1], TIMES), result.time[[0, -1]]]))
     ended = [code for code in codes if code != Status.OK]
@@ -55,15 +69,11 @@ def outcomes(result: Result, *, ax: Any = None, path: str | os.PathLike[str] | N
     shares = [100.0 * count / result.members for count in (going, *counts.values())]
     ok = int((status == Status.OK).sum())
     labels = [f"under way, {ok:,} to the end"] + [_first(result, code, when) for code in ended]
-    with panel(ax, path) as axes:
-        areas = axes.stackplot(time, *shares, colors=[LOOKS[code].color for code in (Status.OK, *ended)], labels=labels)
-        for i, area in enumerate(areas):
-            area.set(hatch=hatch(i), edgecolor="white", linewidth=0.0)
-        axes.set(xlabel="time [s]", ylabel="share of members [%]", xlim=(time[0], time[-1]), ylim=(0.0, 100.0))
-        if ax is None:
-            axes.set_title(wrapped(title(result), axes.figure))
-        below(axes, ncols=1)
-    return axes
+    areas = axes.stackplot(time, *shares, colors=[LOOKS[code].color for code in (Status.OK, *ended)], labels=labels)
+    for i, area in enumerate(areas):
+        area.set(hatch=hatch(i), edgecolor="white", linewidth=0.0)
+    axes.set(xlabel="time [s]", ylabel="share of members [%]", xlim=(time[0], time[-1]), ylim=(0.0, 100.0))
+    below(axes, ncols=1)
 
 
 def _first(result: Result, code: Status, when: np.ndarray) -> str:
@@ -226,9 +236,15 @@ def pairs(
             for j in range(m):
                 _pair(axes[i, j], columns[j], columns[i], groups, i == j)
                 axes[i, j].set(xlabel=names[j] if i == m - 1 else "", ylabel=names[i] if j == 0 else "")
+                widen(axes[i, j].xaxis)
+                if i != j:
+                    widen(axes[i, j].yaxis)
                 if names[i].endswith("down") and i != j:
                     axes[i, j].invert_yaxis()
-                axes[i, j].locator_params(nbins=4)
+                axes[i, j].locator_params(nbins=3)
+                # An offset of all ticks would lie over the label.
+                axes[i, j].xaxis.set_major_formatter("{x:.5g}")
+                axes[i, j].yaxis.set_major_formatter("{x:.5g}")
                 axes[i, j].tick_params(labelbottom=i == m - 1, labelleft=i != j and j == 0, axis="both")
         handles, labels = axes[1, 0].get_legend_handles_labels()
         axes[0, -1].figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False)

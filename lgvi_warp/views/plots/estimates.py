@@ -11,7 +11,7 @@ import numpy as np
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views.choice import of_members
 from lgvi_warp.views.fleet import members_of_run
-from lgvi_warp.views.plots.canvas import COLORS, band, hatch, panels, point_down, style, wrapped
+from lgvi_warp.views.plots.canvas import COLORS, band, below, hatch, panels, point_down, style, wrapped
 from lgvi_warp.views.plots.words import DEPTHS, floors, unit_of
 
 if TYPE_CHECKING:
@@ -102,7 +102,7 @@ def _levels_panel(axes: Any, one: Estimate) -> None:
                               hatch=hatch(c + i), edgecolor=look["color"], linewidth=0, label=label)  # fmt: skip
         if len(levels) % 2:
             axes.plot(one.time, values[:, len(levels) // 2], label=one.coordinates["component"][c], **look)
-    axes.legend(loc="best")
+    below(axes, ncols=4)
 
 
 def _lines_panel(axes: Any, one: Estimate) -> None:
@@ -114,7 +114,7 @@ def _lines_panel(axes: Any, one: Estimate) -> None:
         look = style(c)
         axes.plot(one.time, value[:, c], label=names[c] if c < len(names) else None, **look)
         axes.fill_between(one.time, lower[:, c], upper[:, c], color=look["color"], alpha=0.3, linewidth=0)
-    axes.legend(loc="best")
+    below(axes, ncols=4)
 
 
 def _extremes_panel(axes: Any, one: Estimate) -> None:
@@ -123,7 +123,7 @@ def _extremes_panel(axes: Any, one: Estimate) -> None:
         color, label = COLORS[c % len(COLORS)], one.coordinates["component"][c]
         axes.fill_between(one.time, one["minimum"][:, c], one["maximum"][:, c], facecolor=color, alpha=0.3, hatch=hatch(c),
                           edgecolor=color, linewidth=0, label=label)  # fmt: skip
-    axes.legend(loc="best")
+    below(axes, ncols=4)
 
 
 def _histogram_panel(axes: Any, one: Estimate) -> None:

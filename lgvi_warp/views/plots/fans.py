@@ -18,7 +18,7 @@ from lgvi_warp.views.choice import mixed, of_members
 from lgvi_warp.views.fleet import members_of_run, title
 from lgvi_warp.views.plots.canvas import COLORS, TINTS, band, below, hatch, mark, panel, point_down, style, wrapped
 from lgvi_warp.views.plots.read import Survey, estimate_for, quantity_of, survey_of, unbounded_text, with_samples
-from lgvi_warp.views.plots.words import HINT, floors, is_depth, label_of
+from lgvi_warp.views.plots.words import HINT, floors, floors_of_each, is_depth, label_of
 from lgvi_warp.views.recording.drawn import at_levels
 
 if TYPE_CHECKING:
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 # Bands of the fan, outermost first: lower quantile, upper quantile.
 BANDS = ((0.0, 1.0), (0.05, 0.95), (0.25, 0.75))
-# Most marks of ended members with the same outcome.
-MARKS = 1000
+# Most marks of ended members with the same outcome: more would cover the bands.
+MARKS = 200
 # Statistics that can stand for samples, the best first.
 STANDING = ("quantiles", "mean", "extremes")
 
@@ -167,7 +167,9 @@ def _ends(axes: Any, result: Result, survey: Survey) -> None:
     for code in outcomes(result):
         if code != Status.OK:
             members = np.flatnonzero(status == code)
-            drawn = members[np.argsort(mixed(members), kind="stable")[:MARKS]]
+            # The first and the last to end, and a fair choice of the others.
+            first_and_last = members[[when[members].argmin(), when[members].argmax()]]
+            drawn = np.union1d(members[np.argsort(mixed(members), kind="stable")[:MARKS]], first_and_last)
             label = f"{code.name.lower()} ({len(members):,})"
             axes.scatter(when[drawn], survey.last[drawn], s=24, zorder=3, label=label, **mark(code))
 
@@ -231,7 +233,7 @@ def compare(
         axes.set(xlabel="time [s]", ylabel=label_of(meaning))
         axes.grid(True, alpha=0.3)
         if is_depth(meaning):
-            point_down(axes, tuple({depth for result in results.values() for depth in floors(result)}))
+            point_down(axes, floors_of_each(results))
         sampled = any(curve.banded and not curve.from_statistics for curve in curves.values())
         below(axes, title="median, and band of 90 % of the members under way" if sampled else None)
     return axes

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The first look at a run: depth, energy and a few paths; and the drift of what its laws conserve."""
+"""The first look at a run, in panels that suit it; and the drift of what its laws conserve."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,24 +17,29 @@ from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.views.choice import AT_ONCE
 from lgvi_warp.views.fleet import members_of_run, title
 from lgvi_warp.views.plots.canvas import below, panel, panels, style, wrapped
+from lgvi_warp.views.plots.ends import draw_outcomes
 from lgvi_warp.views.plots.estimates import statistics
 from lgvi_warp.views.plots.fans import draw_fan, notes_on, text_of
 from lgvi_warp.views.plots.read import check_fields, energy_of, quantity_of, selected, with_samples
-from lgvi_warp.views.plots.tracks import draw_paths
+from lgvi_warp.views.plots.steering import draw_angles, draw_commands
+from lgvi_warp.views.plots.tracks import draw_plan
+from lgvi_warp.views.plots.words import is_depth
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
+    from lgvi_warp.statistics.quantity import Quantity
 
 # Members whose momenta are followed: as many as are read at once in 240 frames, 40 numbers each.
 MOST_FOLLOWED = AT_ONCE // 40 // 240 * 10
 
 
 def summary(result: Result, *, figure: Any = None, path: str | os.PathLike[str] | None = None) -> np.ndarray:
-    """Draw a run at a glance: depth and energy of the members under way, and paths of a few.
+    """Draw a run at a glance, in up to four panels that suit it.
 
-    Members that an event stopped, or that failed, are marked where they ended, in the colour of the outcome. Energy is drawn
-    as its error where the scene's laws conserve it. Where not all fields of the motion were kept, there is no energy; where no
-    samples were, the statistics are drawn.
+    There are paths of a few members from above, and the depth of all with the ends of those that an event stopped or that
+    failed. Then come the commands of a controller with their limits and faults where they were kept, else roll, pitch and yaw.
+    The last has the outcomes over time where some member ended, else the energy, as its error where the scene's laws conserve
+    it. What was not kept is left out; where no samples were, the statistics are drawn.
 
     Args:
         result: A result, in memory or in a store.
@@ -49,22 +56,49 @@ def summary(result: Result, *, figure: Any = None, path: str | os.PathLike[str] 
     """
     if not result.samples and result.kept is None and result.statistics:
         return statistics(result, figure=figure, path=path)
-    result = with_samples(result)
-    check_fields(result, ("position",), "a summary")
-    with_energy = set(FIELDS) <= set(result.samples)
-    with panels(figure, path, (1, 3 if with_energy else 2), (15.0 if with_energy else 10.0, 5.6)) as grid:
-        axes, lines = grid[0], [title(result)]
-        fans = [("Depth", quantity_of("depth"))] + [("", energy_of(result))] * with_energy
-        for panel_axes, (name, of) in zip(axes, fans, strict=False):
-            survey = draw_fan(panel_axes, result, of)
-            lines += notes_on(result, survey)
-            panel_axes.set_title(name or of.name.capitalize())
-            if panel_axes.get_legend_handles_labels()[0] and survey.total > 1:
-                below(panel_axes, ncols=3, title=text_of(survey, members_of_run(result)) if name else None)
-        draw_paths(axes[-1], result)
-        figure = axes[0].figure
+    sampled = with_samples(result)
+    check_fields(sampled, ("position",), "a summary")
+    drawings: list[Callable[[Any], list[str]]] = [partial(_plan, sampled), partial(_fan, sampled, quantity_of("depth"))]
+    if "command" in sampled.samples:
+        drawings.append(partial(draw_commands, sampled))
+    elif "attitude" in sampled.samples:
+        drawings.append(partial(draw_angles, sampled))
+    if np.any(result.status):
+        drawings.append(partial(_outcomes, result))
+    elif set(FIELDS) <= set(sampled.samples):
+        drawings.append(partial(_fan, sampled, energy_of(sampled)))
+    rows = -(-len(drawings) // 2)
+    with panels(figure, path, (rows, 2), (12.0, 5.4 * rows)) as grid:
+        lines = [title(result)]
+        for axes, draw in zip(grid.flat, drawings, strict=False):
+            lines += draw(axes)
+        for axes in grid.flat[len(drawings) :]:
+            axes.set_axis_off()
+        figure = grid[0, 0].figure
         figure.suptitle("\n".join(wrapped(line, figure) for line in dict.fromkeys(lines)))
-    return axes
+    return grid.ravel()[: len(drawings)]
+
+
+def _plan(result: Result, axes: Any) -> list[str]:
+    """Draw paths from above."""
+    draw_plan(axes, result)
+    return []
+
+
+def _fan(result: Result, of: Quantity, axes: Any) -> list[str]:
+    """Draw a fan; return what a reader has to know beside it."""
+    survey = draw_fan(axes, result, of)
+    axes.set_title("Depth" if is_depth(of) else of.name.capitalize())
+    if axes.get_legend_handles_labels()[0] and survey.total > 1:
+        below(axes, ncols=4, title=text_of(survey, members_of_run(result)))
+    return notes_on(result, survey)
+
+
+def _outcomes(result: Result, axes: Any) -> list[str]:
+    """Draw the outcomes over time."""
+    draw_outcomes(axes, result)
+    axes.set_title("Outcomes")
+    return []
 
 
 def drift(result: Result, *, ax: Any = None, path: str | os.PathLike[str] | None = None) -> Any:

@@ -191,7 +191,9 @@ def survey_of(result: Result, of: Quantity) -> Survey:
     choice = shown(result) if "position" in result.samples else everyone(result)
     frames = choice.frames
     going = under_way(result)[frames]
-    direction = _direction(result, of, choice)
+    direction = _direction(result, of, choice, going)
+    # The frame at which each member was under way for the last time.
+    ended = np.maximum(going.sum(axis=0) - 1, 0)
     low, high = (np.full(len(frames), np.nan) for _ in range(2))
     last, rows, counts, above = np.empty(result.members), [], [], 0
     # Energy reads 18 numbers of a member, and makes as many more.
@@ -199,13 +201,14 @@ def survey_of(result: Result, of: Quantity) -> Survey:
     for first in range(0, result.members, step):
         members = slice(first, min(first + step, result.members))
         values = numbers(result, of, members, frames)
+        last[members] = values[-1]
         if direction is not None:
+            last[members] = _about(values[-1], direction[ended[members], 0])
             values = _about(values, direction)
         counted = going[:, members] & np.isfinite(values)
         masked = np.where(counted, values, np.nan)
         low, high = np.fmin(low, np.fmin.reduce(masked, axis=1)), np.fmax(high, np.fmax.reduce(masked, axis=1))
         above += int((masked < 0.0).any(axis=0).sum()) if is_depth(of) else 0
-        last[members] = values[-1]
         ranked = choice.ranked[(choice.ranked >= members.start) & (choice.ranked < members.stop)] - members.start
         rows.append(values[:, ranked])
         counts.append(counted[:, ranked])
@@ -239,14 +242,21 @@ def numbers(result: Result, of: Quantity, members: slice | np.ndarray, frames: n
         return of(*samples_of(part))[:, 0].astype(np.float64)
 
 
-def _direction(result: Result, of: Quantity, choice: Shown) -> np.ndarray | None:
-    """Mean direction of an angle at each time [rad], shape (f, 1), continuous in time; None for other quantities."""
+def _direction(result: Result, of: Quantity, choice: Shown, going: np.ndarray) -> np.ndarray | None:
+    """Mean direction of an angle at each time [rad], shape (f, 1), continuous in time; None for other quantities.
+
+    It is of the members drawn; of the one that goes on longest where these have ended; where all have, the last one stays.
+    """
     if of.name not in CIRCULAR:
         return None
-    angle = numbers(result, of, choice.members, choice.frames)
-    counted = under_way(result)[np.ix_(choice.frames, choice.members)] & np.isfinite(angle)
-    arm = np.where(counted, np.exp(1j * np.where(counted, angle, 0.0)), 0.0).sum(axis=1)
-    return np.unwrap(np.angle(arm))[:, None]
+    arm = np.zeros(len(choice.frames), complex)
+    for members in (choice.members, going.sum(axis=0).argmax(keepdims=True)):
+        angle = numbers(result, of, members, choice.frames)
+        counted = going[:, members] & np.isfinite(angle)
+        sums = np.where(counted, np.exp(1j * np.where(counted, angle, 0.0)), 0.0).sum(axis=1)
+        arm = np.where(arm == 0.0, sums, arm)
+    known = np.maximum.accumulate(np.where(arm != 0.0, np.arange(len(arm)), 0))
+    return np.unwrap(np.angle(arm[known]))[:, None]
 
 
 def _about(angle: np.ndarray, direction: np.ndarray) -> np.ndarray:

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 MOST_PATHS = 12
 MOST_AXES = 1
+# A view from above shows at least this much [m].
+LEAST_VIEW = 0.01
 
 
 def paths(result: Result, most: int = MOST_PATHS, *, ax: Any = None, path: str | os.PathLike[str] | None = None) -> Any:
@@ -81,13 +83,29 @@ def plan_view(
         NothingToDraw: No positions were kept, or no member has a finite start.
         OSError: The file cannot be written.
     """
-    result, choice, some = selected(result, most, ("position",), "a view from above")
     with panel(ax, path, (8.0, 6.5)) as axes:
-        _lines(axes, some, some.position[..., 1], some.position[..., 0], start=True)
-        text = f"{some_of(result, len(choice.members))} from above"
-        axes.set(title=_title(axes, text, result), xlabel="east [m]", ylabel="north [m]")
-        axes.set_aspect("equal", adjustable="datalim")
+        draw_plan(axes, result, most)
+        axes.set_title(_title(axes, axes.get_title(), result))
     return axes
+
+
+def draw_plan(axes: Any, result: Result, most: int = MOST_PATHS) -> None:
+    """Draw paths from above.
+
+    Args:
+        axes: Matplotlib axes.
+        result: A result with positions.
+        most: The most members to draw; default 12.
+    """
+    result, choice, some = selected(result, most, ("position",), "a view from above")
+    _lines(axes, some, some.position[..., 1], some.position[..., 0], start=True)
+    title = f"{some_of(result, len(choice.members))} from above"
+    axes.set(title=title[:1].upper() + title[1:], xlabel="east [m]", ylabel="north [m]")
+    middle = 0.5 * (axes.dataLim.min + axes.dataLim.max)
+    axes.update_datalim([middle - 0.5 * LEAST_VIEW, middle + 0.5 * LEAST_VIEW])
+    axes.autoscale_view()
+    axes.locator_params(nbins=6)
+    axes.set_aspect("equal", adjustable="datalim")
 
 
 def phase(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.common.errors import NothingToDraw
-from lgvi_warp.views.plots.canvas import COLORS, GREY, MARKERS, panels, text_size, wrapped
+from lgvi_warp.views.plots.canvas import COLORS, GREY, MARKERS, apart, panels, wrapped
 
 if TYPE_CHECKING:
     from lgvi_warp.studies.tradeoff import Measurement, Tradeoff
@@ -109,7 +109,7 @@ def _words(costs: Any, biases: Any, found: Tradeoff, of: str, any_shown: bool) -
         costs.invert_xaxis()
     if any(point.biases for point in found.measurements):
         biases.axhline(CHANCE, color="black", linewidth=0.8, linestyle=":")
-        biases.text(0.01, CHANCE * 1.1, "chance", transform=biases.get_yaxis_transform())
+        biases.text(1.01, CHANCE, "chance", va="center", transform=biases.get_yaxis_transform())
     sample = f"{found.members} members, 0 to {found.t1:g} s"
     without = f"no reading of {', '.join(found.missing)}; " if found.missing else ""
     figure.suptitle(wrapped(f"{without}{sample}; reference {found.reference}; better is to the right and down", figure))
@@ -121,15 +121,9 @@ def _name(axes: Any, named: list[tuple[str, float, float, Any]]) -> None:
         return
     axes.margins(x=0.02)
     low, high = np.log(axes.get_ylim())
-    # Height of a line of text as a share of the axes.
-    height = 1.35 * text_size(axes.figure) / 72.0 / (0.72 * axes.figure.get_figure(root=True).get_figheight())
     named = sorted(named, key=lambda item: item[2])
-    wanted = np.array([(np.log(cost) - low) / (high - low) for _, _, cost, _ in named])
-    order = np.arange(len(named)) * height
-    places = np.maximum.accumulate(wanted - order) + order
-    # Where the highest would leave the axes, all are moved down as far as is needed.
-    places -= max(0.0, places[-1] - 1.0 + 0.5 * height)
-    places = np.minimum(places, 1.0 - 0.5 * height - order[::-1])
+    wanted = [(np.log(cost) - low) / (high - low) for _, _, cost, _ in named]
+    places = apart(axes, wanted, [1] * len(named))
     for (name, error, cost, color), place in zip(named, places, strict=True):
         axes.annotate(name, (error, cost), (1.03, place), textcoords="axes fraction", color=color, va="center",
                       annotation_clip=False, arrowprops={"arrowstyle": "-", "color": color, "linewidth": 0.6,

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from lgvi_warp.common.errors import SceneError
@@ -50,9 +51,18 @@ def is_depth(of: Quantity) -> bool:
     return of.name in DEPTHS
 
 
-def floors(result: Result) -> tuple[float, ...]:
-    """Depths of the scene's floors [m]."""
-    return tuple(float(event["depth"]) for event in events(result) if event["type"] == "floor")
+def floors(result: Result) -> dict[str, list[float]]:
+    """Depths of the scene's floors [m], by the word for them."""
+    return {"floor": [float(event["depth"]) for event in events(result) if event["type"] == "floor"]}
+
+
+def floors_of_each(results: Mapping[str, Result]) -> dict[str, list[float]]:
+    """Depths of the floors of several scenes [m]; where these differ, by words that name the run."""
+    each = {label: floors(result) for label, result in results.items()}
+    first = next(iter(each.values()))
+    if all(one == first for one in each.values()):
+        return first
+    return {f"floor\nof {label}": one["floor"] for label, one in each.items()}
 
 
 def events(result: Result) -> list[dict[str, Any]]:

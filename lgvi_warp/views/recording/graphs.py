@@ -7,18 +7,20 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.status import Status
 from lgvi_warp.physics.control.signals import CHANNELS
 from lgvi_warp.runs.outcomes import outcome_text, outcomes
 from lgvi_warp.views.choice import frames_of
+from lgvi_warp.views.commands import channels, faults
 from lgvi_warp.views.fleet import LOOKS
 from lgvi_warp.views.recording.drawn import LEVELS, Drawn, Fan, at_levels, first_ended
 from lgvi_warp.views.recording.world import TIMELINE
 
 # Bands of a fan, outermost first: name, places of its levels, and opacity.
 BANDS = (("all", 0, 6, 60), ("90 %", 1, 5, 110), ("50 %", 2, 4, 170))
-MEDIAN, WHITE, GREY = LEVELS.index(0.5), (255, 255, 255), (130, 130, 130)
+# Bands are paler than bodies under way: they are seen through.
+PALE = (120, 180, 255)
+MEDIAN, WHITE, GREY, FAULT = LEVELS.index(0.5), (255, 255, 255), (130, 130, 130), (255, 200, 60)
 # Fewer samples than this are drawn with a marker each.
 MARKED = 3
 # Most histograms: each takes a message of its own.
@@ -52,7 +54,7 @@ def _fan(recording: Any, run: Drawn, fan: Fan) -> None:
     """Log the bands of a fan and its median; of one member, its curve."""
     import rerun as rr
 
-    rgb, single = run.rgb or LOOKS[Status.OK].rgb, run.source.members == 1
+    rgb, single = run.rgb or PALE, run.source.members == 1
     bands = BANDS[1:2] if run.label else BANDS
     for name, low, high, opacity in () if single else bands:
         entity = run.path(f"curves/{fan.name}", name.replace(" %", "_percent"))
@@ -61,7 +63,7 @@ def _fan(recording: Any, run: Drawn, fan: Fan) -> None:
         middle, half = 0.5 * (fan.levels[low] + fan.levels[high]), 0.5 * (fan.levels[high] - fan.levels[low])
         _send(recording, entity, run.time, rr.Measurements.columns(values=middle, variances=half**2))
     name = run.label or ("the member" if single else "median")
-    color = rgb if single or run.label else WHITE
+    color = run.color(Status.OK) if single or run.label else WHITE
     _series(recording, run.path(f"curves/{fan.name}", "median"), run.time, fan.levels[MEDIAN], name, color)
 
 
@@ -94,40 +96,25 @@ def log_member(recording: Any, run: Drawn, place: int, member: int) -> None:
         _series(recording, entity, run.time, seen_values, f"member {member:,}", LOOKS[Status.OK].rgb, 1.0)
 
 
+# Marks of outcomes on the curves of a run that is compared, which are all in its colour; failures have one together.
+MARKERS = {Status.SURFACE: "up", Status.FLOOR: "down", Status.BOX: "square", Status.TIME: "circle", Status.CONDITION: "diamond"}
+MOST_MARKS = 12
+
+
 def _shares(recording: Any, run: Drawn) -> None:
     """Log which share of all members is under way, and which has ended, by outcome."""
+    import rerun as rr
+
     for code, share in run.shares.items():
         name = code.name.lower() if code else "under way"
         label = f"{run.label}: {name}" if run.label else name
         entity = run.path("members", name.replace(" ", "_"))
         _series(recording, entity, run.time, 100.0 * share, label, run.color(code))
-
-
-def channel_names(run: Drawn) -> list[tuple[str, np.ndarray]]:
-    """Name the channels of a run's actuators.
-
-    Args:
-        run: The run.
-
-    Returns:
-        A name and the limits (2,) of each, by their number; NaN where they are not known.
-    """
-    from lgvi_warp.scene.scene import Scene
-
-    count = next((run.few.samples[name].shape[-1] for name in CHANNELS if name in run.few.samples), 0)
-    unknown = [(f"channel {i}", np.full(2, np.nan)) for i in range(count)]
-    tables = {key: value for key, value in run.result.provenance["scene"].items() if key not in ("ensemble", "run")}
-    try:
-        scene = Scene.from_dict(tables)
-    except SceneError:  # laws of a user's own, whose names are not known here
-        return unknown
-    bus = scene.controller.bus if scene.controller is not None else None
-    names: list[tuple[str, np.ndarray]] = []
-    for key, (_, many) in bus.commands.items() if bus else ():
-        limit = run.few.parameters.get(f"{key}.limit", np.full((1, 1), np.nan))
-        most = np.broadcast_to(limit.reshape(len(limit), -1).max(axis=0), many)
-        names += [(f"{key}[{i}]", np.array([-most[i], most[i]])) for i in range(many)]
-    return names if len(names) == count else unknown
+        if code and run.label:
+            at, marks = frames_of(run.time, MOST_MARKS), f"{entity}/marks"
+            style = rr.SeriesPoints(names=label, colors=run.color(code), markers=MARKERS.get(code, "cross"), marker_sizes=5.0)
+            recording.log(marks, style, static=True, strict=True)
+            _send(recording, marks, run.time[at], rr.Scalars.columns(scalars=100.0 * share[at]))
 
 
 def _channels(recording: Any, run: Drawn) -> None:
@@ -136,29 +123,31 @@ def _channels(recording: Any, run: Drawn) -> None:
         if field not in run.few.samples:
             continue
         values = run.few.samples[field]
-        for i, (name, limits) in enumerate(channel_names(run)):
+        for i, channel in enumerate(channels(run.few)):
             (row,) = at_levels(values[..., i], run.counted, [0.5])
-            label = f"{run.label}: {name} {field}" if run.label else f"{name} {field}"
+            name = f"{channel.name} {field}"
+            label = f"{run.label}: {name}" if run.label else name
             entity, color = run.path(field, str(i)), COLORS[i % len(COLORS)]
             _series(recording, entity, run.time, row, label, color, 1.0 if field == "command" else 2.5)
-            # A limit far from what is seen would flatten the curves.
-            near = np.isfinite(limits).all() and limits[1] < 20.0 * max(np.nanmax(np.abs(row), initial=0.0), 1e-9)
-            for side, limit in zip(("lower", "upper"), limits, strict=True) if near and field == "command" else ():
+            for side, limit in zip(("lower", "upper"), channel.limits(row) if field == "command" else (), strict=False):
                 at = run.path("limit", str(i), side)
-                _series(recording, at, run.time, np.full(len(run.time), limit), f"{name} limit", GREY, 1.0)
+                _series(recording, at, run.time, np.full(len(run.time), limit), f"{channel.name} limit", GREY, 1.0)
 
 
 def _log(recording: Any, run: Drawn) -> None:
-    """Log each outcome when its first member has it: how many have it, which was the first, when, and its value."""
+    """Log each outcome when its first member has it, with how many have it and the value, and each fault when it begins."""
     import rerun as rr
 
-    entity = run.path("log")
+    def say(when: float, text: str, level: str, color: tuple[int, int, int]) -> None:
+        text = f"{run.label}: {text}" if run.label else text
+        _send(recording, run.path("log"), np.array([when]), rr.TextLog.columns(text=[text], level=[level], color=[color]))
+
+    for fault in faults(run.result):
+        say(max(fault.time, float(run.time[0])), fault.text, "WARN", FAULT)
     for code in outcomes(run.result):
         when = first_ended(run.result, code) if code else float(run.time[-1])
-        text = f"{run.label}: {outcome_text(run.result, code)}" if run.label else outcome_text(run.result, code)
         level = "INFO" if code == Status.OK or code.stopped else "ERROR"
-        columns = rr.TextLog.columns(text=[text], level=[level], color=[run.color(code)])
-        _send(recording, entity, np.array([when]), columns)
+        say(when, outcome_text(run.result, code), level, run.color(code))
 
 
 def _histogram(recording: Any, run: Drawn) -> None:

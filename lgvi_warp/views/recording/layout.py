@@ -9,43 +9,20 @@ import numpy as np
 
 from lgvi_warp.physics.control.signals import CHANNELS
 from lgvi_warp.views.recording.drawn import Drawn, Fan
+from lgvi_warp.views.recording.eye import ASPECT, SIGHT, distance
 from lgvi_warp.views.recording.world import TIMELINE, Box
 
 # The whole run is played in this time [s].
 PLAYED = 20.0
 BACKGROUND = (9, 24, 38)
-# Where the eye looks: to the north-east, a little down. Half its field of view upward, as a tangent, and the width of the
-# view over its height, on a window of usual size.
-SIGHT = np.array([0.48, 0.82, 0.31]) / np.linalg.norm([0.48, 0.82, 0.31])
-FIELD, ASPECT = 0.9 * np.tan(np.radians(27.5)), 1.3
 
-
-def distance(box: Box, aspect: float) -> float:
-    """How far from the middle of a box the eye must be to see all of it.
-
-    Args:
-        box: The box.
-        aspect: Width of the view over its height.
-
-    Returns:
-        Distance [m].
-    """
-    across = np.cross(SIGHT, (0.0, 0.0, -1.0))
-    across /= np.linalg.norm(across)
-    above = np.cross(across, SIGHT)
-    half = 0.5 * (box.high - box.low)
-    corners = half * np.array([(i, j, k) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
-    needed = np.maximum(np.abs(corners @ across) / (FIELD * aspect), np.abs(corners @ above) / FIELD)
-    return float((needed - corners @ SIGHT).max())
-
-
-def layout(runs: list[Drawn], box: Box, scale: int) -> Any:
+def layout(runs: list[Drawn], box: Box, scales: list[int]) -> Any:
     """Lay out the views: the world on the left, curves and the run's facts on the right.
 
     Args:
         runs: The runs that are drawn.
         box: What is in view.
-        scale: How many times their size hulls are drawn.
+        scales: How many times their size hulls are drawn, of each run.
 
     Returns:
         A blueprint of the viewer.
@@ -56,7 +33,8 @@ def layout(runs: list[Drawn], box: Box, scale: int) -> Any:
     ends = [max(float(run.time[-1]) for run in runs), min(float(run.time[0]) for run in runs)]
     played = ends[0] - ends[1]
     names = [f"{run.label}: {run.text}" if run.label else run.text for run in runs]
-    worlds = [_world(run, name, box, scale, ASPECT / len(runs)) for run, name in zip(runs, names, strict=True)]
+    aspect = ASPECT / len(runs)
+    worlds = [_world(run, name, box, scale, aspect) for run, name, scale in zip(runs, names, scales, strict=True)]
     below = rrb.Horizontal(
         _curve("members", "Members by outcome [%]", _whole(runs[0].time), (0.0, 102.0), True),
         rrb.TextLogView(
@@ -187,7 +165,7 @@ def _world(run: Drawn, name: str, box: Box, scale: int, aspect: float) -> Any:
     import rerun.blueprint as rrb
 
     middle = 0.5 * (box.low + box.high)
-    eye = middle - distance(box, aspect) * SIGHT
+    eye = middle - distance(box.low, box.high, aspect) * SIGHT
     now = rrb.TimeRangeBoundary.cursor_relative(seconds=0)
     past = rrb.VisibleTimeRange(TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=now)
     hulls = f", hulls {scale} times their size" if scale > 1 else ""

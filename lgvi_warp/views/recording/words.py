@@ -13,21 +13,21 @@ from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.views.choice import of_members
 from lgvi_warp.views.recording.drawn import Drawn
 from lgvi_warp.views.recording.hull import shape_of
-from lgvi_warp.views.recording.world import Box, chosen_member
+from lgvi_warp.views.recording.world import Box, chosen_member, floors_of
 
 
-def log_words(recording: Any, runs: list[Drawn], box: Box, scale: int) -> None:
+def log_words(recording: Any, runs: list[Drawn], box: Box, scales: list[int]) -> None:
     """Log the summary of the runs, and their provenance.
 
     Args:
         recording: The stream.
         runs: What is drawn.
         box: What is in view.
-        scale: How many times their size hulls are drawn.
+        scales: How many times their size hulls are drawn, of each run.
     """
     import rerun as rr
 
-    for run in runs:
+    for run, scale in zip(runs, scales, strict=True):
         provenance = f"```json\n{json.dumps(run.result.provenance, indent=2)}\n```"
         rows = [f"| {key} | {text} |" for key, text in lines(run, box, scale).items()]
         texts = {"summary": "\n".join(["| | |", "|---|---|", *rows]), "provenance": provenance}
@@ -99,7 +99,8 @@ def water_text(run: Drawn, box: Box) -> str:
         One sentence.
     """
     kinds = {event["type"] for event in run.result.provenance["scene"].get("events", ())}
-    floor = f"floor at {box.floor:g} m" if "floor" in kinds and box.floor is not None else "no floor"
+    floors = floors_of(run)
+    floor = f"floor at {' and '.join(f'{depth:g}' for depth in floors)} m" if floors else "no floor"
     grid = f"grid of {box.grid:g} m"
     if "surface" in kinds:
         return f"surface and {floor}; {grid}"

@@ -13,6 +13,7 @@ from lgvi_warp.physics import vehicle
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.views.choice import finite_rows
 from lgvi_warp.views.recording.drawn import Drawn, quaternion_xyzw
+from lgvi_warp.views.recording.eye import ASPECT, far_pixel
 from lgvi_warp.views.recording.hull import Mesh, hull_of, mesh_of, shape_of
 
 TIMELINE = "sim_time"
@@ -21,9 +22,9 @@ TRAILS = 40
 CHUNK = 20
 # Scale of a hidden body: an entity without any pose would show a body at the origin.
 UNSEEN = 1e-6
-# A hull is drawn at least this share of the scene long.
-SEEN = 0.02
-TRAIL, WATER, SAND, CURRENT = (150, 165, 180, 150), (90, 170, 230, 40), (150, 120, 80, 90), (0, 200, 200)
+# A hull across the sight is drawn at least so many pixels long and thick, at the far end of what is in view.
+LONG, THICK = 25.0, 5.0
+TRAIL, WATER, SAND, CURRENT = (150, 165, 180, 150), (90, 170, 230, 40), (78, 88, 102, 120), (0, 200, 200)
 # Axes are labelled at the corner of the grid.
 AXES = (("north", (230, 90, 90)), ("east", (90, 200, 90)), ("down", (110, 140, 255)))
 
@@ -35,13 +36,11 @@ class Box:
     Attributes:
         low: Smallest coordinates [m], shape (3,).
         high: Largest coordinates [m], shape (3,).
-        floor: Depth of the floor [m]; None without one.
         surface: Whether the surface is in view.
     """
 
     low: np.ndarray
     high: np.ndarray
-    floor: float | None
     surface: bool
 
     @property
@@ -64,11 +63,11 @@ class Box:
             A box that holds both.
         """
         low, high = np.minimum(self.low, other.low), np.maximum(self.high, other.high)
-        return Box(low, high, self.floor, self.surface or other.surface)
+        return Box(low, high, self.surface or other.surface)
 
 
 def box_of(runs: list[Drawn]) -> Box:
-    """Find the box around all paths, with the floor and the surface where they are near.
+    """Find the box around all paths, with all floors, and the surface where it is near.
 
     Args:
         runs: The runs that are drawn.
@@ -84,15 +83,12 @@ def box_of(runs: list[Drawn]) -> Box:
     least = max(4.0 * _length(runs[0])[1], 0.05 * float((high - low).max()))
     narrow = np.maximum(least - (high - low), 0.0)
     low, high = low - 0.5 * narrow, high + 0.5 * narrow
-    floors = [float(event["depth"]) for run in runs for event in _events(run) if event["type"] == "floor"]
-    floor = max(floors) if floors else None
-    if floor is not None:
-        high[2] = max(high[2], floor)
+    high[2] = max([high[2], *(floor for run in runs for floor in floors_of(run))])
     reach = float(np.linalg.norm(high - low))
     surface = bool(low[2] < 0.5 * reach)
     if surface:
         low[2], high[2] = min(low[2], 0.0), max(high[2], 0.0)
-    return Box(low, high, floor, surface)
+    return Box(low, high, surface)
 
 
 def _whole(run: Drawn) -> np.ndarray:
@@ -100,9 +96,17 @@ def _whole(run: Drawn) -> np.ndarray:
     return finite_rows(run.position)
 
 
-def _events(run: Drawn) -> list[dict[str, Any]]:
-    """Tables of the scene's events."""
-    return list(run.result.provenance["scene"].get("events", ()))
+def floors_of(run: Drawn) -> list[float]:
+    """Depths of the floors of a run's own scene [m], the upper first.
+
+    Args:
+        run: The run.
+
+    Returns:
+        The depths; none where the scene has no floor.
+    """
+    events = run.result.provenance["scene"].get("events", ())
+    return sorted(float(event["depth"]) for event in events if event["type"] == "floor")
 
 
 def _length(run: Drawn) -> tuple[Mesh | tuple[float, float], float]:
@@ -115,17 +119,21 @@ def _length(run: Drawn) -> tuple[Mesh | tuple[float, float], float]:
     return (shape.length, shape.diameter), max(shape.length, shape.diameter)
 
 
-def scale_of(run: Drawn, box: Box) -> int:
+def scale_of(run: Drawn, box: Box, aspect: float = ASPECT) -> int:
     """How many times its size a hull is drawn, so that it is seen in the box.
 
     Args:
         run: The run.
         box: What is in view.
+        aspect: Width of the view over its height; default that of a single run.
 
     Returns:
         A whole number from 1.
     """
-    return max(1, int(np.ceil(SEEN * box.size / _length(run)[1])))
+    form, length = _length(run)
+    thickness = length if isinstance(form, Mesh) else min(form)
+    wanted = max(LONG / length, THICK / thickness) * far_pixel(box.low, box.high, aspect)
+    return max(1, int(np.ceil(wanted)))
 
 
 def log_world(recording: Any, run: Drawn, box: Box, scale: int) -> None:
@@ -278,7 +286,9 @@ def _planes(recording: Any, run: Drawn, box: Box) -> None:
 
     margin = 0.08 * box.size
     low, high = box.low - margin, box.high + margin
-    planes = [("surface", 0.0, WATER)] * box.surface + ([("floor", box.floor, SAND)] if box.floor is not None else [])
+    floors = floors_of(run)
+    planes = [("surface", 0.0, WATER)] * box.surface
+    planes += [(f"floor_{i}" if i else "floor", depth, SAND) for i, depth in enumerate(floors)]
     for name, depth, color in planes:
         corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
         both_sides = [(0, 1, 2), (0, 2, 3), (0, 2, 1), (0, 3, 2)]
@@ -288,7 +298,7 @@ def _planes(recording: Any, run: Drawn, box: Box) -> None:
         sheet = rr.Mesh3D(vertex_positions=points, triangle_indices=both_sides, albedo_factor=color)
         _static(recording, run.path("world", "water", name), sheet)
     # Without a floor, a grid below the fleet tells sizes.
-    below = [("depth", high[2], TRAIL)] if box.floor is None else []
+    below = [] if floors else [("depth", high[2], TRAIL)]
     for name, depth, color in [*planes, *below]:
         lines = _grid(low[:2], high[:2], float(depth), box.grid)
         grid = rr.LineStrips3D(lines, colors=[(*color[:3], 120)], radii=rr.Radius.ui_points(0.5))

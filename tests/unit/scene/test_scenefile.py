@@ -47,12 +47,28 @@ def test_the_paper_in_numbers():
 
 
 def test_the_papers_start(example):
-    m = lw.Ensemble(lw.Scene.load(PAPER)).select(0, 1)
+    m = lw.Ensemble(lw.Scene.load(PAPER, {"start.position": example["params"]["x0"]["b"]})).select(0, 1)
     x0 = example["params"]["x0"]
     for value, key in ((m.position, "b"), (m.attitude, "R"), (m.velocity, "nu"), (m.angular_velocity, "Omega")):
         np.testing.assert_allclose(value[0], x0[key], rtol=0, atol=1e-15)
     R = notation.matrix_from_rotation_vector(np.array([1.0, 2.0, 3.0]))
     np.testing.assert_allclose(R @ m.velocity[0], [0.1, 0.2, 1.0], rtol=0, atol=1e-15)
+
+
+def test_nothing_of_the_papers_example_rises_above_the_surface():
+    """Momentum in inertial axes changes by the net weight alone, and a velocity follows from it by the least and largest mass."""
+    scene = lw.Scene.load(PAPER)
+    fleet = lw.Ensemble.from_scene(scene)
+    members = fleet.select(0, fleet.members)
+    mass, buoyancy = members.parameters["vehicle.mass"], scene.vehicle.buoyancy
+    masses = mass[:, None] + np.diag(scene.vehicle.added_mass)
+    momentum = np.einsum("nij,nj,nj->ni", members.attitude, masses, members.velocity)
+    time = np.linspace(0.0, scene.run.duration, 301)
+    down = momentum[:, 2] + (mass * scene.environment.gravity - buoyancy) * time[:, None]
+    slowest = np.minimum(down / masses.max(axis=1), down / masses.min(axis=1))
+    turned = 0.5 * (1.0 / masses.min(axis=1) - 1.0 / masses.max(axis=1)) * np.hypot(momentum[:, 0], momentum[:, 1])
+    depth = members.position[:, 2] + np.cumsum(slowest - turned, axis=0) * time[1]
+    assert depth.shape == (301, 4096) and depth.min() > 0.0
 
 
 def test_round_trip():

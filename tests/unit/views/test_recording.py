@@ -2,6 +2,7 @@
 """Recordings read back: poses, colours, counts and texts are those of the result; each odd run has one that fits."""
 
 import dataclasses
+import re
 import subprocess
 import sys
 import time
@@ -18,8 +19,9 @@ from lgvi_warp.common.status import Status, stop_time, under_way
 from lgvi_warp.statistics.estimate import Estimate, Estimates
 from lgvi_warp.views import rerun as recordings
 from lgvi_warp.views import viewer
+from lgvi_warp.views.commands import channels
+from lgvi_warp.views.fleet import LOOKS
 from lgvi_warp.views.recording import drawn, layout, world
-from lgvi_warp.views.recording.graphs import channel_names
 from tests.support.made import made
 from tests.unit.views.test_hull import glb
 
@@ -263,8 +265,7 @@ def test_the_current_is_drawn_as_it_flows(mixed, path):
 @pytest.mark.parametrize("spans", [(1.0, 1.0, 1.0), (100.0, 3.0, 1.0), (1.0, 200.0, 5.0), (1.0, 1.0, 300.0)])
 @pytest.mark.parametrize("aspect", [1.3, 0.65])
 def test_the_eye_sees_the_whole_box(spans, aspect):
-    box = world.Box(np.zeros(3), np.array(spans), None, False)
-    far = layout.distance(box, aspect)
+    far = layout.distance(np.zeros(3), np.array(spans), aspect)
     right = np.cross(layout.SIGHT, (0.0, 0.0, -1.0))
     right /= np.linalg.norm(right)
     corners = np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]) * spans - 0.5 * np.array(spans)
@@ -272,6 +273,68 @@ def test_the_eye_sees_the_whole_box(spans, aspect):
     across, above = corners @ right / depth, corners @ np.cross(right, layout.SIGHT) / depth
     inside = max(np.abs(across).max() / aspect, np.abs(above).max()) / np.tan(np.radians(27.5))
     assert (depth > 0.0).all() and inside == pytest.approx(0.9)
+
+
+@pytest.mark.parametrize("span", [(30.0, 30.0, 15.0), (600.0, 40.0, 60.0), (2.0, 3.0, 900.0), (0.1, 0.1, 0.1)])
+@pytest.mark.parametrize("many", [1, 3])
+def test_a_hull_across_the_sight_is_25_by_5_pixels_wherever_it_is(span, many):
+    """By a pinhole camera of its own: 600 pixels are 55 degrees high, and the farthest corner is the worst."""
+    corners = 20.0 + np.array([(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]) * np.array(span)
+    result = made(np.stack([corners, corners]), scene=lw.Scene.named("remus_100"))
+    run = drawn.drawn_of(result)
+    box = world.box_of([run])
+    scale = world.scale_of(run, box, layout.ASPECT / many)
+    eye = 0.5 * (box.low + box.high) - layout.distance(box.low, box.high, layout.ASPECT / many) * layout.SIGHT
+    pixels = 600.0 / (2.0 * np.tan(np.radians(27.5)) * ((corners - eye) @ layout.SIGHT))
+    length, diameter = 1.33, 0.191
+    assert (scale * length * pixels).min() >= 25.0 and (scale * diameter * pixels).min() >= 5.0
+    least = (scale - 1) * min(length / 25.0, diameter / 5.0) * pixels.min()
+    assert scale == 1 or least < 1.4, "no larger than is needed"
+
+
+def test_each_run_has_its_own_floors(tmp_path):
+    """One with a floor, one without, one with two: side by side, in one box."""
+    two = [{"type": "floor", "depth": 18.0}, {"type": "floor", "depth": 25.0, "name": "deep"}]
+    scenes = {"one": SCENE, "none": lw.Scene.named("remus_100"), "two": lw.Scene.named("remus_100", events=two)}
+    path = lw.log_rerun({name: fleet(9, 7, scene=scene) for name, scene in scenes.items()}, tmp_path / "three.rrd")
+    drawn_planes = {
+        name: sorted(entity.rsplit("/", 1)[1] for entity in entities(path) if entity.startswith(f"/world/{name}/water/"))
+        for name in scenes
+    }
+    surface = ["surface", "surface_grid"]
+    assert drawn_planes["one"] == sorted(["floor", "floor_grid", *surface])
+    assert drawn_planes["none"] == sorted(["depth_grid", *surface])
+    assert drawn_planes["two"] == sorted(["floor", "floor_grid", "floor_1", "floor_1_grid", *surface])
+    assert "floor at 16 m" in text_of(path, "/run/summary/one") and "no floor" in text_of(path, "/run/summary/none")
+    assert "floor at 18 and 25 m" in text_of(path, "/run/summary/two")
+
+
+def test_outcomes_of_compared_runs_have_marks_of_their_own(tmp_path):
+    """Both runs have one colour each: what a curve is of is told by its marks."""
+    path = lw.log_rerun({"a": fleet(40), "b": fleet(40, seed=2)}, tmp_path / "both.rrd")
+    marks = {name: text_of(path, f"/members/a/{name}/marks") for name in ("floor", "surface", "non_finite")}
+    shapes = {name: re.search(r"markers.*?\[(\d+)\]|\[(\d+)\]", text) for name, text in marks.items()}
+    assert all(shapes.values()) and len(set(marks.values())) == 3
+    assert "/members/a/under_way/marks" not in entities(path)
+    alone = lw.log_rerun(fleet(40), tmp_path / "alone.rrd")
+    assert not any(name.endswith("/marks") for name in entities(alone))
+
+
+def test_faults_are_in_the_log_when_they_begin(mixed, tmp_path):
+    steered = lw.Scene.load(Path(__file__).parents[3] / "examples" / "scenes" / "remus_100_autopilot.toml")
+    path = lw.log_rerun(made(mixed.position, mixed.time, scene=steered), tmp_path / "fleet.rrd")
+    said = rows(path, "/log", "TextLog:text")
+    assert said[40.0] == ["fault stuck_rudder: control_fins[0] times 0 plus 0.1, from 40 s"]
+    later = made(mixed.position[:10], mixed.time[:10], scene=steered)
+    assert "fault" not in text_of(lw.log_rerun(later, tmp_path / "short.rrd"), "/log")
+
+
+def test_members_that_ended_stand_out_from_the_floor():
+    """By the ratio of luminances of WCAG 2, section 1.4.11: 3 for what has to be seen."""
+    channel = np.array([[*LOOKS[Status.FLOOR].rgb], world.SAND[:3]]) / 255.0
+    linear = np.where(channel <= 0.04045, channel / 12.92, ((channel + 0.055) / 1.055) ** 2.4)
+    bright, dark = np.sort(linear @ [0.2126, 0.7152, 0.0722])[::-1]
+    assert (bright + 0.05) / (dark + 0.05) > 3.0
 
 
 def test_all_bodies_lie_in_the_box(mixed):
@@ -377,9 +440,10 @@ def test_channels_have_the_names_and_limits_of_their_actuators(mixed):
     result = made(mixed.position, mixed.time, scene=steered)
     samples = dict(result.samples) | {"actuator": np.full((31, 40, 2), 0.2), "command": np.full((31, 40, 2), 0.1)}
     run = drawn.drawn_of(dataclasses.replace(result, samples=samples))
-    (first, limits), (second, _) = channel_names(run)
-    assert (first, second) == ("control_fins[0]", "control_fins[1]")
-    assert limits == pytest.approx([-0.349066, 0.349066], rel=1e-5)
+    first, second = channels(run.few)
+    assert (first.name, second.name) == ("control_fins[0]", "control_fins[1]")
+    assert first.limits(np.array([0.1, -0.2])) == pytest.approx([-0.349066, 0.349066], rel=1e-5)
+    assert first.limits(np.array([0.01])) == ()
 
 
 def test_a_mesh_is_drawn_times_a_whole_number(tmp_path):
@@ -391,7 +455,7 @@ def test_a_mesh_is_drawn_times_a_whole_number(tmp_path):
     box = world.box_of([run])
     scale = world.scale_of(run, box)
     assert (
-        scale == np.ceil(world.SEEN * box.size / 0.5) > 5.0
+        scale > 5
         and rows(path, "/world/bodies/ok", "scales")[1.0][0] == [scale] * 3
     )
     assert f"drawn {scale} times their size" in text_of(path, "/run/summary")

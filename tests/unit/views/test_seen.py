@@ -203,7 +203,7 @@ def broken_path(name, folder):
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(module, attribute, replacement)
         if name == "an eye that looks elsewhere":
-            patched.setattr(layout, "distance", lambda box, aspect: -10.0 * box.size)
+            patched.setattr(layout, "distance", lambda low, high, aspect: -10.0 * np.linalg.norm(high - low))
         return lw.log_rerun(fleet(30), folder / "broken.rrd")
 
 

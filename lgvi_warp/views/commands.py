@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Commands of a controller in words: the channels of its actuators with their limits, and its faults."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from lgvi_warp.common.errors import SceneError
+from lgvi_warp.physics.control.signals import CHANNELS
+
+if TYPE_CHECKING:
+    from lgvi_warp.runs.result import Result
+
+# A limit is drawn where it is at most so many times as large as what is seen: a farther one would flatten the curves.
+NEAR = 20.0
+
+
+class Channel(NamedTuple):
+    """One channel of an actuator.
+
+    Args:
+        name: As "control_fins[0]".
+        limit: Largest size of its command; NaN where it is not known.
+    """
+
+    name: str
+    limit: float
+
+    def limits(self, values: np.ndarray) -> tuple[float, ...]:
+        """Choose the limits that are drawn beside values.
+
+        Args:
+            values: What is drawn of the command.
+
+        Returns:
+            The lower and the upper one; none where they are far away or not known.
+        """
+        near = self.limit < NEAR * max(np.nanmax(np.abs(values), initial=0.0), 1e-9)
+        return (-self.limit, self.limit) if near else ()
+
+
+class Broken(NamedTuple):
+    """A fault of a run.
+
+    Args:
+        time: When it begins for the first member [s].
+        text: What it does, in words.
+    """
+
+    time: float
+    text: str
+
+
+def channels(result: Result) -> list[Channel]:
+    """Name the channels of a run's actuators.
+
+    Args:
+        result: A result with commands or actuators.
+
+    Returns:
+        The channels by their number.
+    """
+    from lgvi_warp.scene.scene import Scene
+
+    count = next((result.samples[name].shape[-1] for name in CHANNELS if name in result.samples), 0)
+    unknown = [Channel(f"channel {i}", np.nan) for i in range(count)]
+    tables = {key: value for key, value in result.provenance["scene"].items() if key not in ("ensemble", "run")}
+    try:
+        scene = Scene.from_dict(tables)
+    except SceneError:  # laws of a user's own, whose names are not known here
+        return unknown
+    bus = scene.controller.bus if scene.controller is not None else None
+    named: list[Channel] = []
+    for key, (_, many) in bus.commands.items() if bus else ():
+        limit = result.parameters.get(f"{key}.limit", np.full((1, 1), np.nan))
+        most = np.broadcast_to(limit.reshape(len(limit), -1).max(axis=0), many)
+        named += [Channel(f"{key}[{i}]", float(most[i])) for i in range(many)]
+    return named if len(named) == count else unknown
+
+
+def faults(result: Result) -> list[Broken]:
+    """List the faults of actuators and sensors that begin during a run.
+
+    Args:
+        result: A result.
+
+    Returns:
+        Faults in the order in which they begin.
+    """
+    found = []
+    for table in result.provenance["scene"].get("controller", {}).get("faults", ()):
+        key = table.get("name") or table["type"]
+        numbers = {name: np.atleast_1d(result.parameters[f"{key}.{name}"]) for name in ("time", "gain", "offset")}
+        first, last = (float(end) for end in (numbers["time"].min(), numbers["time"].max()))
+        if first <= result.time[-1]:
+            gain, offset = (_between(numbers[name]) for name in ("gain", "offset"))
+            when = f"from {first:g} s" if first == last else f"from {first:g} s, of the last member from {last:g} s"
+            head = f"fault {key}" if table.get("name") else "fault"
+            found.append(Broken(first, f"{head}: {table['of']}[{table.get('channel', 0)}] times {gain} plus {offset}, {when}"))
+    return sorted(found)
+
+
+def _between(values: np.ndarray) -> str:
+    """A number of the members in words."""
+    low, high = float(values.min()), float(values.max())
+    return f"{low:.3g}" if low == high else f"{low:.3g} to {high:.3g}"

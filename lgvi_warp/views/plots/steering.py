@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What members are steered by, and how they lie: commands with limits and faults, and roll, pitch and yaw, against time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.status import under_way
+from lgvi_warp.views.choice import MOST_BODIES
+from lgvi_warp.views.commands import channels, faults
+from lgvi_warp.views.plots.canvas import GREY, below, hatch, style
+from lgvi_warp.views.plots.read import quantity_of, selected, survey_of
+from lgvi_warp.views.plots.words import WORDS
+from lgvi_warp.views.recording.drawn import at_levels
+
+if TYPE_CHECKING:
+    from lgvi_warp.runs.result import Result
+
+LEVELS = (0.05, 0.5, 0.95)
+
+
+def draw_commands(result: Result, axes: Any) -> list[str]:
+    """Draw the commands of members under way: medians, bands of 90 %, limits that are near, and when faults begin.
+
+    Args:
+        result: A result with commands.
+        axes: Matplotlib axes.
+
+    Returns:
+        Lines on the faults.
+    """
+    result, _, some = selected(result, MOST_BODIES, ("position", "command"), "a picture of commands")
+    counted, broken, lined = under_way(some), faults(result), set()
+    for i, channel in enumerate(channels(some)):
+        levels = at_levels(some.samples["command"][..., i], counted, LEVELS)
+        _band(axes, some.time, levels, i, channel.name)
+        lined |= set(channel.limits(levels))
+    for limit in lined:
+        axes.axhline(limit, color=GREY, linestyle=(0, (6, 2)), linewidth=1.0, label="limit" if limit > 0.0 else None)
+    _mark_faults(axes, result)
+    axes.set(xlabel="time [s]", ylabel="command [unit of each]", title="Commands: medians, bands of 90 %")
+    below(axes, ncols=3)
+    return [fault.text for fault in broken]
+
+
+def draw_angles(result: Result, axes: Any) -> list[str]:
+    """Draw roll, pitch and yaw of members under way: medians and bands of 90 %, and when faults begin.
+
+    Args:
+        result: A result with attitudes.
+        axes: Matplotlib axes.
+
+    Returns:
+        Lines on the faults.
+    """
+    for i, name in enumerate(("euler[0]", "euler[1]", "euler[2]")):
+        survey = survey_of(result, quantity_of(name))
+        levels = np.degrees(at_levels(survey.values, survey.counted, LEVELS))
+        _band(axes, survey.time, levels, i, WORDS[name], banded=survey.total > 1)
+    _mark_faults(axes, result)
+    bands = ": medians, bands of 90 %" if survey.total > 1 else ""
+    axes.set(xlabel="time [s]", ylabel="angle [deg]", title=f"Attitude{bands}")
+    below(axes, ncols=4)
+    return [fault.text for fault in faults(result)]
+
+
+def _band(axes: Any, time: np.ndarray, levels: np.ndarray, i: int, label: str, banded: bool = True) -> None:
+    """Draw a median and the band about it (3, f)."""
+    look, marker = style(i), "o" if len(time) < 3 else ""
+    if banded and (levels[2] > levels[0]).any():
+        axes.fill_between(time, levels[0], levels[2], facecolor=look["color"], alpha=0.2, hatch=hatch(i),
+                          edgecolor=look["color"], linewidth=0)  # fmt: skip
+    axes.plot(time, levels[1], label=label, marker=marker, linewidth=1.4, **look)
+    axes.grid(True, alpha=0.3)
+
+
+def _mark_faults(axes: Any, result: Result) -> None:
+    """Draw a line where each fault begins."""
+    for i, fault in enumerate(faults(result)):
+        axes.axvline(max(fault.time, float(result.time[0])), color="black", linestyle=":", linewidth=1.4,
+                     label="fault" if i == 0 else None)  # fmt: skip

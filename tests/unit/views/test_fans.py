@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Fans of angles: ends are marked about the direction that the members had when they ended."""
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.common.status import Status
+from tests.support.made import made
+
+
+def turning(turns, end, k=61):
+    """Members whose heading makes so many turns in a minute, each until its end (n,) [s], where it stays."""
+    time, end = np.linspace(0.0, 60.0, k), np.asarray(end, dtype=float)
+    n = len(end)
+    spread = np.linspace(-0.3, 0.3, n)
+    heading = 2.0 * np.pi * turns * np.minimum(time[:, None], np.where(np.isnan(end), np.inf, end)) / 60.0 + spread
+    c, s, zero = np.cos(heading), np.sin(heading), np.zeros_like(heading)
+    attitude = np.stack([c, -s, zero, s, c, zero, zero, zero, zero + 1.0], axis=-1).reshape(k, n, 3, 3)
+    status = np.where(np.isnan(end), Status.OK, Status.FLOOR)
+    position = np.ones((k, n, 3)) * np.arange(n)[:, None]
+    return made(position, time, status=status, end=end, attitude=attitude), heading[-1]
+
+
+@pytest.mark.parametrize("turns", [-2.2, 0.4, 3.0])
+def test_a_member_that_ended_is_marked_on_the_turn_on_which_it_ended(turns):
+    """The first go on, the last end one after another: a mark is where the line of its member ended."""
+    end = [*np.full(20, np.nan), *np.linspace(5.0, 55.0, 21)]
+    result, heading = turning(turns, end)
+    axes = lw.plots.fan(result, "euler[2]")
+    (marks,) = [one for one in axes.collections if one.get_label().startswith("floor")]
+    when, angle = np.asarray(marks.get_offsets()).T
+    order = np.argsort(when)
+    np.testing.assert_allclose(when[order], end[20:])
+    np.testing.assert_allclose(angle[order], heading[20:], atol=1e-9)
+
+
+@pytest.mark.parametrize("turns", [-0.7, 1.4, 2.6])
+def test_marks_stay_where_members_ended_when_nobody_is_left(turns):
+    """Once the last has ended there is no mean direction any more."""
+    end = np.linspace(20.0, 50.0, 31)
+    result, heading = turning(turns, end)
+    (marks,) = [one for one in lw.plots.fan(result, "euler[2]").collections if one.get_label().startswith("floor")]
+    when, angle = np.asarray(marks.get_offsets()).T
+    np.testing.assert_allclose(angle[np.argsort(when)], heading, atol=1e-9)
+
+
+def test_a_direction_is_known_though_all_that_are_drawn_have_ended():
+    """Of more members than are drawn a few turn on, and none of these is drawn."""
+    end = np.full(4000, 10.0)
+    drawn = lw.shown(turning(2.5, end)[0]).members
+    end[np.setdiff1d(np.arange(1000, 3000), drawn)[:10]] = np.nan
+    result, _ = turning(2.5, end)
+    assert not np.isin(np.flatnonzero(np.isnan(end)), lw.shown(result).members).any()
+    axes = lw.plots.fan(result, "euler[2]")
+    median = next(line for line in axes.lines if line.get_label() == "median").get_ydata()
+    np.testing.assert_allclose(np.diff(median[11:]), 2.0 * np.pi * 2.5 / 60.0, atol=1e-9)

@@ -119,6 +119,6 @@ def test_all_of_them_without_what_windows_has_not():
     environment = os.environ | {"PYTHONPATH": paths, "LGVI_WARP_IMITATED": "1"}
     if os.environ.get("LGVI_WARP_IMITATED"):
         pytest.skip("this is that process")
-    found = subprocess.run([sys.executable, "-m", "pytest", *words], capture_output=True, text=True, timeout=500,
+    found = subprocess.run([sys.executable, "-m", "pytest", *words], capture_output=True, text=True, timeout=240,
                            cwd=ROOT, env=environment, check=False)  # fmt: skip
     assert found.returncode == 0 and "10 passed" in found.stdout, found.stdout[-4000:] + found.stderr[-2000:]

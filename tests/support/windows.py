@@ -6,6 +6,7 @@ descriptor that is only read is not synced; a file that is open is neither repla
 differs shows on Windows alone.
 """
 
+import contextlib
 import ctypes
 import errno
 import multiprocessing
@@ -17,13 +18,16 @@ import sys
 import tempfile
 from collections import namedtuple
 
+with contextlib.suppress(ImportError):  # it has a part for each system, chosen when it is loaded
+    import psutil  # noqa: F401
+
 OPEN_FILES = "/proc/self/fd"
 MISSING = ("O_NOFOLLOW", "O_DIRECTORY", "O_NONBLOCK", "O_CLOEXEC", "statvfs", "set_blocking", "register_at_fork", "fork",
            "sched_getaffinity", "posix_fallocate", "sysconf", "mkfifo")  # fmt: skip
 
 _open, _fsync, _listdir, _replace, _unlink = os.open, os.fsync, os.listdir, os.replace, os.unlink
 _set_blocking, _set_wakeup, _statvfs, _CDLL = os.set_blocking, signal.set_wakeup_fd, os.statvfs, ctypes.CDLL
-WRITES = os.O_WRONLY | os.O_RDWR
+WRITES, TEMPORARY = os.O_WRONLY | os.O_RDWR, tempfile.gettempdir()
 
 
 def opened(path, flags, mode=0o777, *, dir_fd=None):
@@ -72,7 +76,7 @@ def replaced(source, target, *, src_dir_fd=None, dst_dir_fd=None):
 
 def unlinked(path, *, dir_fd=None):
     assert dir_fd is None
-    if os.path.dirname(path) != tempfile.gettempdir():  # a temporary file is removed by Windows itself when it is closed
+    if os.path.dirname(path) != TEMPORARY:  # a temporary file is removed by Windows itself when it is closed
         refuse_open(path)
     _unlink(path)
 

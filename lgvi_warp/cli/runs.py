@@ -137,9 +137,10 @@ def rescued(result: Any, out: Path) -> str:
         f"the first {n:,} of {total:,} members are" if n < total else f"the run is finished: its {n:,} members are"
     )
     try:
+        place_of(path, out)
         result.save(path)
-    except OSError as error:
-        return f"{members} lost: {path}: {error.strerror or error}"
+    except (OSError, SceneError) as error:
+        return f"{members} lost: {path}: {getattr(error, 'strerror', None) or error}"
     return f"{members} saved in {path}" + ("; a run with --store zarr can go on where it stopped" if n < total else "")
 
 

@@ -171,7 +171,12 @@ def _sign(descriptor: int) -> None:
 
 def _release(path: Path, descriptor: int) -> None:
     """Remove the file while it is locked, so that nobody else's is removed, then unlock it."""
+    kept = False
     with contextlib.suppress(OSError):
-        if _is_still(path, descriptor):
+        if kept := _is_still(path, descriptor):
             path.unlink()
+            kept = False
     os.close(descriptor)
+    if kept:  # Windows removes no file that is open
+        with contextlib.suppress(OSError):
+            path.unlink()

@@ -216,7 +216,10 @@ def _of_study(folder: Path, study: str) -> Iterator[str]:
     if os.path.lexists(rows_of):
         text = file_text(inside(folder, rows_of.name), "CSV file")
         with of_study(rows_of):
-            head, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
+            try:
+                head, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
+            except csv.Error as error:
+                raise ValueError(str(error)) from None
         more = (
             f"The first {MOST_ROWS:,} of {len(rows):,} rows; {rows_of.name} has all." if len(rows) > MOST_ROWS else ""
         )

@@ -49,7 +49,9 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
             remedy = "these are parts of different runs; merge parts of one run"
             raise SceneError(f"{text}: {remedy}" for text in mismatches or ["another recipe"])
     target = Path(out)
-    target = target if target.suffix == ".zarr" else target / first.path.name
+    if target.suffix != ".zarr":
+        safe_files.inside(target, first.path.name)
+        target /= first.path.name
     with explained(target), held(target):
         if os.path.lexists(target) and not overwrite:
             raise SceneError([f"{target}: holds a run already; give --overwrite, or another folder"])

@@ -23,6 +23,7 @@ from lgvi_warp.runs.result import END_TIME, Result
 from lgvi_warp.runs.store.block_files import damaged, name_of
 from lgvi_warp.runs.store.folder import KEPT, ROOT, Folder
 from lgvi_warp.runs.store.kept import keep_of, members_kept
+from lgvi_warp.runs.outcomes import begun_beyond
 from lgvi_warp.runs.store.layout import KEPT_MEMBER, MEMBER
 from lgvi_warp.runs.store.layout_check import understood
 from lgvi_warp.statistics.estimate import Estimates
@@ -279,7 +280,7 @@ def result_of(
         samples=Arrays(group, fields, 1, at),
         **Result.per_member(small),
         parameters=Arrays(group, varied, 0, at, shared),
-        messages=messages + remarks,
+        messages=messages + remarks + begun_beyond(small["status"], small["failure_time"]),
         provenance=provenance,
         statistics=estimates,
         terms=of_scene,

@@ -11,7 +11,6 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.common.real_numbers import column_names
 
-
 # Dimensions of the draws of a posterior, as ArviZ calls them.
 DRAWS = ("chain", "draw")
 

@@ -60,7 +60,9 @@ def begun_beyond(status: np.ndarray, failure_time: np.ndarray) -> tuple[str, ...
     codes, numbers = np.unique(np.asarray(status)[begun], return_counts=True)
     by = ", ".join(f"{Status(int(code)).name.lower()} {number:,}" for code, number in zip(codes, numbers, strict=True))
     some = f"{int(begun.sum()):,} of {len(status):,} members begin at or beyond an event ({by}; the first: member "
-    return (f"{some}{int(begun.argmax())}) and count as stopped at t = 0; start them before it, or leave the event out",)
+    return (
+        f"{some}{int(begun.argmax())}) and count as stopped at t = 0; start them before it, or leave the event out",
+    )
 
 
 def failure_text(result: Result) -> str:

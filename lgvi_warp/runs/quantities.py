@@ -50,6 +50,11 @@ class OfResult:
         return self.of.quantity.fields if isinstance(self.of, Functional) else FIELDS
 
     @property
+    def unit(self) -> str:
+        """Its unit; "" where that is not known."""
+        return self.of.unit if isinstance(self.of, Functional) else ""
+
+    @property
     def over_path(self) -> bool:
         """Whether it needs the samples at all times."""
         return isinstance(self.of, Functional) and self.of.over_path
@@ -125,9 +130,9 @@ class OfEnds(OfResult):
         return super().fields if self.kind == "at" else ("position",)
 
     @property
-    def is_function(self) -> bool:
-        """It is none of a whole Result."""
-        return False
+    def unit(self) -> str:
+        """Its unit."""
+        return {"outcome": "1", "end_time": "s"}.get(self.kind, super().unit)
 
     def check(self, events: Sequence[Event]) -> None:
         """Refuse an outcome that no member of a scene can have, or that the status of members does not tell.
@@ -140,7 +145,9 @@ class OfEnds(OfResult):
         """
         if not self.outcome:
             return
-        check_outcomes("of", [self.outcome], outcomes([event.key for event in events], [event.status for event in events]))
+        check_outcomes(
+            "of", [self.outcome], outcomes([event.key for event in events], [event.status for event in events])
+        )
         named = {event.key: event.status for event in events}.get(self.outcome)
         if named is not None and sum(event.status == named for event in events) > 1:
             remedy = f'ask for "outcome {named.name.lower()}", of both, or gather lw.Outcome'
@@ -172,7 +179,9 @@ class OfEnds(OfResult):
         so = Ends(status, np.asarray(number), result.end_time, tuple(event.key for event in events)).are(self.outcome)
         if self.kind == "outcome":
             return so[:, None].astype(np.float64)
-        numbers = result.end_time[:, None] if self.kind == "end_time" else self._numbers(result, slice(-1, None), members)
+        numbers = (
+            result.end_time[:, None] if self.kind == "end_time" else self._numbers(result, slice(-1, None), members)
+        )
         return np.where(so[:, None], numbers, np.nan)
 
     def _numbers(self, result: Result, when: slice, members: Any) -> np.ndarray:
@@ -238,7 +247,8 @@ def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
     """Read one or several quantities of interest.
 
     Args:
-        of: A text such as "max(depth)", "outcome floor", "end_time floor" or "depth at 30", a Quantity, a function of a Result or of (samples, members), or several of these.
+        of: A text such as "max(depth)", "outcome floor", "end_time floor" or "depth at 30", a Quantity, a
+            function of a Result or of (samples, members), or several of these.
 
     Returns:
         The quantities, in order.

@@ -28,7 +28,8 @@ Dims = dict[str, tuple[str, ...]]
 WORDS = ("name", "settings", "unit", "confidence", "interval", "dims")
 
 
-# Type of a statistic -> an array that its estimates lack where an earlier version gathered them, and their value another meaning.
+# Type of a statistic -> an array that its estimates lack where an earlier version gathered them: their value meant
+# something else.
 SINCE = {"outcome": "alone", "first_passage": "stopped"}
 
 
@@ -112,7 +113,10 @@ class Estimate(Summarized):
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
         """Its numbers at the last sample time, and what its arrays are."""
-        return f"Estimate {self.name!r} at {self.time[-1]:g} s", [*_shown(self), ("arrays", summaries.listed(self.arrays, 30))]
+        return f"Estimate {self.name!r} at {self.time[-1]:g} s", [
+            *_shown(self),
+            ("arrays", summaries.listed(self.arrays, 30)),
+        ]
 
     def with_interval(self, interval: str, arrays: Mapping[str, np.ndarray]) -> Estimate:
         """Return the same estimate with another interval.
@@ -172,7 +176,9 @@ class Estimates(Summarized, Mapping[str, Estimate]):
     def summary_rows(self) -> tuple[str, summaries.Rows]:
         """The numbers of each at the last sample time."""
         end = max((one.time[-1] for one in self.values()), default=0.0)
-        return f"Estimates of {len(self)} statistics at {end:g} s", [row for one in self.values() for row in _shown(one)]
+        return f"Estimates of {len(self)} statistics at {end:g} s", [
+            row for one in self.values() for row in _shown(one)
+        ]
 
     @functools.cached_property
     def dataset(self) -> xarray.Dataset:

@@ -121,7 +121,7 @@ def test_a_users_condition():
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 def test_all_that_begin_beyond_an_event_are_stopped_at_once(method, dtype):
-    """Of members at depths about the floor half rise at 20 m/s: out of it within the first step of 0.1 s, if they began below."""
+    """Of members about the floor half rise at 20 m/s: through it within the first step of 0.1 s, if they began below."""
     depth = np.array([6.9, 7.0, 7.1, 7.5, 8.5, 30.0])
     b = np.stack([np.zeros(12), np.zeros(12), np.repeat(depth, 2)], axis=1)
     nu = np.zeros((12, 3))
@@ -147,7 +147,9 @@ def test_all_that_begin_beyond_an_event_are_stopped_at_once(method, dtype):
 
 
 def test_a_start_at_the_surface_is_no_end():
-    scene = lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), events=stops(surface=0.0), start=lw.Start(velocity=(0, 0, 1.0)))
+    scene = lw.Scene(
+        VEHICLE, lw.Environment(gravity=GRAVITY), events=stops(surface=0.0), start=lw.Start(velocity=(0, 0, 1.0))
+    )
     r = lw.solve(scene, "psi_s", h=0.1, t1=0.3)
     assert r.status[0] == lw.Status.OK and not any("begin" in message for message in r.messages)
 
@@ -163,7 +165,9 @@ def test_what_begins_beyond_in_moving_water_or_under_control_keeps_its_start(tmp
     assert 5 < beyond.sum() < 20 and (r.end_time[beyond] == 0.0).all() and (r.end_time[~beyond] > 0.0).all()
     for field in FIELDS:
         whole = np.asarray(getattr(r, field))
-        np.testing.assert_allclose(whole[:, beyond], np.broadcast_to(whole[:1, beyond], whole[:, beyond].shape), atol=1e-12)
+        np.testing.assert_allclose(
+            whole[:, beyond], np.broadcast_to(whole[:1, beyond], whole[:, beyond].shape), atol=1e-12
+        )
     assert sum("begin at or beyond" in message for message in lw.open_run(tmp_path / "run.zarr").messages) == 1
 
 

@@ -18,12 +18,12 @@ from lgvi_warp.engine.keepers.observation import Observation, Observing, observa
 from lgvi_warp.physics.control.controller import terms_of
 from lgvi_warp.physics.control.signals import IN_FILES
 from lgvi_warp.physics.terms.base import Term
+from lgvi_warp.runs.outcomes import begun_beyond
 from lgvi_warp.runs.provenance import at_end
 from lgvi_warp.runs.result import END_TIME, Result
 from lgvi_warp.runs.store.block_files import damaged, name_of
 from lgvi_warp.runs.store.folder import KEPT, ROOT, Folder
 from lgvi_warp.runs.store.kept import keep_of, members_kept
-from lgvi_warp.runs.outcomes import begun_beyond
 from lgvi_warp.runs.store.layout import KEPT_MEMBER, MEMBER
 from lgvi_warp.runs.store.layout_check import understood
 from lgvi_warp.statistics.estimate import Estimates

@@ -258,8 +258,8 @@ def _add_sensitivity(verbs: Any) -> None:
     add("--analysis", choices=("sobol", "morris"), default="sobol", help="default sobol")
     add("--samples", metavar="N", type=int, help="groups of the design (default: sobol 256, morris 64)")
     add("--first-order", action="store_true", help="sobol without pairs of factors: about half the members")
-    add("--replicates", metavar="R", type=int, default=8, help="sobol: independent sequences, whose spread gives the intervals "
-        "(default 8)")  # fmt: skip
+    add("--replicates", metavar="R", type=int, default=8, help="sobol: independent sequences, whose spread gives the "
+        "intervals (default 8)")  # fmt: skip
     add("--group", metavar="NAME=FACTORS", action="append", default=[], help="sobol: factors to take for one, as "
         '"start=start.position,start.velocity"; may be given several times')  # fmt: skip
     add("--failed", choices=("refuse", "drop"), default="refuse",

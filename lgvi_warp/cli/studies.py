@@ -88,7 +88,11 @@ def sensitivity(chosen: argparse.Namespace) -> int:
     samples = {"sobol": 256, "morris": 64}[chosen.analysis] if chosen.samples is None else chosen.samples
     options: dict[str, Any] = {}
     if chosen.analysis == "sobol":
-        options = {"second_order": not chosen.first_order, "replicates": chosen.replicates, "groups": _groups(chosen.group)}
+        options = {
+            "second_order": not chosen.first_order,
+            "replicates": chosen.replicates,
+            "groups": _groups(chosen.group),
+        }
     try:
         with shown(chosen.quiet) as progress:
             indices: uq.Indices = getattr(uq, chosen.analysis)(

@@ -11,6 +11,9 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.common.real_numbers import column_names
 
+# Dimensions of the draws of a posterior, as ArviZ calls them.
+DRAWS = ("chain", "draw")
+
 
 def is_labelled(value: Any) -> bool:
     """Tell whether a value has named columns, whose order then does not matter.
@@ -31,7 +34,8 @@ def columns_by_name(faults: Faults, key: str, value: Any) -> dict[str, Any]:
         faults: Receives what is wrong: labels that are no texts, or that occur twice.
         key: Name of the value in a fault.
         value: A mapping, a data frame (pandas, polars, pyarrow, or another with `columns` and table[name]), a structured
-            array, an xarray Dataset, or a DataArray with labels along its second dimension.
+            array, an xarray Dataset (of a posterior by chain and draw, all chains one after the other), or a DataArray with
+            labels along its second dimension.
 
     Returns:
         Label -> column, in the value's order; empty after a fault.
@@ -97,6 +101,9 @@ def _read(value: Any, labels: Sequence[str]) -> dict[str, Any]:
         return {label: np.asarray(value)[:, i] for i, label in enumerate(labels)}
     columns = {label: value[label] for label in labels}
     if all(hasattr(column, "dims") and hasattr(column, "transpose") for column in columns.values()):
+        if all(column.dims[:2] == DRAWS for column in columns.values()):
+            # Of a posterior all draws of all chains are members.
+            return {label: np.asarray(column).reshape(-1, *column.shape[2:]) for label, column in columns.items()}
         return {label: np.asarray(column) for label, column in _members_first(columns).items()}
     return {label: column if isinstance(column, np.ndarray | list | tuple) else _plain(column)
             for label, column in columns.items()}  # fmt: skip

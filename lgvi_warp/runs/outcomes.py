@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from lgvi_warp.common.status import Status, stop_time
+from lgvi_warp.common.status import Status, stop_time, stopped
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
@@ -42,6 +42,27 @@ def outcome_text(result: Result, code: Status) -> str:
     first = int(members[stop_time(result)[members].argmin()])
     value = "" if code.stopped else f", value {result.failure_value[first]:.4g}"
     return f"{many} (first: member {first} at {stop_time(result)[first]:g} s{value}): {code.text}"
+
+
+def begun_beyond(status: np.ndarray, failure_time: np.ndarray) -> tuple[str, ...]:
+    """Tell of members that an event stopped before their first step.
+
+    Args:
+        status: Status of each member, (n,).
+        failure_time: When each was stopped or failed [s], (n,).
+
+    Returns:
+        One message; none where no member begins beyond an event.
+    """
+    begun = stopped(status) & (np.asarray(failure_time) == 0.0)
+    if not begun.any():
+        return ()
+    codes, numbers = np.unique(np.asarray(status)[begun], return_counts=True)
+    by = ", ".join(f"{Status(int(code)).name.lower()} {number:,}" for code, number in zip(codes, numbers, strict=True))
+    some = f"{int(begun.sum()):,} of {len(status):,} members begin at or beyond an event ({by}; the first: member "
+    return (
+        f"{some}{int(begun.argmax())}) and count as stopped at t = 0; start them before it, or leave the event out",
+    )
 
 
 def failure_text(result: Result) -> str:

@@ -24,7 +24,7 @@ from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.physics.control.signals import ordered
 from lgvi_warp.runs.provenance import provenance
-from lgvi_warp.runs.quantities import OfInterest, OfResult, quantities
+from lgvi_warp.runs.quantities import OfEnds, OfInterest, OfResult, quantities
 from lgvi_warp.runs.result import Result
 from lgvi_warp.runs.run import completed
 from lgvi_warp.runs.settle import enough_iterations, make_plan
@@ -430,8 +430,11 @@ def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -
         What to save.
 
     Raises:
-        SceneError: if a quantity looks over the path and no interval of samples is known.
+        SceneError: if a quantity looks over the path and no interval of samples is known, or is of an outcome that is none.
     """
+    for each in of:
+        if isinstance(each, OfEnds):
+            each.check(scene.events)
     if save is not None or not of:
         return save
     fields = ordered(name for each in of for name in each.fields)
@@ -439,8 +442,10 @@ def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -
     if paths and scene.run.save_every is None:
         problem = f"save = None: is missing, and {paths[0]} looks over the path"
         raise SceneError([f"{problem}; give save=lw.SaveAt(every=...) or [run] save_every"])
-    has_function = any(each.is_function for each in of)
-    return SaveAt(every=scene.run.save_every if paths or has_function else None, fields=fields)
+    if paths or any(each.is_function for each in of):
+        return SaveAt(every=scene.run.save_every, fields=fields)
+    times = sorted({each.when for each in of if isinstance(each, OfEnds) and each.when is not None})
+    return SaveAt(at=times or None, fields=fields)
 
 
 def prepare(

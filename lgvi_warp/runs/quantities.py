@@ -11,11 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.real_numbers import NotReal, real_results
 from lgvi_warp.physics.control.signals import SAVED
 from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.physics.terms.events import Event
+from lgvi_warp.physics.terms.events import from_list as events_of
 from lgvi_warp.runs.result import Result
+from lgvi_warp.statistics.ends import Ends, check_outcomes, outcomes
 from lgvi_warp.statistics.functional import Functional, functional
 from lgvi_warp.statistics.quantity import Quantity
 
@@ -45,6 +48,11 @@ class OfResult:
     def fields(self) -> tuple[str, ...]:
         """Names of the samples it needs; all of them for a function, because what that uses cannot be known."""
         return self.of.quantity.fields if isinstance(self.of, Functional) else FIELDS
+
+    @property
+    def unit(self) -> str:
+        """Its unit; "" where that is not known."""
+        return self.of.unit if isinstance(self.of, Functional) else ""
 
     @property
     def over_path(self) -> bool:
@@ -99,6 +107,117 @@ class OfResult:
         return [self.label] if count == 1 else [f"{self.label}[{i}]" for i in range(count)]
 
 
+@dataclass(frozen=True)
+class OfEnds(OfResult):
+    """How or when members ended, or a quantity there or at a time.
+
+    "outcome floor" is 1 for members that ended so, else 0; "end_time floor" says when, and "depth at floor" gives the depth
+    there, NaN for members that ended otherwise; "depth at 30" is the depth after 30 s.
+
+    Attributes:
+        kind: "outcome", "end_time" or "at".
+        outcome: Name of the outcome; "" for a time.
+        when: The time [s].
+    """
+
+    kind: str = "at"
+    outcome: str = ""
+    when: float | None = None
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of the samples it needs."""
+        return super().fields if self.kind == "at" else ("position",)
+
+    @property
+    def unit(self) -> str:
+        """Its unit."""
+        return {"outcome": "1", "end_time": "s"}.get(self.kind, super().unit)
+
+    def check(self, events: Sequence[Event]) -> None:
+        """Refuse an outcome that no member of a scene can have, or that the status of members does not tell.
+
+        Args:
+            events: The events of the scene.
+
+        Raises:
+            SceneError: There is no such outcome, or two events have its status.
+        """
+        if not self.outcome:
+            return
+        check_outcomes(
+            "of", [self.outcome], outcomes([event.key for event in events], [event.status for event in events])
+        )
+        named = {event.key: event.status for event in events}.get(self.outcome)
+        if named is not None and sum(event.status == named for event in events) > 1:
+            remedy = f'ask for "outcome {named.name.lower()}", of both, or gather lw.Outcome'
+            raise refusal("of", self.label, f"is one of several events of the status {named.name.lower()}", remedy)
+
+    def values(self, result: Result, members: Any = None) -> np.ndarray:
+        """Compute its numbers for each member.
+
+        Args:
+            result: A result with the fields that it needs.
+            members: As of `OfResult.values`.
+
+        Returns:
+            float64 array, shape (n, m).
+
+        Raises:
+            SceneError: If there is no such outcome, or no sample at the time.
+        """
+        if self.when is not None:
+            rows = np.flatnonzero(np.abs(result.time - self.when) <= 1e-9 * max(1.0, result.time[-1]))
+            if not len(rows):
+                raise refusal("of", self.label, "names no sample time", "keep one there: save=lw.SaveAt(at=[...])")
+            return self._numbers(result, slice(rows[0], rows[0] + 1), members)
+        events = events_of(result.provenance["scene"].get("events", ()))
+        self.check(events)
+        status = np.asarray(result.status)
+        # Names of events are told by their statuses, which `check` has found to differ.
+        number = sum(np.where(status == event.status, 1 + i, 0) for i, event in enumerate(events))
+        so = Ends(status, np.asarray(number), result.end_time, tuple(event.key for event in events)).are(self.outcome)
+        if self.kind == "outcome":
+            return so[:, None].astype(np.float64)
+        numbers = (
+            result.end_time[:, None] if self.kind == "end_time" else self._numbers(result, slice(-1, None), members)
+        )
+        return np.where(so[:, None], numbers, np.nan)
+
+    def _numbers(self, result: Result, when: slice, members: Any) -> np.ndarray:
+        """The quantity at one sample time, (n, m)."""
+        assert isinstance(self.of, Functional)
+        return self.of(*samples_of(result, when, members))[0]
+
+    def labels(self, count: int) -> list[str]:
+        """Name each of its numbers."""
+        if self.kind != "at":
+            return [self.label]
+        end = self.label.partition(" at ")[2]
+        return [f"{label} at {end}" for label in super().labels(count)]
+
+
+def _of_ends(text: str) -> OfEnds | None:
+    """The quantity that a text names by an outcome or a time; None where it names neither. Raises SceneError."""
+    kind, _, outcome = text.partition(" ")
+    if kind in ("outcome", "end_time") and outcome.strip():
+        return OfEnds(text, functional("of", "position"), kind=kind, outcome=outcome.strip())
+    name, _, end = (part.strip() for part in text.partition(" at "))
+    if not end:
+        return None
+    function = functional("of", name)
+    if function.over_path:
+        raise refusal("of", text, "looks over the path, which has no time", f"give {name!r} alone")
+    label = f"{function.label} at {end}"
+    try:
+        when = float(end)
+    except ValueError:
+        return OfEnds(label, function, outcome=end)
+    if not 0.0 <= when < np.inf:
+        raise refusal("of", text, "is at no time of a run", "give a time from 0 [s]")
+    return OfEnds(label, function, when=when)
+
+
 class _Samples(dict[str, np.ndarray]):
     """Samples of a result in the form that functions of (samples, members) take."""
 
@@ -128,7 +247,8 @@ def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
     """Read one or several quantities of interest.
 
     Args:
-        of: A text such as "max(depth)", a Quantity, a function of a Result or of (samples, members), or several of these.
+        of: A text such as "max(depth)", "outcome floor", "end_time floor" or "depth at 30", a Quantity, a
+            function of a Result or of (samples, members), or several of these.
 
     Returns:
         The quantities, in order.
@@ -144,6 +264,9 @@ def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
             results.append(OfResult(getattr(request, "__name__", type(request).__name__), request))
         elif isinstance(request, str | Quantity) or callable(request):
             with faults.including():
+                if isinstance(request, str) and (of_ends := _of_ends(request)) is not None:
+                    results.append(of_ends)
+                    continue
                 function = functional("of", request)
                 results.append(OfResult(function.label, function, not isinstance(request, str)))
         else:

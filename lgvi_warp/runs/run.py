@@ -21,7 +21,7 @@ from lgvi_warp.engine.loop import Merged, RunProgress, run_blocks
 from lgvi_warp.engine.plan import NotSurveyed, Plan
 from lgvi_warp.engine.work import Work
 from lgvi_warp.runs import member_fields
-from lgvi_warp.runs.outcomes import failure_text
+from lgvi_warp.runs.outcomes import begun_beyond, failure_text
 from lgvi_warp.runs.provenance import at_end, messages, provenance
 from lgvi_warp.runs.result import Drawn, Result
 from lgvi_warp.scene import plausibility
@@ -225,7 +225,7 @@ def _in_memory(
         samples=histories,
         **Result.per_member(of_members),
         parameters=Drawn(plan.ensemble, n),
-        messages=texts + remarks + on_the_way,
+        messages=texts + remarks + on_the_way + begun_beyond(of_members["status"], of_members["failure_time"]),
         provenance=at_end(content, of_members, n, plan.ensemble.members),
         terms=tuple(plan.ensemble.scene.terms),
         statistics=estimates,

@@ -29,7 +29,8 @@ Dims = dict[str, tuple[str, ...]]
 WORDS = ("name", "settings", "unit", "confidence", "interval", "dims")
 
 
-# Type of a statistic -> an array that its estimates lack where an earlier version gathered them, and their value another meaning.
+# Type of a statistic -> an array that its estimates lack where an earlier version gathered them: their value meant
+# something else.
 SINCE = {"outcome": "alone", "first_passage": "stopped"}
 
 
@@ -43,8 +44,8 @@ def along(names: Iterable[str], *dims: str) -> Dims:
     return dict.fromkeys(names, dims)
 
 
-@dataclass(frozen=True, eq=False)
-class Estimate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Estimate(Summarized):
     """The values of one statistic with their intervals, as named arrays: estimate["count"].
 
     Arrays that all estimates have are attributes too: value, lower, upper, count.
@@ -74,20 +75,26 @@ class Estimate:
         """Return one of the arrays by its name."""
         return self.arrays[name]
 
+    def _array(self, name: str) -> np.ndarray:
+        """One of the arrays that most estimates have, as an attribute."""
+        if name not in self.arrays:
+            raise AttributeError(f"{self.name!r} has no {name}; it has {', '.join(self.arrays)}", name=name, obj=self)
+        return self.arrays[name]
+
     @property
     def value(self) -> np.ndarray:
         """The estimated statistic itself, with dimensions `dims["value"]`."""
-        return self.arrays["value"]
+        return self._array("value")
 
     @property
     def lower(self) -> np.ndarray:
         """Lower ends of the intervals, shaped like `value`."""
-        return self.arrays["lower"]
+        return self._array("lower")
 
     @property
     def upper(self) -> np.ndarray:
         """Upper ends of the intervals, shaped like `value`."""
-        return self.arrays["upper"]
+        return self._array("upper")
 
     @property
     def half_width(self) -> np.ndarray:
@@ -98,12 +105,19 @@ class Estimate:
     @property
     def count(self) -> np.ndarray:
         """Number of members behind the value at each time, (k,)."""
-        return self.arrays["count"]
+        return self._array("count")
 
     @property
     def time(self) -> np.ndarray:
         """Sample times (k,) [s] of the values."""
         return self.coordinates["time"]
+
+    def summary_rows(self) -> tuple[str, summaries.Rows]:
+        """Its numbers at the last sample time, and what its arrays are."""
+        return f"Estimate {self.name!r} at {self.time[-1]:g} s", [
+            *_shown(self),
+            ("arrays", summaries.listed(self.arrays, 30)),
+        ]
 
     def with_interval(self, interval: str, arrays: Mapping[str, np.ndarray]) -> Estimate:
         """Return the same estimate with another interval.
@@ -161,10 +175,11 @@ class Estimates(Summarized, Mapping[str, Estimate]):
         return len(self._found)
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
-        """Name, unit, shape and last sample time of each."""
-        rows = [(name, f"{' x '.join(map(str, one.value.shape))} values{f' [{one.unit}]' if one.unit != '1' else ''} "
-                 f"({', '.join(one.dims['value'])}), to {one.time[-1]:g} s") for name, one in self.items()]  # fmt: skip
-        return f"Estimates of {len(self)} statistics", rows
+        """The numbers of each at the last sample time."""
+        end = max((one.time[-1] for one in self.values()), default=0.0)
+        return f"Estimates of {len(self)} statistics at {end:g} s", [
+            row for one in self.values() for row in _shown(one)
+        ]
 
     @functools.cached_property
     def dataset(self) -> xarray.Dataset:
@@ -218,6 +233,14 @@ class Estimates(Summarized, Mapping[str, Estimate]):
                 raise ValueError(f"{words['name']!r} is of an earlier version, which took other events for censoring")
             estimates.append(Estimate(**words, arrays=values, coordinates=coordinates))
         return cls(estimates)
+
+
+def _shown(one: Estimate) -> summaries.Rows:
+    """Label, value and interval of each of an estimate's numbers at the last sample time."""
+    from lgvi_warp.statistics.table import rows_of
+
+    lines = [(label, f"{value}, {ends}, {members}") for label, value, ends, members in rows_of(Estimates([one]))]
+    return lines or [(one.name, f"{' x '.join(map(str, one.value.shape))} values ({', '.join(one.dims['value'])})")]
 
 
 def _renamed(single: xarray.Dataset, word: str) -> dict[Hashable, str]:

@@ -32,12 +32,22 @@ def table(estimates: Estimates) -> list[str]:
     Args:
         estimates: the estimates of a run.
     """
+    rows = rows_of(estimates)
+    widths = [max((len(row[i]) for row in rows), default=0) for i in range(3)]
+    return ["  ".join([*(text.ljust(width) for text, width in zip(row, widths, strict=False)), row[3]]) for row in rows]
+
+
+def rows_of(estimates: Estimates) -> list[tuple[str, str, str, str]]:
+    """Return the texts of each number: its label, its value, its interval, and its number of members.
+
+    Args:
+        estimates: the estimates of a run.
+    """
     rows = []
     for label, unit, value, lower, upper, members in entries(estimates):
         ends = f"{lower:.5g} to {upper:.5g}" if np.isfinite(lower) or np.isfinite(upper) else "no interval"
         rows.append((label, f"{value:.6g} {unit}".rstrip(), ends, f"{members:,} members"))
-    widths = [max((len(row[i]) for row in rows), default=0) for i in range(3)]
-    return ["  ".join([*(text.ljust(width) for text, width in zip(row, widths, strict=False)), row[3]]) for row in rows]
+    return rows
 
 
 Line = tuple[str, float, float, float]

@@ -118,6 +118,59 @@ def test_a_users_condition():
     np.testing.assert_array_equal(r.position[-1, ~away], r.position[0, ~away])
 
 
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+@pytest.mark.parametrize("method", ["psi_s", "rk4"])
+def test_all_that_begin_beyond_an_event_are_stopped_at_once(method, dtype):
+    """Of members about the floor half rise at 20 m/s: through it within the first step of 0.1 s, if they began below."""
+    depth = np.array([6.9, 7.0, 7.1, 7.5, 8.5, 30.0])
+    b = np.stack([np.zeros(12), np.zeros(12), np.repeat(depth, 2)], axis=1)
+    nu = np.zeros((12, 3))
+    nu[:, 2] = np.tile([-20.0, 1.0], 6)
+    scene = lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), events=stops(floor=7.0))
+    members = lw.Ensemble.from_states(scene, b, np.tile(np.eye(3), (12, 1, 1)), nu, np.zeros((12, 3)))
+    asked = [lw.Outcome("floor"), lw.EndTime("floor", lw.Mean())]
+    r = lw.solve(members, method, h=0.1, t1=0.3, dtype=dtype, statistics=asked)
+    beyond = b[:, 2] > 7.0
+    assert beyond.sum() == 8 and (r.status[beyond] == lw.Status.FLOOR).all() and (r.end_time[beyond] == 0.0).all()
+    # Momenta are rounded once, and positions to their spacing; an arrival is sought to three spacings.
+    spacing = float(np.finfo(dtype).eps)
+    for field in FIELDS:
+        first, final = (getattr(r, field)[k, beyond] for k in (0, -1))
+        np.testing.assert_allclose(final, first, rtol=2.0 * spacing, atol=spacing)
+    # One that begins on the floor goes on if it rises. Of the four others the two that sink arrive within the run.
+    assert (r.status[~beyond] == [0, lw.Status.FLOOR] * 2).all()
+    assert r.end_time[~beyond][1] == pytest.approx(0.1, abs=3 * 3 * 7.0 * spacing)
+    text = "8 of 12 members begin at or beyond an event (floor 8; the first: member 4) and count as stopped at t = 0"
+    assert any(message.startswith(text) for message in r.messages)
+    assert r.statistics["outcome floor"].value.tolist() == [8 / 12, 10 / 12] == [
+        (r.end_time[r.status == lw.Status.FLOOR] <= t).sum() / 12 for t in r.time]  # fmt: skip
+
+
+def test_a_start_at_the_surface_is_no_end():
+    scene = lw.Scene(
+        VEHICLE, lw.Environment(gravity=GRAVITY), events=stops(surface=0.0), start=lw.Start(velocity=(0, 0, 1.0))
+    )
+    r = lw.solve(scene, "psi_s", h=0.1, t1=0.3)
+    assert r.status[0] == lw.Status.OK and not any("begin" in message for message in r.messages)
+
+
+def test_what_begins_beyond_in_moving_water_or_under_control_keeps_its_start(tmp_path):
+    """The state of such a kernel is relative to the water, which goes on moving; a controller has measured at t = 0."""
+    start = {"position": [0.0, 0.0, 21.0], "velocity": [0.5, 0.0, -3.0]}
+    scene = lw.Scene.named("remus_100", start=start, events=[{"type": "floor", "depth": 20.0}],
+                           terms=[lw.GaussMarkovCurrent(standard_deviation=(0.3, 0.3, 0.0), time_constant=2.0)])  # fmt: skip
+    r = lw.solve(lw.Ensemble(scene, 20, 1, {"start.position[2]": lw.Uniform(low=19.0, high=23.0)}), h=0.05, t1=2.0,
+                 save=lw.SaveAt(every=0.5), store=tmp_path / "run.zarr")  # fmt: skip
+    beyond = r.position[0, :, 2] > 20.0
+    assert 5 < beyond.sum() < 20 and (r.end_time[beyond] == 0.0).all() and (r.end_time[~beyond] > 0.0).all()
+    for field in FIELDS:
+        whole = np.asarray(getattr(r, field))
+        np.testing.assert_allclose(
+            whole[:, beyond], np.broadcast_to(whole[:1, beyond], whole[:, beyond].shape), atol=1e-12
+        )
+    assert sum("begin at or beyond" in message for message in lw.open_run(tmp_path / "run.zarr").messages) == 1
+
+
 # A floor 1.5 m below the start.
 FALL = {"b": (0.0, 0.0, 5.0), "R": TURN, "nu": (0.3, 0.1, 0.5), "Om": (0.4, -0.3, 0.2)}
 FALLING = lw.Scene(HEAVY, lw.Environment(gravity=9.8), events=stops(floor=6.5))

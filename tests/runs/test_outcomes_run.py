@@ -8,6 +8,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.physics.terms import events
+from lgvi_warp.runs.quantities import quantities
 from tests.support.stops import FarAway, stops
 
 STATISTICS = [
@@ -179,6 +180,43 @@ def test_replicates_of_a_design():
     hits = (np.asarray(result.status) == lw.Status.FLOOR).sum()
     for name in ("outcome floor", "exceedance depth above 26", "first_passage depth above 26"):
         assert round(float(np.ravel(result.statistics[name].value)[-1]) * 512) == hits
+
+
+def test_quantities_of_outcomes_and_times():
+    members = fleet(300, stops(floor=26.0, surface=17.0))
+    result = lw.solve(members, **SETTINGS)
+    status, when = np.asarray(result.status), result.end_time
+    floor = status == lw.Status.FLOOR
+    exact = {
+        "outcome floor": floor, "outcome ok": status == 0, "outcome stopped": status > 0,
+        "end_time floor": np.where(floor, when, np.nan), "depth at floor": np.where(floor, result.depth[-1], np.nan),
+        "position at surface": np.where((status == lw.Status.SURFACE)[:, None], result.position[-1], np.nan),
+        "depth at 8": result.depth[2], "norm(velocity) at 40": np.linalg.norm(result.velocity[-1], axis=1),
+    }  # fmt: skip
+    for text, numbers in exact.items():
+        (quantity,) = quantities(text)
+        found = quantity.values(result)
+        np.testing.assert_array_equal(found, np.reshape(numbers, found.shape), err_msg=text)
+        again = [quantities(label)[0].values(result) for label in quantity.labels(found.shape[1])]
+        np.testing.assert_array_equal(np.concatenate(again, axis=1), found)
+    # The same through `uq`, whose runs keep what these need.
+    how = {name: SETTINGS[name] for name in ("method", "h", "t1")}
+    f = lw.uq.model(
+        members.scene, ["vehicle.buoyancy"], ["outcome floor", "depth at 8", "end_time floor"], failed="nan", **how
+    )
+    Y = f([[1205.0], [1220.0]])
+    np.testing.assert_array_equal(Y[:, 0], [1.0, np.nan])  # the second has no end_time
+    assert 20.0 < Y[0, 1] < 26.0 and 8.0 < Y[0, 2] < 40.0
+    found = lw.uq.sobol(members, ["outcome floor", "outcome surface"], samples=64, second_order=False, **how)
+    assert found.quantities == ("outcome floor", "outcome surface") and found.mean.sum() <= 1.0
+    refused = {"outcome flor": "is no outcome of this scene; did you mean 'floor'", "depth at flor": "did you mean",
+               "max(depth) at floor": "looks over the path", "depth at -1": "is at no time of a run"}  # fmt: skip
+    for text, words in refused.items():
+        with pytest.raises(lw.SceneError, match=words):
+            lw.uq.sobol(members, text, samples=8, **how)
+    two = dataclasses.replace(members.scene, events=(*members.scene.events, lw.Floor(depth=30.0, name="deep")))
+    with pytest.raises(lw.SceneError, match="is one of several events of the status floor"):
+        lw.uq.sobol(lw.Ensemble(two, 1, 1, members.vary), "outcome deep", samples=8, **how)
 
 
 def test_an_outcome_that_no_member_can_have_is_refused():

@@ -121,7 +121,9 @@ def test_the_table_and_its_files(found, tmp_path):
     assert len(rows) == 2 * (3 * 2 + 3)
     assert float(rows[0]["value"]) == found.first[0, 0] and rows[0]["index"] == "first"
     content = json.loads(paths[2].read_text())
-    assert content["provenance"]["ensemble"]["sampling"] == {"saltelli": {"replicates": 8}} and len(content["rows"]) == len(rows)
+    assert content["provenance"]["ensemble"]["sampling"] == {"saltelli": {"replicates": 8}} and len(
+        content["rows"]
+    ) == len(rows)
     back = lw.Ensemble.from_scene(
         lw.Scene.from_dict(content["provenance"]["scene"] | {"ensemble": content["provenance"]["ensemble"]})
     )

@@ -61,6 +61,8 @@ def make_advance(spec):
     looking = warned or energetic
     controlled, feed, respond, held = spec.control is not None, stepping.feed, stepping.respond, stepping.held
     asked = controlled and spec.control.asked
+    nearest, spacing = (stepping.watch.nearest, stepping.watch.spacing) if watched else (stepping.method.step,) * 2
+    water_velocity = stepping.method.water_velocity
     read, write, back_up = make_rows(Lane, types.State, paced, spec.compensated)
     drifts = superpose(spec.laws, "flow") is not None
     sample = make_sample(Lane, spec.compensated, stepping.method, drifts, stills)
@@ -138,6 +140,19 @@ def make_advance(spec):
         kept = x
         if any_frozen:
             x = choose(frozen, at_rest(x), x)
+        # Lanes that end before their first step, by their code.
+        early = zero
+        if wp.static(watched):
+            if k0 == 0:
+                distance, margin, beyond = nearest(x, c, real(h), spacing(x, x, c, real(h)))
+                early = positive(margin - distance, positive(frozen, zero, beyond), zero)
+                if wp.static(stills):
+                    still_start = water_velocity(x, c, real(h))
+                    for j in range(wp.static(width)):
+                        if early[j] > real(0.0):
+                            monitor.still[i, 0][j] = still_start.x[j]
+                            monitor.still[i, 1][j] = still_start.y[j]
+                            monitor.still[i, 2][j] = still_start.z[j]
         if k0 == 0:
             if wp.static(looking):
                 begin(x, c, monitor, h, frozen)
@@ -161,17 +176,20 @@ def make_advance(spec):
                     monitor.first_signals[i, j] = memory[i, monitor.signals[j]]
         if wp.static(controlled and checked):
             if wp.static(asked) or k0 == 0:
-                early = failures(x, frozen)
-                if any_positive(early):
-                    for j in range(wp.static(width)):
-                        if early[j] > real(0.0):
-                            status[i][j] = int(early[j])
-                            failed_step[i][j] = k0
+                failed = failures(x, frozen)
+                early = positive(failed, failed, early)
+        if wp.static(watched or (controlled and checked)):
+            if any_positive(early):
+                for j in range(wp.static(width)):
+                    if early[j] > real(0.0):
+                        status[i][j] = int(early[j])
+                        failed_step[i][j] = k0
+                if wp.static(controlled):
                     keep_signals(memory, i, monitor, 0, early)
-                    kept = choose(early, x, kept)
-                    frozen = frozen + early
-                    any_frozen = True
-                    x = choose(frozen, at_rest(x), x)
+                kept = choose(early, x, kept)
+                frozen = frozen + early
+                any_frozen = True
+                x = choose(frozen, at_rest(x), x)
         k = k0
         s = s0
         if wp.static(looking):

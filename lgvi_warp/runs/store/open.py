@@ -18,6 +18,7 @@ from lgvi_warp.engine.keepers.observation import Observation, Observing, observa
 from lgvi_warp.physics.control.controller import terms_of
 from lgvi_warp.physics.control.signals import IN_FILES
 from lgvi_warp.physics.terms.base import Term
+from lgvi_warp.runs.outcomes import begun_beyond
 from lgvi_warp.runs.provenance import at_end
 from lgvi_warp.runs.result import END_TIME, Result
 from lgvi_warp.runs.store.block_files import damaged, name_of
@@ -283,7 +284,7 @@ def result_of(
         samples=Arrays(group, fields, 1, at),
         **Result.per_member(small),
         parameters=Arrays(group, varied, 0, at, shared),
-        messages=messages + remarks,
+        messages=messages + remarks + begun_beyond(small["status"], small["failure_time"]),
         provenance=provenance,
         statistics=estimates,
         terms=of_scene,

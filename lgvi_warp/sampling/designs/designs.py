@@ -17,7 +17,6 @@ from lgvi_warp.sampling.designs.base import Drawn, Sampling, check_replicates
 from lgvi_warp.sampling.designs.sequences import sobol_points
 from lgvi_warp.sampling.designs.space import Space
 
-
 Factors = tuple[tuple[str, tuple[int, ...]], ...]
 
 
@@ -48,7 +47,9 @@ class Saltelli(Sampling):
         faults.choice("second_order", self.second_order, (True, False))
         check_replicates(faults, self.replicates)
         given, example = self.groups, 'give {"start": ["start.position", "start.velocity"]}'
-        pairs = list(given.items() if isinstance(given, Mapping) else given if isinstance(given, list | tuple) else [given])
+        pairs = list(
+            given.items() if isinstance(given, Mapping) else given if isinstance(given, list | tuple) else [given]
+        )
         if not all(isinstance(pair, list | tuple) and len(pair) == 2 and isinstance(pair[0], str) for pair in pairs):
             faults.add("groups", given, "is no mapping of names to lists of factors", example)
             pairs = []
@@ -72,7 +73,9 @@ class Saltelli(Sampling):
         Args:
             space: The cube: which names vary, with how many columns each.
         """
-        group_of = {label: name for name, members in self.groups for member in members for label in _labels(space, member)}
+        group_of = {
+            label: name for name, members in self.groups for member in members for label in _labels(space, member)
+        }
         joined: dict[str, tuple[int, ...]] = {}
         for label, columns in space.factors:
             name = group_of.get(label, label)

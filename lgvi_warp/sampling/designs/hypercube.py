@@ -32,15 +32,16 @@ class LatinHypercube(Replicated):
         SceneError: Where a setting is wrong. The message lists every fault.
     """
 
-    group: int = 0
+    group: int = None  # type: ignore[assignment]  # it has no default, but replicates of every design have one
     kind: ClassVar[str] = "latin_hypercube"
 
     def check_own(self, faults: Faults) -> None:
         """Adds a fault where the group is missing or out of bounds."""
-        group = self.group
-        if not is_whole(group, 2, LARGEST_GROUP):
-            faults.add("group", group, f"is not a whole number from 2 to {LARGEST_GROUP}",
-                       "give how many members make a hypercube: group = 256")  # fmt: skip
+        group, example = self.group, "give how many members make a hypercube: group = 256"
+        if group is None:
+            faults.add("group", group, "is missing", example)
+        elif not is_whole(group, 2, LARGEST_GROUP):
+            faults.add("group", group, f"is not a whole number from 2 to {LARGEST_GROUP}", example)
         else:
             object.__setattr__(self, "group", int(group))
 

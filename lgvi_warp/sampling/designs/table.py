@@ -38,7 +38,7 @@ class Table(Sampling):
             (quote a name that contains a comma), separated by commas, semicolons or tabs. Empty lines and lines that begin
             with # are skipped.
         values: Arrays (n,) or (n, *shape) by name, instead of a file; also a data frame, a structured array or an xarray
-            Dataset with such names.
+            Dataset with such names, of a posterior by chain and draw too (ArviZ: idata.posterior), whose draws are members.
         sha256: Checksum that the file must have, written by `to_dict`; any by default.
         columns: Names of the columns to take; all by default.
         ignore: Names of the columns to leave out, such as an id; none by default.

@@ -302,7 +302,7 @@ def salib() -> Callable[..., Any]:
         from SALib.analyze.morris import analyze
     except ImportError as error:
         raise ImportError("sensitivity needs SALib: pip install 'lgvi-warp[uq]'") from error
-    return analyze  # type: ignore[no-any-return]
+    return analyze
 
 
 def _good_rows(outputs: Outputs, group: int, failed: str) -> np.ndarray:

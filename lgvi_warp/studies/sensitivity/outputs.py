@@ -20,11 +20,11 @@ from lgvi_warp.runs.prepared import FailedMembers as FailedMembers
 from lgvi_warp.runs.quantities import OfInterest, quantities
 from lgvi_warp.scene.ensemble import Ensemble
 
-
 # Arguments that every entry of lw.uq hands on to its runs.
 SETTINGS = ("method", "h", "t1", "save", "dtype", "width", "checks", "on_failure", "common_noise", "threads", "executor",
             "scheduler", "progress")  # fmt: skip
-P, R = ParamSpec("P"), TypeVar("R")
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
 def known_arguments(**gone: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
@@ -44,7 +44,9 @@ def known_arguments(**gone: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
         @functools.wraps(function)
         def checked(*arguments: P.args, **settings: P.kwargs) -> R:
             for name in settings.keys() - known:
-                raise TypeError(f"lw.uq.{function.__name__}() has no argument {name!r}; {gone.get(name) or closest(name, known)}")
+                raise TypeError(
+                    f"lw.uq.{function.__name__}() has no argument {name!r}; {gone.get(name) or closest(name, known)}"
+                )
             return function(*arguments, **settings)
 
         return checked

@@ -11,7 +11,7 @@ import numpy as np
 from lgvi_warp.common.errors import NothingToDraw, refusal
 from lgvi_warp.common.status import under_way
 from lgvi_warp.physics import energy as invariants
-from lgvi_warp.runs.quantities import OfResult, samples_of
+from lgvi_warp.runs.quantities import OfEnds, OfResult, samples_of
 from lgvi_warp.statistics.functional import quantity
 from lgvi_warp.statistics.quantity import Quantity
 from lgvi_warp.views.choice import AT_ONCE, Shown, few, shown
@@ -281,9 +281,10 @@ def at_one_time(
     """
     check_fields(result, of.fields, of.label)
     frame = frame % len(result.time)
-    frames = np.arange(frame + 1) if of.over_path or of.is_function else np.array([frame])
+    all_so_far = of.over_path or of.is_function or isinstance(of, OfEnds)
+    frames = np.arange(frame + 1) if all_so_far else np.array([frame])
     values = of.values(few(result, members, of.fields, frames))
-    return values, of.labels(values.shape[1]), "" if of.is_function else of.of.unit  # type: ignore[union-attr]
+    return values, of.labels(values.shape[1]), of.unit
 
 
 def estimate_for(result: Result, of: str, types: tuple[str, ...]) -> tuple[Estimate, int] | None:

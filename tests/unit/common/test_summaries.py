@@ -22,8 +22,13 @@ from tests.conftest import ROOT
 def estimate(name, unit="m"):
     """An estimate of one number at three times."""
     values = np.arange(3.0)[:, None]
-    dims = {"value": ("time", "component"), "lower": ("time", "component"), "upper": ("time", "component")}
-    arrays = {"value": values, "lower": values - 1.0, "upper": values + 1.0}
+    dims = {
+        "value": ("time", "component"),
+        "lower": ("time", "component"),
+        "upper": ("time", "component"),
+        "count": ("time",),
+    }
+    arrays = {"value": values, "lower": values - 1.0, "upper": values + 1.0, "count": np.full(3, 7)}
     return Estimate(
         name, {"type": "mean"}, unit, 0.95, "", dims, arrays, {"time": np.arange(3.0), "component": np.array(["x"])}
     )
@@ -194,6 +199,26 @@ def test_a_statistic_that_is_not_there_is_answered_with_those_that_are():
     with pytest.raises(KeyError, match="none were asked for"):
         Estimates()["mean depth"]
     assert "mean dept" not in statistics and statistics.get("mean dept") is None and "mean depth" in statistics
+
+
+def test_an_estimate_shows_its_numbers_and_no_whole_arrays():
+    lines = [line.split() for line in repr(estimate("mean depth")).splitlines()]
+    assert lines == [text.split() for text in (
+        "Estimate 'mean depth' at 2 s", "mean depth 2 m, 1 to 3, 7 members", "arrays value, lower, upper, count")]  # fmt: skip
+    lines = repr(result().statistics).splitlines()
+    assert lines[0] == "Estimates of 2 statistics at 2 s" and "2 m/s, 1 to 3, 7 members" in lines[2]
+
+
+def test_an_estimate_has_the_attributes_that_it_has():
+    one = Estimate(
+        "extremes depth", {"type": "extremes"}, "m", 0.95, "", {}, {"minimum": np.zeros(1)}, {"time": np.zeros(1)}
+    )
+    assert not any(hasattr(one, name) for name in ("value", "lower", "upper", "count", "half_width"))
+    assert hasattr(estimate("mean depth"), "lower")
+    with pytest.raises(AttributeError, match="'extremes depth' has no lower; it has minimum"):
+        one.lower
+    with pytest.raises(KeyError):
+        one["lower"]
 
 
 def test_completion_of_names():

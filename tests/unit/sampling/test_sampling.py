@@ -499,7 +499,7 @@ def test_a_scene_file_names_its_sampling(tmp_path):
         ({"halton": {"replicate": 8}}, 8, ["did you mean 'replicates'?"]),
         ({"sobol": {"replicates": 16}}, 40, ["groups of 16", "32 or 48"]),
         ({"latin_hypercube": {"group": 16, "replicates": 4}}, 80, ["groups of 64", "64 or 128"]),
-        ("latin_hypercube", 8, ["group = 0", "256"]),
+        ("latin_hypercube", 8, ["group = None", "is missing", "256"]),
         ({"latin_hypercube": {"group": 2.5}}, 8, ["group = 2.5"]),
         ({"latin_hypercube": {"group": -16}}, 8, ["group = -16"]),
         ({"latin_hypercube": {"group": True}}, 8, ["group = True"]),
@@ -714,3 +714,30 @@ def test_a_grid_names_what_it_is_a_grid_of(axes):
     """What is no table of axes is one fault, and no error of Python's follows."""
     (fault,) = faults(lw.Grid, axes)
     assert fault.startswith("ensemble.sampling.grid.axes = ") and "names nothing" in fault
+
+
+def test_a_hypercube_without_its_group_is_told_so():
+    for make in (
+        lw.LatinHypercube,
+        lambda: sampling.sampling_of("latin_hypercube"),
+        lambda: lw.LatinHypercube(replicates=2),
+    ):
+        (fault,) = faults(make)
+        assert fault == (
+            "ensemble.sampling.latin_hypercube.group = None: is missing; give how many members make a hypercube: group = 256"
+        )
+    assert "is not a whole number from 2" in faults(lw.LatinHypercube, 0)[0]
+
+
+def test_a_posterior_by_chain_and_draw_is_a_table_of_all_draws():
+    """As ArviZ holds it: idata.posterior."""
+    import xarray as xr
+
+    buoyancy, start = np.arange(6.0).reshape(2, 3), np.arange(18.0).reshape(2, 3, 3)
+    each = {"vehicle.buoyancy": (("chain", "draw"), buoyancy), "start.position": (("chain", "draw", "axis"), start)}
+    posterior = xr.Dataset(each, {"chain": [0, 1], "draw": [0, 1, 2]})
+    table = lw.Table(posterior)
+    np.testing.assert_array_equal(table.own_values()["vehicle.buoyancy"], np.arange(6.0))
+    np.testing.assert_array_equal(table.own_values()["start.position"], np.arange(18.0).reshape(6, 3))
+    # One chain is as good, and what has other dimensions is read as before.
+    np.testing.assert_array_equal(lw.Table(posterior.isel(chain=0)).own_values()["vehicle.buoyancy"], [0.0, 1.0, 2.0])

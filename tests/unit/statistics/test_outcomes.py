@@ -215,8 +215,8 @@ def test_coverage(rates):
         sizes.append(found.upper[-1] - found.lower[-1])
     # Of 1,000 intervals of 95 %: 5 standard deviations are 3.4 %; few ends, as of 7, make them hold a little more often.
     assert 0.915 < hold / 1000.0 < 0.985 and alone_hold / 1000.0 > 0.915
-    # The interval is as wide as 1,000 estimates are spread, which are known to 1 / sqrt(2000); Wilson's adds up to some percent
-    # where the normal interval would reach below 0.
+    # The interval is as wide as 1,000 estimates are spread, which is known to 1 / sqrt(2000); Wilson's adds some percent where
+    # the normal interval would reach below 0.
     assert np.mean(sizes) == pytest.approx(2.0 * 1.96 * np.std(values), rel=0.12)
 
 
@@ -254,7 +254,9 @@ def test_first_passage_takes_stopped_members_for_what_they_are(replicates):
     gathers.end(ends, replicates)
     parts = [gathers.close()]
     (found,) = (
-        statistic.estimates(parts, TIMES) if replicates == 1 else statistic.estimates_of_replicates(parts, TIMES, replicates)
+        statistic.estimates(parts, TIMES)
+        if replicates == 1
+        else statistic.estimates_of_replicates(parts, TIMES, replicates)
     )
     np.testing.assert_allclose(found.value, [0, 0, 0, 0, 0.5, 0.5], rtol=1e-15)
     assert found["stopped"].tolist() == [0, 50, 0, 0, 0, 0] and found["lost"].tolist() == [0, 0, 0, 26, 0, 0]
@@ -272,7 +274,12 @@ def test_parts_and_estimates_of_an_earlier_version_are_refused():
     with pytest.raises(ValueError, match="'outcome floor' is of an earlier version"):
         Estimates.from_arrays(arrays, text)
     gather = Gathered(TIMES, 100, [lw.Outcome("floor")])
-    old = {"members": np.array([1]), "time": np.array([1.0]), "so": np.array([True]), "replicate": np.zeros(1, np.int32)}
+    old = {
+        "members": np.array([1]),
+        "time": np.array([1.0]),
+        "so": np.array([True]),
+        "replicate": np.zeros(1, np.int32),
+    }
     with pytest.raises(ValueError, match="'outcome floor' is of an earlier version"):
         gather.merge(blocks(100)[0], [old])
 

@@ -239,7 +239,7 @@ def test_intervals_of_indices_hold_and_are_no_wider_than_they_need(function, sam
 
 
 def test_factors_are_in_the_users_order_and_in_groups():
-    vary = {"vehicle.mass": lw.Uniform(low=1.0, high=3.0), "start.position": lw.Uniform(low=[0.0, 0.0, 0.0], high=[1.0, 2.0, 1.0]),
+    vary = {"vehicle.mass": lw.Uniform(low=1.0, high=3.0), "start.position": lw.Uniform(low=[0.0] * 3, high=[1.0, 2.0, 1.0]),
             "environment.gravity": lw.Uniform(low=9.0, high=10.0)}  # fmt: skip
     labels = ("vehicle.mass", *(f"start.position[{i}]" for i in range(3)), "environment.gravity")
 
@@ -279,7 +279,10 @@ def test_groups_that_are_none(groups, words):
 
 
 def test_samples_are_shared_among_replicates():
-    for samples, words in ((20, "no multiple of replicates = 8; give 16 or 24"), (4, "no multiple of replicates = 8; give 8")):
+    for samples, words in (
+        (20, "no multiple of replicates = 8; give 16 or 24"),
+        (4, "no multiple of replicates = 8; give 8"),
+    ):
         with pytest.raises(lw.SceneError, match=words):
             analyses.sobol(BARE, "depth", samples=samples, vary=VARY)
     with pytest.raises(lw.SceneError, match=r"replicates = 3: is no power of two"):

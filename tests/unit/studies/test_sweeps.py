@@ -243,6 +243,13 @@ def test_members_that_fail_first_are_worst_first():
     assert [row["member"] for row in worst] == [9, 2, 4]
 
 
+def test_inputs_are_in_the_users_order():
+    turned = swept(
+        [record()], CASES[:1], vary={"vehicle.mass": VARY["vehicle.mass"], "start.position": VARY["start.position"]}
+    )
+    assert list(turned.inputs(turned.cells[0])) == ["vehicle.mass", *(f"start.position[{i}]" for i in range(3))]
+
+
 def test_causes_are_those_of_the_members_that_did_not_fail(found):
     inputs = found.inputs(found.cells[1])
     rows = found.causes("stiff", of="iae heading")

@@ -142,11 +142,17 @@ def test_a_neutral_body_at_rest_goes_with_accelerating_water():
     assert np.abs(r.position[-1, 0] - (5.0, 0.0, 10.0)).max() < 1e-12
 
 
-def test_shear_turns_into_relative_speed():
-    # A neutral body that falls through a linear profile u = 0.1 b3 at its own constant speed w (kept by inertia alone):
-    # M nu_r' = -M 0.1 w with isotropic M, so nu_r = -0.1 w t: over ground it keeps the speed that it had.
-    w = 0.5
-    profile = terms.CurrentProfile(depths=(-1000.0, 1000.0), velocities=((-100.0, 0.0, 0.0), (100.0, 0.0, 0.0)))
-    r = run(sphere(), [profile], {"nu": (0.0, 0.0, w)}, 0.05, 10.0, width=1)
-    assert r.velocity[-1, 0] == pytest.approx((0.0, 0.0, w), abs=1e-12)
-    assert r.position[-1, 0] == pytest.approx((0.0, 0.0, w * 10.0), abs=1e-11)
+def test_shear_lifts_a_sphere_that_falls_through_it():
+    # A neutral sphere of mass m and added mass a in u = s b3 along north: (m + a) nu_1' = -m s nu_3, and by Auton's lift
+    # (m + a) nu_3' = -a s nu_1. From nu = (0, 0, w) over ground v_1 = w sqrt(a / m) sinh(k t) and v_3 = w cosh(k t).
+    s, w, t, h = 0.1, 0.5, 10.0, 0.05
+    body = sphere()
+    m, a = body.mass, body.added_mass[0, 0]
+    k = s * np.sqrt(m * a) / (m + a)
+    profile = terms.CurrentProfile(depths=(-1000.0, 1000.0), velocities=((-1000.0 * s, 0.0, 0.0), (1000.0 * s, 0.0, 0.0)))
+    r = run(body, [profile], {"nu": (0.0, 0.0, w)}, h, t, width=1)
+    speed = w * np.array([np.sqrt(a / m) * np.sinh(k * t), 0.0, np.cosh(k * t)])
+    way = w / k * np.array([np.sqrt(a / m) * (np.cosh(k * t) - 1.0), 0.0, np.sinh(k * t)])
+    # Order 2: a part (s h)^2 of a change that is as large as w, or w t.
+    assert r.velocity[-1, 0] == pytest.approx(speed, abs=(s * h) ** 2 * w)
+    assert r.position[-1, 0] == pytest.approx(way, abs=(s * h) ** 2 * w * t)

@@ -160,10 +160,10 @@ class Vehicles:
     def _spaces(self, gymnasium: Any, to: str | None, scale: Any) -> None:
         """Look at the first members, and say what actions and observations are."""
         self._index = np.arange(self.num_envs)
-        # Episodes that each environment has begun before this one, and the member that is prepared for the next one.
+        # Episodes that each environment has begun before this one, and the one among all that is prepared next.
         self._numbers = np.zeros(self.num_envs, np.int64)
         self._prepared = np.full(self.num_envs, -1)
-        self._episodes = Episodes(self._plan, self._drawn(self.members))
+        self._episodes = Episodes(self._plan, self._drawn(self._episode_of(self._numbers)))
         controller = self._plan.kernel_choice.controller
         assert controller is not None
         size = controller.bus.commands[to][1] if to else len(self._columns or ())
@@ -191,18 +191,21 @@ class Vehicles:
     def _seed(self, seed: int) -> None:
         """Draw from now on by this seed."""
         self._source = self._fleet.with_seed(seed, MOST_MEMBERS if self._random else None)
+        self._noises = 0 if self._random else int(self._source.indices.max()) + 1
 
-    def _drawn(self, indices: np.ndarray) -> Members:
-        """The members with these indices."""
-        subset = self._source.subset(indices)
-        members = subset.select(0, len(indices))
-        subset.check_block(0, len(indices), members.parameters)
-        if self._source.varied() and not self._plan.serves(subset, Block(0, len(indices)), members):
+    def _drawn(self, episodes: np.ndarray) -> Members:
+        """The members of episodes, counted over all environments; where members come again, they do with other noise."""
+        times, places = np.divmod(episodes, self._source.members)
+        subset = self._source.subset(places)
+        members = subset.select(0, len(places))
+        subset.check_block(0, len(places), members.parameters)
+        if self._source.varied() and not self._plan.serves(subset, Block(0, len(places)), members):
             problem = "needs what the first members that were drawn do not"
             remedy = "give the ensemble more members, among which is such a one"
-            raise refusal("fleet", f"a member of {indices.min()} to {indices.max()}", problem, remedy)
+            raise refusal("fleet", f"a member of {places.min()} to {places.max()}", problem, remedy)
         # One seed keys the noise of all lanes.
-        return replace(members, seed=self._noise_seed)
+        indices = (members.indices + times * self._noises) % MOST_MEMBERS
+        return replace(members, indices=indices, seed=self._noise_seed)
 
     @property
     def time(self) -> float:
@@ -212,11 +215,11 @@ class Vehicles:
     @property
     def members(self) -> np.ndarray:
         """Indices of the members (num_envs,) that the environments have now."""
-        return self._member_of(self._numbers)
+        return self._episode_of(self._numbers) % self._source.members
 
-    def _member_of(self, numbers: np.ndarray) -> np.ndarray:
-        """Index of each environment's member, where it has begun so many episodes before."""
-        return (self._index + numbers * self.num_envs) % self._source.members
+    def _episode_of(self, numbers: np.ndarray) -> np.ndarray:
+        """Number of each environment's episode among all, where it has begun so many before."""
+        return self._index + numbers * self.num_envs
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -253,7 +256,7 @@ class Vehicles:
                 self._noise_seed = int(seed)
             self._done[:] = False
             self._prepared[:] = -1
-            self._episodes.begin(self._drawn(self.members))
+            self._episodes.begin(self._drawn(self._episode_of(self._numbers)))
             self._observed = self._seen(*self._episodes.look())
         else:
             self._observed = self._observed.copy()
@@ -333,7 +336,7 @@ class Vehicles:
         """Start the present episodes of some environments; their first observations."""
         following = self._numbers + 1
         following[envs] -= 1
-        wanted = self._member_of(following)
+        wanted = self._episode_of(following)
         if np.any(self._prepared[envs] != wanted[envs]):
             # Many at once: one that has begun will need the one after that, before long.
             stale = np.flatnonzero(self._prepared != wanted)

@@ -152,7 +152,7 @@ class Runner:
 
 
 class Prepared:
-    """A run to be called many times, made by `prepare`.
+    """A run to be called many times, made by `prepare`; the noise of row i is that of member i, unless a call says another.
 
     Args:
         fleet: the members of a call without X.
@@ -167,6 +167,7 @@ class Prepared:
 
     Attributes:
         names: names of the columns of X (d,).
+        common_noise: whether noise acts on every member alike.
     """
 
     def __init__(
@@ -183,7 +184,7 @@ class Prepared:
     ):
         self._arguments = made_of
         self._fleet, self._table, self.names, self._of, self._runner = fleet, table, names, of, runner
-        self._levels, self._refuse, self._common_noise = levels, refuse, common_noise
+        self._levels, self._refuse, self.common_noise = levels, refuse, common_noise
 
     @shows_progress
     def __call__(
@@ -192,16 +193,23 @@ class Prepared:
         *,
         seed: int | None = None,
         members: int | None = None,
+        indices: Any = None,
         progress: Callable[[float], None] | bool | None = None,
     ) -> Any:
-        """Run members with these numbers, from t = 0 to the end.
+        """Run members with these numbers, from t = 0; in every call row i has member i's noise, unless a seed or indices differ.
+
+        With noise, what follows rows from call to call (a chain, subset simulation, an optimiser) must say which noise each
+        row has: new `indices` or another `seed` for noise that is new, the same ones for noise that is kept.
 
         Args:
             X: (n, d), columns in the order of `names`; or by name, in any order: a mapping of columns, a data frame, a
                 structured array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3).
                 Without X the members are drawn from the distributions.
-            seed: seed of the members that are drawn; default that of the ensemble.
+            seed: seed of the noise of forces and sensors, and of the members that are drawn, a whole number from 0; default that
+                of the ensemble.
             members: number of members that are drawn, the first ones of the sampling; default those of the ensemble.
+            indices: (n,), beside X: whose noise each row has, that of the member with this index in an ensemble of this seed,
+                whole numbers from 0. Rows with the same index have the same noise. Default None for 0 to n - 1.
             progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is
                 done, in [0, 1].
 
@@ -212,9 +220,13 @@ class Prepared:
             SceneError: if X does not fit the names, or holds unphysical numbers; the message lists every fault.
             FailedMembers: if members failed, unless failed="nan".
         """
-        if X is not None and (seed is not None or members is not None):
-            raise SceneError(["X: is given beside seed or members, which draw the numbers; leave out one of them"])
-        return self._answer(self._drawn(seed, members) if X is None else self._members(X), callback(progress))
+        if X is not None and members is not None:
+            raise refusal("members", members, "is given beside X, whose rows are the members", "leave out one of them")
+        if X is None and indices is not None:
+            remedy = "give X, or draw the members of a seed: run(seed=..., members=...)"
+            raise refusal("indices", indices, "name the noise of the rows of X, and there is no X", remedy)
+        fleet = self._drawn(seed, members) if X is None else self._with_noise(self._members(X), seed, indices)
+        return self._answer(fleet, callback(progress))
 
     def states(
         self,
@@ -227,7 +239,7 @@ class Prepared:
         indices: Any = None,
         seed: int = 0,
     ) -> Any:
-        """Run members from given states.
+        """Run members from given states; in every call row i has member i's noise, unless indices or the seed differ.
 
         Args:
             position: (n, 3) [m], inertial axes.
@@ -250,15 +262,7 @@ class Prepared:
         given = position, attitude, velocity, angular_velocity, parameters
         fleet = Ensemble.from_states(self._fleet.scene, *given)
         fleet.seed = int(EnsembleSettings(fleet.members, seed).seed)
-        if indices is not None:
-            keys = np.asarray(indices)
-            whole = keys.shape == (fleet.members,) and keys.dtype.kind in "iu"
-            if not whole or keys.min() < 0 or keys.max() >= MOST_MEMBERS:
-                problem = "are not one whole number from 0 for each member"
-                remedy = f"give an array of shape ({fleet.members},), of numbers below {MOST_MEMBERS}"
-                raise refusal("indices", indices, problem, remedy)
-            fleet.indices = keys.astype(np.int64)
-        return self._answer(fleet, None)
+        return self._answer(self._with_noise(fleet, None, indices), None)
 
     def __reduce__(self) -> tuple[Any, ...]:
         arguments, settings = self._arguments
@@ -269,6 +273,24 @@ class Prepared:
         if seed is None and members is None:
             return fleet
         return fleet.with_seed(fleet.seed if seed is None else seed, members)
+
+    def _with_noise(self, fleet: Ensemble, seed: int | None, indices: Any) -> Ensemble:
+        """Members whose noise is that of these indices and this seed; None for those that they have. They are new ones."""
+        if seed is not None:
+            fleet.seed = int(EnsembleSettings(fleet.members, seed).seed)
+        if indices is None:
+            return fleet
+        keys = np.asarray(indices)
+        whole = keys.shape == (fleet.members,) and keys.dtype.kind in "iu"
+        if not whole or keys.min() < 0 or keys.max() >= MOST_MEMBERS:
+            problem = "are not one whole number from 0 for each member"
+            remedy = f"give an array of shape ({fleet.members},), of numbers below {MOST_MEMBERS}"
+            raise refusal("indices", indices, problem, remedy)
+        if self.common_noise:
+            problem = "are given, where common_noise=True gives all members the noise of member 0"
+            raise refusal("indices", indices, problem, "leave them out, or prepare the run without common_noise")
+        fleet.indices = keys.astype(np.int64)
+        return fleet
 
     def _members(self, X: Any) -> Ensemble:
         """The ensemble of the members with these numbers."""
@@ -312,7 +334,7 @@ class Prepared:
         return array
 
     def _answer(self, fleet: Ensemble, progress: Callable[[float], None] | None) -> Any:
-        if self._common_noise:
+        if self.common_noise:
             fleet = copy.copy(fleet)
             fleet.indices = np.zeros(fleet.members, dtype=np.int64)
         if not self._of:
@@ -469,10 +491,13 @@ def prepare(
     executor: Any = "threads",
     scheduler: str | None = None,
 ) -> Prepared:
-    """Prepare a run that is called many times with other numbers.
+    """Prepare a run that is called many times with other numbers; noise is frozen by row: row i always has that of member i.
 
     Checks, choices, the kernel and whatever no number of `vary` changes are settled once. A call then costs what the kernel
     takes, and little more; it has the bits of `solve`. The function may be called from several threads, and be pickled.
+
+    Noise of forces and sensors is frozen by row: row i has the noise of member i of the ensemble's seed in every call. What
+    follows rows from call to call, as a chain does, gives run(X, seed=, indices=).
 
         run = lw.prepare(scene, ["vehicle.mass", "start.position[2]"], of="max(depth)", h=0.01, t1=60.0)
         depths = run(X)                                    # X (n, 2), depths (n,)

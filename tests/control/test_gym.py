@@ -2,6 +2,7 @@
 """Vehicles as an environment of Gymnasium: the motion is that of a run, lane by lane, whenever an episode begins."""
 
 import re
+from dataclasses import replace
 
 import gymnasium
 import numpy as np
@@ -60,6 +61,22 @@ def test_the_bits_of_a_run(env):
     observed = steer(env, observed, 50)[0]
     assert np.isclose(env.time, 50 * PERIOD)
     assert np.array_equal(observed[:, 1:], solved(scene([lw.Callback(heading)]), 50))
+
+
+def test_members_that_come_again_have_other_noise():
+    """Of three given members, two environments: each member's first episode has its own noise, each later one new noise."""
+    part = lw.Ensemble(replace(scene(LAW).scene, terms=[*scene(LAW).scene.terms, lw.WrenchNoise(force=(1.0, 1.0, 1.0))]), 3, 3)
+    given = part.select(0, 3)
+    fleet = lw.Ensemble.from_states(part.scene, given.position, given.attitude, given.velocity, given.angular_velocity)
+    env, ends, members = environment(fleet, num_envs=2), [], []
+    for _ in range(6):
+        observed, _ = env.reset()
+        members += env.members.tolist()
+        ends += list(steer(env, observed, 3)[0])
+    assert members == [0, 1, 2] * 4 and len({end.tobytes() for end in ends}) == 12
+    run = lw.solve(fleet.in_scene(replace(fleet.scene, controller=scene([lw.Callback(heading)]).scene.controller)), "psi_s",
+                   h=H, t1=3 * PERIOD, save=lw.SaveAt())  # fmt: skip
+    np.testing.assert_array_equal([end[1:4] for end in ends[:3]], run.position[-1])
 
 
 def test_members_that_start_while_others_go_on():

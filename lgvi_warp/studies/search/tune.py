@@ -12,7 +12,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.physics.fields import FIELDS
-from lgvi_warp.runs.prepared import scene_value
+from lgvi_warp.runs.prepared import Prepared, scene_value
 from lgvi_warp.runs.quantities import OfInterest
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
@@ -189,6 +189,10 @@ class _Costs:
         states: Any = {name: getattr(members, name)[every] for name in FIELDS}
         parameters = {name: v[every] for name, v in self._own.items()}
         parameters |= dict(zip(self._box.names, np.repeat(candidates, n, axis=0).T, strict=True))
-        noise: Any = {"indices": members.indices[every], "seed": members.seed}
-        costs = self._numbers_of(lambda run: run.states(**states, parameters=parameters, **noise))
+
+        def called(run: Prepared) -> Any:
+            indices = None if run.common_noise else members.indices[every]
+            return run.states(**states, parameters=parameters, indices=indices, seed=members.seed)
+
+        costs = self._numbers_of(called)
         return np.where(np.isnan(costs), np.inf, costs).reshape(k, n)

@@ -98,12 +98,14 @@ class ScalarModel:
             raise SceneError(["vary: names alone have no distributions; map names to distributions"])
         return [_Levels() if self.levels else _Column(self._fleet, column) for column in self._columns]
 
-    def __call__(self, X: Any) -> np.ndarray:
-        """Run members with these numbers and return their quantities.
+    def __call__(self, X: Any, *, seed: int | None = None, indices: Any = None) -> np.ndarray:
+        """Run members with these numbers and return their quantities; row i always has the same noise, unless another is asked.
 
         Args:
             X: (n, d), columns in the order of `names`; or by name, in any order: a data frame, a mapping of columns, a
                 structured array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3).
+            seed: seed of the noise, as of a run that `lw.prepare` made; default 0.
+            indices: (n,), whose noise each row has, as of such a run. Default None for 0 to n - 1.
 
         Returns:
             Y (n,), or (n, m) of several numbers: SALib's shape.
@@ -112,13 +114,15 @@ class ScalarModel:
             SceneError: for labels that are missing, unknown or doubled, and for what is no real number.
             FailedMembers: with failed="refuse", where members failed.
         """
-        return np.asarray(self._prepared(X, progress=self._progress))
+        return np.asarray(self._prepared(X, seed=seed, indices=indices, progress=self._progress))
 
-    def scipy(self, X: Any) -> np.ndarray:
+    def scipy(self, X: Any, *, seed: int | None = None, indices: Any = None) -> np.ndarray:
         """Run members as a call does, in scipy's shape.
 
         Args:
             X: (d, n), rows in the order of `names`; or by name, in any order.
+            seed: as of a call.
+            indices: as of a call.
 
         Returns:
             Y (n,), or (m, n) of several numbers.
@@ -128,11 +132,11 @@ class ScalarModel:
             FailedMembers: with failed="refuse", where members failed.
         """
         if is_labelled(X):
-            return np.ascontiguousarray(self(X).T)
+            return np.ascontiguousarray(self(X, seed=seed, indices=indices).T)
         faults = Faults()
         array = faults.real("X", X, f"give an array of shape ({len(self.names)}, n)")
         faults.raise_if_any()
-        return np.ascontiguousarray(self(np.asarray(array).T).T)
+        return np.ascontiguousarray(self(np.asarray(array).T, seed=seed, indices=indices).T)
 
 
 @dataclass(frozen=True)
@@ -220,7 +224,7 @@ def model(
     failed: str = "refuse",
     **settings: Any,
 ) -> ScalarModel:
-    """Turn a scene into a function of what varies.
+    """Turn a scene into a function of what varies; noise is frozen by row, unless a call gives `seed` or `indices`.
 
     f(X) takes X (n, d) and returns Y (n,) or (n, m), for SALib; f.scipy(X) takes X (d, n), for scipy's sobol_indices.
 

@@ -26,7 +26,12 @@ MISSING = ("O_NOFOLLOW", "O_DIRECTORY", "O_NONBLOCK", "O_CLOEXEC", "statvfs", "s
            "sched_getaffinity", "posix_fallocate", "sysconf", "mkfifo")  # fmt: skip
 
 real_open, real_fsync, real_listdir, real_replace, real_unlink = os.open, os.fsync, os.listdir, os.replace, os.unlink
-real_set_blocking, real_set_wakeup, real_statvfs, real_CDLL = os.set_blocking, signal.set_wakeup_fd, os.statvfs, ctypes.CDLL
+real_set_blocking, real_set_wakeup, real_statvfs, real_CDLL = (
+    os.set_blocking,
+    signal.set_wakeup_fd,
+    os.statvfs,
+    ctypes.CDLL,
+)
 WRITES, TEMPORARY = os.O_WRONLY | os.O_RDWR, tempfile.gettempdir()
 
 

@@ -26,7 +26,7 @@ MISSING = ("O_NOFOLLOW", "O_DIRECTORY", "O_NONBLOCK", "O_CLOEXEC", "statvfs", "s
            "sched_getaffinity", "posix_fallocate", "sysconf", "mkfifo")  # fmt: skip
 
 real_open, real_fsync, real_listdir, real_replace, real_unlink = os.open, os.fsync, os.listdir, os.replace, os.unlink
-real_set_blocking, real_set_wakeup, real_statvfs, real_CDLL = (
+real_set_blocking, real_set_wakeup, real_statvfs, real_library = (
     os.set_blocking,
     signal.set_wakeup_fd,
     os.statvfs,
@@ -96,7 +96,7 @@ def set_wakeup(descriptor, **more):
 def loaded(name, *arguments, **more):
     if name is None:
         raise TypeError("bad argument type for built-in operation")
-    return real_CDLL(name, *arguments, **more)
+    return real_library(name, *arguments, **more)
 
 
 def imitate():

@@ -30,7 +30,12 @@ from tests.unit.studies.test_cost import found as tradeoff_of
 SECONDS = 20.0
 VERBS = ("info", "info --json", "plot", "report", "view", "export", "merge", "resume", "sweep", "run")
 # What verbs write into a folder, or under a name that is given.
-DRAWN = {"tradeoff": "tradeoff.png", "sensitivity": "sensitivity.png", "stability": "stability.png", "result": "fleet.png"}
+DRAWN = {
+    "tradeoff": "tradeoff.png",
+    "sensitivity": "sensitivity.png",
+    "stability": "stability.png",
+    "result": "fleet.png",
+}
 SCENE = ROOT / "examples" / "paper.toml"
 SWEEP = f"""
 scene = "{SCENE}"
@@ -348,7 +353,9 @@ def test_a_cell_of_another_is_not_taken(swept, home, capsys):  # noqa: F811
 @pytest.mark.parametrize("place", ["a cell", "the folder of cells", "the summary"])
 def test_a_sweep_replaces_nothing_but_plain_files_of_its_folder(place, kind, swept, home, capsys):  # noqa: F811
     out = shutil.copytree(swept / "out", home.parent / "out")
-    path = {"a cell": the_cell(out), "the folder of cells": out / records.FOLDER, "the summary": out / "summary.md"}[place]
+    path = {"a cell": the_cell(out), "the folder of cells": out / records.FOLDER, "the summary": out / "summary.md"}[
+        place
+    ]
     shutil.rmtree(path) if path.is_dir() else path.unlink()
     if (place, kind) == ("the folder of cells", "a folder"):
         return

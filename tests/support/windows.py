@@ -25,8 +25,13 @@ OPEN_FILES = "/proc/self/fd"
 MISSING = ("O_NOFOLLOW", "O_DIRECTORY", "O_NONBLOCK", "O_CLOEXEC", "statvfs", "set_blocking", "register_at_fork", "fork",
            "sched_getaffinity", "posix_fallocate", "sysconf", "mkfifo")  # fmt: skip
 
-_open, _fsync, _listdir, _replace, _unlink = os.open, os.fsync, os.listdir, os.replace, os.unlink
-_set_blocking, _set_wakeup, _statvfs, _CDLL = os.set_blocking, signal.set_wakeup_fd, os.statvfs, ctypes.CDLL
+real_open, real_fsync, real_listdir, real_replace, real_unlink = os.open, os.fsync, os.listdir, os.replace, os.unlink
+real_set_blocking, real_set_wakeup, real_statvfs, real_library = (
+    os.set_blocking,
+    signal.set_wakeup_fd,
+    os.statvfs,
+    ctypes.CDLL,
+)
 WRITES, TEMPORARY = os.O_WRONLY | os.O_RDWR, tempfile.gettempdir()
 
 
@@ -36,7 +41,7 @@ def opened(path, flags, mode=0o777, *, dir_fd=None):
         raise NotImplementedError("dir_fd unavailable on this platform")
     if os.path.isdir(path):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path))
-    return _open(path, flags, mode)
+    return real_open(path, flags, mode)
 
 
 def synced(descriptor):
@@ -45,19 +50,19 @@ def synced(descriptor):
         flags = next(int(line.split()[1], 8) for line in info if line.startswith("flags:"))
     if not flags & WRITES:
         raise OSError(errno.EBADF, os.strerror(errno.EBADF))
-    _fsync(descriptor)
+    real_fsync(descriptor)
 
 
 def listed(path="."):
     if isinstance(path, int):
         raise TypeError("listdir: path should be string, bytes, os.PathLike or None, not int")
-    return _listdir(path)
+    return real_listdir(path)
 
 
 def refuse_open(path):
     """Raise PermissionError for a file that this process has open, and for a folder with such a file."""
     real = os.path.realpath(path)
-    for name in _listdir(OPEN_FILES):
+    for name in real_listdir(OPEN_FILES):
         try:
             there = os.readlink(f"{OPEN_FILES}/{name}")
         except OSError:
@@ -71,27 +76,27 @@ def replaced(source, target, *, src_dir_fd=None, dst_dir_fd=None):
     refuse_open(source)
     if os.path.lexists(target):
         refuse_open(target)
-    _replace(source, target)
+    real_replace(source, target)
 
 
 def unlinked(path, *, dir_fd=None):
     assert dir_fd is None
     if os.path.dirname(path) != TEMPORARY:  # a temporary file is removed by Windows itself when it is closed
         refuse_open(path)
-    _unlink(path)
+    real_unlink(path)
 
 
 def set_wakeup(descriptor, **more):
     """A pipe that blocks is taken."""
     if descriptor != -1:
-        _set_blocking(descriptor, False)
-    return _set_wakeup(descriptor, **more)
+        real_set_blocking(descriptor, False)
+    return real_set_wakeup(descriptor, **more)
 
 
 def loaded(name, *arguments, **more):
     if name is None:
         raise TypeError("bad argument type for built-in operation")
-    return _CDLL(name, *arguments, **more)
+    return real_library(name, *arguments, **more)
 
 
 def imitate():
@@ -107,7 +112,7 @@ def imitate():
     usage = namedtuple("usage", "total used free")
 
     def disk_usage(path):
-        found = _statvfs(path)
+        found = real_statvfs(path)
         return usage(*(found.f_frsize * blocks for blocks in (found.f_blocks, 0, found.f_bavail)))
 
     shutil.disk_usage = disk_usage

@@ -5,16 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
-from lgvi_warp.runs import predict
+from lgvi_warp.common import machine
 from lgvi_warp.runs.store.create import nearest_folder
 
 
 def test_the_memory_of_this_process(monkeypatch):
     held = np.ones(30_000_000)
-    assert predict.resident() > held.nbytes
+    assert machine.resident() > held.nbytes
     for error in (OSError, ValueError):
         monkeypatch.setattr(Path, "read_text", lambda *_, error=error: (_ for _ in ()).throw(error()))
-        assert predict.resident() == 0
+        assert machine.resident() == 0
 
 
 def test_the_nearest_folder_that_exists(tmp_path):

@@ -122,7 +122,7 @@ def test_an_analysis_comes_back_from_its_files(made, tmp_path):
         content["mean"] == [1.23456789, None] and content["provenance"] == {"seed": 3} and content["name"] == found.name
     )
     (tmp_path / "x.json").write_text(json.dumps(content | {"name": "heat"}))
-    with pytest.raises(ValueError, match=r"x\.json: 'heat' is no analysis"):
+    with pytest.raises(ValueError, match=r"x\.json: .*'heat' is no analysis"):
         Indices.load(tmp_path / "x.json")
 
 

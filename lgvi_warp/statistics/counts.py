@@ -232,6 +232,9 @@ class Exceedance(Condition, Counted):
         return estimate(self, "Wilson", component_dims("value", "lower", "upper"), arrays, time, unit="1")
 
 
+# How intervals of probabilities by time are formed.
+DIRICHLET = "Wilson with the variance of the Dirichlet product"
+
 # Number of equal pieces of the time between two samples, in which passages are counted.
 PIECES = 8
 
@@ -372,7 +375,7 @@ class FirstPassage(Condition, Counted):
         arrays |= {"censored": lost[-1]}
         dims["censored"] = ()
         levels = {"level": np.asarray(self.levels, dtype=np.float64)}
-        text = "Wilson with the variance of the beta product"
+        text = DIRICHLET
         arrays |= (times := self._times(curve.value, lower, upper, time))
         return estimate(self, text, dims | along(times, "level"), arrays, time, levels, "1", labels=())
 

@@ -15,6 +15,7 @@ from lgvi_warp.common import summaries
 from lgvi_warp.common.errors import closest, shown
 from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.common.summaries import Summarized
+from lgvi_warp.statistics.lines import texts_of
 from lgvi_warp.statistics.naming import canonical, free
 from lgvi_warp.statistics.tree import below
 
@@ -237,9 +238,7 @@ class Estimates(Summarized, Mapping[str, Estimate]):
 
 def _shown(one: Estimate) -> summaries.Rows:
     """Label, value and interval of each of an estimate's numbers at the last sample time."""
-    from lgvi_warp.statistics.table import rows_of
-
-    lines = [(label, f"{value}, {ends}, {members}") for label, value, ends, members in rows_of(Estimates([one]))]
+    lines = [(label, f"{value}, {ends}, {members}") for label, value, ends, members in texts_of(one)]
     return lines or [(one.name, f"{' x '.join(map(str, one.value.shape))} values ({', '.join(one.dims['value'])})")]
 
 

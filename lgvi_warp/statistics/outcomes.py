@@ -12,7 +12,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.base import Gatherer, Statistic
-from lgvi_warp.statistics.counts import Curve, Histogram, by_replicates, check_levels
+from lgvi_warp.statistics.counts import DIRICHLET, Curve, Histogram, by_replicates, check_levels
 from lgvi_warp.statistics.ends import FAILED, Ends
 from lgvi_warp.statistics.estimate import Estimate, along
 from lgvi_warp.statistics.moments import Mean, estimate
@@ -187,9 +187,8 @@ class Outcome(OfEnds):
         arrays |= {"ended": ended, "otherwise": others + failed, "failed": failed}
         arrays |= {"count": members - ended - others - failed}
         dims = along(arrays, "time")
-        text = "Wilson with the variance of the Dirichlet product"
         dims |= along(times, "level")
-        return estimate(self, text, dims, arrays | times, time, {"level": levels}, "1", labels=())
+        return estimate(self, DIRICHLET, dims, arrays | times, time, {"level": levels}, "1", labels=())
 
 
 Pair = tuple[np.ndarray, np.ndarray]

@@ -39,14 +39,14 @@ class Saltelli(Sampling):
 
     second_order: bool = True
     replicates: int = 1
-    groups: Any = ()
+    groups: Any = None
     kind: ClassVar[str] = "saltelli"
 
     def __post_init__(self) -> None:
         faults = Faults("ensemble.sampling.saltelli.")
         faults.choice("second_order", self.second_order, (True, False))
         check_replicates(faults, self.replicates)
-        given, example = self.groups, 'give {"start": ["start.position", "start.velocity"]}'
+        given, example = self.groups or (), 'give {"start": ["start.position", "start.velocity"]}'
         pairs = list(
             given.items() if isinstance(given, Mapping) else given if isinstance(given, list | tuple) else [given]
         )
@@ -58,7 +58,7 @@ class Saltelli(Sampling):
                 faults.add(f"groups.{name}", members, "is no list of names of factors", example)
         faults.raise_if_any()
         object.__setattr__(self, "replicates", int(self.replicates))
-        object.__setattr__(self, "groups", tuple((name, tuple(members)) for name, members in pairs))
+        object.__setattr__(self, "groups", tuple((name, tuple(members)) for name, members in pairs) or None)
 
     def to_dict(self) -> Any:
         """The sampling as a scene file has it."""
@@ -74,7 +74,7 @@ class Saltelli(Sampling):
             space: The cube: which names vary, with how many columns each.
         """
         group_of = {
-            label: name for name, members in self.groups for member in members for label in _labels(space, member)
+            label: name for name, members in self.groups or () for member in members for label in _labels(space, member)
         }
         joined: dict[str, tuple[int, ...]] = {}
         for label, columns in space.factors:
@@ -92,7 +92,7 @@ class Saltelli(Sampling):
             faults.add("sampling", self.kind, "has nothing that varies", "give [ensemble.vary]")
             return
         known, taken = [label for label, _ in space.factors], dict[str, str]()
-        for name, group in self.groups:
+        for name, group in self.groups or ():
             for member in group:
                 if not (labels := _labels(space, member)):
                     faults.add(f"groups.{name}", member, "does not vary by itself", closest(member, known))

@@ -74,7 +74,7 @@ def sobol(
     with faults.including():
         check_settings(samples, confidence, failed)
     with faults.including():
-        design = Saltelli(second_order, replicates, groups or ())
+        design = Saltelli(second_order, replicates, groups)
     if not faults and samples % replicates:
         near = samples // replicates * replicates
         ways = " or ".join(str(number) for number in (near, near + replicates) if number)

@@ -156,7 +156,7 @@ def test_each_door_refuses_with_the_same_words(scene, text, tmp_path, capsys):
         "statistics": lambda: lw.Mean(text),
         "a list of quantities": lambda: lw.Covariance(["depth", text]),
         "until": lambda: watch(lw.Until(f"mean {text}", 1.0), (), np.zeros(1)),
-        "sensitivity": lambda: lw.uq.sobol(scene, text, vary=vary, samples=4, **settings),
+        "sensitivity": lambda: lw.uq.sobol(scene, text, vary=vary, samples=8, **settings),
         "tradeoff": lambda: lw.tradeoff(scene, ["psi_s"], of=text),
         "suggest": lambda: lw.suggest(scene, error=1e-3, of=text),
         "stability": lambda: lw.stability_map(scene, of=text),

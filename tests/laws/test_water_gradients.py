@@ -99,6 +99,14 @@ def by_pressure(cases):
     return np.array(found)
 
 
+def test_the_flow_of_these_tests_is_what_it_says():
+    strain = np.array([[0.1, -0.05, 0.2], [-0.05, -0.04, 0.08], [0.2, 0.08, -0.06]])
+    report = lw.check_law(
+        LinearFlow(velocity=(0.2, -0.1, 0.3), acceleration=(0.05, 0.1, -0.08), growth=0.3, **columns(strain))
+    )
+    assert report.ok, report
+
+
 def test_the_pressure_gives_added_mass_and_munks_share():
     # Of a sphere half its displacement; of slender ones Lamb's table (art. 115): along 0.059 and 0.021 at 5 and 9.97 to 1.
     assert Spheroid(1.0, 1.0 / 1.0001).added_mass() / Spheroid(1.0, 1.0 / 1.0001).displaced == pytest.approx(

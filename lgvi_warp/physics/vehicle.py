@@ -438,7 +438,7 @@ def added_blocks(p: Numbers) -> inertias.Blocks:
 
 
 def lopsided(p: Numbers) -> bool:
-    """Whether some member's mass acts elsewhere than at the user's origin, or its added mass couples velocities and rates there.
+    """Whether some member's centre of mass is not the user's origin, or added mass couples velocities and rates there.
 
     Args:
         p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).

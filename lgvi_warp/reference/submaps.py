@@ -179,7 +179,7 @@ def remembered(x: State, body: Body, h: float, second: bool) -> State:
 def damping(x: State, body: Body, h: float, nu: Array, Om: Array, flow: Flow) -> Array:
     """D (6, 6): the sum of the damping laws, and what water that varies in space does.
 
-    With X = R^T G R: force -m X nu - X^T (A11 nu + A12 Om), torque -m hat(r_g) X nu (Lamb 1932, art. 137; Galper & Miloh 1994).
+    With X = R^T G R: force -m X nu - X^T (A11 nu + A12 Om), torque -m r_g x X nu (Lamb 1932, art. 137; Galper & Miloh 1994).
 
     Args:
         x, body, h: State at the start; inertia and laws; step [s].

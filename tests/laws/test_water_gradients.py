@@ -60,7 +60,9 @@ class Cases(NamedTuple):
 def strained(n=20, seed=11):
     """Random slenderness, mass, attitude, velocity, strain and growth."""
     rng = np.random.default_rng(seed)
-    hulls = [Spheroid(a, a / ratio) for a, ratio in zip(rng.uniform(0.3, 0.9, n), rng.uniform(1.2, 9.0, n), strict=True)]
+    hulls = [
+        Spheroid(a, a / ratio) for a, ratio in zip(rng.uniform(0.3, 0.9, n), rng.uniform(1.2, 9.0, n), strict=True)
+    ]
     mass = np.array([hull.displaced for hull in hulls]) * rng.uniform(0.7, 1.4, n)
     S = rng.normal(size=(n, 3, 3)) * 0.1
     S = S + np.swapaxes(S, 1, 2)
@@ -89,15 +91,27 @@ def by_pressure(cases):
     """dv/dt (n, 3) of each case, inertial axes."""
     found = []
     for hull, m, R, b, v, u, rate, S, growth in zip(*cases, strict=True):
-        a = hull.acceleration(m, R.T @ v, R.T @ (u + S @ b), R.T @ (rate + growth * S @ b), R.T @ S @ R, growth * R.T @ S @ R)
+        a = hull.acceleration(
+            m, R.T @ v, R.T @ (u + S @ b), R.T @ (rate + growth * S @ b), R.T @ S @ R, growth * R.T @ S @ R
+        )
         fall = (m - hull.displaced) * GRAVITY * (R.T @ DOWN) / (m + hull.added_mass())
         found.append(R @ (a + fall))
     return np.array(found)
 
 
+def test_the_flow_of_these_tests_is_what_it_says():
+    strain = np.array([[0.1, -0.05, 0.2], [-0.05, -0.04, 0.08], [0.2, 0.08, -0.06]])
+    report = lw.check_law(
+        LinearFlow(velocity=(0.2, -0.1, 0.3), acceleration=(0.05, 0.1, -0.08), growth=0.3, **columns(strain))
+    )
+    assert report.ok, report
+
+
 def test_the_pressure_gives_added_mass_and_munks_share():
     # Of a sphere half its displacement; of slender ones Lamb's table (art. 115): along 0.059 and 0.021 at 5 and 9.97 to 1.
-    assert Spheroid(1.0, 1.0 / 1.0001).added_mass() / Spheroid(1.0, 1.0 / 1.0001).displaced == pytest.approx(0.5, abs=1e-4)
+    assert Spheroid(1.0, 1.0 / 1.0001).added_mass() / Spheroid(1.0, 1.0 / 1.0001).displaced == pytest.approx(
+        0.5, abs=1e-4
+    )
     for ratio, along, across in ((5.01, 0.059, 0.895), (9.97, 0.021, 0.960)):
         hull = Spheroid(1.0, 1.0 / ratio)
         assert hull.added_mass()[:2] / hull.displaced == pytest.approx((along, across), abs=6e-4)
@@ -114,7 +128,11 @@ def test_a_spheroid_in_strained_water_goes_where_the_pressure_pushes_it(method, 
 
 
 # dv/dt by pressure in a strain of 0.05 1/s across the body's axes, of a neutral spheroid at (0.3, 0, -0.7) m.
-KNOWN = {(1.5, 0.0, 0.0): (0.00142, 0.03438), (1.5, 0.0, 0.3): (-0.01192, 0.03438), (0.0, 0.0, 1.0): (-0.04306, -0.00093)}
+KNOWN = {
+    (1.5, 0.0, 0.0): (0.00142, 0.03438),
+    (1.5, 0.0, 0.3): (-0.01192, 0.03438),
+    (0.0, 0.0, 1.0): (-0.04306, -0.00093),
+}
 SLENDER = Spheroid(0.8, 0.1)
 
 
@@ -173,11 +191,16 @@ def lagrangian(b, R, v, Om, t):
     rigid, through = (np.concatenate([R.T @ w, Om]) for w in (v, v - flow))
     phi_t = FLOW["acceleration"] @ b + 0.5 * FLOW["growth"] * b @ STRAIN @ b
     depth = MASS * (b + R @ CENTER)[2] - DISPLACED * b[2]
-    return 0.5 * rigid @ RIGID @ rigid + 0.5 * through @ ADDED @ through + DISPLACED * (phi_t + 0.5 * flow @ flow) + GRAVITY * depth
+    return (
+        0.5 * rigid @ RIGID @ rigid
+        + 0.5 * through @ ADDED @ through
+        + DISPLACED * (phi_t + 0.5 * flow @ flow)
+        + GRAVITY * depth
+    )
 
 
 def slopes(b, R, v, Om, t):
-    """Derivatives of the Lagrangian by b, by turns of the body about its axes, by v and by Om: steps along the imaginary axis."""
+    """Derivatives of the Lagrangian by b, by turns of the body, by v and by Om: by steps along the imaginary axis."""
     e = 1e-30j * np.eye(3)
     moved = (
         [(b + e[i], R, v, Om, t) for i in range(3)],
@@ -192,7 +215,13 @@ def left_over(dv, dOm):
     """(6,) What Hamel's equations leave: dP/dt - dL/db, and dK/dt + Om x K less the derivative by turns."""
 
     def momenta(s):
-        path = (POSE["b"] + s * TWIST["v"], POSE["R"] @ turn(s * TWIST["Om"]), TWIST["v"] + s * dv, TWIST["Om"] + s * dOm, s)
+        path = (
+            POSE["b"] + s * TWIST["v"],
+            POSE["R"] @ turn(s * TWIST["Om"]),
+            TWIST["v"] + s * dv,
+            TWIST["Om"] + s * dOm,
+            s,
+        )
         return np.concatenate(slopes(*path)[2:])
 
     # The derivative along the way to the fourth power of 1e-3.
@@ -255,7 +284,9 @@ def test_the_twin_of_a_lopsided_body_moves_as_its_lagrangian_says():
     _, _, *change = explicit.derivatives(start(body, b, R, momenta[:3], momenta[3:]), body, 0.0)
     dnu, dOm = np.split(np.linalg.solve(I6, np.concatenate(change)), 2)
     nu = R.T @ (TWIST["v"] - u)
-    dv = R @ (dnu + np.cross(TWIST["Om"], nu)) + FLOW["acceleration"] + FLOW["growth"] * STRAIN @ b + STRAIN @ TWIST["v"]
+    dv = (
+        R @ (dnu + np.cross(TWIST["Om"], nu)) + FLOW["acceleration"] + FLOW["growth"] * STRAIN @ b + STRAIN @ TWIST["v"]
+    )
     np.testing.assert_allclose(np.concatenate([dv, dOm]), np.concatenate(by_lagrangian()), rtol=0.0, atol=1e-9)
 
 
@@ -286,7 +317,7 @@ class Wave(NamedTuple):
 
 
 class Driven(NamedTuple):
-    """What acts on a body besides the wave: rigid and added mass (6, 6), centre of mass, displacement, thrust, drag along axes."""
+    """A body in a wave: rigid and added mass (6, 6), centre of mass, displacement and its centre, thrust, drag along axes."""
 
     rigid: np.ndarray
     added: np.ndarray
@@ -306,7 +337,9 @@ class Driven(NamedTuple):
         I6, twist = self.rigid + self.added, np.concatenate([nu, Om])
         p, pi = np.split(I6 @ twist, 2)
         a = R.T @ (rate + G @ u)
-        force = np.cross(p, Om) + (self.displaced - m) * (a - GRAVITY * down) - m * X @ nu - X.T @ (self.added @ twist)[:3]
+        force = (
+            np.cross(p, Om) + (self.displaced - m) * (a - GRAVITY * down) - m * X @ nu - X.T @ (self.added @ twist)[:3]
+        )
         torque = np.cross(pi, Om) + np.cross(p, nu) - np.cross(self.center, m * (X @ nu + a - GRAVITY * down))
         torque = torque + np.cross(self.buoyancy_center, self.displaced * (a - GRAVITY * down))
         wrench = np.concatenate([force + self.thrust, torque + self.torque]) - self.linear * twist

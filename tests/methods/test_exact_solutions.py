@@ -149,7 +149,9 @@ def test_shear_lifts_a_sphere_that_falls_through_it():
     body = sphere()
     m, a = body.mass, body.added_mass[0, 0]
     k = s * np.sqrt(m * a) / (m + a)
-    profile = terms.CurrentProfile(depths=(-1000.0, 1000.0), velocities=((-1000.0 * s, 0.0, 0.0), (1000.0 * s, 0.0, 0.0)))
+    profile = terms.CurrentProfile(
+        depths=(-1000.0, 1000.0), velocities=((-1000.0 * s, 0.0, 0.0), (1000.0 * s, 0.0, 0.0))
+    )
     r = run(body, [profile], {"nu": (0.0, 0.0, w)}, h, t, width=1)
     speed = w * np.array([np.sqrt(a / m) * np.sinh(k * t), 0.0, np.cosh(k * t)])
     way = w / k * np.array([np.sqrt(a / m) * (np.cosh(k * t) - 1.0), 0.0, np.sinh(k * t)])

@@ -106,6 +106,14 @@ def test_energy_is_not_looked_at_where_forces_create_it(tmp_path):
     assert "energy_alarm" not in text and "NoMonitor" in text
 
 
+@pytest.mark.parametrize(("name", "there"), [("current harmonics", False), ("waves", True)])
+def test_water_that_is_the_same_everywhere_has_no_code_for_its_slopes(name, there, tmp_path):
+    text = source(lw.Scene(BARE, lw.Environment(gravity=9.8), terms=list(CASES[name].terms)), tmp_path)
+    assert bool(re.search(r"^static (?!.*adj_).*slopes_in_body_\d+\(", text, re.MULTILINE)) == there
+    # A force at the origin gives no torque: nothing is said of where the centre of mass is.
+    assert "dry_lever" not in text
+
+
 @pytest.mark.parametrize("name", MARKS)
 def test_a_term_adds_its_code_and_no_other(name, tmp_path):
     text = source(lw.Scene(BARE, lw.Environment(gravity=9.8), terms=list(CASES[name].terms)), tmp_path)

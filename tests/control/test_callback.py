@@ -73,6 +73,21 @@ def test_wrong_shape():
         run([lw.Callback(lambda t, y, r, members: np.zeros(len(members)))])
 
 
+ODD = {
+    "complex": (lambda values: values + 0j, "is not numeric"), "texts": (lambda values: values.astype(str), "is not numeric"),
+    "truth": (lambda values: values > 0.0, "is not numeric"), "dates": (lambda values: values.astype("M8[s]"), "is not numeric"),
+    "masked": (lambda values: np.ma.masked_array(values, np.arange(values.size).reshape(values.shape) == 1), "mask that hides"),
+    "ragged": (lambda values: [[1.0], [1.0, 2.0]], "is not numeric"), "none": (lambda values: None, "is not numeric"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("odd, words", ODD.values(), ids=ODD)
+def test_what_is_no_real_number_is_refused(odd, words):
+    """Imaginary parts and masks would be lost without a word."""
+    with pytest.raises(ValueError, match=f"callback 'callback' at t = 0 s, members 0 to 19: .*{words}"):
+        run([lw.Callback(lambda t, y, r, members: odd(heading(t, y, r, members)))])
+
+
 def test_an_exception_says_where():
     def fails(t, y, r, members):
         raise RuntimeError("no solution")

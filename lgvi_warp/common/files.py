@@ -329,9 +329,36 @@ def placed(path: str | os.PathLike[str]) -> Iterator[Path]:
         sync_file(beside, target)
         with named(target):
             beside.replace(target)
+        WRITTEN.note(target)
         sync_folder(target.parent)
     finally:
         beside.unlink(missing_ok=True)
+
+
+class Written:
+    """How many files this process has put in their places, and the last of them, for a process that is ended.
+
+    Attributes:
+        count: number of files.
+        last: path of the last one; None before the first.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.last: Path | None = None
+        self._lock = threading.Lock()
+
+    def note(self, path: Path) -> None:
+        """Count a file.
+
+        Args:
+            path: Its path.
+        """
+        with self._lock:
+            self.count, self.last = self.count + 1, path
+
+
+WRITTEN = Written()
 
 
 def put_folder(beside: Path, target: Path) -> None:

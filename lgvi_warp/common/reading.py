@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 import stat
 from pathlib import Path
+from typing import Any
 
 from lgvi_warp.common.errors import SceneError
 
@@ -36,6 +37,10 @@ class UnreadableError(ValueError):
     def __init__(self, what: str, remedy: str):
         super().__init__(f"{what}; {remedy}")
         self.what, self.remedy = what, remedy
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle what the message is made of, so that another process can raise the same error."""
+        return type(self), (self.what, self.remedy), vars(self)
 
 
 def file_bytes(path: str | os.PathLike[str], kind: str) -> bytes:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, MissingExtra, closest, refusal, shown
+from lgvi_warp.common.errors import Faults, MissingExtra, closest, ragged, refusal, shown
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.real_numbers import answered
 from lgvi_warp.engine.asking import Looks
@@ -370,8 +370,9 @@ class Vehicles:
         return rewards
 
     def _truth(self, values: Any) -> np.ndarray:
-        terminated = np.asarray(values)
-        if terminated.dtype.kind != "b" or np.ma.is_masked(values):
+        whole = not isinstance(values, np.ma.MaskedArray) and not ragged(values)
+        terminated = np.asarray(values) if whole else None
+        if terminated is None or terminated.dtype.kind != "b":
             terminated = answered("terminated", values) != 0.0
         if terminated.shape != (self.num_envs,):
             raise ValueError(f"terminated: returned shape {terminated.shape}; return ({self.num_envs},)")

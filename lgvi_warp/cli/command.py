@@ -115,7 +115,9 @@ def left(chosen: argparse.Namespace) -> str:
         count = WRITTEN.count - getattr(chosen, "files_before", WRITTEN.count)
         if not count:
             return "nothing was written"
-        return f"{WRITTEN.last} was written" if count == 1 else f"{count} files were written, the last one {WRITTEN.last}"
+        return (
+            f"{WRITTEN.last} was written" if count == 1 else f"{count} files were written, the last one {WRITTEN.last}"
+        )
     return f"finished blocks are kept: go on with lgvi-warp resume {store}"
 
 

@@ -133,7 +133,10 @@ def test_a_run_goes_on_with_its_function_alone(tmp_path, version):
     first, same, other = (scene([lw.Callback(turning(k), version=version)], 300) for k in (1.0, 1.0, 2.0))
     lw.solve(first, **settings, store=lw.Store(path), only=range(1))
     if version is None:
-        for existing in (lambda: lw.resume(path, other), lambda: lw.solve(other, **settings, store=lw.Store(path, existing="resume"))):
+        for existing in (
+            lambda: lw.resume(path, other),
+            lambda: lw.solve(other, **settings, store=lw.Store(path, existing="resume")),
+        ):
             with pytest.raises(lw.SceneError, match=r"functions\.laws\.callback is .*go on with the functions"):
                 existing()
     resumed = lw.resume(path, same if version is None else other, threads=1)

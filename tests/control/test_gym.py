@@ -71,14 +71,18 @@ def test_what_is_no_real_number_is_refused(env, odd, words):
         env.step(odd(actions))
     for name in names[: 2 if odd is ODD["truth"][0] else 3]:  # truth values are what `terminated` gives
         with pytest.raises(ValueError, match=f"{name}: .*{words}"):
-            other = environment(**{name: lambda t, y, r, *, name=name: odd(np.zeros((N, 2) if name == "observe" else N))})
+            other = environment(
+                **{name: lambda t, y, r, *, name=name: odd(np.zeros((N, 2) if name == "observe" else N))}
+            )
             other.reset()
             other.step(actions)
 
 
 def test_members_that_come_again_have_other_noise():
     """Of three given members, two environments: each member's first episode has its own noise, each later one new noise."""
-    part = lw.Ensemble(replace(scene(LAW).scene, terms=[*scene(LAW).scene.terms, lw.WrenchNoise(force=(1.0, 1.0, 1.0))]), 3, 3)
+    part = lw.Ensemble(
+        replace(scene(LAW).scene, terms=[*scene(LAW).scene.terms, lw.WrenchNoise(force=(1.0, 1.0, 1.0))]), 3, 3
+    )
     given = part.select(0, 3)
     fleet = lw.Ensemble.from_states(part.scene, given.position, given.attitude, given.velocity, given.angular_velocity)
     env, ends, members = environment(fleet, num_envs=2), [], []

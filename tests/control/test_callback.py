@@ -75,8 +75,9 @@ def test_wrong_shape():
 
 ODD = {
     "complex": (lambda values: values + 0j, "is not numeric"), "texts": (lambda values: values.astype(str), "is not numeric"),
-    "truth": (lambda values: values > 0.0, "is not numeric"), "dates": (lambda values: values.astype("M8[s]"), "is not numeric"),
-    "masked": (lambda values: np.ma.masked_array(values, np.arange(values.size).reshape(values.shape) == 1), "mask that hides"),
+    "truth": (lambda values: values > 0.0, "is not numeric"),
+    "dates": (lambda values: values.astype("M8[s]"), "is not numeric"),
+    "masked": (lambda values: np.ma.array(values, mask=np.arange(values.size).reshape(values.shape) == 1), "mask that hides"),
     "ragged": (lambda values: [[1.0], [1.0, 2.0]], "is not numeric"), "none": (lambda values: None, "is not numeric"),
 }  # fmt: skip
 
@@ -169,7 +170,7 @@ def shares(cases, folder=None, metrics=("iae heading",), **more):
     """Metrics by case of a sweep of the scene; and how often each case asked its function."""
     settings = dict(metrics=list(metrics), h=H, t1=0.5, method="psi_s", out=folder, **more)
     found = lw.sweep(scene([lw.Callback(heading)], 4), cases, **settings)
-    return {case.name: found.values(case.name, list(found.metrics)[0]) for case in found.setup.cases}
+    return {case.name: found.values(case.name, next(iter(found.metrics))) for case in found.setup.cases}
 
 
 def truth(function):

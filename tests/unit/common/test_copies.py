@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Copies and pickles of every public object and exception: the same content, and none of the original's memory to write into."""
+"""Copies and pickles of every public object and exception: the same type and content."""
 
 import concurrent.futures
 import copy

@@ -25,6 +25,7 @@ from lgvi_warp.cli.studies import sensitivity, stability, sweep, tradeoff
 from lgvi_warp.cli.view import view
 from lgvi_warp.cli.warm import warm
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.files import WRITTEN
 
 _VERBS = (run, check, resume, predict, merge, export, tradeoff, sensitivity, stability, sweep, info, bench, tune, warm,
           new, schema, view, plot, report, completion)  # fmt: skip
@@ -51,6 +52,7 @@ def main(arguments: list[str] | None = None) -> int:
             return 0
         chosen = parsed(arguments)
         streams.color(chosen.color)
+        chosen.files_before = WRITTEN.count
         with Signals(lambda: left(chosen)) as signals:
             try:
                 code = VERBS[chosen.verb](chosen)
@@ -110,7 +112,12 @@ def left(chosen: argparse.Namespace) -> str:
     if chosen.verb == "run" and chosen.store == "zarr" and (out_of(chosen) / RUN).exists():
         store = out_of(chosen)
     if store is None:
-        return "nothing was written"
+        count = WRITTEN.count - getattr(chosen, "files_before", WRITTEN.count)
+        if not count:
+            return "nothing was written"
+        return (
+            f"{WRITTEN.last} was written" if count == 1 else f"{count} files were written, the last one {WRITTEN.last}"
+        )
     return f"finished blocks are kept: go on with lgvi-warp resume {store}"
 
 

@@ -45,7 +45,7 @@ class SceneError(ValueError):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the faults, so that another process can raise the same error."""
-        return type(self), (self.faults, self.more), notes_of(self)
+        return type(self), (self.faults, self.more), vars(self)
 
     def prefixed(self, prefix: str) -> SceneError:
         """Return the same faults with a prefix that says where they are.
@@ -74,19 +74,6 @@ def refusal(key: str, value: Any, what: str, remedy: str) -> SceneError:
     return SceneError([f"{cut(key)} = {shown(value)}: {what}; {remedy}"])
 
 
-def notes_of(error: BaseException) -> dict[str, Any] | None:
-    """What an error holds besides its arguments, for its pickle: the notes that were added to it.
-
-    Args:
-        error: The error.
-
-    Returns:
-        Its notes; None where it has none.
-    """
-    notes = getattr(error, "__notes__", None)
-    return {"__notes__": notes} if notes else None
-
-
 class MembersFailed(RuntimeError):  # noqa: N818
     """Members failed in a run with on_failure="raise"; nothing of the run is lost.
 
@@ -101,7 +88,7 @@ class MembersFailed(RuntimeError):  # noqa: N818
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the result with the text, so that another process can raise the same error."""
-        return type(self), (str(self), self.result), notes_of(self)
+        return type(self), (str(self), self.result), vars(self)
 
 
 class Interrupted(KeyboardInterrupt):
@@ -118,7 +105,7 @@ class Interrupted(KeyboardInterrupt):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the result with the text, so that another process can raise the same error."""
-        return type(self), (str(self), self.result), notes_of(self)
+        return type(self), (str(self), self.result), vars(self)
 
 
 class NothingToDraw(ValueError):  # noqa: N818
@@ -140,7 +127,7 @@ class MissingExtra(ImportError):  # noqa: N818
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what the message is made of, so that another process can raise the same error."""
-        return type(self), (self.what, self.library, self.extra), notes_of(self)
+        return type(self), (self.what, self.library, self.extra), vars(self)
 
 
 # Most known names in one message.

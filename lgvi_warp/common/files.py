@@ -353,6 +353,7 @@ def placed(path: str | os.PathLike[str], root: str | os.PathLike[str] | None = N
         sync_file(beside, target)
         with named(target):
             beside.replace(target)
+        WRITTEN.note(target)
         sync_folder(target.parent)
     finally:
         beside.unlink(missing_ok=True)
@@ -376,6 +377,32 @@ def write_text(path: str | os.PathLike[str], text: str, root: str | os.PathLike[
     with placed(path, root) as beside, beside.open("x", encoding="utf-8", newline="\n") as file:
         file.write(text)
     return Path(path)
+
+
+class Written:
+    """How many files this process has put in their places, and the last of them, for a process that is ended.
+
+    Attributes:
+        count: number of files.
+        last: path of the last one; None before the first.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.last: Path | None = None
+        self._lock = threading.Lock()
+
+    def note(self, path: Path) -> None:
+        """Count a file.
+
+        Args:
+            path: Its path.
+        """
+        with self._lock:
+            self.count, self.last = self.count + 1, path
+
+
+WRITTEN = Written()
 
 
 def put_folder(beside: Path, target: Path) -> None:

@@ -39,6 +39,10 @@ class UnreadableError(ValueError):
         super().__init__(f"{what}; {remedy}")
         self.what, self.remedy = what, remedy
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle what the message is made of, so that another process can raise the same error."""
+        return type(self), (self.what, self.remedy), vars(self)
+
 
 @contextlib.contextmanager
 def opened(path: str | os.PathLike[str], kind: str) -> Iterator[BinaryIO]:

@@ -52,6 +52,27 @@ def real_numbers(value: Any) -> np.ndarray:
     raise NotReal("is not numeric")
 
 
+def answered(who: str, values: Any) -> np.ndarray:
+    """Read numbers that steer, of a user's function or agent; nothing of them is left out or turned into numbers.
+
+    Args:
+        who: Who gave them, for the message.
+        values: What was given.
+
+    Returns:
+        float64, of the values' shape; an array of float64 itself.
+
+    Raises:
+        ValueError: The values are complex, masked, texts, truth values or no array.
+    """
+    if type(values) is np.ndarray and values.dtype.kind in "iuf":
+        return values.astype(np.float64, copy=False)
+    try:
+        return real_numbers(values)
+    except NotReal as error:
+        raise ValueError(f"{who}: {error.what}; {error.remedy or 'give real numbers'}") from None
+
+
 def real_results(values: Any) -> np.ndarray:
     """Read the numbers that a user's function returned; masked ones become NaN.
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.real_numbers import answered
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.physics.control.callback import Callback
 
@@ -95,8 +96,8 @@ def ask(packets: Packets, t: float) -> None:
         t: time of the look [s].
 
     Raises:
-        ValueError: where the function returns another shape than the one wanted. What it raises itself comes with the block
-            and the time as a note.
+        ValueError: where the function returns another shape than the one wanted, or what are no real numbers. What it raises
+            itself comes with the block and the time as a note.
     """
     controller = packets.plan.kernel_choice.controller
     assert controller is not None
@@ -106,11 +107,11 @@ def ask(packets: Packets, t: float) -> None:
     members = packets.members.indices
     where = f"callback {callback.key!r} at t = {t:.9g} s, members {members[0]} to {members[-1]}"
     try:
-        values = np.asarray(callback.function(t, measured, wanted, members), dtype=np.float64)
+        given = callback.function(t, measured, wanted, members)
     except Exception as error:
         error.add_note(where)
         raise
-    shape = packets.members.count, controller.bus.rows - controller.bus.answer
+    values, shape = answered(where, given), (packets.members.count, controller.bus.rows - controller.bus.answer)
     if values.shape != shape:
         raise ValueError(f"{where}: returned shape {values.shape}; return {shape}, a row for each member")
     answer(packets, values)

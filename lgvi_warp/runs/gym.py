@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, MissingExtra, closest, refusal, shown
+from lgvi_warp.common.errors import Faults, MissingExtra, closest, ragged, refusal, shown
 from lgvi_warp.common.machine import DTYPES
+from lgvi_warp.common.real_numbers import answered
 from lgvi_warp.engine.asking import Looks
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.episodes import Episodes
@@ -275,7 +276,7 @@ class Vehicles:
             "_status" where vehicles have ended by themselves, and what Gymnasium asks for with autoreset "SameStep".
 
         Raises:
-            ValueError: Where the actions have another shape.
+            ValueError: Where the actions have another shape, or are no real numbers.
             ResetNeeded: Before the first `reset`; with autoreset "Disabled" where an episode has ended; and after
                 2^31 integration steps, when all environments must be reset.
         """
@@ -284,7 +285,7 @@ class Vehicles:
             raise needed().error.ResetNeeded("an episode has ended, or none has begun: call reset first")
         if episodes.steps + episodes.every > self._plan.grid.steps:
             raise needed().error.ResetNeeded("steps are counted up to 2^31: reset all environments")
-        wanted = np.asarray(actions, dtype=np.float64)
+        wanted = answered("actions", actions)
         if wanted.shape != self.action_space.shape:
             raise ValueError(f"actions: have shape {wanted.shape}; give {self.action_space.shape}")
         scaled = wanted if self._scale is None else wanted * self._scale
@@ -354,7 +355,7 @@ class Vehicles:
 
     def _seen(self, y: Looks, r: Looks) -> np.ndarray:
         """Observations of some environments."""
-        observed = np.array(self._observe(self.time, y, r), dtype=self._kind)
+        observed = answered("observe", self._observe(self.time, y, r)).astype(self._kind)
         if observed.ndim != 2 or len(observed) != len(y.heading):
             raise ValueError(f"observe: returned shape {observed.shape}; return ({len(y.heading)}, k), a row for each")
         return observed
@@ -363,13 +364,16 @@ class Vehicles:
         if self._reward is None:
             return np.zeros(self.num_envs)
         more = (np.asarray(actions),) if self._with_actions else ()
-        rewards = np.array(self._reward(self.time, y, r, *more), dtype=np.float64)
+        rewards = answered("reward", self._reward(self.time, y, r, *more))
         if rewards.shape != (self.num_envs,):
             raise ValueError(f"reward: returned shape {rewards.shape}; return ({self.num_envs},)")
         return rewards
 
     def _truth(self, values: Any) -> np.ndarray:
-        terminated = np.asarray(values, dtype=bool)
+        whole = not isinstance(values, np.ma.MaskedArray) and not ragged(values)
+        terminated = np.asarray(values) if whole else None
+        if terminated is None or terminated.dtype.kind != "b":
+            terminated = answered("terminated", values) != 0.0
         if terminated.shape != (self.num_envs,):
             raise ValueError(f"terminated: returned shape {terminated.shape}; return ({self.num_envs},)")
         return terminated

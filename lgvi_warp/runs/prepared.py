@@ -196,7 +196,7 @@ class Prepared:
         indices: Any = None,
         progress: Callable[[float], None] | bool | None = None,
     ) -> Any:
-        """Run members with these numbers, from t = 0; in every call row i has member i's noise, unless a seed or indices differ.
+        """Run members with these numbers, from t = 0; in every call row i has member i's noise, unless told otherwise.
 
         With noise, what follows rows from call to call (a chain, subset simulation, an optimiser) must say which noise each
         row has: new `indices` or another `seed` for noise that is new, the same ones for noise that is kept.
@@ -205,8 +205,8 @@ class Prepared:
             X: (n, d), columns in the order of `names`; or by name, in any order: a mapping of columns, a data frame, a
                 structured array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3).
                 Without X the members are drawn from the distributions.
-            seed: seed of the noise of forces and sensors, and of the members that are drawn, a whole number from 0; default that
-                of the ensemble.
+            seed: seed of the noise of forces and sensors, and of the members that are drawn, a whole number from 0; default
+                that of the ensemble.
             members: number of members that are drawn, the first ones of the sampling; default those of the ensemble.
             indices: (n,), beside X: whose noise each row has, that of the member with this index in an ensemble of this seed,
                 whole numbers from 0. Rows with the same index have the same noise. Default None for 0 to n - 1.

@@ -180,14 +180,17 @@ def _of_block(
     samples: Samples | None,
     known: Callable[[Plan], tuple[dict[str, Any], tuple[str, ...]]] | None,
 ) -> Result:
-    """The result of a block's members: their samples and outcomes, without statistics and messages."""
+    """The result of a block's members: their samples and outcomes, without statistics and messages.
+
+    Its arrays are its own: whoever gets it may write into them, and the run goes on with what it has.
+    """
     content, _ = (provenance(plan, None), ()) if known is None else known(plan)
     at = slice(block.first, block.stop)
-    of_members = member_fields.of(plan, outcomes.all.at(at))
+    of_members = {name: values.copy() for name, values in member_fields.of(plan, outcomes.all.at(at)).items()}
     kept = samples.fields if samples and samples.fields else {}
     return Result(
-        time=plan.grid.times,
-        samples={name: values[:, at] for name, values in kept.items()},
+        time=plan.grid.times.copy(),
+        samples={name: values[:, at].copy() for name, values in kept.items()},
         **Result.per_member(of_members),
         parameters=Drawn(plan.ensemble, block.stop, block.first),
         messages=(),

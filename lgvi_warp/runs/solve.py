@@ -82,8 +82,8 @@ def solve(
         scheduler: Address of Dask's scheduler.
         only: With a store, the blocks to run, such as range(0, 100), for a run in parts. The last part may ask for more
             blocks than there are. The result is of the members of these blocks.
-        on_block: Called with the Result of each block of members as soon as it is finished, in order, in the thread that
-            called: to look at a run while it goes on. Default: nothing is called.
+        on_block: Called with the Result of each block of members as soon as it is finished, a copy, in order, in the thread
+            that called: to look at a run while it goes on. Default: nothing is called.
 
     Returns:
         A Result, of every member unless `until` or `only` says otherwise.

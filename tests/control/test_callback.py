@@ -73,6 +73,22 @@ def test_wrong_shape():
         run([lw.Callback(lambda t, y, r, members: np.zeros(len(members)))])
 
 
+ODD = {
+    "complex": (lambda values: values + 0j, "is not numeric"), "texts": (lambda values: values.astype(str), "is not numeric"),
+    "truth": (lambda values: values > 0.0, "is not numeric"),
+    "dates": (lambda values: values.astype("M8[s]"), "is not numeric"),
+    "masked": (lambda values: np.ma.array(values, mask=np.arange(values.size).reshape(values.shape) == 1), "mask that hides"),
+    "ragged": (lambda values: [[1.0], [1.0, 2.0]], "is not numeric"), "none": (lambda values: None, "is not numeric"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("odd, words", ODD.values(), ids=ODD)
+def test_what_is_no_real_number_is_refused(odd, words):
+    """Imaginary parts and masks would be lost without a word."""
+    with pytest.raises(ValueError, match=f"callback 'callback' at t = 0 s, members 0 to 19: .*{words}"):
+        run([lw.Callback(lambda t, y, r, members: odd(heading(t, y, r, members)))])
+
+
 def test_an_exception_says_where():
     def fails(t, y, r, members):
         raise RuntimeError("no solution")
@@ -118,7 +134,10 @@ def test_a_run_goes_on_with_its_function_alone(tmp_path, version):
     first, same, other = (scene([lw.Callback(turning(k), version=version)], 300) for k in (1.0, 1.0, 2.0))
     lw.solve(first, **settings, store=lw.Store(path), only=range(1))
     if version is None:
-        for existing in (lambda: lw.resume(path, other), lambda: lw.solve(other, **settings, store=lw.Store(path, existing="resume"))):
+        for existing in (
+            lambda: lw.resume(path, other),
+            lambda: lw.solve(other, **settings, store=lw.Store(path, existing="resume")),
+        ):
             with pytest.raises(lw.SceneError, match=r"functions\.laws\.callback is .*go on with the functions"):
                 existing()
     resumed = lw.resume(path, same if version is None else other, threads=1)
@@ -151,7 +170,7 @@ def shares(cases, folder=None, metrics=("iae heading",), **more):
     """Metrics by case of a sweep of the scene; and how often each case asked its function."""
     settings = dict(metrics=list(metrics), h=H, t1=0.5, method="psi_s", out=folder, **more)
     found = lw.sweep(scene([lw.Callback(heading)], 4), cases, **settings)
-    return {case.name: found.values(case.name, list(found.metrics)[0]) for case in found.setup.cases}
+    return {case.name: found.values(case.name, next(iter(found.metrics))) for case in found.setup.cases}
 
 
 def truth(function):

@@ -18,7 +18,7 @@ from lgvi_warp.reference.control import Measurement, Reference
 from lgvi_warp.reference.control.policy import Policy as PolicyTwin
 from lgvi_warp.runs.observations import OBSERVATIONS
 from tests.conftest import ROOT
-from tests.control.test_callback import GAINS, H, heading, scene
+from tests.control.test_callback import GAINS, ODD, H, heading, scene
 
 N, PERIOD = 20, 5 * H
 LAW = [lw.HeadingPID(**GAINS)]
@@ -63,9 +63,26 @@ def test_the_bits_of_a_run(env):
     assert np.array_equal(observed[:, 1:], solved(scene([lw.Callback(heading)]), 50))
 
 
+@pytest.mark.parametrize("odd, words", ODD.values(), ids=ODD)
+def test_what_is_no_real_number_is_refused(env, odd, words):
+    actions, names = np.zeros((N, 1)), ("observe", "reward", "terminated")
+    env.reset()
+    with pytest.raises(ValueError, match=f"actions: .*{words}"):
+        env.step(odd(actions))
+    for name in names[: 2 if odd is ODD["truth"][0] else 3]:  # truth values are what `terminated` gives
+        with pytest.raises(ValueError, match=f"{name}: .*{words}"):
+            other = environment(
+                **{name: lambda t, y, r, *, name=name: odd(np.zeros((N, 2) if name == "observe" else N))}
+            )
+            other.reset()
+            other.step(actions)
+
+
 def test_members_that_come_again_have_other_noise():
     """Of three given members, two environments: each member's first episode has its own noise, each later one new noise."""
-    part = lw.Ensemble(replace(scene(LAW).scene, terms=[*scene(LAW).scene.terms, lw.WrenchNoise(force=(1.0, 1.0, 1.0))]), 3, 3)
+    part = lw.Ensemble(
+        replace(scene(LAW).scene, terms=[*scene(LAW).scene.terms, lw.WrenchNoise(force=(1.0, 1.0, 1.0))]), 3, 3
+    )
     given = part.select(0, 3)
     fleet = lw.Ensemble.from_states(part.scene, given.position, given.attitude, given.velocity, given.angular_velocity)
     env, ends, members = environment(fleet, num_envs=2), [], []

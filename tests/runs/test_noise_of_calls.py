@@ -18,7 +18,7 @@ NAMES = ["start.position[2]", "start.velocity[2]"]
 
 @pytest.fixture(scope="module")
 def noisy():
-    """A neutral body with linear drag under white force and torque, in a random current, which holds a heading by a compass."""
+    """A neutral body with linear drag under white force and torque, in a random current, which holds a heading."""
     controller = lw.Controller(
         period=H,
         sensors=[lw.Sensor(of="heading", noise=0.1, name="compass")],
@@ -26,7 +26,7 @@ def noisy():
         laws=[lw.HeadingPID(kp=1.0, kd=1.0)],
     )
     terms = [lw.Drag(linear=(DRAG,) * 6), lw.WrenchNoise(force=(0.0, 0.0, STRENGTH), torque=(0.1, 0.1, 0.1)),
-             lw.GaussMarkovCurrent(standard_deviation=(0.1, 0.1, 0.0), time_constant=5.0), lw.ControlWrench(limit=2.0)]  # fmt: skip
+             lw.GaussMarkovCurrent(standard_deviation=(0.1,) * 3, time_constant=5.0), lw.ControlWrench(limit=2.0)]  # fmt: skip
     return lw.Scene(BODY, terms=terms, controller=controller)
 
 
@@ -94,8 +94,8 @@ def scene():
     return lw.Scene(BODY, terms=[lw.Drag(linear=(DRAG,) * 6), lw.WrenchNoise(force=(0.0, 0.0, STRENGTH))])
 
 
-# Variance of the depth at T by the force, by the stochastic integral over (1 - e^(-a (T - s))) / a; and of the start, four times
-# it, half by its depth and half by its velocity.
+# Variance of the depth at T by the force, by the stochastic integral over (1 - e^(-a (T - s))) / a; and of the start, four
+# times it, half by its depth and half by its velocity.
 A = DRAG / MASS
 REACH = (1.0 - np.exp(-A * T)) / A
 BY_FORCE = (STRENGTH / DRAG) ** 2 * (T - 2.0 * REACH + (1.0 - np.exp(-2.0 * A * T)) / (2.0 * A))
@@ -173,7 +173,7 @@ def by_row(run, u, index):
 
 
 def test_the_depth_is_the_normal_one(prepared):
-    """Its variance, from 40,000 members: the error of that of normals is sqrt(2 / 40,000), 0.7 %; of the step H^2 / (4 T^2)."""
+    """Its variance, from 40,000 members: the error of that of normals is sqrt(2 / 40,000), 0.7 %."""
     u = np.random.default_rng(0).normal(size=(40_000, 2))
     y = by_index(prepared, 3, u, np.arange(40_000))
     assert y.var() == pytest.approx(5.0 * BY_FORCE, rel=4 * 0.0071)

@@ -414,6 +414,38 @@ def test_a_signal_while_clang_is_at_work(tmp_path, monkeypatch):
     assert lw.Result.load(out / "result.npz").members == 20
 
 
+# The command, whose pictures begin when the result is saved, and last until it is ended.
+DRAWING = """
+import time
+from lgvi_warp.views import plots
+def plot(*given):
+    print("drawing", flush=True)
+    time.sleep(60.0)
+plots.plot = plot
+from lgvi_warp.cli import runs
+runs.rescued = lambda *given: print("saving", flush=True) or time.sleep(60.0)
+from lgvi_warp_command import entry
+entry()
+"""
+
+
+def test_twice_while_files_are_written_names_what_is_there(tmp_path):
+    with begun([*SHORT, "--out", str(tmp_path), "--quiet"], DRAWING) as process:
+        assert process.stdout.readline() == "drawing\n"
+        end = time.monotonic() + SECONDS
+        while not (tmp_path / "fleet.rrd").exists() or not (tmp_path / "result.npz").exists():
+            assert time.monotonic() < end
+            time.sleep(0.05)
+        for _ in range(2):
+            process.send_signal(signal.SIGINT)
+            time.sleep(0.5)
+        code, _, (line,) = ended(process)
+    there = [path.name for path in tmp_path.iterdir() if not path.name.startswith(".")]
+    assert code == 130 and re.fullmatch(
+        rf"lgvi-warp: interrupted twice, ended at once; {len(there)} files were written, the last one .*", line)  # fmt: skip
+    assert line.rsplit("/", 1)[1] in there
+
+
 def test_an_interrupt_while_files_are_written_leaves_them_whole(tmp_path, monkeypatch, capsys):
     from lgvi_warp.views import plots
 

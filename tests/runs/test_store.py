@@ -81,6 +81,35 @@ def test_blocks_are_handed_over_in_order_with_the_bits_of_the_run(into, memory, 
             np.testing.assert_array_equal(np.concatenate([block.parameters[name] for block in handed]), values)
 
 
+@pytest.mark.parametrize("into", ["memory", "store"])
+def test_what_takes_blocks_cannot_change_the_run(into, memory, tmp_path):
+    """It writes into all that it is given, at once and when all is done."""
+    handed = []
+
+    def spoil(block):
+        every = [*block.samples.values(), *block.parameters.values(), *vars(block).values()]
+        for values in every:
+            if isinstance(values, np.ndarray) and values.flags.writeable:
+                values.view(np.ndarray)[...] = 77
+
+    store = {} if into == "memory" else {"store": tmp_path / "run.zarr"}
+    statistic = lw.Mean("position")
+    more = dict(threads=2, statistics=[statistic])
+    result = lw.solve(fleet(), **SETTINGS, **store, **more, on_block=lambda block: (spoil(block), handed.append(block)))
+    for block in handed:
+        spoil(block)
+    clean = lw.solve(fleet(), **SETTINGS, **more)
+    for name, values in vars(memory).items():
+        if isinstance(values, np.ndarray):
+            assert np.asarray(getattr(result, name)).tobytes() == values.tobytes(), name
+    for name in FIELDS:
+        assert result.samples[name].tobytes() == memory.samples[name].tobytes()
+    for name, values in memory.parameters.items():
+        np.testing.assert_array_equal(result.parameters[name], values)
+    np.testing.assert_array_equal(
+        result.statistics[statistic.key].value, clean.statistics[statistic.key].value)  # fmt: skip
+
+
 def test_some_members_alone_are_read(whole, memory):
     some = lw.open_run(whole, [5, 1002, 300])
     assert some.position.tobytes() == memory.position[:, [5, 1002, 300]].tobytes() and some.members == 3

@@ -99,7 +99,7 @@ class ScalarModel:
         return [_Levels() if self.levels else _Column(self._fleet, column) for column in self._columns]
 
     def __call__(self, X: Any, *, seed: int | None = None, indices: Any = None) -> np.ndarray:
-        """Run members with these numbers and return their quantities; row i always has the same noise, unless another is asked.
+        """Run members with these numbers and return their quantities; row i always has the same noise, if not told otherwise.
 
         Args:
             X: (n, d), columns in the order of `names`; or by name, in any order: a data frame, a mapping of columns, a

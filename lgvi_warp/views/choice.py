@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import result_of, whole
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import Status, under_way
 from lgvi_warp.runs import member_fields
@@ -81,10 +82,10 @@ def shown(result: Result, most: int = MOST_BODIES) -> Shown:
 
     Raises:
         NothingToDraw: No samples were kept, or no member has a finite start.
-        ValueError: most is below 1.
+        SceneError: most is no whole number from 1, or the result is none.
     """
-    if most < 1:
-        raise ValueError(f"most = {most}: draws no member; give a number from 1")
+    result_of(result)
+    most = whole("most", most, 1)
     if "position" not in result.samples:
         raise NothingToDraw(
             'no positions were kept: there is nothing to draw; give keep="all", or indices of members to keep'

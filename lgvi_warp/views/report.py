@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lgvi_warp.common import files as durable
+from lgvi_warp.common.arguments import file_path, path_of, result_of
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw, SceneError
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.runs.outcomes import outcome_text, outcomes
@@ -59,12 +60,12 @@ def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]
         OSError: The file cannot be written.
     """
     if isinstance(result, str | os.PathLike):
-        folder = Path(result)
+        folder = path_of("result", result)
         study = next((name for name in STUDIES if (folder / f"{name}.json").is_file()), None)
         if study is not None:
             return _write(path, f"{study.capitalize()} of {folder.resolve().name}", _of_study(folder, study))
         result = _run_in(folder)
-    return _write(path, _name(result.provenance), _of_run(result))
+    return _write(path, _name(result_of(result).provenance), _of_run(result))
 
 
 def _run_in(folder: Path) -> Result:
@@ -88,7 +89,7 @@ def _name(provenance: Mapping[str, Any]) -> str:
 
 def _write(path: str | os.PathLike[str], name: str, parts: Iterator[str]) -> Path:
     """Write a page; it is there whole or not at all."""
-    target = Path(path)
+    target = file_path("path", path)
     heading = html.escape(name)
     head = f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{heading}</title><style>{STYLE}</style></head>'
     with durable.placed(target) as beside:

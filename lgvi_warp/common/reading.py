@@ -59,7 +59,7 @@ def file_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
         with os.fdopen(descriptor, "rb") as file:
             _refuse(os.fstat(descriptor), kind)
             content = file.read(most + 1)
-    except (OSError, ValueError, TypeError) as error:
+    except (OSError, ValueError, TypeError, OverflowError) as error:
         if isinstance(error, UnreadableError):
             raise
         raise UnreadableError(str(getattr(error, "strerror", None) or error), remedy) from None

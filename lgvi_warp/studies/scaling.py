@@ -134,8 +134,10 @@ def term_cost(
         SceneError: The scene has no terms, or an argument is at fault.
     """
     scene = scene_of(scene)
+    faults = Faults()
     if h is not None:
-        Faults().positive("h", h)
+        h = faults.positive("h", h)
+    faults.raise_if_any()
     if not scene.terms:
         raise SceneError(["scene.terms: is empty; give the scene terms whose cost is to be measured"])
     step = scene.run.step if h is None else h

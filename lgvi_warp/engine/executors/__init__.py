@@ -53,7 +53,7 @@ def executor_of(given: Any, threads: int | None = None, scheduler: str | None = 
         faults.add("executor", given, "is not known", f"{closest(str(given), NAMES)}; or give an object with run(...)")
     if scheduler is not None and not among(given, ("dask",)):
         faults.add("scheduler", scheduler, "is for the executor dask alone", 'give executor="dask", or leave it out')
-    if given in STARTING and scheduler is None and multiprocessing.current_process().daemon:
+    if among(given, STARTING) and scheduler is None and multiprocessing.current_process().daemon:
         problem = "starts processes, which a worker of multiprocessing or Celery may not"
         faults.add("executor", given, problem, 'use executor="threads" in it, or run outside of it')
     faults.raise_if_any()

@@ -352,6 +352,8 @@ def stability_map(
                               *((name, value, "s") for name, value in (("t1", t1), ("error_time", error_time))
                                 if value is not None)):  # fmt: skip
         faults.positive(name, value, unit)
+    faults.raise_if_any()
+    error_time, t1 = (None if value is None else float(value) for value in (error_time, t1))
     faults.choice("dtype", dtype, plan.DTYPES)
     grid = None
     with faults.including():

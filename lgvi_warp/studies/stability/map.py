@@ -16,11 +16,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common import machine
-from lgvi_warp.common.arguments import listed
+from lgvi_warp.common.arguments import listed, whole
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import Status, failed, stopped
 from lgvi_warp.engine import plan
+from lgvi_warp.engine.executors import check_threads
 from lgvi_warp.runs.provenance import provenance
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.compared import QUANTITIES, compared_in
@@ -355,10 +356,11 @@ def stability_map(
     faults.raise_if_any()
     error_time, t1 = (None if value is None else float(value) for value in (error_time, t1))
     faults.choice("dtype", dtype, plan.DTYPES)
+    check_threads(faults, threads)
     grid = None
     with faults.including():
         both = (points, points) if isinstance(points, int) else tuple(listed("points", points, "two numbers"))
-        grid = StabilityGrid(scene, x, y, both, directions, seed, h)
+        grid = StabilityGrid(scene, x, y, both, directions, whole("seed", seed, 0), h)
     faults.raise_if_any()
     assert grid is not None and compared is not None
     refused = refusals(grid, names, dtype)

@@ -193,4 +193,4 @@ def plan_of(
 
 def _numbers(key: str, values: Any) -> list[int]:
     """The numbers of a list, each once, rising."""
-    return sorted({whole(key, value, 1) for value in listed(key, values, "whole numbers from 1")})
+    return sorted({whole(key, value, -(2**31)) for value in listed(key, values, "whole numbers from 1")})

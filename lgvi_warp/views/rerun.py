@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from lgvi_warp.common import files as durable
 from lgvi_warp.common.arguments import file_path, of_kind, result_of
-from lgvi_warp.common.errors import NothingToDraw, refusal
+from lgvi_warp.common.errors import NothingToDraw, SceneError
 from lgvi_warp.views import viewer
 from lgvi_warp.views.fleet import identity, title
 from lgvi_warp.views.recording.drawn import Drawn, drawn_of
@@ -59,13 +59,10 @@ def log_rerun(
     """
     viewer.rerun()
     if path is None and to is None:
-        raise refusal(
-            "path", path, "neither it nor to is given, so the recording would go nowhere", 'give path="fleet.rrd"'
-        )
+        words = "neither path nor to is given: the recording would go nowhere"
+        raise SceneError([f'{words}; give path="fleet.rrd"'])
     if to is not None and not isinstance(to, str):
-        of_kind(
-            "to", to, "send_blueprint log", "a recording", "give the address of a viewer, or a rerun.RecordingStream"
-        )
+        of_kind("to", to, "flush", "a recording", "give the address of a viewer, or a rerun.RecordingStream")
     runs = _runs(result, members)
     address = to if isinstance(to, str) else None
     if address is not None:

@@ -353,8 +353,6 @@ def stability_map(
                               *((name, value, "s") for name, value in (("t1", t1), ("error_time", error_time))
                                 if value is not None)):  # fmt: skip
         faults.positive(name, value, unit)
-    faults.raise_if_any()
-    error_time, t1 = (None if value is None else float(value) for value in (error_time, t1))
     faults.choice("dtype", dtype, plan.DTYPES)
     check_threads(faults, threads)
     grid = None
@@ -363,6 +361,7 @@ def stability_map(
         grid = StabilityGrid(scene, x, y, both, directions, whole("seed", seed, 0), h)
     faults.raise_if_any()
     assert grid is not None and compared is not None
+    error_time, t1 = (None if value is None else float(value) for value in (error_time, t1))
     refused = refusals(grid, names, dtype)
     if len(refused) == len(names):
         raise SceneError([f"method {name}: {why}" for name, why in refused.items()])

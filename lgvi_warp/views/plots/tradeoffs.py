@@ -43,7 +43,7 @@ def tradeoff(
         NothingToDraw: No setting was measured.
         OSError: The file cannot be written.
     """
-    of_kind("found", found, "measurements front of", "a trade-off", "give what lw.tradeoff returns")
+    of_kind("found", found, "measurements of", "a trade-off", "give what lw.tradeoff returns")
     of = found.of if of is None else of
     if not found.measurements:
         raise NothingToDraw("no setting was measured: there is nothing to draw")

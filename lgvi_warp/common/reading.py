@@ -84,7 +84,7 @@ def file_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
     try:
         with opened(path, kind) as file:
             content = io.BufferedReader(file).read(most + 1)  # type: ignore[type-var]
-    except (OSError, ValueError, TypeError) as error:
+    except (OSError, ValueError, TypeError, OverflowError) as error:
         if isinstance(error, UnreadableError):
             raise
         raise UnreadableError(str(getattr(error, "strerror", None) or error), remedy) from None

@@ -148,8 +148,8 @@ _WARNING_TEXT = {
     "shorten the step, or do not trust attitudes",
     Warnings.ROTATION: "the rotation in one step is too large: h |Omega| passed the stability limit of the explicit method "
     "(psi_x: 1, beyond which its turns are inaccurate); shorten the step",
-    Warnings.DRAG_STIFF: "drag is stiff: h (l + 2 q|v|) / I > 1 for a method that treats it explicitly, or > 5 for psi_s, psi_x "
-    "and psi_w, which stay stable and are then of order 1 to 1.5 in place of 2; shorten the step, or use rkw3",
+    Warnings.DRAG_STIFF: "drag is stiff: h (l + 2 q|v|) / I > 1 for a method that treats it explicitly, or > 5 for psi_s, "
+    "psi_x and psi_w, which stay stable and are then of order 1 to 1.5 in place of 2; shorten the step, or use rkw3",
     Warnings.MUNK_UNSTABLE: "the Munk moment's oscillation is too fast for this method and step: h w passed the measured "
     "limit of stability; shorten the step",
     Warnings.RESTORING_UNSTABLE: "the restoring moment's oscillation is too fast for this method and step: h sqrt(B|r|/J) "

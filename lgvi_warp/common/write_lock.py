@@ -76,6 +76,31 @@ def write_lock(target: Path, wait: bool = False) -> Iterator[None]:
             _release(path, descriptor)
 
 
+def writer_of(target: Path) -> str | None:
+    """Name who is writing into a file or folder, as its lock says; nothing is locked by asking.
+
+    Args:
+        target: The file or folder.
+
+    Returns:
+        The process in words; None where nobody is, or who held the lock has ended without taking it away.
+    """
+    try:
+        flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+        descriptor = os.open(lock_file(target), flags | getattr(os, "O_CLOEXEC", 0))
+    except OSError:
+        return None
+    try:
+        holder = _holder(descriptor) if stat.S_ISREG(os.fstat(descriptor).st_mode) else None
+        if not holder or (holder["host"] == scratch.host() and not scratch.is_alive(int(holder["pid"]))):
+            return None
+        return _told(descriptor).strip(" ()")
+    except (OSError, ValueError, TypeError):
+        return None
+    finally:
+        os.close(descriptor)
+
+
 def _taken(path: Path, target: Path, wait: bool) -> int:
     """Open and lock the lock's file; return its descriptor. Raises SceneError."""
     while True:

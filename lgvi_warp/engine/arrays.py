@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import warp as wp
 
-from lgvi_kernels.maps.bounded import BOUNDS, FIELDS
 from lgvi_warp.physics.terms.base import Packed
 
 
@@ -168,6 +167,10 @@ class Lanes:
         self.view = view if view.ndim == 3 else view[:, :, None]
 
 
+# The struct of a law that is held to its own rows: its numbers, and where its rows lie (lgvi_kernels.maps.bounded).
+FIELDS = ("own", "bounds")
+
+
 class Group(NamedTuple):
     """What several terms packed: those of one of the kernel's structs, which nests their numbers.
 
@@ -228,7 +231,7 @@ class LawArrays:
             # The table's first row is none's: it is 0, and what a law without rows reads.
             size = part.shape[1]
             ends = (row, row + size - 1) if size else (0, 0)
-            places.append((own, dict(zip(BOUNDS, (*ends, memory, end - 1, bus), strict=True))))
+            places.append((own, (*ends, memory, end - 1, bus)))
             self.remembered.append(slice(memory, work))
             row, memory = row + size, end
         moved = self.places != (places, row, memory)
@@ -266,11 +269,12 @@ class LawArrays:
         view[:, half:] = view[:, :half]
 
 
-def _bounded(dtype: np.dtype) -> list[bool]:
-    """Of each law of a struct, whether bounds stand beside its numbers."""
-    found: list[bool] = []
+def _bounded(dtype: np.dtype) -> list[tuple[str, ...]]:
+    """Of each law of a struct, the names of the bounds that stand beside its numbers, in their order; none for none."""
+    found: list[tuple[str, ...]] = []
     while "own" in (dtype.names or ()):
-        found.append(dtype["own"].names == FIELDS)
+        own = dtype["own"]
+        found.append((own["bounds"].names or ()) if own.names == FIELDS else ())
         dtype = dtype["rest"]
     return found
 
@@ -292,17 +296,17 @@ def _present(rows: np.ndarray | None) -> np.ndarray:
 
 
 def _nested(
-    group: Group, bounded: Sequence[bool], places: Sequence[tuple[dict[str, int], dict[str, int]]]
+    group: Group, bounded: Sequence[tuple[str, ...]], places: Sequence[tuple[dict[str, int], tuple[int, ...]]]
 ) -> list[tuple[tuple[str, ...], Any, bool]]:
     """The numbers of a group as parts of the kernel's struct, which holds those of the first law, and the rest.
 
-    places: for each law where its rows are, as fields of its own, and its bounds.
+    bounded: as of `_bounded`. places: for each law where its rows are, as fields of its own, and its bounds.
     """
     parts: list[tuple[tuple[str, ...], Any, bool]] = []
     each = zip(group.packed, group.shared, bounded, places, strict=True)
-    for i, (packed, known, held, (own, bounds)) in enumerate(each):
+    for i, (packed, known, names, (own, bounds)) in enumerate(each):
         path = (*("rest",) * i, "own")
-        parts.append((path + FIELDS[:1] * held, {**packed.values, **own}, known))
-        if held:
-            parts.append((path + FIELDS[1:], bounds, known))
+        parts.append((path + FIELDS[:1] * bool(names), {**packed.values, **own}, known))
+        if names:
+            parts.append((path + FIELDS[1:], dict(zip(names, bounds, strict=True)), known))
     return parts

@@ -119,6 +119,7 @@ class Plan:
         faults.choice("dtype", self.dtype, DTYPES)
         faults.choice("checks", self.checks, CHECKS)
         faults.choice("on_failure", self.on_failure, ON_FAILURE)
+        faults.raise_if_any()
         if self.width is not None:
             faults.choice("width", self.width, WIDTHS)
         if self.checks == "none" and self.ensemble.scene.events:

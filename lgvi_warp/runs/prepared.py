@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import machine
+from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, SceneError, refusal, shown
 from lgvi_warp.common.labelled import columns_by_name, is_labelled
 from lgvi_warp.common.progress import callback, shows_progress
@@ -543,6 +544,7 @@ def prepare(
     faults.choice("failed", failed, ("refuse", "nan"))
     distributions = isinstance(vary, Mapping)
     listed = names_of(faults, vary) if vary is not None and not distributions else ()
+    levels = flag("levels", levels)
     if levels and listed:
         faults.add("vary", vary, "has no distributions, which levels=True needs", "map names to distributions")
     faults.raise_if_any()

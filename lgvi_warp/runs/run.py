@@ -138,7 +138,15 @@ def run_plan(
     joined = bool(observing.keepers) or not isinstance(runner, Threads)
     runs, work = parts(total, plan.grid.steps, threads, joined), Work(plan, keepers, warned=warned)
     try:
-        n = run_blocks(work, runs, runner, overall.at, enough=observing.enough, merged=merged, after=on_block and after)
+        n = run_blocks(
+            work,
+            runs,
+            runner,
+            overall.at,
+            enough=observing.enough,
+            merged=merged,
+            after=after if on_block is not None else None,
+        )
     except KeyboardInterrupt as stop:
         if not (partial and merged.done):
             raise

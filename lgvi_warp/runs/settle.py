@@ -112,8 +112,9 @@ def make_plan(
     if dropped:
         text = f"run.save_every = {every} s is longer than the run, {t1} s: only the start and the end are kept"
         grid = replace(grid, messages=(*grid.messages, text))
-    dtype, checks = dtype or settings.dtype, checks or settings.checks
-    on_failure = on_failure or settings.on_failure
+    dtype = settings.dtype if dtype is None else dtype
+    checks = settings.checks if checks is None else checks
+    on_failure = settings.on_failure if on_failure is None else on_failure
     others = fields(save.fields), dtype, width, checks, on_failure, survey_all, looks, read_at_looks
     if method is None and settings.method is None and not settings.method_options:
 

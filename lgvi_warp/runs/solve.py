@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from lgvi_warp.common import machine
+from lgvi_warp.common.arguments import function_of
 from lgvi_warp.common.errors import Faults, SceneError, shown
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.engine.executors import executor_of
@@ -105,6 +106,8 @@ def solve(
         observed = observe(ensemble.members, scene.run, statistics, keep, until, scene.events, scene.controller)
     with faults.including():
         runner = executor_of(executor, threads, scheduler)
+    with faults.including():
+        function_of("on_block", on_block)
     if only is not None and store is None:
         faults.add("only", only, "is for a run into a store", "give store=..., or leave it out")
     if only is not None and observed.until is not None:

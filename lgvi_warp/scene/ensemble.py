@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from lgvi_warp.common import machine, summaries
+from lgvi_warp.common.arguments import of_kind
 from lgvi_warp.common.errors import Faults, closest, cut, refusal, shown
 from lgvi_warp.common.labelled import columns_by_name, is_labelled, match
 from lgvi_warp.common.real_numbers import column_names
@@ -124,6 +125,7 @@ class Ensemble(Summarized):
         Raises:
             SceneError: If the settings do not fit the scene, or a member is unphysical.
         """
+        of_kind("scene", scene, "ensemble_settings parameters", "a Scene", "give lw.Scene(...)")
         return cls.of(scene, scene.ensemble_settings or EnsembleSettings())
 
     @classmethod

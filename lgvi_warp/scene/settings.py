@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, SceneError, ragged
+from lgvi_warp.common.errors import Faults, SceneError, among, ragged
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.real_numbers import holds_words, is_whole
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
@@ -138,7 +138,7 @@ class RunSettings:
             SceneError: If the name is not known or an option does not fit the method.
         """
         set_here = Method.name if self.method is None else self.method
-        if name is not None and name != set_here:
+        if name is not None and not among(name, (set_here,)):
             return Method(name)
         return Method(set_here, **self.method_options)
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.common.errors import Faults, closest, refusal
 from lgvi_warp.physics import notation
 from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.sampling.designs.space import Space
@@ -69,6 +69,8 @@ def targets(key: str) -> tuple[Target, ...]:
     Returns:
         The targets, in the order of the key.
     """
+    if not isinstance(key, str):
+        raise refusal("vary", key, "is no name of a quantity", 'give names such as "vehicle.mass"')
     if len(key) > LONGEST_KEY:
         return (Target(key),)
     listed = []

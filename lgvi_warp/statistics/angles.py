@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.errors import Faults, among
 from lgvi_warp.physics import notation
 from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.base import Statistic
@@ -146,7 +146,7 @@ class MeanAttitude(Statistic):
 
     def check(self, faults: Faults) -> None:
         """Note a fault if `of` is not the attitude."""
-        if self.of != "attitude":
+        if not among(self.of, ("attitude",)):
             faults.add("of", self.of, "is no attitude", 'leave it out, or give "attitude"')
 
     @property

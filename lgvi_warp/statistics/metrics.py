@@ -15,7 +15,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.arguments import flag
+from lgvi_warp.common.errors import Faults, among
 from lgvi_warp.common.status import failed
 from lgvi_warp.physics.control.controller import Controller
 from lgvi_warp.statistics import tracking
@@ -152,7 +153,7 @@ class Metric(Then):
     def check(self, faults: Faults) -> None:
         """Note faults of `then`, and of `stopped`, which is not to be chosen."""
         super().check(faults)
-        if self.stopped != "left_out":
+        if not among(self.stopped, ("left_out",)):
             faults.add("stopped", self.stopped, "has no meaning for a metric", "leave it out")
 
     def begin(self, x: np.ndarray) -> State:
@@ -251,7 +252,9 @@ class OfTracking(Metric):
 
     def meant(self) -> Quantity:
         """Return the error."""
-        return tracking.error(tracking.check(f"{self.type}.of", self.of, tracking.ERRORS), bool(self.measured))
+        return tracking.error(
+            tracking.check(f"{self.type}.of", self.of, tracking.ERRORS), flag(f"{self.type}.measured", self.measured)
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, closest, refusal
+from lgvi_warp.common.arguments import listed
+from lgvi_warp.common.errors import Faults, among, closest, refusal
 from lgvi_warp.common.identity import check_version
 from lgvi_warp.common.real_numbers import NotReal, real_results
 from lgvi_warp.physics.control.signals import CHANNELS, SAVED, SIGNALS, ordered
@@ -61,7 +62,7 @@ class OfChannels(Metric):
 
     def meant(self) -> Quantity:
         """Return the channels."""
-        if self.of in CHANNELS:
+        if among(self.of, CHANNELS):
             return _ALL[self.of]
         names = [*CHANNELS, *(f"{name}[0]" for name in CHANNELS)]
         if not isinstance(self.of, str) or self.of.split("[")[0] not in CHANNELS:
@@ -143,7 +144,7 @@ class SaturationShare(OfChannels):
 
     def meant(self) -> Quantity:
         """Return whether some command is at its limit."""
-        if self.of != "command":
+        if not among(self.of, ("command",)):
             raise refusal("saturation_share.of", self.of, "is not the command", "leave it out")
         return _SATURATED
 
@@ -184,7 +185,7 @@ class Energy(OfChannels):
 
     def meant(self) -> Quantity:
         """Return the power."""
-        if self.of != "demand":
+        if not among(self.of, ("demand",)):
             raise refusal("energy.of", self.of, "is not the demand", "leave it out")
         return _POWER
 
@@ -220,7 +221,7 @@ class TimeToFailure(Metric):
 
     def meant(self) -> Quantity:
         """Return a quantity that needs no samples."""
-        if self.of != "end":
+        if not among(self.of, ("end",)):
             raise refusal("time_to_failure.of", self.of, "is not the end", "leave it out")
         return _END
 
@@ -272,7 +273,7 @@ class OwnMetric(Metric):
     def check(self, faults: Faults) -> None:
         """Note fields that there are not."""
         super().check(faults)
-        for name in self.fields:
+        for name in listed("fields", self.fields, "names of fields"):
             faults.choice("fields", name, SAVED)
         check_version(faults, self.version)
 

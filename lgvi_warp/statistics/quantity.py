@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import closest, refusal
 from lgvi_warp.common.real_numbers import NotReal, real_results
 from lgvi_warp.physics import energy as invariants
@@ -55,7 +56,9 @@ class Quantity:
     entries: tuple[tuple[str, tuple[int, ...]], ...] = ()
 
     def __post_init__(self) -> None:
-        if not self.labels:
+        labels = listed("labels", () if self.labels is None else self.labels, "texts")
+        object.__setattr__(self, "labels", tuple(labels))
+        if not labels:
             object.__setattr__(self, "labels", (self.name,))
 
     @property

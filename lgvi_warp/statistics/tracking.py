@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import closest, refusal
+from lgvi_warp.common.errors import among, closest, refusal
 from lgvi_warp.physics.control.signals import ordered
 from lgvi_warp.statistics.quantity import Function, Quantity
 
@@ -245,5 +245,5 @@ def check(key: str, of: Any, known: tuple[str, ...]) -> str:
     """
     if isinstance(of, str) and of in known:
         return of
-    why = "is a distance, which has no goal beyond" if of in tuple(_DISTANCES) else "is nothing that is tracked"
+    why = "is a distance, which has no goal beyond" if among(of, _DISTANCES) else "is nothing that is tracked"
     raise refusal(key, of, why, closest(str(of), known))

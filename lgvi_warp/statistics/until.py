@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, SceneError, closest, refusal
+from lgvi_warp.common.errors import Faults, SceneError, among, closest, refusal
 from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.estimate import Estimate
@@ -56,7 +56,7 @@ class Until:
         if not isinstance(self.statistic, str):
             faults.add("statistic", self.statistic, "is no name", 'give "mean position[2]"')
         faults.positive("half_width", self.half_width, "in the unit of the statistic")
-        if self.at is not None and self.at != "all":
+        if self.at is not None and not among(self.at, ("all",)):
             faults.number("at", self.at, "s", least=0.0)
         if not is_whole(self.members, 2):
             faults.add("members", self.members, "is no whole number from 2", "give 1024")

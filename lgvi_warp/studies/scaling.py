@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import machine
+from lgvi_warp.common.arguments import listed, whole
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
@@ -20,6 +21,7 @@ from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.cost import costs
+from lgvi_warp.studies.members import ensemble_of, scene_of
 from lgvi_warp.studies.speed import least
 
 # Row of a scene without terms, and row of all its terms together.
@@ -56,8 +58,9 @@ def scaling(
     Raises:
         SceneError: An argument is at fault.
     """
-    sizes = rising(10, fleet.members) if members is None else sorted(set(members))
-    counts = rising(2, machine.thread_count()) if threads is None else sorted(set(threads))
+    fleet = ensemble_of(fleet)
+    sizes = rising(10, fleet.members) if members is None else _numbers("members", members)
+    counts = rising(2, machine.thread_count()) if threads is None else _numbers("threads", threads)
     faults = Faults()
     if not sizes or sizes[0] < 1 or sizes[-1] > fleet.members:
         faults.add("members", members, "is not within the fleet", f"name numbers from 1 to {fleet.members}")
@@ -130,6 +133,11 @@ def term_cost(
     Raises:
         SceneError: The scene has no terms, or an argument is at fault.
     """
+    scene = scene_of(scene)
+    faults = Faults()
+    if h is not None:
+        h = faults.positive("h", h)
+    faults.raise_if_any()
     if not scene.terms:
         raise SceneError(["scene.terms: is empty; give the scene terms whose cost is to be measured"])
     step = scene.run.step if h is None else h
@@ -181,3 +189,8 @@ def plan_of(
     plan = make_plan(Ensemble(bare, members, 1), method, h=h, t1=None if h is None else 10.0 * h, dtype=dtype)
     plan.compile()
     return plan
+
+
+def _numbers(key: str, values: Any) -> list[int]:
+    """The numbers of a list, each once, rising."""
+    return sorted({whole(key, value, -(2**31)) for value in listed(key, values, "whole numbers from 1")})

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.engine.executors.threads import ThisThread
@@ -309,17 +310,17 @@ def chosen_methods(methods: Sequence[str] | None, default: Sequence[str] = CANDI
     """
     if methods is None:
         return tuple(default)
-    faults = Faults()
-    for name in methods:
+    faults, names = Faults(), listed("methods", methods, "methods")
+    for name in names:
         try:
             Method(name)
         except SceneError:
             some = ", ".join((*PROGRAMS, *(f"{composition}(psi_s)" for composition in COMPOSITIONS)))
             faults.add("methods", name, "is not known", f"known: {some}")
-    if not methods:
+    if not names:
         faults.add("methods", methods, "is empty", "name one method or more, or leave it out")
     faults.raise_if_any()
-    return tuple(methods)
+    return tuple(names)
 
 
 @shows_progress

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.common.arguments import result_of
+from lgvi_warp.common.errors import NothingToDraw, refusal
+from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.common.status import Status, under_way
 from lgvi_warp.runs import member_fields
 from lgvi_warp.runs.outcomes import outcomes
@@ -81,10 +83,11 @@ def shown(result: Result, most: int = MOST_BODIES) -> Shown:
 
     Raises:
         NothingToDraw: No samples were kept, or no member has a finite start.
-        ValueError: most is below 1.
+        SceneError: most is no whole number from 1, or the result is none.
     """
-    if most < 1:
-        raise ValueError(f"most = {most}: draws no member; give a number from 1")
+    result_of(result)
+    if not is_whole(most, 1):
+        raise refusal("most", most, "draws no member", "give a number from 1")
     if "position" not in result.samples:
         raise NothingToDraw(
             'no positions were kept: there is nothing to draw; give keep="all", or indices of members to keep'

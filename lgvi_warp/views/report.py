@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lgvi_warp.common.arguments import file_path, path_of, result_of
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw, SceneError
 from lgvi_warp.common.files import place_of, write_text
 from lgvi_warp.common.reading import file_bytes, file_json, file_text, understood
@@ -63,8 +64,9 @@ def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]
         OSError: The file cannot be written.
     """
     if isinstance(result, str | os.PathLike):
-        return _of_folder(Path(result), path)
-    return _write(path, _name(result.provenance), _of_run(result))
+    if isinstance(result, str | os.PathLike):
+        return _of_folder(path_of("result", result), path)
+    return _write(path, _name(result_of(result).provenance), _of_run(result))
 
 
 def _of_folder(folder: Path, path: str | os.PathLike[str]) -> Path:
@@ -100,7 +102,7 @@ def _write(path: str | os.PathLike[str], name: str, parts: Iterator[str]) -> Pat
     """Write a page; it is there whole or not at all."""
     heading = html.escape(name)
     head = f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{heading}</title><style>{STYLE}</style></head>'
-    place_of(path)  # before anything is drawn
+    place_of(file_path("path", path))  # before anything is drawn
     return write_text(path, f"{head}<body><h1>{heading}</h1>{''.join(parts)}</body></html>\n")
 
 

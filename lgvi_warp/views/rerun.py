@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lgvi_warp.common import files as durable
-from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.common.arguments import file_path, of_kind, result_of
+from lgvi_warp.common.errors import NothingToDraw, SceneError
 from lgvi_warp.views import viewer
 from lgvi_warp.views.fleet import identity, title
 from lgvi_warp.views.recording.drawn import Drawn, drawn_of
@@ -55,18 +56,21 @@ def log_rerun(
         NothingToDraw: No samples were kept, or no member has a finite start.
         SceneError: There are no such members, or the vehicle's mesh cannot be read.
         OSError: The file cannot be written, no viewer answers at the address, or it ends meanwhile; then the file is whole.
-        ValueError: There is neither a path nor a `to`, or no result.
+        ValueError: There is no result; a SceneError, which is one, where there is neither a path nor a `to`.
     """
     viewer.rerun()
     if path is None and to is None:
-        raise ValueError('neither path nor to is given: the recording would go nowhere; give path="fleet.rrd"')
+        words = "neither path nor to is given: the recording would go nowhere"
+        raise SceneError([f'{words}; give path="fleet.rrd"'])
+    if to is not None and not isinstance(to, str):
+        of_kind("to", to, "flush", "a recording", "give the address of a viewer, or a rerun.RecordingStream")
     runs = _runs(result, members)
     address = to if isinstance(to, str) else None
     if address is not None:
         viewer.reach(address)
     ended: OSError | None = None
     with contextlib.ExitStack() as stack:
-        beside = None if path is None else stack.enter_context(durable.placed(Path(path)))
+        beside = None if path is None else stack.enter_context(durable.placed(file_path("path", path)))
         try:
             if beside or address:
                 _write(runs, beside, address)
@@ -111,12 +115,12 @@ def show(result: Result | Mapping[str, Result], *, members: Any = None) -> None:
 def _runs(result: Result | Mapping[str, Result], members: Any) -> list[Drawn]:
     """What is drawn of each run."""
     if not isinstance(result, Mapping):
-        return [drawn_of(result, members)]
+        return [drawn_of(result_of(result), members)]
     if not result:
         raise NothingToDraw("there is no result to draw; give {name: result}")
     colors = [COLORS[i % len(COLORS)] for i in range(len(result))]
     return [
-        drawn_of(compared, members, str(name), rgb)
+        drawn_of(result_of(compared), members, str(name), rgb)
         for (name, compared), rgb in zip(result.items(), colors, strict=True)
     ]
 

@@ -47,7 +47,8 @@ def rounded(scene):
     """The scene with masses and moments of inertia off by one round-off, to all sides."""
     v = scene.vehicle
     signs = np.diag([1.0, -1.0, 1.0])
-    changed = lw.Vehicle(v.mass, inertia=v.inertia @ (np.eye(3) + UNIT * signs), added_mass=v.added_mass @ (np.eye(3) - UNIT * signs),
+    inertia, added_mass = v.inertia @ (np.eye(3) + UNIT * signs), v.added_mass @ (np.eye(3) - UNIT * signs)
+    changed = lw.Vehicle(v.mass, inertia=inertia, added_mass=added_mass,
                          buoyancy=v.buoyancy, center_of_buoyancy=v.center_of_buoyancy)  # fmt: skip
     return lw.Scene(changed, scene.environment, terms=scene.terms)
 

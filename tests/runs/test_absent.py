@@ -203,8 +203,8 @@ def test_a_varied_member_is_as_if_alone_with_its_numbers(method):
             for term in scene().terms
         }  # fmt: skip
         vehicle = lw.Vehicle(
-            p["vehicle.mass"][member], inertia=p["vehicle.inertia"][member], added_mass=VEHICLE.added_mass, buoyancy=VEHICLE.buoyancy,
-            center_of_buoyancy=VEHICLE.center_of_buoyancy,
+            p["vehicle.mass"][member], inertia=p["vehicle.inertia"][member], added_mass=VEHICLE.added_mass,
+            buoyancy=VEHICLE.buoyancy, center_of_buoyancy=VEHICLE.center_of_buoyancy,
         )  # fmt: skip
         by_hand = lw.Scene(
             vehicle, lw.Environment(gravity=p["environment.gravity"][member]), list(own.values()), scene().start

@@ -242,7 +242,7 @@ def test_as_many_newton_steps_as_the_start_needs(scene, solver, h, n):
 
 def test_a_member_that_spins_up_is_told():
     # At rest no Newton step is needed; 2 rad/s later, at h = 0.1 s, one would be.
-    resting = lw.Scene(lw.Vehicle(20.0, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=0.0), lw.Environment(gravity=0.0),
-                       [lw.Wrench(torque=(1.5, 3.0, 4.0))])  # fmt: skip
+    body = lw.Vehicle(20.0, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=0.0)
+    resting = lw.Scene(body, lw.Environment(gravity=0.0), [lw.Wrench(torque=(1.5, 3.0, 4.0))])
     result = lw.solve(resting, lw.Method("psi_s", iterations="auto"), h=0.1, t1=5.0)
     assert result.status.counts() == {"not_converged": 1} and 0.0 < result.failure_time[0] < 5.0

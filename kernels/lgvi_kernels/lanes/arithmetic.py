@@ -161,7 +161,7 @@ def _vec3_maker(width, real):
 
 @functools.cache
 def own_rows(kind):
-    """Type of the rows of an array that a law may see: those from `first` to `last`, and the first `common` ones, which all see.
+    """Type of the rows of an array that a law may see: those from `first` to `last`, and the first `common` ones.
 
     A read of any other row reads the nearest of the law's own; where it has none, 0. A write goes there too, or nowhere.
     kind: what the array holds.

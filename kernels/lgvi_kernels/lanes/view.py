@@ -70,7 +70,7 @@ def row3(view: Any, row: int):
 
 @wp.func
 def gather1(view: Any, row: int, index: Any):
-    """The number of row `row + index` of the law's table, each lane at an index of its own; index: whole numbers (see whole)."""
+    """The number of row `row + index` of the law's table, each lane at an index of its own (see whole)."""
     return gathered(view.b.x, view.table, view.entry, row, 0, index)
 
 

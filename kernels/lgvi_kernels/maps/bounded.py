@@ -11,8 +11,6 @@ from lgvi_kernels.lanes.state import struct, view_struct
 
 # Where a law's own rows lie: in the table, in the memory, and how many rows of the memory's bus all laws see.
 BOUNDS = ("first_row", "last_row", "first_memory", "last_memory", "bus")
-# What stands in the place of such a law's numbers: these, and its bounds.
-FIELDS = ("own", "bounds")
 ROLES = ("law", "damping", "flow", "evolve", "follow", "steady_force", "energy", "supply", "push")
 
 

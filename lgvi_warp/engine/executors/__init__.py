@@ -7,7 +7,7 @@ import multiprocessing
 from typing import Any
 
 from lgvi_warp.common import machine
-from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.common.errors import Faults, among, closest
 from lgvi_warp.engine.executors.base import Executor
 
 NAMES = ("threads", "processes", "dask")
@@ -49,11 +49,11 @@ def executor_of(given: Any, threads: int | None = None, scheduler: str | None = 
     """
     faults = Faults()
     check_threads(faults, threads)
-    if not isinstance(given, Executor) and given not in NAMES:
+    if not isinstance(given, Executor) and not among(given, NAMES):
         faults.add("executor", given, "is not known", f"{closest(str(given), NAMES)}; or give an object with run(...)")
-    if scheduler is not None and given != "dask":
+    if scheduler is not None and not among(given, ("dask",)):
         faults.add("scheduler", scheduler, "is for the executor dask alone", 'give executor="dask", or leave it out')
-    if given in STARTING and scheduler is None and multiprocessing.current_process().daemon:
+    if among(given, STARTING) and scheduler is None and multiprocessing.current_process().daemon:
         problem = "starts processes, which a worker of multiprocessing or Celery may not"
         faults.add("executor", given, problem, 'use executor="threads" in it, or run outside of it')
     faults.raise_if_any()

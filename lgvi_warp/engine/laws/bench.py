@@ -12,7 +12,7 @@ import warp as wp
 
 from lgvi_kernels.advance.examine import COLUMNS, OUT_FIELDS, make_examine
 from lgvi_warp.common import warp_setup
-from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.errors import SceneError, refusal
 from lgvi_warp.common.machine import register_width
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine import kernel_cache
@@ -101,6 +101,29 @@ class Views:
         turn = notation.quaternion_from_matrix(self.attitude[i])
         where = f"at position {short(self.position[i])} m, quaternion {short(turn)}, t = {self.time[i]:.3g} s"
         return f"{where}, velocity {sizes(self.velocity[i])} m/s, rate {sizes(self.rate[i])} rad/s"
+
+
+# Most views of a check.
+MOST_SAMPLES = 1_000_000
+
+
+def of_scene(scene: Any) -> Scene:
+    """The scene in which a law is checked.
+
+    Args:
+        scene: What the user gave: a Scene, or None for a simple one.
+
+    Returns:
+        The scene.
+
+    Raises:
+        SceneError: If it is none.
+    """
+    if scene is None:
+        return simple_scene()
+    if not isinstance(scene, Scene):
+        raise refusal("scene", scene, "is no Scene", "give lw.Scene(...), or leave it out")
+    return scene
 
 
 def simple_scene() -> Scene:

@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lgvi_kernels import built_in
+from lgvi_warp.common.arguments import whole
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import register_width
 from lgvi_warp.engine import kernel_choice
-from lgvi_warp.engine.laws.bench import ORIGIN, TURN, Bank, Bench, Views, short, simple_scene, sizes
+from lgvi_warp.engine.laws.bench import MOST_SAMPLES, ORIGIN, TURN, Bank, Bench, Views, of_scene, short, sizes
 from lgvi_warp.engine.laws.report import EPS, ROUNDINGS, Check, LawReport, attempt, judged, packed_numbers, unpacked
 from lgvi_warp.physics import notation, terms
 from lgvi_warp.physics.terms.base import PackingContext, Term
@@ -58,7 +59,8 @@ def check_law(
     if not isinstance(term, Term):
         raise SceneError([f"term = {term!r}: is no term; give an object such as lw.Drag(...), not its class"])
     module = kernel_choice.device_module(term, term.device_in(False), built_in)
-    bench = Bench(term, module, scene or simple_scene(), max(1, -(-samples // register_width("float64"))), seed)
+    packets = -(-whole("samples", samples, 1, MOST_SAMPLES) // register_width("float64"))
+    bench = Bench(term, module, of_scene(scene), packets, whole("seed", seed, 0))
     checks: list[Check] = []
     for examine in (_numbers, _finite, _whole, _potential, _damping, _flow, _follow):
         with np.errstate(all="ignore"):  # what is not finite is found by its check

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import SceneError
-from lgvi_warp.engine.laws.bench import simple_scene
+from lgvi_warp.common.arguments import whole
+from lgvi_warp.common.errors import SceneError, refusal
+from lgvi_warp.engine.laws.bench import MOST_SAMPLES, of_scene
 from lgvi_warp.engine.laws.part_bench import (
     COLUMNS,
     EVERY,
@@ -37,6 +38,7 @@ from lgvi_warp.scene.scene import Scene
 AXES = ("north", "east", "down")
 # By how much a part's numbers differ from one member to the next.
 OTHER = 1.125
+TWIN_ROLES = ("measure", "guide", "control", "allocate")
 # A twin computes in another order: so many times the roundings of a sum.
 TWIN = 100.0
 # Time between two looks of a part that is checked without a controller [s].
@@ -133,11 +135,15 @@ def check_controller(
     if not isinstance(part, Part) or part.section not in SECTIONS:
         remedy = "give an object such as lw.HeadingPID(kp=1.0), not its class; lw.check_law checks terms"
         raise SceneError([f"part = {part!r}: is no part of a controller; {remedy}"])
-    completed = _with_part(part, scene or simple_scene())
+    if twin is not None:
+        roles = [role for role in TWIN_ROLES if callable(getattr(twin, role, None))]
+        if not roles or isinstance(twin, type):
+            raise refusal("twin", twin, "has no role", f"give an object with {', '.join(TWIN_ROLES)}, or leave it out")
+    completed = _with_part(part, of_scene(scene))
     (wired,) = (candidate for candidate in completed.controller.parts if candidate.key == part.key)
     numbers = {name: np.asarray(value)[None] for name, value in wired.parameters().items()}
     wired = wired.with_features(frozenset(f"{part.key}.{word}" for word in wired.features(numbers)))
-    bench = PartBench(wired, completed, samples, seed)
+    bench = PartBench(wired, completed, whole("samples", samples, 1, MOST_SAMPLES), whole("seed", seed, 0))
     with np.errstate(all="ignore"):  # what is not finite is found by its check
         packed, checks = packed_numbers(wired, bench.Params, bench.packed)
         if packed is None or not all(check.ok for check in checks):

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from lgvi_kernels.maps import bounded
+from lgvi_warp.engine.arrays import FIELDS
 from lgvi_warp.physics.terms.base import Packed, Term
 
 EPS = float(np.finfo(np.float64).eps)
@@ -135,7 +135,7 @@ def packed_numbers(term: Term, Params: np.dtype, pack: Callable[[], Any]) -> tup
         return None, [Check("packed", 1.0, 0.0, False, f"{text}; {remedy}")]
     places = {"first": packed.rows is not None, "memory": packed.memory is not None, "work": packed.work}
     own = Params["own"]
-    fields = (own["own"] if own.names == bounded.FIELDS else own).names
+    fields = (own["own"] if own.names == FIELDS else own).names
     filled = set(packed.values) | {name for name, present in places.items() if present}
     wanted = set(fields or ()) - {"unused"}
     wrong = [f"{name} is not in packed().values" for name in sorted(wanted - filled)]

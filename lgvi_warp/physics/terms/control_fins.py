@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.actuators import UNLIMITED, motion, packed_following, refuse_unread
@@ -68,7 +69,7 @@ class ControlFins(Fins):
             if self.lift_coefficients is None:
                 raise refusal(f"{self.key}.lift_slope", None, "is missing", "give it [1/rad], or a table of lift")
             object.__setattr__(self, "lift_slope", np.ones(rows_of(self.position)))
-        if not self.flow_angle:
+        if not flag(f"{self.key}.flow_angle", self.flow_angle):
             # Lift then does work.
             object.__setattr__(self, "dissipative", False)
         first = first_row(self.command_schedule)

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.errors import Faults, ragged
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number, side_by_side
 
@@ -66,7 +66,7 @@ class WrenchSchedule(Term):
 
     def __post_init__(self) -> None:
         if self.torque is None:
-            object.__setattr__(self, "torque", np.zeros(np.shape(self.force)))
+            object.__setattr__(self, "torque", np.zeros(() if ragged(self.force) else np.shape(self.force)))
         super().__post_init__()
 
     def check(self, faults: Faults) -> None:

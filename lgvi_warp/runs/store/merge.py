@@ -10,7 +10,8 @@ from pathlib import Path
 
 from lgvi_warp.common import files as durable
 from lgvi_warp.common import safe_files, scratch
-from lgvi_warp.common.errors import MembersFailed, SceneError
+from lgvi_warp.common.arguments import listed
+from lgvi_warp.common.errors import MembersFailed, SceneError, refusal
 from lgvi_warp.engine.block import Block
 from lgvi_warp.runs.store.block_files import marker
 from lgvi_warp.runs.store.commits import Commits
@@ -41,7 +42,9 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
         SceneError: If the stores are not of one run, or damaged.
         OSError: If the disk cannot be written.
     """
-    parts = [Folder(folder_of(path)) for path in paths]
+    parts = [Folder(folder_of(path)) for path in listed("paths", paths, "stores")]
+    if not parts:
+        raise refusal("paths", paths, "names no store", "give the stores to merge")
     first = parts[0]
     for further in parts[1:]:
         mismatches = same_run(further.provenance, first.provenance, str(further.path), str(first.path))

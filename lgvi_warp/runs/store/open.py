@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import path_of
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.status import Status
+from lgvi_warp.common.write_lock import writer_of
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.keepers.observation import Observation, Observing, observation_of, replicates_of
 from lgvi_warp.physics.control.controller import terms_of
@@ -111,7 +113,7 @@ def folder_of(path: str | os.PathLike[str]) -> Path:
     Raises:
         SceneError: If the folder holds no store, several, or a link to one.
     """
-    location = Path(path)
+    location = path_of("path", path)
     if location.suffix == ".zarr":
         return location
     stores = sorted(location.glob("*.zarr")) if location.is_dir() else []
@@ -158,6 +160,8 @@ def open_run(
         blocks = len(folder.unfinished())
         missing = f"{blocks} blocks are missing" if blocks else "the members that it keeps have not been run again yet"
         text = f"{folder.path}: is not complete: {missing}"
+        if not incomplete and (writer := writer_of(folder.path)):
+            raise SceneError([f"{text}; it is being written ({writer}): wait for it, or give incomplete=True"])
         if not incomplete:
             raise SceneError([f"{text}; go on with `lgvi-warp resume {folder.path.parent}`, or give incomplete=True"])
         return result_of(folder, members, (*messages, text))

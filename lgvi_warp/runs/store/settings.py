@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.physics.control.signals import SAVED
 from lgvi_warp.runs.store.arrays import whole_array
@@ -55,8 +56,9 @@ class Store:
         if self.dtype is not None:
             faults.choice("dtype", self.dtype, ("float32", "float64"))
         faults.choice("existing", self.existing, EXISTING)
-        for name in self.fields or ():
-            faults.choice("fields", name, SAVED)
+        with faults.including():
+            for name in () if self.fields is None else listed("fields", self.fields, "names of fields"):
+                faults.choice("fields", name, SAVED)
         faults.number("chunk_bytes", self.chunk_bytes, "bytes", least=1)
         faults.raise_if_any()
         needed()

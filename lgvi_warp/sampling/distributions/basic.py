@@ -319,7 +319,7 @@ class Choice(Distribution):
         try:
             values = np.array(self.values, dtype=np.float64)
             weights = np.ones(len(values)) if self.weights is None else np.array(self.weights, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             return  # a fault for numbers that are not numeric is there already
         if values.ndim == 0 or not len(values):
             faults.add("values", self.values, "is no list of values", "give one value or more")

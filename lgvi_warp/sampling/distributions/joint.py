@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.errors import Faults, ragged
 from lgvi_warp.physics import inertia, notation
 from lgvi_warp.sampling.distributions.basic import Distribution, Spread, floats
 
@@ -330,9 +330,9 @@ class PositiveDefinite(JointLaw):
     widths: ClassVar[tuple[str, ...]] = ("sigma",)
 
     def _check_more(self, faults: Faults) -> None:
-        if self.off_diagonal is not None and np.ndim(self.off_diagonal) > 0:
+        if self.off_diagonal is not None and _dimensions(self.off_diagonal) > 0:
             faults.add("off_diagonal", self.off_diagonal, "is not one number", "give one number from 0")
-        if self.sigma is not None and np.ndim(self.sigma) > 1:
+        if self.sigma is not None and _dimensions(self.sigma) > 1:
             faults.add("sigma", self.sigma, "is a matrix", "give one number, or one for each axis")
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
@@ -455,3 +455,8 @@ def _about_center(base: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
     center = -inertia.vee(base[:3, 3:]) / mass
     H = notation.hat(center)
     return base[3:, 3:] + mass * H @ H, mass, center
+
+
+def _dimensions(values: Any) -> int:
+    """The number of dimensions of what a user gave; 2 of lists that differ in length."""
+    return 2 if ragged(values) else np.ndim(values)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import yaml_text
+from lgvi_warp.common.arguments import names_of
 from lgvi_warp.common.errors import Faults, SceneError, closest
 from lgvi_warp.scene.vehicles import fossen
 from lgvi_warp.scene.vehicles.plugins import by_diagonal
@@ -78,7 +79,7 @@ def vehicle_tables_from_yaml(
     faults.choice("quadratic", quadratic, ("diagonal", "full"))
     for key, value in (("position_axes", position_axes), ("matrix_axes", matrix_axes)):
         faults.choice(key, value, ("flu", "frd"))
-    ignore = {ignore} if isinstance(ignore, str) else set(ignore)
+    ignore = set(names_of("ignore", ignore))
     read = by_meaning(faults, parse_yaml(source), ignore) | by_meaning(faults, given, set())
     positions = fossen.HALF_TURN if position_axes == "flu" else np.ones(3)
     matrices = fossen.HALF_TURN_6 if matrix_axes == "flu" else np.ones(6)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, MissingExtra, refusal
 from lgvi_warp.methods.method import Method
 from lgvi_warp.physics.control.sensor import Sensor
@@ -155,6 +156,7 @@ def linearize(
     faults.positive("step", step, "")
     if period is not None:
         faults.positive("period", period)
+    closed = flag("closed", closed)
     if closed and scene.controller is None:
         faults.add("closed", closed, "needs a controller, which this scene has not", "give [controller]")
     if closed and (period is not None or inputs != "commands"):

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import of_kind
 from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.control.state_feedback import StateFeedback
@@ -79,7 +80,7 @@ def lqr(model: LinearModel, Q: Any, R: Any) -> Regulator:
     from scipy.linalg import solve_discrete_are
 
     faults = Faults()
-    n, m = model.B.shape
+    n, m = of_kind("model", model, "A B C D", "a LinearModel", "give what lw.linearize returns").B.shape
     Q, R = _weights(faults, "Q", Q, n, 0.0), _weights(faults, "R", R, m, np.finfo(float).tiny)
     faults.raise_if_any()
     A, B = model.A, model.B

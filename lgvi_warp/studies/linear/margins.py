@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.methods.method import Method
 from lgvi_warp.physics.control.delay import MOST_PERIODS
@@ -206,7 +207,7 @@ def margins(
     """
     ensemble = ensemble_of(fleet)
     scene: Any = ensemble.scene
-    of, by = ((each,) if isinstance(each, str) else tuple(each) for each in (of, by))
+    of, by = (tuple(listed(key, each, "names")) for key, each in (("of", of), ("by", by)))
     faults = Faults()
     for word in of:
         faults.choice("of", word, OF)

@@ -206,6 +206,8 @@ class StabilityGrid:
         for name, value, least in (("points", points, 1), ("directions", (directions,), 1)):
             if any(isinstance(k, bool) or not isinstance(k, int) or k < least for k in value):
                 faults.add(name, value, "is not a whole number above 0", "give how many")
+        if len(points) != 2:
+            faults.add("points", points, "are not two numbers", "give how many along each axis")
         if not faults and (members := points[0] * points[1] * directions) > MOST_MEMBERS:
             problem = f"make {members:,} members, more than {MOST_MEMBERS:,}"
             faults.add("points", points, problem, "give fewer points or directions")

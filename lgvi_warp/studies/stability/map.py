@@ -13,14 +13,17 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common import machine
+from lgvi_warp.common.arguments import listed, whole
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import Status, failed, stopped
 from lgvi_warp.engine import plan
+from lgvi_warp.engine.executors import check_threads
 from lgvi_warp.runs.provenance import provenance
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.compared import QUANTITIES, compared_in
 from lgvi_warp.studies.files import Saved, finite_or_none
+from lgvi_warp.studies.members import scene_of
 from lgvi_warp.studies.speed import void
 from lgvi_warp.studies.stability.grid import Line, StabilityGrid
 from lgvi_warp.studies.stability.limits import LIMITS
@@ -319,7 +322,8 @@ def stability_map(
         SceneError: for faulty arguments, all in one message; where the scene takes none of the methods; and where noise acts.
     """
     begun, report = time.perf_counter(), callback(progress) or void
-    dtype = dtype or scene.run.dtype
+    scene = scene_of(scene)
+    dtype = scene.run.dtype if dtype is None else dtype
     names = chosen_methods(methods, METHODS)
     faults = Faults()
     compared, unit_of_error = None, ""
@@ -331,12 +335,14 @@ def stability_map(
                                 if value is not None)):  # fmt: skip
         faults.positive(name, value, unit)
     faults.choice("dtype", dtype, plan.DTYPES)
+    check_threads(faults, threads)
     grid = None
     with faults.including():
-        both = (points, points) if isinstance(points, int) else tuple(points)
-        grid = StabilityGrid(scene, x, y, both, directions, seed, h)
+        both = (points, points) if isinstance(points, int) else tuple(listed("points", points, "two numbers"))
+        grid = StabilityGrid(scene, x, y, both, directions, whole("seed", seed, 0), h)
     faults.raise_if_any()
     assert grid is not None and compared is not None
+    error_time, t1 = (None if value is None else float(value) for value in (error_time, t1))
     refused = refusals(grid, names, dtype)
     if len(refused) == len(names):
         raise SceneError([f"method {name}: {why}" for name, why in refused.items()])

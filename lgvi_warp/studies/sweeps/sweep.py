@@ -6,9 +6,9 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
+from lgvi_warp.common.arguments import path_of
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.scene.ensemble import Ensemble
@@ -96,7 +96,7 @@ def sweep(
         conditions = success_of(success, tuple(setup.metrics))
     faults.raise_if_any()
     assert conditions is not None
-    records = Records(None if out is None else Path(out), list(setup.metrics), setup.members.members)
+    records = Records(None if out is None else path_of("out", out), list(setup.metrics), setup.members.members)
     records.check()
     cells = list(_run(setup, records, threads, executor, scheduler, callback(progress)))
     return Sweep(setup, cells, records, conditions, baseline, float(confidence), interval)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import of_kind
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views.plots.canvas import COLORS, hatch, panels, wrapped
 
@@ -34,6 +35,9 @@ def sensitivity(found: Indices, *, figure: Any = None, path: str | os.PathLike[s
         NothingToDraw: No quantity varies.
         OSError: The file cannot be written.
     """
+    of_kind(
+        "found", found, "quantities factors columns", "sensitivity indices", "give what lw.uq.sobol and its like return"
+    )
     varied = [q for q in range(len(found.quantities)) if np.isfinite(getattr(found, found.columns[0])[q]).any()]
     drawn, d = varied[:MOST], len(found.factors)
     if not drawn:

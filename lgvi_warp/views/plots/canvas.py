@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import files as durable
+from lgvi_warp.common.arguments import file_path
 from lgvi_warp.common.errors import MissingExtra
 from lgvi_warp.common.status import Status
 from lgvi_warp.views.fleet import LOOKS
@@ -66,7 +67,7 @@ def save_figure(figure: Any, path: str | os.PathLike[str], dpi: int = DPI) -> Pa
     Raises:
         OSError: The file cannot be written.
     """
-    target = Path(path)
+    target = file_path("path", path)
     with durable.placed(target) as beside:
         figure.savefig(beside, dpi=dpi, format=target.suffix.removeprefix(".") or "png")
     return target

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import result_of
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views.choice import of_members
 from lgvi_warp.views.fleet import members_of_run
@@ -86,7 +87,7 @@ def drawable(result: Result) -> list[Estimate]:
     """
     return [
         estimate
-        for estimate in result.statistics.values()
+        for estimate in result_of(result).statistics.values()
         if len(estimate.time) > 1 and estimate.settings["type"] in _PANEL
     ]
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import of_kind
 from lgvi_warp.views.plots.canvas import panels, wrapped
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ def stability(found: StabilityMap, *, figure: Any = None, path: str | os.PathLik
         ImportError: Matplotlib is not installed (extra: viz).
         OSError: The file cannot be written.
     """
+    of_kind("found", found, "methods classes ratios", "a stability map", "give what lw.stability_map returns")
     n = len(found.methods)
     columns = min(n, 2)
     rows = -(-n // columns)

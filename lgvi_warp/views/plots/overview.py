@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import result_of
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import under_way
 from lgvi_warp.physics import energy as invariants
@@ -54,6 +55,7 @@ def summary(result: Result, *, figure: Any = None, path: str | os.PathLike[str] 
         NothingToDraw: Every member failed before the second sample, none has a finite position, or nothing was kept.
         OSError: The file cannot be written.
     """
+    result_of(result)
     if not result.samples and result.kept is None and result.statistics:
         return statistics(result, figure=figure, path=path)
     sampled = with_samples(result)

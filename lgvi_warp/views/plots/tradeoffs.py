@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import of_kind
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views.plots.canvas import COLORS, GREY, MARKERS, apart, panels, wrapped
 
@@ -42,7 +43,8 @@ def tradeoff(
         NothingToDraw: No setting was measured.
         OSError: The file cannot be written.
     """
-    of = of or found.of
+    of_kind("found", found, "measurements of", "a trade-off", "give what lw.tradeoff returns")
+    of = found.of if of is None else of
     if not found.measurements:
         raise NothingToDraw("no setting was measured: there is nothing to draw")
     shown, front = found.shown(of), found.front(of)

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Arguments of public functions, read whatever the user gave: each returns what is meant, or refuses it by name."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+from lgvi_warp.common.errors import refusal
+from lgvi_warp.common.real_numbers import is_whole
+
+# What a path of files can be given as.
+PATH = "give a path, as text or pathlib.Path"
+
+
+def of_kind(key: str, value: Any, attributes: str, what: str, remedy: str) -> Any:
+    """Read an object that the function looks into.
+
+    Args:
+        key: Name of the argument.
+        value: What the user gave.
+        attributes: Names that it must have, with blanks between.
+        what: What it must be, as "a Result".
+        remedy: Where to get one.
+
+    Returns:
+        The value.
+
+    Raises:
+        SceneError: It is a class, or lacks one of them.
+    """
+    if isinstance(value, type) or not all(hasattr(value, name) for name in attributes.split()):
+        raise refusal(key, value, f"is not {what}", remedy)
+    return value
+
+
+def result_of(value: Any) -> Any:
+    """Read the result of a run.
+
+    Args:
+        value: What the user gave as `result`.
+
+    Returns:
+        The value.
+
+    Raises:
+        SceneError: It is none.
+    """
+    return of_kind(
+        "result", value, "samples status provenance", "a Result", "give what lw.solve or lw.open_run returns"
+    )
+
+
+def path_of(key: str, value: Any) -> Path:
+    """Read a path.
+
+    Args:
+        key: Name of the argument.
+        value: What the user gave.
+
+    Returns:
+        The path.
+
+    Raises:
+        SceneError: It is no path, or none that a system takes.
+    """
+    text = value if isinstance(value, str) else os.fspath(value) if isinstance(value, os.PathLike) else None
+    if not isinstance(text, str):
+        raise refusal(key, value, "is no path", PATH)
+    if "\0" in text or not text:
+        raise refusal(key, value, "holds a null character" if text else "is empty", PATH)
+    return Path(text)
+
+
+def file_path(key: str, value: Any) -> Path:
+    """Read the path of a file that is to be written.
+
+    Args:
+        key: Name of the argument.
+        value: What the user gave.
+
+    Returns:
+        The path, whose last part is a name.
+
+    Raises:
+        SceneError: As `path_of`, or it names no file.
+    """
+    path = path_of(key, value)
+    if not path.name:
+        raise refusal(key, value, "names no file", "end it in the name of the file")
+    return path
+
+
+def whole(key: str, value: Any, least: int, most: int = 2**31 - 1) -> int:
+    """Read a whole number.
+
+    Args:
+        key: Name of the argument.
+        value: What the user gave.
+        least: Smallest number allowed.
+        most: Largest number allowed; default that of 32 bits.
+
+    Returns:
+        The number.
+
+    Raises:
+        SceneError: It is none within these bounds.
+    """
+    if not is_whole(value, least, most):
+        raise refusal(key, value, f"is no whole number from {least} to {most:,}", f"give one from {least}")
+    return int(value)
+
+
+def listed(key: str, value: Any, what: str) -> list[Any]:
+    """Read a list; one text alone stands for a list of it.
+
+    Args:
+        key: Name of the argument.
+        value: What the user gave.
+        what: What the list holds, as "names".
+
+    Returns:
+        Its entries.
+
+    Raises:
+        SceneError: It is no list.
+    """
+    if isinstance(value, str):
+        return [value]
+    try:
+        return list(value)
+    except TypeError:
+        raise refusal(key, value, "is no list", f"give a list of {what}") from None
+
+
+def flag(key: str, value: Any) -> bool:
+    """Read a truth value.
+
+    Args:
+        key: Name of the argument.
+        value: What the user gave.
+
+    Returns:
+        The value.
+
+    Raises:
+        SceneError: It is neither true nor false.
+    """
+    try:
+        if value == bool(value):  # 0 and 1 too, and NumPy's
+            return bool(value)
+    except (TypeError, ValueError):
+        pass
+    raise refusal(key, value, "is neither true nor false", "give True or False")
+
+
+def function_of(key: str, value: Any) -> Any:
+    """Read a function, or None for none.
+
+    Args:
+        key: Name of the argument.
+        value: What the user gave.
+
+    Returns:
+        The value.
+
+    Raises:
+        SceneError: It cannot be called.
+    """
+    if value is not None and not callable(value):
+        raise refusal(key, value, "is no function", "give a function, or leave it out")
+    return value
+
+
+def names_of(key: str, value: Any) -> list[str]:
+    """Read a list of names; one name alone stands for a list of it.
+
+    Args:
+        key: Name of the argument.
+        value: What the user gave.
+
+    Returns:
+        The names.
+
+    Raises:
+        SceneError: It is no list, or holds something else than texts.
+    """
+    names = listed(key, value, "names")
+    for name in names:
+        if not isinstance(name, str):
+            raise refusal(key, name, "is no name", "give a list of names")
+    return names

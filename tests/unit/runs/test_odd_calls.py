@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Public names called with one odd argument each: what they cannot take they refuse by name, with the remedy."""
+
+import traceback
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.common.errors import MissingExtra, NothingToDraw
+from tests.support import odd_calls
+
+# What a call may end with: the refusal, a picture of nothing, a library that is not installed, a file that is not there.
+DELIBERATE = (lw.SceneError, NothingToDraw, MissingExtra, OSError)
+# Studies and trials of the disk: seconds each where an odd argument is taken, as None is.
+LONG = {"stability_map", "suggest", "term_cost", "scaling", "linearize", "trim", "tradeoff", "margins", "sweep", "tune",
+        "worst_case", "predict", "plot", "log_rerun", "report", "plot_statistics"}  # fmt: skip
+PACKAGE = str(Path(lw.__file__).parent)
+
+
+@pytest.fixture(scope="module")
+def given(tmp_path_factory):
+    scene = lw.Scene(lw.Vehicle(**odd_calls.BODY), terms=[lw.Drag(linear=[1.0] * 6)])
+    fleet = lw.Ensemble(scene, 4, 1, {"vehicle.buoyancy": lw.Normal(relative=0.01)})
+    return scene, fleet, lw.solve(fleet, h=0.1, t1=0.4), tmp_path_factory.mktemp("odd")
+
+
+def raw(function, arguments):
+    """The error that a call ends with, unless it is deliberate, or Python's own of a call that does not fit the signature."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            function(**arguments)
+    except DELIBERATE:
+        return None
+    except Exception as error:
+        inside = any(frame.filename.startswith(PACKAGE) for frame in traceback.extract_tb(error.__traceback__))
+        return None if isinstance(error, TypeError) and not inside else error
+    return None
+
+
+def raw_of(calls):
+    """The calls that end in raw errors, as texts."""
+    found = []
+    for label, function, arguments in calls:
+        error = raw(function, arguments)
+        if error is not None:
+            found.append(f"{label}: {type(error).__name__}: {error}")
+    return found
+
+
+@pytest.mark.kernel
+def test_no_odd_call_ends_in_a_raw_error(given):
+    calls = [call for call in odd_calls.odd_calls(*given) if call[0].split("(")[0] not in LONG]
+    some = np.random.default_rng(5).choice(len(calls), 600, replace=False)
+    assert raw_of(calls[i] for i in some) == []
+
+
+@pytest.mark.slow
+@pytest.mark.kernel
+def test_four_thousand_odd_calls(given):
+    calls = [call for call in odd_calls.odd_calls(*given) if call[0].split("(")[0] not in LONG]
+    calls = [calls[i] for i in np.random.default_rng(6).choice(len(calls), 4000, replace=False)]
+    # Of the long ones those that no study takes.
+    calls += [
+        call
+        for call in odd_calls.odd_calls(*given)
+        if call[0].split("(")[0] in LONG and any(type(value) is object for value in call[2].values())
+    ]
+    assert raw_of(calls) == []
+
+
+@pytest.mark.parametrize(
+    "name", ["method", "dtype", "checks", "on_failure", "executor", "save", "statistics", "on_block"]
+)
+def test_arrays_are_refused_where_a_word_is_meant(name):
+    fleet = lw.Ensemble(lw.Scene(lw.Vehicle(**odd_calls.BODY)), 4)
+    with pytest.raises(lw.SceneError, match=name):
+        lw.solve(fleet, h=0.1, t1=0.2, **{name: np.zeros(3)})
+
+
+def test_inertia_and_added_mass_are_given_by_name():
+    with pytest.raises(TypeError, match="positional"):
+        lw.Vehicle(20.0, (1.5, 4.0, 4.5), (5.0, 22.0, 25.0))
+
+
+@pytest.mark.kernel
+def test_a_store_that_is_being_written_is_told_so(tmp_path):
+    fleet = lw.Ensemble(lw.Scene(lw.Vehicle(**odd_calls.BODY)), 600)
+    told = []
+
+    def look(block):
+        try:
+            lw.open_run(tmp_path / "run.zarr")
+        except lw.SceneError as error:
+            told.append(str(error))
+
+    lw.solve(fleet, "psi_s", h=0.1, t1=0.2, store=tmp_path / "run.zarr", on_block=look)
+    assert told and all("is being written (process" in text and "resume" not in text for text in told)
+    assert lw.open_run(tmp_path / "run.zarr").members == 600

@@ -160,7 +160,8 @@ def suggest(
     """Find the cheapest method, step and precision that keep an error for every member up to a time.
 
     The search runs a sample of members; its best settings are then checked on up to 1024 members. Their largest errors are
-    carried on to the size of the fleet by a Pareto tail, and steps shortened where that is too large. Where noise acts, all runs
+    carried on to the size of the fleet by a Pareto tail, and steps shortened where that is too large. Where noise acts, all
+    runs
     of the search see one path of it, drawn every noise_step of the scene or, without one, finer than any step that is tried; a
     run of the setting draws at its own steps.
 

@@ -161,9 +161,8 @@ def suggest(
 
     The search runs a sample of members; its best settings are then checked on up to 1024 members. Their largest errors are
     carried on to the size of the fleet by a Pareto tail, and steps shortened where that is too large. Where noise acts, all
-    runs
-    of the search see one path of it, drawn every noise_step of the scene or, without one, finer than any step that is tried; a
-    run of the setting draws at its own steps.
+    runs of the search see one path of it, drawn every noise_step of the scene or, without one, finer than any step that is
+    tried; a run of the setting draws at its own steps.
 
     Args:
         fleet: the ensemble, or a Scene with one.
@@ -432,10 +431,12 @@ class Ladders:
 
     def _method(
         self, method: str, dtypes: Sequence[str], specs: dict[tuple[str, str], Any], new_kernels: bool
-    ) -> Generator[Trial, None, None]:
-        """Search the precisions of a method, one after the other; yields each trial but the last of a precision."""
+    ) -> Generator[Trial | str, None, None]:
+        """Search the precisions of a method, one after the other; yields where the next method may take its turn."""
         known: dict[str, float | None] = {}
         for dtype in dtypes:
+            if known:
+                yield dtype
             new = specs[method, dtype] not in self._compiled
             least = min((price for price, _ in self.priced), default=math.inf)
             # A step in float32 is cheaper, and its error is no smaller: float64 is for what round-off stopped.

@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 # Processes that tests start load the bytecode that others left.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run quick test test-long coverage mutants lint docs gallery bench bench-peers bench-loops clean
+.PHONY: run quick test test-long coverage mutants lint docs gallery pictures bench bench-peers bench-loops clean
 
 run: $(VENV)/.run
 	$(BIN)/lgvi-warp run examples/paper.toml --out runs/paper
@@ -48,6 +48,10 @@ docs: $(VENV)/.dev
 # The pictures of examples/01 to 12 and docs/gallery.md; ONLY="02 07": of these alone.
 gallery: $(VENV)/.dev
 	$(BIN)/python docs/site_parts/gallery.py $(ONLY)
+
+# The other pictures of the pages; ONLY="waypoints": of these alone. What is measured for them: make no other work meanwhile.
+pictures: $(VENV)/.dev
+	$(BIN)/python docs/site_parts/pictures.py $(ONLY)
 
 bench: $(VENV)/.dev
 	$(BIN)/python -m benchmarks run

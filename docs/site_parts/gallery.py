@@ -7,7 +7,6 @@ A picture carries the hash of the script that drew it and what the script printe
 from __future__ import annotations
 
 import ast
-import hashlib
 import subprocess
 import sys
 import tempfile
@@ -17,6 +16,8 @@ ROOT = Path(__file__).parents[2]
 sys.path.append(str(ROOT / "docs"))
 
 from site_parts import movie  # noqa: E402
+from site_parts import pictures as kept  # noqa: E402
+from site_parts.pictures import digest  # noqa: E402
 
 PICTURES = ROOT / "docs" / "gallery"
 PAGE = ROOT / "docs" / "gallery.md"
@@ -31,12 +32,6 @@ into the folder where it is started. How long something took was measured on two
 def scripts() -> list[Path]:
     """The examples of the gallery, in order."""
     return sorted((ROOT / "examples").glob("[0-9][0-9]_*.py"))
-
-
-def digest(script: Path) -> str:
-    """The hash of a script, whatever its line ends and the line that names its licence."""
-    lines = [line for line in script.read_text().splitlines() if not line.startswith("# SPDX-")]
-    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
 
 def run(script: Path, folder: Path) -> str:
@@ -61,14 +56,8 @@ def keep(script: Path, folder: Path, printed: str) -> None:
         folder: Where it ran.
         printed: What it printed.
     """
-    from PIL import Image, PngImagePlugin
-
-    notes = PngImagePlugin.PngInfo()
-    notes.add_itxt("script", digest(script))
-    notes.add_itxt("printed", printed)
-    with Image.open((folder / script.name).with_suffix(".png")) as picture:
-        small = picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
-        small.save(PICTURES / f"{script.stem}.png", optimize=True, pnginfo=notes)
+    drawn = (folder / script.name).with_suffix(".png")
+    kept.keep(drawn, PICTURES / f"{script.stem}.png", script=digest(script), printed=printed)
 
 
 def notes(script: Path) -> dict[str, str]:
@@ -80,10 +69,7 @@ def notes(script: Path) -> dict[str, str]:
     Returns:
         The hash of the script that drew it, "script", and what that printed, "printed".
     """
-    from PIL import Image
-
-    with Image.open(PICTURES / f"{script.stem}.png") as picture:
-        return dict(picture.text)
+    return kept.notes(PICTURES / f"{script.stem}.png")
 
 
 def section(script: Path) -> str:

@@ -240,7 +240,7 @@ def _add_tradeoff(verbs: Any) -> None:
     _add_shared(verb, SCENE, out=FOLDER.format("runs/NAME_tradeoff"))
     _add_shared(verb, "--methods", methods="names, such as psi_s,kl8(psi_x) (default: all that fit)")
     verb.add_argument("--of", default="position", help=f"what errors are of (default: position); {OF}")
-    verb.add_argument("--seconds", metavar="S", type=float, default=45.0, help="about how long to measure (default 45)")
+    verb.add_argument("--seconds", metavar="S", type=float, default=45.0, help="processor time to measure (default 45)")
 
 
 def _add_sensitivity(verbs: Any) -> None:

@@ -76,7 +76,9 @@ def choices(ensemble: Ensemble, h: float, found: Rates | None = None) -> Iterato
         return
     found = found or rates(ensemble)
     numbers = h_rates(found, h)
-    for name in ranked({name: path_error(Method(name), found, h, AHEAD) for name in DAMPED if stable(Method(name), numbers)}):
+    for name in ranked(
+        {name: path_error(Method(name), found, h, AHEAD) for name in DAMPED if stable(Method(name), numbers)}
+    ):
         yield Method(name, reason=DAMPED[name])
     for name in OTHERWISE:
         if name == OTHERWISE[-1] or stable(Method(name), numbers):
@@ -109,8 +111,12 @@ def messages(method: Method, found: Rates, h: float, t1: float) -> tuple[str, ..
     """
     if path_error(method, found, h, t1) <= ALLOWED:
         return ()
-    text = f"step h = {h:g} s is long for this motion: by its rates {method.name} may be off by more than 1 % of the path"
-    shorter = next((h / n for n in (2, 5, 10, 20, 50, 100) if best_error(method, found, h / n, t1) <= ALLOWED), math.nan)
+    text = (
+        f"step h = {h:g} s is long for this motion: by its rates {method.name} may be off by more than 1 % of the path"
+    )
+    shorter = next(
+        (h / n for n in (2, 5, 10, 20, 50, 100) if best_error(method, found, h / n, t1) <= ALLOWED), math.nan
+    )
     remedy = f"h = {shorter:.3g} s keeps that" if shorter > 0.0 else "shorten it"
     return (f"{text}; {remedy}, or ask for an error: lw.suggest, --error",)
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """About how far a step takes a method off: by the rates at which the motion of a scene changes.
 
-The motion is linearised about the members' start, with the damping of the speed that their drive brings. Of each mode y' = z y / h
-an explicit method makes R(z) in place of exp(z). Errors of a mode that dies away end with it, those of the others add up.
+The motion is linearised about the members' start, with the damping of the speed that their drive brings. Of each mode
+y' = z y / h an explicit method makes R(z) in place of exp(z). Errors of a mode that dies away end with it, those of the others
+add up.
 Measured beside the errors of runs by `python -m benchmarks run damped`.
 """
 

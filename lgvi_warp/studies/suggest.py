@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -88,8 +88,8 @@ class Suggestion:
         error: error asked for [`unit`].
         of: name of the quantity that the error is of.
         unit: unit of that quantity.
-        expected: largest error over members and path that one fleet in ten exceeds which is as large and drawn alike: that of the
-            members checked, carried on to the size of the fleet by how the largest ones fall off [`unit`].
+        expected: largest error over members and path: that of the members checked, carried on to the size of the fleet by how
+            the largest ones fall off; one fleet in ten, as large and drawn alike, exceeds it [`unit`].
         us_per_vehicle_second: microseconds of one core per vehicle and simulated second.
         run_seconds: predicted run time of all members on `threads` threads, without compiling [s].
         threads: threads that `run_seconds` assumes.
@@ -160,8 +160,9 @@ def suggest(
     """Find the cheapest method, step and precision that keep an error for every member up to a time.
 
     The search runs a sample of members; its best settings are then checked on up to 1024 members. Their largest errors are
-    carried on to the size of the fleet by a Pareto tail, and steps shortened where that is too large. Where noise acts, all runs of the search see one path of it, drawn every noise_step of the scene
-    or, without one, finer than any step that is tried; a run of the setting draws at its own steps.
+    carried on to the size of the fleet by a Pareto tail, and steps shortened where that is too large. Where noise acts, all
+    runs of the search see one path of it, drawn every noise_step of the scene or, without one, finer than any step that is
+    tried; a run of the setting draws at its own steps.
 
     Args:
         fleet: the ensemble, or a Scene with one.
@@ -342,7 +343,9 @@ def checked_reference(sample: Sample, of: Compared, error: float, seconds: float
     until = sample.times[reference.reaches(of.name, 0.1 * error)]
     remedy = f"ask for t1 (--duration) up to {until:g} s" if until > 0.0 else "ask for a shorter t1 (--duration)"
     grows = growth_text(growth_of(reference.sample, taken, reference))
-    raise SceneError([f"{problem}: {differ}, and agree no better with shorter steps; {grows}; {remedy}, or for a larger error"])
+    raise SceneError(
+        [f"{problem}: {differ}, and agree no better with shorter steps; {grows}; {remedy}, or for a larger error"]
+    )
 
 
 def short_list(sample: Sample, taken: Sequence[str]) -> list[str]:
@@ -428,10 +431,12 @@ class Ladders:
 
     def _method(
         self, method: str, dtypes: Sequence[str], specs: dict[tuple[str, str], Any], new_kernels: bool
-    ) -> Generator[Trial, None, None]:
-        """Search the precisions of a method, one after the other; yields each trial but the last of a precision."""
+    ) -> Generator[Trial | str, None, None]:
+        """Search the precisions of a method, one after the other; yields where the next method may take its turn."""
         known: dict[str, float | None] = {}
         for dtype in dtypes:
+            if known:
+                yield dtype
             new = specs[method, dtype] not in self._compiled
             least = min((price for price, _ in self.priced), default=math.inf)
             # A step in float32 is cheaper, and its error is no smaller: float64 is for what round-off stopped.
@@ -556,8 +561,8 @@ def refined(
         members: size of the fleet.
 
     Returns:
-        The last trial, and the largest error expected in the fleet [unit of `of`]; after six shorter steps it may still miss the
-        target.
+        The last trial, and the largest error expected in the fleet [unit of `of`]; after six shorter steps it may still miss
+        the target.
     """
     m = sample.allowed(round(float(sample.spacing) / candidate.h))
     order = 1 if sample.draws else Method(candidate.method).order

@@ -228,8 +228,11 @@ def measured(fleet, t1, method, steps):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FLEETS)
 def test_the_method_is_chosen_by_its_error_at_the_step(name):
-    """Chosen: a method off by at most 1 % of the path, or no more than twice as far off as the best. The estimate that says so is
-    right to a factor of five in the error; told is a step that is off by more than five times 1 %, and none by less than a fifth."""
+    """A method off by little, or no more than twice as far as the best.
+
+    The estimate is right to a factor of five: told is a step that is off by more than five times 1 % of the path, and none
+    that is off by less than a fifth of it.
+    """
     fleet, t1 = FLEETS[name]()
     counts = [4 * round(t1 / h / 4) for h in (0.5, 0.375, 0.25, 0.15, 0.1, 0.05)]
     errors = {method: measured(fleet, t1, method, counts) for method in ("rk4", "rk8", "rkw3")}

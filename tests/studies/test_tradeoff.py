@@ -22,6 +22,7 @@ from lgvi_warp import cli
 from lgvi_warp.studies import comparison, cost
 from lgvi_warp.studies import suggest as suggestion
 from lgvi_warp.studies import tradeoff as tradeoffs
+from lgvi_warp.studies.budget import Budget
 from lgvi_warp.studies.comparison import Sample
 from tests.conftest import ROOT
 from tests.support.random_scenes import judged, random_scene
@@ -172,7 +173,7 @@ def test_a_search_compiles_only_what_may_be_cheaper(scene, monkeypatch):
     asked = suggestion.compared_in("position")
 
     def climbed(prices, methods, **settings):
-        ladders = suggestion.Ladders(sample, reference, asked, 0.1, math.inf)
+        ladders = suggestion.Ladders(sample, reference, asked, 0.1, Budget(ENOUGH))
         climbs = []
 
         def longest(method, dtype):
@@ -180,6 +181,7 @@ def test_a_search_compiles_only_what_may_be_cheaper(scene, monkeypatch):
             price = prices[climbs[-1]]
             if price is not None and price < math.inf:
                 ladders.priced.append((price, None))
+            yield from ()
             return price
 
         monkeypatch.setattr(ladders, "longest", longest)

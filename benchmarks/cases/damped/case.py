@@ -2,8 +2,9 @@
 """Driven, damped motion: error and cost of each method and step for REMUS 100 with its rudder at 4 degrees.
 
 As published but in the plane, as in examples/papers/prestero_2001/remus_100.py; the same with its drag 100 and 1000 times as
-strong; in six degrees of freedom with linear damping of its roll, at 80 1/s; and in the plane with a thruster that lags and
-fins whose rate is limited, the rudder to 4 degrees at 5 s and to -4 degrees at 15 s. From 1 to 1.6 m/s; errors are those after
+strong; in six degrees of freedom with linear damping of its roll, at 80 1/s, and as shipped; in the plane with a thruster that
+lags and fins whose rate is limited, the rudder to 4 degrees at 5 s and to -4 degrees at 15 s; and BlueROV2 Heavy, whose
+thrusters push unevenly. From 1 to 1.6 m/s, BlueROV2 at a third of that; errors are those after
 30 s, the largest of the members, against rk8 at a tenth of its shortest step here. Last, for each error, the cheapest of these
 settings beside the cheapest that a run takes which is given the step alone.
 """
@@ -46,8 +47,11 @@ SCENES = {
     "drag x 100": (PLANE, NO_TORQUE, 100.0, 0.0),
     "drag x 1000": (PLANE, NO_TORQUE, 1000.0, 0.0),
     "roll damping": ({}, [], 1.0, 20.0),
+    "six degrees": ({}, [], 1.0, 0.0),
     "lags": (PLANE, LAGGING, 1.0, 0.0),
+    "BlueROV2": None,
 }
+UNEVENLY = [0.4, 0.5, 0.45, 0.4, 0.1, 0.1, 0.1, 0.1]
 
 
 def scene(vehicle, terms, strength, rolling):
@@ -69,6 +73,11 @@ def fleet(name, members):
     """Level, at speeds ahead from 1 to 1.6 m/s."""
     nu, zero = np.zeros((members, 3)), np.zeros((members, 3))
     nu[:, 0] = np.linspace(1.0, 1.6, members)
+    if name == "BlueROV2":
+        pushed = {"thrusters.command": np.broadcast_to(UNEVENLY, (members, 8))}
+        return lw.Ensemble.from_states(
+            lw.Scene.named("bluerov2_heavy"), zero, np.tile(np.eye(3), (members, 1, 1)), nu / 3.0, zero, pushed
+        )
     held = {"control_fins.command": np.broadcast_to([RUDDER, 0.0], (members, 2))}
     level = np.broadcast_to(np.eye(3), (members, 3, 3))
     return lw.Ensemble.from_states(scene(*SCENES[name]), zero, level, nu, zero, {} if name == "lags" else held)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The verbs of studies: what their arguments reach, what they write and how they end. No study runs."""
 
+import dataclasses
 import json
 from types import SimpleNamespace
 
@@ -47,6 +48,17 @@ def drawn(monkeypatch):
     for name in ("tradeoff", "stability", "sensitivity"):
         monkeypatch.setattr(f"lgvi_warp.views.plots.plot_{name}", plot(name))
     return names
+
+
+def test_a_method_that_was_asked_for_and_has_no_measurement_ends_with_1(tmp_path, monkeypatch, drawn, capsys):
+    found = dataclasses.replace(tradeoff_of(4.0), missing={"rk8": "members failed at every step that was tried"})
+    monkeypatch.setattr("lgvi_warp.studies.tradeoff.tradeoff", Study(found))
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["tradeoff", PAPER, "--methods", "rk4,rk8", "--out", "b"]) == 1
+    out, err = capsys.readouterr()
+    assert "lgvi-warp: --methods rk8: has no measurement: members failed at every step" in err
+    assert out.startswith("missing     rk8: members failed") and drawn == [("tradeoff", "tradeoff.png")]
+    assert json.loads((tmp_path / "b" / "tradeoff.json").read_text())["missing"] == found.missing
 
 
 def test_arguments_of_a_tradeoff(tmp_path, monkeypatch, drawn, capsys):

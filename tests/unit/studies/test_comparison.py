@@ -636,7 +636,9 @@ def test_a_sweep_halves_steps_until_round_off(scene):
     reference = dataclasses.replace(reference_of(sample, {}), own={name: np.full(6, 1e-9) for name in NAMES})
     shares = []
     with Runs({"psi_s": 1e-2, "psi_x": 1e-2}) as runs, mock.patch.multiple(tradeoffs, SOLVERS=(("newton", None),)):
-        trials, skipped = tradeoffs.sweep(sample, ["psi_s"], reference, 5, Budget(ENOUGH), Budget(ENOUGH), shares.append)
+        trials, skipped = tradeoffs.sweep(
+            sample, ["psi_s"], reference, 5, Budget(ENOUGH), Budget(ENOUGH), shares.append
+        )
     assert skipped == [] and shares[:4] == pytest.approx([0.0, 0.125, 0.25, 0.375]) and min(shares[4:]) >= 0.5
     ladders = {}
     for trial in trials:
@@ -701,9 +703,7 @@ def test_a_sweep_without_time_tries_what_was_asked_for_by_name(scene):
             ["psi_x float64", "rk4 float64"],
             [*rest, "psi_x float64 at fine steps", "rk4 float64 at fine steps"],
         )
-        statistics, _ = tradeoffs.sweep(
-            sample, ["psi_x"], None, 5, Budget(ENOUGH), Budget(ENOUGH), lambda part: None
-        )
+        statistics, _ = tradeoffs.sweep(sample, ["psi_x"], None, 5, Budget(ENOUGH), Budget(ENOUGH), lambda part: None)
     assert len(statistics) == 2 * 5 and all(trial.errors == {} for trial in statistics)
 
 
@@ -777,7 +777,7 @@ def test_a_reference_says_how_much_time_would_do(scene):
 )
 @pytest.mark.parametrize("members", [1024, 20_000])
 def test_the_largest_error_of_a_fresh_fleet_is_foreseen(law, members):
-    """Brute force: of 200 fresh fleets nine in ten keep what the tail of 1,024 others says, up to chance; few do by the maximum."""
+    """Brute force: nine in ten of 200 fresh fleets keep what the tail of 1,024 others says; by the maximum, half."""
     rng, n = np.random.default_rng(1), 200
     checked = [law(rng, 1024) for _ in range(n)]
     fresh = np.array([law(rng, members).max() for _ in range(n)])

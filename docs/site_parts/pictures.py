@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The pictures of the pages beside the gallery's: what each is made of, and how: `make pictures`, or with ONLY="waypoints".
+
+A picture carries the hash of what made it, so that a stale one is found in any clone.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+LGVI = (sys.executable, "-m", "lgvi_warp")
+KEPT = (sys.executable, "-m", "benchmarks", "table", "fronts", "--kept")
+
+
+class Made(NamedTuple):
+    """How a picture is made.
+
+    Attributes:
+        sources: Files whose text made it: a script or a scene, measured rows, and the code that drew it.
+        command: Words of the command; "{}" stands for a folder that it writes into.
+        file: The picture's name in that folder; empty where the command puts it into its place itself.
+    """
+
+    sources: tuple[str, ...]
+    command: tuple[str, ...]
+    file: str = ""
+
+
+def of_script(script: str, *options: str) -> Made:
+    """A picture that an example writes where it is told to."""
+    return Made((script,), (sys.executable, script, *options, "{}/picture.png"), "picture.png")
+
+
+MAPS = "lgvi_warp/views/plots/maps.py"
+FRONTS = "benchmarks/fronts_picture.py"
+STABILITY = (*LGVI, "stability", "examples/paper.toml", "--grid", "all", "--out", "{}")
+SWEEP = "examples/sweeps/depth_gain_map.toml"
+MADE = {
+    "controllers/dead_thruster.png": of_script("examples/controllers/dead_thruster.py"),
+    "controllers/depth_keeping.png": of_script("examples/controllers/depth_keeping.py"),
+    "controllers/learning.png": of_script("examples/controllers/train_a_policy.py", "1.5"),
+    "controllers/waypoints.png": of_script("examples/controllers/waypoints.py"),
+    "guide/depth_gain_map.png": Made((SWEEP,), (*LGVI, "sweep", SWEEP, "--out", "{}"), "success.png"),
+    "guide/tune_worst_5_percent.png": of_script("examples/sweeps/tune_worst_5_percent.py"),
+    **{
+        f"guide/stability_{name}.png": Made(("examples/paper.toml", MAPS), STABILITY, f"stability_{name}.png")
+        for name in ("omega", "mass", "drag")
+    },
+    **{
+        f"guide/accuracy_{name}.png": Made((f"benchmarks/rows/fronts_{name}.json", FRONTS), (*KEPT, name))
+        for name in ("paper", "remus", "light", "short")
+    },
+}
+
+
+def digest(*paths: Path) -> str:
+    """The hash of texts, whatever their line ends and the lines that name their licence."""
+    lines = [line for path in paths for line in path.read_text().splitlines() if not line.startswith("# SPDX-")]
+    return hashlib.sha256("\n".join(lines).encode()).hexdigest()
+
+
+def made_of(name: str) -> str:
+    """The hash of what makes a picture, by its name below docs/."""
+    return digest(*(ROOT / source for source in MADE[name].sources))
+
+
+def keep(source: Path, target: Path, **texts: str) -> None:
+    """Put a picture into its place, with few colours and with where it comes from.
+
+    Args:
+        source: The picture that was drawn.
+        target: Its place.
+        texts: What it says of itself: "script", the hash of what made it, and more.
+    """
+    from PIL import Image, PngImagePlugin
+
+    notes = PngImagePlugin.PngInfo()
+    for key, text in texts.items():
+        notes.add_itxt(key, text)
+    with Image.open(source) as picture:
+        small = picture.convert("RGB").quantize(256, dither=Image.Dither.NONE)
+    small.save(target, optimize=True, pnginfo=notes)
+
+
+def notes(picture: Path) -> dict[str, str]:
+    """What a picture says of itself."""
+    from PIL import Image
+
+    with Image.open(picture) as opened:
+        return dict(opened.text)
+
+
+def main(chosen: list[str]) -> None:
+    """Draw the pictures, all or those whose names are given; what one command draws together is run once."""
+    commands: dict[tuple[str, ...], list[str]] = {}
+    for name, made in MADE.items():
+        if not chosen or Path(name).stem in chosen:
+            commands.setdefault(made.command, []).append(name)
+    for command, names in commands.items():
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run([word.format(folder) for word in command], cwd=ROOT, check=True)
+            for name in names:
+                if MADE[name].file:
+                    keep(Path(folder) / MADE[name].file, DOCS / name, script=made_of(name))
+                print(name, flush=True)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

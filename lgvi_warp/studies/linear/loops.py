@@ -97,9 +97,10 @@ class Study:
         limits = np.concatenate([np.broadcast_to(own[f"{key}.limit"], (n, c)) for key, c in self.channels.items()], 1)
         why: np.ndarray = np.full(n, UNSETTLED, dtype=object)
         left, due = np.arange(n), self.begin
+        latest: deque[np.ndarray] = deque(maxlen=2)
         while True:
+            latest.clear()
             # Each time from the start: of commands that are on their way, members remember as many as those beside them.
-            latest: deque[np.ndarray] = deque(maxlen=2)
             numbers = {FACTOR: np.ones(len(left)), DELAY: delay[left] * h}
             end = due + bench.every
             motion = bench.run(places[left], None, 0, end, numbers, lambda _, values: latest.extend(_told(values)[-2:]))

@@ -464,7 +464,7 @@ def test_a_case_changes_numbers_lists_vehicle_and_scene():
     assert list(changed.start.position) == [0.0, 0.0, 4.0]
     drag = {term.key: term for term in changed.terms}["drag"]
     assert list(drag.quadratic) == [1.0, 0, 0, 0, 0, 3.0] and list(drag.linear) == [0, 0, 0, 2.0, 2.0, 2.0]
-    assert cases.with_numbers(SCENE, {}) is SCENE
+    assert SCENE.with_numbers({}) is SCENE
     with pytest.raises(lw.SceneError, match="vehicle = 3: is no Vehicle; give"):
         cases.Case("a", vehicle=3).of(SCENE)
 

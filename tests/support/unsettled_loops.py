@@ -24,7 +24,7 @@ def remus() -> lw.Scene:
 
 def rov() -> lw.Scene:
     """BlueROV2 Heavy that keeps its place."""
-    law = lw.PosePID(kp=[40.0] * 3, ki=[1.0] * 3, kd=[60.0] * 3, kr=[20.0] * 3, kw=[8.0] * 3)
+    law = lw.PosePID(kp=[40.0] * 3, ki=[1.0] * 3, kd=[60.0] * 3, kr=[4.0] * 3, kw=[1.5] * 3)
     controller = lw.Controller(
         period=0.1, delay=0.1, guidance=[lw.SetPoint(position=(0.0, 0.0, 5.0), heading=0.3)], laws=[law]
     )
@@ -61,7 +61,7 @@ LOOPS: tuple[tuple[str, str, dict[str, Any]], ...] = (
     ("late thrusters", "rov", {"controller.delay": lw.Choice([1.6, 2.0])}),
     ("damping too high", "rov", {"pose_pid.kd": _all(600.0, 900.0)}),
     ("turning rate too high", "rov", {"pose_pid.kw": _all(60.0, 90.0)}),
-    ("place integral too high", "rov", {"pose_pid.ki": _all(60.0, 90.0)}),
+    ("place integral too high", "rov", {"pose_pid.ki": _all(400.0, 600.0)}),
 )  # fmt: skip
 SCENES = {"remus": remus, "rov": rov}
 

@@ -8,7 +8,8 @@ from typing import Any
 import lgvi_warp as lw
 
 FINS = lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])
-STEP = {"remus": 0.02, "rov": 0.02}
+# Step of their runs [s].
+STEP = 0.02
 
 
 def remus() -> lw.Scene:

@@ -355,7 +355,8 @@ def test_a_loop_within_a_dead_band_moves_nothing():
     matrix = [[0, 0, 0, 0, 0, -0.1], [0, 0, 0, 0, 0, 0.1]]
     one = turning([pushes, lw.Drag(linear=[10.0] * 3 + [1.0] * 3)], lw.AllocationMatrix(to="thrusters", matrix=matrix))
     one = dataclasses.replace(one, start=lw.Start(euler_deg=[0.0, 0.0, np.rad2deg(0.3)]))
-    found = lw.margins(one, None, "gain", method="psi_s", h=H)
+    found = lw.margins(one, None, "gain", method="psi_s", h=0.03)
+    assert "step shortened from 0.03 s to 0.025 s" in str(found) and found.to_dict()["messages"] == list(found.messages)
     assert found.why.tolist() == ["moves nothing"] and np.isnan(found.values["gain_upper"][0])
 
 

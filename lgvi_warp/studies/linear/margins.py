@@ -47,6 +47,7 @@ class Margins:
         why: (n,), why a member has none: "does not settle", "at its limit: thrusters[3]" where a motion stays there, "moves
             nothing" where its commands have no effect, "failed"; "" where it has.
         step: step of the runs [s], to which delays are known.
+        messages: what the user should know, such as that the step was shortened to fit the period.
     """
 
     loop: str
@@ -54,6 +55,7 @@ class Margins:
     by_runs: Mapping[str, np.ndarray]
     why: np.ndarray
     step: float
+    messages: tuple[str, ...] = ()
 
     @property
     def steady(self) -> np.ndarray:
@@ -74,7 +76,7 @@ class Margins:
         """The margins as plain values, for JSON.
 
         Returns:
-            "loop", "step", "why", and under "eigenvalues" and "runs" lists by name; None for NaN, "inf" for infinite ones.
+            "loop", "step", "why", "messages", and under "eigenvalues" and "runs" lists by name; None for NaN, "inf" for infinite ones.
         """
 
         def plain(value: float) -> float | str | None:
@@ -85,7 +87,7 @@ class Margins:
             for way, columns in zip(WAYS, (self.values, self.by_runs), strict=True)
             if columns
         }
-        return {"loop": self.loop, "step": self.step, "why": self.why.tolist(), **ways}
+        return {"loop": self.loop, "step": self.step, "why": self.why.tolist(), "messages": list(self.messages), **ways}
 
     def percentiles(self, of: Sequence[float] = PERCENTILES) -> dict[str, np.ndarray]:
         """How margins are distributed over the members that settle as they are.
@@ -149,7 +151,7 @@ class Margins:
         lines.append(f"{'':16}" + "".join(f"{f'{p:g} %':>10}" for p in PERCENTILES))
         for name, row in self.percentiles().items():
             lines.append(f"{f'{name} {UNITS[name]}'.strip():16}" + "".join(f"{value:10.4g}" for value in row))
-        return "\n".join(lines)
+        return "\n".join([*lines, *self.messages])
 
 
 def margins(
@@ -242,7 +244,8 @@ def margins(
             why[loops.places], found = _group(loops, of, by, most, longest)
             for way, name in ((way, name) for way in by for name in names):
                 answers[way][name][loops.places] = found[way][name]
-    return Margins(loop or "all laws", answers["eigenvalues"], answers["runs"], why, study.bench.plan.grid.h)
+    grid = study.bench.plan.grid
+    return Margins(loop or "all laws", answers["eigenvalues"], answers["runs"], why, grid.h, grid.messages)
 
 
 # Margins (n,) by name, by way.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Twenty loops that settle for no member: wrong signs, gains too high, delays, small limits and rates, integrals, dead zones."""
+"""Twenty loops that settle for no member: wrong signs, gains too high, delays, small limits, integrals."""
 
 from __future__ import annotations
 

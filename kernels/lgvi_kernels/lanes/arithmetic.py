@@ -222,7 +222,9 @@ for _real in REALS:
 
 
 # For an operator of one operand Warp asks its own functions alone: there the minus before a 3-vector is one of them.
-wp._src.context.builtin_functions["neg"].overloads += [f for f in neg.user_overloads.values() if f.input_types["a"] in _LANES3]
+wp._src.context.builtin_functions["neg"].overloads += [
+    f for f in neg.user_overloads.values() if f.input_types["a"] in _LANES3
+]
 
 
 @wp.func

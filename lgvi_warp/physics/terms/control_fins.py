@@ -14,7 +14,15 @@ from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.actuators import UNLIMITED, motion, packed_following, refuse_unread
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, rows_of, side_by_side
 from lgvi_warp.physics.terms.fins import Fins, fin_rows
-from lgvi_warp.physics.terms.wrench import SCHEDULE, at_start, commands, fields_anew, first_row, idle_fields, refuse_idle
+from lgvi_warp.physics.terms.wrench import (
+    SCHEDULE,
+    at_start,
+    commands,
+    fields_anew,
+    first_row,
+    idle_fields,
+    refuse_idle,
+)
 
 # Rows of one fin that its forces need where the flow has no angle: those before the matrices of `fin_rows`.
 STRAIGHT_ROWS = 15

@@ -13,7 +13,15 @@ from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.actuators import FAST, motion, packed_following, refuse_unread
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number, rows_of, side_by_side
-from lgvi_warp.physics.terms.wrench import SCHEDULE, at_start, commands, fields_anew, first_row, idle_fields, refuse_idle
+from lgvi_warp.physics.terms.wrench import (
+    SCHEDULE,
+    at_start,
+    commands,
+    fields_anew,
+    first_row,
+    idle_fields,
+    refuse_idle,
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -76,7 +76,8 @@ class Margins:
         """The margins as plain values, for JSON.
 
         Returns:
-            "loop", "step", "why", "messages", and under "eigenvalues" and "runs" lists by name; None for NaN, "inf" for infinite ones.
+            "loop", "step", "why", "messages", and under "eigenvalues" and "runs" lists by name: None for NaN, "inf" for
+            infinity.
         """
 
         def plain(value: float) -> float | str | None:
@@ -172,7 +173,8 @@ def margins(
     """Find how much gain and delay the loop of each member bears.
 
     A member's loop is looked at in the motion that it has after `about` seconds. That must be steady: velocities, rates, the
-    vertical and the commands are the same to 1e-6 a period later, and no command is at its limit. Else the member goes on for
+    vertical, the commands, and what a law holds at a set-point are the same to 1e-6 a period later, and no command is at its
+    limit. Else the member goes on for
     twice the time, and again, up to `settle`. Then it is turned aside, and must come back in a run. Where one of this is not
     so, it has no margins, and `why` says which.
 

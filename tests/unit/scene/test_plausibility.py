@@ -180,7 +180,9 @@ def changed(usual, odd):
 def test_a_number_that_is_set_or_varies_is_seen_as_the_one_in_a_scene(name):
     usual, odd, _ = LOOKS[name]
     # Of a held command the schedule follows.
-    numbers = {key: value for key, value in changed(usual, odd).items() if name != "fin's command" or "schedule" not in key}
+    numbers = {
+        key: value for key, value in changed(usual, odd).items() if name != "fin's command" or "schedule" not in key
+    }
     assert said(usual.with_numbers(numbers)) == said(odd)
     if "euler" in "".join(numbers):  # Attitudes are drawn by laws of their own.
         return

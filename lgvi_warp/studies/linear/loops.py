@@ -110,7 +110,7 @@ class Study:
             numbers = {FACTOR: np.ones(len(left)), DELAY: delay[left] * h}
             end = due + bench.every
             motion = bench.run(places[left], None, 0, end, numbers, keep)
-            steady = (_apart(latest[1], latest[0], limits[left]) <= REPEATS).all(axis=1)
+            steady = np.all(_apart(latest[1], latest[0], limits[left]) <= REPEATS, axis=1).tolist()
             limited = at_limit(_commands(latest[1], limits), limits[left])
             alive = np.isfinite(motion.position).all(axis=1)
             why[left] = [self._reason(*each) for each in zip(alive, steady, limited, strict=True)]

@@ -331,17 +331,18 @@ class Findings:
         pairs = list(itertools.combinations(shares, 2))
         tests = [self._share_test(shares[a], shares[b], single) for a, b in pairs]
         p = paired.holm(np.array([test.p for test in tests]))
-        tested = {frozenset(pair): (test, level) for pair, test, level in zip(pairs, tests, p, strict=True)}
+        tested = {pair: (d.lower, d.upper, level) for pair, d, level in zip(pairs, tests, p, strict=True)}
+        tested |= {(b, a): (-upper, -lower, level) for (a, b), (lower, upper, level) in tested.items()}
         rows: list[dict[str, Any]] = []
         for case, share in sorted(shares.items(), key=lambda item: -item[1].mean()):
             better = {}
             for rival in (rival for rival in shares if share.mean() > shares[rival].mean()):
-                d, level = tested[frozenset((case, rival))]
+                least, most, level = tested[rival, case]
                 if level < 1.0 - self.confidence:
-                    better[rival] = tuple(sorted((abs(d.lower), abs(d.upper))))
+                    better[rival] = f"{rival} by {100.0 * least:.4g} to {100.0 * most:.4g} points"
             passing = self._probability(share == 1.0) if single else self._mean_share(share)
             rows.append({"rank": len(rows) + 1, "case": case, **passing._asdict(), "better_than": ", ".join(better),
-                         "better_by": better})  # fmt: skip
+                         "better_by": ", ".join(better.values())})  # fmt: skip
         return rows
 
     def _share_test(self, a: np.ndarray, b: np.ndarray, single: bool) -> paired.Difference:

@@ -146,11 +146,7 @@ def summary(found: Findings) -> str:
     if len(found.cases) > 1:
         lines += ["", "## Rank", ""]
         for row in found.ranking():
-            sizes = (
-                f"{rival} by {percent(low)} to {percent(high)} points"
-                for rival, (low, high) in row["better_by"].items()
-            )
-            better = f"; better than {', '.join(sizes)}" if row["better_than"] else ""
+            better = f"; better than {row['better_by']}" if row["better_by"] else ""
             lines.append(f"{row['rank']}. {row['case']}: {percent(row['value'])} % "
                          f"({percent(row['lower'])} to {percent(row['upper'])}){better}")  # fmt: skip
         lines += ["", f"## Against {found.baseline}", ""]

@@ -7,6 +7,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.physics import notation
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
+from lgvi_warp.studies.sweeps.cases import Case
 
 VEHICLE = lw.Vehicle(mass=10.0, inertia=(1.0, 2.0, 2.5))
 
@@ -158,6 +159,7 @@ def test_with_numbers_sets_what_a_scene_may_vary():
     assert fins_of(limited)["command"] == [0.1, 0.2] and fins_of(limited)["limit"] == [0.5, 0.6]
     assert limited.start.velocity.tolist() == [1.5, 0.0, 0.0] and limited.run.step == 0.02
     assert scene.with_numbers({}) is scene and fins_of(scene)["command"] == [0.0, 0.0]
+    assert fins_of(Case("hard over", set={"control_fins.command[0]": 0.3}).of(scene))["command"] == [0.3, 0.0]
     copied = fins_of(scene) | {"command": [0.1, 0.2]}
     assert lw.Scene.named("remus_100", terms=[copied]).parameters()["control_fins.command"].tolist() == [0.1, 0.2]
 

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the author of a law, an event or a controller imports: lanes, their functions, structs, and functions of a View.
 
-A law that writes + - * / between lanes imports `add`, `sub`, `mul`, `div`, `neg` too: Warp looks the operators up by name.
-Only the minus before a 3-vector is written neg(v): for an operator of one operand Warp looks up none.
+A law that writes + - * / between lanes imports `add`, `sub`, `mul`, `div` too: Warp looks the operators up by name. The minus
+before a lane or a 3-vector needs none.
 """
 
 from lgvi_kernels.lanes.arithmetic import (

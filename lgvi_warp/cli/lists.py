@@ -132,11 +132,11 @@ def _methods() -> dict[str, str]:
 
 
 def _vehicles() -> dict[str, str]:
-    """Vehicle -> its title."""
+    """Vehicle -> its title, and what its numbers lead to that few would expect."""
     from lgvi_warp.scene.vehicles.fossen import vehicle_tables, vehicles
 
-    titles = (vehicle_tables(name)["source"]["title"] for name in vehicles())
-    return dict(zip(vehicles(), titles, strict=True))
+    sources = {name: vehicle_tables(name)["source"] for name in vehicles()}
+    return {name: "; ".join(of[key] for key in ("title", "remark") if key in of) for name, of in sources.items()}
 
 
 def _terms() -> dict[str, str]:

@@ -63,6 +63,7 @@ class Prediction:
         disk: Size of the store, or about that of the result's file [bytes].
         free_memory: Memory of the machine [bytes]; None if the system does not tell.
         free_disk: Free space on the disk [bytes]; None if unknown.
+        messages: What the run will tell of its settings, such as that the step is shortened to fit.
     """
 
     members: int
@@ -77,6 +78,7 @@ class Prediction:
     disk: int
     free_memory: int | None
     free_disk: int | None
+    messages: tuple[str, ...] = ()
 
     @property
     def seconds(self) -> float:
@@ -91,6 +93,7 @@ class Prediction:
             f"memory      {self.memory / 1e9:.2f} GB" + _share(self.memory, self.free_memory, "the memory"),
             f"disk        {self.disk / 1e9:.3f} GB" + _share(self.disk, self.free_disk, "what is free"),
         ]
+        lines += [f"note        {text}" for text in self.messages]
         if self.free_memory and self.memory > 0.8 * self.free_memory:
             lines.append("note        more than the memory holds: use --store zarr, save less often or fewer fields")
         if self.free_disk is not None and self.disk > self.free_disk:
@@ -181,6 +184,7 @@ def predict(
         disk=metadata + sum(sized.disk for sized in runs),
         free_memory=machine.memory_bytes(),
         free_disk=shutil.disk_usage(place).free,
+        messages=plan.grid.messages,
     )
 
 

@@ -19,6 +19,7 @@ from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.terms.control_fins import ControlFins
 from lgvi_warp.physics.terms.cross_flow import CrossFlow
+from lgvi_warp.physics.terms.wrench import holds
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import Ensemble, over_members
 from lgvi_warp.scene.like import SceneLike
@@ -145,12 +146,13 @@ def fin_angles(scene: SceneLike, p: Numbers) -> Iterator[Look]:
     for term in scene.terms:
         if not isinstance(term, ControlFins):
             continue
-        for field in ("limit", *(() if term.driver else ("command_schedule",))):
-            values = np.abs(p[f"{term.key}.{field}"])
-            angle = values.reshape(len(values), -1).max(axis=1)
-            held = field == "command_schedule" and len(term.times) == 1
-            name = f"{term.key}.{'command' if held else field}"
-            yield name, angle > LIMITS["fin angle"].value * (1.0 + 1e-9), _text(FAR, angle)
+        angles = {"limit": p[f"{term.key}.limit"]}
+        if not term.driver:
+            field = "command" if holds(term) else "command_schedule"
+            angles[field] = p[f"{term.key}.{field}"]
+        for field, values in angles.items():
+            angle = np.abs(values).reshape(len(values), -1).max(axis=1)
+            yield f"{term.key}.{field}", angle > LIMITS["fin angle"].value * (1.0 + 1e-9), _text(FAR, angle)
 
 
 def depths(scene: SceneLike, p: Numbers) -> Iterator[Look]:

@@ -172,6 +172,25 @@ class Scene(Summarized):
             values |= {f"{term.key}.{name}": value for name, value in term.parameters().items()}
         return values
 
+    def with_numbers(self, numbers: Mapping[str, Any]) -> Scene:
+        """Return the scene with other numbers.
+
+        Args:
+            numbers: Values by name: those of `parameters()`, single entries ("drag.quadratic[0]"), "start.position" and what
+                else a start has, "controller.period", "run.step" and "run.duration". A held command takes the place of
+                another, a schedule that of a held one, an attitude that of another form.
+
+        Returns:
+            A new scene.
+
+        Raises:
+            SceneError: If a name is unknown, or a value does not fit; the message lists every fault.
+        """
+        # A scene whose numbers stay as they are loads no controllers.
+        from lgvi_warp.scene.numbers import with_numbers
+
+        return with_numbers(self, numbers)
+
     @classmethod
     def load(cls, path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> Scene:
         """Read a scene from a scene file (TOML).

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -112,6 +112,18 @@ class Start:
             if chosen.keys().isdisjoint(alternatives.get(name, (name,))):
                 chosen[name] = np.zeros(TABLE[name].shape)
         return chosen
+
+    def with_fields(self, fields: Mapping[str, Any]) -> Start:
+        """Return the start with other values, which take the place of those that say the same thing.
+
+        Args:
+            fields: Values by name.
+
+        Returns:
+            A new start.
+        """
+        alike = {name for names in (ATTITUDES, VELOCITIES) if fields.keys() & set(names) for name in names}
+        return replace(self, **(dict.fromkeys(alike) | dict(fields)))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the section [start] of a scene file.

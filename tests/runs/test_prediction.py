@@ -37,6 +37,13 @@ def test_the_disk_is_that_of_the_run(tmp_path):
     assert found.disk == pytest.approx(sum(map(len, tree(path).values())), rel=1e-3)
 
 
+def test_a_step_that_does_not_fit_is_said_to_be_shortened():
+    found = lw.predict(fleet(), **{**SETTINGS, "h": 0.9 * SETTINGS["h"]})
+    (message,) = found.messages
+    assert message.startswith("step shortened from") and f"note        {message}" in str(found)
+    assert lw.predict(fleet(), **SETTINGS).messages == ()
+
+
 def test_the_memory_of_a_result_is_counted():
     plan = make_plan(fleet(), **SETTINGS)
     result = lw.solve(fleet(), **SETTINGS)

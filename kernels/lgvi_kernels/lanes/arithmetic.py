@@ -2,7 +2,7 @@
 """Lane arithmetic: one Warp thread advances a packet of W vehicles, side by side in SIMD lanes.
 
 A `Lane` is wp.vec(W): one number of W vehicles. A `Lane3` is a struct of three lanes: one 3-vector of W vehicles.
-A module that imports the operators `add`, `sub`, `neg`, `mul`, `div` from here gets `+ - * /` between them lane by lane
+A module that imports the operators `add`, `sub`, `mul`, `div` from here gets `+ - * /` between them lane by lane
 (Warp looks an operator's name up among the module's functions first), so formulas read as they would for one vehicle.
 
 Each operator is one expression of Clang's vector types: it becomes SIMD instructions in every width and every size of
@@ -159,6 +159,7 @@ def _vec3_maker(width, real):
     return make
 
 
+_LANES3 = [lane3(_width, _real) for _width in WIDTHS for _real in REALS]
 @functools.cache
 def own_rows(kind):
     """Type of the rows of an array that a law may see: those from `first` to `last`, and the first `common` ones.
@@ -339,6 +340,10 @@ for _real in REALS:
             return vec3(positive(a, b.x, c.x), positive(a, b.y, c.y), positive(a, b.z, c.z))
 
 
+# For an operator of one operand Warp asks its own functions alone: there the minus before a 3-vector is one of them.
+wp._src.context.builtin_functions["neg"].overloads += [
+    f for f in neg.user_overloads.values() if f.input_types["a"] in _LANES3
+]
 for _real in REALS:
     _OwnNumbers = own_rows(_real)
 

@@ -168,6 +168,8 @@ class Term:
     # The bus of a controller that drives it (see physics/control), and the numbers that then do not act.
     driver: ClassVar[Any] = None
     driven_fields: ClassVar[tuple[str, ...]] = ()
+    # Fields that follow from another one, of which alone a fault is told; set by a term before its fields are checked.
+    following: ClassVar[tuple[str, ...]] = ()
 
     name: str = ""
 
@@ -184,8 +186,8 @@ class Term:
             faults.add("name" if self.name else "type", self.key, *wrong)
         lengths: dict[str, int] = {}
         for item in self.number_fields():
-            value = getattr(self, item.name)
-            object.__setattr__(self, item.name, _checked(faults, item, value, lengths, self.shape_of(item)))
+            value, told = getattr(self, item.name), Faults() if item.name in self.following else faults
+            object.__setattr__(self, item.name, _checked(told, item, value, lengths, self.shape_of(item)))
         if not faults:
             self.check(faults)
         faults.raise_if_any()
@@ -269,6 +271,20 @@ class Term:
             value = getattr(self, name)
             if value is not None and np.ndim(np.asarray(value, dtype=object)) == 0:
                 object.__setattr__(self, name, np.array([value] * count))
+
+    def with_fields(self, fields: Mapping[str, Any]) -> Any:
+        """The same term with other values of some fields.
+
+        Args:
+            fields: Values by the field's name.
+
+        Returns:
+            A new term.
+
+        Raises:
+            SceneError: Where a value is wrong.
+        """
+        return dataclasses.replace(self, **fields)
 
     def check(self, faults: Faults) -> None:
         """Add a fault for each number that is wrong for reasons beyond its shape and its bounds; by default there is none.

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -14,7 +15,15 @@ from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.actuators import UNLIMITED, motion, packed_following, refuse_unread
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, rows_of, side_by_side
 from lgvi_warp.physics.terms.fins import Fins, fin_rows
-from lgvi_warp.physics.terms.wrench import at_start, commands, first_row, refuse_idle
+from lgvi_warp.physics.terms.wrench import (
+    SCHEDULE,
+    at_start,
+    commands,
+    fields_anew,
+    first_row,
+    idle_fields,
+    refuse_idle,
+)
 
 # Rows of one fin that its forces need where the flow has no angle: those before the matrices of `fin_rows`.
 STRAIGHT_ROWS = 15
@@ -79,6 +88,7 @@ class ControlFins(Fins):
             object.__setattr__(self, "command", first)
         self.repeat(rows_of(self.position), "limit", "rate_limit", "time_constant", "command")
         if self.command_schedule is None:
+            object.__setattr__(self, "following", SCHEDULE if self.times is None else ())
             object.__setattr__(self, "command_schedule", [self.command])
             object.__setattr__(self, "times", [0.0] if self.times is None else self.times)
         super().__post_init__()
@@ -97,10 +107,14 @@ class ControlFins(Fins):
         if not isinstance(self.flow_angle, bool):
             faults.add("flow_angle", self.flow_angle, "is neither true nor false", "give one of them")
 
+    def with_fields(self, fields: Mapping[str, Any]) -> Any:
+        """In addition, leaves out the commands in whose place others stand."""
+        return super().with_fields(fields_anew(self, fields))
+
     def to_dict(self) -> dict[str, Any]:
-        """The fins as a table of a scene file; `flow_angle` only where it is false."""
-        content = super().to_dict()
-        return {key: value for key, value in content.items() if not (key == "flow_angle" and value is True)}
+        """The fins as a table of a scene file: of their commands what acts; `flow_angle` only where it is false."""
+        left_out = (*idle_fields(self), *(("flow_angle",) if self.flow_angle else ()))
+        return {key: value for key, value in super().to_dict().items() if key not in left_out}
 
     @property
     def channels(self) -> int:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -12,7 +13,15 @@ from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.actuators import FAST, motion, packed_following, refuse_unread
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number, rows_of, side_by_side
-from lgvi_warp.physics.terms.wrench import at_start, commands, first_row, refuse_idle
+from lgvi_warp.physics.terms.wrench import (
+    SCHEDULE,
+    at_start,
+    commands,
+    fields_anew,
+    first_row,
+    idle_fields,
+    refuse_idle,
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -106,6 +115,7 @@ class Thrusters(Term):
             held = 0.0 if self.command is None else self.command
             held = np.full(n, held) if np.ndim(np.asarray(held, dtype=object)) == 0 else held
             defaults |= {"command": held, "times": [0.0], "command_schedule": [held]}
+            object.__setattr__(self, "following", SCHEDULE if self.times is None else ())
         for name, value in defaults.items():
             if getattr(self, name) is None:
                 object.__setattr__(self, name, value)
@@ -175,10 +185,14 @@ class Thrusters(Term):
             return "thrusters_polynomial" if chosen else "thrusters"
         return f"thrusters_with:{','.join(chosen)}"
 
+    def with_fields(self, fields: Mapping[str, Any]) -> Any:
+        """In addition, leaves out the commands in whose place others stand."""
+        return super().with_fields(fields_anew(self, fields))
+
     def to_dict(self) -> dict[str, Any]:
-        """The term as a table of a scene file; polynomials only where they are not w^2."""
-        content = super().to_dict()
-        return {key: value for key, value in content.items() if not (self.is_square and key.startswith("polynomial"))}
+        """The term as a table of a scene file: of its commands what acts; polynomials only where they are not w^2."""
+        left_out = (*idle_fields(self), *(("polynomial", "polynomial_astern") if self.is_square else ()))
+        return {key: value for key, value in super().to_dict().items() if key not in left_out}
 
     def thrust(self, command: Any) -> np.ndarray:
         """Steady thrust at given commands, within their limits, after the lag.

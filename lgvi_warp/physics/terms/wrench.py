@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -100,6 +101,41 @@ def first_row(schedule: Any) -> Any:
         return 0.0
 
 
+# Fields of a schedule of commands, which stands in place of `command`.
+SCHEDULE = ("times", "command_schedule")
+
+
+def holds(term: Any) -> bool:
+    """Whether a term has commands that are held, so that of its fields `command` acts, and else the schedule."""
+    return len(term.command_schedule) == 1
+
+
+def idle_fields(term: Any) -> tuple[str, ...]:
+    """The fields of a term's commands that follow from the others.
+
+    Args:
+        term: A term whose commands are held or follow a schedule.
+
+    Returns:
+        Names of fields.
+    """
+    return SCHEDULE if holds(term) else ("command",)
+
+
+def fields_anew(term: Any, fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Fields with which a term is built anew: of its commands those that follow from the others are left out.
+
+    Args:
+        term: A term whose commands are held or follow a schedule.
+        fields: Values of fields that change.
+
+    Returns:
+        These, and None for each that follows from them.
+    """
+    left_out = ("command",) if fields.keys() & set(SCHEDULE) else idle_fields(term)
+    return dict.fromkeys(left_out) | dict(fields)
+
+
 def commands(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
     """Times and commands of a term; a command that is held is the only row of the schedule.
 
@@ -146,9 +182,9 @@ def refuse_idle(term: Any, numbers: Numbers, rate: str, remembers: np.ndarray, r
     faults = Faults(f"{term.key}.")
     unread = {}
     if term.driver is None:
-        held = len(term.command_schedule) == 1
-        acts, idle = ("command", ("times", "command_schedule")) if held else ("command_schedule", ("command",))
-        unread = {name: (numbers[name] != getattr(term, name), f"a {acts}", f"vary {term.key}.{acts}") for name in idle}
+        acts = "command" if holds(term) else "command_schedule"
+        unread = {name: (numbers[name] != getattr(term, name), f"a {acts}", f"vary {term.key}.{acts}")
+                  for name in idle_fields(term)}  # fmt: skip
     if not term.memory:
         unread[rate] = (remembers, "none", remedy)
     for name, (bad, alternative, what_to_do) in unread.items():

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from lgvi_warp.physics.control.loop_gain import FACTOR, with_factor
+from lgvi_warp.physics.control.set_point import SetPoint
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.studies.linear.bench import Bench, Motion
@@ -77,6 +78,7 @@ class Study:
         length = (last + 1 + looks + looks // 2) * period
         self.bench = Bench(inside, method, h, length, period, (*FIELDS, "command"))
         self.begin, self.last, self.looks = first * self.bench.every, last * self.bench.every, looks
+        self.held = held(controller)
         self.channels = {key: term.channels for key, term in controller.actuators.items()}
 
     def loops(self, places: np.ndarray) -> tuple[list[Loops], np.ndarray]:
@@ -97,14 +99,19 @@ class Study:
         limits = np.concatenate([np.broadcast_to(own[f"{key}.limit"], (n, c)) for key, c in self.channels.items()], 1)
         why: np.ndarray = np.full(n, UNSETTLED, dtype=object)
         left, due = np.arange(n), self.begin
+        latest: deque[np.ndarray] = deque(maxlen=2)
+
+        def keep(_: int, values: Mapping[str, np.ndarray]) -> None:
+            latest.extend(_told(values, self.held)[-2:])
+
         while True:
+            latest.clear()
             # Each time from the start: of commands that are on their way, members remember as many as those beside them.
-            latest: deque[np.ndarray] = deque(maxlen=2)
             numbers = {FACTOR: np.ones(len(left)), DELAY: delay[left] * h}
             end = due + bench.every
-            motion = bench.run(places[left], None, 0, end, numbers, lambda _, values: latest.extend(_told(values)[-2:]))
-            steady = (_apart(latest[1], latest[0], limits[left]) <= REPEATS).all(axis=1)
-            limited = at_limit(latest[1][:, 9:], limits[left])
+            motion = bench.run(places[left], None, 0, end, numbers, keep)
+            steady = np.all(_apart(latest[1], latest[0], limits[left]) <= REPEATS, axis=1).tolist()
+            limited = at_limit(_commands(latest[1], limits), limits[left])
             alive = np.isfinite(motion.position).all(axis=1)
             why[left] = [self._reason(*each) for each in zip(alive, steady, limited, strict=True)]
             well = why[left] == ""
@@ -125,10 +132,38 @@ class Study:
         return f"{LIMITED}{at}" if at else ""
 
 
-def _told(values: Mapping[str, np.ndarray]) -> np.ndarray:
-    """What must repeat, of samples: velocities, rates, down and commands, (k, m, 9 + channels)."""
+def held(controller: Any) -> frozenset[str]:
+    """What laws follow and a set-point holds: where it runs away beyond a limit of a law, all else may repeat.
+
+    Args:
+        controller: The controller, wired.
+
+    Returns:
+        Names among "depth", "heading" and "position".
+    """
+    given = {wish: part for part in controller.guidance for wish in part.gives}
+    wishes = {wish for law in controller.laws for wish in law.needs if isinstance(given.get(wish), SetPoint)}
+    return frozenset(wishes & {"depth", "heading", "position"} | ({"heading"} if "attitude" in wishes else set()))
+
+
+def _told(values: Mapping[str, np.ndarray], of: Collection[str]) -> np.ndarray:
+    """What must repeat, of samples (k, m, ...): velocities, rates, down, commands; and what is held."""
+    ahead, place = values["attitude"][..., :2, 0], values["position"]
+    others = {"depth": place[..., 2:], "position": place, "heading": ahead}
     down = values["attitude"][..., 2, :]
-    return np.concatenate([values["velocity"], values["angular_velocity"], down, values["command"]], axis=-1)
+    told = [
+        values["velocity"],
+        values["angular_velocity"],
+        down,
+        values["command"],
+        *(others[name] for name in sorted(of)),
+    ]
+    return np.concatenate(told, axis=-1)
+
+
+def _commands(told: np.ndarray, limits: np.ndarray) -> np.ndarray:
+    """The commands (m, channels) of what must repeat."""
+    return told[:, 9 : 9 + limits.shape[1]]
 
 
 def at_limit(command: np.ndarray, limits: np.ndarray) -> np.ndarray:
@@ -145,9 +180,10 @@ def at_limit(command: np.ndarray, limits: np.ndarray) -> np.ndarray:
 
 
 def _apart(told: np.ndarray, other: np.ndarray, limits: np.ndarray) -> np.ndarray:
-    """How far what must repeat is apart (m, 9 + channels): of what is large, as a part of its size."""
+    """How far what must repeat is apart (m, ...): of what is large, as a part of its size."""
     size = np.maximum(1.0, np.abs(other))
-    size[:, 9:] = np.minimum(size[:, 9:], np.maximum(limits, np.finfo(float).tiny))
+    of_commands = _commands(size, limits)
+    of_commands[:] = np.minimum(of_commands, np.maximum(limits, np.finfo(float).tiny))
     with np.errstate(invalid="ignore"):
         return np.asarray(np.abs(told - other) / size)
 
@@ -161,7 +197,7 @@ class Loops:
         delay: (n,), their own delays, in steps.
         limits: (n, channels), the largest commands.
         motion: their motions.
-        told: (n, 9 + channels), velocities, rates, down and commands of these.
+        told: (n, ...), what repeats of these, as `_told` has it.
         begin: steps made until then.
     """
 
@@ -186,7 +222,7 @@ class Loops:
         """
         every = np.arange(len(self.places))
         well, last = self._judged(np.ones(len(every)), self.delay, every)
-        near = _apart(last, self.told, self.limits) <= TILTS * self.study.tilt
+        near = _apart(last, self.told, self.limits)[:, : 9 + self.limits.shape[1]] <= TILTS * self.study.tilt
         return np.asarray(well & near.all(axis=1))
 
     def settle(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> np.ndarray:
@@ -221,7 +257,7 @@ class Loops:
         by[:, 3:6] = tilt
         motion = delayed(bench, self.motion.of(some), k0, steps).moved(by)
         highest, first = np.full((3, m, 3 + limits.shape[1]), -np.inf), bench.plan.due(k0, k0)[1]
-        lowest, last = -highest, np.zeros((m, 9 + limits.shape[1]))
+        lowest, last = -highest, np.zeros_like(self.told[some])
 
         def watch(sample: int, values: Mapping[str, np.ndarray]) -> None:
             signals = np.concatenate([values["angular_velocity"], values["command"] / limits], axis=2)
@@ -229,10 +265,10 @@ class Loops:
             for w in np.unique(third):
                 highest[w] = np.fmax(highest[w], signals[third == w].max(axis=0))
                 lowest[w] = np.fmin(lowest[w], signals[third == w].min(axis=0))
-            last[:] = _told(values)[-1]
+            last[:] = _told(values, self.study.held)[-1]
 
         after = bench.run(self.places[some], motion, k0, k1, {FACTOR: factor, DELAY: steps * bench.plan.grid.h}, watch)
-        settled = np.isfinite(after.position).all(axis=1) & ~at_limit(last[:, 9:], limits).any(axis=1)
+        settled = np.isfinite(after.position).all(axis=1) & ~at_limit(_commands(last, limits), limits).any(axis=1)
         near, swing = np.zeros(m, bool), highest - lowest
         for sizes in (np.linalg.norm(swing[..., :3], axis=2), np.linalg.norm(swing[..., 3:], axis=2)):
             well, little = shrinks(sizes, tilt)

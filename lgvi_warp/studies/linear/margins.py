@@ -48,6 +48,7 @@ class Margins:
         why: (n,), why a member has none: "does not settle", "at its limit: thrusters[3]" where a motion stays there, "moves
             nothing" where its commands have no effect, "failed"; "" where it has.
         step: step of the runs [s], to which delays are known.
+        messages: what the user should know, such as that the step was shortened to fit the period.
     """
 
     loop: str
@@ -55,6 +56,7 @@ class Margins:
     by_runs: Mapping[str, np.ndarray]
     why: np.ndarray
     step: float
+    messages: tuple[str, ...] = ()
 
     @property
     def steady(self) -> np.ndarray:
@@ -75,7 +77,8 @@ class Margins:
         """The margins as plain values, for JSON.
 
         Returns:
-            "loop", "step", "why", and under "eigenvalues" and "runs" lists by name; None for NaN, "inf" for infinite ones.
+            "loop", "step", "why", "messages", and under "eigenvalues" and "runs" lists by name: None for NaN, "inf" for
+            infinity.
         """
 
         def plain(value: float) -> float | str | None:
@@ -86,7 +89,7 @@ class Margins:
             for way, columns in zip(WAYS, (self.values, self.by_runs), strict=True)
             if columns
         }
-        return {"loop": self.loop, "step": self.step, "why": self.why.tolist(), **ways}
+        return {"loop": self.loop, "step": self.step, "why": self.why.tolist(), "messages": list(self.messages), **ways}
 
     def percentiles(self, of: Sequence[float] = PERCENTILES) -> dict[str, np.ndarray]:
         """How margins are distributed over the members that settle as they are.
@@ -150,7 +153,7 @@ class Margins:
         lines.append(f"{'':16}" + "".join(f"{f'{p:g} %':>10}" for p in PERCENTILES))
         for name, row in self.percentiles().items():
             lines.append(f"{f'{name} {UNITS[name]}'.strip():16}" + "".join(f"{value:10.4g}" for value in row))
-        return "\n".join(lines)
+        return "\n".join([*lines, *self.messages])
 
 
 def margins(
@@ -171,7 +174,8 @@ def margins(
     """Find how much gain and delay the loop of each member bears.
 
     A member's loop is looked at in the motion that it has after `about` seconds. That must be steady: velocities, rates, the
-    vertical and the commands are the same to 1e-6 a period later, and no command is at its limit. Else the member goes on for
+    vertical, the commands, and what a law holds at a set-point are the same to 1e-6 a period later, and no command is at its
+    limit. Else the member goes on for
     twice the time, and again, up to `settle`. Then it is turned aside, and must come back in a run. Where one of this is not
     so, it has no margins, and `why` says which.
 
@@ -243,7 +247,8 @@ def margins(
             why[loops.places], found = _group(loops, of, by, most, longest)
             for way, name in ((way, name) for way in by for name in names):
                 answers[way][name][loops.places] = found[way][name]
-    return Margins(loop or "all laws", answers["eigenvalues"], answers["runs"], why, study.bench.plan.grid.h)
+    grid = study.bench.plan.grid
+    return Margins(loop or "all laws", answers["eigenvalues"], answers["runs"], why, grid.h, grid.messages)
 
 
 # Margins (n,) by name, by way.

@@ -19,7 +19,7 @@ ENTRIES = 4_000_000
 SEES = 1e-7
 # An eigenvalue so near to the unit circle is on it.
 ON_CIRCLE = 1e-9
-# What no law sees may grow by this a period: three neutral modes in a row, such as rate, angle and place, are known to no better.
+# What no law sees may grow by this a period: three neutral modes in a row, as rate, angle and place, are known no better.
 NEUTRAL = 1e-3
 
 

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import itertools
-import keyword
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -20,8 +19,6 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import NAMES
 
-# Numbers of a scene that are no parameters of members, and that a case may set all the same.
-SETTINGS = ("controller.period", "run.step", "run.duration")
 # Lists of a scene that a case may replace, beside those of the controller.
 LISTS = ("terms", "events", "controller")
 
@@ -72,12 +69,12 @@ class Case:
         """
         scene = scene if self.scene is None else self.scene
         if isinstance(self.vehicle, Mapping):
-            scene = with_numbers(scene, {f"vehicle.{name}": value for name, value in self.vehicle.items()})
+            scene = scene.with_numbers({f"vehicle.{name}": value for name, value in self.vehicle.items()})
         elif self.vehicle is not None:
             if not isinstance(self.vehicle, Vehicle):
                 raise refusal("vehicle", self.vehicle, "is no Vehicle", "give lw.Vehicle(...), or numbers of it")
             scene = replace(scene, vehicle=self.vehicle)
-        return with_numbers(with_lists(scene, self.replace), self.set)
+        return with_lists(scene, self.replace).with_numbers(self.set)
 
 
 def cases_of(given: Any) -> tuple[Case, ...]:
@@ -180,63 +177,6 @@ def with_lists(scene: Scene, lists: Mapping[str, Any]) -> Scene:
         scene = replace(scene, **of_scene)
     parts = {name: value for name, value in lists.items() if name in SECTIONS}
     return replace(scene, controller=replace(scene.controller, **parts)) if parts else scene
-
-
-def with_numbers(scene: Scene, numbers: Mapping[str, Any]) -> Scene:
-    """Return a scene with other numbers.
-
-    Args:
-        scene: the scene.
-        numbers: values by name, as scene.parameters() lists them; also "start.position", "controller.period", "run.step" and
-            "run.duration", and single entries, "drag.quadratic[0]".
-
-    Raises:
-        SceneError: a name is not known, or a value does not fit.
-    """
-    base, faults = scene.parameters(), Faults()
-    changes: dict[str, dict[str, Any]] = {}
-    for name, value in numbers.items():
-        target, *others = variations.targets(name)
-        key, _, attribute = target.name.rpartition(".")
-        known = (*base, *SETTINGS, *(f"start.{entry}" for entry in NAMES))
-        if others or target.name not in known:
-            faults.add(f'"{name}"', value, "is no number of this scene", closest(name, known))
-            continue
-        attribute += "_" * keyword.iskeyword(attribute)
-        place = changes.setdefault(key, {})
-        if target.index is None:
-            place[attribute] = value
-            continue
-        start = scene.start.given().get(attribute) if key == "start" else base[target.name]
-        whole = np.array(place.get(attribute, start), dtype=np.float64)
-        try:
-            whole[target.index] = value
-        except (IndexError, ValueError, TypeError):
-            faults.add(
-                f'"{name}"', value, f"is no number of {target.name}, of shape {whole.shape}", "give one that there is"
-            )
-            continue
-        place[attribute] = whole
-    faults.raise_if_any()
-    return _changed(scene, changes)
-
-
-def _changed(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
-    """The scene with other values of fields, by the key of the part that has them."""
-    if not changes:
-        return scene
-
-    def part(entry: Any) -> Any:
-        return replace(entry, **changes[entry.key]) if entry.key in changes else entry
-
-    sections: dict[str, Any] = {name: replace(getattr(scene, name), **changes[name])
-                for name in ("vehicle", "environment", "start", "run") if name in changes}  # fmt: skip
-    controller = scene.controller
-    if controller is not None:
-        lists = {section: tuple(map(part, getattr(controller, section))) for section in SECTIONS}
-        controller = replace(controller, **lists, **changes.get("controller", {}))
-    sections |= {name: tuple(map(part, getattr(scene, name))) for name in ("terms", "events")}
-    return replace(scene, **sections, controller=controller)
 
 
 def known_names(scene: Scene) -> set[str]:

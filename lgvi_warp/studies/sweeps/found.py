@@ -311,7 +311,7 @@ class Findings:
         return Compared(a.case.name, b.case.name, a.point, SUCCESS, values, d, "McNemar, exact", np.nan, False, only)
 
     def ranking(self, at: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
-        """Rank the cases by success, and say of which others each is really better.
+        """Rank the cases by success, and say of which others each is better than chance explains, and by how much.
 
         With a grid a case's success is the mean over its points, of each member's share of points passed; a case that was
         refused at a point is left out. All pairs of cases are tested, McNemar's exact test or with a grid a paired t of
@@ -331,13 +331,19 @@ class Findings:
                 shares[case] = np.mean([self.passed(cell) for cell in cells], axis=0)
         pairs = list(itertools.combinations(shares, 2))
         tests = [self._share_test(shares[a], shares[b], single) for a, b in pairs]
-        p = dict(zip(pairs, paired.holm(np.array([test.p for test in tests])), strict=True))
+        p = paired.holm(np.array([test.p for test in tests]))
+        tested = {pair: (d.lower, d.upper, level) for pair, d, level in zip(pairs, tests, p, strict=True)}
+        tested |= {(b, a): (-upper, -lower, level) for (a, b), (lower, upper, level) in tested.items()}
         rows: list[dict[str, Any]] = []
         for case, share in sorted(shares.items(), key=lambda item: -item[1].mean()):
-            worse = [rival for rival in shares if rival != case and share.mean() > shares[rival].mean()
-                     and p[(case, rival) if (case, rival) in p else (rival, case)] < 1.0 - self.confidence]  # fmt: skip
+            better = {}
+            for rival in (rival for rival in shares if share.mean() > shares[rival].mean()):
+                least, most, level = tested[rival, case]
+                if level < 1.0 - self.confidence:
+                    better[rival] = f"{rival} by {100.0 * least:.4g} to {100.0 * most:.4g} points"
             passing = self._probability(share == 1.0) if single else self._mean_share(share)
-            rows.append({"rank": len(rows) + 1, "case": case, **passing._asdict(), "better_than": ", ".join(worse)})
+            rows.append({"rank": len(rows) + 1, "case": case, **passing._asdict(), "better_than": ", ".join(better),
+                         "better_by": ", ".join(better.values())})  # fmt: skip
         return rows
 
     def _share_test(self, a: np.ndarray, b: np.ndarray, single: bool) -> paired.Difference:

@@ -142,7 +142,7 @@ def summary(found: Findings) -> str:
     if len(found.cases) > 1:
         lines += ["", "## Rank", ""]
         for row in found.ranking():
-            better = f"; really better than {row['better_than']}" if row["better_than"] else ""
+            better = f"; better than {row['better_by']}" if row["better_by"] else ""
             lines.append(f"{row['rank']}. {row['case']}: {percent(row['value'])} % "
                          f"({percent(row['lower'])} to {percent(row['upper'])}){better}")  # fmt: skip
         lines += ["", f"## Against {found.baseline}", ""]

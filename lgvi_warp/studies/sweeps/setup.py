@@ -29,7 +29,7 @@ from lgvi_warp.statistics.functional import functional
 from lgvi_warp.statistics.metrics import check_wanted
 from lgvi_warp.statistics.metrics_of_actuators import TimeToFailure
 from lgvi_warp.statistics.then import Then
-from lgvi_warp.studies.sweeps.cases import Case, cases_of, ensemble_of, grid_of, known_names, points_of, with_numbers
+from lgvi_warp.studies.sweeps.cases import Case, cases_of, ensemble_of, grid_of, known_names, points_of
 from lgvi_warp.studies.sweeps.record import Record, key_of
 
 # Most cells, cases times points of the grid, of a sweep.
@@ -80,7 +80,7 @@ class Setup:
         Raises:
             SceneError: the case does not fit.
         """
-        scene = with_numbers(case.of(self.scene), point)
+        scene = case.of(self.scene).with_numbers(point)
         numbers = {**case.set, **point}
         if isinstance(case.vehicle, Mapping):
             numbers |= {f"vehicle.{name}": value for name, value in case.vehicle.items()}

@@ -13,7 +13,7 @@ import pytest
 import warp as wp
 
 from lgvi_kernels.lanes import functions as lm
-from lgvi_kernels.lanes.arithmetic import REALS, WIDTHS, add, lane, neg, vec3  # noqa: F401
+from lgvi_kernels.lanes.arithmetic import REALS, WIDTHS, add, lane, vec3  # noqa: F401
 from lgvi_kernels.lanes.flags import CPU_FLAGS
 
 pytestmark = pytest.mark.kernel
@@ -39,7 +39,7 @@ ARCTANGENT_ERROR = 3.0
 def kernel(width, name):
     """All functions of the arguments a: rows in the order of NAMES; greatest, arctangent2, clamp and fused with b and c.
 
-    "neg" is the minus of a 3-vector, whose numbers are x, b and c: x of it, where the others are as they must be.
+    "neg" is the minus before a 3-vector, thrice, whose numbers are x, b and c: x of it, where the others are as they must be.
     """
     Lane = lane(width, FORMATS[name][0])
 
@@ -57,7 +57,8 @@ def kernel(width, name):
         out[7, i] = lm.clamp(x, a[1, i], a[2, i])
         out[8, i] = lm.arctangent2(x, a[1, i])
         out[9, i] = lm.hyperbolic_tangent(x)
-        v = neg(vec3(x, a[1, i], a[2, i]))
+        u = vec3(x, a[1, i], a[2, i])
+        v = -(-(-u))
         # (x, b, c) . (1, 2, 4), of which no sum of two other signs is the same.
         out[10, i] = v.x + (v.y + v.y) + (v.z + v.z + v.z + v.z)
         out[11, i] = lm.fused(x, a[1, i], a[2, i])

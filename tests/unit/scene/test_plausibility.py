@@ -168,6 +168,35 @@ def test_beyond_a_limit_is_said_and_at_it_is_not(name):
     assert all(word in message for word in words), message
 
 
+def changed(usual, odd):
+    """The numbers by which two scenes of the same parts differ, by the names by which they vary and are set."""
+    values, others = usual.parameters() | usual.start.given(), odd.parameters() | odd.start.given()
+    names = {name: name if "." in name else f"start.{name}" for name in values}
+    same = {name for name in names if name in others and np.array_equal(values[name], others[name])}
+    return {names[name]: others[name] for name in names if name in others and name not in same}
+
+
+@pytest.mark.parametrize("name", LOOKS)
+def test_a_number_that_is_set_or_varies_is_seen_as_the_one_in_a_scene(name):
+    usual, odd, _ = LOOKS[name]
+    # Of a held command the schedule follows.
+    numbers = {
+        key: value for key, value in changed(usual, odd).items() if name != "fin's command" or "schedule" not in key
+    }
+    assert said(usual.with_numbers(numbers)) == said(odd)
+    if "euler" in "".join(numbers):  # Attitudes are drawn by laws of their own.
+        return
+    (message,) = said(lw.Ensemble(usual, 3, 1, {key: lw.Choice([value.tolist()]) for key, value in numbers.items()}))
+    assert message == f"{said(odd)[0]} (all 3 members)"
+
+
+def test_a_command_of_a_shipped_vehicle_that_varies_in_radians_or_in_degrees():
+    remus = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0})
+    (message,) = said(lw.Ensemble(remus, 50, 1, {"control_fins.command[1]": lw.Uniform(low=4.0, high=20.0)}))
+    assert message.startswith("control_fins.command: an angle of") and "all 50 members" in message
+    assert said(lw.Ensemble(remus, 50, 1, {"control_fins.command[1]": lw.Uniform(low=-0.3, high=0.3)})) == ()
+
+
 def test_without_a_stated_length_any_inertia_is_possible():
     assert said(scene({"inertia": [2e6, 3e6, 3e6]})) == ()
 

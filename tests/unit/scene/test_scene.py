@@ -7,6 +7,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.physics import notation
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
+from lgvi_warp.studies.sweeps.cases import Case
 
 VEHICLE = lw.Vehicle(mass=10.0, inertia=(1.0, 2.0, 2.5))
 
@@ -139,3 +140,61 @@ def test_the_remedy_for_settings_of_a_run_names_what_is_public():
     assert "lw.solve(scene, h=..., t1=..., ...)" in fault and "lw.RunSettings" not in fault
     table = lw.Scene(VEHICLE).to_dict() | {"run": {"step": 0.02}}
     assert lw.Scene.from_dict(table).run.step == 0.02
+
+
+def fins_of(scene):
+    return next(table for table in scene.to_dict()["terms"] if table["type"] == "control_fins")
+
+
+def test_with_numbers_sets_what_a_scene_may_vary():
+    scene = lw.Scene.named("remus_100")
+    turned = scene.with_numbers({"control_fins.command": [0.1, 0.2]})
+    assert fins_of(turned)["command"] == [0.1, 0.2] and "times" not in fins_of(turned)
+    assert turned.parameters()["control_fins.command_schedule"].tolist() == [[0.1, 0.2]]
+    assert fins_of(lw.Scene.from_dict(turned.to_dict()))["command"] == [0.1, 0.2]
+    assert fins_of(scene.with_numbers({"control_fins.command[1]": 0.3}))["command"] == [0.0, 0.3]
+    limited = turned.with_numbers(
+        {"control_fins.limit": [0.5, 0.6], "start.velocity": [1.5, 0.0, 0.0], "run.step": 0.02}
+    )
+    assert fins_of(limited)["command"] == [0.1, 0.2] and fins_of(limited)["limit"] == [0.5, 0.6]
+    assert limited.start.velocity.tolist() == [1.5, 0.0, 0.0] and limited.run.step == 0.02
+    assert scene.with_numbers({}) is scene and fins_of(scene)["command"] == [0.0, 0.0]
+    assert fins_of(Case("hard over", set={"control_fins.command[0]": 0.3}).of(scene))["command"] == [0.3, 0.0]
+    copied = fins_of(scene) | {"command": [0.1, 0.2]}
+    assert lw.Scene.named("remus_100", terms=[copied]).parameters()["control_fins.command"].tolist() == [0.1, 0.2]
+
+
+def test_a_schedule_takes_the_place_of_a_held_command_and_is_kept():
+    scene = lw.Scene.named("bluerov2_heavy")
+    rows = {"thrusters.times": [0.0, 5.0], "thrusters.command_schedule": [[0.1] * 8, [0.2] * 8]}
+    driven = scene.with_numbers(rows)
+    table = next(table for table in driven.to_dict()["terms"] if table["type"] == "thrusters")
+    assert "command" not in table and table["times"] == [0.0, 5.0]
+    assert driven.parameters()["thrusters.command"].tolist() == [0.1] * 8
+    later = driven.with_numbers({"thrusters.command_schedule": [[0.3] * 8, [0.2] * 8], "thrusters.limit[2]": 0.9})
+    assert (
+        later.parameters()["thrusters.command"].tolist() == [0.3] * 8
+        and later.parameters()["thrusters.limit"][2] == 0.9
+    )
+    with pytest.raises(lw.SceneError, match=r"thrusters\.command = .*command_schedule; keep one"):
+        driven.with_numbers({"thrusters.command": [0.5] * 8})
+
+
+def test_a_start_that_is_set_takes_the_place_of_another_form():
+    scene = lw.Scene.named("sphere", start={"euler_deg": [0.0, 0.0, 90.0], "velocity": [1.0, 0.0, 0.0]})
+    turned = scene.with_numbers({"start.rotation_vector": [0.0, 0.0, 1.0], "start.velocity_inertial": [0.0, 2.0, 0.0]})
+    assert turned.start.to_dict() == {"rotation_vector": [0.0, 0.0, 1.0], "velocity_inertial": [0.0, 2.0, 0.0]}
+
+
+@pytest.mark.parametrize(("vehicle", "term"), [("remus_100", "control_fins"), ("bluerov2_heavy", "thrusters")])
+@pytest.mark.parametrize("value", [[1.0, 2.0, 3.0], [float("nan")] * 2, [[0.1]], "much"])
+def test_a_command_that_is_wrong_is_told_by_the_key_of_the_user(vehicle, term, value):
+    scene = lw.Scene.named(vehicle)
+    table = next(table for table in scene.to_dict()["terms"] if table["type"] == term)
+    for give in (
+        lambda: scene.with_numbers({f"{term}.command": value}),
+        lambda: lw.Scene.named(vehicle, terms=[table | {"command": value}]),
+    ):
+        with pytest.raises(lw.SceneError, match=rf"^{term}\.command = ") as caught:
+            give()
+        assert "schedule" not in str(caught.value)

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp import cli
 from lgvi_warp.scene.vehicles import fossen as co
+from tests.conftest import ROOT
 
 NAMES = co.vehicles()
 SIMPLE = [name for name in NAMES if name != "remus_100"]
@@ -248,3 +250,18 @@ def test_simple_vehicles_load(name):
 def test_the_full_vehicle_loads():
     given = content("remus_100")["vehicle"]
     np.testing.assert_array_equal(lw.Vehicle(**given).added_mass_matrix, given["added_mass_matrix"])
+
+
+def test_the_rov_that_pitches_over_is_said_to(capsys):
+    """Where thrusters push below the centre of gravity by more than buoyancy rights it, there is no steady pitch."""
+    scene, said = lw.Scene.named("bluerov2_heavy"), "15.5 N"
+    body, (thrusters,) = scene.vehicle, [term for term in scene.terms if term.type == "thrusters"]
+    arm, righting = thrusters.position[:4, 2], float(body.buoyancy) * abs(body.center_of_buoyancy[2])
+    assert np.all(arm == 0.085) and f"{righting / 0.085:.1f} N" == said and f"{righting:.2f}" == "1.32"
+    ahead = np.abs(thrusters.direction[:4, 0]) @ thrusters.thrust(np.ones(8))[:4]
+    assert f"{ahead:.0f}" == "86" and ahead * 0.085 > 5.0 * righting
+    assert cli.main(["list", "vehicles"]) == 0
+    (line,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("bluerov2_heavy")]
+    page = (ROOT / "docs" / "guide" / "vehicles.md").read_text()
+    assert all(number in text for text in (line, page) for number in (said, "0.085 m", "1.32 N m"))
+    assert "The full push ahead is 86 N" in page

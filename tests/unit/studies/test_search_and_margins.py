@@ -275,7 +275,8 @@ def test_margins_in_words_and_by_member():
     ]
     assert found.steady.tolist() == [True, True, False, True] and found.reasons == {"at its limit: fins[1]": 1}
     plain = found.to_dict()
-    assert plain["why"] == ["", "", "at its limit: fins[1]", ""] and plain["eigenvalues"]["gain_upper"] == [
+    assert plain["why"] == ["", "", "at its limit: fins[1]", ""]
+    assert plain["eigenvalues"]["gain_upper"] == [
         2.0,
         8.0,
         None,

@@ -358,7 +358,12 @@ def test_the_summary_of_a_grid(gridded):
     assert f"- stiff at controller.delay = 0.04: passes {low:.4g} to {high:.4g} % (38 of 40, 95 %)" in lines
     best = gridded.ranking()[0]
     low, high = (100.0 * best[end] for end in ("lower", "upper"))
-    assert f"1. stiff: 82.5 % ({low:.4g} to {high:.4g}); really better than soft" in lines
+    # Of the means of shares of the same members, by their difference.
+    shares = [np.mean([gridded.passed(c) for c in gridded.cells_of(name)], axis=0) for name in ("stiff", "soft")]
+    least, most = stats.ttest_rel(*shares).confidence_interval(0.95)
+    by = f"soft by {100.0 * least:.4g} to {100.0 * most:.4g} points"
+    assert 0.0 < least < most and best["better_by"] == by and gridded.ranking()[1]["better_by"] == ""
+    assert f"1. stiff: 82.5 % ({low:.4g} to {high:.4g}); better than {by}" in lines
     rows = {row.point["controller.delay"]: row for row in gridded.compare("soft", "stiff") if row.of == "success"}
     d = rows[0.04].difference
     text = f"- stiff at controller.delay = 0.04: better by {100 * d.lower:.4g} to {100 * d.upper:.4g} points, "
@@ -471,7 +476,7 @@ def test_a_case_changes_numbers_lists_vehicle_and_scene():
     assert list(changed.start.position) == [0.0, 0.0, 4.0]
     drag = {term.key: term for term in changed.terms}["drag"]
     assert list(drag.quadratic) == [1.0, 0, 0, 0, 0, 3.0] and list(drag.linear) == [0, 0, 0, 2.0, 2.0, 2.0]
-    assert cases.with_numbers(SCENE, {}) is SCENE
+    assert SCENE.with_numbers({}) is SCENE
     with pytest.raises(lw.SceneError, match="vehicle = 3: is no Vehicle; give"):
         cases.Case("a", vehicle=3).of(SCENE)
 

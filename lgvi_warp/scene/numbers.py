@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scene with other numbers, by the names by which they vary."""
+
+from __future__ import annotations
+
+import keyword
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.physics.control.base import SECTIONS
+from lgvi_warp.scene import variations
+from lgvi_warp.scene.start import NAMES
+
+SceneT = TypeVar("SceneT", bound=Any)
+# Numbers of a scene that are no parameters of members, and that are set all the same.
+SETTINGS = ("controller.period", "run.step", "run.duration")
+
+
+def with_numbers(scene: SceneT, numbers: Mapping[str, Any]) -> SceneT:
+    """Return a scene with other numbers.
+
+    Args:
+        scene: the scene.
+        numbers: values by name, as scene.parameters() lists them; also "start.position", "controller.period", "run.step" and
+            "run.duration", and single entries, "drag.quadratic[0]".
+
+    Raises:
+        SceneError: a name is not known, or a value does not fit.
+    """
+    base, faults = scene.parameters(), Faults()
+    changes: dict[str, dict[str, Any]] = {}
+    for name, value in numbers.items():
+        target, *others = variations.targets(name)
+        key, _, attribute = target.name.rpartition(".")
+        known = (*base, *SETTINGS, *(f"start.{entry}" for entry in NAMES))
+        if others or target.name not in known:
+            faults.add(f'"{name}"', value, "is no number of this scene", closest(name, known))
+            continue
+        attribute += "_" * keyword.iskeyword(attribute)
+        place = changes.setdefault(key, {})
+        if target.index is None:
+            place[attribute] = value
+            continue
+        start = scene.start.given().get(attribute) if key == "start" else base[target.name]
+        whole = np.array(place.get(attribute, start), dtype=np.float64)
+        try:
+            whole[target.index] = value
+        except (IndexError, ValueError, TypeError):
+            faults.add(
+                f'"{name}"', value, f"is no number of {target.name}, of shape {whole.shape}", "give one that there is"
+            )
+            continue
+        place[attribute] = whole
+    faults.raise_if_any()
+    return _changed(scene, changes)
+
+
+def _changed(scene: SceneT, changes: Mapping[str, Mapping[str, Any]]) -> SceneT:
+    """The scene with other values of fields, by the key of the part that has them."""
+    if not changes:
+        return scene
+
+    def part(entry: Any) -> Any:
+        return entry.with_fields(changes[entry.key]) if entry.key in changes else entry
+
+    sections: dict[str, Any] = {name: replace(getattr(scene, name), **changes[name])
+                for name in ("vehicle", "environment", "run") if name in changes}  # fmt: skip
+    if "start" in changes:
+        sections["start"] = scene.start.with_fields(changes["start"])
+    controller = scene.controller
+    if controller is not None:
+        lists = {section: tuple(map(part, getattr(controller, section))) for section in SECTIONS}
+        controller = replace(controller, **lists, **changes.get("controller", {}))
+    sections |= {name: tuple(map(part, getattr(scene, name))) for name in ("terms", "events")}
+    return replace(scene, **sections, controller=controller)

@@ -15,7 +15,7 @@ import numpy as np
 
 from lgvi_warp.common import files as durable
 from lgvi_warp.common import npy_files, summaries
-from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.errors import MissingExtra, SceneError
 from lgvi_warp.common.phases import Phases
 from lgvi_warp.common.status import Status, StatusArray, WarningArray
 from lgvi_warp.common.summaries import Summarized
@@ -262,7 +262,7 @@ class Result(Summarized):
         try:
             import xarray as xr
         except ImportError as error:
-            raise ImportError("result.dataset needs xarray: pip install 'lgvi-warp[store]'") from error
+            raise MissingExtra("datasets", "xarray", "store") from error
         if self.store is not None:
             stored: Any = self.samples
             return stored.dataset(self.store)

@@ -17,6 +17,14 @@ import numpy as np
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.tables import write_csv
 
+# Study -> pattern of the names of the files that hold what it found.
+STUDY_FILES = {
+    "tradeoff": "tradeoff.json",
+    "sensitivity": "sensitivity.json",
+    "stability": "stability*.json",
+    "sweep": "sweep.json",
+}
+
 
 def finite_or_none(value: Any) -> Any:
     """Replace numbers that are not finite by None, so that JSON can hold the value.

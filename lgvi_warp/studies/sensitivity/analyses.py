@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.errors import Faults, MissingExtra, SceneError
 from lgvi_warp.common.status import Status
 from lgvi_warp.runs.quantities import OfInterest
 from lgvi_warp.sampling.designs.base import Sampling
@@ -291,7 +291,7 @@ def salib(name: str) -> Callable[..., Any]:
 
         return getattr(import_module(f"SALib.analyze.{name}"), "analyze")  # noqa: B009
     except ImportError as error:
-        raise ImportError("sensitivity needs SALib: pip install 'lgvi-warp[uq]'") from error
+        raise MissingExtra("sensitivity studies", "SALib", "uq") from error
 
 
 def _good_rows(outputs: Outputs, group: int, failed: str) -> np.ndarray:

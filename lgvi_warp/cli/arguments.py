@@ -154,7 +154,9 @@ def parser() -> Parser:
     view.add_argument("--members", metavar="LIST", help="draw these members, as 3,17 (default: a fair choice of 1,000)")
     view.add_argument("--out", metavar="FILE", type=Path, help="write the recording there, and open no viewer")
     info = _verb(
-        verbs, "info", help="say what is in a folder that a verb wrote; without one, the machine, versions, the core's peak"
+        verbs,
+        "info",
+        help="say what is in a folder that a verb wrote; without one, the machine, versions, the core's peak",
     )
     info.add_argument("dir", nargs="?", metavar="DIR", type=Path, help="a folder that a verb wrote, or a store")
     info.set_defaults(scene=None)
@@ -336,9 +338,7 @@ def _add_stability(verbs: Any) -> None:
 
 def _add_check(verbs: Any) -> None:
     """Add the verb check with its arguments."""
-    verb = _verb(
-        verbs, "check", help="say whether a scene can run, and which of its numbers look wrong; nothing runs"
-    )
+    verb = _verb(verbs, "check", help="say whether a scene can run, and which of its numbers look wrong; nothing runs")
     _add_shared(verb, "scene --method --step --dtype --duration --members --seed --set")
 
 
@@ -375,7 +375,9 @@ def _add_store_verbs(verbs: Any) -> None:
     export = _verb(verbs, "export", help="write a run as one NetCDF or Parquet file")
     _add_shared(export, "dir")
     page = _verb(verbs, "report", help="write one HTML file about a run or studies: report.html")
-    page.add_argument("dir", metavar="DIR", type=Path, help="folder that run, tradeoff, stability, sensitivity or sweep wrote")
+    page.add_argument(
+        "dir", metavar="DIR", type=Path, help="folder that run, tradeoff, stability, sensitivity or sweep wrote"
+    )
     page.add_argument(
         "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: DIR/report.html)"
     )

@@ -43,7 +43,14 @@ def values() -> dict[str, tuple[str, ...]]:
     from lgvi_warp.scene.vehicles.fossen import vehicles
 
     # Compositions stand without the method that they are of: parentheses mean something to shells.
-    methods = (*method.PROGRAMS, *method.TWO_PART, *method.GAUSS, *method.RUNGE_KUTTA, *method.COMPOSITIONS, *method.HALVES)
+    methods = (
+        *method.PROGRAMS,
+        *method.TWO_PART,
+        *method.GAUSS,
+        *method.RUNGE_KUTTA,
+        *method.COMPOSITIONS,
+        *method.HALVES,
+    )
     return {
         "--method": methods, "--methods": methods, "--dtype": tuple(DTYPES), "--dtypes": tuple(DTYPES),
         "--store-dtype": ("float32", "float64"), "--solver": method.SOLVERS, "--iterations": ("auto",), "--checks": CHECKS,

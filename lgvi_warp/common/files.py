@@ -319,9 +319,12 @@ def placed(path: str | os.PathLike[str]) -> Iterator[Path]:
         The temporary path to write to.
 
     Raises:
-        OSError: The file cannot be made durable or put in its place.
+        OSError: Its folder is not there, or the file cannot be made durable or put in its place.
     """
     target = Path(path)
+    if not target.parent.is_dir():
+        # By its own name: the error of the temporary file would tell that one's.
+        raise FileNotFoundError(errno.ENOENT, "there is no such folder", os.fspath(target.parent))
     scratch.sweep(target)
     beside = scratch.beside(target)
     try:

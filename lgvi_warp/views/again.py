@@ -37,7 +37,12 @@ def again(provenance: Mapping[str, Any]) -> tuple[str, str | None, str]:
 def _given(provenance: Mapping[str, Any]) -> list[str]:
     """Options for what a run was given in place of its scene's own settings."""
     settings, duration = provenance["scene"].get("run", {}), provenance["step"] * provenance["steps"]
-    options = {"method": provenance["method"]["name"], "step": provenance["step"], "duration": duration, "dtype": provenance["dtype"]}
+    options = {
+        "method": provenance["method"]["name"],
+        "step": provenance["step"],
+        "duration": duration,
+        "dtype": provenance["dtype"],
+    }
     chosen = {"method"} if provenance["method"].get("chosen") else set()
     return [word for name, value in options.items() if name not in chosen and not _same(settings.get(name), value)
             for word in (f"--{name}", value if isinstance(value, str) else f"{value:.12g}")]  # fmt: skip

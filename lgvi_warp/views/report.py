@@ -68,7 +68,9 @@ def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]
         OSError: The file cannot be written.
     """
     if not isinstance(result, str | os.PathLike):
-        return _write(path, name_of(result.provenance), [_paragraph(f"Written on {_day(time.time())}."), *_of_run(result)])
+        return _write(
+            path, name_of(result.provenance), [_paragraph(f"Written on {_day(time.time())}."), *_of_run(result)]
+        )
     folder = Path(result)
     run, studies = run_in(folder), studies_in(folder)
     if run is None and not studies:
@@ -80,7 +82,10 @@ def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]
         found, file = run
         parts += [_paragraph(f"Run of {_day(file.stat().st_mtime)}, in {folder.resolve().name}."), *_of_run(found)]
     for file in studies:
-        parts += [_paragraph(f"{_words(file)} of {_day(file.stat().st_mtime)}, in {folder.resolve().name}."), *_of_study(file)]
+        parts += [
+            _paragraph(f"{_words(file)} of {_day(file.stat().st_mtime)}, in {folder.resolve().name}."),
+            *_of_study(file),
+        ]
     if studies:
         parts += [_section(_words(picture), _pixels(picture)) for picture in _pictures_in(folder, run is not None)]
     name = name_of(found.provenance) if run is not None else f"{_words(studies[0])} of {folder.resolve().name}"
@@ -201,7 +206,9 @@ def _pictures_of(result: Result) -> list[Callable[[Any, Path], Path]]:
         return path
 
     differ = len(outcomes(result)) > 1
-    drawn: list[Callable[[Any, Path], Path]] = [plot] if result.samples or result.kept is not None else [shares] * differ
+    drawn: list[Callable[[Any, Path], Path]] = (
+        [plot] if result.samples or result.kept is not None else [shares] * differ
+    )
     drawn += [inputs] if differ and varied(result) else []
     return drawn + ([plot_statistics] if drawable(result) else [])
 

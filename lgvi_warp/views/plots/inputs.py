@@ -45,11 +45,13 @@ def inputs_by_outcome(result: Result, *, ax: Any = None, path: str | os.PathLike
     if len(codes) < 2 or not inputs:
         raise NothingToDraw("all members ended alike, or nothing varies: no input tells them apart")
     most = max(codes, key=lambda code: int((status == code).sum()))
-    shares = {name: one.share for name, one in explained(inputs, np.where(status == most, 1.0, 0.0), CONFIDENCE).items()}
+    shares = {
+        name: one.share for name, one in explained(inputs, np.where(status == most, 1.0, 0.0), CONFIDENCE).items()
+    }
     first, *others = sorted(inputs, key=lambda name: -np.nan_to_num(shares[name], nan=-1.0))
     members = np.sort(np.argsort(mixed(np.arange(result.members)), kind="stable")[:MOST_POINTS])
     upward = inputs[others[0]] if others else np.arange(result.members)
-    words = {name: f"{name}: explains {100.0 * shares[name]:.3g} %" for name in inputs}
+    words = {name: f"{name}: explains {100.0 * max(shares[name], 0.0):.3g} %" for name in inputs}
     with panel(ax, path, (8.0, 6.0)) as axes:
         for code in codes:
             group = members[status[members] == code]
@@ -80,7 +82,9 @@ def varied(result: Result) -> dict[str, np.ndarray]:
         columns = values.reshape(len(values), -1)
         # What differs by round-off alone does not vary.
         for i in np.flatnonzero(np.ptp(columns, axis=0) > 1e-12 * np.abs(columns).max(initial=0.0)):
-            found[name if values.ndim == 1 else f"{name}{[int(k) for k in np.unravel_index(i, values.shape[1:])]}"] = columns[:, i]
+            found[name if values.ndim == 1 else f"{name}{[int(k) for k in np.unravel_index(i, values.shape[1:])]}"] = (
+                columns[:, i]
+            )
     return found
 
 

@@ -191,7 +191,7 @@ def test_scripts_for_shells_in_full():
     assert values.endswith(
         '    case "$verb $before" in\n        "go --to") words="x y" ;;\n        " --color") words="auto always never" ;;\n'
     )
-    assert 'if' not in values and '[[ " go see " == *" $each "* ]]' in values
+    assert "if" not in values and '[[ " go see " == *" $each "* ]]' in values
     cases = (
         'go) words="up down -q --to --out" ;;',
         'see) words="--all" files=1 ;;',

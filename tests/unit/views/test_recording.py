@@ -298,7 +298,9 @@ def test_each_run_has_its_own_floors(tmp_path):
     scenes = {"one": SCENE, "none": lw.Scene.named("remus_100"), "two": lw.Scene.named("remus_100", events=two)}
     path = lw.log_rerun({name: fleet(9, 7, scene=scene) for name, scene in scenes.items()}, tmp_path / "three.rrd")
     drawn_planes = {
-        name: sorted(entity.rsplit("/", 1)[1] for entity in entities(path) if entity.startswith(f"/world/{name}/water/"))
+        name: sorted(
+            entity.rsplit("/", 1)[1] for entity in entities(path) if entity.startswith(f"/world/{name}/water/")
+        )
         for name in scenes
     }
     surface = ["surface", "surface_grid"]
@@ -454,10 +456,7 @@ def test_a_mesh_is_drawn_times_a_whole_number(tmp_path):
     run = drawn.drawn_of(result)
     box = world.box_of([run])
     scale = world.scale_of(run, box)
-    assert (
-        scale > 5
-        and rows(path, "/world/bodies/ok", "scales")[1.0][0] == [scale] * 3
-    )
+    assert scale > 5 and rows(path, "/world/bodies/ok", "scales")[1.0][0] == [scale] * 3
     assert f"drawn {scale} times their size" in text_of(path, "/run/summary")
     mesh.unlink()
     with pytest.raises(lw.SceneError, match=r"vehicle\.shape\.mesh = 'hull\.glb': cannot be read"):

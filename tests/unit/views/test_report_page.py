@@ -81,10 +81,14 @@ def test_settings_that_a_script_gave_are_in_the_command(tmp_path):
 def test_a_scene_of_no_file_names_its_vehicle(tmp_path):
     import tomllib
 
-    scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 285.0}, terms=[{"type": "current", "velocity": [0.1, 0.0, 0.0]}])
+    scene = lw.Scene.named(
+        "remus_100", vehicle={"buoyancy": 285.0}, terms=[{"type": "current", "velocity": [0.1, 0.0, 0.0]}]
+    )
     short = shortened(scene.to_dict())
     assert short["vehicle"] == {"name": "remus_100", "buoyancy": 285.0} and len(short["terms"]) == 1
-    assert lw.Scene.from_dict(tomllib.loads(last_pre(page_of(fleet(scene=scene), tmp_path)))).to_dict() == scene.to_dict()
+    assert (
+        lw.Scene.from_dict(tomllib.loads(last_pre(page_of(fleet(scene=scene), tmp_path)))).to_dict() == scene.to_dict()
+    )
     # Where the vehicle's own terms are not there, its numbers are written out.
     bare = dataclasses.replace(scene, terms=())
     assert shortened(bare.to_dict()) == bare.to_dict()
@@ -113,7 +117,10 @@ def test_pictures_suit_the_run(tmp_path):
     ends = fleet(400)
     rng = np.random.default_rng(7)
     buoyancy = np.where(np.asarray(ends.status) == lw.Status.SURFACE, 280.0, 300.0) + rng.normal(size=ends.members)
-    drawn = dict(ends.parameters) | {"vehicle.buoyancy": buoyancy, "vehicle.weight": 299.0 + rng.normal(size=ends.members)}
+    drawn = dict(ends.parameters) | {
+        "vehicle.buoyancy": buoyancy,
+        "vehicle.weight": 299.0 + rng.normal(size=ends.members),
+    }
     varies = dataclasses.replace(ends, parameters=drawn)
     assert page_of(varies, tmp_path).count("<svg") == 2  # their speeds at the start vary too
     assert page_of(dataclasses.replace(varies, samples={}), tmp_path).count("<svg") == 2
@@ -146,7 +153,9 @@ def test_a_sweep_has_a_page(tmp_path):
     sweep_in(tmp_path)
     text = page_of(tmp_path, tmp_path)
     assert "lqr passes &lt;95 %&gt; of 20" in text and "<td>lqr</td><td>0.95</td>" in text
-    assert text.count("<img") == 1 and f"<h1>Sweep of {tmp_path.name}</h1>" in text and "&quot;members&quot;: 20" in text
+    assert (
+        text.count("<img") == 1 and f"<h1>Sweep of {tmp_path.name}</h1>" in text and "&quot;members&quot;: 20" in text
+    )
 
 
 def test_a_folder_of_several_has_all_of_them(tmp_path):
@@ -190,5 +199,7 @@ def test_a_plain_install_ends_in_a_line_and_one_exit_code(verb, tmp_path, monkey
         monkeypatch.setitem(sys.modules, name, None)
     assert cli.main(WITHOUT[verb](tmp_path)) == 2
     said = capsys.readouterr()
-    assert re.fullmatch(r"lgvi-warp: .* need .*: pip install 'lgvi-warp\[\w+\]'\n", said.err.rpartition("\r")[2]), said.err
+    assert re.fullmatch(r"lgvi-warp: .* need .*: pip install 'lgvi-warp\[\w+\]'\n", said.err.rpartition("\r")[2]), (
+        said.err
+    )
     assert "Traceback" not in said.err and not (tmp_path / "report.html").exists()

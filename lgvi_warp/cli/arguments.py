@@ -32,8 +32,9 @@ EPILOG = """examples:
   lgvi-warp run examples/paper.toml --json -q
 
 exit codes: 0 done; 1 members, files or the disk failed, or info or merge found a run that is not whole; 2 refused: a scene,
-an argument, or what lies in a folder, or a library that is needed is not installed; 130 interrupted, 143 by SIGTERM, 129 by SIGHUP (a second one ends at once). Results
-go to stdout, progress and faults to stderr. The options of every verb: -q, -v, --json, --color.
+an argument, or what lies in a folder, or a library is missing that the verb needs; 130 interrupted, 143 by SIGTERM, 129 by
+SIGHUP (a second one ends at once). Results go to stdout, progress and faults to stderr. The options of every verb: -q, -v,
+--json, --color.
 """
 
 

@@ -201,7 +201,7 @@ def same_run(
 
 
 def _comparable(provenance: Mapping[str, Any]) -> dict[str, Any]:
-    """Provenance without what changes no bit: threads, Python, the scene's [ensemble], [run], shape, title and text, places."""
+    """Provenance without what changes no bit: threads, Python, [ensemble], [run], shape, title, text, places."""
     provenance = {key: value for key, value in provenance.items() if key != "source"}
     scene = {key: value for key, value in provenance["scene"].items() if key not in ("ensemble", "run")}
     scene["vehicle"] = {key: value for key, value in scene["vehicle"].items() if key not in ("shape", "title")}

@@ -67,7 +67,7 @@ def shortened(scene: Mapping[str, Any]) -> Mapping[str, Any]:
     from lgvi_warp.scene.scene import Scene
     from lgvi_warp.scene.vehicles.fossen import vehicles
 
-    name = scene["vehicle"].get("title")
+    name = scene.get("vehicle", {}).get("title")
     if name not in vehicles():
         return scene
     known = Scene.named(name).to_dict()

@@ -81,13 +81,13 @@ def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]
     if run is not None:
         found, file = run
         parts += [_paragraph(f"Run of {_day(file.stat().st_mtime)}, in {folder.resolve().name}."), *_of_run(found)]
+    if studies:
+        parts += [_section(_words(picture), _pixels(picture)) for picture in _pictures_in(folder, run is not None)]
     for file in studies:
         parts += [
             _paragraph(f"{_words(file)} of {_day(file.stat().st_mtime)}, in {folder.resolve().name}."),
             *_of_study(file),
         ]
-    if studies:
-        parts += [_section(_words(picture), _pixels(picture)) for picture in _pictures_in(folder, run is not None)]
     name = name_of(found.provenance) if run is not None else f"{_words(studies[0])} of {folder.resolve().name}"
     return _write(path, name, parts)
 
@@ -135,7 +135,7 @@ def name_of(provenance: Mapping[str, Any]) -> str:
     Returns:
         As "dive: remus_100"; "Run" where neither has a name.
     """
-    source, vehicle = provenance.get("source", {}), provenance["scene"]["vehicle"]
+    source, vehicle = provenance.get("source", {}), provenance["scene"].get("vehicle", {})
     names = (Path(str(source.get("file", ""))).stem, str(vehicle.get("title") or ""))
     return ": ".join(name for name in names if name) or "Run"
 

@@ -21,7 +21,7 @@ from lgvi_warp.views import rerun as recordings
 from lgvi_warp.views import viewer
 from lgvi_warp.views.commands import channels
 from lgvi_warp.views.fleet import LOOKS
-from lgvi_warp.views.recording import drawn, layout, world
+from lgvi_warp.views.recording import drawn, layout, words, world
 from tests.support.made import made
 from tests.unit.views.test_hull import glb
 
@@ -574,3 +574,11 @@ def test_100000_members_take_5_seconds(tmp_path):
     begun = time.process_time()
     path = lw.log_rerun(large, tmp_path / "large.rrd")
     assert time.process_time() - begun < 5.0 and path.stat().st_size < 15e6
+
+
+def test_the_ten_lines_have_room(mixed):
+    """A window of usual size has room for about 66 letters beside their headings."""
+    run = drawn.drawn_of(mixed)
+    box = world.box_of([run])
+    told = words.lines(run, box, world.scale_of(run, box))
+    assert len(told) == 10 and max(map(len, told.values())) <= 66, told

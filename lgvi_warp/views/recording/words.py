@@ -16,7 +16,6 @@ from lgvi_warp.views.recording.drawn import Drawn
 from lgvi_warp.views.recording.hull import shape_of
 from lgvi_warp.views.recording.world import Box, chosen_member, floors_of
 
-
 # Versions that are among the ten lines, which have room for few words; the provenance has all.
 TOLD = ("lgvi-warp", "warp-lang", "rerun")
 

@@ -21,7 +21,8 @@ from lgvi_warp.views import rerun as recordings
 from lgvi_warp.views import viewer
 from lgvi_warp.views.commands import channels
 from lgvi_warp.views.fleet import LOOKS
-from lgvi_warp.views.recording import drawn, layout, words, world
+from lgvi_warp.views.recording import drawn, layout, world
+from lgvi_warp.views.recording import words as ten_words
 from tests.support.made import made
 from tests.unit.views.test_hull import glb
 
@@ -580,5 +581,5 @@ def test_the_ten_lines_have_room(mixed):
     """A window of usual size has room for about 66 letters beside their headings."""
     run = drawn.drawn_of(mixed)
     box = world.box_of([run])
-    told = words.lines(run, box, world.scale_of(run, box))
+    told = ten_words.lines(run, box, world.scale_of(run, box))
     assert len(told) == 10 and max(map(len, told.values())) <= 66, told

@@ -188,6 +188,7 @@ def show_help(chosen: argparse.Namespace) -> int:
     Returns:
         The exit code: 0.
     """
+    chosen.quiet = False
     top = parser()
     text = (top.verbs[chosen.of] if chosen.of else top).format_help()
     tell(chosen, lambda: {"of": chosen.of, "text": text}, text.rstrip)

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
 
 LEVELS = (0.05, 0.5, 0.95)
+# Members whose middle 90 % take more than so much of a turn [deg] point all ways.
+ALL_WAYS = 270.0
 
 
 def draw_commands(result: Result, axes: Any) -> list[str]:
@@ -58,7 +60,11 @@ def draw_angles(result: Result, axes: Any) -> list[str]:
     for i, name in enumerate(("euler[0]", "euler[1]", "euler[2]")):
         survey = survey_of(result, quantity_of(name))
         levels = np.degrees(at_levels(survey.values, survey.counted, LEVELS))
-        _band(axes, survey.time, levels, i, WORDS[name], banded=survey.total > 1)
+        # Members that point all ways have no mean direction about which an angle could be told.
+        scattered = levels[2] - levels[0] > ALL_WAYS
+        levels[:, scattered] = np.nan
+        label = f"{WORDS[name]}, unless all ways" if scattered.any() else WORDS[name]
+        _band(axes, survey.time, levels, i, label, banded=survey.total > 1)
     said = _mark_faults(axes, result)
     bands = ": medians, bands of 90 %" if survey.total > 1 else ""
     axes.set(xlabel="time [s]", ylabel="angle [deg]", title=f"Attitude{bands}")

@@ -9,6 +9,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.views.commands import faults
 from tests.conftest import ROOT
+from tests.support.made import made
 from tests.unit.views.test_fans import turning
 from tests.unit.views.test_recording import fleet
 
@@ -99,3 +100,17 @@ def test_yaw_goes_on_through_a_turn():
     axes = lw.plots.summary(result)[2]
     yaw = next(line for line in axes.lines if line.get_label() == "yaw").get_ydata()
     np.testing.assert_allclose(yaw, np.linspace(0.0, 720.0, 61), atol=1e-6)
+
+
+def test_an_angle_of_members_that_point_all_ways_is_left_out():
+    """Headings that fan out: the middle 90 % of a spread of s take 0.9 s of a turn."""
+    n, time = 201, np.linspace(0.0, 60.0, 61)
+    heading = np.linspace(-np.pi, np.pi, n) * time[:, None] / 60.0
+    c, s, zero = np.cos(heading), np.sin(heading), np.zeros_like(heading)
+    attitude = np.stack([c, -s, zero, s, c, zero, zero, zero, zero + 1.0], axis=-1).reshape(61, n, 3, 3)
+    axes = lw.plots.summary(made(np.ones((61, n, 3)) * time[:, None, None], time, attitude=attitude))[2]
+    yaw = next(line for line in axes.lines if line.get_label() == "yaw, unless all ways")
+    drawn = np.isfinite(yaw.get_ydata())
+    # 0.9 of 360 degrees t / 60 s are 270 degrees at 50 s.
+    np.testing.assert_array_equal(drawn, time <= 50.0)
+    np.testing.assert_allclose(yaw.get_ydata()[drawn], 0.0, atol=1e-6)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A first dive: 1,000 vehicles that differ a little, 60 seconds, a picture and a recording.
 
-Mass and first turn differ from vehicle to vehicle. The summary shows depth and energy of all, and the paths of a few;
+Mass and first turn differ from vehicle to vehicle. The summary shows paths, depth, attitude and energy;
 `rerun 01_first_dive.rrd` plays the recording.
 """
 

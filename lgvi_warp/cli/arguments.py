@@ -32,8 +32,9 @@ EPILOG = """examples:
   lgvi-warp run examples/paper.toml --json -q
 
 exit codes: 0 done; 1 members, files or the disk failed, or info or merge found a run that is not whole; 2 refused: a scene,
-an argument, or what lies in a folder; 130 interrupted, 143 by SIGTERM, 129 by SIGHUP (a second one ends at once). Results
-go to stdout, progress and faults to stderr. The options of every verb: -q, -v, --json, --color.
+an argument, or what lies in a folder, or a library is missing that the verb needs; 130 interrupted, 143 by SIGTERM, 129 by
+SIGHUP (a second one ends at once). Results go to stdout, progress and faults to stderr. The options of every verb: -q, -v,
+--json, --color.
 """
 
 
@@ -154,7 +155,9 @@ def parser() -> Parser:
     view.add_argument("--members", metavar="LIST", help="draw these members, as 3,17 (default: a fair choice of 1,000)")
     view.add_argument("--out", metavar="FILE", type=Path, help="write the recording there, and open no viewer")
     info = _verb(
-        verbs, "info", help="what a folder of any verb holds; without one, the machine, versions, the core's peak"
+        verbs,
+        "info",
+        help="say what is in a folder that a verb wrote; without one, the machine, versions, the core's peak",
     )
     info.add_argument("dir", nargs="?", metavar="DIR", type=Path, help="a folder that a verb wrote, or a store")
     info.set_defaults(scene=None)
@@ -165,8 +168,9 @@ def parser() -> Parser:
     _verb(verbs, "tune", help="measure how many vehicles a packet should hold on this machine, for runs from now on")
     _add_lists(verbs)
     for verb in dict.fromkeys((top, *verbs.choices.values())):  # an old name has the same parser
+        group = verb.add_argument_group("options of every verb")
         for names, settings in COMMON.items():
-            verb.add_argument(*names, default=argparse.SUPPRESS, **settings)
+            group.add_argument(*names, default=argparse.SUPPRESS, **settings)
     top.verbs = verbs.choices
     top.set_defaults(**DEFAULTS)
     return top
@@ -179,10 +183,39 @@ def _verb(verbs: Any, name: str, help: str, **more: Any) -> Parser:
 
 
 def _add_run(verbs: Any) -> None:
-    """Add the verb run with its arguments."""
+    """Add the verb run with its arguments, in groups."""
     run = _verb(verbs, "run", help="run a scene's ensemble: result.npz, fleet.png, fleet.rrd and a summary")
-    add = run.add_argument
-    _add_shared(run, SCENE, out=FOLDER.format("runs/NAME of the scene"))
+    _add_shared(run, "scene")
+    what = run.add_argument_group("what runs")
+    _add_shared(what, "--duration --members --seed --set")
+    _add_how(run.add_argument_group("method, step and precision"))
+    _add_solves(run.add_argument_group("solves and checks"))
+    files = run.add_argument_group("files")
+    _add_shared(files, "--out --keep", out=FOLDER.format("runs/NAME of the scene"))
+    _add_stored(files)
+    live = run.add_argument_group("a look while it runs")
+    live.add_argument(
+        "--live", action="store_true", help="show members in the rerun viewer as they are done, then the whole run"
+    )
+    live.add_argument(
+        "--viewer",
+        metavar="ADDRESS",
+        help="with --live: a viewer that is open (default: one on this machine, or a new one)",
+    )
+    machine = run.add_argument_group("the machine")
+    _add_shared(machine, EXECUTOR, threads=WORKERS)
+    machine.add_argument("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
+
+
+def _add_how(group: Any) -> None:
+    """Add what chooses the method, the step and the precision of a run."""
+    _add_shared(
+        group,
+        "--method --step --dtype",
+        method="rk4, rk8, rkw3, psi_s, psi_x ...: see list methods (default: the scene's, else chosen by what acts)",
+        dtype="float64, float32, or float32_compensated: sums of two float32",
+    )
+    add = group.add_argument
     add(
         "--error",
         metavar="E",
@@ -190,40 +223,34 @@ def _add_run(verbs: Any) -> None:
         help="choose the cheapest method, step and precision that keep this error, and check it after the run",
     )
     add("--of", help=f"what --error is of (default: position [m]); {OF}")
-    _add_shared(
-        run,
-        "--method --step --dtype",
-        method="rk4, rk8, rkw3, psi_s, psi_x ...: see list methods (default: the scene's, else chosen by what acts)",
-        dtype="float64, float32, or float32_compensated: sums of two float32",
-    )
+    add("--rtol", metavar="R", help="with --atol, rk5 and rk8 choose their own steps: relative error of each")
+    add("--atol", metavar="A", help="with --rtol: absolute error of each step")
+
+
+def _add_solves(group: Any) -> None:
+    """Add what is solved and checked in each step of a run."""
+    add = group.add_argument
     add("--solver", help="of equation (24): quartic, cayley, newton or moser_veselov")
     add("--iterations", metavar="N", help='of every solve: a number, or "auto" (default: to the tolerance)')
     add("--tolerance", metavar="T", help="relative residual above which a solve is not converged")
-    add("--rtol", metavar="R", help="with --atol, rk5 and rk8 choose their steps for this relative error")
-    add("--atol", metavar="A", help="and for this absolute one")
     add("--checks", help="none, safe (statuses, default) or all (warnings of what arises on the way as well)")
     add("--on-failure", help="freeze a member that fails (default), raise: exit code 1, or substep: divide its step")
-    _add_shared(run, "--keep")
-    add("--live", action="store_true", help="show members in the rerun viewer as they are done, then the whole run")
-    add(
-        "--viewer",
-        metavar="ADDRESS",
-        help="with --live: a viewer that is open (default: one on this machine, or a new one)",
-    )
-    add("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
-    _add_shared(run, EXECUTOR, threads=WORKERS)
+
+
+def _add_stored(group: Any) -> None:
+    """Add what a run in a store takes."""
     _add_shared(
-        run,
+        group,
         "--store --store-dtype",
         store="result.npz when the run ends (default), or run.zarr block by block, which resume can go on with",
-        store_dtype="float32: store the samples of a float64 run so",
+        store_dtype="float32: samples of a float64 run take half the room in the store",
     )
-    add(
+    group.add_argument(
         "--blocks",
         metavar="A:B",
         help="with --store zarr: run only these blocks, to be merged later (as many of them as there are)",
     )
-    existing = run.add_mutually_exclusive_group()
+    existing = group.add_mutually_exclusive_group()
     _add_shared(existing, "--overwrite")
     existing.add_argument(
         "--resume", action="store_true", help="go on with a run.zarr that is there, if it is this run"
@@ -316,9 +343,7 @@ def _add_stability(verbs: Any) -> None:
 
 def _add_check(verbs: Any) -> None:
     """Add the verb check with its arguments."""
-    verb = _verb(
-        verbs, "check", help="whether a scene can run, and what is odd about it and most likely a unit; nothing runs"
-    )
+    verb = _verb(verbs, "check", help="say whether a scene can run, and which of its numbers look wrong; nothing runs")
     _add_shared(verb, "scene --method --step --dtype --duration --members --seed --set")
 
 
@@ -354,8 +379,10 @@ def _add_store_verbs(verbs: Any) -> None:
     _add_shared(merge, "--overwrite")
     export = _verb(verbs, "export", help="write a run as one NetCDF or Parquet file")
     _add_shared(export, "dir")
-    page = _verb(verbs, "report", help="one HTML file about a run or a study: report.html")
-    page.add_argument("dir", metavar="DIR", type=Path, help="folder that run, tradeoff, stability or sensitivity wrote")
+    page = _verb(verbs, "report", help="write one HTML file about a run or studies: report.html")
+    page.add_argument(
+        "dir", metavar="DIR", type=Path, help="folder that run, tradeoff, stability, sensitivity or sweep wrote"
+    )
     page.add_argument(
         "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: DIR/report.html)"
     )
@@ -367,7 +394,7 @@ def _add_store_verbs(verbs: Any) -> None:
 
 
 def _add_lists(verbs: Any) -> None:
-    """Add the verbs new, list, schema, plot and completion with their arguments."""
+    """Add the verbs new, list, schema, plot, completion and help with their arguments."""
     new = _verb(verbs, "new", help="write a scene file to begin with, with comments")
     new.add_argument("scene", metavar="SCENE", type=Path, help="the file, which must not be there yet")
     new.add_argument(
@@ -382,3 +409,5 @@ def _add_lists(verbs: Any) -> None:
     _add_shared(plot, "--out", out="folder for the pictures, replaced if they exist (default: DIR)")
     completion = _verb(verbs, "completion", help="print what completes the command in a shell")
     completion.add_argument("shell", metavar="SHELL", choices=("bash", "zsh", "fish"), help="bash, zsh or fish")
+    helped = _verb(verbs, "help", help="print the options of a verb; without one, all verbs")
+    helped.add_argument("of", metavar="VERB", nargs="?", choices=[*verbs.choices], help="a verb")

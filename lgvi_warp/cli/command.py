@@ -13,7 +13,7 @@ from collections.abc import Callable
 from lgvi_warp.cli.arguments import parsed, parser
 from lgvi_warp.cli.check import check
 from lgvi_warp.cli.completion import completion
-from lgvi_warp.cli.lists import list_names, new, schema
+from lgvi_warp.cli.lists import list_names, new, schema, show_help
 from lgvi_warp.cli.machine import bench, info, tune
 from lgvi_warp.cli.output import print_faults
 from lgvi_warp.cli.plot import plot
@@ -24,17 +24,17 @@ from lgvi_warp.cli.stores import export, merge, report
 from lgvi_warp.cli.studies import sensitivity, stability, sweep, tradeoff
 from lgvi_warp.cli.view import view
 from lgvi_warp.cli.warm import warm
-from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.errors import MissingExtra, SceneError
 from lgvi_warp.common.files import WRITTEN
 
 _VERBS = (run, check, resume, predict, merge, export, tradeoff, sensitivity, stability, sweep, info, bench, tune, warm,
           new, schema, view, plot, report, completion)  # fmt: skip
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {verb.__name__: verb for verb in _VERBS}
-# The second is the name of predict before.
-VERBS |= {"list": list_names, "plan": predict}
+# plan is the name of predict before.
+VERBS |= {"list": list_names, "plan": predict, "help": show_help}
 
 # Verbs that write no files of the user's.
-READING = ("info", "check", "predict", "plan", "bench", "tune", "warm", "list", "schema", "completion")
+READING = ("info", "check", "predict", "plan", "bench", "tune", "warm", "list", "schema", "completion", "help")
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -79,7 +79,7 @@ def code_of(error: BaseException, chosen: argparse.Namespace, signals: Signals) 
     # A library may turn an interrupt during its import into any exception.
     if isinstance(error, KeyboardInterrupt) or signals.number is not None:
         text, code = f"{signals.text}; {error if isinstance(error, Ended) else left(chosen)}", signals.exit_code
-    elif isinstance(error, SceneError):
+    elif isinstance(error, SceneError | MissingExtra):
         text, code = str(error), 2
     elif isinstance(error, OSError):
         where = f"{error.filename}: " if error.filename else ""

@@ -7,8 +7,9 @@ import argparse
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from lgvi_warp.cli.arguments import parser
+from lgvi_warp.cli.arguments import COMMON, parser
 from lgvi_warp.cli.output import tell
+from lgvi_warp.common.status import CHECKS, ON_FAILURE
 
 
 class Verb(NamedTuple):
@@ -17,7 +18,7 @@ class Verb(NamedTuple):
     Args:
         name: The verb.
         text: What it does.
-        options: Option -> (its help, words that may be its value; none for any, None for an option without a value).
+        options: Option -> (its help, words that may be its value; none for a file, None for an option without a value).
         words: Words that may be its argument; none for files.
     """
 
@@ -27,10 +28,41 @@ class Verb(NamedTuple):
     words: tuple[str, ...]
 
 
+def values() -> dict[str, tuple[str, ...]]:
+    """List the values of options that are checked with the scene and not by the parser.
+
+    Returns:
+        Option -> words that may be its value.
+    """
+    from lgvi_warp.common.machine import DTYPES
+    from lgvi_warp.engine.executors import NAMES
+    from lgvi_warp.methods import method
+    from lgvi_warp.physics.fields import TABLE
+    from lgvi_warp.runs.store.export import FORMATS
+    from lgvi_warp.scene.settings import KEEP
+    from lgvi_warp.scene.vehicles.fossen import vehicles
+
+    # Compositions stand without the method that they are of: parentheses mean something to shells.
+    methods = (
+        *method.PROGRAMS,
+        *method.TWO_PART,
+        *method.GAUSS,
+        *method.RUNGE_KUTTA,
+        *method.COMPOSITIONS,
+        *method.HALVES,
+    )
+    return {
+        "--method": methods, "--methods": methods, "--dtype": tuple(DTYPES), "--dtypes": tuple(DTYPES),
+        "--store-dtype": ("float32", "float64"), "--solver": method.SOLVERS, "--iterations": ("auto",), "--checks": CHECKS,
+        "--on-failure": ON_FAILURE, "--keep": KEEP, "--executor": NAMES, "--of": tuple(TABLE), "--to": tuple(FORMATS),
+        "--vehicle": tuple(vehicles()),
+    }  # fmt: skip
+
+
 BASH = """_lgvi_warp() {{
     local word=${{COMP_WORDS[COMP_CWORD]}} before=${{COMP_WORDS[COMP_CWORD-1]}} verb="" each
     for each in "${{COMP_WORDS[@]:1:COMP_CWORD-1}}"; do
-        [[ $each != -* ]] && {{ verb=$each; break; }}
+        [[ " {known} " == *" $each "* ]] && {{ verb=$each; break; }}
     done
     local words="" files=""
     case "$verb $before" in
@@ -85,14 +117,16 @@ def verbs() -> Iterator[Verb]:
     Yields:
         Each verb with its options.
     """
+    known = values()
     for name, verb in parser().verbs.items():
         options: dict[str, tuple[str, tuple[str, ...] | None]] = {}
         words: tuple[str, ...] = ()
         for action in verb._actions:
-            values = tuple(map(str, action.choices or ()))
+            choices = tuple(map(str, action.choices or ()))
             for option in action.option_strings:
-                options[option] = (action.help or "", None if action.nargs == 0 else values)
-            words = words if action.option_strings else words + values
+                words_of = choices or known.get(option, ())
+                options[option] = (action.help or "", None if action.nargs == 0 else words_of)
+            words = words if action.option_strings else words + choices
         yield Verb(name, verb.description or "", options, words)
 
 
@@ -105,12 +139,17 @@ def bash(known: list[Verb]) -> str:
     Returns:
         Its text, to be sourced.
     """
-    values = [f'        "{verb.name} {option}") words="{" ".join(words)}" ;;' for verb in known
+    lines = [f'        "{verb.name} {option}") words="{" ".join(words)}" ;;' for verb in known
               for option, (_, words) in verb.options.items() if words]  # fmt: skip
     lists = [f'            {verb.name}) words="{" ".join([*verb.words, *verb.options])}"{"" if verb.words else " files=1"} ;;'
              for verb in known]  # fmt: skip
-    names = " ".join([*(verb.name for verb in known), "--help", "--version"])
-    return BASH.format(values="\n".join(values), verbs="\n".join(lists), names=names)
+    # Options of every verb may stand before it.
+    common = [option for options in COMMON for option in options]
+    lines += [f'        " {option}") words="{" ".join(settings["choices"])}" ;;' for options, settings in COMMON.items()
+               for option in options if "choices" in settings]  # fmt: skip
+    verbs_alone = " ".join(verb.name for verb in known)
+    names = " ".join([verbs_alone, "--help", "--version", *common])
+    return BASH.format(values="\n".join(lines), verbs="\n".join(lists), names=names, known=verbs_alone)
 
 
 def zsh(known: list[Verb]) -> str:

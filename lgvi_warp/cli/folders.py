@@ -94,8 +94,9 @@ def contents(folder: Path) -> list[Content]:
     Raises:
         SceneError: The folder holds nothing that a verb wrote, or a link leads out of it.
     """
-    patterns = {"result": "result*.npz", "tradeoff": "tradeoff.json", "sensitivity": "sensitivity.json",
-                "stability": "stability*.json", "sweep": "sweep.json"}  # fmt: skip
+    from lgvi_warp.studies.files import STUDY_FILES
+
+    patterns = {"result": "result*.npz", **STUDY_FILES}
     studies: list[Content] = []
     if folder.suffix != ".zarr" and not folder.exists():
         raise SceneError([f"{folder}: is not there; give the folder of a run or of a study"])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verbs list, new and schema: what a scene file may hold."""
+"""The verbs list, new and schema: what a scene file may hold; and help."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import json
 import os
 from typing import Any
 
+from lgvi_warp.cli.arguments import parser
 from lgvi_warp.cli.output import tell
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.files import place_of, write_text
@@ -174,4 +175,20 @@ def schema(chosen: argparse.Namespace) -> int:
     from lgvi_warp.scene.schema import schema as of_scenes
 
     print(json.dumps(of_scenes(), indent=1, allow_nan=False))
+    return 0
+
+
+def show_help(chosen: argparse.Namespace) -> int:
+    """Run the verb help: print the options of a verb, or all verbs.
+
+    Args:
+        chosen: The command's parsed arguments.
+
+    Returns:
+        The exit code: 0.
+    """
+    chosen.quiet = False
+    top = parser()
+    text = (top.verbs[chosen.of] if chosen.of else top).format_help()
+    tell(chosen, lambda: {"of": chosen.of, "text": text}, text.rstrip)
     return 0

@@ -29,6 +29,7 @@ def plot(chosen: argparse.Namespace) -> int:
 
     Raises:
         SceneError: The folder holds no numbers, or damaged ones.
+        ImportError: Matplotlib or rerun-sdk is not installed (extra: viz).
         OSError: The folder for the pictures cannot be written.
     """
     held = contents(chosen.dir)
@@ -38,8 +39,10 @@ def plot(chosen: argparse.Namespace) -> int:
     with shown(chosen.quiet, "drawing"):
         for content in held:
             _draw(content, written, out)
+    for missing in written.missing.values():  # pictures are all that the verb is for
+        raise missing
     tell(chosen, lambda: documents.of_files(written),
-         lambda: "\n".join([*written.note_lines(), *map(file_line, written.files)]))  # fmt: skip
+         lambda: "\n".join(map(file_line, written.files)))  # fmt: skip
     print_faults(written.empty)
     return 1 if print_faults(written.faults) else 0
 

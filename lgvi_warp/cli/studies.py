@@ -99,7 +99,7 @@ def sensitivity(chosen: argparse.Namespace) -> int:
                 scene, chosen.of or ["position[2]"], samples=samples, failed=chosen.failed, threads=chosen.threads,
                 progress=progress, **options,
             )  # fmt: skip
-    except (uq.FailedMembers, ImportError) as error:
+    except uq.FailedMembers as error:
         return len(print_faults([str(error)]))
     with shown(chosen.quiet, "writing"):
         written = Written(indices.save(out))

@@ -10,7 +10,7 @@ from lgvi_warp.cli.folders import Content, contents
 from lgvi_warp.cli.output import tell
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.report import file_line
-from lgvi_warp.common.errors import MissingExtra, NothingToDraw, SceneError
+from lgvi_warp.common.errors import NothingToDraw, SceneError
 
 
 def view(chosen: argparse.Namespace) -> int:
@@ -24,6 +24,7 @@ def view(chosen: argparse.Namespace) -> int:
 
     Raises:
         SceneError: There is no run, no such member, or nothing to draw.
+        ImportError: rerun-sdk is not installed (extra: viz).
         OSError: The viewer cannot be started, or the file cannot be written.
     """
     members, content = indices(chosen.members), run_in(chosen.dir)
@@ -36,7 +37,7 @@ def view(chosen: argparse.Namespace) -> int:
                 show(result, members=members)
             else:
                 log_rerun(result, chosen.out, members=members)
-    except (MissingExtra, NothingToDraw) as error:
+    except NothingToDraw as error:
         raise SceneError([str(error)]) from None
     files = [] if chosen.out is None else [chosen.out]
     tell(chosen, lambda: {"files": files}, lambda: "\n".join(map(file_line, files)))

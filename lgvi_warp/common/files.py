@@ -343,9 +343,12 @@ def placed(path: str | os.PathLike[str], root: str | os.PathLike[str] | None = N
 
     Raises:
         SceneError: What is there is no plain file, or lies outside the folder.
-        OSError: The file cannot be made durable or put in its place.
+        OSError: Its folder is not there, or the file cannot be made durable or put in its place.
     """
     target = place_of(path, root)
+    if not target.parent.is_dir():
+        # By its own name: the error of the temporary file would tell that one's.
+        raise FileNotFoundError(errno.ENOENT, "there is no such folder", os.fspath(Path(path).parent))
     scratch.sweep(target)
     beside = scratch.beside(target)
     try:

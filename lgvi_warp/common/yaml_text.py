@@ -8,7 +8,7 @@ import importlib
 import re
 from typing import Any
 
-from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.errors import Faults, MissingExtra, SceneError
 
 # Most values with every alias written out: a vehicle has some hundreds of coefficients.
 MOST_VALUES = 20_000
@@ -39,7 +39,7 @@ def parsed(text: str) -> Any:
     try:
         yaml = importlib.import_module("yaml")
     except ImportError:
-        raise ImportError("reading YAML needs PyYAML: pip install 'lgvi-warp[yaml]'") from None
+        raise MissingExtra("YAML files", "PyYAML", "yaml") from None
     if _depth(text) > DEEPEST:
         raise SceneError([DEEP])
     try:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.common import npy_files, summaries
+from lgvi_warp.common.errors import MissingExtra
 from lgvi_warp.common.phases import Phases
 from lgvi_warp.common.reading import understood
 from lgvi_warp.common.status import Status, StatusArray, WarningArray
@@ -261,7 +262,7 @@ class Result(Summarized):
         try:
             import xarray as xr
         except ImportError as error:
-            raise ImportError("result.dataset needs xarray: pip install 'lgvi-warp[store]'") from error
+            raise MissingExtra("datasets", "xarray", "store") from error
         if self.store is not None:
             stored: Any = self.samples
             return stored.dataset(self.store)

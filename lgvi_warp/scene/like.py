@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -48,6 +48,10 @@ class SceneLike(Protocol):
     @property
     def run(self) -> RunSettings:
         """Settings of the run: method, step, duration, ..."""
+
+    @property
+    def source(self) -> Mapping[str, Any]:
+        """The file that it was read from: its name, its text, and what replaced keys of it; empty where there is none."""
 
     @property
     def ensemble_settings(self) -> EnsembleSettings | None:

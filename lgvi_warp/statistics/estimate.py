@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.common import summaries
-from lgvi_warp.common.errors import closest, shown
+from lgvi_warp.common.errors import MissingExtra, closest, shown
 from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.statistics.lines import texts_of
@@ -139,7 +139,7 @@ class Estimate(Summarized):
         try:
             import xarray as xr
         except ImportError as error:
-            raise ImportError("estimate.dataset needs xarray: pip install 'lgvi-warp[store]'") from error
+            raise MissingExtra("datasets", "xarray", "store") from error
         data = {
             name: (self.dims[name], values, {"units": self.unit} if name in ("value", "lower", "upper") else {})
             for name, values in self.arrays.items()

@@ -17,6 +17,14 @@ from lgvi_warp.common.files import write_text
 from lgvi_warp.common.reading import file_json, understood
 from lgvi_warp.common.tables import write_csv
 
+# Study -> pattern of the names of the files that hold what it found.
+STUDY_FILES = {
+    "tradeoff": "tradeoff.json",
+    "sensitivity": "sensitivity.json",
+    "stability": "stability*.json",
+    "sweep": "sweep.json",
+}
+
 
 def finite_or_none(value: Any) -> Any:
     """Replace numbers that are not finite by None, so that JSON can hold the value.

@@ -98,7 +98,9 @@ def faults(result: Result) -> list[Broken]:
             gain, offset = (_between(numbers[name]) for name in ("gain", "offset"))
             when = f"from {first:g} s" if first == last else f"from {first:g} s, of the last member from {last:g} s"
             head = f"fault {key}" if table.get("name") else "fault"
-            found.append(Broken(first, f"{head}: {table['of']}[{table.get('channel', 0)}] times {gain} plus {offset}, {when}"))
+            found.append(
+                Broken(first, f"{head}: {table['of']}[{table.get('channel', 0)}] times {gain} plus {offset}, {when}")
+            )
     return sorted(found)
 
 

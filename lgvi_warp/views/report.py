@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a run or of a study: one HTML file with pictures, tables, the scene and how to run it again."""
+"""The report of a run or of studies: one HTML file with pictures, tables, the scene and how to run it again."""
 
 from __future__ import annotations
 
@@ -10,21 +10,26 @@ import io
 import json
 import os
 import tempfile
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lgvi_warp.common.arguments import file_path, path_of, result_of
-from lgvi_warp.common.errors import MissingExtra, NothingToDraw, SceneError
+from lgvi_warp.common.errors import NothingToDraw, SceneError
 from lgvi_warp.common.files import place_of, write_text
 from lgvi_warp.common.reading import file_bytes, file_json, file_text, understood
 from lgvi_warp.common.safe_files import inside
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.runs.outcomes import outcome_text, outcomes
 from lgvi_warp.statistics.table import table
-from lgvi_warp.studies.files import of_study
+from lgvi_warp.studies.files import STUDY_FILES, of_study
+from lgvi_warp.views.again import again
+from lgvi_warp.views.commands import faults
 from lgvi_warp.views.fleet import LOOKS, title
 from lgvi_warp.views.plots import drawable, plot, plot_statistics
+from lgvi_warp.views.plots import outcomes as draw_outcomes
+from lgvi_warp.views.plots.inputs import inputs_by_outcome, varied
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
@@ -33,26 +38,28 @@ if TYPE_CHECKING:
 MOST_SVG = 1_000_000
 # Rows of a table of a study that the report shows; its CSV file has all.
 MOST_ROWS = 200
-STUDIES = ("tradeoff", "stability", "sensitivity")
+# Pictures that lgvi-warp run writes.
+OF_A_RUN = ("fleet.png", "statistics.png")
 STYLE = """
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
 h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin-top: 2.2rem; border-bottom: 1px solid #ccc; }
 table { border-collapse: collapse; } th, td { text-align: left; padding: .2rem .8rem .2rem 0; vertical-align: top; }
 th { font-weight: 600; } td.number { text-align: right; font-variant-numeric: tabular-nums; }
 pre { background: #f5f5f5; padding: .8rem; overflow-x: auto; font-size: 13px; }
+@media print { pre { white-space: pre-wrap; } }
 svg, img { max-width: 100%; height: auto; } .outcome { display: inline-block; width: .8rem; height: .8rem; }
 """
 
 
 def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]) -> Path:
-    """Write one HTML file that says what a run or a study found; it opens without a network.
+    """Write one HTML file that says what a run or studies found; it opens without a network.
 
-    Of a run it has the outcomes of the members with remedies, notes and warnings, the pictures, the statistics with their
-    intervals, how it was run, the scene as a file, and how to run it again. Of a study it has the pictures and tables that
-    lie in its folder.
+    Of a run it has the outcomes of the members with remedies, notes and warnings, the pictures that suit it, the statistics
+    with their intervals, how it was run, the scene as it was written, and how to run it again. Of a study it has the pictures
+    and tables that lie in its folder.
 
     Args:
-        result: A result, or the folder of a run, a trade-off, a stability map or a sensitivity study.
+        result: A result, or the folder of a run, a trade-off, a stability map, a sensitivity study or a sweep, or of several.
         path: The file.
 
     Returns:
@@ -63,54 +70,103 @@ def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]
         SceneError: The folder holds no run and no study.
         OSError: The file cannot be written.
     """
+    place_of(file_path("path", path))  # before anything is drawn
     if isinstance(result, str | os.PathLike):
-    if isinstance(result, str | os.PathLike):
-        return _of_folder(path_of("result", result), path)
-    return _write(path, _name(result_of(result).provenance), _of_run(result))
+        name, parts = _of_folder(path_of("result", result))
+    else:
+        found = result_of(result)
+        name, parts = name_of(found.provenance), [_paragraph(f"Written on {_day(time.time())}."), *_of_run(found)]
+    heading = html.escape(name)
+    head = f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{heading}</title><style>{STYLE}</style></head>'
+    return write_text(path, f"{head}<body><h1>{heading}</h1>{''.join(parts)}</body></html>\n")
 
 
-def _of_folder(folder: Path, path: str | os.PathLike[str]) -> Path:
-    """Write the page of what a folder holds. Raises SceneError where that is damaged."""
+def _of_folder(folder: Path) -> tuple[str, list[str]]:
+    """Name and parts of the page of what a folder holds. Raises SceneError where that is damaged."""
     with understood(folder, "not what a verb wrote", "write it again"):
-        study = next((name for name in STUDIES if os.path.lexists(folder / f"{name}.json")), None)
-        if study is not None:
-            return _write(path, f"{study.capitalize()} of {folder.resolve().name}", _of_study(folder, study))
-        result = _run_in(folder)
-        return _write(path, _name(result.provenance), _of_run(result))
+        run, studies = run_in(folder), studies_in(folder)
+        if run is None and not studies:
+            fault = "holds no run and no study"
+            remedy = "give a folder that lgvi-warp run, tradeoff, stability, sensitivity or sweep wrote"
+            raise SceneError([f"{folder}: {fault}; {remedy}"])
+        place, parts = folder.resolve().name, list[str]()
+        if run is not None:
+            found, file = run
+            parts += [_paragraph(f"Run of {_day(file.stat().st_mtime)}, in {place}."), *_of_run(found)]
+        if studies:
+            parts += [_section(_words(picture), _pixels(picture)) for picture in _pictures_in(folder, run is not None)]
+        for study in studies:
+            parts += [_paragraph(f"{_words(study)} of {_day(study.stat().st_mtime)}, in {place}."), *_of_study(study)]
+        return name_of(found.provenance) if run is not None else f"{_words(studies[0])} of {place}", parts
 
 
-def _run_in(folder: Path) -> Result:
-    """The run that a folder holds."""
+def run_in(folder: Path) -> tuple[Result, Path] | None:
+    """Read the run that a folder holds.
+
+    Args:
+        folder: The folder of a run, or a store.
+
+    Returns:
+        The result, and the file or the store; None without one.
+
+    Raises:
+        SceneError: It is damaged.
+    """
     from lgvi_warp.runs.result import Result
     from lgvi_warp.runs.store.open import open_run
 
     if os.path.lexists(folder / "result.npz"):
-        return Result.load(inside(folder, "result.npz"))
+        held = inside(folder, "result.npz")
+        return Result.load(held), held
     if (folder / "run.zarr").exists() or folder.suffix == ".zarr":
-        return open_run(folder)
-    fault = "holds no run and no study"
-    remedy = "give a folder that lgvi-warp run, tradeoff, stability or sensitivity wrote"
-    raise SceneError([f"{folder}: {fault}; {remedy}"])
+        return open_run(folder), folder
+    return None
 
 
-def _name(provenance: Mapping[str, Any]) -> str:
-    scene = provenance["scene"]
-    return str(scene.get("name") or scene["vehicle"].get("name") or "Run")
+def studies_in(folder: Path) -> list[Path]:
+    """Find the studies that a folder holds.
+
+    Args:
+        folder: The folder.
+
+    Returns:
+        The JSON file of each.
+
+    Raises:
+        SceneError: A link leads out of the folder.
+    """
+    return [inside(folder, path.name) for pattern in STUDY_FILES.values() for path in sorted(folder.glob(pattern))]
 
 
-def _write(path: str | os.PathLike[str], name: str, parts: Iterator[str]) -> Path:
-    """Write a page; it is there whole or not at all."""
-    heading = html.escape(name)
-    head = f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{heading}</title><style>{STYLE}</style></head>'
-    place_of(file_path("path", path))  # before anything is drawn
-    return write_text(path, f"{head}<body><h1>{heading}</h1>{''.join(parts)}</body></html>\n")
+def name_of(provenance: Mapping[str, Any]) -> str:
+    """Name a run: by its scene file, and by its vehicle.
+
+    Args:
+        provenance: That of the run.
+
+    Returns:
+        As "dive: remus_100"; "Run" where neither has a name.
+    """
+    source, vehicle = provenance.get("source", {}), provenance["scene"].get("vehicle", {})
+    names = (Path(str(source.get("file", ""))).stem, str(vehicle.get("title") or ""))
+    return ": ".join(name for name in names if name) or "Run"
+
+
+def _day(seconds: float) -> str:
+    """The day of a time since the epoch [s], in local time."""
+    return time.strftime("%Y-%m-%d", time.localtime(seconds))
+
+
+def _words(path: Path) -> str:
+    """Name of a file in words."""
+    return path.stem.replace("_", " ").capitalize()
 
 
 def _of_run(result: Result) -> Iterator[str]:
     """The parts of a run's page."""
     yield _paragraph(title(result))
     yield _section("What became of the members", _outcome_table(result))
-    remarks = [*result.messages, *_warnings(result)]
+    remarks = [*result.messages, *_warnings(result), *(fault.text for fault in faults(result))]
     if remarks:
         yield _section("Notes and warnings", _list(remarks))
     pictures = [_picture(draw, result) for draw in _pictures_of(result)]
@@ -141,7 +197,21 @@ def _warnings(result: Result) -> list[str]:
 
 
 def _pictures_of(result: Result) -> list[Callable[[Any, Path], Path]]:
-    drawn: list[Callable[[Any, Path], Path]] = [plot] if result.samples else []
+    """Functions that draw what suits a run: a summary, inputs of members that ended differently, statistics."""
+
+    def inputs(result: Result, path: Path) -> Path:
+        inputs_by_outcome(result, path=path)
+        return path
+
+    def shares(result: Result, path: Path) -> Path:
+        draw_outcomes(result, path=path)
+        return path
+
+    differ = len(outcomes(result)) > 1
+    drawn: list[Callable[[Any, Path], Path]] = (
+        [plot] if result.samples or result.kept is not None else [shares] * differ
+    )
+    drawn += [inputs] if differ and varied(result) else []
     return drawn + ([plot_statistics] if drawable(result) else [])
 
 
@@ -178,55 +248,43 @@ def _settings(result: Result) -> Iterator[tuple[str, str]]:
 
 
 def _again(result: Result) -> str:
-    """The scene as a file, and the command that runs it; a law that is a Python function is not in it."""
-    scene = result.provenance["scene"]
-    if any(law.get("type") == "callback" for law in scene.get("controller", {}).get("laws", ())):
+    """The command that runs it again, and the scene; a law that is a Python function is in neither."""
+    name, command, text = again(result.provenance)
+    if command is None:
         how = _paragraph("A law is a Python function, which no file holds: run the script again. The scene but for it:")
     else:
-        how = _paragraph("Save this scene as scene.toml, then:") + _preformatted("lgvi-warp run scene.toml")
-    return how + _preformatted(toml_of(scene))
+        how = _paragraph(f"Save this scene as {name}, then:") + _preformatted(command)
+    return how + _preformatted(text)
 
 
-def toml_of(content: Mapping[str, Any]) -> str:
-    """Content as the text of a TOML file.
-
-    Args:
-        content: Tables of plain types, such as the scene of a provenance.
-
-    Returns:
-        The text.
-
-    Raises:
-        ImportError: tomlkit is not installed (extra: viz).
-    """
-    try:
-        import tomlkit
-    except ModuleNotFoundError as error:
-        raise MissingExtra("reports", "tomlkit", "viz") from error
-    return str(tomlkit.dumps(content))
-
-
-def _of_study(folder: Path, study: str) -> Iterator[str]:
-    """The parts of a study's page: its pictures, its table, and its settings."""
-    held = inside(folder, f"{study}.json")
-    with of_study(held):
-        content = file_json(held)
-        short = {key: value for key, value in content.items() if not isinstance(value, list)}
-    for path in sorted(folder.glob("*.png")):
-        yield _section(path.stem.replace("_", " ").capitalize(), _pixels(inside(folder, path.name)))
-    rows_of = folder / f"{study}.csv"
-    if os.path.lexists(rows_of):
-        text = file_text(inside(folder, rows_of.name), "CSV file")
-        with of_study(rows_of):
-            try:
-                head, *rows = list(csv.reader(io.StringIO(text, newline=""))) or [[]]
-            except csv.Error as error:
-                raise ValueError(str(error)) from None
-        more = (
-            f"The first {MOST_ROWS:,} of {len(rows):,} rows; {rows_of.name} has all." if len(rows) > MOST_ROWS else ""
-        )
+def _of_study(path: Path) -> Iterator[str]:
+    """The parts of a study's page but for its pictures: words, its table, and its settings."""
+    with of_study(path):
+        short = {key: value for key, value in file_json(path).items() if not isinstance(value, list)}
+    table_file = "table.csv" if path.stem == "sweep" else f"{path.stem}.csv"
+    if path.stem == "sweep" and os.path.lexists(path.with_name("summary.md")):
+        yield _section("Summary", _preformatted(file_text(inside(path.parent, "summary.md"), "text file")))
+    if os.path.lexists(path.with_name(table_file)):
+        head, *rows = _rows_in(inside(path.parent, table_file)) or [[]]
+        more = f"The first {MOST_ROWS:,} of {len(rows):,} rows; {table_file} has all." if len(rows) > MOST_ROWS else ""
         yield _section("Table", _paragraph(more) + _table(head, rows[:MOST_ROWS]))
     yield _section("How it was made", _preformatted(json.dumps(short, indent=1)))
+
+
+def _pictures_in(folder: Path, has_run: bool) -> list[Path]:
+    """Pictures of studies in a folder; those of a run are drawn anew."""
+    return [inside(folder, path.name) for path in sorted(folder.glob("*.png"))
+            if not (has_run and path.name in OF_A_RUN)]  # fmt: skip
+
+
+def _rows_in(path: Path) -> list[list[str]]:
+    """Rows of a CSV file of a study. Raises SceneError for one that is damaged."""
+    text = file_text(path, "CSV file")
+    with of_study(path):
+        try:
+            return list(csv.reader(io.StringIO(text, newline="")))
+        except csv.Error as error:
+            raise ValueError(str(error)) from None
 
 
 class _Html(str):

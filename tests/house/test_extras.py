@@ -13,8 +13,7 @@ from lgvi_warp.runs.store.settings import needed
 from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.statistics.estimate import Estimate
 from lgvi_warp.studies.sensitivity import analyses
-from lgvi_warp.views import plots, rerun
-from lgvi_warp.views import report as views_report
+from lgvi_warp.views import again, plots, rerun
 
 ESTIMATE = Estimate("mean x", {}, "m", 0.95, "", {"value": ("time",)}, {"value": np.zeros(2)}, {"time": np.arange(2.0)})
 DOORS = {
@@ -37,7 +36,7 @@ DOORS = {
     ),
     "YAML": (lambda: yaml_text.parsed("a: 1"), "yaml", "yaml"),
     "plots": (plots.figure_class, "matplotlib.figure", "viz"),
-    "reports": (lambda: views_report.toml_of({}), "tomlkit", "viz"),
+    "reports": (lambda: again.toml_of({}), "tomlkit", "viz"),
     "recordings": (lambda: rerun.log_rerun(None, "x"), "rerun", "viz"),
 }
 

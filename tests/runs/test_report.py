@@ -53,7 +53,8 @@ def test_of_a_run(result, tmp_path):
     path = lw.report(result, tmp_path / "report.html")
     text = path.read_text(encoding="utf-8")
     page = Page(text)
-    assert not page.open and page.tags.count("svg") == 2 and path.stat().st_size < 5_000_000
+    # The summary, the inputs that tell apart who reaches the floor, the statistics.
+    assert not page.open and page.tags.count("svg") == 3 and path.stat().st_size < 5_000_000
     # Nothing is loaded: the page opens without a network.
     assert [source for source in page.loads if not source.startswith("data:")] == []
     counts = result.status.counts()
@@ -73,7 +74,7 @@ def test_of_a_folder_by_the_command(result, tmp_path, capsys):
     assert main(["report", str(tmp_path)]) == 0
     assert "report.html" in capsys.readouterr().out
     of_file = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "floor" in of_file and Page(of_file).tags.count("svg") == 2
+    assert "floor" in of_file and Page(of_file).tags.count("svg") == 3
 
 
 def test_of_a_run_without_samples(result, tmp_path):
@@ -103,6 +104,6 @@ def test_what_is_no_run(tmp_path, capsys):
 def test_names_are_text(result, tmp_path):
     evil = lw.Scene.from_dict(result.provenance["scene"] | {"terms": []})
     few = lw.solve(evil, h=0.02, t1=0.04)
-    few.provenance["scene"]["vehicle"]["name"] = "<script>alert(1)</script>"
+    few.provenance["scene"]["vehicle"]["title"] = "<script>alert(1)</script>"
     text = lw.report(few, tmp_path / "report.html").read_text(encoding="utf-8")
     assert "<script>" not in text and np.isfinite(few.position).any()

@@ -27,7 +27,9 @@ def unread(figure):
         places = [(artist, points_of(artist, axes)) for artist in data_of(axes)]
         legend = axes.get_legend()
         for text, box in [*boxes.items(), *([(legend, legend.get_window_extent())] if legend else [])]:
-            found += [f"{word(text)} over {artist.get_label() or artist}" for artist, points in places if inside(box, points)]
+            found += [
+                f"{word(text)} over {artist.get_label() or artist}" for artist, points in places if inside(box, points)
+            ]
     return found
 
 
@@ -73,7 +75,10 @@ def data_of(axes):
         for artist in artists
         if artist.get_visible()
         and artist is not axes.patch
-        and not (isinstance(artist, Line2D) and artist.get_transform() in (axes.get_xaxis_transform(), axes.get_yaxis_transform()))
+        and not (
+            isinstance(artist, Line2D)
+            and artist.get_transform() in (axes.get_xaxis_transform(), axes.get_yaxis_transform())
+        )
     ]
 
 
@@ -88,7 +93,9 @@ def points_of(artist, axes):
         points = np.concatenate(points) if points else np.empty((0, 2))
     elif isinstance(artist, Rectangle):
         box = artist.get_window_extent()
-        points = np.stack(np.meshgrid(*(np.linspace(*ends, ALONG) for ends in (box.intervalx, box.intervaly))), -1).reshape(-1, 2)
+        points = np.stack(
+            np.meshgrid(*(np.linspace(*ends, ALONG) for ends in (box.intervalx, box.intervaly))), -1
+        ).reshape(-1, 2)
     else:
         points = along(artist.get_transform().transform(artist.get_path().vertices))
     points = points[np.isfinite(points).all(axis=1)]

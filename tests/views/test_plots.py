@@ -322,11 +322,22 @@ def test_a_panel_of_statistics_says_unit_direction_and_what_is_left_out(solved, 
         and histogram.yaxis_inverted()
         and not panels["mean velocity"].yaxis_inverted()
     )
+    # At the start all members are in one bin: on an even scale all else would be dark.
+    (cells,) = histogram.collections
+    norm = cells.norm
+    assert (norm(0.25 * norm.vmax) - norm(0.0)) / (norm(norm.vmax) - norm(0.0)) == pytest.approx(0.5)
     (bar,) = (axes for axes in figure.axes if axes.get_label() == "<colorbar>")
     assert bar.axison and bar.get_ylabel() == "share of members [%]"
     assert "not drawn, see the table: covariance position, mean path_maximum speed" in figure.get_suptitle().replace(
         "\n", " "
     )
+
+
+def test_titles_say_east_and_not_the_number_of_a_component(drawn):
+    titles = [axes.get_title() for axes in drawn["sensitivity"].axes]
+    assert titles[:3] == ["max(north)", "max(east)", "max(depth)"]
+    assert not [text.get_text() for name in ("statistics", "pairs", "histogram") for text in texts(drawn[name])
+                if "position[" in text.get_text()]  # fmt: skip
 
 
 def test_shares_of_outcomes(solved, drawn):

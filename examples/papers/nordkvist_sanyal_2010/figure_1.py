@@ -78,7 +78,8 @@ def draw(curves, path):
 
 def main(path):
     """Compute, draw and print."""
-    scene = lw.Scene.load(SCENE)
+    # The example starts deeper, below a surface; the paper at 10 m.
+    scene = lw.Scene.load(SCENE, {"start.position": [0.0, 0.0, 10.0]})
     curves = {"Psi": psi(scene), "Crouch-Grossman 3": crouch_grossman(scene)}
     draw(curves, path)
     return {name: numbers(*curve) for name, curve in curves.items()}

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, closest, refusal
+from lgvi_warp.common.errors import Faults, MissingExtra, closest, refusal
 from lgvi_warp.common.random import generator
 from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.sampling.designs.base import Drawn, Sampling, check_replicates
@@ -209,7 +209,7 @@ def _morris(space: Space, levels: int, paths: int) -> np.ndarray:
     try:
         from SALib.sample import morris
     except ImportError as error:
-        raise ImportError("Morris' screening needs SALib: pip install 'lgvi-warp[uq]'") from error
+        raise MissingExtra("Morris designs", "SALib", "uq") from error
     x = np.asarray(morris.sample(salib_problem(space), paths, num_levels=levels, seed=generator(space.seed, "morris")))
     x.setflags(write=False)
     return x

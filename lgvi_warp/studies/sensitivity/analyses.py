@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.errors import Faults, MissingExtra, SceneError
 from lgvi_warp.common.status import Status
 from lgvi_warp.runs.quantities import OfInterest
 from lgvi_warp.sampling.designs.base import Sampling
@@ -301,7 +301,7 @@ def salib() -> Callable[..., Any]:
     try:
         from SALib.analyze.morris import analyze
     except ImportError as error:
-        raise ImportError("sensitivity needs SALib: pip install 'lgvi-warp[uq]'") from error
+        raise MissingExtra("sensitivity studies", "SALib", "uq") from error
     return analyze
 
 

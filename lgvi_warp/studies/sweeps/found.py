@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import closest, refusal
+from lgvi_warp.common.errors import MissingExtra, closest, refusal
 from lgvi_warp.common.status import failed, stopped
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.runs.result import Result
@@ -514,7 +514,7 @@ class Findings:
         try:
             import xarray as xr
         except ImportError as error:
-            raise ImportError("sweep.table needs xarray: pip install 'lgvi-warp[store]'") from error
+            raise MissingExtra("tables of sweeps", "xarray", "store") from error
         axes = self.setup.axes
         shape = (len(self.cases), *(len(values) for values in axes.values()))
         rows = self.rows()

@@ -11,6 +11,7 @@ import numpy as np
 from lgvi_warp.common.arguments import of_kind
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views.plots.canvas import COLORS, hatch, panels, wrapped
+from lgvi_warp.views.plots.words import in_words
 
 if TYPE_CHECKING:
     from lgvi_warp.studies.sensitivity import Indices
@@ -55,7 +56,7 @@ def sensitivity(found: Indices, *, figure: Any = None, path: str | os.PathLike[s
         figure = grid[0, 0].figure
         figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
         failed = f", {found.failed} failed" if found.failed else ""
-        names = [name for q, name in enumerate(found.quantities) if q not in drawn]
+        names = [in_words(name) for q, name in enumerate(found.quantities) if q not in drawn]
         more = f"; not shown: {', '.join(names)}" if names else ""
         text = (
             f"{found.name}, {found.samples} samples, {found.members} members{failed}; {found.confidence:.0%} intervals"
@@ -85,5 +86,8 @@ def _bars(axes: Any, found: Indices, q: int) -> None:
             error_kw={"capsize": 2.0},
         )
     axes.axvline(0.0, color="black", linewidth=0.5)
-    axes.set(title=found.quantities[q], xlabel="part of the variance" if found.name.startswith("Sobol") else "effect")
+    axes.set(
+        title=in_words(found.quantities[q]),
+        xlabel="part of the variance" if found.name.startswith("Sobol") else "effect",
+    )
     axes.grid(True, axis="x", alpha=0.3)

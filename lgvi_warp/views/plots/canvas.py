@@ -257,8 +257,7 @@ NEAR = 0.5
 def point_down(axes: Any, floors: Mapping[str, Iterable[float]] = MappingProxyType({})) -> None:
     """Turn the vertical axis, which has depths [m], downwards; draw the surface, and the floors that are near.
 
-    Their names stand beside the axes, where no data are. Where the surface is far above or below what is drawn, a text says how
-    far.
+    Their names stand beside the axes, where no data are. A text says how far away the surface is where it is not drawn.
 
     Args:
         axes: Matplotlib axes, all else drawn.

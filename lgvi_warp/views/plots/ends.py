@@ -17,7 +17,7 @@ from lgvi_warp.views.choice import shown
 from lgvi_warp.views.fleet import LOOKS, title
 from lgvi_warp.views.plots.canvas import COLORS, below, hatch, mark, panel, panels, point_down, widen, wrapped
 from lgvi_warp.views.plots.read import at_one_time, estimate_for, with_samples
-from lgvi_warp.views.plots.words import DEPTHS, WORDS, floors, some_of, unit_of
+from lgvi_warp.views.plots.words import DEPTHS, floors, in_words, some_of, unit_of
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
@@ -132,9 +132,11 @@ def histogram(
             draw, start = (axes.barh, {"left": base}) if down else (axes.bar, {"bottom": base})
             draw(edges[:-1], share, np.diff(edges), **start, **look)
             base = base + share
-        name, count = f"{meaning.label} [{unit or '1'}]", "share of members [%]"
+        name, count = f"{in_words(meaning.label)} [{unit or '1'}]", "share of members [%]"
         axes.set(xlabel=count if down else name, ylabel=f"{name}, down" if down else count)
-        axes.set_title(wrapped(f"{meaning.label} of {some_of(result, result.members)} at {when:g} s", axes.figure))
+        axes.set_title(
+            wrapped(f"{in_words(meaning.label)} of {some_of(result, result.members)} at {when:g} s", axes.figure)
+        )
         if down:
             point_down(axes, floors(result))
         below(axes, ncols=3)
@@ -225,7 +227,7 @@ def pairs(
     for meaning in quantities(list(of)):
         values, labels, unit = at_one_time(result, meaning, choice.members)
         columns += list(values.T)
-        names += [f"{WORDS.get(label, label)} [{unit or '1'}]{', down' * (label in DEPTHS)}" for label in labels]
+        names += [f"{in_words(label)} [{unit or '1'}]{', down' * (label in DEPTHS)}" for label in labels]
     m = len(names)
     if not 2 <= m <= MOST_PAIRS:
         raise refusal("of", list(of), f"has {m} numbers a member", f"name from 2 to {MOST_PAIRS}")

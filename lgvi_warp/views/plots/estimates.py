@@ -13,7 +13,7 @@ from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views.choice import of_members
 from lgvi_warp.views.fleet import members_of_run
 from lgvi_warp.views.plots.canvas import COLORS, band, below, hatch, panels, point_down, style, wrapped
-from lgvi_warp.views.plots.words import DEPTHS, floors, unit_of
+from lgvi_warp.views.plots.words import DEPTHS, floors, in_words, unit_of
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
@@ -50,7 +50,7 @@ def statistics(result: Result, *, figure: Any = None, path: str | os.PathLike[st
     size = max(7.0, 4.6 * columns), 3.9 * rows + 1.0
     with panels(figure, path, (rows, columns), size) as grid:
         for axes, estimate in zip(grid.flat, drawn, strict=False):
-            axes.set(title=wrapped(estimate.name, axes.figure, 1.0 / columns), xlabel="time [s]")
+            axes.set(title=wrapped(in_words(estimate.name), axes.figure, 1.0 / columns), xlabel="time [s]")
             axes.grid(True, alpha=0.3)
             _PANEL[estimate.settings["type"]](axes, estimate)
             _units(axes, result, estimate)
@@ -71,7 +71,7 @@ def _units(axes: Any, result: Result, estimate: Estimate) -> None:
     unit = unit_of(components[0]) if histogram else estimate.unit
     name = components[0] if histogram or len(components) == 1 else ""
     deep = unit == "m" and bool(components) and all(label in DEPTHS for label in components)
-    axes.set_ylabel(f"{name} [{unit or '1'}]{', down' * deep}".strip())
+    axes.set_ylabel(f"{in_words(name)} [{unit or '1'}]{', down' * deep}".strip())
     if deep:
         point_down(axes, floors(result))
 
@@ -102,7 +102,9 @@ def _levels_panel(axes: Any, one: Estimate) -> None:
             axes.fill_between(one.time, values[:, i], values[:, -1 - i], facecolor=look["color"], alpha=0.15 * (i + 1),
                               hatch=hatch(c + i), edgecolor=look["color"], linewidth=0, label=label)  # fmt: skip
         if len(levels) % 2:
-            axes.plot(one.time, values[:, len(levels) // 2], label=one.coordinates["component"][c], **look)
+            axes.plot(
+                one.time, values[:, len(levels) // 2], label=in_words(str(one.coordinates["component"][c])), **look
+            )
     below(axes, ncols=4)
 
 
@@ -113,7 +115,7 @@ def _lines_panel(axes: Any, one: Estimate) -> None:
     names = one.coordinates["component"] if one.coordinates["component"].size else np.array([one.name])
     for c in range(min(value.shape[1], LINES)):
         look = style(c)
-        axes.plot(one.time, value[:, c], label=names[c] if c < len(names) else None, **look)
+        axes.plot(one.time, value[:, c], label=in_words(str(names[c])) if c < len(names) else None, **look)
         axes.fill_between(one.time, lower[:, c], upper[:, c], color=look["color"], alpha=0.3, linewidth=0)
     below(axes, ncols=4)
 
@@ -121,18 +123,24 @@ def _lines_panel(axes: Any, one: Estimate) -> None:
 def _extremes_panel(axes: Any, one: Estimate) -> None:
     """Draw a band from the smallest to the largest value of each component."""
     for c in range(min(one.value.shape[1], LINES)):
-        color, label = COLORS[c % len(COLORS)], one.coordinates["component"][c]
+        color, label = COLORS[c % len(COLORS)], in_words(str(one.coordinates["component"][c]))
         axes.fill_between(one.time, one["minimum"][:, c], one["maximum"][:, c], facecolor=color, alpha=0.3, hatch=hatch(c),
                           edgecolor=color, linewidth=0, label=label)  # fmt: skip
     below(axes, ncols=4)
 
 
 def _histogram_panel(axes: Any, one: Estimate) -> None:
-    """Draw the fractions of the first component, bins against time."""
+    """Draw the fractions of the first component, bins against time; by square roots, since at the start all are in one bin."""
+    from matplotlib.colors import PowerNorm
+
     time, edge = one.time, one.coordinates["edge"]
     middle = 0.5 * (time[1:] + time[:-1])
     drawn = axes.pcolormesh(
-        np.concatenate([time[:1], middle, time[-1:]]), edge, 100.0 * one.value[:, 0].T, cmap="cividis"
+        np.concatenate([time[:1], middle, time[-1:]]),
+        edge,
+        100.0 * one.value[:, 0].T,
+        cmap="cividis",
+        norm=PowerNorm(0.5, vmin=0.0),
     )
     axes.grid(False)
     axes.figure.colorbar(drawn, ax=axes, label="share of members [%]")

@@ -18,7 +18,7 @@ from lgvi_warp.views.choice import mixed, of_members
 from lgvi_warp.views.fleet import members_of_run, title
 from lgvi_warp.views.plots.canvas import COLORS, TINTS, band, below, hatch, mark, panel, point_down, style, wrapped
 from lgvi_warp.views.plots.read import Survey, estimate_for, quantity_of, survey_of, unbounded_text, with_samples
-from lgvi_warp.views.plots.words import HINT, floors, floors_of_each, is_depth, label_of
+from lgvi_warp.views.plots.words import HINT, floors, floors_of_each, in_words, is_depth, label_of
 from lgvi_warp.views.recording.drawn import at_levels
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def draw_fan(axes: Any, result: Result, of: Quantity) -> Survey:
     marker = "o" if len(survey.time) < 3 else ""
     if survey.total == 1:
         line = np.where(survey.counted, survey.values, np.nan)[:, 0]
-        axes.plot(survey.time, line, color=COLORS[0], marker=marker, label=of.name)
+        axes.plot(survey.time, line, color=COLORS[0], marker=marker, label=in_words(of.name))
     else:
         draw_bands(axes, survey.time, survey.values, survey.counted, low=survey.low, high=survey.high, marker=marker)
     _ends(axes, result, survey)

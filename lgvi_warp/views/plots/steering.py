@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
 
 LEVELS = (0.05, 0.5, 0.95)
+# Members whose middle 90 % take more than so much of a turn [deg] point all ways.
+ALL_WAYS = 270.0
 
 
 def draw_commands(result: Result, axes: Any) -> list[str]:
@@ -32,17 +34,17 @@ def draw_commands(result: Result, axes: Any) -> list[str]:
         Lines on the faults.
     """
     result, _, some = selected(result, MOST_BODIES, ("position", "command"), "a picture of commands")
-    counted, broken, lined = under_way(some), faults(result), set()
+    counted, lined = under_way(some), set()
     for i, channel in enumerate(channels(some)):
         levels = at_levels(some.samples["command"][..., i], counted, LEVELS)
         _band(axes, some.time, levels, i, channel.name)
         lined |= set(channel.limits(levels))
     for limit in lined:
         axes.axhline(limit, color=GREY, linestyle=(0, (6, 2)), linewidth=1.0, label="limit" if limit > 0.0 else None)
-    _mark_faults(axes, result)
+    said = _mark_faults(axes, result)
     axes.set(xlabel="time [s]", ylabel="command [unit of each]", title="Commands: medians, bands of 90 %")
     below(axes, ncols=3)
-    return [fault.text for fault in broken]
+    return said
 
 
 def draw_angles(result: Result, axes: Any) -> list[str]:
@@ -58,12 +60,16 @@ def draw_angles(result: Result, axes: Any) -> list[str]:
     for i, name in enumerate(("euler[0]", "euler[1]", "euler[2]")):
         survey = survey_of(result, quantity_of(name))
         levels = np.degrees(at_levels(survey.values, survey.counted, LEVELS))
-        _band(axes, survey.time, levels, i, WORDS[name], banded=survey.total > 1)
-    _mark_faults(axes, result)
+        # Members that point all ways have no mean direction about which an angle could be told.
+        scattered = levels[2] - levels[0] > ALL_WAYS
+        levels[:, scattered] = np.nan
+        label = f"{WORDS[name]}, unless all ways" if scattered.any() else WORDS[name]
+        _band(axes, survey.time, levels, i, label, banded=survey.total > 1)
+    said = _mark_faults(axes, result)
     bands = ": medians, bands of 90 %" if survey.total > 1 else ""
     axes.set(xlabel="time [s]", ylabel="angle [deg]", title=f"Attitude{bands}")
     below(axes, ncols=4)
-    return [fault.text for fault in faults(result)]
+    return said
 
 
 def _band(axes: Any, time: np.ndarray, levels: np.ndarray, i: int, label: str, banded: bool = True) -> None:
@@ -76,8 +82,10 @@ def _band(axes: Any, time: np.ndarray, levels: np.ndarray, i: int, label: str, b
     axes.grid(True, alpha=0.3)
 
 
-def _mark_faults(axes: Any, result: Result) -> None:
-    """Draw a line where each fault begins."""
-    for i, fault in enumerate(faults(result)):
+def _mark_faults(axes: Any, result: Result) -> list[str]:
+    """Draw a line where each fault begins; return what each does."""
+    found = faults(result)
+    for i, fault in enumerate(found):
         axes.axvline(max(fault.time, float(result.time[0])), color="black", linestyle=":", linewidth=1.4,
                      label="fault" if i == 0 else None)  # fmt: skip
+    return [fault.text for fault in found]

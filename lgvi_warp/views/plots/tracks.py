@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -198,7 +199,10 @@ def attitude(
         NothingToDraw: No attitudes were kept, or no member has a finite start.
         OSError: The file cannot be written.
     """
-    result, choice, some = selected(result, most, ("position", "attitude"), "attitudes")
+    result, choice, some = selected(result, max(most, MOST_PATHS), ("position", "attitude"), "attitudes")
+    # Of the choice those that are under way longest: one that fails at once has no path.
+    longest = np.sort(np.argsort(-under_way(some).sum(axis=0), kind="stable")[:most])
+    choice, some = replace(choice, members=choice.members[longest]), some.part(longest)
     # East, north, up: right-handed, with up at the top of the picture.
     points = np.where(under_way(some)[..., None, None], some.attitude[:, :, (1, 0, 2)], np.nan)
     points[:, :, 2] *= -1.0

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +30,7 @@ WORDS = {
     "euler[1]": "pitch",
     "euler[2]": "yaw",
 }
+COMPONENT = re.compile(r"(?<![.\w])[a-z_]+\[\d\]")
 HINT = "start and end alone were kept: give SaveAt(every=...) for the motion between"
 
 
@@ -44,6 +46,18 @@ def label_of(of: Quantity) -> str:
     name = WORDS.get(of.name, of.name.replace("_", " "))
     unit = of.unit or "1"
     return f"{name} [{unit}], down" if is_depth(of) else f"{name} [{unit}]"
+
+
+def in_words(text: str) -> str:
+    """Say components by their names: "max(position[1])" is "max(east)".
+
+    Args:
+        text: Name of a quantity, of a statistic or of one of its components.
+
+    Returns:
+        The text with words for components that have some.
+    """
+    return COMPONENT.sub(lambda found: WORDS.get(found[0], found[0]), text)
 
 
 def is_depth(of: Quantity) -> bool:

@@ -97,7 +97,13 @@ def log_member(recording: Any, run: Drawn, place: int, member: int) -> None:
 
 
 # Marks of outcomes on the curves of a run that is compared, which are all in its colour; failures have one together.
-MARKERS = {Status.SURFACE: "up", Status.FLOOR: "down", Status.BOX: "square", Status.TIME: "circle", Status.CONDITION: "diamond"}
+MARKERS = {
+    Status.SURFACE: "up",
+    Status.FLOOR: "down",
+    Status.BOX: "square",
+    Status.TIME: "circle",
+    Status.CONDITION: "diamond",
+}
 MOST_MARKS = 12
 
 
@@ -112,7 +118,9 @@ def _shares(recording: Any, run: Drawn) -> None:
         _series(recording, entity, run.time, 100.0 * share, label, run.color(code))
         if code and run.label:
             at, marks = frames_of(run.time, MOST_MARKS), f"{entity}/marks"
-            style = rr.SeriesPoints(names=label, colors=run.color(code), markers=MARKERS.get(code, "cross"), marker_sizes=5.0)
+            style = rr.SeriesPoints(
+                names=label, colors=run.color(code), markers=MARKERS.get(code, "cross"), marker_sizes=5.0
+            )
             recording.log(marks, style, static=True, strict=True)
             _send(recording, marks, run.time[at], rr.Scalars.columns(scalars=100.0 * share[at]))
 
@@ -140,7 +148,9 @@ def _log(recording: Any, run: Drawn) -> None:
 
     def say(when: float, text: str, level: str, color: tuple[int, int, int]) -> None:
         text = f"{run.label}: {text}" if run.label else text
-        _send(recording, run.path("log"), np.array([when]), rr.TextLog.columns(text=[text], level=[level], color=[color]))
+        _send(
+            recording, run.path("log"), np.array([when]), rr.TextLog.columns(text=[text], level=[level], color=[color])
+        )
 
     for fault in faults(run.result):
         say(max(fault.time, float(run.time[0])), fault.text, "WARN", FAULT)

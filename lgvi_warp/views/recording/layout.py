@@ -16,6 +16,7 @@ from lgvi_warp.views.recording.world import TIMELINE, Box
 PLAYED = 20.0
 BACKGROUND = (9, 24, 38)
 
+
 def layout(runs: list[Drawn], box: Box, scales: list[int]) -> Any:
     """Lay out the views: the world on the left, curves and the run's facts on the right.
 

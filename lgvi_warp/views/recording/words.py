@@ -8,12 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common import summaries
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.views.choice import of_members
 from lgvi_warp.views.recording.drawn import Drawn
 from lgvi_warp.views.recording.hull import shape_of
 from lgvi_warp.views.recording.world import Box, chosen_member, floors_of
+
+# Versions that are among the ten lines, which have room for few words; the provenance has all.
+TOLD = ("lgvi-warp", "warp-lang", "rerun")
 
 
 def log_words(recording: Any, runs: list[Drawn], box: Box, scales: list[int]) -> None:
@@ -76,9 +80,8 @@ def lines(run: Drawn, box: Box, scale: int) -> dict[str, str]:
         "water": water_text(run, box),
         "energy": energy_text(run),
         "hulls": size,
-        "arrows and wires": f"forces on member {member}, the last as means between times drawn"
-        + ("" if single else "; ellipsoid: 95 % of those under way along each of its axes"),
-        "versions": ", ".join(f"{name} {version}" for name, version in versions.items()),
+        "arrows": f"forces on member {member}" + ("" if single else "; ellipsoid: 95 % of those under way"),
+        "versions": ", ".join(f"{name} {versions[name]}" for name in TOLD if name in versions),
     }
 
 
@@ -127,4 +130,4 @@ def energy_text(run: Drawn) -> str:
         return "not known: every member drawn failed"
     if "energy" in invariants.conserved(few):
         return f"drift {drift:.2g} J, the largest of the members drawn"
-    return f"not conserved: {', '.join(invariants.at_work(few))} do work"
+    return f"not conserved: {summaries.listed(invariants.at_work(few), most=2)} do work"

@@ -188,11 +188,14 @@ VERBS = [
 
 def test_scripts_for_shells_in_full():
     values, _, rest = completion.bash(VERBS).partition("        *) case")
-    assert values.endswith('    case "$verb $before" in\n        "go --to") words="x y" ;;\n')
+    assert values.endswith(
+        '    case "$verb $before" in\n        "go --to") words="x y" ;;\n        " --color") words="auto always never" ;;\n'
+    )
+    assert "if" not in values and '[[ " go see " == *" $each "* ]]' in values
     cases = (
         'go) words="up down -q --to --out" ;;',
         'see) words="--all" files=1 ;;',
-        '*) words="go see --help --version" ;;',
+        '*) words="go see --help --version -q --quiet -v --verbose --json --color" ;;',
     )
     assert rest.startswith(' "$verb" in\n' + "".join(f"            {case}\n" for case in cases))
     assert completion.zsh(VERBS) == completion.ZSH.format(
@@ -215,6 +218,10 @@ def test_verbs_are_read_from_the_parser():
     known = {verb.name: verb for verb in completion.verbs()}
     assert known["list"].words == ("methods", "vehicles", "terms", "laws") and known["run"].words == ()
     options = known["run"].options
+    assert set(options["--method"][1]) >= {"psi_s", "rk4", "gauss6"} and options["--dtype"][1][0] == "float64"
+    assert known["new"].options["--vehicle"][1] == tuple(lw.vehicles())
+    assert known["export"].options["--to"][1] == ("netcdf", "parquet")
+    assert known["help"].words == tuple(known)
     assert options["--store"][1] == ("npz", "zarr") and options["--out"][1] == () and options["--live"][1] is None
     assert options["--quiet"] == options["-q"] and options["--out"][0].startswith("folder for the files")
     assert known["list"].text == "Names of methods, vehicles, terms, or laws of controllers."

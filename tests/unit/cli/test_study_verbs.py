@@ -9,7 +9,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
-from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.common.errors import MissingExtra, NothingToDraw
 from lgvi_warp.studies import sensitivity as uq
 from lgvi_warp.studies.stability.map import GRIDS
 from tests.conftest import ROOT
@@ -120,10 +120,12 @@ def test_arguments_of_a_sensitivity_study(tmp_path, monkeypatch, drawn, capsys):
     assert said.count("file  ") == 4 and said.endswith("MB)\n")
 
 
-@pytest.mark.parametrize("error", [uq.FailedMembers("3 members failed"), ImportError("no scipy")])
-def test_a_sensitivity_study_that_fails_is_one_line(tmp_path, monkeypatch, capsys, error):
+@pytest.mark.parametrize(
+    ("error", "code"), [(uq.FailedMembers("3 members failed"), 1), (MissingExtra("studies", "SALib", "uq"), 2)]
+)
+def test_a_sensitivity_study_that_fails_is_one_line(tmp_path, monkeypatch, capsys, error, code):
     monkeypatch.setattr(uq, "sobol", Study(error))
-    assert cli.main(["sensitivity", PAPER, "--out", str(tmp_path), "-q"]) == 1
+    assert cli.main(["sensitivity", PAPER, "--out", str(tmp_path), "-q"]) == code
     assert capsys.readouterr() == ("", f"lgvi-warp: {error}\n") and not list(tmp_path.iterdir())
 
 

@@ -219,6 +219,13 @@ def test_the_schema_is_json(capsys):
     assert set(json.loads(capsys.readouterr().out)["properties"]) >= {"vehicle", "terms", "controller"}
 
 
+def listed_methods():
+    """Methods by the words of their error."""
+    with pytest.raises(lw.SceneError) as refused:
+        lw.Method("none such")
+    return re.findall(r"[a-z]+\w*", str(refused.value))
+
+
 @pytest.fixture(scope="module")
 def bash(tmp_path_factory):
     """A function of words, of which the last is begun: what bash would offer."""
@@ -244,7 +251,35 @@ def test_bash_completes_verbs_options_values_and_files(bash):
     assert bash("run", "x", "--store-") == ["--store-dtype"]
     assert bash("run", "x", "--store", "") == ["npz", "zarr"] and bash("list", "ve") == ["vehicles"]
     assert bash("--json", "check", "--colo") == ["--color"] and bash("-q", "run", "--color", "a") == ["auto", "always"]
+    assert {"psi", "psi_s", "psi_x"} <= set(bash("run", "x", "--method", "ps")) <= set(listed_methods())
+    assert bash("new", "x", "--vehicle", "re") == ["remus_100"] and bash("export", "x", "--to", "n") == ["netcdf"]
+    assert bash("run", "x", "--dtype", "f") == ["float64", "float32", "float32_compensated"]
+    assert bash("--color", "ne") == ["never"] and bash("--color", "never", "exp") == ["export"]
+    assert bash("help", "tr") == ["tradeoff"] and bash("--color", "auto", "run", "--solver", "new") == ["newton"]
     assert bash("check", "sce") == ["scene", "file.toml"] or bash("check", "sce") == ["scene file.toml"]
+
+
+def test_help_of_a_verb_is_what_its_option_prints(capsys):
+    for words, same in ((["help", "run"], ["run", "--help"]), (["help"], [])):
+        assert cli.main(words) == 0
+        text = capsys.readouterr().out
+        if same:
+            with pytest.raises(SystemExit):
+                cli.main(same)
+        else:
+            assert cli.main(same) == 0
+        assert text == capsys.readouterr().out and "usage: lgvi-warp" in text
+    with pytest.raises(SystemExit):
+        cli.main(["help", "rum"])
+    assert "did you mean 'run'?" in capsys.readouterr().err
+
+
+def test_the_options_of_run_stand_in_groups():
+    groups = {group.title: [option for action in group._group_actions for option in action.option_strings]
+              for group in cli.parser().verbs["run"]._action_groups}  # fmt: skip
+    assert all(len(options) <= 9 for options in groups.values()) and len(groups) >= 7
+    assert {"--method", "--step"} <= set(groups["method, step and precision"]) and "--store" in groups["files"]
+    assert groups["options"] == ["-h", "--help"] and "--color" in groups["options of every verb"]
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
@@ -301,6 +336,7 @@ def test_documents_of_verbs_that_run_nothing(tmp_path, capsys):
         assert document(["list", what], capsys)["names"]
     assert document(["new", str(tmp_path / "a.toml")], capsys)["vehicle"] == "remus_100"
     assert "complete" in document(["completion", "fish"], capsys)["script"]
+    assert document(["help", "run"], capsys)["of"] == "run" and document(["help"], capsys)["of"] is None
 
 
 def test_a_refused_verb_prints_no_document(capsys):

@@ -56,7 +56,7 @@ def test_the_papers_start(example):
 
 
 def test_nothing_of_the_papers_example_rises_above_the_surface():
-    """Momentum in inertial axes changes by the net weight alone, and a velocity follows from it by the least and largest mass."""
+    """Momentum in inertial axes changes by the net weight alone; masses bound the velocity that goes with it."""
     scene = lw.Scene.load(PAPER)
     fleet = lw.Ensemble.from_scene(scene)
     members = fleet.select(0, fleet.members)

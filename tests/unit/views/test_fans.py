@@ -6,6 +6,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
+from lgvi_warp.views.plots.words import in_words
 from tests.support.made import made
 
 
@@ -55,3 +56,28 @@ def test_a_direction_is_known_though_all_that_are_drawn_have_ended():
     axes = lw.plots.fan(result, "euler[2]")
     median = next(line for line in axes.lines if line.get_label() == "median").get_ydata()
     np.testing.assert_allclose(np.diff(median[11:]), 2.0 * np.pi * 2.5 / 60.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("said", "words"), [
+    ("position[1]", "east"), ("max(position[2])", "max(depth)"), ("mean euler[2] at floor", "mean yaw at floor"),
+    ("own.position[1]", "own.position[1]"), ("velocity[0]", "velocity[0]"), ("start.position[1]", "start.position[1]"),
+    ("quantiles position[0]", "quantiles north")])  # fmt: skip
+def test_components_have_names(said, words):
+    assert in_words(said) == words
+
+
+def test_an_attitude_is_of_a_member_that_goes_on():
+    """The members that reach farthest come first in the choice, and one of them failed at once."""
+    result, _ = turning(1.0, [0.0, np.nan, np.nan, 0.0])
+    axes = lw.plots.attitude(result)
+    path = next(line for line in axes.lines if line.get_label() == "forward (x)")
+    assert np.isfinite(np.asarray(path.get_data_3d())).all() and path.get_data_3d()[0].size == 61
+
+
+def test_a_folder_that_is_not_there_is_named(tmp_path):
+    result, _ = turning(1.0, [np.nan, np.nan])
+    path = tmp_path / "nowhere" / "a.png"
+    for write in (lambda: lw.plots.fan(result, path=path), lambda: lw.log_rerun(result, path.with_suffix(".rrd"))):
+        with pytest.raises(FileNotFoundError) as missing:
+            write()
+        assert missing.value.filename == str(path.parent) and "no such folder" in str(missing.value)

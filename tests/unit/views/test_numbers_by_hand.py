@@ -3,6 +3,7 @@
 
 import base64
 import dataclasses
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -200,15 +201,18 @@ def test_text_is_wrapped_to_a_share_of_a_figure():
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "said", "place", "va"),
-    [(100.0, 101.0, "surface 100 m above", 0.98, "top"), (-7.0, -5.0, "surface 5 m below", 0.02, "bottom")],
+    ("low", "high", "said", "at"),
+    [(100.0, 101.0, "surface\n100 m\nabove", 1.0), (-7.0, -5.0, "surface\n5 m\nbelow", 0.0)],
 )
-def test_a_far_surface_is_told_with_its_side(low, high, said, place, va):
+def test_a_far_surface_is_told_with_its_side(low, high, said, at):
+    """Three lines beside the axes, whose middle is half their height from the end of the axes."""
     axes = Figure().subplots()
     axes.set_ylim(low, high)
     canvas.point_down(axes)
     (text,) = axes.texts
-    assert (text.get_text(), text.get_va(), text.get_position()) == (said, va, (0.99, place))
+    assert (text.get_text(), text.get_ha(), text.get_va()) == (said, "left", "center")
+    x, y = text.get_position()
+    assert x > 1.0 and 0.02 < abs(at - y) < 0.2
     assert axes.get_ylim() == (high, low) and not axes.lines
 
 
@@ -216,7 +220,7 @@ def test_a_near_surface_and_floor_are_lines():
     for low, shown in ((1.0, True), (1.01, False)):
         axes = Figure().subplots()
         axes.set_ylim(low, low + 2.0)
-        canvas.point_down(axes, (low + 3.0,))
+        canvas.point_down(axes, {"floor": [low + 3.0]})
         names = [text.get_text() for text in axes.texts]
         assert ("surface" in names) == shown and "floor" in names
         assert axes.get_ylim()[0] == pytest.approx(low + 3.1)
@@ -415,14 +419,18 @@ def test_the_page_of_a_run_by_hand(tmp_path, monkeypatch):
     result = dataclasses.replace(
         sinking(status=[OK] * 8 + [FLOOR] * 2), messages=("a < b",), warnings=bits.view(WarningArray)
     )
-    scene = {"name": "A & B", "ensemble": {"seed": 4}}
+    scene = {"vehicle": {"title": "A & B"}, "ensemble": {"seed": 4}}
     method = {"name": "psi_x", "chosen": "since drag acts"}
     machine = {"cpu": "a cpu", "threads": 2}
     more = {"scene": scene, "method": method, "machine": machine, "versions": {"numpy": "2"}, "steps": 15000}
     result = dataclasses.replace(result, provenance=result.provenance | more)
     text = lw.report(result, tmp_path / "a.html").read_text(encoding="utf-8")
     assert text.startswith('<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>A &amp; B</title><style>')
-    assert "<body><h1>A &amp; B</h1><p>10 members, psi_x, step 0.01 s: " in text and text.endswith("</body></html>\n")
+    today = time.strftime("%Y-%m-%d")
+    assert (
+        f"<body><h1>A &amp; B</h1><p>Written on {today}.</p><p>10 members, psi_x, step 0.01 s: " in text
+        and text.endswith("</body></html>\n")
+    )
     headings = ["What became of the members", "Notes and warnings", "Pictures", "How it was run", "Run it again"]
     places = [text.index(f"<h2>{heading}</h2>") for heading in headings]
     assert places == sorted(places) and text.count("<h2>") == 5
@@ -436,7 +444,8 @@ def test_the_page_of_a_run_by_hand(tmp_path, monkeypatch):
             "seed": "4", "versions": "numpy 2", "machine": "a cpu, 2"}  # fmt: skip
     table = "".join(f"<tr><td>{name}</td><td>{value}</td></tr>" for name, value in rows.items())
     assert f"<h2>How it was run</h2><table>{table}</table>" in text
-    again = "<p>Save this scene as scene.toml, then:</p><pre>lgvi-warp run scene.toml</pre><pre>name = &quot;A &amp; B&quot;"
+    again = "<p>Save this scene as scene.toml, then:</p><pre>lgvi-warp run scene.toml --step 0.01 --duration 150</pre>"
+    again += "<pre>[vehicle]\ntitle = &quot;A &amp; B&quot;"
     assert again in text
 
 
@@ -447,11 +456,11 @@ def test_pages_of_odd_runs(tmp_path, monkeypatch):
 
     monkeypatch.setattr(report, "plot", small)
     result = sinking()
-    callback = {"controller": {"laws": [{"type": "callback"}]}, "vehicle": {"name": "sphere"}}
+    callback = {"controller": {"laws": [{"type": "callback"}]}, "vehicle": {"title": "a ball"}}
     provenance = result.provenance | {"scene": callback, "machine": {}, "steps": 1}
     text = lw.report(dataclasses.replace(result, provenance=provenance), tmp_path / "a.html").read_text()
     assert "A law is a Python function, which no file holds: run the script again. The scene but for it:" in text
-    assert "lgvi-warp run scene.toml" not in text and "<h1>sphere</h1>" in text and "<td>seed</td>" not in text
+    assert "lgvi-warp run scene.toml" not in text and "<h1>a ball</h1>" in text and "<td>seed</td>" not in text
     assert "<h2>Pictures</h2><svg>a picture</svg><h2>" in text and "<h2>Notes" not in text
     nameless = provenance | {"scene": {"vehicle": {}}}
     few = dataclasses.replace(result, provenance=nameless, samples={})
@@ -467,12 +476,16 @@ def test_pages_of_odd_runs(tmp_path, monkeypatch):
 
 
 def test_tables_of_a_study(tmp_path):
+    today = time.strftime("%Y-%m-%d")
     for count, more in ((200, ""), (201, "<p>The first 200 of 201 rows; stability.csv has all.</p>")):
         (tmp_path / "stability.csv").write_text("h\n" + "".join(f"{i}\n" for i in range(count)))
         (tmp_path / "stability.json").write_text('{"of": 3, "cells": [1]}')
         (tmp_path / "a_map.png").write_bytes(b"a")
         text = lw.report(tmp_path, tmp_path / "a.html").read_text()
-        assert f"<h1>Stability of {tmp_path.name}</h1><h2>A map</h2><img " in text
+        assert (
+            f"<h1>Stability of {tmp_path.name}</h1><h2>A map</h2><img " in text
+            and f"<p>Stability of {today}, in " in text
+        )
         assert f"<h2>Table</h2>{more}<table><tr><th>h</th></tr><tr><td>0</td></tr>" in text
         assert text.count("<td>") == 200 and "<h2>How it was made</h2><pre>{\n &quot;of&quot;: 3\n}</pre>" in text
     (tmp_path / "stability.csv").write_text("")

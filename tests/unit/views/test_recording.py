@@ -22,6 +22,7 @@ from lgvi_warp.views import viewer
 from lgvi_warp.views.commands import channels
 from lgvi_warp.views.fleet import LOOKS
 from lgvi_warp.views.recording import drawn, layout, world
+from lgvi_warp.views.recording import words as ten_words
 from tests.support.made import made
 from tests.unit.views.test_hull import glb
 
@@ -298,7 +299,9 @@ def test_each_run_has_its_own_floors(tmp_path):
     scenes = {"one": SCENE, "none": lw.Scene.named("remus_100"), "two": lw.Scene.named("remus_100", events=two)}
     path = lw.log_rerun({name: fleet(9, 7, scene=scene) for name, scene in scenes.items()}, tmp_path / "three.rrd")
     drawn_planes = {
-        name: sorted(entity.rsplit("/", 1)[1] for entity in entities(path) if entity.startswith(f"/world/{name}/water/"))
+        name: sorted(
+            entity.rsplit("/", 1)[1] for entity in entities(path) if entity.startswith(f"/world/{name}/water/")
+        )
         for name in scenes
     }
     surface = ["surface", "surface_grid"]
@@ -454,10 +457,7 @@ def test_a_mesh_is_drawn_times_a_whole_number(tmp_path):
     run = drawn.drawn_of(result)
     box = world.box_of([run])
     scale = world.scale_of(run, box)
-    assert (
-        scale > 5
-        and rows(path, "/world/bodies/ok", "scales")[1.0][0] == [scale] * 3
-    )
+    assert scale > 5 and rows(path, "/world/bodies/ok", "scales")[1.0][0] == [scale] * 3
     assert f"drawn {scale} times their size" in text_of(path, "/run/summary")
     mesh.unlink()
     with pytest.raises(lw.SceneError, match=r"vehicle\.shape\.mesh = 'hull\.glb': cannot be read"):
@@ -575,3 +575,11 @@ def test_100000_members_take_5_seconds(tmp_path):
     begun = time.process_time()
     path = lw.log_rerun(large, tmp_path / "large.rrd")
     assert time.process_time() - begun < 5.0 and path.stat().st_size < 15e6
+
+
+def test_the_ten_lines_have_room(mixed):
+    """A window of usual size has room for about 66 letters beside their headings."""
+    run = drawn.drawn_of(mixed)
+    box = world.box_of([run])
+    told = ten_words.lines(run, box, world.scale_of(run, box))
+    assert len(told) == 10 and max(map(len, told.values())) <= 66, told

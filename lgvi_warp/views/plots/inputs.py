@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What members that ended differently had been given: their outcomes over the inputs that tell them apart."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.common.status import Status
+from lgvi_warp.runs.outcomes import outcomes
+from lgvi_warp.statistics.given_data import explained
+from lgvi_warp.views.choice import mixed
+from lgvi_warp.views.fleet import LOOKS
+from lgvi_warp.views.plots.canvas import below, mark, panel, widen, wrapped
+
+if TYPE_CHECKING:
+    from lgvi_warp.runs.result import Result
+
+# Most members that are drawn.
+MOST_POINTS = 2000
+CONFIDENCE = 0.95
+
+
+def inputs_by_outcome(result: Result, *, ax: Any = None, path: str | os.PathLike[str] | None = None) -> Any:
+    """Draw the outcomes of members over the two inputs that explain most of who had the most frequent one.
+
+    Args:
+        result: A result.
+        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
+        path: File to write; its ending chooses the format. Default None: none is written.
+
+    Returns:
+        The axes.
+
+    Raises:
+        ImportError: Matplotlib is not installed (extra: viz).
+        NothingToDraw: All members ended alike, or nothing varies.
+        OSError: The file cannot be written.
+    """
+    inputs, status = varied(result), np.asarray(result.status)
+    codes = outcomes(result)
+    if len(codes) < 2 or not inputs:
+        raise NothingToDraw("all members ended alike, or nothing varies: no input tells them apart")
+    most = max(codes, key=lambda code: int((status == code).sum()))
+    shares = {
+        name: one.share for name, one in explained(inputs, np.where(status == most, 1.0, 0.0), CONFIDENCE).items()
+    }
+    first, *others = sorted(inputs, key=lambda name: -np.nan_to_num(shares[name], nan=-1.0))
+    members = np.sort(np.argsort(mixed(np.arange(result.members)), kind="stable")[:MOST_POINTS])
+    upward = inputs[others[0]] if others else np.arange(result.members)
+    words = {name: f"{name}: explains {100.0 * max(shares[name], 0.0):.3g} %" for name in inputs}
+    with panel(ax, path, (8.0, 6.0)) as axes:
+        for code in codes:
+            group = members[status[members] == code]
+            look = mark(code) if code != Status.OK else {"color": LOOKS[code].color, "marker": "o", "linewidths": 0}
+            label = f"{code.name.lower()} ({int((status == code).sum()):,})"
+            axes.scatter(inputs[first][group], upward[group], s=14, alpha=0.8, label=label, **look)
+        axes.set(xlabel=words[first], ylabel=words[others[0]] if others else "member")
+        axes.set_title(wrapped(f"Inputs that tell apart who ended as {most.name.lower()}", axes.figure))
+        widen(axes.xaxis)
+        below(axes, ncols=3)
+    return axes
+
+
+def varied(result: Result) -> dict[str, np.ndarray]:
+    """Collect the numbers that differ between members.
+
+    Args:
+        result: A result.
+
+    Returns:
+        Values (n,) by name and component: parameters, and of the start what was kept.
+    """
+    found = {}
+    starts = {f"start.{name}": values[0] for name, values in result.samples.items() if name in STARTS}
+    for name, values in (*result.parameters.items(), *starts.items()):
+        if len(values) != result.members:
+            continue
+        columns = values.reshape(len(values), -1)
+        # What differs by round-off alone does not vary.
+        for i in np.flatnonzero(np.ptp(columns, axis=0) > 1e-12 * np.abs(columns).max(initial=0.0)):
+            found[name if values.ndim == 1 else f"{name}{[int(k) for k in np.unravel_index(i, values.shape[1:])]}"] = (
+                columns[:, i]
+            )
+    return found
+
+
+STARTS = ("position", "velocity", "angular_velocity")

@@ -101,9 +101,14 @@ def test_failed_members(monkeypatch, capsys):
 @pytest.mark.slow
 def test_many_calls(monkeypatch):
     monkeypatch.chdir(ROOT)
-    (text,) = blocks("guide/many_calls.md", "python")
+    text, noise = blocks("guide/many_calls.md", "python")
     exec(text, names := {})
     assert names["depths"].shape == (2,) and np.all(names["depths"] > 9.0)
+    exec(noise, names)
+    still = names["run"](names["x"], seed=7, indices=names["index"])
+    # Same noise: the start's 0.1 m alone, to round-off; other noise: other depths.
+    np.testing.assert_allclose(names["moved"] - still, 0.1, atol=1e-12)
+    assert np.all(names["drawn"] != still)
 
 
 @pytest.mark.slow

@@ -110,6 +110,8 @@ def test_risks_at_their_ends():
 class Told:
     """Stands for `prepare`: notes what it is asked for, and answers by a function of members' numbers."""
 
+    common_noise = False
+
     def __init__(self, monkeypatch, answer):
         self.asked, self.answer, self.states = [], answer, self.of_states
         monkeypatch.setattr(numbers, "prepare", self.prepare)

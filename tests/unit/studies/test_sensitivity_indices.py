@@ -491,7 +491,7 @@ def test_a_model_is_called_in_two_shapes(monkeypatch):
     )
     asked = []
 
-    def prepared(X, progress):
+    def prepared(X, progress, **noise):
         asked.append((X, progress))
         return np.arange(6).reshape(3, 2)
 

@@ -160,6 +160,8 @@ def _vec3_maker(width, real):
 
 
 _LANES3 = [lane3(_width, _real) for _width in WIDTHS for _real in REALS]
+
+
 @functools.cache
 def own_rows(kind):
     """Type of the rows of an array that a law may see: those from `first` to `last`, and the first `common` ones.

@@ -713,7 +713,7 @@ def test_time_that_other_programs_take_does_not_end_a_search(scene, study):
 
     class Waiting(Runs):
         def run(self, plan, threads, executor=None):
-            time.sleep(0.02)
+            time.sleep(0.1)
             return super().run(plan, threads, executor)
 
     sizes = dict.fromkeys(("rk8", "rk4", "psi_x", "psi_s"), 1e-2)
@@ -723,11 +723,11 @@ def test_time_that_other_programs_take_does_not_end_a_search(scene, study):
         with kind(BAD | sizes), mock.patch.object(comparison, "growth", return_value=GROWN):
             if study == "suggest":
                 # Enough processor time for the arithmetic of a search, and less than its runs wait.
-                one = lw.suggest(fleet_of(scene), 1e-4, t1=4.0, methods=methods, seconds=0.9)
+                one = lw.suggest(fleet_of(scene), 1e-4, t1=4.0, methods=methods, seconds=1.0)
                 found.append((one.settings, one.expected))
             else:
-                one = lw.tradeoff(fleet_of(scene), 4.0, methods=methods, seconds=0.9)
-                found.append(({m.setting.method for m in one.measurements}, one.reference))
+                one = lw.tradeoff(fleet_of(scene), 4.0, methods=methods, seconds=1.0)
+                found.append({m.setting.method for m in one.measurements})
     assert found[0] == found[1]
 
 

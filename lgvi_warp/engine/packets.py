@@ -344,24 +344,20 @@ class Packets:
         step = np.zeros(len(bits), np.int64)
         value = value if len(value) else np.full(len(bits), np.nan)
         if not self.plan.spec.looks:
-            return self._with_departed(bits, step, value)
+            return bits, step, value
         monitor = self.monitor
         noted = self._of_members(monitor.warned, np.uint16)
         # The kernel's warning is more serious if its highest bit is above all bits of the start.
         later = (noted & ~bits) > bits
         step = np.where(later, self._of_members(monitor.warned_step, np.int64), 0)
         value = np.where(later, np.sqrt(self._of_members(monitor.warned_size, np.float64)), value)
-        return bits | noted, step, value
+        bits = bits | noted
+        return self._with_departed(bits, step, value) if leaves_rotations(self.plan.method) else (bits, step, value)
 
     def _with_departed(
         self, bits: np.ndarray, step: np.ndarray, value: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same with a warning of the members whose last attitude is no rotation, where a method lets R depart.
-
-        One look at the end is enough: R departs further with each step of such a method.
-        """
-        if self.plan.checks == "none" or not leaves_rotations(self.plan):
-            return bits, step, value
+        """The same with a warning of the members whose last attitude is no rotation: some end between two looks."""
         size = departure(self.state_lanes.view[:, :9])[: len(bits)]
         warning = np.uint16(Warnings.ORTHOGONALITY)
         over = size > orthogonality_limit(self.plan)

@@ -434,7 +434,7 @@ class Plan:
             lead_time=self.lengths[1][-1] if choice.timed else 0.0,
             explicit=self._explicit(),
             compensated=self.dtype == "float32_compensated",
-            looks=watched(self) if self.checks == "all" else (),
+            looks=watched(self),
             energy=choice.conservative,
             backward=checked and back,
             substep=self.on_failure == "substep",

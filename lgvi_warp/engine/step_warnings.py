@@ -9,7 +9,7 @@ import numpy as np
 
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.methods.limits import MUNK, RESTORING, longest_stage, oscillation_limit, rotation_limit
-from lgvi_warp.methods.method import Method
+from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics import vehicle
 from lgvi_warp.physics.inertia import Frame
@@ -34,6 +34,10 @@ class Watched(Protocol):
     @property
     def dtype(self) -> str:
         """The kernel's numbers, such as "float64"."""
+
+    @property
+    def checks(self) -> str:
+        """What the run looks for: "none", "safe" or "all"."""
 
     @property
     def kernel_choice(self) -> Any:
@@ -73,15 +77,18 @@ ENERGY = 0.5
 
 
 def watched(plan: Watched) -> tuple[str, ...]:
-    """The warnings that a kernel with checks="all" looks for: those that its method and scene can give.
+    """The warnings that the kernel looks for.
 
     Args:
         plan: the plan of the run.
 
     Returns:
-        Names of rows of lgvi_kernels.advance.monitor, the least serious first.
+        Names of rows of lgvi_kernels.advance.monitor, the least serious first: with checks="all" those that method and scene
+        can give; with "safe" that of the attitude, where the method lets it depart.
     """
     method, choice = plan.method, plan.kernel_choice
+    if plan.checks != "all":
+        return ("orthogonality",) * (plan.checks == "safe" and leaves_rotations(method))
     rows = ["precision"] * (plan.dtype == "float32") + ["orthogonality"]
     if not method.adaptive:
         munk = choice.mass != "isotropic"
@@ -117,16 +124,16 @@ def _drag_number(plan: Watched, members: Members, water: np.ndarray | None) -> n
     return np.asarray(plan.grid.h * (total / inertias).max(axis=1))
 
 
-def leaves_rotations(plan: Watched) -> bool:
-    """Tell whether the method adds rates to R, whose rows then depart from a rotation's by its own error.
+def leaves_rotations(method: Method) -> bool:
+    """Tell whether a method adds rates to R, whose rows then depart from a rotation's by its own error.
 
     Args:
-        plan: the plan of the run.
+        method: the method of the run.
 
     Returns:
         False for methods that multiply rotations.
     """
-    return plan.spec.explicit is not None and plan.spec.explicit.kind in ("vector", "inertial")
+    return method.tableau is not None and KINDS.get(method.name, "vector") == "vector"
 
 
 def departure(rows: np.ndarray) -> np.ndarray:
@@ -153,7 +160,7 @@ def orthogonality_limit(plan: Watched) -> float:
     Returns:
         The limit [1]: looser for methods whose R leaves the rotations by their own error.
     """
-    if leaves_rotations(plan):
+    if leaves_rotations(plan.method):
         return ORTHOGONAL_TO_ERROR
     return ORTHOGONAL["float64" if plan.dtype == "float64" else "float32"]
 

@@ -186,12 +186,30 @@ def test_an_attitude_that_is_no_rotation_is_told_by_default(kept):
     assert lw.solve(fleet, None, h=h, t1=steps * h, checks="none", **kept).warnings.counts() == {}
 
 
-def test_an_attitude_of_a_member_that_stopped_is_told_of_where_it_stopped(tmp_path):
+@pytest.mark.parametrize("dtype", ["float64", pytest.param("float32", marks=pytest.mark.slow)])
+def test_an_attitude_that_was_no_rotation_on_the_way_is_told(dtype):
+    # float32 runs put R back each 128 steps, so that it is a rotation at the end; samples before are none.
+    h = 0.4
+    result = lw.solve(
+        one(scene_of(**PLAIN), Om=[0.0, 0.0, 1.0]), "rk4", h=h, t1=256 * h, dtype=dtype, save=lw.SaveAt(every=32 * h)
+    )
+    R = result.attitude[:, 0].astype(np.float64)
+    departed = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2))
+    assert departed[3] > 5.0 * step_warnings.ORTHOGONAL_TO_ERROR
+    assert dtype == "float64" or departed[[4, 8]].max() < 1e-4
+    assert result.warnings.counts() == {"orthogonality": 1}
+    # Seen at the first look, after 128 steps; float32 rounds by 6e-8 a step.
+    assert result.warning_time[0] == pytest.approx(128 * h)
+    assert result.warning_value[0] == pytest.approx(shrunk(0.4, 128), rel=1e-4 if dtype == "float64" else 1e-2)
+
+
+@pytest.mark.parametrize("checks", ["safe", pytest.param("all", marks=pytest.mark.slow)])
+def test_an_attitude_of_a_member_that_stopped_is_told_of_where_it_stopped(tmp_path, checks):
     scene = scene_of(**PLAIN)
     scene = lw.Scene(scene.vehicle, scene.environment, events=[lw.StopTime(at=20.0)])
     fleet = one(scene, Om=[[0.0, 0.0, 1.0]] * 5)
-    in_memory = lw.solve(fleet, "rk4", h=0.4, t1=80.0)
-    stored = lw.solve(fleet, "rk4", h=0.4, t1=80.0, store=tmp_path / "run.zarr")
+    in_memory = lw.solve(fleet, "rk4", h=0.4, t1=80.0, checks=checks)
+    stored = lw.solve(fleet, "rk4", h=0.4, t1=80.0, checks=checks, store=tmp_path / "run.zarr")
     for result in (in_memory, stored, lw.open_run(tmp_path / "run.zarr")):
         # 50 whole steps; the event ends the last one, which shrinks R by less than a whole one does.
         assert result.warnings.counts() == {"orthogonality": 5}

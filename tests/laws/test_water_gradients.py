@@ -79,7 +79,7 @@ def fleet_of(cases):
     numbers = {"velocity": cases.u, "acceleration": cases.rate, "growth": cases.growth, **columns(cases.strain)}
     vary = {"vehicle.mass": cases.mass, "vehicle.added_mass": added, "vehicle.buoyancy": displaced * GRAVITY}
     # So hard to turn that the attitude is held: the error of splittings is then that of the water alone.
-    hull = lw.Vehicle(1.0, (1e4, 1e4, 1e4), (1.0, 1.0, 1.0), GRAVITY)
+    hull = lw.Vehicle(1.0, inertia=(1e4, 1e4, 1e4), added_mass=(1.0, 1.0, 1.0), buoyancy=GRAVITY)
     here = lw.Scene(hull, lw.Environment(GRAVITY), terms=[LinearFlow()])
     nu = np.einsum("nji,nj->ni", cases.R, cases.v)
     return lw.Ensemble.from_states(
@@ -155,8 +155,8 @@ def test_a_sphere_in_shear_has_autons_lift():
     v = rng.normal(size=(1, 3))
     G = np.zeros((3, 3))
     G[0, 2] = shear
-    vehicle = lw.Vehicle(mass, (1.0,) * 3, (0.5 * displaced,) * 3, displaced * GRAVITY)
-    here = lw.Scene(vehicle, lw.Environment(GRAVITY), terms=[LinearFlow(**columns(G))])
+    numbers = {"inertia": (1.0,) * 3, "added_mass": (0.5 * displaced,) * 3, "buoyancy": displaced * GRAVITY}
+    here = lw.Scene(lw.Vehicle(mass, **numbers), lw.Environment(GRAVITY), terms=[LinearFlow(**columns(G))])
     b, R = np.array([0.1, 0.2, 0.5]), turn([0.3, -0.4, 0.8])
     got, _ = accelerations(one(here, b, R, v @ R), "rk8", 2e-3)
     u = G @ b

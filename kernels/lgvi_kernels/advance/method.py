@@ -34,7 +34,7 @@ from lgvi_kernels.maps.submaps import (
     rotate,
 )
 from lgvi_kernels.maps.two_part import make_A, make_B
-from lgvi_kernels.maps.water import make_shear
+from lgvi_kernels.maps.water import acceleration_wrench, make_shear, make_water_wrench
 
 
 class Step(NamedTuple):
@@ -103,9 +103,8 @@ def make_velocities(velocity, turning, coupled):
     return velocities_of_state, velocities_of_forces
 
 
-def make_damping(laws, shear):
+def make_damping(damping, shear):
     """D of the damping laws, and of water that varies in space. None if there is neither."""
-    damping = superpose(laws, "damping")
     if damping is None and shear is None:
         return None
 
@@ -132,10 +131,12 @@ def make_method(spec):
     turning = multiplied if spec.explicit else divided
     velocities, velocities_of_forces = make_velocities(velocity, turning, coupled)
     laws = spec.laws
-    law, flow, evolve = (superpose(laws, role) for role in ("law", "flow", "evolve"))
-    varies = spec.flow in ("uniform", "varying")
-    shear = make_shear(matrix3_struct(width, real), "lever" in spec.parts, shifted) if "shear" in spec.parts else None
-    damping = make_damping(laws, shear)
+    law, laws_damping, flow, evolve = (superpose(laws, role) for role in ("law", "damping", "flow", "evolve"))
+    varies, lever = spec.flow in ("uniform", "varying"), "lever" in spec.parts
+    shear, water_wrench = None, acceleration_wrench if varies else None
+    if "shear" in spec.parts:
+        shear, water_wrench = make_shear(matrix3_struct(width, real), lever, shifted), make_water_wrench(lever, shifted)
+    damping = make_damping(laws_damping, shear)
     prepare, exact = None, None
     if spec.drag and spec.explicit is None:
         by_axes = laws[0] is drag
@@ -163,7 +164,7 @@ def make_method(spec):
         return to_body(view, flow(Flow(), view, c.params).velocity)
 
     if spec.explicit is not None:
-        acting = (View, Wrench, Flow, Damping, law, damping, flow, varies, shifted, velocities)
+        acting = (View, Wrench, Flow, Damping, law, laws_damping, damping, flow, water_wrench, shifted, velocities)
         everything, _, _, slope = make_forces(*acting)
         step = make_explicit(spec, everything, velocities, slope)
         momentum = in_body if spec.inertial else None
@@ -196,7 +197,7 @@ def make_method(spec):
             letters[letter] = turns.make_hop(int(letter[1]) - 1, int(letter[2]) - 1, U12, U13, U23, spec.compensated)
     if spec.averages is not None:
         force, potential = superpose(laws, "force"), superpose(laws, "potential")
-        acting = (View, Wrench, Flow, Damping, force, damping, flow, varies, shifted, velocities)
+        acting = (View, Wrench, Flow, Damping, force, laws_damping, damping, flow, water_wrench, shifted, velocities)
         _, forces, current, _ = make_forces(*acting)
         maps = (letters["Ab"], None if spec.mass == "isotropic" else Ap, letters["D"])
         functions = (View, Wrench, potential, forces, current, evolve, velocities)

@@ -9,11 +9,13 @@ from lgvi_kernels.lanes.arithmetic import add, div, mul, ones, sub  # noqa: F401
 from lgvi_kernels.lanes.matrix3 import transposed
 from lgvi_kernels.maps.dissipation import damped_force, damped_torque
 from lgvi_kernels.maps.submaps import look, make_at_user_origin
-from lgvi_kernels.maps.water import acceleration_wrench
 
 
-def make_forces(View, Wrench, Flow, Damping, force, damping, flow, flow_varies, shifted, velocities):
-    """(everything, forces, current, slope) of these laws; an argument is None where a scene has no such law (see make_K)."""
+def make_forces(View, Wrench, Flow, Damping, force, laws_damping, damping, flow, water_wrench, shifted, velocities):
+    """(everything, forces, current, slope) of these laws; an argument is None where a scene has no such law (see make_K).
+
+    laws_damping: that of the laws alone; damping: that of water that varies in space, too, which is in `water_wrench` as well.
+    """
     at_user_origin = make_at_user_origin(shifted)
 
     @wp.func
@@ -32,10 +34,10 @@ def make_forces(View, Wrench, Flow, Damping, force, damping, flow, flow_varies, 
         view.Om = Om
         if wp.static(force is not None):
             w = force(w, view, c.params)
-        if wp.static(flow_varies):
-            w = acceleration_wrench(w, view, c.inertia, water)
-        if wp.static(damping is not None):
-            D = damping(Damping(), view, water, c)
+        if wp.static(water_wrench is not None):
+            w = water_wrench(w, view, c.inertia, water)
+        if wp.static(laws_damping is not None):
+            D = laws_damping(Damping(), view, c.params)
             w.force = w.force - damped_force(D, nu, Om)
             w.torque = w.torque - damped_torque(D, nu, Om)
         return w, water.velocity

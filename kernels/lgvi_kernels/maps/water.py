@@ -17,15 +17,21 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, cross, mul, vec3  # noqa: F401
-from lgvi_kernels.lanes.matrix3 import combine, plus, product, transposed
-from lgvi_kernels.lanes.view import to_body
+from lgvi_kernels.lanes.arithmetic import add, cross, dot, mul, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes.matrix3 import apply, combine, plus, product, transposed
+from lgvi_kernels.lanes.view import to_body, to_inertial
 
 
 @wp.func
 def along(water: Any, v: Any):
     """G v: how fast the water's velocity changes along v, inertial axes."""
     return v.x * water.by_north + v.y * water.by_east + v.z * water.by_depth
+
+
+@wp.func
+def against(water: Any, v: Any):
+    """G^T v: how the water's velocity along v changes, inertial axes."""
+    return vec3(dot(water.by_north, v), dot(water.by_east, v), dot(water.by_depth, v))
 
 
 @wp.func
@@ -70,8 +76,33 @@ def levered(r: Any, m: Any):
     return transposed(about(transposed(m), r))
 
 
+def make_water_wrench(lever, shifted):
+    """The force and torque of water that accelerates and varies in space, at these velocities (see make_shear)."""
+
+    @wp.func
+    def water_wrench(w: Any, view: Any, inertia: Any, water: Any):
+        """acceleration_wrench, less the force m X nu + X^T (A11 nu + A12 Om) and the torque m r_g x X nu."""
+        w = acceleration_wrench(w, view, inertia, water)
+        nu = view.nu
+        if wp.static(shifted):
+            nu = nu + cross(view.Om, inertia.user_origin_forces)
+        carried = to_body(view, along(water, to_inertial(view, nu)))
+        momentum = inertia.added * nu
+        if wp.static(lever):
+            momentum = momentum + apply(inertia.added_coupling, view.Om)
+        force = inertia.dry * carried + to_body(view, against(water, to_inertial(view, momentum)))
+        w.force = w.force - force
+        if wp.static(lever):
+            w.torque = w.torque - cross(inertia.dry_lever, carried)
+            if wp.static(shifted):
+                w.torque = w.torque - cross(inertia.user_origin_forces, force)
+        return w
+
+    return water_wrench
+
+
 def make_shear(Matrix3, lever, shifted):
-    """The damping matrix of the water's variation in space.
+    """The same of the variation in space, as a damping matrix.
 
     lever: the rigid body's centre is not at the user's origin, or added mass couples there (else no torque follows);
     shifted: the user's origin, where the water is taken, is not that of the forces.

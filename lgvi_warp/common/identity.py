@@ -203,7 +203,7 @@ class _Reader:
     def _module(self, module: types.ModuleType, names: set[str]) -> None:
         name = module.__name__
         self._word("module", name)
-        if _is_library(name):
+        if is_library(name):
             self._word(_edition(name))
             return
         if name in self._within:
@@ -234,7 +234,7 @@ class _Reader:
             parts = value.__reduce_ex__(4)  # which refuses what holds more than Python sees
         except Exception as error:  # of any class, and so of any kind
             raise _NotToldError from error
-        if _place(kind) is None and kind.__reduce_ex__ is object.__reduce_ex__ and kind.__reduce__ is object.__reduce__:
+        if _place(kind) is None:
             held = dict(getattr(value, "__dict__", {}))
             held |= {name: getattr(value, name) for name in _slots(kind) if hasattr(value, name)}
             inner = next((base for base in (dict, list, tuple, set, frozenset) if isinstance(value, base)), None)
@@ -242,7 +242,8 @@ class _Reader:
             self._value(kind)
             self._value(held)
             self._value(None if inner is None else inner(value))
-            return
+            if kind.__reduce_ex__ is object.__reduce_ex__ and kind.__reduce__ is object.__reduce__:
+                return
         self._word("reduced")
         # Entries of lists and tables come as iterators.
         self._all("parts", (list(part) if isinstance(part, Iterator) else part for part in parts)
@@ -250,7 +251,7 @@ class _Reader:
 
     def _held_module(self, module: types.ModuleType) -> None:
         """A module that no function names, so that what is used of it is not known."""
-        if not _is_library(module.__name__):
+        if not is_library(module.__name__):
             raise _NotToldError
         self._module(module, set())
 
@@ -284,7 +285,7 @@ def _place(value: Any) -> tuple[str, str, str] | None:
         name = value.__name__
         owners = (owner for owner in ("numpy", "scipy.special") if getattr(sys.modules.get(owner), name, None) is value)
         module = next(owners, None)
-    if not (isinstance(module, str) and isinstance(name, str) and _is_library(module)):
+    if not (isinstance(module, str) and isinstance(name, str) and is_library(module)):
         return None
     found: Any = sys.modules.get(module)
     for part in name.split("."):
@@ -292,8 +293,12 @@ def _place(value: Any) -> tuple[str, str, str] | None:
     return (module, name, _edition(module)) if found is value else None
 
 
-def _is_library(module: str) -> bool:
-    """Whether a module is one of Python's, or is installed, and so is known by its name and edition."""
+def is_library(module: str) -> bool:
+    """Tell whether a module is one of Python's, or is installed, and so is known by its name and edition.
+
+    Args:
+        module: its name.
+    """
     top = module.partition(".")[0]
     file = getattr(sys.modules.get(top), "__file__", None)
     if top in sys.stdlib_module_names:

@@ -89,9 +89,14 @@ def _of_fleet(fleet: Ensemble) -> Iterator[tuple[str, Own]]:
                 yield f"{name}.{part.key}", Own(part.function, part.version)
             if _is_own(type(part)):
                 yield f"{name}.{part.key} class", Own(type(part), None)
-    for name, law in {"sampling": fleet.sampling, **fleet.vary}.items():
+    if _is_own(type(fleet.sampling)):
+        yield "sampling class", Own(type(fleet.sampling), None)
+    for key, law in fleet.vary.items():
+        place = f"vary.{key if isinstance(key, str) else ', '.join(key)}"
+        if law.own is not None:
+            yield place, Own(law.own, None)
         if _is_own(type(law)):
-            yield f"{name} class", Own(type(law), None)
+            yield f"{place} class", Own(type(law), None)
 
 
 def _of_statistic(value: Any, place: str = "") -> Iterator[tuple[str, Any]]:

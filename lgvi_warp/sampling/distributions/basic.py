@@ -71,6 +71,11 @@ class Distribution:
         """Whether it draws whole quantities (as a `JointLaw`), and not each entry by itself."""
         return False
 
+    @property
+    def own(self) -> Any:
+        """The user's object that its numbers are of, where `to_dict` does not say all of it; None where it does."""
+        return None
+
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
         """What prevents it from drawing quantities of these shapes.
 

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, refusal
+from lgvi_warp.common.identity import is_library
 from lgvi_warp.common.real_numbers import real_results
 from lgvi_warp.sampling.distributions.basic import Distribution
 from lgvi_warp.sampling.distributions.joint import CorrelatedNormal
@@ -26,6 +27,9 @@ SCIPY = {
     "triangular": "triang",
     "weibull": "weibull_min",
 }
+
+# A place in memory, in the text of an object that says nothing else of itself.
+ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +82,11 @@ class ScipyDistribution(Distribution):
         """The parameters as lists; loc = 0 for a distribution that was frozen with none, so that a file holds a number."""
         parameters = self.numbers_by_name() or {"loc": 0.0}
         return {name: np.asarray(value).tolist() for name, value in parameters.items()}
+
+    @property
+    def own(self) -> Any:
+        """The frozen distribution, unless it is one of scipy's, which its name and numbers tell."""
+        return None if is_library(type(self.distribution.dist).__module__) else self.distribution
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
         """Values of the distribution's ppf."""
@@ -191,6 +200,12 @@ class UserDistribution(Distribution):
             fault = "gives no numbers at the levels 0.25 and 0.75"
             raise refusal("distribution", self.distribution, fault, "give an object with ppf(u)")
 
+    @property
+    def own(self) -> Any:
+        """The object, unless it is a library's whose text tells which it is."""
+        told = is_library(type(self.distribution).__module__) and not ADDRESS.search(str(self.distribution))
+        return None if told else self.distribution
+
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
         """Values of the object's own quantile function."""
         return self._quantiles(u)
@@ -200,7 +215,7 @@ class UserDistribution(Distribution):
 
     def to_dict(self) -> dict[str, Any]:
         """Its text without the memory address, so that the same distribution always gives the same provenance."""
-        return {self.kind: {"law": re.sub(r" at 0x[0-9a-fA-F]+", "", str(self.distribution))}}
+        return {self.kind: {"law": ADDRESS.sub("", str(self.distribution))}}
 
 
 def quantiles_of(distribution: Any) -> Any:

@@ -61,6 +61,13 @@ class Slotted:
         return self.__k * x
 
 
+class Hidden(Gains):
+    """A law whose pickle says nothing of its state."""
+
+    def __reduce__(self):
+        return Hidden, (0.0,)
+
+
 def added(a, x):
     return a + x
 
@@ -117,6 +124,7 @@ OBJECTS = {
     "bound method": (Gains(1.0).bound, Gains(2.0).bound),
     "methods of one object": (Gains(1.0).bound, Gains(1.0).__call__),
     "slots": (Slotted(1.0), Slotted(2.0)),
+    "beside its pickle": (Hidden(1.0), Hidden(2.0)),
     "partial": (functools.partial(added, 1.0), functools.partial(added, 2.0)),
     "partial by name": (functools.partial(added, a=1.0), functools.partial(added, a=2.0)),
     "ufunc": (np.maximum, np.minimum),

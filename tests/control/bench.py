@@ -54,7 +54,7 @@ def measured(ensemble, truth, h=0.02, dtype="float64", width=4):
     rows = rows.reshape(packets.count, looks * FIELDS, width)
     given = wp.array(rows, dtype=lane(width, plan.spec.real), device="cpu")
     out = wp.zeros((packets.count, looks * FIELDS), dtype=lane(width, plan.spec.real), device="cpu")
-    inputs = [given, packets.laws.loop.array, packets.memory, every, h, looks, out]
+    inputs = [given, packets.laws.structs[1].array, packets.memory, every, h, looks, out]
     wp.launch(kernel, dim=packets.count, inputs=inputs, device="cpu")
     seen = out.numpy().reshape(packets.count, looks, FIELDS, width).transpose(1, 0, 3, 2)
     return seen.reshape(looks, -1, FIELDS)[:, :n]

@@ -84,8 +84,8 @@ def test_members_may_be_drawn(paper):
     assert run.names == ("vehicle.mass", *(f"start.angular_velocity[{i}]" for i in range(3)))
     with pytest.raises(lw.SceneError, match="seed"):
         run(seed=-1)
-    with pytest.raises(lw.SceneError, match="beside seed"):
-        run(np.ones((1, 4)), seed=1)
+    with pytest.raises(lw.SceneError, match="beside X"):
+        run(np.ones((1, 4)), members=1)
 
 
 def test_another_seed_draws_the_same_members_anew(paper):
@@ -271,7 +271,7 @@ def leaves(values):
 
 def arrays(packets):
     """All numbers that a kernel is given, as bytes."""
-    structs = [packets.inertia, packets.laws.params, packets.events]
+    structs = [packets.inertia, *packets.laws.structs]
     views = [leaf for part in structs if len(part.view) for leaf in leaves(part.view)]
     views += [packets.laws.table.view, packets.laws.memory.view, packets.state_lanes.view]
     return [np.broadcast_to(view, (packets.count, *view.shape[1:])).tobytes() for view in views]

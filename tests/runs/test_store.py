@@ -349,7 +349,7 @@ def test_what_is_damaged_is_not_exported(copy, tmp_path, to):
     (copy / "velocity" / "c.0.2.0").unlink()
     with pytest.raises(lw.SceneError, match=r"velocity/c.0.2.0 is missing; `lgvi-warp resume"):
         lw.export(copy, to, out)
-    with pytest.raises(lw.SceneError, match=r"is a folder; give the name of a file"):
+    with pytest.raises(lw.SceneError, match=r"is a folder, which is not replaced; give the name of a file"):
         lw.export(copy, to, tmp_path)
     assert sorted(one.name for one in tmp_path.iterdir()) == ["run.zarr"]
 

@@ -40,7 +40,8 @@ def test_run_writes_three_files_and_a_summary(finished):
 
 
 @pytest.mark.kernel
-def test_the_result_is_that_of_solve(finished, scene):
+def test_the_result_is_that_of_solve(finished):
+    scene = lw.Scene.load(PAPER)
     result = lw.Result.load(finished[0] / "result.npz")
     fleet = lw.Ensemble(scene, 20, 1, scene.ensemble_settings.vary)
     same = lw.solve(fleet, h=0.01, t1=2.0, save=lw.SaveAt(every=0.5))
@@ -53,7 +54,7 @@ def test_the_picture_is_not_empty(finished):
     from matplotlib.image import imread
 
     picture = imread(finished[0] / "fleet.png")
-    assert picture.shape[0] > 400 and picture.shape[1] > 1200
+    assert picture.shape[0] > 1000 and picture.shape[1] >= 1200
     assert all(third.std() > 0.05 for third in np.array_split(picture[..., :3], 3, axis=1))
 
 
@@ -215,7 +216,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_run(tmp_path, mon
 @pytest.mark.kernel
 def test_a_recording_that_cannot_be_begun_is_told(finished, tmp_path):
     result = lw.Result.load(finished[0] / "result.npz")
-    with pytest.raises(OSError, match=r"could not be written .*; is the disk full, or the folder read-only"):
+    with pytest.raises(OSError, match="there is no such folder: '.*none'"):
         lw.log_rerun(result, tmp_path / "none" / "fleet.rrd")
 
 

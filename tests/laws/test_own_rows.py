@@ -10,6 +10,7 @@ import pytest
 import warp as wp
 
 import lgvi_warp as lw
+from lgvi_kernels import built_in
 from lgvi_kernels.law import (  # noqa: F401
     add,
     below,
@@ -31,7 +32,7 @@ from lgvi_kernels.law import (  # noqa: F401
     table3,
     whole,
 )
-from tests.support.tools import one
+from tests.support.tools import GRAVITY, one
 
 BODY = lw.Vehicle(mass=20.0, inertia=(1.5, 4.0, 4.5), added_mass=(4.0, 4.0, 4.0), buoyancy=20.0 * 9.80665)
 # What no law of these tests has in its own rows.
@@ -207,6 +208,33 @@ class Keeper(lw.Term):
 
     def packed(self, numbers, context):
         return lw.Packed({}, memory=numbers["kept"])
+
+
+@functools.cache
+def copied(name):
+    """The device code of an actuator of the package, as a user's own."""
+    law = built_in("laws", name)
+    roles = {role: getattr(law, role) for role in ("law", "evolve", "follow", "report")}
+    return type("Copied", (), roles | {"params": staticmethod(law.params)})
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class OwnActuator(lw.ControlWrench):
+    type: ClassVar[str] = "own_actuator"
+
+    def device_in(self, aligned):
+        return copied(super().device_in(aligned))
+
+
+def test_an_actuator_of_a_users_own_reports_where_it_is():
+    # A torque that lags behind a command that never changes: 1 - e^(-t / T) of it.
+    lag, t1 = 0.5, 1.5
+    controller = lw.Controller(period=0.1, guidance=[lw.SetPoint(heading=1.0)], laws=[lw.HeadingPID(kp=2.0)])
+    still = lw.Vehicle(1e9, inertia=(1e9,) * 3, added_mass=(0.0,) * 3, buoyancy=1e9 * GRAVITY)
+    scene = lw.Scene(still, terms=[OwnActuator(time_constant=lag)], controller=controller)
+    result = lw.solve(one(scene), "psi_s", h=0.05, t1=t1, save=lw.SaveAt(every=0.5, fields=("actuator", "command")))
+    torque = 2.0 * (1.0 - np.exp(-np.array([0.5, 1.0, 1.5]) / lag))
+    np.testing.assert_allclose(result.actuator[1:, 0, 5], torque, rtol=1e-7)
 
 
 @functools.cache

@@ -28,7 +28,9 @@ def test_a_spin_loses_the_energy_that_its_attitude_shrinks_by():
     # Without forces the state holds P = R p, so p = R^T P. A spin about the third axis at an angle of 0.1 a step shrinks the
     # part of R across it by a factor in each step, and the energy of v across it by the square.
     h, rate, mass, v = 0.05, 2.0, 3.0, np.array([0.8, -0.5, 0.4])
-    fleet = one(lw.Scene(lw.Vehicle(mass, inertia=(1.0, 1.5, 2.0)), lw.Environment(gravity=0.0)), nu=v, Om=(0.0, 0.0, rate))
+    fleet = one(
+        lw.Scene(lw.Vehicle(mass, inertia=(1.0, 1.5, 2.0)), lw.Environment(gravity=0.0)), nu=v, Om=(0.0, 0.0, rate)
+    )
     shrunk = factor(rate * h) ** STEPS
     across = 0.5 * mass * (v[0] ** 2 + v[1] ** 2)
     energy, R = lost(fleet, h, STEPS)

@@ -214,9 +214,31 @@ def test_quantities_of_outcomes_and_times():
     for text, words in refused.items():
         with pytest.raises(lw.SceneError, match=words):
             lw.uq.sobol(members, text, samples=8, **how)
-    two = dataclasses.replace(members.scene, events=(*members.scene.events, lw.Floor(depth=30.0, name="deep")))
-    with pytest.raises(lw.SceneError, match="is one of several events of the status floor"):
-        lw.uq.sobol(lw.Ensemble(two, 1, 1, members.vary), "outcome deep", samples=8, **how)
+
+
+def test_quantities_of_two_events_of_one_status():
+    """Two shelves end a drift to the north and one to the south: by hand, since it goes straight on at its first velocity."""
+    shelves = [lw.Box(lower=(-1e6,) * 3, upper=(4.0, 1e6, 1e6), name="north"),
+               lw.Box(lower=(-2.0, -1e6, -1e6), upper=(1e6,) * 3, name="south"), lw.Floor(depth=1e6)]  # fmt: skip
+    scene = lw.Scene.named("sphere", start={"position": [0, 0, 20.0]}, events=shelves)
+    u, t1 = np.array([0.5, -0.5, 0.3, -0.1, 0.2]), 10.0
+    of = ["outcome north", "outcome south", "outcome box", "outcome floor", "end_time south", "position[0] at north"]
+    how = dict(method="psi_s", h=0.1, t1=t1)
+    north, south = u * t1 > 4.0, u * t1 < -2.0
+    f = lw.uq.model(scene, ["start.velocity[0]"], of[:4], **how)
+    np.testing.assert_array_equal(f(u[:, None]), np.stack([north, south, north | south, 0.0 * u], axis=1))
+    run = lw.prepare(scene, ["start.velocity[0]"], of[4:], **how, failed="nan")
+    assert np.isnan(run(u[:, None])).all()  # none ends by both
+    ends = lw.uq.model(scene, ["start.velocity[0]"], "end_time south", **how, failed="nan")(u[:, None])
+    np.testing.assert_allclose(ends, np.where(u < -0.2, -2.0 / u, np.nan), atol=1e-9)
+    there = lw.uq.model(scene, ["start.velocity[0]"], "position[0] at north", **how, failed="nan")(u[:, None])
+    np.testing.assert_allclose(there, np.where(u > 0.4, 4.0, np.nan), atol=1e-9)
+    vary = {"start.velocity[0]": lw.Uniform(low=-0.6, high=0.6)}
+    share = lw.uq.sobol(scene, of[:2], vary=vary, samples=256, second_order=False, **how).mean
+    assert share == pytest.approx([1.0 / 6.0, 1.0 / 3.0], abs=0.02)
+    result = lw.solve(lw.Ensemble(scene, 4, 1, vary), **how)
+    with pytest.raises(lw.SceneError, match=r"is one of several events of the status box; .*lw\.Outcome"):
+        quantities("outcome north")[0].values(result)
 
 
 def test_an_outcome_that_no_member_can_have_is_refused():

@@ -101,9 +101,10 @@ def _read(value: Any, labels: Sequence[str]) -> dict[str, Any]:
         return {label: np.asarray(value)[:, i] for i, label in enumerate(labels)}
     columns = {label: value[label] for label in labels}
     if all(hasattr(column, "dims") and hasattr(column, "transpose") for column in columns.values()):
-        if all(column.dims[:2] == DRAWS for column in columns.values()):
+        if all({*DRAWS} <= {*column.dims} for column in columns.values()):
             # Of a posterior all draws of all chains are members.
-            return {label: np.asarray(column).reshape(-1, *column.shape[2:]) for label, column in columns.items()}
+            drawn = {label: np.asarray(column.transpose(*DRAWS, ...)) for label, column in columns.items()}
+            return {label: column.reshape(-1, *column.shape[2:]) for label, column in drawn.items()}
         return {label: np.asarray(column) for label, column in _members_first(columns).items()}
     return {label: column if isinstance(column, np.ndarray | list | tuple) else _plain(column)
             for label, column in columns.items()}  # fmt: skip

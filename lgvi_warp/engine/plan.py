@@ -538,7 +538,8 @@ class Plan:
         if self._whole:
             # Made anew from these members alone, the plan might choose another kernel.
             return Plan.subplan, self._whole
-        return Plan, tuple(getattr(self, item.name) for item in dataclasses.fields(self) if item.init)
+        settings = tuple(getattr(self, item.name) for item in dataclasses.fields(self) if item.init)
+        return Plan, settings, {"width_source": self.width_source}
 
     @property
     def kernel_hash(self) -> str:

@@ -38,6 +38,7 @@ from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
 from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.settings import MOST_MEMBERS, EnsembleSettings
+from lgvi_warp.statistics.base import Statistic
 
 # Members that are run together where quantities look over their paths, which are kept as long as they run.
 PATHS_AT_ONCE = 16_384
@@ -453,11 +454,8 @@ def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -
         What to save.
 
     Raises:
-        SceneError: if a quantity looks over the path and no interval of samples is known, or is of an outcome that is none.
+        SceneError: if a quantity looks over the path and no interval of samples is known.
     """
-    for each in of:
-        if isinstance(each, OfEnds):
-            each.check(scene.events)
     if save is not None or not of:
         return save
     fields = ordered(name for each in of for name in each.fields)
@@ -469,6 +467,26 @@ def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -
         return SaveAt(every=scene.run.save_every, fields=fields)
     times = sorted({each.when for each in of if isinstance(each, OfEnds) and each.when is not None})
     return SaveAt(at=times or None, fields=fields)
+
+
+def statistics_for(scene: SceneLike, of: Sequence[OfResult]) -> list[Statistic]:
+    """The statistics that quantities need, beside samples.
+
+    Args:
+        scene: the scene.
+        of: the quantities.
+
+    Returns:
+        Statistics of ends; none where the status of members tells how they ended.
+
+    Raises:
+        SceneError: if a quantity is of an outcome that is none.
+    """
+    found = dict[str, Statistic]()
+    for each in of:
+        if isinstance(each, OfEnds):
+            found |= each.gathered(scene.events)
+    return list(found.values())
 
 
 def prepare(
@@ -555,11 +573,12 @@ def prepare(
     else:
         whole = Ensemble(scene, 1)
     names, table, columns = _columns(whole, listed, levels)
+    gathered = statistics_for(scene, interests)
     save = samples_for(scene, interests, save)
     settings = dict(
         method=method, h=h, t1=t1, save=save, dtype=dtype, width=width, checks=checks, on_failure=on_failure
     )
-    runner = Runner(scene, settings, statistics, threads, executor, scheduler)
+    runner = Runner(scene, settings, [*statistics, *gathered] if gathered else statistics, threads, executor, scheduler)
     known = settings | dict(
         statistics=statistics, levels=levels, failed=failed, common_noise=common_noise, threads=threads, executor=executor,
         scheduler=scheduler)  # fmt: skip

@@ -18,8 +18,11 @@ from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.events import Event
 from lgvi_warp.physics.terms.events import from_list as events_of
 from lgvi_warp.runs.result import Result
+from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.statistics.each import Each
 from lgvi_warp.statistics.ends import Ends, check_outcomes, outcomes
 from lgvi_warp.statistics.functional import Functional, functional
+from lgvi_warp.statistics.outcomes import EndTime
 from lgvi_warp.statistics.quantity import Quantity
 
 REMEDY = 'write "position[2]", "depth", "norm(velocity)", "max(depth)", or give a function of a Result'
@@ -134,24 +137,26 @@ class OfEnds(OfResult):
         """Its unit."""
         return {"outcome": "1", "end_time": "s"}.get(self.kind, super().unit)
 
-    def check(self, events: Sequence[Event]) -> None:
-        """Refuse an outcome that no member of a scene can have, or that the status of members does not tell.
+    def gathered(self, events: Sequence[Event]) -> dict[str, Statistic]:
+        """What a run must gather, where several events have the status of this one, which then does not tell them apart.
 
         Args:
             events: The events of the scene.
 
+        Returns:
+            The statistic by its name; empty where the status of members tells.
+
         Raises:
-            SceneError: There is no such outcome, or two events have its status.
+            SceneError: There is no such outcome.
         """
         if not self.outcome:
-            return
+            return {}
         check_outcomes(
             "of", [self.outcome], outcomes([event.key for event in events], [event.status for event in events])
         )
         named = {event.key: event.status for event in events}.get(self.outcome)
-        if named is not None and sum(event.status == named for event in events) > 1:
-            remedy = f'ask for "outcome {named.name.lower()}", of both, or gather lw.Outcome'
-            raise refusal("of", self.label, f"is one of several events of the status {named.name.lower()}", remedy)
+        alone = named is None or sum(event.status == named for event in events) == 1
+        return {} if alone else {f"each end_time {self.outcome}": EndTime(self.outcome, then=Each())}
 
     def values(self, result: Result, members: Any = None) -> np.ndarray:
         """Compute its numbers for each member.
@@ -164,25 +169,33 @@ class OfEnds(OfResult):
             float64 array, shape (n, m).
 
         Raises:
-            SceneError: If there is no such outcome, or no sample at the time.
+            SceneError: If there is no such outcome, if members do not tell it from another one, or at a time of no sample.
         """
         if self.when is not None:
             rows = np.flatnonzero(np.abs(result.time - self.when) <= 1e-9 * max(1.0, result.time[-1]))
             if not len(rows):
                 raise refusal("of", self.label, "names no sample time", "keep one there: save=lw.SaveAt(at=[...])")
             return self._numbers(result, slice(rows[0], rows[0] + 1), members)
-        events = events_of(result.provenance["scene"].get("events", ()))
-        self.check(events)
-        status = np.asarray(result.status)
-        # Names of events are told by their statuses, which `check` has found to differ.
-        number = sum(np.where(status == event.status, 1 + i, 0) for i, event in enumerate(events))
-        so = Ends(status, np.asarray(number), result.end_time, tuple(event.key for event in events)).are(self.outcome)
+        so = self._so(result)
         if self.kind == "outcome":
             return so[:, None].astype(np.float64)
         numbers = (
             result.end_time[:, None] if self.kind == "end_time" else self._numbers(result, slice(-1, None), members)
         )
         return np.where(so[:, None], numbers, np.nan)
+
+    def _so(self, result: Result) -> np.ndarray:
+        """Which members ended so, (n,)."""
+        events = events_of(result.provenance["scene"].get("events", ()))
+        status, named = np.asarray(result.status), {event.key: event.status for event in events}
+        for name in self.gathered(events):
+            if name in result.statistics:
+                return ~np.isnan(result.statistics[name].value[0, 0])
+            problem = f"is one of several events of the status {named[self.outcome].name.lower()}"
+            raise refusal("of", self.label, problem, "gather lw.Outcome, or ask lw.uq or lw.prepare for it")
+        if self.outcome in named:
+            return np.asarray(status == named[self.outcome])
+        return Ends(status, np.zeros_like(status), result.end_time).are(self.outcome)
 
     def _numbers(self, result: Result, when: slice, members: Any) -> np.ndarray:
         """The quantity at one sample time, (n, m)."""

@@ -9,6 +9,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.physics.terms import events
 from lgvi_warp.runs.quantities import quantities
+from tests.conftest import ROOT
 from tests.support.stops import FarAway, stops
 
 STATISTICS = [
@@ -18,12 +19,12 @@ STATISTICS = [
 SETTINGS = {"method": "psi_s", "h": 0.04, "t1": 40.0, "save": lw.SaveAt(every=4.0), "statistics": STATISTICS}
 
 
-def fleet(members, ends=None, **ensemble):
+def fleet(members, ends=None, more=(), **ensemble):
     """The paper's vehicle a little too heavy or too light, from a depth of 20 m."""
     scene = lw.Scene.named("nordkvist_sanyal", start={"position": [0, 0, 20.0], "velocity": [0.1, 0, 0]},
                            vehicle={"buoyancy": 1212.0}, events=ends or stops(floor=26.0))  # fmt: skip
     vary = {"vehicle.buoyancy": lw.Normal(std=3.0), "start.angular_velocity": lw.Normal(std=(0.02, 0.05, 0.02))}
-    return lw.Ensemble(scene, members, 1, vary, **ensemble)
+    return lw.Ensemble(scene, members, 1, vary | dict(more), **ensemble)
 
 
 def agree(result, members):
@@ -146,33 +147,62 @@ def test_an_own_monte_carlo_with_three_competing_events():
     assert np.isfinite(s["outcome floor"]["end_time"][0]) and s["outcome floor"]["end_time"][2] == np.inf
 
 
+def named(name, vary, ends, **start):
+    """A fleet of a named vehicle, or of a scene among the examples."""
+    path = ROOT / "examples" / "scenes" / f"{name}.toml"
+    scene = lw.Scene.load(path) if path.exists() else lw.Scene.named(name, start={"position": [0, 0, 10.0], **start})
+    return lw.Ensemble(dataclasses.replace(scene, events=tuple(ends)), 128, 1, vary)
+
+
+BOTH = {"floor": 26.0, "surface": 17.0}
+ALL = {"floor": 24.0, "surface": 17.0, "lower": (-1e6, -1e6, 0.0), "upper": (2.0, 1e6, 30.0), "radius": 1.5, "at": 30.0}
 FAST = {"start.angular_velocity": lw.Normal(std=(40.0, 5.0, 0.02))}
+HEAVE = {"vehicle.buoyancy": lw.Normal(relative=0.02), "start.velocity[2]": lw.Normal(std=0.3)}
+NEAR = [lw.Floor(depth=11.0), lw.Surface(depth=9.0)]
+WALLS = [lw.Box(lower=(-0.3, -9.0, 0.0), upper=(1e3, 9.0, 99.0), name="astern"),
+         lw.Box(lower=(-1e3, -9.0, 0.0), upper=(0.3, 9.0, 99.0), name="ahead"), lw.Surface(depth=9.5)]  # fmt: skip
+# Members, with settings of the run beside those of SETTINGS.
 TEN = {
-    "none": {}, "floor": {"floor": 26.0}, "floor and surface": {"floor": 26.0, "surface": 17.0},
-    "near": {"floor": 20.5, "surface": 19.5}, "box": {"floor": 26.0, "lower": (-1.0,) * 2 + (0.0,), "upper": (1.0, 1.0, 40.0)},
-    "time": {"floor": 26.0, "surface": 17.0, "at": 20.0}, "far": {"radius": 1.0, "surface": 17.0},
-    "all": {"floor": 24.0, "surface": 17.0, "lower": (-1e6, -1e6, 0.0), "upper": (2.0, 1e6, 30.0), "radius": 1.5, "at": 30.0},
-    "some fail": {"floor": 26.0, "surface": 17.0} | FAST, "some fail, and soon over": {"at": 20.0, "surface": 17.0} | FAST,
+    "nobody ends": (lambda: fleet(256, stops()), {}),
+    "every event": (lambda: fleet(256, stops(**ALL)), {}),
+    "some fail": (lambda: fleet(256, stops(**BOTH), more=FAST), {}),
+    "some fail, and soon over": (lambda: fleet(256, stops(surface=17.0, at=20.0), more=FAST), {}),
+    "replicates": (lambda: fleet(256, stops(**BOTH), sampling=lw.Sobol(replicates=4)), {}),
+    "replicates, some fail": (lambda: fleet(256, stops(**BOTH), more=FAST, sampling=lw.Sobol(replicates=4)), {}),
+    "until": (lambda: fleet(4000, stops(**BOTH)), {"until": lw.Until("outcome floor", 0.05, members=256)}),
+    "remus_100": (lambda: named("remus_100", HEAVE, NEAR, velocity=[1.5, 0, 0]), {"method": "psi_x", "t1": 12.0}),
+    "bluerov2_heavy": (lambda: named("bluerov2_heavy", HEAVE | {"start.velocity[0]": lw.Normal(std=0.5)}, WALLS),
+                       {"method": "rk4", "dtype": "float32", "t1": 8.0}),
+    "bluerov2_dead_thruster": (lambda: named("bluerov2_dead_thruster", HEAVE, [lw.Floor(depth=4.0), lw.StopTime(at=6.0)]),
+                               {"method": None, "h": 0.05, "t1": 8.0}),
 }  # fmt: skip
 
 
+@pytest.mark.parametrize("stored", [False, True], ids=["memory", "store"])
 @pytest.mark.parametrize("name", TEN)
-def test_the_sum_over_outcomes_and_ok_is_1_over_ten_scenes(name, monkeypatch):
+def test_the_sum_over_outcomes_and_ok_is_1_over_ten_scenes(name, stored, monkeypatch, tmp_path):
     monkeypatch.setitem(events.TYPES, FarAway.type, FarAway)
-    limits = {key: value for key, value in TEN[name].items() if key not in FAST}
-    one = fleet(256, stops(**limits))
-    one = lw.Ensemble(one.scene, 256, 1, dict(one.vary) | {key: TEN[name][key] for key in FAST if key in TEN[name]})
-    kinds = ("surface", "floor", "box", "time", "far", "ok")
-    asked = [lw.Outcome(kind) for kind in (*kinds, "stopped", "failed")]
-    result = lw.solve(one, **SETTINGS | {"statistics": asked})
-    s, counts = result.statistics, result.status.counts()
-    for kind in ("surface", "floor", "box", "time", "ok"):
-        assert s[f"outcome {kind}"]["ended"][-1] == counts.get(kind, 0)
-    assert sum(s[f"outcome {kind}"].value[-1] for kind in kinds) == pytest.approx(1.0, abs=1e-13)
-    of_events = sum(s[f"outcome {kind}"].value for kind in kinds[:-1])
-    np.testing.assert_allclose(of_events, s["outcome stopped"].value, atol=1e-13)
+    make, more = TEN[name]
+    one = make()
+    ends = one.scene.events
+    asked = [lw.Outcome(kind) for kind in (*(end.key for end in ends), "ok", "stopped", "failed")]
+    how = SETTINGS | {"save": lw.SaveAt(every=2.0)} | more | {"statistics": asked}
+    if stored:
+        lw.solve(one, **how, store=tmp_path / "run.zarr")
+    result = lw.open_run(tmp_path / "run.zarr") if stored else lw.solve(one, **how)
+    s, counts, n = result.statistics, result.status.counts(), result.members
+    for status in {end.status for end in ends}:
+        of_status = [end.key for end in ends if end.status == status]
+        assert sum(s[f"outcome {key}"]["ended"][-1] for key in of_status) == counts.get(status.name.lower(), 0)
+    each = np.stack([s[f"outcome {end.key}"].value for end in ends])
+    assert each[:, -1].sum() + s["outcome ok"].value[-1] == pytest.approx(1.0, abs=1e-13)
+    np.testing.assert_allclose(each.sum(axis=0), s["outcome stopped"].value, atol=1e-13)
     failed = np.asarray(result.status.failed).sum()
-    assert s["outcome failed"].value[-1] == failed / 256 and (failed > 20) == ("fail" in name)
+    assert s["outcome failed"].value[-1] == failed / n and (failed > 20) == ("fail" in name)
+    if not failed:
+        np.testing.assert_array_equal(each, [s[f"outcome {end.key}"]["fraction"] for end in ends])
+    assert name == "nobody ends" or (each[:, -1] > 0.0).sum() >= 2 - (name == "bluerov2_dead_thruster")
+    assert (n < 4000) == (one.members < 4000 or name == "until")
 
 
 def test_replicates_of_a_design():
@@ -214,9 +244,31 @@ def test_quantities_of_outcomes_and_times():
     for text, words in refused.items():
         with pytest.raises(lw.SceneError, match=words):
             lw.uq.sobol(members, text, samples=8, **how)
-    two = dataclasses.replace(members.scene, events=(*members.scene.events, lw.Floor(depth=30.0, name="deep")))
-    with pytest.raises(lw.SceneError, match="is one of several events of the status floor"):
-        lw.uq.sobol(lw.Ensemble(two, 1, 1, members.vary), "outcome deep", samples=8, **how)
+
+
+def test_quantities_of_two_events_of_one_status():
+    """Two shelves end a drift to the north and one to the south: by hand, since it goes straight on at its first velocity."""
+    shelves = [lw.Box(lower=(-1e6,) * 3, upper=(4.0, 1e6, 1e6), name="north"),
+               lw.Box(lower=(-2.0, -1e6, -1e6), upper=(1e6,) * 3, name="south"), lw.Floor(depth=1e6)]  # fmt: skip
+    scene = lw.Scene.named("sphere", start={"position": [0, 0, 20.0]}, events=shelves)
+    u, t1 = np.array([0.5, -0.5, 0.3, -0.1, 0.2]), 10.0
+    of = ["outcome north", "outcome south", "outcome box", "outcome floor", "end_time south", "position[0] at north"]
+    how = dict(method="psi_s", h=0.1, t1=t1)
+    north, south = u * t1 > 4.0, u * t1 < -2.0
+    f = lw.uq.model(scene, ["start.velocity[0]"], of[:4], **how)
+    np.testing.assert_array_equal(f(u[:, None]), np.stack([north, south, north | south, 0.0 * u], axis=1))
+    run = lw.prepare(scene, ["start.velocity[0]"], of[4:], **how, failed="nan")
+    assert np.isnan(run(u[:, None])).all()  # none ends by both
+    ends = lw.uq.model(scene, ["start.velocity[0]"], "end_time south", **how, failed="nan")(u[:, None])
+    np.testing.assert_allclose(ends, np.where(u < -0.2, -2.0 / u, np.nan), atol=1e-9)
+    there = lw.uq.model(scene, ["start.velocity[0]"], "position[0] at north", **how, failed="nan")(u[:, None])
+    np.testing.assert_allclose(there, np.where(u > 0.4, 4.0, np.nan), atol=1e-9)
+    vary = {"start.velocity[0]": lw.Uniform(low=-0.6, high=0.6)}
+    share = lw.uq.sobol(scene, of[:2], vary=vary, samples=256, second_order=False, **how).mean
+    assert share == pytest.approx([1.0 / 6.0, 1.0 / 3.0], abs=0.02)
+    result = lw.solve(lw.Ensemble(scene, 4, 1, vary), **how)
+    with pytest.raises(lw.SceneError, match=r"is one of several events of the status box; .*lw\.Outcome"):
+        quantities("outcome north")[0].values(result)
 
 
 def test_an_outcome_that_no_member_can_have_is_refused():

@@ -15,7 +15,7 @@ from lgvi_warp.common.errors import closest
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import failed
 from lgvi_warp.methods.saveat import SaveAt
-from lgvi_warp.runs.prepared import PATHS_AT_ONCE, Runner, counted, lost_text, part, samples_for
+from lgvi_warp.runs.prepared import PATHS_AT_ONCE, Runner, counted, lost_text, part, samples_for, statistics_for
 from lgvi_warp.runs.prepared import FailedMembers as FailedMembers
 from lgvi_warp.runs.quantities import OfInterest, quantities
 from lgvi_warp.scene.ensemble import Ensemble
@@ -117,7 +117,8 @@ def evaluate(
     interests, report = quantities(of), callback(progress)
     how = {name: settings.pop(name) for name in ("threads", "executor", "scheduler") if name in settings}
     # The scene's own statistics, keep and until do not apply: every member of the design must run.
-    runner = Runner(fleet.scene, {"save": samples_for(fleet.scene, interests, save), **settings}, **how)
+    gathered = statistics_for(fleet.scene, interests)
+    runner = Runner(fleet.scene, {"save": samples_for(fleet.scene, interests, save), **settings}, gathered, **how)
     if common_noise:
         fleet = fleet.subset(np.arange(fleet.members))
         fleet.indices = np.zeros(fleet.members, dtype=np.int64)

@@ -19,7 +19,7 @@ from lgvi_warp.studies.sweeps.setup import Cell, Setup, made
 from lgvi_warp.studies.sweeps.success import INTERVALS, success_of
 
 # Said of a cell whose function holds what cannot be compared.
-NOT_KEPT = "cannot be told from other functions, so this cell runs in every call; give a version where it takes one, as version=1"
+NOT_KEPT = "cannot be told from other functions, so this cell runs in every call; give version=1 where it takes one"
 
 
 @shows_progress

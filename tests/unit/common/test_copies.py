@@ -17,7 +17,9 @@ from lgvi_warp.common.errors import MissingExtra, NothingToDraw, NotReal
 from lgvi_warp.common.identity import UNKNOWN, identity
 from lgvi_warp.common.reading import UnreadableError
 from lgvi_warp.physics.control.base import SECTIONS
+from lgvi_warp.runs.settle import make_plan
 from tests.conftest import ROOT
+from tests.support.odd_calls import goods
 
 WAYS = {"copy": copy.copy, "deepcopy": copy.deepcopy} | {
     f"pickle {protocol}": lambda value, protocol=protocol: pickle.loads(pickle.dumps(value, protocol))
@@ -77,8 +79,46 @@ def test_a_worker_of_a_pool_raises_them():
             assert str(caught.value) == str(wanted)
 
 
+V = (1.0, 1.0, 1.0)
+SPHERE = lw.Scene.named("sphere")
+# What the defaults and `goods` do not make.
+OTHERS = {
+    "Callback": lambda: lw.Callback(demand, version="1"), "OwnMetric": lambda: lw.OwnMetric(metric),
+    "Quantity": lambda: lw.Quantity("depth", metric), "Case": lambda: lw.Case("one", {"a.b": 1.0}),
+    "Grid": lambda: lw.Grid({"vehicle.mass": [1.0, 2.0]}), "Table": lambda: lw.Table(values={"vehicle.mass": [1.0, 2.0]}),
+    "UnitCubePoints": lambda: lw.UnitCubePoints([[0.5]]), "LatinHypercube": lambda: lw.LatinHypercube(4),
+    "Fins": lambda: lw.Fins(position=[V], chord=[(1, 0, 0)], normal=[(0, 0, 1)], area=0.1, drag=0.1, lift_slope=3.0),
+    "LowPass": lambda: lw.LowPass(of="depth", time_constant=1.0), "Packed": lambda: lw.Packed({"a": np.ones(2)}),
+    "PoseSMC": lambda: lw.PoseSMC(lambda_=V, boundary=V, lambda_r=V, boundary_r=V, k_sigma=V, k_d=V, k_sigma_r=V, k_d_r=V),
+    "PhysicalInertia": lambda: lw.PhysicalInertia(sigma=0.1), "PositiveDefinite": lambda: lw.PositiveDefinite(sigma=0.1),
+    "RotationNormal": lambda: lw.RotationNormal(std=0.1), "Histogram": lambda: lw.Histogram("depth", edges=[0.0, 1.0]),
+    "CorrelatedNormal": lambda: lw.CorrelatedNormal(covariance=np.eye(2)),
+    "ScipyDistribution": lambda: lw.ScipyDistribution(stats.norm()),
+    "Looks": lambda: lw.Looks(np.ones((1, 3)), np.eye(3)[None], np.ones((1, 3)), np.ones((1, 3)), np.ones(1)),
+    "Status": lambda: lw.Status.OK, "Warnings": lambda: lw.Warnings(3), "Store": lambda: lw.Store("run.zarr"),
+    "Plan": lambda: make_plan(lw.Ensemble(SPHERE, 4), method="psi_s", h=0.1, t1=0.5),
+    "PackingContext": lambda: lw.PackingContext({"a.b": np.ones(2)}, None, np.arange(2), 1, 0.1),
+}  # fmt: skip
+
+
+# What the two kinds of indices have in common, and what has a test of its own.
+APART = {"Indices", "Policy"}
+# Classes of which a run makes one, and a study.
+OF_RUNS = {"Result", "Prepared", "Sweep", "Outputs", "ScalarModel"}
+OF_STUDIES = {"Trim", "LinearModel", "Regulator", "Margins", "WorstCase", "Tuned", "StabilityMap", "SobolIndices",
+              "MorrisEffects"}  # fmt: skip
+
+
+def classes():
+    """The public classes by name, but for errors."""
+    public = {name: getattr(module, name) for module in (lw, lw.uq) for name in module.__all__}
+    return {
+        name: value for name, value in public.items() if inspect.isclass(value) and not issubclass(value, BaseException)
+    }
+
+
 def made():
-    """One of each public class that users make, or get from what they make."""
+    """One of each class that needs no run, with what named scenes and those of the examples hold."""
     found = {}
 
     def note(*values):
@@ -92,29 +132,15 @@ def made():
         fleet = lw.Ensemble.from_scene(scene)
         note(fleet, fleet.sampling, *fleet.vary.values())
 
+    note(*(maker() for maker in OTHERS.values()))
     for name in ("sphere", "remus_100", "bluerov2_heavy"):
         parts(lw.Scene.named(name))
     for path in sorted((ROOT / "examples" / "scenes").glob("*.toml")):
         parts(lw.Scene.load(path))
-    sphere = lw.Scene.named("sphere")
-    for name in lw.__all__:
-        if inspect.isclass(getattr(lw, name)) and name not in found:
-            try:
-                note(getattr(lw, name)())
-            except (TypeError, ValueError):
-                continue
-    eye = np.eye(3)
-    note(
-        lw.Callback(demand, version="1"), lw.OwnMetric(metric), lw.Quantity("depth", metric), lw.Case("one", {"a.b": 1.0}),
-        lw.Floor(depth=20.0), lw.Box(lower=(-1.0,) * 3, upper=(1.0,) * 3), lw.Until("mean position[0]", 0.1),
-        lw.Choice([1.0, 2.0]), lw.CorrelatedNormal(std=(1.0, 2.0), correlation=np.eye(2)), lw.LogNormal(sigma=0.1),
-        lw.TruncatedNormal(std=1.0, low=-1.0, high=1.0), lw.RotationNormal(std=0.1), lw.ScipyDistribution(stats.norm()),
-        lw.Histogram("depth", edges=[0.0, 1.0]), lw.Table(values={"vehicle.mass": [1.0, 2.0]}), lw.UnitCubePoints([[0.5]]),
-        lw.LatinHypercube(4), lw.Store("run.zarr"), lw.Packed({"a": np.ones(2)}),
-        lw.Waypoints(points=[[0.0, 0.0, 1.0], [9.0, 0.0, 1.0]], speed=1.0, look_ahead=2.0, radius=1.0),
-        lw.WrenchSchedule(times=[0.0, 1.0], force=np.zeros((2, 3))), lw.Status.OK, lw.Warnings(0),
-        replace(sphere, ensemble_settings=None), lw.Vehicle(mass=1.0, inertia=eye),
-    )  # fmt: skip
+    by_name, own = goods(SPHERE, None, None, ROOT)
+    for name in classes().keys() - found.keys() - OF_RUNS - OF_STUDIES - APART:
+        needed = [p.name for p in inspect.signature(getattr(lw, name)).parameters.values() if p.default is p.empty]
+        note(getattr(lw, name)(**({key: by_name[key] for key in needed if key in by_name} | own.get(name, {}))))
     return found
 
 
@@ -136,18 +162,42 @@ def test_objects(name, way):
         assert told[0] == told[1]
 
 
+def test_every_public_class_is_among_them():
+    assert classes().keys() - APART <= MADE.keys() | OF_RUNS | OF_STUDIES
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_policy_without_its_file(way, tmp_path):
+    np.savez(tmp_path / "policy.npz", weights_0=np.ones((1, 1)), biases_0=np.zeros(1))
+    one = lw.Policy(file=tmp_path / "policy.npz", inputs=["depth_error"], outputs=["Z"])
+    (tmp_path / "policy.npz").unlink()
+    again = WAYS[way](one)
+    assert type(again) is lw.Policy and again.to_dict() == one.to_dict()
+
+
+def test_public_functions_and_classes_are_themselves():
+    for module in (lw, lw.uq, lw.plots):
+        for name in module.__all__:
+            value = getattr(module, name)
+            if callable(value):
+                assert all(way(value) is value for way in WAYS.values()), name
+
+
 @pytest.fixture(scope="module")
 def ran():
-    """What runs and studies give."""
-    scene = lw.Scene.named("sphere")
+    """What runs give."""
     vary = {"start.velocity[0]": lw.Normal(std=0.1)}
-    fleet = lw.Ensemble(scene, 4, 0, vary)
+    fleet = lw.Ensemble(SPHERE, 4, 0, vary)
     settings = dict(method="psi_s", h=0.1, t1=0.5)
     found = lw.solve(fleet, **settings, statistics=[lw.Mean("position")])
-    run = lw.prepare(scene, list(vary), of="depth", **settings)
-    return {"Result": found, "Estimates": found.statistics, "Estimate": found.statistics["mean position"], "Prepared": run,
-            "model": lw.uq.model(scene, vary, "depth", **settings), "status": found.status, "warnings": found.warnings,
+    run = lw.prepare(SPHERE, list(vary), of="depth", **settings)
+    made = {"Result": found, "Estimates": found.statistics, "Estimate": found.statistics["mean position"], "Prepared": run,
+            "ScalarModel": lw.uq.model(SPHERE, vary, "depth", **settings),
+            "Outputs": lw.uq.evaluate(fleet, "depth", **settings),
+            "status": found.status, "warnings": found.warnings, "prediction": lw.predict(fleet, **settings),
             "Sweep": lw.sweep(fleet, [{"name": "one"}], **settings)}  # fmt: skip
+    assert made.keys() >= OF_RUNS
+    return made
 
 
 @pytest.mark.kernel
@@ -159,10 +209,41 @@ def test_what_runs_give(ran, way):
         if name == "Result":
             np.testing.assert_array_equal(again.position, value.position)
             assert again.provenance == value.provenance
-        elif name in ("Prepared", "model"):
+        elif name in ("Prepared", "ScalarModel"):
             np.testing.assert_array_equal(again(np.ones((2, 1))), value(np.ones((2, 1))))
         elif isinstance(value, np.ndarray):
             np.testing.assert_array_equal(again, value)
+        else:
+            assert repr(again) == repr(value), name
+
+
+@pytest.mark.slow
+@pytest.mark.kernel
+def test_what_studies_give():
+    drag, run = lw.Drag(linear=(4.0, 9.0, 12.0, 1.0, 2.0, 3.0)), dict(method="psi_s", h=0.1)
+    body = lw.Scene(lw.Vehicle(20.0, inertia=(5.0, 8.0, 11.0)), terms=[lw.ControlWrench(limit=1e3), drag])
+    turn = lw.Controller(period=0.1, guidance=[lw.SetPoint(heading=0.1)], laws=[lw.HeadingPID(kp=5.0, kd=5.0)])
+    loop, vary, short = replace(body, controller=turn), {"start.position[2]": lw.Normal(std=1.0)}, run | {"t1": 0.2}
+    steady = lw.trim(body, 1.0, **run)
+    model = lw.linearize(replace(body, start=steady.start), **run)
+    both = vary | {"start.velocity[1]": lw.Normal(std=0.1)}
+    found = {
+        "Trim": steady, "LinearModel": model, "Margins": lw.margins(loop, "heading_pid", "gain", about=5.0, **run),
+        "Regulator": lw.lqr(model, np.ones(len(model.states)), np.ones(len(model.inputs))),
+        "WorstCase": lw.worst_case(loop, {"start.position[2]": (1.0, 2.0)}, "depth", budget=32, **short),
+        "Tuned": lw.tune(lw.Ensemble(loop, 4, 1, vary), {"heading_pid.kp": (1.0, 5.0)}, "depth", budget=64, **short),
+        "StabilityMap": lw.stability_map(SPHERE, ("h", 0.1, 0.2), ("angular_velocity", 0.5, 1.0), ["psi_s"], points=2,
+                                         directions=1, t1=1.0, error_time=0.5, h=0.1),
+        "SobolIndices": lw.uq.sobol(SPHERE, "depth", vary=both, samples=16, **short),
+        "MorrisEffects": lw.uq.morris(SPHERE, "depth", vary=both, samples=4, **short),
+        "Suggestion": lw.suggest(lw.Ensemble(SPHERE, 16, 0, vary), 1e-2, t1=1.0),
+        "Tradeoff": lw.tradeoff(lw.Ensemble(SPHERE, 16, 0, vary), t1=1.0, methods=["psi_s"], members=16, seconds=2.0),
+    }  # fmt: skip
+    assert found.keys() >= OF_STUDIES
+    for name, value in found.items():
+        for way in WAYS.values():
+            again = way(value)
+            assert type(again) is type(value) and type(value).__name__ == name and repr(again) == repr(value)
 
 
 def all_fail():

@@ -741,3 +741,11 @@ def test_a_posterior_by_chain_and_draw_is_a_table_of_all_draws():
     np.testing.assert_array_equal(table.own_values()["start.position"], np.arange(18.0).reshape(6, 3))
     # One chain is as good, and what has other dimensions is read as before.
     np.testing.assert_array_equal(lw.Table(posterior.isel(chain=0)).own_values()["vehicle.buoyancy"], [0.0, 1.0, 2.0])
+    for other in (
+        posterior.transpose("axis", "draw", "chain"),
+        xr.DataTree.from_dict({"posterior": posterior})["posterior"],
+    ):
+        again = lw.Table(other).own_values()
+        assert again.keys() == table.own_values().keys()
+        for name, values in table.own_values().items():
+            np.testing.assert_array_equal(again[name], values)

@@ -401,7 +401,7 @@ def test_outputs_are_of_all_groups_of_members(monkeypatch):
     runs, shares = [], []
 
     class Runner:
-        def __init__(self, scene, settings, **how):
+        def __init__(self, scene, settings, statistics=(), **how):
             runs.append((scene, settings, how))
 
         def run(self, group, progress):

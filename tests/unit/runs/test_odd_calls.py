@@ -27,6 +27,12 @@ def given(tmp_path_factory):
     return scene, fleet, lw.solve(fleet, h=0.1, t1=0.4), tmp_path_factory.mktemp("odd")
 
 
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    """Odd names of files are names in a folder of the test."""
+    monkeypatch.chdir(tmp_path)
+
+
 def raw(function, arguments):
     """The error that a call ends with, unless it is deliberate, or Python's own of a call that does not fit the signature."""
     try:

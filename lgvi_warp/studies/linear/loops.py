@@ -302,7 +302,7 @@ def shrinks(swing: np.ndarray, tilt: float) -> tuple[np.ndarray, np.ndarray]:
         tilt: the angle by which the run began aside [rad].
 
     Returns:
-        ((m,) whether it settles, (m,) whether that is near the edge, or slower modes are left, so that a longer run tells more).
+        ((m,) whether it settles, (m,) whether a longer run tells more: near the edge, or where slower modes are left).
     """
     first, second, last = swing
     still = last <= SETTLED * tilt

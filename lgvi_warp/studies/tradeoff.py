@@ -448,7 +448,9 @@ def without_reading(
 
     def why(name: str) -> str:
         least = min(trial.candidate.h for trial in trials if trial.candidate.method == name)
-        return f"members failed at every step down to {least:.4g} s; for shorter ones give more seconds than {seconds:g}"
+        return (
+            f"members failed at every step down to {least:.4g} s; for shorter ones give more seconds than {seconds:g}"
+        )
 
     return {name: refused.get(name) or why(name) for name in dict.fromkeys(names) if name not in there}
 

@@ -8,7 +8,7 @@ advance damped scenes: the cheapest whose step is stable and whose error is smal
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.engine.plan import Plan, damping_terms
@@ -76,25 +76,32 @@ def choices(ensemble: Ensemble, h: float, found: Rates | None = None) -> Iterato
         return
     found = found or rates(ensemble)
     numbers = h_rates(found, h)
-    for name in ranked(
-        {name: path_error(Method(name), found, h, AHEAD) for name in DAMPED if stable(Method(name), numbers)}
-    ):
+    well = [name for name in DAMPED if stable(Method(name), numbers)]
+    errors = {
+        name: path_error(Method(name), found, h, AHEAD)
+        for name in DAMPED
+        if name in well or stable(Method(name), numbers, 1.0)
+    }
+    for name in ranked(errors, well):
         yield Method(name, reason=DAMPED[name])
     for name in OTHERWISE:
         if name == OTHERWISE[-1] or stable(Method(name), numbers):
             yield Method(name, reason="since the scene is damped, and Runge-Kutta methods do not take it at this step")
 
 
-def ranked(errors: dict[str, float]) -> list[str]:
+def ranked(errors: dict[str, float], well: Collection[str]) -> list[str]:
     """Rank methods by their errors at a step.
 
     Args:
         errors: Name -> error over the length of the path [1], the cheapest first.
+        well: Those of them that are well within their limits.
 
     Returns:
-        Those whose error is allowed, the cheapest first; then the others, the least error first.
+        Those whose error is allowed, the cheapest first; then the others, the least error first. Near its limit of damping a
+        method is one of the others.
     """
-    return sorted(errors, key=lambda name: 0.0 if errors[name] <= ALLOWED else errors[name])
+    known = [name for name in errors if name in well or math.isfinite(errors[name])]
+    return sorted(known, key=lambda name: 0.0 if name in well and errors[name] <= ALLOWED else errors[name])
 
 
 def messages(method: Method, found: Rates, h: float, t1: float) -> tuple[str, ...]:
@@ -109,7 +116,8 @@ def messages(method: Method, found: Rates, h: float, t1: float) -> tuple[str, ..
     Returns:
         One sentence where the error is above 1 % of the path, otherwise nothing.
     """
-    if path_error(method, found, h, t1) <= ALLOWED:
+    near = method.name in DAMPED and not stable(method, h_rates(found, h))
+    if path_error(method, found, h, t1) <= ALLOWED and not near:
         return ()
     text = (
         f"step h = {h:g} s is long for this motion: by its rates {method.name} may be off by more than 1 % of the path"
@@ -138,17 +146,18 @@ def best_error(method: Method, found: Rates, h: float, t1: float) -> float:
     return min((path_error(one, found, h, t1) for one in others if stable(one, numbers)), default=math.inf)
 
 
-def stable(method: Method, numbers: dict[str, float]) -> bool:
+def stable(method: Method, numbers: dict[str, float], share: float = SHARES["drag"]) -> bool:
     """Tell whether a step is well within a method's limits.
 
     Args:
         method: The method.
         numbers: As of `h_rates`.
+        share: Part of the limit of damping that may be used.
 
     Returns:
         False where a number is above its share of the limit.
     """
-    drag = MOST_IMPLICIT if method.linearly_implicit else SHARES["drag"] * drag_limit(method.name)
+    drag = MOST_IMPLICIT if method.linearly_implicit else share * drag_limit(method.name)
     return numbers["drag"] <= drag and numbers["rotation"] <= SHARES["rotation"] * rotation_limit(method)
 
 

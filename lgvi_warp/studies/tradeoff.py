@@ -421,27 +421,38 @@ def tradeoff(
         messages=tuple(messages),
         seconds=time.perf_counter() - begun,
         units=QUANTITIES | {compared.name: compared.unit},
-        missing=without_reading(names, measured, refused) if methods else {},
+        missing=without_reading(names, trials, measured, refused, seconds) if methods else {},
     )
 
 
-def without_reading(names: Sequence[str], measured: Sequence[Measurement], refused: dict[str, str]) -> dict[str, str]:
+def without_reading(
+    names: Sequence[str],
+    trials: Sequence[Trial],
+    measured: Sequence[Measurement],
+    refused: dict[str, str],
+    seconds: float,
+) -> dict[str, str]:
     """Name the methods that were asked for and have no measurement.
 
     Args:
         names: of the methods.
+        trials: what was run.
         measured: the measurements.
         refused: method -> why the scene does not take it.
+        seconds: processor time of the whole trade-off [s].
 
     Returns:
         Method -> why it has none.
     """
     there = {measurement.setting.method for measurement in measured}
-    return {
-        name: refused.get(name, "members failed at every step that was tried")
-        for name in dict.fromkeys(names)
-        if name not in there
-    }
+
+    def why(name: str) -> str:
+        least = min(trial.candidate.h for trial in trials if trial.candidate.method == name)
+        return (
+            f"members failed at every step down to {least:.4g} s; for shorter ones give more seconds than {seconds:g}"
+        )
+
+    return {name: refused.get(name) or why(name) for name in dict.fromkeys(names) if name not in there}
 
 
 def growth_of(sample: Sample, taken: Sequence[str], reference: Reference) -> Growth:

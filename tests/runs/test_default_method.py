@@ -195,6 +195,16 @@ def driven_bluerov():
     return lw.Ensemble.from_states(lw.Scene.named("bluerov2_heavy"), *states, {"thrusters.command": command}), 10.0
 
 
+def spinning_bluerov():
+    """A BlueROV2 whose thrusters turn it: at 0.5 s its damping is 6 % below the limit of rk8, and rkw3 is off by the path."""
+    states = np.tile([0.0, 0.0, 50.0], (4, 1)), np.tile(np.eye(3), (4, 1, 1)), np.zeros((4, 3)), np.zeros((4, 3))
+    start = np.random.default_rng(3).normal(0.0, 0.05, (2, 4, 3))
+    command = np.tile([0.6, -0.6, 0.6, -0.6, 0.2, 0.2, -0.1, 0.2], (4, 1))
+    nu = [0.1, 0.0, 0.0], [0.0, 0.0, 0.2]
+    states = *states[:2], *(rest + away + by for rest, away, by in zip(states[2:], nu, start, strict=True))
+    return lw.Ensemble.from_states(lw.Scene.named("bluerov2_heavy"), *states, {"thrusters.command": command}), 10.0
+
+
 def torpedo_in_a_turn():
     push = lw.Wrench(force=[8.0, 0.0, 0.0], torque=[0.0, 0.0, 0.5])
     drag = lw.Drag(linear=[1.0, 4.0, 4.0, 0.2, 1.0, 1.0], quadratic=[2.0, 15.0, 15.0, 0.5, 3.0, 3.0])
@@ -253,6 +263,17 @@ def test_remus_in_a_turn_is_not_off_by_metres():
     plan = make_plan(fleet, h=0.375, t1=t1)
     (lost, kept) = (measured(fleet, t1, method, [80])[0] for method in ("rk4", "rk8"))
     assert lost > 0.1 and kept < 1e-3 and plan.method.name == "rk8"
+
+
+@pytest.mark.kernel
+def test_near_its_limit_a_method_is_taken_before_one_that_is_off_by_more():
+    for (fleet, t1), h in ((spinning_bluerov(), 0.5), (turning_remus((0.3, 0.2, 0.1)), 0.375)):
+        plan = make_plan(fleet, h=h, t1=t1)
+        (taken,), (other,) = (measured(fleet, t1, method, [round(t1 / h)]) for method in (plan.method.name, "rkw3"))
+        assert plan.method.name == "rk8" and taken < 0.01 and other > 4.0 * taken
+    fleet, t1 = spinning_bluerov()
+    (text,) = make_plan(fleet, h=0.5, t1=t1).grid.messages
+    assert "rk8 may be off by more than 1 % of the path" in text
 
 
 def test_the_choice_does_not_depend_on_the_length_of_the_run_or_the_number_of_members():

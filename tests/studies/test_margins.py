@@ -45,22 +45,30 @@ def found(fleet):
     return lw.margins(fleet, "heading_pid", by=("eigenvalues", "runs"), about=80.0, method="psi_s", h=H)
 
 
-def radius(kp, ki, kd, g, steps):
+def radius(kp, ki, kd, g, steps, T=PERIOD, drag=0.0):
     """Largest eigenvalue of the sampled loop: angle, rate, integral, and the torques that are on their way."""
+    h = T / EVERY
     q, s = divmod(steps, EVERY)
-    T, late = PERIOD, s * H
+    late = s * h
+
+    def left(t):
+        """The time for which a rate of 1 turns in t seconds: (1 - exp(-drag t / J)) J / drag."""
+        return -np.expm1(-drag * t / J) * J / drag if drag else t
 
     def push(t):
         """Angle and rate after a torque that acts for the last t seconds of a period."""
-        return np.array([0.5 * t**2, t]) / J
+        return np.array([(t - left(t)) / drag if drag else 0.5 * t**2 / J, left(t) / J])
 
     A = np.zeros((3 + q + 2, 3 + q + 2))
-    A[:2, :2] = [[1.0, T], [0.0, 1.0]]
+    A[:2, :2] = [[1.0, left(T)], [0.0, 1.0 - drag * left(T) / J]]
     A[:2, 3 + q] = push(T - late)
     A[:2, 4 + q] = push(T) - push(T - late)
     A[2, :3] = -T, 0.0, 1.0
     A[3] = g * (-kp * A[0] - kd * A[1] + ki * A[2])
     A[4:, 3:-1] = np.eye(q + 1)
+    if not ki:
+        # An integral that nothing uses.
+        A = np.delete(np.delete(A, 2, 0), 2, 1)
     return np.abs(np.linalg.eigvals(A)).max()
 
 
@@ -312,6 +320,34 @@ def test_a_gain_limit_that_is_known_for_any_length_of_runs_heading_and_limit(sec
         assert found.steady.all() and values["gain_lower"][0] < 0.02  # below, 60 s are short
         # Of the eigenvalues by differences, 1e-10, and brackets; of runs 3 % in a third of them, 1e-4, and half of a bracket.
         assert values["gain_upper"][0] == pytest.approx(49.85, rel=1e-5 if by == "eigenvalues" else 3e-3)
+
+
+def test_runs_judge_swings_by_angles_and_not_by_parts_of_limits():
+    """A demand of 60 N m/rad at factors up to 5 is 60 tilts of a limit of 5 N m: small all the same, since it shrinks."""
+    one = dataclasses.replace(scene(delay=0.06, kp=60.0, ki=0.0, kd=20.0), terms=[lw.ControlWrench(limit=[5.0] * 6)])
+    expected = edge(lambda g: radius(60.0, 0.0, 20.0, g, 3) < study.SHRINKS ** (PERIOD / 80.0), 1.0, 100.0)
+    for seconds in (240.0, 900.0):
+        found = lw.margins(one, None, "gain", by="runs", seconds=seconds, method="psi_s", h=H)
+        # Half of a bracket, and that a run of 900 s comes nearer to the edge.
+        assert found.by_runs["gain_upper"][0] == pytest.approx(expected, rel=3e-3 if seconds == 240.0 else 1e-2)
+
+
+@pytest.mark.parametrize(("kp", "ki", "kd", "drag", "steps", "most", "tilt"), [
+    # Beyond the limit a swing that starts from 1e-5 rad wraps around, where its last third is by chance below its second.
+    (5.1206017, 0.0, 1.5507809, 1.4798703, 13, 7920.0, 1e-5),
+    # Swings of commands far above ten thousandths of their limits; a slow integral behind a fast mode.
+    (1.7977004, 0.0545263, 0.0997715, 6.5997012, 10, 1.37, 1e-3),
+    (0.3076565, 0.0036990, 2.4844341, 3.8696209, 12, 279.0, 1e-3),
+])  # fmt: skip
+def test_swings_that_wrap_and_slow_integrals(kp, ki, kd, drag, steps, most, tilt):
+    assert radius(kp, ki, kd, 49.84, steps, 0.05, drag) < 1.0 < radius(kp, ki, kd, 49.86, steps, 0.05, drag)
+    one = scene(delay=0.01 * steps, kp=kp, ki=ki, kd=kd)
+    acting = [lw.ControlWrench(limit=[most] * 6), lw.Drag(linear=[drag] * 6)]
+    one = dataclasses.replace(one, controller=dataclasses.replace(one.controller, period=0.05), terms=acting)
+    found = lw.margins(one, "heading_pid", "gain", by=("eigenvalues",), tilt=tilt, method="rk4", h=0.01)
+    by_runs = lw.margins(one, "heading_pid", "gain", by="runs", tilt=tilt, method="rk4", h=0.01).by_runs
+    assert found.values["gain_upper"][0] == pytest.approx(49.85, rel=1e-3)
+    assert by_runs["gain_upper"][0] == pytest.approx(49.85, rel=1e-2)
 
 
 def test_saturated_members_whose_sampled_loop_grows_are_never_steady():

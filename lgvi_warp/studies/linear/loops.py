@@ -29,8 +29,10 @@ SHRINKS = 0.97
 NEAR = 0.8
 # What swings by less than this part of its first third, or of the tilt, has settled: what is left is round-off.
 SETTLED = 1e-6
-# What swings by more tilts than this in the last third, or ends so far aside, has not settled.
+# What is aside by more tilts than this in the last third, or turns by more within a period, has not settled.
 TILTS = 10.0
+# What has shrunk to this part of its first third is not growing: where it does not shrink yet, slower modes are left.
+FADED = 0.1
 # Looks of a run below which its thirds show no envelope.
 LEAST_LOOKS = 30
 
@@ -49,6 +51,7 @@ class Study:
         h: step [s].
 
     Attributes:
+        period: time between two looks [s].
         bench: what makes the steps.
         begin: steps until loops are looked at.
         last: steps until they are looked at last.
@@ -68,6 +71,7 @@ class Study:
     ):
         scene: Any = fleet.scene
         controller, period = scene.controller, float(scene.controller.period)
+        self.period = period
         # With some delay in the scene, commands may be delayed in any lane.
         laws = with_factor(controller.laws, loop)
         acted = replace(controller, laws=laws, delay=controller.delay if controller.delay > 0.0 else period)
@@ -242,7 +246,7 @@ class Loops:
         """Whether loops settle, and what `_told` tells after the run."""
         looks = self.study.looks
         settled, near, last = self._run(factor, steps, some, looks)
-        again = np.flatnonzero(settled & near)
+        again = np.flatnonzero(near)
         if len(again):
             settled[again] = self._run(factor[again], steps[again], some[again], looks + looks // 2)[0]
         return settled, last
@@ -250,31 +254,44 @@ class Loops:
     def _run(
         self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray, looks: int
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Whether loops settle in so many looks, whether they shrink by little, and what `_told` tells at the end."""
+        """Whether loops settle in so many looks, whether a longer run may tell more, and what `_told` tells at the end."""
         bench, tilt, limits, m = self.study.bench, self.study.tilt, self.limits[some], len(some)
         k0, k1 = self.begin, self.begin + looks * bench.every
         by = np.zeros((m, 12))
         by[:, 3:6] = tilt
         motion = delayed(bench, self.motion.of(some), k0, steps).moved(by)
         highest, first = np.full((3, m, 3 + limits.shape[1]), -np.inf), bench.plan.due(k0, k0)[1]
-        lowest, last = -highest, np.zeros_like(self.told[some])
+        lowest, last, within = -highest, np.zeros_like(self.told[some]), np.ones(m, bool)
+        begun = self.motion.attitude[some]
 
         def watch(sample: int, values: Mapping[str, np.ndarray]) -> None:
+            nonlocal within
             signals = np.concatenate([values["angular_velocity"], values["command"] / limits], axis=2)
             third = np.minimum((sample - first + np.arange(len(signals))) // (looks // 3), 2)
             for w in np.unique(third):
                 highest[w] = np.fmax(highest[w], signals[third == w].max(axis=0))
                 lowest[w] = np.fmin(lowest[w], signals[third == w].min(axis=0))
+            aside = _aside(values["attitude"][third == 2], begun, "heading" in self.study.held) <= TILTS * tilt
+            within &= (aside & ~at_limit(values["command"][third == 2], limits).any(axis=2)).all(axis=0)
             last[:] = _told(values, self.study.held)[-1]
 
         after = bench.run(self.places[some], motion, k0, k1, {FACTOR: factor, DELAY: steps * bench.plan.grid.h}, watch)
-        settled = np.isfinite(after.position).all(axis=1) & ~at_limit(_commands(last, limits), limits).any(axis=1)
         near, swing = np.zeros(m, bool), highest - lowest
-        for sizes in (np.linalg.norm(swing[..., :3], axis=2), np.linalg.norm(swing[..., 3:], axis=2)):
-            well, little = shrinks(sizes, tilt)
+        rates, commands = np.linalg.norm(swing[..., :3], axis=2), np.linalg.norm(swing[..., 3:], axis=2)
+        within &= np.isfinite(after.position).all(axis=1) & (rates[2] * self.study.period < TILTS * tilt)
+        settled = within.copy()
+        for sizes in (rates, commands):
+            well, undecided = shrinks(sizes, tilt)
             settled &= well
-            near |= little
-        return settled, near, last
+            near |= undecided
+        return settled, near & within, last
+
+
+def _aside(attitude: np.ndarray, other: np.ndarray, heading: bool) -> np.ndarray:
+    """How far the vertical, and the heading where it is held, are aside (k, m) [rad]."""
+    apart = np.abs(attitude - other)
+    down = apart[..., 2, :].max(axis=-1)
+    return np.maximum(down, apart[..., :2, 0].max(axis=-1)) if heading else down
 
 
 def shrinks(swing: np.ndarray, tilt: float) -> tuple[np.ndarray, np.ndarray]:
@@ -285,10 +302,11 @@ def shrinks(swing: np.ndarray, tilt: float) -> tuple[np.ndarray, np.ndarray]:
         tilt: the angle by which the run began aside [rad].
 
     Returns:
-        ((m,) whether it settles, (m,) whether it shrinks by little).
+        ((m,) whether it settles, (m,) whether a longer run tells more: near the edge, or where slower modes are left).
     """
     first, second, last = swing
     still = last <= SETTLED * tilt
     with np.errstate(invalid="ignore"):
         less = (last < SHRINKS * second) | (second < SETTLED * first)
-    return still | (less & (last < first) & (last < TILTS * tilt)), ~still & (last > NEAR * second)
+    well = still | (less & (last < first))
+    return well, ~still & (last > NEAR * second) & (well | (last < FADED * first))

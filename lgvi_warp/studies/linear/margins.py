@@ -175,17 +175,17 @@ def margins(
 
     A member's loop is looked at in the motion that it has after `about` seconds. That must be steady: velocities, rates, the
     vertical, the commands, and what a law holds at a set-point are the same to 1e-6 a period later, and no command is at its
-    limit. Else the member goes on for
-    twice the time, and again, up to `settle`. Then it is turned aside, and must come back in a run. Where one of this is not
-    so, it has no margins, and `why` says which.
+    limit. Else the member goes on for twice the time, and again, up to `settle`. Then it is turned aside, and must come back
+    in a run. Where one of this is not so, it has no margins, and `why` says which.
 
     By eigenvalues: those of the sampled loop about that motion. It is affine in the factor on the law's demand, and each delay
     within a period is linearised: so all brackets are halved without a run. Neutral modes that no law sees do not count.
 
     By runs: every member has a factor, or a delay, of its own in a lane; each run divides all brackets at once. From the same
     motion, turned by `tilt`, a loop settles if what its rates and commands swing shrinks from the second to the last
-    third of the run, is less than in the first, and less than 10 tilts. Where it shrinks by little, a run of 1.5 times the
-    length is judged as well. The error is not judged: a slow integral hides a small fast limit cycle in it.
+    third of the run and is less than in the first; and if in the last third no command is at its limit, the body is aside by
+    less than 10 tilts, and turns by less within a period. Where it shrinks by little, a run of 1.5 times the length is judged
+    as well. The error is not judged: a slow integral hides a small fast limit cycle in it.
 
     Where the answer changes more than once, the edge is one of them.
 

@@ -28,8 +28,8 @@ def given(tmp_path_factory):
 
 
 @pytest.fixture(autouse=True)
-def _elsewhere(tmp_path, monkeypatch):
-    """Paths among the odd arguments are written to."""
+def elsewhere(tmp_path, monkeypatch):
+    """Odd names of files are names in a folder of the test."""
     monkeypatch.chdir(tmp_path)
 
 

@@ -335,10 +335,12 @@ def test_edges_are_found_from_any_guess(guess):
 
 
 @pytest.mark.parametrize(("thirds", "settles", "near"), [
-    ((1.0, 0.8, 0.6), True, False), ((1.0, 0.8, 0.7), True, True), ((1.0, 0.8, 0.78), False, True),
+    ((1.0, 0.8, 0.6), True, False), ((1.0, 0.8, 0.7), True, True), ((1.0, 0.8, 0.78), False, False),
+    # What has faded to a 1e-5th, in which slower modes do not shrink yet, is judged by a longer run.
+    ((1.0, 8e-6, 9e-6), False, True),
     ((1.0, 3e-7, 3e-7), True, True), ((1.0, 2e-6, 2e-6), False, True),
-    # It grows until something holds it, where it swings by chance a little less; or shrinks to what is no more small.
-    ((0.01, 3.0, 2.8), False, True), ((1.0, 1.3, 1.1), False, True), ((300.0, 30.0, 10.0), False, False),
+    # It grows until something holds it, where it swings by chance a little less.
+    ((0.01, 3.0, 2.8), False, False), ((1.0, 1.3, 1.1), False, False),
     # Nothing but round-off swings, or nothing at all, or no number is left.
     ((0.0, 0.0, 0.0), True, False), ((1e-12, 1e-12, 2e-12), True, False), ((np.inf, np.nan, np.nan), False, False),
 ])  # fmt: skip

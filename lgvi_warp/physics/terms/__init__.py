@@ -40,6 +40,8 @@ def register_term(kind: type[AnyTerm]) -> type[AnyTerm]:
     Raises:
         ValueError: Where `type` is empty or taken by another class.
     """
+    if not isinstance(kind, type) or not hasattr(kind, "kinds"):
+        raise refusal("kind", kind, "is no class of a term", "give a subclass of lw.Term")
     if not registry.add(kind.kinds, kind):
         former = kind.kinds.get(kind.type)
         problem = f"is that of {former.__module__}.{former.__qualname__}" if former else "is missing"

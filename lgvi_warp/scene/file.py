@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from lgvi_warp.common.arguments import mapping_of
+from lgvi_warp.common.arguments import mapping_of, path_of
 from lgvi_warp.common.errors import SceneError, among, cut, refusal
 from lgvi_warp.common.reading import file_text
 from lgvi_warp.common.safe_files import inside
@@ -49,7 +49,7 @@ def tables_and_text(
         SceneError: If the file cannot be read, is no TOML, or an override does not fit.
     """
     text = file_text(path, "scene file")
-    return tables_of_text(text, overrides, os.fspath(path), Path(path).parent), text
+    return tables_of_text(text, overrides, os.fspath(path), path_of("path", path).parent), text
 
 
 def tables_of_text(

@@ -85,6 +85,11 @@ def test_what_is_given_in_the_place_of_a_table_or_a_name_is_refused_by_its_key(o
             lw.Scene.from_dict(content)
 
 
+def test_a_path_of_bytes_is_refused_though_its_file_is_there():
+    with pytest.raises(lw.SceneError, match="is no path"):
+        lw.Scene.load(bytes(ROOT / "examples" / "paper.toml"))
+
+
 @pytest.mark.parametrize("large", [2**63, 2**70, -(2**70)])
 @pytest.mark.parametrize(
     "distribution", [{"lognormal": {"sigma": 0.0, "median": 1}}, {"uniform": {"low": 0, "high": 1}}]

@@ -11,6 +11,7 @@ from lgvi_warp.cli.output import tell
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.report import file_line
 from lgvi_warp.common.errors import NothingToDraw, SceneError
+from lgvi_warp.common.files import place_of
 
 
 def view(chosen: argparse.Namespace) -> int:
@@ -28,6 +29,8 @@ def view(chosen: argparse.Namespace) -> int:
         OSError: The viewer cannot be started, or the file cannot be written.
     """
     members, content = indices(chosen.members), run_in(chosen.dir)
+    if chosen.out is not None:
+        place_of(chosen.out)  # before the run is read: a fault of the recording is none of the run
     result = content.load()
     from lgvi_warp.views.rerun import log_rerun, show
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -132,6 +133,40 @@ def listed(key: str, value: Any, what: str) -> list[Any]:
         return list(value)
     except TypeError:
         raise refusal(key, value, "is no list", f"give a list of {what}") from None
+
+
+def mapping_of(key: str, value: Any, what: str) -> Mapping[Any, Any]:
+    """Read a mapping.
+
+    Args:
+        key: Name of the argument.
+        value: What the user gave.
+        what: What maps to what, as "names to numbers".
+
+    Returns:
+        The value.
+
+    Raises:
+        SceneError: It is none.
+    """
+    if not isinstance(value, Mapping):
+        raise refusal(key, value, "is no mapping", f"give a dict of {what}")
+    return value
+
+
+def ensemble_of(value: Any) -> Any:
+    """Read an ensemble.
+
+    Args:
+        value: What the user gave as `fleet`.
+
+    Returns:
+        The value.
+
+    Raises:
+        SceneError: It is none.
+    """
+    return of_kind("fleet", value, "scene members sampling", "an Ensemble", "give lw.Ensemble(scene, members)")
 
 
 def flag(key: str, value: Any) -> bool:

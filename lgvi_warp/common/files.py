@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import safe_files, scratch
+from lgvi_warp.common.arguments import path_of
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.safe_files import named
 from lgvi_warp.common.scratch import UNFINISHED
@@ -318,9 +319,10 @@ def place_of(path: str | os.PathLike[str], root: str | os.PathLike[str] | None =
         Its path without links.
 
     Raises:
-        SceneError: A folder, device, pipe or socket is there, or a link leads out of the folder.
+        SceneError: A folder, device, pipe or socket is there, a link leads out of the folder, or it is no path.
     """
-    target = Path(os.path.realpath(path)) if root is None else safe_files.inside(root, Path(path).relative_to(root))
+    path = path_of("path", path)
+    target = Path(os.path.realpath(path)) if root is None else safe_files.inside(root, path.absolute())
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
         if there := safe_files.kind(os.lstat(target).st_mode):
             raise SceneError([f"{path}: {there}, which is not replaced; give the name of a file"])

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from lgvi_warp.common import safe_files
+from lgvi_warp.common.arguments import path_of
 from lgvi_warp.common.errors import NothingToDraw, SceneError
 
 # Largest size of each kind of file [bytes]. Scenes and coefficients (YAML, XML) are written by hand or by a script; parsers
@@ -185,7 +186,7 @@ def understood(path: str | os.PathLike[str], what: str, remedy: str) -> Iterator
     Raises:
         SceneError: In place of any error that the content of the file causes.
     """
-    name = os.fspath(path)
+    name = str(path_of("path", path))
     try:
         yield
     except NothingToDraw:

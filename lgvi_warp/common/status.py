@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.errors import refusal
+from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.common.summaries import counted
 
 # Values of `checks` and `on_failure` in solve and in a scene's [run].
@@ -224,7 +226,12 @@ class WarningArray(np.ndarray):
 
         Returns:
             bool, shape (n,).
+
+        Raises:
+            SceneError: It is no warning.
         """
+        if not is_whole(warning, 0, np.iinfo(np.uint16).max):
+            raise refusal("warning", warning, "is no warning", "give one of lw.Warnings, or several joined by |")
         return (np.asarray(self) & int(warning)) != 0
 
     def worst(self) -> np.ndarray:

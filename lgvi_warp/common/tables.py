@@ -29,10 +29,9 @@ def write_csv(
         SceneError: What is there is no plain file, or lies outside the folder.
         OSError: The file cannot be written.
     """
-    target = Path(path)
     names = list(dict.fromkeys(key for row in rows for key in row))
-    with durable.placed(target, root) as beside, beside.open("x", newline="", encoding="utf-8") as file:
+    with durable.placed(path, root) as beside, beside.open("x", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, names)
         writer.writeheader()
         writer.writerows(rows)
-    return target
+    return Path(path)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import functools
-import operator
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -14,9 +13,9 @@ import numpy as np
 
 from lgvi_warp.common import machine, summaries
 from lgvi_warp.common.arguments import of_kind
-from lgvi_warp.common.errors import Faults, closest, cut, refusal, shown
+from lgvi_warp.common.errors import Faults, closest, cut, ragged, refusal, shown
 from lgvi_warp.common.labelled import columns_by_name, is_labelled, match
-from lgvi_warp.common.real_numbers import column_names
+from lgvi_warp.common.real_numbers import column_names, is_whole
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics import notation
 from lgvi_warp.physics import vehicle as vehicles
@@ -449,7 +448,7 @@ class Ensemble(Summarized):
         Raises:
             IndexError: If there are no such members.
         """
-        if not 0 <= first < stop <= self.members:
+        if not (is_whole(first, 0, self.members - 1) and is_whole(stop, int(first) + 1, self.members)):
             raise IndexError(f"members {first} to {stop} of {self.members}")
         m = stop - first
         values = self._values(first, stop)
@@ -506,7 +505,7 @@ class Ensemble(Summarized):
         Raises:
             IndexError: If this is no list of whole numbers, or there are no such members.
         """
-        chosen = np.asarray(indices)
+        chosen = np.asarray(None if ragged(indices) else indices)
         if chosen.ndim != 1 or not len(chosen) or chosen.dtype.kind not in "iu" or np.ma.is_masked(indices):
             raise IndexError(f"members {shown(indices)}: give a list of one or more whole numbers")
         if chosen.min() < 0 or chosen.max() >= self.members:
@@ -607,7 +606,7 @@ class Ensemble(Summarized):
         Raises:
             IndexError: If there is no such member.
         """
-        return self.subset([operator.index(index)])
+        return self.subset([index])
 
     @property
     def replicates(self) -> int:

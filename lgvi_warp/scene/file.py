@@ -10,7 +10,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from lgvi_warp.common.errors import SceneError, among, refusal
+from lgvi_warp.common.arguments import mapping_of, path_of
+from lgvi_warp.common.errors import SceneError, among, cut, refusal
 from lgvi_warp.common.reading import file_text
 from lgvi_warp.common.safe_files import inside
 from lgvi_warp.common.toml_text import parsed
@@ -48,7 +49,7 @@ def tables_and_text(
         SceneError: If the file cannot be read, is no TOML, or an override does not fit.
     """
     text = file_text(path, "scene file")
-    return tables_of_text(text, overrides, os.fspath(path), Path(path).parent), text
+    return tables_of_text(text, overrides, os.fspath(path), path_of("path", path).parent), text
 
 
 def tables_of_text(
@@ -69,7 +70,8 @@ def tables_of_text(
         SceneError: If the text is no TOML, or an override does not fit.
     """
     content = parsed(text, name)
-    for key, value in (overrides or {}).items():
+    given = {} if overrides is None else mapping_of("overrides", overrides, "dotted keys to values")
+    for key, value in given.items():
         override(content, key, value)
     return _files_in(folder, content) if folder else content
 
@@ -136,11 +138,11 @@ def override(content: dict[str, Any], key: str, value: Any) -> None:
     Raises:
         SceneError: If the key is not dotted, its section is no table, or the text holds several values.
     """
-    if isinstance(value, str):
+    section, _, rest = key.partition(".") if isinstance(key, str) else ("", "", "")
+    if isinstance(value, str) and rest:
         value = _value_of(key, value)
-    section, _, rest = key.partition(".")
     if not rest:
-        raise SceneError([f"{key}: is not a dotted key; write section.key=value, such as vehicle.mass=120"])
+        raise SceneError([f"{cut(key)}: is not a dotted key; write section.key=value, such as vehicle.mass=120"])
     table = content.setdefault(section, {})
     if section == "ensemble" and rest.startswith("vary.") and isinstance(table, dict):
         table, rest = table.setdefault("vary", {}), rest.removeprefix("vary.").strip("\"'")

@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from lgvi_warp.common.arguments import mapping_of
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.physics.control.base import SECTIONS
 from lgvi_warp.scene import variations
@@ -33,7 +34,7 @@ def with_numbers(scene: SceneT, numbers: Mapping[str, Any]) -> SceneT:
     """
     base, faults = scene.parameters(), Faults()
     changes: dict[str, dict[str, Any]] = {}
-    for name, value in numbers.items():
+    for name, value in mapping_of("numbers", numbers, "names to numbers").items():
         target, *others = variations.targets(name)
         key, _, attribute = target.name.rpartition(".")
         known = (*base, *SETTINGS, *(f"start.{entry}" for entry in NAMES))

@@ -13,6 +13,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
+from lgvi_warp.common.arguments import path_of
+from lgvi_warp.common.errors import among
 from lgvi_warp.common.files import write_text
 from lgvi_warp.common.reading import file_json, understood
 from lgvi_warp.common.tables import write_csv
@@ -135,7 +137,8 @@ class Saved(ABC):
         Raises:
             OSError: where they cannot be written.
         """
-        target, name = Path(folder), name or self.study
+        target = path_of("folder", folder)
+        name = self.study if among(name, ("",)) else str(path_of("name", name))
         target.mkdir(parents=True, exist_ok=True)
         text = write_text(target / f"{name}.json", self.to_json(), target)
         return [text, write_csv(self.rows(), target / f"{name}.csv", target)]

@@ -133,8 +133,14 @@ class Tradeoff(Saved):
 
         Returns:
             Measurements in order of rising cost.
+
+        Raises:
+            SceneError: where the trade-off has no such quantity or kind.
         """
-        of = of or self.of
+        of, faults = self.of if of is None else of, Faults()
+        faults.choice("of", of, (self.of, *self.units))
+        faults.choice("kind", kind, KINDS)
+        faults.raise_if_any()
         good = [
             measurement
             for measurement in self.measurements

@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 # A picture of more bytes is drawn in pixels, so that the file stays small.
 MOST_SVG = 1_000_000
+# Most bytes of the pictures of studies that it holds; one has some tens of kilobytes.
+MOST_PICTURES = 100_000_000
 # Rows of a table of a study that the report shows; its CSV file has all.
 MOST_ROWS = 200
 # Pictures that lgvi-warp run writes.
@@ -273,8 +275,13 @@ def _of_study(path: Path) -> Iterator[str]:
 
 def _pictures_in(folder: Path, has_run: bool) -> list[Path]:
     """Pictures of studies in a folder; those of a run are drawn anew."""
-    return [inside(folder, path.name) for path in sorted(folder.glob("*.png"))
-            if not (has_run and path.name in OF_A_RUN)]  # fmt: skip
+    pictures = [inside(folder, path.name) for path in sorted(folder.glob("*.png"))
+                if not (has_run and path.name in OF_A_RUN)]  # fmt: skip
+    # One large file may have many names.
+    if (size := sum(path.stat().st_size for path in pictures)) > MOST_PICTURES:
+        fault = f"its pictures have {size / 1e6:,.0f} MB, more than the {MOST_PICTURES / 1e6:,.0f} MB of a report"
+        raise SceneError([f"{folder}: {fault}; take some away"])
+    return pictures
 
 
 def _rows_in(path: Path) -> list[list[str]]:

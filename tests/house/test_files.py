@@ -42,14 +42,32 @@ def called(node):
         return f"{whose}.{name}"
     if name == "open":
         mode = node.args[0] if node.args else next((item.value for item in node.keywords if item.arg == "mode"), None)
+        if not node.args and mode is None:
+            return "open"
         return "open" if isinstance(mode, ast.Constant) and str(mode.value)[:1] in "rwxa" else None
     return name if name in FORBIDDEN else None
 
 
+def imported(node):
+    """Forbidden names that an import gives other names, so that a call would not show them."""
+    if isinstance(node, ast.ImportFrom):
+        module = {"numpy": "np"}.get(node.module, node.module)
+        return [name for item in node.names if (name := f"{module}.{item.name}") in FORBIDDEN]
+    usual = {"numpy": "np"}
+    return [f"{item.name} as {item.asname}" for item in node.names
+            if item.asname not in (None, usual.get(item.name))
+            and any(name.startswith(f"{usual.get(item.name, item.name)}.") for name in FORBIDDEN)]  # fmt: skip
+
+
 def opened(source):
-    """(line, name) of each call that opens a file in a source."""
-    nodes = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.Call))
-    return [(node.lineno, name) for node in nodes if (name := called(node)) is not None]
+    """(line, name) of each call that opens a file in a source, and of each import that hides one."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            found += [(node.lineno, name) for name in imported(node)]
+        elif isinstance(node, ast.Call) and (name := called(node)) is not None:
+            found.append((node.lineno, name))
+    return found
 
 
 @pytest.mark.parametrize(
@@ -59,6 +77,10 @@ def opened(source):
         ("import numpy as np\nx = np.load(p)", {"np.load"}),
         ("with path.open('rb') as file: pass", {"open"}),
         ("with open(path) as file: pass", {"open"}),
+        ("with path.open() as file: pass", {"open"}),
+        ("from json import dumps, loads", {"json.loads"}),
+        ("from numpy import load as read", {"np.load"}),
+        ("import numpy as numbers, json, os", {"numpy as numbers"}),
         ("statistic.open(time, 3); webbrowser.open(uri); text.replace('a', 'b')", set()),
     ],
 )

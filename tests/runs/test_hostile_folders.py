@@ -220,6 +220,44 @@ def test_verbs_replace_nothing_but_plain_files_of_the_folder(base, kind, theirs,
         shutil.rmtree(path / name) if odd[name] and (path / name).is_dir() else (path / name).unlink()
 
 
+STUDIES = {
+    "tradeoff": ["--members", 4, "--duration", 0.1, "--methods", "psi_s"],
+    "sensitivity": ["--samples", 8, "--duration", 0.1],
+    "stability": ["--points", 2, "--duration", 0.1, "--methods", "psi_s"],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.kernel
+@pytest.mark.parametrize("kind", hostile.PLACES)
+@pytest.mark.parametrize("verb", STUDIES)
+def test_a_study_that_is_run_replaces_nothing_but_plain_files_of_its_folder(verb, kind, home, capsys):  # noqa: F811
+    out, asked = home.parent / "study", [verb, SCENE, *STUDIES[verb], "--quiet", "--out"]
+    out.mkdir()
+    for ending in ("json", "csv", "png"):
+        name = f"{verb}.{ending}"
+        occupied(out / name, kind, home)
+        before, odd = snapshot(home), special(out)
+        assert cli.main([*map(str, asked), str(out)]) in (1, 2)
+        text = capsys.readouterr().err
+        assert name in text and text.count("\n") == 1 and ("not replaced" in text or hostile.OUT in text)
+        assert snapshot(home) == before and special(out) == odd
+        shutil.rmtree(out)
+        out.mkdir()
+        (home / "pipe").unlink(missing_ok=True)
+
+
+@pytest.mark.parametrize("verb", ["view", "merge"])
+@pytest.mark.parametrize("kind", ["a link to a device", "a pipe", "a socket"])
+def test_the_place_is_told_and_not_the_run(verb, kind, theirs, good, home, capsys):  # noqa: F811
+    run, out = (theirs("result"), home.parent / "a.rrd") if verb == "view" else (good / "run.zarr", home.parent / "a")
+    occupied(out, kind, home)
+    before = out.lstat()
+    assert cli.main([verb, str(run), "--out", str(out)]) == 2
+    text = capsys.readouterr().err
+    assert text.startswith(f"lgvi-warp: {out}: is a ") and text.count("\n") == 1 and out.lstat().st_ino == before.st_ino
+
+
 WRITERS = {
     "a result": lambda path: flown().save(path),
     "a table": lambda path: tradeoff_of(4.0).to_csv(path),

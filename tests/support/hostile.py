@@ -146,6 +146,17 @@ def content(name, data):
     return harm
 
 
+def often(name, size, count):
+    """A file of so many zeros, and links to it beside it."""
+
+    def harm(path, home):
+        sized(name, size)(path, home)
+        for i in range(count):
+            (path / f"{i}{name}").symlink_to(name)
+
+    return harm
+
+
 def sized(name, size):
     """A file of so many zeros, which take no room."""
 
@@ -577,6 +588,7 @@ FOLDERS = {
     "tradeoff: a picture is a link": ("tradeoff", link("x.png", "secret"), None),
     "tradeoff: a picture is a link to zeros": ("tradeoff", link("x.png", "/dev/zero"), None),
     "tradeoff: a picture is a pipe": ("tradeoff", special("x.png", os.mkfifo), None),
+    "tradeoff: a picture has 200 names": ("tradeoff", often("x.png", 10**7, 200), None),
     "tradeoff: a picture has 50 GB": ("tradeoff", sized("x.png", 50 * 10**9), None),
     "tradeoff: a name writes on the terminal": ("tradeoff", named("\x1b]0;x\x07\x1b[2J.png"), None),
     "tradeoff: a name of two lines": ("tradeoff", named("a\nb.csv"), None),

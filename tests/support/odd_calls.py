@@ -205,3 +205,44 @@ def odd_calls(scene, fleet, result, folder):
                 # What a user's function raises is his own.
                 if not (parameter.name in CALLED and callable(odd)):
                     yield f"{name}({parameter.name}=ODD[{i}])", function, {**given, parameter.name: odd}
+
+
+def odd_calls_within(scene, result, folder, studies):
+    """The same of what is not named in `lw` itself: pictures, sensitivity, and methods of objects; studies: by their class."""
+    rows = [
+        {"members": 4, "threads": 1, "method": "rk4", "term": "drag", "dtype": "float64", "ns_per_member_step": 9.0}
+    ]
+    saltelli = lw.Ensemble(scene, None, 1, {"vehicle.buoyancy": lw.Normal(relative=0.01)}, lw.Saltelli(replicates=2))
+    path = folder / "within.png"
+    pictures = {
+        name: {"result": result, "results": {"a": result}, "rows": rows, "path": path, "figure": None, "found": None}
+        for name in ("attitude", "compare", "drift", "fan", "histogram", "margins", "outcomes", "pairs", "paths", "phase",
+                     "plan_view", "save_figure", "scaling", "statistics", "summary", "term_cost")
+    }  # fmt: skip
+    asked = {
+        "scene": scene,
+        "of": "depth",
+        "fleet": saltelli,
+        "outputs": None,
+        "vary": ["vehicle.mass"],
+        "h": 0.1,
+        "t1": 0.2,
+    }
+    called = [(f"plots.{name}", getattr(lw.plots, name), given) for name, given in pictures.items()]
+    called += [(f"uq.{name}", getattr(lw.uq, name), asked) for name in ("evaluate", "model", "morris_of", "sobol_of")]
+    of_file = {"path": folder / "none.json", "folder": folder / "within"}
+    methods = [(scene, "with_numbers", {}), (result, "save", {"path": folder / "a.npz"}), (result, "load", of_file),
+               (result.warnings, "has", {}), (lw.terms, "register_term", {})]  # fmt: skip
+    methods += [
+        (study, name, of_file) for study in studies for name in ("load", "save", "to_csv") if hasattr(study, name)
+    ]
+    methods += [(study, name, {}) for study in studies for name in ("shown", "front") if hasattr(study, name)]
+    called += [(f"{type(one).__name__}.{name}", getattr(one, name), given) for one, name, given in methods]
+    for label, function, goods in called:
+        known = [p for p in inspect.signature(function).parameters.values() if p.kind is not p.VAR_KEYWORD]
+        given = {p.name: goods[p.name] for p in known if p.default is p.empty and p.name in goods}
+        for parameter in known:
+            for i, odd in enumerate(ODD):
+                # A function of the user's may raise what it likes; nothing is drawn where nothing is odd.
+                if not (callable(odd) or (odd is None and parameter.default is None)):
+                    yield f"{label}({parameter.name}=ODD[{i}])", function, {**given, parameter.name: odd}

@@ -160,14 +160,6 @@ class Part(Term):
         object.__setattr__(part, "bus", bus)
         return part
 
-    def check_scene(self, faults: Faults, h: float) -> None:
-        """Add a fault for each number that does not fit the run.
-
-        Args:
-            faults: Collects the faults.
-            h: Step of the run [s].
-        """
-
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The numbers as they are: a controller works in the user's axes."""
         if self.lanes() is None:

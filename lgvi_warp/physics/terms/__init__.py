@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from lgvi_warp.common import registry
-from lgvi_warp.common.errors import Faults, closest, refusal
+from lgvi_warp.common.errors import Faults, among, closest, refusal
 from lgvi_warp.common.names import folded
 from lgvi_warp.physics.terms.base import AnyTerm, Term, build, check_list
 from lgvi_warp.physics.terms.hydrostatics import Restoring, Weight
@@ -40,6 +40,8 @@ def register_term(kind: type[AnyTerm]) -> type[AnyTerm]:
     Raises:
         ValueError: Where `type` is empty or taken by another class.
     """
+    if not isinstance(kind, type) or not hasattr(kind, "kinds"):
+        raise refusal("kind", kind, "is no class of a term", "give a subclass of lw.Term")
     if not registry.add(kind.kinds, kind):
         former = kind.kinds.get(kind.type)
         problem = f"is that of {former.__module__}.{former.__qualname__}" if former else "is missing"
@@ -92,7 +94,7 @@ def _from_table(where: str, table: Any) -> Term:
     implied = [term.type for term in IMPLIED]
     kind = TYPES.get(word) if isinstance(word, str) else None
     if kind is None or word in implied:
-        follows = word in (*implied, "buoyancy")
+        follows = among(word, (*implied, "buoyancy"))
         known = sorted(TYPES.keys() - implied)
         remedy = "leave it out: it follows from the vehicle" if follows else closest(word, known)
         raise refusal(f"{where}.type", word, "is not known", remedy)

@@ -53,6 +53,8 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
             raise SceneError(f"{text}: {remedy}" for text in mismatches or ["another recipe"])
     target = Path(out)
     if target.suffix != ".zarr":
+        if os.path.lexists(target) and not target.is_dir():
+            raise SceneError([f"{target}: is a file; give a folder"])
         safe_files.inside(target, first.path.name)
         target /= first.path.name
     with explained(target), held(target):

@@ -46,7 +46,10 @@ class Saltelli(Sampling):
         faults = Faults("ensemble.sampling.saltelli.")
         faults.choice("second_order", self.second_order, (True, False))
         check_replicates(faults, self.replicates)
-        given, example = self.groups or (), 'give {"start": ["start.position", "start.velocity"]}'
+        given, example = (
+            () if self.groups is None else self.groups,
+            'give {"start": ["start.position", "start.velocity"]}',
+        )
         pairs = list(
             given.items() if isinstance(given, Mapping) else given if isinstance(given, list | tuple) else [given]
         )

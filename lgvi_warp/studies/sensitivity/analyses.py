@@ -4,11 +4,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, MissingExtra, SceneError
+from lgvi_warp.common.arguments import ensemble_of, of_kind
+from lgvi_warp.common.errors import Faults, MissingExtra, SceneError, refusal
 from lgvi_warp.common.status import Status
 from lgvi_warp.runs.quantities import OfInterest
 from lgvi_warp.sampling.designs.base import Sampling
@@ -20,6 +21,8 @@ from lgvi_warp.scene.settings import EnsembleSettings
 from lgvi_warp.studies.sensitivity.estimates import sobol_estimates
 from lgvi_warp.studies.sensitivity.indices import MorrisEffects, SobolIndices
 from lgvi_warp.studies.sensitivity.outputs import FailedMembers, Outputs, evaluate, known_arguments
+
+Design = TypeVar("Design", bound=Sampling)
 
 FAILED = ("refuse", "drop")
 # A quantity whose range is below this part of its size varies by round-off alone.
@@ -100,8 +103,7 @@ def sobol_of(fleet: Ensemble, outputs: Outputs, *, confidence: float = 0.95, fai
     Raises:
         FailedMembers: where members failed and the indices cannot be computed from the others.
     """
-    design = fleet.sampling
-    assert isinstance(design, Saltelli)
+    design = _design_of(fleet, outputs, Saltelli)
     factors, group = design.factors(fleet.space), design.group_size(fleet.space)
     order = _order(fleet, factors)
     Y, messages = whole_groups(outputs, group, failed)
@@ -125,6 +127,16 @@ def sobol_of(fleet: Ensemble, outputs: Outputs, *, confidence: float = 0.95, fai
         second=second if design.second_order else None,
         second_confidence=second_half if design.second_order else None,
     )
+
+
+def _design_of(fleet: Ensemble, outputs: Outputs, kind: type[Design]) -> Design:
+    """The design of an ensemble that was run, of one kind. Raises SceneError for another one."""
+    of_kind("outputs", outputs, "values labels failed counts", "of lw.uq.evaluate", "give what it returns")
+    design = ensemble_of(fleet).sampling
+    if not isinstance(design, kind):
+        example = f"give lw.Ensemble(..., sampling=lw.{kind.__name__}())"
+        raise refusal("fleet.sampling", design, f"is not lw.{kind.__name__}", example)
+    return design
 
 
 def _order(fleet: Ensemble, factors: Factors) -> list[int]:
@@ -194,8 +206,7 @@ def morris_of(
         ImportError: without SALib.
     """
     analyze = salib()
-    design, space = fleet.sampling, fleet.space
-    assert isinstance(design, Morris)
+    design, space = _design_of(fleet, outputs, Morris), fleet.space
     group = design.group_size(space)
     kept = _good_rows(outputs, group, failed)
     Y, messages = whole_groups(outputs, group, failed)

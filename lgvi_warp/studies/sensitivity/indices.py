@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common.arguments import path_of
 from lgvi_warp.common.files import write_text
 from lgvi_warp.common.reading import file_json
 from lgvi_warp.common.tables import write_csv
@@ -161,7 +162,7 @@ class Indices:
         Raises:
             OSError: where they cannot be written.
         """
-        target = Path(folder)
+        target = path_of("folder", folder)
         target.mkdir(parents=True, exist_ok=True)
         paths = [target / f"sensitivity.{ending}" for ending in ("txt", "csv", "json")]
         write_text(paths[0], f"{self}\n", target)

@@ -11,6 +11,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
+from lgvi_warp.common.arguments import ensemble_of, flag
 from lgvi_warp.common.errors import closest
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import failed
@@ -115,6 +116,7 @@ def evaluate(
         SceneError: for faulty arguments, and where a path is needed and no sampling interval is known.
     """
     interests, report = quantities(of), callback(progress)
+    ensemble_of(fleet), flag("common_noise", common_noise)
     how = {name: settings.pop(name) for name in ("threads", "executor", "scheduler") if name in settings}
     # The scene's own statistics, keep and until do not apply: every member of the design must run.
     gathered = statistics_for(fleet.scene, interests)

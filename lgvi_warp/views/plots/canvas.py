@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import files as durable
-from lgvi_warp.common.arguments import file_path
+from lgvi_warp.common.arguments import file_path, of_kind
 from lgvi_warp.common.errors import MissingExtra
 from lgvi_warp.common.status import Status
 from lgvi_warp.views.fleet import LOOKS
@@ -67,6 +67,7 @@ def save_figure(figure: Any, path: str | os.PathLike[str], dpi: int = DPI) -> Pa
     Raises:
         OSError: The file cannot be written.
     """
+    of_kind("figure", figure, "savefig", "a figure of Matplotlib", "give one, as axes.figure")
     target = file_path("path", path)
     with durable.placed(target) as beside:
         figure.savefig(beside, dpi=dpi, format=target.suffix.removeprefix(".") or "png")
@@ -92,7 +93,10 @@ def panel(
         ImportError: Matplotlib is not installed (extra: viz).
         OSError: The file cannot be written.
     """
-    figure = figure_class()(figsize=size, layout="constrained") if ax is None else ax.figure
+    of_class = figure_class()
+    if ax is not None:
+        of_kind("ax", ax, "figure plot", "axes of Matplotlib", "give those that plt.subplots returns, or leave it out")
+    figure = of_class(figsize=size, layout="constrained") if ax is None else ax.figure
     with drawing(figure, path, ax is None):
         yield figure.add_subplot(projection=projection) if ax is None else ax
 
@@ -122,6 +126,8 @@ def panels(
         OSError: The file cannot be written.
     """
     of_class = figure_class()
+    if figure is not None:
+        of_kind("figure", figure, "subplots get_figure", "a figure of Matplotlib", "give plt.figure(), or leave it out")
     target = of_class(figsize=size, layout="constrained") if figure is None else figure
     with drawing(target, path, figure is None):
         yield target.subplots(*shape, squeeze=False, **options)
@@ -138,6 +144,8 @@ def drawing(figure: Any, path: str | os.PathLike[str] | None, sized: bool) -> It
     """
     import matplotlib as mpl
 
+    if path is not None:
+        durable.place_of(file_path("path", path))  # before anything is drawn
     size = text_size(figure)
     settings = dict.fromkeys(
         (

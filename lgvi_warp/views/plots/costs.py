@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.reading import file_text
 from lgvi_warp.common.safe_files import parsed
@@ -122,7 +123,8 @@ def measured(rows: Rows, keys: tuple[str, ...], remedy: str) -> list[Mapping[str
     """
     if isinstance(rows, str | os.PathLike):
         rows = [parsed(line) for line in file_text(rows, "cost file").splitlines() if line.startswith("{")]
-    points = [row for row in rows if all(key in row for key in (*keys, COST))]
+    rows = listed("rows", rows, "rows")
+    points = [row for row in rows if isinstance(row, Mapping) and all(key in row for key in (*keys, COST))]
     if not points:
         raise NothingToDraw(f"no row has {', '.join(keys)} and {COST}: there is nothing to draw; give rows of {remedy}")
     return points

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import of_kind
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views.plots.canvas import panels, style, wrapped
 
@@ -42,6 +43,7 @@ def margins(found: Margins, *, figure: Any = None, path: str | os.PathLike[str] 
         NothingToDraw: No member has margins; the message says why.
         OSError: The file cannot be written.
     """
+    of_kind("found", found, "steady values by_runs", "of lw.margins", "give what lw.margins returns")
     steady = np.asarray(found.steady)
     if not steady.any():
         raise NothingToDraw(f"none of the {found.members} members has margins ({found.told}): there is nothing to draw")

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import NothingToDraw, refusal
+from lgvi_warp.common.arguments import listed, result_of
+from lgvi_warp.common.errors import Faults, NothingToDraw, refusal
 from lgvi_warp.common.status import Status, stop_time
 from lgvi_warp.runs import outcomes as ended_so
 from lgvi_warp.runs.quantities import OfResult, quantities
@@ -47,6 +48,7 @@ def outcomes(result: Result, *, ax: Any = None, path: str | os.PathLike[str] | N
         ImportError: Matplotlib is not installed (extra: viz).
         OSError: The file cannot be written.
     """
+    result_of(result)
     with panel(ax, path) as axes:
         draw_outcomes(axes, result)
         if ax is None:
@@ -114,7 +116,10 @@ def histogram(
         OSError: The file cannot be written.
     """
     (meaning,) = quantities([of])
-    estimate = None if result.samples else estimate_for(result, meaning.label, ("histogram",))
+    faults = Faults()
+    at = None if at is None else faults.number("at", at, "s")
+    faults.raise_if_any()
+    estimate = None if result_of(result).samples else estimate_for(result, meaning.label, ("histogram",))
     result = result if estimate else with_samples(result)
     edges, when, unit, shares = _gathered(*estimate, at) if estimate else _counted(result, meaning, at)
     down = meaning.label in DEPTHS
@@ -224,7 +229,7 @@ def pairs(
     choice = shown(result, MOST_POINTS)
     columns: list[np.ndarray] = []
     names: list[str] = []
-    for meaning in quantities(list(of)):
+    for meaning in quantities(listed("of", of, "quantities")):
         values, labels, unit = at_one_time(result, meaning, choice.members)
         columns += list(values.T)
         names += [f"{in_words(label)} [{unit or '1'}]{', down' * (label in DEPTHS)}" for label in labels]

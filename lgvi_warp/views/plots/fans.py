@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import mapping_of, result_of
 from lgvi_warp.common.errors import NothingToDraw, refusal
 from lgvi_warp.common.status import Status, failed, stop_time
 from lgvi_warp.runs.outcomes import outcomes
@@ -55,7 +56,7 @@ def fan(result: Result, of: Any = "depth", *, ax: Any = None, path: str | os.Pat
         OSError: The file cannot be written.
     """
     meaning = quantity_of(of)
-    estimate = None if result.samples else estimate_for(result, meaning.name, STANDING)
+    estimate = None if result_of(result).samples else estimate_for(result, meaning.name, STANDING)
     if estimate is None:
         result = with_samples(result)
     with panel(ax, path) as axes:
@@ -219,6 +220,8 @@ def compare(
         SceneError: There are no results, or the quantity is not known or has several components.
         OSError: The file cannot be written.
     """
+    for result in mapping_of("results", results, "labels to results").values():
+        result_of(result)
     if not results:
         raise refusal("results", results, "holds no result", "give results by label: {'a': a, 'b': b}")
     meaning = quantity_of(of)

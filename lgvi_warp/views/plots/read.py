@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import result_of, whole
 from lgvi_warp.common.errors import NothingToDraw, refusal
 from lgvi_warp.common.status import under_way
 from lgvi_warp.physics import energy as invariants
@@ -70,8 +71,9 @@ def with_samples(result: Result) -> Result:
 
     Raises:
         NothingToDraw: No samples were kept.
+        SceneError: It is no result.
     """
-    if result.samples:
+    if result_of(result).samples:
         return result
     if result.kept is not None:
         return result.kept
@@ -98,7 +100,7 @@ def selected(result: Result, most: int, fields: tuple[str, ...], what: str) -> t
     """
     result = with_samples(result)
     check_fields(result, fields, what)
-    choice = shown(result, most)
+    choice = shown(result, whole("most", most, 1))
     return result, choice, few(result, choice.members, fields, choice.frames)
 
 

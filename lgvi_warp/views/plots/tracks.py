@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from lgvi_warp.common.arguments import listed, whole
+from lgvi_warp.common.errors import refusal
 from lgvi_warp.common.status import Status, under_way
 from lgvi_warp.views.plots.canvas import COLORS, STYLES, below, mark, outcome_style, panel, point_down, wrapped
 from lgvi_warp.views.plots.read import numbers, quantity_of, selected, with_samples
@@ -135,7 +137,10 @@ def phase(
         SceneError: A quantity is not known, or has several components.
         OSError: The file cannot be written.
     """
-    across, upward = (quantity_of(item) for item in of)
+    names = listed("of", of, "two quantities")
+    if len(names) != 2:
+        raise refusal("of", of, f"names {len(names)} quantities", "name two, the horizontal one and the vertical one")
+    across, upward = map(quantity_of, names)
     fields = tuple(dict.fromkeys(("position", *across.fields, *upward.fields)))
     result, choice, some = selected(result, most, fields, "a phase portrait")
     x, y = (numbers(result, meaning, choice.members, choice.frames) for meaning in (across, upward))
@@ -199,7 +204,9 @@ def attitude(
         NothingToDraw: No attitudes were kept, or no member has a finite start.
         OSError: The file cannot be written.
     """
-    result, choice, some = selected(result, max(most, MOST_PATHS), ("position", "attitude"), "attitudes")
+    result, choice, some = selected(
+        result, max(whole("most", most, 1), MOST_PATHS), ("position", "attitude"), "attitudes"
+    )
     # Of the choice those that are under way longest: one that fails at once has no path.
     longest = np.sort(np.argsort(-under_way(some).sum(axis=0), kind="stable")[:most])
     choice, some = replace(choice, members=choice.members[longest]), some.part(longest)

@@ -11,6 +11,8 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw
 from tests.support import odd_calls
+from tests.unit.cli.test_terminal import region, sobol
+from tests.unit.studies.test_cost import found as tradeoff_of
 
 # What a call may end with: the refusal, a picture of nothing, a library that is not installed, a file that is not there.
 DELIBERATE = (lw.SceneError, NothingToDraw, MissingExtra, OSError)
@@ -29,7 +31,7 @@ def given(tmp_path_factory):
 
 @pytest.fixture(autouse=True)
 def elsewhere(tmp_path, monkeypatch):
-    """Odd names of files are names in a folder of the test."""
+    """A text is a path too: what is written there is not left in the folder of the tests."""
     monkeypatch.chdir(tmp_path)
 
 
@@ -62,6 +64,42 @@ def test_no_odd_call_ends_in_a_raw_error(given):
     calls = [call for call in odd_calls.odd_calls(*given) if call[0].split("(")[0] not in LONG]
     some = np.random.default_rng(5).choice(len(calls), 600, replace=False)
     assert raw_of(calls[i] for i in some) == []
+
+
+@pytest.mark.slow
+@pytest.mark.kernel
+def test_no_odd_call_of_a_picture_or_a_method_ends_in_a_raw_error(given):
+    scene, _, result, folder = given
+    assert raw_of(odd_calls.odd_calls_within(scene, result, folder, (tradeoff_of(4.0), sobol(), region()))) == []
+
+
+@pytest.mark.parametrize(
+    "draw", ["attitude", "drift", "fan", "histogram", "outcomes", "pairs", "paths", "phase", "plan_view"]
+)
+@pytest.mark.parametrize("odd", [None, 3, "x", np.zeros(3), lw.Result])
+def test_pictures_are_of_results(draw, odd):
+    with pytest.raises(lw.SceneError, match=r"^result = .*is not a Result; give what lw.solve"):
+        getattr(lw.plots, draw)(odd)
+
+
+@pytest.mark.parametrize("odd", [None, 3, "", "a\0b", b"x", object()])
+def test_what_is_no_path_is_told_before_anything_is_read_or_written(odd):
+    for call in (tradeoff_of(4.0).save, tradeoff_of(4.0).to_csv, sobol().save, type(region()).load, lw.Result.load):
+        with pytest.raises(lw.SceneError, match=r"(path|folder) = .*(is no path|is empty|null character)"):
+            call(odd)
+
+
+@pytest.mark.parametrize("odd", [None, "x", 2.5, True, [[1.0], [1.0, 2.0]], np.zeros(3), 10**400, -1])
+def test_members_that_are_none_are_told_by_index(odd):
+    fleet = lw.Ensemble(lw.Scene(lw.Vehicle(**odd_calls.BODY)), 4)
+    for call in (
+        fleet.member,
+        fleet.subset,
+        lambda index: fleet.select(index, 2),
+        lambda index: fleet.select(0, index),
+    ):
+        with pytest.raises(IndexError, match=r"^members "):
+            call(odd)
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.scene.schema import schema
+from tests.conftest import ROOT
 from tests.support.drawn_scenes import drawn_scene
 
 SCHEMA = schema()
@@ -68,6 +69,25 @@ def test_what_once_ended_in_a_traceback_is_refused_by_name(content, key):
     with pytest.raises(lw.SceneError) as caught:
         lw.Scene.from_dict(content)
     assert key in str(caught.value)
+
+
+@pytest.mark.parametrize("odd", [1, True, "x", ["vehicle"], 10**400, b"x", np.zeros(3), object, {1: 2}, {"": 1}])
+def test_what_is_given_in_the_place_of_a_table_or_a_name_is_refused_by_its_key(odd):
+    with pytest.raises(lw.SceneError, match=r"overrides|1|names no|empty"):
+        lw.Scene.load(ROOT / "examples" / "paper.toml", odd)
+    for content, key in (
+        ({"vehicle": BODY, "terms": [{"type": odd}]}, r"terms\[0\].type"),
+        ({"vehicle": {"name": odd}}, "vehicle"),
+        ({"vehicle": BODY, "events": [{"type": odd}]}, r"events\[0\].type"),
+        ({"vehicle": BODY, "controller": {"period": 0.1, "laws": [{"type": odd}]}}, "laws"),
+    ):
+        with pytest.raises(lw.SceneError, match=key):
+            lw.Scene.from_dict(content)
+
+
+def test_a_path_of_bytes_is_refused_though_its_file_is_there():
+    with pytest.raises(lw.SceneError, match="is no path"):
+        lw.Scene.load(bytes(ROOT / "examples" / "paper.toml"))
 
 
 @pytest.mark.parametrize("large", [2**63, 2**70, -(2**70)])

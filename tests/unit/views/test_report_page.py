@@ -195,7 +195,15 @@ WITHOUT = {
 def test_a_plain_install_ends_in_a_line_and_one_exit_code(verb, tmp_path, monkeypatch, capsys):
     """Libraries of extras are not there: what a verb cannot do without is named with its extra."""
     fleet(9, 5).save(tmp_path / "result.npz")
-    for name in ("matplotlib", "matplotlib.figure", "tomlkit", "rerun", "SALib", "SALib.sample", "SALib.analyze.sobol"):
+    for name in (
+        "matplotlib",
+        "matplotlib.figure",
+        "tomlkit",
+        "rerun",
+        "SALib",
+        "SALib.sample",
+        "SALib.analyze.morris",
+    ):
         monkeypatch.setitem(sys.modules, name, None)
     assert cli.main(WITHOUT[verb](tmp_path)) == 2
     said = capsys.readouterr()

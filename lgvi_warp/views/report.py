@@ -241,20 +241,16 @@ def _settings(result: Result) -> Iterator[tuple[str, str]]:
     yield "step", f"{provenance['step']:g} s, {provenance['steps']:,} steps"
     yield "numbers", str(provenance["dtype"])
     yield "members", f"{result.members:,}"
-    if (seed := provenance["scene"].get("ensemble", {}).get("seed")) is not None:
+    if (seed := provenance.get("ensemble", {}).get("seed")) is not None:
         yield "seed", str(seed)
     yield "versions", ", ".join(f"{name} {version}" for name, version in provenance["versions"].items())
     yield "machine", ", ".join(str(value) for value in provenance["machine"].values())
 
 
 def _again(result: Result) -> str:
-    """The command that runs it again, and the scene; a law that is a Python function is in neither."""
-    name, command, text = again(result.provenance)
-    if command is None:
-        how = _paragraph("A law is a Python function, which no file holds: run the script again. The scene but for it:")
-    else:
-        how = _paragraph(f"Save this scene as {name}, then:") + _preformatted(command)
-    return how + _preformatted(text)
+    """The command that runs it again, and the scene."""
+    command, said, text = again(result.provenance)
+    return _paragraph(said) + (_preformatted(command) if command else "") + _preformatted(text)
 
 
 def _of_study(path: Path) -> Iterator[str]:

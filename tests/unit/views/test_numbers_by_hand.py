@@ -423,6 +423,7 @@ def test_the_page_of_a_run_by_hand(tmp_path, monkeypatch):
     method = {"name": "psi_x", "chosen": "since drag acts"}
     machine = {"cpu": "a cpu", "threads": 2}
     more = {"scene": scene, "method": method, "machine": machine, "versions": {"numpy": "2"}, "steps": 15000}
+    more["ensemble"] = {"members": 10, "seed": 4}
     result = dataclasses.replace(result, provenance=result.provenance | more)
     text = lw.report(result, tmp_path / "a.html").read_text(encoding="utf-8")
     assert text.startswith('<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>A &amp; B</title><style>')

@@ -188,6 +188,23 @@ def test_what_cannot_be_drawn_says_why():
     assert words.unit_of("depth") == "m" and words.unit_of("my own number") == ""
 
 
+def test_factors_without_effect_take_no_rows():
+    """Of three factors the second has indices of zero for both quantities, the third for one of them."""
+    numbers = np.array([[0.7, 0.0, 0.0], [0.4, 0.0, 0.6]])
+    found = SimpleNamespace(name="Sobol indices", quantities=["depth", "speed"], factors=["a", "b", "c"], samples=8, members=80,
+                            failed=0, confidence=0.95, columns=["first", "total"], first=numbers, total=numbers,
+                            intervals={"first": "half"}, half=0.1 * numbers)  # fmt: skip
+    left, right = lw.plots.sensitivity(found)
+    assert [label.get_text() for label in left.get_yticklabels()] == ["a", "c"]
+    for axes, widths in ((left, [0.7, 0.0]), (right, [0.4, 0.6])):
+        assert [[bar.get_width() for bar in bars] for bars in axes.containers if hasattr(bars, "patches")] == [
+            widths
+        ] * 2
+    assert left.figure.get_suptitle().replace("\n", " ").endswith("; without any effect: b")
+    found.first = found.total = found.half = 0.0 * numbers
+    assert len(lw.plots.sensitivity(found)[0].get_yticklabels()) == 3
+
+
 def test_text_is_wrapped_to_a_share_of_a_figure():
     figure = Figure(figsize=(10.0, 4.0))
     assert canvas.text_size(figure) == 9.0 and canvas.text_size(Figure(figsize=(20.0, 4.0))) == 18.0

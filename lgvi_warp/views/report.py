@@ -30,6 +30,7 @@ from lgvi_warp.views.fleet import LOOKS, title
 from lgvi_warp.views.plots import drawable, plot, plot_statistics
 from lgvi_warp.views.plots import outcomes as draw_outcomes
 from lgvi_warp.views.plots.inputs import inputs_by_outcome, varied
+from lgvi_warp.views.sweeps import PICTURES
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
@@ -93,10 +94,11 @@ def _of_folder(folder: Path) -> tuple[str, list[str]]:
         if run is not None:
             found, file = run
             parts += [_paragraph(f"Run of {_day(file.stat().st_mtime)}, in {place}."), *_of_run(found)]
+        parts += [_paragraph(f"{_words(study)} of {_day(study.stat().st_mtime)}, in {place}.") for study in studies]
         if studies:
             parts += [_section(_words(picture), _pixels(picture)) for picture in _pictures_in(folder, run is not None)]
         for study in studies:
-            parts += [_paragraph(f"{_words(study)} of {_day(study.stat().st_mtime)}, in {place}."), *_of_study(study)]
+            parts += _of_study(study)
         return name_of(found.provenance) if run is not None else f"{_words(studies[0])} of {place}", parts
 
 
@@ -268,9 +270,10 @@ def _of_study(path: Path) -> Iterator[str]:
 
 
 def _pictures_in(folder: Path, has_run: bool) -> list[Path]:
-    """Pictures of studies in a folder; those of a run are drawn anew."""
-    return [inside(folder, path.name) for path in sorted(folder.glob("*.png"))
-            if not (has_run and path.name in OF_A_RUN)]  # fmt: skip
+    """Pictures of studies in a folder, those of a sweep in their order; those of a run are drawn anew."""
+    drawn = {path.name for path in folder.glob("*.png")} - set(OF_A_RUN if has_run else ())
+    of_sweeps = [name for name in PICTURES if name in drawn]
+    return [inside(folder, name) for name in (*of_sweeps, *sorted(drawn.difference(of_sweeps)))]
 
 
 def _rows_in(path: Path) -> list[list[str]]:

@@ -350,17 +350,20 @@ def _response(axes: Any, sweep: Sweep, cell: Cell, of: str, count: int) -> None:
         axes.plot(result.time, wanted, "k:", linewidth=1.0, label="wanted")
 
 
+# Functions that draw a sweep, by the name of the file.
+PICTURES: dict[str, Callable[[Any, Path], Any]] = {
+    "success.png": plot_success,
+    "metrics.png": plot_metrics,
+    "differences.png": plot_differences,
+    "causes.png": plot_causes,
+    "responses.png": plot_responses,
+}
+
+
 def pictures(sweep: Sweep) -> dict[str, Callable[[Any, Path], Any]]:
     """Return the functions that draw a sweep, by the name of the file; paired differences where there are cases to compare.
 
     Args:
         sweep: the sweep.
     """
-    differences = {"differences.png": plot_differences} if len(sweep.cases) > 1 else {}
-    return {
-        "success.png": plot_success,
-        "metrics.png": plot_metrics,
-        **differences,
-        "causes.png": plot_causes,
-        "responses.png": plot_responses,
-    }
+    return {name: draw for name, draw in PICTURES.items() if draw is not plot_differences or len(sweep.cases) > 1}

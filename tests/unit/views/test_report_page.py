@@ -11,6 +11,7 @@ from html import unescape
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import lgvi_warp as lw
 from lgvi_warp import cli
@@ -198,6 +199,22 @@ def test_a_sweep_has_a_page(tmp_path):
     assert (
         text.count("<img") == 1 and f"<h1>Sweep of {tmp_path.name}</h1>" in text and "&quot;members&quot;: 20" in text
     )
+
+
+def test_pictures_of_a_sweep_come_after_its_date_in_their_order(tmp_path):
+    sweep_in(tmp_path)
+    for name in ("a", "causes", "metrics", "success"):
+        Image.new("RGB", (4, 4)).save(tmp_path / f"{name}.png")
+    text = lw.report(tmp_path, tmp_path / "report.html").read_text(encoding="utf-8")
+    words = [
+        f"Sweep of {time.strftime('%Y-%m-%d')}",
+        "<h2>Success</h2>",
+        "<h2>Metrics</h2>",
+        "<h2>Causes</h2>",
+        "<h2>A</h2>",
+    ]
+    places = [text.index(word) for word in words]
+    assert places == sorted(places)
 
 
 def test_a_folder_of_several_has_all_of_them(tmp_path):

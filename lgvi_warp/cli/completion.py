@@ -61,6 +61,9 @@ def values() -> dict[str, tuple[str, ...]]:
 
 BASH = """_lgvi_warp() {{
     local word=${{COMP_WORDS[COMP_CWORD]}} before=${{COMP_WORDS[COMP_CWORD-1]}} verb="" each
+    # Readline takes "--option=value" for three words.
+    [[ $before == "=" ]] && before=${{COMP_WORDS[COMP_CWORD-2]}}
+    [[ $word == "=" ]] && word=""
     for each in "${{COMP_WORDS[@]:1:COMP_CWORD-1}}"; do
         [[ " {known} " == *" $each "* ]] && {{ verb=$each; break; }}
     done
@@ -72,7 +75,9 @@ BASH = """_lgvi_warp() {{
             *) words="{names}" ;;
         esac ;;
     esac
+    [[ $word == *,* && $before == --methods ]] && words=$(printf "${{word%,*}},%s " $words)
     COMPREPLY=($(compgen -W "$words" -- "$word"))
+    local IFS=$'\n'
     [[ -n $files && $word != -* ]] && COMPREPLY+=($(compgen -f -- "$word"))
 }}
 complete -o filenames -F _lgvi_warp lgvi-warp

@@ -105,6 +105,25 @@ def rotation_limit(method: Method) -> float:
     return imaginary_limit(method.name) if method.tableau else np.inf
 
 
+def too_large(method: Method) -> str:
+    """Say what reached its limit where a method's step is too large, and below what the step has to stay.
+
+    Args:
+        method: A method whose status reports it.
+
+    Returns:
+        One sentence.
+    """
+    reached = "half the angle of a turn" if method.turns else "|J^-1 a|"
+    head = f"the step is too large: {reached} reached 1{'' if method.turns else ', where equation (24) may have no solution'}"
+    if method.two_part:
+        return f"{head}; shorten the step, so that no part of it turns by a quarter turn"
+    part = max(share for letter, share in method.program if letter[0] in "DRWP") * longest_stage(method)
+    slender = ", and more for a slender body, whose turns about its length are split off: there psi_s is better"
+    limit = f"{(2.0 if method.turns else 1.0) / part:.3g} / |angular velocity|"
+    return f"{head}; shorten the step below {limit}{slender if method.turns else ''}"
+
+
 def stability_polynomial(tableau: Tableau, z: np.ndarray) -> np.ndarray:
     """Evaluate the stability polynomial R(z) of an explicit method: one step of y' = (z/h) y from y = 1.
 

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lgvi_warp.common.status import Status, stop_time, stopped
+from lgvi_warp.methods.limits import too_large
+from lgvi_warp.methods.method import Method
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
@@ -41,7 +43,8 @@ def outcome_text(result: Result, code: Status) -> str:
         return f"{many}: {code.text}"
     first = int(members[stop_time(result)[members].argmin()])
     value = "" if code.stopped else f", value {result.failure_value[first]:.4g}"
-    return f"{many} (first: member {first} at {stop_time(result)[first]:g} s{value}): {code.text}"
+    text = too_large(Method(result.provenance["method"]["name"])) if code == Status.STEP_TOO_LARGE else code.text
+    return f"{many} (first: member {first} at {stop_time(result)[first]:g} s{value}): {text}"
 
 
 def begun_beyond(status: np.ndarray, failure_time: np.ndarray) -> tuple[str, ...]:

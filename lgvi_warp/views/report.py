@@ -30,6 +30,7 @@ from lgvi_warp.views.fleet import LOOKS, title
 from lgvi_warp.views.plots import drawable, plot, plot_statistics
 from lgvi_warp.views.plots import outcomes as draw_outcomes
 from lgvi_warp.views.plots.inputs import inputs_by_outcome, varied
+from lgvi_warp.views.sweeps import PICTURES
 
 if TYPE_CHECKING:
     from lgvi_warp.runs.result import Result
@@ -95,10 +96,11 @@ def _of_folder(folder: Path) -> tuple[str, list[str]]:
         if run is not None:
             found, file = run
             parts += [_paragraph(f"Run of {_day(file.stat().st_mtime)}, in {place}."), *_of_run(found)]
+        parts += [_paragraph(f"{_words(study)} of {_day(study.stat().st_mtime)}, in {place}.") for study in studies]
         if studies:
             parts += [_section(_words(picture), _pixels(picture)) for picture in _pictures_in(folder, run is not None)]
         for study in studies:
-            parts += [_paragraph(f"{_words(study)} of {_day(study.stat().st_mtime)}, in {place}."), *_of_study(study)]
+            parts += _of_study(study)
         return name_of(found.provenance) if run is not None else f"{_words(studies[0])} of {place}", parts
 
 
@@ -243,20 +245,16 @@ def _settings(result: Result) -> Iterator[tuple[str, str]]:
     yield "step", f"{provenance['step']:g} s, {provenance['steps']:,} steps"
     yield "numbers", str(provenance["dtype"])
     yield "members", f"{result.members:,}"
-    if (seed := provenance["scene"].get("ensemble", {}).get("seed")) is not None:
+    if (seed := provenance.get("ensemble", {}).get("seed")) is not None:
         yield "seed", str(seed)
     yield "versions", ", ".join(f"{name} {version}" for name, version in provenance["versions"].items())
     yield "machine", ", ".join(str(value) for value in provenance["machine"].values())
 
 
 def _again(result: Result) -> str:
-    """The command that runs it again, and the scene; a law that is a Python function is in neither."""
-    name, command, text = again(result.provenance)
-    if command is None:
-        how = _paragraph("A law is a Python function, which no file holds: run the script again. The scene but for it:")
-    else:
-        how = _paragraph(f"Save this scene as {name}, then:") + _preformatted(command)
-    return how + _preformatted(text)
+    """The command that runs it again, and the scene."""
+    command, said, text = again(result.provenance)
+    return _paragraph(said) + (_preformatted(command) if command else "") + _preformatted(text)
 
 
 def _of_study(path: Path) -> Iterator[str]:
@@ -274,9 +272,10 @@ def _of_study(path: Path) -> Iterator[str]:
 
 
 def _pictures_in(folder: Path, has_run: bool) -> list[Path]:
-    """Pictures of studies in a folder; those of a run are drawn anew."""
-    pictures = [inside(folder, path.name) for path in sorted(folder.glob("*.png"))
-                if not (has_run and path.name in OF_A_RUN)]  # fmt: skip
+    """Pictures of studies in a folder, those of a sweep in their order; those of a run are drawn anew."""
+    drawn = {path.name for path in folder.glob("*.png")} - set(OF_A_RUN if has_run else ())
+    of_sweeps = [name for name in PICTURES if name in drawn]
+    pictures = [inside(folder, name) for name in (*of_sweeps, *sorted(drawn.difference(of_sweeps)))]
     # One large file may have many names.
     if (size := sum(path.stat().st_size for path in pictures)) > MOST_PICTURES:
         fault = f"its pictures have {size / 1e6:,.0f} MB, more than the {MOST_PICTURES / 1e6:,.0f} MB of a report"

@@ -269,13 +269,16 @@ def plot_causes(sweep: Sweep, path: FilePath | None = None, *, figure: Any = Non
 def plot_responses(
     sweep: Sweep, path: FilePath | None = None, of: str = "", members: int = MOST_PATHS, *, figure: Any = None
 ) -> np.ndarray:
-    """Draw fans of what is tracked over time, by case at the first point of the grid, of members that are run again.
+    """Draw fans of what is tracked over time, by case at one point of the grid, of members that are run again.
+
+    The point is the one where the success of the cases differs most; the first one of equals.
 
     Args:
         sweep: the sweep.
         path: of the picture; default None, which writes none.
         of: "depth", "heading", "speed", "north" or "east"; or a distance from what is wanted, "position", "attitude" or
-            "cross_track". By default what the first metric of such a number is of.
+            "cross_track". By default what that metric is of whose medians differ most between cases there, in interquartile
+            ranges; the first one of equals.
         members: number of members that are run again, the first ones; by default 200.
         figure: Matplotlib figure to draw on; default None, one of its own.
 
@@ -287,11 +290,9 @@ def plot_responses(
         ImportError: matplotlib is not installed (extra: viz).
         OSError: the file cannot be written.
     """
-    start = {name: values[0] for name, values in sweep.setup.axes.items()}
-    cells = [cell for cell in _ran(sweep) if cell.point == start]
-    tracked = (str(metric.of) for metric in sweep.setup.metrics.values())
-    of = of or next((name for name in tracked if name in tracking.ERRORS), "")
-    if of not in tracking.ERRORS or not cells:
+    cells = _most_apart(sweep)
+    of = of or _tracked(sweep, cells)
+    if of not in tracking.ERRORS:
         raise NothingToDraw("no metric is of a number that is tracked over time")
     count = min(members, sweep.members_count)
     columns = min(MOST_COLUMNS, len(cells))
@@ -307,9 +308,30 @@ def plot_responses(
         away = "" if of in tracking.CHANNELS[False] else " from what is wanted"
         grid[0, 0].figure.supylabel(f"{of}{away} [{unit}]: {count} members")
         if of == "depth":
-            point_down(grid[0, 0])
+            point_down(grid[0, -1])
         grid[0, 0].legend()
     return grid.ravel()[: len(cells)]
+
+
+def _most_apart(sweep: Sweep) -> list[Cell]:
+    """The cells that ran at the point of the grid where the success of the cases differs most."""
+    by_point: dict[tuple[Any, ...], list[Cell]] = {}
+    for cell in _ran(sweep):
+        by_point.setdefault(tuple(cell.point.values()), []).append(cell)
+    return max(by_point.values(), key=lambda cells: np.ptp([sweep.passed(cell).mean() for cell in cells]))
+
+
+def _tracked(sweep: Sweep, cells: list[Cell]) -> str:
+    """What the metric is of whose medians differ most between cells, of numbers tracked over time; "" without one."""
+
+    def apart(name: str) -> float:
+        boxes = [_box(sweep, cell, name) for cell in cells]
+        medians = [box["med"] for box in boxes if np.isfinite(box["med"])]
+        width = np.nansum([box["q3"] - box["q1"] for box in boxes])
+        return float(np.ptp(medians) / (width + 1e-300)) if medians else 0.0
+
+    known = [name for name, metric in sweep.setup.metrics.items() if str(metric.of) in tracking.ERRORS]
+    return str(sweep.setup.metrics[max(known, key=apart)].of) if known else ""
 
 
 def _response(axes: Any, sweep: Sweep, cell: Cell, of: str, count: int) -> None:
@@ -328,17 +350,20 @@ def _response(axes: Any, sweep: Sweep, cell: Cell, of: str, count: int) -> None:
         axes.plot(result.time, wanted, "k:", linewidth=1.0, label="wanted")
 
 
+# Functions that draw a sweep, by the name of the file.
+PICTURES: dict[str, Callable[[Any, Path], Any]] = {
+    "success.png": plot_success,
+    "metrics.png": plot_metrics,
+    "differences.png": plot_differences,
+    "causes.png": plot_causes,
+    "responses.png": plot_responses,
+}
+
+
 def pictures(sweep: Sweep) -> dict[str, Callable[[Any, Path], Any]]:
     """Return the functions that draw a sweep, by the name of the file; paired differences where there are cases to compare.
 
     Args:
         sweep: the sweep.
     """
-    differences = {"differences.png": plot_differences} if len(sweep.cases) > 1 else {}
-    return {
-        "success.png": plot_success,
-        "metrics.png": plot_metrics,
-        **differences,
-        "causes.png": plot_causes,
-        "responses.png": plot_responses,
-    }
+    return {name: draw for name, draw in PICTURES.items() if draw is not plot_differences or len(sweep.cases) > 1}

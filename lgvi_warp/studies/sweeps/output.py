@@ -12,6 +12,7 @@ import numpy as np
 
 from lgvi_warp.common import machine
 from lgvi_warp.common.files import write_text
+from lgvi_warp.common.status import Status
 from lgvi_warp.common.tables import write_csv
 from lgvi_warp.studies.files import finite_or_none
 from lgvi_warp.studies.sweeps.found import SUCCESS, Compared, Findings
@@ -157,7 +158,8 @@ def summary(found: Findings) -> str:
     lines += ["", "## Worst members", ""]
     for row in found.worst(5):
         at = ", ".join(f"{name} = {row[name]}" for name in found.setup.axes)
-        lines.append(f"- member {row['member']} of {row['case']}{' at ' + at if at else ''}, status {row['status']}")
+        status = Status(row["status"]).name.lower()
+        lines.append(f"- member {row['member']} of {row['case']}{' at ' + at if at else ''}, status {status}")
     return "\n".join(lines) + "\n"
 
 

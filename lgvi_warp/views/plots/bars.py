@@ -40,24 +40,30 @@ def sensitivity(found: Indices, *, figure: Any = None, path: str | os.PathLike[s
         "found", found, "quantities factors columns", "sensitivity indices", "give what lw.uq.sobol and its like return"
     )
     varied = [q for q in range(len(found.quantities)) if np.isfinite(getattr(found, found.columns[0])[q]).any()]
-    drawn, d = varied[:MOST], len(found.factors)
+    drawn = varied[:MOST]
     if not drawn:
         raise NothingToDraw("no quantity varies: there is nothing to draw")
+    # Of a factor that changes no quantity at all, as one without a spread, every index is zero.
+    acting = np.any([np.asarray(getattr(found, column))[varied] != 0.0 for column in found.columns], axis=(0, 1))
+    shown = np.flatnonzero(acting | ~acting.any())
+    d = len(shown)
     columns = min(len(drawn), 3)
     rows = -(-len(drawn) // columns)
     size = 3.0 + 4.5 * columns, 2.2 + rows * (1.4 + 0.4 * d)
     with panels(figure, path, (rows, columns), size, sharey=True) as grid:
         for axes, q in zip(grid.flat, drawn, strict=False):
-            _bars(axes, found, q)
+            _bars(axes, found, q, shown)
         for axes in grid.flat[len(drawn) :]:
             axes.set_axis_off()
-        grid[0, 0].set_yticks(np.arange(d), found.factors)
+        grid[0, 0].set_yticks(np.arange(d), [found.factors[i] for i in shown])
         grid[0, 0].invert_yaxis()
         figure = grid[0, 0].figure
         figure.legend(*grid[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False)
         failed = f", {found.failed} failed" if found.failed else ""
         names = [in_words(name) for q, name in enumerate(found.quantities) if q not in drawn]
         more = f"; not shown: {', '.join(names)}" if names else ""
+        still = [name for name, acts in zip(found.factors, acting, strict=True) if not acts and acting.any()]
+        more += f"; without any effect: {', '.join(still)}" if still else ""
         text = (
             f"{found.name}, {found.samples} samples, {found.members} members{failed}; {found.confidence:.0%} intervals"
         )
@@ -65,17 +71,17 @@ def sensitivity(found: Indices, *, figure: Any = None, path: str | os.PathLike[s
     return grid.ravel()[: len(drawn)]
 
 
-def _bars(axes: Any, found: Indices, q: int) -> None:
-    """Draw the bars of one quantity, the columns of a factor side by side."""
-    places = np.arange(len(found.factors))
+def _bars(axes: Any, found: Indices, q: int, shown: np.ndarray) -> None:
+    """Draw the bars of one quantity, the columns of a factor side by side; shown: indices of the factors."""
+    places = np.arange(len(shown))
     width = 0.8 / len(found.columns)
     for i, column in enumerate(found.columns):
         name = found.intervals.get(column)
-        half = getattr(found, name)[q] if name else None
+        half = getattr(found, name)[q][shown] if name else None
         at = places + (i - 0.5 * (len(found.columns) - 1)) * width
         axes.barh(
             at,
-            getattr(found, column)[q],
+            getattr(found, column)[q][shown],
             width,
             xerr=half,
             label=column,

@@ -322,15 +322,18 @@ def widen(axis: Any) -> None:
         axis.axes.set(**{f"{axis.axis_name}lim": (middle - 0.5 * least, middle + 0.5 * least)})
 
 
-def below(axes: Any, **options: Any) -> None:
+def below(axes: Any, ncols: int = 1, **options: Any) -> None:
     """Draw the legend below the axes and their label, where it hides nothing.
 
     Args:
         axes: Matplotlib axes.
+        ncols: Most columns; where there are several rows, they are as full as each other.
         **options: Passed to Axes.legend.
     """
     from matplotlib.transforms import ScaledTranslation
 
     lines = ScaledTranslation(0.0, -3.2 * text_size(axes.figure) / 72.0, axes.get_figure(root=True).dpi_scale_trans)
     place = {"bbox_to_anchor": (0.5, 0.0), "bbox_transform": axes.transAxes + lines, "loc": "upper center"}
-    axes.legend(**place, frameon=False, **options)
+    entries = max(1, len(axes.get_legend_handles_labels()[0]))
+    rows = -(-entries // ncols)
+    axes.legend(**place, frameon=False, ncols=-(-entries // rows), **options)

@@ -42,7 +42,7 @@ def draw_commands(result: Result, axes: Any) -> list[str]:
     for limit in lined:
         axes.axhline(limit, color=GREY, linestyle=(0, (6, 2)), linewidth=1.0, label="limit" if limit > 0.0 else None)
     said = _mark_faults(axes, result)
-    axes.set(xlabel="time [s]", ylabel="command [unit of each]", title="Commands: medians, bands of 90 %")
+    axes.set(xlabel="time [s]", ylabel="command [unit of each]", title=f"Commands{_bands(some.members)}")
     below(axes, ncols=3)
     return said
 
@@ -62,14 +62,22 @@ def draw_angles(result: Result, axes: Any) -> list[str]:
         levels = np.degrees(at_levels(survey.values, survey.counted, LEVELS))
         # Members that point all ways have no mean direction about which an angle could be told.
         scattered = levels[2] - levels[0] > ALL_WAYS
+        if len(scattered) > 2:  # a time between two such ones makes no line, and would stretch the axis
+            padded = np.pad(scattered, 1, constant_values=True)
+            scattered |= padded[:-2] & padded[2:]
         levels[:, scattered] = np.nan
-        label = f"{WORDS[name]}, unless all ways" if scattered.any() else WORDS[name]
+        gaps = ": all ways" if scattered.all() else "; gaps: all ways" if scattered.any() else ""
+        label = f"{WORDS[name]}{gaps}"
         _band(axes, survey.time, levels, i, label, banded=survey.total > 1)
     said = _mark_faults(axes, result)
-    bands = ": medians, bands of 90 %" if survey.total > 1 else ""
-    axes.set(xlabel="time [s]", ylabel="angle [deg]", title=f"Attitude{bands}")
+    axes.set(xlabel="time [s]", ylabel="angle [deg]", title=f"Attitude{_bands(survey.total)}")
     below(axes, ncols=4)
     return said
+
+
+def _bands(members: int) -> str:
+    """What the lines of so many members are, for a title; "" for one."""
+    return ": medians, bands of 90 %" if members > 1 else ""
 
 
 def _band(axes: Any, time: np.ndarray, levels: np.ndarray, i: int, label: str, banded: bool = True) -> None:

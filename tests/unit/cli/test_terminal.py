@@ -256,7 +256,12 @@ def test_bash_completes_verbs_options_values_and_files(bash):
     assert bash("run", "x", "--dtype", "f") == ["float64", "float32", "float32_compensated"]
     assert bash("--color", "ne") == ["never"] and bash("--color", "never", "exp") == ["export"]
     assert bash("help", "tr") == ["tradeoff"] and bash("--color", "auto", "run", "--solver", "new") == ["newton"]
-    assert bash("check", "sce") == ["scene", "file.toml"] or bash("check", "sce") == ["scene file.toml"]
+    assert bash("check", "sce") == ["scene file.toml"]
+    # Readline's words of --method=psi_, and of a list.
+    assert bash("run", "x", "--dtype", "=", "float32_") == ["float32_compensated"]
+    assert bash("run", "x", "--store", "=") == ["npz", "zarr"]
+    assert bash("tradeoff", "x", "--methods", "rk4,psi_w") == ["rk4,psi_w"]
+    assert bash("warm", "x", "--methods", "=", "rk4,rkw") == ["rk4,rkw3"]
 
 
 def test_help_of_a_verb_is_what_its_option_prints(capsys):

@@ -339,11 +339,11 @@ comparison.csv has the differences of all metrics.
 
 ## Worst members
 
-- member 3 of stiff, status 3
-- member 7 of stiff, status 0
-- member 39 of soft, status 0
-- member 39 of stiff, status 0
-- member 38 of soft, status 0
+- member 3 of stiff, status non_finite
+- member 7 of stiff, status ok
+- member 39 of soft, status ok
+- member 39 of stiff, status ok
+- member 38 of soft, status ok
 """
 
 
@@ -370,7 +370,7 @@ def test_the_summary_of_a_grid(gridded):
     assert text + "seen on the same members (10 pass only there, 0 only with soft)" in lines
     # Metrics differ too, but with a grid they would be too many.
     assert not any("iae heading +" in line for line in lines)
-    assert lines[-5] == "- member 39 of soft at controller.delay = 0.02, status 0"
+    assert lines[-5] == "- member 39 of soft at controller.delay = 0.02, status ok"
 
 
 def test_a_summary_where_the_second_is_worse_and_a_cause_is_known():

@@ -4,6 +4,7 @@
 import threading
 
 import matplotlib as mpl
+import pytest
 from matplotlib.figure import Figure
 
 from lgvi_warp.views.plots import canvas
@@ -31,3 +32,14 @@ def test_pictures_in_two_threads_keep_their_sizes_of_text():
     assert labels["small"].get_fontsize() == canvas.text_size(small)
     assert labels["large"].get_fontsize() == canvas.text_size(large)
     assert dict(mpl.rcParams) == before
+
+
+@pytest.mark.parametrize(("entries", "columns"), [(1, 1), (4, 4), (5, 3), (7, 4), (9, 3)])
+def test_rows_of_a_legend_are_as_full_as_each_other(entries, columns):
+    axes = Figure(figsize=(12.0, 5.0)).subplots()
+    for i in range(entries):
+        axes.plot([0.0, 1.0], [0.0, i], label=f"{i}")
+    canvas.below(axes, ncols=4)
+    axes.figure.draw_without_rendering()
+    places = [round(text.get_window_extent().x0) for text in axes.get_legend().get_texts()]
+    assert len(set(places)) == columns

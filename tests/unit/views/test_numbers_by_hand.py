@@ -188,6 +188,23 @@ def test_what_cannot_be_drawn_says_why():
     assert words.unit_of("depth") == "m" and words.unit_of("my own number") == ""
 
 
+def test_factors_without_effect_take_no_rows():
+    """Of three factors the second has indices of zero for both quantities, the third for one of them."""
+    numbers = np.array([[0.7, 0.0, 0.0], [0.4, 0.0, 0.6]])
+    found = SimpleNamespace(name="Sobol indices", quantities=["depth", "speed"], factors=["a", "b", "c"], samples=8,
+                            members=80, failed=0, confidence=0.95, columns=["first", "total"], first=numbers, total=numbers,
+                            intervals={"first": "half"}, half=0.1 * numbers)  # fmt: skip
+    left, right = lw.plots.sensitivity(found)
+    assert [label.get_text() for label in left.get_yticklabels()] == ["a", "c"]
+    for axes, widths in ((left, [0.7, 0.0]), (right, [0.4, 0.6])):
+        assert [[bar.get_width() for bar in bars] for bars in axes.containers if hasattr(bars, "patches")] == [
+            widths
+        ] * 2
+    assert left.figure.get_suptitle().replace("\n", " ").endswith("; without any effect: b")
+    found.first = found.total = found.half = 0.0 * numbers
+    assert len(lw.plots.sensitivity(found)[0].get_yticklabels()) == 3
+
+
 def test_text_is_wrapped_to_a_share_of_a_figure():
     figure = Figure(figsize=(10.0, 4.0))
     assert canvas.text_size(figure) == 9.0 and canvas.text_size(Figure(figsize=(20.0, 4.0))) == 18.0
@@ -423,6 +440,7 @@ def test_the_page_of_a_run_by_hand(tmp_path, monkeypatch):
     method = {"name": "psi_x", "chosen": "since drag acts"}
     machine = {"cpu": "a cpu", "threads": 2}
     more = {"scene": scene, "method": method, "machine": machine, "versions": {"numpy": "2"}, "steps": 15000}
+    more["ensemble"] = {"members": 10, "seed": 4}
     result = dataclasses.replace(result, provenance=result.provenance | more)
     text = lw.report(result, tmp_path / "a.html").read_text(encoding="utf-8")
     assert text.startswith('<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>A &amp; B</title><style>')
@@ -460,7 +478,9 @@ def test_pages_of_odd_runs(tmp_path, monkeypatch):
     provenance = result.provenance | {"scene": callback, "machine": {}, "steps": 1}
     text = lw.report(dataclasses.replace(result, provenance=provenance), tmp_path / "a.html").read_text()
     assert "A law is a Python function, which no file holds: run the script again. The scene but for it:" in text
-    assert "lgvi-warp run scene.toml" not in text and "<h1>a ball</h1>" in text and "<td>seed</td>" not in text
+    assert "lgvi-warp run scene.toml" not in text and "<h1>a ball</h1>" in text
+    seed = result.provenance["ensemble"]["seed"]
+    assert f"<td>seed</td><td>{seed}</td>" in text
     assert "<h2>Pictures</h2><svg>a picture</svg><h2>" in text and "<h2>Notes" not in text
     nameless = provenance | {"scene": {"vehicle": {}}}
     few = dataclasses.replace(result, provenance=nameless, samples={})
@@ -482,10 +502,8 @@ def test_tables_of_a_study(tmp_path):
         (tmp_path / "stability.json").write_text('{"of": 3, "cells": [1]}')
         (tmp_path / "a_map.png").write_bytes(b"a")
         text = lw.report(tmp_path, tmp_path / "a.html").read_text()
-        assert (
-            f"<h1>Stability of {tmp_path.name}</h1><h2>A map</h2><img " in text
-            and f"<p>Stability of {today}, in " in text
-        )
+        head = f"<h1>Stability of {tmp_path.name}</h1><p>Stability of {today}, in {tmp_path.name}.</p>"
+        assert f"{head}<h2>A map</h2><img " in text
         assert f"<h2>Table</h2>{more}<table><tr><th>h</th></tr><tr><td>0</td></tr>" in text
         assert text.count("<td>") == 200 and "<h2>How it was made</h2><pre>{\n &quot;of&quot;: 3\n}</pre>" in text
     (tmp_path / "stability.csv").write_text("")

@@ -11,6 +11,7 @@ from html import unescape
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import lgvi_warp as lw
 from lgvi_warp import cli
@@ -50,7 +51,13 @@ def of_file(tmp_path, text=TEXT, overrides=None):
     path.write_text(text)
     scene = lw.Scene.load(path, overrides)
     result = fleet(scene=scene)
+    result = with_ensemble(result, lw.Ensemble.from_scene(scene))
     return dataclasses.replace(result, provenance=dict(result.provenance) | {"source": dict(scene.source)})
+
+
+def with_ensemble(result, ensemble):
+    """A run of an ensemble."""
+    return dataclasses.replace(result, provenance=dict(result.provenance) | {"ensemble": ensemble.to_dict()})
 
 
 def page_of(result, tmp_path):
@@ -73,9 +80,46 @@ def test_the_scene_is_as_the_user_wrote_it(tmp_path):
 def test_settings_that_a_script_gave_are_in_the_command(tmp_path):
     result = of_file(tmp_path)
     told = dict(result.provenance) | {"step": 0.02, "steps": 500, "dtype": "float32", "method": {"name": "rk4"}}
-    _, command, _ = again(told)
+    command, *_ = again(told)
     assert command == "lgvi-warp run dive.toml --method rk4 --step 0.02 --duration 10 --dtype float32"
-    assert again(result.provenance)[1] == "lgvi-warp run dive.toml"
+    assert again(result.provenance)[0] == "lgvi-warp run dive.toml"
+    stepped = {"name": "rk5", "rtol": 1e-9, "atol": 1e-8}
+    told = dict(result.provenance) | {"method": stepped, "checks": "all", "on_failure": "substep"}
+    wanted = "--method rk5 --rtol 1e-09 --atol 1e-08 --checks all --on-failure substep"
+    assert again(told)[0] == f"lgvi-warp run dive.toml {wanted}"
+
+
+@pytest.mark.parametrize(
+    "tail", ["", '[ensemble]\nmembers = 9\n[ensemble.vary]\n"vehicle.buoyancy" = { normal = { std = 1.0 } }\n']
+)
+@pytest.mark.parametrize("sampling", ["random", "sobol"])
+def test_an_ensemble_of_python_is_in_the_scene_that_runs_it_again(tmp_path, tail, sampling):
+    overrides = {"ensemble.members": "3", "vehicle.buoyancy": "286.0"}
+    result = of_file(tmp_path, TEXT + tail, overrides)
+    scene = lw.Scene.load(tmp_path / "dive.toml", overrides)
+    vary = {"start.angular_velocity": lw.Normal(std=2.0), "vehicle.buoyancy": lw.Uniform(low=280.0, high=290.0)}
+    drawn = lw.Ensemble(scene, members=4, seed=7, vary=vary, sampling=sampling).subset([1, 3])
+    command, said, text = again(with_ensemble(result, drawn).provenance)
+    assert command == "lgvi-warp run dive.toml --set vehicle.buoyancy=286.0"
+    assert "given in Python" in said and "# A heavy REMUS, as ballasted in May." in text
+    (tmp_path / "dive.toml").write_text(text)
+    loaded = lw.Ensemble.from_scene(lw.Scene.load(tmp_path / "dive.toml", {"vehicle.buoyancy": "286.0"}))
+    ours, theirs = (ensemble.select(0, 2) for ensemble in (drawn, loaded))
+    np.testing.assert_array_equal(ours.angular_velocity, theirs.angular_velocity)
+    np.testing.assert_array_equal(ours.parameters["vehicle.buoyancy"], theirs.parameters["vehicle.buoyancy"])
+    # The scene's own ensemble is no such one.
+    command, said, text = again(with_ensemble(result, lw.Ensemble.from_scene(scene)).provenance)
+    assert text == TEXT + tail and "--set ensemble.members=3" in command and "Python" not in said
+
+
+def test_numbers_of_python_are_in_no_file(tmp_path):
+    result = of_file(tmp_path)
+    scene = lw.Scene.load(tmp_path / "dive.toml")
+    given = lw.Ensemble.from_states(
+        scene, np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), np.ones((2, 3))
+    )
+    command, said, text = again(with_ensemble(result, given).provenance)
+    assert command is None and "run the script again" in said and text == TEXT
 
 
 def test_a_scene_of_no_file_names_its_vehicle(tmp_path):
@@ -86,9 +130,8 @@ def test_a_scene_of_no_file_names_its_vehicle(tmp_path):
     )
     short = shortened(scene.to_dict())
     assert short["vehicle"] == {"name": "remus_100", "buoyancy": 285.0} and len(short["terms"]) == 1
-    assert (
-        lw.Scene.from_dict(tomllib.loads(last_pre(page_of(fleet(scene=scene), tmp_path)))).to_dict() == scene.to_dict()
-    )
+    page = page_of(with_ensemble(fleet(scene=scene), lw.Ensemble.from_scene(scene)), tmp_path)
+    assert lw.Scene.from_dict(tomllib.loads(last_pre(page))).to_dict() == scene.to_dict()
     # Where the vehicle's own terms are not there, its numbers are written out.
     bare = dataclasses.replace(scene, terms=())
     assert shortened(bare.to_dict()) == bare.to_dict()
@@ -156,6 +199,22 @@ def test_a_sweep_has_a_page(tmp_path):
     assert (
         text.count("<img") == 1 and f"<h1>Sweep of {tmp_path.name}</h1>" in text and "&quot;members&quot;: 20" in text
     )
+
+
+def test_pictures_of_a_sweep_come_after_its_date_in_their_order(tmp_path):
+    sweep_in(tmp_path)
+    for name in ("a", "causes", "metrics", "success"):
+        Image.new("RGB", (4, 4)).save(tmp_path / f"{name}.png")
+    text = lw.report(tmp_path, tmp_path / "report.html").read_text(encoding="utf-8")
+    words = [
+        f"Sweep of {time.strftime('%Y-%m-%d')}",
+        "<h2>Success</h2>",
+        "<h2>Metrics</h2>",
+        "<h2>Causes</h2>",
+        "<h2>A</h2>",
+    ]
+    places = [text.index(word) for word in words]
+    assert places == sorted(places)
 
 
 def test_a_folder_of_several_has_all_of_them(tmp_path):

@@ -35,6 +35,7 @@ def all_well(result):
         (all_well(fleet()), ["12 of 40 members from above", "Depth", "Attitude: medians, bands of 90 %", "Energy"]),
         (steered(), ["12 of 40 members from above", "Depth", "Commands: medians, bands of 90 %", "Outcomes"]),
         (fleet(1, 12), ["1 member from above", "Depth", "Attitude", "Outcomes"]),
+        (steered(1), ["1 member from above", "Depth", "Commands", "Outcomes"]),
     ],
 )
 def test_panels_suit_the_run(result, titles):
@@ -109,8 +110,20 @@ def test_an_angle_of_members_that_point_all_ways_is_left_out():
     c, s, zero = np.cos(heading), np.sin(heading), np.zeros_like(heading)
     attitude = np.stack([c, -s, zero, s, c, zero, zero, zero, zero + 1.0], axis=-1).reshape(61, n, 3, 3)
     axes = lw.plots.summary(made(np.ones((61, n, 3)) * time[:, None, None], time, attitude=attitude))[2]
-    yaw = next(line for line in axes.lines if line.get_label() == "yaw, unless all ways")
+    yaw = next(line for line in axes.lines if line.get_label() == "yaw; gaps: all ways")
     drawn = np.isfinite(yaw.get_ydata())
     # 0.9 of 360 degrees t / 60 s are 270 degrees at 50 s.
     np.testing.assert_array_equal(drawn, time <= 50.0)
     np.testing.assert_allclose(yaw.get_ydata()[drawn], 0.0, atol=1e-6)
+
+
+def test_an_axis_of_angles_shows_what_is_drawn():
+    """Headings that point all ways but for one time after a turn and a half."""
+    n, time = 201, np.linspace(0.0, 60.0, 61)
+    spread = np.where((time == 30.0) | (time > 50.0), 0.1, 1.0)
+    heading = np.linspace(-np.pi, np.pi, n) * spread[:, None] + 0.2 * time[:, None]
+    c, s, zero = np.cos(heading), np.sin(heading), np.zeros_like(heading)
+    attitude = np.stack([c, -s, zero, s, c, zero, zero, zero, zero + 1.0], axis=-1).reshape(61, n, 3, 3)
+    axes = lw.plots.summary(made(np.ones((61, n, 3)) * time[:, None, None], time, attitude=attitude))[2]
+    yaw = next(line for line in axes.lines if line.get_label() == "yaw; gaps: all ways")
+    np.testing.assert_array_equal(np.isfinite(yaw.get_ydata()), time > 50.0)

@@ -35,7 +35,8 @@ class ByHand(Sweep):
         self.__dict__.setdefault("asked", []).append((case, members, at, save))
         z = np.arange(5.0)[:, None] + np.arange(len(members))
         result = made(np.stack([z, 0.0 * z, 10.0 + z], axis=-1))
-        wanted = {"reference_depth": z + 12.0, "reference_position": result.position + np.array([3.0, 4.0, 0.0])}
+        wanted = {"reference_depth": z + 12.0, "reference_position": result.position + np.array([3.0, 4.0, 0.0]),
+                  "reference_heading": 0.0 * z}  # fmt: skip
         result.samples.update(wanted)
         return result
 
@@ -234,6 +235,19 @@ def test_responses_by_case():
     np.testing.assert_allclose(lines["wanted"].get_ydata(), np.arange(5.0) + 15.0)
     assert look(lines["wanted"]) == ("#000000", "None", ":") and lines["wanted"].get_linewidth() == 1.0
     assert "wanted" in [text.get_text() for text in panels[0].get_legend().get_texts()]
+
+
+def test_responses_are_drawn_where_cases_differ_and_of_what_differs():
+    """Passes of two cases at two points: 50 and 60 %, 90 and 10 %. Medians of depth are less apart than those of heading."""
+    found = swept([0.5, 0.9, 0.6, 0.1].__getitem__, {"k": [1, 2]})
+    heading = SimpleNamespace(unit="rad", quantity=SimpleNamespace(unit=""), of="heading")
+    found.setup.metrics["h"] = heading
+    for i, cell in enumerate(found.cells):
+        found.record(cell).numbers["h"] = 100.0 * i + np.arange(N)
+    panels = sweeps.plot_responses(found, members=3)
+    assert [asked[:3] for asked in found.asked] == [(name, range(3), {"k": 2}) for name in "ab"]
+    assert [panel.get_title() for panel in panels] == ["a at k = 2", "b at k = 2"]
+    assert panels[0].figure.get_supylabel() == "heading [rad]: 3 members"
 
 
 def test_responses_of_a_distance_and_their_times():

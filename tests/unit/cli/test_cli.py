@@ -216,7 +216,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_run(tmp_path, mon
 @pytest.mark.kernel
 def test_a_recording_that_cannot_be_begun_is_told(finished, tmp_path):
     result = lw.Result.load(finished[0] / "result.npz")
-    with pytest.raises(OSError, match="there is no such folder: '.*none'"):
+    with pytest.raises(OSError, match=r"there is no such folder: '.*none'"):
         lw.log_rerun(result, tmp_path / "none" / "fleet.rrd")
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run the examples, keep their pictures, and write docs/gallery.md: `make gallery`, or `make gallery ONLY="02 07"`.
 
-A picture carries the hash of the script that drew it and what the script printed: a stale picture is found in any clone.
+A picture carries the hash of the code that drew it and what the script printed: a stale picture is found in any clone.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ sys.path.append(str(ROOT / "docs"))
 
 from site_parts import movie  # noqa: E402
 from site_parts import pictures as kept  # noqa: E402
-from site_parts.pictures import digest  # noqa: E402
+from site_parts.pictures import made_of_script  # noqa: E402
 
 PICTURES = ROOT / "docs" / "gallery"
 PAGE = ROOT / "docs" / "gallery.md"
@@ -57,7 +57,7 @@ def keep(script: Path, folder: Path, printed: str) -> None:
         printed: What it printed.
     """
     drawn = (folder / script.name).with_suffix(".png")
-    kept.keep(drawn, PICTURES / f"{script.stem}.png", script=digest(script), printed=printed)
+    kept.keep(drawn, PICTURES / f"{script.stem}.png", script=made_of_script(script), printed=printed)
 
 
 def notes(script: Path) -> dict[str, str]:
@@ -67,7 +67,7 @@ def notes(script: Path) -> dict[str, str]:
         script: The example.
 
     Returns:
-        The hash of the script that drew it, "script", and what that printed, "printed".
+        The hash of the code that drew it, "script", and what that printed, "printed".
     """
     return kept.notes(PICTURES / f"{script.stem}.png")
 

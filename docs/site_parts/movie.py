@@ -80,7 +80,7 @@ def shoot(path: Path, times: np.ndarray, folder: Path) -> list[Any]:
 
 def main() -> None:
     """Write the moving picture."""
-    from site_parts.gallery import digest
+    from site_parts.pictures import digest
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -33,12 +33,21 @@ class Made(NamedTuple):
     file: str = ""
 
 
+def room(name: str) -> tuple[str, ...]:
+    """The files of a room of the package that draws, by its name in lgvi_warp/views."""
+    return tuple(path.relative_to(ROOT).as_posix() for path in sorted((ROOT / "lgvi_warp/views" / name).glob("*.py")))
+
+
+def sources_of(script: Path) -> tuple[str, ...]:
+    """The code that draws an example's picture: the example, and the package's where it draws by that."""
+    return (script.relative_to(ROOT).as_posix(), *(room("plots") if "lw.plot" in script.read_text() else ()))
+
+
 def of_script(script: str, *options: str) -> Made:
     """A picture that an example writes where it is told to."""
-    return Made((script,), (sys.executable, script, *options, "{}/picture.png"), "picture.png")
+    return Made(sources_of(ROOT / script), (sys.executable, script, *options, "{}/picture.png"), "picture.png")
 
 
-MAPS = "lgvi_warp/views/plots/maps.py"
 FRONTS = "benchmarks/fronts_picture.py"
 STABILITY = (*LGVI, "stability", "examples/paper.toml", "--grid", "all", "--out", "{}")
 SWEEP = "examples/sweeps/depth_gain_map.toml"
@@ -47,10 +56,10 @@ MADE = {
     "controllers/depth_keeping.png": of_script("examples/controllers/depth_keeping.py"),
     "controllers/learning.png": of_script("examples/controllers/train_a_policy.py", "1.5"),
     "controllers/waypoints.png": of_script("examples/controllers/waypoints.py"),
-    "guide/depth_gain_map.png": Made((SWEEP,), (*LGVI, "sweep", SWEEP, "--out", "{}"), "success.png"),
+    "guide/depth_gain_map.png": Made((SWEEP, *room("plots")), (*LGVI, "sweep", SWEEP, "--out", "{}"), "success.png"),
     "guide/tune_worst_5_percent.png": of_script("examples/sweeps/tune_worst_5_percent.py"),
     **{
-        f"guide/stability_{name}.png": Made(("examples/paper.toml", MAPS), STABILITY, f"stability_{name}.png")
+        f"guide/stability_{name}.png": Made(("examples/paper.toml", *room("plots")), STABILITY, f"stability_{name}.png")
         for name in ("omega", "mass", "drag")
     },
     **{
@@ -69,6 +78,11 @@ def digest(*paths: Path) -> str:
 def made_of(name: str) -> str:
     """The hash of what makes a picture, by its name below docs/."""
     return digest(*(ROOT / source for source in MADE[name].sources))
+
+
+def made_of_script(script: Path) -> str:
+    """The hash of what draws an example's picture."""
+    return digest(*(ROOT / source for source in sources_of(script)))
 
 
 def keep(source: Path, target: Path, **texts: str) -> None:

@@ -11,7 +11,7 @@ from tests.conftest import ROOT
 
 sys.path.append(str(ROOT / "docs"))
 
-from site_parts import gallery, movie
+from site_parts import gallery, movie, pictures
 
 SCRIPTS = gallery.scripts()
 # What these print depends on the machine's speed.
@@ -25,7 +25,7 @@ def test_there_are_twelve():
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
 def test_it_is_short_and_its_picture_is_of_its_text(script):
     assert len(script.read_text().splitlines()) < 80
-    assert gallery.notes(script)["script"] == gallery.digest(script), "stale: run `make gallery`"
+    assert gallery.notes(script)["script"] == pictures.made_of_script(script), "stale: run `make gallery`"
 
 
 def test_the_page_is_as_the_scripts_and_pictures_say():
@@ -35,14 +35,15 @@ def test_the_page_is_as_the_scripts_and_pictures_say():
 def test_the_moving_picture_is_of_its_script():
     with Image.open(movie.MOVIE) as picture:
         assert picture.n_frames == movie.FRAMES and picture.size == movie.SIZE
-        assert picture.info["xmp"].decode() == gallery.digest(Path(movie.__file__)), "stale: run `make gallery`"
+        assert picture.info["xmp"].decode() == pictures.digest(Path(movie.__file__)), "stale: run `make gallery`"
     assert movie.MOVIE.stat().st_size < 600_000
 
 
 def test_a_changed_script_is_found(tmp_path):
     changed = tmp_path / SCRIPTS[0].name
     changed.write_text(SCRIPTS[0].read_text() + "x = 1\n")
-    assert gallery.notes(changed)["script"] != gallery.digest(changed)
+    drawing = [ROOT / source for source in pictures.sources_of(SCRIPTS[0])[1:]]
+    assert drawing and gallery.notes(SCRIPTS[0])["script"] != pictures.digest(changed, *drawing)
 
 
 @pytest.mark.slow

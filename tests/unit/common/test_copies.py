@@ -72,7 +72,7 @@ def failing(name):
 def test_a_worker_of_a_pool_raises_them():
     """A pool that cannot read an error waits for ever. (Interrupted, as KeyboardInterrupt, ends the worker itself.)"""
     with multiprocessing.get_context("spawn").Pool(1) as pool:
-        for name in ERRORS.keys() - {"Interrupted"}:
+        for name in sorted(ERRORS.keys() - {"Interrupted"}):
             wanted = ERRORS[name]()
             with pytest.raises(type(wanted)) as caught:
                 pool.apply_async(failing, (name,)).get(60.0)
@@ -138,7 +138,7 @@ def made():
     for path in sorted((ROOT / "examples" / "scenes").glob("*.toml")):
         parts(lw.Scene.load(path))
     by_name, own = goods(SPHERE, None, None, ROOT)
-    for name in classes().keys() - found.keys() - OF_RUNS - OF_STUDIES - APART:
+    for name in sorted(classes().keys() - found.keys() - OF_RUNS - OF_STUDIES - APART):
         needed = [p.name for p in inspect.signature(getattr(lw, name)).parameters.values() if p.default is p.empty]
         note(getattr(lw, name)(**({key: by_name[key] for key in needed if key in by_name} | own.get(name, {}))))
     return found

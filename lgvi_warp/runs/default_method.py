@@ -27,7 +27,7 @@ MOST_IMPLICIT = 1000.0
 ALLOWED = 0.01
 # The choice looks so far ahead, whatever the length of the run: a longer run begins with the bits of a shorter one [s].
 AHEAD = 30.0
-# For damped scenes, the cheapest step first (`python -m benchmarks run damped`).
+# For damped scenes, in the order in which they are taken: mostly that of their cost (`python -m benchmarks run damped`).
 DAMPED = {
     "rk4": "since the scene is damped",
     "rk8": "since the scene is damped and the step long",

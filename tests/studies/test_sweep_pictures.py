@@ -104,7 +104,7 @@ def test_causes_are_drawn_where_most_is_open(found):  # noqa: F811
 
 
 def test_responses_are_fans_of_members_run_again(plain):
-    panels = sweeps.plot_responses(plain, members=5)
+    panels = sweeps.plot_responses(plain, of="position", members=5)
     assert [axes.get_title() for axes in panels] == ["soft", "stiff"]
     figure = panels[0].figure
     assert figure.get_supylabel() == "position from what is wanted [m]: 5 members"

@@ -11,7 +11,7 @@ import lgvi_warp as lw
 WANTED, LIMIT = 10.0, 20.0  # m, deg of a fin
 GROUPS = {"the least buoyant fifth": ("#0072B2", "-"), "the most buoyant fifth": ("#D55E00", "--")}
 
-waves = lw.Waves(amplitudes=[0.5, 0.3, 0.2], periods=[9.0, 7.0, 5.5], headings_deg=[180.0, 150.0, 200.0])
+waves = lw.Waves(amplitudes=[0.75, 0.45, 0.3], periods=[9.0, 7.0, 5.5], headings_deg=[180.0, 150.0, 200.0])
 controller = lw.Controller(
     period=0.1,  # s between looks
     sensors=[lw.Sensor(name="depth_cell", of="depth", noise=0.02)],  # m

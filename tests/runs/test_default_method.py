@@ -102,7 +102,11 @@ def test_psi_s_and_psi_x_bear_oscillations_no_longer():
         )
 
 
-@pytest.mark.parametrize("name", ["fins", "control fins", "control fins with rates", "cross-flow", "body lift"])
+LIFTING = ("fins", "control fins", "control fins with rates", "cross-flow", "body lift")
+DRAGS = ("linear drag", "quadratic drag", "drag", "drag matrix")
+
+
+@pytest.mark.parametrize("name", LIFTING)
 def test_braking_bounds_the_twin(name, rng):
     """Largest rate of the wrench's derivative by the velocity: never above that of `braking`."""
     (term,), (law,) = CASES[name].terms, CASES[name].laws
@@ -118,7 +122,21 @@ def test_braking_bounds_the_twin(name, rng):
         assert rate(derivative(law, nu)) <= bound * (1.0 + 1e-6)
 
 
-@pytest.mark.parametrize("name", ["linear drag", "quadratic drag", "drag", "drag matrix"])
+@pytest.mark.parametrize("name", [*LIFTING, *DRAGS])
+def test_braking_takes_numbers_that_vary_alone(name):
+    """One number of three members, all others shared: as if all were given for each member."""
+    (term,) = CASES[name].terms
+    shared = {key: np.asarray(value)[None] for key, value in term.parameters().items()}
+    speeds, density = np.arange(1.0, 19.0).reshape(3, 6), np.full(1, 1025.0)
+    for key, value in shared.items():
+        numbers = shared | {key: value * np.array([1.0, 1.01, 1.02]).reshape(3, *(1,) * (value.ndim - 1))}
+        every = {each: np.broadcast_to(values, (3, *values.shape[1:])) for each, values in numbers.items()}
+        np.testing.assert_array_equal(
+            term.braking(numbers, speeds, density), term.braking(every, speeds, np.full(3, 1025.0))
+        )
+
+
+@pytest.mark.parametrize("name", DRAGS)
 def test_braking_of_drag_is_the_derivative(name, rng):
     (term,), (law,) = CASES[name].terms, CASES[name].laws
     numbers = {key: np.asarray(value)[None] for key, value in term.parameters().items()}

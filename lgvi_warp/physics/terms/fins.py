@@ -83,7 +83,8 @@ class Fins(Term):
         slope = numbers["lift_slope"] + 2.0 * (numbers["drag"] + numbers["drag_normal"])
         size = 0.5 * water_density[:, None] * numbers["area"] * slope * np.linalg.norm(speeds[:, :3], axis=1)[:, None]
         normal = numbers["normal"] / np.linalg.norm(numbers["normal"], axis=-1, keepdims=True)
-        rows = np.concatenate([normal, np.cross(numbers["position"], normal)], axis=-1)
+        arm = np.cross(numbers["position"], normal)
+        rows = np.concatenate(np.broadcast_arrays(normal, arm), axis=-1)
         return np.asarray(np.einsum("nk,nki,nkj->nij", size, rows, rows))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:

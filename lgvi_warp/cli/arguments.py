@@ -89,11 +89,7 @@ class Parser(argparse.ArgumentParser):
     verbs: Mapping[str, Parser] = {}
 
     def error(self, message: str) -> NoReturn:
-        """Print the usage and the fault, and end with exit code 2.
-
-        Args:
-            message: The fault.
-        """
+        """Print the usage and the fault, and end with exit code 2."""
         if wrong := re.search(r"invalid choice: '(.*?)' \(choose from (.*)\)", message):
             names = re.findall(r"[\w-]+", wrong[2])
             message = f"{message[: wrong.start()]}{wrong[1]!r} is not known; {closest(wrong[1], names)}"
@@ -103,11 +99,7 @@ class Parser(argparse.ArgumentParser):
 def parsed(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     """Read the command's arguments; a fault, or a help that was asked for, ends the process.
 
-    Args:
-        arguments: The arguments; default None, those of the process.
-
-    Returns:
-        The chosen verb and its options.
+    arguments: The arguments; default None, those of the process.
     """
     top = parser()
     chosen, unknown = top.parse_known_args(arguments)

@@ -13,17 +13,7 @@ from lgvi_warp.cli.settings import load_scene
 
 
 def check(chosen: argparse.Namespace) -> int:
-    """Run the verb check: print what is odd about a scene, without running it.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 0 for a scene that can run, however odd.
-
-    Raises:
-        SceneError: The scene cannot run.
-    """
+    """Run the verb check: print what is odd about a scene, without running it."""
     from lgvi_warp.scene import plausibility
     from lgvi_warp.scene.ensemble import Ensemble
 

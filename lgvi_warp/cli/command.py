@@ -63,19 +63,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def code_of(error: BaseException, chosen: argparse.Namespace, signals: Signals) -> int:
-    """Print on stderr why a verb ended.
-
-    Args:
-        error: What the verb raised.
-        chosen: The command's parsed arguments.
-        signals: The signals heard.
-
-    Returns:
-        The exit code.
-
-    Raises:
-        BaseException: The error itself, where it is neither the user's fault nor the system's.
-    """
+    """Print on stderr why a verb ended."""
     # A library may turn an interrupt during its import into any exception.
     if isinstance(error, KeyboardInterrupt) or signals.number is not None:
         text, code = f"{signals.text}; {error if isinstance(error, Ended) else left(chosen)}", signals.exit_code
@@ -96,14 +84,7 @@ def code_of(error: BaseException, chosen: argparse.Namespace, signals: Signals) 
 
 
 def left(chosen: argparse.Namespace) -> str:
-    """Say what an interrupted verb leaves.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        One sentence, with the way to go on where there is one.
-    """
+    """Say what an interrupted verb leaves."""
     if chosen.verb in READING:
         return "nothing was to be written"
     if chosen.verb == "sweep":

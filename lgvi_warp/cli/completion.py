@@ -15,11 +15,7 @@ from lgvi_warp.common.status import CHECKS, ON_FAILURE
 class Verb(NamedTuple):
     """A verb and the words that may follow it.
 
-    Args:
-        name: The verb.
-        text: What it does.
-        options: Option -> (its help, words that may be its value; none for a file, None for an option without a value).
-        words: Words that may be its argument; none for files.
+    options: Option -> (its help, words that may be its value; none for a file, None for an option without a value).
     """
 
     name: str
@@ -29,11 +25,7 @@ class Verb(NamedTuple):
 
 
 def values() -> dict[str, tuple[str, ...]]:
-    """List the values of options that are checked with the scene and not by the parser.
-
-    Returns:
-        Option -> words that may be its value.
-    """
+    """List the values of options that are checked with the scene and not by the parser."""
     from lgvi_warp.common.machine import DTYPES
     from lgvi_warp.engine.executors import NAMES
     from lgvi_warp.methods import method
@@ -102,14 +94,7 @@ _lgvi_warp() {{
 
 
 def completion(chosen: argparse.Namespace) -> int:
-    """Run the verb completion: print a script for a shell.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 0.
-    """
+    """Run the verb completion: print a script for a shell."""
     chosen.quiet = False
     text = {"bash": bash, "zsh": zsh, "fish": fish}[chosen.shell](list(verbs()))
     tell(chosen, lambda: {"shell": chosen.shell, "script": text}, text.rstrip)
@@ -117,11 +102,7 @@ def completion(chosen: argparse.Namespace) -> int:
 
 
 def verbs() -> Iterator[Verb]:
-    """Read the verbs from the parser.
-
-    Yields:
-        Each verb with its options.
-    """
+    """Read the verbs from the parser."""
     known = values()
     for name, verb in parser().verbs.items():
         options: dict[str, tuple[str, tuple[str, ...] | None]] = {}
@@ -136,14 +117,7 @@ def verbs() -> Iterator[Verb]:
 
 
 def bash(known: list[Verb]) -> str:
-    """Write the script for bash.
-
-    Args:
-        known: The verbs.
-
-    Returns:
-        Its text, to be sourced.
-    """
+    """Write the script for bash."""
     lines = [f'        "{verb.name} {option}") words="{" ".join(words)}" ;;' for verb in known
               for option, (_, words) in verb.options.items() if words]  # fmt: skip
     lists = [f'            {verb.name}) words="{" ".join([*verb.words, *verb.options])}"{"" if verb.words else " files=1"} ;;'
@@ -158,14 +132,7 @@ def bash(known: list[Verb]) -> str:
 
 
 def zsh(known: list[Verb]) -> str:
-    """Write the script for zsh.
-
-    Args:
-        known: The verbs.
-
-    Returns:
-        Its text, for a file _lgvi-warp in a folder of $fpath.
-    """
+    """Write the script for zsh."""
     names = "\n".join(f"        {_quoted(f'{verb.name}:{verb.text}')}" for verb in known)
     lists = []
     for verb in known:
@@ -176,14 +143,7 @@ def zsh(known: list[Verb]) -> str:
 
 
 def fish(known: list[Verb]) -> str:
-    """Write the script for fish.
-
-    Args:
-        known: The verbs.
-
-    Returns:
-        Its text, for ~/.config/fish/completions/lgvi-warp.fish.
-    """
+    """Write the script for fish."""
     lines = [
         f"complete -c lgvi-warp -n __fish_use_subcommand -f -a {verb.name} -d {_quoted(verb.text)}" for verb in known
     ]

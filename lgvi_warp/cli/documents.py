@@ -13,11 +13,7 @@ from lgvi_warp.cli.writing import Written
 def of_settings(provenance: dict[str, Any]) -> dict[str, Any]:
     """How a run was computed.
 
-    Args:
-        provenance: That of the run.
-
-    Returns:
-        Method, precision, step, number of steps and end of the run [s], seed, versions and machine.
+    Returns: Method, precision, step, number of steps and end of the run [s], seed, versions and machine.
     """
     names = ("dtype", "step", "steps", "versions", "machine")
     method, duration = provenance["method"], provenance["step"] * provenance["steps"]
@@ -28,11 +24,7 @@ def of_settings(provenance: dict[str, Any]) -> dict[str, Any]:
 def of_result(result: Any) -> dict[str, Any]:
     """What became of the members of a run.
 
-    Args:
-        result: Its result.
-
-    Returns:
-        Members by outcome and by warning, messages, statistics at the end of the run, and how it was computed.
+    Returns: Members by outcome and by warning, messages, statistics at the end of the run, and how it was computed.
     """
     divided = result.substeps > 0
     return {
@@ -50,14 +42,7 @@ def of_result(result: Any) -> dict[str, Any]:
 
 
 def of_statistics(estimates: Any) -> list[dict[str, Any]]:
-    """The estimates of a run at its last sample time.
-
-    Args:
-        estimates: The estimates.
-
-    Returns:
-        A table for each number: label, unit, value, ends of its interval, and number of members behind it.
-    """
+    """The estimates of a run at its last sample time."""
     from lgvi_warp.statistics.table import entries
 
     return [dict(zip(("label", "unit", "value", "lower", "upper", "members"), entry, strict=True))
@@ -67,12 +52,8 @@ def of_statistics(estimates: Any) -> list[dict[str, Any]]:
 def of_energy(drawn: Any, members: int) -> dict[str, Any] | None:
     """The drift of what the motion conserves, and the change of energy.
 
-    Args:
-        drawn: The members that it is taken of, as a result; None for none.
-        members: Number of members of the run.
-
-    Returns:
-        Largest change of each quantity over members and samples, the quantities that are conserved, and what does work.
+    drawn: The members that it is taken of, as a result; None for none.
+    Returns: Largest change of each quantity over members and samples, the quantities that are conserved, and what does work.
     """
     from lgvi_warp.physics import energy as invariants
 
@@ -91,15 +72,8 @@ def of_energy(drawn: Any, members: int) -> dict[str, Any] | None:
 def of_run(result: Any, drawn: Any, written: Written, faults: Sequence[str], seconds: float) -> dict[str, Any]:
     """A run, as the verbs run and resume print it.
 
-    Args:
-        result: Its result.
-        drawn: The members of the pictures, as a result; None for none.
-        written: The files.
-        faults: One text for each file, check or member that failed.
-        seconds: Time that the verb took [s].
-
-    Returns:
-        The document without its head.
+    drawn: The members of the pictures, as a result; None for none.
+    seconds: Time that the verb took [s].
     """
     rate = result.members * result.provenance["steps"] / result.run_seconds if result.run_seconds else None
     return of_result(result) | {
@@ -111,15 +85,7 @@ def of_run(result: Any, drawn: Any, written: Written, faults: Sequence[str], sec
 
 
 def of_files(written: Written, faults: Sequence[str] = ()) -> dict[str, Any]:
-    """The files of a verb.
-
-    Args:
-        written: The files, and what failed.
-        faults: Other faults; default none.
-
-    Returns:
-        Paths, faults and notes.
-    """
+    """The files of a verb."""
     return {
         "files": [Path(path) for path in written.files],
         "faults": [*written.faults, *faults],
@@ -128,26 +94,12 @@ def of_files(written: Written, faults: Sequence[str] = ()) -> dict[str, Any]:
 
 
 def of_prediction(prediction: Any) -> dict[str, Any]:
-    """A prediction of a run.
-
-    Args:
-        prediction: The prediction.
-
-    Returns:
-        Its numbers by name.
-    """
+    """A prediction of a run."""
     return {**vars(prediction), "seconds": prediction.seconds}
 
 
 def of_store(contents: dict[str, Any]) -> dict[str, Any]:
-    """What a store holds.
-
-    Args:
-        contents: As runs.store.state has it.
-
-    Returns:
-        The same, with how it was computed in place of the provenance.
-    """
+    """What a store holds."""
     return {name: value for name, value in contents.items() if name != "provenance"} | {
         "settings": of_settings(contents["provenance"])
     }

@@ -25,26 +25,13 @@ MOST_SAID = 20
 
 @dataclass(frozen=True)
 class Content:
-    """Numbers in a folder.
-
-    Args:
-        kind: "store", "result", "tradeoff", "sensitivity", "stability" or "sweep".
-        path: The file, or the store.
-    """
+    """Numbers in a folder."""
 
     kind: str
     path: Path
 
     def load(self) -> Any:
-        """Read the numbers.
-
-        Returns:
-            A result, or what a study found; of a sweep the content of its file.
-
-        Raises:
-            SceneError: The file is damaged.
-            OSError: It cannot be read.
-        """
+        """Read the numbers."""
         if self.kind == "store":
             from lgvi_warp.runs.store.open import open_run
 
@@ -59,11 +46,7 @@ class Content:
         return _study(self.kind).load(self.path)
 
     def understood(self) -> AbstractContextManager[None]:
-        """Turn what the numbers raise where they are shown or drawn into a fault of their file.
-
-        Returns:
-            A context manager, which raises SceneError.
-        """
+        """Turn what the numbers raise where they are shown or drawn into a fault of their file."""
         return understood(self.path, "not what a verb wrote", "write it again, or see where by -v")
 
 
@@ -83,17 +66,7 @@ def _study(kind: str) -> Any:
 
 
 def contents(folder: Path) -> list[Content]:
-    """Look for numbers in a folder.
-
-    Args:
-        folder: A folder that a verb wrote, or a store.
-
-    Returns:
-        What is there; a store is the last.
-
-    Raises:
-        SceneError: The folder holds nothing that a verb wrote, or a link leads out of it.
-    """
+    """Look for numbers in a folder."""
     from lgvi_warp.studies.files import STUDY_FILES
 
     patterns = {"result": "result*.npz", **STUDY_FILES}
@@ -115,17 +88,7 @@ def contents(folder: Path) -> list[Content]:
 
 
 def info_of_folder(chosen: argparse.Namespace) -> int:
-    """Print what a folder holds, and what is damaged of it.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 0 if everything is complete and undamaged, otherwise 1.
-
-    Raises:
-        SceneError: The folder holds nothing that a verb wrote, or what it holds is damaged.
-    """
+    """Print what a folder holds, and what is damaged of it."""
     parts = [_part(content, chosen) for content in contents(chosen.dir)]
     others = [path for path in sorted(chosen.dir.glob("*")) if path.suffix in OTHERS and chosen.dir.suffix != ".zarr"]
     undamaged = all(document.get("complete", True) for document, _ in parts)
@@ -167,15 +130,7 @@ def _part(content: Content, chosen: argparse.Namespace) -> tuple[dict[str, Any],
 
 
 def text_of(kind: str, found: Any) -> str:
-    """Describe what a study found.
-
-    Args:
-        kind: "tradeoff", "sensitivity" or "stability".
-        found: What it found.
-
-    Returns:
-        The report of the study.
-    """
+    """Describe what a study found."""
     if kind == "tradeoff":
         from lgvi_warp.studies.tradeoff import report_text
 
@@ -188,15 +143,7 @@ def text_of(kind: str, found: Any) -> str:
 
 
 def store_lines(found: dict[str, Any], chosen: argparse.Namespace) -> Iterator[str]:
-    """Say what a store holds.
-
-    Args:
-        found: What its state is, as runs.store.state has it.
-        chosen: The command's parsed arguments.
-
-    Yields:
-        Its lines.
-    """
+    """Say what a store holds."""
     provenance = found["provenance"]
     yield f"run         {found['path']} ({found['bytes'] / 1e6:.1f} MB), lgvi-warp {provenance['versions']['lgvi-warp']}"
     yield members_line(found["members"], provenance)

@@ -69,17 +69,7 @@ COLUMN = 41
 
 
 def new(chosen: argparse.Namespace) -> int:
-    """Run the verb new: write a scene file with comments.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 0.
-
-    Raises:
-        SceneError: The file is there already, or no vehicle has that name.
-    """
+    """Run the verb new: write a scene file with comments."""
     from lgvi_warp.scene.vehicles.fossen import vehicle_tables
 
     content = vehicle_tables(chosen.vehicle)
@@ -101,14 +91,7 @@ def new(chosen: argparse.Namespace) -> int:
 
 
 def list_names(chosen: argparse.Namespace) -> int:
-    """Run the verb list: names of methods, vehicles, terms, or parts of a controller.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 0.
-    """
+    """Run the verb list: names of methods, vehicles, terms, or parts of a controller."""
     entries = {"methods": _methods, "vehicles": _vehicles, "terms": _terms, "laws": _laws}[chosen.of]()
     width = max(map(len, entries))
     tell(chosen, lambda: {"of": chosen.of, "names": [{"name": name, "text": text} for name, text in entries.items()]},
@@ -164,14 +147,7 @@ def _summary(kind: Any) -> str:
 
 
 def schema(chosen: argparse.Namespace) -> int:
-    """Run the verb schema: print the JSON schema of scene files.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 0.
-    """
+    """Run the verb schema: print the JSON schema of scene files."""
     from lgvi_warp.scene.schema import schema as of_scenes
 
     print(json.dumps(of_scenes(), indent=1, allow_nan=False))
@@ -179,14 +155,7 @@ def schema(chosen: argparse.Namespace) -> int:
 
 
 def show_help(chosen: argparse.Namespace) -> int:
-    """Run the verb help: print the options of a verb, or all verbs.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 0.
-    """
+    """Run the verb help: print the options of a verb, or all verbs."""
     chosen.quiet = False
     top = parser()
     text = (top.verbs[chosen.of] if chosen.of else top).format_help()

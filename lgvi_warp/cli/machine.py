@@ -16,17 +16,7 @@ from lgvi_warp.engine.peak import fma_peak
 
 
 def info(chosen: argparse.Namespace) -> int:
-    """Run the verb info: describe a stored run, or this machine.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 1 for a run that is not complete, otherwise 0.
-
-    Raises:
-        SceneError: The folder holds nothing that a verb wrote.
-    """
+    """Run the verb info: describe a stored run, or this machine."""
     if chosen.dir is not None:
         return info_of_folder(chosen)
     from lgvi_warp.common import machine
@@ -83,14 +73,7 @@ def _of_limit(memory: int) -> str:
 
 
 def bench(chosen: argparse.Namespace) -> int:
-    """Run the verb bench: measure the kernel's speed on this machine.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 0.
-    """
+    """Run the verb bench: measure the kernel's speed on this machine."""
     from lgvi_warp.studies.speed import measure
 
     readings = []

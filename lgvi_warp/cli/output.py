@@ -24,14 +24,7 @@ COLORS = {"note": YELLOW, "warnings": YELLOW, "kept": BOLD, "damage": RED}
 
 
 def colored(stream: TextIO) -> bool:
-    """Tell whether colors are wanted.
-
-    Args:
-        stream: Where they would go; its `color` is "always", "never", or "auto", which holds where it has none.
-
-    Returns:
-        With "auto" True on a terminal, unless NO_COLOR is set or TERM is "dumb" (https://no-color.org).
-    """
+    """Tell whether colors are wanted."""
     choice: str = getattr(stream, "color", "auto")
     if choice != "auto":
         return choice == "always"
@@ -39,25 +32,12 @@ def colored(stream: TextIO) -> bool:
 
 
 def painted(text: str, color: str) -> str:
-    """Wrap a text in the codes of a color.
-
-    Args:
-        text: The text.
-        color: Code of the color.
-
-    Returns:
-        The text between the color and its end.
-    """
+    """Wrap a text in the codes of a color."""
     return f"\x1b[{color}m{text}\x1b[0m"
 
 
 def say(chosen: argparse.Namespace, text: str) -> None:
-    """Print a text on stdout, its labels in colors, unless it is not wanted.
-
-    Args:
-        chosen: The command's parsed arguments.
-        text: Lines, most of which begin with a label and two blanks.
-    """
+    """Print a text on stdout, its labels in colors, unless it is not wanted."""
     if chosen.quiet or chosen.json or not text:
         return
     # Names and texts of a file may hold what a terminal obeys.
@@ -68,13 +48,7 @@ def say(chosen: argparse.Namespace, text: str) -> None:
 
 
 def tell(chosen: argparse.Namespace, document: Callable[[], dict[str, Any]], text: Callable[[], str]) -> None:
-    """Print the results of a verb: a text, or one JSON document.
-
-    Args:
-        chosen: The command's parsed arguments.
-        document: Makes the document without its head.
-        text: Makes the text.
-    """
+    """Print the results of a verb: a text, or one JSON document."""
     if chosen.json:
         head = {"verb": chosen.verb, "version": __version__}
         print(json.dumps(plain(head | document()), indent=1, allow_nan=False), flush=True)
@@ -85,11 +59,7 @@ def tell(chosen: argparse.Namespace, document: Callable[[], dict[str, Any]], tex
 def plain(value: Any) -> Any:
     """Turn a value into what JSON holds.
 
-    Args:
-        value: Numbers, texts, paths, and nested tables, lists and arrays of them.
-
-    Returns:
-        The same in plain types; numbers that are not finite are None.
+    Returns: The same in plain types; numbers that are not finite are None.
     """
     if isinstance(value, dict):
         return {str(key): plain(item) for key, item in value.items()}
@@ -103,14 +73,7 @@ def plain(value: Any) -> Any:
 
 
 def print_faults(faults: Iterable[str]) -> list[str]:
-    """Print faults on stderr.
-
-    Args:
-        faults: One text per fault.
-
-    Returns:
-        The same faults.
-    """
+    """Print faults on stderr."""
     faults = list(faults)
     name = painted("lgvi-warp:", RED) if colored(sys.stderr) else "lgvi-warp:"
     for fault in faults:

@@ -32,12 +32,7 @@ def shown(quiet: bool, phase: str = "compiling") -> Iterator[Progress | None]:
 def part_of(progress: Progress | None, i: int, n: int) -> Callable[[float], None] | None:
     """Turn the progress of one part into that of the whole.
 
-    Args:
-        progress: Progress of the whole; None for none.
-        i: Index of the part.
-        n: Number of parts, all equally long.
-
-    Returns:
-        A function of the part's fraction; None without a progress.
+    progress: Progress of the whole; None for none.
+    Returns: A function of the part's fraction; None without a progress.
     """
     return progress and (lambda part: progress((i + part) / n))

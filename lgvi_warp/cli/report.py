@@ -64,12 +64,8 @@ MOST_DRAWN = 30_000_000
 def shown_members(result: Any) -> Any:
     """Select the members that the picture and the drift are made of.
 
-    Args:
-        result: The run's result.
-
-    Returns:
-        The result itself; members of a large one in a store, in memory, as `lw.shown` chooses them; without samples, the kept
-        members, or None where there are none, or where a field of the motion was not saved.
+    Returns: The result itself; members of a large one in a store, in memory, as `lw.shown` chooses them; without samples, the
+        kept members, or None where there are none, or where a field of the motion was not saved.
     """
     if not result.samples:
         return result.kept and shown_members(result.kept)
@@ -89,14 +85,7 @@ def shown_members(result: Any) -> Any:
 
 
 def unsaved(result: Any) -> list[str]:
-    """Name the fields of the motion that a run did not save, though it has samples.
-
-    Args:
-        result: The run's result.
-
-    Returns:
-        Their names.
-    """
+    """Name the fields of the motion that a run did not save, though it has samples."""
     from lgvi_warp.physics.fields import FIELDS
 
     return [name for name in FIELDS if result.samples and name not in result.samples]
@@ -105,14 +94,8 @@ def unsaved(result: Any) -> list[str]:
 def write(result: Any, drawn: Any, out: Path, viewer: str | None = None) -> Written:
     """Write result.npz, fleet.png, fleet.rrd and statistics.png side by side, as far as the run has them.
 
-    Args:
-        result: The run's result; a stored one is written already.
-        drawn: The members of the picture, from `shown_members`; None for neither picture nor recording.
-        out: Folder of the files.
-        viewer: Address of a viewer that gets the recording too; default None.
-
-    Returns:
-        What was written, and what failed.
+    drawn: The members of the picture, from `shown_members`; None for neither picture nor recording.
+    viewer: Address of a viewer that gets the recording too; default None.
     """
     written = Written([result.store] if result.store else [])
     writers: dict[str, Callable[[Path], Path]] = {} if result.store else {"result.npz": result.save}
@@ -139,13 +122,8 @@ def _record(result: Any, path: Path, viewer: str | None) -> Path:
 def pictures(result: Any, drawn: Any, viewer: str | None = None) -> dict[str, Callable[[Path], Path]]:
     """The pictures that a run has.
 
-    Args:
-        result: The run's result.
-        drawn: The members of the picture, from `shown_members`; None for neither picture nor recording.
-        viewer: Address of a viewer that gets the recording too; default None.
-
-    Returns:
-        Name of each file -> function of its path that draws it.
+    drawn: The members of the picture, from `shown_members`; None for neither picture nor recording.
+    viewer: Address of a viewer that gets the recording too; default None.
     """
     from lgvi_warp.views import plots
 
@@ -212,14 +190,7 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float = 0.0, ve
 
 
 def look_lines(files: Sequence[Path]) -> list[str]:
-    """Say how to look at what a run wrote.
-
-    Args:
-        files: The files.
-
-    Returns:
-        One line; none without files.
-    """
+    """Say how to look at what a run wrote."""
     known = {path.name: path for path in files}
     ways = [f"rerun {known['fleet.rrd']}"] if "fleet.rrd" in known else []
     ways += [f"open {path}" for name, path in known.items() if name.endswith(".png")][:1]
@@ -228,14 +199,7 @@ def look_lines(files: Sequence[Path]) -> list[str]:
 
 
 def how_lines(provenance: dict[str, Any]) -> list[str]:
-    """Say how a run was computed.
-
-    Args:
-        provenance: That of the run.
-
-    Returns:
-        Two lines.
-    """
+    """Say how a run was computed."""
     machine = provenance["machine"]
     versions = ", ".join(f"{name} {version}" for name, version in provenance["versions"].items())
     seed = provenance["ensemble"].get("seed")
@@ -255,15 +219,7 @@ INVARIANTS = {
 
 
 def energy_lines(result: Any, drawn: Any) -> list[str]:
-    """Line on the drift of conserved quantities, or on the change of energy where forces do work.
-
-    Args:
-        result: The run's result.
-        drawn: The members of it that are drawn, as a result.
-
-    Returns:
-        One line; none where no energy is known.
-    """
+    """Line on the drift of conserved quantities, or on the change of energy where forces do work."""
     import math
 
     from lgvi_warp.physics import energy as invariants
@@ -312,15 +268,7 @@ def _speed(result: Any, seconds: float) -> list[str]:
 
 
 def members_line(members: int, provenance: dict[str, Any]) -> str:
-    """Say how many members were run, and how.
-
-    Args:
-        members: Number of members.
-        provenance: That of the run.
-
-    Returns:
-        One line, and one more where the method was chosen by what acts.
-    """
+    """Say how many members were run, and how."""
     name, chosen = provenance["method"]["name"], provenance["method"].get("chosen")
     line = (
         f"members     {members:,}, {name}, {provenance['dtype']}, step {provenance['step']:g} s, "
@@ -330,14 +278,7 @@ def members_line(members: int, provenance: dict[str, Any]) -> str:
 
 
 def controller_lines(scene: Mapping[str, Any]) -> list[str]:
-    """Say what a controller consists of.
-
-    Args:
-        scene: The scene, as a table.
-
-    Returns:
-        One line; none for a scene without a controller.
-    """
+    """Say what a controller consists of."""
     section = scene.get("controller")
     if not section:
         return []
@@ -350,13 +291,6 @@ def controller_lines(scene: Mapping[str, Any]) -> list[str]:
 
 
 def file_line(path: Path) -> str:
-    """Name a file or a folder with its size.
-
-    Args:
-        path: The file or folder.
-
-    Returns:
-        One line.
-    """
+    """Name a file or a folder with its size."""
     size = path.stat().st_size if path.is_file() else size_below(path)
     return f"file        {path} ({size / 1e6:.1f} MB)"

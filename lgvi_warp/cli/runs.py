@@ -25,18 +25,7 @@ RESULT, PART = "result.npz", "result_part.npz"
 
 
 def run(chosen: argparse.Namespace) -> int:
-    """Run the verb run: simulate a scene's ensemble, write its files and print its summary.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 1 if a file, a check or every member failed, otherwise 0.
-
-    Raises:
-        SceneError: The scene or an argument is refused.
-        Ended: The run was interrupted; the text says what is saved.
-    """
+    """Run the verb run: simulate a scene's ensemble, write its files and print its summary."""
     begun = time.perf_counter()
     scene = load_scene(chosen)
     store, only = store_settings(chosen), block_range(chosen)
@@ -76,16 +65,7 @@ def run(chosen: argparse.Namespace) -> int:
 def live_address(scene: Any, chosen: argparse.Namespace) -> str | None:
     """Find the viewer of --live, before anything runs.
 
-    Args:
-        scene: The scene.
-        chosen: The command's parsed arguments.
-
-    Returns:
-        Its address; None without --live.
-
-    Raises:
-        SceneError: The run keeps nothing to show, or a library is missing.
-        OSError: No viewer answers or starts.
+    Returns: Its address; None without --live.
     """
     if not chosen.live:
         if chosen.viewer is not None:
@@ -104,12 +84,8 @@ def live_address(scene: Any, chosen: argparse.Namespace) -> str | None:
 def live_view(scene: Any, address: str | None) -> Callable[[Any], None] | None:
     """Open the recording of --live.
 
-    Args:
-        scene: The scene.
-        address: Address of the viewer; None without --live.
-
-    Returns:
-        What takes the members that are done; None without --live.
+    address: Address of the viewer; None without --live.
+    Returns: What takes the members that are done; None without --live.
     """
     if address is None:
         return None
@@ -119,15 +95,7 @@ def live_view(scene: Any, address: str | None) -> Callable[[Any], None] | None:
 
 
 def rescued(result: Any, out: Path) -> str:
-    """Save the members that an interrupted run finished, without pictures.
-
-    Args:
-        result: What the run has so far.
-        out: Folder of the files.
-
-    Returns:
-        One sentence on what is saved, and how to go on.
-    """
+    """Save the members that an interrupted run finished, without pictures."""
     if result.store is not None:
         return f"the run is finished: its pictures are made by lgvi-warp resume {result.store.parent}"
     # Keep an existing result of another run.
@@ -145,14 +113,7 @@ def rescued(result: Any, out: Path) -> str:
 
 
 def all_failed(result: Any) -> bool:
-    """Tell whether every member failed.
-
-    Args:
-        result: The run's result.
-
-    Returns:
-        True where none reached the end, or the event that stopped it.
-    """
+    """Tell whether every member failed."""
     from lgvi_warp.common.status import failed
 
     return bool(failed(result.status).all())
@@ -161,15 +122,7 @@ def all_failed(result: Any) -> bool:
 def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
     """Choose method, step and precision for --error, and print them.
 
-    Args:
-        scene: The scene.
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The suggestion; None without --error.
-
-    Raises:
-        SceneError: Other arguments contradict --error, or no setting keeps it.
+    Returns: The suggestion; None without --error.
     """
     if chosen.error is None:
         if chosen.of is not None:
@@ -194,17 +147,7 @@ def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
 
 
 def check_error(scene: Any, result: Any, suggested: Any, chosen: argparse.Namespace) -> list[str]:
-    """Print the error of a run, measured by some members at half its step.
-
-    Args:
-        scene: The scene.
-        result: The run's result.
-        suggested: The suggestion that it followed.
-        chosen: The command's parsed arguments.
-
-    Returns:
-        One fault where the error is above the one asked for, otherwise nothing.
-    """
+    """Print the error of a run, measured by some members at half its step."""
     from lgvi_warp.scene.ensemble import Ensemble
     from lgvi_warp.studies.suggest import verified
 

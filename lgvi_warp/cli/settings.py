@@ -50,31 +50,14 @@ def overrides(chosen: argparse.Namespace) -> dict[str, Any]:
 
 
 def load_scene(chosen: argparse.Namespace) -> Scene:
-    """Load the scene file with the keys that the command line replaces.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The scene.
-
-    Raises:
-        SceneError: The scene or an argument is refused.
-    """
+    """Load the scene file with the keys that the command line replaces."""
     from lgvi_warp.scene.scene import Scene
 
     return Scene.load(chosen.scene, overrides(chosen))
 
 
 def whole(text: str) -> str:
-    """Write a whole number as TOML does: 1e6 becomes 1000000.
-
-    Args:
-        text: A number.
-
-    Returns:
-        Its digits; any other text unchanged.
-    """
+    """Write a whole number as TOML does: 1e6 becomes 1000000."""
     if text.strip("+-").isdigit():
         return text
     try:
@@ -85,14 +68,7 @@ def whole(text: str) -> str:
 
 
 def listed(text: str) -> str:
-    """Write indices as a TOML list: 3,17 becomes [3,17].
-
-    Args:
-        text: Indices with commas, or a word.
-
-    Returns:
-        The list; a word unchanged.
-    """
+    """Write indices as a TOML list: 3,17 becomes [3,17]."""
     return f"[{text}]" if text.replace(",", "").replace(" ", "").isdigit() else text
 
 
@@ -100,50 +76,19 @@ PLAIN = {"members": whole, "seed": whole, "keep": listed}
 
 
 def out_of(chosen: argparse.Namespace, suffix: str = "") -> Path:
-    """Choose the folder for the files: --out, or one named after the scene.
-
-    Args:
-        chosen: The command's parsed arguments.
-        suffix: End of the default folder's name; default none.
-
-    Returns:
-        The folder, which is not made.
-    """
+    """Choose the folder for the files: --out, or one named after the scene."""
     name = Path(chosen.scene).stem
     # A file called "...toml" would give "..", the parent folder.
     return chosen.out or Path("runs") / f"{name if name.strip('.') else 'scene'}{suffix}"
 
 
 def folder(chosen: argparse.Namespace, suffix: str = "") -> Path:
-    """Make the folder for the files before the run, since results that cannot be written would be lost.
-
-    Args:
-        chosen: The command's parsed arguments.
-        suffix: End of the default folder's name; default none.
-
-    Returns:
-        The folder.
-
-    Raises:
-        SceneError: It is a file.
-        OSError: It cannot be made or written to.
-    """
+    """Make the folder for the files before the run, since results that cannot be written would be lost."""
     return writable(out_of(chosen, suffix))
 
 
 def writable(out: Path) -> Path:
-    """Make a folder, where it is not there, and look whether it can be written.
-
-    Args:
-        out: The folder.
-
-    Returns:
-        The same folder.
-
-    Raises:
-        SceneError: It is a file.
-        OSError: It cannot be made or written to.
-    """
+    """Make a folder, where it is not there, and look whether it can be written."""
     try:
         out.mkdir(parents=True, exist_ok=True)
     except FileExistsError:
@@ -158,14 +103,7 @@ def writable(out: Path) -> Path:
 def store_settings(chosen: argparse.Namespace) -> Any:
     """Read the store from the arguments.
 
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        A `Store`; None for a run in memory.
-
-    Raises:
-        SceneError: An argument needs a store, and there is none.
+    Returns: A `Store`; None for a run in memory.
     """
     if chosen.store == "npz":
         names = ("store_dtype", "blocks", "overwrite", "resume")
@@ -182,14 +120,7 @@ def store_settings(chosen: argparse.Namespace) -> Any:
 def block_range(chosen: argparse.Namespace) -> range | None:
     """Read the blocks to run from --blocks A:B.
 
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The blocks from A to B - 1; None for all.
-
-    Raises:
-        SceneError: The text is no range.
+    Returns: The blocks from A to B - 1; None for all.
     """
     if chosen.blocks is None:
         return None

@@ -28,9 +28,6 @@ class Signals:
     A thread listens for the second one, since the main thread may be in a long call of native code. Ignored signals stay
     ignored; previous handlers are restored at the end. Outside the main thread the context does nothing.
 
-    Args:
-        left: Returns what the process leaves when it ends at once.
-
     Attributes:
         number: Number of the first signal heard; None without one.
         said: Whether the end has been reported already.
@@ -120,8 +117,7 @@ class Signals:
 class Lasting:
     """A stream that ignores a reader's disappearance: a run goes on without its terminal.
 
-    Args:
-        stream: The stream to write to; None for one that was closed before Python started.
+    stream: The stream to write to; None for one that was closed before Python started.
     """
 
     # Whether texts are in colors: "auto", "always" or "never".
@@ -131,34 +127,16 @@ class Lasting:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        """Write a text, unless the reader is gone.
-
-        Args:
-            text: The text.
-
-        Returns:
-            Its length.
-
-        Raises:
-            OSError: Any other error, such as a full disk.
-        """
+        """Write a text, unless the reader is gone."""
         self._unless_gone(lambda stream: stream.write(text))
         return len(text)
 
     def flush(self) -> None:
-        """Flush the stream, unless the reader is gone.
-
-        Raises:
-            OSError: Any other error, such as a full disk.
-        """
+        """Flush the stream, unless the reader is gone."""
         self._unless_gone(lambda stream: stream.flush())
 
     def isatty(self) -> bool:
-        """Tell whether the stream is a terminal.
-
-        Returns:
-            False as well where the reader is gone.
-        """
+        """Tell whether the stream is a terminal."""
         return self._stream is not None and self._stream.isatty()
 
     def _unless_gone(self, act: Callable[[TextIO], Any]) -> None:
@@ -185,11 +163,7 @@ class Streams:
 
     @staticmethod
     def color(choice: str) -> None:
-        """Choose whether texts are in colors.
-
-        Args:
-            choice: "auto", "always" or "never".
-        """
+        """Choose whether texts are in colors."""
         for stream in (sys.stdout, sys.stderr):
             stream.color = choice  # type: ignore[union-attr]
 

@@ -21,17 +21,7 @@ from lgvi_warp.common.reading import file_json
 
 
 def finish(written: Written, chosen: argparse.Namespace, content: Mapping[str, Any], text: str) -> int:
-    """Print a study's report, its files and its notes, and say what failed.
-
-    Args:
-        written: The study's files.
-        chosen: The command's parsed arguments.
-        content: What was found, as in its JSON files, by their names.
-        text: The report.
-
-    Returns:
-        The exit code: 1 if a file failed, otherwise 0.
-    """
+    """Print a study's report, its files and its notes, and say what failed."""
     tell(
         chosen,
         lambda: {"content": content} | documents.of_files(written),

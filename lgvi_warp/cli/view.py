@@ -15,19 +15,7 @@ from lgvi_warp.common.files import place_of
 
 
 def view(chosen: argparse.Namespace) -> int:
-    """Run the verb view: open a run in the rerun viewer, or write its recording.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 0.
-
-    Raises:
-        SceneError: There is no run, no such member, or nothing to draw.
-        ImportError: rerun-sdk is not installed (extra: viz).
-        OSError: The viewer cannot be started, or the file cannot be written.
-    """
+    """Run the verb view: open a run in the rerun viewer, or write its recording."""
     members, content = indices(chosen.members), run_in(chosen.dir)
     if chosen.out is not None:
         place_of(chosen.out)  # before the run is read: a fault of the recording is none of the run
@@ -48,17 +36,7 @@ def view(chosen: argparse.Namespace) -> int:
 
 
 def run_in(path: Path) -> Content:
-    """Find the run at a path.
-
-    Args:
-        path: A result.npz, a store, or a folder with one of these.
-
-    Returns:
-        The run.
-
-    Raises:
-        SceneError: There is none.
-    """
+    """Find the run at a path."""
     held = [Content("result", path)] if path.suffix == ".npz" else contents(path)
     runs = [content for content in held if content.kind in ("result", "store")]
     if not runs:
@@ -69,14 +47,8 @@ def run_in(path: Path) -> Content:
 def indices(text: str | None) -> list[int] | None:
     """Read the indices of members.
 
-    Args:
-        text: Numbers with commas, as "3,17"; None for none.
-
-    Returns:
-        The indices; None for none.
-
-    Raises:
-        SceneError: The text is no list of indices.
+    text: Numbers with commas, as "3,17"; None for none.
+    Returns: The indices; None for none.
     """
     if text is None:
         return None

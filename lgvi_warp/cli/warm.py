@@ -12,17 +12,7 @@ from lgvi_warp.common import machine
 
 
 def warm(chosen: argparse.Namespace) -> int:
-    """Run the verb warm: compile what runs of a scene need, and print how long each phase took.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 0.
-
-    Raises:
-        SceneError: The scene cannot run, or refuses a method or precision.
-    """
+    """Run the verb warm: compile what runs of a scene need, and print how long each phase took."""
     from lgvi_warp.runs import warm as kernels
 
     begun = time.perf_counter()

@@ -20,14 +20,7 @@ PERIOD = 0.2
 
 @dataclass
 class Written:
-    """Outcome of writing several files.
-
-    Args:
-        files: Files that were written.
-        faults: One text for each file that failed.
-        empty: One text for each picture without anything to draw.
-        missing: Name of each file that needs a missing library -> the error.
-    """
+    """Outcome of writing several files."""
 
     files: list[Path] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
@@ -35,12 +28,7 @@ class Written:
     missing: dict[str, MissingExtra] = field(default_factory=dict)
 
     def take(self, path: Path, write: Callable[[], Path]) -> None:
-        """Write a file into a folder, or note why it was not written.
-
-        Args:
-            path: The file; no link leads it out of its folder.
-            write: Writes it and returns its path.
-        """
+        """Write a file into a folder, or note why it was not written."""
         try:
             place_of(path, path.parent)
             self.files.append(write())
@@ -52,13 +40,7 @@ class Written:
             self.faults.append(f"{path} was not written: {error}")
 
     def draw(self, plot: Callable[[Any, Path], Any], found: Any, path: Path) -> None:
-        """Draw a study's picture, or note why it was not drawn.
-
-        Args:
-            plot: Draws the study into a file.
-            found: What the study found.
-            path: The file.
-        """
+        """Draw a study's picture, or note why it was not drawn."""
 
         def drawn() -> Path:
             plot(found, path)
@@ -67,11 +49,7 @@ class Written:
         self.take(path, drawn)
 
     def note_lines(self) -> list[str]:
-        """Say which libraries are missing for pictures.
-
-        Returns:
-            One line, or none where nothing is missing.
-        """
+        """Say which libraries are missing for pictures."""
         if not self.missing:
             return []
         files, errors = ", ".join(self.missing), self.missing.values()
@@ -83,18 +61,7 @@ class Written:
 
 
 def side_by_side(writers: Mapping[Path, Callable[[Path], Path]]) -> dict[Path, Future[Path]]:
-    """Write files, each in a thread of its own.
-
-    Args:
-        writers: Path -> function that writes it.
-
-    Returns:
-        Path -> its future, which is done.
-
-    Raises:
-        KeyboardInterrupt: An interrupt came; the files begun are finished first, and the text names them. A second
-            interrupt does not wait.
-    """
+    """Write files, each in a thread of its own."""
     if not writers:
         return {}
     pool = ThreadPoolExecutor(len(writers))

@@ -16,56 +16,21 @@ PATH = "give a path, as text or pathlib.Path"
 
 
 def of_kind(key: str, value: Any, attributes: str, what: str, remedy: str) -> Any:
-    """Read an object that the function looks into.
-
-    Args:
-        key: Name of the argument.
-        value: What the user gave.
-        attributes: Names that it must have, with blanks between.
-        what: What it must be, as "a Result".
-        remedy: Where to get one.
-
-    Returns:
-        The value.
-
-    Raises:
-        SceneError: It is a class, or lacks one of them.
-    """
+    """Read an object that the function looks into."""
     if isinstance(value, type) or not all(hasattr(value, name) for name in attributes.split()):
         raise refusal(key, value, f"is not {what}", remedy)
     return value
 
 
 def result_of(value: Any) -> Any:
-    """Read the result of a run.
-
-    Args:
-        value: What the user gave as `result`.
-
-    Returns:
-        The value.
-
-    Raises:
-        SceneError: It is none.
-    """
+    """Read the result of a run."""
     return of_kind(
         "result", value, "samples status provenance", "a Result", "give what lw.solve or lw.open_run returns"
     )
 
 
 def path_of(key: str, value: Any) -> Path:
-    """Read a path.
-
-    Args:
-        key: Name of the argument.
-        value: What the user gave.
-
-    Returns:
-        The path.
-
-    Raises:
-        SceneError: It is no path, or none that a system takes.
-    """
+    """Read a path."""
     text = value if isinstance(value, str) else os.fspath(value) if isinstance(value, os.PathLike) else None
     if not isinstance(text, str):
         raise refusal(key, value, "is no path", PATH)
@@ -75,18 +40,7 @@ def path_of(key: str, value: Any) -> Path:
 
 
 def file_path(key: str, value: Any) -> Path:
-    """Read the path of a file that is to be written.
-
-    Args:
-        key: Name of the argument.
-        value: What the user gave.
-
-    Returns:
-        The path, whose last part is a name.
-
-    Raises:
-        SceneError: As `path_of`, or it names no file.
-    """
+    """Read the path of a file that is to be written."""
     path = path_of(key, value)
     if not path.name:
         raise refusal(key, value, "names no file", "end it in the name of the file")
@@ -94,39 +48,14 @@ def file_path(key: str, value: Any) -> Path:
 
 
 def whole(key: str, value: Any, least: int, most: int = 2**31 - 1) -> int:
-    """Read a whole number.
-
-    Args:
-        key: Name of the argument.
-        value: What the user gave.
-        least: Smallest number allowed.
-        most: Largest number allowed; default that of 32 bits.
-
-    Returns:
-        The number.
-
-    Raises:
-        SceneError: It is none within these bounds.
-    """
+    """Read a whole number."""
     if not is_whole(value, least, most):
         raise refusal(key, value, f"is no whole number from {least} to {most:,}", f"give one from {least}")
     return int(value)
 
 
 def listed(key: str, value: Any, what: str) -> list[Any]:
-    """Read a list; one text alone stands for a list of it.
-
-    Args:
-        key: Name of the argument.
-        value: What the user gave.
-        what: What the list holds, as "names".
-
-    Returns:
-        Its entries.
-
-    Raises:
-        SceneError: It is no list.
-    """
+    """Read a list; one text alone stands for a list of it."""
     if isinstance(value, str):
         return [value]
     try:
@@ -136,52 +65,19 @@ def listed(key: str, value: Any, what: str) -> list[Any]:
 
 
 def mapping_of(key: str, value: Any, what: str) -> Mapping[Any, Any]:
-    """Read a mapping.
-
-    Args:
-        key: Name of the argument.
-        value: What the user gave.
-        what: What maps to what, as "names to numbers".
-
-    Returns:
-        The value.
-
-    Raises:
-        SceneError: It is none.
-    """
+    """Read a mapping."""
     if not isinstance(value, Mapping):
         raise refusal(key, value, "is no mapping", f"give a dict of {what}")
     return value
 
 
 def ensemble_of(value: Any) -> Any:
-    """Read an ensemble.
-
-    Args:
-        value: What the user gave as `fleet`.
-
-    Returns:
-        The value.
-
-    Raises:
-        SceneError: It is none.
-    """
+    """Read an ensemble."""
     return of_kind("fleet", value, "scene members sampling", "an Ensemble", "give lw.Ensemble(scene, members)")
 
 
 def flag(key: str, value: Any) -> bool:
-    """Read a truth value.
-
-    Args:
-        key: Name of the argument.
-        value: What the user gave.
-
-    Returns:
-        The value.
-
-    Raises:
-        SceneError: It is neither true nor false.
-    """
+    """Read a truth value."""
     try:
         if value == bool(value):  # 0 and 1 too, and NumPy's
             return bool(value)
@@ -191,36 +87,14 @@ def flag(key: str, value: Any) -> bool:
 
 
 def function_of(key: str, value: Any) -> Any:
-    """Read a function, or None for none.
-
-    Args:
-        key: Name of the argument.
-        value: What the user gave.
-
-    Returns:
-        The value.
-
-    Raises:
-        SceneError: It cannot be called.
-    """
+    """Read a function, or None for none."""
     if value is not None and not callable(value):
         raise refusal(key, value, "is no function", "give a function, or leave it out")
     return value
 
 
 def names_of(key: str, value: Any) -> list[str]:
-    """Read a list of names; one name alone stands for a list of it.
-
-    Args:
-        key: Name of the argument.
-        value: What the user gave.
-
-    Returns:
-        The names.
-
-    Raises:
-        SceneError: It is no list, or holds something else than texts.
-    """
+    """Read a list of names; one name alone stands for a list of it."""
     names = listed(key, value, "names")
     for name in names:
         if not isinstance(name, str):

@@ -20,12 +20,7 @@ ROOT, OWN = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
 def cpu_quota(root: Path = ROOT, own: Path = OWN) -> float | None:
     """CPU time that this process may use.
 
-    Args:
-        root: Folder where control groups are mounted; default /sys/fs/cgroup.
-        own: File that names this process's groups; default /proc/self/cgroup.
-
-    Returns:
-        The smallest quota of its groups [CPUs], as 1.5 for 150 ms in each 100 ms; None without a quota.
+    Returns: The smallest quota of its groups [CPUs], as 1.5 for 150 ms in each 100 ms; None without a quota.
     """
     return _cpu_quota(root, own, int(time.monotonic()))
 
@@ -41,12 +36,7 @@ def _cpu_quota(root: Path, own: Path, second: int) -> float | None:
 def memory_limit(root: Path = ROOT, own: Path = OWN) -> int | None:
     """Memory that this process may use together with the others in its groups.
 
-    Args:
-        root: Folder where control groups are mounted; default /sys/fs/cgroup.
-        own: File that names this process's groups; default /proc/self/cgroup.
-
-    Returns:
-        The smallest limit of its groups [bytes]; None without one. Version 1 expresses "none" by a number that no machine
+    Returns: The smallest limit of its groups [bytes]; None without one. Version 1 expresses "none" by a number that no machine
         has.
     """
     limits = [_number(folder / "memory.max") for folder in _folders(root, own, "")]

@@ -60,17 +60,7 @@ class SceneError(ValueError):
 
 
 def refusal(key: str, value: Any, what: str, remedy: str) -> SceneError:
-    """Make the error of a single fault.
-
-    Args:
-        key: Name of the setting at fault.
-        value: Its value.
-        what: What is wrong with it.
-        remedy: How to mend it.
-
-    Returns:
-        The error, to raise.
-    """
+    """Make the error of a single fault."""
     return SceneError([f"{cut(key)} = {shown(value)}: {what}; {remedy}"])
 
 
@@ -113,13 +103,7 @@ class NothingToDraw(ValueError):  # noqa: N818
 
 
 class MissingExtra(ImportError):  # noqa: N818
-    """A library of one of the package's extras is not installed.
-
-    Args:
-        what: What needs the library, as "plots".
-        library: Name of the library for pip.
-        extra: The extra of lgvi-warp that installs it.
-    """
+    """A library of one of the package's extras is not installed."""
 
     def __init__(self, what: str, library: str, extra: str):
         super().__init__(f"{what} need {library}: pip install 'lgvi-warp[{extra}]'", name=library)
@@ -135,15 +119,7 @@ MOST_KNOWN = 60
 
 
 def closest(word: Any, known: Iterable[str]) -> str:
-    """Suggest the known name nearest to a word.
-
-    Args:
-        word: What the user wrote.
-        known: The names that are allowed.
-
-    Returns:
-        'did you mean "name"?', or the list of the known names where none is near.
-    """
+    """Suggest the known name nearest to a word."""
     names = [str(name) for name in known]
     text = word[:LONGEST_VALUE] if isinstance(word, str) else shown(word)
     near = [name for name in names if name.endswith(f".{text}")]
@@ -153,15 +129,7 @@ def closest(word: Any, known: Iterable[str]) -> str:
 
 
 def among(value: Any, known: Iterable[Any]) -> bool:
-    """Tell whether a value is one of those known, whatever the user gave: arrays and tables too.
-
-    Args:
-        value: What the user gave.
-        known: Names, numbers or truth values.
-
-    Returns:
-        Whether it equals one of them and has its type.
-    """
+    """Tell whether a value is one of those known, whatever the user gave: arrays and tables too."""
     return any(type(value) is type(k) and value == k for k in known)
 
 
@@ -212,14 +180,7 @@ def shown(value: Any) -> str:
 
 
 def cut(name: Any) -> str:
-    """Shorten a name for a message: a file may hold one of any length.
-
-    Args:
-        name: A name; of what is no text, its repr is taken.
-
-    Returns:
-        The name, cut after 200 characters.
-    """
+    """Shorten a name for a message: a file may hold one of any length."""
     text = name if isinstance(name, str) else shown(name)
     return text if len(text) <= LONGEST_NAME else f"{text[:LONGEST_NAME]}..."
 
@@ -228,38 +189,17 @@ def one_line(fault: str) -> str:
     """Put a fault on one printable line of limited length.
 
     A file may hold line ends, or control codes that a terminal would obey.
-
-    Args:
-        fault: The text of a fault.
-
-    Returns:
-        The text without control characters; of a long one, its beginning and its end.
     """
     return printable(fault if len(fault) <= HEAD + END else f"{fault[:HEAD]} ... {fault[-END:]}")
 
 
 def printable(text: str, kept: str = "") -> str:
-    """Show control characters, which a terminal would obey, as text.
-
-    Args:
-        text: Any text.
-        kept: Characters that stay as they are; default none.
-
-    Returns:
-        The text, each of them as its code.
-    """
+    """Show control characters, which a terminal would obey, as text."""
     return text if text.isprintable() else "".join(c if c.isprintable() or c in kept else ascii(c)[1:-1] for c in text)
 
 
 def ragged(value: Any) -> bool:
-    """Tell whether nested lists differ in length, so that NumPy makes no array of them.
-
-    Args:
-        value: Lists within lists, or anything else.
-
-    Returns:
-        True where NumPy refuses the value.
-    """
+    """Tell whether nested lists differ in length, so that NumPy makes no array of them."""
     try:
         np.asarray(value)
     except ValueError:
@@ -268,24 +208,13 @@ def ragged(value: Any) -> bool:
 
 
 class Faults:
-    """Collects faults, so that a user sees all of them at once.
-
-    Args:
-        prefix: Text before each fault; default none.
-    """
+    """Collects faults, so that a user sees all of them at once."""
 
     def __init__(self, prefix: str = ""):
         self._prefix, self._found, self._more = prefix, list[str](), 0
 
     def add(self, key: str, value: Any, what: str, remedy: str | Callable[[], str]) -> None:
-        """Note one fault, as "key = value: what is wrong; the remedy".
-
-        Args:
-            key: Name of the setting at fault.
-            value: Its value.
-            what: What is wrong with it.
-            remedy: How to mend it. Give a function where the text takes time: it is called only if the fault is shown.
-        """
+        """Note one fault, as "key = value: what is wrong; the remedy"."""
         if len(self._found) >= MOST_FAULTS:
             self._more += 1
             return
@@ -303,25 +232,12 @@ class Faults:
             self._more += error.more + len(error.faults[room:])
 
     def raise_if_any(self) -> None:
-        """Raise all noted faults at once.
-
-        Raises:
-            SceneError: At least one fault was noted.
-        """
+        """Raise all noted faults at once."""
         if self._found:
             raise SceneError(self._found, self._more)
 
     def choice(self, key: str, value: Any, known: Iterable[Any]) -> bool:
-        """Check that a value is one of those allowed; note a fault otherwise.
-
-        Args:
-            key: Name of the setting.
-            value: Its value.
-            known: The values that are allowed; the type must agree too.
-
-        Returns:
-            Whether the value is allowed.
-        """
+        """Check that a value is one of those allowed; note a fault otherwise."""
         known = list(known)
         good = among(value, known)
         if not good:
@@ -329,13 +245,7 @@ class Faults:
         return good
 
     def keys(self, key: str, given: Iterable[str], known: Iterable[str]) -> None:
-        """Check that every key is one of those allowed; note a fault for each other one.
-
-        Args:
-            key: Name of the table; "" for the top of a scene.
-            given: The keys of the user. Of a mapping, the fault shows the value too.
-            known: The keys that are allowed.
-        """
+        """Check that every key is one of those allowed; note a fault for each other one."""
         known = list(known)
         for name in given:
             if name not in known:
@@ -346,13 +256,7 @@ class Faults:
     def real(self, key: str, value: Any, remedy: str = "give numbers") -> np.ndarray | None:
         """Read real numbers; note a fault where the value holds anything else.
 
-        Args:
-            key: Name of the setting.
-            value: What the user gave.
-            remedy: How to mend it, where the fault itself suggests nothing; default "give numbers".
-
-        Returns:
-            A new float64 array of the value's shape, which may hold NaN; None after a fault.
+        Returns: A new float64 array of the value's shape, which may hold NaN; None after a fault.
         """
         try:
             return real_numbers(value)
@@ -363,14 +267,8 @@ class Faults:
     def finite(self, key: str, value: Any, shape: tuple[int, ...] | None = None, unit: str = "") -> np.ndarray | None:
         """Read finite numbers; note a fault where one is not finite or the shape differs.
 
-        Args:
-            key: Name of the setting.
-            value: What the user gave.
-            shape: The shape asked for, () for one number; default None, any shape.
-            unit: Unit named in the remedy; default none.
-
-        Returns:
-            A read-only float64 array; None after a fault.
+        shape: The shape asked for, () for one number; default None, any shape.
+        Returns: A read-only float64 array; None after a fault.
         """
         wanted = "a number" if shape == () else f"numbers of shape {shape}" if shape else "numbers"
         remedy = f"give {wanted}" + (f" [{unit}]" if unit else "")
@@ -389,14 +287,7 @@ class Faults:
     def number(self, key: str, value: Any, unit: str = "", least: float = -np.inf) -> float | None:
         """Read one finite number; note a fault where it is too small.
 
-        Args:
-            key: Name of the setting.
-            value: What the user gave.
-            unit: Unit named in the remedy; default none.
-            least: The smallest value allowed; default no bound.
-
-        Returns:
-            The number; None after a fault.
+        Returns: The number; None after a fault.
         """
         array = self.finite(key, value, (), unit)
         if array is None:
@@ -409,13 +300,7 @@ class Faults:
     def positive(self, key: str, value: Any, unit: str = "s") -> float | None:
         """Read one finite number above 0; note a fault where it is not.
 
-        Args:
-            key: Name of the setting.
-            value: What the user gave.
-            unit: Unit named in the remedy; default "s".
-
-        Returns:
-            The number; None after a fault.
+        Returns: The number; None after a fault.
         """
         if type(value) is float and 0.0 < value < math.inf:
             return value
@@ -428,14 +313,7 @@ class Faults:
     def symmetric(self, key: str, value: Any, unit: str, size: int = 3) -> np.ndarray | None:
         """Read a symmetric matrix, or the diagonal of a diagonal one.
 
-        Args:
-            key: Name of the setting.
-            value: `size` numbers, or a matrix symmetric to 1e-9 of its largest entry.
-            unit: Unit named in the remedy.
-            size: Rows of the matrix; default 3.
-
-        Returns:
-            The matrix, float64, shape (size, size), exactly symmetric; None after a fault.
+        Returns: The matrix, float64, shape (size, size), exactly symmetric; None after a fault.
         """
         if holds_words(value):
             self.finite(key, value, (size,), unit)  # notes the fault

@@ -29,15 +29,7 @@ SYNCS, MOST_WAITING = 16, 32
 
 
 def checksum(data: Any, before: int = 0) -> int:
-    """CRC-32C checksum, as zarr's crc32c codec computes it.
-
-    Args:
-        data: Bytes, or a contiguous array.
-        before: Checksum of the data that precede it; default 0, none.
-
-    Returns:
-        The checksum of all data so far, 32 bits.
-    """
+    """CRC-32C checksum, as zarr's crc32c codec computes it."""
     import google_crc32c
 
     view = memoryview(data)
@@ -47,11 +39,7 @@ def checksum(data: Any, before: int = 0) -> int:
 
 @functools.cache
 def syncs() -> ThreadPoolExecutor:
-    """Threads that wait for the disk.
-
-    Returns:
-        An executor that the whole process shares.
-    """
+    """Threads that wait for the disk."""
     return ThreadPoolExecutor(SYNCS, thread_name_prefix="lgvi_warp_sync")
 
 
@@ -70,15 +58,7 @@ if hasattr(os, "register_at_fork"):
 
 
 def sync_file(beside: Path, target: Path) -> None:
-    """Wait until a file's content is on the disk.
-
-    Args:
-        beside: The file as it is named now.
-        target: Its later name, which an OSError reports.
-
-    Raises:
-        OSError: The file cannot be synced.
-    """
+    """Wait until a file's content is on the disk."""
     # Windows syncs only what is open for writing.
     descriptor = os.open(beside, os.O_RDWR)
     try:
@@ -104,14 +84,7 @@ def _sync_early(descriptor: int, target: Path) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Wait until the names in a folder are on the disk; do nothing where the system cannot sync folders.
-
-    Args:
-        folder: The folder.
-
-    Raises:
-        OSError: The folder cannot be synced.
-    """
+    """Wait until the names in a folder are on the disk; do nothing where the system cannot sync folders."""
     with contextlib.suppress(PermissionError):  # Windows opens no folders
         descriptor = os.open(folder, os.O_RDONLY)
         try:
@@ -124,9 +97,6 @@ class Files:
     """Files that appear together: `write` each, then `finish` all.
 
     Until then they lie beside their places under temporary names, so that existing files stay whole.
-
-    Args:
-        root: Folder below which all of them lie.
 
     Attributes:
         sums: Key of each file written -> [bytes, CRC-32C].
@@ -142,15 +112,6 @@ class Files:
         """Write one file, and note its size and checksum.
 
         Waits while many large files have not reached the disk.
-
-        Args:
-            key: Path of the file below the root.
-            data: Bytes, or a contiguous array.
-            checked: Whether to append the data's own checksum, 4 bytes; default False.
-
-        Raises:
-            SceneError: A link stands in its way.
-            OSError: The file cannot be written.
         """
         target = self._root / key
         beside = scratch.beside(target)
@@ -173,14 +134,7 @@ class Files:
         ]
 
     def place(self) -> set[Path]:
-        """Wait for the syncs, then rename the files to their places.
-
-        Returns:
-            Their folders, which are not synced yet.
-
-        Raises:
-            OSError: A sync or a renaming failed.
-        """
+        """Wait for the syncs, then rename the files to their places."""
         for _, _, sync in self._waiting:
             assert sync is not None
             sync.result()
@@ -191,11 +145,7 @@ class Files:
         return folders
 
     def finish(self) -> None:
-        """Sync the files, put them in their places, and sync their folders.
-
-        Raises:
-            OSError: One of these steps failed.
-        """
+        """Sync the files, put them in their places, and sync their folders."""
         (error,) = finish_together([self])
         if error is not None:
             raise error
@@ -210,11 +160,7 @@ class Files:
 def finish_together(several: Sequence[Files]) -> list[OSError | None]:
     """Finish several sets of files; each folder is synced once.
 
-    Args:
-        several: The sets.
-
-    Returns:
-        For each set, None or the error for which it is not in its place.
+    Returns: For each set, None or the error for which it is not in its place.
     """
     # Concurrent syncs share the file system's commits.
     for files in several:
@@ -235,15 +181,7 @@ def finish_together(several: Sequence[Files]) -> list[OSError | None]:
 
 
 def write_all(file: Any, view: memoryview) -> None:
-    """Write every byte, however few the system takes at a time.
-
-    Args:
-        file: An unbuffered file, open for writing.
-        view: The bytes.
-
-    Raises:
-        OSError: The disk is full, or another error of the system.
-    """
+    """Write every byte, however few the system takes at a time."""
     while len(view):
         written = file.write(view)
         if not written:
@@ -252,16 +190,7 @@ def write_all(file: Any, view: memoryview) -> None:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write one file durably: it is there whole or not at all.
-
-    Args:
-        path: The file.
-        data: Its bytes.
-
-    Raises:
-        SceneError: A link stands in its way.
-        OSError: The file cannot be written.
-    """
+    """Write one file durably: it is there whole or not at all."""
     files = Files(path.parent)
     try:
         files.write(path.name, data)
@@ -274,18 +203,8 @@ def write_whole(path: Path, data: bytes) -> None:
 def fault(root: Path, key: str, size: int, crc: int) -> str | None:
     """Compare a file with the size and checksum noted for it.
 
-    Args:
-        root: Folder below which it lies.
-        key: Its path from there.
-        size: Its size [bytes].
-        crc: CRC-32C checksum of its bytes.
-
-    Returns:
-        "is missing", "is torn" or "has changed"; None for a file in order.
-
-    Raises:
-        SceneError: It is a link, a pipe or a device.
-        OSError: It cannot be read.
+    size: Its size [bytes].
+    Returns: "is missing", "is torn" or "has changed"; None for a file in order.
     """
     try:
         with safe_files.opened(root, key) as file:
@@ -297,11 +216,7 @@ def fault(root: Path, key: str, size: int, crc: int) -> str | None:
 
 
 def remove_unfinished(folders: Iterable[Path]) -> None:
-    """Remove unfinished files of writers that were killed.
-
-    Args:
-        folders: Folders that only one writer at a time may change.
-    """
+    """Remove unfinished files of writers that were killed."""
     for folder in folders:
         for path in folder.glob(f"*{UNFINISHED}"):
             if scratch.is_unfinished(path.name) and not path.is_dir():
@@ -311,15 +226,7 @@ def remove_unfinished(folders: Iterable[Path]) -> None:
 def place_of(path: str | os.PathLike[str], root: str | os.PathLike[str] | None = None) -> Path:
     """Find where a file is to be written: a link that the user names is followed, and only a plain file is replaced.
 
-    Args:
-        path: The file.
-        root: Folder that it may not leave by a link, since its name is not the user's; default None, it may.
-
-    Returns:
-        Its path without links.
-
-    Raises:
-        SceneError: A folder, device, pipe or socket is there, a link leads out of the folder, or it is no path.
+    root: Folder that it may not leave by a link, since its name is not the user's; default None, it may.
     """
     path = path_of("path", path)
     target = Path(os.path.realpath(path)) if root is None else safe_files.inside(root, path.absolute())
@@ -336,16 +243,7 @@ def placed(path: str | os.PathLike[str], root: str | os.PathLike[str] | None = N
     An existing file stays whole until then; after an error the new one is removed. Unfinished files of killed writers of the
     same file are removed too. Every file that a user has goes through here.
 
-    Args:
-        path: The file.
-        root: Folder that it may not leave by a link, since its name is not the user's; default None, it may.
-
-    Yields:
-        The temporary path to write to.
-
-    Raises:
-        SceneError: What is there is no plain file, or lies outside the folder.
-        OSError: Its folder is not there, or the file cannot be made durable or put in its place.
+    root: Folder that it may not leave by a link, since its name is not the user's; default None, it may.
     """
     target = place_of(path, root)
     if not target.parent.is_dir():
@@ -365,20 +263,7 @@ def placed(path: str | os.PathLike[str], root: str | os.PathLike[str] | None = N
 
 
 def write_text(path: str | os.PathLike[str], text: str, root: str | os.PathLike[str] | None = None) -> Path:
-    """Write a text file in UTF-8; it is there whole or not at all.
-
-    Args:
-        path: The file.
-        text: Its text.
-        root: As of `placed`.
-
-    Returns:
-        The path.
-
-    Raises:
-        SceneError: What is there is no plain file, or lies outside the folder.
-        OSError: The file cannot be written.
-    """
+    """Write a text file in UTF-8; it is there whole or not at all."""
     with placed(path, root) as beside, beside.open("x", encoding="utf-8", newline="\n") as file:
         file.write(text)
     return Path(path)
@@ -398,11 +283,7 @@ class Written:
         self._lock = threading.Lock()
 
     def note(self, path: Path) -> None:
-        """Count a file.
-
-        Args:
-            path: Its path.
-        """
+        """Count a file."""
         with self._lock:
             self.count, self.last = self.count + 1, path
 
@@ -411,15 +292,7 @@ WRITTEN = Written()
 
 
 def put_folder(beside: Path, target: Path) -> None:
-    """Replace a folder by another; a crash leaves one of the two, whole.
-
-    Args:
-        beside: The new folder, in the same parent folder.
-        target: Its place; an existing folder there is removed.
-
-    Raises:
-        OSError: The folder cannot be put there.
-    """
+    """Replace a folder by another; a crash leaves one of the two, whole."""
     old = beside
     if not target.exists():
         beside.replace(target)
@@ -433,15 +306,7 @@ def put_folder(beside: Path, target: Path) -> None:
 
 
 def exchanged(one: Path, other: Path) -> bool:
-    """Exchange two folders in one step.
-
-    Args:
-        one: Path of a folder.
-        other: Path of the other folder.
-
-    Returns:
-        Whether they were exchanged; False where the system cannot.
-    """
+    """Exchange two folders in one step."""
     try:
         rename = ctypes.CDLL(None, use_errno=True).renameat2
     except (OSError, AttributeError, TypeError):
@@ -451,11 +316,7 @@ def exchanged(one: Path, other: Path) -> bool:
 
 
 def restored(target: Path) -> None:
-    """Put back a folder whose writer was killed while it replaced it.
-
-    Args:
-        target: Place of the folder; nothing happens where something is there.
-    """
+    """Put back a folder whose writer was killed while it replaced it."""
     old = [path for path in scratch.left_behind(target) if path.suffix == scratch.OLD and not path.is_symlink()]
     if len(old) == 1 and not target.exists():
         old[0].replace(target)
@@ -464,15 +325,7 @@ def restored(target: Path) -> None:
 
 @contextlib.contextmanager
 def locked(path: Path, wait: bool = False) -> Iterator[bool]:
-    """Hold a folder or file for this process alone.
-
-    Args:
-        path: The folder or file.
-        wait: Whether to wait until it is free; default False.
-
-    Yields:
-        Whether it is held; True as well where the system has no locks.
-    """
+    """Hold a folder or file for this process alone."""
     try:
         import fcntl
     except ImportError:

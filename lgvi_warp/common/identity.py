@@ -41,12 +41,7 @@ def identity(function: Any, version: Any = None) -> str:
     Code, names and constants count, defaults, what closures hold and the globals that the code names, and all that these
     lead to; arrays by their numbers. Names of files and places in them do not.
 
-    Args:
-        function: anything that can be called, or a class.
-        version: what the user says it is, which is then believed; default None.
-
-    Returns:
-        A text that differs where the function does; `UNKNOWN` where that cannot be told.
+    version: what the user says it is, which is then believed; default None.
     """
     if version is not None:
         return f"version {version}"
@@ -59,24 +54,14 @@ def identity(function: Any, version: Any = None) -> str:
 def check_version(faults: Faults, version: Any) -> None:
     """Note a version that is neither a text nor a number.
 
-    Args:
-        faults: takes the fault.
-        version: what the user gave; None for none.
+    version: what the user gave; None for none.
     """
     if version is not None and (isinstance(version, bool) or not isinstance(version, str | int | float)):
         faults.add("version", version, "is neither a text nor a number", 'give version="2"')
 
 
 def comparable(one: str, other: str) -> bool:
-    """Tell whether two identities can differ for one reason alone: that the functions do.
-
-    Args:
-        one: an identity.
-        other: another one.
-
-    Returns:
-        False where one of them is unknown, or they are of two versions of Python, whose code differs.
-    """
+    """Tell whether two identities can differ for one reason alone: that the functions do."""
     return UNKNOWN not in (one, other) and one.partition(" ")[0] == other.partition(" ")[0]
 
 
@@ -95,11 +80,7 @@ class _Reader:
         self._within = set[str]()
 
     def read(self, value: Any) -> str:
-        """Return the hash of an object.
-
-        Args:
-            value: the object.
-        """
+        """Return the hash of an object."""
         self._value(value)
         return self._hash.hexdigest()[:32]
 
@@ -294,11 +275,7 @@ def _place(value: Any) -> tuple[str, str, str] | None:
 
 
 def is_library(module: str) -> bool:
-    """Tell whether a module is one of Python's, or is installed, and so is known by its name and edition.
-
-    Args:
-        module: its name.
-    """
+    """Tell whether a module is one of Python's, or is installed, and so is known by its name and edition."""
     top = module.partition(".")[0]
     file = getattr(sys.modules.get(top), "__file__", None)
     if top in sys.stdlib_module_names:

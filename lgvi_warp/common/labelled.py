@@ -16,29 +16,16 @@ DRAWS = ("chain", "draw")
 
 
 def is_labelled(value: Any) -> bool:
-    """Tell whether a value has named columns, whose order then does not matter.
-
-    Args:
-        value: Anything a user gave for a table.
-
-    Returns:
-        True for a mapping, a data frame, a structured array, or a labelled xarray object.
-    """
+    """Tell whether a value has named columns, whose order then does not matter."""
     return _labels(value) is not None
 
 
 def columns_by_name(faults: Faults, key: str, value: Any) -> dict[str, Any]:
     """Read the columns of a labelled value.
 
-    Args:
-        faults: Receives what is wrong: labels that are no texts, or that occur twice.
-        key: Name of the value in a fault.
-        value: A mapping, a data frame (pandas, polars, pyarrow, or another with `columns` and table[name]), a structured
-            array, an xarray Dataset (of a posterior by chain and draw, all chains one after the other), or a DataArray with
-            labels along its second dimension.
-
-    Returns:
-        Label -> column, in the value's order; empty after a fault.
+    value: A mapping, a data frame (pandas, polars, pyarrow, or another with `columns` and table[name]), a structured array, an
+        xarray Dataset (of a posterior by chain and draw, all chains one after the other), or a DataArray with labels along its
+        second dimension.
     """
     labels = _labels(value)
     if labels is None or not labels:
@@ -58,17 +45,7 @@ def columns_by_name(faults: Faults, key: str, value: Any) -> dict[str, Any]:
 
 
 def match(faults: Faults, key: str, given: Sequence[str], wanted: Sequence[str]) -> bool:
-    """Compare labels with those that are wanted, in any order; note a fault for each missing or unknown one.
-
-    Args:
-        faults: Receives the faults.
-        key: Name of the value in a fault.
-        given: Labels of the value.
-        wanted: Labels it must have.
-
-    Returns:
-        Whether they agree.
-    """
+    """Compare labels with those that are wanted, in any order; note a fault for each missing or unknown one."""
     missing = [name for name in wanted if name not in given]
     for label in given:
         if label not in wanted:

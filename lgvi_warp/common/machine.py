@@ -21,11 +21,7 @@ REGISTER_BYTES = {"avx512": 64, "avx2": 32, "other": 16}
 
 
 def simd() -> str:
-    """Widest SIMD extension of the processor.
-
-    Returns:
-        "avx512", "avx2" or "other".
-    """
+    """Widest SIMD extension of the processor."""
     from numpy._core._multiarray_umath import __cpu_features__ as features
 
     if features.get("AVX512F"):
@@ -34,45 +30,26 @@ def simd() -> str:
 
 
 def register_width(dtype: str) -> int:
-    """Vehicles of which one number each fills a SIMD register.
-
-    Args:
-        dtype: "float64", "float32" or "float32_compensated".
-
-    Returns:
-        The number of vehicles; for float64, 8 on AVX-512, 4 on AVX2, 2 elsewhere.
-    """
+    """Vehicles of which one number each fills a SIMD register."""
     return REGISTER_BYTES[simd()] // np.dtype(DTYPES[dtype]).itemsize
 
 
 def affinity() -> int:
-    """Cores that this process may run on.
-
-    Returns:
-        The number, as os.process_cpu_count gives it from Python 3.13 on.
-    """
+    """Cores that this process may run on."""
     if hasattr(os, "process_cpu_count"):
         return os.process_cpu_count() or 1
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def thread_count() -> int:
-    """Default number of threads of a run.
-
-    Returns:
-        One for each core, but no more than a container's quota of CPU time keeps busy.
-    """
+    """Default number of threads of a run."""
     quota = container.cpu_quota()
     return affinity() if quota is None else max(1, min(affinity(), math.ceil(quota)))
 
 
 @functools.cache
 def cpu_name() -> str:
-    """Name of the processor.
-
-    Returns:
-        The model name, as the system reports it.
-    """
+    """Name of the processor."""
     info = Path("/proc/cpuinfo")
     if info.exists():
         for line in info.read_text().splitlines():
@@ -84,8 +61,7 @@ def cpu_name() -> str:
 def physical_memory() -> int | None:
     """Memory of the machine.
 
-    Returns:
-        Its size [bytes]; None where the system does not tell.
+    Returns: Its size [bytes]; None where the system does not tell.
     """
     try:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
@@ -96,8 +72,7 @@ def physical_memory() -> int | None:
 def memory_bytes() -> int | None:
     """Memory available to this process: the machine's, or the limit of its container.
 
-    Returns:
-        Its size [bytes]; None if neither is known.
+    Returns: Its size [bytes]; None if neither is known.
     """
     known = [size for size in (physical_memory(), container.memory_limit()) if size is not None]
     return min(known, default=None)
@@ -106,8 +81,7 @@ def memory_bytes() -> int | None:
 def resident() -> int:
     """Memory of this process.
 
-    Returns:
-        Resident memory [bytes]; 0 where the system does not tell.
+    Returns: Resident memory [bytes]; 0 where the system does not tell.
     """
     try:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
@@ -116,11 +90,7 @@ def resident() -> int:
 
 
 def versions() -> dict[str, str]:
-    """Versions of the software that a result depends on.
-
-    Returns:
-        Name -> version, of Python and four packages.
-    """
+    """Versions of the software that a result depends on."""
     return dict(_versions())
 
 
@@ -134,18 +104,10 @@ def _versions() -> tuple[tuple[str, str], ...]:
 
 
 def kind() -> dict[str, str]:
-    """Processor, SIMD extension and versions: where they agree, the same inputs give the same bits.
-
-    Returns:
-        Name -> value.
-    """
+    """Processor, SIMD extension and versions: where they agree, the same inputs give the same bits."""
     return {"cpu": cpu_name(), "simd": simd()} | {name: v for name, v in versions().items() if name != "python"}
 
 
 def describe() -> dict[str, Any]:
-    """Describe the machine for a result's provenance.
-
-    Returns:
-        "cpu", "simd", "threads" and "system".
-    """
+    """Describe the machine for a result's provenance."""
     return {"cpu": cpu_name(), "simd": simd(), "threads": thread_count(), "system": platform.system()}

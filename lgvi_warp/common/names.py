@@ -17,11 +17,7 @@ RULE = "give letters, digits, _, - and points"
 def wrong_with(name: str) -> tuple[str, str] | None:
     """Check a name of a term or an event.
 
-    Args:
-        name: The name.
-
-    Returns:
-        (what is wrong, the remedy); None for a good name.
+    Returns: (what is wrong, the remedy); None for a good name.
     """
     if not name:
         return "is empty", RULE
@@ -40,37 +36,19 @@ def wrong_with(name: str) -> tuple[str, str] | None:
 
 
 def shown_character(one: str) -> str:
-    """Write a character so that a message can show it.
-
-    Args:
-        one: One character.
-
-    Returns:
-        "a space", "a point", or its repr.
-    """
+    """Write a character so that a message can show it."""
     return {" ": "a space", ".": "a point"}.get(one, ascii(one) if not one.isprintable() else repr(one))
 
 
 def folded(name: str) -> str:
-    """Normalise a name as file systems do that ignore case, or that write accents in two ways.
-
-    Args:
-        name: Name of a term or an event.
-
-    Returns:
-        The same text for names that such a file system cannot tell apart.
-    """
+    """Normalise a name as file systems do that ignore case, or that write accents in two ways."""
     return unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", name).casefold())
 
 
 def alike(names: Iterable[str]) -> list[tuple[str, str]]:
     """Find different names that some file system cannot tell apart.
 
-    Args:
-        names: Names of terms and events.
-
-    Returns:
-        Pairs (earlier name, later name), in the order of the names.
+    Returns: Pairs (earlier name, later name), in the order of the names.
     """
     first: dict[str, str] = {}
     pairs: list[tuple[str, str]] = []

@@ -28,20 +28,7 @@ MOST_LIST, MOST_ARRAYS = 4_000_000, 20_000
 
 @contextlib.contextmanager
 def opened(root: Path, key: str) -> Iterator[Iterator[np.ndarray]]:
-    """Open a file of several arrays below a root folder.
-
-    Args:
-        root: The root folder.
-        key: Path of the file from there.
-
-    Yields:
-        The arrays, one after another.
-
-    Raises:
-        ValueError: The file holds something else.
-        SceneError: It is a link, a pipe or a device.
-        OSError: It cannot be read.
-    """
+    """Open a file of several arrays below a root folder."""
     with safe_files.opened(root, key) as raw:
         size = os.fstat(raw.fileno()).st_size
         with io.BufferedReader(raw) as file:  # type: ignore[type-var]
@@ -54,18 +41,7 @@ def _in_turn(file: BinaryIO, size: int) -> Iterator[np.ndarray]:
 
 
 def read(file: Any, left: int) -> np.ndarray:
-    """Read one array from a stream.
-
-    Args:
-        file: A buffered binary stream.
-        left: Bytes that the stream still has.
-
-    Returns:
-        The array.
-
-    Raises:
-        ValueError: The stream holds no array, or a longer one than it has bytes for.
-    """
+    """Read one array from a stream."""
     shape, fortran, dtype = _described(file)
     count = math.prod(shape)
     if dtype.kind not in KINDS or dtype.itemsize == 0 or count * dtype.itemsize > left:
@@ -90,17 +66,7 @@ def _described(file: Any) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
 
 
 def text(arrays: Iterator[np.ndarray]) -> str:
-    """Take the next array, which must be one text.
-
-    Args:
-        arrays: Arrays of a file, one after another.
-
-    Returns:
-        The text.
-
-    Raises:
-        ValueError: The next array is no text, or there is none.
-    """
+    """Take the next array, which must be one text."""
     array = next(arrays, np.zeros(0))
     if array.dtype.kind != "U" or array.shape:
         raise ValueError("does not begin with a text")
@@ -121,18 +87,7 @@ class _Careful(io.BufferedReader):
 
 
 def of_npz(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
-    """Read all arrays of an .npz file, each once, and no more than the file has room for.
-
-    Args:
-        path: The file; its arrays are stored without compression.
-
-    Returns:
-        Name -> array.
-
-    Raises:
-        ValueError: It is no regular file, no such file, or is damaged.
-        OSError: It cannot be read.
-    """
+    """Read all arrays of an .npz file, each once, and no more than the file has room for."""
     with reading.opened(path, "NumPy file") as raw:
         try:
             with _Careful(raw) as file, zipfile.ZipFile(file) as archive:  # type: ignore[arg-type]
@@ -144,20 +99,7 @@ def of_npz(path: str | os.PathLike[str]) -> dict[str, np.ndarray]:
 def write_npz(
     path: str | os.PathLike[str], arrays: Mapping[str, Any], root: str | os.PathLike[str] | None = None
 ) -> Path:
-    """Write arrays to an .npz file; it is there whole or not at all, and the same arrays give the same bytes.
-
-    Args:
-        path: The file.
-        arrays: Name -> array, or text.
-        root: As of `files.placed`.
-
-    Returns:
-        The path.
-
-    Raises:
-        SceneError: What is there is no plain file, or lies outside the folder.
-        OSError: The file cannot be written.
-    """
+    """Write arrays to an .npz file; it is there whole or not at all, and the same arrays give the same bytes."""
     with durable.placed(path, root) as beside, beside.open("xb") as file:
         np.savez(file, **arrays)
     return Path(path)

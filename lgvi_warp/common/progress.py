@@ -45,11 +45,7 @@ class Progress:
         threading.Thread(target=self._tick, name="progress", daemon=True).start()
 
     def __call__(self, fraction: float) -> None:
-        """Show the fraction done, at most once per interval.
-
-        Args:
-            fraction: Part of the work that is done, 0 to 1.
-        """
+        """Show the fraction done, at most once per interval."""
         now = time.perf_counter()
         with self._lock:
             if self._first == 0.0 < fraction:
@@ -92,22 +88,14 @@ class Progress:
 
 
 class NotebookBar:
-    """A bar of tqdm in a notebook.
-
-    Args:
-        tqdm: The class of tqdm's bars.
-    """
+    """A bar of tqdm in a notebook."""
 
     def __init__(self, tqdm: Any):
         self._bar = tqdm(total=1.0, desc="compiling", bar_format="{desc} {percentage:3.0f}% |{bar}| {remaining} left")
         self._lock = threading.Lock()
 
     def __call__(self, fraction: float) -> None:
-        """Show the fraction done.
-
-        Args:
-            fraction: Part of the work that is done, 0 to 1.
-        """
+        """Show the fraction done."""
         with self._lock:
             if fraction > 0.0 == self._bar.n:
                 self._bar.set_description_str("running")
@@ -119,11 +107,7 @@ class NotebookBar:
 
 
 def bar() -> Progress | NotebookBar:
-    """Begin to show the progress of a call: a bar of tqdm in a notebook that has it, otherwise `Progress` on stderr.
-
-    Returns:
-        What is called with fractions, and closed at the end.
-    """
+    """Begin to show the progress of a call: a bar of tqdm in a notebook that has it, otherwise `Progress` on stderr."""
     notebook = "ipykernel" in sys.modules
     if notebook:
         with contextlib.suppress(ImportError):
@@ -136,11 +120,8 @@ def bar() -> Progress | NotebookBar:
 def shows_progress(call: Callable[P, R]) -> Callable[P, R]:
     """Let `progress=True` of a function show its progress; a decorator.
 
-    Args:
-        call: A function with the keyword `progress`, a function of the fraction that is done.
-
-    Returns:
-        The same function, which takes True (a bar on a terminal or in a notebook, lines elsewhere) and False (nothing) too.
+    Returns: The same function, which takes True (a bar on a terminal or in a notebook, lines elsewhere) and False (nothing)
+        too.
     """
 
     @functools.wraps(call)
@@ -164,10 +145,7 @@ def shows_progress(call: Callable[P, R]) -> Callable[P, R]:
 def callback(progress: Callable[[float], None] | bool | None) -> Callable[[float], None] | None:
     """The function to call with fractions, of what a function with `shows_progress` got.
 
-    Args:
-        progress: The function, False or None.
-
-    Returns:
-        The function; None for none.
+    progress: The function, False or None.
+    Returns: The function; None for none.
     """
     return progress if callable(progress) else None

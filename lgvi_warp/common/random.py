@@ -16,29 +16,12 @@ NEAR = 64
 
 @functools.lru_cache(maxsize=1024)
 def seed_words(seed: int, name: str) -> tuple[int, ...]:
-    """Entropy for numpy.random.SeedSequence that depends on a seed and a name.
-
-    Args:
-        seed: A whole number >= 0.
-        name: Name of what is drawn.
-
-    Returns:
-        The seed, and eight words of 32 bits from the name's SHA-256.
-    """
+    """Entropy for numpy.random.SeedSequence that depends on a seed and a name."""
     return (int(seed), *(int(word) for word in np.frombuffer(hashlib.sha256(name.encode()).digest(), dtype="<u4")))
 
 
 def generator(seed: int, name: str, *more: int) -> np.random.Generator:
-    """A random generator that depends on a seed and a name only.
-
-    Args:
-        seed: A whole number >= 0.
-        name: Name of what is drawn.
-        more: Further words of entropy, such as the number of a group.
-
-    Returns:
-        A Philox generator.
-    """
+    """A random generator that depends on a seed and a name only."""
     return np.random.Generator(np.random.Philox(np.random.SeedSequence([*seed_words(seed, name), *more])))
 
 
@@ -52,15 +35,7 @@ def uniforms(seed: int, name: str, first: int, count: int, components: int) -> n
 
     They depend on the seed, the member's index and the name only: Philox counters, a fixed number for each member.
 
-    Args:
-        seed: A whole number >= 0.
-        name: Name of what is drawn.
-        first: Index of the first member.
-        count: Number of members.
-        components: Numbers for each member.
-
-    Returns:
-        Numbers in (0, 1), float64, shape (count, components).
+    Returns: Numbers in (0, 1), float64, shape (count, components).
     """
     counters = -(-components // 4)
     generator = np.random.Philox(key=_philox_key(int(seed), name))
@@ -72,14 +47,8 @@ def uniforms(seed: int, name: str, first: int, count: int, components: int) -> n
 def uniforms_of(seed: int, name: str, members: np.ndarray, components: int) -> np.ndarray:
     """Uniform random numbers of any members; neighbours are drawn together.
 
-    Args:
-        seed: A whole number >= 0.
-        name: Name of what is drawn.
-        members: Indices in any order, shape (n,).
-        components: Numbers for each member.
-
-    Returns:
-        Numbers in (0, 1), float64, shape (n, components), the same as `uniforms` gives for these members.
+    members: Indices in any order, shape (n,).
+    Returns: Numbers in (0, 1), float64, shape (n, components), the same as `uniforms` gives for these members.
     """
     first, count = int(members[0]), len(members)
     if count == 1 or np.all(np.diff(members) == 1):

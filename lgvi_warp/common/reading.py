@@ -29,12 +29,7 @@ OTHER_PATHS = "give the path of a file, or its text"
 
 
 class UnreadableError(ValueError):
-    """A file is not read.
-
-    Args:
-        what: What is wrong with it.
-        remedy: How to mend it.
-    """
+    """A file is not read."""
 
     def __init__(self, what: str, remedy: str):
         super().__init__(f"{what}; {remedy}")
@@ -47,19 +42,7 @@ class UnreadableError(ValueError):
 
 @contextlib.contextmanager
 def opened(path: str | os.PathLike[str], kind: str) -> Iterator[BinaryIO]:
-    """Open a regular file for reading.
-
-    Args:
-        path: The file.
-        kind: What it is, such as "scene file"; a file larger than such files may be is refused before it is read.
-
-    Yields:
-        The unbuffered file.
-
-    Raises:
-        UnreadableError: It is no regular file, or is too large.
-        OSError: The system refuses it.
-    """
+    """Open a regular file for reading."""
     # Checked before it is opened, since opening a device may have effects. Nothing here waits for a pipe's other end.
     _refuse(os.stat(path), kind)
     flags = (getattr(os, name, 0) for name in ("O_NONBLOCK", "O_CLOEXEC", "O_BINARY"))
@@ -69,18 +52,7 @@ def opened(path: str | os.PathLike[str], kind: str) -> Iterator[BinaryIO]:
 
 
 def file_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
-    """Read all bytes of a regular file.
-
-    Args:
-        path: The file.
-        kind: What it is, as of `opened`.
-
-    Returns:
-        The bytes.
-
-    Raises:
-        UnreadableError: It is no regular file, is too large, or the system refuses it.
-    """
+    """Read all bytes of a regular file."""
     remedy, most = PATHS.get(kind, OTHER_PATHS), MOST_BYTES.get(kind, MOST_OTHERS)
     try:
         with opened(path, kind) as file:
@@ -114,17 +86,7 @@ def _smaller(kind: str) -> str:
 
 
 def text_of(content: bytes) -> str:
-    """Decode bytes in UTF-8, without a byte order mark.
-
-    Args:
-        content: The bytes of a file.
-
-    Returns:
-        The text.
-
-    Raises:
-        UnreadableError: They are no text in UTF-8.
-    """
+    """Decode bytes in UTF-8, without a byte order mark."""
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise UnreadableError("is in UTF-16", "save it in UTF-8")
     try:
@@ -135,18 +97,7 @@ def text_of(content: bytes) -> str:
 
 
 def file_text(path: str | os.PathLike[str], kind: str) -> str:
-    """Read a text file in UTF-8.
-
-    Args:
-        path: The file.
-        kind: What it is, such as "scene file".
-
-    Returns:
-        The text.
-
-    Raises:
-        SceneError: It cannot be read; the message has the reason and the remedy.
-    """
+    """Read a text file in UTF-8."""
     try:
         content = file_bytes(path, kind)
     except UnreadableError as error:
@@ -158,34 +109,14 @@ def file_text(path: str | os.PathLike[str], kind: str) -> str:
 
 
 def file_json(path: str | os.PathLike[str]) -> Any:
-    """Read a JSON file.
-
-    Args:
-        path: The file.
-
-    Returns:
-        Its content.
-
-    Raises:
-        ValueError: It is no regular file, is too large or nested too deep, or is not JSON in UTF-8.
-        OSError: It cannot be read.
-    """
+    """Read a JSON file."""
     with opened(path, "JSON file") as file:
         return safe_files.parsed(text_of(io.BufferedReader(file).read(safe_files.MOST_JSON)))  # type: ignore[type-var]
 
 
 @contextlib.contextmanager
 def understood(path: str | os.PathLike[str], what: str, remedy: str) -> Iterator[None]:
-    """Turn what the content of a file raises in the `with` block into a fault of the file.
-
-    Args:
-        path: The file, which the message names.
-        what: What is wrong with it if it is not damaged, as "of another version".
-        remedy: How to get another one.
-
-    Raises:
-        SceneError: In place of any error that the content of the file causes.
-    """
+    """Turn what the content of a file raises in the `with` block into a fault of the file."""
     name = str(path_of("path", path))
     try:
         yield

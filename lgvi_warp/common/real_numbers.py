@@ -14,9 +14,7 @@ import numpy as np
 class NotReal(ValueError):  # noqa: N818
     """A value is no array of real numbers.
 
-    Args:
-        what: What is wrong with it.
-        remedy: How to mend it; default None, "give numbers".
+    remedy: How to mend it; default None, "give numbers".
     """
 
     def __init__(self, what: str, remedy: str | None = None):
@@ -27,15 +25,7 @@ class NotReal(ValueError):  # noqa: N818
 def real_numbers(value: Any) -> np.ndarray:
     """Read real numbers into a new array; they may be NaN or infinite.
 
-    Args:
-        value: A number, lists of numbers, an array, or anything NumPy makes an array of.
-
-    Returns:
-        float64, of the value's shape.
-
-    Raises:
-        NotReal: The value holds texts, truth values, complex numbers or dates, lists of different lengths, a masked
-            number, or a table whose column names would be lost.
+    Returns: float64, of the value's shape.
     """
     for leaf in _parts(value):
         _check(leaf)
@@ -55,15 +45,7 @@ def real_numbers(value: Any) -> np.ndarray:
 def answered(who: str, values: Any) -> np.ndarray:
     """Read numbers that steer, of a user's function or agent; nothing of them is left out or turned into numbers.
 
-    Args:
-        who: Who gave them, for the message.
-        values: What was given.
-
-    Returns:
-        float64, of the values' shape; an array of float64 itself.
-
-    Raises:
-        ValueError: The values are complex, masked, texts, truth values or no array.
+    Returns: float64, of the values' shape; an array of float64 itself.
     """
     if type(values) is np.ndarray and values.dtype.kind in "iuf":
         return values.astype(np.float64, copy=False)
@@ -74,17 +56,7 @@ def answered(who: str, values: Any) -> np.ndarray:
 
 
 def real_results(values: Any) -> np.ndarray:
-    """Read the numbers that a user's function returned; masked ones become NaN.
-
-    Args:
-        values: What the function returned.
-
-    Returns:
-        An array of numbers or of truth values.
-
-    Raises:
-        NotReal: The values are complex, texts, or no array.
-    """
+    """Read the numbers that a user's function returned; masked ones become NaN."""
     if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
         if values.dtype.kind not in "biuf":
             raise NotReal("gave no real numbers")
@@ -102,38 +74,19 @@ def holds_words(value: Any) -> bool:
     """Tell whether a truth value or a text hides among numbers.
 
     [true, 1.0] would pass for [1.0, 1.0], and NumPy turns one long text among many numbers into as many long texts.
-
-    Args:
-        value: A value, or lists of values.
-
-    Returns:
-        True where one is a truth value or a text.
     """
     return any(_is_word(leaf) for leaf in _parts(value))
 
 
 def is_whole(value: Any, least: int, most: float = math.inf) -> bool:
-    """Tell whether a value is a whole number within bounds; true and false are none.
-
-    Args:
-        value: What a user gave.
-        least: The smallest number allowed.
-        most: The largest number allowed; default none.
-
-    Returns:
-        Whether it is one.
-    """
+    """Tell whether a value is a whole number within bounds; true and false are none."""
     return isinstance(value, Integral) and not isinstance(value, bool) and least <= int(value) <= most
 
 
 def column_names(value: Any) -> list[Any] | None:
     """Column names of a table such as pandas.DataFrame or polars.DataFrame.
 
-    Args:
-        value: Any value.
-
-    Returns:
-        The names; None for a value without them.
+    Returns: The names; None for a value without them.
     """
     for name in ("column_names", "columns"):  # pyarrow's `columns` are the columns themselves
         names = getattr(value, name, None)

@@ -13,14 +13,6 @@ def add(known: dict[str, Any], kind: type, attribute: str = "type") -> bool:
     """Make a class known by its word, unless another class has that word.
 
     A class of the same module and name replaces the former one: it is the same class, made again in a notebook.
-
-    Args:
-        known: Classes by their words.
-        kind: The class. One that only inherits its word is not added.
-        attribute: Name of the class attribute that holds the word.
-
-    Returns:
-        Whether the class is known by its word now.
     """
     word = vars(kind).get(attribute)
     if not word:
@@ -32,10 +24,6 @@ def add(known: dict[str, Any], kind: type, attribute: str = "type") -> bool:
 
 
 def load_modules(package: ModuleType) -> None:
-    """Import every module of a package, so that all its classes are known.
-
-    Args:
-        package: The package.
-    """
+    """Import every module of a package, so that all its classes are known."""
     for module in iter_modules(package.__path__):
         import_module(f"{package.__name__}.{module.name}")

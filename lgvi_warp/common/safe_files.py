@@ -27,15 +27,7 @@ _FOLDER = getattr(os, "O_DIRECTORY", 0) | os.O_RDONLY | _PLAIN
 
 
 def refused(path: Path, what: str) -> SceneError:
-    """Make the error for a file that a store never holds.
-
-    Args:
-        path: The file.
-        what: What is wrong with it, as `kind` says.
-
-    Returns:
-        The error, with its remedy.
-    """
+    """Make the error for a file that a store never holds."""
     remedy = "take it away, and what it leads to is left alone" if what == "is a link" else "take it away"
     return SceneError([f"{path}: {what}, where a run has plain files and folders only; {remedy}"])
 
@@ -51,30 +43,12 @@ KINDS = {
 
 
 def kind(mode: int) -> str:
-    """Say what a file is that is not a plain one.
-
-    Args:
-        mode: Its mode, as os.stat gives it.
-
-    Returns:
-        "is a link", "is a named pipe" and so on; "" for a plain file.
-    """
+    """Say what a file is that is not a plain one."""
     return "" if stat.S_ISREG(mode) else KINDS.get(stat.S_IFMT(mode), "is no plain file")
 
 
 def inside(root: str | os.PathLike[str], name: str | os.PathLike[str]) -> Path:
-    """Find a file that lies in a folder, or will, where its links lead; one that leads out of the folder is refused.
-
-    Args:
-        root: The folder; a link to it is followed.
-        name: Path of the file from there.
-
-    Returns:
-        Its path without links; it need not exist.
-
-    Raises:
-        SceneError: It lies outside.
-    """
+    """Find a file that lies in a folder, or will, where its links lead; one that leads out of the folder is refused."""
     home, path = (Path(os.path.realpath(one)) for one in (root, Path(root) / name))
     if not path.is_relative_to(home):
         remedy = "put a copy in its place, or name that file yourself"
@@ -84,14 +58,7 @@ def inside(root: str | os.PathLike[str], name: str | os.PathLike[str]) -> Path:
 
 @contextlib.contextmanager
 def named(path: Path) -> Iterator[None]:
-    """Give an OSError raised inside the `with` block the name of this file.
-
-    Args:
-        path: The file.
-
-    Raises:
-        OSError: That error.
-    """
+    """Give an OSError raised inside the `with` block the name of this file."""
     try:
         yield
     except OSError as error:
@@ -103,16 +70,7 @@ def named(path: Path) -> Iterator[None]:
 def folder(root: Path, inner: Path) -> Iterator[int | None]:
     """Open a folder below a root, without following links; the root itself may be one.
 
-    Args:
-        root: The root folder.
-        inner: The folder below it.
-
-    Yields:
-        A descriptor; None on a system without descriptors of folders.
-
-    Raises:
-        SceneError: A link is on the way.
-        OSError: A folder cannot be opened.
+    Yields: A descriptor; None on a system without descriptors of folders.
     """
     steps = inner.relative_to(root).parts
     if not BY_DESCRIPTOR:
@@ -149,20 +107,7 @@ def _check_folder(mode: int, path: Path) -> None:
 
 @contextlib.contextmanager
 def opened(root: Path, key: str) -> Iterator[BinaryIO]:
-    """Open a plain file below a root for reading.
-
-    Args:
-        root: The root folder.
-        key: Path of the file from there.
-
-    Yields:
-        The unbuffered file.
-
-    Raises:
-        SceneError: It is a link, a pipe or a device.
-        FileNotFoundError: It is missing.
-        OSError: It cannot be opened.
-    """
+    """Open a plain file below a root for reading."""
     path = root / key
     with folder(root, path.parent) as inside:
         where: Any = path if inside is None else path.name
@@ -183,17 +128,7 @@ def _check_file(mode: int, path: Path) -> None:
 def read(root: Path, key: str, most: int) -> bytes:
     """Read a plain file below a root.
 
-    Args:
-        root: The root folder.
-        key: Path of the file from there.
-        most: Largest size allowed [bytes].
-
-    Returns:
-        Its bytes.
-
-    Raises:
-        SceneError: It is no plain file, or too large.
-        OSError: It is missing or cannot be read.
+    most: Largest size allowed [bytes].
     """
     with opened(root, key) as file:
         size = os.fstat(file.fileno()).st_size
@@ -203,35 +138,12 @@ def read(root: Path, key: str, most: int) -> bytes:
 
 
 def read_json(root: Path, key: str) -> Any:
-    """Read a JSON file below a root.
-
-    Args:
-        root: The root folder.
-        key: Path of the file from there.
-
-    Returns:
-        Its content.
-
-    Raises:
-        ValueError: It is not JSON.
-        SceneError: It is no plain file, or too large.
-        OSError: It is missing or cannot be read.
-    """
+    """Read a JSON file below a root."""
     return parsed(read(root, key, MOST_JSON))
 
 
 def parsed(text: str | bytes) -> Any:
-    """Parse JSON into Python's objects.
-
-    Args:
-        text: The JSON text.
-
-    Returns:
-        Its content.
-
-    Raises:
-        ValueError: It is not JSON, or is nested too deep.
-    """
+    """Parse JSON into Python's objects."""
     try:
         content = json.loads(text)
     except RecursionError:
@@ -247,19 +159,7 @@ def parsed(text: str | bytes) -> Any:
 
 @contextlib.contextmanager
 def created(root: Path, path: Path) -> Iterator[BinaryIO]:
-    """Create a new file below a root for writing.
-
-    Args:
-        root: The root folder.
-        path: The file, which must not exist.
-
-    Yields:
-        The unbuffered file.
-
-    Raises:
-        SceneError: A folder on the way is a link.
-        OSError: It cannot be created.
-    """
+    """Create a new file below a root for writing."""
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _PLAIN
     with folder(root, path.parent) as inside:
         where = path if inside is None else path.name
@@ -269,17 +169,7 @@ def created(root: Path, path: Path) -> Iterator[BinaryIO]:
 
 
 def rename(root: Path, path: Path, target: Path) -> None:
-    """Rename a file within its folder below a root; an existing link of that name is replaced, not followed.
-
-    Args:
-        root: The root folder.
-        path: The file.
-        target: Its new path, in the same folder.
-
-    Raises:
-        SceneError: A folder on the way is a link.
-        OSError: It cannot be renamed.
-    """
+    """Rename a file within its folder below a root; an existing link of that name is replaced, not followed."""
     with folder(root, path.parent) as inside:
         if inside is None:
             path.replace(target)
@@ -294,16 +184,7 @@ MOST_DEEP = 8
 def entries(root: Path, below: str = "") -> Iterator[tuple[str, os.DirEntry[str]]]:
     """List everything below a root, in order of names; links are not followed.
 
-    Args:
-        root: The root folder.
-        below: Folder to begin with, ending in "/"; default the root.
-
-    Yields:
-        (path from the root, directory entry).
-
-    Raises:
-        SceneError: Folders are nested too deep.
-        OSError: A folder cannot be read.
+    Yields: (path from the root, directory entry).
     """
     if below.count("/") > MOST_DEEP:
         raise SceneError([f"{root / below}: lies deeper than the folders of a run do; remove it"])
@@ -316,19 +197,7 @@ def entries(root: Path, below: str = "") -> Iterator[tuple[str, os.DirEntry[str]
 
 
 def names(root: Path, key: str) -> set[str]:
-    """List the names in a folder below a root.
-
-    Args:
-        root: The root folder.
-        key: Path of the folder from there.
-
-    Returns:
-        The names; empty where the folder is missing.
-
-    Raises:
-        SceneError: A link is on the way.
-        OSError: It cannot be read.
-    """
+    """List the names in a folder below a root."""
     try:
         with folder(root, root / key) as inside:
             return set(os.listdir(root / key if inside is None else inside))
@@ -339,25 +208,14 @@ def names(root: Path, key: str) -> set[str]:
 def size_below(root: Path) -> int:
     """Add up the plain files below a folder.
 
-    Args:
-        root: The folder.
-
-    Returns:
-        Their size [bytes].
+    Returns: Their size [bytes].
     """
     plain = (entry for _, entry in entries(root) if entry.is_file(follow_symlinks=False))
     return sum(entry.stat(follow_symlinks=False).st_size for entry in plain)
 
 
 def refuse_links(root: Path) -> None:
-    """Refuse a folder that holds anything but plain files and folders.
-
-    Args:
-        root: The folder.
-
-    Raises:
-        SceneError: A link, device or pipe lies below it.
-    """
+    """Refuse a folder that holds anything but plain files and folders."""
     for name, entry in entries(root):
         if not entry.is_dir(follow_symlinks=False):
             _check_file(entry.stat(follow_symlinks=False).st_mode, root / name)

@@ -19,11 +19,7 @@ MARK = re.compile(r"(?P<host>[^/]+?)-(?:(?P<space>\d+)-)?(?P<pid>\d+)(?:-[0-9a-f
 
 
 def host() -> str:
-    """Identify the machine and the process namespace, within which a process number is unique.
-
-    Returns:
-        "HOST-NAMESPACE"; namespace 0 where the system has none.
-    """
+    """Identify the machine and the process namespace, within which a process number is unique."""
     try:
         space = os.stat("/proc/self/ns/pid").st_ino
     except OSError:
@@ -32,27 +28,12 @@ def host() -> str:
 
 
 def beside(target: Path, ending: str = UNFINISHED) -> Path:
-    """Make a temporary name, in the same folder, that no other writer has.
-
-    Args:
-        target: The later path.
-        ending: UNFINISHED (default), NEW or OLD.
-
-    Returns:
-        The temporary path.
-    """
+    """Make a temporary name, in the same folder, that no other writer has."""
     return target.with_name(f"{target.name}.{host()}-{os.getpid()}-{secrets.token_hex(4)}{ending}")
 
 
 def is_alive(pid: int) -> bool:
-    """Tell whether a process of this machine runs.
-
-    Args:
-        pid: Its number.
-
-    Returns:
-        True where it runs, or where the system does not tell.
-    """
+    """Tell whether a process of this machine runs."""
     if os.name != "posix":
         return True
     try:
@@ -67,12 +48,7 @@ def is_alive(pid: int) -> bool:
 def of_target(name: str, target: str) -> re.Match[str] | None:
     """Read the writer from a temporary name.
 
-    Args:
-        name: Name of a file or folder.
-        target: Name that it was made for.
-
-    Returns:
-        A match with "host", "space" and "pid"; None for any other name.
+    Returns: A match with "host", "space" and "pid"; None for any other name.
     """
     head, ending = f"{target}.", os.path.splitext(name)[1]
     if not name.startswith(head) or ending not in (UNFINISHED, NEW, OLD):
@@ -81,27 +57,13 @@ def of_target(name: str, target: str) -> re.Match[str] | None:
 
 
 def is_unfinished(name: str) -> bool:
-    """Tell whether a name is that of an unfinished file.
-
-    Args:
-        name: Name of a file.
-
-    Returns:
-        True for a name that `beside` gives with its default ending.
-    """
+    """Tell whether a name is that of an unfinished file."""
     head, ending = os.path.splitext(name)
     return ending == UNFINISHED and any(MARK.fullmatch(head[dot.end() :]) for dot in re.finditer(r"(?<!^)\.", head))
 
 
 def left_behind(target: Path) -> list[Path]:
-    """Find what dead writers of this machine left of a target.
-
-    Args:
-        target: Path of the file or folder that they wrote.
-
-    Returns:
-        Paths of their files and folders.
-    """
+    """Find what dead writers of this machine left of a target."""
     try:
         names = os.listdir(target.parent)
     except OSError:
@@ -127,10 +89,6 @@ def sweep(target: Path) -> None:
 
 
 def remove_folder(path: Path) -> None:
-    """Remove a folder with all its content; a missing one is no error, and a link is not followed.
-
-    Args:
-        path: The folder.
-    """
+    """Remove a folder with all its content; a missing one is no error, and a link is not followed."""
     with contextlib.suppress(FileNotFoundError):
         shutil.rmtree(path)

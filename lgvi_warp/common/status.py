@@ -102,8 +102,7 @@ class StatusArray(np.ndarray):
     def counts(self) -> dict[str, int]:
         """Count members by outcome.
 
-        Returns:
-            Name of the status in lower case -> number of members, in the order of the codes; only those that occur.
+        Returns: Name of the status in lower case -> number of members, in the order of the codes; only those that occur.
         """
         values, numbers = np.unique(np.asarray(self), return_counts=True)
         return {Status(v).name.lower(): int(n) for v, n in zip(values, numbers, strict=True)}
@@ -181,11 +180,8 @@ OK, FIRST_EVENT, LAST_EVENT = int(Status.OK), int(Status.SURFACE), int(max(Statu
 def stopped(status: Any) -> np.ndarray:
     """Mask of the members that an event of the scene stopped, which is no failure.
 
-    Args:
-        status: Codes of `Status`, shape (n,).
-
-    Returns:
-        bool, shape (n,).
+    status: Codes of `Status`, shape (n,).
+    Returns: bool, shape (n,).
     """
     codes = np.asarray(status)
     return np.asarray((codes >= FIRST_EVENT) & (codes <= LAST_EVENT))
@@ -194,11 +190,8 @@ def stopped(status: Any) -> np.ndarray:
 def failed(status: Any) -> np.ndarray:
     """Mask of the members that neither reached the end nor were stopped by an event.
 
-    Args:
-        status: Codes of `Status`, shape (n,).
-
-    Returns:
-        bool, shape (n,).
+    status: Codes of `Status`, shape (n,).
+    Returns: bool, shape (n,).
     """
     codes = np.asarray(status)
     return np.asarray((codes != OK) & ~stopped(codes))
@@ -210,8 +203,7 @@ class WarningArray(np.ndarray):
     def counts(self) -> dict[str, int]:
         """Count members by warning.
 
-        Returns:
-            Name of the warning in lower case -> number of members, the most serious last; only those that occur. A member
+        Returns: Name of the warning in lower case -> number of members, the most serious last; only those that occur. A member
             counts once for each of its warnings.
         """
         bits = np.asarray(self)
@@ -221,14 +213,7 @@ class WarningArray(np.ndarray):
     def has(self, warning: Warnings) -> np.ndarray:
         """Mask of the members with a warning.
 
-        Args:
-            warning: One warning, or several joined by |: a member with any of them counts.
-
-        Returns:
-            bool, shape (n,).
-
-        Raises:
-            SceneError: It is no warning.
+        Returns: bool, shape (n,).
         """
         if not is_whole(warning, 0, np.iinfo(np.uint16).max):
             raise refusal("warning", warning, "is no warning", "give one of lw.Warnings, or several joined by |")
@@ -237,8 +222,7 @@ class WarningArray(np.ndarray):
     def worst(self) -> np.ndarray:
         """Find the most serious warning of each member.
 
-        Returns:
-            One bit of `Warnings` each, uint16, shape (n,); 0 for a member without a warning.
+        Returns: One bit of `Warnings` each, uint16, shape (n,); 0 for a member without a warning.
         """
         bits = np.asarray(self, dtype=np.uint16)
         highest = np.zeros_like(bits)
@@ -250,11 +234,7 @@ class WarningArray(np.ndarray):
 def under_way(result: Any) -> np.ndarray:
     """Mask of the members under way at each sample: neither stopped by an event nor failed.
 
-    Args:
-        result: A `Result` of n members with k samples.
-
-    Returns:
-        bool, shape (k, n).
+    Returns: bool, shape (k, n).
     """
     return np.asarray(result.time[:, None] <= stop_time(result) * (1.0 + ROUNDING))
 
@@ -262,11 +242,7 @@ def under_way(result: Any) -> np.ndarray:
 def stop_time(result: Any) -> np.ndarray:
     """When each member stopped: the time of its event, or of its last good state where it failed.
 
-    Args:
-        result: A `Result` of n members.
-
-    Returns:
-        Times [s], shape (n,); infinite for a member that ran to the end.
+    Returns: Times [s], shape (n,); infinite for a member that ran to the end.
     """
     return np.where(np.asarray(result.status) != Status.OK, np.asarray(result.failure_time), np.inf)
 

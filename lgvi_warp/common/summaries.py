@@ -64,41 +64,22 @@ def _cut(line: str) -> str:
 
 
 def listed(names: Iterable[Any], most: int = 8) -> str:
-    """List some names.
-
-    Args:
-        names: The names.
-        most: Number of names that are written out; default 8.
-
-    Returns:
-        The names with commas; "none" for none.
-    """
+    """List some names."""
     words = [str(name) for name in names]
     more = f" and {len(words) - most:,} more" if len(words) > most else ""
     return ", ".join(words[:most]) + more if words else "none"
 
 
 def counted(counts: dict[str, int]) -> str:
-    """Write numbers by name.
-
-    Args:
-        counts: Name -> number.
-
-    Returns:
-        "ok 12, floor 3".
-    """
+    """Write numbers by name."""
     return ", ".join(f"{name} {number:,}" for name, number in counts.items())
 
 
 def numbers(value: Any, unit: str = "") -> str:
     """Write a number or an array.
 
-    Args:
-        value: A number, or an array of any shape.
-        unit: Its unit; default none.
-
-    Returns:
-        A few digits of each entry; of a matrix its diagonal or its shape.
+    value: A number, or an array of any shape.
+    Returns: A few digits of each entry; of a matrix its diagonal or its shape.
     """
     array = np.asarray(value, dtype=np.float64)
     after = f" {unit}" if unit not in ("", "1") else ""
@@ -114,14 +95,9 @@ def numbers(value: Any, unit: str = "") -> str:
 def curves(time: np.ndarray, values: np.ndarray, marked: np.ndarray, label: str) -> str:
     """Draw a few curves as SVG; larger values stand lower.
 
-    Args:
-        time: Times (k,).
-        values: Values (k, n); what is not finite is left out.
-        marked: Curves in the second colour (n,).
-        label: What is drawn, with its unit and range.
-
-    Returns:
-        The SVG; "" where nothing is finite or there is one time.
+    time: Times (k,).
+    values: Values (k, n); what is not finite is left out.
+    marked: Curves in the second colour (n,).
     """
     width, height, margin = 260.0, 90.0, 6.0
     finite = np.isfinite(values)

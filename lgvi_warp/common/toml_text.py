@@ -24,18 +24,7 @@ LEAST, MOST = -(2**63), 2**63 - 1
 
 
 def parsed(text: str, name: str) -> dict[str, Any]:
-    """Parse a TOML text.
-
-    Args:
-        text: The TOML text.
-        name: Its name in a message.
-
-    Returns:
-        Tables by name.
-
-    Raises:
-        SceneError: It is not TOML, is nested deeper than any scene, or holds a number or text that is too large.
-    """
+    """Parse a TOML text."""
     if DOTTED.search(text):
         raise SceneError([f"{name}: has a key of more than {MOST_DOTS} parts; write section.key"])
     if (tables := sum(1 for _ in TABLE.finditer(text))) > MOST_TABLES:

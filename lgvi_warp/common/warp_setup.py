@@ -62,9 +62,6 @@ def start() -> None:
 
     A banner that the user asked for is shown. Native code writes the remark to the file descriptor itself, whatever Warp's
     log level, so it is caught there.
-
-    Raises:
-        OSError: The folder of Warp's kernel cache cannot be made; the message names it and WARP_CACHE_PATH.
     """
     # Two threads that redirect stderr at once would leave it closed.
     with build_lock:
@@ -88,15 +85,7 @@ def start_once() -> None:
 
 
 def unusable(cache: str | os.PathLike[str], error: OSError) -> OSError:
-    """Explain an error of the kernel cache, with its remedy.
-
-    Args:
-        cache: Folder of the cache.
-        error: The system's error.
-
-    Returns:
-        An error of the same number that names the folder and WARP_CACHE_PATH.
-    """
+    """Explain an error of the kernel cache, with its remedy."""
     full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
     problem = "has no room for a new kernel" if full else "cannot be written"
     remedy = f"{'make room, or ' if full else ''}set WARP_CACHE_PATH to another folder"
@@ -104,19 +93,14 @@ def unusable(cache: str | os.PathLike[str], error: OSError) -> OSError:
 
 
 def header_folders() -> dict[int, Any]:
-    """Temporary folders of Clang's precompiled headers.
-
-    Returns:
-        Thread -> folder; empty where Warp keeps them elsewhere.
-    """
+    """Temporary folders of Clang's precompiled headers."""
     return getattr(context.runtime, "_pch_dirs", {})
 
 
 def header_folder() -> Path | None:
     """The folder of this thread's precompiled header.
 
-    Returns:
-        A folder that is there; None where Warp keeps it elsewhere.
+    Returns: A folder that is there; None where Warp keeps it elsewhere.
     """
     folder = getattr(context.runtime, "get_clang_pch_dir", lambda: None)()
     return None if folder is None else Path(folder)

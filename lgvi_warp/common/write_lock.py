@@ -40,30 +40,14 @@ if hasattr(os, "register_at_fork"):
 
 
 def lock_file(target: Path) -> Path:
-    """Path of the lock of a file or folder, the same for all paths that lead to it.
-
-    Args:
-        target: The file or folder.
-
-    Returns:
-        Path of the lock's file, beside the target.
-    """
+    """Path of the lock of a file or folder, the same for all paths that lead to it."""
     place = Path(os.path.realpath(target))
     return place.with_name(f".{place.name}.lock")
 
 
 @contextlib.contextmanager
 def write_lock(target: Path, wait: bool = False) -> Iterator[None]:
-    """Keep other writers out of a file or folder inside the `with` block; its parent folder is made.
-
-    Args:
-        target: The file or folder, which may not exist yet.
-        wait: Whether to wait until another writer has ended; default False.
-
-    Raises:
-        SceneError: Another writer holds it, which the message names, or another file has the lock's name.
-        OSError: The lock cannot be made.
-    """
+    """Keep other writers out of a file or folder inside the `with` block; its parent folder is made."""
     path = lock_file(target)
     path.parent.mkdir(parents=True, exist_ok=True)
     descriptor, holder = _taken(path, target, wait), os.getpid()
@@ -79,11 +63,7 @@ def write_lock(target: Path, wait: bool = False) -> Iterator[None]:
 def writer_of(target: Path) -> str | None:
     """Name who is writing into a file or folder, as its lock says; nothing is locked by asking.
 
-    Args:
-        target: The file or folder.
-
-    Returns:
-        The process in words; None where nobody is, or who held the lock has ended without taking it away.
+    Returns: The process in words; None where nobody is, or who held the lock has ended without taking it away.
     """
     try:
         flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)

@@ -24,18 +24,7 @@ PLAIN = {f"tag:yaml.org,2002:{kind}" for kind in ("null", "bool", "int", "float"
 
 
 def parsed(text: str) -> Any:
-    """Parse a YAML text into plain tables, lists, texts and numbers.
-
-    Args:
-        text: YAML 1.1, or 1.2 where the two agree.
-
-    Returns:
-        Its only document.
-
-    Raises:
-        SceneError: It is not YAML, or holds what is refused; every fault of its values is named.
-        ImportError: PyYAML is not installed.
-    """
+    """Parse a YAML text into plain tables, lists, texts and numbers."""
     try:
         yaml = importlib.import_module("yaml")
     except ImportError:

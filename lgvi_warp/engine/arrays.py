@@ -17,9 +17,8 @@ from lgvi_warp.physics.terms.base import Packed
 def put(target: np.ndarray, column: Any) -> None:
     """Write one number of each member into lanes; lanes beyond the last member get the last member's.
 
-    Args:
-        target: (packets, width), or (1, width) for a number that members share; written in place.
-        column: a number, or an array (1,) or (m,).
+    target: (packets, width), or (1, width) for a number that members share; written in place.
+    column: a number, or an array (1,) or (m,).
     """
     if np.ndim(column) == 0 or len(column) == 1:
         target[...] = column
@@ -34,9 +33,8 @@ def put(target: np.ndarray, column: Any) -> None:
 def put_rows(target: np.ndarray, rows: np.ndarray) -> None:
     """Write rows of members into lanes; lanes beyond the last member get the last member's.
 
-    Args:
-        target: (packets or 1, d, width), written in place.
-        rows: (1 or m, d).
+    target: (packets or 1, d, width), written in place.
+    rows: (1 or m, d).
     """
     packets, d, width = target.shape
     if len(rows) == 1:
@@ -52,10 +50,9 @@ def put_rows(target: np.ndarray, rows: np.ndarray) -> None:
 def fill(target: np.ndarray, value: Any) -> None:
     """Write the numbers of members into a field of a structured array.
 
-    Args:
-        target: (packets or 1,), the field; written in place.
-        value: a number, whole numbers (m,), numbers (1 or m,), vectors (1 or m, 3), matrices (1 or m, 3, 3), a pair of
-            diagonal and off-diagonal of symmetric matrices, or a mapping of these by name.
+    target: (packets or 1,), the field; written in place.
+    value: a number, whole numbers (m,), numbers (1 or m,), vectors (1 or m, 3), matrices (1 or m, 3, 3), a pair of diagonal
+        and off-diagonal of symmetric matrices, or a mapping of these by name.
     """
     names = target.dtype.names or ()
     if isinstance(value, dict):
@@ -75,14 +72,7 @@ def fill(target: np.ndarray, value: Any) -> None:
 
 
 def longest(value: Any) -> int:
-    """The leading dimension of what `fill` writes.
-
-    Args:
-        value: as of `fill`.
-
-    Returns:
-        1, or the number of members if any number varies.
-    """
+    """The leading dimension of what `fill` writes."""
     if isinstance(value, dict):
         return max(map(longest, value.values()), default=1)
     if isinstance(value, tuple):
@@ -92,10 +82,6 @@ def longest(value: Any) -> int:
 
 class Structs:
     """A Warp array of structs whose fields are written through NumPy, those that all members share only once.
-
-    Args:
-        struct: the Warp struct.
-        dtype: its NumPy type.
 
     Attributes:
         array: the Warp array, of one struct, or of one a packet where a number varies; None before `write`.
@@ -114,12 +100,7 @@ class Structs:
         self.view = np.empty(0, self._dtype)
 
     def write(self, packets: int, parts: list[tuple[tuple[str, ...], Any, bool]]) -> None:
-        """Write numbers of members.
-
-        Args:
-            packets: number of packets.
-            parts: for each part of the struct its path, its fields as of `fill`, and whether all members share it.
-        """
+        """Write numbers of members."""
         varying = [(path, fields) for path, fields, shared in parts if not shared]
         count = packets if max((longest(fields) for _, fields in varying), default=1) > 1 else 1
         names = [tuple(fields) for _, fields, _ in parts]
@@ -151,11 +132,6 @@ def _at(target: np.ndarray, path: tuple[str, ...]) -> np.ndarray:
 class Lanes:
     """A Warp array of lanes, or of single numbers, rows of them a packet, written through NumPy.
 
-    Args:
-        packets: number of packets.
-        rows: number of rows.
-        Lane: Warp's type of a lane, or of a number.
-
     Attributes:
         array: the Warp array, (packets, rows).
         view: the same memory, (packets, rows, width), or (packets, rows, 1) of numbers.
@@ -186,12 +162,8 @@ class Group(NamedTuple):
 class LawArrays:
     """The numbers of a kernel's laws: their structs, their rows of a table, and what they remember.
 
-    Args:
-        packets: number of packets.
-        kinds: for each group of laws, such as the terms, a controller's parts, and the events, Warp's struct of its numbers
-            and the struct's NumPy type.
-        Lane: Warp's type of a lane.
-        Number: what the table holds: lanes (default), or numbers that all members share.
+    kinds: for each group of laws, such as the terms, a controller's parts, and the events, Warp's struct of its numbers and
+        the struct's NumPy type.
 
     Attributes:
         structs: the structs of each group.
@@ -212,13 +184,7 @@ class LawArrays:
         self.places: Any = None
 
     def write(self, groups: Sequence[Group], scratch: int = 0, bus: int = 0) -> None:
-        """Write what the terms packed, and the parts of a controller.
-
-        Args:
-            groups: one for each of `kinds`.
-            scratch: rows that the method remembers for itself (default 0).
-            bus: rows of the memory before theirs (default 0).
-        """
+        """Write what the terms packed, and the parts of a controller."""
         laws = [law for group in groups for law in group.packed]
         rows = [_present(law.rows) for law in laws]
         starts = [part for law in laws for part in (_present(law.memory), np.zeros((1, law.work)))]
@@ -280,14 +246,7 @@ def _bounded(dtype: np.dtype) -> list[tuple[str, ...]]:
 
 
 def memory_rows(law: Packed) -> int:
-    """Rows of the memory that a law has, its scratch rows among them.
-
-    Args:
-        law: what its term packed.
-
-    Returns:
-        Their number.
-    """
+    """Rows of the memory that a law has, its scratch rows among them."""
     return _present(law.memory).shape[1] + law.work
 
 

@@ -47,12 +47,8 @@ class Looks:
 def last_look(packets: Packets, members: np.ndarray | None = None) -> tuple[Looks, Looks]:
     """What was measured and what was wanted at the last look.
 
-    Args:
-        packets: packets of a plan that asks, after a launch.
-        members: which of their members (m,); default None for all.
-
-    Returns:
-        (measured, wanted), copies.
+    members: which of their members (m,); default None for all.
+    Returns: (measured, wanted), copies.
     """
     y, r = (_numbers(packets, packets.plan.noted_rows[name], members) for name in ("measured", "reference"))
     measured_attitude, wanted_attitude = (rows[:, 3:12].reshape(-1, 3, 3) for rows in (y, r))
@@ -75,9 +71,7 @@ def _numbers(packets: Packets, places: range, members: np.ndarray | None) -> np.
 def answer(packets: Packets, values: np.ndarray) -> None:
     """Write the host's answer to the last look.
 
-    Args:
-        packets: packets of a plan that asks.
-        values: demands (m, 6), or commands (m, channels).
+    values: demands (m, 6), or commands (m, channels).
     """
     controller = packets.plan.kernel_choice.controller
     assert controller is not None
@@ -91,13 +85,7 @@ def answer(packets: Packets, values: np.ndarray) -> None:
 def ask(packets: Packets, t: float) -> None:
     """Call the function of a plan's controller with the last look, and write its answer.
 
-    Args:
-        packets: packets of the block.
-        t: time of the look [s].
-
-    Raises:
-        ValueError: where the function returns another shape than the one wanted, or what are no real numbers. What it raises
-            itself comes with the block and the time as a note.
+    t: time of the look [s].
     """
     controller = packets.plan.kernel_choice.controller
     assert controller is not None

@@ -28,12 +28,6 @@ def block_size(members: int) -> int:
     """Number of members of a block: a power of two from 256 to 4096.
 
     It depends on the number of members only, so that bits and files do not depend on the machine.
-
-    Args:
-        members: number of members of the run.
-
-    Returns:
-        Members of each block but the last.
     """
     size = 256
     while size < 4096 and size * 64 <= members:
@@ -50,29 +44,13 @@ def shares(members: int, threads: int, steps: int) -> int:
 
     Fewer blocks cost less. Some for each thread keep all threads at work until the end, and blocks of long runs are small, so
     that an interrupt leaves as many finished members as it can.
-
-    Args:
-        members: number of members of the run.
-        threads: number of threads.
-        steps: number of steps of the run.
-
-    Returns:
-        Members of each block but the last, a multiple of 256 up to 16,384.
     """
     wanted = min(-(-members // (4 * threads if threads > 1 else 1)), -(-WORTHWHILE // steps))
     return min(16_384, -(-wanted // 256) * 256)
 
 
 def blocks(members: int, size: int | None = None) -> list[Block]:
-    """Divide the members of a run into blocks.
-
-    Args:
-        members: number of members of the run.
-        size: members of a block; default `block_size(members)`.
-
-    Returns:
-        Blocks of that many members in order; the last one has the rest.
-    """
+    """Divide the members of a run into blocks."""
     size = size or block_size(members)
     return [Block(i, min(i + size, members)) for i in range(0, members, size)]
 
@@ -80,14 +58,7 @@ def blocks(members: int, size: int | None = None) -> list[Block]:
 def parts(members: int, steps: int, threads: int, joined: bool) -> list[Block]:
     """The blocks of a run.
 
-    Args:
-        members: number of members of the run.
-        steps: number of steps of the run.
-        threads: number of threads.
-        joined: whether bits or files depend on blocks: with statistics, which are joined block by block, in a store, and
-            where others than threads of this process run them.
-
-    Returns:
-        The blocks in order.
+    joined: whether bits or files depend on blocks: with statistics, which are joined block by block, in a store, and where
+        others than threads of this process run them.
     """
     return blocks(members, None if joined else shares(members, threads, steps))

@@ -23,10 +23,6 @@ class Episodes:
     Those that come next are packed and looked at ahead, many at once, in packets of their own. When one starts, its lane is
     copied. So a start costs little, and no bit of the others changes.
 
-    Args:
-        plan: a plan that asks.
-        members: the m members of the block.
-
     Attributes:
         packets: the members' packets.
         steps: number of steps made.
@@ -42,11 +38,7 @@ class Episodes:
         self.begin(members)
 
     def begin(self, members: Members) -> None:
-        """Start all members anew, at t = 0. Nothing is prepared any more.
-
-        Args:
-            members: m members.
-        """
+        """Start all members anew, at t = 0. Nothing is prepared any more."""
         self.packets.refill(members)
         self.packets.launch(0, 0)
         self.steps = 0
@@ -60,8 +52,7 @@ class Episodes:
     def advance(self, values: np.ndarray) -> None:
         """Answer the last look, and go on to the next one.
 
-        Args:
-            values: demands (m, 6), or commands (m, channels).
+        values: demands (m, 6), or commands (m, channels).
         """
         answer(self.packets, values)
         self.packets.launch(self.steps, self.steps + self.every)
@@ -70,42 +61,28 @@ class Episodes:
     def look(self) -> tuple[Looks, Looks]:
         """What is measured and what is wanted now.
 
-        Returns:
-            (measured, wanted).
+        Returns: (measured, wanted).
         """
         return last_look(self.packets)
 
     def status(self) -> np.ndarray:
         """The status of each member.
 
-        Returns:
-            (m,), 0 for those that go on.
+        Returns: (m,), 0 for those that go on.
         """
         if not self.packets.status.numpy().any():
             return np.zeros(self.packets.members.count, np.uint8)
         return self.packets.ended()[0]
 
     def room_for(self, count: int) -> int:
-        """How many members to draw for some that are prepared: few different numbers, for each of which packets are kept.
-
-        Args:
-            count: number of those that are prepared.
-
-        Returns:
-            A number from `count`, with which all lanes are full.
-        """
+        """How many members to draw for some that are prepared: few different numbers, for each of which packets are kept."""
         width = self.plan.spec.width
         return width << (-(-count // width) - 1).bit_length()
 
     def prepare(self, lanes: np.ndarray, members: Members) -> None:
         """Prepare the members that are to start next in some lanes.
 
-        Args:
-            lanes: (r,), which of the m lanes.
-            members: `room_for(r)` members, of which the first r are prepared.
-
-        Raises:
-            SceneError: where they need other rows of table or memory than those that they will replace.
+        lanes: (r,), which of the m lanes.
         """
         aside = self._aside_for(members.count, lambda count: members)
         aside.refill(members)
@@ -121,11 +98,8 @@ class Episodes:
     def restart(self, lanes: np.ndarray) -> tuple[Looks, Looks]:
         """Start the prepared members.
 
-        Args:
-            lanes: (r,), which of the m lanes.
-
-        Returns:
-            What is measured of them and wanted, (r, ...).
+        lanes: (r,), which of the m lanes.
+        Returns: What is measured of them and wanted, (r, ...).
         """
         assert self._next is not None
         rehearsals = self._rehearsals()
@@ -143,11 +117,8 @@ class Episodes:
     def look_at(self, lanes: np.ndarray) -> tuple[Looks, Looks]:
         """Look at members that have ended, in the state in which they did; in the block itself they rest meanwhile.
 
-        Args:
-            lanes: (r,), which of the m lanes.
-
-        Returns:
-            What is measured of them and wanted, (r, ...).
+        lanes: (r,), which of the m lanes.
+        Returns: What is measured of them and wanted, (r, ...).
         """
         places = np.arange(len(lanes))
         aside = self._aside_for(self.room_for(len(lanes)), self._any)

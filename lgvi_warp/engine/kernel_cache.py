@@ -51,17 +51,7 @@ loaded: weakref.WeakSet[Any] = weakref.WeakSet()
 
 
 def load(module: Any) -> Phases:
-    """Load a kernel's code, compiling it where the cache has none that is whole.
-
-    Args:
-        module: Warp's module of the kernel.
-
-    Returns:
-        How long each phase took; zeros for a kernel that this process has loaded already.
-
-    Raises:
-        OSError: where the cache has no such kernel and takes none; it names the folder and WARP_CACHE_PATH.
-    """
+    """Load a kernel's code, compiling it where the cache has none that is whole."""
     warp_setup.start()
     with build_lock:
         if module in loaded:
@@ -86,12 +76,6 @@ def one_at_a_time(kernel: str) -> Iterator[None]:
     """Let one process compile a kernel while others that want the same one wait for what it puts into the cache.
 
     Kernels whose hashes begin with the same two digits share a lock, so that there are at most 256 files to lock.
-
-    Args:
-        kernel: hash of the kernel, hexadecimal.
-
-    Returns:
-        A context manager.
     """
     path = Path(wp.config.kernel_cache_dir) / LOCKS / kernel[:2]
     try:
@@ -105,14 +89,7 @@ def one_at_a_time(kernel: str) -> Iterator[None]:
 
 
 def is_whole(code: Path) -> bool:
-    """Whether a kernel's code, and all files that its checksums name, are as they were compiled.
-
-    Args:
-        code: the file with the kernel's code.
-
-    Returns:
-        False also where a file or the checksums are missing or unreadable.
-    """
+    """Whether a kernel's code, and all files that its checksums name, are as they were compiled."""
     try:
         sums = json.loads(code.with_name(code.name + SUMS).read_bytes())
         return code.name in sums and all(_sha256(code.with_name(name)) == value for name, value in sums.items())
@@ -127,16 +104,7 @@ def _sha256(path: Path) -> str:
 def compile_module(module: Any, cache: Path, code: Path) -> tuple[float, float]:
     """Compile and load a kernel in a scratch folder, then put its files into the cache, checksums last.
 
-    Args:
-        module: Warp's module of the kernel.
-        cache: The cache's folder.
-        code: The file that will hold the kernel's code.
-
-    Returns:
-        When its source and its code were written, as time.time() counts [s].
-
-    Raises:
-        OSError: The cache has no room, or cannot be written.
+    Returns: When its source and its code were written, as time.time() counts [s].
     """
     try:
         sweep(cache, code.parent)
@@ -178,14 +146,7 @@ def _move(compiled: Path, code: Path) -> None:
 
 @contextlib.contextmanager
 def scratch_folder(cache: Path) -> Iterator[Path]:
-    """A folder of this process's own, which `sweep` leaves alone while it lives.
-
-    Args:
-        cache: The cache's folder.
-
-    Yields:
-        The folder, removed at the end.
-    """
+    """A folder of this process's own, which `sweep` leaves alone while it lives."""
     with contextlib.ExitStack() as stack:
         with one_at_a_time(SCRATCH):
             path = Path(tempfile.mkdtemp(prefix=SCRATCH, dir=cache))
@@ -214,13 +175,6 @@ def kept_header(cache: Path, scratch: Path) -> Iterator[None]:
     """Give this thread the precompiled header of an earlier process, or keep the one that Clang writes now.
 
     Clang needs longer for it than for a plain kernel, and Warp makes it anew in every process.
-
-    Args:
-        cache: The cache's folder.
-        scratch: A folder of this process's own, beside it.
-
-    Yields:
-        While a kernel is compiled.
     """
     folder = warp_setup.header_folder()
     if folder is None:
@@ -248,11 +202,7 @@ def kept_header(cache: Path, scratch: Path) -> Iterator[None]:
 
 @functools.cache
 def header_key() -> str:
-    """What a precompiled header belongs to: the processor, and Warp's own headers as they were.
-
-    Returns:
-        The name of a folder.
-    """
+    """What a precompiled header belongs to: the processor, and Warp's own headers as they were."""
     native = Path(wp.__file__).parent / "native"
     files = [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in sorted(native.glob("*.h"))]
     content = json.dumps([wp.get_cpu_kernel_cache_key(), str(native), files])
@@ -264,9 +214,6 @@ def private_gradients() -> Iterator[None]:
     """Let Clang leave out the functions for gradients that Warp writes for each struct.
 
     No kernel here calls them, but other files could, unless they are static; they would take up to two fifths of the time.
-
-    Yields:
-        While kernels are compiled.
     """
     template = codegen.struct_template
     visible = "CUDA_CALLABLE void adj_atomic_add("
@@ -289,12 +236,7 @@ def temporary_room() -> bool:
 def seek_room(folder: Path, wanted: int = ROOM_BYTES) -> None:
     """Check by trial that a folder has room for some bytes and files: nothing else reveals quotas and limits.
 
-    Args:
-        folder: where to look.
-        wanted: room needed [bytes].
-
-    Raises:
-        OSError: ENOSPC and the like, where there is no such room.
+    wanted: room needed [bytes].
     """
     if hasattr(os, "statvfs"):
         system = os.statvfs(folder)

@@ -82,19 +82,8 @@ def choose_kernel(
 ) -> KernelChoice:
     """Choose what the kernel of a run must contain.
 
-    Args:
-        ensemble: the members.
-        method: the integration method.
-        h: step [s].
-        facts: survey of the members.
-        built_in: (folder, name) -> module of built-in device code in the folder "laws" or "stops", None where there is none.
-        checked: whether the run watches the energy of scenes that conserve or lose it (default True).
-
-    Returns:
-        The laws that act, how each enters, and the method's program for them.
-
-    Raises:
-        SceneError: if the method cannot do what the scene asks, or a law's device code is unusable.
+    h: step [s].
+    built_in: (folder, name) -> module of built-in device code in the folder "laws" or "stops", None where there is none.
     """
     explicit = method.tableau is not None
     controller = _controller(ensemble, facts)
@@ -220,14 +209,7 @@ MOST_BACKWARD_DRAG = 0.5
 def check_backward_drag(ensemble: Ensemble, choice: KernelChoice, method: Method, h: float) -> None:
     """Refuse drag that is too strong for a composition's backward stages, judged by the members' starts.
 
-    Args:
-        ensemble: the members.
-        choice: what their kernel contains.
-        method: the integration method.
-        h: step [s].
-
-    Raises:
-        SceneError: if a member's drag is too strong; it names the largest drag number.
+    h: step [s].
     """
     back = -h * min(0.0, *method.stages)
     if back == 0.0 or not choice.drag:
@@ -258,16 +240,7 @@ suitable: set[tuple[type, str]] = set()
 def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) -> Any:
     """The module of a term's device code, checked for what a kernel needs of it.
 
-    Args:
-        term: the term.
-        device: a module, or the name of a built-in one.
-        built_in: (folder, name) -> module of built-in device code, None where there is none.
-
-    Returns:
-        The module.
-
-    Raises:
-        SceneError: if the module is not known, lacks a struct or all roles, or a role has a wrong signature.
+    built_in: (folder, name) -> module of built-in device code, None where there is none.
     """
     folder, roles = _folder_and_roles(term)
     page = f"see docs/develop/add_a_{'controller' if isinstance(term, Part) else 'force'}.md"
@@ -305,26 +278,14 @@ def _folder_and_roles(term: Term) -> tuple[str, Sequence[str]]:
 
 
 def is_built_in(module: Any) -> bool:
-    """Whether device code is one of the package's own.
-
-    Args:
-        module: a module, or a user's object.
-
-    Returns:
-        True for a module of lgvi_kernels.
-    """
+    """Whether device code is one of the package's own."""
     return str(getattr(module, "__name__", "")).startswith("lgvi_kernels.")
 
 
 def declared(term: Term, module: Any) -> tuple[tuple[str, Any], ...]:
     """The fields of the device struct of a term that do not follow from its module.
 
-    Args:
-        term: the term.
-        module: its device code.
-
-    Returns:
-        (name, kind) of each number, unless the module defines `params`, and of a noisy term's key (see
+    Returns: (name, kind) of each number, unless the module defines `params`, and of a noisy term's key (see
         lgvi_kernels.maps.compose).
     """
     numbers = (getattr(module, "params", None) is None and term.lanes()) or ()

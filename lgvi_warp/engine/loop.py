@@ -17,9 +17,7 @@ from lgvi_warp.engine.work import Work, in_order
 class RunProgress:
     """The fraction of a run's vehicle-steps made so far, reported from any thread.
 
-    Args:
-        total: vehicle-steps of the run.
-        report: called with the fraction [1] at each advance; None for no report.
+    report: called with the fraction [1] at each advance; None for no report.
     """
 
     def __init__(self, total: int, report: Callable[[float], None] | None):
@@ -28,12 +26,7 @@ class RunProgress:
         self._sum = 0
 
     def at(self, block: Block, vehicle_steps: int) -> None:
-        """Note how far a block is; one that runs again starts from zero.
-
-        Args:
-            block: the block.
-            vehicle_steps: vehicle-steps made of it so far.
-        """
+        """Note how far a block is; one that runs again starts from zero."""
         if self._report is None:
             return
         with self._lock:
@@ -67,23 +60,10 @@ def run_blocks(
 ) -> int:
     """Run blocks and merge their results into the keepers, in block order.
 
-    Args:
-        work: what is done with each block.
-        runs: the blocks of the run, in order.
-        executor: where they run.
-        advanced: called with a block and the vehicle-steps made of it so far.
-        left: blocks that the store does not hold yet; None (default) for all.
-        enough: asked after each block, with the number of members so far, whether the run may end (default: never); later
-            blocks are then dropped.
-        merged: updated before and after each merge, for when an exception ends the run.
-        after: called with each block when it is merged; None (default) for nothing.
-
-    Returns:
-        Index after the last member merged.
-
-    Raises:
-        SceneError: if a member is unphysical.
-        NotSurveyed: if a member needs what the kernel does not have.
+    left: blocks that the store does not hold yet; None (default) for all.
+    enough: asked after each block, with the number of members so far, whether the run may end (default: never); later blocks
+        are then dropped.
+    after: called with each block when it is merged; None (default) for nothing.
     """
     fresh = set(left or ())
     merged = merged or Merged()

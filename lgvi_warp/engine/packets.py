@@ -37,10 +37,6 @@ from lgvi_warp.sampling.members import Members
 class Packets:
     """The members of one block packed into lanes, ready to launch.
 
-    Args:
-        plan: the plan of the run.
-        members: the m members of the block.
-
     Attributes:
         count: number of packets.
         frame: axes and origins that the kernel works in.
@@ -74,15 +70,7 @@ class Packets:
 
     @classmethod
     def of(cls, plan: Plan, members: Members) -> Packets:
-        """Packets of these members: those of a finished block, if there are any of this size, or new ones.
-
-        Args:
-            plan: the plan of the run.
-            members: the members of the block.
-
-        Returns:
-            The packets, which no other thread has.
-        """
+        """Packets of these members: those of a finished block, if there are any of this size, or new ones."""
         for _ in range(len(plan.idle)):
             try:
                 packets = plan.idle.pop()
@@ -98,11 +86,7 @@ class Packets:
         self.plan.idle.append(self)
 
     def refill(self, members: Members) -> None:
-        """Take other members in place of these, from their starts on.
-
-        Args:
-            members: as many packets of members.
-        """
+        """Take other members in place of these, from their starts on."""
         plan, self.members = self.plan, members
         packing = Packing(plan, members)
         self.frame, self.scale, self._packing = packing.frame, packing.scale, packing
@@ -206,12 +190,7 @@ class Packets:
     def advance(self, k0: int, k1: int) -> np.ndarray:
         """Make the steps from k0 to k1, and return the samples by member.
 
-        Args:
-            k0: number of steps made before.
-            k1: number of steps made after.
-
-        Returns:
-            Samples due after step k0 and no later than step k1: (samples, count * width, numbers of a sample), a copy.
+        Returns: Samples due after step k0 and no later than step k1: (samples, count * width, numbers of a sample), a copy.
         """
         packed = self.launch(k0, k1)
         packets, samples, numbers, width = packed.shape
@@ -220,12 +199,7 @@ class Packets:
     def launch(self, k0: int, k1: int) -> np.ndarray:
         """Make the steps from k0 to k1, and return the samples as the kernel wrote them.
 
-        Args:
-            k0: number of steps made before.
-            k1: number of steps made after.
-
-        Returns:
-            Samples due after step k0 and no later than step k1: (count, samples, numbers of a sample, width), in memory
+        Returns: Samples due after step k0 and no later than step k1: (count, samples, numbers of a sample, width), in memory
             that the next launch overwrites.
         """
         plan = self.plan
@@ -263,11 +237,7 @@ class Packets:
     def gathered(self, when: slice) -> np.ndarray:
         """What the last launch gathered at looks.
 
-        Args:
-            when: slice of the looks, which are in slots that follow one another.
-
-        Returns:
-            (looks, members, numbers of a sample), in memory that the next launch overwrites, in the user's axes.
+        Returns: (looks, members, numbers of a sample), in memory that the next launch overwrites, in the user's axes.
         """
         slots, numbers = self.monitor.slots, self.monitor.numbers
         first = when.start % slots
@@ -278,22 +248,14 @@ class Packets:
     def first_signals(self) -> np.ndarray:
         """The signals at t = 0, once the first launch has made them.
 
-        Returns:
-            (1, count * width, numbers of the signals), a copy.
+        Returns: (1, count * width, numbers of the signals), a copy.
         """
         rows = self.monitor.first_signals.numpy()[:, : len(self.plan.signal_rows)]
         packets, numbers, width = rows.shape
         return rows.transpose(0, 2, 1).reshape(1, packets * width, numbers).copy()
 
     def outcome(self, warned: bool = True) -> Outcome:
-        """The outcome of each member so far.
-
-        Args:
-            warned: whether to look for warnings (default True); else there are none.
-
-        Returns:
-            Status, steps before the failure, value that crossed its limit, warnings and event of the m members.
-        """
+        """The outcome of each member so far."""
         m = self.members.count
         none = np.zeros(m, np.uint16), np.zeros(m, np.int64), np.full(m, np.nan)
         warnings: tuple[np.ndarray, np.ndarray, np.ndarray] = self._warnings() if warned else none
@@ -318,8 +280,7 @@ class Packets:
     def ended(self) -> tuple[np.ndarray, np.ndarray]:
         """Status of each member, and the last step of those it made itself.
 
-        Returns:
-            (status, step): both (m,); after that step a member that ended keeps its state.
+        Returns: (status, step): both (m,); after that step a member that ended keeps its state.
         """
         outcome = self.outcome(warned=False)
         return outcome.status, outcome.failed_step
@@ -367,27 +328,13 @@ class Packets:
 
 
 def columns_of(sizes: Mapping[str, int]) -> Any:
-    """Where the kernel writes the motion.
-
-    Args:
-        sizes: numbers of each field of a sample, in their order.
-
-    Returns:
-        The first number of each of SAMPLE_FIELDS; -1 where it is not among them.
-    """
+    """Where the kernel writes the motion."""
     firsts = dict(zip(sizes, accumulate(sizes.values(), initial=0), strict=False))
     return wp.vec4i(*(firsts.get(name, -1) for name in SAMPLE_FIELDS))
 
 
 def columns_at_looks(plan: Plan) -> np.ndarray:
-    """Where in a look's rows the kernel writes the motion.
-
-    Args:
-        plan: the plan of the run.
-
-    Returns:
-        For each number of SAMPLE_FIELDS in turn its row, int32; -1 where it is not gathered.
-    """
+    """Where in a look's rows the kernel writes the motion."""
     columns, row, firsts = [], 0, {}
     for name, size in plan.look_fields.items():
         firsts[name], row = row, row + size

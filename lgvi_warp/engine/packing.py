@@ -35,10 +35,6 @@ Plan = Any
 class Packing:
     """What the kernel needs of some members, in its frame and its units.
 
-    Args:
-        plan: the plan of the run.
-        members: the m members.
-
     Attributes:
         frame: axes and origins that the kernel works in.
         U: (1 or m, 3, 3), matrix of the turns of psi_x; zero for other methods.
@@ -63,11 +59,7 @@ class Packing:
         return context(numbers, self.frame, m.indices, m.seed, plan.grid.h, plan.kernel_choice.aligned)
 
     def inertia(self) -> Fields:
-        """The fields of the kernel's Inertia.
-
-        Returns:
-            Arrays by field, with a leading dimension of 1 or m.
-        """
+        """The fields of the kernel's Inertia."""
         fields: Fields = self._shared("inertia", self._inertia)
         return fields
 
@@ -118,11 +110,7 @@ class Packing:
         return fields
 
     def laws(self) -> list[Packed]:
-        """The numbers of each law.
-
-        Returns:
-            What each term packs, in the order of the kernel's laws.
-        """
+        """The numbers of each law."""
         each = enumerate(self.plan.kernel_choice.laws)
         return [self._shared(("law", i), functools.partial(self._law, i, term, module)) for i, (term, module) in each]
 
@@ -137,11 +125,7 @@ class Packing:
         return term.packed_directions(parameters, self._context(numbers))
 
     def control(self) -> list[Packed]:
-        """The numbers of each part of the controller.
-
-        Returns:
-            What each part packs, in the order in which they act.
-        """
+        """The numbers of each part of the controller."""
 
         def pack(part: Any, numbers: Any) -> Packed:
             packed: Packed = part.packed(Ensemble.own(part, numbers), self._context(numbers))
@@ -151,11 +135,7 @@ class Packing:
         return [self._shared(("part", i), functools.partial(pack, part)) for i, part in each]
 
     def events(self) -> list[Packed]:
-        """The numbers of each event.
-
-        Returns:
-            What each event packs, in the order of the scene.
-        """
+        """The numbers of each event."""
 
         def pack(event: Any, numbers: Any) -> Packed:
             packed: Packed = event.packed(Ensemble.own(event, numbers), self._context(numbers))
@@ -165,15 +145,7 @@ class Packing:
         return [self._shared(("event", i), functools.partial(pack, event)) for i, event in each]
 
     def scratch(self, laws: Sequence[Packed], bus: int = 0) -> int:
-        """Rows of the memory that the method keeps for itself.
-
-        Args:
-            laws: what each term packs, each part of the controller, and each event.
-            bus: rows of the memory before theirs (default 0).
-
-        Returns:
-            Their number.
-        """
+        """Rows of the memory that the method keeps for itself."""
         spec = self.plan.spec
         if spec.memory and spec.explicit is not None and spec.explicit.goes_back:
             return bus + sum(memory_rows(law) for law in laws)
@@ -183,8 +155,7 @@ class Packing:
     def state(self, rows: np.ndarray) -> None:
         """Write the members' states.
 
-        Args:
-            rows: (m, fields of a state), written in place.
+        rows: (m, fields of a state), written in place.
         """
         m, frame, spec = self.members, self.frame, self.plan.spec
         attitude, velocity, rate = (_once(x) for x in (m.attitude, m.velocity, m.angular_velocity))
@@ -244,12 +215,6 @@ def rows_shared(plan: Plan) -> bool:
     """Whether all members share the rows of the laws, of the controller's parts and of the events, and these are many.
 
     Few rows have a copy for each lane, whoever shares them: so one kernel serves scenes in which other numbers vary.
-
-    Args:
-        plan: a plan whose spec is chosen but for this.
-
-    Returns:
-        True where one number of each row serves all members.
     """
     # What few members need is packed once, here.
     members = plan.ensemble.members
@@ -302,11 +267,8 @@ def _shear(numbers: Any, frame: Frame, full: bool, lever: bool) -> Fields:
 def symmetric(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The entries of symmetric matrices as the kernel takes them.
 
-    Args:
-        matrix: (n, 3, 3).
-
-    Returns:
-        Diagonal (n, 3), and off-diagonal entries 23, 31, 12 (n, 3).
+    matrix: (n, 3, 3).
+    Returns: Diagonal (n, 3), and off-diagonal entries 23, 31, 12 (n, 3).
     """
     off = np.stack([matrix[:, 1, 2], matrix[:, 2, 0], matrix[:, 0, 1]], axis=1)
     return np.einsum("nii->ni", matrix), off

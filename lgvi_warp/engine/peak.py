@@ -13,14 +13,9 @@ from lgvi_warp.common.machine import register_width
 def fma_peak(dtype: str = "float64", width: int | None = None, rounds: int = 5, loops: int = 1_000_000) -> float:
     """Measure how many fused multiply-adds one core makes per second.
 
-    Args:
-        dtype: "float64" (default) or "float32".
-        width: lanes of a packet; None (default) for what suits this machine's registers.
-        rounds: number of timed launches, of which the fastest counts (default 5).
-        loops: passes of the kernel's loop per launch (default 1,000,000).
-
-    Returns:
-        Fused multiply-adds per second of one core [1/s].
+    width: lanes of a packet; None (default) for what suits this machine's registers.
+    loops: passes of the kernel's loop per launch (default 1,000,000).
+    Returns: Fused multiply-adds per second of one core [1/s].
     """
     import warp as wp
 

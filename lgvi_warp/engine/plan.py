@@ -649,14 +649,7 @@ class Plan:
 
 
 def damping_terms(terms: Sequence[Term]) -> list[Term]:
-    """The terms whose device code has damping.
-
-    Args:
-        terms: terms of a scene.
-
-    Returns:
-        Those terms; they may have no effect in any member.
-    """
+    """The terms whose device code has damping."""
     devices = [built_in("laws", term.device) if isinstance(term.device, str) else term.device for term in terms]
     return [term for term, device in zip(terms, devices, strict=True) if hasattr(device, "damping")]
 

@@ -84,15 +84,7 @@ class WatchedContext(PackingContext):
 
 
 def context(numbers: Mapping[str, np.ndarray], *run: Any) -> PackingContext:
-    """A packing context for a computation that `Shared` may watch.
-
-    Args:
-        numbers: parameters by name, as the computation was given them.
-        run: frame, indices of the members, seed, step and `aligned`, as of `PackingContext`.
-
-    Returns:
-        The context.
-    """
+    """A packing context for a computation that `Shared` may watch."""
     return (WatchedContext if isinstance(numbers, Reads) else PackingContext)(numbers, *run)
 
 
@@ -110,9 +102,6 @@ class Shared:
 
     What a computation reads is seen when it runs first, so nothing has to list it. Which numbers it reads must depend on
     numbers that it read before only, as is so for any function of them.
-
-    Args:
-        varied: names of what varies; FRAME, MEMBERS and SEED may be among them.
     """
 
     varied: set[str]
@@ -121,16 +110,7 @@ class Shared:
     _last: _Few | None = None
 
     def __call__(self, key: Any, numbers: Mapping[str, np.ndarray], compute: Callable[[Any], Value]) -> Value:
-        """A result from memory, or computed.
-
-        Args:
-            key: name of the computation; two that may differ must have two names.
-            numbers: what it may read, by name.
-            compute: the computation.
-
-        Returns:
-            Its result.
-        """
+        """A result from memory, or computed."""
         if key in self._kept:
             return self._kept[key]
         last = self._last
@@ -153,11 +133,7 @@ class Shared:
     def completed(self, numbers: Mapping[str, np.ndarray]) -> Any:
         """The numbers that `remember` was given for these members.
 
-        Args:
-            numbers: numbers by name, the same arrays as then and no copies of them.
-
-        Returns:
-            The completed numbers; None for other members.
+        Returns: The completed numbers; None for other members.
         """
         last = self._last
         if last is None or any(numbers.get(name) is not last.given.get(name) for name in self.varied):
@@ -165,22 +141,10 @@ class Shared:
         return last.numbers
 
     def remember(self, given: Mapping[str, np.ndarray], numbers: Mapping[str, Any]) -> None:
-        """Keep what follows from the numbers of few members until others come: a run looks at them more than once.
-
-        Args:
-            given: numbers by name.
-            numbers: the same with what completes them, from which results are computed.
-        """
+        """Keep what follows from the numbers of few members until others come: a run looks at them more than once."""
         few = all(len(given[name]) <= KEPT for name in self.varied if name in given)
         self._last = _Few(given, numbers, {}) if few else None
 
     def keeps(self, key: Any) -> bool:
-        """Whether a computation that ran is shared by all members.
-
-        Args:
-            key: name of the computation.
-
-        Returns:
-            False also for one that has not run.
-        """
+        """Whether a computation that ran is shared by all members."""
         return key in self._kept

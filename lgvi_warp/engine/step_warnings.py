@@ -79,12 +79,8 @@ ENERGY = 0.5
 def watched(plan: Watched) -> tuple[str, ...]:
     """The warnings that the kernel looks for.
 
-    Args:
-        plan: the plan of the run.
-
-    Returns:
-        Names of rows of lgvi_kernels.advance.monitor, the least serious first: with checks="all" those that method and scene
-        can give; with "safe" that of the attitude, where the method lets it depart.
+    Returns: Names of rows of lgvi_kernels.advance.monitor, the least serious first: with checks="all" those that method and
+        scene can give; with "safe" that of the attitude, where the method lets it depart.
     """
     method, choice = plan.method, plan.kernel_choice
     if plan.checks != "all":
@@ -125,25 +121,15 @@ def _drag_number(plan: Watched, members: Members, water: np.ndarray | None) -> n
 
 
 def leaves_rotations(method: Method) -> bool:
-    """Tell whether a method adds rates to R, whose rows then depart from a rotation's by its own error.
-
-    Args:
-        method: the method of the run.
-
-    Returns:
-        False for methods that multiply rotations.
-    """
+    """Tell whether a method adds rates to R, whose rows then depart from a rotation's by its own error."""
     return method.tableau is not None and KINDS.get(method.name, "vector") == "vector"
 
 
 def departure(rows: np.ndarray) -> np.ndarray:
     """How far matrices are from rotations.
 
-    Args:
-        rows: (packets, 9, width), entries of R row by row.
-
-    Returns:
-        (packets * width,), the largest entry of |R R^T - I|.
+    rows: (packets, 9, width), entries of R row by row.
+    Returns: (packets * width,), the largest entry of |R R^T - I|.
     """
     R = rows.reshape(len(rows), 3, 3, -1)
     pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
@@ -152,28 +138,14 @@ def departure(rows: np.ndarray) -> np.ndarray:
 
 
 def orthogonality_limit(plan: Watched) -> float:
-    """The largest |R^T R - I| that gives no warning.
-
-    Args:
-        plan: the plan of the run.
-
-    Returns:
-        The limit [1]: looser for methods whose R leaves the rotations by their own error.
-    """
+    """The largest |R^T R - I| that gives no warning."""
     if leaves_rotations(plan.method):
         return ORTHOGONAL_TO_ERROR
     return ORTHOGONAL["float64" if plan.dtype == "float64" else "float32"]
 
 
 def row_limits(plan: Watched) -> dict[str, float]:
-    """The limit of each watched row.
-
-    Args:
-        plan: the plan of the run.
-
-    Returns:
-        Limits by row, in the row's unit.
-    """
+    """The limit of each watched row."""
     method = plan.method
     known = {
         "precision": PRECISION,
@@ -190,11 +162,7 @@ def row_limits(plan: Watched) -> dict[str, float]:
 def munk_factor(frame: Frame) -> np.ndarray:
     """Squared frequency of the fastest oscillation that the Munk moment causes, per |p|^2.
 
-    Args:
-        frame: mass matrix and inertia of 1 or n members.
-
-    Returns:
-        (1 or n,) [1/(kg^2 m^2)].
+    Returns: (1 or n,) [1/(kg^2 m^2)].
     """
     M = np.linalg.eigvalsh(frame.M) if np.any(frame.M[:, ~np.eye(3, dtype=bool)]) else np.einsum("nii->ni", frame.M)
     return np.asarray((1.0 / M.min(axis=1) - 1.0 / M.max(axis=1)) / frame.J.min(axis=1))
@@ -205,15 +173,9 @@ def at_start(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The warnings that follow from the members' numbers and starts.
 
-    Args:
-        plan: the plan of the run.
-        members: the m members.
-        frame: axes, origins and inertia that the kernel works in.
-        momentum: (m, 3) [N s], linear momentum relative to the water.
-        water: (m, 3) [m/s], velocity of the water in body axes; None where it rests.
-
-    Returns:
-        (bits, value), both (m,): bits of `Warnings`, and the value of the most serious one; NaN for none.
+    momentum: (m, 3) [N s], linear momentum relative to the water.
+    water: (m, 3) [m/s], velocity of the water in body axes; None where it rests.
+    Returns: (bits, value), both (m,): bits of `Warnings`, and the value of the most serious one; NaN for none.
     """
     m, h, method = members.count, plan.grid.h, plan.method
     bits, value = np.zeros(m, np.uint16), np.full(m, np.nan)

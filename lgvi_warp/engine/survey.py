@@ -37,11 +37,7 @@ COUPLINGS = ((0, 1), (0, 2), (1, 2), (0, 0), (1, 1), (2, 2))
 def shape_of_mass(M: np.ndarray) -> str:
     """The simplest shape that fits every mass matrix.
 
-    Args:
-        M: (n, 3, 3) [kg], mass matrices.
-
-    Returns:
-        "isotropic", "diagonal" or "full".
+    M: (n, 3, 3) [kg], mass matrices.
     """
     off, diagonal = notation.off_diagonal(M), np.einsum("nii->ni", M)
     if off.any() and (np.abs(off).max(axis=1) > DIAGONAL * np.abs(diagonal).max(axis=1)).any():
@@ -52,13 +48,8 @@ def shape_of_mass(M: np.ndarray) -> str:
 def frame_of(method: Method, parameters: Parameters) -> tuple[Frame, np.ndarray, np.ndarray]:
     """The axes and origins that a method works in.
 
-    Args:
-        method: the integration method.
-        parameters: parameters of n members by name.
-
-    Returns:
-        (frame, U, coupling): the frame; U (n, 3, 3) of the turns of psi_x, zero for other methods; and the coupling
-        norm (n,) that is left in this frame and that the method cannot treat.
+    Returns: (frame, U, coupling): the frame; U (n, 3, 3) of the turns of psi_x, zero for other methods; and the coupling norm
+        (n,) that is left in this frame and that the method cannot treat.
     """
     return _frame_of(method, vehicle.inertia_blocks(parameters))
 
@@ -137,25 +128,11 @@ class Survey:
         return tuple(facts.values())
 
     def covers(self, other: Survey) -> bool:
-        """Whether a kernel chosen by this survey serves the members of the other, too.
-
-        Args:
-            other: survey of other members.
-
-        Returns:
-            False where the other members need more.
-        """
+        """Whether a kernel chosen by this survey serves the members of the other, too."""
         return self.joined(other).decisive == self.decisive
 
     def joined(self, other: Survey) -> Survey:
-        """The survey of the members of both.
-
-        Args:
-            other: survey of other members.
-
-        Returns:
-            The joint survey.
-        """
+        """The survey of the members of both."""
         pairs = zip(vars(self).values(), vars(other).values(), strict=True)
         return Survey(*(a | b if isinstance(a, frozenset | Oddities) else max(a, b) for a, b in pairs))
 
@@ -170,16 +147,8 @@ def survey(
 ) -> Survey:
     """Look at members, or at one alone where no number of the vehicle, the water or the laws varies.
 
-    Args:
-        ensemble: the members.
-        method: the integration method.
-        h: step [s].
-        shared: what all members share, filled here as far as it is computed; by default it is forgotten.
-        odd: whether to look for odd numbers (default True).
-        most: number of the first members to look at; None (default) for all.
-
-    Returns:
-        What holds for at least one member, and the largest values.
+    h: step [s].
+    most: number of the first members to look at; None (default) for all.
     """
     known = Shared({*ensemble.varied_names, MEMBERS}) if shared is None else shared
 
@@ -197,16 +166,7 @@ def survey_of(
 ) -> Survey:
     """Look at the members of one block, whose parameters are drawn already.
 
-    Args:
-        parameters: their parameters by name.
-        ensemble: all members.
-        method: the integration method.
-        h: step [s].
-        shared: what all members share.
-        block: the block.
-
-    Returns:
-        What holds for at least one of them, without what is odd.
+    h: step [s].
     """
     return _seen(parameters, ensemble, method, h, shared, False, block.first, block.stop)
 
@@ -214,13 +174,7 @@ def survey_of(
 def framed(method: Method, parameters: Parameters, shared: Shared) -> dict[str, Any]:
     """Parameters with the frame that follows from them, under the name FRAME.
 
-    Args:
-        method: the integration method.
-        parameters: parameters of n members by name.
-        shared: what all members share, and the frame if it is shared.
-
-    Returns:
-        The parameters and, under FRAME, what `frame_of` returns; under AXES the same, but any mass matrix in it.
+    Returns: The parameters and, under FRAME, what `frame_of` returns; under AXES the same, but any mass matrix in it.
     """
     completed: dict[str, Any] | None = shared.completed(parameters)
     if completed is not None:

@@ -51,53 +51,25 @@ class Width(NamedTuple):
 def parts(kernel: str) -> tuple[str, str]:
     """Split one of KERNELS.
 
-    Args:
-        kernel: Its name.
-
-    Returns:
-        (kind, dtype); "plain" where the kind makes no difference.
+    Returns: (kind, dtype); "plain" where the kind makes no difference.
     """
     kind, _, dtype = kernel.rpartition(" ")
     return kind or "plain", dtype
 
 
 def kernel_kind(kind: str, dtype: str) -> str:
-    """Name what a width is chosen for.
-
-    Args:
-        kind: One of KINDS.
-        dtype: "float64", "float32" or "float32_compensated".
-
-    Returns:
-        One of KERNELS.
-    """
+    """Name what a width is chosen for."""
     return dtype if dtype == "float32_compensated" else f"{kind} {dtype}"
 
 
 def default_width(kind: str, dtype: str) -> Width:
-    """Choose the width of a kernel on this machine.
-
-    Args:
-        kind: One of KINDS.
-        dtype: "float64", "float32" or "float32_compensated".
-
-    Returns:
-        The width as it was tuned, otherwise that of the table.
-    """
+    """Choose the width of a kernel on this machine."""
     lanes = tuned().get(kernel_kind(kind, dtype))
     return Width(lanes, "tuned") if lanes else of_table(kind, dtype)
 
 
 def of_table(kind: str, dtype: str) -> Width:
-    """Look up the width of a kernel for this kind of processor.
-
-    Args:
-        kind: One of KINDS.
-        dtype: "float64", "float32" or "float32_compensated".
-
-    Returns:
-        The width; of one SIMD register for processors that are not in the table.
-    """
+    """Look up the width of a kernel for this kind of processor."""
     simd = machine.simd()
     processor = f"Intel, {simd}" if "Intel" in machine.cpu_name() else simd
     processor = processor if processor in REGISTERS else simd
@@ -106,11 +78,7 @@ def of_table(kind: str, dtype: str) -> Width:
 
 
 def path() -> Path:
-    """Place of the file of tuned widths.
-
-    Returns:
-        A path in the folder that holds the kernel caches of all versions of Warp.
-    """
+    """Place of the file of tuned widths."""
     return _path(os.environ.get("WARP_CACHE_PATH"))
 
 
@@ -122,42 +90,20 @@ def _path(folder: str | None) -> Path:
 
 
 def tuned() -> dict[str, int]:
-    """Read the widths that were tuned on this machine with these versions.
-
-    Returns:
-        Kernel, one of KERNELS -> width; what is missing, unreadable or odd is left out.
-    """
+    """Read the widths that were tuned on this machine with these versions."""
     return read(path())
 
 
 @functools.cache
 def read(file: Path) -> dict[str, int]:
-    """Read a file of tuned widths once in a process.
-
-    Args:
-        file: The file.
-
-    Returns:
-        As `tuned`.
-    """
+    """Read a file of tuned widths once in a process."""
     known = _content(file).get(this_machine())
     known = known if isinstance(known, dict) else {}
     return {name: known[name] for name in KERNELS if type(known.get(name)) is int and known[name] in WIDTHS}
 
 
 def keep(widths: Mapping[str, int]) -> Path:
-    """Keep widths for this machine and these versions, beside those of others.
-
-    Args:
-        widths: Kernel, one of KERNELS -> width.
-
-    Returns:
-        The file.
-
-    Raises:
-        OSError: The file cannot be written.
-        SceneError: A link stands in its place.
-    """
+    """Keep widths for this machine and these versions, beside those of others."""
     file = path()
     file.parent.mkdir(parents=True, exist_ok=True)
     with files.locked(file.parent, wait=True):
@@ -168,11 +114,7 @@ def keep(widths: Mapping[str, int]) -> Path:
 
 
 def this_machine() -> str:
-    """Name this machine and the versions with which widths are measured.
-
-    Returns:
-        One line.
-    """
+    """Name this machine and the versions with which widths are measured."""
     versions = machine.versions()
     return f"{machine.cpu_name()}, {machine.simd()}, lgvi-warp {versions['lgvi-warp']}, Warp {versions['warp-lang']}"
 

@@ -46,11 +46,7 @@ class Work:
     What is wrong with a block's members is returned as an exception, which the run raises when that block's turn comes: with
     `until` it may end before, and how far threads are ahead must not matter.
 
-    Args:
-        plan: the plan of the run.
-        keepers: what is kept of the members.
-        store: the store; None (default) for none.
-        warned: whether outcomes have warnings (default True).
+    store: the store; None (default) for none.
     """
 
     plan: Plan
@@ -66,13 +62,10 @@ class Work:
     ) -> tuple[Any, ...] | Exception | None:
         """Advance one block, or take it from the store.
 
-        Args:
-            block: the block.
-            halted: asked before each launch whether to give up (default: never).
-            advanced: called with the vehicle-steps made of this block so far (default: nothing).
-
-        Returns:
-            What each keeper closed with; None if the block was halted; a SceneError or NotSurveyed because of its members.
+        halted: asked before each launch whether to give up (default: never).
+        advanced: called with the vehicle-steps made of this block so far (default: nothing).
+        Returns: What each keeper closed with; None if the block was halted; a SceneError or NotSurveyed because of its
+            members.
         """
         from lgvi_warp.engine.plan import NotSurveyed
 
@@ -114,16 +107,9 @@ def run_block(
 ) -> tuple[Any, ...] | None:
     """Advance a block through all steps.
 
-    Args:
-        plan: the plan of the run.
-        block: the block.
-        keepers: what is kept of the members.
-        halted: asked before each launch whether to give up (default: never).
-        advanced: called with the vehicle-steps made since the last call (default: nothing).
-        warned: whether the outcome has warnings (default True).
-
-    Returns:
-        What each keeper closed with; None if the block was halted before the end.
+    halted: asked before each launch whether to give up (default: never).
+    advanced: called with the vehicle-steps made since the last call (default: nothing).
+    Returns: What each keeper closed with; None if the block was halted before the end.
     """
     from lgvi_warp.engine.asking import ask
     from lgvi_warp.engine.packets import Packets
@@ -186,13 +172,7 @@ def run_block(
 def at_start(plan: Plan, members: Members, packets: Packets) -> dict[str, np.ndarray]:
     """The samples at t = 0, in the dtype of those that follow.
 
-    Args:
-        plan: the plan of the run.
-        members: the m members.
-        packets: their packets; signals are 0 before the first launch.
-
-    Returns:
-        By field: (1, m, ...), in the field's unit.
+    Returns: By field: (1, m, ...), in the field's unit.
     """
     real = np.dtype(DTYPES[plan.dtype])
     types = {"position": np.dtype(np.float64)} if plan.spec.compensated else {}
@@ -205,15 +185,7 @@ def at_start(plan: Plan, members: Members, packets: Packets) -> dict[str, np.nda
 
 
 def in_order(runs: Sequence[Block], done: Iterable[tuple[Block, Any]]) -> Iterator[tuple[Block, Any]]:
-    """Put blocks that finish in any order into their own order.
-
-    Args:
-        runs: the blocks, in order.
-        done: blocks with their results, as they finish.
-
-    Yields:
-        The same pairs, in the order of `runs`.
-    """
+    """Put blocks that finish in any order into their own order."""
     waiting: dict[int, Any] = {}
     position = 0
     for block, value in done:
@@ -228,14 +200,8 @@ def unpacked(
 ) -> dict[str, np.ndarray]:
     """Convert the kernel's raw samples to fields, from the kernel's origin and axes to the user's.
 
-    Args:
-        fields: numbers of each field in a raw sample; twice the field's own for pairs that are summed in float64.
-        raw: (samples, members, numbers), as `Packets.advance` returns them.
-        frame: the kernel's axes and origins.
-        table: the fields by name (default those of the motion). Signals are in the user's axes already.
-
-    Returns:
-        By field: (samples, members, ...), in the field's unit.
+    raw: (samples, members, numbers), as `Packets.advance` returns them.
+    Returns: By field: (samples, members, ...), in the field's unit.
     """
     samples = divided(fields, raw, table)
     if frame.turned:
@@ -262,14 +228,8 @@ def divided(
 ) -> dict[str, np.ndarray]:
     """Raw samples by field, in the axes that they are in.
 
-    Args:
-        fields: numbers of each field, as of `unpacked`.
-        raw: (samples, members, numbers).
-        table: the fields by name.
-        entries: which numbers of a field there are, counted from 0; by default all. The others are NaN.
-
-    Returns:
-        By field: (samples, members, ...), views where no pairs are summed.
+    raw: (samples, members, numbers).
+    Returns: By field: (samples, members, ...), views where no pairs are summed.
     """
     samples: dict[str, np.ndarray] = {}
     column = 0
@@ -291,15 +251,7 @@ def divided(
 def samples_of(plan: Plan, grid: TimeGrid, when: slice, fields: Mapping[str, np.ndarray], ends: Ends) -> Fields:
     """Fields of a block with the times, steps and terms that belong to them.
 
-    Args:
-        plan: the plan of the run.
-        grid: the samples to keep, or the looks.
-        when: slice of them.
-        fields: values by field, (times, members, ...).
-        ends: returns status and last own step of each member (see `Fields`).
-
-    Returns:
-        The samples as keepers receive them.
+    fields: values by field, (times, members, ...).
     """
     scene = plan.ensemble.scene
     return Fields(fields, grid.times[when], grid.sample_steps[when], scene.terms, ends, scene.controller)

@@ -19,11 +19,7 @@ def gauss(s: int) -> Gauss:
     With l_j = b_j sum_k (2k + 1) P_k(x_j) P_k, x = 2c - 1, of the Legendre polynomials P_k, a_ij is the integral of l_j
     up to c_i, and the extrapolation its value at 1 + c_i. Source: Hairer, Lubich & Wanner, II.1.3.
 
-    Args:
-        s: Number of stages; the order is 2s.
-
-    Returns:
-        (a, b, c, extrapolation) of shapes (s, s), (s,), (s,), (s, s).
+    Returns: (a, b, c, extrapolation) of shapes (s, s), (s,), (s,), (s, s).
     """
     x, w = legendre.leggauss(s)
     b, c, P = 0.5 * w, 0.5 * (x + 1.0), legendre.legvander(x, s)

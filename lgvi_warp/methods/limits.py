@@ -39,26 +39,14 @@ RESTORING = {method: float(restoring) for method, _, restoring in _ROWS}
 
 
 def longest_stage(method: Method) -> float:
-    """Length of a method's longest stage, forward or backward.
-
-    Args:
-        method: The method.
-
-    Returns:
-        The length in steps.
-    """
+    """Length of a method's longest stage, forward or backward."""
     return max(abs(length) for length in method.lengths(None)[0])
 
 
 def oscillation_limit(method: Method, table: Mapping[str, float]) -> float:
     """Largest stable h w of a method for an oscillation of angular frequency w.
 
-    Args:
-        method: The method.
-        table: Measured limits by name, MUNK or RESTORING.
-
-    Returns:
-        The limit [rad]: measured, or for a composition that was not measured, that of its base divided by the longest
+    Returns: The limit [rad]: measured, or for a composition that was not measured, that of its base divided by the longest
         stage. Infinite where a status reports the failure instead.
     """
     if method.gauss or method.adaptive:
@@ -74,11 +62,7 @@ def oscillation_limit(method: Method, table: Mapping[str, float]) -> float:
 def imaginary_limit(name: str) -> float:
     """Largest y with |R(iy)| <= 1, R the stability function of an explicit method: h |Omega| of a steady spin.
 
-    Args:
-        name: Name of an explicit method.
-
-    Returns:
-        The limit [rad].
+    Returns: The limit [rad].
     """
     tableau = Method(name).tableau
     assert tableau is not None
@@ -92,11 +76,7 @@ def imaginary_limit(name: str) -> float:
 def rotation_limit(method: Method) -> float:
     """Largest h |Omega| of a method that has no status for it.
 
-    Args:
-        method: The method.
-
-    Returns:
-        The limit [rad]; infinite for a method whose status reports a step that is too large.
+    Returns: The limit [rad]; infinite for a method whose status reports a step that is too large.
     """
     if method.adaptive:
         return np.inf
@@ -106,14 +86,7 @@ def rotation_limit(method: Method) -> float:
 
 
 def too_large(method: Method) -> str:
-    """Say what reached its limit where a method's step is too large, and below what the step has to stay.
-
-    Args:
-        method: A method whose status reports it.
-
-    Returns:
-        One sentence.
-    """
+    """Say what reached its limit where a method's step is too large, and below what the step has to stay."""
     reached = "half the angle of a turn" if method.turns else "|J^-1 a|"
     head = f"the step is too large: {reached} reached 1{'' if method.turns else ', where equation (24) may have no solution'}"
     if method.two_part:
@@ -127,12 +100,8 @@ def too_large(method: Method) -> str:
 def stability_polynomial(tableau: Tableau, z: np.ndarray) -> np.ndarray:
     """Evaluate the stability polynomial R(z) of an explicit method: one step of y' = (z/h) y from y = 1.
 
-    Args:
-        tableau: of the method.
-        z: complex or real numbers (n,).
-
-    Returns:
-        R(z) (n,).
+    z: complex or real numbers (n,).
+    Returns: R(z) (n,).
     """
     s = len(tableau.b)
     slopes: list[np.ndarray] = []
@@ -144,12 +113,8 @@ def stability_polynomial(tableau: Tableau, z: np.ndarray) -> np.ndarray:
 def first_unstable(numbers: np.ndarray, growth: np.ndarray) -> float:
     """Find the largest number up to which a small motion stays small.
 
-    Args:
-        numbers: numbers h w (n,), rising by STEP [rad].
-        growth: growth of the motion in one step (n,).
-
-    Returns:
-        The limit; infinite where there is none.
+    numbers: numbers h w (n,), rising by STEP [rad].
+    growth: growth of the motion in one step (n,).
     """
     beyond = growth > 1.0 + GROWTH
     return float(numbers[np.argmax(beyond)] - STEP) if beyond.any() else math.inf
@@ -160,12 +125,6 @@ def drag_limit(name: str) -> float:
     """Compute the largest h (l + 2 q |v|) / I, beyond which explicit drag grows.
 
     A composition is refused where a stage that goes backward would meet a drag number above 0.5.
-
-    Args:
-        name: of the method.
-
-    Returns:
-        The limit [1]; infinite where drag is advanced exactly or implicitly.
     """
     method = Method(name)
     if method.linearly_implicit:

@@ -367,11 +367,7 @@ def _between_0_and_1(value: Any) -> bool:
 def parted(name: str) -> tuple[str, str | None]:
     """Divide the name of a method.
 
-    Args:
-        name: Such as "psi_s" or "su4(psi_s)".
-
-    Returns:
-        The method that is composed, and the composition; None where there is none.
+    Returns: The method that is composed, and the composition; None where there is none.
     """
     match = re.fullmatch(r"(\w+)\((\w+)\)", name)
     return (match[2], match[1]) if match else (name, None)
@@ -380,11 +376,7 @@ def parted(name: str) -> tuple[str, str | None]:
 def merged(program: Program) -> tuple[tuple[str, float] | None, Program]:
     """Join a flow that both opens and closes the program with that of the next step.
 
-    Args:
-        program: Sub-maps of one stage.
-
-    Returns:
-        (lead, maps): the lead is the half of that flow, None where there is none; maps is the rest of the program.
+    Returns: (lead, maps): the lead is the half of that flow, None where there is none; maps is the rest of the program.
     """
     first, last = program[0], program[-1]
     if len(program) > 1 and first == last and first[0] in FLOWS:
@@ -396,12 +388,6 @@ def palindrome_of_parts(printed: tuple[float, ...]) -> tuple[float, ...]:
     """Complete the printed coefficients of a splitting into two parts.
 
     The numbers of each part sum to one, which gives the last two.
-
-    Args:
-        printed: First half of the palindrome, the parts in turn, without the last number of each part.
-
-    Returns:
-        All coefficients, the parts in turn.
     """
     c, n = list(printed), len(printed)
     c.append(0.5 - sum(c[n % 2 :: 2]))
@@ -410,26 +396,12 @@ def palindrome_of_parts(printed: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def divisible(program: Program) -> bool:
-    """Tell whether a symmetric program is the product of a map and its adjoint.
-
-    Args:
-        program: Sub-maps of one stage, symmetric.
-
-    Returns:
-        True where its middle sub-map, if it has one, is a flow and can be divided.
-    """
+    """Tell whether a symmetric program is the product of a map and its adjoint."""
     return len(program) % 2 == 0 or program[len(program) // 2][0] in FLOWS
 
 
 def divided(program: Program) -> Program:
-    """Replace the middle sub-map by two halves of it.
-
-    Args:
-        program: Sub-maps of one stage, symmetric.
-
-    Returns:
-        The program with two halves of its middle; unchanged where it has no middle.
-    """
+    """Replace the middle sub-map by two halves of it."""
     n = len(program) // 2
     if len(program) % 2 == 0:
         return program
@@ -441,12 +413,6 @@ def with_hops(program: Program) -> Program:
     """Insert the translations between the three axes' origins.
 
     They are needed when inertia is coupled, since each turn is then made about its own origin.
-
-    Args:
-        program: Sub-maps of one stage, with turns R1 to R3.
-
-    Returns:
-        The program with "hij" wherever the origin changes from axis i to axis j.
     """
     hopped: list[tuple[str, float]] = []
     current_axis = 1
@@ -462,28 +428,13 @@ def with_hops(program: Program) -> Program:
 
 
 def middle_axis(program: Program) -> int:
-    """Axis at whose origin a program of turns applies its kick.
-
-    Args:
-        program: Sub-maps of one stage, with turns R1 to R3 before K.
-
-    Returns:
-        1, 2 or 3: the axis of the turn before K.
-    """
+    """Axis at whose origin a program of turns applies its kick."""
     letters = [letter for letter, _ in program]
     return int(letters[letters.index("K") - 1][1])
 
 
 def simplified(program: Program, isotropic: bool) -> Program:
-    """Remove the Munk moment where M = m I: it is zero, and computing it would only add round-off.
-
-    Args:
-        program: Sub-maps of one stage.
-        isotropic: Whether M is a multiple of the identity.
-
-    Returns:
-        The program with Ab instead of T and without Ap if isotropic; otherwise unchanged.
-    """
+    """Remove the Munk moment where M = m I: it is zero, and computing it would only add round-off."""
     if not isotropic:
         return program
     return tuple(("Ab" if letter == "T" else letter, c) for letter, c in program if letter != "Ap")

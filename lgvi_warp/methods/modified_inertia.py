@@ -15,11 +15,8 @@ import numpy as np
 def fields(J: np.ndarray) -> dict[str, Any]:
     """The numbers of the modified inertia that the kernel needs.
 
-    Args:
-        J: Principal moments of inertia [kg m^2], shape (n, 3).
-
-    Returns:
-        "inverse_J" (n, 3), and the series "shrink" and "shift" as {"c1": (n,), ...}.
+    J: Principal moments of inertia [kg m^2], shape (n, 3).
+    Returns: "inverse_J" (n, 3), and the series "shrink" and "shift" as {"c1": (n,), ...}.
     """
     shrink, shift = series(J)
     return {
@@ -32,11 +29,8 @@ def fields(J: np.ndarray) -> dict[str, Any]:
 def series(J: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
     """Coefficients of the polynomials s and d, by Hairer & Vilmart (2006).
 
-    Args:
-        J: Principal moments of inertia [kg m^2], shape (n, 3).
-
-    Returns:
-        (coefficients of s, of d), nine arrays (n,) each, of N, H; N^2, N H, H^2; N^3, N^2 H, N H^2, H^3.
+    J: Principal moments of inertia [kg m^2], shape (n, 3).
+    Returns: (coefficients of s, of d), nine arrays (n,) each, of N, H; N^2, N H, H^2; N^3, N^2 H, N H^2, H^3.
     """
     e = J.prod(axis=1)
 

@@ -57,11 +57,9 @@ class SaveAt:
 class TimeGrid:
     """Uniform steps from 0 to the end of a run, and those after which a sample is kept.
 
-    Args:
-        h: Length of a step [s].
-        sample_steps: Numbers of steps before each sample, int64, shape (k,); the first is 0.
-        times: Times of the samples [s], shape (k,); the first is 0.
-        messages: What the user should know, such as that the step was shortened.
+    h: Length of a step [s].
+    sample_steps: Numbers of steps before each sample, int64, shape (k,); the first is 0.
+    times: Times of the samples [s], shape (k,); the first is 0.
     """
 
     h: float
@@ -75,28 +73,14 @@ class TimeGrid:
         return int(self.sample_steps[-1])
 
     def looks(self, every: int) -> TimeGrid:
-        """The same steps with samples at the looks of a controller alone.
-
-        Args:
-            every: Number of steps between two looks.
-
-        Returns:
-            The grid; it ends with the last look.
-        """
+        """The same steps with samples at the looks of a controller alone."""
         step, steps = exact(self.h), np.arange(0, self.steps + 1, every)
         times = np.array([k * step.numerator / step.denominator for k in steps.tolist()])
         return TimeGrid(self.h, steps, times, self.messages)
 
 
 def exact(x: float) -> Fraction:
-    """The number that was meant: 0.1 + 0.2 is 3/10, 0.3333333333333333 is 1/3, 1e-12 is itself.
-
-    Args:
-        x: A number as a float.
-
-    Returns:
-        The simplest fraction whose float is x to 15 digits.
-    """
+    """The number that was meant: 0.1 + 0.2 is 3/10, 0.3333333333333333 is 1/3, 1e-12 is itself."""
     simple = Fraction(repr(float(x))).limit_denominator(10**6)
     return simple if abs(float(simple) - x) <= 1e-15 * abs(x) else Fraction(f"{x:.15g}")
 
@@ -106,17 +90,8 @@ def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:
 
     The step is shortened until it divides every sample time and the end.
 
-    Args:
-        h: The step asked for [s].
-        t1: End of the run [s].
-        save: Which samples to keep.
-
-    Returns:
-        The grid of steps, with a message where the step was shortened.
-
-    Raises:
-        SceneError: h or t1 is not positive, a sample lies beyond t1, there are too many samples or steps, or the step
-            would shrink more than MOST_SHORTENING times.
+    h: The step asked for [s].
+    t1: End of the run [s].
     """
     faults = Faults()
     faults.positive("step", h)
@@ -155,13 +130,6 @@ def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:
 
 
 def divisors(count: int) -> list[int]:
-    """The whole numbers that divide a whole number.
-
-    Args:
-        count: A whole number from 1.
-
-    Returns:
-        Its divisors, rising.
-    """
+    """The whole numbers that divide a whole number."""
     small = [k for k in range(1, math.isqrt(count) + 1) if count % k == 0]
     return sorted({*small, *(count // k for k in small)})

@@ -14,15 +14,11 @@ Row = tuple[float, ...]
 class Tableau:
     """Coefficients of a Runge-Kutta method with s stages.
 
-    Args:
-        order: Order of convergence.
-        a: Stage matrix; row i holds its i numbers.
-        b: Weights, shape (s,).
-        c: Nodes, shape (s,).
-        errors: Rows e of error estimates, shape (s,), or (s + 1,) with the slope at the new state last; default none.
-        estimate: Power of h in the error estimate, from which the next step follows; default 0.
-        implicit: Matrix g of a linearly implicit method; row i holds its i + 1 numbers, the last of which is the same in all
-            rows; default none, an explicit method.
+    b: Weights, shape (s,).
+    c: Nodes, shape (s,).
+    errors: Rows e of error estimates, shape (s,), or (s + 1,) with the slope at the new state last; default none.
+    implicit: Matrix g of a linearly implicit method; row i holds its i + 1 numbers, the last of which is the same in all rows;
+        default none, an explicit method.
     """
 
     order: int

@@ -59,11 +59,7 @@ class Sampled(Protocol):
     def own(self, term: Term) -> dict[str, np.ndarray]:
         """The numbers of one term.
 
-        Args:
-            term: A term of the scene.
-
-        Returns:
-            Its numbers by field, each of shape (1, ...) or (n, ...).
+        Returns: Its numbers by field, each of shape (1, ...) or (n, ...).
         """
 
 
@@ -99,11 +95,7 @@ def _broadcast(matrices: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, n
 def kinetic_energy(result: Sampled) -> np.ndarray:
     """Kinetic energy relative to the water, (nu, Om).I6 (nu, Om) / 2.
 
-    Args:
-        result: Samples with all four fields of the state.
-
-    Returns:
-        Energy (k, n) [J].
+    Returns: Energy (k, n) [J].
     """
     return np.asarray(0.5 * np.sum(_relative(result) * _momenta(result), axis=-1))
 
@@ -111,11 +103,7 @@ def kinetic_energy(result: Sampled) -> np.ndarray:
 def energy(result: Sampled) -> np.ndarray:
     """Total energy: the kinetic energy relative to the water, and the potential of every term.
 
-    Args:
-        result: Samples with all four fields of the state.
-
-    Returns:
-        Energy (k, n) [J].
+    Returns: Energy (k, n) [J].
     """
     total = kinetic_energy(result)
     position, attitude = result.position.astype(np.float64), result.attitude.astype(np.float64)
@@ -127,11 +115,7 @@ def energy(result: Sampled) -> np.ndarray:
 def linear_momentum(result: Sampled) -> np.ndarray:
     """Linear momentum R p in inertial axes. Without a potential it is conserved.
 
-    Args:
-        result: Samples with all four fields of the state.
-
-    Returns:
-        Momentum (k, n, 3) [N s].
+    Returns: Momentum (k, n, 3) [N s].
     """
     return _times(result.attitude.astype(np.float64), _momenta(result)[..., :3])
 
@@ -139,11 +123,7 @@ def linear_momentum(result: Sampled) -> np.ndarray:
 def angular_momentum(result: Sampled) -> np.ndarray:
     """Angular momentum R pi + b x R p about the inertial origin. Without a potential it is conserved.
 
-    Args:
-        result: Samples with all four fields of the state.
-
-    Returns:
-        Momentum (k, n, 3) [N m s].
+    Returns: Momentum (k, n, 3) [N m s].
     """
     spin = _momenta(result)[..., 3:]
     b, P = (np.moveaxis(x, -1, 0) for x in (result.position.astype(np.float64), linear_momentum(result)))
@@ -158,12 +138,7 @@ def energy_growth(result: Sampled, *, dissipative: bool = False) -> np.ndarray:
     the potential.
     A bounded motion stays below about 1, however it exchanges energy.
 
-    Args:
-        result: Samples with all four fields of the state.
-        dissipative: Whether only growth counts, since energy may be lost; by default any change does.
-
-    Returns:
-        Ratios (n,); infinite where the energy is not finite at some time.
+    Returns: Ratios (n,); infinite where the energy is not finite at some time.
     """
     kinetic, total = kinetic_energy(result), result.energy
     potential = total - kinetic
@@ -185,24 +160,13 @@ def _present(result: Sampled) -> tuple[Term, ...]:
 def conserved(result: Sampled) -> frozenset[str]:
     """What the laws of a result's scene conserve, as each term says itself (`Term.conserves`).
 
-    Args:
-        result: A run, whose parameters decide which terms act.
-
-    Returns:
-        The names among "energy", "horizontal_momentum" and "vertical_angular_momentum" that every acting term conserves.
+    Returns: The names among "energy", "horizontal_momentum" and "vertical_angular_momentum" that every acting term conserves.
     """
     return CONSERVED.intersection(*(term.conserves for term in _present(result)))
 
 
 def at_work(result: Sampled) -> tuple[str, ...]:
-    """The terms that do work: drag, thrust, noise, moving water and the like.
-
-    Args:
-        result: A run, whose parameters decide which terms act.
-
-    Returns:
-        Keys of these terms; () where there is none.
-    """
+    """The terms that do work: drag, thrust, noise, moving water and the like."""
     return tuple(term.key for term in _present(result) if "energy" not in term.conserves)
 
 

@@ -12,11 +12,7 @@ from numpy import ndindex
 class Field:
     """Numbers of one vehicle at one time.
 
-    Args:
-        name: name in scene files, results and stores.
-        shape: shape of the numbers; () for one number.
-        unit: their unit, as messages write it.
-        meaning: what they are, in a few words.
+    shape: shape of the numbers; () for one number.
     """
 
     name: str
@@ -62,13 +58,5 @@ _TAILS = {(): (), (3,): ("component",), (3, 3): ("row", "column")}
 
 
 def dims_of(name: str, tail: tuple[int, ...]) -> tuple[str, ...]:
-    """Names of the dimensions of one vehicle's numbers at one time, in stores and datasets.
-
-    Args:
-        name: Name of the array.
-        tail: Shape of the numbers.
-
-    Returns:
-        A name for each dimension.
-    """
+    """Names of the dimensions of one vehicle's numbers at one time, in stores and datasets."""
     return _TAILS.get(tail, tuple(f"{name}_{i}" for i in range(len(tail))))

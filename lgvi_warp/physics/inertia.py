@@ -23,11 +23,8 @@ ROUND_OFF = 1e-12
 def vee(A: np.ndarray) -> np.ndarray:
     """Vectors of the skew part of matrices, the inverse of `hat`.
 
-    Args:
-        A: Matrices (..., 3, 3).
-
-    Returns:
-        Vectors (..., 3).
+    A: Matrices (..., 3, 3).
+    Returns: Vectors (..., 3).
     """
     return 0.5 * np.stack([A[..., i, j] - A[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=-1)
 
@@ -35,10 +32,9 @@ def vee(A: np.ndarray) -> np.ndarray:
 class Blocks(NamedTuple):
     """The blocks of mass matrices. Each has a leading dimension of 1 or n of its own.
 
-    Args:
-        M: Mass, (., 3, 3) [kg].
-        C: Coupling, (., 3, 3) [kg m].
-        J: Inertia, (., 3, 3) [kg m2].
+    M: Mass, (., 3, 3) [kg].
+    C: Coupling, (., 3, 3) [kg m].
+    J: Inertia, (., 3, 3) [kg m2].
     """
 
     M: np.ndarray
@@ -49,11 +45,7 @@ class Blocks(NamedTuple):
 def blocks(I6: np.ndarray) -> Blocks:
     """The blocks M, C and J of mass matrices.
 
-    Args:
-        I6: Mass matrices (n, 6, 6), linear part first.
-
-    Returns:
-        Blocks of n members each.
+    I6: Mass matrices (n, 6, 6), linear part first.
     """
     return Blocks(I6[:, :3, :3], I6[:, :3, 3:], I6[:, 3:, 3:])
 
@@ -61,13 +53,10 @@ def blocks(I6: np.ndarray) -> Blocks:
 def joined(M: np.ndarray, C: np.ndarray, J: np.ndarray) -> np.ndarray:
     """Mass matrices made of their blocks.
 
-    Args:
-        M: Mass, (n, 3, 3) [kg].
-        C: Coupling, (n, 3, 3) [kg m].
-        J: Inertia, (n, 3, 3) [kg m2].
-
-    Returns:
-        I6 (n, 6, 6), linear part first.
+    M: Mass, (n, 3, 3) [kg].
+    C: Coupling, (n, 3, 3) [kg m].
+    J: Inertia, (n, 3, 3) [kg m2].
+    Returns: I6 (n, 6, 6), linear part first.
     """
     I6 = np.empty((max(len(M), len(C), len(J)), 6, 6))
     I6[:, :3, :3], I6[:, :3, 3:], I6[:, 3:, :3], I6[:, 3:, 3:] = M, C, np.swapaxes(C, -1, -2), J
@@ -77,12 +66,9 @@ def joined(M: np.ndarray, C: np.ndarray, J: np.ndarray) -> np.ndarray:
 def motion_from(origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
     """Matrices that turn velocities at another origin and in axes Q into those of the same motion at the user's, in his axes.
 
-    Args:
-        origin: The other origin, (n, 3) [m], from the user's in his axes.
-        Q: The other axes in the user's, (n, 3, 3).
-
-    Returns:
-        X (n, 6, 6), which act on (nu, Om).
+    origin: The other origin, (n, 3) [m], from the user's in his axes.
+    Q: The other axes in the user's, (n, 3, 3).
+    Returns: X (n, 6, 6), which act on (nu, Om).
     """
     X = np.zeros((max(len(Q), len(origin)), 6, 6))
     X[:, :3, :3] = X[:, 3:, 3:] = Q + 0.0  # without negative zeros
@@ -93,13 +79,10 @@ def motion_from(origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
 def moved(I6: np.ndarray, origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
     """Mass matrices about another origin and in other axes.
 
-    Args:
-        I6: Mass matrices (n, 6, 6) about the user's origin, in the user's axes.
-        origin: The other origin, (n, 3) [m], from the user's in his axes.
-        Q: The other axes in the user's, (n, 3, 3).
-
-    Returns:
-        I6 (n, 6, 6) there.
+    I6: Mass matrices (n, 6, 6) about the user's origin, in the user's axes.
+    origin: The other origin, (n, 3) [m], from the user's in his axes.
+    Q: The other axes in the user's, (n, 3, 3).
+    Returns: I6 (n, 6, 6) there.
     """
     X = motion_from(origin, Q)
     return np.swapaxes(X, -1, -2) @ I6 @ X
@@ -108,11 +91,8 @@ def moved(I6: np.ndarray, origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
 def coupling(I6: np.ndarray) -> np.ndarray:
     """The coupling norm: the largest singular value of M^-1/2 C J^-1/2.
 
-    Args:
-        I6: Mass matrices (n, 6, 6).
-
-    Returns:
-        Norms (n,), from 0 to 1; infinite where round-off or overflow leaves no positive definite matrix.
+    I6: Mass matrices (n, 6, 6).
+    Returns: Norms (n,), from 0 to 1; infinite where round-off or overflow leaves no positive definite matrix.
     """
     M, C, J = blocks(I6)
     try:
@@ -129,14 +109,12 @@ def coupling(I6: np.ndarray) -> np.ndarray:
 class Frame:
     """The axes and origins in which a kernel keeps a vehicle. Leading dimensions are 1 or n.
 
-    Args:
-        Q: The kernel's body axes in the user's, (., 3, 3).
-        origin: Origin of the state, (., 3) [m], from the user's in his axes.
-        forces: Origin of the forces, (., 3) [m], from the user's in his axes.
-        M: Mass matrix in the axes Q, (., 3, 3) [kg].
-        J: Diagonal (Schur) inertia in the axes Q, (., 3) [kg m2].
-        E: M^-1 C at the origin of the state, (., 3, 3) [m]; 0 without coupling.
-        E_forces: M^-1 C at the origin of the forces, (., 3, 3) [m]; 0 without coupling.
+    origin: Origin of the state, (., 3) [m], from the user's in his axes.
+    forces: Origin of the forces, (., 3) [m], from the user's in his axes.
+    M: Mass matrix in the axes Q, (., 3, 3) [kg].
+    J: Diagonal (Schur) inertia in the axes Q, (., 3) [kg m2].
+    E: M^-1 C at the origin of the state, (., 3, 3) [m]; 0 without coupling.
+    E_forces: M^-1 C at the origin of the forces, (., 3, 3) [m]; 0 without coupling.
     """
 
     Q: np.ndarray
@@ -176,34 +154,21 @@ class Frame:
     def inertia_at(self, E: np.ndarray) -> np.ndarray:
         """Mass matrix in these axes, at the origin where M^-1 C is E: J = Js + E^T M E.
 
-        Args:
-            E: M^-1 C at that origin, (n, 3, 3) [m].
-
-        Returns:
-            I6 (n, 6, 6).
+        E: M^-1 C at that origin, (n, 3, 3) [m].
+        Returns: I6 (n, 6, 6).
         """
         J = self.J[:, :, None] * np.eye(3)
         return joined(self.M + 0.0 * E, self.M @ E, J + np.swapaxes(E, -1, -2) @ self.M @ E)
 
     def vector(self, v: np.ndarray) -> np.ndarray:
-        """Components of body vectors in these axes.
-
-        Args:
-            v: Vectors (n, ..., 3) in the user's axes.
-
-        Returns:
-            Vectors (n, ..., 3).
-        """
+        """Components of body vectors in these axes."""
         return np.einsum("nji,n...j->n...i", *notation.repeated(self.Q, v))
 
     def point(self, r: np.ndarray) -> np.ndarray:
         """Points relative to the origin of the forces, in these axes.
 
-        Args:
-            r: Points (n, ..., 3) [m] from the user's origin, in the user's axes.
-
-        Returns:
-            Points (n, ..., 3) [m].
+        r: Points (n, ..., 3) [m] from the user's origin, in the user's axes.
+        Returns: Points (n, ..., 3) [m].
         """
         return self.vector(r - _expanded(self.forces, r))
 
@@ -212,12 +177,9 @@ class Frame:
 
         The angular part of a twist that measures a velocity transforms in the same way.
 
-        Args:
-            torque: Torques (n, ..., 3) [N m] about the user's origin, in the user's axes.
-            force: Forces (n, ..., 3) [N] of the same wrenches.
-
-        Returns:
-            Torques (n, ..., 3) [N m].
+        torque: Torques (n, ..., 3) [N m] about the user's origin, in the user's axes.
+        force: Forces (n, ..., 3) [N] of the same wrenches.
+        Returns: Torques (n, ..., 3) [N m].
         """
         arm, torque, force = np.broadcast_arrays(_expanded(self.forces, force), torque, force)
         return self.vector(torque - notation.cross(arm, force))
@@ -231,11 +193,7 @@ def _expanded(origin: np.ndarray, like: np.ndarray) -> np.ndarray:
 def schur(body: Blocks) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The mass, E and the Schur complement of mass matrices.
 
-    Args:
-        body: Mass matrices.
-
-    Returns:
-        M [kg], E = M^-1 C [m] and Js = J - C^T E [kg m2], each (., 3, 3).
+    Returns: M [kg], E = M^-1 C [m] and Js = J - C^T E [kg m2], each (., 3, 3).
     """
     coupled = np.any(body.C, axis=(-2, -1))
     if not coupled.any():
@@ -249,15 +207,7 @@ def schur(body: Blocks) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def in_axes(Q: np.ndarray, A: np.ndarray) -> np.ndarray:
-    """Matrices in other axes, Q^T A Q.
-
-    Args:
-        Q: The other axes in the user's, (., 3, 3).
-        A: Matrices (., 3, 3) in the user's axes.
-
-    Returns:
-        Matrices (., 3, 3) in the axes Q.
-    """
+    """Matrices in other axes, Q^T A Q."""
     if np.all(np.eye(3) == Q):
         return A
     return np.asarray(np.swapaxes(Q, -1, -2) @ A @ Q)
@@ -267,12 +217,6 @@ def uncoupled_frame(body: Blocks) -> tuple[Frame, np.ndarray]:
     """The frame at the origin where M and J are uncoupled, with J diagonal.
 
     The coupling vanishes there if and only if E is skew.
-
-    Args:
-        body: Mass matrices about the user's origin, in the user's axes.
-
-    Returns:
-        The frame, and the coupling norm (.,) that remains there.
     """
     M, E, Js = schur(body)
     origin = -vee(E)
@@ -288,12 +232,9 @@ def uncoupled_frame(body: Blocks) -> tuple[Frame, np.ndarray]:
 def ascending(Q: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Principal axes in the order of rising inertia, still right-handed.
 
-    Args:
-        Q: Axes (n, 3, 3).
-        J: Principal inertias (n, 3) [kg m2].
-
-    Returns:
-        Axes (n, 3, 3) and inertias (n, 3) in that order.
+    Q: Axes (n, 3, 3).
+    J: Principal inertias (n, 3) [kg m2].
+    Returns: Axes (n, 3, 3) and inertias (n, 3) in that order.
     """
     order = np.argsort(J, axis=1, kind="stable")
     Q = np.take_along_axis(Q, order[:, None, :], axis=2)
@@ -304,12 +245,7 @@ def ascending(Q: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def turns_frame(body: Blocks, middle: int = 3) -> tuple[Frame, np.ndarray]:
     """The frame of psi_x: the state at axis 1's origin, the forces at the origin of axis `middle`.
 
-    Args:
-        body: Mass matrices about the user's origin, in the user's axes.
-        middle: Axis at whose origin the kick acts, 2 or 3; 3 by default.
-
-    Returns:
-        The frame, and U (n, 3, 3) [m], upper triangular: E at the origin of the state.
+    Returns: The frame, and U (n, 3, 3) [m], upper triangular: E at the origin of the state.
     """
     M, E, Js = schur(body)
     Q, J = ascending(*notation.principal_axes(Js))
@@ -326,14 +262,7 @@ def turns_frame(body: Blocks, middle: int = 3) -> tuple[Frame, np.ndarray]:
 
 
 def symmetric_frame(body: Blocks) -> Frame:
-    """The frame of psi_w: at the origin where E = S is symmetric, in the principal axes of Js.
-
-    Args:
-        body: Mass matrices about the user's origin, in the user's axes.
-
-    Returns:
-        The frame.
-    """
+    """The frame of psi_w: at the origin where E = S is symmetric, in the principal axes of Js."""
     M, E, Js = schur(body)
     origin = -vee(E)
     Q, J = notation.principal_axes(Js)

@@ -21,13 +21,9 @@ def rates(
 
     Mathematics, section 7: w_Munk^2 = |p|^2 (1/M_min - 1/M_max) / J_min, w_restoring^2 = B |r| / J_min.
 
-    Args:
-        parameters: names of the scene -> values with leading dimension 1 or n.
-        velocity: of the members (n, 3) [m/s], body axes.
-        angular_velocity: of the members (n, 3) [rad/s], body axes.
-
-    Returns:
-        Names of LIMITS -> rate (n,) [rad/s; drag 1/s].
+    velocity: of the members (n, 3) [m/s], body axes.
+    angular_velocity: of the members (n, 3) [rad/s], body axes.
+    Returns: Names of LIMITS -> rate (n,) [rad/s; drag 1/s].
     """
     n = len(velocity)
     I6 = np.broadcast_to(vehicle.inertia6(parameters), (n, 6, 6))
@@ -52,14 +48,10 @@ def drag_rate(
 ) -> np.ndarray:
     """Compute the largest (l_ii + 2 q_ii |v_i|) / I_ii over the six axes, summed over all drag terms.
 
-    Args:
-        parameters: names of the scene -> values with leading dimension 1 or n.
-        I6: inertia with added mass (n, 6, 6) [kg, kg m, kg m^2].
-        velocity: of the members (n, 3) [m/s], body axes.
-        angular_velocity: of the members (n, 3) [rad/s], body axes.
-
-    Returns:
-        Rate (n,) [1/s]; 0 without drag.
+    I6: inertia with added mass (n, 6, 6) [kg, kg m, kg m^2].
+    velocity: of the members (n, 3) [m/s], body axes.
+    angular_velocity: of the members (n, 3) [rad/s], body axes.
+    Returns: Rate (n,) [1/s]; 0 without drag.
     """
     speeds = np.abs(np.concatenate([velocity, angular_velocity], axis=1))
     total = np.zeros_like(speeds)
@@ -70,14 +62,7 @@ def drag_rate(
 
 
 def drag_keys(parameters: Mapping[str, np.ndarray]) -> list[str]:
-    """Find the terms with linear and quadratic drag coefficients on six axes.
-
-    Args:
-        parameters: names of the scene -> values.
-
-    Returns:
-        Keys of the terms, such as "drag".
-    """
+    """Find the terms with linear and quadratic drag coefficients on six axes."""
     keys = [name.removesuffix(".quadratic") for name in parameters if name.endswith(".quadratic")]
     return [key for key in keys if parameters.get(f"{key}.linear", np.zeros(1)).shape[-1] == 6]
 

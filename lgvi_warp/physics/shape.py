@@ -59,14 +59,8 @@ class Shape:
 def shape_from(value: Any) -> Shape | None:
     """Read the shape of a vehicle.
 
-    Args:
-        value: A table as in a scene file, a Shape, or None for none.
-
-    Returns:
-        The shape.
-
-    Raises:
-        SceneError: The table is at fault. The message lists every fault.
+    value: A table as in a scene file, a Shape, or None for none.
+    Returns: The shape.
     """
     if value is None or isinstance(value, Shape):
         return value

@@ -259,14 +259,7 @@ def _definite(matrix: np.ndarray, other: Any = 0.0) -> bool:
 
 
 def compact(matrix: np.ndarray) -> list[Any]:
-    """A 3x3 matrix as a scene file writes it.
-
-    Args:
-        matrix: Square matrix.
-
-    Returns:
-        The diagonal as a list where nothing is beside it, else nested lists.
-    """
+    """A 3x3 matrix as a scene file writes it."""
     diagonal = np.diag(matrix)
     return (diagonal if np.array_equal(matrix, np.diag(diagonal)) else matrix).tolist()
 
@@ -274,12 +267,7 @@ def compact(matrix: np.ndarray) -> list[Any]:
 def unusual(name: str, inertia: Any) -> tuple[str, ...]:
     """Warn about principal inertias that no rigid body has (J_i + J_j < J_k), though a body with added inertia may have them.
 
-    Args:
-        name: Name of the field, for the message.
-        inertia: Inertia (3, 3) [kg m2].
-
-    Returns:
-        One warning, or ().
+    inertia: Inertia (3, 3) [kg m2].
     """
     small, middle, large = np.linalg.eigvalsh(inertia)
     if small >= large * (1.0 - 1e-12) - middle:
@@ -291,11 +279,8 @@ def unusual(name: str, inertia: Any) -> tuple[str, ...]:
 def about_center(rigid: np.ndarray) -> np.ndarray:
     """Inertia about the centre of gravity.
 
-    Args:
-        rigid: Rigid bodies' mass matrices (n, 6, 6) [kg, kg m, kg m2] about any origin.
-
-    Returns:
-        Inertia (n, 3, 3) [kg m2].
+    rigid: Rigid bodies' mass matrices (n, 6, 6) [kg, kg m, kg m2] about any origin.
+    Returns: Inertia (n, 3, 3) [kg m2].
     """
     m = rigid[:, :1, :1]
     H = notation.hat(-inertias.vee(rigid[:, :3, 3:]) / m[:, 0])
@@ -305,11 +290,8 @@ def about_center(rigid: np.ndarray) -> np.ndarray:
 def shortage(rigid: np.ndarray) -> np.ndarray:
     """The fraction of the largest principal inertia by which the other two sum to less than it.
 
-    Args:
-        rigid: Rigid bodies' mass matrices (n, 6, 6) [kg, kg m, kg m2].
-
-    Returns:
-        Fractions (n,); 0 or below for what a rigid body can have.
+    rigid: Rigid bodies' mass matrices (n, 6, 6) [kg, kg m, kg m2].
+    Returns: Fractions (n,); 0 or below for what a rigid body can have.
     """
     small, middle, large = np.linalg.eigvalsh(about_center(rigid)).T
     return np.asarray(1.0 - (small + middle) / large)
@@ -318,12 +300,8 @@ def shortage(rigid: np.ndarray) -> np.ndarray:
 def impossible(rigid: np.ndarray, tolerance: float = 0.0) -> np.ndarray:
     """Which mass matrices no rigid body has: two principal inertias sum to less than the third.
 
-    Args:
-        rigid: Mass matrices (n, 6, 6) [kg, kg m, kg m2].
-        tolerance: Fraction of the largest principal inertia that is allowed to be missing, besides round-off.
-
-    Returns:
-        Mask (n,), True for an impossible matrix.
+    rigid: Mass matrices (n, 6, 6) [kg, kg m, kg m2].
+    Returns: Mask (n,), True for an impossible matrix.
     """
     return shortage(rigid) > max(tolerance, ROUND_OFF)
 
@@ -331,11 +309,7 @@ def impossible(rigid: np.ndarray, tolerance: float = 0.0) -> np.ndarray:
 def inertia_blocks(p: Numbers) -> inertias.Blocks:
     """Blocks of the mass matrix of body and added mass about the user's origin, each with a member for what varies in it.
 
-    Args:
-        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-
-    Returns:
-        The blocks.
+    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
     """
     if "vehicle.rigid_body_mass_matrix" in p:
         return inertias.blocks(p["vehicle.rigid_body_mass_matrix"] + p["vehicle.added_mass_matrix"])
@@ -345,11 +319,8 @@ def inertia_blocks(p: Numbers) -> inertias.Blocks:
 def mass_matrix(p: Numbers) -> np.ndarray:
     """Mass and added mass of a vehicle whose mass matrix has no coupling.
 
-    Args:
-        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-
-    Returns:
-        M (n, 3, 3) [kg].
+    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+    Returns: M (n, 3, 3) [kg].
     """
     return np.asarray(p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"])
 
@@ -357,11 +328,8 @@ def mass_matrix(p: Numbers) -> np.ndarray:
 def inertia6(p: Numbers) -> np.ndarray:
     """Mass matrix of body and added mass about the user's origin.
 
-    Args:
-        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-
-    Returns:
-        I6 (n, 6, 6) [kg, kg m, kg m2], linear part first.
+    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+    Returns: I6 (n, 6, 6) [kg, kg m, kg m2], linear part first.
     """
     return inertias.joined(*inertia_blocks(p))
 
@@ -369,11 +337,8 @@ def inertia6(p: Numbers) -> np.ndarray:
 def dry_mass(p: Numbers) -> np.ndarray:
     """Mass of the rigid body.
 
-    Args:
-        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-
-    Returns:
-        Mass (n,) [kg].
+    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+    Returns: Mass (n,) [kg].
     """
     if "vehicle.rigid_body_mass_matrix" in p:
         return np.asarray(p["vehicle.rigid_body_mass_matrix"][:, 0, 0])
@@ -383,11 +348,8 @@ def dry_mass(p: Numbers) -> np.ndarray:
 def weight(p: Numbers) -> np.ndarray:
     """Weight of the vehicle: as given, or mass times gravity.
 
-    Args:
-        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-
-    Returns:
-        Weight (n,) [N].
+    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+    Returns: Weight (n,) [N].
     """
     if "vehicle.weight" in p:
         return np.asarray(p["vehicle.weight"])
@@ -397,11 +359,8 @@ def weight(p: Numbers) -> np.ndarray:
 def displaced_mass(p: Numbers) -> np.ndarray:
     """Mass of the displaced water: buoyancy over gravity, or without gravity the mass of a neutral vehicle.
 
-    Args:
-        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-
-    Returns:
-        Mass (n,) [kg].
+    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+    Returns: Mass (n,) [kg].
     """
     g = p["environment.gravity"]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -411,11 +370,8 @@ def displaced_mass(p: Numbers) -> np.ndarray:
 def center_of_mass(p: Numbers) -> np.ndarray:
     """Centre of the rigid body's mass, from the user's origin.
 
-    Args:
-        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-
-    Returns:
-        Points (n, 3) [m] in body axes; zero, shape (1, 3), for a vehicle in the simple form.
+    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+    Returns: Points (n, 3) [m] in body axes; zero, shape (1, 3), for a vehicle in the simple form.
     """
     if "vehicle.rigid_body_mass_matrix" in p:
         rigid = p["vehicle.rigid_body_mass_matrix"]
@@ -426,11 +382,8 @@ def center_of_mass(p: Numbers) -> np.ndarray:
 def added_blocks(p: Numbers) -> inertias.Blocks:
     """Added mass about the user's origin.
 
-    Args:
-        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-
-    Returns:
-        Its blocks, (1 or n, 3, 3) each; those of the coupling and of the rates are zero for a vehicle in the simple form.
+    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+    Returns: Its blocks, (1 or n, 3, 3) each; those of the coupling and of the rates are zero for a vehicle in the simple form.
     """
     if "vehicle.rigid_body_mass_matrix" in p:
         return inertias.blocks(p["vehicle.added_mass_matrix"])
@@ -440,10 +393,6 @@ def added_blocks(p: Numbers) -> inertias.Blocks:
 def lopsided(p: Numbers) -> bool:
     """Whether some member's centre of mass is not the user's origin, or added mass couples velocities and rates there.
 
-    Args:
-        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-
-    Returns:
-        False where a force at the origin gives no torque.
+    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
     """
     return bool(np.any(center_of_mass(p)) or np.any(added_blocks(p).C))

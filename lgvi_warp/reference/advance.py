@@ -17,11 +17,7 @@ def step(
 ) -> State:
     """One step of h [s]: the program with g h for each stage coefficient g.
 
-    Args:
-        x, body: State at the start; inertia and laws.
-        program, h: (letter, coefficient) of each sub-map; step [s].
-        stages: Coefficients of the composition's stages; default one stage.
-        solve: Solver of equation (24).
+    program, h: (letter, coefficient) of each sub-map; step [s].
     """
     for g in stages:
         for letter, coefficient in program:
@@ -40,12 +36,7 @@ def advance(
 ) -> State:
     """The state after so many steps.
 
-    Args:
-        x, body: State at the start; inertia and laws.
-        program, h: (letter, coefficient) of each sub-map; step [s].
-        steps: Number of steps.
-        stages: Coefficients of the composition's stages; default one stage.
-        solve: Solver of equation (24).
+    program, h: (letter, coefficient) of each sub-map; step [s].
     """
     for _ in range(steps):
         x = step(replace(x, t=x.step * h), body, program, h, stages, solve)
@@ -65,13 +56,7 @@ def trajectory(
 ) -> list[State]:
     """The states after 0, every, 2 every, ..., steps steps. Raises ValueError if `every` does not divide `steps`.
 
-    Args:
-        x, body: State at the start; inertia and laws.
-        program, h: (letter, coefficient) of each sub-map; step [s].
-        steps: Number of steps.
-        every: Steps from one state of the list to the next; default 1.
-        stages: Coefficients of the composition's stages; default one stage.
-        solve: Solver of equation (24).
+    program, h: (letter, coefficient) of each sub-map; step [s].
     """
     if steps % every:
         raise ValueError(f"every = {every} does not divide steps = {steps}")
@@ -94,12 +79,7 @@ def arrival(
 
     distance: positive at x, zero or below after the whole step.
 
-    Args:
-        x, body: State at the start; inertia and laws.
-        program, h: (letter, coefficient) of each sub-map; step [s].
-        distance: Distance to the event, positive at x and not after the whole step.
-        stages: Coefficients of the composition's stages; default one stage.
-        solve: Solver of equation (24).
+    program, h: (letter, coefficient) of each sub-map; step [s].
     """
     start = replace(x, t=x.step * h)
 

@@ -17,10 +17,8 @@ Stage = tuple[Array, Array, Array, Array]
 def rates(b: Array, R: Array, nu: Array, Om: Array, body: Body) -> tuple[Array, Array, Array]:
     """Eq. (1) and (3): db/dt in inertial axes, then dnu/dt and dOm/dt in body axes.
 
-    Args:
-        b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular
-            velocity (3,) [rad/s], body axes.
-        body: Inertia and laws.
+    b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular velocity
+        (3,) [rad/s], body axes.
     """
     force, torque = body.wrench(b, R)
     p, pi = body.M @ nu, body.J @ Om
@@ -32,10 +30,9 @@ def rates(b: Array, R: Array, nu: Array, Om: Array, body: Body) -> tuple[Array, 
 def along_screw(b: Array, R: Array, d: Array, theta: Array) -> tuple[Array, Array]:
     """(b, R) exp of the twist (d, theta) in SE(3): b + R V d and R exp(hat(theta)), V the integral of exp.
 
-    Args:
-        b, R: Position (3,) [m]; attitude (3, 3), body to inertial axes.
-        d: Translation (3,) [m] of the twist.
-        theta: Rotation vector (3,) of the twist.
+    b, R: Position (3,) [m]; attitude (3, 3), body to inertial axes.
+    d: Translation (3,) [m] of the twist.
+    theta: Rotation vector (3,) of the twist.
     """
     n, H = norm(theta), hat(theta)
     third = (n - math.sin(n)) / n**3 if n > 1e-2 else 1.0 / 6.0 - n**2 / 120.0 + n**4 / 5040.0
@@ -53,10 +50,9 @@ def cg3(b: Array, R: Array, nu: Array, Om: Array, body: Body, h: float) -> Motio
 
     b moves by the same screws. Returns b, R, nu, Om at k + 1.
 
-    Args:
-        b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular
-            velocity (3,) [rad/s], body axes.
-        body, h: Inertia and laws; step [s].
+    b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular velocity
+        (3,) [rad/s], body axes.
+    body, h: Inertia and laws; step [s].
     """
     stages: list[Stage] = []
     for row in CG3_A:
@@ -71,12 +67,10 @@ def crouch_grossman_row(
 ) -> Motion:
     """From the state at k along the frozen twists of the stages so far, with the weights of one row of the tableau.
 
-    Args:
-        b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular
-            velocity (3,) [rad/s], body axes.
-        h: Step [s].
-        row: Weights of the stages, a row of the tableau.
-        stages: nu, Om and their rates at the stages so far.
+    b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular velocity
+        (3,) [rad/s], body axes.
+    h: Step [s].
+    row: Weights of the stages, a row of the tableau.
     """
     for weight, (nui, Omi, nu_rate, Om_rate) in zip(row, stages, strict=True):
         b, R = along_screw(b, R, h * weight * nui, h * weight * Omi)
@@ -97,10 +91,9 @@ def inverse_dexp(theta: Array, Om: Array) -> Array:
 def rkmk4(b: Array, R: Array, nu: Array, Om: Array, body: Body, h: float) -> Motion:
     """Runge-Kutta-Munthe-Kaas, order 4 (HLW IV.8.2): RK4 for the rotation vector. Returns b, R, nu, Om at k + 1.
 
-    Args:
-        b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular
-            velocity (3,) [rad/s], body axes.
-        body, h: Inertia and laws; step [s].
+    b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular velocity
+        (3,) [rad/s], body axes.
+    body, h: Inertia and laws; step [s].
     """
     theta = np.zeros(3)
     rate: tuple[Array, ...] = (np.zeros(3),) * 4

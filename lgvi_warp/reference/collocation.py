@@ -57,10 +57,8 @@ def pack(x: State) -> Array:
 def unpack(y: Array, x: State, t: float) -> State:
     """The state with y (18,) at t [s], the rest as in x.
 
-    Args:
-        y: Vector (18,), see `pack`.
-        x: State with the other fields.
-        t: Time [s].
+    y: Vector (18,), see `pack`.
+    t: Time [s].
     """
     return replace(x, b=y[:3], R=y[3:12].reshape(3, 3), p=y[12:15], pi=y[15:], t=t)
 
@@ -68,8 +66,7 @@ def unpack(y: Array, x: State, t: float) -> State:
 def rates(x: State, body: Body, h: float) -> Array:
     """Rate of the vector of `pack`, dy/dt (18,).
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
+    x, body, h: State at the start; inertia and laws; step [s].
     """
     b, R, p, pi = derivatives(x, body, h)
     return np.concatenate([b, R.ravel(), p, pi])
@@ -80,10 +77,8 @@ def solve_stages(x: State, body: Body, h: float, method: Gauss, K: Array) -> tup
 
     The iteration ends where the change is round-off or no longer falls. Raises NotConverged.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        method: Coefficients of the Gauss method.
-        K: Guess of the rates (s, 18).
+    x, body, h: State at the start; inertia and laws; step [s].
+    K: Guess of the rates (s, 18).
     """
     y, smallest = pack(x), np.inf
     for iteration in range(1, MOST_ITERATIONS + 1):
@@ -101,10 +96,7 @@ def advance(x: State, body: Body, h: float, steps: int, s: int = 3) -> tuple[Sta
 
     Each step starts from the stages of the one before, extrapolated; the sum y + h sum b_i K_i is compensated.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        steps: Number of steps.
-        s: Number of stages.
+    x, body, h: State at the start; inertia and laws; step [s].
     """
     method, evaluations = gauss(s), 0
     K: Array = np.zeros((s, 18))

@@ -76,9 +76,8 @@ class Reduced:
     def to_reduced(self, b: Array, R: Array, nu: Array, Om: Array) -> CoupledState:
         """The state of the user's b (3,) [m], R (3, 3), nu (3,) [m/s], Om (3,) [rad/s].
 
-        Args:
-            b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes;
-                angular velocity (3,) [rad/s], body axes.
+        b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular
+            velocity (3,) [rad/s], body axes.
         """
         Om_1, nu_1 = self.Q.T @ Om, self.Q.T @ (nu + cross(Om, self.o[0]))
         p = self.M @ (nu_1 + self.E @ Om_1)
@@ -92,10 +91,8 @@ class Reduced:
     def momenta_about(self, i: int, b: Array, R: Array, p: Array, pi: Array) -> CoupledState:
         """And back: the state told at o_i.
 
-        Args:
-            i: Number of the origin, 1 to 3.
-            b, R: Position (3,) [m] of the user's origin; attitude (3, 3) of the user's axes.
-            p, pi: Momentum (3,) [N s], the user's axes; angular momentum (3,) [N m s] about the user's origin.
+        b, R: Position (3,) [m] of the user's origin; attitude (3, 3) of the user's axes.
+        p, pi: Momentum (3,) [N s], the user's axes; angular momentum (3,) [N m s] about the user's origin.
         """
         o = self.o[i - 1]
         return CoupledState(b + R @ o, R @ self.Q, self.Q.T @ p, self.Q.T @ (pi - cross(o, p)))
@@ -208,11 +205,7 @@ def slide(x: CoupledState, n: Array) -> CoupledState:
 def shears(V: Array, j: int, k: int, t: float) -> Array:
     """The rows of V (n, 3) turned by F = cay(t e_i), V F: x += t z, z -= s x, x += t z on columns j, k (cyclic).
 
-    Args:
-        V: Rows (n, 3) to turn.
-        j: Column of x.
-        k: Column of z.
-        t: Tangent of half the angle.
+    V: Rows (n, 3) to turn.
     """
     V, s = V.copy(), 2.0 * t / (1.0 + t * t)
     V[:, j] += t * V[:, k]
@@ -224,8 +217,7 @@ def shears(V: Array, j: int, k: int, t: float) -> Array:
 def T(x: CoupledState, body: Reduced, h: float) -> CoupledState:
     """The exact flow of p.A p / 2: n = h A p, b += R n, pi += p x n. The same at every origin.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
+    x, body, h: State at the start; inertia and laws; step [s].
     """
     return slide(x, h * body.A @ x.p)
 
@@ -236,10 +228,7 @@ def R_i(x: CoupledState, body: ReducedX, i: int, h: float) -> CoupledState:
     y^3/3 makes t1 = tan(y) to order 4. Symplectic, since the angle 2 atan(t1) + 2 atan(t2) and the slide are the
     derivatives of one function of (p_i, pi_i). Infinite where t1 t2 = 1: a turn by pi in one step.
 
-    Args:
-        x, body: State at the start; inertia and laws.
-        i: Number of the axis and its origin, 1 to 3.
-        h: Step [s].
+    h: Step [s].
     """
     i, j, k = i - 1, i % 3, (i + 1) % 3
     g, pitch = 0.5 * h / body.Js[i], body.E[i, i]
@@ -252,22 +241,15 @@ def R_i(x: CoupledState, body: ReducedX, i: int, h: float) -> CoupledState:
 
 
 def hop(x: CoupledState, body: ReducedX, i: int, j: int) -> CoupledState:
-    """The same state told at o_j instead of o_i (1, 2, 3): b += R d, pi -= d x p, d = a_j - a_i.
-
-    Args:
-        x, body: State at the start; inertia and laws.
-        i, j: Number of the origin before, 1 to 3; number of the origin after, 1 to 3.
-    """
+    """The same state told at o_j instead of o_i (1, 2, 3): b += R d, pi -= d x p, d = a_j - a_i."""
     return slide(x, body.a[j - 1] - body.a[i - 1])
 
 
 def K(x: CoupledState, body: Reduced, h: float, wrench: Wrench, i: int = 1) -> CoupledState:
     """The potential's kick, standing at o_i: p += h f', pi += h m' with f' = Q^T f, m' = Q^T (m - o_i x f).
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        wrench: Function (b, R) -> force [N], torque [N m] in the user's frame.
-        i: Number of the origin at which x stands; default 1.
+    x, body, h: State at the start; inertia and laws; step [s].
+    wrench: Function (b, R) -> force [N], torque [N m] in the user's frame.
     """
     R = x.R @ body.Q.T
     f, m = wrench(x.b - R @ body.o[i - 1], R)
@@ -277,11 +259,10 @@ def K(x: CoupledState, body: Reduced, h: float, wrench: Wrench, i: int = 1) -> C
 def w_matrix(D: Array, c: Array, al: Array, sg: Array) -> Array:
     """diag(D - s) - k^ with k = al - 2 sg, s = al.c.
 
-    Args:
-        D: Twice the moments Js (3,).
-        c: The parameter (3,).
-        al: The right-hand side (3,).
-        sg: S's modified inertia times P (3,).
+    D: Twice the moments Js (3,).
+    c: The parameter (3,).
+    al: The right-hand side (3,).
+    sg: S's modified inertia times P (3,).
     """
     return np.diag(D - al @ c) - hat(al - 2.0 * sg)
 
@@ -294,9 +275,8 @@ def w_turning(c: Array, S: Array) -> float:
 def w_guess(a: Array, P: Array, Js: Array, S: Array, sg: Array) -> Array:
     """The initial guess of section 2 (a): r of c = a / D, then the root s0 of the quartic's linear part.
 
-    Args:
-        a, P, Js, S, sg: h pi - S P (3,); h p (3,); moments (3,) [kg m2]; the gauge S (3, 3) [m]; S's modified inertia
-            times P (3,).
+    a, P, Js, S, sg: h pi - S P (3,); h p (3,); moments (3,) [kg m2]; the gauge S (3, 3) [m]; S's modified inertia times P
+        (3,).
     """
     D = 2.0 * Js
     D_jk, D_sum = np.array([D[1] * D[2], D[2] * D[0], D[0] * D[1]]), D.sum() - D
@@ -311,9 +291,8 @@ def w_guess(a: Array, P: Array, Js: Array, S: Array, sg: Array) -> Array:
 def w_parameter(a: Array, P: Array, Js: Array, S: Array, newtons: int | None) -> Array:
     """c with [diag(D - s) - k^] c = al: F = cay(c) of W. a = h pi - S P, P = h p. Raises NoSolution (a ValueError).
 
-    Args:
-        a, P, Js, S: h pi - S P (3,); h p (3,); moments (3,) [kg m2]; the gauge S (3, 3) [m].
-        newtons: Number of Newton steps; None: until round-off.
+    a, P, Js, S: h pi - S P (3,); h p (3,); moments (3,) [kg m2]; the gauge S (3, 3) [m].
+    newtons: Number of Newton steps; None: until round-off.
     """
     D, sg = 2.0 * Js, modified_inertia(S) @ P
 
@@ -338,11 +317,7 @@ def w_parameter(a: Array, P: Array, Js: Array, S: Array, newtons: int | None) ->
 def settled(value: Callable[[Array], Array], newton: Callable[[Array], Array], c: Array, scale: float) -> Array:
     """Newton steps until |value| is below SETTLED scale or stagnates; raises NoSolution if it stays above RESIDUAL.
 
-    Args:
-        value: Function whose root is sought.
-        newton: One Newton step.
-        c: Guess of the root (3,).
-        scale: Size of the equation's right-hand side.
+    c: Guess of the root (3,).
     """
     rho = norm(value(c))
     for _ in range(MOST_ITERATIONS):
@@ -364,9 +339,8 @@ def W(x: CoupledState, body: ReducedW, h: float, newtons: int | None = None) -> 
     Y = -vee(F Sd - Sd F^T); b += R Y, pi -= Y x p; R <- R F, p <- F^T p, pi <- F^T pi. newtons: so many Newton steps
     from the guess, or None for round-off. Raises NoSolution (a ValueError).
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        newtons: Number of Newton steps; default None, until round-off.
+    x, body, h: State at the start; inertia and laws; step [s].
+    newtons: Number of Newton steps; default None, until round-off.
     """
     P = h * x.p
     F, Sd = cay(w_parameter(h * x.pi - body.S @ P, P, body.Js, body.S, newtons)), modified_inertia(body.S)
@@ -377,9 +351,7 @@ def W(x: CoupledState, body: ReducedW, h: float, newtons: int | None = None) -> 
 def drag(x: CoupledState, body: Reduced, h: float, z: Direction) -> CoupledState:
     """The exact flow of one direction: w+ = w e^-y / (1 + h L q |w| (1 - e^-y)/y), y = h L l, L = z.I^-1 z.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        z: Direction of drag with its coefficients.
+    x, body, h: State at the start; inertia and laws; step [s].
     """
     v, w = z.twist[:3], z.twist[3:]
     v, w = body.Q.T @ v, body.Q.T @ (w - cross(body.o[0], v))
@@ -396,9 +368,7 @@ def drag(x: CoupledState, body: Reduced, h: float, z: Direction) -> CoupledState
 def E(x: CoupledState, body: Reduced, h: float, directions: Sequence[Direction]) -> CoupledState:
     """Drag along the directions, one after another, each exactly: the half before the step.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        directions: Directions of drag, each with its coefficients.
+    x, body, h: State at the start; inertia and laws; step [s].
     """
     for z in directions:
         x = drag(x, body, h, z)
@@ -408,9 +378,7 @@ def E(x: CoupledState, body: Reduced, h: float, directions: Sequence[Direction])
 def E_adjoint(x: CoupledState, body: Reduced, h: float, directions: Sequence[Direction]) -> CoupledState:
     """E with the directions in reversed order: the half after the step.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        directions: Directions of drag, each with its coefficients.
+    x, body, h: State at the start; inertia and laws; step [s].
     """
     return E(x, body, h, directions[::-1])
 
@@ -448,12 +416,11 @@ def step(
 
     kick: what happens instead of K by the wrench, told in the user's frame.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        program: (letter, coefficient) of each sub-map.
-        wrench: Function (b, R) -> force [N], torque [N m] in the user's frame.
-        newtons: Number of Newton steps; default None, until round-off.
-        kick: What happens in place of K, in the user's frame; default None.
+    x, body, h: State at the start; inertia and laws; step [s].
+    program: (letter, coefficient) of each sub-map.
+    wrench: Function (b, R) -> force [N], torque [N m] in the user's frame.
+    newtons: Number of Newton steps; default None, until round-off.
+    kick: What happens in place of K, in the user's frame; default None.
     """
     at = 1
     for letter, coefficient in program:
@@ -476,11 +443,10 @@ def energy(
 ) -> float:
     """(nu, Om).I6 (nu, Om)/2 + U(b, R) [J], user's origin and axes.
 
-    Args:
-        b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular
-            velocity (3,) [rad/s], body axes.
-        I6: Inertia (6, 6).
-        potential: U(b, R) [J]; default None, no potential.
+    b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular velocity
+        (3,) [rad/s], body axes.
+    I6: Inertia (6, 6).
+    potential: U(b, R) [J]; default None, no potential.
     """
     xi = np.concatenate([nu, Om])
     return float(0.5 * xi @ I6 @ xi) + (potential(b, R) if potential else 0.0)

@@ -65,10 +65,8 @@ def pack(x: State) -> Array:
 def unpack(y: Array, x: State, t: float) -> State:
     """The state with y (15,) at t [s], the rest as in x.
 
-    Args:
-        y: Vector (15,), see `pack`.
-        x: State with the other fields.
-        t: Time [s].
+    y: Vector (15,), see `pack`.
+    t: Time [s].
     """
     first, last = y[3:6], y[6:9]
     return replace(x, b=y[:3], R=np.array([first, cross(last, first), last]), p=y[9:12], pi=y[12:], t=t)
@@ -77,9 +75,8 @@ def unpack(y: Array, x: State, t: float) -> State:
 def wrench(x: State, body: Body, h: float, nu: Array, Om: Array) -> tuple[Array, Array, Array]:
     """Force (3,) [N], torque (3,) [N m] of all laws, body axes, and the water's velocity (3,) [m/s], inertial.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        nu, Om: Velocity (3,) [m/s], body axes; angular velocity (3,) [rad/s], body axes.
+    x, body, h: State at the start; inertia and laws; step [s].
+    nu, Om: Velocity (3,) [m/s], body axes; angular velocity (3,) [rad/s], body axes.
     """
     views = look(x, body, h)
     flow = water(views, body)
@@ -100,9 +97,8 @@ def derivatives(x: State, body: Body, h: float, origin: Array = USER) -> tuple[A
     b' = R nu + u, R' = R hat(Om), p' = p x Om + f, pi' = pi x Om + p x nu + m; h [s] is the step, which some laws look at.
     origin (3,) [m]: where x has its b and pi, from the user's origin.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        origin: Point (3,) [m] of the body, from the user's origin; default that origin.
+    x, body, h: State at the start; inertia and laws; step [s].
+    origin: Point (3,) [m] of the body, from the user's origin; default that origin.
     """
     x = at(x, -origin)
     nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
@@ -115,9 +111,8 @@ def derivatives(x: State, body: Body, h: float, origin: Array = USER) -> tuple[A
 def rates(x: State, body: Body, h: float, origin: Array = USER) -> Array:
     """Rate of the vector of `pack`, dy/dt (15,).
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        origin: Point (3,) [m] of the body, from the user's origin; default that origin.
+    x, body, h: State at the start; inertia and laws; step [s].
+    origin: Point (3,) [m] of the body, from the user's origin; default that origin.
     """
     b, R, p, pi = derivatives(x, body, h, origin)
     return np.concatenate([b, R[0], R[2], p, pi])
@@ -128,9 +123,7 @@ def remembered_half(x: State, body: Body, h: float, second: bool) -> State:
 
     That of laws whose memory is known at every stage stays as it is: see `followed`.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        second: Whether it is the second half of the step.
+    x, body, h: State at the start; inertia and laws; step [s].
     """
     if not any(memory.size for memory in x.memory):
         return x
@@ -149,8 +142,7 @@ def followed(x: State, body: Body, h: float) -> State:
 
     Raises ValueError for h < 0, which a stage of cg3 asks for: what a law remembers does not say how it came about.
 
-    Args:
-        x, body, h: State with the memory of h before; inertia and laws; length of that time [s].
+    x, body, h: State with the memory of h before; inertia and laws; length of that time [s].
     """
     if h == 0.0 or not any(memory.size for memory in x.memory):
         return x
@@ -163,10 +155,8 @@ def followed(x: State, body: Body, h: float) -> State:
 def stages(x: State, body: Body, h: float, tableau: Tableau, origin: Array = USER) -> Array:
     """k_i = f(t + c_i h, y + h sum_j a_ij k_j), (stages, 15).
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        tableau: Coefficients of the Runge-Kutta method.
-        origin: Point (3,) [m] of the body, from the user's origin; default that origin.
+    x, body, h: State at the start; inertia and laws; step [s].
+    origin: Point (3,) [m] of the body, from the user's origin; default that origin.
     """
     y, K = pack(x), np.zeros((len(tableau.b), 15))
     for i, (row, c) in enumerate(zip(tableau.a, tableau.c, strict=True)):
@@ -188,10 +178,8 @@ def stepper(tableau: Tableau, origin: Array = USER) -> Step:
 def advance(step: Step, x: State, body: Body, h: float, steps: int) -> State:
     """The state after so many steps of h [s].
 
-    Args:
-        step: Function (x, body, h) that makes one step.
-        x, body, h: State at the start; inertia and laws; step [s].
-        steps: Number of steps.
+    step: Function (x, body, h) that makes one step.
+    x, body, h: State at the start; inertia and laws; step [s].
     """
     for _ in range(steps):
         x = step(replace(x, t=x.step * h), body, h)
@@ -204,11 +192,8 @@ def advance_steady(tableau: Tableau, x: State, body: Body, h: float, steps: int,
 
     y = (b, two rows of R, pi), (12,), of which p = R^T (R p) at every stage.
 
-    Args:
-        tableau: Coefficients of the Runge-Kutta method.
-        x, body, h: State at the start; inertia and laws; step [s].
-        steps: Number of steps.
-        origin: Point (3,) [m] of the body, from the user's origin; default that origin.
+    x, body, h: State at the start; inertia and laws; step [s].
+    origin: Point (3,) [m] of the body, from the user's origin; default that origin.
     """
     x = at(x, origin)
     nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, at(x, -origin).pi])), 2)
@@ -234,11 +219,8 @@ def advance_steady(tableau: Tableau, x: State, body: Body, h: float, steps: int,
 def error_norm(tableau: Tableau, K: Array, h: float, scale: Array) -> float:
     """The error of a step over the tolerance, HNW (4.11); with two estimates, HNW II.10: e5^2 / sqrt(e5^2 + e3^2 / 100).
 
-    Args:
-        tableau: Coefficients of the Runge-Kutta method.
-        K: Rates (stages, 15), with the rate at the end where the tableau asks for it.
-        h: Step [s].
-        scale: Tolerance of each entry of y.
+    K: Rates (stages, 15), with the rate at the end where the tableau asks for it.
+    h: Step [s].
     """
     norms = [float(np.mean((h * np.array(e) @ K / scale) ** 2)) for e in tableau.errors]
     if len(norms) == 1:
@@ -248,13 +230,7 @@ def error_norm(tableau: Tableau, K: Array, h: float, scale: Array) -> float:
 
 
 def next_factor(tableau: Tableau, error: float, before: float) -> float:
-    """PI control, h <- h factor; error and before: those of this step and of the last accepted.
-
-    Args:
-        tableau: Coefficients of the Runge-Kutta method.
-        error: Error of this step over the tolerance.
-        before: Error of the last accepted step over the tolerance.
-    """
+    """PI control, h <- h factor; error and before: those of this step and of the last accepted."""
     exponent = 1.0 / tableau.estimate - 0.75 * BETA
     factor = SAFETY * max(error, 1e-10) ** -exponent * max(before, 1e-4) ** BETA
     return min(GROW, max(SHRINK, factor))
@@ -263,10 +239,8 @@ def next_factor(tableau: Tableau, error: float, before: float) -> float:
 def attempt(x: State, body: Body, h: float, tableau: Tableau, rtol: float, atol: float | Array) -> tuple[State, float]:
     """The state h [s] later and its error over the tolerance atol + rtol max(|y_k|, |y_k+1|).
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        tableau: Coefficients of the Runge-Kutta method.
-        rtol, atol: Relative tolerance; absolute tolerance, one number or (15,).
+    x, body, h: State at the start; inertia and laws; step [s].
+    rtol, atol: Relative tolerance; absolute tolerance, one number or (15,).
     """
     x = remembered_half(x, body, h, second=False)
     K, y = stages(x, body, h, tableau), pack(x)
@@ -281,10 +255,7 @@ def attempt(x: State, body: Body, h: float, tableau: Tableau, rtol: float, atol:
 def first_step(x: State, body: Body, tableau: Tableau, rtol: float, atol: float | Array) -> float:
     """HNW II.4, a starting step: an explicit Euler step of h0 = 0.01 |y| / |f| estimates the second derivative.
 
-    Args:
-        x, body: State at the start; inertia and laws.
-        tableau: Coefficients of the Runge-Kutta method.
-        rtol, atol: Relative tolerance; absolute tolerance, one number or (15,).
+    rtol, atol: Relative tolerance; absolute tolerance, one number or (15,).
     """
     y, f = pack(x), rates(x, body, 1.0)
     scale = atol + rtol * np.abs(y)
@@ -308,12 +279,9 @@ def adaptive(
 
     Every state's `step` counts the accepted steps. Raises ValueError where the step becomes too small.
 
-    Args:
-        x, body: State at the start; inertia and laws.
-        times: Times [s], rising.
-        rtol, atol: Relative tolerance; absolute tolerance, one number or (15,).
-        tableau: Coefficients of the Runge-Kutta method.
-        h: First step [s]; default None, chosen by `first_step`.
+    times: Times [s], rising.
+    rtol, atol: Relative tolerance; absolute tolerance, one number or (15,).
+    h: First step [s]; default None, chosen by `first_step`.
     """
     h = first_step(x, body, tableau, rtol, atol) if h is None else h
     states, before = [], 1e-4

@@ -25,8 +25,7 @@ class Implicit(Tableau, Protocol):
 def slope(x: State, body: Body, h: float) -> Array:
     """D(s nu) (6, 6), near the derivative of D(nu) nu: s = 1 + q^2 / (1 + q^2), q = h tr I6^-1 D.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
+    x, body, h: State at the start; inertia and laws; step [s].
     """
     nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
     flow = water(look(x, body, h), body)
@@ -40,10 +39,8 @@ def stages(x: State, body: Body, h: float, tableau: Implicit, origin: Array = US
 
     With s_i = sum_j<i g_ij / g k_j, the equation of k_i is (1 - h g A) (k_i + s_i) = f + s_i.
 
-    Args:
-        x, body, h: State at the start, with b and pi at `origin`; inertia and laws; step [s].
-        tableau: Coefficients of the method.
-        origin: Point (3,) [m] of the body, from the user's origin; default that origin.
+    x, body, h: State at the start, with b and pi at `origin`; inertia and laws; step [s].
+    origin: Point (3,) [m] of the body, from the user's origin; default that origin.
     """
     y, K = pack(x), np.zeros((len(tableau.b), 15))
     g = tableau.implicit[0][0]

@@ -15,10 +15,8 @@ def direction(y: np.ndarray, goal: float) -> float:
 def overshoot(t: np.ndarray, y: np.ndarray, goal: float) -> float:
     """How far y goes beyond the goal.
 
-    Args:
-        t: times of the looks under way (k,) [s].
-        y: actual numbers at these looks (k,).
-        goal: the wanted number.
+    t: times of the looks under way (k,) [s].
+    y: actual numbers at these looks (k,).
     """
     return max(0.0, float(np.max(direction(y, goal) * (y - goal))))
 
@@ -26,10 +24,8 @@ def overshoot(t: np.ndarray, y: np.ndarray, goal: float) -> float:
 def undershoot(t: np.ndarray, y: np.ndarray, goal: float) -> float:
     """How far y goes the wrong way.
 
-    Args:
-        t: times of the looks under way (k,) [s].
-        y: actual numbers at these looks (k,).
-        goal: the wanted number.
+    t: times of the looks under way (k,) [s].
+    y: actual numbers at these looks (k,).
     """
     return max(0.0, float(np.max(direction(y, goal) * (y[0] - y))))
 
@@ -37,10 +33,8 @@ def undershoot(t: np.ndarray, y: np.ndarray, goal: float) -> float:
 def peak(t: np.ndarray, y: np.ndarray, goal: float) -> float:
     """y where it is farthest in the direction of the step.
 
-    Args:
-        t: times of the looks under way (k,) [s].
-        y: actual numbers at these looks (k,).
-        goal: the wanted number.
+    t: times of the looks under way (k,) [s].
+    y: actual numbers at these looks (k,).
     """
     return float(y[np.argmax(direction(y, goal) * y)])
 
@@ -48,10 +42,8 @@ def peak(t: np.ndarray, y: np.ndarray, goal: float) -> float:
 def peak_time(t: np.ndarray, y: np.ndarray, goal: float) -> float:
     """The time at which y is farthest in the direction of the step [s].
 
-    Args:
-        t: times of the looks under way (k,) [s].
-        y: actual numbers at these looks (k,).
-        goal: the wanted number.
+    t: times of the looks under way (k,) [s].
+    y: actual numbers at these looks (k,).
     """
     return float(t[np.argmax(direction(y, goal) * y)])
 
@@ -59,10 +51,8 @@ def peak_time(t: np.ndarray, y: np.ndarray, goal: float) -> float:
 def rise_time(t: np.ndarray, y: np.ndarray, goal: float) -> float:
     """From the first look with 10 % of the step done to the first one with 90 %.
 
-    Args:
-        t: times of the looks under way (k,) [s].
-        y: actual numbers at these looks (k,).
-        goal: the wanted number.
+    t: times of the looks under way (k,) [s].
+    y: actual numbers at these looks (k,).
     """
     if goal == y[0]:
         return 0.0
@@ -75,11 +65,8 @@ def rise_time(t: np.ndarray, y: np.ndarray, goal: float) -> float:
 def settling_time(t: np.ndarray, y: np.ndarray, goal: float, within: float) -> float:
     """The first look from which on y is within the band.
 
-    Args:
-        t: times of the looks under way (k,) [s].
-        y: actual numbers at these looks (k,).
-        goal: the wanted number.
-        within: half the width of the band, in the unit of y.
+    t: times of the looks under way (k,) [s].
+    y: actual numbers at these looks (k,).
     """
     outside = np.flatnonzero(np.abs(y - goal) > within)
     if not len(outside):
@@ -90,11 +77,9 @@ def settling_time(t: np.ndarray, y: np.ndarray, goal: float, within: float) -> f
 def steady_state_error(t: np.ndarray, e: np.ndarray, end: float, share: float = 0.1) -> float:
     """The mean error over the last part of the run.
 
-    Args:
-        t: times of the looks under way (k,) [s].
-        e: errors at these looks (k,), wanted less actual.
-        end: the end of the run [s].
-        share: the part of the run at its end that counts, 0.1 by default.
+    t: times of the looks under way (k,) [s].
+    e: errors at these looks (k,), wanted less actual.
+    end: the end of the run [s].
     """
     if t[-1] < end:
         return np.nan
@@ -139,10 +124,9 @@ def travel(t: np.ndarray, actuator: np.ndarray) -> float:
 def saturation_share(t: np.ndarray, command: np.ndarray, limit: np.ndarray) -> float:
     """The share of time with a command at its limit or beyond.
 
-    Args:
-        t: times of the looks under way (k,) [s].
-        command: commands at these looks (k, channels).
-        limit: the limit of each channel (channels,).
+    t: times of the looks under way (k,) [s].
+    command: commands at these looks (k, channels).
+    limit: the limit of each channel (channels,).
     """
     held = np.any(np.abs(command[:-1]) >= limit * (1.0 - 1e-6), axis=1)
     return float(np.sum(held * np.diff(t)) / (t[-1] - t[0]))
@@ -151,11 +135,10 @@ def saturation_share(t: np.ndarray, command: np.ndarray, limit: np.ndarray) -> f
 def energy(t: np.ndarray, wrench: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray) -> float:
     """The integral of |power| of a delivered wrench [J].
 
-    Args:
-        t: times of the looks under way (k,) [s].
-        wrench: delivered forces and torques at these looks (k, 6) [N, N m], body axes.
-        velocity: velocities (k, 3) [m/s], body axes.
-        angular_velocity: (k, 3) [rad/s], body axes.
+    t: times of the looks under way (k,) [s].
+    wrench: delivered forces and torques at these looks (k, 6) [N, N m], body axes.
+    velocity: velocities (k, 3) [m/s], body axes.
+    angular_velocity: (k, 3) [rad/s], body axes.
     """
     power = np.sum(wrench[:, :3] * velocity, axis=1) + np.sum(wrench[:, 3:] * angular_velocity, axis=1)
     return float(np.trapezoid(np.abs(power), t))

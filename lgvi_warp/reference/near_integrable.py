@@ -62,11 +62,9 @@ def modified_inertia(pi: Array, J: Array, h: float, order: int = 10) -> Array:
     Hairer & Vilmart (2006), J. Phys. A 39, 13225, whose coefficients are symmetric functions of the moments J. Since J~
     depends on pi, the rotation is symplectic to that order only, where D of equation (24) is so exactly. Raises NoSolution.
 
-    Args:
-        pi: Angular momentum (3,) [N m s], body axes.
-        J: Inertia (3, 3) [kg m2].
-        h: Step [s].
-        order: Order of the rotation, 2 to 10; default 10.
+    pi: Angular momentum (3,) [N m s], body axes.
+    J: Inertia (3, 3) [kg m2].
+    h: Step [s].
     """
     moments, axes = np.linalg.eigh(J)
     N, H = 0.5 * h * h * pi @ pi, 0.5 * h * h * pi @ np.linalg.solve(J, pi)
@@ -136,10 +134,7 @@ def coefficients(moments: Array) -> list[tuple[list[float], list[float]]]:
 def D(x: State, body: Body, h: float, order: int = 10, solve: Solver = quartic) -> State:
     """The free rotation to that order: equation (24) with J~ instead of J, then R <- R F, p <- F^T p, pi <- F^T pi.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        order: Order of the rotation, 2 to 10; default 10.
-        solve: Solver of equation (24).
+    x, body, h: State at the start; inertia and laws; step [s].
     """
     F = solve(h * x.pi, modified_inertia(x.pi, body.J, h, order))
     return replace(x, R=x.R @ F, p=F.T @ x.p, pi=F.T @ x.pi)
@@ -148,10 +143,7 @@ def D(x: State, body: Body, h: float, order: int = 10, solve: Solver = quartic) 
 def A(x: State, body: Body, h: float, order: int = 10, solve: Solver = quartic) -> State:
     """The flow of pi.J^-1 pi / 2 + U_b(b): the free rotation and p <- p + h f, in either order.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        order: Order of the rotation, 2 to 10; default 10.
-        solve: Solver of equation (24).
+    x, body, h: State at the start; inertia and laws; step [s].
     """
     x = D(x, body, h, order, solve)
     force, _ = body.wrench(x.b, x.R, potential=True)
@@ -161,8 +153,7 @@ def A(x: State, body: Body, h: float, order: int = 10, solve: Solver = quartic) 
 def B(x: State, body: Body, h: float) -> State:
     """The flow of p.M^-1 p / 2 + U_R(R): T and pi <- pi + h m, in either order.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
+    x, body, h: State at the start; inertia and laws; step [s].
     """
     _, torque = body.wrench(x.b, x.R, potential=True)
     return kicked(T(x, body, h), h, (np.zeros(3), torque))
@@ -171,11 +162,7 @@ def B(x: State, body: Body, h: float) -> State:
 def step(x: State, body: Body, program: Program, h: float, order: int = 10, solve: Solver = quartic) -> State:
     """One step of h [s].
 
-    Args:
-        x, body: State at the start; inertia and laws.
-        program, h: (letter, coefficient) of each sub-map; step [s].
-        order: Order of the rotation, 2 to 10; default 10.
-        solve: Solver of equation (24).
+    program, h: (letter, coefficient) of each sub-map; step [s].
     """
     for part, coefficient in program:
         x = A(x, body, coefficient * h, order, solve) if part == "A" else B(x, body, coefficient * h)

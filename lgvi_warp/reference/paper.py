@@ -21,9 +21,8 @@ Motion = tuple[Array, Array, Array, Array]
 def equation_10(Om_k: Array, body: Body, h: float, solve: Solver = newton) -> Array:
     """Eq. (10): F_k with h hat(J Om_k) = F_k Jd - Jd F_k^T.
 
-    Args:
-        Om_k: Angular velocity (3,) [rad/s] at k.
-        body, h, solve: Inertia and laws; step [s]; solver of equation (24).
+    Om_k: Angular velocity (3,) [rad/s] at k.
+    body, h, solve: Inertia and laws; step [s]; solver of equation (24).
     """
     return solve(h * body.J @ Om_k, body.J)
 
@@ -36,9 +35,7 @@ def equation_11(R_k: Array, F_k: Array) -> Array:
 def equation_12(b_k: Array, R_k: Array, nu_k: Array, h: float) -> Array:
     """Eq. (12): b_{k+1} = h R_k nu_k + b_k, with the old R and the old nu.
 
-    Args:
-        b_k, R_k, nu_k: The state at k.
-        h: Step [s].
+    h: Step [s].
     """
     return b_k + h * R_k @ nu_k
 
@@ -46,11 +43,9 @@ def equation_12(b_k: Array, R_k: Array, nu_k: Array, h: float) -> Array:
 def equation_13(nu_k: Array, F_k: Array, b_k1: Array, R_k1: Array, body: Body, h: float) -> Array:
     """Eq. (13): M nu_{k+1} = F_k^T M nu_k + h U_{k+1}. Returns nu_{k+1}.
 
-    Args:
-        nu_k: Velocity (3,) [m/s] at k.
-        F_k: Rotation (3, 3) of equation (10).
-        b_k1, R_k1: The state at k + 1.
-        body, h: Inertia and laws; step [s].
+    nu_k: Velocity (3,) [m/s] at k.
+    F_k: Rotation (3, 3) of equation (10).
+    body, h: Inertia and laws; step [s].
     """
     force, _ = body.wrench(b_k1, R_k1)
     return np.linalg.solve(body.M, F_k.T @ body.M @ nu_k + h * force)
@@ -59,11 +54,9 @@ def equation_13(nu_k: Array, F_k: Array, b_k1: Array, R_k1: Array, body: Body, h
 def equation_14(Om_k: Array, F_k: Array, nu_k1: Array, b_k1: Array, R_k1: Array, body: Body, h: float) -> Array:
     """Eq. (14): J Om_{k+1} = F_k^T J Om_k + h M nu_{k+1} x nu_{k+1} + h M_{k+1}, with the new nu. Returns Om_{k+1}.
 
-    Args:
-        Om_k: Angular velocity (3,) [rad/s] at k.
-        F_k: Rotation (3, 3) of equation (10).
-        nu_k1, b_k1, R_k1: The state at k + 1.
-        body, h: Inertia and laws; step [s].
+    Om_k: Angular velocity (3,) [rad/s] at k.
+    F_k: Rotation (3, 3) of equation (10).
+    body, h: Inertia and laws; step [s].
     """
     _, torque = body.wrench(b_k1, R_k1)
     munk = cross(body.M @ nu_k1, nu_k1)
@@ -73,9 +66,7 @@ def equation_14(Om_k: Array, F_k: Array, nu_k1: Array, b_k1: Array, R_k1: Array,
 def phi(b_k: Array, R_k: Array, nu_k: Array, Om_k: Array, body: Body, h: float, solve: Solver = newton) -> Motion:
     """Phi_h, eq. (10)-(14), in the order they are printed. Returns b, R, nu, Om at k + 1.
 
-    Args:
-        b_k, R_k, nu_k, Om_k: The state at k.
-        body, h, solve: Inertia and laws; step [s]; solver of equation (24).
+    body, h, solve: Inertia and laws; step [s]; solver of equation (24).
     """
     F_k = equation_10(Om_k, body, h, solve)
     R_k1 = equation_11(R_k, F_k)
@@ -88,9 +79,7 @@ def phi(b_k: Array, R_k: Array, nu_k: Array, Om_k: Array, body: Body, h: float, 
 def kicked_momentum(b_k: Array, R_k: Array, nu_k: Array, Om_k: Array, body: Body, h: float) -> Array:
     """The bracket of eq. (19) and (21): J Om_k + h M nu_k x nu_k + h M_k, with the old nu.
 
-    Args:
-        b_k, R_k, nu_k, Om_k: The state at k.
-        body, h: Inertia and laws; step [s].
+    body, h: Inertia and laws; step [s].
     """
     _, torque = body.wrench(b_k, R_k)
     return body.J @ Om_k + h * cross(body.M @ nu_k, nu_k) + h * torque
@@ -99,9 +88,8 @@ def kicked_momentum(b_k: Array, R_k: Array, nu_k: Array, Om_k: Array, body: Body
 def equation_19(q: Array, body: Body, h: float, solve: Solver = newton) -> Array:
     """Eq. (19): F_{k+1} with F_{k+1}^T Jd - Jd F_{k+1} = h hat(q), q the kicked momentum.
 
-    Args:
-        q: The kicked momentum (3,).
-        body, h, solve: Inertia and laws; step [s]; solver of equation (24).
+    q: The kicked momentum (3,).
+    body, h, solve: Inertia and laws; step [s]; solver of equation (24).
     """
     return solve(h * q, body.J).T
 
@@ -109,11 +97,9 @@ def equation_19(q: Array, body: Body, h: float, solve: Solver = newton) -> Array
 def equation_20(nu_k: Array, F_k1: Array, b_k: Array, R_k: Array, body: Body, h: float) -> Array:
     """Eq. (20): M nu_{k+1} = F_{k+1} (M nu_k + h U_k). Returns nu_{k+1}.
 
-    Args:
-        nu_k: Velocity (3,) [m/s] at k.
-        F_k1: Rotation (3, 3) of equation (19).
-        b_k, R_k: The state at k.
-        body, h: Inertia and laws; step [s].
+    nu_k: Velocity (3,) [m/s] at k.
+    F_k1: Rotation (3, 3) of equation (19).
+    body, h: Inertia and laws; step [s].
     """
     force, _ = body.wrench(b_k, R_k)
     return np.linalg.solve(body.M, F_k1 @ (body.M @ nu_k + h * force))
@@ -122,10 +108,8 @@ def equation_20(nu_k: Array, F_k1: Array, b_k: Array, R_k: Array, body: Body, h:
 def equation_21(q: Array, F_k1: Array, body: Body) -> Array:
     """Eq. (21): J Om_{k+1} = F_{k+1} q. Returns Om_{k+1}.
 
-    Args:
-        q: The kicked momentum (3,).
-        F_k1: Rotation (3, 3) of equation (19).
-        body: Inertia and laws.
+    q: The kicked momentum (3,).
+    F_k1: Rotation (3, 3) of equation (19).
     """
     return np.linalg.solve(body.J, F_k1 @ q)
 
@@ -138,10 +122,8 @@ def equation_22(R_k: Array, F_k1: Array) -> Array:
 def equation_23(b_k: Array, R_k1: Array, nu_k1: Array, h: float) -> Array:
     """Eq. (23): b_{k+1} = h R_{k+1} nu_{k+1} + b_k, with the new R and the new nu.
 
-    Args:
-        b_k: Position (3,) [m] at k.
-        R_k1, nu_k1: The state at k + 1.
-        h: Step [s].
+    b_k: Position (3,) [m] at k.
+    h: Step [s].
     """
     return b_k + h * R_k1 @ nu_k1
 
@@ -151,9 +133,7 @@ def phi_adjoint(
 ) -> Motion:
     """Phi*_h, eq. (19)-(23), in the order they are printed. Returns b, R, nu, Om at k + 1.
 
-    Args:
-        b_k, R_k, nu_k, Om_k: The state at k.
-        body, h, solve: Inertia and laws; step [s]; solver of equation (24).
+    body, h, solve: Inertia and laws; step [s]; solver of equation (24).
     """
     q = kicked_momentum(b_k, R_k, nu_k, Om_k, body, h)
     F_k1 = equation_19(q, body, h, solve)
@@ -167,9 +147,7 @@ def phi_adjoint(
 def psi(b_k: Array, R_k: Array, nu_k: Array, Om_k: Array, body: Body, h: float, solve: Solver = newton) -> Motion:
     """Psi_h = Phi*_{h/2} o Phi_{h/2}, section III-F: Phi first, each over half the step.
 
-    Args:
-        b_k, R_k, nu_k, Om_k: The state at k.
-        body, h, solve: Inertia and laws; step [s]; solver of equation (24).
+    body, h, solve: Inertia and laws; step [s]; solver of equation (24).
     """
     return phi_adjoint(*phi(b_k, R_k, nu_k, Om_k, body, 0.5 * h, solve), body, 0.5 * h, solve)
 
@@ -181,9 +159,8 @@ Wrench = tuple[Array, Array]
 def forces(x: State, body: Body, h: float, nu: Array, Om: Array) -> Wrench:
     """phi(b, nu, R, Om) and tau(b, nu, R, Om): all laws that do not follow from a potential.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        nu, Om: Velocity (3,) [m/s], body axes; angular velocity (3,) [rad/s], body axes.
+    x, body, h: State at the start; inertia and laws; step [s].
+    nu, Om: Velocity (3,) [m/s], body axes; angular velocity (3,) [rad/s], body axes.
     """
     views = look(x, body, h)
     flow = water(views, body)
@@ -196,9 +173,7 @@ def forces(x: State, body: Body, h: float, nu: Array, Om: Array) -> Wrench:
 def equation_15(old: Wrench, new: Wrench, alpha: float) -> Array:
     """Eq. (15): phi_k = alpha phi(b_k, nu_k, R_k, Om_k) + (1 - alpha) phi(b_{k+1}, nu_k, R_{k+1}, Om_k).
 
-    Args:
-        old, new: Force [N] and torque [N m] at k; force [N] and torque [N m] at k + 1, with the velocities at k.
-        alpha: Weight of the old force, 0 to 1.
+    old, new: Force [N] and torque [N m] at k; force [N] and torque [N m] at k + 1, with the velocities at k.
     """
     return alpha * old[0] + (1.0 - alpha) * new[0]
 
@@ -206,9 +181,7 @@ def equation_15(old: Wrench, new: Wrench, alpha: float) -> Array:
 def equation_16(old: Wrench, new: Wrench, beta: float) -> Array:
     """Eq. (16): tau_k = beta tau(b_k, nu_k, R_k, Om_k) + (1 - beta) tau(b_{k+1}, nu_k, R_{k+1}, Om_k).
 
-    Args:
-        old, new: Force [N] and torque [N m] at k; force [N] and torque [N m] at k + 1, with the velocities at k.
-        beta: Weight of the old torque, 0 to 1.
+    old, new: Force [N] and torque [N m] at k; force [N] and torque [N m] at k + 1, with the velocities at k.
     """
     return beta * old[1] + (1.0 - beta) * new[1]
 
@@ -230,10 +203,7 @@ def drift(x: State, body: Body, h: float) -> Array:
 def Phi(x: State, body: Body, h: float, solve: Solver = newton, alpha: float = 0.5, beta: float = 0.5) -> State:
     """Phi_h with (15), (16): (10)-(14) in the order they appear. What laws remember is advanced first.
 
-    Args:
-        x, body, h, solve: State at the start; inertia and laws; step [s]; solver of equation (24).
-        alpha: Weight of the old force, 0 to 1.
-        beta: Weight of the old torque, 0 to 1.
+    x, body, h, solve: State at the start; inertia and laws; step [s]; solver of equation (24).
     """
     x = at_time(remembered_over(at_time(x, x.t + 0.5 * h), body, h), x.t)
     nu, Om = velocities(x, body)
@@ -252,10 +222,7 @@ def Phi_adjoint(x: State, body: Body, h: float, solve: Solver = newton, alpha: f
 
     Raises NoSolution where it does not settle.
 
-    Args:
-        x, body, h, solve: State at the start; inertia and laws; step [s]; solver of equation (24).
-        alpha: Weight of the old force, 0 to 1.
-        beta: Weight of the old torque, 0 to 1.
+    x, body, h, solve: State at the start; inertia and laws; step [s]; solver of equation (24).
     """
     nu, Om = velocities(x, body)
     f, m = body.wrench(x.b, x.R, look(x, body, h), potential=True)
@@ -287,8 +254,7 @@ def at_time(x: State, t: float) -> State:
 def remembered_over(x: State, body: Body, h: float) -> State:
     """What laws remember, over all of h; x.t is the middle of it.
 
-    Args:
-        x, body, h: State in the middle of the step; inertia and laws; step [s].
+    x, body, h: State in the middle of the step; inertia and laws; step [s].
     """
     return remembered(remembered(x, body, h, second=False), body, h, second=True)
 

@@ -41,12 +41,7 @@ def box_muller(words: NDArray[np.uint32]) -> NDArray[np.float64]:
 def normals(
     seed0: ArrayLike, seed1: ArrayLike, member: ArrayLike, step: ArrayLike, channel: ArrayLike
 ) -> NDArray[np.float64]:
-    """Four independent standard normals, shape (..., 4), of whole numbers of 32 bits that are broadcast together.
-
-    Args:
-        seed0, seed1, member, step, channel: Lower half of the run's seed; upper half; index of the member; number of the
-            step; number of the stream.
-    """
+    """Four independent standard normals, shape (..., 4), of whole numbers of 32 bits that are broadcast together."""
     numbers = [np.asarray(x, dtype=np.int64) & WORD for x in (member, step, channel, 0, seed0, seed1)]
     *counter, seed0, seed1 = np.broadcast_arrays(*numbers)
     words = philox4x32(np.stack(counter, axis=-1), np.stack([seed0, seed1], axis=-1))
@@ -56,10 +51,8 @@ def normals(
 def draws_of_step(law: Any, view: Any, stream: int = 0) -> NDArray[np.float64]:
     """Three standard normals of each draw of a step, shape (r, 3): step k has the draws k r to k r + r - 1.
 
-    Args:
-        law: Its key (seed0, seed1 and channel) and `noise_step` [s], the time between two draws, or None for the step.
-        view: Its member, step and h [s].
-        stream: 0, the default, or 1, two that are independent.
+    law: Its key (seed0, seed1 and channel) and `noise_step` [s], the time between two draws, or None for the step.
+    view: Its member, step and h [s].
     """
     count = 1 if law.noise_step is None else round(view.h / law.noise_step)
     draws = view.step * count + np.arange(count)

@@ -81,9 +81,8 @@ def modified_inertia(J: Array) -> Array:
 def residual(F: Array, a: Array, J: Array) -> float:
     """|F Jd - Jd F^T - hat(a)| / |a|, equation (24) as a number; not divided where a = 0.
 
-    Args:
-        F: Rotation (3, 3).
-        a, J: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2].
+    F: Rotation (3, 3).
+    a, J: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2].
     """
     Jd = modified_inertia(J)
     return norm(vee(F @ Jd - Jd @ F.T) - a) / (norm(a) or 1.0)
@@ -110,11 +109,8 @@ def iterate(value: Function, differential: Function, x: Array, a: Array, iterati
     A test against round-off alone would never end: near |J^-1 a| = 1 the residual stagnates above it. Raises NoSolution
     if it stays large; LinAlgError (a ValueError) if a fixed count meets a singular differential, beyond that bound.
 
-    Args:
-        value: Function whose root is sought.
-        differential: Its differential.
-        x: Guess of the root (3,).
-        a, iterations: Right-hand side (3,), whose size scales the residual; number of Newton steps; None: until round-off.
+    x: Guess of the root (3,).
+    a, iterations: Right-hand side (3,), whose size scales the residual; number of Newton steps; None: until round-off.
     """
     if iterations is not None:
         for _ in range(iterations):
@@ -140,9 +136,8 @@ def newton(a: Array, J: Array, iterations: int | None = None) -> Array:
 
     iterations: that many steps from J^-1 a, or None for round-off. Raises NoSolution.
 
-    Args:
-        a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2]; number of
-            Newton steps; default None, until round-off.
+    a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2]; number of Newton steps;
+        default None, until round-off.
     """
     if not np.any(a):
         return np.eye(3)
@@ -178,9 +173,8 @@ def newton_differential(f: Array, J: Array) -> Array:
 def cayley_value(c: Array, a: Array, J: Array) -> Array:
     """G(c) = a + a x c + c (a.c) - 2 J c, equation (24) for F = cay(c).
 
-    Args:
-        c: Parameter (3,) of the rotation.
-        a, J: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2].
+    c: Parameter (3,) of the rotation.
+    a, J: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2].
     """
     return a + cross(a, c) + c * (a @ c) - 2.0 * J @ c
 
@@ -190,9 +184,8 @@ def cayley(a: Array, J: Array, iterations: int | None = None) -> Array:
 
     iterations: that many steps from (2 J)^-1 a, or None for round-off. Raises NoSolution.
 
-    Args:
-        a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2]; number of
-            Newton steps; default None, until round-off.
+    a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2]; number of Newton steps;
+        default None, until round-off.
     """
     if not np.any(a):
         return np.eye(3)
@@ -221,9 +214,8 @@ def quartic_root(a: Array, J: Array, iterations: int | None) -> float:
 
     q is convex and falls up to that root, so every step from its near side stays there, until round-off.
 
-    Args:
-        a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); moments of inertia (3,) [kg m2]; number
-            of Newton steps; None: until they no longer climb.
+    a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); moments of inertia (3,) [kg m2]; number of
+        Newton steps; None: until they no longer climb.
     """
     q0, q1, q2, d1 = quartic_coefficients(a, J)
     s = q0 / q1
@@ -239,9 +231,7 @@ def quartic_root(a: Array, J: Array, iterations: int | None) -> float:
 def quartic_parameter(a: Array, J: Array, s: float) -> Array:
     """c = n / det for the diagonal J (3,) and the root s; for any s, G(c) = (a.c - s) c: the residual for free.
 
-    Args:
-        a, J: h pi (3,) [N m s2], the right-hand side of equation (24); moments of inertia (3,) [kg m2].
-        s: Root of the quartic.
+    a, J: h pi (3,) [N m s2], the right-hand side of equation (24); moments of inertia (3,) [kg m2].
     """
     b = 2.0 * J - s
     b1, b2, b3 = b.tolist()
@@ -255,9 +245,8 @@ def quartic(a: Array, J: Array, iterations: int | None = None) -> Array:
 
     iterations: Newton steps on the quartic, or None for round-off. F is a rotation whatever s is. Raises NoSolution.
 
-    Args:
-        a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2]; number of
-            Newton steps; default None, until round-off.
+    a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2]; number of Newton steps;
+        default None, until round-off.
     """
     s = quartic_root(a, J, iterations)
     c = quartic_parameter(a, J, s)
@@ -295,9 +284,7 @@ def moser_veselov(a: Array, J: Array, iterations: int | None = None) -> Array:
     printed text is Jd). Explicit: iterations means nothing here. Raises NoSolution where roots coincide (near a sphere,
     a = 0), where none has a positive real part, where Jd is singular, and where the answer is no rotation.
 
-    Args:
-        a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2]; has no meaning
-            here.
+    a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2]; has no meaning here.
     """
     Jd = np.diag(modified_inertia(np.diag(J)))
     lambdas = moser_veselov_roots(a, Jd**2)
@@ -317,9 +304,7 @@ def riccati(a: Array, J: Array, iterations: int | None = None) -> Array:
     eigenvalues with positive real part. Explicit: iterations means nothing here. Raises NoSolution where that subspace
     does not give an S or F is no rotation, and where Jd is singular (plates).
 
-    Args:
-        a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2]; has no meaning
-            here.
+    a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2]; has no meaning here.
     """
     A, Jd = 0.5 * hat(a), modified_inertia(J)
     if not np.linalg.cond(Jd) < 1.0 / SINGULAR:

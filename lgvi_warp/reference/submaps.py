@@ -61,10 +61,8 @@ class Body:
     ) -> tuple[Array, Array]:
         """Sum of the laws' wrenches; only those that follow from a potential, or only the others, if so asked.
 
-        Args:
-            b, R: Position (3,) [m]; attitude (3, 3), body to inertial axes.
-            views: What each law sees; by default a body at rest.
-            potential: True: only laws that follow from a potential; False: only the others; default None, all.
+        b, R: Position (3,) [m]; attitude (3, 3), body to inertial axes.
+        potential: True: only laws that follow from a potential; False: only the others; default None, all.
         """
         force, torque = np.zeros(3), np.zeros(3)
         views = views or tuple(View(R, b, np.zeros(3), np.zeros(3)) for _ in self.terms)
@@ -82,10 +80,8 @@ class Body:
 def start(body: Body, b: Array, R: Array, p: Array, pi: Array) -> State:
     """The state at t = 0, with what the laws remember.
 
-    Args:
-        body: Inertia and laws.
-        b, R: Position (3,) [m]; attitude (3, 3), body to inertial axes.
-        p, pi: Momentum (3,) [N s], body axes; angular momentum (3,) [N m s], body axes.
+    b, R: Position (3,) [m]; attitude (3, 3), body to inertial axes.
+    p, pi: Momentum (3,) [N s], body axes; angular momentum (3,) [N m s], body axes.
     """
     return State(b, R, p, pi, memory=tuple(term.start() for term in body.terms))
 
@@ -103,8 +99,7 @@ def velocity(body: Body, p: Array) -> Array:
 def look(x: State, body: Body, h: float) -> tuple[View, ...]:
     """What each law sees of the state: attitude, position, velocities, time and its memory.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
+    x, body, h: State at the start; inertia and laws; step [s].
     """
     nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
     memory = x.memory or (np.zeros(0),) * len(body.terms)
@@ -114,8 +109,7 @@ def look(x: State, body: Body, h: float) -> tuple[View, ...]:
 def Ab(x: State, body: Body, h: float, solve: Solver = newton) -> State:
     """Eq. (12) and (23), Nordkvist & Sanyal 2010: b <- b + h R nu.
 
-    Args:
-        x, body, h, solve: State at the start; inertia and laws; step [s]; not used: every sub-map takes the same arguments.
+    x, body, h, solve: State at the start; inertia and laws; step [s]; not used: every sub-map takes the same arguments.
     """
     return replace(x, b=x.b + h * x.R @ velocity(body, x.p), t=x.t + h)
 
@@ -123,8 +117,7 @@ def Ab(x: State, body: Body, h: float, solve: Solver = newton) -> State:
 def Ap(x: State, body: Body, h: float, solve: Solver = newton) -> State:
     """The Munk moment of eq. (14) and (19): pi <- pi + h p x nu.
 
-    Args:
-        x, body, h, solve: State at the start; inertia and laws; step [s]; not used: every sub-map takes the same arguments.
+    x, body, h, solve: State at the start; inertia and laws; step [s]; not used: every sub-map takes the same arguments.
     """
     return replace(x, pi=x.pi + h * cross(x.p, velocity(body, x.p)))
 
@@ -132,8 +125,7 @@ def Ap(x: State, body: Body, h: float, solve: Solver = newton) -> State:
 def T(x: State, body: Body, h: float, solve: Solver = newton) -> State:
     """Ab and Ap together: the exact flow of the kinetic energy p.M^-1 p / 2.
 
-    Args:
-        x, body, h, solve: State at the start; inertia and laws; step [s]; not used: every sub-map takes the same arguments.
+    x, body, h, solve: State at the start; inertia and laws; step [s]; not used: every sub-map takes the same arguments.
     """
     return Ap(Ab(x, body, h), body, h)
 
@@ -141,8 +133,7 @@ def T(x: State, body: Body, h: float, solve: Solver = newton) -> State:
 def D(x: State, body: Body, h: float, solve: Solver = newton) -> State:
     """Eq. (10), (11): F = S(h pi), R <- R F; of (13), (14): p <- F^T p, pi <- F^T pi. Adjoint: (19)-(22).
 
-    Args:
-        x, body, h, solve: State at the start; inertia and laws; step [s]; solver of equation (24).
+    x, body, h, solve: State at the start; inertia and laws; step [s]; solver of equation (24).
     """
     F = solve(h * x.pi, body.J)
     return replace(x, R=x.R @ F, p=F.T @ x.p, pi=F.T @ x.pi)
@@ -156,10 +147,7 @@ def water(views: tuple[View, ...], body: Body) -> Flow:
 def acceleration_wrench(R: Array, body: Body, flow: Flow) -> tuple[Array, Array]:
     """(rho V - m) R^T Du/Dt at the centres of buoyancy and gravity: the push of water that accelerates.
 
-    Args:
-        R: Attitude (3, 3), body to inertial axes.
-        body: Inertia and laws.
-        flow: The water's velocity, rate and gradient.
+    R: Attitude (3, 3), body to inertial axes.
     """
     a = R.T @ (flow.rate + flow.gradient @ flow.velocity)
     return body.excess * a, cross(body.excess_lever, a)
@@ -168,9 +156,7 @@ def acceleration_wrench(R: Array, body: Body, flow: Flow) -> tuple[Array, Array]
 def remembered(x: State, body: Body, h: float, second: bool) -> State:
     """What the laws remember, half a kick later.
 
-    Args:
-        x, body, h: State in the middle of the kick; inertia and laws; length of the kick [s].
-        second: Whether it is the second half of the kick.
+    x, body, h: State in the middle of the kick; inertia and laws; length of the kick [s].
     """
     views = look(x, body, h)
     return replace(x, memory=tuple(term.evolve(view, second) for term, view in zip(body.terms, views, strict=True)))
@@ -181,10 +167,8 @@ def damping(x: State, body: Body, h: float, nu: Array, Om: Array, flow: Flow) ->
 
     With X = R^T G R: force -m X nu - X^T (A11 nu + A12 Om), torque -m r_g x X nu (Lamb 1932, art. 137; Galper & Miloh 1994).
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        nu, Om: Velocity (3,) [m/s] at which damping is taken; angular velocity (3,) [rad/s] at which damping is taken.
-        flow: The water's velocity, rate and gradient.
+    x, body, h: State at the start; inertia and laws; step [s].
+    nu, Om: Velocity (3,) [m/s] at which damping is taken; angular velocity (3,) [rad/s] at which damping is taken.
     """
     views = tuple(replace(view, nu=nu, Om=Om) for view in look(x, body, h))
     total = sum((term.damping(view) for term, view in zip(body.terms, views, strict=True)), np.zeros((6, 6)))
@@ -198,9 +182,7 @@ def damping(x: State, body: Body, h: float, nu: Array, Om: Array, flow: Flow) ->
 def V(x: State, body: Body, h: float, flow: Flow) -> State:
     """Velocity-dependent laws, -D(nu) nu, by the linearly implicit step of order 2 with D frozen at the predicted middle.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        flow: The water's velocity, rate and gradient.
+    x, body, h: State at the start; inertia and laws; step [s].
     """
     I6, P = body.I6, np.concatenate([x.p, x.pi])
     start = np.linalg.solve(I6, P)
@@ -215,9 +197,7 @@ def V(x: State, body: Body, h: float, flow: Flow) -> State:
 def E(x: State, body: Body, h: float, flow: Flow) -> State:
     """Drag by its exact flow; where the inertia is not diagonal, by that of one axis after the other.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        flow: Not used: `V` takes the same arguments.
+    x, body, h: State at the start; inertia and laws; step [s].
     """
     (drag,) = (term for term in body.terms if isinstance(term, Drag))
     P = np.concatenate([x.p, x.pi])
@@ -232,9 +212,7 @@ def E(x: State, body: Body, h: float, flow: Flow) -> State:
 def dissipated(x: State, body: Body, h: float, flow: Flow) -> State:
     """E where drag is the only velocity-dependent law, V otherwise.
 
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-        flow: The water's velocity, rate and gradient.
+    x, body, h: State at the start; inertia and laws; step [s].
     """
     damped = [term for term in body.terms if type(term).damping is not Law.damping]
     alone = len(damped) == 1 and isinstance(damped[0], Drag) and not np.any(flow.gradient)
@@ -246,9 +224,8 @@ def dissipated(x: State, body: Body, h: float, flow: Flow) -> State:
 def kicked(x: State, h: float, wrench: tuple[Array, Array]) -> State:
     """p <- p + h f, pi <- pi + h m.
 
-    Args:
-        x, h: State at the start; step [s].
-        wrench: Force [N] and torque [N m].
+    x, h: State at the start; step [s].
+    wrench: Force [N] and torque [N m].
     """
     return replace(x, p=x.p + h * wrench[0], pi=x.pi + h * wrench[1])
 
@@ -258,8 +235,7 @@ def K(x: State, body: Body, h: float, solve: Solver = newton) -> State:
 
     Half of what the laws remember and of the water's drift, half the kick, drag, and the other halves: order 2.
 
-    Args:
-        x, body, h, solve: State at the start; inertia and laws; step [s]; not used: every sub-map takes the same arguments.
+    x, body, h, solve: State at the start; inertia and laws; step [s]; not used: every sub-map takes the same arguments.
     """
     x = remembered(x, body, h, second=False)
     b = x.b

@@ -37,19 +37,7 @@ OTHERWISE = ("psi_x", "psi_s")
 
 
 def planned(ensemble: Ensemble, grid: TimeGrid, plan_of: Callable[[Method, tuple[str, ...]], Plan]) -> Plan:
-    """Plan a run with the first method that takes it.
-
-    Args:
-        ensemble: The members.
-        grid: Steps and end of the run.
-        plan_of: Function from a method, and what the user should know of its step, to the plan of the run.
-
-    Returns:
-        The plan; its method says why it was chosen.
-
-    Raises:
-        SceneError: If none takes it.
-    """
+    """Plan a run with the first method that takes it."""
     found = rates(ensemble)
     for method in choices(ensemble, grid.h, found):
         try:
@@ -62,13 +50,8 @@ def planned(ensemble: Ensemble, grid: TimeGrid, plan_of: Callable[[Method, tuple
 def choices(ensemble: Ensemble, h: float, found: Rates | None = None) -> Iterator[Method]:
     """List the methods for a run, the best first.
 
-    Args:
-        ensemble: The members.
-        h: Step [s].
-        found: The rates of the motion; default None: they are computed.
-
-    Yields:
-        A method, which the scene may refuse.
+    h: Step [s].
+    found: The rates of the motion; default None: they are computed.
     """
     if not is_damped(ensemble):
         yield Method("psi_s", reason="since nothing damps the motion")
@@ -92,13 +75,8 @@ def choices(ensemble: Ensemble, h: float, found: Rates | None = None) -> Iterato
 def ranked(errors: dict[str, float], well: Collection[str]) -> list[str]:
     """Rank methods by their errors at a step.
 
-    Args:
-        errors: Name -> error over the length of the path [1], the cheapest first.
-        well: Those of them that are well within their limits.
-
-    Returns:
-        Those whose error is allowed, the cheapest first; then the others, the least error first. Near its limit of damping a
-        method is one of the others.
+    Returns: Those whose error is allowed, the cheapest first; then the others, the least error first. Near its limit of
+        damping a method is one of the others.
     """
     known = [name for name in errors if name in well or math.isfinite(errors[name])]
     return sorted(known, key=lambda name: 0.0 if name in well and errors[name] <= ALLOWED else errors[name])
@@ -107,14 +85,8 @@ def ranked(errors: dict[str, float], well: Collection[str]) -> list[str]:
 def messages(method: Method, found: Rates, h: float, t1: float) -> tuple[str, ...]:
     """Tell that a step is too long to follow the path.
 
-    Args:
-        method: The method that was chosen.
-        found: The rates of the motion.
-        h: Step [s].
-        t1: End [s]. A step is judged by no less than AHEAD, as the choice is.
-
-    Returns:
-        One sentence where the error is above 1 % of the path, otherwise nothing.
+    h: Step [s].
+    t1: End [s]. A step is judged by no less than AHEAD, as the choice is.
     """
     near = method.name in DAMPED and not stable(method, h_rates(found, h))
     if path_error(method, found, h, t1) <= ALLOWED and not near:
@@ -132,14 +104,8 @@ def messages(method: Method, found: Rates, h: float, t1: float) -> tuple[str, ..
 def best_error(method: Method, found: Rates, h: float, t1: float) -> float:
     """The error at a shorter step, by the method itself or one of those for damped scenes.
 
-    Args:
-        method: The method at the step that was asked for.
-        found: The rates of the motion.
-        h: The shorter step [s].
-        t1: End [s].
-
-    Returns:
-        Error over the length of the path [1]; infinite where none is stable.
+    h: The shorter step [s].
+    t1: End [s].
     """
     numbers = h_rates(found, h)
     others = [Method(name) for name in DAMPED] if found.drag != 0.0 else [method]
@@ -147,29 +113,13 @@ def best_error(method: Method, found: Rates, h: float, t1: float) -> float:
 
 
 def stable(method: Method, numbers: dict[str, float], share: float = SHARES["drag"]) -> bool:
-    """Tell whether a step is well within a method's limits.
-
-    Args:
-        method: The method.
-        numbers: As of `h_rates`.
-        share: Part of the limit of damping that may be used.
-
-    Returns:
-        False where a number is above its share of the limit.
-    """
+    """Tell whether a step is well within a method's limits."""
     drag = MOST_IMPLICIT if method.linearly_implicit else share * drag_limit(method.name)
     return numbers["drag"] <= drag and numbers["rotation"] <= SHARES["rotation"] * rotation_limit(method)
 
 
 def is_damped(ensemble: Ensemble) -> bool:
-    """Tell whether a term takes energy from some of the first members.
-
-    Args:
-        ensemble: The members.
-
-    Returns:
-        True where a dissipative term acts.
-    """
+    """Tell whether a term takes energy from some of the first members."""
     terms = [term for term in damping_terms(ensemble.scene.terms) if term.dissipative]
     if not terms:
         return False
@@ -180,11 +130,7 @@ def is_damped(ensemble: Ensemble) -> bool:
 def h_rates(found: Rates, h: float) -> dict[str, float]:
     """Multiply the rates of the fastest of the first members by the step.
 
-    Args:
-        found: The rates.
-        h: Step [s].
-
-    Returns:
-        "drag" and "rotation" -> number [1]; drag as large as rkw3 takes where a term does not tell how it brakes.
+    h: Step [s].
+    Returns: "drag" and "rotation" -> number [1]; drag as large as rkw3 takes where a term does not tell how it brakes.
     """
     return {"drag": MOST_IMPLICIT if found.drag is None else h * found.drag, "rotation": h * found.rotation}

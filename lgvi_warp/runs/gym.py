@@ -380,14 +380,7 @@ class Vehicles:
 
 
 def needed() -> Any:
-    """Gymnasium.
-
-    Returns:
-        The module.
-
-    Raises:
-        MissingExtra: Where it is not installed.
-    """
+    """Gymnasium."""
     try:
         import gymnasium
     except ImportError as error:

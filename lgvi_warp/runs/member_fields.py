@@ -97,25 +97,14 @@ FIELDS = (
 
 
 def present(plan: Plan) -> tuple[MemberField, ...]:
-    """Select the fields that a run of this plan has.
-
-    Args:
-        plan: Plan of the run.
-
-    Returns:
-        The fields, in their fixed order.
-    """
+    """Select the fields that a run of this plan has."""
     return tuple(member_field for member_field in FIELDS if member_field.when(plan))
 
 
 def size(plan: Plan) -> int:
     """Compute the size of a member's fields.
 
-    Args:
-        plan: Plan of the run.
-
-    Returns:
-        Size [bytes].
+    Returns: Size [bytes].
     """
     return sum(np.dtype(item.dtype).itemsize for item in present(plan))
 
@@ -123,11 +112,6 @@ def size(plan: Plan) -> int:
 def of(plan: Plan, outcome: Outcome) -> dict[str, np.ndarray]:
     """Compute the fields of an outcome's members.
 
-    Args:
-        plan: Plan of the run.
-        outcome: How n members ended.
-
-    Returns:
-        Arrays of shape (n,), by name.
+    Returns: Arrays of shape (n,), by name.
     """
     return {item.name: item.of(plan, outcome).astype(item.dtype, copy=False) for item in present(plan)}

@@ -15,12 +15,7 @@ from lgvi_warp.engine.asking import Looks
 def heading_error(y: Looks, r: Looks) -> np.ndarray:
     """The wanted heading less the measured one.
 
-    Args:
-        y: What is measured of m members.
-        r: What is wanted.
-
-    Returns:
-        (m,) [rad], in (-pi, pi], from the forward axes, without Euler angles.
+    Returns: (m,) [rad], in (-pi, pi], from the forward axes, without Euler angles.
     """
     s, c = r.attitude[:, :2, 0], y.attitude[:, :2, 0]
     return np.arctan2(s[:, 1] * c[:, 0] - s[:, 0] * c[:, 1], s[:, 0] * c[:, 0] + s[:, 1] * c[:, 1])
@@ -29,12 +24,7 @@ def heading_error(y: Looks, r: Looks) -> np.ndarray:
 def attitude_error(y: Looks, r: Looks) -> np.ndarray:
     """e_R = vee(R_d^T R - R^T R_d) / 2, as of `lw.PosePID`.
 
-    Args:
-        y: What is measured of m members.
-        r: What is wanted.
-
-    Returns:
-        (m, 3) [1], body axes.
+    Returns: (m, 3) [1], body axes.
     """
     return 0.5 * np.cross(y.attitude, r.attitude).sum(axis=1)
 
@@ -42,12 +32,7 @@ def attitude_error(y: Looks, r: Looks) -> np.ndarray:
 def position_error(y: Looks, r: Looks) -> np.ndarray:
     """The wanted position less the measured one.
 
-    Args:
-        y: What is measured of m members.
-        r: What is wanted.
-
-    Returns:
-        (m, 3) [m], body axes.
+    Returns: (m, 3) [m], body axes.
     """
     return np.einsum("nji,nj->ni", y.attitude, r.position - y.position)
 
@@ -55,11 +40,7 @@ def position_error(y: Looks, r: Looks) -> np.ndarray:
 def water_velocity(y: Looks) -> np.ndarray:
     """The measured velocity through the water.
 
-    Args:
-        y: What is measured of m members.
-
-    Returns:
-        (m, 3) [m/s], body axes.
+    Returns: (m, 3) [m/s], body axes.
     """
     assert y.water_velocity is not None
     return y.water_velocity
@@ -68,10 +49,8 @@ def water_velocity(y: Looks) -> np.ndarray:
 class Observation(NamedTuple):
     """A number, or several, that a learner may see.
 
-    Args:
-        length: How many numbers it is.
-        wish: What guidance must give for it; None for nothing.
-        of: Function of the measured and the wanted motion of m members that returns (m,) or (m, length).
+    wish: What guidance must give for it; None for nothing.
+    of: Function of the measured and the wanted motion of m members that returns (m,) or (m, length).
     """
 
     length: int
@@ -110,13 +89,7 @@ OBSERVATIONS |= {
 def observer(faults: Faults, names: Any, wishes: Sequence[str]) -> Callable[[float, Looks, Looks], np.ndarray]:
     """The function that gathers named numbers.
 
-    Args:
-        faults: Collects a fault for each name that is unknown, or for which no guidance gives what is wanted.
-        names: Names among `OBSERVATIONS`, or of one number of several, such as "down[0]".
-        wishes: What guidance gives.
-
-    Returns:
-        Function of the time and of the measured and wanted motion of m members that returns (m, k).
+    Returns: Function of the time and of the measured and wanted motion of m members that returns (m, k).
     """
     chosen: list[tuple[Observation, int | None]] = []
     known: Mapping[str, tuple[str, int | None]] = {

@@ -28,15 +28,7 @@ def outcomes(result: Result) -> list[Status]:
 
 
 def outcome_text(result: Result, code: Status) -> str:
-    """Describe one status: how many members have it, which of them had it first, and what it means.
-
-    Args:
-        result: Result of a run.
-        code: A status that at least one member has.
-
-    Returns:
-        One line; for a failure with the value that passed its limit, and the remedy.
-    """
+    """Describe one status: how many members have it, which of them had it first, and what it means."""
     members = np.flatnonzero(np.asarray(result.status) == code)
     many = f"{code.name.lower()}, {len(members):,} of {result.members:,} members"
     if code == Status.OK:
@@ -50,12 +42,8 @@ def outcome_text(result: Result, code: Status) -> str:
 def begun_beyond(status: np.ndarray, failure_time: np.ndarray) -> tuple[str, ...]:
     """Tell of members that an event stopped before their first step.
 
-    Args:
-        status: Status of each member, (n,).
-        failure_time: When each was stopped or failed [s], (n,).
-
-    Returns:
-        One message; none where no member begins beyond an event.
+    status: Status of each member, (n,).
+    failure_time: When each was stopped or failed [s], (n,).
     """
     begun = stopped(status) & (np.asarray(failure_time) == 0.0)
     if not begun.any():
@@ -69,13 +57,6 @@ def begun_beyond(status: np.ndarray, failure_time: np.ndarray) -> tuple[str, ...
 
 
 def failure_text(result: Result) -> str:
-    """Describe each kind of failure in a line with its remedy.
-
-    Args:
-        result: Result of a run.
-
-    Returns:
-        The lines; "" if no member failed.
-    """
+    """Describe each kind of failure in a line with its remedy."""
     failures = [code for code in outcomes(result) if code != Status.OK and not code.stopped]
     return "\n".join(outcome_text(result, code) for code in failures)

@@ -194,14 +194,8 @@ def costs(plan: Plan, runs: Sequence[Block], threads: int, observed: Observation
     Trials run one block per thread. The number of steps is doubled until a trial takes long enough; a second trial of half
     the steps separates the cost of a step from what a block costs before its first step.
 
-    Args:
-        plan: The plan, compiled.
-        runs: The blocks of the run.
-        threads: Number of threads.
-        observed: What the run keeps; None: samples of all members and no statistics.
-
-    Returns:
-        (set-up, one step) [s], for all blocks on all threads.
+    observed: What the run keeps; None: samples of all members and no statistics.
+    Returns: (set-up, one step) [s], for all blocks on all threads.
     """
     chosen = runs[:threads]
     steps, most = min(64, plan.grid.steps), plan.grid.steps
@@ -238,12 +232,8 @@ def _seconds(plan: Plan, steps: int, chosen: Sequence[Block], threads: int, obse
 def result_bytes(plan: Plan, fields: Sequence[str] | None = None) -> int:
     """Size of a result in memory, and about that of its file.
 
-    Args:
-        plan: The run.
-        fields: Fields of the samples that the result holds; default None, all of the plan.
-
-    Returns:
-        The size [bytes].
+    fields: Fields of the samples that the result holds; default None, all of the plan.
+    Returns: The size [bytes].
     """
     k, n = len(plan.grid.times), plan.ensemble.members
     real = np.dtype(machine.DTYPES[plan.dtype]).itemsize
@@ -301,11 +291,7 @@ class Sized:
     def working(self, threads: int) -> int:
         """Compute the memory of the blocks at work.
 
-        Args:
-            threads: Number of threads.
-
-        Returns:
-            Memory [bytes].
+        Returns: Memory [bytes].
         """
         plan = self.plan
         joined = self.store is not None or self.statistics.part > 0
@@ -326,12 +312,7 @@ class Sized:
 def memory(runs: Sequence[Sized], threads: int) -> int:
     """Compute the memory that several runs, one after the other, add to the process.
 
-    Args:
-        runs: The runs, in order; the results of earlier ones stay in memory.
-        threads: Number of threads.
-
-    Returns:
-        The peak [bytes].
+    Returns: The peak [bytes].
     """
     peaks = [
         sum(earlier.held for earlier in runs[: i + 1]) + max(run.working(threads), run.statistics.reading)
@@ -343,14 +324,7 @@ def memory(runs: Sequence[Sized], threads: int) -> int:
 def again(plan: Plan, observed: Observation, store: Store | None, fields: Sequence[str]) -> list[Sized]:
     """Find the run of the members that are run again for their samples.
 
-    Args:
-        plan: Plan of the whole run.
-        observed: What the run keeps.
-        store: Where the run is written; None: in memory.
-        fields: Names of the fields whose samples are kept.
-
-    Returns:
-        A list with this run; empty if there is none, or if its members are not known before the run.
+    store: Where the run is written; None: in memory.
     """
     if isinstance(observed.keep, str):
         return []
@@ -365,13 +339,7 @@ def again(plan: Plan, observed: Observation, store: Store | None, fields: Sequen
 def writing(runs: Sequence[Sized], folder: Path, threads: int) -> tuple[float, int]:
     """Predict the time that writing takes, from metadata that are written and removed again, and the speed of the disk.
 
-    Args:
-        runs: The runs, each with its store.
-        folder: An existing folder on the disk that is used.
-        threads: Number of threads.
-
-    Returns:
-        Time for metadata, chunks and the wait until the last blocks are safe [s]; size of the metadata [bytes].
+    Returns: Time for metadata, chunks and the wait until the last blocks are safe [s]; size of the metadata [bytes].
     """
     from lgvi_warp.runs.provenance import messages, provenance
 
@@ -397,12 +365,7 @@ def writing(runs: Sequence[Sized], folder: Path, threads: int) -> tuple[float, i
 def disk_speed(folder: Path, threads: int) -> float:
     """Measure the speed of a disk with files that are written, synced and removed again.
 
-    Args:
-        folder: An existing folder on the disk.
-        threads: Number of threads that write at the same time.
-
-    Returns:
-        Speed of all threads together [bytes/s].
+    Returns: Speed of all threads together [bytes/s].
     """
     data = np.random.default_rng(0).bytes(PROBE_BYTES // threads)
 

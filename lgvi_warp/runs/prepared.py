@@ -59,16 +59,7 @@ class _Kind:
 class Runner:
     """Settings of a run, and the plans that they lead to: what `solve` settles once for a call, and `prepare` once for many.
 
-    Args:
-        scene: the scene of every member.
-        settings: arguments of `make_plan`, method, h, t1, save, dtype, width, checks and on_failure.
-        statistics: statistics to gather (default none).
-        threads: number of threads; None (default) for all cores.
-        executor: as of `solve`, "threads" by default.
-        scheduler: as of `solve`.
-
-    Raises:
-        SceneError: if a setting is at fault.
+    threads: number of threads; None (default) for all cores.
     """
 
     def __init__(
@@ -90,17 +81,7 @@ class Runner:
         self._last: Plan | None = None
 
     def plan(self, fleet: Ensemble) -> Plan:
-        """The plan of a run of some members; a kernel is chosen for what these members are, as `solve` does.
-
-        Args:
-            fleet: the members.
-
-        Returns:
-            A plan, compiled.
-
-        Raises:
-            SceneError: if the method cannot do what these members ask.
-        """
+        """The plan of a run of some members; a kernel is chosen for what these members are, as `solve` does."""
         names = frozenset(fleet.varied_names)
         kind = self._kinds.get(names)
         if kind is not None and self._last is not None:
@@ -129,18 +110,8 @@ class Runner:
     def run(self, fleet: Ensemble, progress: Callable[[float], None] | None = None, warned: bool = True) -> Result:
         """Run some members.
 
-        Args:
-            fleet: the members.
-            progress: called with the fraction of the work that is done, in [0, 1].
-            warned: whether the result has warnings; default True.
-
-        Returns:
-            Their result, whose provenance names the members' number but not their values, and whose messages leave out what
-            is odd about their values.
-
-        Raises:
-            SceneError: if the method cannot do what these members ask.
-            MembersFailed: if members failed and on_failure is "raise".
+        Returns: Their result, whose provenance names the members' number but not their values, and whose messages leave out
+            what is odd about their values.
         """
         few = {"members": fleet.members, "seed": fleet.seed, "varied": sorted(fleet.varied_names)}
 
@@ -203,24 +174,16 @@ class Prepared:
         With noise, what follows rows from call to call (a chain, subset simulation, an optimiser) must say which noise each
         row has: new `indices` or another `seed` for noise that is new, the same ones for noise that is kept.
 
-        Args:
-            X: (n, d), columns in the order of `names`; or by name, in any order: a mapping of columns, a data frame, a
-                structured array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3).
-                Without X the members are drawn from the distributions.
-            seed: seed of the noise of forces and sensors, and of the members that are drawn, a whole number from 0; default
-                that of the ensemble.
-            members: number of members that are drawn, the first ones of the sampling; default those of the ensemble.
-            indices: (n,), beside X: whose noise each row has, that of the member with this index in an ensemble of this seed,
-                whole numbers from 0. Rows with the same index have the same noise. Default None for 0 to n - 1.
-            progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is
-                done, in [0, 1].
-
-        Returns:
-            The quantities, (n,) of a single number and (n, m) of several; a `Result` without `of`.
-
-        Raises:
-            SceneError: if X does not fit the names, or holds unphysical numbers; the message lists every fault.
-            FailedMembers: if members failed, unless failed="nan".
+        X: (n, d), columns in the order of `names`; or by name, in any order: a mapping of columns, a data frame, a structured
+            array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3). Without X the members
+            are drawn from the distributions.
+        seed: seed of the noise of forces and sensors, and of the members that are drawn, a whole number from 0; default that
+            of the ensemble.
+        indices: (n,), beside X: whose noise each row has, that of the member with this index in an ensemble of this seed,
+            whole numbers from 0. Rows with the same index have the same noise. Default None for 0 to n - 1.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
+            in [0, 1].
+        Returns: The quantities, (n,) of a single number and (n, m) of several; a `Result` without `of`.
         """
         if X is not None and members is not None:
             raise refusal("members", members, "is given beside X, whose rows are the members", "leave out one of them")
@@ -364,29 +327,14 @@ class Prepared:
 
 
 def part(progress: Callable[[float], None], begin: float, end: float) -> Callable[[float], None]:
-    """Tell of a part of the work as a part of the whole.
-
-    Args:
-        progress: called with the fraction of the whole.
-        begin: fraction of the whole where the part begins.
-        end: fraction of the whole where it ends.
-
-    Returns:
-        A function to be called with the fraction of the part.
-    """
+    """Tell of a part of the work as a part of the whole."""
     return lambda fraction: progress(begin + (end - begin) * fraction)
 
 
 def lost_text(lost: np.ndarray, counts: Mapping[str, int], remedy: str) -> str:
     """Describe how many members failed, and of what.
 
-    Args:
-        lost: (n,), whether each failed, or a quantity of it is not finite.
-        counts: number of members by cause.
-        remedy: what the user can do, which ends the text.
-
-    Returns:
-        One line of text.
+    lost: (n,), whether each failed, or a quantity of it is not finite.
     """
     causes = ", ".join(f"{name} {number}" for name, number in counts.items() if name != "ok")
     first = int(np.argmax(lost))
@@ -396,12 +344,8 @@ def lost_text(lost: np.ndarray, counts: Mapping[str, int], remedy: str) -> str:
 def counted(status: np.ndarray, values: np.ndarray) -> dict[str, int]:
     """Count members by what became of them.
 
-    Args:
-        status: (n,), their status.
-        values: (n, m), their quantities.
-
-    Returns:
-        Name of a status -> number of members, and how many have a quantity that is not finite.
+    status: (n,), their status.
+    values: (n, m), their quantities.
     """
     names = {Status(int(code)).name.lower(): int((status == code).sum()) for code in np.unique(status)}
     odd = int((~np.isfinite(values).all(axis=1)).sum())
@@ -409,30 +353,12 @@ def counted(status: np.ndarray, values: np.ndarray) -> dict[str, int]:
 
 
 def scene_numbers(scene: Any) -> dict[str, np.ndarray]:
-    """Every number of a scene that may vary.
-
-    Args:
-        scene: the scene.
-
-    Returns:
-        Values by name, those of the start among them.
-    """
+    """Every number of a scene that may vary."""
     return scene.parameters() | {f"start.{key}": value for key, value in scene.start.given().items()}
 
 
 def scene_value(scene: Any, name: str) -> np.ndarray:
-    """A single number of a scene.
-
-    Args:
-        scene: the scene.
-        name: such as "start.position[2]".
-
-    Returns:
-        The number ().
-
-    Raises:
-        SceneError: if the scene has no such number, or the name is that of several.
-    """
+    """A single number of a scene."""
     (target,) = variations.targets(name)
     known, faults = scene_numbers(scene), Faults("vary.")
     if variations.known_target(faults, name, "...", target, known) and (ndim := target.of(known[target.name]).ndim):
@@ -443,19 +369,7 @@ def scene_value(scene: Any, name: str) -> np.ndarray:
 
 
 def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -> SaveAt | None:
-    """The samples that quantities need, where the user does not say which to keep.
-
-    Args:
-        scene: the scene.
-        of: the quantities; none for whole results.
-        save: what the user gave.
-
-    Returns:
-        What to save.
-
-    Raises:
-        SceneError: if a quantity looks over the path and no interval of samples is known.
-    """
+    """The samples that quantities need, where the user does not say which to keep."""
     if save is not None or not of:
         return save
     fields = ordered(name for each in of for name in each.fields)
@@ -470,18 +384,7 @@ def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -
 
 
 def statistics_for(scene: SceneLike, of: Sequence[OfResult]) -> list[Statistic]:
-    """The statistics that quantities need, beside samples.
-
-    Args:
-        scene: the scene.
-        of: the quantities.
-
-    Returns:
-        Statistics of ends; none where the status of members tells how they ended.
-
-    Raises:
-        SceneError: if a quantity is of an outcome that is none.
-    """
+    """The statistics that quantities need, beside samples."""
     found = dict[str, Statistic]()
     for each in of:
         if isinstance(each, OfEnds):

@@ -17,28 +17,12 @@ from lgvi_warp.scene.functions import functions_of, identities
 
 
 def messages(plan: Plan) -> tuple[str, ...]:
-    """List what the user should know before the run: on times, vehicle, parameters and starts.
-
-    Args:
-        plan: Plan of the run.
-
-    Returns:
-        The messages.
-    """
+    """List what the user should know before the run: on times, vehicle, parameters and starts."""
     return plan.grid.messages + tuple(plan.ensemble.scene.vehicle.warnings) + odd_before(plan)
 
 
 def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence[str] | None = None) -> dict[str, Any]:
-    """Everything that a result follows from: scene, ensemble, settings, versions and machine.
-
-    Args:
-        plan: Plan of the run.
-        observed: What the run keeps; recorded only if that is not simply the samples of all members.
-        fields: Names of the fields whose samples are kept; default all of the plan.
-
-    Returns:
-        A table that JSON can hold.
-    """
+    """Everything that a result follows from: scene, ensemble, settings, versions and machine."""
     content = {
         "scene": plan.ensemble.scene.to_dict(),
         "ensemble": plan.ensemble.to_dict(),
@@ -75,28 +59,15 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
 def at_end(content: dict[str, Any], values: Mapping[str, np.ndarray], members: int, planned: int) -> dict[str, Any]:
     """Add to the provenance of a run what its end tells.
 
-    Args:
-        content: Provenance from the start of the run.
-        values: Fields of the members that ran, by name, each of shape (n,).
-        members: Number of members that ran, n.
-        planned: Number of members of the ensemble.
-
-    Returns:
-        The provenance with the mean numbers of steps if these were chosen, and with n if the run ended early.
+    values: Fields of the members that ran, by name, each of shape (n,).
+    Returns: The provenance with the mean numbers of steps if these were chosen, and with n if the run ended early.
     """
     means = {name: float(values[name].mean()) for name in ("steps_made", "steps_tried") if name in values}
     return content | means | ({"members": members} if members < planned else {})
 
 
 def odd_before(plan: Plan) -> tuple[str, ...]:
-    """List messages on implausible parameters and starts of the members.
-
-    Args:
-        plan: Plan of the run; of a large fleet only the first members' starts are checked.
-
-    Returns:
-        The messages.
-    """
+    """List messages on implausible parameters and starts of the members."""
     ensemble = plan.ensemble
     varies = ensemble.starts_vary or bool(ensemble.varied() and plausibility.own_flows(ensemble.scene))
     starts = plausibility.of_start(ensemble.scene, ensemble.select(0, min(AT_ONCE, ensemble.members) if varies else 1))

@@ -70,16 +70,9 @@ class OfResult:
     def values(self, result: Result, members: Any = None) -> np.ndarray:
         """Compute its numbers for each member.
 
-        Args:
-            result: A result with the fields that it needs.
-            members: As lw.Ensemble.select gives them, for a Quantity that looks at them; by default the result's own
-                parameters and first samples.
-
-        Returns:
-            float64 array, shape (n, m).
-
-        Raises:
-            SceneError: If a function returns something else than n rows of real numbers.
+        members: As lw.Ensemble.select gives them, for a Quantity that looks at them; by default the result's own parameters
+            and first samples.
+        Returns: float64 array, shape (n, m).
         """
         if isinstance(self.of, Functional):
             numbers = self.of(*samples_of(result, slice(None) if self.over_path else slice(-1, None), members))
@@ -97,14 +90,7 @@ class OfResult:
         return numbers.reshape(result.members, -1)
 
     def labels(self, count: int) -> list[str]:
-        """Name each of its numbers.
-
-        Args:
-            count: How many numbers it has for a member.
-
-        Returns:
-            A label for each.
-        """
+        """Name each of its numbers."""
         if isinstance(self.of, Functional):
             return list(self.of.labels)
         return [self.label] if count == 1 else [f"{self.label}[{i}]" for i in range(count)]
@@ -138,17 +124,7 @@ class OfEnds(OfResult):
         return {"outcome": "1", "end_time": "s"}.get(self.kind, super().unit)
 
     def gathered(self, events: Sequence[Event]) -> dict[str, Statistic]:
-        """What a run must gather, where several events have the status of this one, which then does not tell them apart.
-
-        Args:
-            events: The events of the scene.
-
-        Returns:
-            The statistic by its name; empty where the status of members tells.
-
-        Raises:
-            SceneError: There is no such outcome.
-        """
+        """What a run must gather, where several events have the status of this one, which then does not tell them apart."""
         if not self.outcome:
             return {}
         check_outcomes(
@@ -161,15 +137,7 @@ class OfEnds(OfResult):
     def values(self, result: Result, members: Any = None) -> np.ndarray:
         """Compute its numbers for each member.
 
-        Args:
-            result: A result with the fields that it needs.
-            members: As of `OfResult.values`.
-
-        Returns:
-            float64 array, shape (n, m).
-
-        Raises:
-            SceneError: If there is no such outcome, if members do not tell it from another one, or at a time of no sample.
+        Returns: float64 array, shape (n, m).
         """
         if self.when is not None:
             rows = np.flatnonzero(np.abs(result.time - self.when) <= 1e-9 * max(1.0, result.time[-1]))
@@ -242,13 +210,7 @@ class _Samples(dict[str, np.ndarray]):
 def samples_of(result: Result, when: slice = slice(None), members: Any = None) -> tuple[Any, Any]:
     """Give the samples and members of a result in the form that a Quantity's function takes.
 
-    Args:
-        result: The result.
-        when: Which of its times; default all.
-        members: The members; default the result's own parameters and first samples.
-
-    Returns:
-        The pair (samples, members).
+    Returns: The pair (samples, members).
     """
     fields = {name: result.samples[name][when] for name in SAVED if name in result.samples}
     start = {name: result.samples[name][0] for name in fields}
@@ -259,15 +221,8 @@ def samples_of(result: Result, when: slice = slice(None), members: Any = None) -
 def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
     """Read one or several quantities of interest.
 
-    Args:
-        of: A text such as "max(depth)", "outcome floor", "end_time floor" or "depth at 30", a Quantity, a
-            function of a Result or of (samples, members), or several of these.
-
-    Returns:
-        The quantities, in order.
-
-    Raises:
-        SceneError: If any of them is at fault; the message names every fault.
+    of: A text such as "max(depth)", "outcome floor", "end_time floor" or "depth at 30", a Quantity, a function of a Result or
+        of (samples, members), or several of these.
     """
     requests = list(of) if isinstance(of, list | tuple) else [of]
     faults = Faults()

@@ -16,17 +16,7 @@ TEXTS = ("messages", "provenance", "statistics")
 
 
 def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """Check that the arrays of a result fit each other, and read its texts.
-
-    Args:
-        content: Arrays of the file, by name.
-
-    Returns:
-        "messages" and "provenance", parsed.
-
-    Raises:
-        ValueError: If something is missing or does not fit; the message names it.
-    """
+    """Check that the arrays of a result fit each other, and read its texts."""
     if missing := [name for name in ("time", "status", *TEXTS[:2]) if name not in content]:
         raise ValueError(f"it has no {', '.join(missing)}")
     of_members = {item.name: np.dtype(item.dtype) for item in member_fields.FIELDS}

@@ -31,20 +31,8 @@ from lgvi_warp.statistics.estimate import Estimates
 def completed(plan: Plan, threads: int, observed: Observation, fields: Sequence[str], **settings: Any) -> Result:
     """Run a plan, and the members again whose samples alone are kept.
 
-    Args:
-        plan: Plan of the run. Where a member beyond those that were looked at needs another kernel, the run begins anew with a
-            kernel for all members, so that they have the bits of one kernel.
-        threads: Number of threads.
-        observed: What is kept.
-        fields: Names of the fields whose samples are kept.
-        settings: Further arguments of `run_plan`.
-
-    Returns:
-        The result, with `kept` and `kept_members`.
-
-    Raises:
-        MembersFailed: If members failed and the plan's on_failure is "raise".
-        Interrupted: As of `run_plan`.
+    plan: Plan of the run. Where a member beyond those that were looked at needs another kernel, the run begins anew with a
+        kernel for all members, so that they have the bits of one kernel.
     """
     try:
         result = run_plan(plan, threads, observed=observed, fields=fields, **settings)
@@ -57,21 +45,7 @@ def completed(plan: Plan, threads: int, observed: Observation, fields: Sequence[
 def finished(
     result: Result, plan: Plan, observed: Observation, fields: Sequence[str], threads: int | None = None
 ) -> Result:
-    """Complete a result with the samples of members that are run again, which a store has already.
-
-    Args:
-        result: Result of the run.
-        plan: Plan of the run.
-        observed: What the run keeps.
-        fields: Names of the fields kept of the members that are run again.
-        threads: Number of threads; default all cores.
-
-    Returns:
-        The result with `kept` and `kept_members`.
-
-    Raises:
-        MembersFailed: If members failed and the plan's on_failure is "raise".
-    """
+    """Complete a result with the samples of members that are run again, which a store has already."""
     if result.store is None:
         indices, kept = again(plan, observed, result.status, fields, threads)
         if kept is not None:
@@ -96,25 +70,8 @@ def run_plan(
 ) -> Result:
     """Run the blocks of a plan, all or as many as its statistics need, and gather the result in memory.
 
-    Args:
-        plan: The plan.
-        threads: Number of threads.
-        progress: Called with the fraction of the work that is done, in [0, 1].
-        observed: What is kept; default the samples of all members.
-        fields: Names of the fields whose samples are kept; default all of the plan.
-        executor: What runs the blocks; default this number of threads.
-        partial: Whether an interrupt raises Interrupted with the members that were finished.
-        known: Function from the plan to provenance and messages, where many runs share them; by default they are made for
-            this run.
-        warned: Whether the result has warnings; default True.
-        on_block: Called with the result of each block of members as soon as it is finished, in order; default nothing.
-
-    Returns:
-        The result of all members, or of the first ones where `until` ended the run.
-
-    Raises:
-        Interrupted: On KeyboardInterrupt, if `partial` and a block was finished.
-        NotSurveyed: If a member beyond those that were looked at needs another kernel.
+    known: Function from the plan to provenance and messages, where many runs share them; by default they are made for this
+        run.
     """
     observed = observed or Observation()
     compile_seconds = plan.compile()
@@ -163,15 +120,8 @@ def again(
 ) -> tuple[np.ndarray, Result | None]:
     """Run the members again whose samples are wanted after the run; they have the same bits as in the run.
 
-    Args:
-        plan: Plan of the run.
-        observed: What the run keeps.
-        status: Status of each member, shape (n,).
-        fields: Names of the fields whose samples are kept.
-        threads: Number of threads; default all cores.
-
-    Returns:
-        Indices of these members, shape (m,), and their result, or None if there are none.
+    status: Status of each member, shape (n,).
+    Returns: Indices of these members, shape (m,), and their result, or None if there are none.
     """
     indices = observed.again(status)
     if not len(indices):

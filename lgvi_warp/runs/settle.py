@@ -26,15 +26,8 @@ from lgvi_warp.scene.settings import RunSettings
 def blocks_there(only: range | None, plan: Plan) -> range | None:
     """Limit the blocks asked for to those that the run has.
 
-    Args:
-        only: Indices of blocks, in steps of 1; the end may lie beyond the last block. None: all blocks.
-        plan: Plan of the whole run.
-
-    Returns:
-        The indices that exist, or None for all blocks.
-
-    Raises:
-        SceneError: If the range has another step or a negative start, or none of its blocks exists.
+    only: Indices of blocks, in steps of 1; the end may lie beyond the last block. None: all blocks.
+    Returns: The indices that exist, or None for all blocks.
     """
     count = len(blocks(plan.ensemble.members))
     if only is None:
@@ -64,26 +57,9 @@ def make_plan(
 ) -> Plan:
     """Settle the settings of a run, from the arguments and, where they are None, from the scene's [run] section.
 
-    Args:
-        ensemble: The members.
-        method: A name or a Method; where the scene has none either, and no options of one, it is chosen by what acts.
-        h: Step [s].
-        t1: End of the run [s].
-        save: Which samples to save, and when.
-        dtype: "float64", "float32" or "float32_compensated".
-        width: Vehicles per packet; default from the CPU.
-        checks: "safe", "all" or "none".
-        on_failure: "freeze", "raise" or "substep".
-        fields: Function from the names of the fields that `save` asks for to those that the kernel writes; default the same.
-        survey_all: As of `Plan`; default True.
-        looks: As of `Plan`; default False.
-        read_at_looks: As of `Plan`; default None.
-
-    Returns:
-        The plan, with a fixed number of Newton steps where the method says iterations="auto".
-
-    Raises:
-        SceneError: If settings are missing or at fault.
+    h: Step [s].
+    t1: End of the run [s].
+    read_at_looks: As of `Plan`; default None.
     """
     settings = ensemble.scene.run
     h = settings.step if h is None else h
@@ -135,12 +111,7 @@ def make_plan(
 def fields_of(save: SaveAt | None, settings: RunSettings) -> tuple[str, ...]:
     """Names of the samples that a run keeps.
 
-    Args:
-        save: What the call says; None where it says nothing.
-        settings: What the scene says.
-
-    Returns:
-        The names of the call, else those of the scene, else those of the motion.
+    save: What the call says; None where it says nothing.
     """
     if save is not None:
         return save.fields
@@ -156,14 +127,8 @@ def enough_iterations(ensemble: Ensemble, method: Method, h: float, dtype: str) 
 
     The residual after a fixed number grows with h |Omega|: twice the step leaves room for members that spin up.
 
-    Args:
-        ensemble: The members, which are run for one step, of twice the length, from their starts.
-        method: The method, whose own `iterations` is ignored.
-        h: Step of the run [s].
-        dtype: Number type of the run.
-
-    Returns:
-        The number of Newton steps, or None if more than MOST_FIXED would be needed.
+    h: Step of the run [s].
+    Returns: The number of Newton steps, or None if more than MOST_FIXED would be needed.
     """
     for n in range(MOST_FIXED + 1):
         fixed = replace(method, iterations=n)

@@ -47,15 +47,7 @@ class Sizes:
 
 
 def sizes(plan: Plan, statistics: Sequence[Statistic]) -> Sizes:
-    """Measure the sizes of statistics in a run.
-
-    Args:
-        plan: The plan, compiled.
-        statistics: The statistics.
-
-    Returns:
-        The sizes, extrapolated to all sample times of the plan.
-    """
+    """Measure the sizes of statistics in a run."""
     times, runs = len(plan.grid.times), blocks(plan.ensemble.members)
     if not statistics:
         return Sizes()

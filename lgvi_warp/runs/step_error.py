@@ -60,14 +60,7 @@ class Rates:
 
 @np.errstate(over="ignore", invalid="ignore")
 def rates(ensemble: Ensemble) -> Rates:
-    """Find the rates of the first members under way.
-
-    Args:
-        ensemble: The members.
-
-    Returns:
-        The rates.
-    """
+    """Find the rates of the first members under way."""
     members = ensemble.select(0, min(LOOKED_AT, ensemble.members))
     p, terms = members.parameters, damping_terms(ensemble.scene.terms)
     known = all(type(term).braking is not Term.braking for term in terms)
@@ -85,13 +78,7 @@ def rates(ensemble: Ensemble) -> Rates:
 def braking(ensemble: Ensemble, terms: list[Any], members: Members) -> np.ndarray:
     """Damping of the members at the larger of their speeds at the start and of those that their drive brings.
 
-    Args:
-        ensemble: The ensemble.
-        terms: Its terms that brake.
-        members: Its first members.
-
-    Returns:
-        Matrices (n, 6, 6) [N s/m, N s, N m s].
+    Returns: Matrices (n, 6, 6) [N s/m, N s, N m s].
     """
     p = members.parameters
 
@@ -114,12 +101,8 @@ def braking(ensemble: Ensemble, terms: list[Any], members: Members) -> np.ndarra
 def drive(term: Any, numbers: dict[str, np.ndarray]) -> np.ndarray:
     """Force and torque with which a term drives each member, by the member's own numbers.
 
-    Args:
-        term: The term.
-        numbers: Its numbers by field, of shape (1, ...) or (n, ...).
-
-    Returns:
-        Sizes (1 or n, 6) [N, N m].
+    numbers: Its numbers by field, of shape (1, ...) or (n, ...).
+    Returns: Sizes (1 or n, 6) [N, N m].
     """
     varied = {name: values for name, values in numbers.items() if len(values) > 1}
     if type(term).drive is Term.drive or not varied:
@@ -137,13 +120,10 @@ def drive(term: Any, numbers: dict[str, np.ndarray]) -> np.ndarray:
 def terminal_speeds(force: np.ndarray, linear: np.ndarray, quadratic: np.ndarray) -> np.ndarray:
     """Speeds at which drag along an axis balances a force.
 
-    Args:
-        force: Sizes of force and torque, (n, 6) [N, N m].
-        linear: Linear drag, (n, 6) [N s/m, N m s].
-        quadratic: Quadratic drag, (n, 6) [N s2/m2, N m s2].
-
-    Returns:
-        Speeds (n, 6) [m/s, rad/s]; 0 where nothing brakes.
+    force: Sizes of force and torque, (n, 6) [N, N m].
+    linear: Linear drag, (n, 6) [N s/m, N m s].
+    quadratic: Quadratic drag, (n, 6) [N s2/m2, N m s2].
+    Returns: Speeds (n, 6) [m/s, rad/s]; 0 where nothing brakes.
     """
     root = linear + np.sqrt(linear**2 + 4.0 * np.maximum(quadratic, 0.0) * force)
     return np.divide(2.0 * force, root, out=np.zeros(np.broadcast_shapes(force.shape, root.shape)), where=root > 0.0)
@@ -152,13 +132,9 @@ def terminal_speeds(force: np.ndarray, linear: np.ndarray, quadratic: np.ndarray
 def modes(inertia: np.ndarray, damping: np.ndarray, members: Members) -> np.ndarray:
     """Rates of the motion linearised about the start: velocity, rate, and the attitude, which the restoring moment turns back.
 
-    Args:
-        inertia: Mass matrices about the user's origin (1 or n, 6, 6) [kg, kg m, kg m2].
-        damping: Damping (1 or n, 6, 6) [N s/m, N s, N m s].
-        members: The members.
-
-    Returns:
-        Rates (n, 10), complex [1/s]: of the nine modes, and of the turning itself.
+    inertia: Mass matrices about the user's origin (1 or n, 6, 6) [kg, kg m, kg m2].
+    damping: Damping (1 or n, 6, 6) [N s/m, N s, N m s].
+    Returns: Rates (n, 10), complex [1/s]: of the nine modes, and of the turning itself.
     """
     v, w = members.velocity, members.angular_velocity
     n = len(v)
@@ -187,14 +163,9 @@ def modes(inertia: np.ndarray, damping: np.ndarray, members: Members) -> np.ndar
 def path_error(method: Method, found: Rates, h: float, t1: float) -> float:
     """Estimate how far a method is off.
 
-    Args:
-        method: The method.
-        found: Rates of the scene.
-        h: Step [s].
-        t1: End [s].
-
-    Returns:
-        Largest error in position over the length of the path, about [1]; infinite where the step is unstable.
+    h: Step [s].
+    t1: End [s].
+    Returns: Largest error in position over the length of the path, about [1]; infinite where the step is unstable.
     """
     if not np.isfinite(found.modes).all():
         return math.inf

@@ -17,19 +17,7 @@ from lgvi_warp.scene.scene import Scene
 
 
 def plans_of(scene: Scene, methods: Sequence[str], dtypes: Sequence[str]) -> list[Plan]:
-    """Plan the runs of a scene by some methods and precisions.
-
-    Args:
-        scene: The scene.
-        methods: Names; none for the scene's own.
-        dtypes: Names of precisions; none for the scene's own.
-
-    Returns:
-        One plan for each kernel that these runs take.
-
-    Raises:
-        SceneError: The scene cannot run, or refuses a method or precision.
-    """
+    """Plan the runs of a scene by some methods and precisions."""
     ensemble = Ensemble.from_scene(scene)
     plans: dict[tuple[str, str], Plan] = {}
     for method in methods or (None,):
@@ -40,19 +28,7 @@ def plans_of(scene: Scene, methods: Sequence[str], dtypes: Sequence[str]) -> lis
 
 
 def warm(plans: Sequence[Plan], workers: int) -> Iterator[tuple[Plan, Phases]]:
-    """Compile the kernels of some plans into Warp's cache.
-
-    Args:
-        plans: The plans.
-        workers: Number of processes; with one, or for one kernel, this process compiles.
-
-    Yields:
-        A plan whose kernel is in the cache, and how long its phases took.
-
-    Raises:
-        SceneError: The device code of a user's law does not compile.
-        OSError: The kernel cache cannot be written.
-    """
+    """Compile the kernels of some plans into Warp's cache."""
     workers = min(workers, len(plans))
     if workers < 2:
         for plan in plans:

@@ -16,15 +16,7 @@ from lgvi_warp.scene.variations import MATRICES, Target, Variation, targets
 
 
 def names_of(faults: Faults, vary: Any) -> tuple[str, ...]:
-    """Check and normalise a list of names without distributions.
-
-    Args:
-        faults: takes what is no list of names, and names that occur twice.
-        vary: a name or a list of names.
-
-    Returns:
-        The names in their usual spelling; none after a fault.
-    """
+    """Check and normalise a list of names without distributions."""
     listed = [vary] if isinstance(vary, str) else vary
     if not isinstance(listed, Sequence) or not listed or not all(isinstance(name, str) for name in listed):
         remedy = 'give {"vehicle.mass": lw.Normal(...)} or a list of names, ["vehicle.mass", "start.position[2]"]'
@@ -37,28 +29,13 @@ def names_of(faults: Faults, vary: Any) -> tuple[str, ...]:
 
 
 def as_given(fleet: Ensemble) -> list[Variation]:
-    """List what varies in the order of `vary`, and then what the sampling itself varies.
-
-    Args:
-        fleet: the ensemble.
-
-    Returns:
-        Its variations.
-    """
+    """List what varies in the order of `vary`, and then what the sampling itself varies."""
     place = {key: number for number, key in enumerate(fleet.vary)}
     return sorted(fleet.variations, key=lambda variation: place.get(variation.key, len(place)))
 
 
 def columns_of(space: Space, key: str) -> range:
-    """Find the columns of the cube that belong to a key.
-
-    Args:
-        space: the cube of an ensemble.
-        key: of a variation.
-
-    Returns:
-        Range of its columns.
-    """
+    """Find the columns of the cube that belong to a key."""
     place = space.keys.index(key)
     first = sum(space.sizes[:place])
     return range(first, first + space.sizes[place])
@@ -69,14 +46,8 @@ def whole_columns(
 ) -> dict[str, np.ndarray]:
     """Select one column for each name from data given by label.
 
-    Args:
-        faults: takes labels that are missing, unknown or doubled, and columns that are no numbers.
-        names: of the model's columns, such as "current.velocity[0]".
-        scene: the scene's numbers by name.
-        given: label -> (n,), or (n, *shape) of a whole number that the names hold the entries of.
-
-    Returns:
-        Name -> column (n,); empty after a fault.
+    given: label -> (n,), or (n, *shape) of a whole number that the names hold the entries of.
+    Returns: Name -> column (n,); empty after a fault.
     """
     columns: dict[str, np.ndarray] = {}
     labels: list[str] = []
@@ -129,14 +100,8 @@ def _entries(
 def stacked(faults: Faults, key: str, names: Sequence[str], columns: Mapping[str, np.ndarray]) -> np.ndarray | None:
     """Put the columns side by side in the order of the names.
 
-    Args:
-        faults: takes columns of different lengths.
-        key: name of the argument in the message.
-        names: of the columns.
-        columns: name -> column (n,).
-
-    Returns:
-        Array (n, d); None after a fault.
+    columns: name -> column (n,).
+    Returns: Array (n, d); None after a fault.
     """
     shapes = {name: columns[name].shape for name in names}
     if all(len(shape) == 1 for shape in shapes.values()) and len(set(shapes.values())) == 1:

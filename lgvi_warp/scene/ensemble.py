@@ -648,15 +648,7 @@ Found = TypeVar("Found")
 
 
 def over_members(look: Callable[[int, int], Found], members: int) -> list[Found]:
-    """Apply a function to all members, some at a time so that memory stays small, on all cores.
-
-    Args:
-        look: Function of the first member and the one after the last.
-        members: Number of members.
-
-    Returns:
-        The function's results, in the order of the members.
-    """
+    """Apply a function to all members, some at a time so that memory stays small, on all cores."""
     firsts = range(0, members, AT_ONCE)
     if len(firsts) < 2:
         return [look(0, members)] if members else []
@@ -785,15 +777,7 @@ def _given_parameters(faults: Faults, base: Mapping[str, np.ndarray], given: Any
 
 
 def check_names(vary: Mapping[str, Any], parameters: Sequence[str]) -> None:
-    """Check that a scene has the names that vary.
-
-    Args:
-        vary: Distributions by name.
-        parameters: Names of the scene's parameters.
-
-    Raises:
-        SceneError: If a name is not among them and is none of the start; the message lists every such name.
-    """
+    """Check that a scene has the names that vary."""
     faults = Faults("ensemble.vary.")
     known = [*parameters, *(f"start.{name}" for name in NAMES)]
     for key, distribution in vary.items():

@@ -18,36 +18,14 @@ from lgvi_warp.common.toml_text import parsed
 
 
 def tables_of_file(path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """Read the tables of a scene file (TOML).
-
-    Args:
-        path: Path of the file.
-        overrides: Values by dotted key ("vehicle.mass") that replace those of the file; by default none.
-
-    Returns:
-        Tables by section name.
-
-    Raises:
-        SceneError: If the file cannot be read, is no TOML, or an override does not fit.
-    """
+    """Read the tables of a scene file (TOML)."""
     return tables_and_text(path, overrides)[0]
 
 
 def tables_and_text(
     path: str | os.PathLike[str], overrides: Mapping[str, Any] | None = None
 ) -> tuple[dict[str, Any], str]:
-    """Read a scene file (TOML) as tables and as it was written.
-
-    Args:
-        path: Path of the file.
-        overrides: Values by dotted key ("vehicle.mass") that replace those of the file in the tables; by default none.
-
-    Returns:
-        Tables by section name, and the text of the file.
-
-    Raises:
-        SceneError: If the file cannot be read, is no TOML, or an override does not fit.
-    """
+    """Read a scene file (TOML) as tables and as it was written."""
     text = file_text(path, "scene file")
     return tables_of_text(text, overrides, os.fspath(path), path_of("path", path).parent), text
 
@@ -57,17 +35,7 @@ def tables_of_text(
 ) -> dict[str, Any]:
     """Read the tables of the text of a scene file (TOML).
 
-    Args:
-        text: Content of a scene file.
-        overrides: Values by dotted key ("vehicle.mass") that replace those of the text; by default none.
-        name: Name of the text in messages; by default "scene".
-        folder: Folder that relative paths in the text refer to; None for the current one (default).
-
-    Returns:
-        Tables by section name.
-
-    Raises:
-        SceneError: If the text is no TOML, or an override does not fit.
+    folder: Folder that relative paths in the text refer to; None for the current one (default).
     """
     content = parsed(text, name)
     given = {} if overrides is None else mapping_of("overrides", overrides, "dotted keys to values")
@@ -80,9 +48,6 @@ def _files_in(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
     """Return the content with the paths of files that it names, where they are relative, put below the folder.
 
     These are a table of members, the policies of a controller, and the mesh of a vehicle.
-
-    Raises:
-        SceneError: The mesh lies outside the folder, or is not there.
     """
     try:
         ensemble = content["ensemble"]
@@ -128,16 +93,7 @@ def _mesh_in(folder: Path, name: str) -> str:
 
 
 def override(content: dict[str, Any], key: str, value: Any) -> None:
-    """Set the value of a dotted key in the tables of a scene file, in place.
-
-    Args:
-        content: Tables by section name; changed in place.
-        key: Dotted key, such as vehicle.mass or ensemble.members.
-        value: The new value. A text is read as a TOML value where it is one, else it is taken as a text.
-
-    Raises:
-        SceneError: If the key is not dotted, its section is no table, or the text holds several values.
-    """
+    """Set the value of a dotted key in the tables of a scene file, in place."""
     section, _, rest = key.partition(".") if isinstance(key, str) else ("", "", "")
     if isinstance(value, str) and rest:
         value = _value_of(key, value)
@@ -170,15 +126,6 @@ def with_named_vehicle(content: Mapping[str, Any]) -> Mapping[str, Any]:
     """Insert the vehicle that [vehicle] name = "remus_100" refers to.
 
     Keys beside the name replace the vehicle's own values. A term of the same name or type replaces the vehicle's term.
-
-    Args:
-        content: Tables by section name.
-
-    Returns:
-        The tables with the vehicle, its terms and its water; the argument itself if it names no vehicle.
-
-    Raises:
-        SceneError: If no vehicle has that name, or the content is no table.
     """
     if not isinstance(content, Mapping):
         raise refusal("scene", content, "is no table", "give tables by section name, as of a scene file")

@@ -19,9 +19,7 @@ from lgvi_warp.statistics.quantity import Quantity
 class Own(NamedTuple):
     """A function or a class of the user's.
 
-    Args:
-        function: it itself.
-        version: what the user says it is; None where nothing is said.
+    version: what the user says it is; None where nothing is said.
     """
 
     function: Any
@@ -31,12 +29,7 @@ class Own(NamedTuple):
 def functions_of(fleet: Ensemble | None, statistics: Iterable[Statistic] = ()) -> dict[str, Own]:
     """List the user's functions and classes that a run depends on, which no table can hold.
 
-    Args:
-        fleet: the members; None for statistics alone.
-        statistics: what is gathered.
-
-    Returns:
-        Each by its place, as "laws.callback"; empty for a run of what the package has.
+    fleet: the members; None for statistics alone.
     """
     found = {} if fleet is None else dict(_of_fleet(fleet))
     for i, statistic in enumerate(statistics):
@@ -47,11 +40,7 @@ def functions_of(fleet: Ensemble | None, statistics: Iterable[Statistic] = ()) -
 
 
 def identities(found: dict[str, Own]) -> dict[str, str]:
-    """Return which functions these are, by place.
-
-    Args:
-        found: what `functions_of` lists.
-    """
+    """Return which functions these are, by place."""
     return {place: identity(*own) for place, own in found.items()}
 
 
@@ -63,11 +52,7 @@ class ToldApart:
         self._names: dict[tuple[Any, ...], tuple[Own, tuple[str, int]]] = {}
 
     def name(self, own: Own) -> tuple[str, int]:
-        """Return what a function is, as it was when it was met first, and which one of its kind in this call.
-
-        Args:
-            own: the function.
-        """
+        """Return what a function is, as it was when it was met first, and which one of its kind in this call."""
         function = own.function
         parts = (function.__self__, function.__func__) if isinstance(function, MethodType) else (function,)
         key = (*map(id, parts), own.version)

@@ -65,15 +65,7 @@ class SceneLike(Protocol):
         """Remember that the ensemble of `ensemble_settings` is sound."""
 
     def parameters(self) -> dict[str, np.ndarray]:
-        """Return every number that may vary from member to member.
-
-        Returns:
-            Values by name, such as "vehicle.mass".
-        """
+        """Return every number that may vary from member to member."""
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the scene as tables in the form of a scene file.
-
-        Returns:
-            Tables by section name.
-        """
+        """Return the scene as tables in the form of a scene file."""

@@ -24,13 +24,8 @@ SETTINGS = ("controller.period", "run.step", "run.duration")
 def with_numbers(scene: SceneT, numbers: Mapping[str, Any]) -> SceneT:
     """Return a scene with other numbers.
 
-    Args:
-        scene: the scene.
-        numbers: values by name, as scene.parameters() lists them; also "start.position", "controller.period", "run.step" and
-            "run.duration", and single entries, "drag.quadratic[0]".
-
-    Raises:
-        SceneError: a name is not known, or a value does not fit.
+    numbers: values by name, as scene.parameters() lists them; also "start.position", "controller.period", "run.step" and
+        "run.duration", and single entries, "drag.quadratic[0]".
     """
     base, faults = scene.parameters(), Faults()
     changes: dict[str, dict[str, Any]] = {}

@@ -11,14 +11,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Odd:
-    """How many members have an odd value of one quantity.
-
-    Args:
-        text: Sentence about the first member that has an odd value.
-        first: Index of that member.
-        count: Number of members with an odd value.
-        shared: True if all members share one value.
-    """
+    """How many members have an odd value of one quantity."""
 
     text: str
     first: int
@@ -28,11 +21,7 @@ class Odd:
 
 @dataclass(frozen=True)
 class Oddities:
-    """Odd values by quantity; `a | b` joins those of members `a` with those of members `b` after them.
-
-    Args:
-        found: Odd values by name of the quantity.
-    """
+    """Odd values by quantity; `a | b` joins those of members `a` with those of members `b` after them."""
 
     found: Mapping[str, Odd]
 
@@ -46,12 +35,7 @@ class Oddities:
     def messages(self, members: int, most: int | None = None) -> tuple[str, ...]:
         """Return one sentence for each odd quantity.
 
-        Args:
-            members: Number of members of the ensemble.
-            most: Number of members that were looked at; None for all (default).
-
-        Returns:
-            Sentences that end with the number of members concerned.
+        most: Number of members that were looked at; None for all (default).
         """
         return tuple(f"{key}: {odd.text}{_whose(odd, members, most)}" for key, odd in self.found.items())
 
@@ -72,14 +56,8 @@ Look = tuple[str, np.ndarray, Callable[[int], str]]
 def gathered(looks: Iterable[Look], first: int, stop: int) -> Oddities:
     """Count the odd values of the members first to stop - 1.
 
-    Args:
-        looks: For each check the name of a quantity, the members that are odd (1,) or (n,), and the text about one
-            member. Where several checks bear one name, the first that finds an odd member counts.
-        first: Index of the first member.
-        stop: Index after the last member.
-
-    Returns:
-        Odd values by name of the quantity.
+    looks: For each check the name of a quantity, the members that are odd (1,) or (n,), and the text about one member. Where
+        several checks bear one name, the first that finds an odd member counts.
     """
     odd_by_name: dict[str, Odd] = {}
     for key, odd, text in looks:

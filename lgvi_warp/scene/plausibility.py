@@ -29,13 +29,7 @@ Numbers = Mapping[str, np.ndarray]
 
 
 class Limit(NamedTuple):
-    """A bound beyond which a value is odd.
-
-    Args:
-        value: The bound, in `unit`.
-        unit: Its unit.
-        reason: Why a value beyond it is odd.
-    """
+    """A bound beyond which a value is odd."""
 
     value: float
     unit: str
@@ -81,12 +75,7 @@ def _text(template: str, *numbers: np.ndarray) -> Callable[[int], str]:
 def net_weight(scene: SceneLike, p: Numbers) -> Iterator[Look]:
     """Look for a net weight that hardly any vehicle has.
 
-    Args:
-        scene: The scene of all members.
-        p: Parameters by name, (1, ...) or (n, ...).
-
-    Yields:
-        Name of the quantity, mask of the odd members, and the text about one of them.
+    p: Parameters by name, (1, ...) or (n, ...).
     """
     weight, buoyancy = np.broadcast_arrays(vehicles.weight(p), p["vehicle.buoyancy"])
     net = weight - buoyancy
@@ -102,12 +91,7 @@ def net_weight(scene: SceneLike, p: Numbers) -> Iterator[Look]:
 def density(scene: SceneLike, p: Numbers) -> Iterator[Look]:
     """Look for a density that water cannot have.
 
-    Args:
-        scene: The scene of all members.
-        p: Parameters by name, (1, ...) or (n, ...).
-
-    Yields:
-        Name of the quantity, mask of the odd members, and the text about one of them.
+    p: Parameters by name, (1, ...) or (n, ...).
     """
     rho = p["environment.water_density"]
     odd = (rho < LIMITS["light water"].value) | (rho > LIMITS["heavy water"].value)
@@ -117,12 +101,7 @@ def density(scene: SceneLike, p: Numbers) -> Iterator[Look]:
 def currents(scene: SceneLike, p: Numbers) -> Iterator[Look]:
     """Look for currents that are faster than any tide.
 
-    Args:
-        scene: The scene of all members.
-        p: Parameters by name, (1, ...) or (n, ...).
-
-    Yields:
-        Name of the quantity, mask of the odd members, and the text about one of them.
+    p: Parameters by name, (1, ...) or (n, ...).
     """
     for term in scene.terms:
         field = CURRENTS.get(term.type)
@@ -136,12 +115,7 @@ def currents(scene: SceneLike, p: Numbers) -> Iterator[Look]:
 def fin_angles(scene: SceneLike, p: Numbers) -> Iterator[Look]:
     """Look for fins that turn beyond 90 degrees, by their limit or by their command.
 
-    Args:
-        scene: The scene of all members.
-        p: Parameters by name, (1, ...) or (n, ...).
-
-    Yields:
-        Name of the quantity, mask of the odd members, and the text about one of them.
+    p: Parameters by name, (1, ...) or (n, ...).
     """
     for term in scene.terms:
         if not isinstance(term, ControlFins):
@@ -158,12 +132,8 @@ def fin_angles(scene: SceneLike, p: Numbers) -> Iterator[Look]:
 def depths(scene: SceneLike, p: Numbers) -> Iterator[Look]:
     """Look for depths above the surface: most likely they are heights.
 
-    Args:
-        scene: The scene of all members.
-        p: Parameters by name, (1, ...) or (n, ...).
-
-    Yields:
-        Name of the quantity, mask of the odd members, and the text about one of them. A table of depths is odd if it
+    p: Parameters by name, (1, ...) or (n, ...).
+    Yields: Name of the quantity, mask of the odd members, and the text about one of them. A table of depths is odd if it
         begins above the surface and holds no depth below it.
     """
     for term in scene.parts:
@@ -182,12 +152,7 @@ def inertia(scene: SceneLike, p: Numbers) -> Iterator[Look]:
     coordinate is at most a quarter of its range squared (Popoviciu 1935), so that the rigid body's inertia is at most
     m (L^2 + D^2)/4. Added inertia is that of strips: at most the added mass times the largest distance squared.
 
-    Args:
-        scene: The scene of all members.
-        p: Parameters by name, (1, ...) or (n, ...).
-
-    Yields:
-        Name of the quantity, mask of the odd members, and the text about one of them.
+    p: Parameters by name, (1, ...) or (n, ...).
     """
     for term in scene.terms:
         if isinstance(term, CrossFlow):
@@ -219,12 +184,7 @@ def _diagonal(matrices: np.ndarray) -> np.ndarray:
 def actuators(scene: SceneLike, p: Numbers) -> Iterator[Look]:
     """Look for components of a force or a moment that a controller asks for, and its actuators cannot make.
 
-    Args:
-        scene: The scene of all members.
-        p: Parameters by name, (1, ...) or (n, ...).
-
-    Yields:
-        Name of the list, a mask of one number, and the text.
+    p: Parameters by name, (1, ...) or (n, ...).
     """
     missing = () if scene.controller is None else scene.controller.unspanned
     text = f"actuators cannot make {', '.join(missing)} as the laws ask: what is left is told back to them as not delivered"
@@ -244,16 +204,8 @@ def of_numbers(
 ) -> Oddities:
     """Return the odd parameters of some members.
 
-    Args:
-        scene: The scene of all members.
-        p: Parameters by name, of 1 (shared) or of stop - first members.
-        first: Index of the first member.
-        stop: Index after the last member.
-        once: Function of a key, numbers and a computation of them, which may remember what all members share; by default
-            it computes each time.
-
-    Returns:
-        Odd values by name.
+    once: Function of a key, numbers and a computation of them, which may remember what all members share; by default it
+        computes each time.
     """
     with np.errstate(all="ignore"):
         looks = [once(check, p, functools.partial(_looks, check, scene)) for check in OF_NUMBERS]
@@ -265,14 +217,7 @@ def _looks(check: Callable[[SceneLike, Numbers], Iterator[Look]], scene: SceneLi
 
 
 def of_ensemble(ensemble: Ensemble) -> Oddities:
-    """Return the odd parameters and starts of all members.
-
-    Args:
-        ensemble: The ensemble; its members are drawn some at a time so that memory stays small.
-
-    Returns:
-        Odd values by name.
-    """
+    """Return the odd parameters and starts of all members."""
 
     def look(first: int, stop: int) -> Oddities:
         members = ensemble.select(first, stop)
@@ -282,16 +227,7 @@ def of_ensemble(ensemble: Ensemble) -> Oddities:
 
 
 def of_start(scene: SceneLike, members: Members, first: int = 0) -> Oddities:
-    """Return the odd starts of some members, and the odd velocities of water that user-defined terms give there.
-
-    Args:
-        scene: The scene of all members.
-        members: Their numbers and states, as Ensemble.select gives them.
-        first: Index of the first member; by default 0.
-
-    Returns:
-        Odd values by name.
-    """
+    """Return the odd starts of some members, and the odd velocities of water that user-defined terms give there."""
     with np.errstate(all="ignore"):
         return gathered(_of_start(scene, members), first, first + members.count)
 
@@ -314,26 +250,13 @@ def own_flows(scene: SceneLike) -> list[Term]:
     """Return the user-defined terms that move the water.
 
     Waves are left out, too: in waves, water may be faster than in any current.
-
-    Args:
-        scene: The scene.
-
-    Returns:
-        The terms.
     """
     known = (*CURRENTS, "waves")
     return [term for term in scene.terms if term.type not in known and type(term).water is not Term.water]
 
 
 def ends_at_the_surface(scene: SceneLike) -> bool:
-    """Return whether an event stops a member that rises through the surface.
-
-    Args:
-        scene: The scene.
-
-    Returns:
-        True with an event of type "surface", or with a box that does not reach above the surface.
-    """
+    """Return whether an event stops a member that rises through the surface."""
     boxes = (event.lower[2] for event in scene.events if event.type == "box")
     return any(event.type == "surface" for event in scene.events) or any(top >= 0.0 for top in boxes)
 
@@ -341,12 +264,7 @@ def ends_at_the_surface(scene: SceneLike) -> bool:
 def on_the_way(scene: SceneLike, samples: Mapping[str, np.ndarray]) -> Oddities:
     """Return what became odd of members that began well, by samples that are in memory anyway.
 
-    Args:
-        scene: The scene of all members.
-        samples: "position" and "velocity", (k, n, 3) [m, m/s], of which the first is the start.
-
-    Returns:
-        Odd values by name; none where there are no such samples.
+    samples: "position" and "velocity", (k, n, 3) [m, m/s], of which the first is the start.
     """
     limit = LIMITS["speed"].value
     with np.errstate(all="ignore"):

@@ -287,33 +287,12 @@ SECTIONS = ("vehicle", "environment", "start", "ensemble", "run", "terms", "even
 
 
 def loads(text: str, overrides: Mapping[str, Any] | None = None) -> Scene:
-    """Build a scene from the text of a scene file (TOML).
-
-    Args:
-        text: Content of a scene file.
-        overrides: Values by dotted key ("vehicle.mass") that replace those of the text; by default none.
-
-    Returns:
-        The scene.
-
-    Raises:
-        SceneError: If anything is wrong; the message lists every fault.
-    """
+    """Build a scene from the text of a scene file (TOML)."""
     return from_dict(tables_of_text(text, overrides))
 
 
 def from_dict(content: Mapping[str, Any]) -> Scene:
-    """Build a scene from the tables of a scene file.
-
-    Args:
-        content: Tables by section name.
-
-    Returns:
-        The scene.
-
-    Raises:
-        SceneError: If anything is wrong; the message lists every fault.
-    """
+    """Build a scene from the tables of a scene file."""
     content = with_named_vehicle(content)
     faults = Faults()
     faults.keys("", content, SECTIONS)

@@ -33,11 +33,7 @@ WORDS = {"float": "number", "int": "integer", "str": "string", "bool": "boolean"
 
 
 def schema() -> Schema:
-    """Describe scene files.
-
-    Returns:
-        A JSON schema (draft 2020-12) of the tables of a scene file; terms that were registered are in it.
-    """
+    """Describe scene files."""
     own_terms = {word: kind for word, kind in terms.TYPES.items() if word not in {term.type for term in terms.IMPLIED}}
     vary = {word: _table(kind) for word, kind in DISTRIBUTIONS.items() if word != UserDistribution.kind}
     vary |= {word: {"type": "object"} for word in (*SCIPY, ScipyDistribution.kind)}

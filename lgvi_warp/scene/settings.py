@@ -28,11 +28,8 @@ KEEP = ("all", "none", "failed")
 def check_keep(faults: Faults, key: str, keep: Any, members: int | None = None) -> None:
     """Check which members' samples are to be kept, and note what is wrong.
 
-    Args:
-        faults: Collects what is wrong.
-        key: Name of the setting in messages.
-        keep: "all", "none", "failed" (members that failed, not those that an event stopped), or indices of members.
-        members: Number of members, which every index must be below; None if it is not known yet (default).
+    keep: "all", "none", "failed" (members that failed, not those that an event stopped), or indices of members.
+    members: Number of members, which every index must be below; None if it is not known yet (default).
     """
     if isinstance(keep, str):
         faults.choice(key, keep, KEEP)
@@ -227,15 +224,8 @@ def section(
 ) -> dict[str, Any]:
     """Write the section [ensemble] of a scene file from settings that were checked.
 
-    Args:
-        members: Number of members; None where the sampling says it.
-        seed: Seed of the draws.
-        vary: Distributions by name.
-        sampling: How members are drawn.
-        indices: Indices of the members; None for all.
-
-    Returns:
-        The seed and every setting that differs from its default, by name.
+    members: Number of members; None where the sampling says it.
+    indices: Indices of the members; None for all.
     """
     content: dict[str, Any] = {} if members is None else {"members": int(members)}
     content["seed"] = int(seed)

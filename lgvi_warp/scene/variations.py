@@ -35,9 +35,7 @@ RIGID = ("vehicle.inertia", "vehicle.rigid_body_mass_matrix")
 class Target:
     """A number of the scene, or one entry of it.
 
-    Args:
-        name: Name of the number, such as "start.position".
-        index: Index of the entry; None for the whole number (default).
+    index: Index of the entry; None for the whole number (default).
     """
 
     name: str
@@ -49,26 +47,12 @@ class Target:
         return self.name if self.index is None else f"{self.name}[{','.join(map(str, self.index))}]"
 
     def of(self, whole: np.ndarray) -> np.ndarray:
-        """Return the target's value out of the whole number.
-
-        Args:
-            whole: Value of the number that the target names.
-
-        Returns:
-            That value, or its entry at `index`.
-        """
+        """Return the target's value out of the whole number."""
         return np.asarray(whole if self.index is None else whole[self.index])
 
 
 def targets(key: str) -> tuple[Target, ...]:
-    """Read the targets that a key names.
-
-    Args:
-        key: "vehicle.mass", "start.position[2]", or several of these with commas between.
-
-    Returns:
-        The targets, in the order of the key.
-    """
+    """Read the targets that a key names."""
     if not isinstance(key, str):
         raise refusal("vary", key, "is no name of a quantity", 'give names such as "vehicle.mass"')
     if len(key) > LONGEST_KEY:
@@ -85,14 +69,7 @@ def targets(key: str) -> tuple[Target, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Variation:
-    """One key of `vary`, with its distribution and the scene's values of what it draws.
-
-    Args:
-        key: The key as it was given.
-        distribution: The distribution.
-        targets: What the key names.
-        wholes: The scene's value of each target's number.
-    """
+    """One key of `vary`, with its distribution and the scene's values of what it draws."""
 
     key: str
     distribution: Any
@@ -120,11 +97,7 @@ class Variation:
         return int(self.distribution.size(bases)) if self.distribution.joint else max(1, bases[0].size)
 
     def labels(self) -> list[str]:
-        """Return a label of each factor of the sampling.
-
-        Returns:
-            One label for each entry that is drawn by itself; the key alone for a joint distribution.
-        """
+        """Return a label of each factor of the sampling."""
         (target, *_), (base, *_) = self.targets, self.bases
         if self.distribution.joint or base.ndim == 0:
             return [self.key]
@@ -137,11 +110,8 @@ class Variation:
     def values(self, u: np.ndarray) -> list[tuple[Target, np.ndarray]]:
         """Return the values of the targets at points of the unit cube.
 
-        Args:
-            u: Levels in (0, 1), (n, size).
-
-        Returns:
-            For each target the target and its values (n, *shape).
+        u: Levels in (0, 1), (n, size).
+        Returns: For each target the target and its values (n, *shape).
         """
         bases = self.bases
         if self.distribution.joint:
@@ -157,11 +127,7 @@ class Variation:
 def diagonal(matrix: np.ndarray) -> bool:
     """Return whether all entries off a matrix's diagonal are zero.
 
-    Args:
-        matrix: A square matrix (d, d).
-
-    Returns:
-        True for a diagonal matrix.
+    matrix: A square matrix (d, d).
     """
     return not np.any(matrix - np.diag(np.diag(matrix)))
 
@@ -169,11 +135,8 @@ def diagonal(matrix: np.ndarray) -> bool:
 def drawn_entries(whole: np.ndarray) -> np.ndarray:
     """Return the entries of a symmetric matrix that vary.
 
-    Args:
-        whole: A symmetric matrix (d, d).
-
-    Returns:
-        The diagonal (d,) of a diagonal matrix; else the upper triangle (d (d + 1)/2,), row by row.
+    whole: A symmetric matrix (d, d).
+    Returns: The diagonal (d,) of a diagonal matrix; else the upper triangle (d (d + 1)/2,), row by row.
     """
     return np.diag(whole) if diagonal(whole) else whole[np.triu_indices(len(whole))]
 
@@ -181,12 +144,9 @@ def drawn_entries(whole: np.ndarray) -> np.ndarray:
 def symmetric(drawn: np.ndarray, whole: np.ndarray) -> np.ndarray:
     """Build symmetric matrices from the entries that vary.
 
-    Args:
-        drawn: Entries (n, k), in the order of `drawn_entries`.
-        whole: The scene's matrix (d, d), which decides whether they are diagonal.
-
-    Returns:
-        Matrices (n, d, d).
+    drawn: Entries (n, k), in the order of `drawn_entries`.
+    whole: The scene's matrix (d, d), which decides whether they are diagonal.
+    Returns: Matrices (n, d, d).
     """
     size = len(whole)
     if diagonal(whole):
@@ -200,10 +160,8 @@ def symmetric(drawn: np.ndarray, whole: np.ndarray) -> np.ndarray:
 def put(values: dict[str, np.ndarray], target: Target, drawn: np.ndarray) -> None:
     """Set the values of a target among the numbers by name, in place.
 
-    Args:
-        values: Arrays by name, (1, ...) or (n, ...); changed in place.
-        target: What the values belong to. An entry of a symmetric matrix is set on both sides of the diagonal.
-        drawn: Values (n, ...).
+    values: Arrays by name, (1, ...) or (n, ...); changed in place.
+    drawn: Values (n, ...).
     """
     if target.index is None:
         values[target.name] = drawn
@@ -229,19 +187,7 @@ def _hint(name: str, known: Mapping[str, np.ndarray], also: str) -> str:
 def known_target(
     faults: Faults, key: str, distribution: Any, target: Target, known: Mapping[str, np.ndarray], also: str = ""
 ) -> bool:
-    """Check that the scene has a target, and note what is wrong.
-
-    Args:
-        faults: Collects what is wrong.
-        key: The key that names the target, for messages.
-        distribution: Its distribution, for messages.
-        target: What is to vary.
-        known: The scene's values by name.
-        also: Another remedy for a name that the scene does not have; by default none.
-
-    Returns:
-        True if the scene has the target.
-    """
+    """Check that the scene has a target, and note what is wrong."""
     if target.name not in known:
         remedy = functools.partial(_hint, target.name, known, also)
         faults.add(f'"{key}"', distribution, "does not name what the scene has", remedy)
@@ -267,14 +213,7 @@ ROTATIONS = (
 def variation(faults: Faults, key: str, distribution: Any, known: Mapping[str, np.ndarray]) -> Variation | None:
     """Match a key of `vary` and its distribution with a scene, and note what is wrong.
 
-    Args:
-        faults: Collects what is wrong.
-        key: The key.
-        distribution: The distribution.
-        known: The scene's values by name.
-
-    Returns:
-        The variation; None if anything is wrong.
+    Returns: The variation; None if anything is wrong.
     """
     if not isinstance(distribution, Distribution):
         remedy = "give lw.Normal(std=...) or another, or an object with ppf(u), such as scipy.stats.gamma(2.0)"
@@ -330,12 +269,7 @@ def _no_such_matrices(target: Target, values: np.ndarray) -> tuple[str, str] | N
 
 
 def clashes(faults: Faults, named: Iterable[tuple[str, tuple[Target, ...]]]) -> None:
-    """Note every number that is varied twice, by two keys or by one.
-
-    Args:
-        faults: Collects what is wrong.
-        named: Each key with its targets.
-    """
+    """Note every number that is varied twice, by two keys or by one."""
     taken: dict[str, list[tuple[tuple[int, ...] | None, str]]] = {}
     for key, wanted in named:
         for target in wanted:
@@ -350,15 +284,7 @@ def clashes(faults: Faults, named: Iterable[tuple[str, tuple[Target, ...]]]) -> 
 
 
 def space(seed: int, found: Sequence[Variation]) -> Space:
-    """Return the unit cube of the sampling points.
-
-    Args:
-        seed: Seed of the ensemble.
-        found: What varies.
-
-    Returns:
-        The cube, with its dimensions in the order of the keys.
-    """
+    """Return the unit cube of the sampling points."""
     ordered = sorted(found, key=lambda varied: varied.key)
     factors: list[tuple[str, tuple[int, ...]]] = []
     first = 0

@@ -96,13 +96,9 @@ class CircularMean(Statistic):
     ) -> dict[str, np.ndarray]:
         """Intervals of the mean direction and of the resultant length.
 
-        Args:
-            value: (k, d) [rad], the mean direction.
-            length: (k, d), the resultant length.
-            errors: standard errors (k, d) of the mean of (cosine, sine) across and along its direction, and of its
-                length.
-            factor: number of standard errors in half an interval of the direction.
-            factor_of_length: the same of the length.
+        value: (k, d) [rad], the mean direction.
+        length: (k, d), the resultant length.
+        errors: standard errors (k, d) of the mean of (cosine, sine) across and along its direction, and of its length.
         """
         across, along, wide = errors
         error = across / np.where(length > 0.0, length, 1.0)

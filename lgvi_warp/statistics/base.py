@@ -359,20 +359,12 @@ class Statistic:
 
 
 def together(each: Sequence[Sequence[Part]]) -> list[Part]:
-    """Return the parts of all replicates in the order of the blocks.
-
-    Args:
-        each: the parts of each replicate.
-    """
+    """Return the parts of all replicates in the order of the blocks."""
     return [part for parts in zip(*each, strict=True) for part in parts]
 
 
 def plain(value: Any) -> Any:
-    """Return a value as TOML and JSON can hold it: lists for arrays, tables for statistics, names for functions.
-
-    Args:
-        value: a value of a statistic's argument.
-    """
+    """Return a value as TOML and JSON can hold it: lists for arrays, tables for statistics, names for functions."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if isinstance(value, list | tuple):
@@ -385,16 +377,7 @@ def plain(value: Any) -> Any:
 
 
 def from_list(given: Any, key: str = "statistics", *, whole: bool = True) -> tuple[Statistic, ...]:
-    """Return statistics from tables of a scene file, from `Statistic` objects, or from a mix of both.
-
-    Args:
-        given: a list of tables and objects.
-        key: name of the list in messages; by default "statistics".
-        whole: whether names must differ, which needs each statistic to say what it is of; by default True.
-
-    Raises:
-        SceneError: with every fault.
-    """
+    """Return statistics from tables of a scene file, from `Statistic` objects, or from a mix of both."""
     if isinstance(given, str | Mapping | Statistic) or not isinstance(given, Sequence):
         example = 'write [[run.statistics]] and type = "mean" below, or statistics=[lw.Mean("position")]'
         raise refusal(key, given, "is no list", example)
@@ -415,11 +398,7 @@ def from_list(given: Any, key: str = "statistics", *, whole: bool = True) -> tup
 
 
 def _from_table(where: str, given: Any) -> Statistic:
-    """Return the statistic of a table, or the statistic itself.
-
-    Raises:
-        SceneError: with every fault of the table.
-    """
+    """Return the statistic of a table, or the statistic itself."""
     if isinstance(given, Statistic):
         return given
     if not isinstance(given, Mapping):

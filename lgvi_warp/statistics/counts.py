@@ -37,11 +37,7 @@ class Counted(Statistic):
 
 
 def by_replicates(number: int) -> str:
-    """Return the text that says how an interval of a probability was formed.
-
-    Args:
-        number: number of replicates.
-    """
+    """Return the text that says how an interval of a probability was formed."""
     return f"Wilson with the variance and Student's t of {number} replicates"
 
 
@@ -410,12 +406,7 @@ class FirstPassage(Condition, Counted):
 
 
 def check_levels(faults: Faults, levels: Any) -> None:
-    """Note a fault if levels are no fractions between 0 and 1.
-
-    Args:
-        faults: the list that faults are added to.
-        levels: the fractions of members.
-    """
+    """Note a fault if levels are no fractions between 0 and 1."""
     numbers = faults.finite("levels", levels)
     if numbers is not None and (numbers.ndim != 1 or np.any(numbers <= 0.0) or np.any(numbers >= 1.0)):
         faults.add("levels", levels, "are no numbers between 0 and 1", "give (0.05, 0.5, 0.95)")
@@ -427,11 +418,9 @@ class Curve:
     A member that ends otherwise passes no more; if none does, this is Kaplan & Meier's curve (1958). A member that is lost
     is known up to the sample before, and is at risk in no later piece.
 
-    Args:
-        passed: (k, pieces), number of members that pass in each piece.
-        others: (k, pieces), number of members that end otherwise in each piece.
-        lost: (k,), number of members that are lost before each time.
-        total: number of all members.
+    passed: (k, pieces), number of members that pass in each piece.
+    others: (k, pieces), number of members that end otherwise in each piece.
+    lost: (k,), number of members that are lost before each time.
 
     Attributes:
         value: (k, pieces), estimated probability to have passed; the fraction of all members as long as none is lost.
@@ -442,11 +431,7 @@ class Curve:
 
     @classmethod
     def of(cls, part: Part) -> Curve:
-        """Return the curve of first passages.
-
-        Args:
-            part: the part of all members, of one replicate.
-        """
+        """Return the curve of first passages."""
         passed = part["passed"][0, :-1]
         others = np.zeros_like(passed)
         # They stop within the time before a sample: the last of its pieces counts them.
@@ -477,10 +462,9 @@ class Curve:
         Clopper & Pearson's limits; if none is lost, it is Jeffreys' Beta(m + 1/2, n - m + 1/2), and the number is that of
         all members. Where few are at risk the variance of Greenwood's kind is far too small.
 
-        Args:
-            n: (k, 1), members at risk at each time.
-            now: (k, pieces), members that passed since the time before.
-            so_far: (k, pieces), members that passed or ended otherwise since the time before.
+        n: (k, 1), members at risk at each time.
+        now: (k, pieces), members that passed since the time before.
+        so_far: (k, pieces), members that passed or ended otherwise since the time before.
         """
         # Means, variances and covariance of S, the probability to be under way, and of F, to have passed.
         size = n + 1.0
@@ -510,9 +494,8 @@ class Curve:
 
         After the last member at risk all that were lost may pass at once; without any member the interval is 0 to 1.
 
-        Args:
-            lower: (k, pieces), lower end.
-            upper: (k, pieces), upper end.
+        lower: (k, pieces), lower end.
+        upper: (k, pieces), upper end.
         """
         nobody = not self.risk[0]
         most = np.minimum(1.0, 1.0 - self._otherwise + (upper - self.value))

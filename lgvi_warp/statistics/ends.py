@@ -19,11 +19,9 @@ STOPPED, FAILED = "stopped", "failed"
 class Ends:
     """The ends of n members.
 
-    Args:
-        status: (n,), of `Status`.
-        event: (n,), number of the event that stopped each member, counted from 1; 0 for none.
-        time: (n,) [s], of the event or of the failure; the end of the run for the others.
-        events: what the events of the scene are called, in their order.
+    status: (n,), of `Status`.
+    event: (n,), number of the event that stopped each member, counted from 1; 0 for none.
+    time: (n,) [s], of the event or of the failure; the end of the run for the others.
     """
 
     status: np.ndarray
@@ -34,11 +32,7 @@ class Ends:
     def are(self, outcome: str) -> np.ndarray:
         """Which members had this outcome.
 
-        Args:
-            outcome: the name of an event of the scene, of a status, or "stopped" or "failed".
-
-        Returns:
-            (n,), true or false.
+        Returns: (n,), true or false.
         """
         if outcome in self.events:
             return np.asarray(self.event == 1 + self.events.index(outcome))
@@ -65,16 +59,7 @@ def outcomes(events: Iterable[str], statuses: Iterable[Status]) -> list[str]:
 
 
 def check_outcomes(key: str, asked: Sequence[str], known: Sequence[str]) -> None:
-    """Refuse outcomes that no member of a scene can have.
-
-    Args:
-        key: what asks for them.
-        asked: names of outcomes.
-        known: see `outcomes`.
-
-    Raises:
-        SceneError: with every name that is not known.
-    """
+    """Refuse outcomes that no member of a scene can have."""
     faults = Faults()
     for name in asked:
         if name not in known:

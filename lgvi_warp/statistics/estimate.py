@@ -36,12 +36,7 @@ SINCE = {"outcome": "alone", "first_passage": "stopped"}
 
 
 def along(names: Iterable[str], *dims: str) -> Dims:
-    """Return the same dimensions for several arrays.
-
-    Args:
-        names: names of the arrays.
-        *dims: names of their dimensions, in order.
-    """
+    """Return the same dimensions for several arrays."""
     return dict.fromkeys(names, dims)
 
 
@@ -151,11 +146,7 @@ class Estimate(Summarized):
 
 
 class Estimates(Summarized, Mapping[str, Estimate]):
-    """The estimates of a run by name, in the order of the statistics; "above 10.0" in a name is found as "above 10".
-
-    Args:
-        estimates: the estimates; by default none.
-    """
+    """The estimates of a run by name, in the order of the statistics; "above 10.0" in a name is found as "above 10"."""
 
     def __init__(self, estimates: Sequence[Estimate] = ()):
         self._found = {estimate.name: estimate for estimate in estimates}
@@ -201,11 +192,7 @@ class Estimates(Summarized, Mapping[str, Estimate]):
         return xr.merge(datasets, join="exact", compat="equals")
 
     def to_arrays(self) -> tuple[dict[str, np.ndarray], str]:
-        """Return the estimates in a form that a file can hold.
-
-        Returns:
-            Named arrays, and a JSON text of everything else.
-        """
+        """Return the estimates in a form that a file can hold."""
         arrays, words = dict[str, np.ndarray](), []
         for i, estimate in enumerate(self.values()):
             arrays |= {f"{i}/{name}": values for name, values in estimate.arrays.items()}
@@ -215,15 +202,7 @@ class Estimates(Summarized, Mapping[str, Estimate]):
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, np.ndarray], text: str) -> Estimates:
-        """Return the estimates that `to_arrays` has written.
-
-        Args:
-            arrays: the named arrays.
-            text: the JSON text.
-
-        Raises:
-            ValueError: an estimate is of an earlier version, in which its value meant something else.
-        """
+        """Return the estimates that `to_arrays` has written."""
         estimates = []
         for i, words in enumerate(parsed(text)):
             estimate_arrays = below(arrays, f"{i}/")

@@ -38,11 +38,7 @@ FUNCTIONS = (*OVER_TIME, "norm")
 class Functional:
     """A quantity with the functions applied to it.
 
-    Args:
-        label: the expression without spaces.
-        quantity: the innermost quantity.
-        functions: names of the functions, the innermost first; by default none.
-        entry: index of the component that is taken of the result; None (the default): all.
+    entry: index of the component that is taken of the result; None (the default): all.
     """
 
     label: str
@@ -111,12 +107,7 @@ class Functional:
     def __call__(self, samples: Fields, members: Members) -> np.ndarray:
         """Evaluate the expression.
 
-        Args:
-            samples: the samples of a block, of k times.
-            members: the n members of the block.
-
-        Returns:
-            float64: (k, n, size), or (n, size) if it reduces the path.
+        Returns: float64: (k, n, size), or (n, size) if it reduces the path.
         """
         if self.over_path:
             values = self.inner(samples, members).astype(np.float64, copy=False)
@@ -132,15 +123,7 @@ class Functional:
 
 
 def functional(key: str, of: Any) -> Functional:
-    """Return the expression that `of` gives.
-
-    Args:
-        key: the key that messages name.
-        of: an expression as text, a Quantity, or anything that `quantity` takes.
-
-    Raises:
-        SceneError: `of` is no expression, or names what is not known.
-    """
+    """Return the expression that `of` gives."""
     if isinstance(of, Functional):
         return of
     if not isinstance(of, str):
@@ -180,13 +163,7 @@ def _nested(text: str) -> tuple[list[str], str]:
 def quantity(key: str, of: Any) -> Quantity:
     """Return the quantity that `of` gives.
 
-    Args:
-        key: the key that messages name.
-        of: a name, a name with an index, a Quantity, a function of (samples, members), or a list of these, taken as one
-            quantity.
-
-    Raises:
-        SceneError: `of` gives no quantity.
+    of: a name, a name with an index, a Quantity, a function of (samples, members), or a list of these, taken as one quantity.
     """
     if isinstance(of, Quantity):
         return of
@@ -206,10 +183,6 @@ def quantity(key: str, of: Any) -> Quantity:
 
 
 def over_path(quantity: Quantity) -> Functional | None:
-    """Return the expression of a quantity that reduces the path; None for a quantity at each time.
-
-    Args:
-        quantity: a quantity.
-    """
+    """Return the expression of a quantity that reduces the path; None for a quantity at each time."""
     expression = quantity.function
     return expression if isinstance(expression, Functional) and expression.over_path else None

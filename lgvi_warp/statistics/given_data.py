@@ -15,13 +15,8 @@ FEWEST_BINS, MOST_BINS = 4, 64
 class Explained(NamedTuple):
     """What of an output one input explains.
 
-    Args:
-        share: first-order index, the share of the output's variance that the mean over this input explains: 0 to 1. The
-            estimate may be a little below 0.
-        lower: lower end of its interval.
-        upper: upper end of its interval.
-        p: probability of such an index if the input has no influence on the mean (F test).
-        slope: standardised coefficient of the linear regression on all inputs together: its sign says the direction.
+    share: first-order index, the share of the output's variance that the mean over this input explains: 0 to 1. The estimate
+        may be a little below 0.
     """
 
     share: float
@@ -38,13 +33,8 @@ def explained(inputs: Mapping[str, np.ndarray], y: np.ndarray, confidence: float
     that of all, less what chance alone puts between them (Kelley's epsilon squared, 1935); its interval is of the
     noncentral F distribution. Inputs are meant to be independent of one another.
 
-    Args:
-        inputs: numbers by name, (n,); members with one that is not finite are left out.
-        y: the output (n,), numbers or true and false.
-        confidence: confidence level, between 0 and 1.
-
-    Returns:
-        By name; NaN where the output or the input is the same for all members.
+    inputs: numbers by name, (n,); members with one that is not finite are left out.
+    y: the output (n,), numbers or true and false.
     """
     names, y = list(inputs), np.asarray(y, np.float64)
     X = np.stack([np.asarray(inputs[name], np.float64) for name in names]) if names else np.zeros((0, len(y)))

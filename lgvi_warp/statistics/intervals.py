@@ -9,14 +9,7 @@ import numpy as np
 
 
 def normal(confidence: float) -> float:
-    """Return half the width of a normal variable's central interval, in standard deviations.
-
-    Args:
-        confidence: confidence level, between 0 and 1.
-
-    Returns:
-        The quantile of the standard normal at 0.5 + 0.5 confidence.
-    """
+    """Return half the width of a normal variable's central interval, in standard deviations."""
     from scipy.special import ndtri
 
     return float(ndtri(0.5 + 0.5 * confidence))
@@ -25,12 +18,7 @@ def normal(confidence: float) -> float:
 def student(count: np.ndarray, confidence: float) -> np.ndarray:
     """Return half the width of a mean's interval in standard errors: Student's t of count - 1 degrees of freedom.
 
-    Args:
-        count: number of members, any shape.
-        confidence: confidence level, between 0 and 1.
-
-    Returns:
-        As count; infinite for fewer than two members.
+    count: number of members, any shape.
     """
     from scipy.special import stdtrit
 
@@ -39,31 +27,13 @@ def student(count: np.ndarray, confidence: float) -> np.ndarray:
 
 
 def about(value: np.ndarray, standard_error: np.ndarray, factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the interval value -+ factor standard errors.
-
-    Args:
-        value: the estimate.
-        standard_error: its standard error, in the same unit.
-        factor: number of standard errors in half the interval.
-
-    Returns:
-        Lower and upper end; -inf and inf where the factor is infinite.
-    """
+    """Return the interval value -+ factor standard errors."""
     half = np.where(np.isinf(factor), np.inf, np.where(np.isinf(factor), 0.0, factor) * standard_error)
     return value - half, value + half
 
 
 def of_logarithm(value: np.ndarray, standard_error: np.ndarray, factor: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the interval of a positive number from that of its logarithm: value exp(-+ factor standard_error / value).
-
-    Args:
-        value: the estimate, not below 0.
-        standard_error: its standard error, in the same unit.
-        factor: number of standard errors in half the interval.
-
-    Returns:
-        Lower and upper end; 0 and inf where the factor or the standard error is infinite.
-    """
+    """Return the interval of a positive number from that of its logarithm: value exp(-+ factor standard_error / value)."""
     open_ = (np.isinf(factor) | np.isinf(standard_error)) & ~np.isnan(value)
     some = (value > 0.0) & ~open_
     with np.errstate(over="ignore", invalid="ignore"):
@@ -77,15 +47,6 @@ def wilson(
     """Return the interval of a probability p0 that n trials estimated as p.
 
     It is where |p - p0| <= z sqrt(p0 (1 - p0) / n) (Wilson 1927).
-
-    Args:
-        probability: the fraction p of the trials.
-        count: number n of trials.
-        confidence: confidence level, between 0 and 1.
-        factor: z; by default that of the normal distribution.
-
-    Returns:
-        Lower and upper end; 0 and 1 without trials.
     """
     z2 = np.square(normal(confidence) if factor is None else factor)
     n = np.where(count > 0, count, 1.0)
@@ -103,14 +64,6 @@ def clopper_pearson(hits: np.ndarray, count: np.ndarray, confidence: float) -> t
     """Return the interval of a probability whose two tails are below half of 1 - confidence each (Clopper & Pearson 1934).
 
     It covers at least as often as it says, for any probability; so it is wider than Wilson's.
-
-    Args:
-        hits: number k of hits among the trials.
-        count: number n of trials.
-        confidence: confidence level, between 0 and 1.
-
-    Returns:
-        Lower and upper end; 0 and 1 without trials.
     """
     from scipy.special import betaincinv
 
@@ -122,12 +75,7 @@ def clopper_pearson(hits: np.ndarray, count: np.ndarray, confidence: float) -> t
 
 
 def none_of(count: int, confidence: float) -> float:
-    """Return the one-sided upper limit of a probability of which no hit was seen: 1 - (1 - confidence)^(1 / n).
-
-    Args:
-        count: number n of trials; 1 without trials.
-        confidence: confidence level, between 0 and 1.
-    """
+    """Return the one-sided upper limit of a probability of which no hit was seen: 1 - (1 - confidence)^(1 / n)."""
     return float(-np.expm1(np.log1p(-confidence) / count)) if count else 1.0
 
 
@@ -137,12 +85,8 @@ def of_replicates(each: np.ndarray, confidence: float) -> tuple[np.ndarray, np.n
     L'Ecuyer, Nakayama, Owen & Tuffin (2023): among the intervals for randomized quasi-Monte Carlo that they compare,
     none is more reliable.
 
-    Args:
-        each: (R, ...), the estimates.
-        confidence: confidence level, between 0 and 1.
-
-    Returns:
-        Standard error and half width (...); infinite where an estimate is missing.
+    each: (R, ...), the estimates.
+    Returns: Standard error and half width (...); infinite where an estimate is missing.
     """
     R = len(each)
     with np.errstate(invalid="ignore"):
@@ -160,15 +104,7 @@ def probability_of_replicates(
     may agree by chance. Where none or all of the members were counted there is no spread: the interval is that of
     `count` independent members.
 
-    Args:
-        probability: the fraction of all members.
-        each: (R, ...), the fraction of each replicate.
-        count: number of members.
-        confidence: confidence level, between 0 and 1.
-        least: number of members whose share is added to the standard error, in squares; by default 1.
-
-    Returns:
-        Lower and upper end; 0 and 1 where an estimate is missing.
+    each: (R, ...), the fraction of each replicate.
     """
     error, _ = of_replicates(each, confidence)
     error = np.hypot(error, least / np.maximum(count, 1))
@@ -182,13 +118,7 @@ def probability_of_replicates(
 def binomial_quantile(p: float | np.ndarray, n: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Return a quantile of the binomial distribution: the least k with P(B <= k) >= p.
 
-    Args:
-        p: level of the quantile, between 0 and 1.
-        n: number of trials.
-        q: probability of success in one trial.
-
-    Returns:
-        k as float64, in the common shape of the arguments.
+    Returns: k as float64, in the common shape of the arguments.
     """
     from scipy.special import bdtr, bdtrik
 
@@ -204,14 +134,6 @@ def ranks(count: np.ndarray, level: np.ndarray, confidence: float) -> tuple[np.n
     """Return the ranks l < u of the sorted values that hold a quantile between them: P(l <= B < u) >= confidence.
 
     B is the number of values below the quantile, which is binomial.
-
-    Args:
-        count: number of values.
-        level: level of the quantile, between 0 and 1.
-        confidence: confidence level, between 0 and 1.
-
-    Returns:
-        l and u, counted from 1; l = 0 or u = count + 1 where there is no such value.
     """
     tail = 0.5 * (1.0 - confidence)
     return binomial_quantile(tail, count, level), binomial_quantile(1.0 - tail, count, level) + 1.0

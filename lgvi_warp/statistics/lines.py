@@ -10,14 +10,7 @@ import numpy as np
 
 
 def entries_of(one: Any) -> Iterator[tuple[str, str, float, float, float, int]]:
-    """List the numbers of an estimate at its end.
-
-    Args:
-        one: the estimate.
-
-    Yields:
-        Label, unit ("" for none), value, lower and upper end of the interval, number of members.
-    """
+    """List the numbers of an estimate at its end."""
     unit = "" if one.unit == "1" or one.unit.startswith("products") else one.unit
     members = _MEMBERS.get(one.settings["type"], lambda one: one.count[-1])(one)
     for label, value, lower, upper in _LINES.get(one.settings["type"], _entries)(one):
@@ -25,11 +18,7 @@ def entries_of(one: Any) -> Iterator[tuple[str, str, float, float, float, int]]:
 
 
 def texts_of(one: Any) -> list[tuple[str, str, str, str]]:
-    """Return the texts of each number of an estimate: its label, its value, its interval, and its number of members.
-
-    Args:
-        one: the estimate.
-    """
+    """Return the texts of each number of an estimate: its label, its value, its interval, and its number of members."""
     rows = []
     for label, unit, value, lower, upper, members in entries_of(one):
         ends = f"{lower:.5g} to {upper:.5g}" if np.isfinite(lower) or np.isfinite(upper) else "no interval"

@@ -230,10 +230,8 @@ class Metric(Then):
 def accumulated(total: np.ndarray, looks: Looks, parts: np.ndarray) -> np.ndarray:
     """Return a sum with the parts of some looks added in turn, so that its bits do not depend on how many come at once.
 
-    Args:
-        total: the sum so far (n,).
-        looks: the looks.
-        parts: what each adds (k, n).
+    total: the sum so far (n,).
+    parts: what each adds (k, n).
     """
     total = total.copy()
     for addend in looks.of_living(parts, 0.0):
@@ -658,11 +656,7 @@ class RMSError(ISE):
 def check_wanted(faults: Faults, key: str, metrics: Mapping[str, Statistic], controller: Controller | None) -> None:
     """Add a fault for each metric of what no guidance wants: its errors would be those from zero.
 
-    Args:
-        faults: collects the faults.
-        key: who asks for the metrics.
-        metrics: statistics by name, metrics among them.
-        controller: the controller of the scene; None for none, which is a fault of its own.
+    controller: the controller of the scene; None for none, which is a fault of its own.
     """
     if controller is None:
         return

@@ -37,11 +37,7 @@ class _AllOf(Quantity):
 
 
 def all_of(*names: str) -> Quantity:
-    """Return all numbers of some samples as a quantity.
-
-    Args:
-        *names: names of samples.
-    """
+    """Return all numbers of some samples as a quantity."""
     return _AllOf(
         ", ".join(names), _nothing, SIGNALS[names[0]].field.unit if names[0] in SIGNALS else "", ordered(names)
     )

@@ -19,12 +19,9 @@ from lgvi_warp.statistics.values import Values
 def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return the sums over members of a_i b_j.
 
-    Args:
-        a: (k, d, n).
-        b: (k, d, n).
-
-    Returns:
-        (k, d, d).
+    a: (k, d, n).
+    b: (k, d, n).
+    Returns: (k, d, d).
     """
     # BLAS pays only for more than a few rows; pieces keep each product too small for BLAS to start threads of its own.
     if a.shape[1] <= 4:
@@ -36,12 +33,8 @@ def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def joined_means(left: Part, right: Part) -> tuple[Part, np.ndarray, np.ndarray]:
     """Return the common mean of two sets of members.
 
-    Args:
-        left: part of the first set: count (k,), mean (k, d).
-        right: part of the second set.
-
-    Returns:
-        count and mean of both sets; and how far the mean of each set lies above the common mean, (k, d) each.
+    left: part of the first set: count (k,), mean (k, d).
+    Returns: count and mean of both sets; and how far the mean of each set lies above the common mean, (k, d) each.
     """
     n = left["count"] + right["count"]
     share = (right["count"] / np.maximum(n, 1))[:, None]
@@ -54,12 +47,9 @@ def joined_means(left: Part, right: Part) -> tuple[Part, np.ndarray, np.ndarray]
 def outer(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return the products a_i b_j at each time.
 
-    Args:
-        a: (k, d).
-        b: (k, d).
-
-    Returns:
-        (k, d, d).
+    a: (k, d).
+    b: (k, d).
+    Returns: (k, d, d).
     """
     return np.asarray(a[:, :, None] * b[:, None, :])
 
@@ -70,12 +60,9 @@ def moved(part: Part, a: np.ndarray) -> Part:
     With x less its mean: m11[i, j] is the sum of x_i x_j, m21 of x_i^2 x_j, m22 of x_i^2 x_j^2. About the point these
     are the sums of (x_i + a_i) (x_j + a_j) and so on.
 
-    Args:
-        part: count (k,), m11 (k, d, d), and m21, m22 (k, d, d) where fourth moments are kept.
-        a: (k, d), the mean less the point.
-
-    Returns:
-        m11, and m21 and m22 where the part has them, (k, d, d) each.
+    part: count (k,), m11 (k, d, d), and m21, m22 (k, d, d) where fourth moments are kept.
+    a: (k, d), the mean less the point.
+    Returns: m11, and m21 and m22 where the part has them, (k, d, d) each.
     """
     n, m11, aa = part["count"][:, None, None], part["m11"], outer(a, a)
     moments = {"m11": m11 + n * aa}
@@ -91,15 +78,7 @@ def moved(part: Part, a: np.ndarray) -> Part:
 
 
 def joined(left: Part, right: Part) -> Part:
-    """Return the moments of two sets of members together, about their common mean.
-
-    Args:
-        left: part of the first set.
-        right: part of the second set.
-
-    Returns:
-        The part of both sets, with the same arrays.
-    """
+    """Return the moments of two sets of members together, about their common mean."""
     both, a, b = joined_means(left, right)
     first, second = moved(left, a), moved(right, b)
     return both | {key: first[key] + second[key] for key in first}
@@ -108,24 +87,16 @@ def joined(left: Part, right: Part) -> Part:
 def empty_as_nan(values: np.ndarray, count: np.ndarray, least: int = 1) -> np.ndarray:
     """Return the values with NaN at times that have too few members.
 
-    Args:
-        values: (k, ...).
-        count: (k,), members at each time.
-        least: the least number of members; by default 1.
-
-    Returns:
-        (k, ...), as values.
+    values: (k, ...).
+    count: (k,), members at each time.
+    Returns: (k, ...), as values.
     """
     few = (count < least).reshape(-1, *[1] * (values.ndim - 1))
     return np.asarray(np.where(few, np.nan, values))
 
 
 def component_dims(*names: str) -> Dims:
-    """Return the dimensions (time, component) of several arrays, and (time,) of the count.
-
-    Args:
-        *names: names of the arrays.
-    """
+    """Return the dimensions (time, component) of several arrays, and (time,) of the count."""
     return {"count": ("time",)} | along(names, "time", "component")
 
 
@@ -260,15 +231,7 @@ def estimate(
 ) -> Estimate:
     """Return the Estimate of a statistic.
 
-    Args:
-        statistic: the statistic; it gives the name and the confidence level.
-        interval: how the interval was formed.
-        dims: names of each array's dimensions.
-        arrays: the arrays by name.
-        time: (k,) [s], the sample times.
-        coordinates: coordinates of dimensions other than time and component; by default none.
-        unit: unit of the value; by default that of the quantity.
-        labels: names of the components; by default those of the quantity.
+    time: (k,) [s], the sample times.
     """
     components = np.array(statistic.quantity.labels if labels is None else labels)
     return Estimate(

@@ -18,42 +18,24 @@ _MINUS = re.compile(r"(?<!\w)-(?=[\d.])|(?<=\de)-(?=\d)")
 
 
 def spelled(value: Any) -> str:
-    """Return a number, or several, as names spell them: 10 for 10.0, (2, -0.5) for [2.0, -0.5]; with all digits needed.
-
-    Args:
-        value: a number, or an array of numbers.
-    """
+    """Return a number, or several, as names spell them: 10 for 10.0, (2, -0.5) for [2.0, -0.5]; with all digits needed."""
     numbers = np.asarray(value, dtype=np.float64)
     texts = [repr(number + 0.0).removesuffix(".0") for number in numbers.ravel().tolist()]
     return texts[0] if len(texts) == 1 else f"({', '.join(texts)})"
 
 
 def canonical(name: str) -> str:
-    """Return a name as all its spellings have it: "above 10" for "above 10.0", "attitude[0,1]" for "attitude[0, 1]".
-
-    Args:
-        name: the name of a statistic.
-    """
+    """Return a name as all its spellings have it: "above 10" for "above 10.0", "attitude[0,1]" for "attitude[0, 1]"."""
     return _SPACE.sub("", _NUMBER.sub(lambda match: spelled(float(match[0])), name))
 
 
 def word(name: str) -> str:
-    """Return a variable's name: "exceedance velocity[0] above -0.5" becomes exceedance_velocity_0_above_minus_0_5.
-
-    Args:
-        name: the name of a statistic.
-    """
+    """Return a variable's name: "exceedance velocity[0] above -0.5" becomes exceedance_velocity_0_above_minus_0_5."""
     return re.sub(r"\W+", "_", _MINUS.sub(" minus ", name)).strip("_")
 
 
 def free(name: str, variables: Callable[[str], Iterable[str]], taken: set[str]) -> str:
-    """Return the name's `word`, with a number after it where one of its variables is taken already.
-
-    Args:
-        name: the name of a statistic.
-        variables: function that returns the variables' names that a word leads to.
-        taken: names that are taken; those of the word are added.
-    """
+    """Return the name's `word`, with a number after it where one of its variables is taken already."""
     first, number = word(name), 1
     candidate = first
     while taken & set(variables(candidate)):

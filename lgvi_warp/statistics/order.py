@@ -188,11 +188,8 @@ class Quantiles(Statistic):
     def _read(self, part: Part, time: np.ndarray, ends: EndsOf, interval: str) -> Estimate:
         """Return the quantiles, with the interval between two ranks.
 
-        Args:
-            part: the sketch of all members.
-            time: (k,) [s], the sample times.
-            ends: function from the value (k, levels, d) to the ranks, counted from 1, of the interval's ends.
-            interval: how the interval was formed.
+        time: (k,) [s], the sample times.
+        ends: function from the value (k, levels, d) to the ranks, counted from 1, of the interval's ends.
         """
         count = part["count"]
         level = np.array(self.levels)[None, :]

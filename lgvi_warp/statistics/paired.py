@@ -18,15 +18,7 @@ DRAWN_AT_ONCE = 2_000_000
 
 
 class Difference(NamedTuple):
-    """A difference between two cases, second less first.
-
-    Args:
-        value: the difference.
-        lower: lower end of its interval.
-        upper: upper end of its interval.
-        p: probability of a difference at least as large if there is none; NaN where no test was made.
-        pairs: number of members that count.
-    """
+    """A difference between two cases, second less first."""
 
     value: float
     lower: float
@@ -40,12 +32,6 @@ def proportions(only_first: int, only_second: int, pairs: int, confidence: float
 
     Interval: Tango's score interval (1998, Statistics in Medicine 17): all differences that a score test does not refuse.
     Test: McNemar's exact one, of the members that differ, half of which would be of each kind.
-
-    Args:
-        only_first: members that pass in the first case alone.
-        only_second: members that pass in the second case alone.
-        pairs: number n of all members.
-        confidence: confidence level, between 0 and 1.
     """
     from scipy.special import bdtr
 
@@ -84,10 +70,8 @@ def _score(delta: float, more: int, less: int, n: int) -> float:
 def means(first: np.ndarray, second: np.ndarray, confidence: float) -> Difference:
     """Return the difference of two means over the same members: Student's t of the differences.
 
-    Args:
-        first: numbers in the first case (n,); pairs with a number that is not finite are left out.
-        second: numbers in the second case (n,).
-        confidence: confidence level, between 0 and 1.
+    first: numbers in the first case (n,); pairs with a number that is not finite are left out.
+    second: numbers in the second case (n,).
     """
     from scipy.special import stdtr
 
@@ -113,13 +97,8 @@ def quantiles(
     quantiles are among few values, and the interval is too wide by up to a half (Hall, DiCiccio & Romano 1989, Annals of
     Statistics 17).
 
-    Args:
-        first: numbers in the first case (n,); pairs with a number that is not finite are left out.
-        second: numbers in the second case (n,).
-        level: level of the quantile, between 0 and 1.
-        confidence: confidence level, between 0 and 1.
-        resamples: number of resamples; 999 by default.
-        seed: seed of the resamples; 0 by default.
+    first: numbers in the first case (n,); pairs with a number that is not finite are left out.
+    second: numbers in the second case (n,).
     """
     both = np.isfinite(first) & np.isfinite(second)
     x = np.stack([first[both], second[both]])
@@ -148,11 +127,8 @@ def quantiles(
 def holm(p: np.ndarray) -> np.ndarray:
     """Return p-values corrected for their number (Holm 1979): the chance of any false one stays below the level.
 
-    Args:
-        p: p-values (m,); NaN where no test was made, which stays so and does not count.
-
-    Returns:
-        Corrected p-values (m,), at most 1, in the order given.
+    p: p-values (m,); NaN where no test was made, which stays so and does not count.
+    Returns: Corrected p-values (m,), at most 1, in the order given.
     """
     corrected = np.full(len(p), np.nan)
     order = np.argsort(p)[: np.count_nonzero(~np.isnan(p))]

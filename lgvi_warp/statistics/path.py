@@ -218,10 +218,6 @@ class OfExpression(OfPath):
     """The number that an expression such as "max(depth)" gives for each member's path, then a statistic of it.
 
     The name of an estimate has the expression: "mean max(depth)".
-
-    Args:
-        of: the expression.
-        then: the statistic, without `of`.
     """
 
     def meant(self) -> Quantity:
@@ -248,11 +244,7 @@ class OfExpression(OfPath):
 
 
 def followed(statistic: Statistic) -> Statistic:
-    """Return the statistic that is gathered for one: of paths, where it is of an expression that looks over them.
-
-    Args:
-        statistic: a statistic, such as lw.Quantiles("max(depth)").
-    """
+    """Return the statistic that is gathered for one: of paths, where it is of an expression that looks over them."""
     if statistic.path is None:
         return statistic
     return OfExpression(statistic.path.label, then=replace(statistic, of=None), stopped=statistic.stopped)

@@ -69,15 +69,7 @@ class Quantity:
     def __call__(self, samples: Fields, members: Members) -> np.ndarray:
         """Evaluate the quantity.
 
-        Args:
-            samples: the samples of a block.
-            members: the members of the block.
-
-        Returns:
-            (k, d, n), contiguous; float32 where the function returns float32, else float64.
-
-        Raises:
-            ValueError: the function returned another shape, or numbers that are not real.
+        Returns: (k, d, n), contiguous; float32 where the function returns float32, else float64.
         """
         try:
             values = real_results(self.function(samples, members))
@@ -158,16 +150,7 @@ SIGNAL_QUANTITIES = {
 
 
 def named(key: str, of: str, text: str) -> Quantity:
-    """Return the quantity of a name, or one component of it.
-
-    Args:
-        key: the key that messages name.
-        of: what was asked for, which messages show.
-        text: a name such as "position", or a component such as "position[2]".
-
-    Raises:
-        SceneError: the name or the component is not known.
-    """
+    """Return the quantity of a name, or one component of it."""
     match = re.fullmatch(r"(\w+)(\[[\d, ]+\])?", text.strip())
     if match and match[1] in CHANNELS:
         return _channel(key, of, match[1], match[2] or "")
@@ -200,12 +183,7 @@ def _channel(key: str, of: str, name: str, index: str) -> Quantity:
 
 
 def component(base: Quantity, i: int) -> Quantity:
-    """Return one component of a quantity as a quantity.
-
-    Args:
-        base: a quantity of d components.
-        i: index of the component, from 0.
-    """
+    """Return one component of a quantity as a quantity."""
     if base.size == 1:
         return base
     inner = base.function
@@ -213,11 +191,7 @@ def component(base: Quantity, i: int) -> Quantity:
 
 
 def joined(parts: Sequence[Quantity]) -> Quantity:
-    """Return several quantities as one, with their components side by side.
-
-    Args:
-        parts: the quantities, at least one.
-    """
+    """Return several quantities as one, with their components side by side."""
     if len(parts) == 1:
         return parts[0]
 

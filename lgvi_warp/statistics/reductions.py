@@ -17,12 +17,8 @@ def _as_it_is(x: np.ndarray) -> np.ndarray:
 class Reduction:
     """How the samples of paths become one number for each path.
 
-    Args:
-        step: function (state, before, x, dt, share) that returns the state after another sample x. `before` is the sample
-            before it, dt the time [s] between the two, share that time divided by the time since the first sample.
-        start: function of the first sample that returns the first state; by default the sample.
-        finish: function of the last state that returns the numbers; by default the state.
-        of_samples: whether the number is one of the samples, so that float32 holds it exactly; by default False.
+    step: function (state, before, x, dt, share) that returns the state after another sample x. `before` is the sample before
+        it, dt the time [s] between the two, share that time divided by the time since the first sample.
     """
 
     step: Callable[[np.ndarray, np.ndarray, np.ndarray, float, float], np.ndarray]
@@ -33,9 +29,8 @@ class Reduction:
     def over(self, samples: np.ndarray, time: np.ndarray) -> np.ndarray:
         """Return the numbers of whole paths.
 
-        Args:
-            samples: (k, ...), the samples at k times.
-            time: (k,) [s], their times.
+        samples: (k, ...), the samples at k times.
+        time: (k,) [s], their times.
         """
         state = self.start(samples[0])
         for t in range(1, len(samples)):

@@ -15,14 +15,11 @@ from lgvi_warp.common.status import failed
 class Fields(dict[str, np.ndarray]):
     """Samples of a block by the name of the field: arrays (k, n, ...) of k sample times and n members.
 
-    Args:
-        fields: the arrays by name, such as "position" (k, n, 3) [m].
-        time: (k,) [s], sample times.
-        steps: (k,), number of steps made before each sample time.
-        terms: the terms of the scene.
-        ends: function that returns the status (n,) of the members, and the last step (n,) after which each was still
-            running.
-        controller: the controller of the scene; None (the default) for none.
+    fields: the arrays by name, such as "position" (k, n, 3) [m].
+    time: (k,) [s], sample times.
+    steps: (k,), number of steps made before each sample time.
+    ends: function that returns the status (n,) of the members, and the last step (n,) after which each was still running.
+    controller: the controller of the scene; None (the default) for none.
     """
 
     def __init__(
@@ -45,8 +42,7 @@ class Fields(dict[str, np.ndarray]):
     def at(self, places: np.ndarray) -> Fields:
         """Return the samples at some of these times.
 
-        Args:
-            places: indices of the times (m,).
+        places: indices of the times (m,).
         """
         values = {name: values[places] for name, values in self.items()}
         return Fields(values, self.time[places], self._steps[places], self.terms, self._when_ended, self.controller)
@@ -60,11 +56,7 @@ class Fields(dict[str, np.ndarray]):
     def good(self, held: bool = True) -> np.ndarray | None:
         """Return which members are valid at each time.
 
-        Args:
-            held: whether a member that an event stopped stays valid; by default True.
-
-        Returns:
-            (k, n), or None if all members are valid at all times.
+        Returns: (k, n), or None if all members are valid at all times.
         """
         if self._ends is None:
             return None

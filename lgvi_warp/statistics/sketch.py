@@ -24,13 +24,7 @@ from lgvi_warp.statistics.tree import Part
 
 
 def coin(level: int, place: int, sides: int) -> int:
-    """Return a pseudo-random whole number from 0 to sides - 1 that depends on the place alone: the same for every run.
-
-    Args:
-        level: level in the tree of blocks.
-        place: index in that level.
-        sides: number of possible results.
-    """
+    """Return a pseudo-random whole number from 0 to sides - 1 that depends on the place alone: the same for every run."""
     digest = hashlib.blake2b(b"%d %d" % (level, place), digest_size=8).digest()
     return int.from_bytes(digest, "little") % sides
 
@@ -38,14 +32,8 @@ def coin(level: int, place: int, sides: int) -> int:
 def of(x: np.ndarray, members: int, size: int, block: int) -> Part:
     """Return the sketch of one block.
 
-    Args:
-        x: (k, d, n), the values; +inf where a member does not count.
-        members: number of members of a full block; a shorter one is filled up with +inf.
-        size: largest number of values to keep.
-        block: number of the block.
-
-    Returns:
-        values (k, d, m) in order, their weights (m,), and error, variance and shift of the rank, (1,) each.
+    x: (k, d, n), the values; +inf where a member does not count.
+    Returns: values (k, d, m) in order, their weights (m,), and error, variance and shift of the rank, (1,) each.
     """
     k, d, n = x.shape
     values = np.empty((k, d, max(members, n)), x.dtype)
@@ -69,12 +57,9 @@ def _part(values: np.ndarray, weights: np.ndarray, error: float, variance: float
 def merged(left: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Merge sorted rows of two arrays: NumPy's stable sort detects the two runs and merges them.
 
-    Args:
-        left: (k, d, a), sorted along the last axis.
-        right: (k, d, b), sorted along the last axis.
-
-    Returns:
-        (k, d, a + b), sorted along the last axis.
+    left: (k, d, a), sorted along the last axis.
+    right: (k, d, b), sorted along the last axis.
+    Returns: (k, d, a + b), sorted along the last axis.
     """
     both = np.concatenate([left, right], axis=2)
     both.sort(axis=2, kind="stable")
@@ -84,14 +69,7 @@ def merged(left: np.ndarray, right: np.ndarray) -> np.ndarray:
 def join(left: Part, right: Part, size: int, place: tuple[int, int]) -> Part:
     """Return the sketch of two sketches of equal weight and length.
 
-    Args:
-        left: sketch of the blocks that come first.
-        right: sketch of the blocks that follow.
-        size: largest number of values to keep.
-        place: (level, index) of the result in the tree of blocks.
-
-    Raises:
-        ValueError: the sketches differ in length or weight.
+    place: (level, index) of the result in the tree of blocks.
     """
     a, b = left["values"].shape[2], right["values"].shape[2]
     error, variance, shift = (float(left[key][0] + right[key][0]) for key in ("error", "variance", "shift"))
@@ -107,11 +85,7 @@ def join(left: Part, right: Part, size: int, place: tuple[int, int]) -> Part:
 
 
 def together(parts: Sequence[Part]) -> Part:
-    """Return sketches of any weights side by side, as one part.
-
-    Args:
-        parts: the sketches.
-    """
+    """Return sketches of any weights side by side, as one part."""
     values = np.concatenate([part["values"] for part in parts], axis=2)
     weights = np.concatenate([part["weights"] for part in parts])
     numbers = (float(sum(part[key][0] for part in parts)) for key in ("error", "variance", "shift"))
@@ -121,13 +95,8 @@ def together(parts: Sequence[Part]) -> Part:
 def sorted_values(part: Part) -> tuple[np.ndarray, np.ndarray]:
     """Return the values of a sketch in order, with their ranks.
 
-    Args:
-        part: a sketch, or several side by side.
-
-    Returns:
-        Values (k, d, m) in order, and their ranks (k, d, m), counted from 0: each is the middle of the ranks that the
-        value
-        represents, corrected by the shift.
+    Returns: Values (k, d, m) in order, and their ranks (k, d, m), counted from 0: each is the middle of the ranks that the
+        value represents, corrected by the shift.
     """
     values, weights = part["values"], part["weights"]
     if np.all(weights == 1):
@@ -142,12 +111,8 @@ def sorted_values(part: Part) -> tuple[np.ndarray, np.ndarray]:
 def fraction(parts: Sequence[Part], x: np.ndarray) -> np.ndarray:
     """Return the fraction of the members whose values do not exceed a number.
 
-    Args:
-        parts: sketches that together hold all members.
-        x: (k, q, d), the numbers.
-
-    Returns:
-        (k, q, d); NaN where no member counts.
+    x: (k, q, d), the numbers.
+    Returns: (k, q, d); NaN where no member counts.
     """
     below = sum(
         part["weights"][0] * np.count_nonzero(part["values"][:, None] <= x[..., None], axis=3) - part["shift"][0]
@@ -160,14 +125,11 @@ def fraction(parts: Sequence[Part], x: np.ndarray) -> np.ndarray:
 def at_rank(values: np.ndarray, middles: np.ndarray, finite: np.ndarray, rank: np.ndarray) -> np.ndarray:
     """Return values at given ranks: linear between the values kept, never beyond the finite ones.
 
-    Args:
-        values: (k, d, m), in order.
-        middles: (k, d, m), their ranks, counted from 0.
-        finite: (k, d, m), which values are finite.
-        rank: (k, q, d), the ranks asked for, counted from 0.
-
-    Returns:
-        (k, q, d); NaN where no value is finite.
+    values: (k, d, m), in order.
+    middles: (k, d, m), their ranks, counted from 0.
+    finite: (k, d, m), which values are finite.
+    rank: (k, q, d), the ranks asked for, counted from 0.
+    Returns: (k, q, d); NaN where no value is finite.
     """
     k, d = values.shape[:2]
     interpolated = np.full(rank.shape, np.nan)

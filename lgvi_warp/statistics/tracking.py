@@ -24,11 +24,8 @@ Numbers = Callable[[Mapping[str, np.ndarray]], np.ndarray]
 def wrapped(angle: np.ndarray) -> np.ndarray:
     """Angles within [-pi, pi].
 
-    Args:
-        angle: (...,) [rad].
-
-    Returns:
-        (...,) [rad].
+    angle: (...,) [rad].
+    Returns: (...,) [rad].
     """
     turns = np.asarray(angle / (2.0 * np.pi))
     np.rint(turns, out=turns)
@@ -40,16 +37,10 @@ def wrapped(angle: np.ndarray) -> np.ndarray:
 class Channel:
     """One number of the motion that is wanted and that the vehicle has.
 
-    Args:
-        name: its name.
-        unit: its unit.
-        actual: function of the samples that returns the vehicle's numbers (k, n).
-        of_actual: names of the samples that this reads.
-        wanted: name of the signal that is wanted, (k, n) or, with `entry`, (k, n, 3).
-        entry: index of the wanted number in its signal; None (the default): it is one number.
-        wish: what guidance calls it, and what of that is wanted: ("depth", None) or ("position", 0); None for none.
-        angle: whether it is an angle, so that differences are wrapped; by default False.
-        entries: which numbers of the first of these samples it reads, counted from 0; by default () for all.
+    actual: function of the samples that returns the vehicle's numbers (k, n).
+    wanted: name of the signal that is wanted, (k, n) or, with `entry`, (k, n, 3).
+    entry: index of the wanted number in its signal; None (the default): it is one number.
+    wish: what guidance calls it, and what of that is wanted: ("depth", None) or ("position", 0); None for none.
     """
 
     name: str
@@ -65,38 +56,24 @@ class Channel:
     def difference(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Return a - b, wrapped where these are angles.
 
-        Args:
-            a: (k, n) [unit].
-            b: (k, n) [unit].
+        a: (k, n) [unit].
+        b: (k, n) [unit].
         """
         return wrapped(a - b) if self.angle else a - b
 
     def reference(self, samples: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Return what is wanted at each look, (k, n) [unit].
-
-        Args:
-            samples: the samples of a block.
-        """
+        """Return what is wanted at each look, (k, n) [unit]."""
         values = samples[self.wanted].astype(np.float64, copy=False)
         return values if self.entry is None else values[..., self.entry]
 
     def error(self, samples: Fields, members: Members) -> np.ndarray:
-        """Return what is wanted less what is, (k, n) [unit].
-
-        Args:
-            samples: the samples of a block.
-            members: its members.
-        """
+        """Return what is wanted less what is, (k, n) [unit]."""
         return self.difference(self.reference(samples), self.actual(samples))
 
     def course(self, samples: Fields, members: Members) -> np.ndarray:
         """Return what is and its goal, (k, n, 2) [unit].
 
         The goal is the set point, where the guidance that says it is one, before any reference model; else what is wanted.
-
-        Args:
-            samples: the samples of a block.
-            members: its members.
         """
         y, goal = self.actual(samples), self._set_point(samples.controller, members)
         goal = self.reference(samples) if goal is None else np.broadcast_to(goal, y.shape)
@@ -199,12 +176,7 @@ NEEDED |= {"position": "position", "attitude": "attitude", "cross_track": "posit
 
 @functools.cache
 def error(name: str, measured: bool) -> Quantity:
-    """Return the error of tracking as a quantity: wanted less actual.
-
-    Args:
-        name: one of `ERRORS`.
-        measured: whether the actual number is what sensors measure, or the truth.
-    """
+    """Return the error of tracking as a quantity: wanted less actual."""
     if name in _DISTANCES:
         unit, actual, wanted, function = _DISTANCES[name]
         actual = f"measured_{actual}" if measured else actual
@@ -215,12 +187,7 @@ def error(name: str, measured: bool) -> Quantity:
 
 @functools.cache
 def course(name: str, measured: bool) -> Quantity:
-    """Return a number of the motion and its goal as a quantity of two components.
-
-    Args:
-        name: one of the names of `CHANNELS`.
-        measured: whether the number is what sensors measure, or the truth.
-    """
+    """Return a number of the motion and its goal as a quantity of two components."""
     channel = CHANNELS[measured][name]
     return _of_channel(channel, channel.course, (name, f"goal of {name}"))
 
@@ -233,16 +200,7 @@ def _of_channel(channel: Channel, function: Function, labels: tuple[str, ...]) -
 
 
 def check(key: str, of: Any, known: tuple[str, ...]) -> str:
-    """Return the name of what is tracked.
-
-    Args:
-        key: the key that messages name.
-        of: what was asked for.
-        known: names that there are.
-
-    Raises:
-        SceneError: it is none of these.
-    """
+    """Return the name of what is tracked."""
     if isinstance(of, str) and of in known:
         return of
     why = "is a distance, which has no goal beyond" if among(of, _DISTANCES) else "is nothing that is tracked"

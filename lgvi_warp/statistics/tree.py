@@ -13,15 +13,7 @@ Join = Callable[[Part, Part, tuple[int, int]], Part]
 
 
 def below(arrays: Mapping[str, np.ndarray], head: str) -> Part:
-    """The arrays whose names begin with a head, named without it.
-
-    Args:
-        arrays: Arrays by name.
-        head: The beginning of the names, such as "0/".
-
-    Returns:
-        The arrays that have it.
-    """
+    """The arrays whose names begin with a head, named without it."""
     return {name.removeprefix(head): array for name, array in arrays.items() if name.startswith(head)}
 
 
@@ -31,20 +23,14 @@ class Tree:
     The part (level, i) covers the blocks from i 2^level on. It is joined from its two halves as soon as both have come,
     so that it does not depend on the order in which blocks come. Of b blocks log2(b) parts are kept.
 
-    Args:
-        join: function (left, right, place) that returns the part of both, see `Statistic.join`.
+    join: function (left, right, place) that returns the part of both, see `Statistic.join`.
     """
 
     def __init__(self, join: Join):
         self._join, self._parts = join, dict[tuple[int, int], Part]()
 
     def add(self, block: int, part: Part) -> None:
-        """Take in the part of one block.
-
-        Args:
-            block: number of the block, from 0.
-            part: what summarises its members.
-        """
+        """Take in the part of one block."""
         level, i = 0, block
         while (neighbour := self._parts.pop((level, i ^ 1), None)) is not None:
             earlier, later = (neighbour, part) if i % 2 else (part, neighbour)

@@ -70,14 +70,7 @@ class Until:
 
 
 def from_dict(given: Any) -> Until:
-    """Return the stopping rule of a table, or the rule itself.
-
-    Args:
-        given: an `Until`, or the table `run.until` of a scene file.
-
-    Raises:
-        SceneError: with every fault of the table.
-    """
+    """Return the stopping rule of a table, or the rule itself."""
     if isinstance(given, Until):
         return given
     example = 'write [run.until] and statistic = "mean position[2]", half_width = 0.01'
@@ -96,15 +89,8 @@ def from_dict(given: Any) -> Until:
 class Watch:
     """A stopping rule bound to the statistics of a run.
 
-    Args:
-        until: the rule.
-        statistic: the statistic that gathers the watched estimate.
-        name: name of the estimate.
-        entry: index of the watched entries by dimension; all entries along other dimensions.
-        rows: indices of the watched sample times.
-        looked: number of members at the last look; by default 0.
-        doubling: whether to look at powers of two of members only; by default False. With replicates a design is
-            balanced there, and the spread of a few estimates comes out small by chance too often for many looks.
+    doubling: whether to look at powers of two of members only; by default False. With replicates a design is balanced there,
+        and the spread of a few estimates comes out small by chance too often for many looks.
     """
 
     until: Until
@@ -117,11 +103,7 @@ class Watch:
     doubling: bool = False
 
     def due(self, members: int) -> bool:
-        """Return whether to look at the interval now, and note the look.
-
-        Args:
-            members: number of members done.
-        """
+        """Return whether to look at the interval now, and note the look."""
         if members < self.until.members or members < self.looked * (1.0 + GROWTH):
             return False
         if self.doubling and members & (members - 1):
@@ -130,31 +112,18 @@ class Watch:
         return True
 
     def reached(self, estimates: Sequence[Estimate]) -> bool:
-        """Return whether the watched intervals are narrow enough.
-
-        Args:
-            estimates: the estimates of all members so far.
-        """
+        """Return whether the watched intervals are narrow enough."""
         return self.widest(estimates) <= self.until.half_width
 
     def report(self, members: int, estimates: Sequence[Estimate]) -> str:
-        """Return a sentence for the user on whether the rule was satisfied.
-
-        Args:
-            members: number of members done.
-            estimates: the estimates of these members.
-        """
+        """Return a sentence for the user on whether the rule was satisfied."""
         widest = self.widest(estimates)
         word = "reached" if widest <= self.until.half_width else "not reached"
         goal = f"half width {self.until.half_width:g} of {self.until.statistic}"
         return f"{goal}: {word} with {members} members, {widest:.3g}"
 
     def widest(self, estimates: Sequence[Estimate]) -> float:
-        """Return the largest half width of the watched intervals; infinite where an interval is missing.
-
-        Args:
-            estimates: the estimates of all members so far.
-        """
+        """Return the largest half width of the watched intervals; infinite where an interval is missing."""
         estimate = next(candidate for candidate in estimates if candidate.name == self.name)
         half = estimate.half_width
         dims = estimate.dims["value"]
@@ -169,13 +138,7 @@ class Watch:
 def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> Watch:
     """Bind a stopping rule to the statistics of a run; a mean that is not among them is added.
 
-    Args:
-        until: the rule.
-        statistics: the statistics of the run.
-        times: (k,) [s], the sample times of the run.
-
-    Raises:
-        SceneError: the rule names no statistic, no sample time, or a statistic without an interval.
+    times: (k,) [s], the sample times of the run.
     """
     faults = Faults("until.")
     rows = np.array([len(times) - 1])
@@ -226,11 +189,7 @@ def _entries(one: Statistic) -> dict[str, dict[str, int]]:
 
 
 def _target(name: str, known: Mapping[str, Named]) -> Named:
-    """What a name asks to watch: one of those known, or a mean that is added to them.
-
-    Raises:
-        SceneError: it asks for neither.
-    """
+    """What a name asks to watch: one of those known, or a mean that is added to them."""
     alike = (known[spelling] for spelling in known if canonical(spelling) == canonical(name))
     if (target := known.get(name) or next(alike, None)) is not None:
         return target

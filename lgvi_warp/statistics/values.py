@@ -14,13 +14,8 @@ class Values:
     A member counts at a time if it had not failed by then and all of its numbers are finite. If the members belong to R
     replicates, each time has R rows, one for each replicate (see `dealt`), and n and `size` are per replicate.
 
-    Args:
-        x: (k, d, n), the numbers.
-        good: (k, n), which members had not failed; None (the default) if none had.
-        first: index of the block's first member in the run; by default 0.
-        block: number of the block; by default 0.
-        size: number of members of a full block; by default n.
-        replicates: number R of replicates; by default 1.
+    x: (k, d, n), the numbers.
+    good: (k, n), which members had not failed; None (the default) if none had.
 
     Attributes:
         x: (k, d, n), float64; 0 where a member does not count.
@@ -54,22 +49,15 @@ class Values:
     def members(self, at: np.ndarray) -> np.ndarray:
         """Return the indices in the run of some of these members.
 
-        Args:
-            at: (k, d), places along the last axis of `x`.
-
-        Returns:
-            (k, d), indices of members of the run.
+        at: (k, d), places along the last axis of `x`.
+        Returns: (k, d), indices of members of the run.
         """
         return self.first + at * self.replicates + (np.arange(len(at)) % self.replicates)[:, None]
 
     def filled(self, value: float) -> np.ndarray:
         """Return x with a given number where a member does not count.
 
-        Args:
-            value: the number to fill in.
-
-        Returns:
-            (k, d, n), in the quantity's unit.
+        Returns: (k, d, n), in the quantity's unit.
         """
         return self.x if self.good is None else np.where(self.good[:, None], self.x, value)
 
@@ -89,16 +77,8 @@ class Values:
 def dealt(x: np.ndarray, good: np.ndarray | None, first: int, block: int, size: int, replicates: int) -> Values:
     """Return values with one row for each time and replicate; member i belongs to replicate i mod R.
 
-    Args:
-        x: (k, d, n), numbers of all members, n a multiple of R.
-        good: (k, n), which members had not failed; None if none had.
-        first: index of the block's first member in the run.
-        block: number of the block.
-        size: number of members of a full block.
-        replicates: number R of replicates.
-
-    Returns:
-        Values of k R rows and n / R members.
+    x: (k, d, n), numbers of all members, n a multiple of R.
+    good: (k, n), which members had not failed; None if none had.
     """
     k, d, n = x.shape
     R = replicates

@@ -14,9 +14,8 @@ class Budget:
 
     Searches run their members in the thread that asks, so its time is that of the run.
 
-    Args:
-        seconds: processor time to spend [s].
-        clock: reads the time [s]. Default: the processor time of this thread.
+    seconds: processor time to spend [s].
+    clock: reads the time [s]. Default: the processor time of this thread.
 
     Attributes:
         seconds: the same.
@@ -48,11 +47,8 @@ class Budget:
 def rounded_up(seconds: float) -> float:
     """The next length of a search that is easy to say: 1, 2, 3, 5 or 10 times a power of ten.
 
-    Args:
-        seconds: length [s], above 0.
-
-    Returns:
-        The next one of these that is not below it [s].
+    seconds: length [s], above 0.
+    Returns: The next one of these that is not below it [s].
     """
     power = 10.0 ** math.floor(math.log10(seconds))
     return next(nice * power for nice in (1.0, 2.0, 3.0, 5.0, 10.0) if nice * power >= seconds * (1.0 - 1e-9))

@@ -37,11 +37,7 @@ class Compared:
     def values(self, result: Result) -> np.ndarray:
         """Compute the quantity at each time.
 
-        Args:
-            result: of k times and n members.
-
-        Returns:
-            Its numbers (k, n, components), float64 [unit].
+        Returns: Its numbers (k, n, components), float64 [unit].
         """
         if self.functional is None:
             values = np.asarray(getattr(result, self.name), dtype=np.float64)
@@ -51,13 +47,8 @@ class Compared:
     def distance(self, result: Result, reference: Result) -> np.ndarray:
         """Measure the distance of two results in this quantity.
 
-        Args:
-            result: of k times and n members.
-            reference: the same members at the same times.
-
-        Returns:
-            Length of the difference (k, n) [unit]; of angles [rad] the short way round. Of a mean, for every member alike, the
-            upper end of the 95 % interval of the difference of the means, whose members are paired.
+        Returns: Length of the difference (k, n) [unit]; of angles [rad] the short way round. Of a mean, for every member
+            alike, the upper end of the 95 % interval of the difference of the means, whose members are paired.
         """
         with np.errstate(invalid="ignore"):
             apart = self.values(result) - self.values(reference)
@@ -70,11 +61,7 @@ class Compared:
     def largest(self, result: Result) -> float:
         """Return the largest size of the quantity.
 
-        Args:
-            result: of any run.
-
-        Returns:
-            Largest absolute value over times, members and components [unit].
+        Returns: Largest absolute value over times, members and components [unit].
         """
         return float(np.nanmax(np.abs(self.values(result))))
 
@@ -93,15 +80,8 @@ MEAN = "mean "
 def compared_in(of: Any) -> Compared:
     """Find the quantity that a name or a lw.Quantity means.
 
-    Args:
-        of: a name such as "position", "depth", "position[2]" or "norm(velocity)", a lw.Quantity, or a Compared; "mean
-            position[0]" for the mean over the members.
-
-    Returns:
-        The quantity with its unit.
-
-    Raises:
-        SceneError: for unknown names, for several quantities, and for those that look over the path.
+    of: a name such as "position", "depth", "position[2]" or "norm(velocity)", a lw.Quantity, or a Compared; "mean position[0]"
+        for the mean over the members.
     """
     if isinstance(of, Compared):
         return of

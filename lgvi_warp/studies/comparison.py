@@ -81,21 +81,13 @@ class Candidate:
     def options(self) -> dict[str, Any]:
         """Convert the setting to arguments for lw.solve.
 
-        Returns:
-            method, h [s] and dtype, for `lw.solve(fleet, **options)`.
+        Returns: method, h [s] and dtype, for `lw.solve(fleet, **options)`.
         """
         method: Any = self.method if self.plain else self.resolved()
         return {"method": method, "h": self.h, "dtype": self.dtype}
 
     def resolved(self) -> Method:
-        """Build the method with its solver.
-
-        Returns:
-            The Method.
-
-        Raises:
-            SceneError: where the method or the solver does not exist.
-        """
+        """Build the method with its solver."""
         return Method(self.method, self.solver, self.iterations)
 
 
@@ -105,11 +97,7 @@ class Sample:
     Steps are spacing / m for whole m. The spacing is run.save_every of the scene where it divides t1, else t1 / samples.
     Where noise acts on a grid, m divides the number of its draws in the spacing, so that all runs see one path.
 
-    Args:
-        fleet: the ensemble, or a Scene with one.
-        t1: end time [s]. Default: run.duration of the scene.
-        members: largest number of members. Default 128.
-        samples: largest number of times after 0. Default 20.
+    t1: end time [s]. Default: run.duration of the scene.
 
     Attributes:
         whole: the whole ensemble.
@@ -123,9 +111,6 @@ class Sample:
         rate: largest angular rate at the start, at least one turn in t1 [rad/s].
         draws: number of draws of noise in the spacing; 0 for runs that draw once a step.
         fixed_draws: the most that the noise_steps of the scene allow; 0 where no term has one.
-
-    Raises:
-        SceneError: without an end time, and where a noise_step of the scene does not divide the spacing.
     """
 
     def __init__(self, fleet: Ensemble | Scene, t1: float | None = None, members: int = 128, samples: int = SAMPLES):
@@ -155,25 +140,11 @@ class Sample:
         self.draws, self.fixed_draws = 0, self._fixed_draws()
 
     def more(self, members: int) -> Sample:
-        """Make the same sample with more members.
-
-        Args:
-            members: largest number of members.
-
-        Returns:
-            A new sample.
-        """
+        """Make the same sample with more members."""
         return Sample(self.whole, self.t1, members, self.samples)
 
     def on_grid(self, draws: int) -> Sample:
-        """Make the same sample with noise on a grid that all its runs share.
-
-        Args:
-            draws: number of draws in the spacing, for terms without a noise_step of their own.
-
-        Returns:
-            A sample whose steps are multiples of the grid's.
-        """
+        """Make the same sample with noise on a grid that all its runs share."""
         sample = copy.copy(self)
         sample.draws = draws
         sample.ensemble = drawn_every(self._drawn_once_a_step, self.h(draws))
@@ -195,14 +166,7 @@ class Sample:
         return math.gcd(*counts)
 
     def allowed(self, m: int) -> int:
-        """Find a number of steps that noise on a grid allows.
-
-        Args:
-            m: number of steps in the spacing.
-
-        Returns:
-            The least number from m on that divides the draws, or the draws; m itself without a grid.
-        """
+        """Find a number of steps that noise on a grid allows."""
         if not self.draws:
             return m
         return next((count for count in saveat.divisors(self.draws) if count >= m), self.draws)
@@ -210,81 +174,37 @@ class Sample:
     def coarsest(self, angle: float) -> int:
         """Find the largest step in which no member turns by more than an angle at the start.
 
-        Args:
-            angle: largest turn of one step [rad].
-
-        Returns:
-            m, for the step spacing / m.
+        angle: largest turn of one step [rad].
         """
         return self.allowed(max(1, math.ceil(float(self.spacing) * self.rate / angle)))
 
     def h(self, m: int) -> float:
         """Compute a step from its number.
 
-        Args:
-            m: number of steps in the spacing.
-
-        Returns:
-            The step spacing / m [s].
+        Returns: The step spacing / m [s].
         """
         return float(self.spacing / m)
 
     def candidate(self, method: str, m: int, dtype: str = "float64", solver: Any = ("quartic", None)) -> Candidate:
         """Make a setting with the step spacing / m.
 
-        Args:
-            method: name of the method.
-            m: number of steps in the spacing.
-            dtype: precision. Default "float64".
-            solver: (name, iterations) of the solver of equation (24). Default: the quartic to its tolerance.
-
-        Returns:
-            The setting.
+        solver: (name, iterations) of the solver of equation (24). Default: the quartic to its tolerance.
         """
         return Candidate(method, self.h(m), dtype, *solver)
 
     def plan(self, candidate: Candidate, ensemble: Ensemble | None = None) -> Plan:
-        """Make the plan of a run at the sample's times.
-
-        Args:
-            candidate: method, step, precision and solver.
-            ensemble: members to run in place of the sample's.
-
-        Returns:
-            The plan, not yet compiled.
-
-        Raises:
-            SceneError: where the scene refuses the method.
-        """
+        """Make the plan of a run at the sample's times."""
         m = round(float(self.spacing / Fraction(candidate.h)))
         grid = TimeGrid(candidate.h, self.index * m, self.times)
         return Plan(ensemble or self.ensemble, candidate.resolved(), grid, FIELDS, candidate.dtype)
 
     def plan_to_price(self, candidate: Candidate) -> Plan:
-        """Make the plan of a run of a setting outside the comparison.
-
-        Args:
-            candidate: method, step, precision and solver.
-
-        Returns:
-            The plan, by the kernel of `plan`. Noise that has no noise_step in the scene is drawn once a step.
-        """
+        """Make the plan of a run of a setting outside the comparison."""
         sample = self.on_grid(round(float(self.spacing) / candidate.h)) if self.draws else self
         return sample.plan(candidate)
 
     def run(self, candidate: Candidate, ensemble: Ensemble | None = None) -> Result:
-        """Run a setting in this thread, whose processor time is then the run's.
-
-        Args:
-            candidate: method, step, precision and solver.
-            ensemble: members to run in place of the sample's.
-
-        Returns:
-            The result at the sample's times.
-
-        Raises:
-            SceneError: where the scene refuses the method.
-        """
+        """Run a setting in this thread, whose processor time is then the run's."""
         return run_plan(self.plan(candidate, ensemble), 1, executor=ThisThread())
 
     def accepted(
@@ -292,13 +212,8 @@ class Sample:
     ) -> tuple[list[str], dict[str, str]]:
         """Sort methods into those that the scene takes and those that it refuses.
 
-        Args:
-            methods: names of methods.
-            dtype: precision. Default "float64".
-            most: number of accepted methods after which no more are looked at. Default: all are.
-
-        Returns:
-            (accepted, refused): names of the first, and name -> reason of the others.
+        most: number of accepted methods after which no more are looked at. Default: all are.
+        Returns: (accepted, refused): names of the first, and name -> reason of the others.
         """
         good: list[str] = []
         refused: dict[str, str] = {}
@@ -321,11 +236,7 @@ class Sample:
     def noise(self, method: str) -> str:
         """Tell whether random numbers act, and whether they can be drawn on a grid.
 
-        Args:
-            method: name of a method that the scene takes.
-
-        Returns:
-            "none"; "grid"; or "free", for a term with NOISE that is no NoisyTerm: its path differs from step to step.
+        Returns: "none"; "grid"; or "free", for a term with NOISE that is no NoisyTerm: its path differs from step to step.
         """
         laws = self.plan(self.candidate(method, 1)).kernel_choice.laws
         noisy = [term for term, module in laws if getattr(module, "NOISE", False)]
@@ -337,13 +248,7 @@ class Sample:
 def drawn_every(fleet: Ensemble, noise_step: float, own: bool = True) -> Ensemble:
     """Put the noise of an ensemble on a grid.
 
-    Args:
-        fleet: the ensemble.
-        noise_step: time from one draw to the next [s].
-        own: whether terms with a noise_step keep it. Default True.
-
-    Returns:
-        The same members of a scene whose noisy terms have this noise_step.
+    noise_step: time from one draw to the next [s].
     """
     terms = [
         replace(term, noise_step=noise_step)
@@ -357,27 +262,14 @@ def drawn_every(fleet: Ensemble, noise_step: float, own: bool = True) -> Ensembl
 
 
 def failed(result: Result) -> bool:
-    """Tell whether some member failed; those stopped by an event did not.
-
-    Args:
-        result: of any run.
-
-    Returns:
-        True if at least one member failed.
-    """
+    """Tell whether some member failed; those stopped by an event did not."""
     return bool(failed_members(result.status).any())
 
 
 def distances(result: Result, reference: Result, asked: Compared | None = None) -> dict[str, np.ndarray]:
     """Measure how far two results are apart at each time.
 
-    Args:
-        result: of k times and n members.
-        reference: the same members at the same times.
-        asked: one more quantity than those of QUANTITIES.
-
-    Returns:
-        Quantity -> distance (k, n) [its unit]; NaN from where an event stopped a member in either result.
+    Returns: Quantity -> distance (k, n) [its unit]; NaN from where an event stopped a member in either result.
     """
     apart = {name: getattr(result, name).astype(np.float64) - getattr(reference, name) for name in FIELDS}
     chord = np.linalg.norm(apart.pop("attitude"), axis=(-2, -1))
@@ -394,12 +286,8 @@ def distances(result: Result, reference: Result, asked: Compared | None = None) 
 def errors(apart: dict[str, np.ndarray], until: int) -> dict[str, dict[str, float]]:
     """Reduce distances to norms over members and times, leaving out members that were stopped.
 
-    Args:
-        apart: quantity -> (k, n), as of `distances`.
-        until: index of the last sample that counts.
-
-    Returns:
-        Quantity -> {"end_max", "end_rms", "path_max", "path_rms"} [its unit].
+    apart: quantity -> (k, n), as of `distances`.
+    Returns: Quantity -> {"end_max", "end_rms", "path_max", "path_rms"} [its unit].
     """
     norms = {}
     for name, values in apart.items():
@@ -438,24 +326,15 @@ class Reference:
     def error(self, of: str, until: int = -1) -> float:
         """Return the reference's own error.
 
-        Args:
-            of: name of the quantity.
-            until: index of the last sample that counts. Default: the last of all.
-
-        Returns:
-            Largest difference of the two runs up to that sample [unit of `of`].
+        until: index of the last sample that counts. Default: the last of all.
+        Returns: Largest difference of the two runs up to that sample [unit of `of`].
         """
         return float(self.own[of][until])
 
     def reaches(self, of: str, error: float) -> int:
         """Find how far the reference's own error stays below a bound.
 
-        Args:
-            of: name of the quantity.
-            error: the bound [unit of `of`].
-
-        Returns:
-            Index of the last sample up to which it does.
+        error: the bound [unit of `of`].
         """
         return int(np.searchsorted(self.own[of], error, side="right")) - 1
 
@@ -464,14 +343,6 @@ def extrapolated(sample: Sample, method: str, m: int) -> Result:
     """Run a method; where its order is below four and no noise acts, extrapolate from three steps.
 
     Richardson's extrapolation of the steps h, h/2 and h/4 takes out the terms in h^2 and h^3.
-
-    Args:
-        sample: members and times.
-        method: name of the method.
-        m: number of steps in the spacing.
-
-    Returns:
-        The result at the sample's times.
     """
     if Method(method).order >= 4 or sample.draws:
         return sample.run(sample.candidate(method, m))
@@ -487,13 +358,7 @@ def extrapolated(sample: Sample, method: str, m: int) -> Result:
 def agreement(a: Result, b: Result, asked: Compared | None = None) -> dict[str, np.ndarray]:
     """Measure how far two results agree up to each time, over all members.
 
-    Args:
-        a: a result of k times.
-        b: the same members at the same times.
-        asked: one more quantity than those of QUANTITIES.
-
-    Returns:
-        Quantity -> largest distance up to each time (k,) [its unit]; infinite where a member failed.
+    Returns: Quantity -> largest distance up to each time (k,) [its unit]; infinite where a member failed.
     """
     if failed(a) or failed(b):
         names = dict.fromkeys([*QUANTITIES, *([asked.name] if asked else [])])
@@ -506,14 +371,7 @@ def agreement(a: Result, b: Result, asked: Compared | None = None) -> dict[str, 
 
 
 def paired(names: Sequence[str]) -> tuple[str, str]:
-    """Choose the two methods of a reference.
-
-    Args:
-        names: of methods, the best first.
-
-    Returns:
-        The two best; the best twice where the second is of much lower order.
-    """
+    """Choose the two methods of a reference."""
     first, second = names[0], names[min(1, len(names) - 1)]
     return first, second if Method(second).order >= Method(first).order - 2 else first
 
@@ -533,19 +391,8 @@ def make_reference(
 
     How well the runs agree is for the caller to judge.
 
-    Args:
-        sample: members and times.
-        of: quantity whose agreement counts. Default "position".
-        goal: difference at which to stop [unit of `of`]. Default 0: as small as it gets.
-        seconds: processor time to spend, without compiling [s]. Default 15.
-        methods: two names in place of the best ones that the scene takes.
-        report: called with the fraction of the time that is spent.
-
-    Returns:
-        The reference whose two runs agreed best.
-
-    Raises:
-        SceneError: where the scene takes none of the precise methods.
+    goal: difference at which to stop [unit of `of`]. Default 0: as small as it gets.
+    seconds: processor time to spend, without compiling [s]. Default 15.
     """
     compared = compared_in(of)
     of = compared.name
@@ -607,14 +454,11 @@ def make_reference(
 def more_seconds(error: float, goal: float, gain: float, last: float) -> float:
     """Predict how long it takes to refine two runs to a goal.
 
-    Args:
-        error: how far they are apart [any unit].
-        goal: how far they may be apart [same unit].
-        gain: factor by which the last refinement brought them together.
-        last: processor time of the last two runs [s].
-
-    Returns:
-        Processor time of all refinements to come, each twice as long as the one before [s]; infinite where it cannot be told.
+    error: how far they are apart [any unit].
+    goal: how far they may be apart [same unit].
+    last: processor time of the last two runs [s].
+    Returns: Processor time of all refinements to come, each twice as long as the one before [s]; infinite where it cannot be
+        told.
     """
     if not (math.isfinite(error) and goal > 0.0 and 1.5 < gain < math.inf):
         return math.inf
@@ -625,13 +469,9 @@ def more_seconds(error: float, goal: float, gain: float, last: float) -> float:
 def time_over(seconds: float, more: float, share: float) -> tuple[str, str]:
     """Say that the time of a search was over, and how much would do.
 
-    Args:
-        seconds: time that was given [s].
-        more: processor time that the reference needs [s]; infinite where it cannot be told.
-        share: part of a search's time that its reference gets.
-
-    Returns:
-        (cause, remedy).
+    seconds: time that was given [s].
+    more: processor time that the reference needs [s]; infinite where it cannot be told.
+    Returns: (cause, remedy).
     """
     cause = f"{seconds:g} s were over"
     if not math.isfinite(more):
@@ -669,15 +509,7 @@ STEEPEST = 3.0
 
 
 def growth(sample: Sample, candidate: Candidate) -> Growth:
-    """Measure growth by two runs whose starts differ by 1e-8 rad in attitude.
-
-    Args:
-        sample: members and times.
-        candidate: method, step, precision and solver of both runs.
-
-    Returns:
-        Growth of the difference.
-    """
+    """Measure growth by two runs whose starts differ by 1e-8 rad in attitude."""
     fleet = sample.ensemble
     start = fleet.select(0, fleet.members)
     turn = np.random.default_rng(0).normal(size=(fleet.members, 3))
@@ -699,13 +531,9 @@ def growth(sample: Sample, candidate: Candidate) -> Growth:
 def fitted(times: np.ndarray, curve: np.ndarray, t1: float) -> Growth:
     """Fit an exponential and a power of time to the growth of a difference.
 
-    Args:
-        times: times (k,) [s].
-        curve: difference over that at the start (k,).
-        t1: end time [s].
-
-    Returns:
-        The growth; its numbers are NaN with fewer than two times after 0.
+    times: times (k,) [s].
+    curve: difference over that at the start (k,).
+    t1: end time [s].
     """
     later = times > 0.0
     if later.sum() < 2:
@@ -753,13 +581,7 @@ def biases(result: Result, reference: Result, asked: Compared | None = None) -> 
     Each difference is in standard errors of the sample, as root mean square over components and times after 0. Two
     independent samples of the same distribution differ by about 1.4.
 
-    Args:
-        result: of k times and n members.
-        reference: the same quantities at the same times.
-        asked: one more quantity than those of QUANTITIES.
-
-    Returns:
-        "NAME_mean" and "NAME_std" -> difference [standard errors]; empty for one member or where one failed.
+    Returns: "NAME_mean" and "NAME_std" -> difference [standard errors]; empty for one member or where one failed.
     """
     n = result.members
     if n < 2 or failed(result):
@@ -782,15 +604,7 @@ def biases(result: Result, reference: Result, asked: Compared | None = None) -> 
 
 
 def part(result: Result, members: Sequence[int]) -> Result:
-    """Select some members of a result, in memory or in a store.
-
-    Args:
-        result: of n members.
-        members: their indices.
-
-    Returns:
-        A result of these members.
-    """
+    """Select some members of a result, in memory or in a store."""
     at = np.asarray(members)
     if result.store is not None:
         from lgvi_warp.runs.store.open import chosen

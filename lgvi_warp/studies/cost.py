@@ -34,8 +34,7 @@ def thread_seconds() -> float:
     A kernel on the CPU runs in the thread that launches it, so its time is that thread's. Windows counts CPU time in
     ticks of 16 ms, too coarse for a launch: there time.perf_counter is read.
 
-    Returns:
-        Time since an arbitrary start [s].
+    Returns: Time since an arbitrary start [s].
     """
     return time.perf_counter() if os.name == "nt" else time.thread_time()
 
@@ -57,13 +56,6 @@ def costs(plans: Sequence[Plan], rounds: int = 5) -> list[Cost]:
     """Measure the cost of plans, with one number for all plans that run the same kernel.
 
     The readings are taken in interleaved rounds: what slows the machine for a while slows all plans alike.
-
-    Args:
-        plans: the plans.
-        rounds: number of readings of each. Default 5.
-
-    Returns:
-        Cost of each plan.
     """
     calls, steps = launches(plans)
     kinds = [Kind(plan.spec, plan.grid.h, work_grows(plan)) for plan in plans]
@@ -100,12 +92,8 @@ def of_steps(kinds: Sequence[Kind], seconds: np.ndarray) -> list[tuple[float, fl
     A step of one kernel is the same work whatever its length, and costs the least of all its readings. Where a longer
     step is more work, it costs the least of the readings of steps as long or longer, each of which is at least its cost.
 
-    Args:
-        kinds: kind of each row of readings.
-        seconds: readings of one step (kinds, rounds) [s]; NaN where there is none.
-
-    Returns:
-        (seconds of a step [s], median over least) of each kind.
+    seconds: readings of one step (kinds, rounds) [s]; NaN where there is none.
+    Returns: (seconds of a step [s], median over least) of each kind.
     """
     prices = []
     for kind in kinds:
@@ -123,12 +111,7 @@ def confirmed(kinds: Sequence[Kind], seconds: np.ndarray) -> list[bool]:
 
     On a busy machine every reading may be disturbed; two that agree are taken as undisturbed.
 
-    Args:
-        kinds: kind of each row of readings.
-        seconds: readings of one step (kinds, rounds) [s]; NaN where there is none.
-
-    Returns:
-        True where the second least reading is within NEAR of the least.
+    seconds: readings of one step (kinds, rounds) [s]; NaN where there is none.
     """
     met_again = []
     for kind in kinds:
@@ -146,11 +129,7 @@ def _bounding(kind: Kind, kinds: Sequence[Kind], seconds: np.ndarray) -> np.ndar
 def launches(plans: Sequence[Plan]) -> tuple[list[Callable[[], object]], np.ndarray]:
     """Prepare one launch of each plan that is long enough to time.
 
-    Args:
-        plans: the plans.
-
-    Returns:
-        (calls, steps): a call of each plan, and the steps times vehicles that it makes (plans, 1).
+    Returns: (calls, steps): a call of each plan, and the steps times vehicles that it makes (plans, 1).
     """
     calls: list[Callable[[], object]] = []
     steps = np.empty((len(plans), 1))
@@ -170,12 +149,7 @@ def launches(plans: Sequence[Plan]) -> tuple[list[Callable[[], object]], np.ndar
 def timed(calls: Sequence[Callable[[], object]], rounds: int) -> np.ndarray:
     """Time calls in interleaved rounds, after one call of each to warm up.
 
-    Args:
-        calls: functions without arguments.
-        rounds: number of readings of each.
-
-    Returns:
-        CPU time of each call in each round (calls, rounds) [s], at least the clock's resolution.
+    Returns: CPU time of each call in each round (calls, rounds) [s], at least the clock's resolution.
     """
     for call in calls:
         call()
@@ -194,12 +168,6 @@ def work_grows(plan: Plan) -> bool:
 
     It is where a step iterates to a tolerance (the quartic's few Newton steps aside), where each packet chooses its own
     steps, and where a step takes several draws of noise.
-
-    Args:
-        plan: the plan.
-
-    Returns:
-        True if the cost of a step depends on its length.
     """
     spec, letters = plan.spec, {letter for letter, _ in plan.spec.maps}
     newton = spec.explicit is None and spec.adaptive and (spec.solver != "quartic" or "W" in letters)
@@ -210,11 +178,8 @@ def work_grows(plan: Plan) -> bool:
 def disagreement(spreads: Sequence[tuple[str, float]]) -> str | None:
     """Write the message about costs whose readings disagree.
 
-    Args:
-        spreads: (name of the setting, median of its readings over the least) of each.
-
-    Returns:
-        The message; None where all readings agree.
+    spreads: (name of the setting, median of its readings over the least) of each.
+    Returns: The message; None where all readings agree.
     """
     worst: dict[str, float] = {}
     for name, spread in spreads:
@@ -230,13 +195,6 @@ def disagreement(spreads: Sequence[tuple[str, float]]) -> str | None:
 
 
 def agreement_text(spreads: Sequence[float]) -> str:
-    """Describe how costs were read and how well the readings agree.
-
-    Args:
-        spreads: median over least of each cost.
-
-    Returns:
-        One line of text.
-    """
+    """Describe how costs were read and how well the readings agree."""
     most = max((spread for spread in spreads if math.isfinite(spread)), default=1.0)
     return f"CPU time of one thread, the least of several readings; their median is at most {most:.2f} times that"

@@ -31,11 +31,7 @@ STUDY_FILES = {
 def finite_or_none(value: Any) -> Any:
     """Replace numbers that are not finite by None, so that JSON can hold the value.
 
-    Args:
-        value: a number, a text, None, or nested dicts, lists, tuples and arrays of them.
-
-    Returns:
-        The same with plain floats, and with lists in place of tuples and arrays.
+    value: a number, a text, None, or nested dicts, lists, tuples and arrays of them.
     """
     if isinstance(value, dict):
         return {key: finite_or_none(item) for key, item in value.items()}
@@ -51,12 +47,9 @@ def finite_or_none(value: Any) -> Any:
 def numbers(value: Any, missing: float) -> Any:
     """Undo `finite_or_none`.
 
-    Args:
-        value: None, numbers, texts, and nested tables and lists of them.
-        missing: what stands for None, infinite or NaN.
-
-    Returns:
-        The same with this number in place of None.
+    value: None, numbers, texts, and nested tables and lists of them.
+    missing: what stands for None, infinite or NaN.
+    Returns: The same with this number in place of None.
     """
     if isinstance(value, dict):
         return {key: numbers(item, missing) for key, item in value.items()}
@@ -66,14 +59,7 @@ def numbers(value: Any, missing: float) -> Any:
 
 
 def of_study(path: str | os.PathLike[str]) -> AbstractContextManager[None]:
-    """Turn what the content of a study's file raises in the `with` block into a fault of the file.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        A context manager, which raises SceneError.
-    """
+    """Turn what the content of a study's file raises in the `with` block into a fault of the file."""
     return understood(path, "of another version", "run the study again")
 
 

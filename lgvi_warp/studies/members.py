@@ -13,14 +13,7 @@ from lgvi_warp.scene.scene import Scene
 def ensemble_of(fleet: Any) -> Ensemble:
     """The members that are meant.
 
-    Args:
-        fleet: An Ensemble, or a Scene, whose [ensemble] is meant.
-
-    Returns:
-        The ensemble.
-
-    Raises:
-        SceneError: If it is neither.
+    fleet: An Ensemble, or a Scene, whose [ensemble] is meant.
     """
     if isinstance(fleet, Ensemble):
         return fleet
@@ -30,17 +23,7 @@ def ensemble_of(fleet: Any) -> Ensemble:
 
 
 def scene_of(scene: Any) -> Scene:
-    """The scene that is meant.
-
-    Args:
-        scene: A Scene, or an Ensemble, whose scene is meant, without what varies.
-
-    Returns:
-        The scene.
-
-    Raises:
-        SceneError: If it is neither.
-    """
+    """The scene that is meant."""
     scene_itself: Any = scene.scene if isinstance(scene, Ensemble) else scene
     if not isinstance(scene_itself, Scene):
         raise refusal("scene", scene, "is neither a Scene nor an Ensemble", "give lw.Scene(...)")

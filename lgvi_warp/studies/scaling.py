@@ -89,15 +89,7 @@ def _run(plan: Plan, threads: int) -> None:
 
 
 def rising(base: int, most: int) -> list[int]:
-    """List the powers of a number up to a bound, and the bound.
-
-    Args:
-        base: The number.
-        most: The bound.
-
-    Returns:
-        1, base, base squared and so on below the bound, then the bound.
-    """
+    """List the powers of a number up to a bound, and the bound."""
     powers = [1]
     while powers[-1] * base < most:
         powers.append(powers[-1] * base)
@@ -171,19 +163,9 @@ def plan_of(
 ) -> Plan:
     """Plan ten steps of a scene with some terms, without what steers it and what ends it.
 
-    Args:
-        scene: The scene.
-        terms: Its terms.
-        members: Number of members.
-        method: Name of the method, or a Method; None: that of the scene.
-        h: Step [s].
-        dtype: The precision; None: that of the scene.
-
-    Returns:
-        The plan, compiled.
-
-    Raises:
-        SceneError: An argument is at fault.
+    method: Name of the method, or a Method; None: that of the scene.
+    h: Step [s].
+    dtype: The precision; None: that of the scene.
     """
     bare = dataclasses.replace(scene, terms=terms, controller=None, events=(), ensemble_settings=None)
     plan = make_plan(Ensemble(bare, members, 1), method, h=h, t1=None if h is None else 10.0 * h, dtype=dtype)

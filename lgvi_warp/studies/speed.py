@@ -33,12 +33,8 @@ NEWTON = 8
 def operations(method: str, iterations: int | None = None) -> int | None:
     """Count the arithmetic operations of one step.
 
-    Args:
-        method: name of the method.
-        iterations: Newton steps of each solve of the quartic. Default: one.
-
-    Returns:
-        Number of operations; None for methods that were not counted.
+    iterations: Newton steps of each solve of the quartic. Default: one.
+    Returns: Number of operations; None for methods that were not counted.
     """
     if method not in OPERATIONS:
         return None
@@ -46,11 +42,7 @@ def operations(method: str, iterations: int | None = None) -> int | None:
 
 
 def example() -> Scene:
-    """Build the example of Nordkvist & Sanyal (2010).
-
-    Returns:
-        A Scene of its vehicle and start.
-    """
+    """Build the example of Nordkvist & Sanyal (2010)."""
     vehicle = Vehicle(
         123.8,
         inertia=[5.46, 5.29, 5.72],
@@ -64,15 +56,7 @@ def example() -> Scene:
 
 
 def fleet(members: int, *terms: Term) -> Ensemble:
-    """Build an ensemble around the example, whose angular velocities vary by 10 %.
-
-    Args:
-        members: number of members.
-        terms: what acts on them besides weight and buoyancy. Default nothing.
-
-    Returns:
-        The ensemble.
-    """
+    """Build an ensemble around the example, whose angular velocities vary by 10 %."""
     from lgvi_warp.sampling.distributions.basic import Normal
 
     return Ensemble(
@@ -81,14 +65,7 @@ def fleet(members: int, *terms: Term) -> Ensemble:
 
 
 def stepper(plan: Plan) -> Callable[[], None]:
-    """Prepare a call that makes all steps of a plan on one thread, without samples and set-up.
-
-    Args:
-        plan: the plan; it is compiled here.
-
-    Returns:
-        A function to be timed.
-    """
+    """Prepare a call that makes all steps of a plan on one thread, without samples and set-up."""
     plan.compile()
     packets = Packets(plan, plan.ensemble.select(0, plan.ensemble.members))
     return lambda: void(packets.advance(0, plan.grid.steps))
@@ -101,12 +78,7 @@ def void(_: Any) -> None:
 def interleaved(calls: Sequence[Callable[[], None]], rounds: int = 5) -> list[float]:
     """Time calls in turn, so that a slow period of the machine slows all of them.
 
-    Args:
-        calls: functions without arguments.
-        rounds: number of readings of each. Default 5.
-
-    Returns:
-        Median wall time of each call [s].
+    Returns: Median wall time of each call [s].
     """
     times: list[list[float]] = [[] for _ in calls]
     for call in calls:
@@ -122,12 +94,7 @@ def interleaved(calls: Sequence[Callable[[], None]], rounds: int = 5) -> list[fl
 def least(calls: Sequence[Callable[[], None]], rounds: int = 15) -> list[float]:
     """Time calls in turn; other work on the machine can only lengthen a reading, so the least of each counts.
 
-    Args:
-        calls: functions without arguments.
-        rounds: number of readings of each. Default 15.
-
-    Returns:
-        Least wall time of each call [s].
+    Returns: Least wall time of each call [s].
     """
     best = [np.inf] * len(calls)
     for _ in range(rounds):
@@ -139,15 +106,7 @@ def least(calls: Sequence[Callable[[], None]], rounds: int = 15) -> list[float]:
 
 
 def measure(members: int = 4096, steps: int = 1000) -> Iterator[str]:
-    """Measure psi_s in both precisions next to the peak of the core.
-
-    Args:
-        members: number of members. Default 4096.
-        steps: number of steps. Default 1000.
-
-    Yields:
-        A line of JSON for each precision, as of `record`.
-    """
+    """Measure psi_s in both precisions next to the peak of the core."""
     for dtype in ("float64", "float32"):
         plan = make_plan(fleet(members), "psi_s", h=0.01, t1=0.01 * steps, dtype=dtype)
         seconds = interleaved([stepper(plan)])[0] / (members * steps)
@@ -158,15 +117,9 @@ def measure(members: int = 4096, steps: int = 1000) -> Iterator[str]:
 def record(method: Method, dtype: str, width: int, seconds: float, peak: float) -> dict[str, Any]:
     """Describe one measurement of a kernel next to the core's peak.
 
-    Args:
-        method: the method.
-        dtype: its precision.
-        width: members in one packet.
-        seconds: time per vehicle and step [s].
-        peak: fused multiply-adds of the core per second [1/s].
-
-    Returns:
-        Record of the settings, ns per vehicle and step, operations, peak [1e9/s] and the part of the peak reached.
+    seconds: time per vehicle and step [s].
+    peak: fused multiply-adds of the core per second [1/s].
+    Returns: Record of the settings, ns per vehicle and step, operations, peak [1e9/s] and the part of the peak reached.
     """
     count = operations(method.name, None if method.iterations is None else int(method.iterations))
     return {

@@ -265,30 +265,14 @@ def suggest(
 def errors_of(one: Trial, reference: Reference, of: str) -> np.ndarray:
     """Largest error over the path of each member of a trial.
 
-    Args:
-        one: the trial.
-        reference: what errors are measured against.
-        of: name of the quantity.
-
-    Returns:
-        Errors (n,) [its unit].
+    Returns: Errors (n,) [its unit].
     """
     apart = comparison.distances(one.result, reference.result, reference.asked)[of]
     return np.asarray(np.max(np.where(np.isnan(apart), 0.0, apart), axis=0))
 
 
 def worst_of(one: Trial, reference: Reference, of: str, members: int = CONFIRMED // 2) -> tuple[int, ...]:
-    """Find the members of a trial that have the largest errors.
-
-    Args:
-        one: the trial.
-        reference: what errors are measured against.
-        of: name of the quantity.
-        members: largest number of indices. Default 32.
-
-    Returns:
-        Indices of the members, the largest error first.
-    """
+    """Find the members of a trial that have the largest errors."""
     return tuple(int(i) for i in np.argsort(-errors_of(one, reference, of))[:members])
 
 
@@ -298,12 +282,7 @@ def largest_in_fleet(errors: np.ndarray, members: int) -> float:
     The largest ones fall off as a power of their rank (Hill 1975), which gives the error that a fleet exceeds with a chance of
     CHANCE (Weissman 1978). Tails that end are fallen off faster: for them it is too large, never too small.
 
-    Args:
-        errors: of the members that were checked, drawn as those of the fleet are (n,).
-        members: size of the fleet.
-
-    Returns:
-        The error, at least the largest one.
+    errors: of the members that were checked, drawn as those of the fleet are (n,).
     """
     n = len(errors)
     falling = np.sort(errors)[::-1]
@@ -317,19 +296,8 @@ def largest_in_fleet(errors: np.ndarray, members: int) -> float:
 def checked_reference(sample: Sample, of: Compared, error: float, seconds: float, taken: Sequence[str]) -> Reference:
     """Make a reference that is ten times better than the error up to the end.
 
-    Args:
-        sample: members and times.
-        of: quantity that the error is of.
-        error: error asked for [unit of `of`].
-        seconds: processor time of the whole search, of which the reference gets a part [s].
-        taken: methods that the scene takes; one of them measures how errors grow, for the message.
-
-    Returns:
-        The reference.
-
-    Raises:
-        SceneError: where the two best runs differ by more than a tenth of the error. It says first why: the time was over, and
-            how much would do; or shorter steps agree no better, and the time up to which they agree.
+    error: error asked for [unit of `of`].
+    seconds: processor time of the whole search, of which the reference gets a part [s].
     """
     reference = comparison.make_reference(sample, of, goal=error / 30.0, seconds=SHARE * seconds)
     apart = reference.error(of.name)
@@ -349,15 +317,7 @@ def checked_reference(sample: Sample, of: Compared, error: float, seconds: float
 
 
 def short_list(sample: Sample, taken: Sequence[str]) -> list[str]:
-    """List the methods to try first, by what acts in the scene.
-
-    Args:
-        sample: members and times.
-        taken: names of the methods that the scene takes.
-
-    Returns:
-        Their names; all where the scene takes none of the list.
-    """
+    """List the methods to try first, by what acts in the scene."""
     if sample.noise(taken[0]) != "none":
         names = SHORT["noisy"]
     elif not is_damped(sample.ensemble):
@@ -376,13 +336,7 @@ class Ladders:
     lengthened by the slope of the errors. A method is given up where its steps cost twice what the cheapest setting so far
     does, and a precision where the other one is better.
 
-    Args:
-        sample: members and times.
-        reference: what errors are measured against.
-        asked: quantity that the error is of.
-        target: largest error allowed [unit of `asked`].
-        budget: processor time to spend; compiling is free.
-        named: whether the methods were asked for by name: then each runs one step however little time there is. Default False.
+    target: largest error allowed [unit of `asked`].
 
     Attributes:
         priced: (microseconds of one core per vehicle and second, trial) of each setting that keeps the target.
@@ -403,13 +357,7 @@ class Ladders:
         self._compiled = {sample.plan(sample.candidate(name, 1)).spec for name in reference.methods}
 
     def climb(self, methods: Sequence[str], report: Callable[[float], None] = void, new_kernels: bool = True) -> None:
-        """Search some methods: a step of each in turn.
-
-        Args:
-            methods: their names.
-            report: called with the fraction of them that is done.
-            new_kernels: whether to compile kernels that the search has not loaded. Default True.
-        """
+        """Search some methods: a step of each in turn."""
         specs = {
             (method, dtype): self.sample.plan(self.sample.candidate(method, 1, dtype)).spec
             for method in methods
@@ -451,16 +399,8 @@ class Ladders:
     def longest(self, method: str, dtype: str) -> Generator[Trial, None, float | None]:
         """Find the longest step that keeps the target.
 
-        Args:
-            method: name of the method.
-            dtype: precision.
-
-        Yields:
-            Each trial that misses the target and is followed by one of half the step.
-
-        Returns:
-            Its cost [us of one core per vehicle and second]; infinite where steps that might keep the target are too dear, and
-            None where the errors cease to fall.
+        Returns: Its cost [us of one core per vehicle and second]; infinite where steps that might keep the target are too
+            dear, and None where the errors cease to fall.
         """
         sample, reference, of, target = self.sample, self.reference, self.of, self.target
         m, before, worse = sample.coarsest(2.0), math.inf, 0
@@ -500,14 +440,7 @@ class Ladders:
 
 
 def step_cost(plan: Plan) -> float:
-    """Measure what one step of a plan costs.
-
-    Args:
-        plan: the plan.
-
-    Returns:
-        Microseconds of one core for one step of one vehicle.
-    """
+    """Measure what one step of a plan costs."""
     return costs([plan], ROUNDS)[0] * plan.grid.h
 
 
@@ -516,17 +449,8 @@ def lengthened(
 ) -> Trial:
     """Lengthen a step towards twice its length as far as the target allows.
 
-    Args:
-        sample: members and times.
-        good: trial that keeps the target, of the step spacing / m.
-        m: number of its steps in the sample's spacing.
-        before: error of the step twice as long [unit of `of`].
-        reference: what errors are measured against.
-        of: name of the quantity.
-        target: largest error allowed [unit of `of`].
-
-    Returns:
-        The trial of the longest step found that keeps the target; `good` itself where none does better.
+    before: error of the step twice as long [unit of `of`].
+    target: largest error allowed [unit of `of`].
     """
     low, high, size = m // 2, m, good.error(of)
     if not math.isfinite(before) or before <= target or low < 1:
@@ -552,17 +476,9 @@ def refined(
 ) -> tuple[Trial, float]:
     """Run a setting on a sample and shorten its step until a whole fleet keeps the target.
 
-    Args:
-        sample: members and times.
-        candidate: where to begin.
-        reference: what errors are measured against.
-        of: name of the quantity.
-        target: largest error allowed [unit of `of`].
-        members: size of the fleet.
-
-    Returns:
-        The last trial, and the largest error expected in the fleet [unit of `of`]; after six shorter steps it may still miss
-        the target.
+    target: largest error allowed [unit of `of`].
+    Returns: The last trial, and the largest error expected in the fleet [unit of `of`]; after six shorter steps it may still
+        miss the target.
     """
     m = sample.allowed(round(float(sample.spacing) / candidate.h))
     order = 1 if sample.draws else Method(candidate.method).order
@@ -579,14 +495,8 @@ def refined(
 def seconds_of(fleet: Ensemble, candidate: Candidate, t1: float, members: int = 256) -> float:
     """Predict the CPU time of a whole run from that of a few members.
 
-    Args:
-        fleet: all members.
-        candidate: method, step, precision and solver.
-        t1: end time [s].
-        members: number of members that are timed. Default 256.
-
-    Returns:
-        Time of all members on one core, the scene's samples included and compiling not [s].
+    t1: end time [s].
+    Returns: Time of all members on one core, the scene's samples included and compiling not [s].
     """
     n = min(members, fleet.members)
     plan = make_plan(fleet.subset(range(n)), candidate.resolved(), candidate.h, t1, dtype=candidate.dtype)
@@ -597,13 +507,8 @@ def seconds_of(fleet: Ensemble, candidate: Candidate, t1: float, members: int = 
 def memory_of(fleet: Ensemble, candidate: Candidate, t1: float) -> int:
     """Predict the memory of a run of all members, with the scene's samples.
 
-    Args:
-        fleet: all members.
-        candidate: method, step, precision and solver.
-        t1: end time [s].
-
-    Returns:
-        Memory of the run and its result [bytes].
+    t1: end time [s].
+    Returns: Memory of the run and its result [bytes].
     """
     grid = make_plan(fleet.subset([0]), candidate.resolved(), candidate.h, t1, dtype=candidate.dtype).grid
     a_sample = 18 * np.dtype(machine.DTYPES[candidate.dtype]).itemsize
@@ -618,13 +523,7 @@ def verified(fleet: Ensemble, result: Result, found: Suggestion) -> tuple[float,
     members are run with both steps on one path, drawn at each of the shorter ones; errors are of order 1, and what each
     halving changes is independent, so that squares add up.
 
-    Args:
-        fleet: the ensemble that was run.
-        result: its result.
-        found: the suggestion that it was run by.
-
-    Returns:
-        (error, members): largest error over these members and all samples [found.unit], and how many members they are.
+    Returns: (error, members): largest error over these members and all samples [found.unit], and how many members they are.
     """
     candidate = found.setting
     chosen = list(dict.fromkeys((*found.worst, *range(fleet.members))))[:CONFIRMED]

@@ -79,12 +79,7 @@ class Measurement:
     def error(self, of: str = "position", kind: str = "path_max") -> float:
         """Look up one error of this setting.
 
-        Args:
-            of: name of the quantity. Default "position".
-            kind: "end_max", "end_rms", "path_max" or "path_rms". Default "path_max".
-
-        Returns:
-            The error [unit of `of`]; infinite where there is none.
+        Returns: The error [unit of `of`]; infinite where there is none.
         """
         return self.errors.get(of, {}).get(kind, math.inf)
 
@@ -241,11 +236,7 @@ class Trial:
     def error(self, of: str) -> float:
         """Return the largest error over members and path.
 
-        Args:
-            of: name of the quantity.
-
-        Returns:
-            The error [unit of `of`]; infinite where a member failed or there is no reference.
+        Returns: The error [unit of `of`]; infinite where a member failed or there is no reference.
         """
         return self.errors[of]["path_max"] if self.errors else math.inf
 
@@ -259,18 +250,9 @@ def tried(
 ) -> Trial:
     """Run a setting on a sample and measure its errors.
 
-    Args:
-        sample: members and times.
-        candidate: method, step, precision and solver.
-        reference: what errors are measured against; None for no errors.
-        until: index of the last sample that is compared. Default: the last of all.
-        budget: what compiling does not count in. Default: none.
-
-    Returns:
-        The trial.
-
-    Raises:
-        SceneError: where the scene refuses the setting.
+    reference: what errors are measured against; None for no errors.
+    until: index of the last sample that is compared. Default: the last of all.
+    budget: what compiling does not count in. Default: none.
     """
     plan = sample.plan(candidate)
     with budget.free() if budget else contextlib.nullcontext():
@@ -289,30 +271,15 @@ def tried(
 
 
 def costs(plans: Sequence[Plan], rounds: int = 5) -> list[float]:
-    """Measure the cost of plans (see cost.py).
-
-    Args:
-        plans: the plans.
-        rounds: number of readings of each. Default 5.
-
-    Returns:
-        Microseconds of one core per vehicle and simulated second of each plan.
-    """
+    """Measure the cost of plans (see cost.py)."""
     return [price.us_per_vehicle_second for price in cost.costs(plans, rounds)]
 
 
 def chosen_methods(methods: Sequence[str] | None, default: Sequence[str] = CANDIDATES) -> tuple[str, ...]:
     """Check the names of the methods to try.
 
-    Args:
-        methods: names; None for the default ones.
-        default: names used for None.
-
-    Returns:
-        Names of methods that exist.
-
-    Raises:
-        SceneError: for names that do not exist, and for an empty list.
+    methods: names; None for the default ones.
+    default: names used for None.
     """
     if methods is None:
         return tuple(default)
@@ -440,15 +407,7 @@ def without_reading(
 ) -> dict[str, str]:
     """Name the methods that were asked for and have no measurement.
 
-    Args:
-        names: of the methods.
-        trials: what was run.
-        measured: the measurements.
-        refused: method -> why the scene does not take it.
-        seconds: processor time of the whole trade-off [s].
-
-    Returns:
-        Method -> why it has none.
+    seconds: processor time of the whole trade-off [s].
     """
     there = {measurement.setting.method for measurement in measured}
 
@@ -462,16 +421,7 @@ def without_reading(
 
 
 def growth_of(sample: Sample, taken: Sequence[str], reference: Reference) -> Growth:
-    """Measure how errors grow, by the method of highest order at about the reference's step.
-
-    Args:
-        sample: members and times.
-        taken: names of methods that the scene takes.
-        reference: gives the step.
-
-    Returns:
-        Growth of a small difference.
-    """
+    """Measure how errors grow, by the method of highest order at about the reference's step."""
     method = max(taken, key=lambda name: Method(name).order)
     often = sample if sample.draws else Sample(sample.whole, sample.t1, sample.members)
     m = max(1, round(float(often.spacing) / reference.result.provenance["step"]))
@@ -479,44 +429,20 @@ def growth_of(sample: Sample, taken: Sequence[str], reference: Reference) -> Gro
 
 
 def noise_text(sample: Sample) -> str:
-    """Say how the runs of a comparison share their noise.
-
-    Args:
-        sample: members and times, with noise on a grid.
-
-    Returns:
-        A sentence.
-    """
+    """Say how the runs of a comparison share their noise."""
     every = f"{sample.h(sample.draws):.4g} s"
     return f"noise acts: all runs see one path of it, drawn every {every}; errors by paths are of order 1"
 
 
 def reaches_nothing(reference: Reference, of: Compared) -> bool:
-    """Tell whether a reference is too rough for errors of members even at the first time.
-
-    Args:
-        reference: its own errors decide.
-        of: quantity that they are of.
-
-    Returns:
-        True where `trusted_until` would raise an error.
-    """
+    """Tell whether a reference is too rough for errors of members even at the first time."""
     return reference.reaches(of.name, comparison.LOST / (TRUST * TRUST)) < 1
 
 
 def trusted_until(reference: Reference, of: Compared, seconds: float) -> int:
     """Find the last sample at which errors below 1e-2 can be measured.
 
-    Args:
-        reference: its own errors decide.
-        of: quantity that they are of.
-        seconds: time of the whole trade-off, for the message [s].
-
-    Returns:
-        Index of the sample.
-
-    Raises:
-        SceneError: where the reference is not good enough even at the first time.
+    seconds: time of the whole trade-off, for the message [s].
     """
     until = reference.reaches(of.name, comparison.LOST / (TRUST * TRUST))
     if reaches_nothing(reference, of):
@@ -607,15 +533,7 @@ def sweep(
 
 
 def series_of(sample: Sample, methods: Sequence[str]) -> list[Series]:
-    """List the series of settings, the default precision of every method first.
-
-    Args:
-        sample: members and times.
-        methods: names of the methods, in this order.
-
-    Returns:
-        The series, at their coarsest steps.
-    """
+    """List the series of settings, the default precision of every method first."""
     plain: tuple[str, int | None] = ("quartic", None)
     settings = [(name, dtype, plain) for dtype in PRECISIONS for name in methods]
     settings += [(SOLVED_BY, "float64", solved) for solved in SOLVERS if SOLVED_BY in methods]
@@ -629,16 +547,7 @@ def halved(
 ) -> bool:
     """Run the next step of a series.
 
-    Args:
-        sample: members and times.
-        one: the series, which goes on to half the step.
-        trials: all trials so far; the new one is appended.
-        reference: what errors are measured against; None where noise acts.
-        until: index of the last sample that is compared.
-        budget: of the runs.
-
-    Returns:
-        Whether a shorter step is worth a run.
+    reference: what errors are measured against; None where noise acts.
     """
     trial = tried(sample, sample.candidate(one.method, one.m, one.dtype, one.solver), reference, until, budget)
     trials.append(trial)
@@ -658,30 +567,14 @@ def halved(
 
 
 def hopeless(one: Trial, trials: Sequence[Trial]) -> bool:
-    """Tell whether another setting was more accurate in a tenth of the time.
-
-    Args:
-        one: the trial in question.
-        trials: all trials so far.
-
-    Returns:
-        True if finer steps of this setting cannot reach the front.
-    """
+    """Tell whether another setting was more accurate in a tenth of the time."""
     error = max(one.error(of) for of in DECIDING)
     rivals = (rival for rival in trials if HOPELESS * rival.cpu_seconds < one.cpu_seconds)
     return math.isfinite(error) and any(max(rival.error(of) for of in DECIDING) < error for rival in rivals)
 
 
 def between(sample: Sample, trials: list[Trial], reference: Reference, until: int, budget: Budget) -> None:
-    """Add trials near the Pareto front, at steps between those already tried.
-
-    Args:
-        sample: members and times.
-        trials: all trials so far; new ones are appended.
-        reference: what errors are measured against.
-        until: index of the last sample that is compared.
-        budget: of the runs; once it is over none is added.
-    """
+    """Add trials near the Pareto front, at steps between those already tried."""
     ranked = sorted((trial.cpu_seconds, trial.error(DECIDING[0]), i) for i, trial in enumerate(trials))
     best, near = math.inf, list[Trial]()
     for _, error, i in ranked:
@@ -708,16 +601,7 @@ def measurements(
 ) -> list[Measurement]:
     """Measure the cost of the trials and collect their errors, drifts and biases.
 
-    Args:
-        sample: members and times.
-        trials: the trials; those that failed are left out.
-        reference: what errors are measured against; None where noise acts.
-        finest: the result that statistics are compared with.
-        until: index of the last sample that is compared.
-        asked: one more quantity to take biases of.
-
-    Returns:
-        One measurement of each trial that did not fail.
+    reference: what errors are measured against; None where noise acts.
     """
     good = [trial for trial in trials if not comparison.failed(trial.result) and (trial.errors or reference is None)]
     compiled: dict[tuple[str, str], float] = {}
@@ -748,14 +632,7 @@ def measurements(
 
 
 def report_text(found: Tradeoff) -> str:
-    """Write the trade-off as a text of several lines.
-
-    Args:
-        found: the trade-off.
-
-    Returns:
-        Messages, sample, reference, predictability, the front as a table, and biases.
-    """
+    """Write the trade-off as a text of several lines."""
     unit = found.units[found.of]
     lines = [f"missing     {name}: {why}" for name, why in found.missing.items()]
     lines += [f"note        {message}" for message in found.messages]
@@ -788,14 +665,7 @@ def report_text(found: Tradeoff) -> str:
 
 
 def growth_text(found: Growth) -> str:
-    """Describe how errors grow, in words.
-
-    Args:
-        found: the growth of a small difference.
-
-    Returns:
-        One or two sentences.
-    """
+    """Describe how errors grow, in words."""
     if not np.isfinite(found.rate):
         return "unknown: a difference of 1e-8 rad grows beyond measure at once"
     if found.power is not None:
@@ -810,12 +680,6 @@ def bias_lines(found: Tradeoff) -> list[str]:
     """Write a table of the statistics' biases against the step.
 
     The table is of one method in float64 with the default solver: the first of order 2, or of the order nearest to it.
-
-    Args:
-        found: the trade-off.
-
-    Returns:
-        Lines of the table; none where there are no biases.
     """
     double = [
         measurement

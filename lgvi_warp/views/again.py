@@ -18,15 +18,9 @@ DEFAULTS = {"dtype": "float64", "checks": "safe", "on_failure": "freeze"}
 def again(provenance: Mapping[str, Any]) -> tuple[str | None, str, str]:
     """Say how to run a run again.
 
-    Args:
-        provenance: That of the run.
-
-    Returns:
-        The command, None where no file holds all of the run; what a reader has to know; and the text of the scene file: as it
-        was written, else of the scene's tables. An ensemble that was given in Python stands in it in place of the file's own.
-
-    Raises:
-        ImportError: tomlkit is not installed (extra: viz), and the text is not the one that was written.
+    Returns: The command, None where no file holds all of the run; what a reader has to know; and the text of the scene file:
+        as it was written, else of the scene's tables. An ensemble that was given in Python stands in it in place of the file's
+        own.
     """
     scene, source = provenance["scene"], provenance.get("source", {})
     written = isinstance(source.get("text"), str)
@@ -105,14 +99,7 @@ def _same(setting: Any, value: Any) -> bool:
 
 
 def shortened(scene: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Name a vehicle of the package in place of its numbers, where that is the same scene.
-
-    Args:
-        scene: Tables of a scene.
-
-    Returns:
-        Tables of the same scene, with the numbers that differ from the vehicle's own alone.
-    """
+    """Name a vehicle of the package in place of its numbers, where that is the same scene."""
     from lgvi_warp.scene.scene import Scene
     from lgvi_warp.scene.vehicles.fossen import vehicles
 
@@ -133,17 +120,7 @@ def shortened(scene: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def toml_of(content: Mapping[str, Any]) -> str:
-    """Content as the text of a TOML file.
-
-    Args:
-        content: Tables of plain types, such as the scene of a provenance.
-
-    Returns:
-        The text.
-
-    Raises:
-        ImportError: tomlkit is not installed (extra: viz).
-    """
+    """Content as the text of a TOML file."""
     return str(_tomlkit().dumps(content))
 
 

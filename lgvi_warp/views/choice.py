@@ -52,15 +52,7 @@ class Shown:
 
 
 def of_members(count: int, total: int) -> str:
-    """Say how many members of how many.
-
-    Args:
-        count: Number of members.
-        total: Number that they are taken from.
-
-    Returns:
-        "1,000 of 100,000 members"; "1 member" and "7 members" where these are all.
-    """
+    """Say how many members of how many."""
     if count < total:
         return f"{count:,} of {total:,} members"
     return f"{total:,} member{'s' * (total != 1)}"
@@ -105,12 +97,7 @@ def shown(result: Result, most: int = MOST_BODIES) -> Shown:
 def frames_of(time: np.ndarray, most: int = MOST_FRAMES) -> np.ndarray:
     """Choose samples that are even in time.
 
-    Args:
-        time: Times of the samples [s], rising, shape (k,).
-        most: The most samples to choose.
-
-    Returns:
-        Indices, rising, the first and the last sample among them; all where there are no more.
+    time: Times of the samples [s], rising, shape (k,).
     """
     if len(time) <= most:
         return np.arange(len(time))
@@ -125,11 +112,8 @@ def mixed(index: np.ndarray) -> np.ndarray:
 
     Steele, Lea & Flood 2014, Fast splittable pseudorandom number generators, OOPSLA.
 
-    Args:
-        index: Whole numbers from 0, shape (n,).
-
-    Returns:
-        uint64, shape (n,); different for different numbers.
+    index: Whole numbers from 0, shape (n,).
+    Returns: uint64, shape (n,); different for different numbers.
     """
     z = (index.astype(np.uint64) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -140,12 +124,7 @@ def mixed(index: np.ndarray) -> np.ndarray:
 def pieces(result: Result, fields: tuple[str, ...]) -> Iterator[tuple[slice, Mapping[str, np.ndarray]]]:
     """Read samples of successive members, so that a large run in a store never lies in memory whole.
 
-    Args:
-        result: The result.
-        fields: Names of the samples to read.
-
-    Yields:
-        Pairs (members, samples): a slice of the members, and their samples by name, shape (k, members, ...).
+    Yields: Pairs (members, samples): a slice of the members, and their samples by name, shape (k, members, ...).
     """
     many = max(1, AT_ONCE // len(result.time))
     for first in range(0, result.members, many):
@@ -158,14 +137,9 @@ def samples_of(
 ) -> dict[str, np.ndarray]:
     """Read samples of some members.
 
-    Args:
-        result: The result.
-        fields: Names of the samples.
-        members: The members.
-        frames: Indices of the samples' times; default None, all.
-
-    Returns:
-        Samples by name, shape (k, members, ...); views where the result is in memory, members are a slice and times are all.
+    frames: Indices of the samples' times; default None, all.
+    Returns: Samples by name, shape (k, members, ...); views where the result is in memory, members are a slice and times are
+        all.
     """
     at: Any = slice(None) if frames is None else frames
     if result.store is not None:
@@ -196,11 +170,8 @@ def _survey(result: Result, frames: np.ndarray) -> tuple[np.ndarray, list[int]]:
 def finite_rows(vectors: np.ndarray) -> np.ndarray:
     """Tell which vectors are finite.
 
-    Args:
-        vectors: Numbers, shape (..., 3).
-
-    Returns:
-        Mask (...).
+    vectors: Numbers, shape (..., 3).
+    Returns: Mask (...).
     """
     # One sum and one test: reducing a short axis takes several times as long.
     with np.errstate(invalid="ignore", over="ignore"):
@@ -223,14 +194,7 @@ def few(
 ) -> Result:
     """Take some members at some times into memory.
 
-    Args:
-        result: The result.
-        members: The members, a slice or indices.
-        fields: Names of the samples to read; those that were not kept are left out.
-        frames: Indices of the samples' times; default None, all.
-
-    Returns:
-        A result of these.
+    frames: Indices of the samples' times; default None, all.
     """
     samples = samples_of(result, tuple(name for name in fields if name in result.samples), members, frames)
     of_members = {item.name: getattr(result, item.name)[members] for item in member_fields.EVERY}

@@ -18,25 +18,13 @@ NEAR = 20.0
 
 
 class Channel(NamedTuple):
-    """One channel of an actuator.
-
-    Args:
-        name: As "control_fins[0]".
-        limit: Largest size of its command; NaN where it is not known.
-    """
+    """One channel of an actuator."""
 
     name: str
     limit: float
 
     def limits(self, values: np.ndarray) -> tuple[float, ...]:
-        """Choose the limits that are drawn beside values.
-
-        Args:
-            values: What is drawn of the command.
-
-        Returns:
-            The lower and the upper one; none where they are far away or not known.
-        """
+        """Choose the limits that are drawn beside values."""
         near = self.limit < NEAR * max(np.nanmax(np.abs(values), initial=0.0), 1e-9)
         return (-self.limit, self.limit) if near else ()
 
@@ -44,9 +32,7 @@ class Channel(NamedTuple):
 class Broken(NamedTuple):
     """A fault of a run.
 
-    Args:
-        time: When it begins for the first member [s].
-        text: What it does, in words.
+    time: When it begins for the first member [s].
     """
 
     time: float
@@ -54,14 +40,7 @@ class Broken(NamedTuple):
 
 
 def channels(result: Result) -> list[Channel]:
-    """Name the channels of a run's actuators.
-
-    Args:
-        result: A result with commands or actuators.
-
-    Returns:
-        The channels by their number.
-    """
+    """Name the channels of a run's actuators."""
     from lgvi_warp.scene.scene import Scene
 
     count = next((result.samples[name].shape[-1] for name in CHANNELS if name in result.samples), 0)
@@ -81,14 +60,7 @@ def channels(result: Result) -> list[Channel]:
 
 
 def faults(result: Result) -> list[Broken]:
-    """List the faults of actuators and sensors that begin during a run.
-
-    Args:
-        result: A result.
-
-    Returns:
-        Faults in the order in which they begin.
-    """
+    """List the faults of actuators and sensors that begin during a run."""
     found = []
     for table in result.provenance["scene"].get("controller", {}).get("faults", ()):
         key = table.get("name") or table["type"]

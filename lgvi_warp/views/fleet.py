@@ -18,12 +18,7 @@ if TYPE_CHECKING:
 
 
 class Look(NamedTuple):
-    """How members with one outcome are drawn.
-
-    Args:
-        color: Colour as #RRGGBB.
-        marker: Matplotlib's marker where such members ended.
-    """
+    """How members with one outcome are drawn."""
 
     color: str
     marker: str
@@ -51,10 +46,7 @@ LOOKS |= {code: Look("#D55E00", marker) for code, marker in zip(FAILURES, "xX*P1
 class Curve(NamedTuple):
     """One number of all members against time.
 
-    Args:
-        name: Title of the curve.
-        label: Label of its axis, with the unit.
-        values: The numbers, shape (k, n).
+    values: The numbers, shape (k, n).
     """
 
     name: str
@@ -65,11 +57,7 @@ class Curve(NamedTuple):
 def energy_curve(result: Result) -> Curve:
     """Energy against time, as its error where the scene's laws conserve it.
 
-    Args:
-        result: A result with position, attitude, velocity and angular velocity.
-
-    Returns:
-        E(t) - E(0), or E(t) where a force does work [J], shape (k, n).
+    Returns: E(t) - E(0), or E(t) where a force does work [J], shape (k, n).
     """
     if "energy" in invariants.conserved(result):
         return Curve("Energy error", "E(t) - E(0) [J]", result.energy - result.energy[:1])
@@ -77,14 +65,7 @@ def energy_curve(result: Result) -> Curve:
 
 
 def title(result: Result) -> str:
-    """Title of a picture: members, method and step, and the outcomes where not all ran to the end.
-
-    Args:
-        result: A result.
-
-    Returns:
-        One line of text.
-    """
+    """Title of a picture: members, method and step, and the outcomes where not all ran to the end."""
     method, step = result.provenance["method"]["name"], result.provenance["step"]
     text = f"{of_members(result.members, members_of_run(result))}, {method}, step {step:g} s"
     counts = result.status.counts()
@@ -94,14 +75,7 @@ def title(result: Result) -> str:
 
 
 def members_of_run(result: Result) -> int:
-    """Count the members of the run that a result is of, or a part of.
-
-    Args:
-        result: A result.
-
-    Returns:
-        The number of members that were run.
-    """
+    """Count the members of the run that a result is of, or a part of."""
     planned = result.provenance["ensemble"].get("members") or 0
     return max(result.members, int(result.provenance.get("members", planned)))
 
@@ -110,12 +84,6 @@ def identity(result: Result) -> str:
     """Identifier of a run: a hash of its provenance and samples.
 
     The provenance alone is not enough, since parts of a run share it.
-
-    Args:
-        result: A result.
-
-    Returns:
-        16 hexadecimal digits, the same for the same run.
     """
     digest = hashlib.sha256(json.dumps(result.provenance, sort_keys=True).encode())
     arrays = [result.time, np.asarray(result.status), stop_time(result)]

@@ -38,9 +38,6 @@ class Live:
 
     A viewer that is closed, or takes nothing for a while, ends the view and not the run.
 
-    Args:
-        recording: The stream to send to, an rr.RecordingStream.
-
     Attributes:
         closed: Whether the viewer was closed.
     """
@@ -55,11 +52,7 @@ class Live:
         self._scale, self._curves = 1, 0
 
     def add(self, block: Result) -> None:
-        """Show the next members; `lgvi_warp.solve(..., on_block=live.add)` calls it.
-
-        Args:
-            block: Their result; one without positions, attitudes and velocities is counted, not drawn.
-        """
+        """Show the next members; `lgvi_warp.solve(..., on_block=live.add)` calls it."""
         if self.closed:
             return
         try:
@@ -114,15 +107,7 @@ class Live:
 
 
 def live(scene: Any, address: str) -> Live:
-    """Open a recording of a run that is about to begin.
-
-    Args:
-        scene: The run's scene.
-        address: Address of a viewer, as "rerun+http://127.0.0.1:9876/proxy".
-
-    Returns:
-        What takes the blocks of the run.
-    """
+    """Open a recording of a run that is about to begin."""
     name = hashlib.sha256(json.dumps(scene.to_dict(), sort_keys=True).encode()).hexdigest()[:16]
     recording = viewer.rerun().RecordingStream(f"lgvi_warp_live_{name}", recording_id=f"live_{name}")
     recording.connect_grpc(address)

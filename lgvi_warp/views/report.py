@@ -107,14 +107,7 @@ def _of_folder(folder: Path) -> tuple[str, list[str]]:
 def run_in(folder: Path) -> tuple[Result, Path] | None:
     """Read the run that a folder holds.
 
-    Args:
-        folder: The folder of a run, or a store.
-
-    Returns:
-        The result, and the file or the store; None without one.
-
-    Raises:
-        SceneError: It is damaged.
+    Returns: The result, and the file or the store; None without one.
     """
     from lgvi_warp.runs.result import Result
     from lgvi_warp.runs.store.open import open_run
@@ -128,29 +121,12 @@ def run_in(folder: Path) -> tuple[Result, Path] | None:
 
 
 def studies_in(folder: Path) -> list[Path]:
-    """Find the studies that a folder holds.
-
-    Args:
-        folder: The folder.
-
-    Returns:
-        The JSON file of each.
-
-    Raises:
-        SceneError: A link leads out of the folder.
-    """
+    """Find the studies that a folder holds."""
     return [inside(folder, path.name) for pattern in STUDY_FILES.values() for path in sorted(folder.glob(pattern))]
 
 
 def name_of(provenance: Mapping[str, Any]) -> str:
-    """Name a run: by its scene file, and by its vehicle.
-
-    Args:
-        provenance: That of the run.
-
-    Returns:
-        As "dive: remus_100"; "Run" where neither has a name.
-    """
+    """Name a run: by its scene file, and by its vehicle."""
     source, vehicle = provenance.get("source", {}), provenance["scene"].get("vehicle", {})
     names = (Path(str(source.get("file", ""))).stem, str(vehicle.get("title") or ""))
     return ": ".join(name for name in names if name) or "Run"

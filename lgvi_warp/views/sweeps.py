@@ -65,18 +65,9 @@ def plot_success(sweep: Sweep, path: FilePath | None = None, *, figure: Any = No
 
     A map has the interval in each field, and is drawn at the first value of any further axis.
 
-    Args:
-        sweep: the sweep.
-        path: of the picture; default None, which writes none.
-        figure: Matplotlib figure to draw on; default None, one of its own.
-
-    Returns:
-        The axes, (panels,).
-
-    Raises:
-        NothingToDraw: all cells were refused.
-        ImportError: matplotlib is not installed (extra: viz).
-        OSError: the file cannot be written.
+    path: of the picture; default None, which writes none.
+    figure: Matplotlib figure to draw on; default None, one of its own.
+    Returns: The axes, (panels,).
     """
     cells, long = _ran(sweep), _long(sweep)
     if len(long) >= 2:
@@ -152,18 +143,9 @@ def plot_metrics(sweep: Sweep, path: FilePath | None = None, *, figure: Any = No
 
     Boxes are of members that did not fail and whose number is finite. The first 40 cells that ran are drawn.
 
-    Args:
-        sweep: the sweep.
-        path: of the picture; default None, which writes none.
-        figure: Matplotlib figure to draw on; default None, one of its own.
-
-    Returns:
-        The axes, (metrics,).
-
-    Raises:
-        NothingToDraw: all cells were refused, or there are no metrics.
-        ImportError: matplotlib is not installed (extra: viz).
-        OSError: the file cannot be written.
+    path: of the picture; default None, which writes none.
+    figure: Matplotlib figure to draw on; default None, one of its own.
+    Returns: The axes, (metrics,).
     """
     every = _ran(sweep)
     cells, names = every[:MOST_BOXES], [name for name in sweep.metrics if name != END]
@@ -197,18 +179,9 @@ def _box(sweep: Sweep, cell: Cell, name: str) -> dict[str, float]:
 def plot_differences(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
     """Draw the differences of success to the baseline on the same members, with their intervals.
 
-    Args:
-        sweep: the sweep.
-        path: of the picture; default None, which writes none.
-        figure: Matplotlib figure to draw on; default None, one of its own.
-
-    Returns:
-        The axes, (1,).
-
-    Raises:
-        NothingToDraw: there is nothing to compare.
-        ImportError: matplotlib is not installed (extra: viz).
-        OSError: the file cannot be written.
+    path: of the picture; default None, which writes none.
+    figure: Matplotlib figure to draw on; default None, one of its own.
+    Returns: The axes, (1,).
     """
     rows = [row for row in against_baseline(sweep) if row.of == SUCCESS]
     if not rows:
@@ -234,18 +207,9 @@ def plot_differences(sweep: Sweep, path: FilePath | None = None, *, figure: Any 
 def plot_causes(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
     """Draw which members pass over the two inputs that explain most of it, in the cell where most is open.
 
-    Args:
-        sweep: the sweep.
-        path: of the picture; default None, which writes none.
-        figure: Matplotlib figure to draw on; default None, one of its own.
-
-    Returns:
-        The axes, (1,).
-
-    Raises:
-        NothingToDraw: in no cell some members pass and some do not, or nothing varies.
-        ImportError: matplotlib is not installed (extra: viz).
-        OSError: the file cannot be written.
+    path: of the picture; default None, which writes none.
+    figure: Matplotlib figure to draw on; default None, one of its own.
+    Returns: The axes, (1,).
     """
     away, _, cell = min((abs(sweep.passed(cell).mean() - 0.5), cell.index, cell) for cell in _ran(sweep))
     rows = sweep.causes(cell.case.name, cell.point)[:2]
@@ -273,22 +237,12 @@ def plot_responses(
 
     The point is the one where the success of the cases differs most; the first one of equals.
 
-    Args:
-        sweep: the sweep.
-        path: of the picture; default None, which writes none.
-        of: "depth", "heading", "speed", "north" or "east"; or a distance from what is wanted, "position", "attitude" or
-            "cross_track". By default what that metric is of whose medians differ most between cases there, in interquartile
-            ranges; the first one of equals.
-        members: number of members that are run again, the first ones; by default 200.
-        figure: Matplotlib figure to draw on; default None, one of its own.
-
-    Returns:
-        The axes, (cases that ran,).
-
-    Raises:
-        NothingToDraw: all cells were refused, or no metric is of such a number.
-        ImportError: matplotlib is not installed (extra: viz).
-        OSError: the file cannot be written.
+    path: of the picture; default None, which writes none.
+    of: "depth", "heading", "speed", "north" or "east"; or a distance from what is wanted, "position", "attitude" or
+        "cross_track". By default what that metric is of whose medians differ most between cases there, in interquartile
+        ranges; the first one of equals.
+    figure: Matplotlib figure to draw on; default None, one of its own.
+    Returns: The axes, (cases that ran,).
     """
     cells = _most_apart(sweep)
     of = of or _tracked(sweep, cells)
@@ -361,9 +315,5 @@ PICTURES: dict[str, Callable[[Any, Path], Any]] = {
 
 
 def pictures(sweep: Sweep) -> dict[str, Callable[[Any, Path], Any]]:
-    """Return the functions that draw a sweep, by the name of the file; paired differences where there are cases to compare.
-
-    Args:
-        sweep: the sweep.
-    """
+    """Return the functions that draw a sweep, by the name of the file; paired differences where there are cases to compare."""
     return {name: draw for name, draw in PICTURES.items() if draw is not plot_differences or len(sweep.cases) > 1}

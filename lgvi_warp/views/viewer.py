@@ -32,14 +32,7 @@ EMPTY_ANSWER = bytes(5)
 
 
 def rerun() -> Any:
-    """Load rerun.
-
-    Returns:
-        The module.
-
-    Raises:
-        ImportError: rerun-sdk is not installed (extra: viz).
-    """
+    """Load rerun."""
     try:
         import rerun as module
     except ModuleNotFoundError as error:
@@ -48,25 +41,14 @@ def rerun() -> Any:
 
 
 def program() -> Path:
-    """Name the viewer that comes with rerun-sdk.
-
-    Returns:
-        Path of its program.
-    """
+    """Name the viewer that comes with rerun-sdk."""
     import rerun_cli
 
     return Path(rerun_cli.__file__).with_name("rerun.exe" if os.name == "nt" else "rerun")
 
 
 def reach(address: str) -> None:
-    """Require that a viewer answers at an address: rerun would wait without end for anything else that listens there.
-
-    Args:
-        address: As "rerun+http://127.0.0.1:9876/proxy".
-
-    Raises:
-        OSError: Nothing answers there, or what does is no viewer.
-    """
+    """Require that a viewer answers at an address: rerun would wait without end for anything else that listens there."""
     remedy = f'start a viewer with "rerun", or give to="{ADDRESS}"'
     try:
         answer = _greeted(address)
@@ -77,14 +59,7 @@ def reach(address: str) -> None:
 
 
 def answers(address: str) -> bool:
-    """Tell whether a viewer answers at an address.
-
-    Args:
-        address: As "rerun+http://127.0.0.1:9876/proxy".
-
-    Returns:
-        False where nothing listens, or what does is no viewer.
-    """
+    """Tell whether a viewer answers at an address."""
     try:
         return _greeted(address)
     except (OSError, ValueError):
@@ -92,14 +67,7 @@ def answers(address: str) -> bool:
 
 
 def is_open() -> bool:
-    """Tell whether a viewer is open at the port that viewers have.
-
-    Returns:
-        False where nothing listens there.
-
-    Raises:
-        OSError: Something else has the port.
-    """
+    """Tell whether a viewer is open at the port that viewers have."""
     try:
         answer = _greeted(ADDRESS)
     except OSError:
@@ -155,15 +123,7 @@ def _frames(connection: socket.socket) -> Iterator[tuple[int, bytes]]:
 
 
 def watched(send: Callable[[], None], address: str) -> None:
-    """Send to a viewer for as long as it answers: rerun would wait without end for one that does not.
-
-    Args:
-        send: sends everything.
-        address: of the viewer.
-
-    Raises:
-        OSError: the viewer does not answer any more.
-    """
+    """Send to a viewer for as long as it answers: rerun would wait without end for one that does not."""
     raised: list[BaseException] = []
 
     def sending() -> None:
@@ -183,15 +143,7 @@ def watched(send: Callable[[], None], address: str) -> None:
 
 
 def start(words: Sequence[str | Path], remedy: str) -> None:
-    """Start a viewer that goes on after this process.
-
-    Args:
-        words: Its arguments.
-        remedy: What to do where it does not start.
-
-    Raises:
-        OSError: It cannot be started, as where there is no display.
-    """
+    """Start a viewer that goes on after this process."""
     # The command silences the recorder, not the viewer, whose words say why it does not start.
     environment = {name: value for name, value in os.environ.items() if (name, value) != ("RUST_LOG", "off")}
     with tempfile.TemporaryFile("w+") as log:
@@ -212,15 +164,7 @@ def start(words: Sequence[str | Path], remedy: str) -> None:
 def opened(address: str | None) -> str:
     """Find a viewer for what is sent while it is made, or start one.
 
-    Args:
-        address: Where it listens; None for one on this machine, which is started where none is open.
-
-    Returns:
-        Its address.
-
-    Raises:
-        ImportError: rerun-sdk is not installed (extra: viz).
-        OSError: None answers at the address, something else has its port, or none can be started.
+    address: Where it listens; None for one on this machine, which is started where none is open.
     """
     rerun()
     if address is not None:

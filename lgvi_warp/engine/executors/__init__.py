@@ -20,9 +20,7 @@ MOST_THREADS = 100_000
 def check_threads(faults: Faults, threads: Any) -> None:
     """Add a fault where a number of threads is not a whole number from 1 to MOST_THREADS.
 
-    Args:
-        faults: the list that faults are added to.
-        threads: the number to check; None stands for all cores.
+    threads: the number to check; None stands for all cores.
     """
     if threads is None:
         return
@@ -36,16 +34,7 @@ def check_threads(faults: Faults, threads: Any) -> None:
 def executor_of(given: Any, threads: int | None = None, scheduler: str | None = None) -> Executor:
     """The executor that a name stands for, or the executor itself where an object is given.
 
-    Args:
-        given: "threads", "processes", "dask", or an object with a method `run` as `Executor` has it.
-        threads: number of threads, processes or workers; None (default) for all cores.
-        scheduler: address of a Dask scheduler; without one (default), "dask" starts a cluster on this machine.
-
-    Returns:
-        An executor, ready to run blocks.
-
-    Raises:
-        SceneError: if the name is not known, an argument does not fit the executor, or no scheduler answers.
+    threads: number of threads, processes or workers; None (default) for all cores.
     """
     faults = Faults()
     check_threads(faults, threads)

@@ -27,25 +27,12 @@ class Executor(Protocol):
     """Runs blocks in any order and anywhere; results do not depend on it."""
 
     def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
-        """Run all blocks and yield each with its result, as it finishes; closing the generator cancels what still runs.
-
-        Args:
-            work: what is done with each block.
-            blocks: the blocks.
-            advanced: called with a block and the vehicle-steps made of it so far, from any thread.
-
-        Yields:
-            Each block and its result, as it finishes.
-        """
+        """Run all blocks and yield each with its result, as it finishes; closing the generator cancels what still runs."""
 
 
 @contextlib.contextmanager
 def deaf() -> Iterator[None]:
-    """Let processes started inside ignore interrupts from the terminal, from their first moment on.
-
-    Returns:
-        A context manager.
-    """
+    """Let processes started inside ignore interrupts from the terminal, from their first moment on."""
     before: dict[int, Any] = {}
     try:
         for number in (getattr(signal, name) for name in ("SIGINT", "SIGHUP") if hasattr(signal, name)):
@@ -61,18 +48,7 @@ def deaf() -> Iterator[None]:
 
 
 def sent(work: Work, name: str) -> bytes:
-    """Pickle the work for another process.
-
-    Args:
-        work: what is done with each block.
-        name: name of the executor, for messages.
-
-    Returns:
-        The pickled work.
-
-    Raises:
-        SceneError: if something in it cannot be pickled; the message names it and says why.
-    """
+    """Pickle the work for another process."""
     try:
         return pickle.dumps(work, pickle.HIGHEST_PROTOCOL)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
@@ -80,18 +56,7 @@ def sent(work: Work, name: str) -> bytes:
 
 
 def received(data: bytes, name: str) -> Work:
-    """Unpickle the work in another process, and load its kernel.
-
-    Args:
-        data: the pickled work.
-        name: name of the executor, for messages.
-
-    Returns:
-        The work, ready to be called with blocks.
-
-    Raises:
-        SceneError: if it cannot be unpickled here.
-    """
+    """Unpickle the work in another process, and load its kernel."""
     try:
         work: Work = pickle.loads(data)
     except (pickle.UnpicklingError, AttributeError, ImportError) as error:
@@ -108,14 +73,7 @@ def _refusal(name: str, what: str, error: Exception) -> str:
 
 
 def ended(futures: Mapping[Future[Any], Block]) -> Iterator[tuple[Block, Any]]:
-    """The blocks that finished although their run was interrupted.
-
-    Args:
-        futures: futures of the blocks' results.
-
-    Yields:
-        Each finished block and its result.
-    """
+    """The blocks that finished although their run was interrupted."""
     for future, block in futures.items():
         done = future.done() and not future.cancelled() and future.exception() is None
         if done and not isinstance(future.result(), Exception | None):

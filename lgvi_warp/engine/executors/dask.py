@@ -29,29 +29,14 @@ TIMEOUT = 10.0
 class Dask:
     """Runs blocks on a Dask cluster.
 
-    Args:
-        scheduler: address of the scheduler, or a distributed.Client; None (default) starts a cluster on this machine.
-        workers: number of processes of a cluster that is started here (default 1).
+    scheduler: address of the scheduler, or a distributed.Client; None (default) starts a cluster on this machine.
     """
 
     scheduler: Any = None
     workers: int = 1
 
     def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
-        """Run all blocks and yield each with its result.
-
-        Args:
-            work: what is done with each block.
-            blocks: the blocks.
-            advanced: called with a block and the vehicle-steps made of it so far.
-
-        Yields:
-            Each block and its result, as it finishes.
-
-        Raises:
-            SceneError: if the work cannot be pickled, or a worker's machine is of another kind.
-            RuntimeError: if workers die again and again over a block.
-        """
+        """Run all blocks and yield each with its result."""
         data, topic = sent(work, "dask"), f"lgvi_warp-{uuid.uuid4()}"
         with self._client() as client:
             from distributed import KilledWorker, as_completed
@@ -81,11 +66,7 @@ class Dask:
                         client.run(_end, topic, on_error="ignore")
 
     def check(self) -> None:
-        """Check that the scheduler answers, before anything is written.
-
-        Raises:
-            SceneError: if it does not.
-        """
+        """Check that the scheduler answers, before anything is written."""
         if isinstance(self.scheduler, str):
             with self._client():
                 pass

@@ -29,29 +29,12 @@ HALT = -1
 
 @dataclass(frozen=True)
 class Processes:
-    """Runs blocks in processes of one thread each; the kernel is compiled here and loaded from Warp's cache there.
-
-    Args:
-        workers: number of processes.
-    """
+    """Runs blocks in processes of one thread each; the kernel is compiled here and loaded from Warp's cache there."""
 
     workers: int
 
     def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
-        """Run all blocks and yield each with its result.
-
-        Args:
-            work: what is done with each block.
-            blocks: the blocks.
-            advanced: called with a block and the vehicle-steps made of it so far.
-
-        Yields:
-            Each block and its result, as it finishes.
-
-        Raises:
-            SceneError: if the work cannot be pickled.
-            RuntimeError: if processes die again and again without finishing a block.
-        """
+        """Run all blocks and yield each with its result."""
         data = sent(work, "processes")
         unfinished = dict(enumerate(blocks))
         deaths: Counter[int] = Counter()

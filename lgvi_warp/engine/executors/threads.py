@@ -23,27 +23,14 @@ class ThisThread:
     """Runs blocks in the thread that asks: its CPU time is theirs, and it hears an interrupt between two launches."""
 
     def run(self, work: Work, blocks: Sequence[Block], advanced: Advanced) -> Generator[tuple[Block, Any], None, None]:
-        """Run all blocks and yield each with its result.
-
-        Args:
-            work: what is done with each block.
-            blocks: the blocks.
-            advanced: called with a block and the vehicle-steps made of it so far.
-
-        Yields:
-            Each block and its result, in order.
-        """
+        """Run all blocks and yield each with its result."""
         for block in blocks:
             yield block, work(block, lambda: False, functools.partial(advanced, block))
 
 
 @dataclass(frozen=True)
 class Threads:
-    """Runs blocks in threads of this process.
-
-    Args:
-        threads: number of threads.
-    """
+    """Runs blocks in threads of this process."""
 
     threads: int
 
@@ -52,14 +39,6 @@ class Threads:
 
         The first exception halts running blocks, drops those that have not begun, and is raised. After an interrupt from
         the keyboard, blocks that finished nevertheless are yielded first, since a launch cannot be cut short.
-
-        Args:
-            work: what is done with each block.
-            blocks: the blocks.
-            advanced: called with a block and the vehicle-steps made of it so far.
-
-        Yields:
-            Each block and its result, as it finishes.
         """
         # The main thread waits, so that blocks at work come to their end when it hears an interrupt. One block alone would
         # be lost in any thread.

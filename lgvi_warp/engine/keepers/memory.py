@@ -23,9 +23,6 @@ class Outcomes:
 
     It is pickled without its contents: what it gathers stays in the run's own process.
 
-    Args:
-        plan: the plan of the run.
-
     Attributes:
         all: the outcome of all n members.
     """
@@ -37,25 +34,11 @@ class Outcomes:
         return {}
 
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockOutcome:
-        """The keeper of a block's outcome.
-
-        Args:
-            plan: the plan of the run.
-            block: the block.
-            members: its members.
-
-        Returns:
-            A keeper that takes no samples.
-        """
+        """The keeper of a block's outcome."""
         return _BlockOutcome()
 
     def merge(self, block: Block, part: Outcome) -> None:
-        """Copy a block's outcome into its place.
-
-        Args:
-            block: the block.
-            part: the outcome of its members.
-        """
+        """Copy a block's outcome into its place."""
         if block.count == len(self.all.status):
             self.all = part
             return
@@ -81,9 +64,7 @@ class Samples:
 
     From other processes a block's samples come as its result.
 
-    Args:
-        plan: the plan of the run.
-        fields: names of the fields to keep; None (default) for those of the plan.
+    fields: names of the fields to keep; None (default) for those of the plan.
 
     Attributes:
         names: names of the fields.
@@ -98,14 +79,7 @@ class Samples:
 
     @classmethod
     def elsewhere(cls, names: Sequence[str]) -> Samples:
-        """The keeper as another process has it: without room for all members.
-
-        Args:
-            names: names of the fields.
-
-        Returns:
-            A keeper whose blocks return their samples as results.
-        """
+        """The keeper as another process has it: without room for all members."""
         samples = cls.__new__(cls)
         samples.names = tuple(names)
         return samples
@@ -114,16 +88,7 @@ class Samples:
         return {"names": self.names}
 
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockSamples:
-        """The keeper of a block's samples.
-
-        Args:
-            plan: the plan of the run.
-            block: the block.
-            members: its members.
-
-        Returns:
-            A keeper that writes into this one's arrays, or in another process into arrays of its own.
-        """
+        """The keeper of a block's samples."""
         if self.fields is None:
             return _BlockSamples(_empty(plan, self.names, block.count), sent=True)
         return _BlockSamples({name: values[:, block.first : block.stop] for name, values in self.fields.items()})
@@ -131,9 +96,7 @@ class Samples:
     def merge(self, block: Block, part: dict[str, np.ndarray] | None) -> None:
         """Copy samples that came from another process; others are in their places already.
 
-        Args:
-            block: the block.
-            part: samples by field, (k, members of the block, ...); None if they are in their places.
+        part: samples by field, (k, members of the block, ...); None if they are in their places.
         """
         assert self.fields is not None
         for name, values in (part or {}).items():

@@ -29,14 +29,7 @@ EVENLY_SPREAD = ("latin_hypercube", "sobol", "halton")
 
 
 def replicates_of(ensemble: Mapping[str, Any]) -> int:
-    """The number of independent replicates of an ensemble's design, from its provenance.
-
-    Args:
-        ensemble: provenance of the ensemble.
-
-    Returns:
-        1 where there are none, and for members that were chosen by index or given explicitly.
-    """
+    """The number of independent replicates of an ensemble's design, from its provenance."""
     sampling = ensemble.get("sampling", "random")
     if isinstance(sampling, str) or "indices" in ensemble or ensemble.get("explicit"):
         return 1
@@ -47,10 +40,7 @@ def replicates_of(ensemble: Mapping[str, Any]) -> int:
 class Observation:
     """What is to be kept of a run, and when it stops.
 
-    Args:
-        statistics: statistics to gather during the run (default none).
-        keep: members whose samples are kept: "all" (default), "none", "failed", or indices of members.
-        until: condition that ends the run before the last member; None (default) for no such condition.
+    until: condition that ends the run before the last member; None (default) for no such condition.
     """
 
     statistics: tuple[Statistic, ...] = ()
@@ -68,11 +58,7 @@ class Observation:
         return any(statistic.looks for statistic in self.statistics)
 
     def read_at_looks(self) -> dict[str, tuple[int, ...]]:
-        """What statistics read of the motion at the looks of a controller.
-
-        Returns:
-            Field -> which of its numbers, counted from 0; () for all.
-        """
+        """What statistics read of the motion at the looks of a controller."""
         entries: dict[str, tuple[int, ...]] = {}
         for quantity in (statistic.quantity for statistic in self.statistics if statistic.looks):
             few = dict(quantity.entries)
@@ -84,14 +70,7 @@ class Observation:
         return entries
 
     def fields(self, asked: Sequence[str]) -> tuple[str, ...]:
-        """The sample fields that the kernel must write: those to keep and those that statistics need.
-
-        Args:
-            asked: fields of the samples to keep.
-
-        Returns:
-            Names of the fields, in their order.
-        """
+        """The sample fields that the kernel must write: those to keep and those that statistics need."""
         wanted = {name for statistic in self.statistics for name in statistic.quantity.fields}
         if self.until is not None:
             wanted |= set(watch_fields(self.until, self.statistics))
@@ -105,15 +84,9 @@ class Observation:
     def watch(self, times: np.ndarray) -> tuple[tuple[Statistic, ...], Watch | None]:
         """The statistics to gather, and the watch of the stopping condition.
 
-        Args:
-            times: (k,) [s], sample times.
-
-        Returns:
-            (statistics, watch): the watched statistic is added where it is not among them; without a condition the watch
+        times: (k,) [s], sample times.
+        Returns: (statistics, watch): the watched statistic is added where it is not among them; without a condition the watch
             is None.
-
-        Raises:
-            SceneError: if the condition names no statistic or no sample time of the run.
         """
         if self.until is None:
             return self.statistics, None
@@ -124,22 +97,14 @@ class Observation:
     def again(self, status: np.ndarray) -> np.ndarray:
         """The members to run again in order to store their samples.
 
-        Args:
-            status: (n,), status of the members.
-
-        Returns:
-            Indices of members.
+        status: (n,), status of the members.
         """
         if isinstance(self.keep, str):
             return np.flatnonzero(failed(status)) if self.keep == "failed" else np.empty(0, np.int64)
         return np.array([i for i in self.keep if i < len(status)], dtype=np.int64)
 
     def to_dict(self) -> dict[str, Any]:
-        """The observation as a table, as in a scene file.
-
-        Returns:
-            Keep, statistics and condition; "functions" names the statistics that depend on Python functions.
-        """
+        """The observation as a table, as in a scene file."""
         content: dict[str, Any] = {"keep": self.keep if isinstance(self.keep, str) else [int(i) for i in self.keep]}
         if self.statistics:
             content["statistics"] = [statistic.to_dict() for statistic in self.statistics]
@@ -160,15 +125,8 @@ def _of_functions(value: Any) -> bool:
 def observation_of(told: Mapping[str, Any] | None, statistics: Any = None) -> Observation:
     """Restore an observation from its table.
 
-    Args:
-        told: what `to_dict` returned; None for a run that kept nothing but samples.
-        statistics: the run's statistics; needed where they depend on functions (default None).
-
-    Returns:
-        The observation.
-
-    Raises:
-        SceneError: if statistics are needed and missing, or are not those of the run.
+    told: what `to_dict` returned; None for a run that kept nothing but samples.
+    statistics: the run's statistics; needed where they depend on functions (default None).
     """
     if told is None:
         if statistics:
@@ -191,14 +149,7 @@ def observation_of(told: Mapping[str, Any] | None, statistics: Any = None) -> Ob
 class Observing:
     """An observation during a run: gathers the statistics, and decides whether the run may stop.
 
-    Args:
-        observed: what is to be kept.
-        time: (k,) [s], sample times.
-        members: members of the whole ensemble.
-        replicates: independent replicates of the ensemble's design (default 1).
-
-    Raises:
-        SceneError: if the stopping condition names no statistic or no sample time of the run.
+    time: (k,) [s], sample times.
     """
 
     def __init__(self, observed: Observation, time: np.ndarray, members: int, replicates: int = 1):
@@ -213,14 +164,7 @@ class Observing:
         return (self._gathered,) if self._gathered else ()
 
     def enough(self, members: int) -> bool:
-        """Whether the run may end; asked after each block, in block order.
-
-        Args:
-            members: number of members so far.
-
-        Returns:
-            True once the condition of the observation is met.
-        """
+        """Whether the run may end; asked after each block, in block order."""
         watch = self._watch
         return bool(watch and watch.due(members) and watch.reached(self._watched()))
 
@@ -230,12 +174,8 @@ class Observing:
     def read(self, ensemble: Mapping[str, Any], status: np.ndarray) -> tuple[Estimates, tuple[str, ...]]:
         """The statistics, and messages about them.
 
-        Args:
-            ensemble: provenance of the ensemble.
-            status: (m,), status of the members that ran.
-
-        Returns:
-            (estimates, messages): the estimates by name, and what the user should know about them.
+        status: (m,), status of the members that ran.
+        Returns: (estimates, messages): the estimates by name, and what the user should know about them.
         """
         estimates, members = self._gathered.result() if self._gathered else Estimates(), len(status)
         messages = notes(estimates, ensemble, status, self._gathered.apart if self._gathered else ())
@@ -243,18 +183,7 @@ class Observing:
 
 
 def watch_fields(until: Until, statistics: Sequence[Statistic]) -> tuple[str, ...]:
-    """The sample fields that a stopping condition needs.
-
-    Args:
-        until: the condition.
-        statistics: statistics of the run.
-
-    Returns:
-        Names of the fields.
-
-    Raises:
-        SceneError: if the condition names no statistic.
-    """
+    """The sample fields that a stopping condition needs."""
     return watch(Until(until.statistic, until.half_width), statistics, np.zeros(1)).statistic.quantity.fields
 
 
@@ -269,20 +198,8 @@ def observe(
 ) -> Observation:
     """The observation that the arguments of solve describe; those that are None come from the scene's [run].
 
-    Args:
-        plan_members: number of members of the run.
-        settings: the scene's [run] settings.
-        given: the argument `statistics` of solve.
-        keep: the argument `keep` of solve.
-        until: the argument `until` of solve; False for no condition.
-        events: events of the scene (default none).
-        controller: controller of the scene; None (default) for none.
-
-    Returns:
-        What is to be kept, and when the run stops.
-
-    Raises:
-        SceneError: naming every fault.
+    settings: the scene's [run] settings.
+    controller: controller of the scene; None (default) for none.
     """
     faults = Faults()
     gathered: tuple[Statistic, ...] = ()
@@ -312,14 +229,7 @@ def notes(
 ) -> tuple[str, ...]:
     """Messages about statistics: members left out, and intervals that do not fit the sampling.
 
-    Args:
-        estimates: the estimates by name.
-        ensemble: provenance of the ensemble.
-        status: (m,), status of the members that ran.
-        apart: names of estimates that leave members out on purpose (default none).
-
-    Returns:
-        The messages; none where there are no estimates.
+    status: (m,), status of the members that ran.
     """
     if not estimates:
         return ()

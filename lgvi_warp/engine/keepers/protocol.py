@@ -24,46 +24,23 @@ class BlockKeeper(Protocol):
     def take(self, when: slice, samples: Fields) -> None:
         """Receive samples of the block; each time comes once, in order.
 
-        Args:
-            when: slice of the sample times.
-            samples: by field, (times, members of the block, ...).
+        samples: by field, (times, members of the block, ...).
         """
 
     # One that has `look(when, samples)` as well receives with that the samples at all looks, before those to keep.
 
     def close(self, outcome: Outcome) -> Any:
-        """Return the block's result, small and picklable.
-
-        Args:
-            outcome: the outcome of the block's members.
-
-        Returns:
-            What `Keeper.merge` receives.
-        """
+        """Return the block's result, small and picklable."""
 
 
 class Keeper(Protocol):
     """What a run keeps of its members: all samples, statistics or files."""
 
     def open(self, plan: Plan, block: Block, members: Members) -> BlockKeeper:
-        """Prepare for a block, before its first step, in the thread or process that runs it.
-
-        Args:
-            plan: the plan of the run.
-            block: the block.
-            members: its members.
-
-        Returns:
-            The keeper of this block.
-        """
+        """Prepare for a block, before its first step, in the thread or process that runs it."""
 
     def merge(self, block: Block, part: Any) -> None:
-        """Merge the result of a block; called in block order, in the thread that started the run.
-
-        Args:
-            block: the block.
-            part: what the block's keeper closed with.
-        """
+        """Merge the result of a block; called in block order, in the thread that started the run."""
 
 
 @runtime_checkable
@@ -77,23 +54,11 @@ class PartKeeper(Keeper, Protocol):
     def to_arrays(self, part: Any) -> tuple[dict[str, np.ndarray], Any]:
         """Split a block's result into what a store can hold.
 
-        Args:
-            part: what the block's keeper closed with.
-
-        Returns:
-            (arrays, content): arrays by name, and what JSON can hold.
+        Returns: (arrays, content): arrays by name, and what JSON can hold.
         """
 
     def from_arrays(self, arrays: dict[str, np.ndarray], content: Any) -> Any:
-        """Restore a block's result, with the same bits.
-
-        Args:
-            arrays: arrays by name.
-            content: the JSON content.
-
-        Returns:
-            What `merge` receives.
-        """
+        """Restore a block's result, with the same bits."""
 
 
 class BlockStore(Keeper, Protocol):
@@ -102,30 +67,11 @@ class BlockStore(Keeper, Protocol):
     def parts(self, block: Block, keepers: Sequence[Keeper]) -> tuple[Any, ...] | None:
         """The results that the store holds for a block.
 
-        Args:
-            block: the block.
-            keepers: the keepers of the run.
-
-        Returns:
-            What each keeper closed with; None if the store does not hold the block.
+        Returns: What each keeper closed with; None if the store does not hold the block.
         """
 
     def finish(self, block: Block, own: Any, keepers: Sequence[Keeper], parts: Sequence[Any]) -> None:
-        """Make a block durable.
-
-        Args:
-            block: the block.
-            own: what the store's block keeper closed with.
-            keepers: the other keepers of the run.
-            parts: what their block keepers closed with.
-        """
+        """Make a block durable."""
 
     def understood(self, block: Block) -> AbstractContextManager[None]:
-        """A context in which a stored block's results are used: errors are reported as faults of the store.
-
-        Args:
-            block: the block.
-
-        Returns:
-            The context manager.
-        """
+        """A context in which a stored block's results are used: errors are reported as faults of the store."""

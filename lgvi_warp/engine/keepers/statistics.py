@@ -27,11 +27,7 @@ class Gathered:
 
     With replicates, member i belongs to replicate i mod R, and parts hold the numbers of each replicate separately.
 
-    Args:
-        time: (k,) [s], sample times.
-        members: number of members of the run.
-        statistics: the statistics to gather.
-        replicates: R, number of independent replicates (default 1).
+    time: (k,) [s], sample times.
 
     Attributes:
         statistics: those that blocks gather: of paths, where one looks over them.
@@ -49,29 +45,12 @@ class Gathered:
         self.trees = [Tree(statistic.join) for statistic in self.statistics]
 
     def open(self, plan: Plan, block: Block, members: Members) -> _BlockStatistics:
-        """The keeper of a block's statistics.
-
-        Args:
-            plan: the plan of the run.
-            block: the block.
-            members: its members.
-
-        Returns:
-            A keeper that closes with one part for each statistic.
-        """
+        """The keeper of a block's statistics."""
         place = (block.first, block.first // self._size, self._size)
         return _BlockStatistics(self, plan, members, place)
 
     def merge(self, block: Block, part: list[Part]) -> None:
-        """Add a block's parts to the trees.
-
-        Args:
-            block: the block.
-            part: for each statistic, arrays by name.
-
-        Raises:
-            ValueError: a stored part is of an earlier version.
-        """
+        """Add a block's parts to the trees."""
         for statistic, statistic_part in zip(self.statistics, part, strict=True):
             if statistic.since - statistic_part.keys():
                 raise ValueError(f"{statistic.key!r} is of an earlier version, which took other events for censoring")
@@ -83,11 +62,7 @@ class Gathered:
     def estimates(self, chosen: Statistic | None = None) -> list[Estimate]:
         """Estimates from the blocks so far.
 
-        Args:
-            chosen: the statistic wanted; None (default) for all.
-
-        Returns:
-            The estimates, in the order of the statistics.
+        chosen: the statistic wanted; None (default) for all.
         """
         estimates: list[Estimate] = []
         for requested, statistic, tree in zip(self._asked, self.statistics, self.trees, strict=True):
@@ -97,15 +72,7 @@ class Gathered:
         return estimates
 
     def said(self, statistic: Statistic, parts: Sequence[Part]) -> list[Estimate]:
-        """Estimates of one statistic from given parts.
-
-        Args:
-            statistic: the statistic.
-            parts: parts of its tree.
-
-        Returns:
-            The estimates of the statistic.
-        """
+        """Estimates of one statistic from given parts."""
         time = self.times_of(statistic)
         if self.replicates > 1:
             return statistic.estimates_of_replicates(parts, time, self.replicates)
@@ -114,20 +81,12 @@ class Gathered:
     def times_of(self, statistic: Statistic) -> np.ndarray:
         """The times of a statistic's values: all sample times, or the end alone.
 
-        Args:
-            statistic: the statistic.
-
-        Returns:
-            (k,) or (1,) [s].
+        Returns: (k,) or (1,) [s].
         """
         return self.time if statistic.at is None else self.time[-1:]
 
     def result(self) -> Estimates:
-        """All estimates by name.
-
-        Returns:
-            The estimates from the blocks so far.
-        """
+        """All estimates by name."""
         return Estimates(self.estimates())
 
     @property
@@ -143,26 +102,14 @@ class Gathered:
     def to_arrays(part: Sequence[Part]) -> tuple[dict[str, np.ndarray], Any]:
         """A block's parts as arrays for a file.
 
-        Args:
-            part: for each statistic, arrays by name.
-
-        Returns:
-            (arrays, number): arrays by name, and the number of statistics.
+        Returns: (arrays, number): arrays by name, and the number of statistics.
         """
         arrays = {f"{i}/{name}": array for i, entry in enumerate(part) for name, array in entry.items()}
         return arrays, len(part)
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, np.ndarray], content: Any) -> list[Part]:
-        """Restore a block's parts; merging them gives the same bits.
-
-        Args:
-            arrays: arrays by name, from `to_arrays`.
-            content: the number of statistics.
-
-        Returns:
-            For each statistic, arrays by name.
-        """
+        """Restore a block's parts; merging them gives the same bits."""
         prefixes = (f"{i}/" for i in range(content))
         return [{name.removeprefix(p): array for name, array in arrays.items() if name.startswith(p)} for p in prefixes]
 

@@ -54,33 +54,19 @@ class Views:
     def moved(self, axis: int, by: float) -> Views:
         """The views with every position displaced along an inertial axis.
 
-        Args:
-            axis: index of the axis, 0 to 2.
-            by: displacement [m].
-
-        Returns:
-            The displaced views.
+        by: displacement [m].
         """
         return replace(self, position=self.position + by * np.eye(3)[axis])
 
     def turned(self, axis: int, by: float) -> Views:
         """The views with every attitude turned about one of its body axes.
 
-        Args:
-            axis: index of the axis, 0 to 2.
-            by: angle [rad].
-
-        Returns:
-            The turned views.
+        by: angle [rad].
         """
         return replace(self, attitude=self.attitude @ notation.matrix_from_rotation_vector(by * np.eye(3)[axis]))
 
     def elsewhere(self) -> Views:
-        """The same states, expressed in the body axes TURN about the origin ORIGIN.
-
-        Returns:
-            The views in the other axes.
-        """
+        """The same states, expressed in the body axes TURN about the origin ORIGIN."""
         return Views(
             self.attitude @ TURN,
             self.position + notation.rotate_out(self.attitude, ORIGIN[None]),
@@ -90,14 +76,7 @@ class Views:
         )
 
     def description(self, i: int) -> str:
-        """One view in words, for a message.
-
-        Args:
-            i: index of the view.
-
-        Returns:
-            Position, quaternion, time, velocity and angular velocity, with their units.
-        """
+        """One view in words, for a message."""
         turn = notation.quaternion_from_matrix(self.attitude[i])
         where = f"at position {short(self.position[i])} m, quaternion {short(turn)}, t = {self.time[i]:.3g} s"
         return f"{where}, velocity {sizes(self.velocity[i])} m/s, rate {sizes(self.rate[i])} rad/s"
@@ -110,14 +89,7 @@ MOST_SAMPLES = 1_000_000
 def of_scene(scene: Any) -> Scene:
     """The scene in which a law is checked.
 
-    Args:
-        scene: What the user gave: a Scene, or None for a simple one.
-
-    Returns:
-        The scene.
-
-    Raises:
-        SceneError: If it is none.
+    scene: What the user gave: a Scene, or None for a simple one.
     """
     if scene is None:
         return simple_scene()
@@ -129,8 +101,7 @@ def of_scene(scene: Any) -> Scene:
 def simple_scene() -> Scene:
     """A scene of one vehicle without symmetry, for laws that are checked without a scene.
 
-    Returns:
-        A vehicle of 20 kg, slightly heavy, whose inertias all differ and whose centre of buoyancy is off all axes.
+    Returns: A vehicle of 20 kg, slightly heavy, whose inertias all differ and whose centre of buoyancy is off all axes.
     """
     body = Vehicle(
         20.0,
@@ -145,20 +116,10 @@ def simple_scene() -> Scene:
 class Bench:
     """A term with its numbers packed as for a run, ready to be evaluated at views.
 
-    Args:
-        term: the term.
-        module: its device code.
-        scene: scene with the vehicle and the environment.
-        packets: number of packets of views.
-        seed: seed of the random views.
-
     Attributes:
         views: random views, `count` of them.
         corners: views at rest and along single axes.
         packets: the term's numbers on the device; set once packed() has been checked.
-
-    Raises:
-        SceneError: if the device code does not compile.
     """
 
     packets: Bank
@@ -182,35 +143,20 @@ class Bench:
     def context(self, parameters: Mapping[str, np.ndarray], elsewhere: bool = False) -> PackingContext:
         """The context that packed() receives.
 
-        Args:
-            parameters: parameters of the scene by name, each (1, ...) or (n, ...).
-            elsewhere: whether the kernel's axes are TURN at ORIGIN; by default they are the user's.
-
-        Returns:
-            The context for `count` members.
+        parameters: parameters of the scene by name, each (1, ...) or (n, ...).
         """
         return packing_context(parameters, self.count, self.seed, KICK, elsewhere)
 
     def at(self, views: Views) -> dict[str, np.ndarray]:
         """Evaluate every role of the law.
 
-        Args:
-            views: as many views as the bench has.
-
-        Returns:
-            By role: (count, numbers of the role).
+        Returns: By role: (count, numbers of the role).
         """
         return self.packets.evaluate(views)
 
 
 class Bank:
-    """A term's numbers, table and memory, packed as for a run.
-
-    Args:
-        bench: the bench with the term and the compiled kernel.
-        context: what packed() receives.
-        views: views at which the law's memory is first updated.
-    """
+    """A term's numbers, table and memory, packed as for a run."""
 
     def __init__(self, bench: Bench, context: PackingContext, views: Views):
         self.bench, self.count = bench, bench.count // bench.width
@@ -227,11 +173,7 @@ class Bank:
     def evaluate(self, views: Views) -> dict[str, np.ndarray]:
         """Evaluate every role of the law, and its energy where it has one.
 
-        Args:
-            views: as many views as the bench has.
-
-        Returns:
-            By role: (count, numbers of the role).
+        Returns: By role: (count, numbers of the role).
         """
         out = self.run_device(views, -1)
         roles = (*self.bench.roles, *["energy"] * hasattr(self.bench.module, "energy"))
@@ -240,13 +182,8 @@ class Bank:
     def run_device(self, views: Views, second: int, h: float = KICK) -> np.ndarray:
         """Evaluate the law once at each view.
 
-        Args:
-            views: k views.
-            second: which half of a kick `evolve` makes, 0 or 1; 2 for `follow`; -1 for none of these.
-            h: length of the kick, or of the time before the views (default KICK) [s].
-
-        Returns:
-            (k, OUT_FIELDS), the columns of `lgvi_kernels.advance.examine.COLUMNS`.
+        h: length of the kick, or of the time before the views (default KICK) [s].
+        Returns: (k, OUT_FIELDS), the columns of `lgvi_kernels.advance.examine.COLUMNS`.
         """
         width, Lane = self.bench.width, self.bench.examine.Lane
         flat = [views.attitude.reshape(-1, 9), views.position, views.velocity, views.rate]
@@ -267,15 +204,8 @@ def packing_context(
 ) -> PackingContext:
     """The context that packed() receives.
 
-    Args:
-        parameters: parameters of the scene by name, each (1, ...) or (n, ...).
-        count: number of members.
-        seed: seed of the ensemble.
-        h: step [s].
-        elsewhere: whether the kernel's axes are TURN at ORIGIN; by default they are the user's.
-
-    Returns:
-        The context.
+    parameters: parameters of the scene by name, each (1, ...) or (n, ...).
+    h: step [s].
     """
     M, _, Js = inertia.schur(inertia.blocks(vehicle.inertia6(parameters)))
     n, none = len(M), np.zeros((len(M), 3, 3))
@@ -295,18 +225,7 @@ REMEDY = (
 def built(term: Term, module: Any, width: int, make: Callable[..., Any] = make_examine, remedy: str = REMEDY) -> Any:
     """The compiled kernel that evaluates a law, or a part of a controller.
 
-    Args:
-        term: the term, or the part.
-        module: its device code.
-        width: lanes of a packet.
-        make: (module, numbers, width, real) -> kernel and types; by default `make_examine`.
-        remedy: what to look for where it does not compile; by default what laws get wrong.
-
-    Returns:
-        What `make` returns.
-
-    Raises:
-        SceneError: with Warp's message, where it does not compile.
+    make: (module, numbers, width, real) -> kernel and types; by default `make_examine`.
     """
     try:
         hash(module)
@@ -329,14 +248,7 @@ def built(term: Term, module: Any, width: int, make: Callable[..., Any] = make_e
 def random_views(packets: int, width: int, seed: int, around: np.ndarray) -> Views:
     """Random views around a position.
 
-    Args:
-        packets: number of packets.
-        width: lanes of a packet; all lanes of a packet have the same time.
-        seed: seed of the random numbers.
-        around: (3,) [m], mean of the positions, whose standard deviation is 4 m.
-
-    Returns:
-        packets * width views.
+    around: (3,) [m], mean of the positions, whose standard deviation is 4 m.
     """
     rng = np.random.default_rng(seed)
     k = packets * width
@@ -351,13 +263,7 @@ def corner_views(packets: int, width: int, around: np.ndarray) -> Iterator[Views
     Velocity and rate are zero, along one axis, or so small that their squares vanish. The attitude is the identity, the
     position is `around` or the origin, and the time is 0.
 
-    Args:
-        packets: number of packets.
-        width: lanes of a packet.
-        around: (3,) [m], the first of the two positions.
-
-    Yields:
-        packets * width views at a time, until each corner was among them.
+    around: (3,) [m], the first of the two positions.
     """
     axes = np.concatenate([np.eye(6), -np.eye(6)])
     twists = np.concatenate([np.zeros((1, 6)), axes, 1e-200 * axes])
@@ -374,11 +280,7 @@ def corner_views(packets: int, width: int, around: np.ndarray) -> Iterator[Views
 def short(values: np.ndarray) -> str:
     """Numbers for a message, rounded to three decimals.
 
-    Args:
-        values: numbers of any shape.
-
-    Returns:
-        A list in brackets.
+    values: numbers of any shape.
     """
     return str(np.round(np.asarray(values), 3).tolist())
 
@@ -386,10 +288,6 @@ def short(values: np.ndarray) -> str:
 def sizes(values: np.ndarray) -> str:
     """Numbers for a message with three significant digits, for those that may be very small.
 
-    Args:
-        values: (n,), numbers.
-
-    Returns:
-        A list in brackets.
+    values: (n,), numbers.
     """
     return "[" + ", ".join(f"{value:.3g}" for value in values) + "]"

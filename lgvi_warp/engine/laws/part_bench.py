@@ -67,12 +67,7 @@ class RandomLooks:
     def vector(self, group: str, name: str) -> np.ndarray:
         """A vector of all looks.
 
-        Args:
-            group: "measured", "wanted" or "demanded".
-            name: its name, as that of the device struct.
-
-        Returns:
-            (LOOKS, k, 3), a view of the rows.
+        Returns: (LOOKS, k, 3), a view of the rows.
         """
         first = COLUMNS[group, name]
         return self.rows[..., first : first + 3]
@@ -80,48 +75,25 @@ class RandomLooks:
     def attitude(self, group: str) -> np.ndarray:
         """The attitude that is measured or wanted.
 
-        Args:
-            group: "measured" or "wanted".
-
-        Returns:
-            (LOOKS, k, 3, 3), body to inertial axes.
+        Returns: (LOOKS, k, 3, 3), body to inertial axes.
         """
         return np.stack([self.vector(group, name) for name in ("north", "east", "down")], axis=-2)
 
     def elsewhere(self) -> RandomLooks:
-        """The same looks at another true position, which only sensors before the part may know.
-
-        Returns:
-            The other looks.
-        """
+        """The same looks at another true position, which only sensors before the part may know."""
         rows = self.rows.copy()
         rows[..., examine_part.TRUE_POSITION :] += 17.0
         return replace(self, rows=rows)
 
     def but_lane(self, lane: int, width: int) -> RandomLooks:
-        """Looks in which all lanes of a packet differ but one.
-
-        Args:
-            lane: index of the lane that stays.
-            width: lanes of a packet.
-
-        Returns:
-            The other looks.
-        """
+        """Looks in which all lanes of a packet differ but one."""
         others = np.arange(self.rows.shape[1]) % width != lane
         rows, bus = self.rows.copy(), self.bus.copy()
         rows[:, others], bus[others] = np.roll(rows, 1, axis=1)[:, others] + 0.5, bus[others] + 0.5
         return replace(self, rows=rows, bus=bus)
 
     def description(self, i: int) -> str:
-        """The first look of a member in words, for a message.
-
-        Args:
-            i: index of the member.
-
-        Returns:
-            Position, quaternion and velocities that are measured, and the wanted position, with their units.
-        """
+        """The first look of a member in words, for a message."""
         place, wanted, velocity, rate = (
             self.vector(*name)[0, i]
             for name in (("measured", "position"), ("wanted", "position"), ("measured", "velocity"),
@@ -153,21 +125,12 @@ class Answers(NamedTuple):
 class PartBench:
     """A part with its numbers packed as for a run, ready to be evaluated at looks.
 
-    Args:
-        part: the part, of a scene.
-        scene: scene with the part.
-        samples: least number of members.
-        seed: seed of the random looks.
-
     Attributes:
         roles: the roles that its device code has.
         widths: lanes of a packet, of each kernel: those of a register, and one.
         count: number of members.
         period: time between two looks [s].
         looks: random looks.
-
-    Raises:
-        SceneError: if the device code lacks something, has a wrong signature or does not compile.
     """
 
     def __init__(self, part: Part, scene: Scene, samples: int, seed: int):
@@ -188,28 +151,14 @@ class PartBench:
     def packed(self, parameters: Mapping[str, np.ndarray] | None = None, elsewhere: bool = False) -> Any:
         """What the part packs.
 
-        Args:
-            parameters: parameters of the scene by name, each (1, ...) or (n, ...); by default those of the scene.
-            elsewhere: whether the kernel's axes are others than the user's; by default they are not.
-
-        Returns:
-            What its packed() returns.
+        parameters: parameters of the scene by name, each (1, ...) or (n, ...); by default those of the scene.
         """
         numbers = self.parameters if parameters is None else parameters
         context = packing_context(numbers, self.count, self.seed, self.period / EVERY, elsewhere)
         return self.part.packed(Ensemble.own(self.part, numbers), context)
 
     def answers(self, packed: Any, looks: RandomLooks, width: int | None = None) -> Answers:
-        """Let the part act at each look, from its memory at the start.
-
-        Args:
-            packed: what its packed() returned.
-            looks: as many members as the bench has.
-            width: lanes of a packet, one of `widths`; by default the first.
-
-        Returns:
-            What it made of them.
-        """
+        """Let the part act at each look, from its memory at the start."""
         launch = _Launch(self, packed, looks, width or self.widths[0])
         out = np.stack([launch.look(k) for k in range(LOOKS)], axis=1)
         first = self.bus.rows
@@ -218,11 +167,7 @@ class PartBench:
     def nanoseconds(self, packed: Any) -> float:
         """Processor time of the part for a member and a look, less that of a kernel that only copies.
 
-        Args:
-            packed: what its packed() returned.
-
-        Returns:
-            The time [ns], at least 0; the least of some rounds.
+        Returns: The time [ns], at least 0; the least of some rounds.
         """
         bench_launch, spent = _Launch(self, packed, self.looks, self.widths[0]), []
         for acts in (1, 0):
@@ -261,13 +206,7 @@ class _Launch:
         return np.array(out.reshape(-1, OUT_FIELDS))
 
     def launch(self, k: int, acts: int, repeats: int) -> None:
-        """Launch the kernel for all packets, some times over.
-
-        Args:
-            k: Number of the look.
-            acts: Whether the part acts at this look, 0 or 1.
-            repeats: How many times over.
-        """
+        """Launch the kernel for all packets, some times over."""
         period, laws = self.bench.period, self.laws
         inputs = [laws.structs[0].array, laws.table.array, self.rows.array, k, k * EVERY, period / EVERY, period, acts]
         with build_lock:
@@ -282,14 +221,8 @@ class _Launch:
 def random_looks(count: int, bus: int, seed: int, around: np.ndarray) -> RandomLooks:
     """Random looks around a position.
 
-    Args:
-        count: number of members.
-        bus: rows of the bus.
-        seed: seed of the random numbers.
-        around: (3,) [m], mean of the positions, whose standard deviation is 4 m.
-
-    Returns:
-        Any attitude; velocities [m/s], angular velocities [rad/s], demands [N, N m] and what others left in the memory of
+    around: (3,) [m], mean of the positions, whose standard deviation is 4 m.
+    Returns: Any attitude; velocities [m/s], angular velocities [rad/s], demands [N, N m] and what others left in the memory of
         order 1.
     """
     rng = np.random.default_rng(seed)
@@ -305,10 +238,7 @@ def random_looks(count: int, bus: int, seed: int, around: np.ndarray) -> RandomL
 def turn(looks: RandomLooks, group: str, attitude: np.ndarray) -> None:
     """Write an attitude into looks.
 
-    Args:
-        looks: the looks, changed in place.
-        group: "measured" or "wanted".
-        attitude: (..., 3, 3), body to inertial axes.
+    attitude: (..., 3, 3), body to inertial axes.
     """
     for i, name in enumerate(("north", "east", "down")):
         looks.vector(group, name)[...] = attitude[..., i, :]
@@ -317,12 +247,8 @@ def turn(looks: RandomLooks, group: str, attitude: np.ndarray) -> None:
 def corner_looks(looks: RandomLooks) -> list[RandomLooks]:
     """Looks at which a careless part divides by zero.
 
-    Args:
-        looks: random looks.
-
-    Returns:
-        What is wanted is what is measured; the wanted attitude is turned by half a turn; everything is at rest, level, at the
-        origin, and nothing is demanded.
+    Returns: What is wanted is what is measured; the wanted attitude is turned by half a turn; everything is at rest, level, at
+        the origin, and nothing is demanded.
     """
     same, turned, rest = (replace(looks, rows=looks.rows.copy(), bus=np.zeros_like(looks.bus)) for _ in range(3))
     for name in ("position", "velocity", "angular_velocity"):

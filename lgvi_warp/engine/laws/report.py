@@ -66,28 +66,14 @@ class Described(Protocol):
     """Views, or looks, that a message can describe."""
 
     def description(self, i: int) -> str:
-        """One of them in words.
-
-        Args:
-            i: its index.
-
-        Returns:
-            Its numbers, with their units.
-        """
+        """One of them in words."""
 
 
 def judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, views: Described, remedy: str) -> Check:
     """A check of deviations: the one that exceeds its limit by most, and the view where it occurs.
 
-    Args:
-        name: what was checked.
-        difference: (k,) or (k, d), deviations at k views.
-        allowed: largest deviation that is allowed; for each view (k,) where it is an array.
-        views: the k views.
-        remedy: what to do where one is too large.
-
-    Returns:
-        The check.
+    difference: (k,) or (k, d), deviations at k views.
+    allowed: largest deviation that is allowed; for each view (k,) where it is an array.
     """
     k = len(difference)
     worst = np.abs(difference).reshape(k, -1)
@@ -102,15 +88,7 @@ def judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, views
 
 
 def attempt(make: Callable[[], Any], where: str) -> Any:
-    """Pack, or say what fails.
-
-    Args:
-        make: packs, and may do more.
-        where: with which numbers, for the message.
-
-    Returns:
-        What `make` returns, or a message where it raises.
-    """
+    """Pack, or say what fails."""
     try:
         return make()
     except Exception as error:
@@ -120,13 +98,7 @@ def attempt(make: Callable[[], Any], where: str) -> Any:
 def packed_numbers(term: Term, Params: np.dtype, pack: Callable[[], Any]) -> tuple[Packed | None, list[Check]]:
     """Whether packed() fills what params() names.
 
-    Args:
-        term: the term, or the part.
-        Params: NumPy type of the struct, whose numbers are `own`.
-        pack: calls packed().
-
-    Returns:
-        What was packed, None where that fails; and the check.
+    Returns: What was packed, None where that fails; and the check.
     """
     packed = attempt(pack, "with shared numbers")
     if not isinstance(packed, Packed):
@@ -144,13 +116,6 @@ def packed_numbers(term: Term, Params: np.dtype, pack: Callable[[], Any]) -> tup
 
 
 def unpacked(problem: str) -> Check:
-    """The check of numbers that the device cannot take.
-
-    Args:
-        problem: what failed.
-
-    Returns:
-        A failed check with its remedy.
-    """
+    """The check of numbers that the device cannot take."""
     text = f"{problem}; give arrays (1,), (1, 3) or (n,), (n, 3), and whole numbers"
     return Check("packed", 1.0, 0.0, False, text)

@@ -34,16 +34,9 @@ READINGS = {
 class Bus(NamedTuple):
     """The first rows of the memory, by which parts hand numbers on: {actuator: (first row, channels)} and single rows.
 
-    Args:
-        commands: Rows of the commands of each actuator, by the key of its term.
-        unmet: First of six rows with what of the demand X Y Z K M N the last look did not deliver.
-        report: First of as many rows as there are commands, where actuators say where they are.
-        acting: First row of the commands that act, where commands are delayed. As many rows of the commands before follow, and
-            the row of the step from which the former act.
-        rows: Number of rows.
-        delayed: Whether the commands of some member are delayed.
-        period: Time between two looks [s].
-        answer: First of the rows into which a `Callback` writes, as many as it returns numbers, or which laws share.
+    acting: First row of the commands that act, where commands are delayed. As many rows of the commands before follow, and the
+        row of the step from which the former act.
+    period: Time between two looks [s].
     """
 
     commands: Mapping[str, tuple[int, int]]
@@ -64,13 +57,7 @@ class Bus(NamedTuple):
     def of(cls, channels: Mapping[str, int], period: float = 1.0, answers: int = 0) -> Bus:
         """The bus of some actuators.
 
-        Args:
-            channels: Number of commands of each, by the key of its term.
-            period: Time between two looks [s]; 1 by default.
-            answers: Numbers that a function of the host writes at each look, or laws share; 0 by default, for none.
-
-        Returns:
-            Rows for all of them.
+        period: Time between two looks [s]; 1 by default.
         """
         commands, row = {}, 0
         for key, count in channels.items():
@@ -80,14 +67,7 @@ class Bus(NamedTuple):
         return cls(commands, row, row + 6, 2 * row + 6, rows + answers, period=period, answer=rows)
 
     def values_of(self, key: str) -> dict[str, Any]:
-        """What the device code of an actuator reads.
-
-        Args:
-            key: Key of its term.
-
-        Returns:
-            Fields `commands` and `report` of its struct.
-        """
+        """What the device code of an actuator reads."""
         first = self.commands[key][0]
         if not self.delayed:
             return {"commands": {"row": first}, "report": self.report + first}
@@ -284,12 +264,9 @@ class PoseLaw(IntegralLaw):
 def restoring(nominal: Numbers) -> tuple[np.ndarray, np.ndarray]:
     """What weight and buoyancy do to a vehicle.
 
-    Args:
-        nominal: Parameters of a scene by name, each of the shape that the scene has.
-
-    Returns:
-        Weight less buoyancy (1,) [N], which acts downward; and the sum of both times their points (1, 3) [N m] in body axes,
-        whose cross product with the direction downward is the moment.
+    nominal: Parameters of a scene by name, each of the shape that the scene has.
+    Returns: Weight less buoyancy (1,) [N], which acts downward; and the sum of both times their points (1, 3) [N m] in body
+        axes, whose cross product with the direction downward is the moment.
     """
     numbers = {name: np.asarray(value)[None] for name, value in nominal.items()}
     weight, buoyancy = vehicle.weight(numbers), numbers["vehicle.buoyancy"]
@@ -305,12 +282,9 @@ NEVER, SAME_TIME = 1e30, 1e-6
 def first_step(time: np.ndarray, h: float) -> np.ndarray:
     """The first step at or after a time.
 
-    Args:
-        time: Times [s], of any shape; inf for never.
-        h: Step of the run [s].
-
-    Returns:
-        Numbers of steps, in the same shape; `NEVER` for never.
+    time: Times [s], of any shape; inf for never.
+    h: Step of the run [s].
+    Returns: Numbers of steps, in the same shape; `NEVER` for never.
     """
     return np.ceil(np.minimum(time / h, NEVER) - SAME_TIME)
 
@@ -408,11 +382,8 @@ ROUND_OFF = 1e-12
 def rest_rows(reached: np.ndarray) -> np.ndarray:
     """Rows by which the device code finds what actuators cannot make of a demand.
 
-    Args:
-        reached: Projector (n, 6, 6) onto the demands that they can make.
-
-    Returns:
-        The projector onto the others, line by line, (n, 36), without round-off.
+    reached: Projector (n, 6, 6) onto the demands that they can make.
+    Returns: The projector onto the others, line by line, (n, 36), without round-off.
     """
     others = np.eye(6) - reached
     return np.where(np.abs(others) < ROUND_OFF, 0.0, others).reshape(len(others), -1)

@@ -90,14 +90,7 @@ class CallbackCommands(Allocation):
 
 
 def refuse_second(callbacks: list[Callback]) -> None:
-    """Refuse more than one callback: each asks for a launch of its own.
-
-    Args:
-        callbacks: Those of a controller.
-
-    Raises:
-        SceneError: Where there are two.
-    """
+    """Refuse more than one callback: each asks for a launch of its own."""
     if len(callbacks) > 1:
         raise refusal(
             "laws", f"{len(callbacks)} callbacks", "are more than one", "call the other function from the first"

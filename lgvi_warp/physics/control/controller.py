@@ -299,14 +299,8 @@ class Controller:
 def from_table(given: Any) -> Controller | None:
     """A controller from the section of a scene file.
 
-    Args:
-        given: A Controller, a table, or None.
-
-    Returns:
-        The controller; None for None.
-
-    Raises:
-        SceneError: Where anything is wrong; the message lists every fault.
+    given: A Controller, a table, or None.
+    Returns: The controller; None for None.
     """
     if given is None or isinstance(given, Controller):
         return given
@@ -328,15 +322,6 @@ def terms_of(scene: Mapping[str, Any]) -> tuple[Term, ...]:
     """The terms of a scene from its content, each of which knows whether a controller drives it.
 
     The controller itself is not built: a law may be a function, of which the content has the name alone.
-
-    Args:
-        scene: The content of a scene, as `Scene.to_dict` gives it.
-
-    Returns:
-        The terms.
-
-    Raises:
-        SceneError: Where a table is no term.
     """
     terms, table = from_list(scene.get("terms", ())), scene.get("controller")
     lists = (table.get(section) for section in ("laws", "allocation")) if isinstance(table, Mapping) else ()

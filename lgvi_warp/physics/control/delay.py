@@ -19,9 +19,8 @@ MOST_PERIODS = 1000
 class Delay(Part):
     """The delay of a controller, a part that `Controller` makes of its numbers. Its key is that of the section.
 
-    Args:
-        period: Time between two looks [s].
-        delay: From a look until its commands act [s].
+    period: Time between two looks [s].
+    delay: From a look until its commands act [s].
     """
 
     device: ClassVar[str] = "delay"

@@ -17,11 +17,7 @@ FACTOR = f"{END}.factor"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LoopBegin(ControlLaw):
-    """Notes the demand before the laws of a loop.
-
-    Args:
-        asks: Components that the laws ask for.
-    """
+    """Notes the demand before the laws of a loop."""
 
     device: ClassVar[str] = "loop_gain:begin"
     shared_rows: ClassVar[int] = 6
@@ -41,11 +37,7 @@ class LoopBegin(ControlLaw):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LoopGain(LoopBegin):
-    """Multiplies the demand of the laws since `LoopBegin`.
-
-    Args:
-        factor: The factor; 1 by default.
-    """
+    """Multiplies the demand of the laws since `LoopBegin`."""
 
     device: ClassVar[str] = "loop_gain:end"
 
@@ -55,12 +47,7 @@ class LoopGain(LoopBegin):
 def with_factor(laws: Sequence[ControlLaw], loop: str | None) -> list[ControlLaw]:
     """The laws of a controller, with a factor on the demand of one of them.
 
-    Args:
-        laws: The laws.
-        loop: Key of the law; None for all laws.
-
-    Returns:
-        The laws with two more.
+    loop: Key of the law; None for all laws.
     """
     chosen = [law for law in laws if loop in (None, law.key)]
     asks = tuple(name for name in COMPONENTS if any(name in (law.demands or COMPONENTS) for law in chosen))

@@ -157,12 +157,8 @@ def _lines(B: np.ndarray, weights: np.ndarray, lost: Sequence[int]) -> np.ndarra
 def rising_knots(at: np.ndarray, values: np.ndarray) -> np.ndarray:
     """As `knots`, where several knots may be at one place: those change nothing.
 
-    Args:
-        at: Places of the knots (n, k), rising or equal.
-        values: Values at the knots (n, k), equal where the places are.
-
-    Returns:
-        Rows (n, 1 + 3 (k - 1)).
+    at: Places of the knots (n, k), rising or equal.
+    values: Values at the knots (n, k), equal where the places are.
     """
     width = np.diff(at, axis=1)
     inverse = np.divide(1.0, width, out=np.zeros_like(width), where=width > 0.0)
@@ -184,12 +180,9 @@ def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
     It is a polynomial in 2 s - 1, f = (largest f) (1 - (1 - s^2)^2), in which the inverse is smooth where f begins as a square
     and where it turns (lgvi_kernels.laws.thrust_curves).
 
-    Args:
-        polynomial: Coefficients (1 or n, powers) from the first power up.
-        reach: Largest arguments (1 or n,).
-
-    Returns:
-        Rows (1 or n, 20): 1 / largest value, that value, its argument, least slope, and the coefficients.
+    polynomial: Coefficients (1 or n, powers) from the first power up.
+    reach: Largest arguments (1 or n,).
+    Returns: Rows (1 or n, 20): 1 / largest value, that value, its argument, least slope, and the coefficients.
     """
     polynomial, reach = repeated(polynomial, reach)
     top = highest(polynomial, reach)
@@ -205,12 +198,9 @@ def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
 def highest(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
     """Where polynomials without a constant cease to rise.
 
-    Args:
-        polynomial: Coefficients (1 or n, powers) from the first power up.
-        reach: Largest arguments (1 or n,).
-
-    Returns:
-        Where each turns first (1 or n,), or its reach.
+    polynomial: Coefficients (1 or n, powers) from the first power up.
+    reach: Largest arguments (1 or n,).
+    Returns: Where each turns first (1 or n,), or its reach.
     """
     polynomial, reach = repeated(polynomial, reach)
     points = reach[:, None] * np.linspace(0.0, 1.0, POINTS)

@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 class Signal(NamedTuple):
     """A signal, and where the kernel has it.
 
-    Args:
-        field: Its name, shape, unit and meaning; where it has as many numbers as the scene has commands, the shape is (1,).
-        group: What the kernel notes for it: "demand", "measured", "reference" or "actuator"; "" for nothing.
-        row: The first row, within what is noted, of the row in the bus.
+    field: Its name, shape, unit and meaning; where it has as many numbers as the scene has commands, the shape is (1,).
     """
 
     field: Field
@@ -77,14 +74,7 @@ IN_FILES = (*SAVED, "quaternion_wxyz", "energy")
 
 
 def ordered(names: Iterable[str]) -> tuple[str, ...]:
-    """Names of samples in the order in which they are saved.
-
-    Args:
-        names: Some of `SAVED`, in any order.
-
-    Returns:
-        Each of them once.
-    """
+    """Names of samples in the order in which they are saved."""
     wanted = set(names)
     return tuple(name for name in SAVED if name in wanted)
 
@@ -92,11 +82,7 @@ def ordered(names: Iterable[str]) -> tuple[str, ...]:
 def saved_fields(controller: Controller | None) -> dict[str, Field]:
     """The fields that runs of a scene may save.
 
-    Args:
-        controller: Its controller, wired; None for none.
-
-    Returns:
-        Fields by name, in their order.
+    controller: Its controller, wired; None for none.
     """
     fields = {name: TABLE[name] for name in FIELDS}
     if controller is None or controller.bus is None:
@@ -109,12 +95,7 @@ def saved_fields(controller: Controller | None) -> dict[str, Field]:
 def has_shape(name: str, shape: tuple[int, ...]) -> bool:
     """Whether numbers of one vehicle at one time may have this shape, in some scene.
 
-    Args:
-        name: One of `SAVED`.
-        shape: The shape.
-
-    Returns:
-        True where a run could have saved them.
+    shape: The shape.
     """
     if name in CHANNELS:
         return len(shape) == 1 and shape[0] > 0
@@ -122,29 +103,14 @@ def has_shape(name: str, shape: tuple[int, ...]) -> bool:
 
 
 def row_of(name: str, bus: Bus, noted: Mapping[str, int]) -> int:
-    """The first row of the memory that holds a signal.
-
-    Args:
-        name: Its name.
-        bus: Rows of the controller.
-        noted: First row of what looks note, by group.
-
-    Returns:
-        The number of the row; those of its other numbers follow.
-    """
+    """The first row of the memory that holds a signal."""
     signal = SIGNALS[name]
     firsts = {"command": 0, "unmet": bus.unmet, "actuator": bus.report}
     return firsts[name] if name in firsts else noted[signal.group] + signal.row
 
 
 def check_names(faults: Faults, key: str, names: Any) -> None:
-    """Add a fault for each name that no sample has.
-
-    Args:
-        faults: Collects the faults.
-        key: Who asks for them.
-        names: Names of samples, as the user gave them.
-    """
+    """Add a fault for each name that no sample has."""
     if isinstance(names, str) or not isinstance(names, Collection):
         faults.add(key, names, "is no list of names", 'give one, such as ["position", "attitude"]')
         return
@@ -155,11 +121,7 @@ def check_names(faults: Faults, key: str, names: Any) -> None:
 def check(faults: Faults, key: str, names: Iterable[str], controller: Controller | None) -> None:
     """Add a fault for each signal that a scene does not have.
 
-    Args:
-        faults: Collects the faults.
-        key: Who asks for it.
-        names: Names of samples.
-        controller: The controller of the scene; None for none.
+    controller: The controller of the scene; None for none.
     """
     problem = "is a signal of a controller, which this scene has not"
     for name in ordered(names) if controller is None else ():

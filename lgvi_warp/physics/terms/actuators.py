@@ -18,11 +18,7 @@ FAST, UNLIMITED = 1e20, 1e6
 def motion(term: Any) -> dict[str, bool]:
     """How the channels of an actuator that a controller drives follow their commands, by the scene's own numbers.
 
-    Args:
-        term: The term, with `time_constant` and `rate_limit`, each None or (channels,).
-
-    Returns:
-        Features of its device code: whether "lag" and "rate" are among them.
+    term: The term, with `time_constant` and `rate_limit`, each None or (channels,).
     """
     lag, rate = term.time_constant, term.rate_limit
     return {
@@ -34,12 +30,7 @@ def motion(term: Any) -> dict[str, bool]:
 def refuse_unread(term: Any, numbers: Numbers) -> None:
     """Refuse members' lags and limits of rates of a driven actuator where the scene has none: its kernel reads none.
 
-    Args:
-        term: The term.
-        numbers: Members' numbers by field, each (n, channels).
-
-    Raises:
-        SceneError: Where some member has one.
+    numbers: Members' numbers by field, each (n, channels).
     """
     faults, features = Faults(f"{term.key}."), motion(term)
     acting = {"lag": ("time_constant", lambda x: x > 0.0), "rate": ("rate_limit", lambda x: x < UNLIMITED)}
@@ -58,18 +49,13 @@ def packed_following(
 ) -> Packed:
     """Pack an actuator whose device code is made by lgvi_kernels.laws.driven or .scheduled.
 
-    Args:
-        term: The term. Its numbers are `limit`, where it has them `time_constant` and `rate_limit`, each (n, channels), and
-            its schedule where no controller drives it.
-        numbers: Its numbers by field, (m, ...).
-        blocks: Other rows of each channel, (m, channels, rows).
-        shared: Rows behind those of all channels, (m, rows); None, the default, for none.
-        size: How many of these there are of a kind; 0 by default.
-        work: Scratch rows of its device code; 0 by default.
-
-    Returns:
-        Rows of each channel: the blocks, limit, 1 / lag and limit of the rate; its schedule; the shared rows; and the memory
-        of places, where they move: 0 of a driven actuator, else the command at the start.
+    term: The term. Its numbers are `limit`, where it has them `time_constant` and `rate_limit`, each (n, channels), and its
+        schedule where no controller drives it.
+    numbers: Its numbers by field, (m, ...).
+    blocks: Other rows of each channel, (m, channels, rows).
+    shared: Rows behind those of all channels, (m, rows); None, the default, for none.
+    Returns: Rows of each channel: the blocks, limit, 1 / lag and limit of the rate; its schedule; the shared rows; and the
+        memory of places, where they move: 0 of a driven actuator, else the command at the start.
     """
     limit = numbers["limit"]
     none = np.zeros_like(limit)

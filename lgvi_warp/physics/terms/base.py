@@ -119,14 +119,7 @@ def number(
 
 
 def word_of(item: dataclasses.Field[Any]) -> str:
-    """The name of a field in scene files, parameters and faults.
-
-    Args:
-        item: A field of a term.
-
-    Returns:
-        Its name; without the underscore at the end where the rest is a word of Python, as of `lambda_`.
-    """
+    """The name of a field in scene files, parameters and faults."""
     word = item.name.removesuffix("_")
     return word if keyword.iskeyword(word) else item.name
 
@@ -537,13 +530,8 @@ def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray
 
     Between knots the table is linear, outside it is constant.
 
-    Args:
-        at: Places of the knots (n, k), rising, in any unit.
-        values: Values at the knots (n, k, d).
-        steps: Whether each value holds from its knot to the next, instead of the linear interpolation.
-
-    Returns:
-        Rows (n, d + (k - 1) (2 + d)); n is the larger of the two leading dimensions.
+    at: Places of the knots (n, k), rising, in any unit.
+    values: Values at the knots (n, k, d).
     """
     at, values = repeated(at, values)
     inverse = np.full((len(at), at.shape[1] - 1), STEEP) if steps else 1.0 / np.diff(at, axis=1)
@@ -555,14 +543,7 @@ def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray
 
 
 def side_by_side(*parts: np.ndarray) -> np.ndarray:
-    """Join arrays along the last dimension; a leading dimension of 1 is repeated.
-
-    Args:
-        parts: Arrays (1 or n, ..., d).
-
-    Returns:
-        One array (n, ..., sum of d).
-    """
+    """Join arrays along the last dimension; a leading dimension of 1 is repeated."""
     return np.concatenate(repeated(*parts), axis=-1)
 
 
@@ -574,31 +555,12 @@ AnyTerm = TypeVar("AnyTerm", bound=Term)
 
 
 def rows_of(value: Any) -> int:
-    """Count the rows of a field that is not checked yet.
-
-    Args:
-        value: What the user gave.
-
-    Returns:
-        Its length; 1 of a single number.
-    """
+    """Count the rows of a field that is not checked yet."""
     return len(np.atleast_1d(np.asarray(value, dtype=object)))
 
 
 def build(where: str, kind: type[AnyTerm], table: Mapping[str, Any]) -> AnyTerm:
-    """Build a term of one type from its table in a scene file.
-
-    Args:
-        where: Place of the table in the file, "terms[0]", with which faults begin.
-        kind: Class of the term.
-        table: Fields by name, as the file has them.
-
-    Returns:
-        The term.
-
-    Raises:
-        SceneError: Where a field is unknown, missing or wrong. The message lists every fault.
-    """
+    """Build a term of one type from its table in a scene file."""
     faults = Faults()
     fields = {word_of(item): item for item in dataclasses.fields(kind) if item.init}
     values = {key: value for key, value in table.items() if key != "type"}
@@ -623,16 +585,7 @@ MOST_TERMS = 1000
 
 
 def check_list(what: str, given: Any, example: str) -> None:
-    """Refuse what is no list, or a list of more terms or events than a scene may have.
-
-    Args:
-        what: Name of the list, "terms" or "events".
-        given: The list.
-        example: How to give one.
-
-    Raises:
-        SceneError: Where it is no list, or has more than `MOST_TERMS` entries.
-    """
+    """Refuse what is no list, or a list of more terms or events than a scene may have."""
     if not isinstance(given, Sequence) or isinstance(given, str):
         raise refusal(what, given, "is no list", example)
     if len(given) > MOST_TERMS:

@@ -129,14 +129,7 @@ def _turned(Q: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
 
 
 def has_exact_flow(frame: Frame) -> bool:
-    """Whether the user's axes are principal axes of M and J, in any order, about the same origin.
-
-    Args:
-        frame: The kernel's frame.
-
-    Returns:
-        True where drag along each axis changes one momentum only, in every member.
-    """
+    """Whether the user's axes are principal axes of M and J, in any order, about the same origin."""
     M = frame.M
     off = np.abs(M[:, ~np.eye(3, dtype=bool)]).max(axis=1)
     diagonal = off <= DIAGONAL * np.abs(np.einsum("nii->ni", M)).max(axis=1)
@@ -274,13 +267,8 @@ def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, context: PackingCon
     Where the kernel's axes are turned, the quadratic part is given for each velocity that has a column: its twist (6), which
     measures the velocity, and its wrench (6).
 
-    Args:
-        linear: Linear coefficients (n, 6, 6), user's axes and origin.
-        quadratic: Quadratic coefficients (n, 6, 6), user's axes and origin.
-        context: The scene's parameters, the frame and the run.
-
-    Returns:
-        The rows, and which parts are present.
+    linear: Linear coefficients (n, 6, 6), user's axes and origin.
+    quadratic: Quadratic coefficients (n, 6, 6), user's axes and origin.
     """
     # X gives the user's velocities from those at the origin of the forces in the kernel's axes.
     X = context.frame.from_forces

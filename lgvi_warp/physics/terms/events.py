@@ -105,17 +105,7 @@ TYPES = Event.kinds
 
 
 def from_list(given: Any) -> tuple[Event, ...]:
-    """Build the events of a scene.
-
-    Args:
-        given: A list of tables of a scene file, of `Event` objects, or of both.
-
-    Returns:
-        The events, in the same order.
-
-    Raises:
-        SceneError: Where an entry is no event. The message lists every fault.
-    """
+    """Build the events of a scene."""
     check_list("events", given, "write [[events]] and type = ... below, or events=[lw.Surface()]")
     faults, events = Faults(), list[Event]()
     for i, entry in enumerate(given):

@@ -105,12 +105,8 @@ def fin_rows(numbers: Numbers, context: PackingContext) -> np.ndarray:
 
     S = c c^T + n n^T and W = n c^T - c n^T, block by block (lgvi_kernels/laws/fins.py).
 
-    Args:
-        numbers: The term's numbers by field, each of shape (members, fins, ...).
-        context: The scene's parameters, the frame and the run.
-
-    Returns:
-        Rows (members, fins, 51).
+    numbers: The term's numbers by field, each of shape (members, fins, ...).
+    Returns: Rows (members, fins, 51).
     """
     chord = numbers["chord"] / np.linalg.norm(numbers["chord"], axis=-1, keepdims=True)
     normal = numbers["normal"] - np.sum(numbers["normal"] * chord, axis=-1, keepdims=True) * chord
@@ -132,13 +128,7 @@ def fin_rows(numbers: Numbers, context: PackingContext) -> np.ndarray:
 def twist(frame: Frame, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """Rows that measure the velocity of a point along a unit vector, which are also the wrench of a unit force there.
 
-    Args:
-        frame: The kernel's frame.
-        point: Points (n, ..., 3) [m] from the user's origin, user's axes.
-        direction: Unit vectors (n, ..., 3), user's axes.
-
-    Returns:
-        Twists (n, ..., 6), linear part first, in the kernel's axes about the origin of the forces.
+    point: Points (n, ..., 3) [m] from the user's origin, user's axes.
     """
     *_, point, direction = repeated(frame.Q, frame.forces, point, direction)
     return np.concatenate([frame.vector(direction), frame.torque(np.cross(point, direction), direction)], axis=-1)

@@ -57,11 +57,8 @@ class Restoring(Term):
 def net(p: Numbers) -> np.ndarray:
     """Weight less buoyancy, the net force downward.
 
-    Args:
-        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-
-    Returns:
-        Force (n,) [N], negative where buoyancy is the larger.
+    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+    Returns: Force (n,) [N], negative where buoyancy is the larger.
     """
     return vehicle.weight(p) - p["vehicle.buoyancy"]
 
@@ -69,11 +66,8 @@ def net(p: Numbers) -> np.ndarray:
 def moment(p: Numbers) -> np.ndarray:
     """The vector B r_b - W r_g about the user's origin, from which the restoring moment follows.
 
-    Args:
-        p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-
-    Returns:
-        Vectors (n, 3) [N m] in body axes.
+    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
+    Returns: Vectors (n, 3) [N m] in body axes.
     """
     lift = p["vehicle.buoyancy"][:, None] * p["vehicle.center_of_buoyancy"]
     if "vehicle.center_of_gravity" not in p:

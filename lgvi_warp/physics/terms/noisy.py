@@ -17,26 +17,12 @@ def channel(key: str) -> int:
     """The first of a term's two channels of random numbers: twice a hash of its name, so that no two overlap.
 
     Two names of one scene have the same channel with a probability of 2^-31.
-
-    Args:
-        key: Name of the term.
-
-    Returns:
-        The channel, an int32.
     """
     return _signed(2 * zlib.crc32(key.encode()))
 
 
 def key_of(name: str, context: PackingContext) -> dict[str, Any]:
-    """What keys random numbers, besides the number of the draw: the low 64 bits of the seed, the member, who draws.
-
-    Args:
-        name: Name of the term or of the part of a controller.
-        context: The scene's parameters, the frame and the run.
-
-    Returns:
-        The fields of a key of the device (see lgvi_kernels/lanes/noise.py).
-    """
+    """What keys random numbers, besides the number of the draw: the low 64 bits of the seed, the member, who draws."""
     return {
         "member": context.members.astype(np.int32),
         "seed0": _signed(context.seed),

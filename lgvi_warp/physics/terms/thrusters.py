@@ -368,13 +368,9 @@ def _unfit(at: np.ndarray, values: np.ndarray) -> np.ndarray:
 def side_of_table(at: np.ndarray, values: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
     """One side of tables of thrust, by size: from the command at which thrust begins on.
 
-    Args:
-        at: Commands (n, t), rising.
-        values: Thrusts (n, t), rising.
-        side: 1 ahead, -1 astern.
-
-    Returns:
-        Sizes of commands (n, t) and of thrusts (n, t), from (begin, 0) up; points of the other side are at the begin.
+    at: Commands (n, t), rising.
+    values: Thrusts (n, t), rising.
+    Returns: Sizes of commands (n, t) and of thrusts (n, t), from (begin, 0) up; points of the other side are at the begin.
     """
     if side < 0.0:
         at, values = -at[:, ::-1], -values[:, ::-1]

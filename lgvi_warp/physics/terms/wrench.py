@@ -89,11 +89,8 @@ class WrenchSchedule(Term):
 def first_row(schedule: Any) -> Any:
     """The commands at the first time of a schedule.
 
-    Args:
-        schedule: Commands (k, units), as the user gave them, or None.
-
-    Returns:
-        Commands (units,); 0.0 where there is no schedule, or none that can be read.
+    schedule: Commands (k, units), as the user gave them, or None.
+    Returns: Commands (units,); 0.0 where there is no schedule, or none that can be read.
     """
     try:
         return np.atleast_2d(np.array(schedule, dtype=np.float64))[0] if schedule is not None else 0.0
@@ -111,26 +108,14 @@ def holds(term: Any) -> bool:
 
 
 def idle_fields(term: Any) -> tuple[str, ...]:
-    """The fields of a term's commands that follow from the others.
-
-    Args:
-        term: A term whose commands are held or follow a schedule.
-
-    Returns:
-        Names of fields.
-    """
+    """The fields of a term's commands that follow from the others."""
     return SCHEDULE if holds(term) else ("command",)
 
 
 def fields_anew(term: Any, fields: Mapping[str, Any]) -> dict[str, Any]:
     """Fields with which a term is built anew: of its commands those that follow from the others are left out.
 
-    Args:
-        term: A term whose commands are held or follow a schedule.
-        fields: Values of fields that change.
-
-    Returns:
-        These, and None for each that follows from them.
+    Returns: These, and None for each that follows from them.
     """
     left_out = ("command",) if fields.keys() & set(SCHEDULE) else idle_fields(term)
     return dict.fromkeys(left_out) | dict(fields)
@@ -139,11 +124,8 @@ def fields_anew(term: Any, fields: Mapping[str, Any]) -> dict[str, Any]:
 def commands(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
     """Times and commands of a term; a command that is held is the only row of the schedule.
 
-    Args:
-        numbers: The term's numbers by field, each of shape (n, ...).
-
-    Returns:
-        Times (n, k) [s] and commands (n, k, units).
+    numbers: The term's numbers by field, each of shape (n, ...).
+    Returns: Times (n, k) [s] and commands (n, k, units).
     """
     schedule = numbers["command_schedule"]
     return numbers["times"], numbers["command"][:, None, :] if schedule.shape[1] == 1 else schedule
@@ -152,12 +134,9 @@ def commands(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
 def at_start(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:
     """Commands at t = 0.
 
-    Args:
-        times: Times of the schedule (1 or n, k) [s].
-        schedule: Commands (1 or n, k, columns).
-
-    Returns:
-        Commands (n, columns).
+    times: Times of the schedule (1 or n, k) [s].
+    schedule: Commands (1 or n, k, columns).
+    Returns: Commands (n, columns).
     """
     members = zip(*repeated(times, schedule), strict=True)
     return np.array([[np.interp(0.0, at, column) for column in commands.T] for at, commands in members])
@@ -169,15 +148,8 @@ def refuse_idle(term: Any, numbers: Numbers, rate: str, remembers: np.ndarray, r
     That is `command` in a scene with a schedule and the reverse, and the numbers of a memory that the scene does not have. No
     controller drives the term, or the former do not exist.
 
-    Args:
-        term: The term of the scene.
-        numbers: Members' numbers by field, each of shape (n, ...).
-        rate: Name of the field that gives the term a memory, such as "time_constant".
-        remembers: Whether each member's number in that field needs the memory, (n, units).
-        remedy: What to do, for the message.
-
-    Raises:
-        SceneError: Where some member's number would have no effect.
+    numbers: Members' numbers by field, each of shape (n, ...).
+    remembers: Whether each member's number in that field needs the memory, (n, units).
     """
     faults = Faults(f"{term.key}.")
     unread = {}

@@ -75,11 +75,8 @@ class Part:
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
         """The demand plus that of this law.
 
-        Args:
-            w: Demand of the laws before it (6,) = (X, Y, Z, K, M, N) [N, N m].
-            r: Wanted motion.
-            y: Measured motion.
-            unmet: Part of the last look's demand that was not delivered (6,) [N, N m].
+        w: Demand of the laws before it (6,) = (X, Y, Z, K, M, N) [N, N m].
+        unmet: Part of the last look's demand that was not delivered (6,) [N, N m].
         """
         return w
 
@@ -115,10 +112,8 @@ def pose_errors(r: Reference, y: Measurement) -> tuple[Array, Array, Array, Arra
 def unhindered(error: Array, unmet: Array, conditional: bool) -> Array:
     """An error without the entries that would demand more of what is not delivered already.
 
-    Args:
-        error: Errors (3,).
-        unmet: Part of the demand that was not delivered (3,).
-        conditional: Whether the law integrates conditionally; if not, the error stays as it is.
+    error: Errors (3,).
+    unmet: Part of the demand that was not delivered (3,).
     """
     return np.where(conditional & (unmet * error > 0.0), 0.0, error)
 
@@ -133,9 +128,8 @@ class PoseIntegrals:
     def at_look(self, law: Any, y: Measurement, unmet: Array, e: Array, e_R: Array) -> tuple[Array, Array]:
         """I and I_R at this look, from the errors of the last one; those of this look are kept.
 
-        Args:
-            law: integral_limit (2,) and anti_windup.
-            y, unmet, e, e_R: Measurement; what the last look did not deliver (6,); errors of this look.
+        law: integral_limit (2,) and anti_windup.
+        y, unmet, e, e_R: Measurement; what the last look did not deliver (6,); errors of this look.
         """
         conditional = law.anti_windup == "conditional"
         error = y.R @ unhindered(y.R.T @ self.e, unmet[:3], conditional)
@@ -150,9 +144,7 @@ class PoseIntegrals:
 def balance(law: Any, y: Measurement) -> Array:
     """The wrench (6,) that balances weight and buoyancy of the nominal vehicle, if the law's feedforward is "restoring".
 
-    Args:
-        law: feedforward; weight and buoyancy [N], center_of_mass and center_of_buoyancy (3,) [m] of the nominal vehicle.
-        y: Measurement.
+    law: feedforward; weight and buoyancy [N], center_of_mass and center_of_buoyancy (3,) [m] of the nominal vehicle.
     """
     if law.feedforward != "restoring":
         return np.zeros(6)
@@ -164,8 +156,7 @@ def balance(law: Any, y: Measurement) -> Array:
 def cannot(reached: Array) -> Array:
     """The projector (6, 6) onto the demands that actuators cannot make, without round-off.
 
-    Args:
-        reached: Projector (6, 6) onto those that they can.
+    reached: Projector (6, 6) onto those that they can.
     """
     others = np.eye(6) - reached
     return np.where(np.abs(others) < 1e-12, 0.0, others)
@@ -180,9 +171,7 @@ class Integral:
     def at_look(self, period: float, limit: float, unmet: float, conditional: bool) -> float:
         """I + T e within +-limit, unless more of the demand would go where some of it was not delivered.
 
-        Args:
-            period, limit: Time between looks T [s]; largest size of I.
-            unmet, conditional: What was not delivered at the last look; whether it counts.
+        period, limit: Time between looks T [s]; largest size of I.
         """
         if not (conditional and unmet * self.error > 0.0):
             self.value = float(np.clip(self.value + period * self.error, -limit, limit))

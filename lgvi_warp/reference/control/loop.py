@@ -54,10 +54,7 @@ class Loop:
     def look(self, x: State, body: Body, h: float) -> None:
         """Measure, guide, control and allocate at the start of step x.step.
 
-        Args:
-            x: State of the member.
-            body: Its rigid body and its terms.
-            h: Step [s].
+        h: Step [s].
         """
         view = look(x, body, h)
         nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
@@ -96,9 +93,7 @@ def closed_loop(
 ) -> list[State]:
     """The states after 0, 1, ..., steps steps, with a look before every `every`-th.
 
-    Args:
-        x, body, loop: State at the start; inertia and laws, those that the loop drives among them; the controller.
-        step, h, steps: (x, body, h) -> the state h later; step [s]; number of steps.
+    step, h, steps: (x, body, h) -> the state h later; step [s]; number of steps.
     """
     loop.begin()
     states = [x]

@@ -14,8 +14,7 @@ from lgvi_warp.reference.rotation import exp
 def share(period: float, time_constant: float) -> float:
     """1 - exp(-T / time constant): how far a filter goes towards its input over a period.
 
-    Args:
-        period, time_constant: T [s]; the constant [s], 0 for no filter.
+    period, time_constant: T [s]; the constant [s], 0 for no filter.
     """
     return -math.expm1(-period / time_constant) if time_constant > 0.0 else 1.0
 

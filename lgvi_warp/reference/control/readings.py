@@ -46,11 +46,7 @@ def turn_to(A: Array, B: Array) -> Array:
 
 
 def values(y: Measurement, of: str) -> Array:
-    """The numbers (1,) or (3,) of a reading; of an attitude roll, pitch and yaw.
-
-    Args:
-        y, of: The measurement; what is read.
-    """
+    """The numbers (1,) or (3,) of a reading; of an attitude roll, pitch and yaw."""
     if of == "depth":
         return y.position[2:]
     if of == "heading":
@@ -61,8 +57,7 @@ def values(y: Measurement, of: str) -> Array:
 def with_values(y: Measurement, of: str, v: Array) -> Measurement:
     """The measurement that reads v.
 
-    Args:
-        y, of, v: The measurement; what is read; its numbers (1,) or (3,).
+    y, of, v: The measurement; what is read; its numbers (1,) or (3,).
     """
     if of == "depth":
         return replace(y, position=np.array([*y.position[:2], v[0]]))
@@ -75,9 +70,5 @@ def with_values(y: Measurement, of: str, v: Array) -> Measurement:
 
 
 def shifted(y: Measurement, of: str, e: Array) -> Measurement:
-    """The measurement with the error e (1,) or (3,); an attitude is turned by it.
-
-    Args:
-        y, of, e: The measurement; what is read; the error.
-    """
+    """The measurement with the error e (1,) or (3,); an attitude is turned by it."""
     return replace(y, R=y.R @ exp(e)) if of == "attitude" else with_values(y, of, values(y, of) + e)

@@ -67,8 +67,7 @@ def orthonormal(chord: Array, normal: Array) -> tuple[Array, Array]:
 def turned(c: Array, n: Array, angle: float) -> tuple[Array, Array]:
     """c' = cos c + sin n, n' = cos n - sin c.
 
-    Args:
-        c, n: Unit vector (3,) along the chord; unit vector (3,) along the normal.
-        angle: Angle of deflection [rad].
+    c, n: Unit vector (3,) along the chord; unit vector (3,) along the normal.
+    angle: Angle of deflection [rad].
     """
     return math.cos(angle) * c + math.sin(angle) * n, math.cos(angle) * n - math.sin(angle) * c

@@ -64,10 +64,8 @@ class Following(Law):
 def chased(n: float, first: float, last: float, lag: float, rate: float, s: float) -> float:
     """n after s [s] in which the command u goes straight from first to last: n' = (u - n) / lag, no faster than rate.
 
-    Args:
-        n, first, last: Place at the start; the command at the start and at the end.
-        lag, rate: Time constant [s], 0 for none; largest rate, inf for none.
-        s: Duration [s].
+    lag, rate: Time constant [s], 0 for none; largest rate, inf for none.
+    s: Duration [s].
     """
     if s <= 0.0:
         return n

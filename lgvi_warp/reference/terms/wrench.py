@@ -30,11 +30,9 @@ class WrenchSchedule(Law):
 def at_time(t: float, times: Array, values: Array, steps: bool) -> Array:
     """A table's row at t: linear between the times, or held from each to the next; constant outside.
 
-    Args:
-        t: Time [s].
-        times: Times [s], rising.
-        values: Values (k, 3) at the times.
-        steps: Whether each value holds until the next time.
+    t: Time [s].
+    times: Times [s], rising.
+    values: Values (k, 3) at the times.
     """
     if steps:
         return np.asarray(np.asarray(values)[max(int(np.searchsorted(times, t, side="left")) - 1, 0)])
@@ -44,11 +42,10 @@ def at_time(t: float, times: Array, values: Array, steps: bool) -> Array:
 def pieces(t: float, h: float, times: Array, values: Array, limit: Array) -> Iterator[tuple[float, Array, Array]]:
     """The straight pieces of a limited table within the h [s] before t, the first first: (duration [s], first, last value).
 
-    Args:
-        t, h: End and length of the interval [s].
-        times: Times [s], rising.
-        values: Values (k, n) at the times.
-        limit: Largest sizes (n,) of a value.
+    t, h: End and length of the interval [s].
+    times: Times [s], rising.
+    values: Values (k, n) at the times.
+    limit: Largest sizes (n,) of a value.
     """
     changes = np.diff(values, axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -9,21 +9,7 @@ import numpy as np
 
 
 def array(group: Any, name: str, shape: Any, chunks: Any, dtype: str, fill: Any, dims: Any, attributes: Any) -> Any:
-    """Create an array of raw little-endian numbers with a checksum in each chunk.
-
-    Args:
-        group: zarr group that it lies in.
-        name: Name of the array.
-        shape: Shape of the array.
-        chunks: Shape of a chunk.
-        dtype: NumPy's type string.
-        fill: Value that stands where nothing was written.
-        dims: Names of the dimensions.
-        attributes: CF attributes.
-
-    Returns:
-        The zarr array, without chunks.
-    """
+    """Create an array of raw little-endian numbers with a checksum in each chunk."""
     from zarr.codecs import BytesCodec, Crc32cCodec
 
     return group.create_array(
@@ -34,15 +20,7 @@ def array(group: Any, name: str, shape: Any, chunks: Any, dtype: str, fill: Any,
 
 
 def whole_array(group: Any, name: str, values: np.ndarray, dims: tuple[str, ...], attributes: dict[str, Any]) -> None:
-    """Create a small array of one chunk and write it.
-
-    Args:
-        group: zarr group that it lies in.
-        name: Name of the array.
-        values: Numbers of the array.
-        dims: Names of the dimensions.
-        attributes: CF attributes.
-    """
+    """Create a small array of one chunk and write it."""
     values = np.ascontiguousarray(values)
     fill = np.nan if values.dtype.kind == "f" else 0
     dtype = values.dtype.newbyteorder("<").str

@@ -30,14 +30,7 @@ if TYPE_CHECKING:
 
 
 def name_of(block: Block) -> str:
-    """Return the name of a block's files without their suffix.
-
-    Args:
-        block: The block.
-
-    Returns:
-        Its first member, with nine digits.
-    """
+    """Return the name of a block's files without their suffix."""
     return f"{block.first:09d}"
 
 
@@ -58,102 +51,42 @@ class BlockFiles:
     commits: Commits = field(default_factory=Commits, compare=False)
 
     def open(self, plan: Plan, block: Block, members: Any) -> BlockWriter:
-        """Open a writer of a block's chunks.
-
-        Args:
-            plan: Plan of the run.
-            block: The block.
-            members: Its members.
-
-        Returns:
-            The writer.
-        """
+        """Open a writer of a block's chunks."""
         return BlockWriter(self.root, self.columns, self.room, plan, block, members)
 
     def understood(self, block: Block) -> AbstractContextManager[None]:
-        """Turn errors that arise while a block's parts are used into faults of their file.
-
-        Args:
-            block: The block.
-
-        Returns:
-            The context in which the parts are used.
-        """
+        """Turn errors that arise while a block's parts are used into faults of their file."""
         return understood(self.root / self.parts_key(block))
 
     def merge(self, block: Block, part: Any) -> None:
-        """Do nothing: the block is in its place already.
-
-        Args:
-            block: The block.
-            part: What its writer closed it with.
-        """
+        """Do nothing: the block is in its place already."""
 
     def finish(self, block: Block, files: durable.Files, keepers: Sequence[Keeper], parts: Sequence[Any]) -> None:
-        """Hand over a block to be made durable and marked.
-
-        Args:
-            block: The block.
-            files: Its files, written and not synced.
-            keepers: Further keepers.
-            parts: What each of them closed the block with.
-
-        Raises:
-            OSError: If this or an earlier block could not be written.
-        """
+        """Hand over a block to be made durable and marked."""
         if keepers:
             files.write(self.parts_key(block), packed(keepers, parts))
         self.commits.add(files, self.marker(block), marker(files.sums))
 
     @staticmethod
     def parts_key(block: Block) -> str:
-        """Return the path of the file with a block's parts of the keepers.
-
-        Args:
-            block: The block.
-
-        Returns:
-            The path below the store's root.
-        """
+        """Return the path of the file with a block's parts of the keepers."""
         return f"parts/{name_of(block)}.npy"
 
     def sums(self, block: Block) -> dict[str, list[int]] | None:
         """Read the sizes and checksums in a block's marker.
 
-        Args:
-            block: The block.
-
-        Returns:
-            [size, checksum] by path of the file; None if the block is not finished.
-
-        Raises:
-            SceneError: If the marker is a link.
+        Returns: [size, checksum] by path of the file; None if the block is not finished.
         """
         return read_marker(self.root, f"blocks/{name_of(block)}.json")
 
     def marker(self, block: Block) -> Path:
-        """Return the path of a block's marker, the file that says that the block is finished.
-
-        Args:
-            block: The block.
-
-        Returns:
-            The path.
-        """
+        """Return the path of a block's marker, the file that says that the block is finished."""
         return self.root / "blocks" / f"{name_of(block)}.json"
 
     def parts(self, block: Block, keepers: Sequence[Keeper]) -> tuple[Any, ...] | None:
         """Read the parts of the keepers for a block.
 
-        Args:
-            block: The block.
-            keepers: The keepers.
-
-        Returns:
-            A part for each keeper; None if the block is not finished.
-
-        Raises:
-            SceneError: If the file is damaged.
+        Returns: A part for each keeper; None if the block is not finished.
         """
         if self.sums(block) is None:
             return None
@@ -163,16 +96,7 @@ class BlockFiles:
             return unpacked(keepers, self.root, self.parts_key(block))
 
     def faults(self, block: Block, samples: int, keepers: Sequence[Any]) -> list[str]:
-        """Compare a block's files with its marker.
-
-        Args:
-            block: The block.
-            samples: Number of sample times.
-            keepers: The keepers that leave parts.
-
-        Returns:
-            A text for each fault; only "is not finished" for a block that is not.
-        """
+        """Compare a block's files with its marker."""
         sums = self.sums(block)
         if sums is None:
             return ["is not finished"]
@@ -181,17 +105,7 @@ class BlockFiles:
         return [f"{key} {text}" for key, text in damaged(self.root, sums).items()]
 
     def unfit(self, block: Block, sums: Mapping[str, Sequence[int]], samples: int, keepers: Sequence[Any]) -> list[str]:
-        """Check the names and sizes in a block's marker: only the block's own chunks and parts may be there.
-
-        Args:
-            block: The block.
-            sums: Sizes and checksums in its marker.
-            samples: Number of sample times.
-            keepers: The keepers that leave parts.
-
-        Returns:
-            A text for each fault.
-        """
+        """Check the names and sizes in a block's marker: only the block's own chunks and parts may be there."""
         sizes = {key: column.bytes for column in self.columns for key in column.keys(block, samples)}
         parts = self.parts_key(block)
         faults = [f"{key} is not in the marker" for key in (*sizes, *([parts] if keepers else [])) if key not in sums]
@@ -201,12 +115,7 @@ class BlockFiles:
         return faults + [f"{key} has {sums[key][0]} bytes in the marker, not {sizes[key]}" for key in wrong]
 
     def remove(self, runs: Sequence[Block], samples: int) -> None:
-        """Remove all files of blocks, their markers first.
-
-        Args:
-            runs: The blocks.
-            samples: Number of sample times.
-        """
+        """Remove all files of blocks, their markers first."""
         for block in runs:
             self.marker(block).unlink(missing_ok=True)
         for block in runs:
@@ -222,15 +131,7 @@ class BlockFiles:
 
 
 def packed(keepers: Sequence[Keeper], parts: Sequence[Any]) -> bytes:
-    """Pack a block's parts into a file: a JSON text, then the arrays, each as in an .npy file.
-
-    Args:
-        keepers: The keepers.
-        parts: What each of them closed the block with.
-
-    Returns:
-        The file's content, the same bytes for the same parts.
-    """
+    """Pack a block's parts into a file: a JSON text, then the arrays, each as in an .npy file."""
     headers: list[tuple[str, list[str], Any]] = []
     arrays: list[np.ndarray] = []
     for keeper, part in zip(keepers, parts, strict=True):
@@ -245,16 +146,7 @@ def packed(keepers: Sequence[Keeper], parts: Sequence[Any]) -> bytes:
 
 
 def unpacked(keepers: Sequence[Keeper], root: Path, key: str) -> tuple[Any, ...]:
-    """Read a block's parts from a file.
-
-    Args:
-        keepers: The keepers whose parts are wanted.
-        root: Folder of the store.
-        key: Path of the file below it.
-
-    Returns:
-        A part for each keeper.
-    """
+    """Read a block's parts from a file."""
     with npy_files.opened(root, key) as arrays:
         headers = parsed(npy_files.text(arrays))
         contents = {name: (dict(zip(names, arrays, strict=False)), content) for name, names, content in headers}
@@ -264,11 +156,7 @@ def unpacked(keepers: Sequence[Keeper], root: Path, key: str) -> tuple[Any, ...]
 def marker(sums: Mapping[str, list[int]]) -> bytes:
     """Write a block's marker: files with their sizes and checksums, and the marker's own checksum in its last line.
 
-    Args:
-        sums: [size, checksum] by path of the file.
-
-    Returns:
-        Content of the marker.
+    sums: [size, checksum] by path of the file.
     """
     text = json.dumps(dict(sorted(sums.items())), indent=0).encode()
     return text + b"\n%08x\n" % durable.checksum(text)
@@ -277,12 +165,7 @@ def marker(sums: Mapping[str, list[int]]) -> bytes:
 def damaged(root: Path, sums: Mapping[str, Sequence[int]]) -> dict[str, str]:
     """Find the files that are not as their marker says.
 
-    Args:
-        root: Folder of the store.
-        sums: [size, checksum] by path of the file.
-
-    Returns:
-        What is wrong, by path of the file.
+    sums: [size, checksum] by path of the file.
     """
     faults = ((key, durable.fault(root, key, *size_and_sum)) for key, size_and_sum in sums.items())
     return {key: text for key, text in faults if text}
@@ -291,15 +174,7 @@ def damaged(root: Path, sums: Mapping[str, Sequence[int]]) -> dict[str, str]:
 def read_marker(root: Path, key: str) -> dict[str, list[int]] | None:
     """Read a marker.
 
-    Args:
-        root: Folder of the store.
-        key: Path of the marker below it.
-
-    Returns:
-        [size, checksum] by path of the file; None if there is no marker, or a damaged one.
-
-    Raises:
-        SceneError: If the marker is a link.
+    Returns: [size, checksum] by path of the file; None if there is no marker, or a damaged one.
     """
     try:
         content = safe_files.read(root, key, safe_files.MOST_JSON)
@@ -319,14 +194,7 @@ def check(
 ) -> Iterator[tuple[Block, list[str]]]:
     """Compare the files of blocks with their markers, reading every file.
 
-    Args:
-        block_files: The store's blocks.
-        runs: The blocks to check.
-        samples: Number of sample times.
-        keepers: The keepers that leave parts.
-
-    Yields:
-        Tuples (block, its faults), in order; see BlockFiles.faults.
+    Yields: Tuples (block, its faults), in order; see BlockFiles.faults.
     """
     with ThreadPoolExecutor(machine.thread_count()) as pool:
         faults = pool.map(lambda block: block_files.faults(block, samples, keepers), runs)

@@ -40,9 +40,8 @@ class Commits:
     folder once, and only then does the same with the markers. The first error is raised by the next `add`, or at the end;
     blocks that can be made durable nevertheless are.
 
-    Args:
-        waits: Whether `add` returns only when its block is durable. Copies in other processes wait, because nothing waits
-            for the end of these processes. Default False.
+    waits: Whether `add` returns only when its block is durable. Copies in other processes wait, because nothing waits for the
+        end of these processes. Default False.
     """
 
     def __init__(self, waits: bool = False):
@@ -55,16 +54,7 @@ class Commits:
         return Commits, (True,)
 
     def add(self, files: Files, path: Path, marker: bytes) -> None:
-        """Add a block; waits where too many blocks are in the queue.
-
-        Args:
-            files: The block's files, written and not synced.
-            path: Path of its marker.
-            marker: Content of its marker.
-
-        Raises:
-            OSError: If this or an earlier block could not be written.
-        """
+        """Add a block; waits where too many blocks are in the queue."""
         commit = Commit(files, path, marker)
         with self._changed:
             self._changed.wait_for(lambda: len(self._waiting) < MOST)

@@ -34,19 +34,7 @@ SPARE_BYTES = 20_000_000
 def create(
     store: Store, plan: Plan, provenance: Mapping[str, Any], messages: Sequence[str], keepers: Sequence[Keeper] = ()
 ) -> None:
-    """Create the store's folder with all of its metadata, either whole or not at all.
-
-    Args:
-        store: Folder and settings.
-        plan: Plan of the run.
-        provenance: Provenance as a store keeps it.
-        messages: What the user should know.
-        keepers: Keepers whose parts the store will hold; its recipe lists their names.
-
-    Raises:
-        SceneError: If an array's name cannot be a folder, or the disk has too little room.
-        OSError: If the disk cannot be written.
-    """
+    """Create the store's folder with all of its metadata, either whole or not at all."""
     target = Path(os.path.realpath(store.folder))
     check_names(columns(plan, store))
     free_enough(target, size(plan, store))
@@ -60,26 +48,12 @@ def create(
 
 
 def names_of(keepers: Sequence[Keeper]) -> list[str]:
-    """List the names of the keepers that leave parts in a store.
-
-    Args:
-        keepers: The keepers of a run.
-
-    Returns:
-        The names, in the order of the keepers.
-    """
+    """List the names of the keepers that leave parts in a store."""
     return [keeper.name for keeper in keepers if isinstance(keeper, PartKeeper)]
 
 
 def nearest_folder(path: Path) -> Path:
-    """Find the folder that exists on the way to a path.
-
-    Args:
-        path: The path, which need not exist.
-
-    Returns:
-        The folder itself, or the nearest one above it.
-    """
+    """Find the folder that exists on the way to a path."""
     path = path.absolute()
     while not path.is_dir():
         path = path.parent
@@ -89,9 +63,7 @@ def nearest_folder(path: Path) -> Path:
 def free_enough(path: Path, wanted: int) -> None:
     """Raise SceneError if a disk has less room than a run needs.
 
-    Args:
-        path: Where the run will be written; need not exist.
-        wanted: Size of the run [bytes].
+    wanted: Size of the run [bytes].
     """
     free = shutil.disk_usage(nearest_folder(path)).free
     if wanted + SPARE_BYTES > free:
@@ -108,16 +80,7 @@ def skeleton(
     messages: Sequence[str],
     keepers: Sequence[Keeper] = (),
 ) -> None:
-    """Write groups and arrays without their blocks to disk.
-
-    Args:
-        root: Folder of the store, which is made.
-        store: Settings.
-        plan: Plan of the run.
-        provenance: Provenance as a store keeps it.
-        messages: What the user should know.
-        keepers: Keepers whose parts the store will hold.
-    """
+    """Write groups and arrays without their blocks to disk."""
     import zarr
     from zarr.storage import MemoryStore
 

@@ -72,14 +72,7 @@ def export(path: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | 
 
 
 def check_whole(folder: Folder) -> None:
-    """Check that every file is as it was written: a missing chunk would be exported as NaN.
-
-    Args:
-        folder: The store.
-
-    Raises:
-        SceneError: If the run is not complete or is damaged.
-    """
+    """Check that every file is as it was written: a missing chunk would be exported as NaN."""
     content = state(folder.path)
     if not content["complete"]:
         unfinished = content["blocks"] - content["finished"]

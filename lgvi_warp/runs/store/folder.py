@@ -47,10 +47,6 @@ ROOT, CREATED, KEPT = "zarr.json", "created.json", "kept"
 class Folder:
     """An existing store, which may come from elsewhere: everything it says is checked before it is used.
 
-    Args:
-        path: Its folder, or a link to it.
-        within: The run that it is a group of; default itself.
-
     Attributes:
         attributes: The attributes of its zarr group.
         provenance: Scene, ensemble, settings, versions and machine of the run.
@@ -62,9 +58,6 @@ class Folder:
         ran: Blocks that this process ran.
         ran_kept: Blocks of kept members that this process ran.
         noted: What cannot be promised of going on with it.
-
-    Raises:
-        SceneError: If there is no store, or its metadata is damaged.
     """
 
     def __init__(self, path: Path, within: Path | None = None):
@@ -100,11 +93,7 @@ class Folder:
         return safe_files.read_json(self.within, (self.path / ROOT).relative_to(self.within).as_posix())
 
     def kept(self) -> Folder | None:
-        """Open the group of the kept members; None if there is none.
-
-        Raises:
-            SceneError: If it is damaged.
-        """
+        """Open the group of the kept members; None if there is none."""
         return Folder(self.path / KEPT, self.path) if os.path.lexists(self.path / KEPT) else None
 
     @property
@@ -141,11 +130,7 @@ class Folder:
         return zarr.open_group(self.checked(), mode="r", zarr_format=3)
 
     def refuse_too_large(self) -> None:
-        """Check that what is read at once, numbers of members without times, fits into memory.
-
-        Raises:
-            SceneError: If it does not.
-        """
+        """Check that what is read at once, numbers of members without times, fits into memory."""
         each = sum(column.bytes for column in self.layout.columns if not column.times) * len(self.runs)
         memory = machine.memory_bytes() or 2**40
         if each > memory:
@@ -162,9 +147,6 @@ class Folder:
         """List the files of blocks that are not there; none is read.
 
         A missing chunk raises no error: it reads as NaN or 0.
-
-        Returns:
-            Their paths below the store.
         """
         files, samples = self.block_files, self.layout.times
         wanted = [f"blocks/{name_of(block)}.json" for block in self.runs]
@@ -174,17 +156,7 @@ class Folder:
         return [key for key in wanted if key not in present]
 
     def plan(self, ensemble: Ensemble | None = None) -> Plan:
-        """Build the plan of the run again.
-
-        Args:
-            ensemble: The run's ensemble. Needed if a scene file cannot describe it (distributions of your own).
-
-        Returns:
-            The plan.
-
-        Raises:
-            SceneError: If the store is damaged, or does not describe the ensemble.
-        """
+        """Build the plan of the run again."""
         try:
             # A missing chunk raises no error: it reads as NaN or 0.
             lost = [text for text in self.damage() if text.startswith(("time/", "step/", "explicit/"))]
@@ -224,11 +196,7 @@ class Folder:
         return unlike
 
     def finish(self, members: int | None = None) -> None:
-        """Mark the run as complete.
-
-        Args:
-            members: Number of members, where it ended before the last of the ensemble.
-        """
+        """Mark the run as complete."""
         if not self.complete:
             self._say({"complete": True} | ({} if members is None else {"members": members}), below(self.path / KEPT))
 
@@ -236,9 +204,6 @@ class Folder:
         """Take over the layout in the root's metadata of another folder of the same run.
 
         If it differs from this folder's, the run is marked as incomplete.
-
-        Args:
-            other: The other folder.
         """
         content, right = self._root(), safe_files.read_json(other, ROOT)
         if Folder(other).layout != self.layout:
@@ -262,14 +227,7 @@ class Folder:
 
 
 def below(path: Path) -> dict[str, Any]:
-    """Read the metadata of a group and its arrays, in the form that the enclosing group holds them.
-
-    Args:
-        path: Folder of the group.
-
-    Returns:
-        Metadata by name; empty if there is no such group.
-    """
+    """Read the metadata of a group and its arrays, in the form that the enclosing group holds them."""
     if not path.exists():
         return {}
     root = safe_files.read_json(path.parent, f"{path.name}/{ROOT}")
@@ -279,26 +237,12 @@ def below(path: Path) -> dict[str, Any]:
 
 
 def checksum_of(texts: Sequence[str]) -> int:
-    """Compute one checksum of several texts.
-
-    Args:
-        texts: The texts, in order.
-
-    Returns:
-        CRC-32C of the texts joined by zero bytes.
-    """
+    """Compute one checksum of several texts."""
     return durable.checksum("\0".join(texts).encode())
 
 
 def check_names(found: Sequence[StoreArray]) -> None:
-    """Check that each array's name can be that of a folder.
-
-    Args:
-        found: The arrays.
-
-    Raises:
-        SceneError: If a name cannot; the message names every fault.
-    """
+    """Check that each array's name can be that of a folder."""
     faults = Faults("store.")
     for name in (column.name for column in found if not store_check.is_name(column.name)):
         remedy = 'give the term or event another name, without / \\ : * ? " < > | and of 200 bytes at most'
@@ -308,18 +252,7 @@ def check_names(found: Sequence[StoreArray]) -> None:
 
 @contextlib.contextmanager
 def held(path: Path) -> Iterator[None]:
-    """Hold the lock of a store, which need not exist yet, and clean up what a killed run left.
-
-    Args:
-        path: Folder of the store.
-
-    Yields:
-        Nothing; the lock is held in this context.
-
-    Raises:
-        SceneError: If another run works in it; the message names that run.
-        OSError: If the disk cannot be written.
-    """
+    """Hold the lock of a store, which need not exist yet, and clean up what a killed run left."""
     with write_lock(path):
         place = Path(os.path.realpath(path))
         durable.restored(place)
@@ -332,11 +265,7 @@ def held(path: Path) -> Iterator[None]:
 def foreign(path: Path) -> str | None:
     """Find what no run wrote in a folder.
 
-    Args:
-        path: The folder.
-
-    Returns:
-        A text on the first such file, or on why the folder is none of a run; None if it holds a run alone.
+    Returns: A text on the first such file, or on why the folder is none of a run; None if it holds a run alone.
     """
     if path.is_symlink() or not path.is_dir():
         return "is no folder of a run"
@@ -352,13 +281,6 @@ def foreign(path: Path) -> str | None:
 
 
 def refuse_foreign(path: Path) -> None:
-    """Check that a folder that is to be replaced holds only what a run wrote.
-
-    Args:
-        path: The folder, which need not exist.
-
-    Raises:
-        SceneError: If it holds something else.
-    """
+    """Check that a folder that is to be replaced holds only what a run wrote."""
     if os.path.lexists(path) and (fault := foreign(Path(os.path.realpath(path)))):
         raise SceneError([f"{path}: {fault}; it is not overwritten: move it away, or give another folder"])

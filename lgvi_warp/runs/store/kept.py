@@ -60,12 +60,7 @@ class KeptStore(Store):
         return self.folder.parent
 
     def write_given(self, group: Any, plan: Plan) -> None:
-        """Write which members the group holds; what they were given as arrays is in the run's own group.
-
-        Args:
-            group: zarr group of the store.
-            plan: Plan of the run of these members.
-        """
+        """Write which members the group holds; what they were given as arrays is in the run's own group."""
         whole_array(group, KEPT_MEMBER, self.members, (KEPT_MEMBER,), MEMBERS)
         if not self.chosen.all():
             whole_array(group, "chosen", self.chosen.astype(np.uint8), (KEPT_MEMBER,), CHOSEN)
@@ -93,21 +88,7 @@ class KeptRun:
     def __call__(
         self, run: StoredRun, members: int, executor: Executor, progress: Callable[[float], None] | None = None
     ) -> int:
-        """Run the blocks that are missing or damaged.
-
-        Args:
-            run: The stored run.
-            members: The run's number of members.
-            executor: What runs the blocks.
-            progress: Called with the fraction of the work that is done, in [0, 1].
-
-        Returns:
-            Number of blocks run.
-
-        Raises:
-            SceneError: As the run does.
-            OSError: As the run does.
-        """
+        """Run the blocks that are missing or damaged."""
         store, path = run.store, run.store.folder / KEPT
         wanted = members_kept(self.observed.keep, Folder(store.folder), members)
         group = group_of(store, run.plan, wanted)
@@ -126,13 +107,7 @@ class KeptRun:
 def group_of(store: Store, plan: Plan, wanted: np.ndarray) -> KeptStore:
     """Build the group of a store for kept members.
 
-    Args:
-        store: Store of the run.
-        plan: Plan of the run.
-        wanted: Indices of the kept members, shape (m,).
-
-    Returns:
-        The group, to be resumed if it exists.
+    wanted: Indices of the kept members, shape (m,).
     """
     beside = plan.with_neighbours(wanted)
     chosen = np.isin(beside, wanted)
@@ -147,13 +122,7 @@ def _after(progress: Callable[[float], None], before: int, more: int) -> Callabl
 def members_kept(keep: Any, folder: Folder, members: int | None = None) -> np.ndarray:
     """Find the members whose samples are kept, where those of all members are not.
 
-    Args:
-        keep: As for solve.
-        folder: Store of the run.
-        members: Number of members to look at, from the first; default all.
-
-    Returns:
-        Indices of the members, shape (m,).
+    Returns: Indices of the members, shape (m,).
     """
     if isinstance(keep, str) and keep in ("all", "none"):
         return np.empty(0, np.int64)
@@ -162,12 +131,5 @@ def members_kept(keep: Any, folder: Folder, members: int | None = None) -> np.nd
 
 
 def keep_of(provenance: Mapping[str, Any]) -> Any:
-    """Read from provenance which samples a run keeps.
-
-    Args:
-        provenance: Provenance of the run.
-
-    Returns:
-        The `keep` of solve.
-    """
+    """Read from provenance which samples a run keeps."""
     return provenance.get("observed", {}).get("keep", "all")

@@ -82,38 +82,17 @@ class StoreArray:
     def shape(self, samples: int, members: int) -> tuple[int, ...]:
         """Return the shape of the whole array.
 
-        Args:
-            samples: Number of sample times, k.
-            members: Number of members, n.
-
-        Returns:
-            (k, n, *tail), or (n, *tail) without times.
+        Returns: (k, n, *tail), or (n, *tail) without times.
         """
         return (*((samples,) if self.times else ()), members, *self.tail)
 
     def key(self, block: Block, time: int = 0) -> str:
-        """Return the path of a chunk's file.
-
-        Args:
-            block: The block of members.
-            time: Number of the chunk along the times; default the first.
-
-        Returns:
-            The path below the store's root.
-        """
+        """Return the path of a chunk's file."""
         index = (*((time,) if self.times else ()), block.first // self.length, *(0,) * len(self.tail))
         return f"{self.name}/c." + ".".join(map(str, index))
 
     def keys(self, block: Block, samples: int) -> list[str]:
-        """Return the paths of all chunks of a block.
-
-        Args:
-            block: The block of members.
-            samples: Number of sample times, k.
-
-        Returns:
-            The paths below the store's root, in order of time.
-        """
+        """Return the paths of all chunks of a block."""
         return [self.key(block, time) for time in range(-(-samples // self.times) if self.times else 1)]
 
     @property
@@ -123,15 +102,7 @@ class StoreArray:
 
 
 def columns(plan: Plan, store: Chunking) -> tuple[StoreArray, ...]:
-    """List the arrays that a run fills block by block.
-
-    Args:
-        plan: Plan of the run.
-        store: Fields, dtype and size of chunks.
-
-    Returns:
-        The arrays: samples, member's index, fields of members, varied parameters.
-    """
+    """List the arrays that a run fills block by block."""
     length = blocks(plan.ensemble.members)[0].count
     index = {"standard_name": "realization", "long_name": "member of the ensemble"}
     arrays = (
@@ -171,14 +142,7 @@ def _parameters(plan: Plan, length: int) -> list[StoreArray]:
 
 
 def parameter_units(scene: Any) -> dict[str, str]:
-    """Look up the units of a scene's parameters.
-
-    Args:
-        scene: The scene.
-
-    Returns:
-        Units by name of the parameter; "1" where none is known.
-    """
+    """Look up the units of a scene's parameters."""
     from lgvi_warp.physics import vehicle
     from lgvi_warp.physics.terms.base import word_of
 
@@ -192,12 +156,7 @@ def parameter_units(scene: Any) -> dict[str, str]:
 def size(plan: Plan, store: Chunking) -> int:
     """Compute the size of all chunks of a run.
 
-    Args:
-        plan: Plan of the run.
-        store: Fields, dtype and size of chunks.
-
-    Returns:
-        Size [bytes].
+    Returns: Size [bytes].
     """
     k, runs = len(plan.grid.times), len(blocks(plan.ensemble.members))
     each = sum(column.bytes * len(column.keys(Block(0, column.length), k)) for column in columns(plan, store))

@@ -51,26 +51,12 @@ class NotOursError(ValueError):
 
 
 def is_name(name: Any) -> bool:
-    """Tell whether a name is safe for a folder on every system.
-
-    Args:
-        name: The name, of any type.
-
-    Returns:
-        True for a printable text that is not too long and no path, drive or wild card.
-    """
+    """Tell whether a name is safe for a folder on every system."""
     return isinstance(name, str) and 0 < len(name.encode(errors="replace")) <= MOST_NAME and not UNFIT.search(name)
 
 
 def is_file_of_store(name: str) -> bool:
-    """Tell whether a run, or a killed writer of one, may have left a file of this name.
-
-    Args:
-        name: Path of the file below the store's root.
-
-    Returns:
-        True if it may.
-    """
+    """Tell whether a run, or a killed writer of one, may have left a file of this name."""
     folder, _, last = name.rpartition("/")
     if scratch.is_unfinished(last):
         ends = (dot.start() for dot in re.finditer(r"\.", last))
@@ -145,8 +131,7 @@ class Layout:
     def frame(self) -> dict[str, int | None]:
         """List the files that belong to no block.
 
-        Returns:
-            Sizes [bytes] by path below the root; None where the size is not known.
+        Returns: Sizes [bytes] by path below the root; None where the size is not known.
         """
         files: dict[str, int | None] = {f"{name}/zarr.json": None for name in (*self.arrays, *self.groups)}
         block_names = {column.name for column in self.columns}
@@ -158,11 +143,7 @@ class Layout:
     def chunk_bytes(self, key: str) -> int | None:
         """Look up the size of a chunk's file.
 
-        Args:
-            key: Path of the file below the root.
-
-        Returns:
-            Size [bytes]; None if the layout has no such file.
+        Returns: Size [bytes]; None if the layout has no such file.
         """
         name, _, last = key.rpartition("/")
         array = self.arrays.get(name)
@@ -174,14 +155,7 @@ class Layout:
         return array.bytes if inside else None
 
     def root(self, attributes: Mapping[str, Any]) -> bytes:
-        """Write the root's metadata for zarr, with those of all arrays in it.
-
-        Args:
-            attributes: Attributes of the group.
-
-        Returns:
-            The metadata as JSON.
-        """
+        """Write the root's metadata for zarr, with those of all arrays in it."""
         group = {"attributes": {}, "zarr_format": 3, "node_type": "group"}
         empty = {"kind": "inline", "must_understand": False, "metadata": {}}
         inner = {name: group | {"consolidated_metadata": empty} for name in self.groups}
@@ -191,18 +165,7 @@ class Layout:
 
 
 def layout_of(content: Mapping[str, Any], members: int) -> Layout:
-    """Read and check the layout in a root's metadata.
-
-    Args:
-        content: The root's metadata.
-        members: Number of members of the run.
-
-    Returns:
-        The layout.
-
-    Raises:
-        NotOursError: If this package writes no such metadata.
-    """
+    """Read and check the layout in a root's metadata."""
     inner = _table(_table(content, "zarr.json").get("consolidated_metadata"), "consolidated_metadata").get("metadata")
     arrays, groups = dict[str, StoredArray](), list[str]()
     for name, metadata in _table(inner, "metadata").items():
@@ -266,14 +229,7 @@ def _plain(attributes: Mapping[str, Any], name: str) -> None:
 
 
 def is_text(value: Any) -> bool:
-    """Tell whether a value is a text that cannot control a terminal.
-
-    Args:
-        value: The value, of any type.
-
-    Returns:
-        True for a text of printable characters and line breaks.
-    """
+    """Tell whether a value is a text that cannot control a terminal."""
     return isinstance(value, str) and (value.isprintable() or value.replace("\n", " ").isprintable())
 
 
@@ -310,17 +266,7 @@ def _checked(arrays: dict[str, StoredArray], groups: tuple[str, ...], members: i
 
 @contextlib.contextmanager
 def understood(path: Path) -> Iterator[None]:
-    """Turn errors that arise while a file is read into faults of the file.
-
-    Args:
-        path: The file, which the message names.
-
-    Yields:
-        Nothing; the file is read in this context.
-
-    Raises:
-        SceneError: In place of any error that the content of the file causes.
-    """
+    """Turn errors that arise while a file is read into faults of the file."""
     try:
         yield
     except SceneError:
@@ -333,12 +279,5 @@ def understood(path: Path) -> Iterator[None]:
 
 
 def is_sum(value: Any) -> bool:
-    """Tell whether a value is a list of a size and a checksum.
-
-    Args:
-        value: The value, of any type.
-
-    Returns:
-        True for a list of two integers that are not negative.
-    """
+    """Tell whether a value is a list of a size and a checksum."""
     return isinstance(value, list) and len(value) == 2 and all(type(number) is int and number >= 0 for number in value)

@@ -64,14 +64,7 @@ class Arrays(Mapping[str, np.ndarray]):
         return np.asarray(array[at] if isinstance(self.members, slice) else array.oindex[at])
 
     def part(self, places: slice | np.ndarray) -> Arrays:
-        """Select members of those that these arrays read.
-
-        Args:
-            places: Slice or indices among them.
-
-        Returns:
-            Arrays of these members alone.
-        """
+        """Select members of those that these arrays read."""
         if not isinstance(self.members, slice):
             return replace(self, members=self.members[places])
         of_slice = range(self.members.start, self.members.stop, self.members.step)
@@ -81,14 +74,7 @@ class Arrays(Mapping[str, np.ndarray]):
         return replace(self, members=slice(chosen_range.start, chosen_range.stop, chosen_range.step))
 
     def dataset(self, path: Path) -> xarray.Dataset:
-        """Open the whole store as an xarray Dataset.
-
-        Args:
-            path: The store.
-
-        Returns:
-            The dataset; see the function `dataset`.
-        """
+        """Open the whole store as an xarray Dataset."""
         return dataset(path)
 
     def __contains__(self, name: object) -> bool:
@@ -102,17 +88,7 @@ class Arrays(Mapping[str, np.ndarray]):
 
 
 def folder_of(path: str | os.PathLike[str]) -> Path:
-    """Find the store at a path: the path itself if it ends in .zarr, else the one .zarr in that folder.
-
-    Args:
-        path: A store, or a folder with one store.
-
-    Returns:
-        Path of the store, which need not exist if the name ends in .zarr.
-
-    Raises:
-        SceneError: If the folder holds no store, several, or a link to one.
-    """
+    """Find the store at a path: the path itself if it ends in .zarr, else the one .zarr in that folder."""
     location = path_of("path", path)
     if location.suffix == ".zarr":
         return location
@@ -184,14 +160,7 @@ def open_run(
 def times_of(folder: Folder) -> np.ndarray:
     """Read the times of a run's samples.
 
-    Args:
-        folder: The store.
-
-    Returns:
-        Times [s], shape (k,).
-
-    Raises:
-        SceneError: If they are lost.
+    Returns: Times [s], shape (k,).
     """
     try:
         time = np.asarray(folder.group()["time"][:])
@@ -204,18 +173,7 @@ def times_of(folder: Folder) -> np.ndarray:
 
 
 def gathered(folder: Folder, observed: Observation) -> Observing:
-    """Read the statistics of a complete run from the parts of its blocks.
-
-    Args:
-        folder: The store.
-        observed: What the run keeps.
-
-    Returns:
-        The keepers of its statistics, with all blocks merged.
-
-    Raises:
-        SceneError: If parts are missing or damaged.
-    """
+    """Read the statistics of a complete run from the parts of its blocks."""
     replicates = replicates_of(folder.provenance["ensemble"])
     observing = Observing(observed, times_of(folder), int(folder.recipe["members"]), replicates)
     block_files = folder.block_files
@@ -249,19 +207,8 @@ def result_of(
 ) -> Result:
     """Build the Result of a store.
 
-    Args:
-        folder: The store.
-        members: Indices or a slice of the members; None: all.
-        messages: Messages of the result.
-        terms: Terms of the scene; default those in its provenance.
-        observing: Keepers of its statistics, with all blocks merged; None: no statistics.
-
-    Returns:
-        A result that reads samples and parameters when they are used.
-
-    Raises:
-        SceneError: If the store is damaged, or too large for the memory.
-        IndexError: If there are no such members.
+    members: Indices or a slice of the members; None: all.
+    observing: Keepers of its statistics, with all blocks merged; None: no statistics.
     """
     folder.refuse_too_large()
     group, time = folder.group(), times_of(folder)
@@ -301,15 +248,7 @@ def result_of(
 def kept_of(folder: Folder, terms: Sequence[Term]) -> tuple[np.ndarray, Result | None]:
     """Read the members that a complete run keeps.
 
-    Args:
-        folder: The store.
-        terms: Terms of the scene.
-
-    Returns:
-        Indices of the members, shape (m,), and their result; None if there are none.
-
-    Raises:
-        SceneError: If they are missing or damaged.
+    Returns: Indices of the members, shape (m,), and their result; None if there are none.
     """
     wanted = members_kept(keep_of(folder.provenance), folder) if folder.complete else np.empty(0, np.int64)
     if not len(wanted):
@@ -343,28 +282,13 @@ def _places(members: Any, n: int) -> slice | np.ndarray:
 
 
 def chosen(result: Result, members: Sequence[int]) -> Result:
-    """Read some members of a run in a store into memory.
-
-    Args:
-        result: Result of the run.
-        members: Indices of the members.
-
-    Returns:
-        A result in memory.
-    """
+    """Read some members of a run in a store into memory."""
     selection = result_of(Folder(Path(result.store or "")), members, result.messages, result.terms)
     return replace(selection, samples=dict(selection.samples), parameters=dict(selection.parameters), store=None)
 
 
 def dataset(path: Path) -> xarray.Dataset:
-    """Open a store as an xarray Dataset, in pieces of its chunks if dask is installed.
-
-    Args:
-        path: The store.
-
-    Returns:
-        The dataset of the members that the run has; for a group of kept members, of these alone.
-    """
+    """Open a store as an xarray Dataset, in pieces of its chunks if dask is installed."""
     import importlib.util
 
     import xarray

@@ -27,14 +27,7 @@ if TYPE_CHECKING:
 
 
 def recipe(plan: Plan) -> dict[str, Any]:
-    """Write a plan's settings without its ensemble and its times.
-
-    Args:
-        plan: Plan of the run.
-
-    Returns:
-        A table that JSON holds with all digits.
-    """
+    """Write a plan's settings without its ensemble and its times."""
     return {
         "members": plan.ensemble.members,
         "method": dataclasses.asdict(plan.method),
@@ -53,18 +46,8 @@ def plan_of(
 ) -> Plan:
     """Build the plan of a recipe.
 
-    Args:
-        made: The recipe.
-        ensemble: The members.
-        sample_steps: Number of steps made until each sample, shape (k,).
-        times: Times of the samples [s], shape (k,).
-        looks: As of `Plan`; default False.
-
-    Returns:
-        The plan.
-
-    Raises:
-        SceneError: If the recipe is at fault.
+    sample_steps: Number of steps made until each sample, shape (k,).
+    times: Times of the samples [s], shape (k,).
     """
     from lgvi_warp.engine.plan import Plan
 
@@ -82,13 +65,6 @@ def of_store(provenance: Mapping[str, Any], ensemble: Ensemble) -> dict[str, Any
     """Shorten provenance for a store: instead of arrays it holds their checksum, of a table its column names.
 
     A table read from a file keeps the file's name and checksum, which it has already.
-
-    Args:
-        provenance: Provenance of the run.
-        ensemble: Its members.
-
-    Returns:
-        The provenance that the store holds.
     """
     explicit, sampling = ensemble.explicit(), ensemble.sampling
     arrays, content = sampling.arrays(), dict(provenance["ensemble"])
@@ -116,21 +92,7 @@ def ensemble_of(
     noise: np.ndarray | None,
     store: Path,
 ) -> Ensemble:
-    """Build the ensemble that provenance describes.
-
-    Args:
-        scene: Table of the scene.
-        settings: Table of the ensemble.
-        explicit: Arrays that the ensemble was given, by name.
-        noise: Indices of the members for noise, if they were set.
-        store: Folder of the store, beside which a table's file is looked for.
-
-    Returns:
-        The ensemble.
-
-    Raises:
-        SceneError: If the tables are at fault, or a file of a table is missing or changed.
-    """
+    """Build the ensemble that provenance describes."""
     _check_table(_table_in(settings))
     settings = {key: value for key, value in settings.items() if key != ARRAYS}
     table = _table(settings, explicit, store)
@@ -185,17 +147,7 @@ def _table(settings: Mapping[str, Any], explicit: Mapping[str, np.ndarray], stor
 def same_run(
     stored: Mapping[str, Any], now: Mapping[str, Any], name: str = "the store", other: str | None = None
 ) -> list[str]:
-    """List the differences between two provenances that the bits of a run depend on.
-
-    Args:
-        stored: One provenance.
-        now: The other.
-        name: What the first is called in the texts.
-        other: What the second is called; default "here", this run.
-
-    Returns:
-        A text for each difference: the key and both values.
-    """
+    """List the differences between two provenances that the bits of a run depend on."""
     found = [*differences(_comparable(stored), _comparable(now)), *_functions(stored, now)[0]]
     return [
         f"{key} is {first!r} in {name} and {second!r} {f'in {other}' if other else 'here'}"
@@ -247,13 +199,7 @@ def _without_place(ensemble: Mapping[str, Any]) -> dict[str, Any]:
 def differences(there: Any, here: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
     """Find the leaves that differ between two nested tables.
 
-    Args:
-        there: One table, or value.
-        here: The other.
-        key: Dotted key of both; "" at the top.
-
-    Yields:
-        Tuples (dotted key, one value, other value).
+    Yields: Tuples (dotted key, one value, other value).
     """
     if isinstance(there, Mapping) and isinstance(here, Mapping):
         for name in [*there, *(name for name in here if name not in there)]:
@@ -266,18 +212,6 @@ def refuse_another(path: Any, stored: Mapping[str, Any], now: Mapping[str, Any],
     """Check that two provenances are of the same run.
 
     Only machine, versions and the user's functions can be forced: another scene or method makes another run.
-
-    Args:
-        path: The store, which the message names.
-        stored: Provenance in the store.
-        now: Provenance of this run.
-        force: Whether to accept another machine or other versions.
-
-    Returns:
-        Messages on differences that were accepted, and on functions that cannot be compared.
-
-    Raises:
-        SceneError: If they are of different runs.
     """
     mismatches = same_run(stored, parsed(json.dumps(now)))
     forcible = [text for text in mismatches if text.startswith(("machine.", "versions.", "kernel", "functions."))]
@@ -294,15 +228,7 @@ def refuse_another(path: Any, stored: Mapping[str, Any], now: Mapping[str, Any],
 
 
 def noted_functions(stored: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[str, ...]:
-    """Say which functions of a finished run's statistics are others than those that it was given.
-
-    Args:
-        stored: Provenance in the store.
-        now: "functions" of the statistics that are given now.
-
-    Returns:
-        The messages.
-    """
+    """Say which functions of a finished run's statistics are others than those that it was given."""
     here = now["functions"]
     there = {name: text for name, text in stored.get("functions", {}).items() if name in here}
     differ, untold = _functions({"functions": there}, now)

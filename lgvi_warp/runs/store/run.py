@@ -59,19 +59,7 @@ class StoredRun:
     after: Callable[[Block], None] | None = None
 
     def run(self, executor: Executor, progress: Callable[[float], None] | None = None) -> Folder:
-        """Run the blocks that are missing or damaged.
-
-        Args:
-            executor: What runs the blocks.
-            progress: Called with the fraction of the work that is done, in [0, 1].
-
-        Returns:
-            The store, with the numbers of blocks found and run.
-
-        Raises:
-            SceneError: If the folder holds something else, or settings are refused.
-            OSError: If the disk cannot be written.
-        """
+        """Run the blocks that are missing or damaged."""
         check_keepers(self.keepers)
         path = self.store.folder
         with self._alone():
@@ -187,14 +175,7 @@ class StoredRun:
 
 
 def check_keepers(keepers: Sequence[Keeper]) -> None:
-    """Check that each keeper can leave its parts in a store, under its own name.
-
-    Args:
-        keepers: The keepers.
-
-    Raises:
-        SceneError: If one cannot; the message names every fault.
-    """
+    """Check that each keeper can leave its parts in a store, under its own name."""
     faults = Faults("keepers.")
     for keeper in keepers:
         if not isinstance(keeper, PartKeeper):
@@ -207,17 +188,7 @@ def check_keepers(keepers: Sequence[Keeper]) -> None:
 
 @contextlib.contextmanager
 def explained(path: os.PathLike[str]) -> Iterator[None]:
-    """Add to errors of the disk what they mean for the run.
-
-    Args:
-        path: The store.
-
-    Yields:
-        Nothing; files are written in this context.
-
-    Raises:
-        OSError: If the disk cannot be written.
-    """
+    """Add to errors of the disk what they mean for the run."""
     try:
         yield
     except OSError as error:

@@ -32,25 +32,7 @@ def run_stored(
     fields: Sequence[str] | None = None,
     on_block: Callable[[Result], None] | None = None,
 ) -> Result:
-    """Run the blocks of a plan into a store.
-
-    Args:
-        plan: The plan.
-        store: Folder and settings of the store.
-        executor: What runs the blocks.
-        progress: Called with the fraction of the work that is done, in [0, 1].
-        only: Indices of the blocks to run; default all.
-        observed: What is kept; default the samples of all members. If these are not kept, the store has no samples.
-        fields: Names of the fields whose samples are kept; default all of the plan.
-        on_block: Called with the result of each block of members as soon as it is in the store, in order; default nothing.
-
-    Returns:
-        A result that reads from the store, of the members of the blocks that were asked for.
-
-    Raises:
-        SceneError: If the folder holds another run, or the disk has too little room.
-        OSError: If the disk cannot be written.
-    """
+    """Run the blocks of a plan into a store."""
     observed = observed or Observation()
     compile_seconds = plan.compile()
     start = time.perf_counter()
@@ -86,14 +68,7 @@ def run_stored(
 
 
 def went_on(folder: Folder) -> tuple[str, ...]:
-    """Tell how many blocks of a run were in the store already.
-
-    Args:
-        folder: Store of the run that has ended.
-
-    Returns:
-        A message; none if no block was there.
-    """
+    """Tell how many blocks of a run were in the store already."""
     present, ran, ran_kept = folder.found, folder.ran, folder.ran_kept
     if not present:
         return ()
@@ -106,14 +81,7 @@ def went_on(folder: Folder) -> tuple[str, ...]:
 def settled(store: Store, plan: Plan, observed: Observation, fields: Sequence[str] | None) -> Store:
     """Settle which samples a store holds: none if those of all members are not kept.
 
-    Args:
-        store: The store asked for.
-        plan: Plan of the run.
-        observed: What the run keeps.
-        fields: Names of the fields whose samples are kept; None: all of the plan.
-
-    Returns:
-        The store with its fields.
+    fields: Names of the fields whose samples are kept; None: all of the plan.
     """
     wanted = set(plan.fields if fields is None else fields) if observed.samples else set()
     stored = wanted if store.fields is None else wanted & set(store.fields)

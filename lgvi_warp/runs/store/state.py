@@ -16,15 +16,7 @@ from lgvi_warp.runs.store.settings import Store
 
 
 def store_of(folder: Folder, force: bool = False) -> Store:
-    """Restore the settings that a store was made with, to continue its run.
-
-    Args:
-        folder: The store.
-        force: Whether to continue on another machine or with other versions; default False.
-
-    Returns:
-        The settings, with existing="resume".
-    """
+    """Restore the settings that a store was made with, to continue its run."""
     layout = folder.recipe["store"]
     fields = None if layout["fields"] is None else tuple(layout["fields"])
     return Store(folder.path, layout["dtype"], fields, "resume", force, layout["chunk_bytes"])
@@ -33,15 +25,8 @@ def store_of(folder: Folder, force: bool = False) -> Store:
 def state(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Report what a store holds; every file is read.
 
-    Args:
-        path: A store, or a folder with one store.
-
-    Returns:
-        A table: path, members, samples (times), fields, keepers, blocks (in all), finished (blocks), kept (members),
+    Returns: A table: path, members, samples (times), fields, keepers, blocks (in all), finished (blocks), kept (members),
         complete, bytes, damage (texts) and provenance.
-
-    Raises:
-        SceneError: If there is no run.
     """
     folder = Folder(folder_of(path))
     runs, recipe = folder.runs, folder.recipe
@@ -70,15 +55,7 @@ def state(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def kept_state(folder: Folder, sound: bool) -> tuple[int, list[str]]:
-    """Report on the members that a run keeps.
-
-    Args:
-        folder: The store of the run.
-        sound: Whether the files of the run itself are undamaged.
-
-    Returns:
-        The number of members that are kept, and a text for each damaged file of theirs.
-    """
+    """Report on the members that a run keeps."""
     wanted = len(members_kept(keep_of(folder.provenance), folder)) if folder.complete and sound else 0
     try:
         group = folder.kept()

@@ -72,18 +72,7 @@ def _store(value: Mapping[str, Any]) -> bool:
 
 
 def check(attributes: Mapping[str, Any], provenance: Any, recipe: Any, messages: Any, shared: Any) -> None:
-    """Check the attributes and texts of a store.
-
-    Args:
-        attributes: Attributes of its group.
-        provenance: Provenance, parsed.
-        recipe: Recipe, parsed.
-        messages: Messages, parsed.
-        shared: Shared parameters, parsed.
-
-    Raises:
-        NotOursError: If a run never writes this; the message names the first fault.
-    """
+    """Check the attributes and texts of a store."""
     unknown = sorted(attributes.keys() - ATTRIBUTES)
     if unknown:
         raise NotOursError(f"attribute {unknown[0][:60]!r} is not known")

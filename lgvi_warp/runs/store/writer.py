@@ -28,16 +28,7 @@ class Room(list[dict[str, np.ndarray]]):
 
 
 class BlockWriter:
-    """Writer of one block into a store.
-
-    Args:
-        root: Folder of the store.
-        columns: The arrays that are written block by block.
-        room: Pool of chunks.
-        plan: Plan of the run.
-        block: The block.
-        members: Its members.
-    """
+    """Writer of one block into a store."""
 
     def __init__(
         self, root: Path, columns: tuple[StoreArray, ...], room: Room, plan: Plan, block: Block, members: Members
@@ -59,9 +50,7 @@ class BlockWriter:
     def take(self, when: slice, samples: dict[str, np.ndarray]) -> None:
         """Put samples into their chunks, and write the chunks that are full.
 
-        Args:
-            when: Which sample times.
-            samples: Arrays (times, members of the block, ...), by name.
+        samples: Arrays (times, members of the block, ...), by name.
         """
         for column in self._timed:
             self._take(column, when, samples[column.name])
@@ -83,14 +72,7 @@ class BlockWriter:
         self._files.write(column.key(self._block, number), chunk, checked=True)
 
     def close(self, outcome: Outcome) -> Files:
-        """Write the fields and parameters of the members.
-
-        Args:
-            outcome: How the members ended.
-
-        Returns:
-            The block's files, which are not durable yet.
-        """
+        """Write the fields and parameters of the members."""
         values = {MEMBER: self._members.indices} | self._members.parameters
         values |= member_fields.of(self._plan, outcome)
         for column in self._of_members:

@@ -21,16 +21,7 @@ ROOT = "zarr.json"
 
 
 def checked_store(root: Path, layout: Layout, metadata: bytes) -> Any:
-    """Open a folder for zarr, for reading only.
-
-    Args:
-        root: Folder of the store.
-        layout: Its arrays.
-        metadata: Metadata of its root, as `Layout.root` gives it.
-
-    Returns:
-        The zarr store.
-    """
+    """Open a folder for zarr, for reading only."""
     return _class()(root, layout, metadata)
 
 
@@ -41,13 +32,7 @@ def _class() -> Any:
     from zarr.core.buffer.core import default_buffer_prototype
 
     class CheckedStore(Store):
-        """A store's folder, for reading only.
-
-        Args:
-            root: Folder of the store.
-            layout: Its arrays.
-            metadata: Metadata of its root, as `Layout.root` gives it.
-        """
+        """A store's folder, for reading only."""
 
         supports_writes = supports_deletes = supports_partial_writes = False
         supports_listing = True
@@ -70,14 +55,7 @@ def _class() -> Any:
             return f"file://{self.root.absolute().as_posix()}"
 
         def with_read_only(self, read_only: bool = False) -> CheckedStore:
-            """Return the store itself, which is read-only.
-
-            Args:
-                read_only: Must be True.
-
-            Raises:
-                ValueError: If it is not.
-            """
+            """Return the store itself, which is read-only."""
             if not read_only:
                 raise ValueError("a run's store is only read by zarr")
             return self
@@ -85,14 +63,7 @@ def _class() -> Any:
         def content(self, key: str) -> bytes | None:
             """Read the content of a file.
 
-            Args:
-                key: Path of the file below the root.
-
-            Returns:
-                Its bytes; None if it is missing, or no file of the layout.
-
-            Raises:
-                SceneError: If it has not the size that it must have.
+            Returns: Its bytes; None if it is missing, or no file of the layout.
             """
             if key == ROOT:
                 return self.metadata
@@ -112,13 +83,8 @@ def _class() -> Any:
         ) -> Buffer | None:
             """Read a file, or a range of its bytes.
 
-            Args:
-                key: Path of the file below the root.
-                prototype: zarr's kind of buffer.
-                byte_range: First and last byte; None: the whole file.
-
-            Returns:
-                The bytes; None if the file is missing.
+            byte_range: First and last byte; None: the whole file.
+            Returns: The bytes; None if the file is missing.
             """
             data = await asyncio.to_thread(self.content, key)
             if data is None:
@@ -134,24 +100,12 @@ def _class() -> Any:
         ) -> list[Buffer | None]:
             """Read several files, or ranges of their bytes.
 
-            Args:
-                prototype: zarr's kind of buffer.
-                key_ranges: Path and range of each.
-
-            Returns:
-                The bytes of each; None for a missing file.
+            Returns: The bytes of each; None for a missing file.
             """
             return [await self.get(key, prototype, part) for key, part in key_ranges]
 
         async def exists(self, key: str) -> bool:
-            """Tell whether a file is there.
-
-            Args:
-                key: Path of the file below the root.
-
-            Raises:
-                SceneError: If it has not the size that it must have.
-            """
+            """Tell whether a file is there."""
             return await asyncio.to_thread(self.content, key) is not None
 
         async def set(self, key: str, value: Buffer) -> None:
@@ -167,26 +121,12 @@ def _class() -> Any:
             yield ROOT
 
         async def list_prefix(self, prefix: str) -> AsyncIterator[str]:
-            """List the root's metadata, if its name begins with a prefix.
-
-            Args:
-                prefix: The prefix.
-
-            Yields:
-                The name of the metadata.
-            """
+            """List the root's metadata, if its name begins with a prefix."""
             if ROOT.startswith(prefix):
                 yield ROOT
 
         async def list_dir(self, prefix: str) -> AsyncIterator[str]:
-            """List the arrays and groups in a folder.
-
-            Args:
-                prefix: Path of the folder below the root.
-
-            Yields:
-                Their names, sorted.
-            """
+            """List the arrays and groups in a folder."""
             head = f"{prefix.rstrip('/')}/" if prefix else ""
             inside = (name for name in (*self.layout.arrays, *self.layout.groups) if name.startswith(head))
             for name in sorted({name.removeprefix(head).partition("/")[0] for name in inside}):

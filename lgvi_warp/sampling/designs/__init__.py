@@ -26,14 +26,7 @@ globals().update({kind.__name__: kind for kind in KINDS.values()})
 def sampling_of(content: Any) -> Sampling:
     """Build a sampling from what a scene file or a user gives.
 
-    Args:
-        content: A `Sampling`, its name, or { name = { ... } } as in a scene file.
-
-    Returns:
-        The sampling.
-
-    Raises:
-        SceneError: Where the name or a setting is unknown or wrong. The message lists every fault.
+    content: A `Sampling`, its name, or { name = { ... } } as in a scene file.
     """
     if isinstance(content, Sampling):
         return content

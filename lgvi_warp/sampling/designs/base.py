@@ -145,11 +145,8 @@ class Sampling:
 def inside(cube: np.ndarray) -> np.ndarray:
     """Levels clipped to the open interval (0, 1), where quantiles are finite.
 
-    Args:
-        cube: Levels in [0, 1], of any shape.
-
-    Returns:
-        A read-only array of the same shape.
+    cube: Levels in [0, 1], of any shape.
+    Returns: A read-only array of the same shape.
     """
     cube = np.clip(cube, 2.0**-54, 1.0 - 2.0**-53)
     cube.setflags(write=False)
@@ -157,12 +154,7 @@ def inside(cube: np.ndarray) -> np.ndarray:
 
 
 def check_replicates(faults: Faults, replicates: Any) -> None:
-    """Add a fault where a number of replicates is no power of two from 1 to 64.
-
-    Args:
-        faults: Collects the faults.
-        replicates: The number.
-    """
+    """Add a fault where a number of replicates is no power of two from 1 to 64."""
     if not is_whole(replicates, 1, MOST_REPLICATES) or replicates & (replicates - 1):
         remark = f"is no power of two from 1 to {MOST_REPLICATES}"
         faults.add("replicates", replicates, remark, "give 8, 16, 32 or 64")

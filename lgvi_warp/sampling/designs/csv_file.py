@@ -34,17 +34,7 @@ def columns_of(faults: Faults, path: str, content: bytes, choose: Choose) -> dic
     The names are in the first line that is neither empty nor a comment (#); every other line holds one number for each.
     Commas, semicolons or tabs separate cells, as in the first line.
 
-    Args:
-        faults: Collects the faults.
-        path: Path of the file, for messages.
-        content: Bytes of the file.
-        choose: Takes the faults and the names of the first line; returns those to read, and adds faults.
-
-    Returns:
-        Columns (lines,) by name; {} where there is a fault.
-
-    Raises:
-        UnicodeDecodeError: Where the file is not UTF-8.
+    Returns: Columns (lines,) by name; {} where there is a fault.
     """
     rows: Any = csv.reader(())
     try:

@@ -219,14 +219,7 @@ def _morris(space: Space, levels: int, paths: int) -> np.ndarray:
 
 
 def salib_problem(space: Space) -> dict[str, Any]:
-    """The unit cube as a problem of SALib.
-
-    Args:
-        space: The cube: which names vary, with how many columns each.
-
-    Returns:
-        "num_vars", "names" and "bounds" of the columns, and "groups" where a factor has several columns.
-    """
+    """The unit cube as a problem of SALib."""
     names: list[str] = []
     for label, columns in space.factors:
         names += [label] if len(columns) == 1 else [f"{label} {i}" for i in range(len(columns))]

@@ -40,15 +40,8 @@ def sobol_points(seed: int, name: str, dimensions: int, indices: np.ndarray, scr
 
     A point is the exclusive or of point 0 and of one number for each bit of its index, so that any point is found directly.
 
-    Args:
-        seed: Seed of the scramble.
-        name: Name of the stream of random numbers.
-        dimensions: Columns of the points.
-        indices: Indices of the points, (n,).
-        scramble: Whether the sequence is scrambled; True by default.
-
-    Returns:
-        Points (n, dimensions) in (0, 1).
+    indices: Indices of the points, (n,).
+    Returns: Points (n, dimensions) in (0, 1).
     """
     if not dimensions:
         return np.empty((len(indices), 0))

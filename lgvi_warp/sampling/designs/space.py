@@ -11,14 +11,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Space:
-    """The unit cube that a sampling fills.
-
-    Args:
-        seed: Seed of the ensemble.
-        keys: Names that vary, in their order.
-        sizes: The number of columns of each.
-        factors: Label and columns of each factor: an entry that varies by itself, or all that one joint distribution draws.
-    """
+    """The unit cube that a sampling fills."""
 
     seed: int
     keys: tuple[str, ...]
@@ -33,24 +26,14 @@ class Space:
     def split(self, cube: np.ndarray) -> dict[str, np.ndarray]:
         """Split points into the columns of each key.
 
-        Args:
-            cube: Points (n, dimensions).
-
-        Returns:
-            Levels (n, size) by key.
+        cube: Points (n, dimensions).
+        Returns: Levels (n, size) by key.
         """
         parts = np.split(cube, np.cumsum(self.sizes)[:-1], axis=1) if self.keys else []
         return dict(zip(self.keys, parts, strict=True))
 
     def of(self, keys: Iterable[str]) -> Space:
-        """The part of the cube that some keys span.
-
-        Args:
-            keys: The keys to keep.
-
-        Returns:
-            A cube with the same seed and only these keys and their factors.
-        """
+        """The part of the cube that some keys span."""
         wanted = set(keys)
         starts = np.cumsum([0, *self.sizes])
         kept = [i for i, key in enumerate(self.keys) if key in wanted]

@@ -182,13 +182,8 @@ class Table(Sampling):
 def moved(file: str, sha256: str | None, beside: Path) -> str:
     """Where a table is now, if it was moved together with a store.
 
-    Args:
-        file: Absolute path where it was.
-        sha256: Checksum of the file; None where it is unknown.
-        beside: Path of the store.
-
-    Returns:
-        The last parts of the path below a folder above the store, where a file with that checksum is there; else `file`.
+    sha256: Checksum of the file; None where it is unknown.
+    Returns: The last parts of the path below a folder above the store, where a file with that checksum is there; else `file`.
     """
     parts = Path(file).parts[1:]
     if sha256 is None or Path(file).exists():

@@ -123,12 +123,7 @@ class Distribution:
 def ordered(low: np.ndarray, high: np.ndarray) -> bool:
     """Whether low < high in every component.
 
-    Args:
-        low: Lower bounds.
-        high: Upper bounds.
-
-    Returns:
-        False also where the shapes do not fit each other.
+    Returns: False also where the shapes do not fit each other.
     """
     try:
         return bool(np.all(low < high))
@@ -139,12 +134,7 @@ def ordered(low: np.ndarray, high: np.ndarray) -> bool:
 def varies_nothing(distribution: Distribution, bases: Sequence[np.ndarray]) -> str | None:
     """Find a distribution that is relative to the scene's value where that is 0, so that nothing would vary.
 
-    Args:
-        distribution: The distribution.
-        bases: The scene's value of each quantity that it draws.
-
-    Returns:
-        The name of its width, "relative" or "sigma"; None where it does vary the quantity.
+    Returns: The name of its width, "relative" or "sigma"; None where it does vary the quantity.
     """
     if any(np.any(base) for base in bases):
         return None
@@ -158,11 +148,7 @@ def varies_nothing(distribution: Distribution, bases: Sequence[np.ndarray]) -> s
 def floats(values: Any) -> np.ndarray:
     """Read numbers that were checked as float64: whole ones of any size among them.
 
-    Args:
-        values: a number, lists of numbers, or an array.
-
-    Returns:
-        An array of their shape.
+    Returns: An array of their shape.
     """
     return np.asarray(values, dtype=np.float64)
 

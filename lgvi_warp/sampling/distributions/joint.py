@@ -22,11 +22,8 @@ SIX_DIGITS = 1e-5
 def normals(u: np.ndarray) -> np.ndarray:
     """Standard normal numbers at given levels.
 
-    Args:
-        u: Levels in (0, 1), of any shape.
-
-    Returns:
-        Numbers of the same shape.
+    u: Levels in (0, 1), of any shape.
+    Returns: Numbers of the same shape.
     """
     from scipy.special import ndtri
 
@@ -38,12 +35,9 @@ def combined(matrix: np.ndarray, z: np.ndarray) -> np.ndarray:
 
     The sum is written out: its order, and so its bits, must not depend on the number of rows.
 
-    Args:
-        matrix: Matrix (d, d).
-        z: Rows (n, d).
-
-    Returns:
-        Products (n, d).
+    matrix: Matrix (d, d).
+    z: Rows (n, d).
+    Returns: Products (n, d).
     """
     total = z[:, :1] * matrix[:, 0]
     for k in range(1, z.shape[1]):
@@ -56,11 +50,8 @@ def correlation(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
     Units and sizes of the entries play no part in the correlation: metres beside newtons are judged alike.
 
-    Args:
-        covariance: Covariance (d, d).
-
-    Returns:
-        Standard deviations (d,) and correlation (d, d), with 1 on the diagonal where the variance is 0.
+    covariance: Covariance (d, d).
+    Returns: Standard deviations (d,) and correlation (d, d), with 1 on the diagonal where the variance is 0.
     """
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     scale = np.where(std > 0.0, std, 1.0)
@@ -70,11 +61,8 @@ def correlation(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def root_of_covariance(covariance: np.ndarray) -> np.ndarray:
     """L with L L^T = covariance, found from the correlation.
 
-    Args:
-        covariance: Covariance (d, d), positive semidefinite.
-
-    Returns:
-        L (d, d).
+    covariance: Covariance (d, d), positive semidefinite.
+    Returns: L (d, d).
     """
     std, C = correlation(covariance)
     return np.asarray(std[:, None] * root(C))
@@ -83,11 +71,8 @@ def root_of_covariance(covariance: np.ndarray) -> np.ndarray:
 def root(matrix: np.ndarray) -> np.ndarray:
     """L with L L^T = matrix: Cholesky's factor, or the symmetric root where the matrix is singular.
 
-    Args:
-        matrix: Matrix (d, d), positive semidefinite.
-
-    Returns:
-        L (d, d).
+    matrix: Matrix (d, d), positive semidefinite.
+    Returns: L (d, d).
     """
     try:
         return np.linalg.cholesky(matrix)
@@ -143,11 +128,7 @@ def _covariance(faults: Faults, distribution: Any, size: int | None) -> np.ndarr
 def components(shapes: Sequence[tuple[int, ...]]) -> int:
     """The number of entries in quantities of these shapes.
 
-    Args:
-        shapes: The shape of each quantity.
-
-    Returns:
-        The sum of their sizes.
+    shapes: The shape of each quantity.
     """
     return sum(int(np.prod(shape)) for shape in shapes)
 
@@ -438,11 +419,8 @@ def _trace(matrices: np.ndarray) -> np.ndarray:
 def second_moments(J: np.ndarray) -> np.ndarray:
     """Second moments of mass, S = tr(J) / 2 - J: the integral of r r^T over the mass.
 
-    Args:
-        J: Inertia (..., 3, 3) [kg m2].
-
-    Returns:
-        S (..., 3, 3) [kg m2].
+    J: Inertia (..., 3, 3) [kg m2].
+    Returns: S (..., 3, 3) [kg m2].
     """
     return np.asarray(0.5 * _trace(J) * np.eye(3) - J)
 

@@ -221,11 +221,7 @@ class UserDistribution(Distribution):
 def quantiles_of(distribution: Any) -> Any:
     """The quantile function of an object.
 
-    Args:
-        distribution: Any object.
-
-    Returns:
-        Its method ppf or icdf; None where it has neither.
+    Returns: Its method ppf or icdf; None where it has neither.
     """
     function = getattr(distribution, "ppf", None) or getattr(distribution, "icdf", None)
     return function if callable(function) else None
@@ -235,25 +231,14 @@ KINDS = Distribution.kinds
 
 
 def is_frozen(value: Any) -> bool:
-    """Whether an object is a frozen distribution of scipy.stats, found without importing that.
-
-    Args:
-        value: Any object.
-
-    Returns:
-        True where it has the attributes of one.
-    """
+    """Whether an object is a frozen distribution of scipy.stats, found without importing that."""
     return all(hasattr(value, name) for name in ("dist", "args", "kwds", "ppf"))
 
 
 def name_of_unfrozen(value: Any) -> str | None:
     """The name of a distribution of scipy.stats that was given without numbers, such as scipy.stats.norm.
 
-    Args:
-        value: Any object.
-
-    Returns:
-        The name; None for anything else.
+    Returns: The name; None for anything else.
     """
     known = sys.modules.get("scipy.stats")
     name = getattr(value, "name", None)
@@ -261,14 +246,7 @@ def name_of_unfrozen(value: Any) -> str | None:
 
 
 def without_numbers(value: Any) -> tuple[str, str]:
-    """The fault of a distribution of scipy.stats that was given without numbers.
-
-    Args:
-        value: The distribution, as scipy.stats.norm.
-
-    Returns:
-        The fault and its remedy.
-    """
+    """The fault of a distribution of scipy.stats that was given without numbers."""
     numbers = ", ".join(f"{name}=..." for name in _numbers_of(value))
     remedy = f"give them: scipy.stats.{value.name}({numbers})"
     return "is no frozen distribution of scipy.stats: it has no numbers", remedy
@@ -285,18 +263,7 @@ def _numbers_of(distribution: Any) -> list[str]:
 
 
 def as_distribution(key: str, value: Any) -> Any:
-    """Turn what stands in `vary` into a distribution, where it is one.
-
-    Args:
-        key: Name of what varies, with which faults begin.
-        value: A table, a distribution of scipy.stats, an object with quantiles, or anything else.
-
-    Returns:
-        The distribution; anything else unchanged.
-
-    Raises:
-        SceneError: Where a table or an object is no distribution.
-    """
+    """Turn what stands in `vary` into a distribution, where it is one."""
     if isinstance(value, Distribution | type):
         return value
     if isinstance(value, Mapping):
@@ -317,18 +284,7 @@ def as_distribution(key: str, value: Any) -> Any:
 
 
 def from_dict(key: str, content: Any) -> Distribution:
-    """Build a distribution from a table of a scene file, { normal = { std = 1.0 } }.
-
-    Args:
-        key: Name of what varies, with which faults begin.
-        content: The table.
-
-    Returns:
-        The distribution.
-
-    Raises:
-        SceneError: Where the name or a number is wrong. The message lists every fault.
-    """
+    """Build a distribution from a table of a scene file, { normal = { std = 1.0 } }."""
     if not isinstance(content, Mapping) or len(content) != 1:
         raise refusal(key, content, "is not a distribution", "write { normal = { std = 1.0 } }")
     faults = Faults()

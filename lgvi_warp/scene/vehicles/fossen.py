@@ -50,14 +50,7 @@ def vehicles() -> list[str]:
 def vehicle_file(name: str) -> Path:
     """Return the path of a vehicle's file.
 
-    Args:
-        name: One of the names that `vehicles()` lists.
-
-    Returns:
-        Path of a TOML file in the scene file's form, with a table [source].
-
-    Raises:
-        SceneError: If no vehicle has that name.
+    Returns: Path of a TOML file in the scene file's form, with a table [source].
     """
     if name not in (known := vehicles()):
         raise SceneError([f"vehicle file {name!r}: is not known; {closest(name, known)}"])
@@ -65,17 +58,7 @@ def vehicle_file(name: str) -> Path:
 
 
 def vehicle_tables(name: str) -> dict[str, Any]:
-    """Read a vehicle's file.
-
-    Args:
-        name: One of the names that `vehicles()` lists.
-
-    Returns:
-        Its tables by name.
-
-    Raises:
-        SceneError: If no vehicle has that name.
-    """
+    """Read a vehicle's file."""
     return parsed(file_text(vehicle_file(name), "scene file"), name)
 
 
@@ -88,21 +71,19 @@ class Coefficients:
 
     Drag is force_i = -(l_ij + q_ij |v_j|) v_j - u f_ij v_j, with u the speed ahead.
 
-    Args:
-        mass: Mass [kg].
-        inertia: Inertia (3, 3) [kg m2] about the centre of gravity.
-        center_of_gravity: Position (3,) [m] from the body origin.
-        center_of_buoyancy: Position (3,) [m] from the body origin.
-        weight: Weight [N].
-        buoyancy: Buoyancy [N].
-        added_mass: Added mass (6, 6) [kg, kg m, kg m2], positive; by default zero.
-        linear: Linear drag l (6, 6) [N s/m, N s, N m s]; by default zero.
-        quadratic: Quadratic drag q (6, 6) [N s2/m2, N s2/m, N s2, N m s2]; by default zero.
-        forward: Drag in proportion to the speed ahead, f (6, 6), in the units of `quadratic`; by default zero.
-        current: Velocity (3,) [m/s] of the water, north, east, down; by default zero.
-        gravity: Acceleration of free fall [m/s2] that the forces were found with; None if unknown (default).
-        water_density: Density of the water [kg/m3]; None if unknown (default).
-        warnings: Texts about what the user should know.
+    mass: Mass [kg].
+    inertia: Inertia (3, 3) [kg m2] about the centre of gravity.
+    center_of_gravity: Position (3,) [m] from the body origin.
+    center_of_buoyancy: Position (3,) [m] from the body origin.
+    weight: Weight [N].
+    buoyancy: Buoyancy [N].
+    added_mass: Added mass (6, 6) [kg, kg m, kg m2], positive; by default zero.
+    linear: Linear drag l (6, 6) [N s/m, N s, N m s]; by default zero.
+    quadratic: Quadratic drag q (6, 6) [N s2/m2, N s2/m, N s2, N m s2]; by default zero.
+    forward: Drag in proportion to the speed ahead, f (6, 6), in the units of `quadratic`; by default zero.
+    current: Velocity (3,) [m/s] of the water, north, east, down; by default zero.
+    gravity: Acceleration of free fall [m/s2] that the forces were found with; None if unknown (default).
+    water_density: Density of the water [kg/m3]; None if unknown (default).
     """
 
     mass: float | None
@@ -121,17 +102,7 @@ class Coefficients:
     warnings: list[str] = field(default_factory=list)
 
     def to_dict(self, faults: Faults) -> dict[str, Any]:
-        """Return the tables of a scene file, after the checks that need all numbers.
-
-        Args:
-            faults: Faults noted so far, which are raised with those of the sums.
-
-        Returns:
-            The tables "vehicle" and "environment", and the list "terms".
-
-        Raises:
-            SceneError: If there are faults; the message lists every one.
-        """
+        """Return the tables of a scene file, after the checks that need all numbers."""
         faults.raise_if_any()
         assert self.mass is not None and self.inertia is not None and self.center_of_gravity is not None
         rigid = rigid_body_matrix(self.mass, self.inertia, self.center_of_gravity)
@@ -156,11 +127,7 @@ class Coefficients:
         return tables
 
     def unstable(self) -> list[str]:
-        """Return a warning if the centre of gravity is above the centre of buoyancy: such a vehicle turns upside down.
-
-        Returns:
-            The warning, or an empty list.
-        """
+        """Return a warning if the centre of gravity is above the centre of buoyancy: such a vehicle turns upside down."""
         assert self.center_of_gravity is not None and self.center_of_buoyancy is not None
         above = float(self.center_of_buoyancy[2] - self.center_of_gravity[2])
         if not self.buoyancy or above <= RELATIVE:
@@ -172,9 +139,6 @@ class Coefficients:
         """Return the terms of drag, lift and current, without those that are zero.
 
         Drag is a term "drag" where its matrices are diagonal, else a term "drag_matrix".
-
-        Returns:
-            Tables as in a scene file.
         """
         terms: list[dict[str, Any]] = []
         pair = (self.linear, self.quadratic)
@@ -193,11 +157,7 @@ class Coefficients:
 def plain(value: Any) -> Any:
     """Convert an array to lists of floats, with 0.0 in place of -0.0.
 
-    Args:
-        value: A number or an array.
-
-    Returns:
-        A float, or nested lists of the same shape.
+    Returns: A float, or nested lists of the same shape.
     """
     return (np.asarray(value) + 0.0).tolist()
 
@@ -205,29 +165,17 @@ def plain(value: Any) -> Any:
 def rigid_body_matrix(mass: float, inertia: np.ndarray, center: np.ndarray) -> np.ndarray:
     """Return the rigid body's mass matrix about the body origin.
 
-    Args:
-        mass: Mass [kg].
-        inertia: Inertia (3, 3) [kg m2] about the centre of gravity.
-        center: Centre of gravity (3,) [m] from the body origin.
-
-    Returns:
-        M_RB (6, 6) [kg, kg m, kg m2].
+    mass: Mass [kg].
+    inertia: Inertia (3, 3) [kg m2] about the centre of gravity.
+    center: Centre of gravity (3,) [m] from the body origin.
+    Returns: M_RB (6, 6) [kg, kg m, kg m2].
     """
     S = hat(center)
     return np.block([[mass * np.eye(3), -mass * S], [mass * S, inertia - mass * S @ S]])
 
 
 def symmetric(faults: Faults, key: str, matrix: np.ndarray) -> np.ndarray:
-    """Return the symmetric part of a matrix that is symmetric to the digits given.
-
-    Args:
-        faults: Collects what is wrong.
-        key: Name of the matrix in messages.
-        matrix: A square matrix; a difference across the diagonal beyond a part in 1e6 of the largest entry is a fault.
-
-    Returns:
-        The mean of the matrix and its transpose.
-    """
+    """Return the symmetric part of a matrix that is symmetric to the digits given."""
     if np.abs(matrix - matrix.T).max() > RELATIVE * np.abs(matrix).max():
         remedy = "added mass of a body in unbounded water is symmetric: mend the pair"
         faults.add(key, matrix, "is not symmetric", remedy)
@@ -246,18 +194,14 @@ def rigid_body(
 ) -> Coefficients:
     """Check mass, inertia, centres and forces of a body, and note what is wrong.
 
-    Args:
-        faults: Collects what is wrong.
-        mass: Mass [kg].
-        inertia: Inertia (3,) or (3, 3) [kg m2] about the centre of gravity.
-        center_of_gravity: Position (3,) [m] from the body origin.
-        center_of_buoyancy: Position (3,) [m] from the body origin.
-        weight: Weight [N]; None for mass times gravity.
-        buoyancy: Buoyancy [N]; None for the weight.
-        gravity: Acceleration of free fall [m/s2].
-
-    Returns:
-        The body without added mass and drag; None in place of what is wrong.
+    mass: Mass [kg].
+    inertia: Inertia (3,) or (3, 3) [kg m2] about the centre of gravity.
+    center_of_gravity: Position (3,) [m] from the body origin.
+    center_of_buoyancy: Position (3,) [m] from the body origin.
+    weight: Weight [N]; None for mass times gravity.
+    buoyancy: Buoyancy [N]; None for the weight.
+    gravity: Acceleration of free fall [m/s2].
+    Returns: The body without added mass and drag; None in place of what is wrong.
     """
     mass, gravity = faults.positive("mass", mass, "kg"), faults.number("gravity", gravity, "m/s2", least=0.0)
     inertia = faults.symmetric("inertia", inertia, "kg m2")
@@ -280,13 +224,7 @@ _NAMES = "X_udot (or Xudot, X_du, X_{\\dot u}), X_u, X_uu (or X_u|u|, X_{u|u|}, 
 
 @dataclass(frozen=True)
 class Name:
-    """The name of a coefficient, as read.
-
-    Args:
-        kind: "dot", "linear", "quadratic", "even", "product" or "modulus".
-        row: Index of the force or moment in X Y Z K M N.
-        columns: Indices of the velocities in u v w p q r.
-    """
+    """The name of a coefficient, as read."""
 
     kind: str
     row: int
@@ -296,11 +234,8 @@ class Name:
 def read_name(name: str) -> Name | None:
     """Read the name of a hydrodynamic derivative, in any of the usual spellings.
 
-    Args:
-        name: A name, such as "X_udot", "Xuu" or "X_{u|u|}".
-
-    Returns:
-        What the name says; None if it is no such name.
+    name: A name, such as "X_udot", "Xuu" or "X_{u|u|}".
+    Returns: What the name says; None if it is no such name.
     """
     text = re.sub(r"[\s_{}\\$,()*]", "", str(name))
     if len(text) < 2 or text[0] not in FORCES:
@@ -374,13 +309,7 @@ def vehicle_tables_from_fossen(
 
 
 def about_gravity(faults: Faults, body: Coefficients, inertia_about: str) -> None:
-    """Carry an inertia that is given about the body origin to the centre of gravity, in place.
-
-    Args:
-        faults: Collects what is wrong.
-        body: The body; its inertia is changed in place.
-        inertia_about: "origin" if the inertia is about the body origin, "gravity" if it needs no change.
-    """
+    """Carry an inertia that is given about the body origin to the centre of gravity, in place."""
     known = faults.choice("inertia_about", inertia_about, ("origin", "gravity"))
     if not known or inertia_about == "gravity" or body.mass is None or body.inertia is None:
         return
@@ -390,14 +319,7 @@ def about_gravity(faults: Faults, body: Coefficients, inertia_about: str) -> Non
 
 
 def add_derivatives(faults: Faults, body: Coefficients, values: Mapping[str, Any], ignore: Iterable[str] = ()) -> None:
-    """Put derivatives into the body's matrices of added mass and drag, which are minus their values.
-
-    Args:
-        faults: Collects what is wrong.
-        body: The body; its matrices are set in place.
-        values: Values by name, in any spelling of `read_name`.
-        ignore: Names to leave out; by default none.
-    """
+    """Put derivatives into the body's matrices of added mass and drag, which are minus their values."""
     if not isinstance(values, Mapping):
         faults.add("coefficients", values, "is not a map of names", 'write {"X_udot": -30.0, "X_u": -4.0, ...}')
         values = {}
@@ -426,11 +348,7 @@ def add_derivatives(faults: Faults, body: Coefficients, values: Mapping[str, Any
 def refuse_name(faults: Faults, key: str, value: Any, name: Name | None) -> None:
     """Note why a coefficient cannot be taken.
 
-    Args:
-        faults: Collects what is wrong.
-        key: The coefficient's name as given.
-        value: Its value.
-        name: What the name says; None if it is not a coefficient's name.
+    name: What the name says; None if it is not a coefficient's name.
     """
     if name is None:
         faults.add(key, value, "is not a coefficient's name", f"known: {_NAMES}")
@@ -449,14 +367,7 @@ def refuse_name(faults: Faults, key: str, value: Any, name: Name | None) -> None
 
 
 def refuse_sign(faults: Faults, key: str, number: float, name: Name) -> None:
-    """Note a diagonal derivative above zero, which would be negative added mass, or drag that drives.
-
-    Args:
-        faults: Collects what is wrong.
-        key: The coefficient's name as given.
-        number: Its value.
-        name: What the name says.
-    """
+    """Note a diagonal derivative above zero, which would be negative added mass, or drag that drives."""
     if name.row == name.columns[0] and number > 0.0:
         problem = "is positive; the sign convention is Fossen's, in which this derivative is negative"
         faults.add(key, number, problem, f"write {-number:g} if it is meant as added mass or drag")
@@ -467,14 +378,8 @@ def with_partners(
 ) -> np.ndarray:
     """Fill in the missing one of each pair of added masses, and note pairs that differ.
 
-    Args:
-        faults: Collects what is wrong.
-        matrix: Added mass (6, 6) of the coefficients that are given.
-        keys: Names as given, by kind, row and column.
-        given: Values by name.
-
-    Returns:
-        The added mass matrix (6, 6), symmetric if no fault was noted.
+    matrix: Added mass (6, 6) of the coefficients that are given.
+    Returns: The added mass matrix (6, 6), symmetric if no fault was noted.
     """
     full = matrix.copy()
     for row, column in combinations(range(6), 2):
@@ -495,16 +400,7 @@ def with_partners(
 
 
 def as_positive(faults: Faults, key: str, matrix: np.ndarray) -> np.ndarray:
-    """Return a matrix of added mass or drag that is positive on its diagonal, from either sign convention.
-
-    Args:
-        faults: Collects what is wrong.
-        key: Name of the matrix in messages.
-        matrix: Magnitudes, or derivatives in Fossen's signs; taken as derivatives if the diagonal is zero.
-
-    Returns:
-        The matrix, or minus the matrix.
-    """
+    """Return a matrix of added mass or drag that is positive on its diagonal, from either sign convention."""
     diagonal = np.diag(matrix)
     if np.any(diagonal > 0.0) and np.any(diagonal < 0.0):
         remedy = "give all as derivatives (Fossen's signs, negative) or all as magnitudes (positive)"
@@ -518,11 +414,8 @@ PAIRS = ("xx", "xy", "xz", "yy", "yz", "zz")
 def inertia_from_names(named: Mapping[str, Any]) -> np.ndarray:
     """Build an inertia matrix from its six named entries.
 
-    Args:
-        named: ixx, ixy, ixz, iyy, iyz, izz [kg m2]; 0 where one is missing.
-
-    Returns:
-        The matrix (3, 3) [kg m2].
+    named: ixx, ixy, ixz, iyy, iyz, izz [kg m2]; 0 where one is missing.
+    Returns: The matrix (3, 3) [kg m2].
     """
     xx, xy, xz, yy, yz, zz = (named.get(f"i{pair}", 0.0) for pair in PAIRS)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
@@ -531,31 +424,16 @@ def inertia_from_names(named: Mapping[str, Any]) -> np.ndarray:
 def turned(value: Any, axes: np.ndarray) -> Any:
     """Turn a vector into other axes.
 
-    Args:
-        value: A vector (3,); anything else is returned as it is, to be refused by a later check.
-        axes: Sign of each axis (3,).
-
-    Returns:
-        The vector (3,) in the other axes.
+    value: A vector (3,); anything else is returned as it is, to be refused by a later check.
+    axes: Sign of each axis (3,).
+    Returns: The vector (3,) in the other axes.
     """
     checked = Faults().finite("", value, (3,))
     return value if checked is None else axes * checked
 
 
 def read_text(source: str | os.PathLike[str], is_text: bool, what: str) -> str:
-    """Return a text, or the content of the file that it names.
-
-    Args:
-        source: The text itself, or the path of a file.
-        is_text: True if it is the text itself.
-        what: Kind of the content in messages, such as "YAML file".
-
-    Returns:
-        The text.
-
-    Raises:
-        SceneError: If the text is too long or the file cannot be read.
-    """
+    """Return a text, or the content of the file that it names."""
     if is_text:
         text = str(source)
         if len(text) > (most := MOST_BYTES.get(what, MOST_OTHERS)):

@@ -24,17 +24,13 @@ def _zeros() -> np.ndarray:
 class Link:
     """One link of a robot description, in its own axes (x ahead, y to port, z up) from its own origin.
 
-    Args:
-        name: Full name of the link.
-        pose: Pose of the link in the model; by default at the origin.
-        mass: Mass [kg]; by default 0.
-        center: Centre of mass (3,) [m]; by default the origin.
-        inertia: Inertia (3, 3) [kg m2] about the centre of mass; by default zero.
-        volume: Displaced volume [m3]; by default 0.
-        volume_center: Centre of that volume (3,) [m]; by default the origin.
-        added_mass: Added mass (6, 6) about the origin; by default zero.
-        weighed: Whether the file gives the link's mass; by default True.
-        shapeless: Names of collision shapes whose volume the file does not hold; by default none.
+    mass: Mass [kg]; by default 0.
+    center: Centre of mass (3,) [m]; by default the origin.
+    inertia: Inertia (3, 3) [kg m2] about the centre of mass; by default zero.
+    volume: Displaced volume [m3]; by default 0.
+    volume_center: Centre of that volume (3,) [m]; by default the origin.
+    added_mass: Added mass (6, 6) about the origin; by default zero.
+    shapeless: Names of collision shapes whose volume the file does not hold; by default none.
     """
 
     name: str
@@ -51,13 +47,7 @@ class Link:
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint between two links.
-
-    Args:
-        type: Type of the joint, such as "fixed" or "revolute".
-        parent: Full name of the parent link.
-        child: Full name of the child link.
-    """
+    """A joint between two links."""
 
     type: str
     parent: str
@@ -68,13 +58,12 @@ class Joint:
 class Lump:
     """Several links as one rigid body, in the axes of its main link.
 
-    Args:
-        mass: Mass [kg].
-        center: Centre of mass (3,) [m].
-        inertia: Inertia (3, 3) [kg m2] about the centre of mass.
-        volume: Displaced volume [m3].
-        volume_center: Centre of that volume (3,) [m].
-        added_mass: Added mass (6, 6) about the main link's origin.
+    mass: Mass [kg].
+    center: Centre of mass (3,) [m].
+    inertia: Inertia (3, 3) [kg m2] about the centre of mass.
+    volume: Displaced volume [m3].
+    volume_center: Centre of that volume (3,) [m].
+    added_mass: Added mass (6, 6) about the main link's origin.
     """
 
     mass: float
@@ -105,13 +94,7 @@ FLAT = ("plane", "empty")
 def volume_of(faults: Faults, where: str, collision: Element) -> float | None:
     """Return the volume of a collision's shape.
 
-    Args:
-        faults: Collects what is wrong.
-        where: Beginning of the names in messages.
-        collision: The element <collision>.
-
-    Returns:
-        Volume [m3]; 0 for a plane; None for a mesh and the like, whose volume the file does not hold.
+    Returns: Volume [m3]; 0 for a plane; None for a mesh and the like, whose volume the file does not hold.
     """
     geometry = collision.find("geometry")
     if geometry is None:
@@ -135,15 +118,8 @@ def volume_of(faults: Faults, where: str, collision: Element) -> float | None:
 def size_of(faults: Faults, where: str, shape: Element, key: str, default: str) -> np.ndarray:
     """Return one size of a shape, which is an element in SDF and an attribute in URDF.
 
-    Args:
-        faults: Collects what is wrong.
-        where: Beginning of the names in messages.
-        shape: The element of the shape.
-        key: Name of the size, such as "radius".
-        default: Numbers to take if the size is missing, as a text.
-
-    Returns:
-        As many numbers [m] as the default holds.
+    shape: The element of the shape.
+    Returns: As many numbers [m] as the default holds.
     """
     attribute = shape.get(key)
     if attribute is not None:
@@ -154,9 +130,7 @@ def size_of(faults: Faults, where: str, shape: Element, key: str, default: str) 
 def add_volumes(link: Link, shapes: Iterable[tuple[str, float | None, np.ndarray]]) -> None:
     """Set volume and centre of a link from its collision shapes, as Gazebo's Buoyancy system does.
 
-    Args:
-        link: The link, changed in place.
-        shapes: Name, volume [m3] and centre (3,) [m] of each shape; volume None if the file does not hold it.
+    shapes: Name, volume [m3] and centre (3,) [m] of each shape; volume None if the file does not hold it.
     """
     known = []
     for name, volume, center in shapes:
@@ -172,14 +146,8 @@ def add_volumes(link: Link, shapes: Iterable[tuple[str, float | None, np.ndarray
 def read_inertia(faults: Faults, where: str, element: Element | None, default: str = "1") -> np.ndarray:
     """Read an inertia matrix from its six names, which are elements in SDF and attributes in URDF.
 
-    Args:
-        faults: Collects what is wrong.
-        where: Beginning of the names in messages.
-        element: The element <inertia>; None if there is none.
-        default: Diagonal entry where one is missing, as a text; by default "1", as in SDF. Off the diagonal it is 0.
-
-    Returns:
-        The matrix (3, 3) [kg m2].
+    element: The element <inertia>; None if there is none.
+    Returns: The matrix (3, 3) [kg m2].
     """
     named = {}
     for pair in PAIRS:
@@ -198,12 +166,7 @@ def read_inertia(faults: Faults, where: str, element: Element | None, default: s
 def beside(joints: Iterable[Joint], types: tuple[str, ...] | None = None) -> dict[str, list[str]]:
     """Return the neighbours of each link across joints.
 
-    Args:
-        joints: The joints.
-        types: Types of joints to follow; None for any (default).
-
-    Returns:
-        Names of neighbours by name of the link.
+    types: Types of joints to follow; None for any (default).
     """
     neighbours: dict[str, list[str]] = {}
     for joint in joints:
@@ -214,15 +177,7 @@ def beside(joints: Iterable[Joint], types: tuple[str, ...] | None = None) -> dic
 
 
 def joined(first: str, neighbours: Mapping[str, Sequence[str]]) -> list[str]:
-    """Return all links that a link is joined to, directly or through others.
-
-    Args:
-        first: Name of the link.
-        neighbours: Names of neighbours by name of the link.
-
-    Returns:
-        Names, the link itself first.
-    """
+    """Return all links that a link is joined to, directly or through others."""
     reached, waiting = {first: None}, [first]
     while waiting:
         for name in neighbours.get(waiting.pop(), ()):
@@ -233,15 +188,7 @@ def joined(first: str, neighbours: Mapping[str, Sequence[str]]) -> list[str]:
 
 
 def main_link(links: Mapping[str, Link], joints: Sequence[Joint]) -> str:
-    """Return the main link: of the heaviest set of joined links the heaviest that is no joint's child.
-
-    Args:
-        links: Links by full name.
-        joints: The joints.
-
-    Returns:
-        Full name of the link; the heaviest of the set if each is a joint's child.
-    """
+    """Return the main link: of the heaviest set of joined links the heaviest that is no joint's child."""
     sets, remaining, neighbours = [], dict.fromkeys(links), beside(joints)
     while remaining:
         sets.append([name for name in joined(next(iter(remaining)), neighbours) if name in links])
@@ -256,26 +203,14 @@ def main_link(links: Mapping[str, Link], joints: Sequence[Joint]) -> str:
 def carried(pose: Pose) -> np.ndarray:
     """Return the matrix that carries a velocity from the body's frame to a link's.
 
-    Args:
-        pose: Pose of the link in the body.
-
-    Returns:
-        X (6, 6): the link has the velocity X v, in its own axes, where the body has v.
+    Returns: X (6, 6): the link has the velocity X v, in its own axes, where the body has v.
     """
     R, p = pose.rotation, pose.position
     return np.block([[R.T, -R.T @ hat(p)], [np.zeros((3, 3)), R.T]])
 
 
 def lumped(links: Iterable[Link], main: Link) -> Lump:
-    """Lump rigidly joined links into one body; inertia by the parallel axis theorem.
-
-    Args:
-        links: The links.
-        main: The link in whose axes, and about whose origin, the body is given.
-
-    Returns:
-        The body.
-    """
+    """Lump rigidly joined links into one body; inertia by the parallel axis theorem."""
     placed = [(link, main.pose.inverse().then(link.pose)) for link in links]
     mass = sum(link.mass for link, _ in placed)
     volume = sum(link.volume for link, _ in placed)
@@ -300,18 +235,7 @@ def _mean(weights: Sequence[float], points: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def link_named(links: Mapping[str, Link], name: str) -> str:
-    """Return the full name of a link.
-
-    Args:
-        links: Links by full name.
-        name: The full name, or its last part alone.
-
-    Returns:
-        The full name.
-
-    Raises:
-        SceneError: If no link fits, or several do.
-    """
+    """Return the full name of a link."""
     if name in links:
         return name
     fitting = [key for key in links if key.endswith((f"::{name}", f"/{name}")) or name.endswith(f"/{key}")]

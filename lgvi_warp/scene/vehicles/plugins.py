@@ -30,17 +30,10 @@ UNREAD = {
 class Hydrodynamics:
     """Hydrodynamic coefficients of one link, in axes x ahead, y to starboard, z down, about its origin.
 
-    Args:
-        link: Name of the link.
-        added_mass: As in Coefficients.
-        linear: As in Coefficients.
-        quadratic: As in Coefficients.
-        forward: As in Coefficients.
-        density: Density of the water [kg/m3]; None if the plugin does not give it (default).
-        volume: Displaced volume [m3] that uuv_simulator gives and does not take from shapes; None for gz-sim (default).
-        volume_center: Centre of that volume (3,) [m], in the link's own axes (z up).
-        neutral: Whether the buoyancy is the weight; by default False.
-        current: Velocity (3,) [m/s] of the water, north, east, down.
+    density: Density of the water [kg/m3]; None if the plugin does not give it (default).
+    volume: Displaced volume [m3] that uuv_simulator gives and does not take from shapes; None for gz-sim (default).
+    volume_center: Centre of that volume (3,) [m], in the link's own axes (z up).
+    current: Velocity (3,) [m/s] of the water, north, east, down.
     """
 
     link: str
@@ -60,38 +53,18 @@ def is_hydrodynamics(plugin: Element) -> bool:
 
     It is if it holds a coefficient, or bears the name and has a link. Other plugins bear that name, too, and a
     controller's gain may be called kP as a drag coefficient is.
-
-    Args:
-        plugin: The element <plugin>.
-
-    Returns:
-        True for Gazebo's Hydrodynamics.
     """
     named = "hydrodynamics" in plugin_name(plugin) and plugin.find("link_name") is not None
     return named or any(_TERM.match(child.tag) and child.tag[0] in "xyz" for child in plugin)
 
 
 def is_underwater_object(plugin: Element) -> bool:
-    """Return whether a plugin is uuv_simulator's, which holds links with a hydrodynamic model.
-
-    Args:
-        plugin: The element <plugin>.
-
-    Returns:
-        True for uuv_simulator's plugin.
-    """
+    """Return whether a plugin is uuv_simulator's, which holds links with a hydrodynamic model."""
     return any(link.find("hydrodynamic_model") is not None for link in plugin.findall("link"))
 
 
 def unread(plugins: Sequence[Element]) -> list[str]:
-    """Return a warning for each kind of plugin that pushes the vehicle but is not read.
-
-    Args:
-        plugins: Elements <plugin>.
-
-    Returns:
-        The warnings.
-    """
+    """Return a warning for each kind of plugin that pushes the vehicle but is not read."""
     lines = []
     for kind, (parts, remedy) in UNREAD.items():
         count = sum(any(part in plugin_name(plugin) for part in parts) and not is_read(plugin) for plugin in plugins)
@@ -101,14 +74,7 @@ def unread(plugins: Sequence[Element]) -> list[str]:
 
 
 def is_read(plugin: Element) -> bool:
-    """Return whether the coefficients of a plugin are read.
-
-    Args:
-        plugin: The element <plugin>.
-
-    Returns:
-        True for Gazebo's Hydrodynamics and uuv_simulator's plugin.
-    """
+    """Return whether the coefficients of a plugin are read."""
     return is_hydrodynamics(plugin) or is_underwater_object(plugin)
 
 
@@ -116,17 +82,7 @@ def is_read(plugin: Element) -> bool:
 
 
 def read_hydrodynamics(faults: Faults, warnings: list[str], plugin: Element, link: str) -> Hydrodynamics:
-    """Read the coefficients of gz-sim's Hydrodynamics, in either sign convention.
-
-    Args:
-        faults: Collects what is wrong.
-        warnings: Collects what the user should know.
-        plugin: The element <plugin>.
-        link: Name of the link that it acts on.
-
-    Returns:
-        The coefficients.
-    """
+    """Read the coefficients of gz-sim's Hydrodynamics, in either sign convention."""
     hydrodynamics = Hydrodynamics(link, density=plugin_density(faults, plugin))
     matrices = {"added mass": np.zeros((6, 6)), "linear drag": np.zeros((6, 6)), "quadratic drag": np.zeros((6, 6))}
     even = []
@@ -171,12 +127,7 @@ def read_hydrodynamics(faults: Faults, warnings: list[str], plugin: Element, lin
 def plugin_density(faults: Faults, plugin: Element) -> float | None:
     """Return the water density that a plugin gives.
 
-    Args:
-        faults: Collects what is wrong.
-        plugin: The element <plugin>.
-
-    Returns:
-        Density [kg/m3]; None if the plugin does not give it.
+    Returns: Density [kg/m3]; None if the plugin does not give it.
     """
     for tag in ("water_density", "waterDensity", "fluid_density"):
         if text_of(plugin.find(tag)):
@@ -188,16 +139,7 @@ def plugin_density(faults: Faults, plugin: Element) -> float | None:
 
 
 def read_underwater_object(faults: Faults, warnings: list[str], plugin: Element) -> list[Hydrodynamics]:
-    """Read the links of uuv_simulator's plugin; its matrices are in axes x ahead, y to starboard, z down already.
-
-    Args:
-        faults: Collects what is wrong.
-        warnings: Collects what the user should know.
-        plugin: The element <plugin>.
-
-    Returns:
-        Coefficients of each link.
-    """
+    """Read the links of uuv_simulator's plugin; its matrices are in axes x ahead, y to starboard, z down already."""
     density = plugin_density(faults, plugin)
     density = 1028.0 if density is None else density  # kg/m3: the plugin's default
     return [read_underwater_link(faults, warnings, link, density) for link in plugin.findall("link")]
@@ -206,14 +148,7 @@ def read_underwater_object(faults: Faults, warnings: list[str], plugin: Element)
 def read_underwater_link(faults: Faults, warnings: list[str], link: Element, density: float) -> Hydrodynamics:
     """Read volume, centre and matrices of one link of uuv_simulator's plugin.
 
-    Args:
-        faults: Collects what is wrong.
-        warnings: Collects what the user should know.
-        link: The element <link> of the plugin.
-        density: Density of the water [kg/m3].
-
-    Returns:
-        The link's coefficients.
+    density: Density of the water [kg/m3].
     """
     name = link.get("name", "")
     hydrodynamics = Hydrodynamics(name, density=density, neutral=is_true(link.findtext("neutrally_buoyant")))
@@ -241,13 +176,7 @@ def read_underwater_link(faults: Faults, warnings: list[str], link: Element, den
 def block_matrix(faults: Faults, key: str, text: str) -> np.ndarray:
     """Read a matrix from 36 numbers, or from the 6 of its diagonal.
 
-    Args:
-        faults: Collects what is wrong.
-        key: Name of the matrix in messages.
-        text: The numbers, separated by spaces.
-
-    Returns:
-        The matrix (6, 6); zeros if the text is empty.
+    Returns: The matrix (6, 6); zeros if the text is empty.
     """
     if not text:
         return np.zeros((6, 6))
@@ -260,12 +189,8 @@ def block_matrix(faults: Faults, key: str, text: str) -> np.ndarray:
 def by_diagonal(warnings: list[str], quadratic: np.ndarray) -> np.ndarray:
     """Return the diagonal part of a quadratic damping matrix; uuv_simulator does not use the other entries.
 
-    Args:
-        warnings: Collects what the user should know.
-        quadratic: Quadratic damping (6, 6).
-
-    Returns:
-        The diagonal matrix (6, 6).
+    quadratic: Quadratic damping (6, 6).
+    Returns: The diagonal matrix (6, 6).
     """
     diagonal = np.diag(np.diag(quadratic))
     if not np.array_equal(quadratic, diagonal):
@@ -277,14 +202,7 @@ def by_diagonal(warnings: list[str], quadratic: np.ndarray) -> np.ndarray:
 
 
 def add_to(faults: Faults, body: Coefficients, found: Hydrodynamics, pose: Pose) -> None:
-    """Add a link's coefficients to those of the body.
-
-    Args:
-        faults: Collects what is wrong.
-        body: The body, changed in place.
-        found: Coefficients of the link.
-        pose: Pose of the link in the body (axes z up).
-    """
+    """Add a link's coefficients to those of the body."""
     X = HALF_TURN_6[:, None] * carried(pose) * HALF_TURN_6
     for name in ("added_mass", "linear"):
         setattr(body, name, getattr(body, name) + X.T @ getattr(found, name) @ X)

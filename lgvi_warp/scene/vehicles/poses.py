@@ -21,31 +21,19 @@ LONGEST_CHAIN = 200
 class Pose(NamedTuple):
     """Where a frame lies in another one.
 
-    Args:
-        position: Position of its origin (3,) [m].
-        rotation: Rotation matrix (3, 3).
+    position: Position of its origin (3,) [m].
+    rotation: Rotation matrix (3, 3).
     """
 
     position: np.ndarray
     rotation: np.ndarray
 
     def then(self, inner: Pose) -> Pose:
-        """Return the pose in the outer frame of what has a pose in this frame.
-
-        Args:
-            inner: Pose in this frame.
-
-        Returns:
-            The pose in the outer frame.
-        """
+        """Return the pose in the outer frame of what has a pose in this frame."""
         return Pose(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)
 
     def inverse(self) -> Pose:
-        """Return the pose of the outer frame in this frame.
-
-        Returns:
-            The inverse pose.
-        """
+        """Return the pose of the outer frame in this frame."""
         return Pose(-self.rotation.T @ self.position, self.rotation.T)
 
 
@@ -55,11 +43,8 @@ HERE = Pose(np.zeros(3), np.eye(3))
 def rotation_from_rpy(angles: np.ndarray) -> np.ndarray:
     """Return the rotation matrix of roll, pitch and yaw.
 
-    Args:
-        angles: Roll, pitch, yaw (3,) [rad].
-
-    Returns:
-        Rz(yaw) Ry(pitch) Rx(roll), (3, 3).
+    angles: Roll, pitch, yaw (3,) [rad].
+    Returns: Rz(yaw) Ry(pitch) Rx(roll), (3, 3).
     """
     (sr, sp, sy), (cr, cp, cy) = np.sin(angles), np.cos(angles)
     first = [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr]
@@ -70,11 +55,8 @@ def rotation_from_rpy(angles: np.ndarray) -> np.ndarray:
 def rotation_from_xyzw(quaternion: np.ndarray) -> np.ndarray:
     """Return the rotation matrix of a quaternion.
 
-    Args:
-        quaternion: x, y, z, w (4,), scalar last, of any length but 0.
-
-    Returns:
-        The matrix (3, 3).
+    quaternion: x, y, z, w (4,), scalar last, of any length but 0.
+    Returns: The matrix (3, 3).
     """
     *v, w = quaternion / (np.linalg.norm(quaternion) or 1.0)
     S = hat(np.array(v))
@@ -84,13 +66,7 @@ def rotation_from_xyzw(quaternion: np.ndarray) -> np.ndarray:
 def read_pose(faults: Faults, where: str, pose: Element | None) -> Pose:
     """Read the pose in an element <pose> of SDF.
 
-    Args:
-        faults: Collects what is wrong.
-        where: Beginning of the names in messages.
-        pose: The element, with x y z roll pitch yaw, or x y z and a quaternion; None if there is none.
-
-    Returns:
-        The pose; without offset where the element is missing or empty.
+    pose: The element, with x y z roll pitch yaw, or x y z and a quaternion; None if there is none.
     """
     if pose is None or not text_of(pose):
         return HERE
@@ -105,13 +81,7 @@ def read_pose(faults: Faults, where: str, pose: Element | None) -> Pose:
 def read_origin(faults: Faults, where: str, parent: Element | None) -> Pose:
     """Read the pose in an element <origin> of URDF, from its xyz and rpy.
 
-    Args:
-        faults: Collects what is wrong.
-        where: Beginning of the names in messages.
-        parent: The element that holds <origin>; None if there is none.
-
-    Returns:
-        The pose; without offset where <origin> is missing.
+    parent: The element that holds <origin>; None if there is none.
     """
     origin = child_of(parent, "origin")
     if origin is None:
@@ -124,12 +94,7 @@ def read_origin(faults: Faults, where: str, parent: Element | None) -> Pose:
 class Scope:
     """The names of one <model> of an SDF file: its links, joints, frames and nested models.
 
-    Args:
-        model: The element <model>.
-        prefix: Beginning of the full names of what it holds, "" (default) or "nested::".
-        parent: Scope of the model that this one is nested in; None for the root (default).
-        named: Elements by name, filled from the model.
-        nested: Scopes of nested models by name, filled from the model.
+    parent: Scope of the model that this one is nested in; None for the root (default).
     """
 
     model: Element
@@ -147,27 +112,13 @@ class Scope:
                     self.nested[name] = Scope(child, f"{self.prefix}{name}::", self)
 
     def each(self) -> Iterator[Scope]:
-        """Iterate over this scope and those nested in it.
-
-        Yields:
-            This scope, then each nested one.
-        """
+        """Iterate over this scope and those nested in it."""
         yield self
         for scope in self.nested.values():
             yield from scope.each()
 
     def find(self, name: str) -> tuple[Scope, str]:
-        """Find the scope that a name belongs to.
-
-        Args:
-            name: A name such as "link" or "nested::link".
-
-        Returns:
-            The scope, and the name within it.
-
-        Raises:
-            KeyError: If there is no such name.
-        """
+        """Find the scope that a name belongs to."""
         scope, rest = self, name
         while "::" in rest:
             head, rest = rest.split("::", 1)
@@ -179,12 +130,7 @@ class Scope:
     def link_of(self, name: str) -> str | None:
         """Return the full name of the link that a name stands for.
 
-        Args:
-            name: Name of a link, of a frame or joint that is attached to one, or of a model, which stands for its
-                canonical link.
-
-        Returns:
-            Full name of the link; None if there is none.
+        Returns: Full name of the link; None if there is none.
         """
         scope, rest = self, name
         for _ in range(LONGEST_CHAIN):
@@ -205,28 +151,14 @@ class Scope:
 
 
 class Poses:
-    """Poses of all names of one model, each computed once.
-
-    Args:
-        faults: Collects what is wrong, under the name of what is placed.
-        root: Scope of the model in which the poses are given.
-    """
+    """Poses of all names of one model, each computed once."""
 
     def __init__(self, faults: Faults, root: Scope):
         self.faults, self.root = faults, root
         self.known: dict[tuple[int, str], Pose] = {(id(root), "__model__"): HERE}
 
     def of(self, scope: Scope, name: str, chain: tuple[tuple[int, str], ...] = ()) -> Pose:
-        """Return the pose of a name in the root model.
-
-        Args:
-            scope: Scope that the name belongs to.
-            name: The name.
-            chain: Names whose poses wait for this one, to detect circles; by default none.
-
-        Returns:
-            The pose; without offset after noting a fault.
-        """
+        """Return the pose of a name in the root model."""
         key = (id(scope), name)
         if key in self.known:
             return self.known[key]
@@ -249,32 +181,14 @@ class Poses:
         return pose
 
     def placed(self, scope: Scope, element: Element, frame: str, chain: tuple[tuple[int, str], ...] = ()) -> Pose:
-        """Return the pose in the root model of an element that holds a <pose>.
-
-        Args:
-            scope: Scope that the element belongs to.
-            element: The element.
-            frame: Name of the frame that the pose is given in, unless the element names one.
-            chain: Names whose poses wait for this one, to detect circles; by default none.
-
-        Returns:
-            The pose.
-        """
+        """Return the pose in the root model of an element that holds a <pose>."""
         where = f"{scope.prefix}{element.get('name', element.tag)} "
         pose = element.find("pose")
         relative_to = (pose.get("relative_to") if pose is not None else None) or frame
         return self.of(*self.lookup(scope, relative_to), chain).then(read_pose(self.faults, where, pose))
 
     def lookup(self, scope: Scope, name: str) -> tuple[Scope, str]:
-        """Find what a name of a scope stands for.
-
-        Args:
-            scope: The scope.
-            name: The name.
-
-        Returns:
-            The scope that it belongs to, and the name within it; the model itself after noting a fault.
-        """
+        """Find what a name of a scope stands for."""
         try:
             return scope.find(name)
         except KeyError:

@@ -33,10 +33,8 @@ GAZEBO_DENSITY = 1000.0  # kg/m3: of Gazebo's Buoyancy system, if none is given
 class Water:
     """What the <world> of a file says about the water.
 
-    Args:
-        gravity: Acceleration of free fall [m/s2]; None if the file does not give it (default).
-        density: Density of the water [kg/m3]; None if the file does not give it (default).
-        enabled: Names of the models or links that have buoyancy; empty for all (default).
+    gravity: Acceleration of free fall [m/s2]; None if the file does not give it (default).
+    density: Density of the water [kg/m3]; None if the file does not give it (default).
     """
 
     gravity: float | None = None
@@ -46,16 +44,7 @@ class Water:
 
 @dataclass
 class RobotModel:
-    """A model as read from a file.
-
-    Args:
-        name: Name of the model.
-        links: Links by full name.
-        joints: Joints between the links.
-        hydrodynamics: Coefficients that plugins give, by link.
-        water: What the world says about the water.
-        warnings: Texts about what the user should know.
-    """
+    """A model as read from a file."""
 
     name: str
     links: dict[str, Link]
@@ -66,28 +55,13 @@ class RobotModel:
 
 
 def listed(names: Sequence[str], most: int = 20) -> str:
-    """Return names as one text, and how many more there are.
-
-    Args:
-        names: The names.
-        most: Most names to list; by default 20.
-
-    Returns:
-        The names with commas between.
-    """
+    """Return names as one text, and how many more there are."""
     more = f" and {len(names) - most} more" if len(names) > most else ""
     return ", ".join(names[:most]) + more
 
 
 def refuse_crowd(elements: Sequence[Element]) -> None:
-    """Refuse more elements than any vehicle has, since the time to read them would have no bound.
-
-    Args:
-        elements: Elements of one kind.
-
-    Raises:
-        SceneError: If there are more than MOST_LINKS.
-    """
+    """Refuse more elements than any vehicle has, since the time to read them would have no bound."""
     if len(elements) > MOST_LINKS:
         problem = f"the model has {len(elements):,} of <{elements[0].tag}>, more than {MOST_LINKS:,}"
         raise SceneError([f"SDF model: {problem}; give the vehicle alone"])
@@ -99,34 +73,14 @@ def refuse_crowd(elements: Sequence[Element]) -> None:
 def read_model(faults: Faults, root: Element, name: str | None, link: str | None) -> RobotModel:
     """Read the model of a file: that of a URDF, or the chosen one of an SDF file.
 
-    Args:
-        faults: Collects what is wrong.
-        root: Root element of the file.
-        name: Name of the model; None where the file holds one only.
-        link: Name of a link of the model; None if none is named.
-
-    Returns:
-        The model.
-
-    Raises:
-        SceneError: If there is no such model, several fit, or the model is too large.
+    name: Name of the model; None where the file holds one only.
+    link: Name of a link of the model; None if none is named.
     """
     return model_of_urdf(faults, root) if root.tag == "robot" else model_of_sdf(faults, root, name, link)
 
 
 def model_of_urdf(faults: Faults, root: Element) -> RobotModel:
-    """Read the model of a URDF file.
-
-    Args:
-        faults: Collects what is wrong.
-        root: Root element of the file.
-
-    Returns:
-        The model.
-
-    Raises:
-        SceneError: If the file holds xacro, or the model is too large.
-    """
+    """Read the model of a URDF file."""
     for tag in ("link", "joint", "plugin", "collision"):
         refuse_crowd(list(root.iter(tag)))
     links, joints = read_urdf(faults, root)
@@ -141,17 +95,8 @@ def model_of_urdf(faults: Faults, root: Element) -> RobotModel:
 def model_of_sdf(faults: Faults, root: Element, name: str | None, link: str | None) -> RobotModel:
     """Read one model of an SDF file.
 
-    Args:
-        faults: Collects what is wrong.
-        root: Root element of the file.
-        name: Name of the model; None for the only one, or the only one with hydrodynamics.
-        link: Name of a link of the model; None if none is named.
-
-    Returns:
-        The model.
-
-    Raises:
-        SceneError: If there is no such model, several fit, or the model is too large.
+    name: Name of the model; None for the only one, or the only one with hydrodynamics.
+    link: Name of a link of the model; None if none is named.
     """
     element, world = chosen_model(root, name, link)
     for tag in ("link", "joint", "plugin", "collision", "frame", "model"):
@@ -175,17 +120,7 @@ def model_of_sdf(faults: Faults, root: Element, name: str | None, link: str | No
 
 
 def world_of(root: Element) -> Element:
-    """Return the first <world> of a file.
-
-    Args:
-        root: Root element of the file.
-
-    Returns:
-        The element <world>.
-
-    Raises:
-        SceneError: If there is none.
-    """
+    """Return the first <world> of a file."""
     world = next(root.iter("world"), None)
     if world is None:
         raise SceneError(["world: the file has no <world>; give an SDF file with one"])
@@ -195,16 +130,9 @@ def world_of(root: Element) -> Element:
 def chosen_model(root: Element, name: str | None, link: str | None) -> tuple[Element, Element | None]:
     """Choose a top-level <model> of an SDF file.
 
-    Args:
-        root: Root element of the file.
-        name: Name of the model; None for the only one, or the only one with hydrodynamics.
-        link: Name of a link of the model; None if none is named.
-
-    Returns:
-        The element <model>, and the <world> that holds it or None.
-
-    Raises:
-        SceneError: If there is no such model, or several fit.
+    name: Name of the model; None for the only one, or the only one with hydrodynamics.
+    link: Name of a link of the model; None if none is named.
+    Returns: The element <model>, and the <world> that holds it or None.
     """
     known: list[tuple[Element, Element | None]] = []
     known += [(child, world) for world in root.iter("world") for child in world.findall("model")]
@@ -235,16 +163,7 @@ def _names(pairs: Sequence[tuple[Element, Element | None]]) -> list[str]:
 
 
 def read_water(faults: Faults, warnings: list[str], world: Element) -> Water:
-    """Read gravity and density of a world.
-
-    Args:
-        faults: Collects what is wrong.
-        warnings: Collects what the user should know.
-        world: The element <world>.
-
-    Returns:
-        The water; where its density changes with depth, with the density below all layers.
-    """
+    """Read gravity and density of a world."""
     vector = numbers(faults, "<world> ", world, "gravity", f"0 0 {-GAZEBO_GRAVITY}")
     if np.any(vector[:2]) or vector[2] > 0.0:
         faults.add("<gravity>", vector, "does not point down", "turn the world so that it is along -z")
@@ -267,30 +186,12 @@ def read_water(faults: Faults, warnings: list[str], world: Element) -> Water:
 
 
 def is_buoyancy(plugin: Element) -> bool:
-    """Return whether a plugin is Gazebo's Buoyancy, which is not its BuoyancyEngine.
-
-    Args:
-        plugin: The element <plugin>.
-
-    Returns:
-        True for Gazebo's Buoyancy.
-    """
+    """Return whether a plugin is Gazebo's Buoyancy, which is not its BuoyancyEngine."""
     return "buoyancy" in plugin_name(plugin) and "engine" not in plugin_name(plugin)
 
 
 def read_link(faults: Faults, warnings: list[str], poses: Poses, scope: Scope, name: str) -> Link:
-    """Read one link of an SDF file: mass, inertia, added mass, displaced volume and pose.
-
-    Args:
-        faults: Collects what is wrong.
-        warnings: Collects what the user should know.
-        poses: Poses of the model.
-        scope: Scope that the link belongs to.
-        name: Name of the link in that scope.
-
-    Returns:
-        The link.
-    """
+    """Read one link of an SDF file: mass, inertia, added mass, displaced volume and pose."""
     element = scope.named[name]
     link, where = Link(scope.prefix + name, poses.of(scope, name)), f"{scope.prefix}{name} "
     inertial = element.find("inertial")
@@ -324,15 +225,7 @@ def read_link(faults: Faults, warnings: list[str], poses: Poses, scope: Scope, n
 
 
 def joints_of(root: Scope, scope: Scope) -> list[Joint]:
-    """Read the joints of a scope; a detachable joint counts as fixed, as at the start.
-
-    Args:
-        root: Scope of the whole model.
-        scope: Scope whose joints are read.
-
-    Returns:
-        The joints, with full names of the links.
-    """
+    """Read the joints of a scope; a detachable joint counts as fixed, as at the start."""
     joints = []
     for element in scope.named.values():
         if element.tag == "joint":
@@ -349,13 +242,8 @@ def joints_of(root: Scope, scope: Scope) -> list[Joint]:
 def read_fluid_added_mass(faults: Faults, where: str, element: Element | None) -> np.ndarray:
     """Read the added mass in an element <fluid_added_mass>: xx, xy ... rr.
 
-    Args:
-        faults: Collects what is wrong.
-        where: Beginning of the names in messages.
-        element: The element; None if there is none.
-
-    Returns:
-        The matrix (6, 6) in the link's axes about its origin; 0 where an entry is missing.
+    element: The element; None if there is none.
+    Returns: The matrix (6, 6) in the link's axes about its origin; 0 where an entry is missing.
     """
     matrix = np.zeros((6, 6))
     for row, column in combinations_with_replacement(range(6), 2):
@@ -368,14 +256,7 @@ def read_fluid_added_mass(faults: Faults, where: str, element: Element | None) -
 
 
 def add_plugins(faults: Faults, read: RobotModel, plugins: Sequence[Element], prefix: str) -> None:
-    """Add the coefficients that plugins give to the model.
-
-    Args:
-        faults: Collects what is wrong.
-        read: The model, changed in place.
-        plugins: Elements <plugin>.
-        prefix: Beginning of the full names of the links that the plugins name.
-    """
+    """Add the coefficients that plugins give to the model."""
     for plugin in plugins:
         if is_underwater_object(plugin):
             read.hydrodynamics += read_underwater_object(faults, read.warnings, plugin)

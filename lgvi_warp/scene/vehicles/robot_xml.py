@@ -38,15 +38,7 @@ class Reader:
         self.tree, self.level, self.elements = TreeBuilder(), 0, 0
 
     def start(self, tag: str, attributes: dict[str, str]) -> None:
-        """Open an element and count it.
-
-        Args:
-            tag: Name of the element.
-            attributes: Its attributes by name.
-
-        Raises:
-            Refused: If there are more elements or levels than the limits allow.
-        """
+        """Open an element and count it."""
         self.level, self.elements = self.level + 1, self.elements + 1
         if self.level > MOST_LEVELS:
             raise Refused(f"is nested more than {MOST_LEVELS} levels deep; give the model alone")
@@ -55,39 +47,17 @@ class Reader:
         self.tree.start(tag, attributes)
 
     def end(self, tag: str) -> None:
-        """Close the element that was opened last.
-
-        Args:
-            tag: Name of the element.
-        """
+        """Close the element that was opened last."""
         self.level -= 1
         self.tree.end(tag)
 
     def doctype(self, *_: Any) -> None:
-        """Refuse a document type, since it may declare entities, which can grow without end or name other files.
-
-        Args:
-            *_: What expat says about it, which is not used.
-
-        Raises:
-            Refused: Always.
-        """
+        """Refuse a document type, since it may declare entities, which can grow without end or name other files."""
         raise Refused("has a document type declaration (<!DOCTYPE>), which is not read; remove it")
 
 
 def parse_xml(source: str | os.PathLike[str], what: str = "SDF") -> Element:
-    """Parse the XML of a text or of a file.
-
-    Args:
-        source: The text itself, or the path of a file.
-        what: Kind of the content in messages; by default "SDF".
-
-    Returns:
-        The root element.
-
-    Raises:
-        SceneError: If the content cannot be read; the message has one line.
-    """
+    """Parse the XML of a text or of a file."""
     is_text = isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
     content = str(source).encode() if is_text else read_bytes(source, what)
     content = content.removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n")
@@ -107,14 +77,7 @@ def parse_xml(source: str | os.PathLike[str], what: str = "SDF") -> Element:
 
 
 def remedy_for(content: bytes) -> str:
-    """Return what to do with a text that is not XML.
-
-    Args:
-        content: The text.
-
-    Returns:
-        The program to run, if the text looks like its template; else to mend that line.
-    """
+    """Return what to do with a text that is not XML."""
     mark = next((mark for mark in (b"<%", b"{%", b"{{", b"@(", b"@{", b"=@") if mark in content), None)
     if mark is None:
         return "mend that line"
@@ -123,18 +86,7 @@ def remedy_for(content: bytes) -> str:
 
 
 def read_bytes(source: Any, what: str) -> bytes:
-    """Return the content of a file.
-
-    Args:
-        source: Path of the file.
-        what: Kind of the content in messages.
-
-    Returns:
-        The bytes of the file.
-
-    Raises:
-        SceneError: If this is no regular file of a bounded size.
-    """
+    """Return the content of a file."""
     try:
         return file_bytes(source, f"{what} file")
     except UnreadableError as error:
@@ -147,11 +99,7 @@ def read_bytes(source: Any, what: str) -> bytes:
 def text_of(element: Element | None) -> str:
     """Return the text of an element, without spaces around it.
 
-    Args:
-        element: The element; None if there is none.
-
-    Returns:
-        The text; "" if there is none.
+    element: The element; None if there is none.
     """
     return (element.text or "").strip() if element is not None else ""
 
@@ -159,12 +107,8 @@ def text_of(element: Element | None) -> str:
 def child_of(parent: Element | None, tag: str) -> Element | None:
     """The first child of an element that may be missing.
 
-    Args:
-        parent: The element, or None.
-        tag: Tag of the child.
-
-    Returns:
-        The child; None where either is missing.
+    parent: The element, or None.
+    Returns: The child; None where either is missing.
     """
     return None if parent is None else parent.find(tag)
 
@@ -172,11 +116,7 @@ def child_of(parent: Element | None, tag: str) -> Element | None:
 def is_true(text: str | None) -> bool:
     """Return the truth value that a text stands for in SDF.
 
-    Args:
-        text: The text; None if there is none.
-
-    Returns:
-        True for "1" and "true", in upper or lower case.
+    text: The text; None if there is none.
     """
     return (text or "").strip().lower() in ("1", "true")
 
@@ -184,11 +124,7 @@ def is_true(text: str | None) -> bool:
 def floats(text: str) -> np.ndarray | None:
     """Return the numbers in a text, separated by spaces.
 
-    Args:
-        text: The text.
-
-    Returns:
-        Numbers (n,); None if the text holds anything else.
+    Returns: Numbers (n,); None if the text holds anything else.
     """
     try:
         return np.array([float(word) for word in text.split()]) if text.isascii() and "_" not in text else None
@@ -199,14 +135,7 @@ def floats(text: str) -> np.ndarray | None:
 def numbers_in(faults: Faults, key: str, text: str, count: int) -> np.ndarray:
     """Return the numbers in a text that must hold a fixed count of finite ones.
 
-    Args:
-        faults: Collects what is wrong.
-        key: Name of the numbers in messages.
-        text: The numbers, separated by spaces.
-        count: How many there must be.
-
-    Returns:
-        Numbers (count,); zeros after noting a fault.
+    Returns: Numbers (count,); zeros after noting a fault.
     """
     values = floats(text)
     if values is not None and values.shape == (count,) and np.all(np.isfinite(values)):
@@ -224,15 +153,7 @@ def numbers_in(faults: Faults, key: str, text: str, count: int) -> np.ndarray:
 def numbers(faults: Faults, where: str, parent: Element | None, tag: str, default: str) -> np.ndarray:
     """Return the numbers in a child element.
 
-    Args:
-        faults: Collects what is wrong.
-        where: Beginning of the names in messages.
-        parent: The element that holds the child; None if there is none.
-        tag: Name of the child element.
-        default: Numbers to take if the child is missing or empty, as a text.
-
-    Returns:
-        As many numbers as the default holds; zeros after noting a fault.
+    parent: The element that holds the child; None if there is none.
     """
     return numbers_in(faults, f"{where}<{tag}>", text_of(child_of(parent, tag)) or default, len(default.split()))
 
@@ -254,14 +175,7 @@ def number(faults: Faults, where: str, parent: Element | None, tag: str, default
 
 
 def plugins_of(element: Element) -> Iterator[Element]:
-    """Iterate over the plugins of a model and of the models nested in it, without those of included files.
-
-    Args:
-        element: The element <model> or <robot>.
-
-    Yields:
-        Elements <plugin>.
-    """
+    """Iterate over the plugins of a model and of the models nested in it, without those of included files."""
     for child in element:
         if child.tag == "plugin":
             yield child
@@ -270,12 +184,5 @@ def plugins_of(element: Element) -> Iterator[Element]:
 
 
 def plugin_name(plugin: Element) -> str:
-    """Return name and file name of a plugin, by which it is recognised.
-
-    Args:
-        plugin: The element <plugin>.
-
-    Returns:
-        Both with a space between, in lower case.
-    """
+    """Return name and file name of a plugin, by which it is recognised."""
     return (plugin.get("name", "") + " " + plugin.get("filename", "")).lower()

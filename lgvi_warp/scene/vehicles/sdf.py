@@ -88,15 +88,7 @@ def vehicle_tables_from_sdf(
 def add_hydrodynamics(
     faults: Faults, body: Coefficients, read: RobotModel, main: Link, own: Sequence[Hydrodynamics]
 ) -> None:
-    """Add the coefficients that plugins give to the body.
-
-    Args:
-        faults: Collects what is wrong.
-        body: The body, changed in place.
-        read: The model as read.
-        main: The main link, in whose axes the body is given.
-        own: Coefficients of the links of the body.
-    """
+    """Add the coefficients that plugins give to the body."""
     for hydrodynamics in own:
         body_link = read.links[hydrodynamics.link]
         if np.any(hydrodynamics.added_mass) and np.any(body_link.added_mass):
@@ -106,15 +98,7 @@ def add_hydrodynamics(
 
 
 def refuse_empty(faults: Faults, read: RobotModel) -> None:
-    """Refuse a model that has no link.
-
-    Args:
-        faults: Collects what is wrong.
-        read: The model as read.
-
-    Raises:
-        SceneError: If the model has no link.
-    """
+    """Refuse a model that has no link."""
     if not read.links:
         faults.raise_if_any()
         known = "; ".join(["the model has none", *read.warnings])
@@ -122,16 +106,7 @@ def refuse_empty(faults: Faults, read: RobotModel) -> None:
 
 
 def refuse_unweighed(read: RobotModel, main: Link, parts: Sequence[Link]) -> None:
-    """Refuse a main link without inertia; note other links without it, to which Gazebo gives 1 kg.
-
-    Args:
-        read: The model as read; its warnings are extended.
-        main: The main link.
-        parts: Links of the body.
-
-    Raises:
-        SceneError: If the file gives no inertia of the main link.
-    """
+    """Refuse a main link without inertia; note other links without it, to which Gazebo gives 1 kg."""
     if not main.weighed:
         raise SceneError([f"SDF link {main.name!r}: has no <inertial>; add mass, pose and inertia"])
     unweighed = [body_link.name for body_link in parts if not body_link.weighed]
@@ -142,12 +117,9 @@ def refuse_unweighed(read: RobotModel, main: Link, parts: Sequence[Link]) -> Non
 def weight_of(read: RobotModel, volume: float | None) -> float | None:
     """Return the weight of the displaced water.
 
-    Args:
-        read: The model as read; its warnings are extended if no shape displaces water.
-        volume: Displaced volume [m3].
-
-    Returns:
-        Weight [N]; None if it is unknown, or nothing is displaced though buoyancy is not restricted to some models.
+    read: The model as read; its warnings are extended if no shape displaces water.
+    volume: Displaced volume [m3].
+    Returns: Weight [N]; None if it is unknown, or nothing is displaced though buoyancy is not restricted to some models.
     """
     water = read.water
     if not volume and not water.enabled:
@@ -159,15 +131,9 @@ def weight_of(read: RobotModel, volume: float | None) -> float | None:
 def body_of(faults: Faults, lump: Lump, buoyancy: float | None, at: Any, gravity: float | None) -> Coefficients:
     """Build the rigid body of lumped links, in axes x ahead, y to starboard, z down.
 
-    Args:
-        faults: Collects what is wrong.
-        lump: The lumped links, z up.
-        buoyancy: Buoyancy [N]; None for the weight.
-        at: Centre of buoyancy (3,) [m], z down.
-        gravity: Acceleration of free fall [m/s2]; None if it is at fault.
-
-    Returns:
-        The body, with its added mass.
+    buoyancy: Buoyancy [N]; None for the weight.
+    at: Centre of buoyancy (3,) [m], z down.
+    gravity: Acceleration of free fall [m/s2]; None if it is at fault.
     """
     inertia = HALF_TURN[:, None] * lump.inertia * HALF_TURN
     gravity = 0.0 if gravity is None else gravity  # a fault by then
@@ -179,15 +145,7 @@ def body_of(faults: Faults, lump: Lump, buoyancy: float | None, at: Any, gravity
 def chosen_link(read: RobotModel, link: str | None) -> str:
     """Return the full name of the main link.
 
-    Args:
-        read: The model as read.
-        link: Name of the link; None for that of the plugin, else the first of the heaviest joined links.
-
-    Returns:
-        Full name of the link.
-
-    Raises:
-        SceneError: If no link fits the name, or several do.
+    link: Name of the link; None for that of the plugin, else the first of the heaviest joined links.
     """
     if link is not None:
         return link_named(read.links, link)
@@ -197,15 +155,7 @@ def chosen_link(read: RobotModel, link: str | None) -> str:
 
 
 def together(read: RobotModel, main: Link) -> list[str]:
-    """Return the links that form one body with the main link; warn of moving links and of those left out.
-
-    Args:
-        read: The model as read; its warnings are extended.
-        main: The main link.
-
-    Returns:
-        Full names of the links.
-    """
+    """Return the links that form one body with the main link; warn of moving links and of those left out."""
     every = [name for name in joined(main.name, beside(read.joints)) if name in read.links]
     fixed = set(joined(main.name, beside(read.joints, ("fixed",))))
     moving = [name for name in every if name not in fixed]
@@ -221,11 +171,8 @@ def together(read: RobotModel, main: Link) -> list[str]:
 def set_water(faults: Faults, read: RobotModel, density: float | None, gravity: float | None) -> None:
     """Set density and gravity of the model: as given, else the world's, else a plugin's, else the default.
 
-    Args:
-        faults: Collects what is wrong.
-        read: The model as read, changed in place.
-        density: Density of the water [kg/m3]; None if not given.
-        gravity: Acceleration of free fall [m/s2]; None if not given.
+    density: Density of the water [kg/m3]; None if not given.
+    gravity: Acceleration of free fall [m/s2]; None if not given.
     """
     named = [each.density for each in read.hydrodynamics if each.density is not None]
     density = next(x for x in (density, read.water.density, *named, GAZEBO_DENSITY) if x is not None)
@@ -239,14 +186,7 @@ def displaced_by(
 ) -> tuple[float, np.ndarray]:
     """Return displaced volume and its centre, of the shapes or as uuv_simulator's plugin gives it.
 
-    Args:
-        read: The model as read; its warnings are extended.
-        parts: Links of the body.
-        main: The main link.
-        own: Coefficients of the links of the body.
-
-    Returns:
-        Volume [m3] and its centre (3,) [m] in the main link's axes (z up).
+    Returns: Volume [m3] and its centre (3,) [m] in the main link's axes (z up).
     """
     by_plugin = [hydrodynamics for hydrodynamics in own if hydrodynamics.volume is not None]
     for hydrodynamics in by_plugin:
@@ -263,15 +203,7 @@ def displaced_by(
 
 
 def has_buoyancy(read: RobotModel, name: str) -> bool:
-    """Return whether Gazebo's Buoyancy system acts on a link.
-
-    Args:
-        read: The model as read.
-        name: Full name of the link.
-
-    Returns:
-        True if no element <enable> restricts it, or one names the link or a model that holds it.
-    """
+    """Return whether Gazebo's Buoyancy system acts on a link."""
     scoped = f"{read.name}::{name}::"
     return not read.water.enabled or any(scoped.startswith(f"{enabled}::") for enabled in read.water.enabled)
 
@@ -279,11 +211,7 @@ def has_buoyancy(read: RobotModel, name: str) -> bool:
 def refuse_shapeless(faults: Faults, read: RobotModel, parts: Sequence[Link], own: Sequence[Hydrodynamics]) -> None:
     """Note shapes whose volume lies in another file: without them the vehicle would sink.
 
-    Args:
-        faults: Collects what is wrong.
-        read: The model as read.
-        parts: Links of the body.
-        own: Coefficients of the links of the body; one with a volume makes shapes superfluous.
+    own: Coefficients of the links of the body; one with a volume makes shapes superfluous.
     """
     if any(hydrodynamics.volume is not None for hydrodynamics in own):
         return

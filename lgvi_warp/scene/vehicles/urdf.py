@@ -12,14 +12,7 @@ from lgvi_warp.scene.vehicles.robot_xml import TEMPLATES, numbers_in
 
 
 def refuse_xacro(root: Element) -> None:
-    """Refuse a file with elements of xacro, naming the first.
-
-    Args:
-        root: Root element of the file.
-
-    Raises:
-        SceneError: If the file holds such an element.
-    """
+    """Refuse a file with elements of xacro, naming the first."""
     for element in root.iter():
         if element.tag.startswith("xacro:"):
             shown = " ".join([element.tag, *(f'{key}="{value}"' for key, value in element.attrib.items())])[:80]
@@ -28,18 +21,7 @@ def refuse_xacro(root: Element) -> None:
 
 
 def read_urdf(faults: Faults, root: Element) -> tuple[dict[str, Link], list[Joint]]:
-    """Read the links and joints of a URDF file.
-
-    Args:
-        faults: Collects what is wrong.
-        root: Root element of the file.
-
-    Returns:
-        Links by name, each with its pose in the frame of the root link, and the joints.
-
-    Raises:
-        SceneError: If the file holds xacro.
-    """
+    """Read the links and joints of a URDF file."""
     refuse_xacro(root)
     links = {link.name: link for link in (read_link(faults, element) for element in root.findall("link"))}
     joints, origins = [], {}
@@ -53,15 +35,7 @@ def read_urdf(faults: Faults, root: Element) -> tuple[dict[str, Link], list[Join
 
 
 def read_link(faults: Faults, element: Element) -> Link:
-    """Read one link of a URDF file; without <inertial> it is a frame, and weighs nothing.
-
-    Args:
-        faults: Collects what is wrong.
-        element: The element <link>.
-
-    Returns:
-        The link, without its pose.
-    """
+    """Read one link of a URDF file; without <inertial> it is a frame, and weighs nothing."""
     link = Link(element.get("name", ""))
     inertial = element.find("inertial")
     if inertial is not None:
@@ -82,13 +56,7 @@ def read_link(faults: Faults, element: Element) -> Link:
 
 
 def place(faults: Faults, links: dict[str, Link], origins: dict[str, tuple[str, Pose]]) -> None:
-    """Set the pose of each link from those of the joints above it.
-
-    Args:
-        faults: Collects what is wrong.
-        links: Links by name, changed in place.
-        origins: For each link the name of its parent, and its joint's pose in the parent.
-    """
+    """Set the pose of each link from those of the joints above it."""
     for name, link in links.items():
         above, passed = name, {name}
         while above in origins:

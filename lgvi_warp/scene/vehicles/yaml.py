@@ -99,17 +99,7 @@ def vehicle_tables_from_yaml(
 
 
 def parse_yaml(source: str | os.PathLike[str]) -> Mapping[str, Any]:
-    """Parse the map in a YAML text or file.
-
-    Args:
-        source: The text itself, or the path of a file.
-
-    Returns:
-        Values by key.
-
-    Raises:
-        SceneError: If the content cannot be read or is no map.
-    """
+    """Parse the map in a YAML text or file."""
     text = fossen.read_text(source, isinstance(source, str) and ("\n" in source or ": " in source), "YAML file")
     content = yaml_text.parsed(text)
     if not isinstance(content, Mapping):
@@ -118,16 +108,7 @@ def parse_yaml(source: str | os.PathLike[str]) -> Mapping[str, Any]:
 
 
 def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str]) -> dict[str, Any]:
-    """Sort values by what their keys mean: aliases resolved, tables opened, Fossen's names gathered.
-
-    Args:
-        faults: Collects what is wrong.
-        content: Values by key, as in the file.
-        ignore: Keys to leave out.
-
-    Returns:
-        Values by meaning, such as "mass"; those under Fossen's names as a map "coefficients".
-    """
+    """Sort values by what their keys mean: aliases resolved, tables opened, Fossen's names gathered."""
     meanings = {alias: name for name, aliases in _ALIASES.items() for alias in aliases}
     read: dict[str, Any] = {}
     for key, value in content.items():
@@ -153,13 +134,7 @@ def by_meaning(faults: Faults, content: Mapping[str, Any], ignore: set[str]) -> 
 def yaml_body(faults: Faults, read: Mapping[str, Any], positions: np.ndarray) -> fossen.Coefficients:
     """Build mass, inertia, centres and forces of a body from a YAML map.
 
-    Args:
-        faults: Collects what is wrong.
-        read: Values by meaning.
-        positions: Sign of each axis (3,), to turn positions and inertia into x ahead, y to starboard, z down.
-
-    Returns:
-        The body without added mass and drag.
+    positions: Sign of each axis (3,), to turn positions and inertia into x ahead, y to starboard, z down.
     """
     inertia = read.get("inertia")
     if isinstance(inertia, Mapping):
@@ -189,15 +164,7 @@ def yaml_body(faults: Faults, read: Mapping[str, Any], positions: np.ndarray) ->
 
 
 def is_neutral(faults: Faults, read: Mapping[str, Any]) -> bool:
-    """Return whether the file declares the vehicle neutrally buoyant.
-
-    Args:
-        faults: Collects what is wrong.
-        read: Values by meaning.
-
-    Returns:
-        True if the buoyancy is to be the weight.
-    """
+    """Return whether the file declares the vehicle neutrally buoyant."""
     value = read.get("neutrally_buoyant", False)
     faults.choice("neutrally_buoyant", bool(value) if value in (0, 1) else value, (True, False))
     return bool(value)
@@ -206,15 +173,10 @@ def is_neutral(faults: Faults, read: Mapping[str, Any]) -> bool:
 def displaced_weight(faults: Faults, volume: Any, density: Any, gravity: Any, is_given: bool) -> float | None:
     """Return the weight of the displaced water.
 
-    Args:
-        faults: Collects what is wrong.
-        volume: Displaced volume [m3].
-        density: Density of the water [kg/m3].
-        gravity: Acceleration of free fall [m/s2].
-        is_given: Whether the file gives the density, without which a volume has no weight.
-
-    Returns:
-        Weight [N]; None after noting a fault.
+    volume: Displaced volume [m3].
+    density: Density of the water [kg/m3].
+    gravity: Acceleration of free fall [m/s2].
+    Returns: Weight [N]; None after noting a fault.
     """
     if not is_given:
         faults.positive("density", "not given", "kg/m3 (with volume)")
@@ -225,13 +187,8 @@ def displaced_weight(faults: Faults, volume: Any, density: Any, gravity: Any, is
 def matrix_6(faults: Faults, key: str, value: Any) -> np.ndarray:
     """Return a matrix of added mass or damping, positive on its diagonal, from either sign convention.
 
-    Args:
-        faults: Collects what is wrong.
-        key: Name of the matrix in messages.
-        value: 6x6 or 36 numbers, or the 6 of a diagonal; None if not given.
-
-    Returns:
-        The matrix (6, 6); zeros if it is not given or at fault.
+    value: 6x6 or 36 numbers, or the 6 of a diagonal; None if not given.
+    Returns: The matrix (6, 6); zeros if it is not given or at fault.
     """
     array = None if value is None else faults.finite(key, value)
     if array is None:

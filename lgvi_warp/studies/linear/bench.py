@@ -43,12 +43,11 @@ Watch = Callable[[int, Mapping[str, np.ndarray]], None]
 class Motion:
     """Motions of m members, and what they remember.
 
-    Args:
-        position: (m, 3) [m], inertial axes.
-        attitude: (m, 3, 3), body to inertial axes.
-        velocity: (m, 3) [m/s], body axes.
-        angular_velocity: (m, 3) [rad/s], body axes.
-        memory: by key of a term or a part, (m, rows); under "" that of the controller's bus.
+    position: (m, 3) [m], inertial axes.
+    attitude: (m, 3, 3), body to inertial axes.
+    velocity: (m, 3) [m/s], body axes.
+    angular_velocity: (m, 3) [rad/s], body axes.
+    memory: by key of a term or a part, (m, rows); under "" that of the controller's bus.
     """
 
     position: np.ndarray
@@ -65,11 +64,7 @@ class Motion:
     def of(self, places: np.ndarray) -> Motion:
         """Some of them.
 
-        Args:
-            places: (k,), which.
-
-        Returns:
-            k motions.
+        places: (k,), which.
         """
         memory = {key: rows[places] for key, rows in self.memory.items()}
         states: Any = {name: getattr(self, name)[places] for name in FIELDS}
@@ -78,11 +73,7 @@ class Motion:
     def moved(self, by: np.ndarray) -> Motion:
         """The motions a little beside these.
 
-        Args:
-            by: (m, 12): position [m], inertial axes; rotation vector [rad], body axes; velocity and angular velocity.
-
-        Returns:
-            m motions with the same memory.
+        by: (m, 12): position [m], inertial axes; rotation vector [rad], body axes; velocity and angular velocity.
         """
         place, turn, velocity, rate = np.split(by, 4, axis=1)
         attitude = self.attitude @ notation.matrix_from_rotation_vector(turn)
@@ -93,11 +84,7 @@ class Motion:
     def apart(self, other: Motion) -> np.ndarray:
         """How far these are beside others, in the coordinates of `moved`.
 
-        Args:
-            other: m motions, whose attitudes differ by less than a quarter turn.
-
-        Returns:
-            (m, 12).
+        Returns: (m, 12).
         """
         R = np.swapaxes(other.attitude, 1, 2) @ self.attitude
         skew = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
@@ -113,21 +100,14 @@ class Bench:
 
     Its kernel has no merged lead: what lies in its state between two launches is the motion itself.
 
-    Args:
-        fleet: the members.
-        method: as of `lw.solve`.
-        h: step [s]; None for the scene's.
-        t1: the longest run [s].
-        spacing: time between two samples [s].
-        fields: names of the samples.
+    h: step [s]; None for the scene's.
+    t1: the longest run [s].
+    spacing: time between two samples [s].
 
     Attributes:
         fleet: the members.
         plan: the plan.
         every: steps between two looks; 1 without a controller.
-
-    Raises:
-        SceneError: where the plan cannot be made, or a law is a Python function.
     """
 
     def __init__(
@@ -164,12 +144,8 @@ class Bench:
     def start(self, places: np.ndarray, numbers: Mapping[str, np.ndarray] | None = None) -> Motion:
         """The motions of members at t = 0, and what they remember before the first look.
 
-        Args:
-            places: (m,), which members.
-            numbers: Values (m, ...) by name that replace those of the members; None for none (default).
-
-        Returns:
-            m motions.
+        places: (m,), which members.
+        numbers: Values (m, ...) by name that replace those of the members; None for none (default).
         """
         packets = self._filled(places, None, numbers or {})
         start = packets.members
@@ -189,16 +165,11 @@ class Bench:
     ) -> Motion:
         """Make the steps from k0 to k1.
 
-        Args:
-            places: (m,), which members.
-            motion: their motions after the look at step k0; None for their own at t = 0, with k0 = 0.
-            k0: number of steps made before; above 0 with a motion.
-            k1: number of steps made after.
-            numbers: Values (m, ...) by name that replace those of the members; None for none (default).
-            watch: called with the step of each sample and the sample; None for nobody (default).
-
-        Returns:
-            The motions after k1 steps, and what is remembered after a look at them. Where a member failed it is NaN.
+        places: (m,), which members.
+        motion: their motions after the look at step k0; None for their own at t = 0, with k0 = 0.
+        numbers: Values (m, ...) by name that replace those of the members; None for none (default).
+        watch: called with the step of each sample and the sample; None for nobody (default).
+        Returns: The motions after k1 steps, and what is remembered after a look at them. Where a member failed it is NaN.
         """
         plan, m = self.plan, len(places)
         packets = self._filled(places, motion, numbers or {})
@@ -254,15 +225,7 @@ class Bench:
 
 
 def calm(scene: Any, what: str) -> None:
-    """Refuse a scene in which something acts by chance or in waves: no motion of it is steady.
-
-    Args:
-        scene: the scene.
-        what: what is asked for.
-
-    Raises:
-        SceneError: where a term is noise or waves.
-    """
+    """Refuse a scene in which something acts by chance or in waves: no motion of it is steady."""
     for term in scene.terms:
         if isinstance(term, NoisyTerm | Waves):
             raise refusal(
@@ -273,13 +236,7 @@ def calm(scene: Any, what: str) -> None:
 def plant(scene: Scene, period: float, extra: Sequence[Any] = ()) -> Scene:
     """A scene whose actuators hold what they are commanded: no law acts on them.
 
-    Args:
-        scene: the scene; its controller is left out.
-        period: time between two commands [s].
-        extra: actuators beside those of the scene; none by default.
-
-    Returns:
-        The scene; without actuators it has no controller.
+    period: time between two commands [s].
     """
     terms = [*scene.terms, *extra]
     able = [term for term in terms if term.channels and not term.own_commands]

@@ -16,13 +16,7 @@ STEP = 1e-5
 
 @dataclass(frozen=True)
 class Row:
-    """A number that is remembered.
-
-    Args:
-        key: of whose memory it is, as of `Motion`.
-        row: which of its rows.
-        name: its name among the states.
-    """
+    """A number that is remembered."""
 
     key: str
     row: int
@@ -30,14 +24,7 @@ class Row:
 
 
 def names_of(rows: Sequence[Row]) -> tuple[str, ...]:
-    """Names of the states: the motion, then what is remembered.
-
-    Args:
-        rows: what is remembered.
-
-    Returns:
-        12 + len(rows) names.
-    """
+    """Names of the states: the motion, then what is remembered."""
     return (*COORDINATES, *(row.name for row in rows))
 
 
@@ -56,20 +43,9 @@ def differences(
 ) -> np.ndarray:
     """Derivatives of the motion and the memory after some steps, by those before.
 
-    Args:
-        bench: what makes the steps.
-        places: (n,), which members.
-        about: their n motions.
-        k0: number of steps made before, above 0.
-        steps: number of steps.
-        moved: rows of the memory by which it is derived.
-        seen: rows that are derived; none by default. Both may be the same.
-        motion: whether it is derived by the motion too (default True).
-        numbers: values (n, ...) by name that replace those of the members; None for none (default).
-        step: half a difference of numbers up to 1, and its ratio to larger ones (default 1e-5).
-
-    Returns:
-        (n, 12 + seen, 12 + moved), or (n, 12 + seen, moved) without the motion. NaN where a copy of a member failed.
+    places: (n,), which members.
+    numbers: values (n, ...) by name that replace those of the members; None for none (default).
+    Returns: (n, 12 + seen, 12 + moved), or (n, 12 + seen, moved) without the motion. NaN where a copy of a member failed.
     """
     count = 12 * motion + len(moved)
     parts = []

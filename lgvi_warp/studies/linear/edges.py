@@ -19,16 +19,10 @@ def edges(
     Brackets grow from the guess by steps that double, and are then halved: both in the distance from the start for whole
     numbers, in the logarithm else.
 
-    Args:
-        holds: asks members at values.
-        start: (n,), where it holds; NaN for members that are not asked.
-        last: (n,), the farthest values asked, above or below the start.
-        guess: (n,), where the edge may be; NaN or infinite where nobody knows.
-        narrow: width of the brackets at the end: of the logarithm, or in whole numbers.
-        whole: whether values are whole numbers (default False).
-
-    Returns:
-        (n, 2): the value nearest to the edge where it holds, and where it does not; infinite or 0 (as `last` is above or
+    start: (n,), where it holds; NaN for members that are not asked.
+    last: (n,), the farthest values asked, above or below the start.
+    guess: (n,), where the edge may be; NaN or infinite where nobody knows.
+    Returns: (n, 2): the value nearest to the edge where it holds, and where it does not; infinite or 0 (as `last` is above or
         below) where it holds at the last one.
     """
     forward, backward = (lambda v: v, lambda v: v) if whole else (np.log, np.exp)

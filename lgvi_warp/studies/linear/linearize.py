@@ -240,15 +240,7 @@ def _closed_model(scene: Scene, time: float, method: Any, h: float, step: float)
 
 
 def command_rows(bench: Bench, row: int) -> tuple[int, ...]:
-    """Rows of the bus by which a command acts during a period.
-
-    Args:
-        bench: whose bus it is.
-        row: its first row.
-
-    Returns:
-        The row itself; with a delay those of the command that acts and of the one before.
-    """
+    """Rows of the bus by which a command acts during a period."""
     bus: Any = bench.bus
     return (bus.acting + row, bus.acting + bus.channels + row) if bus.delayed else (row,)
 
@@ -258,13 +250,7 @@ def loop_rows(bench: Bench, memory: Mapping[str, np.ndarray], look: int) -> tupl
 
     What looks note of themselves is left out, and what was not delivered: only its sign counts, for integrals that wait.
 
-    Args:
-        bench: the loop.
-        memory: as of `Motion`.
-        look: number of the look, by which the ring of delayed commands is turned.
-
-    Returns:
-        (rows, rows a look later), in the same order.
+    Returns: (rows, rows a look later), in the same order.
     """
     bus: Any = bench.bus
     names = [f"{key}.command[{i}]" for key, (_, count) in bus.commands.items() for i in range(count)]
@@ -286,16 +272,7 @@ def loop_rows(bench: Bench, memory: Mapping[str, np.ndarray], look: int) -> tupl
 
 
 def remembered(bench: Bench, memory: Mapping[str, np.ndarray], terms: bool) -> list[Row]:
-    """What is remembered beside the commands.
-
-    Args:
-        bench: by whom.
-        memory: as of `Motion`.
-        terms: whether of terms, else of the parts of the controller.
-
-    Returns:
-        Rows, in order.
-    """
+    """What is remembered beside the commands."""
     choice = bench.plan.kernel_choice
     each = (term for term, _ in (choice.laws if terms else choice.parts_of_control) if term.key in memory)
     rows = []
@@ -313,14 +290,7 @@ RANDOM = ("noise", "drift")
 def check_parts(controller: Any, what: str, refused: Collection[str] | None = None) -> None:
     """Refuse parts of a controller that no linear model of one period has, or that let no motion be steady.
 
-    Args:
-        controller: the controller.
-        what: who needs it.
-        refused: numbers of sensors that are refused; None (default) for all but the bias, of which there is no linear model.
-
-    Raises:
-        SceneError: where a sensor has such a number: draws random numbers, rounds, is late or reads at some looks only. All
-            are named.
+    refused: numbers of sensors that are refused; None (default) for all but the bias, of which there is no linear model.
     """
     problem = (
         f"lets no motion be steady, as {what} need it"
@@ -340,11 +310,7 @@ def check_parts(controller: Any, what: str, refused: Collection[str] | None = No
 def read(A: np.ndarray) -> np.ndarray:
     """States that something depends on, those of the motion always; the others decay within a look.
 
-    Args:
-        A: (n, n).
-
-    Returns:
-        Their numbers, rising.
+    A: (n, n).
     """
     keep = np.arange(len(A))
     while True:

@@ -40,15 +40,12 @@ LEAST_LOOKS = 30
 class Study:
     """Members whose factor and delay are their own.
 
-    Args:
-        fleet: the members.
-        loop: key of the law; None for all laws.
-        about: time after which loops are looked at [s].
-        settle: longest time after which those are that settle later [s].
-        seconds: length of the runs [s].
-        tilt: angle by which runs begin aside [rad].
-        method: as of `lw.solve`.
-        h: step [s].
+    loop: key of the law; None for all laws.
+    about: time after which loops are looked at [s].
+    settle: longest time after which those are that settle later [s].
+    seconds: length of the runs [s].
+    tilt: angle by which runs begin aside [rad].
+    h: step [s].
 
     Attributes:
         period: time between two looks [s].
@@ -90,11 +87,9 @@ class Study:
 
         Those whose motion does not repeat after `about`, or that are at a limit, go on for twice the time, and again.
 
-        Args:
-            places: (n,), which members.
-
-        Returns:
-            Loops of the members that settle, those after the same time together; and (n,), why others do not, "" for these.
+        places: (n,), which members.
+        Returns: Loops of the members that settle, those after the same time together; and (n,), why others do not, "" for
+            these.
         """
         bench, n, found = self.bench, len(places), list[Loops]()
         own = self.fleet.subset(places).parameters(0, n)
@@ -137,14 +132,7 @@ class Study:
 
 
 def held(controller: Any) -> frozenset[str]:
-    """What laws follow and a set-point holds: where it runs away beyond a limit of a law, all else may repeat.
-
-    Args:
-        controller: The controller, wired.
-
-    Returns:
-        Names among "depth", "heading" and "position".
-    """
+    """What laws follow and a set-point holds: where it runs away beyond a limit of a law, all else may repeat."""
     given = {wish: part for part in controller.guidance for wish in part.gives}
     wishes = {wish for law in controller.laws for wish in law.needs if isinstance(given.get(wish), SetPoint)}
     return frozenset(wishes & {"depth", "heading", "position"} | ({"heading"} if "attitude" in wishes else set()))
@@ -173,12 +161,7 @@ def _commands(told: np.ndarray, limits: np.ndarray) -> np.ndarray:
 def at_limit(command: np.ndarray, limits: np.ndarray) -> np.ndarray:
     """Which commands (m, channels) are at their limits: not those that can be nothing but 0.
 
-    Args:
-        command: the commands.
-        limits: the largest ones.
-
-    Returns:
-        (m, channels).
+    Returns: (m, channels).
     """
     return np.asarray((limits > 0.0) & (np.abs(command) >= limits * (1.0 - AT_LIMIT)))
 
@@ -195,14 +178,10 @@ def _apart(told: np.ndarray, other: np.ndarray, limits: np.ndarray) -> np.ndarra
 class Loops:
     """Loops at their steady motions, to be asked whether they settle with other numbers.
 
-    Args:
-        study: the members.
-        places: (n,), which of them.
-        delay: (n,), their own delays, in steps.
-        limits: (n, channels), the largest commands.
-        motion: their motions.
-        told: (n, ...), what repeats of these, as `_told` has it.
-        begin: steps made until then.
+    places: (n,), which of them.
+    delay: (n,), their own delays, in steps.
+    limits: (n, channels), the largest commands.
+    told: (n, ...), what repeats of these, as `_told` has it.
     """
 
     def __init__(
@@ -221,8 +200,7 @@ class Loops:
     def return_to_it(self) -> np.ndarray:
         """Whether loops as they are come back to their motions, by a run.
 
-        Returns:
-            (n,).
+        Returns: (n,).
         """
         every = np.arange(len(self.places))
         well, last = self._judged(np.ones(len(every)), self.delay, every)
@@ -232,13 +210,10 @@ class Loops:
     def settle(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> np.ndarray:
         """Whether loops settle, by a run.
 
-        Args:
-            factor: (m,), factors on the demand.
-            steps: (m,), delays in steps.
-            some: (m,), which of the members.
-
-        Returns:
-            (m,).
+        factor: (m,), factors on the demand.
+        steps: (m,), delays in steps.
+        some: (m,), which of the members.
+        Returns: (m,).
         """
         return self._judged(factor, steps, some)[0]
 
@@ -297,12 +272,9 @@ def _aside(attitude: np.ndarray, other: np.ndarray, heading: bool) -> np.ndarray
 def shrinks(swing: np.ndarray, tilt: float) -> tuple[np.ndarray, np.ndarray]:
     """Whether what swings settles.
 
-    Args:
-        swing: (3, m), how far in each third of a run.
-        tilt: the angle by which the run began aside [rad].
-
-    Returns:
-        ((m,) whether it settles, (m,) whether a longer run tells more: near the edge, or where slower modes are left).
+    swing: (3, m), how far in each third of a run.
+    tilt: the angle by which the run began aside [rad].
+    Returns: ((m,) whether it settles, (m,) whether a longer run tells more: near the edge, or where slower modes are left).
     """
     first, second, last = swing
     still = last <= SETTLED * tilt

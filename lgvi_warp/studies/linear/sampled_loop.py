@@ -26,14 +26,7 @@ NEUTRAL = 1e-3
 def delayed(bench: Bench, motion: Motion, k: int, steps: np.ndarray) -> Motion:
     """The motions as after a look at a steady motion, with a delay.
 
-    Args:
-        bench: the members.
-        motion: their motions.
-        k: number of steps made.
-        steps: (m,) delay, in steps.
-
-    Returns:
-        The same motions; all commands that are on their way are the last ones.
+    steps: (m,) delay, in steps.
     """
     bus: Any = bench.bus
     memory = {key: rows.copy() for key, rows in motion.memory.items()}
@@ -50,11 +43,7 @@ class SampledLoop:
 
     u' is affine in the factor. P, Q1, Q0 for each delay within a period, and what the look does, are differences in lanes.
 
-    Args:
-        bench: members whose factor and delay are by member, and whose commands may be delayed.
-        places: (n,), which members.
-        motion: their n motions.
-        k: number of steps made, at a look.
+    places: (n,), which members.
 
     Attributes:
         every: steps between two looks.
@@ -137,13 +126,11 @@ class SampledLoop:
     def stable(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> np.ndarray:
         """Whether loops settle.
 
-        Args:
-            factor: (m,), factors on the demand.
-            steps: (m,), delays in steps.
-            some: (m,), which of the members.
-
-        Returns:
-            (m,): whether all eigenvalues are within the unit circle, of what laws see; and what they do not see does not grow.
+        factor: (m,), factors on the demand.
+        steps: (m,), delays in steps.
+        some: (m,), which of the members.
+        Returns: (m,): whether all eigenvalues are within the unit circle, of what laws see; and what they do not see does not
+            grow.
         """
         answer = np.zeros(len(some), bool)
         for q in np.unique(steps // self.every):

@@ -128,15 +128,8 @@ def trim(
 def step_of(scene: Any, h: float | None) -> float:
     """The step of a study.
 
-    Args:
-        scene: the scene.
-        h: the step that is asked for [s]; None for the scene's.
-
-    Returns:
-        The step [s].
-
-    Raises:
-        SceneError: where there is none.
+    h: the step that is asked for [s]; None for the scene's.
+    Returns: The step [s].
     """
     faults, step = Faults(), scene.run.step if h is None else h
     if step is None:

@@ -136,16 +136,7 @@ def search(cost: Cost, d: int, most: int, seed: int, restarts: int, good_enough:
     Evolution (Storn & Price 1997) several times, each from other places; then all corners where they are few; then a walk
     along the axes from the best place, with steps that shrink where none is better.
 
-    Args:
-        cost: cost of candidates.
-        d: number of dimensions.
-        most: number of candidates that may be asked, as many as a generation or more.
-        seed: seed of the random numbers.
-        restarts: number of evolutions, at least 1.
-        good_enough: cost at which the search ends (default: never).
-
-    Returns:
-        The best candidate.
+    good_enough: cost at which the search ends (default: never).
     """
     from scipy.optimize import differential_evolution
     from scipy.stats import qmc

@@ -21,19 +21,11 @@ from lgvi_warp.studies.sweeps.setup import metric_of
 class Numbers:
     """A prepared run that returns one number of each member: NaN for those that fail, and where a quantity is not finite.
 
-    Args:
-        scene: the scene of every member.
-        names: names of the columns of a call; None where members are given as states.
-        key: name of the argument that says what the number is, for messages.
-        of: a quantity of interest, as of `prepare`; or a metric, as "iae depth", an object or a table.
-        settings: further arguments of `prepare`.
+    names: names of the columns of a call; None where members are given as states.
 
     Attributes:
         label: what the number is called.
         of_metric: whether it is a metric.
-
-    Raises:
-        SceneError: an argument is at fault.
     """
 
     def __init__(self, scene: Scene, names: list[str] | None, key: str, of: Any, settings: Mapping[str, Any]):
@@ -50,14 +42,7 @@ class Numbers:
     def __call__(self, call: Callable[[Prepared], Any]) -> np.ndarray:
         """Run members.
 
-        Args:
-            call: calls the prepared run.
-
-        Returns:
-            (n,); a metric may be infinite, as a settling time is where a member never settles.
-
-        Raises:
-            SceneError: members have several numbers each.
+        Returns: (n,); a metric may be infinite, as a settling time is where a member never settles.
         """
         answer = call(self.run)
         if self.of_metric:

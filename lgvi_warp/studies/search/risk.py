@@ -34,11 +34,8 @@ class CVaR:
     def __call__(self, costs: np.ndarray) -> np.ndarray:
         """The risk.
 
-        Args:
-            costs: (k, members).
-
-        Returns:
-            (k,); infinite where a member of the worst part has an infinite cost.
+        costs: (k, members).
+        Returns: (k,); infinite where a member of the worst part has an infinite cost.
         """
         n = costs.shape[1]
         worst = -np.sort(-costs, axis=1)
@@ -73,12 +70,8 @@ class _Quantile:
 def risk_of(faults: Faults, given: Any) -> Any:
     """Read a risk.
 
-    Args:
-        faults: Collects the faults.
-        given: "mean", the level of a quantile in (0, 1), or a `CVaR`.
-
-    Returns:
-        The risk, a function of costs (k, members); the mean where it is at fault.
+    given: "mean", the level of a quantile in (0, 1), or a `CVaR`.
+    Returns: The risk, a function of costs (k, members); the mean where it is at fault.
     """
     if isinstance(given, CVaR):
         return given

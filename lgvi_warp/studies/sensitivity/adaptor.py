@@ -101,18 +101,10 @@ class ScalarModel:
     def __call__(self, X: Any, *, seed: int | None = None, indices: Any = None) -> np.ndarray:
         """Run members with these numbers and return their quantities; row i always has the same noise, if not told otherwise.
 
-        Args:
-            X: (n, d), columns in the order of `names`; or by name, in any order: a data frame, a mapping of columns, a
-                structured array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3).
-            seed: seed of the noise, as of a run that `lw.prepare` made; default 0.
-            indices: (n,), whose noise each row has, as of such a run. Default None for 0 to n - 1.
-
-        Returns:
-            Y (n,), or (n, m) of several numbers: SALib's shape.
-
-        Raises:
-            SceneError: for labels that are missing, unknown or doubled, and for what is no real number.
-            FailedMembers: with failed="refuse", where members failed.
+        X: (n, d), columns in the order of `names`; or by name, in any order: a data frame, a mapping of columns, a structured
+            array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3).
+        indices: (n,), whose noise each row has, as of such a run. Default None for 0 to n - 1.
+        Returns: Y (n,), or (n, m) of several numbers: SALib's shape.
         """
         return np.asarray(self._prepared(X, seed=seed, indices=indices, progress=self._progress))
 
@@ -172,14 +164,7 @@ class _Column:
 
 
 def entries_of(one: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarray]]]:
-    """List the distributions of the single entries of a variation.
-
-    Args:
-        one: the variation.
-
-    Returns:
-        (distribution, the scene's value, the distribution's numbers) of each entry.
-    """
+    """List the distributions of the single entries of a variation."""
     (base,) = one.bases
     distribution = one.distribution
     numbers = {name: np.broadcast_to(value, base.shape).reshape(-1)
@@ -192,13 +177,7 @@ def entries_of(one: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarray]]]:
 def salib_distribution(distribution: Any, base: Any, numbers: Mapping[str, Any]) -> tuple[str, list[float]] | None:
     """Translate a distribution to SALib's (name, bounds).
 
-    Args:
-        distribution: the distribution.
-        base: the scene's value.
-        numbers: the distribution's numbers by name.
-
-    Returns:
-        Name and bounds; None where SALib has none for it.
+    Returns: Name and bounds; None where SALib has none for it.
     """
     base = float(base)
     mean = float(numbers.get("mean", base))

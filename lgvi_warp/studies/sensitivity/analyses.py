@@ -255,14 +255,7 @@ def _common(
 def check_settings(samples: Any, confidence: Any, failed: Any, resamples: Any = 2) -> None:
     """Refuse settings of an analysis that are at fault.
 
-    Args:
-        samples: number of groups or paths, at least 2.
-        confidence: level of the intervals, between 0 and 1.
-        failed: "refuse" or "drop".
-        resamples: number of the bootstrap's resamples, at least 2; default: none are drawn.
-
-    Raises:
-        SceneError: with every fault.
+    resamples: number of the bootstrap's resamples, at least 2; default: none are drawn.
     """
     faults = Faults()
     for name, value in (("samples", samples), ("resamples", resamples)):
@@ -278,18 +271,8 @@ def check_settings(samples: Any, confidence: Any, failed: Any, resamples: Any = 
 def designed(scene: Any, vary: Any, seed: int | None, design: Sampling, samples: int) -> Ensemble:
     """Build the ensemble of a design with this number of groups.
 
-    Args:
-        scene: a Scene or an Ensemble.
-        vary: name -> distribution; None for those of the scene.
-        seed: of the design; None for that of the scene.
-        design: the design.
-        samples: number of its groups.
-
-    Returns:
-        The ensemble.
-
-    Raises:
-        SceneError: it is neither a Scene nor an Ensemble.
+    vary: name -> distribution; None for those of the scene.
+    seed: of the design; None for that of the scene.
     """
     if isinstance(scene, Ensemble):
         scene, known, known_seed = scene.scene, scene.vary, scene.seed
@@ -304,11 +287,7 @@ def designed(scene: Any, vary: Any, seed: int | None, design: Sampling, samples:
 
 
 def salib() -> Callable[..., Any]:
-    """SALib's analysis of Morris' design.
-
-    Raises:
-        ImportError: SALib is not installed; the message names the extra.
-    """
+    """SALib's analysis of Morris' design."""
     try:
         from SALib.analyze.morris import analyze
     except ImportError as error:
@@ -332,16 +311,7 @@ def _good_rows(outputs: Outputs, group: int, failed: str) -> np.ndarray:
 def whole_groups(outputs: Outputs, group: int, failed: str) -> tuple[np.ndarray, list[str]]:
     """Select the quantities of groups without a failure; write messages about the other groups.
 
-    Args:
-        outputs: quantities of the members.
-        group: number of members of a group.
-        failed: "refuse" or "drop".
-
-    Returns:
-        (quantities, messages).
-
-    Raises:
-        FailedMembers: where members failed and too few groups are left.
+    Returns: (quantities, messages).
     """
     kept = _good_rows(outputs, group, failed)
     messages = []
@@ -359,13 +329,7 @@ def whole_groups(outputs: Outputs, group: int, failed: str) -> tuple[np.ndarray,
 def varying(Y: np.ndarray, labels: Sequence[str], messages: list[str]) -> list[int]:
     """List the quantities that vary; write messages about those that do not.
 
-    Args:
-        Y: the quantities (n, m).
-        labels: their names.
-        messages: to which messages are added.
-
-    Returns:
-        Columns of those that vary.
+    Y: the quantities (n, m).
     """
     constant = np.ptp(Y, axis=0) <= CONSTANT * np.abs(Y).max(axis=0)
     messages += [f"{labels[int(q)]} does not vary: it has no indices" for q in np.flatnonzero(constant)]

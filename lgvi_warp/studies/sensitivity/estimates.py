@@ -30,11 +30,8 @@ def sobol_estimates(Y: np.ndarray, replicate: np.ndarray, second_order: bool, co
 
     Intervals are Student's t of the replicates' linearised ratios: points of one sequence are not independent, scrambles are.
 
-    Args:
-        Y: (N, group size), the quantity in the order of the design: A, A with each factor of B, B with each of A, and B.
-        replicate: (N,), from which scramble each group is.
-        second_order: whether the groups have B with each factor of A.
-        confidence: level of the intervals, between 0 and 1.
+    Y: (N, group size), the quantity in the order of the design: A, A with each factor of B, B with each of A, and B.
+    replicate: (N,), from which scramble each group is.
     """
     y = Y - Y.mean()
     d = (y.shape[1] - 2) // (2 if second_order else 1)

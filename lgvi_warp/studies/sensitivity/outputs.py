@@ -29,14 +29,7 @@ R = TypeVar("R")
 
 
 def known_arguments(**gone: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Refuse arguments that neither the function nor its runs have, by the function's own name.
-
-    Args:
-        gone: name of an argument that it had once -> what to give now.
-
-    Returns:
-        A decorator.
-    """
+    """Refuse arguments that neither the function nor its runs have, by the function's own name."""
 
     def decorated(function: Callable[P, R]) -> Callable[P, R]:
         named = [p.name for p in inspect.signature(function).parameters.values() if p.kind is not p.VAR_KEYWORD]

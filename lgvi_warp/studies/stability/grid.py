@@ -58,17 +58,7 @@ class Axis:
 
     @classmethod
     def parse(cls, text: str) -> Axis:
-        """Read an axis from a text.
-
-        Args:
-            text: such as "h", "h=0.01:3", "vehicle.mass=50:500:linear" or "vehicle.inertia=0.1:10:log:scale".
-
-        Returns:
-            The axis.
-
-        Raises:
-            SceneError: where the text has another form.
-        """
+        """Read an axis from a text."""
         name, equals, rest = str(text).partition("=")
         faults, words = Faults(), rest.split(":") if equals else []
         low, high, log, scaled = None, None, True, None
@@ -95,11 +85,7 @@ class Axis:
     def values(self, points: int) -> np.ndarray:
         """Compute the values along the axis, whose range must be known.
 
-        Args:
-            points: number of values.
-
-        Returns:
-            Values from low to high (points,), in the unit of the axis.
+        Returns: Values from low to high (points,), in the unit of the axis.
         """
         assert self.low is not None and self.high is not None
         return np.geomspace(self.low, self.high, points) if self.log else np.linspace(self.low, self.high, points)
@@ -124,37 +110,19 @@ class Line:
     values: np.ndarray
 
     def to_dict(self) -> dict[str, Any]:
-        """Convert the axis to plain types for JSON.
-
-        Returns:
-            All fields; values as a list.
-        """
+        """Convert the axis to plain types for JSON."""
         return vars(self) | {"values": self.values.tolist()}
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Line:
-        """Build an axis from the content of a JSON file.
-
-        Args:
-            content: as `to_dict` returns it.
-
-        Returns:
-            The axis.
-        """
+        """Build an axis from the content of a JSON file."""
         return cls(**content | {"values": np.asarray(content["values"], dtype=np.float64)})
 
 
 def axis_of(given: Any) -> Axis:
     """Convert a user's description to an Axis.
 
-    Args:
-        given: an Axis, a text for Axis.parse, or (name, low, high).
-
-    Returns:
-        The axis.
-
-    Raises:
-        SceneError: for a text that is no axis.
+    given: an Axis, a text for Axis.parse, or (name, low, high).
     """
     if isinstance(given, Axis):
         return given
@@ -169,14 +137,8 @@ class StabilityGrid:
     Members are numbered (y, x, direction), the last fastest. The first direction is the scene's own start; the others are
     turned at random. What the scene's ensemble varies is left out.
 
-    Args:
-        scene: the scene.
-        x: horizontal axis, in any form that `axis_of` takes.
-        y: vertical axis, likewise.
-        points: number of cells (nx, ny).
-        directions: number of starts of each cell.
-        seed: of the random turns.
-        h: the step, where it is on no axis [s]; None for run.step of the scene.
+    points: number of cells (nx, ny).
+    h: the step, where it is on no axis [s]; None for run.step of the scene.
 
     Attributes:
         scene: the scene without its ensemble.
@@ -190,9 +152,6 @@ class StabilityGrid:
         varied: name -> values of the parameters that differ between members, with leading dimension n.
         direction: name -> unit vectors (n, 3) of velocity and angular velocity, body axes.
         h: step of every member (n,) [s].
-
-    Raises:
-        SceneError: for faulty arguments, all in one message.
     """
 
     def __init__(
@@ -281,14 +240,7 @@ class StabilityGrid:
         return (0.1 * value, 10.0 * value) if value > 0.0 else (None, None)
 
     def scaled(self, axis: Axis) -> bool:
-        """Tell whether a parameter is multiplied by the values of an axis.
-
-        Args:
-            axis: one of the map's.
-
-        Returns:
-            True if it is multiplied, False if it is set or no parameter.
-        """
+        """Tell whether a parameter is multiplied by the values of an axis."""
         if axis.key in SPECIAL:
             return False
         return bool(self.base.parameters[axis.key][0].ndim) if axis.scaled is None else axis.scaled
@@ -296,12 +248,7 @@ class StabilityGrid:
     def line(self, axis: Axis, values: np.ndarray) -> Line:
         """Describe an axis as a finished map has it.
 
-        Args:
-            axis: one of the map's.
-            values: its values (k,).
-
-        Returns:
-            The axis with label, unit and values.
+        values: its values (k,).
         """
         if axis.key in SPECIAL:
             unit, label = SPECIAL[axis.key]
@@ -381,11 +328,8 @@ class StabilityGrid:
     def parameters(self, members: np.ndarray) -> dict[str, np.ndarray]:
         """Collect all parameters of some members.
 
-        Args:
-            members: their indices (k,).
-
-        Returns:
-            Name -> values with leading dimension k, or 1 where members share them [the scene's units].
+        members: their indices (k,).
+        Returns: Name -> values with leading dimension k, or 1 where members share them [the scene's units].
         """
         return {name: self.varied[name][members] if name in self.varied else value
                 for name, value in self.base.parameters.items()}  # fmt: skip
@@ -393,14 +337,7 @@ class StabilityGrid:
     def fleet(self, members: np.ndarray) -> Ensemble:
         """Build an ensemble of some members.
 
-        Args:
-            members: their indices (k,).
-
-        Returns:
-            The ensemble, of explicit states.
-
-        Raises:
-            SceneError: for unphysical values.
+        members: their indices (k,).
         """
         b, R, nu, Om = (self.state[name][members] for name in FIELDS)
         varied = {name: value[members] for name, value in self.varied.items()}
@@ -409,8 +346,7 @@ class StabilityGrid:
     def rates(self) -> dict[str, np.ndarray]:
         """Compute how fast every member moves at its start.
 
-        Returns:
-            Names of studies.stability.limits.LIMITS -> rate (n,) [rad/s or 1/s].
+        Returns: Names of studies.stability.limits.LIMITS -> rate (n,) [rad/s or 1/s].
         """
         every = np.arange(len(self.h))
         return member_rates.rates(self.parameters(every), self.state["velocity"], self.state["angular_velocity"])
@@ -418,8 +354,7 @@ class StabilityGrid:
     def columns(self) -> list[tuple[float, np.ndarray]]:
         """Group the members by their step.
 
-        Returns:
-            (h [s], indices of the members that take it) of each step, the shortest first.
+        Returns: (h [s], indices of the members that take it) of each step, the shortest first.
         """
         steps, step_index = np.unique(self.h, return_inverse=True)
         return [(float(h), np.flatnonzero(step_index == i)) for i, h in enumerate(steps)]
@@ -428,12 +363,7 @@ class StabilityGrid:
 def rotation_vectors(rng: np.random.Generator, n: int) -> np.ndarray:
     """Draw the rotation vectors of uniformly random attitudes; the first is zero.
 
-    Args:
-        rng: generator of the draws.
-        n: number of attitudes.
-
-    Returns:
-        Rotation vectors (n, 3) [rad].
+    Returns: Rotation vectors (n, 3) [rad].
     """
     q = rng.normal(size=(n, 4))
     q /= np.linalg.norm(q, axis=1, keepdims=True)

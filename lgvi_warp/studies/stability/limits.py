@@ -47,12 +47,7 @@ def oscillation_limit(name: str, kind: str = "munk") -> float:
     For sub-maps it follows from the product of shears that a step is, for explicit methods from the stability polynomial
     at i h w. Large amplitudes may tumble earlier.
 
-    Args:
-        name: of the method.
-        kind: "munk" or "restoring". Default "munk".
-
-    Returns:
-        The limit [rad]; infinite without one; NaN for gauss*, which end where their iteration does.
+    Returns: The limit [rad]; infinite without one; NaN for gauss*, which end where their iteration does.
     """
     method, numbers = Method(name), np.arange(STEP, MOST, STEP)
     if method.gauss:
@@ -77,11 +72,7 @@ def rotation_limit(name: str) -> float:
     It is |J^-1 a| = 1 for equation (24), half an angle of 1 for turns about axes, and for rk* the step at which the
     numbers of R grow.
 
-    Args:
-        name: of the method.
-
-    Returns:
-        The limit [rad]; infinite for Runge-Kutta methods on the rotation group; NaN for gauss*.
+    Returns: The limit [rad]; infinite for Runge-Kutta methods on the rotation group; NaN for gauss*.
     """
     method = Method(name)
     if method.tableau:

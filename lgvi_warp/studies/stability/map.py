@@ -251,14 +251,7 @@ def _array(values: Any, kind: Any) -> np.ndarray:
 
 
 def status_name(code: int) -> str:
-    """Name a status code of the map.
-
-    Args:
-        code: of Status, or 255 for a refused cell.
-
-    Returns:
-        Name in small letters, or "refused".
-    """
+    """Name a status code of the map."""
     return "refused" if code == REFUSED else Status(code).name.lower()
 
 
@@ -405,12 +398,8 @@ def worst_status(grid: StabilityGrid, status: np.ndarray) -> np.ndarray:
 
     Refusals by the program come first, then failures, events and OK.
 
-    Args:
-        grid: The map's grid.
-        status: Status of each start (members,).
-
-    Returns:
-        Status of each cell (ny, nx).
+    status: Status of each start (members,).
+    Returns: Status of each cell (ny, nx).
     """
     rank = np.where(stopped(status), status - 500, np.where(status == Status.OK, -1000, status)).reshape(grid.shape)
     chosen = np.argmax(rank, axis=2)[:, :, None]
@@ -420,14 +409,8 @@ def worst_status(grid: StabilityGrid, status: np.ndarray) -> np.ndarray:
 def cells_of(one: Found, verified: np.ndarray, error: float, energy_bound: float) -> np.ndarray:
     """Classify every member of a method's runs.
 
-    Args:
-        one: what the runs showed.
-        verified: whether each member's reference is good enough (n,).
-        error: largest error of an accurate member [unit of the quantity].
-        energy_bound: largest growth of energy of a bounded member [1].
-
-    Returns:
-        Cell codes (n,).
+    verified: whether each member's reference is good enough (n,).
+    Returns: Cell codes (n,).
     """
     unbounded = ~(one.growth / energy_bound <= 1.0)
     flagged = one.warned | failed(one.status)
@@ -460,14 +443,7 @@ def _provenance(
 
 
 def report_text(found: StabilityMap) -> str:
-    """Write the map as a text of several lines.
-
-    Args:
-        found: the map.
-
-    Returns:
-        Messages, axes, bounds, reference, and a table of cells by class for each method.
-    """
+    """Write the map as a text of several lines."""
     unit = found.unit
     lines = [f"note        {message}" for message in found.messages]
     lines += [

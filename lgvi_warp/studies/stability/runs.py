@@ -82,12 +82,7 @@ class Column:
     def grid(self, finer: int = 1, whole: bool = True) -> TimeGrid:
         """Make the steps and sample times of a run.
 
-        Args:
-            finer: factor by which h is divided. Default 1.
-            whole: whether to sample the whole run, or at the error steps alone. Default True.
-
-        Returns:
-            The steps and the times [s].
+        Returns: The steps and the times [s].
         """
         steps = self.steps if whole else self.error_steps
         return TimeGrid(self.h / finer, steps * finer, steps * self.h)
@@ -96,15 +91,10 @@ class Column:
 def column(h: float, members: np.ndarray, error_time: float, t1: float, least: int = 1) -> Column:
     """Make the column of the members that share a step, with both times rounded up to whole steps.
 
-    Args:
-        h: the step [s].
-        members: their indices (k,).
-        error_time: time up to which errors count [s].
-        t1: time up to which energies count [s].
-        least: least number of steps. Default 1.
-
-    Returns:
-        The column, without a reference.
+    h: the step [s].
+    members: their indices (k,).
+    error_time: time up to which errors count [s].
+    t1: time up to which energies count [s].
     """
     short, long = (max(least, math.ceil(t / h * (1.0 - 1e-12))) for t in (error_time, t1))
     errors = np.unique(np.linspace(0, short, ERROR_SAMPLES + 1).round().astype(np.int64))
@@ -115,36 +105,12 @@ def column(h: float, members: np.ndarray, error_time: float, t1: float, least: i
 def plan_of(
     grid: StabilityGrid, members: np.ndarray, method: str, times: TimeGrid, dtype: str, checks: str = "safe"
 ) -> Plan:
-    """Make the plan of a run of some members.
-
-    Args:
-        grid: cells of the map.
-        members: their indices.
-        method: name of the method.
-        times: steps and sample times.
-        dtype: precision.
-        checks: "safe" (default), or "all" for warnings as well.
-
-    Returns:
-        The plan.
-
-    Raises:
-        SceneError: where the method cannot make the run.
-    """
+    """Make the plan of a run of some members."""
     return Plan(grid.fleet(members), Method(method), times, FIELDS, dtype, checks=checks)
 
 
 def refusals(grid: StabilityGrid, names: Sequence[str], dtype: str) -> dict[str, str]:
-    """Find the methods that the scene does not take at any step.
-
-    Args:
-        grid: cells of the map.
-        names: of the methods.
-        dtype: precision.
-
-    Returns:
-        Name of the method -> reason.
-    """
+    """Find the methods that the scene does not take at any step."""
     refused = {}
     for name in names:
         try:
@@ -157,15 +123,7 @@ def refusals(grid: StabilityGrid, names: Sequence[str], dtype: str) -> dict[str,
 def judged(grid: StabilityGrid, names: Sequence[str]) -> str:
     """Decide how energies are judged, by the forces that act.
 
-    Args:
-        grid: cells of the map.
-        names: of methods that the scene takes.
-
-    Returns:
-        "conservative" where energy is kept, "dissipative" where it is only lost, "driven" where a force may supply it.
-
-    Raises:
-        SceneError: where noise acts.
+    Returns: "conservative" where energy is kept, "dissipative" where it is only lost, "driven" where a force may supply it.
     """
     laws = plan_of(grid, np.arange(1), names[0], SHORTEST, "float64").kernel_choice.laws
     if any(getattr(module, "NOISE", False) for _, module in laws):
@@ -200,19 +158,7 @@ def make_references(
 ) -> str:
     """Give every column its reference at the error times.
 
-    Args:
-        grid: cells of the map.
-        columns: all columns; their references are filled in.
-        of: quantity that the error is of.
-        error: largest error of an accurate cell [unit of `of`]; references agree to a tenth of it.
-        threads: number of threads.
-        report: called with the fraction of the columns that is done.
-
-    Returns:
-        Methods and steps of the references, in words.
-
-    Raises:
-        SceneError: where the scene takes none of the precise methods.
+    error: largest error of an accurate cell [unit of `of`]; references agree to a tenth of it.
     """
     compared = compared_in(of)
     first, second = precise_pair(grid)
@@ -231,17 +177,7 @@ def make_references(
 
 
 def precise_pair(grid: StabilityGrid) -> tuple[str, str]:
-    """Choose the two best methods that the scene takes.
-
-    Args:
-        grid: cells of the map.
-
-    Returns:
-        Their names.
-
-    Raises:
-        SceneError: where it takes none.
-    """
+    """Choose the two best methods that the scene takes."""
     names = list(itertools.islice((name for name in PRECISE if not refusals(grid, [name], "float64")), 2))
     if not names:
         raise SceneError([f"method: the scene takes none of {', '.join(PRECISE)} for a reference"])
@@ -280,13 +216,7 @@ def _reference(
 def joined(whole: Result | None, part: Result, at: np.ndarray) -> Result:
     """Replace members of a result by those of another one.
 
-    Args:
-        whole: the result, which is changed; None for none.
-        part: other members.
-        at: their places in the whole.
-
-    Returns:
-        The whole; the part alone where there is no whole.
+    whole: the result, which is changed; None for none.
     """
     if whole is None:
         return part
@@ -303,17 +233,7 @@ def run_method(
 ) -> tuple[Found, str]:  # fmt: skip
     """Run a method over all columns.
 
-    Args:
-        grid: cells of the map.
-        columns: all columns, with their references.
-        method: name of the method.
-        dtype: precision.
-        of: quantity that errors are of.
-        judged: how energies are judged, as of the function `judged`.
-        threads: number of threads.
-
-    Returns:
-        (findings, reason): what the runs showed, and why the program refused some of them; "" where it refused none.
+    Returns: (findings, reason): what the runs showed, and why the program refused some of them; "" where it refused none.
     """
     n = len(grid.h)
     findings = Found(np.full(n, np.inf), np.zeros(n), np.full(n, REFUSED), np.zeros(n, bool))
@@ -344,16 +264,7 @@ def run_method(
 
 
 def judge(result: Result, column: Column, at: np.ndarray, found: Found, of: Compared, judged: str) -> None:
-    """Write down the errors, energies, statuses and warnings of a run of some members of a column.
-
-    Args:
-        result: of the run.
-        column: the members' column, with its reference.
-        at: places of the members in it.
-        found: where it is written.
-        of: quantity that errors are of.
-        judged: how energies are judged, as of the function `judged`.
-    """
+    """Write down the errors, energies, statuses and warnings of a run of some members of a column."""
     members = column.members[at]
     found.status[members] = np.asarray(result.status)
     warnings = getattr(result, "warnings", None)

@@ -80,12 +80,8 @@ class Case:
 def cases_of(given: Any) -> tuple[Case, ...]:
     """Return the cases of a sweep.
 
-    Args:
-        given: a list of `Case` and of tables with its arguments; a mapping of names to these tables, or to the numbers that a
-            case sets; None for one case, the scene itself.
-
-    Raises:
-        SceneError: with every fault.
+    given: a list of `Case` and of tables with its arguments; a mapping of names to these tables, or to the numbers that a case
+        sets; None for one case, the scene itself.
     """
     if given is None:
         return (Case("scene"),)
@@ -120,11 +116,7 @@ def cases_of(given: Any) -> tuple[Case, ...]:
 def grid_of(given: Any) -> dict[str, list[Any]]:
     """Return the axes of a sweep's grid.
 
-    Args:
-        given: name of a number -> its values; None for no grid.
-
-    Raises:
-        SceneError: an axis has no values, or the same one twice.
+    given: name of a number -> its values; None for no grid.
     """
     if given is None:
         return {}
@@ -142,24 +134,12 @@ def grid_of(given: Any) -> dict[str, list[Any]]:
 
 
 def points_of(axes: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
-    """Return all combinations of the values of a grid, the last axis fastest; one without numbers where there is no axis.
-
-    Args:
-        axes: name -> values.
-    """
+    """Return all combinations of the values of a grid, the last axis fastest; one without numbers where there is no axis."""
     return [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
 
 
 def with_lists(scene: Scene, lists: Mapping[str, Any]) -> Scene:
-    """Return a scene with other parts.
-
-    Args:
-        scene: the scene.
-        lists: name of a list -> its new content; of "terms", entries replace those of the same name and are added otherwise.
-
-    Raises:
-        SceneError: there is no such list, or its content is at fault.
-    """
+    """Return a scene with other parts."""
     known = (*SECTIONS, *LISTS)
     faults = Faults("replace.")
     for name in lists:
@@ -180,11 +160,7 @@ def with_lists(scene: Scene, lists: Mapping[str, Any]) -> Scene:
 
 
 def known_names(scene: Scene) -> set[str]:
-    """Return the names of all that may vary in a scene.
-
-    Args:
-        scene: the scene.
-    """
+    """Return the names of all that may vary in a scene."""
     return {*scene.parameters(), *(f"start.{name}" for name in NAMES)}
 
 
@@ -193,17 +169,7 @@ def ensemble_of(
 ) -> tuple[Ensemble, list[str]]:
     """Return the members of a case: those of all cases, as far as it has what varies and does not set it.
 
-    Args:
-        scene: the scene of the case.
-        numbers: what it sets.
-        vary: distributions by name.
-        like: members, seed and sampling.
-
-    Returns:
-        (members, names of what does not vary in this case).
-
-    Raises:
-        SceneError: the members do not fit, or a sampling other than random would give other members.
+    Returns: (members, names of what does not vary in this case).
     """
     known = known_names(scene)
     fixed = {target.name for name in numbers for target in variations.targets(name)}

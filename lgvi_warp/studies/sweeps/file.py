@@ -22,17 +22,7 @@ RUN = {"method": "method", "step": "h", "duration": "t1", "dtype": "dtype"}
 
 
 def arguments_of_file(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Read the arguments of `sweep` from a sweep file (TOML); paths in it are relative to its folder.
-
-    Args:
-        path: of the file.
-
-    Returns:
-        Arguments by name, those alone that the file gives.
-
-    Raises:
-        SceneError: the file cannot be read or its content is wrong; the message lists every fault.
-    """
+    """Read the arguments of `sweep` from a sweep file (TOML); paths in it are relative to its folder."""
     content = parsed(file_text(path, "sweep file"), os.fspath(path))
     folder, faults = Path(path).parent, Faults()
     faults.keys("", content, KEYS)

@@ -33,20 +33,7 @@ SUCCESS = "success"
 
 @dataclass(frozen=True)
 class Compared:
-    """A difference between two cases on the same members, at one point of the grid.
-
-    Args:
-        first: name of the first case.
-        second: name of the second case.
-        point: values of the grid by name.
-        of: "success", or the name of a metric.
-        values: the number of the first case and of the second.
-        difference: second less first, with its interval.
-        test: how p was formed.
-        p: p-value, corrected for the number of comparisons made together (Holm).
-        real: whether p is below 1 - confidence.
-        only: for success, members that pass in the first case alone and in the second alone.
-    """
+    """A difference between two cases on the same members, at one point of the grid."""
 
     first: str
     second: str
@@ -536,9 +523,5 @@ def _median(x: np.ndarray) -> float:
 
 
 def coordinates(values: Sequence[Any]) -> list[Any]:
-    """Return values of an axis as coordinates: numbers and texts as they are, others as texts.
-
-    Args:
-        values: the values.
-    """
+    """Return values of an axis as coordinates: numbers and texts as they are, others as texts."""
     return [value if isinstance(value, int | float | str) else str(value) for value in values]

@@ -70,22 +70,14 @@ class Sweep(Findings):
 
 
 def against_baseline(found: Findings) -> list[Compared]:
-    """Return the comparisons of all other cases with the baseline.
-
-    Args:
-        found: the sweep.
-    """
+    """Return the comparisons of all other cases with the baseline."""
     others = [case for case in found.cases if case != found.baseline]
     rows = [row for case in others for row in found.compare(found.baseline, case)]
     return found.corrected_for_number(rows)
 
 
 def provenance(found: Findings) -> dict[str, Any]:
-    """Return all that the sweep follows from, of plain types.
-
-    Args:
-        found: the sweep.
-    """
+    """Return all that the sweep follows from, of plain types."""
     setup = found.setup
     cells = [{"case": cell.case.name, "at": {name: plain(value) for name, value in cell.point.items()}, "key": cell.key,
               "fixed": list(cell.fixed), "refused": found.record(cell).refused, "messages": list(found.record(cell).messages)}
@@ -100,11 +92,7 @@ def provenance(found: Findings) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """Return a value as JSON can hold it: plain types, others as text.
-
-    Args:
-        value: the value.
-    """
+    """Return a value as JSON can hold it: plain types, others as text."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, float) and not np.isfinite(value):
@@ -113,11 +101,7 @@ def plain(value: Any) -> Any:
 
 
 def percent(value: float) -> str:
-    """Return a fraction in percent, as text.
-
-    Args:
-        value: the fraction.
-    """
+    """Return a fraction in percent, as text."""
     return f"{100.0 * value:.4g}"
 
 

@@ -27,11 +27,8 @@ FOLDER = "cells"
 class Record:
     """What the members of a cell showed.
 
-    Args:
-        status: (n,), of `Status`.
-        numbers: metrics by name, (n,).
-        messages: what the run said.
-        refused: why it did not run; "" (default) where it did.
+    status: (n,), of `Status`.
+    numbers: metrics by name, (n,).
     """
 
     status: np.ndarray
@@ -41,24 +38,11 @@ class Record:
 
     @classmethod
     def of_refusal(cls, text: str) -> Record:
-        """Return the record of a cell that did not run.
-
-        Args:
-            text: why.
-        """
+        """Return the record of a cell that did not run."""
         return cls(np.zeros(0, np.uint8), {}, (), text)
 
     def save(self, path: Path, root: Path) -> None:
-        """Write the record; the file is there whole or not at all, and the same record has the same bytes.
-
-        Args:
-            path: of the file; its name is the key of the cell.
-            root: folder of the sweep, which no link leads out of.
-
-        Raises:
-            SceneError: what is there is no plain file, or lies outside the folder.
-            OSError: it cannot be written.
-        """
+        """Write the record; the file is there whole or not at all, and the same record has the same bytes."""
         place_of(path, root).parent.mkdir(parents=True, exist_ok=True)
         names = list(self.numbers)
         table = np.array([self.numbers[name] for name in names], np.float64).reshape(len(names), len(self.status))
@@ -69,13 +53,7 @@ class Record:
 
     @classmethod
     def load(cls, path: Path, metrics: Sequence[str], members: int) -> Record | None:
-        """Return the record of a file; None where there is none, or none that is whole and of this cell.
-
-        Args:
-            path: of the file; its name is the key of the cell.
-            metrics: their names.
-            members: their number.
-        """
+        """Return the record of a file; None where there is none, or none that is whole and of this cell."""
         try:
             arrays = of_npz(path)
             words = parsed(arrays["words"].tobytes())
@@ -107,10 +85,7 @@ def _checksum(
 class Records:
     """The records of all cells.
 
-    Args:
-        folder: folder of the sweep; None (default): they are kept in memory.
-        metrics: names of the metrics of each record; default none.
-        members: number of members of each record; default 0.
+    folder: folder of the sweep; None (default): they are kept in memory.
     """
 
     folder: Path | None = None
@@ -119,11 +94,7 @@ class Records:
     _kept: dict[str, Record] = field(default_factory=dict)
 
     def check(self) -> None:
-        """Look at what a folder holds already, before anything is run.
-
-        Raises:
-            SceneError: a link leads out of the folder, or what is there is no plain file.
-        """
+        """Look at what a folder holds already, before anything is run."""
         if self.folder is not None and (cells := inside(self.folder, FOLDER)).is_dir():
             for name in os.listdir(cells):
                 place_of(self.folder / FOLDER / name, self.folder)
@@ -135,47 +106,26 @@ class Records:
         return record
 
     def get(self, key: str) -> Record | None:
-        """Return the record of a key; None where there is none.
-
-        Args:
-            key: that of the cell.
-        """
+        """Return the record of a key; None where there is none."""
         if key in self._kept or self.folder is None:
             return self._kept.get(key)
         return Record.load(self.path(key), self.metrics, self.members)
 
     def put(self, key: str, record: Record, lasting: bool = True) -> None:
-        """Keep a record. Refusals stay in memory: what a case lacks may be mended before the sweep goes on.
-
-        Args:
-            key: that of the cell.
-            record: the record.
-            lasting: whether another call may take it for its own; default True.
-
-        Raises:
-            OSError: it cannot be written.
-        """
+        """Keep a record. Refusals stay in memory: what a case lacks may be mended before the sweep goes on."""
         if self.folder is None or record.refused or not lasting:
             self._kept[key] = record
         else:
             record.save(self.path(key), self.folder)
 
     def path(self, key: str) -> Path:
-        """Return the file of a record.
-
-        Args:
-            key: that of the cell.
-        """
+        """Return the file of a record."""
         assert self.folder is not None
         return self.folder / FOLDER / f"{key}.npz"
 
 
 def key_of(content: Mapping[str, Any]) -> str:
-    """Return a key for what decides a cell's numbers: 32 hexadecimal digits.
-
-    Args:
-        content: what decides them, of plain types.
-    """
+    """Return a key for what decides a cell's numbers: 32 hexadecimal digits."""
     text = json.dumps(content, sort_keys=True, default=_plain)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 

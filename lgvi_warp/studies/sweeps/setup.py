@@ -40,18 +40,7 @@ END = "time_to_failure"
 
 @dataclass(frozen=True)
 class Setup:
-    """What is to be run: cells and the settings of their runs.
-
-    Args:
-        scene: the sweep's scene.
-        cases: its cases.
-        axes: axes of the grid.
-        members: the members, of the sweep's own scene.
-        metrics: metrics by name, each with the number of every member.
-        settings: arguments of `solve`.
-        vary: distributions by name, those of numbers that only some cases have among them.
-        told: which functions of the user's it has met.
-    """
+    """What is to be run: cells and the settings of their runs."""
 
     scene: Scene
     cases: tuple[Case, ...]
@@ -70,15 +59,7 @@ class Setup:
     def fleet(self, case: Case, point: Mapping[str, Any]) -> tuple[Ensemble, list[str]]:
         """Return the members of a cell.
 
-        Args:
-            case: the case.
-            point: the point of the grid.
-
-        Returns:
-            (members, names of what does not vary in this cell).
-
-        Raises:
-            SceneError: the case does not fit.
+        Returns: (members, names of what does not vary in this cell).
         """
         scene = case.of(self.scene).with_numbers(point)
         numbers = {**case.set, **point}
@@ -87,11 +68,7 @@ class Setup:
         return ensemble_of(scene, numbers, self.vary, self.members)
 
     def key(self, fleet: Ensemble) -> str:
-        """Return the key of a cell's record.
-
-        Args:
-            fleet: its members.
-        """
+        """Return the key of a cell's record."""
         scene = fleet.scene.to_dict()
         scene.pop("ensemble", None)
         tables = [metric.to_dict() for metric in self.metrics.values()]
@@ -101,19 +78,11 @@ class Setup:
                        "settings": self.settings, "versions": versions})  # fmt: skip
 
     def functions(self, fleet: Ensemble) -> dict[str, Own]:
-        """Return the user's functions that a cell's numbers depend on, by their place.
-
-        Args:
-            fleet: its members.
-        """
+        """Return the user's functions that a cell's numbers depend on, by their place."""
         return functions_of(fleet, self.metrics.values())
 
     def unknown(self, fleet: Ensemble) -> list[str]:
-        """Return the places of functions that another call cannot tell from others.
-
-        Args:
-            fleet: members of a cell.
-        """
+        """Return the places of functions that another call cannot tell from others."""
         return [place for place, own in self.functions(fleet).items() if self.told.name(own)[0] == UNKNOWN]
 
     def note_functions(self) -> None:
@@ -124,11 +93,7 @@ class Setup:
                 self.key(fleet)
 
     def kept(self, fleet: Ensemble) -> dict[str, Any]:
-        """Return the arguments of `solve` for what a run keeps: metrics alone, all of them at looks.
-
-        Args:
-            fleet: members of a cell.
-        """
+        """Return the arguments of `solve` for what a run keeps: metrics alone, all of them at looks."""
         metrics, controller = list(self.metrics.values()), fleet.scene.controller
         # Metrics come to looks by themselves; expressions over the path are of the samples.
         by_samples = controller is not None and not all(metric.looks for metric in metrics)
@@ -136,15 +101,7 @@ class Setup:
         return {"save": save, "statistics": metrics, "keep": "none"}
 
     def run(self, fleet: Ensemble, **more: Any) -> Record:
-        """Run a cell.
-
-        Args:
-            fleet: its members.
-            **more: further arguments of `solve`.
-
-        Raises:
-            SceneError: it is refused.
-        """
+        """Run a cell."""
         faults = Faults()
         check_wanted(faults, "metrics", self.metrics, fleet.scene.controller)
         faults.raise_if_any()
@@ -157,13 +114,7 @@ class Setup:
 class Cell:
     """A case at a point of the grid.
 
-    Args:
-        index: its place among all cells.
-        case: the case.
-        point: values by name.
-        key: that of its record.
-        fleet: its members; None where it was refused before there were any.
-        fixed: names of what varies in the sweep and not here.
+    fleet: its members; None where it was refused before there were any.
     """
 
     index: int
@@ -191,25 +142,7 @@ def made(
     metrics: Any,
     settings: Mapping[str, Any],
 ) -> Setup:
-    """Return what a sweep would run; every argument but the last is as of `sweep`.
-
-    Args:
-        scene: the scene.
-        cases: cases, or numbers by name of a case.
-        grid: values by name of a number.
-        vary: distributions beside the scene's.
-        members: number of members.
-        seed: of the members.
-        sampling: of the members.
-        metrics: metrics, or their names.
-        settings: further arguments of `solve` by name.
-
-    Returns:
-        Cases, grid, members and metrics, checked.
-
-    Raises:
-        SceneError: arguments are at fault.
-    """
+    """Return what a sweep would run; every argument but the last is as of `sweep`."""
     faults = Faults()
     base, together = _given(scene, vary)
     parts: dict[str, Any] = {"cases": (), "axes": {}, "metrics": {}}
@@ -235,15 +168,7 @@ def made(
 
 
 def too_many_text(setup: Setup, count: int) -> str:
-    """Say what is wrong with so many cells: the time that they would take.
-
-    Args:
-        setup: the sweep.
-        count: number of its cells.
-
-    Returns:
-        The end of a sentence.
-    """
+    """Say what is wrong with so many cells: the time that they would take."""
     try:
         prediction = _prediction(setup, None)
     except SceneError:
@@ -261,8 +186,7 @@ def _prediction(setup: Setup, threads: int | None) -> Prediction:
 def duration_text(seconds: float) -> str:
     """Return a time in words.
 
-    Args:
-        seconds: the time [s].
+    seconds: the time [s].
     """
     for unit, size in (("years", 3.15e7), ("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
         if seconds >= 2.0 * size:
@@ -273,12 +197,7 @@ def duration_text(seconds: float) -> str:
 def plan_text(setup: Setup, threads: int | None = None) -> str:
     """Return what a sweep would take, as lines of text, from a trial of its first cell.
 
-    Args:
-        setup: the sweep.
-        threads: number of threads; None (default) for all cores.
-
-    Raises:
-        SceneError: the first cell is refused.
+    threads: number of threads; None (default) for all cores.
     """
     prediction, count = _prediction(setup, threads), len(setup.cells)
     points, duration = count // len(setup.cases), duration_text((prediction.advance + prediction.set_up) * count)
@@ -329,14 +248,7 @@ def _given(scene: Any, vary: Any) -> tuple[Ensemble, dict[Any, Any]]:
 
 
 def metrics_of(given: Any) -> dict[str, Statistic]:
-    """Return metrics by name, each with the number of every member; "time_to_failure" is added.
-
-    Args:
-        given: a list of statistics of one number of each member, tables of them, "iae heading", or expressions over the path.
-
-    Raises:
-        SceneError: with every fault.
-    """
+    """Return metrics by name, each with the number of every member; "time_to_failure" is added."""
     if isinstance(given, str | Mapping) or not isinstance(given, Sequence):
         raise refusal("metrics", given, "is no list", 'give ["overshoot depth", lw.IAE("heading")]')
     faults, metrics = Faults(), dict[str, Statistic]()
@@ -353,18 +265,7 @@ def metrics_of(given: Any) -> dict[str, Statistic]:
 
 
 def metric_of(key: str, entry: Any) -> tuple[str, Statistic]:
-    """Return the name and the statistic of one metric.
-
-    Args:
-        key: the argument's name, for messages.
-        entry: "iae depth", lw.IAE("depth"), a table, or an expression over the path.
-
-    Returns:
-        Its name, and the statistic with the number of each member.
-
-    Raises:
-        SceneError: it is none.
-    """
+    """Return the name and the statistic of one metric."""
     if isinstance(entry, str):
         word, _, of = entry.partition(" ")
         if word in TYPES:
@@ -389,15 +290,8 @@ def metric_of(key: str, entry: Any) -> tuple[str, Statistic]:
 def again(setup: Setup, cell: Cell, indices: Sequence[int], save: SaveAt | None, threads: int | None) -> Result:
     """Run some members of a cell alone, with the bits that they had in it.
 
-    Args:
-        setup: the sweep.
-        cell: the cell.
-        indices: the members.
-        save: what to save of them, and when; None: as the scene says.
-        threads: number of threads; None for all cores.
-
-    Raises:
-        SceneError: the cell was refused, or has no such members.
+    save: what to save of them, and when; None: as the scene says.
+    threads: number of threads; None for all cores.
     """
     from lgvi_warp.engine.keepers.observation import Observation
     from lgvi_warp.runs.run import again as run_again

@@ -80,18 +80,10 @@ def panel(
 ) -> Iterator[Any]:
     """Give axes to draw on; when the drawing is done, write the file that was asked for.
 
-    Args:
-        ax: The user's axes; None for a figure of one's own.
-        path: The file; None for none.
-        size: Width and height of an own figure [in]; default (8, 5).
-        projection: Projection of own axes; default None, plane.
-
-    Yields:
-        The axes.
-
-    Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
-        OSError: The file cannot be written.
+    ax: The user's axes; None for a figure of one's own.
+    path: The file; None for none.
+    size: Width and height of an own figure [in]; default (8, 5).
+    projection: Projection of own axes; default None, plane.
     """
     of_class = figure_class()
     if ax is not None:
@@ -111,19 +103,10 @@ def panels(
 ) -> Iterator[np.ndarray]:
     """Give several axes to draw on; when the drawing is done, write the file that was asked for.
 
-    Args:
-        figure: The user's figure; None for one's own.
-        path: The file; None for none.
-        shape: Numbers of rows and columns.
-        size: Width and height of an own figure [in].
-        **options: Passed to Figure.subplots.
-
-    Yields:
-        The axes, shape (rows, columns).
-
-    Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
-        OSError: The file cannot be written.
+    figure: The user's figure; None for one's own.
+    path: The file; None for none.
+    size: Width and height of an own figure [in].
+    Yields: The axes, shape (rows, columns).
     """
     of_class = figure_class()
     if figure is not None:
@@ -137,10 +120,7 @@ def panels(
 def drawing(figure: Any, path: str | os.PathLike[str] | None, sized: bool) -> Iterator[None]:
     """Draw with text that can be read in a small picture; then write the file.
 
-    Args:
-        figure: Matplotlib's figure.
-        path: The file; None for none.
-        sized: Whether the figure is no user's, so that its ticks are sized too.
+    path: The file; None for none.
     """
     import matplotlib as mpl
 
@@ -168,93 +148,41 @@ def drawing(figure: Any, path: str | os.PathLike[str] | None, sized: bool) -> It
 
 
 def text_size(figure: Any) -> float:
-    """Find the size of text for a figure.
-
-    Args:
-        figure: Matplotlib's figure.
-
-    Returns:
-        Points.
-    """
+    """Find the size of text for a figure."""
     return max(LEAST_TEXT, TEXT * float(figure.get_figure(root=True).get_figwidth()))
 
 
 def wrapped(text: str, figure: Any, share: float = 1.0) -> str:
-    """Break a text into lines that a figure has room for.
-
-    Args:
-        text: The text.
-        figure: Matplotlib's figure.
-        share: Share of its width; default 1.
-
-    Returns:
-        The text with line breaks.
-    """
+    """Break a text into lines that a figure has room for."""
     width = float(figure.get_figure(root=True).get_figwidth())
     return "\n".join(textwrap.wrap(text, int(share * 72.0 * width / (0.6 * text_size(figure)))))
 
 
 def style(i: int) -> dict[str, Any]:
-    """Colour and line style of the i-th of several lines, pairwise different for 49 of them.
-
-    Args:
-        i: Index from 0.
-
-    Returns:
-        Arguments of Axes.plot.
-    """
+    """Colour and line style of the i-th of several lines, pairwise different for 49 of them."""
     turn = i // len(COLORS)
     return {"color": COLORS[i % len(COLORS)], "linestyle": STYLES[(i + turn) % len(STYLES)]}
 
 
 def mark(code: Status) -> dict[str, Any]:
-    """Colour and marker of an outcome; filled markers have a black edge.
-
-    Args:
-        code: The outcome.
-
-    Returns:
-        Arguments of Axes.scatter.
-    """
+    """Colour and marker of an outcome; filled markers have a black edge."""
     look = LOOKS[code]
     edge = {"edgecolors": "black", "linewidths": 0.5} if code.stopped else {"linewidths": 1.4}
     return {"color": look.color, "marker": look.marker} | edge
 
 
 def outcome_style(code: Status) -> dict[str, Any]:
-    """Colour and line style of paths with an outcome.
-
-    Args:
-        code: The outcome.
-
-    Returns:
-        Arguments of Axes.plot.
-    """
+    """Colour and line style of paths with an outcome."""
     return {"color": LOOKS[code].color, "linestyle": "-" if code == Status.OK else "--" if code.stopped else ":"}
 
 
 def hatch(i: int) -> str:
-    """Hatch of the i-th of several areas.
-
-    Args:
-        i: Index from 0.
-
-    Returns:
-        Matplotlib's hatch.
-    """
+    """Hatch of the i-th of several areas."""
     return HATCHES[i % len(HATCHES)]
 
 
 def band(low: float, high: float) -> str:
-    """Name the band between two quantiles.
-
-    Args:
-        low: Lower level, from 0 to 1.
-        high: Upper level.
-
-    Returns:
-        What part of the members it holds, as "90%" or "99.8%".
-    """
+    """Name the band between two quantiles."""
     return f"{100.0 * (high - low):.4g}%"
 
 
@@ -267,9 +195,7 @@ def point_down(axes: Any, floors: Mapping[str, Iterable[float]] = MappingProxyTy
 
     Their names stand beside the axes, where no data are. A text says how far away the surface is where it is not drawn.
 
-    Args:
-        axes: Matplotlib axes, all else drawn.
-        floors: Depths [m] by what is said of them, as {"floor": [20.0]}; default none.
+    floors: Depths [m] by what is said of them, as {"floor": [20.0]}; default none.
     """
     low, high = sorted(axes.get_ylim())
     reach = NEAR * (high - low)
@@ -290,16 +216,7 @@ def point_down(axes: Any, floors: Mapping[str, Iterable[float]] = MappingProxyTy
 
 
 def apart(axes: Any, wanted: Sequence[float], lines: Sequence[int]) -> np.ndarray:
-    """Move texts beside axes up and down, as little as keeps one from another.
-
-    Args:
-        axes: Matplotlib axes.
-        wanted: Heights of their middles that they would have, shares of the axes, rising.
-        lines: How many lines each has.
-
-    Returns:
-        Heights, rising.
-    """
+    """Move texts beside axes up and down, as little as keeps one from another."""
     high = 0.8 * axes.get_position().height * axes.get_figure(root=True).get_figheight()
     half = 0.5 * 1.35 * text_size(axes.figure) / 72.0 / high * np.asarray(lines, dtype=float)
     # Where each would stand if all below it stood side by side from the bottom.
@@ -310,11 +227,7 @@ def apart(axes: Any, wanted: Sequence[float], lines: Sequence[int]) -> np.ndarra
 
 
 def widen(axis: Any) -> None:
-    """Show at least a ten-thousandth of the numbers' size: the labels of a narrower range cannot be told apart.
-
-    Args:
-        axis: Matplotlib's axis, all drawn.
-    """
+    """Show at least a ten-thousandth of the numbers' size: the labels of a narrower range cannot be told apart."""
     low, high = sorted(axis.get_view_interval())
     least = 1e-4 * max(abs(low), abs(high))
     if high - low < least:
@@ -323,13 +236,7 @@ def widen(axis: Any) -> None:
 
 
 def below(axes: Any, ncols: int = 1, **options: Any) -> None:
-    """Draw the legend below the axes and their label, where it hides nothing.
-
-    Args:
-        axes: Matplotlib axes.
-        ncols: Most columns; where there are several rows, they are as full as each other.
-        **options: Passed to Axes.legend.
-    """
+    """Draw the legend below the axes and their label, where it hides nothing."""
     from matplotlib.transforms import ScaledTranslation
 
     lines = ScaledTranslation(0.0, -3.2 * text_size(axes.figure) / 72.0, axes.get_figure(root=True).dpi_scale_trans)

@@ -109,17 +109,7 @@ def term_cost(rows: Rows, *, ax: Any = None, path: str | os.PathLike[str] | None
 def measured(rows: Rows, keys: tuple[str, ...], remedy: str) -> list[Mapping[str, Any]]:
     """Take the rows of one kind of measurement.
 
-    Args:
-        rows: Rows, or a file of JSON lines.
-        keys: What a row of that kind has, besides the cost.
-        remedy: What would give such rows.
-
-    Returns:
-        The rows that have all of these keys.
-
-    Raises:
-        NothingToDraw: There are none.
-        OSError: The file cannot be read.
+    keys: What a row of that kind has, besides the cost.
     """
     if isinstance(rows, str | os.PathLike):
         rows = [parsed(line) for line in file_text(rows, "cost file").splitlines() if line.startswith("{")]

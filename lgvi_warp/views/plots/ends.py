@@ -57,12 +57,7 @@ def outcomes(result: Result, *, ax: Any = None, path: str | os.PathLike[str] | N
 
 
 def draw_outcomes(axes: Any, result: Result) -> None:
-    """Draw the shares of the members under way and of those that ended, with a legend.
-
-    Args:
-        axes: Matplotlib axes.
-        result: A result.
-    """
+    """Draw the shares of the members under way and of those that ended, with a legend."""
     codes, status, when = ended_so.outcomes(result), np.asarray(result.status), stop_time(result)
     time = np.unique(np.concatenate([np.linspace(result.time[0], result.time[-1], TIMES), result.time[[0, -1]]]))
     ended = [code for code in codes if code != Status.OK]

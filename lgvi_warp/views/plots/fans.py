@@ -78,19 +78,7 @@ def fan(result: Result, of: Any = "depth", *, ax: Any = None, path: str | os.Pat
 
 
 def draw_fan(axes: Any, result: Result, of: Quantity) -> Survey:
-    """Draw a fan, the ends of members, and labels.
-
-    Args:
-        axes: Matplotlib axes.
-        result: A result with samples.
-        of: A quantity of one number.
-
-    Returns:
-        What was drawn.
-
-    Raises:
-        NothingToDraw: Nothing of the quantity was kept, no member has a finite number, or all failed at once.
-    """
+    """Draw a fan, the ends of members, and labels."""
     survey = survey_of(result, of)
     if failed(result.status).all() and not survey.under_way[1:].any():
         raise NothingToDraw(
@@ -113,29 +101,13 @@ def draw_fan(axes: Any, result: Result, of: Quantity) -> Survey:
 
 
 def notes_on(result: Result, survey: Survey) -> list[str]:
-    """Say what a reader of a fan has to know beside it.
-
-    Args:
-        result: The result.
-        survey: What is drawn of it.
-
-    Returns:
-        Lines on members above the surface, and on how to have more than start and end.
-    """
+    """Say what a reader of a fan has to know beside it."""
     few_times = HINT if len(survey.time) < 3 else ""
     return [note for note in (unbounded_text(result, survey), few_times) if note]
 
 
 def text_of(survey: Survey, total: int) -> str:
-    """Say how many members are in a fan, at its beginning and at its end.
-
-    Args:
-        survey: What is drawn.
-        total: Number of members of the run.
-
-    Returns:
-        A line or two.
-    """
+    """Say how many members are in a fan, at its beginning and at its end."""
     first, last = int(survey.under_way[0]), int(survey.under_way[-1])
     text = of_members(survey.total, total)
     if (survey.under_way != survey.total).any():
@@ -146,12 +118,10 @@ def text_of(survey: Survey, total: int) -> str:
 def draw_bands(axes: Any, time: np.ndarray, values: np.ndarray, counted: np.ndarray, **look: Any) -> None:
     """Draw bands between quantiles of many members against time, and their median.
 
-    Args:
-        axes: Matplotlib axes.
-        time: Times [s], shape (k,).
-        values: A number of each member, shape (k, n).
-        counted: Mask (k, n) of the members that count at each time.
-        **look: Arguments of Axes.plot for the median; and low and high (k,), extremes where they are of more members.
+    time: Times [s], shape (k,).
+    values: A number of each member, shape (k, n).
+    counted: Mask (k, n) of the members that count at each time.
+    **look: Arguments of Axes.plot for the median; and low and high (k,), extremes where they are of more members.
     """
     levels = sorted({q for band in BANDS for q in band} | {0.5})
     curves = dict(zip(levels, at_levels(values, counted, levels), strict=True))

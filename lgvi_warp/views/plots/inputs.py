@@ -27,18 +27,8 @@ CONFIDENCE = 0.95
 def inputs_by_outcome(result: Result, *, ax: Any = None, path: str | os.PathLike[str] | None = None) -> Any:
     """Draw the outcomes of members over the two inputs that explain most of who had the most frequent one.
 
-    Args:
-        result: A result.
-        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
-
-    Returns:
-        The axes.
-
-    Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
-        NothingToDraw: All members ended alike, or nothing varies.
-        OSError: The file cannot be written.
+    ax: Matplotlib axes to draw on; default None, those of a figure of its own.
+    path: File to write; its ending chooses the format. Default None: none is written.
     """
     inputs, status = varied(result), np.asarray(result.status)
     codes = outcomes(result)
@@ -68,11 +58,7 @@ def inputs_by_outcome(result: Result, *, ax: Any = None, path: str | os.PathLike
 def varied(result: Result) -> dict[str, np.ndarray]:
     """Collect the numbers that differ between members.
 
-    Args:
-        result: A result.
-
-    Returns:
-        Values (n,) by name and component: parameters, and of the start what was kept.
+    Returns: Values (n,) by name and component: parameters, and of the start what was kept.
     """
     found = {}
     starts = {f"start.{name}": values[0] for name, values in result.samples.items() if name in STARTS}

@@ -61,18 +61,7 @@ class Survey:
 
 
 def with_samples(result: Result) -> Result:
-    """Give the result whose samples are drawn.
-
-    Args:
-        result: A result.
-
-    Returns:
-        The result, or the members that it kept.
-
-    Raises:
-        NothingToDraw: No samples were kept.
-        SceneError: It is no result.
-    """
+    """Give the result whose samples are drawn."""
     if result_of(result).samples:
         return result
     if result.kept is not None:
@@ -86,17 +75,7 @@ def with_samples(result: Result) -> Result:
 def selected(result: Result, most: int, fields: tuple[str, ...], what: str) -> tuple[Result, Shown, Result]:
     """Choose the members that a picture draws, and read their samples.
 
-    Args:
-        result: A result.
-        most: The most members to draw.
-        fields: Names of the samples that are needed.
-        what: What needs them.
-
-    Returns:
-        The result that has the samples, the choice, and the samples of those members at the times that are drawn.
-
-    Raises:
-        NothingToDraw: Some were not kept, or no member has a finite start.
+    Returns: The result that has the samples, the choice, and the samples of those members at the times that are drawn.
     """
     result = with_samples(result)
     check_fields(result, fields, what)
@@ -105,16 +84,7 @@ def selected(result: Result, most: int, fields: tuple[str, ...], what: str) -> t
 
 
 def check_fields(result: Result, fields: tuple[str, ...], what: str) -> None:
-    """Refuse to draw what was not kept.
-
-    Args:
-        result: A result with samples.
-        fields: Names of the samples that are needed.
-        what: What needs them.
-
-    Raises:
-        NothingToDraw: Some were not kept.
-    """
+    """Refuse to draw what was not kept."""
     if missing := [name for name in fields if name not in result.samples]:
         raise NothingToDraw(
             f"{', '.join(missing)} not kept: {what} needs {'them' if len(missing) > 1 else 'it'}; "
@@ -123,17 +93,7 @@ def check_fields(result: Result, fields: tuple[str, ...], what: str) -> None:
 
 
 def quantity_of(of: Any) -> Quantity:
-    """Read a quantity that has one number a member and time.
-
-    Args:
-        of: Its name, as "depth" or "position[2]", or a `lw.Quantity`.
-
-    Returns:
-        The quantity.
-
-    Raises:
-        SceneError: It is not known, or has several numbers.
-    """
+    """Read a quantity that has one number a member and time."""
     meaning = quantity("of", of)
     if meaning.size > 1:
         raise refusal("of", of, f"has {meaning.size} components", f"name one: {', '.join(meaning.labels)}")
@@ -143,11 +103,7 @@ def quantity_of(of: Any) -> Quantity:
 def energy_of(result: Result) -> Quantity:
     """Energy, as its error where the scene's laws conserve it.
 
-    Args:
-        result: A result.
-
-    Returns:
-        The quantity "energy error", E(t) - E(0), or "energy", E(t) [J].
+    Returns: The quantity "energy error", E(t) - E(0), or "energy", E(t) [J].
     """
     energy = quantity("of", "energy")
     if "energy" not in invariants.conserved(result):
@@ -161,15 +117,7 @@ def energy_of(result: Result) -> Quantity:
 
 
 def unbounded_text(result: Result, survey: Survey) -> str:
-    """Say how many members leave water that has no surface.
-
-    Args:
-        result: The result.
-        survey: Its depths.
-
-    Returns:
-        A line; "" where none does, or where an event ends members at the surface.
-    """
+    """Say how many members leave water that has no surface."""
     if not survey.above or any(event["type"] == "surface" for event in events(result)):
         return ""
     who = "the vehicle passes" if survey.total == 1 else f"{survey.above:,} of {survey.total:,} members pass"
@@ -177,18 +125,7 @@ def unbounded_text(result: Result, survey: Survey) -> str:
 
 
 def survey_of(result: Result, of: Quantity) -> Survey:
-    """Read one number of all members, in pieces: a large run never lies in memory whole.
-
-    Args:
-        result: A result with samples, in memory or in a store.
-        of: The quantity.
-
-    Returns:
-        Its extremes over all members, and its values of those that quantiles are taken of.
-
-    Raises:
-        NothingToDraw: The quantity's samples were not kept, or no member has a finite number.
-    """
+    """Read one number of all members, in pieces: a large run never lies in memory whole."""
     check_fields(result, of.fields, of.name)
     choice = shown(result) if "position" in result.samples else everyone(result)
     frames = choice.frames
@@ -230,14 +167,8 @@ def everyone(result: Result) -> Shown:
 def numbers(result: Result, of: Quantity, members: slice | np.ndarray, frames: np.ndarray | None = None) -> np.ndarray:
     """Compute a quantity of some members.
 
-    Args:
-        result: A result with samples.
-        of: A quantity of one number.
-        members: The members, a slice or indices.
-        frames: Indices of the times; default None, all.
-
-    Returns:
-        Numbers, float64, shape (f, m).
+    frames: Indices of the times; default None, all.
+    Returns: Numbers, float64, shape (f, m).
     """
     part = few(result, members, of.fields, frames)
     with np.errstate(invalid="ignore"):
@@ -272,14 +203,8 @@ def at_one_time(
 ) -> tuple[np.ndarray, list[str], str]:
     """Compute a quantity of interest of some members at one time.
 
-    Args:
-        result: A result with samples.
-        of: The quantity; one that looks over the path does so up to this time.
-        members: Indices of the members, shape (m,).
-        frame: Index of the time; default the last.
-
-    Returns:
-        Numbers (m, c), the names of the c components, and the unit.
+    members: Indices of the members, shape (m,).
+    Returns: Numbers (m, c), the names of the c components, and the unit.
     """
     check_fields(result, of.fields, of.label)
     frame = frame % len(result.time)
@@ -292,13 +217,7 @@ def at_one_time(
 def estimate_for(result: Result, of: str, types: tuple[str, ...]) -> tuple[Estimate, int] | None:
     """Find a statistic of a quantity.
 
-    Args:
-        result: A result.
-        of: Name of the quantity or of one component, as "depth".
-        types: Types of statistics, the best first.
-
-    Returns:
-        The estimate and the index of the component; None where there is none.
+    Returns: The estimate and the index of the component; None where there is none.
     """
     names = DEPTHS if of in DEPTHS else (of,)
     for kind in types:

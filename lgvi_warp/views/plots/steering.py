@@ -24,15 +24,7 @@ ALL_WAYS = 270.0
 
 
 def draw_commands(result: Result, axes: Any) -> list[str]:
-    """Draw the commands of members under way: medians, bands of 90 %, limits that are near, and when faults begin.
-
-    Args:
-        result: A result with commands.
-        axes: Matplotlib axes.
-
-    Returns:
-        Lines on the faults.
-    """
+    """Draw the commands of members under way: medians, bands of 90 %, limits that are near, and when faults begin."""
     result, _, some = selected(result, MOST_BODIES, ("position", "command"), "a picture of commands")
     counted, lined = under_way(some), set()
     for i, channel in enumerate(channels(some)):
@@ -48,15 +40,7 @@ def draw_commands(result: Result, axes: Any) -> list[str]:
 
 
 def draw_angles(result: Result, axes: Any) -> list[str]:
-    """Draw roll, pitch and yaw of members under way: medians and bands of 90 %, and when faults begin.
-
-    Args:
-        result: A result with attitudes.
-        axes: Matplotlib axes.
-
-    Returns:
-        Lines on the faults.
-    """
+    """Draw roll, pitch and yaw of members under way: medians and bands of 90 %, and when faults begin."""
     for i, name in enumerate(("euler[0]", "euler[1]", "euler[2]")):
         survey = survey_of(result, quantity_of(name))
         levels = np.degrees(at_levels(survey.values, survey.counted, LEVELS))

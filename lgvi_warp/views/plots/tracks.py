@@ -50,13 +50,7 @@ def paths(result: Result, most: int = MOST_PATHS, *, ax: Any = None, path: str |
 
 
 def draw_paths(axes: Any, result: Result, most: int = MOST_PATHS) -> None:
-    """Draw paths from the side.
-
-    Args:
-        axes: Matplotlib axes.
-        result: A result with positions.
-        most: The most members to draw; default 12.
-    """
+    """Draw paths from the side."""
     result, choice, some = selected(result, most, ("position",), "paths")
     first = result.samples["position"][0] if result.store is None else some.position[0]
     start = first[np.isfinite(first).all(axis=-1), :2].mean(axis=0)
@@ -93,13 +87,7 @@ def plan_view(
 
 
 def draw_plan(axes: Any, result: Result, most: int = MOST_PATHS) -> None:
-    """Draw paths from above.
-
-    Args:
-        axes: Matplotlib axes.
-        result: A result with positions.
-        most: The most members to draw; default 12.
-    """
+    """Draw paths from above."""
     result, choice, some = selected(result, most, ("position",), "a view from above")
     _lines(axes, some, some.position[..., 1], some.position[..., 0], start=True)
     title = f"{some_of(result, len(choice.members))} from above"

@@ -37,11 +37,7 @@ HINT = "start and end alone were kept: give SaveAt(every=...) for the motion bet
 def label_of(of: Quantity) -> str:
     """Label of an axis: the quantity and its unit.
 
-    Args:
-        of: The quantity.
-
-    Returns:
-        As "speed [m/s]"; depths say that they point down.
+    Returns: As "speed [m/s]"; depths say that they point down.
     """
     name = WORDS.get(of.name, of.name.replace("_", " "))
     unit = of.unit or "1"
@@ -49,14 +45,7 @@ def label_of(of: Quantity) -> str:
 
 
 def in_words(text: str) -> str:
-    """Say components by their names: "max(position[1])" is "max(east)".
-
-    Args:
-        text: Name of a quantity, of a statistic or of one of its components.
-
-    Returns:
-        The text with words for components that have some.
-    """
+    """Say components by their names: "max(position[1])" is "max(east)"."""
     return COMPONENT.sub(lambda found: WORDS.get(found[0], found[0]), text)
 
 
@@ -90,14 +79,7 @@ def some_of(result: Result, drawn: int) -> str:
 
 
 def unit_of(label: str) -> str:
-    """Find the unit of a quantity by its name.
-
-    Args:
-        label: The name, as "position[2]".
-
-    Returns:
-        The unit; "" for the user's own quantities, which have no other place to say it than their name.
-    """
+    """Find the unit of a quantity by its name."""
     try:
         return quantity("of", label).unit
     except SceneError:

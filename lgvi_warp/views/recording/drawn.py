@@ -124,26 +124,11 @@ class Drawn:
         return not np.nanmax(self.fans[0].levels, initial=-np.inf) > 1.0
 
     def color(self, code: Status) -> tuple[int, int, int]:
-        """Choose the colour of members.
-
-        Args:
-            code: Their outcome; OK while they are under way.
-
-        Returns:
-            The run's colour where runs are compared, else the outcome's, 0 to 255 each.
-        """
+        """Choose the colour of members."""
         return self.rgb or LOOKS[code].rgb
 
     def path(self, head: str, *parts: str) -> str:
-        """Name an entity of this run.
-
-        Args:
-            head: First parts of its name, as "curves/height".
-            *parts: The others.
-
-        Returns:
-            A path; where runs are compared, with the run's label after the head.
-        """
+        """Name an entity of this run."""
         import rerun as rr
 
         return str(rr.new_entity_path([*head.split("/"), *([self.label] if self.label else []), *parts]))
@@ -151,8 +136,7 @@ class Drawn:
     def groups(self) -> list[tuple[Status, np.ndarray]]:
         """Divide the members drawn by what became of them until each time.
 
-        Returns:
-            Pairs of a status and a mask (f, m); OK for those under way.
+        Returns: Pairs of a status and a mask (f, m); OK for those under way.
         """
         status = np.asarray(self.few.status)
         is_finite = finite_rows(self.few.position)
@@ -163,18 +147,7 @@ class Drawn:
 def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[int, int, int] | None = None) -> Drawn:
     """Read what is drawn of a run.
 
-    Args:
-        result: The run; where it kept samples of some members only, these are drawn.
-        members: Indices of the members to draw; default those of `lgvi_warp.shown`.
-        label: Name of the run among those that are compared; default "", a single one.
-        rgb: Its colour among them; default None.
-
-    Returns:
-        What is drawn.
-
-    Raises:
-        NothingToDraw: No samples were kept, or no member has a finite start.
-        SceneError: There are no such members.
+    rgb: Its colour among them; default None.
     """
     source = result.kept if not result.samples and result.kept is not None else result
     if missing := [name for name in NEEDED if source.samples and name not in source.samples]:
@@ -204,19 +177,7 @@ def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[in
 
 
 def places_of(members: Any, total: int, kept: np.ndarray) -> np.ndarray:
-    """Find the places of the user's indices among the kept members.
-
-    Args:
-        members: The user's indices.
-        total: Number of members of the run.
-        kept: Indices of the members that have samples, rising.
-
-    Returns:
-        Places, rising, each once.
-
-    Raises:
-        SceneError: There are no such members, or they have no samples.
-    """
+    """Find the places of the user's indices among the kept members."""
     indices = np.asarray(members)
     if indices.ndim != 1 or not indices.size or indices.dtype.kind not in "iu":
         raise refusal("members", members, "is no list of members", "give indices: members=[3, 17]")
@@ -235,16 +196,7 @@ STREAMED = {"height": ("depth", -1.0), "speed": ("speed", 1.0)}
 
 
 def streamed(result: Result, fan: Fan, frames: np.ndarray) -> Fan:
-    """Take a fan of all members from the run's own quantiles and extremes, where no samples of all were kept.
-
-    Args:
-        result: A result.
-        fan: A fan of the members that were kept.
-        frames: Indices of the times drawn.
-
-    Returns:
-        The fan by the run's statistics; itself where there are none.
-    """
+    """Take a fan of all members from the run's own quantiles and extremes, where no samples of all were kept."""
     quantity, sign = STREAMED.get(fan.name, ("", 1.0))
     levels, replaced = np.full_like(fan.levels, np.nan), False
     for estimate in result.statistics.values() if not result.samples else ():
@@ -264,11 +216,8 @@ def streamed(result: Result, fan: Fan, frames: np.ndarray) -> Fan:
 def roll_pitch_heading(attitude: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute angles of attitudes.
 
-    Args:
-        attitude: Rotations from body to inertial axes, shape (..., 3, 3).
-
-    Returns:
-        Roll, pitch and heading [deg], float32, shape (...) each.
+    attitude: Rotations from body to inertial axes, shape (..., 3, 3).
+    Returns: Roll, pitch and heading [deg], float32, shape (...) each.
     """
     part = {place: attitude[..., *place].astype(np.float32) for place in ((0, 0), (1, 0), (2, 0), (2, 1), (2, 2))}
     roll = np.degrees(np.arctan2(part[2, 1], part[2, 2]))
@@ -338,13 +287,9 @@ def _survey(
 def at_levels(values: np.ndarray, counted: np.ndarray, levels: Sequence[float]) -> np.ndarray:
     """Quantiles over the members that count at each time, linear between neighbours.
 
-    Args:
-        values: Numbers of the members, shape (f, n).
-        counted: Mask (f, n) of the members that count; a value that is not finite never does.
-        levels: m numbers from 0 to 1.
-
-    Returns:
-        Quantiles, float64, shape (m, f); NaN at times when no member counts.
+    values: Numbers of the members, shape (f, n).
+    counted: Mask (f, n) of the members that count; a value that is not finite never does.
+    Returns: Quantiles, float64, shape (m, f); NaN at times when no member counts.
     """
     ranked = np.sort(np.where(counted & np.isfinite(values), values, np.inf), axis=1)
     counts = np.isfinite(ranked).sum(axis=1)
@@ -390,12 +335,7 @@ def _range(values: np.ndarray) -> tuple[float, float]:
 def first_ended(result: Result, code: Status) -> float:
     """When the first member ended so.
 
-    Args:
-        result: The result.
-        code: A status that some member has, other than OK.
-
-    Returns:
-        Time [s].
+    Returns: Time [s].
     """
     return float(stop_time(result)[np.asarray(result.status) == code].min())
 
@@ -403,10 +343,7 @@ def first_ended(result: Result, code: Status) -> float:
 def quaternion_xyzw(attitude: np.ndarray) -> np.ndarray:
     """Quaternions as the viewer takes them.
 
-    Args:
-        attitude: Rotations from body to inertial axes, shape (..., 3, 3).
-
-    Returns:
-        float32, scalar last, shape (..., 4).
+    attitude: Rotations from body to inertial axes, shape (..., 3, 3).
+    Returns: float32, scalar last, shape (..., 4).
     """
     return notation.quaternion_from_matrix(attitude)[..., [1, 2, 3, 0]].astype(np.float32)

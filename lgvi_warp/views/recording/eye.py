@@ -15,13 +15,9 @@ FIELD, ASPECT, HIGH = 0.9 * TANGENT, 1.3, 600.0
 def distance(low: np.ndarray, high: np.ndarray, aspect: float) -> float:
     """How far from the middle of a box the eye must be to see all of it.
 
-    Args:
-        low: Smallest coordinates of the box [m], shape (3,).
-        high: Largest ones [m], shape (3,).
-        aspect: Width of the view over its height.
-
-    Returns:
-        Distance [m].
+    low: Smallest coordinates of the box [m], shape (3,).
+    high: Largest ones [m], shape (3,).
+    Returns: Distance [m].
     """
     across = np.cross(SIGHT, (0.0, 0.0, -1.0))
     across /= np.linalg.norm(across)
@@ -34,13 +30,9 @@ def distance(low: np.ndarray, high: np.ndarray, aspect: float) -> float:
 def far_pixel(low: np.ndarray, high: np.ndarray, aspect: float) -> float:
     """How much one pixel covers at the far end of a box.
 
-    Args:
-        low: Smallest coordinates of the box [m], shape (3,).
-        high: Largest ones [m], shape (3,).
-        aspect: Width of the view over its height.
-
-    Returns:
-        Length across the sight [m].
+    low: Smallest coordinates of the box [m], shape (3,).
+    high: Largest ones [m], shape (3,).
+    Returns: Length across the sight [m].
     """
     farthest = distance(low, high, aspect) + float((_corners(low, high) @ SIGHT).max())
     return 2.0 * TANGENT * farthest / HIGH

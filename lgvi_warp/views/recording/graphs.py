@@ -30,12 +30,7 @@ COLORS = list(dict.fromkeys(look.rgb for look in LOOKS.values()))
 
 
 def log_graphs(recording: Any, run: Drawn) -> None:
-    """Log all curves of one run, the log of its outcomes and the histogram of its depths.
-
-    Args:
-        recording: The stream.
-        run: What is drawn.
-    """
+    """Log all curves of one run, the log of its outcomes and the histogram of its depths."""
     for fan in run.fans:
         _fan(recording, run, fan)
     _shares(recording, run)
@@ -81,14 +76,7 @@ def _series(
 
 
 def log_member(recording: Any, run: Drawn, place: int, member: int) -> None:
-    """Log height and speed of one member while it is under way.
-
-    Args:
-        recording: The stream.
-        run: What is drawn.
-        place: Its place among the members drawn.
-        member: Its index in the run.
-    """
+    """Log height and speed of one member while it is under way."""
     speed = np.linalg.norm(run.few.velocity[:, place], axis=-1)
     for name, values in (("height", -run.position[:, place, 2]), ("speed", speed)):
         seen_values = np.where(run.counted[:, place], values, np.nan)

@@ -26,11 +26,10 @@ LIGHT, FIN = (245, 245, 245), (255, 200, 60)
 class Hull(NamedTuple):
     """A surface of triangles in body axes.
 
-    Args:
-        points: Corners, shape (p, 3) [m].
-        triangles: Indices of corners, shape (t, 3).
-        normals: Outward unit vectors at the corners, shape (p, 3).
-        parts: What each corner belongs to, shape (p,): 0 the hull, 1 its nose, 2 its fin.
+    points: Corners, shape (p, 3) [m].
+    triangles: Indices of corners, shape (t, 3).
+    normals: Outward unit vectors at the corners, shape (p, 3).
+    parts: What each corner belongs to, shape (p,): 0 the hull, 1 its nose, 2 its fin.
     """
 
     points: np.ndarray
@@ -41,11 +40,7 @@ class Hull(NamedTuple):
     def colors(self, rgb: tuple[int, int, int]) -> np.ndarray:
         """Colour the hull, with a light nose and a bright fin that show its attitude.
 
-        Args:
-            rgb: Colour of the hull, 0 to 255 each.
-
-        Returns:
-            Colours of the corners, uint8, shape (p, 3).
+        Returns: Colours of the corners, uint8, shape (p, 3).
         """
         return np.array([rgb, LIGHT, FIN], np.uint8)[self.parts]
 
@@ -53,12 +48,8 @@ class Hull(NamedTuple):
 def hull_of(length: float, diameter: float) -> Hull:
     """Build a hull along the body's x axis: a cylinder with round ends, a light nose, and a fin on its upper side.
 
-    Args:
-        length: From end to end [m].
-        diameter: Largest diameter [m].
-
-    Returns:
-        The surface.
+    length: From end to end [m].
+    diameter: Largest diameter [m].
     """
     radius, end = 0.5 * diameter, min(0.5 * diameter, 0.5 * length)
     bend = np.linspace(0.0, 0.5 * np.pi, ALONG + 1)
@@ -93,12 +84,8 @@ def hull_of(length: float, diameter: float) -> Hull:
 def shape_of(scene: Mapping[str, Any], parameters: Mapping[str, np.ndarray]) -> tuple[Shape, str]:
     """Find the shape of a run's vehicle.
 
-    Args:
-        scene: Table of the scene, from the run's provenance.
-        parameters: Parameters of the members by name, each of shape (1, ...) or (n, ...).
-
-    Returns:
-        The shape, and where it comes from in words; without a shape in the scene, a hull of the displaced volume.
+    parameters: Parameters of the members by name, each of shape (1, ...) or (n, ...).
+    Returns: The shape, and where it comes from in words; without a shape in the scene, a hull of the displaced volume.
     """
     shape = shape_from(scene["vehicle"].get("shape"))
     if shape is not None:
@@ -112,9 +99,7 @@ def shape_of(scene: Mapping[str, Any], parameters: Mapping[str, np.ndarray]) -> 
 class Mesh(NamedTuple):
     """A user's mesh.
 
-    Args:
-        content: Bytes of the .glb file.
-        length: Its largest extent [m].
+    length: Its largest extent [m].
     """
 
     content: bytes
@@ -125,17 +110,7 @@ JSON_CHUNK = 0x4E4F534A
 
 
 def mesh_of(path: str) -> Mesh:
-    """Read a binary glTF file that holds all its parts.
-
-    Args:
-        path: The file.
-
-    Returns:
-        Its bytes and size.
-
-    Raises:
-        SceneError: It is not there, is no binary glTF 2.0, or names further files.
-    """
+    """Read a binary glTF file that holds all its parts."""
     key, remedy = "vehicle.shape.mesh", "give a binary glTF 2.0 file with all its parts, or length and diameter [m]"
     try:
         content = file_bytes(path, "mesh")

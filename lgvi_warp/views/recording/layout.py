@@ -18,16 +18,7 @@ BACKGROUND = (9, 24, 38)
 
 
 def layout(runs: list[Drawn], box: Box, scales: list[int]) -> Any:
-    """Lay out the views: the world on the left, curves and the run's facts on the right.
-
-    Args:
-        runs: The runs that are drawn.
-        box: What is in view.
-        scales: How many times their size hulls are drawn, of each run.
-
-    Returns:
-        A blueprint of the viewer.
-    """
+    """Lay out the views: the world on the left, curves and the run's facts on the right."""
     import rerun.blueprint as rrb
     from rerun.blueprint.encodings import TextLogColumn
 
@@ -49,16 +40,7 @@ def layout(runs: list[Drawn], box: Box, scales: list[int]) -> Any:
 
 
 def live_layout(run: Drawn, box: Box, scale: int) -> Any:
-    """Lay out the views of a run that goes on: the world on the left, curves of single members on the right.
-
-    Args:
-        run: Members that are drawn.
-        box: What is in view.
-        scale: How many times their size hulls are drawn.
-
-    Returns:
-        A blueprint of the viewer.
-    """
+    """Lay out the views of a run that goes on: the world on the left, curves of single members on the right."""
     import rerun.blueprint as rrb
 
     titles = {fan.name: fan.title for fan in run.fans}

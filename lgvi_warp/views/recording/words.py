@@ -21,14 +21,7 @@ TOLD = ("lgvi-warp", "warp-lang", "rerun")
 
 
 def log_words(recording: Any, runs: list[Drawn], box: Box, scales: list[int]) -> None:
-    """Log the summary of the runs, and their provenance.
-
-    Args:
-        recording: The stream.
-        runs: What is drawn.
-        box: What is in view.
-        scales: How many times their size hulls are drawn, of each run.
-    """
+    """Log the summary of the runs, and their provenance."""
     import rerun as rr
 
     for run, scale in zip(runs, scales, strict=True):
@@ -41,16 +34,7 @@ def log_words(recording: Any, runs: list[Drawn], box: Box, scales: list[int]) ->
 
 
 def lines(run: Drawn, box: Box, scale: int) -> dict[str, str]:
-    """Say of a run in ten lines what it is, what became of it, and what is drawn.
-
-    Args:
-        run: The run.
-        box: What is in view.
-        scale: How many times its size a hull is drawn.
-
-    Returns:
-        Texts by heading.
-    """
+    """Say of a run in ten lines what it is, what became of it, and what is drawn."""
     result, settings = run.result, run.result.provenance
     counts = ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items())
     few = len(run.choice.members) < result.members
@@ -92,15 +76,7 @@ def _rerun_version() -> str:
 
 
 def water_text(run: Drawn, box: Box) -> str:
-    """Say where the water ends, and whether members leave it.
-
-    Args:
-        run: The run.
-        box: What is in view.
-
-    Returns:
-        One sentence.
-    """
+    """Say where the water ends, and whether members leave it."""
     kinds = {event["type"] for event in run.result.provenance["scene"].get("events", ())}
     floors = floors_of(run)
     floor = f"floor at {' and '.join(f'{depth:g}' for depth in floors)} m" if floors else "no floor"
@@ -114,14 +90,7 @@ def water_text(run: Drawn, box: Box) -> str:
 
 
 def energy_text(run: Drawn) -> str:
-    """Say how well energy is kept, or what does work.
-
-    Args:
-        run: The run.
-
-    Returns:
-        One sentence.
-    """
+    """Say how well energy is kept, or what does work."""
     few = run.few
     if not set(FIELDS) <= set(few.samples):
         return "not known: not all of the motion was kept"

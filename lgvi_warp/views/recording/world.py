@@ -67,14 +67,7 @@ class Box:
 
 
 def box_of(runs: list[Drawn]) -> Box:
-    """Find the box around all paths, with all floors, and the surface where it is near.
-
-    Args:
-        runs: The runs that are drawn.
-
-    Returns:
-        The box, at least as large as a few hulls along each axis.
-    """
+    """Find the box around all paths, with all floors, and the surface where it is near."""
     ends = [(run.position[mask].min(axis=0), run.position[mask].max(axis=0)) for run in runs for mask in [_whole(run)]]
     low, high = (
         np.min([end[0] for end in ends], axis=0).astype(float),
@@ -97,14 +90,7 @@ def _whole(run: Drawn) -> np.ndarray:
 
 
 def floors_of(run: Drawn) -> list[float]:
-    """Depths of the floors of a run's own scene [m], the upper first.
-
-    Args:
-        run: The run.
-
-    Returns:
-        The depths; none where the scene has no floor.
-    """
+    """Depths of the floors of a run's own scene [m], the upper first."""
     events = run.result.provenance["scene"].get("events", ())
     return sorted(float(event["depth"]) for event in events if event["type"] == "floor")
 
@@ -120,16 +106,7 @@ def _length(run: Drawn) -> tuple[Mesh | tuple[float, float], float]:
 
 
 def scale_of(run: Drawn, box: Box, aspect: float = ASPECT) -> int:
-    """How many times its size a hull is drawn, so that it is seen in the box.
-
-    Args:
-        run: The run.
-        box: What is in view.
-        aspect: Width of the view over its height; default that of a single run.
-
-    Returns:
-        A whole number from 1.
-    """
+    """How many times its size a hull is drawn, so that it is seen in the box."""
     form, length = _length(run)
     thickness = length if isinstance(form, Mesh) else min(form)
     wanted = max(LONG / length, THICK / thickness) * far_pixel(box.low, box.high, aspect)
@@ -137,14 +114,7 @@ def scale_of(run: Drawn, box: Box, aspect: float = ASPECT) -> int:
 
 
 def log_world(recording: Any, run: Drawn, box: Box, scale: int) -> None:
-    """Log all of one run that stands in its world.
-
-    Args:
-        recording: The stream.
-        run: What is drawn.
-        box: What is in view.
-        scale: How many times their size hulls are drawn.
-    """
+    """Log all of one run that stands in its world."""
     log_frame(recording, run, box)
     log_bodies(recording, run, scale)
     _trails(recording, run)
@@ -153,13 +123,7 @@ def log_world(recording: Any, run: Drawn, box: Box, scale: int) -> None:
 
 
 def log_frame(recording: Any, run: Drawn, box: Box) -> None:
-    """Log what stands around the members of one run: surface, floor, axes and current.
-
-    Args:
-        recording: The stream.
-        run: What is drawn.
-        box: What is in view.
-    """
+    """Log what stands around the members of one run: surface, floor, axes and current."""
     import rerun as rr
 
     recording.log(run.path("world"), rr.ViewCoordinates.FRD, static=True, strict=True)
@@ -179,13 +143,7 @@ def _columns(recording: Any, entity: str, time: np.ndarray, columns: Any) -> Non
 
 
 def log_bodies(recording: Any, run: Drawn, scale: int) -> None:
-    """Log a hull for each outcome, and the poses of the members that have had it so far.
-
-    Args:
-        recording: The stream.
-        run: What is drawn.
-        scale: How many times their size hulls are drawn.
-    """
+    """Log a hull for each outcome, and the poses of the members that have had it so far."""
     import rerun as rr
 
     form, _ = _length(run)
@@ -247,12 +205,7 @@ def _trails(recording: Any, run: Drawn) -> None:
 
 
 def log_paths(recording: Any, run: Drawn) -> None:
-    """Log the whole ways of some members, as they are at all times.
-
-    Args:
-        recording: The stream.
-        run: What is drawn.
-    """
+    """Log the whole ways of some members, as they are at all times."""
     import rerun as rr
 
     members = slice(None, None, -(-run.few.members // TRAILS))
@@ -331,12 +284,8 @@ def _axes(recording: Any, run: Drawn, box: Box) -> None:
 def water_at(run: Drawn, points: np.ndarray) -> np.ndarray:
     """Compute how the water moves, by the numbers of the first member drawn.
 
-    Args:
-        run: The run.
-        points: Places, shape (g, 3) [m].
-
-    Returns:
-        Velocity in inertial axes, shape (f, g, 3) [m/s]; zero for water whose motion is not known after the run.
+    points: Places, shape (g, 3) [m].
+    Returns: Velocity in inertial axes, shape (f, g, 3) [m/s]; zero for water whose motion is not known after the run.
     """
     places = np.broadcast_to(points, (len(run.time), *points.shape))
     total = np.zeros(places.shape)
@@ -378,14 +327,7 @@ def _current(recording: Any, run: Drawn, box: Box) -> None:
 
 
 def chosen_member(run: Drawn) -> int:
-    """Choose the member whose forces are drawn: of those drawn the first that goes on longest.
-
-    Args:
-        run: The run.
-
-    Returns:
-        Its place among the members drawn.
-    """
+    """Choose the member whose forces are drawn: of those drawn the first that goes on longest."""
     return int(run.counted.sum(axis=0).argmax())
 
 
@@ -399,11 +341,7 @@ def forces_on(run: Drawn) -> tuple[np.ndarray, np.ndarray]:
 
     The last follow from the balance of momentum, as means between the times drawn.
 
-    Args:
-        run: The run.
-
-    Returns:
-        Forces in inertial axes, shape (f, 3, 3) [N], and where they act in body axes, shape (3, 3) [m].
+    Returns: Forces in inertial axes, shape (f, 3, 3) [N], and where they act in body axes, shape (3, 3) [m].
     """
     member = np.array([chosen_member(run)])
     few = run.few.part(member)

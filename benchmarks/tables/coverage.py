@@ -15,9 +15,9 @@ from benchmarks.pages import line, markdown
 from lgvi_warp.physics.notation import matrix_from_rotation_vector
 from lgvi_warp.sampling.designs import sampling_of
 from lgvi_warp.sampling.designs.space import Space
-from lgvi_warp.statistics.tree import Tree
+from lgvi_warp.statistics.estimates.tree import Tree
 from lgvi_warp.statistics.until import Watch
-from lgvi_warp.statistics.values import Values, dealt
+from lgvi_warp.statistics.values.values import Values, dealt
 
 BLOCK = 256
 # Members of the first table's intervals.

@@ -12,8 +12,8 @@ from unittest import mock
 
 import lgvi_warp as lw
 from lgvi_warp.cli import parser
+from lgvi_warp.control.controller import SECTIONS as CONTROLLER
 from lgvi_warp.physics import terms
-from lgvi_warp.physics.control.controller import SECTIONS as CONTROLLER
 from lgvi_warp.physics.shape import Shape
 from lgvi_warp.physics.terms import events
 from lgvi_warp.physics.terms.base import word_of

@@ -43,7 +43,7 @@ def of_result(result: Any) -> dict[str, Any]:
 
 def of_statistics(estimates: Any) -> list[dict[str, Any]]:
     """The estimates of a run at its last sample time."""
-    from lgvi_warp.statistics.table import entries
+    from lgvi_warp.statistics.estimates.table import entries
 
     return [dict(zip(("label", "unit", "value", "lower", "upper", "members"), entry, strict=True))
             for entry in entries(estimates)]  # fmt: skip

@@ -33,11 +33,11 @@ class Content:
     def load(self) -> Any:
         """Read the numbers."""
         if self.kind == "store":
-            from lgvi_warp.runs.store.open import open_run
+            from lgvi_warp.store.open import open_run
 
             return open_run(self.path)
         if self.kind == "result":
-            from lgvi_warp.runs.result import Result
+            from lgvi_warp.results.result import Result
 
             return Result.load(self.path)
         if self.kind == "sweep":
@@ -82,7 +82,7 @@ def contents(folder: Path) -> list[Content]:
             raise SceneError([f"{folder}: holds nothing that a verb wrote; give the folder of a run or of a study"])
         if not stores:
             return studies
-    from lgvi_warp.runs.store.open import folder_of
+    from lgvi_warp.store.open import folder_of
 
     return [*studies, Content("store", folder_of(folder))]
 
@@ -109,7 +109,7 @@ def _part(content: Content, chosen: argparse.Namespace) -> tuple[dict[str, Any],
     """The document on one content of a folder, and its text."""
     head = {"kind": content.kind, "path": content.path}
     if content.kind == "store":
-        from lgvi_warp.runs.store.state import state
+        from lgvi_warp.store.state import state
 
         numbers = state(content.path)
         return head | documents.of_store(numbers), lambda: "\n".join(store_lines(numbers, chosen))

@@ -70,7 +70,7 @@ COLUMN = 41
 
 def new(chosen: argparse.Namespace) -> int:
     """Run the verb new: write a scene file with comments."""
-    from lgvi_warp.scene.vehicles.fossen import vehicle_tables
+    from lgvi_warp.vehicles.fossen import vehicle_tables
 
     content = vehicle_tables(chosen.vehicle)
     if os.path.lexists(place_of(chosen.scene)):
@@ -117,7 +117,7 @@ def _methods() -> dict[str, str]:
 
 def _vehicles() -> dict[str, str]:
     """Vehicle -> its title, and what its numbers lead to that few would expect."""
-    from lgvi_warp.scene.vehicles.fossen import vehicle_tables, vehicles
+    from lgvi_warp.vehicles.fossen import vehicle_tables, vehicles
 
     sources = {name: vehicle_tables(name)["source"] for name in vehicles()}
     return {name: "; ".join(of[key] for key in ("title", "remark") if key in of) for name, of in sources.items()}
@@ -133,8 +133,8 @@ def _terms() -> dict[str, str]:
 
 def _laws() -> dict[str, str]:
     """Type of a part of a controller -> its list in the scene file, and what it is."""
-    from lgvi_warp.physics.control.base import SECTIONS
-    from lgvi_warp.physics.control.controller import Controller  # noqa: F401  (which makes every part known)
+    from lgvi_warp.control.base import SECTIONS
+    from lgvi_warp.control.controller import Controller  # noqa: F401  (which makes every part known)
 
     sections = ("laws", *(section for section in SECTIONS if section != "laws"))
     kinds = ((section, word, kind) for section in sections for word, kind in sorted(SECTIONS[section].kinds.items()))

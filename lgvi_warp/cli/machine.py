@@ -93,7 +93,7 @@ def tune(chosen: argparse.Namespace) -> int:
     Returns:
         The exit code: 0.
     """
-    from lgvi_warp.studies import tuning
+    from lgvi_warp.studies import packet_width as tuning
 
     kernels: dict[str, dict[str, Any]] = {}
     for kernel, ns, of_table, fastest in tuning.tune():

@@ -34,7 +34,7 @@ def report(result: Any, out: Path, chosen: argparse.Namespace, begun: float, fai
     Returns:
         These, and one text for each file that could not be written.
     """
-    from lgvi_warp.runs.store.folder import Folder
+    from lgvi_warp.store.folder import Folder
 
     if result.store is not None and not Folder(result.store).complete:
         lines = [
@@ -73,7 +73,7 @@ def shown_members(result: Any) -> Any:
         return None
     if result.store is None:
         return result
-    from lgvi_warp.runs.store.open import chosen
+    from lgvi_warp.store.open import chosen
     from lgvi_warp.views.choice import shown
 
     most = max(1, MOST_DRAWN // (18 * len(result.time)))
@@ -112,8 +112,8 @@ def write(result: Any, drawn: Any, out: Path, viewer: str | None = None) -> Writ
 
 def _record(result: Any, path: Path, viewer: str | None) -> Path:
     """Write the recording of a result, and send it to a viewer where there is one."""
-    from lgvi_warp.views.rerun import log_rerun
-    from lgvi_warp.views.viewer import answers
+    from lgvi_warp.views.recording.rerun import log_rerun
+    from lgvi_warp.views.recording.viewer import answers
 
     log_rerun(result, path, to=viewer if viewer and answers(viewer) else None)
     return path
@@ -152,8 +152,8 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float = 0.0, ve
         The lines as one text.
     """
     from lgvi_warp.common.status import Status
-    from lgvi_warp.runs.outcomes import outcome_text, outcomes
-    from lgvi_warp.statistics.table import table
+    from lgvi_warp.results.outcomes import outcome_text, outcomes
+    from lgvi_warp.statistics.estimates.table import table
 
     settings = result.provenance
     lines = [

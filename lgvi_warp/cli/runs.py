@@ -35,7 +35,7 @@ def run(chosen: argparse.Namespace) -> int:
     else:
         inside(out, RUN)
     warm = _import_in_background()
-    from lgvi_warp.runs.solve import solve
+    from lgvi_warp.calls.solve import solve
 
     suggested = suggestion(scene, chosen)
     settings = suggested.settings if suggested else {}
@@ -73,7 +73,7 @@ def live_address(scene: Any, chosen: argparse.Namespace) -> str | None:
         return None
     if not (isinstance(scene.run.keep, str) and scene.run.keep == "all"):
         raise SceneError(["--live: shows members as they are done, and the run keeps none; add --keep all"])
-    from lgvi_warp.views.viewer import opened
+    from lgvi_warp.views.recording.viewer import opened
 
     try:
         return opened(chosen.viewer)
@@ -89,7 +89,7 @@ def live_view(scene: Any, address: str | None) -> Callable[[Any], None] | None:
     """
     if address is None:
         return None
-    from lgvi_warp.views.live import live
+    from lgvi_warp.views.recording.live import live
 
     return live(scene, address).add
 
@@ -189,7 +189,7 @@ def resume(chosen: argparse.Namespace) -> int:
     Raises:
         SceneError: The store cannot be continued.
     """
-    from lgvi_warp.runs.store.resume import resume as go_on
+    from lgvi_warp.calls.resume import resume as go_on
 
     begun = time.perf_counter()
     failures = []
@@ -218,7 +218,7 @@ def predict(chosen: argparse.Namespace) -> int:
     Raises:
         SceneError: The scene or an argument is refused.
     """
-    from lgvi_warp.runs import predict as prediction
+    from lgvi_warp.calls import predict as prediction
 
     scene = load_scene(chosen)
     with shown(chosen.quiet, "measuring"):

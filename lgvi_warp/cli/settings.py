@@ -111,7 +111,7 @@ def store_settings(chosen: argparse.Namespace) -> Any:
         if options:
             raise SceneError([f"{' and '.join(options)}: is for runs in a store; add --store zarr, or leave it out"])
         return None
-    from lgvi_warp.runs.store.settings import Store
+    from lgvi_warp.store.settings import Store
 
     existing = next((name for name in ("overwrite", "resume") if getattr(chosen, name, False)), "refuse")
     return Store(out_of(chosen) / RUN, chosen.store_dtype, existing=existing)

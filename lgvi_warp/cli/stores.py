@@ -23,7 +23,7 @@ def merge(chosen: argparse.Namespace) -> int:
     Raises:
         SceneError: The folders do not belong together, or a store is there already.
     """
-    from lgvi_warp.runs.store.merge import merge as put_together
+    from lgvi_warp.calls.merge import merge as put_together
 
     with shown(chosen.quiet, "writing"):
         folder = put_together(chosen.dirs, chosen.out, chosen.overwrite)
@@ -50,7 +50,7 @@ def export(chosen: argparse.Namespace) -> int:
     Raises:
         SceneError: The store cannot be read, or the format is unknown.
     """
-    from lgvi_warp.runs.store.export import export as write_as
+    from lgvi_warp.store.export import export as write_as
 
     with shown(chosen.quiet, "writing"):
         path = write_as(chosen.dir, chosen.to, chosen.out)
@@ -72,7 +72,7 @@ def report(chosen: argparse.Namespace) -> int:
     """
     import webbrowser
 
-    from lgvi_warp.views.report import report as write_report
+    from lgvi_warp.views.pages.report import report as write_report
 
     if chosen.out is None:
         place_of(chosen.dir / "report.html", chosen.dir)

@@ -170,7 +170,7 @@ def sweep(chosen: argparse.Namespace) -> int:
     from lgvi_warp.studies.sweeps.file import arguments_of_file
     from lgvi_warp.studies.sweeps.setup import made, plan_text
     from lgvi_warp.studies.sweeps.sweep import sweep as run_sweep
-    from lgvi_warp.views.sweeps import pictures
+    from lgvi_warp.views.plots.sweep_pictures import pictures
 
     arguments = arguments_of_file(chosen.scene)
     for name in ("members", "seed"):
@@ -203,7 +203,7 @@ def sweep(chosen: argparse.Namespace) -> int:
 
 def _record_worst(found: Any, count: int, out: Path, written: Written) -> None:
     """Run the worst members again, those of each cell together, and write a recording of them."""
-    from lgvi_warp.views.rerun import log_rerun
+    from lgvi_warp.views.recording.rerun import log_rerun
 
     members: dict[int, list[int]] = {}
     for row in found.worst(count):

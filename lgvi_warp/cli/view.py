@@ -20,7 +20,7 @@ def view(chosen: argparse.Namespace) -> int:
     if chosen.out is not None:
         place_of(chosen.out)  # before the run is read: a fault of the recording is none of the run
     result = content.load()
-    from lgvi_warp.views.rerun import log_rerun, show
+    from lgvi_warp.views.recording.rerun import log_rerun, show
 
     try:
         with shown(chosen.quiet, "drawing"), content.understood():

@@ -13,7 +13,7 @@ from lgvi_warp.common import machine
 
 def warm(chosen: argparse.Namespace) -> int:
     """Run the verb warm: compile what runs of a scene need, and print how long each phase took."""
-    from lgvi_warp.runs import warm as kernels
+    from lgvi_warp.calls import warm as kernels
 
     begun = time.perf_counter()
     scene = load_scene(chosen)

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from importlib import import_module
-from pkgutil import iter_modules
+from pkgutil import walk_packages
 from types import ModuleType
 from typing import Any
 
@@ -24,6 +24,6 @@ def add(known: dict[str, Any], kind: type, attribute: str = "type") -> bool:
 
 
 def load_modules(package: ModuleType) -> None:
-    """Import every module of a package, so that all its classes are known."""
-    for module in iter_modules(package.__path__):
-        import_module(f"{package.__name__}.{module.name}")
+    """Import every module of a package and of its inner folders, so that all its classes are known."""
+    for module in walk_packages(package.__path__, f"{package.__name__}."):
+        import_module(module.name)

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import refusal
-from lgvi_warp.engine.asking import Looks, answer, last_look
+from lgvi_warp.control.sensor import Sensor
+from lgvi_warp.control.trajectory import Trajectory
+from lgvi_warp.engine.host_callback import Looks, answer, last_look
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.plan import Plan
-from lgvi_warp.physics.control.sensor import Sensor
-from lgvi_warp.physics.control.trajectory import Trajectory
 from lgvi_warp.sampling.members import Members
 
 

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.control.base import Part
+from lgvi_warp.control.controller import Controller
 from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey
 from lgvi_warp.methods.method import FORCED, Method, Program, divided, merged, simplified, with_hops
 from lgvi_warp.physics import terms, vehicle
-from lgvi_warp.physics.control.base import Part
-from lgvi_warp.physics.control.controller import Controller
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.terms.drag import PARTS, Drag
 from lgvi_warp.physics.terms.noisy import NoisyTerm

@@ -28,6 +28,8 @@ from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.phases import Phases
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
 from lgvi_warp.common.warp_setup import build_lock
+from lgvi_warp.control.base import Part
+from lgvi_warp.control.signals import SIGNALS, check, ordered, row_of, saved_fields
 from lgvi_warp.engine import kernel_cache
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, choose_kernel, declared, is_built_in
@@ -39,8 +41,6 @@ from lgvi_warp.engine.widths import default_width
 from lgvi_warp.methods.gauss import gauss
 from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid, divisors
-from lgvi_warp.physics.control.base import Part
-from lgvi_warp.physics.control.signals import SIGNALS, check, ordered, row_of, saved_fields
 from lgvi_warp.physics.fields import Field
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.terms.noisy import NoisyTerm

@@ -14,13 +14,13 @@ import numpy as np
 
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import DTYPES
+from lgvi_warp.control.signals import SIGNALS
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.keepers.protocol import BlockStore, Keeper
 from lgvi_warp.physics import notation
-from lgvi_warp.physics.control.signals import SIGNALS
 from lgvi_warp.physics.fields import TABLE, Field
 from lgvi_warp.physics.inertia import Frame
-from lgvi_warp.statistics.samples import Fields
+from lgvi_warp.statistics.values.samples import Fields
 
 if TYPE_CHECKING:
     from lgvi_warp.engine.packets import Packets
@@ -111,7 +111,7 @@ def run_block(
     advanced: called with the vehicle-steps made since the last call (default: nothing).
     Returns: What each keeper closed with; None if the block was halted before the end.
     """
-    from lgvi_warp.engine.asking import ask
+    from lgvi_warp.engine.host_callback import ask
     from lgvi_warp.engine.packets import Packets
 
     # Members that are not finite, or exceed float32, get their status from the kernel: no warning from NumPy.

@@ -11,7 +11,7 @@ from fractions import Fraction
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.control.signals import check_names
+from lgvi_warp.control.signals import check_names
 from lgvi_warp.physics.fields import FIELDS
 
 # A grid whose step would be more than this many times shorter than the one asked for is refused.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Metrics of one member's whole path in plain NumPy, as twins of lgvi_warp/statistics/metrics.py: names are theirs.
+"""Metrics of one member's whole path in plain NumPy, twins of lgvi_warp/statistics/metrics/tracking_metrics.py: same names.
 
 t: times of the looks under way (k,) [s]; y: actual numbers (k,), goal: one number; e: errors (k,), wanted less actual.
 """

@@ -20,12 +20,12 @@ from lgvi_warp.engine.keepers.observation import Observation, Observing
 from lgvi_warp.engine.loop import Merged, RunProgress, run_blocks
 from lgvi_warp.engine.plan import NotSurveyed, Plan
 from lgvi_warp.engine.work import Work
-from lgvi_warp.runs import member_fields
-from lgvi_warp.runs.outcomes import begun_beyond, failure_text
-from lgvi_warp.runs.provenance import at_end, messages, provenance
-from lgvi_warp.runs.result import Drawn, Result
+from lgvi_warp.results import member_fields
+from lgvi_warp.results.outcomes import begun_beyond, failure_text
+from lgvi_warp.results.provenance import at_end, messages, provenance
+from lgvi_warp.results.result import Drawn, Result
 from lgvi_warp.scene import plausibility
-from lgvi_warp.statistics.estimate import Estimates
+from lgvi_warp.statistics.estimates.estimate import Estimates
 
 
 def completed(plan: Plan, threads: int, observed: Observation, fields: Sequence[str], **settings: Any) -> Result:

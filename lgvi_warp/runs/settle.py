@@ -11,11 +11,11 @@ import numpy as np
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import Status
+from lgvi_warp.control.signals import check
 from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt, time_grid
-from lgvi_warp.physics.control.signals import check
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.default_method import planned
 from lgvi_warp.runs.run import run_plan

@@ -9,11 +9,11 @@ from types import MethodType
 from typing import Any, NamedTuple
 
 from lgvi_warp.common.identity import identity
-from lgvi_warp.physics.control.base import SECTIONS
-from lgvi_warp.physics.control.callback import Callback
+from lgvi_warp.control.base import SECTIONS
+from lgvi_warp.control.callback import Callback
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.statistics.base import Statistic
-from lgvi_warp.statistics.quantity import Quantity
+from lgvi_warp.statistics.values.quantity import Quantity
 
 
 class Own(NamedTuple):

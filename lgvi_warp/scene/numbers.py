@@ -12,7 +12,7 @@ import numpy as np
 
 from lgvi_warp.common.arguments import mapping_of
 from lgvi_warp.common.errors import Faults, closest
-from lgvi_warp.physics.control.base import SECTIONS
+from lgvi_warp.control.base import SECTIONS
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.start import NAMES
 

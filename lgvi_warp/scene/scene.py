@@ -76,7 +76,7 @@ class Scene(Summarized):
         if self.controller is not None:
             with faults.including():
                 # A scene without a controller loads none of its parts.
-                from lgvi_warp.physics.control.controller import from_table
+                from lgvi_warp.control.controller import from_table
 
                 object.__setattr__(self, "controller", from_table(self.controller))
         if not faults:

@@ -9,9 +9,9 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from lgvi_warp.control.base import SECTIONS as LISTS
+from lgvi_warp.control.controller import Controller
 from lgvi_warp.physics import terms
-from lgvi_warp.physics.control.base import SECTIONS as LISTS
-from lgvi_warp.physics.control.controller import Controller
 from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.physics.terms import events
 from lgvi_warp.physics.terms.base import Term, word_of
@@ -22,9 +22,9 @@ from lgvi_warp.sampling.distributions.named import SCIPY, ScipyDistribution, Use
 from lgvi_warp.scene.scene import SECTIONS
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 from lgvi_warp.scene.start import Environment, Start
-from lgvi_warp.scene.vehicles.fossen import vehicles
 from lgvi_warp.statistics import TYPES as STATISTICS
 from lgvi_warp.statistics.until import Until
+from lgvi_warp.vehicles.fossen import vehicles
 
 Schema = dict[str, Any]
 

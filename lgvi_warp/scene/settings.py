@@ -91,7 +91,7 @@ class RunSettings:
         faults = Faults("run.")
         check_keep(faults, "keep", self.keep)
         if self.save_fields is not None:
-            from lgvi_warp.physics.control.signals import check_names
+            from lgvi_warp.control.signals import check_names
 
             check_names(faults, "save_fields", self.save_fields)
         # Most scenes have neither statistics nor a stopping rule: their import is a quarter of that of a scene.

@@ -11,12 +11,12 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, among
 from lgvi_warp.physics import notation
-from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.base import Statistic
-from lgvi_warp.statistics.estimate import Estimate, along
+from lgvi_warp.statistics.estimates import intervals
+from lgvi_warp.statistics.estimates.estimate import Estimate, along
+from lgvi_warp.statistics.estimates.tree import Part
 from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate, joined_means, sums
-from lgvi_warp.statistics.tree import Part
-from lgvi_warp.statistics.values import Values
+from lgvi_warp.statistics.values.values import Values
 
 # The skew matrices of the axes; + 0.0 leaves no -0.
 HATS = notation.hat(np.eye(3)) + 0.0

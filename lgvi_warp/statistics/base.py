@@ -18,13 +18,13 @@ import numpy as np
 
 from lgvi_warp.common import registry
 from lgvi_warp.common.errors import Faults, SceneError, closest, refusal
-from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.ends import Ends
-from lgvi_warp.statistics.estimate import Estimate
-from lgvi_warp.statistics.functional import Functional, over_path, quantity
-from lgvi_warp.statistics.quantity import Quantity
-from lgvi_warp.statistics.tree import Part
-from lgvi_warp.statistics.values import Values
+from lgvi_warp.statistics.estimates import intervals
+from lgvi_warp.statistics.estimates.estimate import Estimate
+from lgvi_warp.statistics.estimates.tree import Part
+from lgvi_warp.statistics.values.functional import Functional, over_path, quantity
+from lgvi_warp.statistics.values.quantity import Quantity
+from lgvi_warp.statistics.values.values import Values
 
 STOPPED = ("held", "left_out")
 

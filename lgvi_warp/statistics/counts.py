@@ -12,14 +12,14 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.real_numbers import is_whole
-from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.base import Gatherer, Statistic, together
 from lgvi_warp.statistics.ends import STOPPED, Ends
-from lgvi_warp.statistics.estimate import Estimate, along
+from lgvi_warp.statistics.estimates import intervals
+from lgvi_warp.statistics.estimates.estimate import Estimate, along
+from lgvi_warp.statistics.estimates.naming import spelled
+from lgvi_warp.statistics.estimates.tree import Part
 from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate
-from lgvi_warp.statistics.naming import spelled
-from lgvi_warp.statistics.tree import Part
-from lgvi_warp.statistics.values import Values
+from lgvi_warp.statistics.values.values import Values
 
 
 class Counted(Statistic):

@@ -9,11 +9,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.base import Statistic
-from lgvi_warp.statistics.estimate import Dims, Estimate, along
-from lgvi_warp.statistics.tree import Part
-from lgvi_warp.statistics.values import Values
+from lgvi_warp.statistics.estimates import intervals
+from lgvi_warp.statistics.estimates.estimate import Dims, Estimate, along
+from lgvi_warp.statistics.estimates.tree import Part
+from lgvi_warp.statistics.values.values import Values
 
 
 def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:

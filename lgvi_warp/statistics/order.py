@@ -11,12 +11,12 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.real_numbers import is_whole
-from lgvi_warp.statistics import intervals, sketch
 from lgvi_warp.statistics.base import Statistic, together
-from lgvi_warp.statistics.estimate import Estimate, along
+from lgvi_warp.statistics.estimates import intervals, sketch
+from lgvi_warp.statistics.estimates.estimate import Estimate, along
+from lgvi_warp.statistics.estimates.tree import Part
 from lgvi_warp.statistics.moments import component_dims, empty_as_nan, estimate
-from lgvi_warp.statistics.tree import Part
-from lgvi_warp.statistics.values import Values
+from lgvi_warp.statistics.values.values import Values
 
 # Values of sketches that are sorted together; each takes some 50 bytes.
 SORTED_AT_ONCE = 2_000_000

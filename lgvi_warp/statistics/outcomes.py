@@ -10,17 +10,17 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
-from lgvi_warp.statistics import intervals
 from lgvi_warp.statistics.base import Gatherer, Statistic
 from lgvi_warp.statistics.counts import DIRICHLET, Curve, Histogram, by_replicates, check_levels
 from lgvi_warp.statistics.ends import FAILED, Ends
-from lgvi_warp.statistics.estimate import Estimate, along
+from lgvi_warp.statistics.estimates import intervals
+from lgvi_warp.statistics.estimates.estimate import Estimate, along
+from lgvi_warp.statistics.estimates.tree import Part
 from lgvi_warp.statistics.moments import Mean, estimate
 from lgvi_warp.statistics.order import Quantiles
-from lgvi_warp.statistics.quantity import Quantity
-from lgvi_warp.statistics.then import Then
-from lgvi_warp.statistics.tree import Part
-from lgvi_warp.statistics.values import Values
+from lgvi_warp.statistics.paths.member_statistic import Then
+from lgvi_warp.statistics.values.quantity import Quantity
+from lgvi_warp.statistics.values.values import Values
 
 # How a member ended: not before the end of the run, by the outcome asked for, otherwise, or by a failure.
 NOT, SO, OTHERWISE, LOST = 0.0, 1.0, 2.0, 3.0

@@ -14,11 +14,11 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError, among, closest, refusal
 from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.statistics.base import Statistic
-from lgvi_warp.statistics.estimate import Estimate
-from lgvi_warp.statistics.functional import quantity
+from lgvi_warp.statistics.estimates.estimate import Estimate
+from lgvi_warp.statistics.estimates.naming import canonical
 from lgvi_warp.statistics.moments import Covariance, Mean
-from lgvi_warp.statistics.naming import canonical
 from lgvi_warp.statistics.order import Quantiles
+from lgvi_warp.statistics.values.functional import quantity
 
 # After a look, the number of members grows by at least this fraction before the next one.
 GROWTH = 0.05

@@ -24,12 +24,12 @@ from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.noisy import NoisyTerm
-from lgvi_warp.runs.result import Result
+from lgvi_warp.results.result import Result
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.budget import Budget, rounded_up
-from lgvi_warp.studies.compared import QUANTITIES, Compared, compared_in
+from lgvi_warp.studies.distance import QUANTITIES, Compared, compared_in
 
 # Error at which a trajectory is no longer meaningful [m or rad].
 LOST = 1e-2
@@ -607,7 +607,7 @@ def part(result: Result, members: Sequence[int]) -> Result:
     """Select some members of a result, in memory or in a store."""
     at = np.asarray(members)
     if result.store is not None:
-        from lgvi_warp.runs.store.open import chosen
+        from lgvi_warp.store.open import chosen
 
         return chosen(result, members)
     return result.part(at)

@@ -20,8 +20,8 @@ from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics.terms.noisy import NoisyTerm
+from lgvi_warp.results.result import Result
 from lgvi_warp.runs.default_method import h_rates, is_damped
-from lgvi_warp.runs.result import Result
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.runs.step_error import rates
@@ -30,8 +30,8 @@ from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies import comparison, cost
 from lgvi_warp.studies import tradeoff as tradeoffs
 from lgvi_warp.studies.budget import Budget, rounded_up
-from lgvi_warp.studies.compared import Compared, compared_in
 from lgvi_warp.studies.comparison import Candidate, Reference, Sample
+from lgvi_warp.studies.distance import Compared, compared_in
 from lgvi_warp.studies.speed import void
 from lgvi_warp.studies.tradeoff import (
     PRECISIONS,

@@ -19,13 +19,13 @@ from lgvi_warp.engine.executors.threads import ThisThread
 from lgvi_warp.engine.plan import DTYPES, Plan
 from lgvi_warp.methods.method import COMPOSITIONS, PROGRAMS, Method
 from lgvi_warp.physics import energy as invariants
-from lgvi_warp.runs.result import Result
+from lgvi_warp.results.result import Result
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies import comparison, cost
 from lgvi_warp.studies.budget import Budget
-from lgvi_warp.studies.compared import QUANTITIES, Compared, compared_in
 from lgvi_warp.studies.comparison import Candidate, Growth, Reference, Sample
+from lgvi_warp.studies.distance import QUANTITIES, Compared, compared_in
 from lgvi_warp.studies.files import Saved, finite_or_none, numbers
 from lgvi_warp.studies.speed import void
 

@@ -13,11 +13,11 @@ from lgvi_warp.common.arguments import result_of
 from lgvi_warp.common.errors import NothingToDraw, refusal
 from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.common.status import Status, under_way
-from lgvi_warp.runs import member_fields
-from lgvi_warp.runs.outcomes import outcomes
+from lgvi_warp.results import member_fields
+from lgvi_warp.results.outcomes import outcomes
 
 if TYPE_CHECKING:
-    from lgvi_warp.runs.result import Result
+    from lgvi_warp.results.result import Result
 
 # More bodies than this cannot be told apart in a window, and cost time and file size.
 MOST_BODIES = 1000

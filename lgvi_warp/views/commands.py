@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from lgvi_warp.common.errors import SceneError
-from lgvi_warp.physics.control.signals import CHANNELS
+from lgvi_warp.control.signals import CHANNELS
 
 if TYPE_CHECKING:
-    from lgvi_warp.runs.result import Result
+    from lgvi_warp.results.result import Result
 
 # A limit is drawn where it is at most so many times as large as what is seen: a farther one would flatten the curves.
 NEAR = 20.0

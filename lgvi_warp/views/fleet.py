@@ -14,7 +14,7 @@ from lgvi_warp.physics import energy as invariants
 from lgvi_warp.views.choice import of_members, pieces
 
 if TYPE_CHECKING:
-    from lgvi_warp.runs.result import Result
+    from lgvi_warp.results.result import Result
 
 
 class Look(NamedTuple):

@@ -13,10 +13,10 @@ from gymnasium.wrappers.vector import RecordEpisodeStatistics
 from scipy.spatial.transform import Rotation
 
 import lgvi_warp as lw
-from lgvi_warp.physics.control.policy import INPUTS
+from lgvi_warp.calls.observations import OBSERVATIONS
+from lgvi_warp.control.policy import INPUTS
 from lgvi_warp.reference.control import Measurement, Reference
 from lgvi_warp.reference.control.policy import Policy as PolicyTwin
-from lgvi_warp.runs.observations import OBSERVATIONS
 from tests.conftest import ROOT
 from tests.control.test_callback import GAINS, ODD, H, heading, scene
 

@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.physics.control.base import SECTIONS
+from lgvi_warp.control.base import SECTIONS
 from tests.extremes.fuzz import CONTROLLED, GOOD, outcomes
 
 SLOW = pytest.mark.slow

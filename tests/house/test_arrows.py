@@ -79,7 +79,7 @@ def test_the_reader_finds_both_packages():
         ("if TYPE_CHECKING:\n    import rerun\nelse:\n    import xarray", [("rerun", "typing"), ("xarray", "top")]),
         ("from lgvi_warp import views", [("lgvi_warp.views", "top")]),
         ("from . import plots", [("lgvi_warp.views.plots", "top")]),
-        ("from ..runs.result import Result", [("lgvi_warp.runs.result.Result", "top")]),
+        ("from ..results.result import Result", [("lgvi_warp.results.result.Result", "top")]),
     ],
 )
 def test_the_reader_sees_an_import(source, expected):
@@ -109,9 +109,9 @@ def test_only_seven_files_of_the_engine_know_the_kernels():
         "lgvi_warp.engine.plan",
         "lgvi_warp.engine.packets",
         "lgvi_warp.engine.peak",
-        "lgvi_warp.engine.laws.bench",
-        "lgvi_warp.engine.laws.check",
-        "lgvi_warp.engine.laws.part_bench",
+        "lgvi_warp.checks.bench",
+        "lgvi_warp.checks.check",
+        "lgvi_warp.checks.part_bench",
     }
     assert importers("lgvi_kernels") == those
 

@@ -9,11 +9,13 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.common import yaml_text
 from lgvi_warp.engine.executors import executor_of
-from lgvi_warp.runs.store.settings import needed
 from lgvi_warp.sampling.designs.space import Space
-from lgvi_warp.statistics.estimate import Estimate
+from lgvi_warp.statistics.estimates.estimate import Estimate
+from lgvi_warp.store.settings import needed
 from lgvi_warp.studies.sensitivity import analyses
-from lgvi_warp.views import again, plots, rerun
+from lgvi_warp.views import plots
+from lgvi_warp.views.pages import again
+from lgvi_warp.views.recording import rerun
 
 ESTIMATE = Estimate("mean x", {}, "m", 0.95, "", {"value": ("time",)}, {"value": np.zeros(2)}, {"time": np.arange(2.0)})
 DOORS = {

@@ -21,12 +21,12 @@ ALLOWED = {
     ("engine/kernel_cache.py", "write_text"): "the same, in a scratch folder of the process",
     ("engine/kernel_cache.py", "shutil.copyfile"): "the same",
     ("engine/kernel_cache.py", "os.open"): "a folder, to lock it",
-    ("runs/store/block_files.py", "np.save"): "into memory",
+    ("store/block_files.py", "np.save"): "into memory",
     ("cli/command.py", "os.open"): "the null device in the place of a closed stream",
     ("cli/signals.py", "open"): "the end of a pipe of its own",
     ("engine/executors/base.py", "pickle.loads"): "what a process sends to its own workers",
-    ("runs/warm.py", "pickle.loads"): "the same",
-    ("scene/vehicles/yaml.py", "read_text"): "a function of that name, which goes through reading",
+    ("calls/warm.py", "pickle.loads"): "the same",
+    ("vehicles/yaml.py", "read_text"): "a function of that name, which goes through reading",
 }
 
 

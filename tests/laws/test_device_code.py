@@ -11,7 +11,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_kernels import built_in
-from lgvi_warp.engine.laws.bench import KICK, ORIGIN, STEP, TURN, Bank, Bench
+from lgvi_warp.checks.bench import KICK, ORIGIN, STEP, TURN, Bank, Bench
 from lgvi_warp.reference.terms import View
 from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.weight import Weight

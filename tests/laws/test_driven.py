@@ -8,8 +8,8 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_kernels import built_in
-from lgvi_warp.engine.laws.bench import KICK, ORIGIN, TURN, Bank, Bench
-from lgvi_warp.physics.control.base import Bus
+from lgvi_warp.checks.bench import KICK, ORIGIN, TURN, Bank, Bench
+from lgvi_warp.control.base import Bus
 from lgvi_warp.reference.terms import View
 from lgvi_warp.reference.terms.control_fins import ControlFins
 from lgvi_warp.reference.terms.driven import ControlWrench

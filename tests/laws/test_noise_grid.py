@@ -10,7 +10,7 @@ import warp as wp
 
 import lgvi_warp as lw
 from lgvi_kernels.law import add, div, mul, normals_over, ones, root  # noqa: F401
-from lgvi_warp.engine.laws.bench import KICK, STEP, Bank, Bench
+from lgvi_warp.checks.bench import KICK, STEP, Bank, Bench
 from lgvi_warp.physics import terms
 from lgvi_warp.reference.random import draws_of_step, normals
 from lgvi_warp.reference.terms import View

@@ -11,13 +11,13 @@ import warp as wp
 import lgvi_warp as lw
 from lgvi_kernels.law import div, mul, neg, ones, positive, sub, vec3  # noqa: F401
 from lgvi_warp.common.status import Status, under_way
+from lgvi_warp.control.base import ControlLaw
+from lgvi_warp.control.signals import SAVED, SIGNALS
 from lgvi_warp.engine import plan as plans
 from lgvi_warp.physics import energy as invariants
-from lgvi_warp.physics.control.base import ControlLaw
-from lgvi_warp.physics.control.signals import SAVED, SIGNALS
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.runs.store.folder import Folder
+from lgvi_warp.store.folder import Folder
 from tests.runs.test_outcomes_shown import rows
 from tests.support.stores import differing
 

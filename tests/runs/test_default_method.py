@@ -10,11 +10,11 @@ import lgvi_warp as lw
 from lgvi_warp.cli.report import members_line
 from lgvi_warp.methods import limits
 from lgvi_warp.reference.terms import View
+from lgvi_warp.results.provenance import provenance
 from lgvi_warp.runs import default_method, step_error
-from lgvi_warp.runs.provenance import provenance
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.runs.store import recipe
 from lgvi_warp.scene.settings import RunSettings
+from lgvi_warp.store import recipe
 from tests.laws.cases import CASES
 
 DRAG = lw.Drag(linear=[5.0, 10.0, 10.0, 0.5, 2.0, 2.0])

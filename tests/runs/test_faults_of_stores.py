@@ -18,7 +18,7 @@ from lgvi_warp import cli
 from lgvi_warp.cli import report
 from lgvi_warp.common import files as durable
 from lgvi_warp.common import safe_files, scratch, write_lock
-from lgvi_warp.runs.store import folder as store
+from lgvi_warp.store import folder as store
 from tests.conftest import ROOT
 from tests.support import hostile
 from tests.support.stores import MEMBERS, SETTINGS, differing, fleet, forked, tree

@@ -17,8 +17,8 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp import cli
 from lgvi_warp.common import safe_files
-from lgvi_warp.runs.store import folder as store
-from lgvi_warp.runs.store.state import state
+from lgvi_warp.store import folder as store
+from lgvi_warp.store.state import state
 from tests.support import hostile
 from tests.support.stores import SETTINGS, STATISTICS, differing, fleet
 

@@ -13,9 +13,9 @@ import lgvi_warp as lw
 from lgvi_warp import cli
 from lgvi_warp.common.status import Status
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.runs.store import open as stored
-from lgvi_warp.runs.store.folder import Folder
-from lgvi_warp.runs.store.state import state
+from lgvi_warp.store import open as stored
+from lgvi_warp.store.folder import Folder
+from lgvi_warp.store.state import state
 from tests.runs.test_store import FIELDS, flip, remove, tear
 from tests.support.stores import MEMBERS, SETTINGS, differing, fleet, forked, tree
 

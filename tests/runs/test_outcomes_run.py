@@ -8,7 +8,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.physics.terms import events
-from lgvi_warp.runs.quantities import quantities
+from lgvi_warp.results.quantities import quantities
 from tests.conftest import ROOT
 from tests.support.stops import FarAway, stops
 

@@ -17,7 +17,7 @@ from lgvi_warp.cli import report
 from lgvi_warp.common import status
 from lgvi_warp.common.status import Status, StatusArray, failed, stopped
 from lgvi_warp.physics import energy as invariants
-from lgvi_warp.runs import outcomes
+from lgvi_warp.results import outcomes
 from lgvi_warp.views import fleet as looks
 from tests.laws import cases
 

@@ -9,15 +9,15 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
+from lgvi_warp.calls import predict as prediction
+from lgvi_warp.calls.sizes import sizes
 from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.keepers.observation import observe
 from lgvi_warp.engine.keepers.statistics import Gathered
-from lgvi_warp.runs import member_fields
-from lgvi_warp.runs import predict as prediction
+from lgvi_warp.results import member_fields
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.runs.sizes import sizes
-from lgvi_warp.runs.store.block_files import BlockFiles
-from lgvi_warp.runs.store.folder import Folder
+from lgvi_warp.store.block_files import BlockFiles
+from lgvi_warp.store.folder import Folder
 from tests.conftest import ROOT
 from tests.support.stores import SETTINGS, STATISTICS, fleet, tree
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.calls import predict, prepared
+from lgvi_warp.calls.prepared import FailedMembers
 from lgvi_warp.engine import plan as plans
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.shared import Shared
-from lgvi_warp.runs import predict, prepared
-from lgvi_warp.runs.prepared import FailedMembers
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene import ensemble as ensembles

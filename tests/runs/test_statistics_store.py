@@ -11,11 +11,11 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp import cli
 from lgvi_warp.engine.keepers.observation import observation_of, observe
-from lgvi_warp.runs.provenance import messages, provenance
+from lgvi_warp.results.provenance import messages, provenance
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.runs.store.create import create
-from lgvi_warp.runs.store.folder import Folder
-from lgvi_warp.runs.store.state import state
+from lgvi_warp.store.create import create
+from lgvi_warp.store.folder import Folder
+from lgvi_warp.store.state import state
 from tests.conftest import ROOT
 from tests.support.stores import SETTINGS, STATISTICS, UNTIL, bits, differing, fleet, forked, markers, tree
 

@@ -21,14 +21,14 @@ from lgvi_warp.common import files as durable
 from lgvi_warp.common import machine, safe_files
 from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.executors.threads import Threads
-from lgvi_warp.runs import member_fields
-from lgvi_warp.runs.provenance import messages, provenance
+from lgvi_warp.results import member_fields
+from lgvi_warp.results.provenance import messages, provenance
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.runs.store import folder as store
-from lgvi_warp.runs.store import layout as store_layout
-from lgvi_warp.runs.store.block_files import packed, unpacked
-from lgvi_warp.runs.store.run import StoredRun
-from lgvi_warp.runs.store.state import state
+from lgvi_warp.store import folder as store
+from lgvi_warp.store import layout as store_layout
+from lgvi_warp.store.block_files import packed, unpacked
+from lgvi_warp.store.run import StoredRun
+from lgvi_warp.store.state import state
 from tests.conftest import ROOT
 from tests.support.stores import MEMBERS, SETTINGS, differing, fleet, markers, tree
 
@@ -380,7 +380,7 @@ def test_an_export_that_fails_says_what_the_library_says(error, number, text, wh
     def fail(folder, path):
         raise error
 
-    monkeypatch.setattr("lgvi_warp.runs.store.export._netcdf", fail)
+    monkeypatch.setattr("lgvi_warp.store.export._netcdf", fail)
     with pytest.raises(OSError) as caught:
         lw.export(whole, "netcdf", tmp_path / "run.nc")
     assert (caught.value.errno, caught.value.strerror, caught.value.filename) == (
@@ -662,7 +662,7 @@ def test_a_file_system_that_is_read_only(tmp_path, monkeypatch, capsys):
     def refused(*_, **__):
         raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(tmp_path))
 
-    monkeypatch.setattr("lgvi_warp.runs.store.create.skeleton", refused)
+    monkeypatch.setattr("lgvi_warp.store.create.skeleton", refused)
     arguments = [
         "run",
         str(ROOT / "examples" / "paper.toml"),

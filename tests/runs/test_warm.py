@@ -11,9 +11,9 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
+from lgvi_warp.calls import warm
 from lgvi_warp.common.phases import Phases
 from lgvi_warp.runs import run as runs
-from lgvi_warp.runs import warm
 from tests.conftest import ROOT
 
 PAPER = ROOT / "examples" / "paper.toml"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.physics.control.loop_gain import FACTOR
+from lgvi_warp.control.loop_gain import FACTOR
 from lgvi_warp.scene.settings import RunSettings
 from lgvi_warp.studies.linear import loops as study
 from lgvi_warp.studies.linear.edges import edges

@@ -15,7 +15,7 @@ from scipy import stats
 
 import lgvi_warp as lw
 from lgvi_warp import cli
-from lgvi_warp.runs import quantities
+from lgvi_warp.results import quantities
 from lgvi_warp.scene.settings import RunSettings
 from lgvi_warp.studies import sensitivity as uq
 from tests.conftest import ROOT

@@ -30,7 +30,7 @@ from lgvi_warp.cli import documents, report
 from lgvi_warp.cli.folders import text_of
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.status import WarningArray
-from lgvi_warp.statistics.estimate import Estimates
+from lgvi_warp.statistics.estimates.estimate import Estimates
 from tests.conftest import ROOT
 from tests.unit.cli.test_terminal import morris, region, sobol
 from tests.unit.statistics.test_statistics import gathered

@@ -11,8 +11,8 @@ import zipfile
 
 import numpy as np
 
-from lgvi_warp.runs.store import folder as store
-from lgvi_warp.runs.store.block_files import marker, read_marker
+from lgvi_warp.store import folder as store
+from lgvi_warp.store.block_files import marker, read_marker
 
 ROOT = "zarr.json"
 TEXTS = ("provenance", "recipe", "messages", "shared")

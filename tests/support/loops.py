@@ -6,9 +6,9 @@ import importlib
 
 import numpy as np
 
+from lgvi_warp.control.pose_pid import PosePID
+from lgvi_warp.control.pose_smc import PoseSMC
 from lgvi_warp.methods.method import PROGRAMS
-from lgvi_warp.physics.control.pose_pid import PosePID
-from lgvi_warp.physics.control.pose_smc import PoseSMC
 from lgvi_warp.reference import advance
 from lgvi_warp.reference.control.loop import Loop, closed_loop
 from lgvi_warp.reference.control.policy import Policy

@@ -26,14 +26,14 @@ from lgvi_warp.engine.loop import RunProgress, run_blocks
 from lgvi_warp.engine.outcome import Outcome
 from lgvi_warp.engine.work import Work
 from lgvi_warp.methods.saveat import SaveAt
-from lgvi_warp.runs.provenance import messages, provenance
+from lgvi_warp.results.provenance import messages, provenance
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.runs.store.block_files import BlockFiles
-from lgvi_warp.runs.store.create import create
-from lgvi_warp.runs.store.layout import columns
-from lgvi_warp.runs.store.run import StoredRun
-from lgvi_warp.runs.store.settings import Store
+from lgvi_warp.store.block_files import BlockFiles
+from lgvi_warp.store.create import create
+from lgvi_warp.store.layout import columns
+from lgvi_warp.store.run import StoredRun
+from lgvi_warp.store.settings import Store
 from lgvi_warp.studies import speed
 
 

@@ -2,7 +2,7 @@
 """The look of a controller: from the state to the commands of its actuators, and the signals that are saved.
 
 Commands are rows of the memory that a look writes and that every step until the next one reads: so a hold of order zero is
-exact, whatever the method. The first rows of the memory are the bus of the controller (lgvi_warp/physics/control/base.py).
+exact, whatever the method. The first rows of the memory are the bus of the controller (lgvi_warp/control/base.py).
 """
 
 from typing import Any

@@ -15,7 +15,7 @@ from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.outcome import Outcome
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.sampling.members import Members
-from lgvi_warp.statistics.samples import Fields
+from lgvi_warp.statistics.values.samples import Fields
 
 
 class Outcomes:

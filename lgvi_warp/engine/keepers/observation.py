@@ -11,18 +11,18 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import failed, stopped
+from lgvi_warp.control.controller import Controller
+from lgvi_warp.control.signals import SIGNALS, ordered
 from lgvi_warp.engine.keepers.statistics import Gathered
-from lgvi_warp.physics.control.controller import Controller
-from lgvi_warp.physics.control.signals import SIGNALS, ordered
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.events import Event
 from lgvi_warp.scene.settings import check_keep
 from lgvi_warp.statistics.base import Statistic, from_list
 from lgvi_warp.statistics.ends import check_outcomes, outcomes
-from lgvi_warp.statistics.estimate import Estimate, Estimates
-from lgvi_warp.statistics.metrics import check_wanted
-from lgvi_warp.statistics.quantity import Quantity
+from lgvi_warp.statistics.estimates.estimate import Estimate, Estimates
+from lgvi_warp.statistics.metrics.tracking_metrics import check_wanted
 from lgvi_warp.statistics.until import Until, Watch, from_dict, watch
+from lgvi_warp.statistics.values.quantity import Quantity
 
 # Samplings whose means are at least as close as those of independent members.
 EVENLY_SPREAD = ("latin_hypercube", "sobol", "halton")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 import numpy as np
 
 from lgvi_warp.engine.block import Block
-from lgvi_warp.statistics.samples import Fields
+from lgvi_warp.statistics.values.samples import Fields
 
 if TYPE_CHECKING:
     from lgvi_warp.engine.outcome import Outcome

@@ -10,11 +10,11 @@ import numpy as np
 
 from lgvi_warp.engine.block import Block, blocks
 from lgvi_warp.statistics.base import Statistic
-from lgvi_warp.statistics.estimate import Estimate, Estimates
-from lgvi_warp.statistics.path import followed
-from lgvi_warp.statistics.samples import Fields
-from lgvi_warp.statistics.tree import Part, Tree
-from lgvi_warp.statistics.values import Values, dealt
+from lgvi_warp.statistics.estimates.estimate import Estimate, Estimates
+from lgvi_warp.statistics.estimates.tree import Part, Tree
+from lgvi_warp.statistics.paths.path import followed
+from lgvi_warp.statistics.values.samples import Fields
+from lgvi_warp.statistics.values.values import Values, dealt
 
 if TYPE_CHECKING:
     from lgvi_warp.engine.outcome import Outcome

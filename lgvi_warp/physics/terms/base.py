@@ -158,7 +158,7 @@ class Term:
     dissipative: ClassVar[bool] = True
     # Numbers without which it does nothing: it is absent where all of them are zero. None named: it always acts.
     strengths: ClassVar[tuple[str, ...]] = ()
-    # The bus of a controller that drives it (see physics/control), and the numbers that then do not act.
+    # The bus of a controller that drives it (see lgvi_warp/control), and the numbers that then do not act.
     driver: ClassVar[Any] = None
     driven_fields: ClassVar[tuple[str, ...]] = ()
     # Fields that follow from another one, of which alone a fault is told; set by a term before its fields are checked.

@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import refusal
+from lgvi_warp.control.controller import Controller
+from lgvi_warp.control.matrix import AllocationMatrix
+from lgvi_warp.control.set_point import SetPoint
+from lgvi_warp.control.state_feedback import StateFeedback
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.work import unpacked
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.physics import notation
-from lgvi_warp.physics.control.controller import Controller
-from lgvi_warp.physics.control.matrix import AllocationMatrix
-from lgvi_warp.physics.control.set_point import SetPoint
-from lgvi_warp.physics.control.state_feedback import StateFeedback
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.events import StopTime
 from lgvi_warp.physics.terms.noisy import NoisyTerm

@@ -11,8 +11,8 @@ import numpy as np
 
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, MissingExtra, refusal
+from lgvi_warp.control.sensor import Sensor
 from lgvi_warp.methods.method import Method
-from lgvi_warp.physics.control.sensor import Sensor
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS, ControlWrench
 from lgvi_warp.scene.ensemble import Ensemble

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.physics.control.loop_gain import FACTOR, with_factor
-from lgvi_warp.physics.control.set_point import SetPoint
+from lgvi_warp.control.loop_gain import FACTOR, with_factor
+from lgvi_warp.control.set_point import SetPoint
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.studies.linear.bench import Bench, Motion

@@ -10,8 +10,8 @@ import numpy as np
 
 from lgvi_warp.common.arguments import of_kind
 from lgvi_warp.common.errors import Faults, SceneError, refusal
+from lgvi_warp.control.state_feedback import StateFeedback
 from lgvi_warp.physics import notation
-from lgvi_warp.physics.control.state_feedback import StateFeedback
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS
 from lgvi_warp.studies.linear.bench import COORDINATES
 from lgvi_warp.studies.linear.linearize import LinearModel

@@ -12,8 +12,8 @@ import numpy as np
 
 from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.control.delay import MOST_PERIODS
 from lgvi_warp.methods.method import Method
-from lgvi_warp.physics.control.delay import MOST_PERIODS
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.linear.bench import calm

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.calls.prepared import scene_value
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.runs.prepared import scene_value
 
 # Candidates of a generation for each number, at least so many.
 POPULATION, LEAST = 8, 16

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.calls.prepared import Prepared, prepare
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.status import failed
 from lgvi_warp.methods.saveat import SaveAt
-from lgvi_warp.runs.prepared import Prepared, prepare
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics import TYPES
 from lgvi_warp.statistics.base import Statistic

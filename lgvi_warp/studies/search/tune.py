@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.calls.prepared import Prepared, scene_value
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.physics.fields import FIELDS
-from lgvi_warp.runs.prepared import Prepared, scene_value
-from lgvi_warp.runs.quantities import OfInterest
+from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics.base import Statistic

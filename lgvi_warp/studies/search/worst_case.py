@@ -12,7 +12,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.progress import callback, shows_progress
-from lgvi_warp.runs.quantities import OfInterest
+from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.calls.prepared import prepare
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.labelled import is_labelled
-from lgvi_warp.runs.prepared import prepare
-from lgvi_warp.runs.quantities import OfInterest
+from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.sampling.designs.designs import salib_problem
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.columns import as_given, columns_of

@@ -11,7 +11,7 @@ import numpy as np
 from lgvi_warp.common.arguments import ensemble_of, of_kind
 from lgvi_warp.common.errors import Faults, MissingExtra, SceneError, refusal
 from lgvi_warp.common.status import Status
-from lgvi_warp.runs.quantities import OfInterest
+from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.sampling.designs.base import Sampling
 from lgvi_warp.sampling.designs.designs import Factors, Morris, Saltelli, salib_problem
 from lgvi_warp.scene.columns import as_given, columns_of

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lgvi_warp.statistics.intervals import student
+from lgvi_warp.statistics.estimates.intervals import student
 
 
 class Ratio(NamedTuple):

@@ -11,14 +11,14 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
+from lgvi_warp.calls.prepared import PATHS_AT_ONCE, Runner, counted, lost_text, part, samples_for, statistics_for
+from lgvi_warp.calls.prepared import FailedMembers as FailedMembers
 from lgvi_warp.common.arguments import ensemble_of, flag
 from lgvi_warp.common.errors import closest
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import failed
 from lgvi_warp.methods.saveat import SaveAt
-from lgvi_warp.runs.prepared import PATHS_AT_ONCE, Runner, counted, lost_text, part, samples_for, statistics_for
-from lgvi_warp.runs.prepared import FailedMembers as FailedMembers
-from lgvi_warp.runs.quantities import OfInterest, quantities
+from lgvi_warp.results.quantities import OfInterest, quantities
 from lgvi_warp.scene.ensemble import Ensemble
 
 # Arguments that every entry of lw.uq hands on to its runs.

@@ -15,9 +15,9 @@ from lgvi_warp.physics import notation, vehicle
 from lgvi_warp.physics import rates as member_rates
 from lgvi_warp.physics.fields import FIELDS, TABLE
 from lgvi_warp.physics.terms.drag import Drag
-from lgvi_warp.runs.store.layout import parameter_units
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
+from lgvi_warp.store.layout import parameter_units
 
 # Names of axes that are no parameters of the scene -> unit and label.
 SPECIAL = {

@@ -19,9 +19,9 @@ from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import Status, failed, stopped
 from lgvi_warp.engine import plan
 from lgvi_warp.engine.executors import check_threads
-from lgvi_warp.runs.provenance import provenance
+from lgvi_warp.results.provenance import provenance
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.studies.compared import QUANTITIES, compared_in
+from lgvi_warp.studies.distance import QUANTITIES, compared_in
 from lgvi_warp.studies.files import Saved, finite_or_none
 from lgvi_warp.studies.members import scene_of
 from lgvi_warp.studies.speed import void

@@ -19,11 +19,11 @@ from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics.fields import FIELDS
-from lgvi_warp.runs.result import Result
+from lgvi_warp.results.result import Result
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.studies import comparison
-from lgvi_warp.studies.compared import Compared, compared_in
 from lgvi_warp.studies.comparison import PRECISE, paired
+from lgvi_warp.studies.distance import Compared, compared_in
 from lgvi_warp.studies.stability.grid import StabilityGrid
 
 # Number of times at which errors are measured, and energies.

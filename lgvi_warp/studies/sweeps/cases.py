@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest, refusal
+from lgvi_warp.control.base import SECTIONS
 from lgvi_warp.physics import terms
-from lgvi_warp.physics.control.base import SECTIONS
 from lgvi_warp.physics.vehicle import Vehicle
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.ensemble import Ensemble

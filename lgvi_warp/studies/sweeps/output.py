@@ -15,9 +15,9 @@ from lgvi_warp.common.files import write_text
 from lgvi_warp.common.status import Status
 from lgvi_warp.common.tables import write_csv
 from lgvi_warp.studies.files import finite_or_none
-from lgvi_warp.studies.sweeps.found import SUCCESS, Compared, Findings
 from lgvi_warp.studies.sweeps.setup import END
 from lgvi_warp.studies.sweeps.success import none_text
+from lgvi_warp.studies.sweeps.sweep_table import SUCCESS, Compared, Findings
 
 # Worst members that are listed.
 LISTED = 20

@@ -11,24 +11,24 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.calls.predict import Prediction, predict
+from lgvi_warp.calls.solve import solve
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.identity import UNKNOWN
 from lgvi_warp.methods.saveat import SaveAt
-from lgvi_warp.runs.predict import Prediction, predict
-from lgvi_warp.runs.result import Result
-from lgvi_warp.runs.solve import solve
+from lgvi_warp.results.result import Result
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.functions import Own, ToldApart, functions_of
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics import TYPES
 from lgvi_warp.statistics.base import Statistic, from_list
-from lgvi_warp.statistics.each import Each
-from lgvi_warp.statistics.functional import functional
-from lgvi_warp.statistics.metrics import check_wanted
-from lgvi_warp.statistics.metrics_of_actuators import TimeToFailure
-from lgvi_warp.statistics.then import Then
+from lgvi_warp.statistics.metrics.actuator_metrics import TimeToFailure
+from lgvi_warp.statistics.metrics.tracking_metrics import check_wanted
+from lgvi_warp.statistics.paths.each import Each
+from lgvi_warp.statistics.paths.member_statistic import Then
+from lgvi_warp.statistics.values.functional import functional
 from lgvi_warp.studies.sweeps.cases import Case, cases_of, ensemble_of, grid_of, known_names, points_of
 from lgvi_warp.studies.sweeps.record import Record, key_of
 

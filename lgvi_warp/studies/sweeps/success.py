@@ -11,7 +11,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, closest, refusal
 from lgvi_warp.common.status import Status, failed
-from lgvi_warp.statistics import intervals
+from lgvi_warp.statistics.estimates import intervals
 
 # Words for how a member ended, beside the names of statuses: at the end of the run; there or stopped by an event.
 OK, NOT_FAILED = "ok", "not_failed"

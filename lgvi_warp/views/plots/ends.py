@@ -12,8 +12,8 @@ import numpy as np
 from lgvi_warp.common.arguments import listed, result_of
 from lgvi_warp.common.errors import Faults, NothingToDraw, refusal
 from lgvi_warp.common.status import Status, stop_time
-from lgvi_warp.runs import outcomes as ended_so
-from lgvi_warp.runs.quantities import OfResult, quantities
+from lgvi_warp.results import outcomes as ended_so
+from lgvi_warp.results.quantities import OfResult, quantities
 from lgvi_warp.views.choice import shown
 from lgvi_warp.views.fleet import LOOKS, title
 from lgvi_warp.views.plots.canvas import COLORS, below, hatch, mark, panel, panels, point_down, widen, wrapped
@@ -21,8 +21,8 @@ from lgvi_warp.views.plots.read import at_one_time, estimate_for, with_samples
 from lgvi_warp.views.plots.words import DEPTHS, floors, in_words, some_of, unit_of
 
 if TYPE_CHECKING:
-    from lgvi_warp.runs.result import Result
-    from lgvi_warp.statistics.estimate import Estimate
+    from lgvi_warp.results.result import Result
+    from lgvi_warp.statistics.estimates.estimate import Estimate
 
 # Times at which shares are drawn where members end.
 TIMES = 400

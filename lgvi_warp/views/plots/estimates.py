@@ -16,8 +16,8 @@ from lgvi_warp.views.plots.canvas import COLORS, band, below, hatch, panels, poi
 from lgvi_warp.views.plots.words import DEPTHS, floors, in_words, unit_of
 
 if TYPE_CHECKING:
-    from lgvi_warp.runs.result import Result
-    from lgvi_warp.statistics.estimate import Estimate
+    from lgvi_warp.results.result import Result
+    from lgvi_warp.statistics.estimates.estimate import Estimate
 
 # Most panels of statistics, and most lines in a panel.
 PANELS, LINES = 12, 12

@@ -13,8 +13,8 @@ import numpy as np
 from lgvi_warp.common.arguments import mapping_of, result_of
 from lgvi_warp.common.errors import NothingToDraw, refusal
 from lgvi_warp.common.status import Status, failed, stop_time
-from lgvi_warp.runs.outcomes import outcomes
-from lgvi_warp.statistics.quantity import Quantity
+from lgvi_warp.results.outcomes import outcomes
+from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.views.choice import mixed, of_members
 from lgvi_warp.views.fleet import members_of_run, title
 from lgvi_warp.views.plots.canvas import COLORS, TINTS, band, below, hatch, mark, panel, point_down, style, wrapped
@@ -23,8 +23,8 @@ from lgvi_warp.views.plots.words import HINT, floors, floors_of_each, in_words, 
 from lgvi_warp.views.recording.drawn import at_levels
 
 if TYPE_CHECKING:
-    from lgvi_warp.runs.result import Result
-    from lgvi_warp.statistics.estimate import Estimate
+    from lgvi_warp.results.result import Result
+    from lgvi_warp.statistics.estimates.estimate import Estimate
 
 # Bands of the fan, outermost first: lower quantile, upper quantile.
 BANDS = ((0.0, 1.0), (0.05, 0.95), (0.25, 0.75))

@@ -10,14 +10,14 @@ import numpy as np
 
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import Status
-from lgvi_warp.runs.outcomes import outcomes
-from lgvi_warp.statistics.given_data import explained
+from lgvi_warp.results.outcomes import outcomes
+from lgvi_warp.statistics.estimates.given_data import explained
 from lgvi_warp.views.choice import mixed
 from lgvi_warp.views.fleet import LOOKS
 from lgvi_warp.views.plots.canvas import below, mark, panel, widen, wrapped
 
 if TYPE_CHECKING:
-    from lgvi_warp.runs.result import Result
+    from lgvi_warp.results.result import Result
 
 # Most members that are drawn.
 MOST_POINTS = 2000

@@ -27,8 +27,8 @@ from lgvi_warp.views.plots.tracks import draw_plan
 from lgvi_warp.views.plots.words import is_depth
 
 if TYPE_CHECKING:
-    from lgvi_warp.runs.result import Result
-    from lgvi_warp.statistics.quantity import Quantity
+    from lgvi_warp.results.result import Result
+    from lgvi_warp.statistics.values.quantity import Quantity
 
 # Members whose momenta are followed: as many as are read at once in 240 frames, 40 numbers each.
 MOST_FOLLOWED = AT_ONCE // 40 // 240 * 10

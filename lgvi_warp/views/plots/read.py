@@ -12,15 +12,15 @@ from lgvi_warp.common.arguments import result_of, whole
 from lgvi_warp.common.errors import NothingToDraw, refusal
 from lgvi_warp.common.status import under_way
 from lgvi_warp.physics import energy as invariants
-from lgvi_warp.runs.quantities import OfEnds, OfResult, samples_of
-from lgvi_warp.statistics.functional import quantity
-from lgvi_warp.statistics.quantity import Quantity
+from lgvi_warp.results.quantities import OfEnds, OfResult, samples_of
+from lgvi_warp.statistics.values.functional import quantity
+from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.views.choice import AT_ONCE, Shown, few, shown
 from lgvi_warp.views.plots.words import DEPTHS, events, is_depth
 
 if TYPE_CHECKING:
-    from lgvi_warp.runs.result import Result
-    from lgvi_warp.statistics.estimate import Estimate
+    from lgvi_warp.results.result import Result
+    from lgvi_warp.statistics.estimates.estimate import Estimate
 
 # Angles that go around: they are drawn about their mean direction.
 CIRCULAR = ("euler[0]", "euler[2]")

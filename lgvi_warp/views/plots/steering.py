@@ -16,7 +16,7 @@ from lgvi_warp.views.plots.words import WORDS
 from lgvi_warp.views.recording.drawn import at_levels
 
 if TYPE_CHECKING:
-    from lgvi_warp.runs.result import Result
+    from lgvi_warp.results.result import Result
 
 LEVELS = (0.05, 0.5, 0.95)
 # Members whose middle 90 % take more than so much of a turn [deg] point all ways.

@@ -17,7 +17,7 @@ from lgvi_warp.views.plots.read import numbers, quantity_of, selected, with_samp
 from lgvi_warp.views.plots.words import HINT, floors, is_depth, label_of, some_of
 
 if TYPE_CHECKING:
-    from lgvi_warp.runs.result import Result
+    from lgvi_warp.results.result import Result
 
 MOST_PATHS = 12
 MOST_AXES = 1

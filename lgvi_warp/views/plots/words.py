@@ -8,13 +8,13 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from lgvi_warp.common.errors import SceneError
-from lgvi_warp.statistics.functional import quantity
-from lgvi_warp.statistics.quantity import Quantity
+from lgvi_warp.statistics.values.functional import quantity
+from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.views.choice import of_members
 from lgvi_warp.views.fleet import members_of_run
 
 if TYPE_CHECKING:
-    from lgvi_warp.runs.result import Result
+    from lgvi_warp.results.result import Result
 
 DEPTHS = ("depth", "position[2]")
 WORDS = {

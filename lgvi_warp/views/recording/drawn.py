@@ -12,16 +12,16 @@ import numpy as np
 
 from lgvi_warp.common.errors import NothingToDraw, refusal
 from lgvi_warp.common.status import Status, stop_time, under_way
+from lgvi_warp.control.signals import CHANNELS
 from lgvi_warp.physics import notation
-from lgvi_warp.physics.control.signals import CHANNELS
 from lgvi_warp.physics.fields import FIELDS
-from lgvi_warp.runs.outcomes import outcomes
+from lgvi_warp.results.outcomes import outcomes
 from lgvi_warp.views import choice as choices
 from lgvi_warp.views.choice import Shown, finite_rows, of_members, pieces, shown
 from lgvi_warp.views.fleet import LOOKS, energy_curve
 
 if TYPE_CHECKING:
-    from lgvi_warp.runs.result import Result
+    from lgvi_warp.results.result import Result
 
 NEEDED = ("position", "attitude", "velocity")
 # Levels of a fan: smallest, largest, and quantiles between.

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.status import Status
-from lgvi_warp.physics.control.signals import CHANNELS
-from lgvi_warp.runs.outcomes import outcome_text, outcomes
+from lgvi_warp.control.signals import CHANNELS
+from lgvi_warp.results.outcomes import outcome_text, outcomes
 from lgvi_warp.views.choice import frames_of
 from lgvi_warp.views.commands import channels, faults
 from lgvi_warp.views.fleet import LOOKS

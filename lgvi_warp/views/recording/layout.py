@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.physics.control.signals import CHANNELS
+from lgvi_warp.control.signals import CHANNELS
 from lgvi_warp.views.recording.drawn import Drawn, Fan
 from lgvi_warp.views.recording.eye import ASPECT, SIGHT, distance
 from lgvi_warp.views.recording.world import TIMELINE, Box

@@ -14,7 +14,7 @@ from lgvi_warp import cli
 from lgvi_warp.cli import command, machine, settings
 from lgvi_warp.cli.runs import all_failed
 from lgvi_warp.engine import widths
-from lgvi_warp.studies import tuning
+from lgvi_warp.studies import packet_width as tuning
 from tests.conftest import ROOT
 
 PAPER = str(ROOT / "examples" / "paper.toml")

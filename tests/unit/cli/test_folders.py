@@ -68,7 +68,7 @@ def test_contents_of_a_folder(tmp_path, monkeypatch):
         content.path.write_text("{}")
     (tmp_path / "other.json").write_text("{}")
     assert contents(tmp_path) == expected
-    monkeypatch.setattr("lgvi_warp.runs.store.open.folder_of", lambda path: path / "a.zarr")
+    monkeypatch.setattr("lgvi_warp.store.open.folder_of", lambda path: path / "a.zarr")
     (tmp_path / "a.zarr").mkdir()
     assert contents(tmp_path) == [*expected, Content("store", tmp_path / "a.zarr / ".strip(" /"))]
     alone = tmp_path / "b"
@@ -93,9 +93,9 @@ def test_info_of_a_folder_with_everything(store, tmp_path, monkeypatch, capsys):
     for name in ("b.rrd", "a.png", "c.nc", "d.parquet", "e.html", "f.csv", "g.txt", "h.dat"):
         (tmp_path / name).write_text("x")
     (tmp_path / "run.zarr").mkdir()
-    monkeypatch.setattr("lgvi_warp.runs.store.open.folder_of", lambda path: tmp_path / "run.zarr")
+    monkeypatch.setattr("lgvi_warp.store.open.folder_of", lambda path: tmp_path / "run.zarr")
     states = Study([store, store | {"complete": True}, store])
-    monkeypatch.setattr("lgvi_warp.runs.store.state.state", states)
+    monkeypatch.setattr("lgvi_warp.store.state.state", states)
     assert cli.main(["info", str(tmp_path)]) == 1
     text = capsys.readouterr().out
     said = [line.partition(" (")[0] for line in text.split("\n")]
@@ -200,14 +200,14 @@ def test_a_viewed_run_says_its_file(tmp_path, monkeypatch, capsys):
     told().save(tmp_path / "result.npz")
     logged, shown = [], []
     log = lambda result, out, members: (logged.append((result.members, members)), out.write_bytes(b"x" * 200_000))  # noqa: E731
-    monkeypatch.setattr("lgvi_warp.views.rerun.log_rerun", log)
-    monkeypatch.setattr("lgvi_warp.views.rerun.show", lambda result, members: shown.append(members))
+    monkeypatch.setattr("lgvi_warp.views.recording.rerun.log_rerun", log)
+    monkeypatch.setattr("lgvi_warp.views.recording.rerun.show", lambda result, members: shown.append(members))
     assert cli.main(["view", str(tmp_path), "--out", str(tmp_path / "a.rrd"), "--members", "1,2"]) == 0
     assert capsys.readouterr().out == f"file        {tmp_path}/a.rrd (0.2 MB)\n" and logged == [(4, [1, 2])]
     assert cli.main(["view", str(tmp_path), "--json"]) == 0 and shown == [None]
     assert json.loads(capsys.readouterr().out)["files"] == []
     for error in (lw_error("no member"), OSError("no display")):
-        monkeypatch.setattr("lgvi_warp.views.rerun.show", Study(error))
+        monkeypatch.setattr("lgvi_warp.views.recording.rerun.show", Study(error))
         assert cli.main(["view", str(tmp_path), "-q"]) == (2 if "member" in str(error) else 1)
         assert capsys.readouterr().err == f"lgvi-warp: {error}\n"
 
@@ -236,7 +236,7 @@ def test_merging_says_what_is_missing(tmp_path, monkeypatch, capsys):
     path.mkdir()
     (path / "a").write_bytes(b"x" * 100_000)
     study = Study([Merged(path, 2), Merged(path, 0), Merged(path, 0, True), Merged(path, 1, True)])
-    monkeypatch.setattr("lgvi_warp.runs.store.merge.merge", study)
+    monkeypatch.setattr("lgvi_warp.calls.merge.merge", study)
     verb, line = ["merge", "a", "b", "--out", "c"], f"file        {path} (0.1 MB)"
     resume = f"lgvi-warp resume {path} runs them"
     for text in (f"2 of 3 blocks are in none of the folders; {resume}",
@@ -257,8 +257,8 @@ def test_a_run_is_exported_and_reported(tmp_path, monkeypatch, capsys):
     for name in ("a.nc", "report.html", "b.html"):
         (tmp_path / name).write_bytes(b"x" * 100_000)
     write, page, opened = Study(tmp_path / "a.nc"), Study([tmp_path / "report.html", tmp_path / "b.html"]), []
-    monkeypatch.setattr("lgvi_warp.runs.store.export.export", write)
-    monkeypatch.setattr("lgvi_warp.views.report.report", page)
+    monkeypatch.setattr("lgvi_warp.store.export.export", write)
+    monkeypatch.setattr("lgvi_warp.views.pages.report.report", page)
     monkeypatch.setattr("webbrowser.open", opened.append)
     assert cli.main(["export", "a", "--to", "netcdf", "--out", "b"]) == 0
     assert capsys.readouterr().out == f"file        {tmp_path}/a.nc (0.1 MB)\n"

@@ -85,7 +85,7 @@ def test_bench_and_tune_in_full(known, tmp_path, monkeypatch, capsys):
     assert json.loads(capsys.readouterr().out)["readings"] == [{"a": 1}, {"a": 2}]
     assert study.calls == [(4096, 1000), (5, 7)]
     readings = [("plain float64", {8: 2.0, 16: 1.525}, 8, 16), ("dense float64", {8: 1.0}, 8, 8)]
-    monkeypatch.setattr("lgvi_warp.studies.tuning.tune", lambda: readings)
+    monkeypatch.setattr("lgvi_warp.studies.packet_width.tune", lambda: readings)
     kept = []
     monkeypatch.setattr(widths, "keep", lambda best: kept.append(best) or "a file")
     assert cli.main(["tune"]) == 0 and kept == [{"plain float64": 16, "dense float64": 8}]
@@ -99,8 +99,8 @@ def test_bench_and_tune_in_full(known, tmp_path, monkeypatch, capsys):
 def test_warm_in_full(monkeypatch, capsys):
     plans = [SimpleNamespace(method=SimpleNamespace(name=name), dtype="float64") for name in ("psi_s", "rk4")]
     asked, phases = [], [Phases(0.5, 2.0, 0.25), Phases(0.25, 0.0, 0.5)]
-    monkeypatch.setattr("lgvi_warp.runs.warm.plans_of", lambda *given: asked.append(given[1:]) or plans)
-    monkeypatch.setattr("lgvi_warp.runs.warm.warm",
+    monkeypatch.setattr("lgvi_warp.calls.warm.plans_of", lambda *given: asked.append(given[1:]) or plans)
+    monkeypatch.setattr("lgvi_warp.calls.warm.warm",
                         lambda given, workers: asked.append((given, workers)) or zip(given, phases, strict=True))  # fmt: skip
     monkeypatch.setattr(common, "thread_count", lambda: 7)
     assert cli.main(["warm", PAPER]) == 0

@@ -182,7 +182,7 @@ def test_members_that_are_drawn():
 def test_of_a_large_store_some_members_are_drawn(monkeypatch):
     result = dataclasses.replace(told(6), store=Path("run.zarr"))
     chosen = []
-    monkeypatch.setattr("lgvi_warp.runs.store.open.chosen", lambda whole, members: chosen.append(list(members)))
+    monkeypatch.setattr("lgvi_warp.store.open.chosen", lambda whole, members: chosen.append(list(members)))
     monkeypatch.setattr("lgvi_warp.views.choice.shown", lambda _, most: SimpleNamespace(members=[most, most + 1]))
     for drawn, expected in ((18 * 3 * 6, list(range(6))), (18 * 3 * 6 - 1, [5, 6]), (18 * 3 * 2, [2, 3]), (1, [1, 2])):
         monkeypatch.setattr(report, "MOST_DRAWN", drawn)
@@ -202,11 +202,13 @@ def test_files_that_a_run_has(tmp_path, monkeypatch):
     plots = "lgvi_warp.views.plots"
     monkeypatch.setattr(f"{plots}.plot", lambda *given: calls.append(("plot", *given)) or given[1])
     monkeypatch.setattr(f"{plots}.plot_statistics", lambda *given: calls.append(("statistics", *given)) or given[1])
-    monkeypatch.setattr("lgvi_warp.views.rerun.log_rerun", lambda *given, to: calls.append(("record", *given, to)))
+    monkeypatch.setattr(
+        "lgvi_warp.views.recording.rerun.log_rerun", lambda *given, to: calls.append(("record", *given, to))
+    )
     monkeypatch.setattr(f"{plots}.drawable", lambda _: True)
     few = told(2)
     for viewer, answers, to in ((None, True, None), ("a", True, "a"), ("a", False, None)):
-        monkeypatch.setattr("lgvi_warp.views.viewer.answers", lambda _, answers=answers: answers)
+        monkeypatch.setattr("lgvi_warp.views.recording.viewer.answers", lambda _, answers=answers: answers)
         drawings = report.pictures(result, few, viewer)
         calls.clear()
         assert [draw(Path(name)) for name, draw in drawings.items()] == [
@@ -249,7 +251,7 @@ def test_the_end_of_a_run_is_told(tmp_path, monkeypatch, capsys):
 
 
 def test_a_part_of_a_run_is_to_be_merged(tmp_path, monkeypatch, capsys):
-    from lgvi_warp.runs.store import folder
+    from lgvi_warp.store import folder
 
     monkeypatch.setattr(folder, "Folder", lambda path: SimpleNamespace(complete=False))
     stored = dataclasses.replace(told(1200), store=tmp_path / "run.zarr")

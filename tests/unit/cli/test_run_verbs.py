@@ -39,7 +39,7 @@ def solved(monkeypatch):
             reports.append((result, out, list(failures), address))
             return failures
 
-        monkeypatch.setattr("lgvi_warp.runs.solve.solve", study)
+        monkeypatch.setattr("lgvi_warp.calls.solve.solve", study)
         monkeypatch.setattr(runs, "report", report)
         monkeypatch.setattr(runs, "_import_in_background", lambda: SimpleNamespace(join=lambda: None))
         return study.calls, reports
@@ -147,8 +147,12 @@ def test_a_live_run_hands_over_its_blocks(solved, tmp_path, monkeypatch):
     result = result_of()
     calls, reports = solved(result)
     asked, views = [], []
-    monkeypatch.setattr("lgvi_warp.views.viewer.opened", lambda address: asked.append(address) or "rerun+http://a")
-    monkeypatch.setattr("lgvi_warp.views.live.live", lambda *given: views.append(given) or SimpleNamespace(add="takes"))
+    monkeypatch.setattr(
+        "lgvi_warp.views.recording.viewer.opened", lambda address: asked.append(address) or "rerun+http://a"
+    )
+    monkeypatch.setattr(
+        "lgvi_warp.views.recording.live.live", lambda *given: views.append(given) or SimpleNamespace(add="takes")
+    )
     for options, address in (([], None), (["--viewer", "rerun+http://b"], "rerun+http://b")):
         assert cli.main(["run", PAPER, "--out", str(tmp_path), "-q", "--live", *options]) == 0
         assert asked.pop() == address
@@ -159,7 +163,9 @@ def test_a_live_run_hands_over_its_blocks(solved, tmp_path, monkeypatch):
 
 def test_a_live_run_needs_its_library_and_what_it_shows(solved, tmp_path, monkeypatch, capsys):
     calls, _ = solved(result_of())
-    monkeypatch.setattr("lgvi_warp.views.viewer.opened", Study(MissingExtra("recordings", "rerun-sdk", "viz")))
+    monkeypatch.setattr(
+        "lgvi_warp.views.recording.viewer.opened", Study(MissingExtra("recordings", "rerun-sdk", "viz"))
+    )
     verb = ["run", PAPER, "--out", str(tmp_path / "out"), "-q"]
     cases = {("--live",): "pip install 'lgvi-warp[viz]'", ("--viewer", "x"): "has no effect without --live; add --live"}
     none = "--live: shows members as they are done, and the run keeps none; add --keep all"
@@ -226,7 +232,7 @@ def test_arguments_of_resume(solved, tmp_path, monkeypatch, capsys):
     _, reports = solved(result)
     failed = dataclasses.replace(result_of(status=Status.NON_FINITE), store=result.store)
     study = Study([result, result, MembersFailed("all failed", result), failed])
-    monkeypatch.setattr("lgvi_warp.runs.store.resume.resume", study)
+    monkeypatch.setattr("lgvi_warp.calls.resume.resume", study)
     assert cli.main(["resume", str(tmp_path), "-q"]) == 0
     options = ["--threads", "2", "--executor", "processes", "--scheduler", "tcp://x", "--force"]
     assert cli.main(["resume", str(tmp_path), *options]) == 0
@@ -242,7 +248,7 @@ def test_arguments_of_resume(solved, tmp_path, monkeypatch, capsys):
 
 def test_arguments_of_predict(tmp_path, monkeypatch, capsys):
     study = Study(SimpleNamespace(seconds=3.0, members=4))
-    monkeypatch.setattr("lgvi_warp.runs.predict.predict", study)
+    monkeypatch.setattr("lgvi_warp.calls.predict.predict", study)
     options = [
         "--threads",
         "2",

@@ -258,7 +258,7 @@ def sweep(tmp_path, monkeypatch):
     }
     monkeypatch.setattr("lgvi_warp.studies.sweeps.file.arguments_of_file", lambda path: dict(file, file=path))
     monkeypatch.setattr(
-        "lgvi_warp.views.sweeps.pictures", lambda _: {"a.png": lambda found, path: path.write_text("a")}
+        "lgvi_warp.views.plots.sweep_pictures.pictures", lambda _: {"a.png": lambda found, path: path.write_text("a")}
     )
 
     def run(*options, refused=("", "", "")):
@@ -302,7 +302,7 @@ def test_the_worst_members_are_recorded_by_cell(sweep, tmp_path, monkeypatch, ca
         recorded.append((result, path.name))
         path.write_text("a recording")
 
-    monkeypatch.setattr("lgvi_warp.views.rerun.log_rerun", log)
+    monkeypatch.setattr("lgvi_warp.views.recording.rerun.log_rerun", log)
     code, _, found = sweep("--record", "3", "--json")
     assert code == 0 and found.runs == [("a", [5, 9], {"delay": 2}), ("b", [4], {"delay": 1})]
     assert recorded == [("members [5, 9] of a", "worst_0001.rrd"), ("members [4] of b", "worst_0002.rrd")]

@@ -16,12 +16,13 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
+from lgvi_warp.calls import predict as prediction
+from lgvi_warp.calls import warm as kernels
 from lgvi_warp.cli import arguments, command, machine, output, progress, signals
 from lgvi_warp.common.phases import Phases
 from lgvi_warp.engine import widths
-from lgvi_warp.runs import predict as prediction
-from lgvi_warp.runs import warm as kernels
-from lgvi_warp.studies import speed, tuning
+from lgvi_warp.studies import packet_width as tuning
+from lgvi_warp.studies import speed
 from lgvi_warp.studies.sensitivity import Indices, MorrisEffects, SobolIndices
 from lgvi_warp.studies.stability.grid import Line
 from lgvi_warp.studies.stability.map import StabilityMap

@@ -27,7 +27,9 @@ def test_a_recording_of_some_members(folder, tmp_path, capsys, name):
 
 def test_the_viewer_is_started(folder, monkeypatch):
     seen = []
-    monkeypatch.setattr("lgvi_warp.views.rerun.show", lambda result, members: seen.append((result.members, members)))
+    monkeypatch.setattr(
+        "lgvi_warp.views.recording.rerun.show", lambda result, members: seen.append((result.members, members))
+    )
     assert main(["view", str(folder)]) == 0 and main(["view", str(folder), "--members", "0"]) == 0
     assert seen == [(6, None), (6, [0])]
 

@@ -16,7 +16,7 @@ import lgvi_warp as lw
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw, NotReal
 from lgvi_warp.common.identity import UNKNOWN, identity
 from lgvi_warp.common.reading import UnreadableError
-from lgvi_warp.physics.control.base import SECTIONS
+from lgvi_warp.control.base import SECTIONS
 from lgvi_warp.runs.settle import make_plan
 from tests.conftest import ROOT
 from tests.support.odd_calls import goods

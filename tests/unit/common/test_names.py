@@ -7,8 +7,8 @@ import lgvi_warp as lw
 from lgvi_warp.common import names
 from lgvi_warp.common.errors import one_line
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.runs.store.layout import columns
 from lgvi_warp.scene.scene import from_dict
+from lgvi_warp.store.layout import columns
 
 BODY = {"mass": 10.0, "inertia": [1.0, 2.0, 2.5], "buoyancy": 98.0}
 DRAG = {"type": "drag", "linear": [1.0] * 6}

@@ -13,9 +13,9 @@ import lgvi_warp as lw
 from lgvi_warp.common import summaries
 from lgvi_warp.common.status import Status, StatusArray, WarningArray
 from lgvi_warp.common.summaries import Summarized
-from lgvi_warp.runs.quantities import samples_of
-from lgvi_warp.statistics.estimate import Estimate, Estimates
-from lgvi_warp.statistics.quantity import KNOWN
+from lgvi_warp.results.quantities import samples_of
+from lgvi_warp.statistics.estimates.estimate import Estimate, Estimates
+from lgvi_warp.statistics.values.quantity import KNOWN
 from tests.conftest import ROOT
 
 

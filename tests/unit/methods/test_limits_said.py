@@ -7,7 +7,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
-from lgvi_warp.runs.outcomes import outcome_text
+from lgvi_warp.results.outcomes import outcome_text
 from tests.unit.views.test_recording import fleet
 
 

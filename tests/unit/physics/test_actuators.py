@@ -7,8 +7,8 @@ import pytest
 import lgvi_warp as lw
 from lgvi_kernels.laws.thrust_curves import NEWTON_STEPS, START_SIZE
 from lgvi_warp.common.errors import SceneError
-from lgvi_warp.physics.control import pseudo_inverse
-from lgvi_warp.physics.control.pseudo_inverse import inverse_rows
+from lgvi_warp.control import pseudo_inverse
+from lgvi_warp.control.pseudo_inverse import inverse_rows
 from lgvi_warp.physics.terms.thrusters import side_of_table
 from lgvi_warp.scene import plausibility
 

@@ -6,9 +6,9 @@ import os
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.runs.provenance import provenance
+from lgvi_warp.results.provenance import provenance
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.runs.store.recipe import same_run
+from lgvi_warp.store.recipe import same_run
 
 BODY = "[vehicle]\nmass = 30.0\ninertia = [0.2, 3.0, 3.0]\nbuoyancy = 290.0\n"
 

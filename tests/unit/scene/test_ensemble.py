@@ -8,7 +8,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.physics import notation
-from lgvi_warp.runs.result import Drawn
+from lgvi_warp.results.result import Drawn
 from lgvi_warp.scene import ensemble as ensembles
 
 FULL = np.array([[5.0, 0.3, 0.1], [0.3, 6.0, -0.2], [0.1, -0.2, 7.0]])

@@ -197,7 +197,7 @@ def test_what_a_quantity_of_the_users_gives():
 
 
 def test_what_a_function_of_a_result_gives():
-    from lgvi_warp.runs.quantities import quantities
+    from lgvi_warp.results.quantities import quantities
 
     result = type("Result", (), {"members": 3})()
     (one,) = quantities(lambda result: np.ma.array([1.0, 2.0, 3.0], mask=[0, 1, 0]))

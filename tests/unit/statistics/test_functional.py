@@ -11,11 +11,11 @@ import lgvi_warp as lw
 from lgvi_warp.cli.command import main
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS, TABLE
-from lgvi_warp.runs.quantities import quantities
-from lgvi_warp.statistics.path import followed
+from lgvi_warp.results.quantities import quantities
+from lgvi_warp.statistics.paths.path import followed
 from lgvi_warp.statistics.until import watch
-from lgvi_warp.statistics.values import Values
-from lgvi_warp.studies.compared import compared_in
+from lgvi_warp.statistics.values.values import Values
+from lgvi_warp.studies.distance import compared_in
 from tests.conftest import ROOT
 
 K, N = 7, 5

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from lgvi_warp.statistics.given_data import explained
+from lgvi_warp.statistics.estimates.given_data import explained
 
 
 def test_indices_of_ishigami():

@@ -7,7 +7,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
 from lgvi_warp.statistics.ends import Ends
-from lgvi_warp.statistics.values import Values
+from lgvi_warp.statistics.values.values import Values
 
 # A member that an event stopped.
 STOPPED = int(next(status for status in Status if status.stopped))
@@ -101,7 +101,7 @@ def test_batches_and_replicates_change_no_bit():
         whole = number(metric, samples, batches=())
         for batches in ((1,), (1, 2, 3), (5, 500, 5_000)):
             assert number(metric, samples, batches=batches).tobytes() == whole.tobytes()
-    from lgvi_warp.statistics.values import dealt
+    from lgvi_warp.statistics.values.values import dealt
 
     metric = each(lw.IAE, "depth")
     gatherer = metric.open(T, 8)

@@ -8,10 +8,10 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.physics import notation
-from lgvi_warp.runs.quantities import quantities
-from lgvi_warp.statistics.functional import functional, quantity
-from lgvi_warp.statistics.quantity import KNOWN
-from lgvi_warp.studies.compared import QUANTITIES, compared_in
+from lgvi_warp.results.quantities import quantities
+from lgvi_warp.statistics.values.functional import functional, quantity
+from lgvi_warp.statistics.values.quantity import KNOWN
+from lgvi_warp.studies.distance import QUANTITIES, compared_in
 
 K, N = 4, 3
 AT_EACH_TIME = [

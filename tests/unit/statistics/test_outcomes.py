@@ -10,10 +10,10 @@ from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.keepers.statistics import Gathered
 from lgvi_warp.statistics.base import from_list
 from lgvi_warp.statistics.ends import Ends, check_outcomes, outcomes
-from lgvi_warp.statistics.estimate import Estimates
-from lgvi_warp.statistics.table import table
-from lgvi_warp.statistics.tree import Tree
-from lgvi_warp.statistics.values import Values, dealt
+from lgvi_warp.statistics.estimates.estimate import Estimates
+from lgvi_warp.statistics.estimates.table import table
+from lgvi_warp.statistics.estimates.tree import Tree
+from lgvi_warp.statistics.values.values import Values, dealt
 from tests.unit.statistics.test_statistics import check_as_files_hold_it
 
 FLOOR, SURFACE, OK, FAILED = lw.Status.FLOOR, lw.Status.SURFACE, lw.Status.OK, lw.Status.NON_FINITE

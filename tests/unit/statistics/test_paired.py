@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import optimize, stats
 
-from lgvi_warp.statistics import intervals, paired
+from lgvi_warp.statistics.estimates import intervals, paired
 
 
 @pytest.mark.parametrize(("hits", "count"), [(0, 10), (1, 10), (7, 10), (10, 10), (13, 4000), (0, 0)])

@@ -5,12 +5,13 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.statistics import TYPES, intervals, sketch
+from lgvi_warp.statistics import TYPES
 from lgvi_warp.statistics.base import from_list
-from lgvi_warp.statistics.estimate import Estimate, Estimates
-from lgvi_warp.statistics.tree import Tree
+from lgvi_warp.statistics.estimates import intervals, sketch
+from lgvi_warp.statistics.estimates.estimate import Estimate, Estimates
+from lgvi_warp.statistics.estimates.tree import Tree
 from lgvi_warp.statistics.until import watch
-from lgvi_warp.statistics.values import Values, dealt
+from lgvi_warp.statistics.values.values import Values, dealt
 
 LEVELS = (0.05, 0.5, 0.95)
 

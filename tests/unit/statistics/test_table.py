@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.statistics.estimate import Estimates
-from lgvi_warp.statistics.table import table
+from lgvi_warp.statistics.estimates.estimate import Estimates
+from lgvi_warp.statistics.estimates.table import table
 from tests.unit.statistics import test_outcomes
 from tests.unit.statistics.test_statistics import gathered, rotations, scalar
 

@@ -17,7 +17,8 @@ from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
-from lgvi_warp.studies import compared, comparison, cost, suggest
+from lgvi_warp.studies import comparison, cost, suggest
+from lgvi_warp.studies import distance as compared
 from lgvi_warp.studies import tradeoff as tradeoffs
 from lgvi_warp.studies.budget import Budget
 from lgvi_warp.studies.comparison import Candidate, Growth, Reference, Sample

@@ -14,7 +14,8 @@ import lgvi_warp as lw
 from lgvi_warp.common import machine
 from lgvi_warp.engine import widths
 from lgvi_warp.engine.plan import Plan
-from lgvi_warp.studies import cost, files, members, scaling, speed, tuning
+from lgvi_warp.studies import cost, files, members, scaling, speed
+from lgvi_warp.studies import packet_width as tuning
 from lgvi_warp.studies.cost import Cost, Kind
 
 

@@ -18,7 +18,7 @@ from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation, vehicle
 from lgvi_warp.physics.rates import drag_rate, rates
 from lgvi_warp.scene.settings import RunSettings
-from lgvi_warp.studies.compared import compared_in
+from lgvi_warp.studies.distance import compared_in
 from lgvi_warp.studies.stability import runs
 from lgvi_warp.studies.stability.grid import ALIASES, Axis, Line, StabilityGrid, axis_of, rotation_vectors
 from lgvi_warp.studies.stability.limits import oscillation_limit, rotation_limit

@@ -12,12 +12,12 @@ from scipy import stats
 
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
-from lgvi_warp.statistics import paired
-from lgvi_warp.statistics.given_data import explained
+from lgvi_warp.statistics.estimates import paired
+from lgvi_warp.statistics.estimates.given_data import explained
 from lgvi_warp.studies.sweeps import cases, output, setup, success
 from lgvi_warp.studies.sweeps.file import arguments_of_file
-from lgvi_warp.studies.sweeps.found import coordinates
 from lgvi_warp.studies.sweeps.record import Record, Records, key_of
+from lgvi_warp.studies.sweeps.sweep_table import coordinates
 
 N = 40
 TABLES = {

@@ -8,7 +8,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.errors import NothingToDraw
-from lgvi_warp.statistics.estimate import Estimate, Estimates
+from lgvi_warp.statistics.estimates.estimate import Estimate, Estimates
 from lgvi_warp.views.plots.canvas import band
 from tests.support.made import made
 

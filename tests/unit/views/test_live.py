@@ -15,9 +15,9 @@ from rerun.chunk import RrdReader
 import lgvi_warp as lw
 from lgvi_warp import cli
 from lgvi_warp.common.status import under_way
-from lgvi_warp.views import rerun as drawing
-from lgvi_warp.views import viewer
-from lgvi_warp.views.live import Live
+from lgvi_warp.views.recording import rerun as drawing
+from lgvi_warp.views.recording import viewer
+from lgvi_warp.views.recording.live import Live
 from tests.conftest import ROOT
 from tests.support.viewer import free_port, receiver, serving
 from tests.unit.views.test_recording import fleet, rows, text_of

@@ -14,10 +14,11 @@ from matplotlib.figure import Figure
 import lgvi_warp as lw
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import Status, WarningArray
-from lgvi_warp.statistics.estimate import Estimate, Estimates
-from lgvi_warp.views import choice, fleet, live, report, rerun, viewer
+from lgvi_warp.statistics.estimates.estimate import Estimate, Estimates
+from lgvi_warp.views import choice, fleet
+from lgvi_warp.views.pages import report
 from lgvi_warp.views.plots import canvas, fans, read, words
-from lgvi_warp.views.recording import drawn
+from lgvi_warp.views.recording import drawn, live, rerun, viewer
 from lgvi_warp.views.recording import words as told
 from tests.support.made import made
 

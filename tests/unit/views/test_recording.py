@@ -16,12 +16,11 @@ from rerun.chunk import RrdReader
 import lgvi_warp as lw
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import Status, stop_time, under_way
-from lgvi_warp.statistics.estimate import Estimate, Estimates
-from lgvi_warp.views import rerun as recordings
-from lgvi_warp.views import viewer
+from lgvi_warp.statistics.estimates.estimate import Estimate, Estimates
 from lgvi_warp.views.commands import channels
 from lgvi_warp.views.fleet import LOOKS
-from lgvi_warp.views.recording import drawn, layout, world
+from lgvi_warp.views.recording import drawn, layout, viewer, world
+from lgvi_warp.views.recording import rerun as recordings
 from lgvi_warp.views.recording import words as ten_words
 from tests.support.made import made
 from tests.unit.views.test_hull import glb

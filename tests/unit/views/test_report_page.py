@@ -15,7 +15,7 @@ from PIL import Image
 
 import lgvi_warp as lw
 from lgvi_warp import cli
-from lgvi_warp.views.again import again, shortened
+from lgvi_warp.views.pages.again import again, shortened
 from lgvi_warp.views.plots.inputs import inputs_by_outcome, varied
 from tests.conftest import ROOT
 from tests.unit.views import test_recording

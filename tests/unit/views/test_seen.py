@@ -11,11 +11,11 @@ import rerun as rr
 
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
-from lgvi_warp.views import rerun as recordings
 from lgvi_warp.views.fleet import LOOKS
-from lgvi_warp.views.live import Live
 from lgvi_warp.views.recording import layout, world
+from lgvi_warp.views.recording import rerun as recordings
 from lgvi_warp.views.recording.hull import FIN
+from lgvi_warp.views.recording.live import Live
 from tests.conftest import ROOT
 from tests.support.made import made
 from tests.support.viewer import colored, moved, painted, viewer

@@ -14,7 +14,7 @@ from lgvi_warp.common.status import Status
 from lgvi_warp.studies.sweeps.output import Sweep, against_baseline
 from lgvi_warp.studies.sweeps.record import Record
 from lgvi_warp.studies.sweeps.setup import END, Cell
-from lgvi_warp.views import sweeps
+from lgvi_warp.views.plots import sweep_pictures as sweeps
 from tests.support.made import made
 
 N = 40

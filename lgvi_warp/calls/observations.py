@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a learner may see: names for numbers of what a controller measures and wants, those of `lw.Policy` among them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.engine.host_callback import Looks
+
+
+def heading_error(y: Looks, r: Looks) -> np.ndarray:
+    """The wanted heading less the measured one.
+
+    Returns: (m,) [rad], in (-pi, pi], from the forward axes, without Euler angles.
+    """
+    s, c = r.attitude[:, :2, 0], y.attitude[:, :2, 0]
+    return np.arctan2(s[:, 1] * c[:, 0] - s[:, 0] * c[:, 1], s[:, 0] * c[:, 0] + s[:, 1] * c[:, 1])
+
+
+def attitude_error(y: Looks, r: Looks) -> np.ndarray:
+    """e_R = vee(R_d^T R - R^T R_d) / 2, as of `lw.PosePID`.
+
+    Returns: (m, 3) [1], body axes.
+    """
+    return 0.5 * np.cross(y.attitude, r.attitude).sum(axis=1)
+
+
+def position_error(y: Looks, r: Looks) -> np.ndarray:
+    """The wanted position less the measured one.
+
+    Returns: (m, 3) [m], body axes.
+    """
+    return np.einsum("nji,nj->ni", y.attitude, r.position - y.position)
+
+
+def water_velocity(y: Looks) -> np.ndarray:
+    """The measured velocity through the water.
+
+    Returns: (m, 3) [m/s], body axes.
+    """
+    assert y.water_velocity is not None
+    return y.water_velocity
+
+
+class Observation(NamedTuple):
+    """A number, or several, that a learner may see.
+
+    wish: What guidance must give for it; None for nothing.
+    of: Function of the measured and the wanted motion of m members that returns (m,) or (m, length).
+    """
+
+    length: int
+    wish: str | None
+    of: Callable[[Looks, Looks], Any]
+
+
+OBSERVATIONS = {
+    "depth_error": Observation(1, "depth", lambda y, r: r.depth - y.depth),
+    "heading_error": Observation(1, "heading", heading_error),
+    "speed_error": Observation(1, "speed", lambda y, r: r.speed - water_velocity(y)[:, 0]),
+    "depth": Observation(1, None, lambda y, r: y.depth),
+    "position_error": Observation(3, "position", position_error),
+    "attitude_error": Observation(3, "attitude", attitude_error),
+    "velocity": Observation(3, None, lambda y, r: y.velocity),
+    "water_velocity": Observation(3, None, lambda y, r: water_velocity(y)),
+    "angular_velocity": Observation(3, None, lambda y, r: y.angular_velocity),
+    "down": Observation(3, None, lambda y, r: y.attitude[:, 2]),
+    "measured_position": Observation(3, None, lambda y, r: y.position),
+    "measured_attitude": Observation(9, None, lambda y, r: y.attitude),
+    "measured_heading": Observation(1, None, lambda y, r: y.heading),
+    "reference_position": Observation(3, None, lambda y, r: r.position),
+    "reference_attitude": Observation(9, None, lambda y, r: r.attitude),
+    "reference_velocity": Observation(3, None, lambda y, r: r.velocity),
+    "reference_angular_velocity": Observation(3, None, lambda y, r: r.angular_velocity),
+    "reference_heading": Observation(1, None, lambda y, r: r.heading),
+    "reference_depth": Observation(1, None, lambda y, r: r.depth),
+    "reference_speed": Observation(1, None, lambda y, r: r.speed),
+}  # fmt: skip
+# Signals of a controller that are the same as one above.
+OBSERVATIONS |= {
+    f"measured_{name}": OBSERVATIONS[name] for name in ("depth", "velocity", "water_velocity", "angular_velocity")
+}
+
+
+def observer(faults: Faults, names: Any, wishes: Sequence[str]) -> Callable[[float, Looks, Looks], np.ndarray]:
+    """The function that gathers named numbers.
+
+    Returns: Function of the time and of the measured and wanted motion of m members that returns (m, k).
+    """
+    chosen: list[tuple[Observation, int | None]] = []
+    known: Mapping[str, tuple[str, int | None]] = {
+        (name if i is None else f"{name}[{i}]"): (name, i)
+        for name, each in OBSERVATIONS.items()
+        for i in (None, *(range(each.length) if each.length > 1 else ()))
+    }
+    if isinstance(names, str) or not isinstance(names, Sequence) or not names:
+        faults.add("observe", names, "is no list of names and no function", "give names such as depth_error")
+        names = ()
+    for i, entry in enumerate(names):
+        if not isinstance(entry, str) or entry not in known:
+            faults.add(f"observe[{i}]", entry, "is not known", closest(entry, known))
+            continue
+        name, index = known[entry]
+        wish = OBSERVATIONS[name].wish
+        if wish is not None and wish not in wishes:
+            remedy = "give guidance that wants it, such as lw.SetPoint"
+            faults.add(f"observe[{i}]", entry, f"needs a wanted {wish}, which no guidance gives", remedy)
+        chosen.append((OBSERVATIONS[name], index))
+
+    def observe(t: float, y: Looks, r: Looks) -> np.ndarray:
+        columns = [np.reshape(each.of(y, r), (len(y.heading), each.length)) for each, _ in chosen]
+        return np.concatenate(
+            [c if i is None else c[:, i : i + 1] for c, (_, i) in zip(columns, chosen, strict=True)], axis=1
+        )
+
+    return observe

@@ -1,0 +1,530 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`prepare`: a run that is called many times with other numbers, at little more than what its kernel takes."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common import machine
+from lgvi_warp.common.arguments import flag
+from lgvi_warp.common.errors import Faults, SceneError, refusal, shown
+from lgvi_warp.common.labelled import columns_by_name, is_labelled
+from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.common.status import Status, failed
+from lgvi_warp.control.signals import ordered
+from lgvi_warp.engine.executors import executor_of
+from lgvi_warp.engine.keepers.observation import observe
+from lgvi_warp.engine.plan import Plan
+from lgvi_warp.engine.shared import Shared
+from lgvi_warp.engine.survey import survey
+from lgvi_warp.methods.method import Method
+from lgvi_warp.methods.saveat import SaveAt
+from lgvi_warp.results.provenance import provenance
+from lgvi_warp.results.quantities import OfEnds, OfInterest, OfResult, quantities
+from lgvi_warp.results.result import Result
+from lgvi_warp.runs.run import completed
+from lgvi_warp.runs.settle import enough_iterations, make_plan
+from lgvi_warp.sampling.designs.designs import salib_problem
+from lgvi_warp.sampling.designs.levels import UnitCubePoints
+from lgvi_warp.sampling.designs.table import Table
+from lgvi_warp.scene import variations
+from lgvi_warp.scene.columns import as_given, columns_of, names_of, stacked, whole_columns
+from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
+from lgvi_warp.scene.like import SceneLike
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.scene.settings import MOST_MEMBERS, EnsembleSettings
+from lgvi_warp.statistics.base import Statistic
+
+# Members that are run together where quantities look over their paths, which are kept as long as they run.
+PATHS_AT_ONCE = 16_384
+
+
+class FailedMembers(SceneError):  # noqa: N818  (what happened, and no fault of the scene)
+    """Raised when members failed and the answer cannot be computed from the remaining ones."""
+
+
+@dataclass
+class _Kind:
+    """Plans of ensembles in which the same names vary, by what their survey found."""
+
+    shared: Shared
+    plans: dict[Any, Plan] = field(default_factory=dict)
+
+
+class Runner:
+    """Settings of a run, and the plans that they lead to: what `solve` settles once for a call, and `prepare` once for many.
+
+    threads: number of threads; None (default) for all cores.
+    """
+
+    def __init__(
+        self,
+        scene: SceneLike,
+        settings: Mapping[str, Any],
+        statistics: Sequence[Any] = (),
+        threads: int | None = None,
+        executor: Any = "threads",
+        scheduler: str | None = None,
+    ):
+        self.scene, self.settings = scene, dict(settings)
+        self.observed = observe(1, scene.run, statistics, "all", False, scene.events, scene.controller)
+        self.executor = executor_of(executor, threads, scheduler)
+        self.threads = threads or machine.thread_count()
+        chosen = self.settings.get("method")
+        self._auto = (chosen if isinstance(chosen, Method) else scene.run.method_of(chosen)).iterations == "auto"
+        self._kinds: dict[frozenset[str], _Kind] = {}
+        self._last: Plan | None = None
+
+    def plan(self, fleet: Ensemble) -> Plan:
+        """The plan of a run of some members; a kernel is chosen for what these members are, as `solve` does."""
+        names = frozenset(fleet.varied_names)
+        kind = self._kinds.get(names)
+        if kind is not None and self._last is not None:
+            method, h, dtype = self._last.method, self._last.grid.h, self._last.dtype
+            if self._auto:
+                method = replace(method, iterations=enough_iterations(fleet, method, h, dtype))
+            plan = kind.plans.get((method, survey(fleet, method, h, kind.shared, odd=False, most=SURVEYED).decisive))
+            if plan is not None:
+                return plan.of(fleet)
+        plan = make_plan(
+            fleet,
+            **self.settings,
+            fields=self.observed.fields,
+            survey_all=False,
+            read_at_looks=self.observed.read_at_looks(),
+            looks=self.observed.looks,
+        )
+        plan.compile()
+        if plan.method.reason:  # chosen once, by the members of the first plan
+            self.settings["method"] = plan.method
+        kind = self._kinds.setdefault(names, _Kind(plan.shared))
+        facts = survey(fleet, plan.method, plan.grid.h, kind.shared, odd=False, most=SURVEYED)
+        kind.plans[plan.method, facts.decisive] = self._last = plan
+        return plan
+
+    def run(self, fleet: Ensemble, progress: Callable[[float], None] | None = None, warned: bool = True) -> Result:
+        """Run some members.
+
+        Returns: Their result, whose provenance names the members' number but not their values, and whose messages leave out
+            what is odd about their values.
+        """
+        few = {"members": fleet.members, "seed": fleet.seed, "varied": sorted(fleet.varied_names)}
+
+        def known(plan: Plan) -> tuple[dict[str, Any], tuple[str, ...]]:
+            content = plan.shared("provenance", {}, lambda numbers: provenance(plan, self.observed))
+            return {**content, "ensemble": few}, plan.grid.messages
+
+        plan = self.plan(fleet)
+        settings = dict(progress=progress, executor=self.executor, known=known, warned=warned)
+        return completed(plan, self.threads, self.observed, plan.fields, **settings)
+
+
+class Prepared:
+    """A run to be called many times, made by `prepare`; the noise of row i is that of member i, unless a call says another.
+
+    Args:
+        fleet: the members of a call without X.
+        table: members whose columns a call with X replaces; or why there are none.
+        names: names of the columns of X.
+        of: quantities of interest; empty for whole results.
+        runner: what settles and runs.
+        levels: columns of the cube, in the order of the names, where X holds levels; None where it holds values.
+        refuse: whether a failed member is an error; else its quantities are NaN.
+        common_noise: whether noise acts on every member alike.
+        made_of: arguments of `prepare`, by position and by name, for a pickle.
+
+    Attributes:
+        names: names of the columns of X (d,).
+        common_noise: whether noise acts on every member alike.
+    """
+
+    def __init__(
+        self,
+        fleet: Ensemble,
+        table: Ensemble | str,
+        names: tuple[str, ...],
+        of: tuple[OfResult, ...],
+        runner: Runner,
+        levels: Sequence[int] | None,
+        refuse: bool,
+        common_noise: bool,
+        made_of: tuple[Any, ...],
+    ):
+        self._arguments = made_of
+        self._fleet, self._table, self.names, self._of, self._runner = fleet, table, names, of, runner
+        self._levels, self._refuse, self.common_noise = levels, refuse, common_noise
+
+    @shows_progress
+    def __call__(
+        self,
+        X: Any = None,
+        *,
+        seed: int | None = None,
+        members: int | None = None,
+        indices: Any = None,
+        progress: Callable[[float], None] | bool | None = None,
+    ) -> Any:
+        """Run members with these numbers, from t = 0; in every call row i has member i's noise, unless told otherwise.
+
+        With noise, what follows rows from call to call (a chain, subset simulation, an optimiser) must say which noise each
+        row has: new `indices` or another `seed` for noise that is new, the same ones for noise that is kept.
+
+        X: (n, d), columns in the order of `names`; or by name, in any order: a mapping of columns, a data frame, a structured
+            array, an xarray Dataset. By name a whole vector may be given, "current.velocity": (n, 3). Without X the members
+            are drawn from the distributions.
+        seed: seed of the noise of forces and sensors, and of the members that are drawn, a whole number from 0; default that
+            of the ensemble.
+        indices: (n,), beside X: whose noise each row has, that of the member with this index in an ensemble of this seed,
+            whole numbers from 0. Rows with the same index have the same noise. Default None for 0 to n - 1.
+        progress: True shows a bar or lines, as in lw.solve; a function is called with the fraction of the work that is done,
+            in [0, 1].
+        Returns: The quantities, (n,) of a single number and (n, m) of several; a `Result` without `of`.
+        """
+        if X is not None and members is not None:
+            raise refusal("members", members, "is given beside X, whose rows are the members", "leave out one of them")
+        if X is None and indices is not None:
+            remedy = "give X, or draw the members of a seed: run(seed=..., members=...)"
+            raise refusal("indices", indices, "name the noise of the rows of X, and there is no X", remedy)
+        fleet = self._drawn(seed, members) if X is None else self._with_noise(self._members(X), seed, indices)
+        return self._answer(fleet, callback(progress))
+
+    def states(
+        self,
+        position: Any,
+        attitude: Any,
+        velocity: Any,
+        angular_velocity: Any,
+        parameters: Any = None,
+        *,
+        indices: Any = None,
+        seed: int = 0,
+    ) -> Any:
+        """Run members from given states; in every call row i has member i's noise, unless indices or the seed differ.
+
+        Args:
+            position: (n, 3) [m], inertial axes.
+            attitude: (n, 3, 3), body to inertial axes.
+            velocity: (n, 3) [m/s], body axes.
+            angular_velocity: (n, 3) [rad/s], body axes.
+            parameters: arrays (n, ...) by name, as of `Ensemble.from_states`; default None.
+            indices: (n,), whole numbers from 0 that key the noise of each member, such as its index in another ensemble;
+                members with the same index have the same noise. Default None for 0 to n - 1.
+            seed: the seed of the noise, a whole number from 0. Default 0.
+
+        Returns:
+            As of a call.
+
+        Raises:
+            SceneError: if an array has a wrong shape or unphysical values, or the seed is no whole number. States that are not
+                finite are taken: their members fail.
+            FailedMembers: if members failed, unless failed="nan".
+        """
+        given = position, attitude, velocity, angular_velocity, parameters
+        fleet = Ensemble.from_states(self._fleet.scene, *given)
+        fleet.seed = int(EnsembleSettings(fleet.members, seed).seed)
+        return self._answer(self._with_noise(fleet, None, indices), None)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        arguments, settings = self._arguments
+        return _prepared_again, (arguments, settings)
+
+    def _drawn(self, seed: int | None, members: int | None) -> Ensemble:
+        fleet = self._fleet
+        if seed is None and members is None:
+            return fleet
+        return fleet.with_seed(fleet.seed if seed is None else seed, members)
+
+    def _with_noise(self, fleet: Ensemble, seed: int | None, indices: Any) -> Ensemble:
+        """Members whose noise is that of these indices and this seed; None for those that they have. They are new ones."""
+        if seed is not None:
+            fleet.seed = int(EnsembleSettings(fleet.members, seed).seed)
+        if indices is None:
+            return fleet
+        keys = np.asarray(indices)
+        whole = keys.shape == (fleet.members,) and keys.dtype.kind in "iu"
+        if not whole or keys.min() < 0 or keys.max() >= MOST_MEMBERS:
+            problem = "are not one whole number from 0 for each member"
+            remedy = f"give an array of shape ({fleet.members},), of numbers below {MOST_MEMBERS}"
+            raise refusal("indices", indices, problem, remedy)
+        if self.common_noise:
+            problem = "are given, where common_noise=True gives all members the noise of member 0"
+            raise refusal("indices", indices, problem, "leave them out, or prepare the run without common_noise")
+        fleet.indices = keys.astype(np.int64)
+        return fleet
+
+    def _members(self, X: Any) -> Ensemble:
+        """The ensemble of the members with these numbers."""
+        if isinstance(self._table, str):
+            raise SceneError([f"X: {self._table}"])
+        numbers = self.numbers(X)
+        if self._levels is None:
+            return self._table.with_columns(dict(zip(self.names, numbers.T, strict=True)))
+        inside = np.empty_like(numbers)
+        inside[:, self._levels] = np.clip(numbers, 2.0**-53, 1.0 - 2.0**-53)
+        return Ensemble(self._fleet.scene, None, self._fleet.seed, self._fleet.vary, UnitCubePoints(inside))
+
+    def numbers(self, X: Any) -> np.ndarray:
+        """Numbers of members as an array.
+
+        Args:
+            X: as of a call.
+
+        Returns:
+            (n, d), columns in the order of the names.
+
+        Raises:
+            SceneError: for labels that are missing, unknown or doubled, and for what is no real number.
+        """
+        faults, names = Faults(), self.names
+        shape = f"give an array of shape (n, {len(names)}), columns {', '.join(names)}"
+        if is_labelled(X):
+            known = scene_numbers(self._fleet.scene)
+            columns = whole_columns(faults, names, known, columns_by_name(faults, "X", X))
+            array = stacked(faults, "X", names, columns) if columns else None
+        else:
+            array = faults.real("X", X, shape)
+        if array is not None and (array.ndim != 2 or array.shape[1] != len(names) or not len(array)):
+            faults.add("X", "...", f"has shape {array.shape}", shape)
+        if array is not None and self._levels is not None and not np.all((array >= 0.0) & (array <= 1.0)):
+            odd = array[~((array >= 0.0) & (array <= 1.0))][0]
+            remedy = "give levels, or leave out levels=True to give the numbers"
+            faults.add("X", odd, "is not a level between 0 and 1", remedy)
+        faults.raise_if_any()
+        assert array is not None
+        return array
+
+    def _answer(self, fleet: Ensemble, progress: Callable[[float], None] | None) -> Any:
+        if self.common_noise:
+            fleet = copy.copy(fleet)
+            fleet.indices = np.zeros(fleet.members, dtype=np.int64)
+        if not self._of:
+            return self._runner.run(fleet, progress)
+        large = any(each.over_path or each.is_function for each in self._of)
+        at_once, groups = PATHS_AT_ONCE if large else fleet.members, []
+        for first in range(0, fleet.members, at_once):
+            stop = min(first + at_once, fleet.members)
+            group = fleet if stop - first == fleet.members else fleet.subset(np.arange(first, stop))
+            groups.append(self._values(group, progress and part(progress, first / fleet.members, stop / fleet.members)))
+        values, status = (np.concatenate(each) for each in zip(*groups, strict=True))
+        lost = failed(status) | ~np.isfinite(values).all(axis=1)
+        if lost.any():
+            if self._refuse:
+                remedy = 'mend what fails, or take NaN for them: failed="nan"'
+                raise FailedMembers([lost_text(lost, counted(status, values), remedy)])
+            values = np.where(lost[:, None], np.nan, values)
+        return values[:, 0] if values.shape[1] == 1 else values
+
+    def _values(self, fleet: Ensemble, progress: Callable[[float], None] | None) -> tuple[np.ndarray, np.ndarray]:
+        """The quantities (n, m) of some members, and their status (n,)."""
+        result = self._runner.run(fleet, progress, warned=False)
+        members = fleet.select(0, fleet.members) if any(each.looks_at_members for each in self._of) else None
+        return np.concatenate([each.values(result, members) for each in self._of], axis=1), np.asarray(result.status)
+
+
+def part(progress: Callable[[float], None], begin: float, end: float) -> Callable[[float], None]:
+    """Tell of a part of the work as a part of the whole."""
+    return lambda fraction: progress(begin + (end - begin) * fraction)
+
+
+def lost_text(lost: np.ndarray, counts: Mapping[str, int], remedy: str) -> str:
+    """Describe how many members failed, and of what.
+
+    lost: (n,), whether each failed, or a quantity of it is not finite.
+    """
+    causes = ", ".join(f"{name} {number}" for name, number in counts.items() if name != "ok")
+    first = int(np.argmax(lost))
+    return f"{int(lost.sum())} of {len(lost)} members failed ({causes}; the first: member {first}); {remedy}"
+
+
+def counted(status: np.ndarray, values: np.ndarray) -> dict[str, int]:
+    """Count members by what became of them.
+
+    status: (n,), their status.
+    values: (n, m), their quantities.
+    """
+    names = {Status(int(code)).name.lower(): int((status == code).sum()) for code in np.unique(status)}
+    odd = int((~np.isfinite(values).all(axis=1)).sum())
+    return names | ({"quantity not finite": odd} if odd else {})
+
+
+def scene_numbers(scene: Any) -> dict[str, np.ndarray]:
+    """Every number of a scene that may vary."""
+    return scene.parameters() | {f"start.{key}": value for key, value in scene.start.given().items()}
+
+
+def scene_value(scene: Any, name: str) -> np.ndarray:
+    """A single number of a scene."""
+    (target,) = variations.targets(name)
+    known, faults = scene_numbers(scene), Faults("vary.")
+    if variations.known_target(faults, name, "...", target, known) and (ndim := target.of(known[target.name]).ndim):
+        entry = f"{name}[{','.join('0' * ndim)}]"
+        faults.add(f'"{name}"', "...", "is not a single number", f'name its entries, such as "{entry}"')
+    faults.raise_if_any()
+    return target.of(known[target.name])
+
+
+def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -> SaveAt | None:
+    """The samples that quantities need, where the user does not say which to keep."""
+    if save is not None or not of:
+        return save
+    fields = ordered(name for each in of for name in each.fields)
+    paths = [each.label for each in of if each.over_path]
+    if paths and scene.run.save_every is None:
+        problem = f"save = None: is missing, and {paths[0]} looks over the path"
+        raise SceneError([f"{problem}; give save=lw.SaveAt(every=...) or [run] save_every"])
+    if paths or any(each.is_function for each in of):
+        return SaveAt(every=scene.run.save_every, fields=fields)
+    times = sorted({each.when for each in of if isinstance(each, OfEnds) and each.when is not None})
+    return SaveAt(at=times or None, fields=fields)
+
+
+def statistics_for(scene: SceneLike, of: Sequence[OfResult]) -> list[Statistic]:
+    """The statistics that quantities need, beside samples."""
+    found = dict[str, Statistic]()
+    for each in of:
+        if isinstance(each, OfEnds):
+            found |= each.gathered(scene.events)
+    return list(found.values())
+
+
+def prepare(
+    fleet: Scene | Ensemble,
+    vary: Mapping[Any, Any] | Sequence[str] | None = None,
+    of: OfInterest | Sequence[OfInterest] | None = None,
+    *,
+    method: str | Method | None = None,
+    h: float | None = None,
+    t1: float | None = None,
+    save: SaveAt | None = None,
+    dtype: str | None = None,
+    statistics: Sequence[Any] = (),
+    levels: bool = False,
+    failed: str = "refuse",
+    common_noise: bool = False,
+    threads: int | None = None,
+    width: int | None = None,
+    checks: str | None = None,
+    on_failure: str | None = None,
+    executor: Any = "threads",
+    scheduler: str | None = None,
+) -> Prepared:
+    """Prepare a run that is called many times with other numbers; noise is frozen by row: row i always has that of member i.
+
+    Checks, choices, the kernel and whatever no number of `vary` changes are settled once. A call then costs what the kernel
+    takes, and little more; it has the bits of `solve`. The function may be called from several threads, and be pickled.
+
+    Noise of forces and sensors is frozen by row: row i has the noise of member i of the ensemble's seed in every call. What
+    follows rows from call to call, as a chain does, gives run(X, seed=, indices=).
+
+        run = lw.prepare(scene, ["vehicle.mass", "start.position[2]"], of="max(depth)", h=0.01, t1=60.0)
+        depths = run(X)                                    # X (n, 2), depths (n,)
+
+    Args:
+        fleet: A Scene or an Ensemble; its [ensemble] is used where `vary` is None.
+        vary: Names of what varies, ["vehicle.mass", "start.position[2]"], or a mapping of names to distributions.
+        of: One or several quantities of interest: "position[2]", "max(depth)", a Quantity, a function of a Result. Default
+            None: calls return results.
+        method: As of `lw.solve`, but where it is left out, chosen once, for `fleet`. What else is left out, of h, t1, dtype,
+            width, checks, on_failure, threads, executor and scheduler, is taken from the scene's [run].
+        h: Step [s].
+        t1: End of the run [s].
+        save: Samples to keep, as of `lw.solve`; default with `of`: those that the quantities need.
+        dtype: "float64", "float32" or "float32_compensated".
+        statistics: Statistics gathered over the members of each call, in result.statistics; default none.
+        levels: Whether X holds numbers in (0, 1), which the distributions turn into values, in place of the values;
+            joint distributions need it. Default False.
+        failed: "refuse" (default) for an error where members fail, "nan" for NaN in their place; for `of` only.
+        common_noise: Whether forces with noise act on every member alike. Default False.
+        threads: Number of threads; default all cores.
+        width: Vehicles per packet; default from the CPU.
+        checks: "safe", "all" or "none".
+        on_failure: "freeze", "raise" or "substep".
+        executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
+        scheduler: Address of Dask's scheduler.
+
+    Returns:
+        The function; its `names` are the columns of X.
+
+    Raises:
+        SceneError: For faulty arguments, all in one message.
+    """
+    faults = Faults()
+    if not isinstance(fleet, Ensemble | Scene):
+        problem = "is neither an Ensemble nor a Scene"
+        raise SceneError([f"fleet = {shown(fleet)}: {problem}; give lw.Scene(...) or lw.Ensemble(...)"])
+    scene = fleet.scene if isinstance(fleet, Ensemble) else fleet
+    interests: tuple[OfResult, ...] = ()
+    if of is not None:
+        with faults.including():
+            interests = quantities(of)
+    faults.choice("failed", failed, ("refuse", "nan"))
+    distributions = isinstance(vary, Mapping)
+    listed = names_of(faults, vary) if vary is not None and not distributions else ()
+    levels = flag("levels", levels)
+    if levels and listed:
+        faults.add("vary", vary, "has no distributions, which levels=True needs", "map names to distributions")
+    faults.raise_if_any()
+    if vary is None:
+        whole = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(scene)
+    elif distributions:
+        whole = Ensemble(scene, 1, 0, vary)  # type: ignore[arg-type]
+    else:
+        whole = Ensemble(scene, 1)
+    names, table, columns = _columns(whole, listed, levels)
+    gathered = statistics_for(scene, interests)
+    save = samples_for(scene, interests, save)
+    settings = dict(
+        method=method, h=h, t1=t1, save=save, dtype=dtype, width=width, checks=checks, on_failure=on_failure
+    )
+    runner = Runner(scene, settings, [*statistics, *gathered] if gathered else statistics, threads, executor, scheduler)
+    known = settings | dict(
+        statistics=statistics, levels=levels, failed=failed, common_noise=common_noise, threads=threads, executor=executor,
+        scheduler=scheduler)  # fmt: skip
+    made_of = (fleet, vary, of), known
+    first = whole if isinstance(table, str) else table
+    runner.plan(first)
+    first.select(0, 1)  # which keeps what all members share
+    return Prepared(whole, table, names, interests, runner, columns, failed == "refuse", common_noise, made_of)
+
+
+def _prepared_again(arguments: tuple[Any, ...], settings: dict[str, Any]) -> Prepared:
+    return prepare(*arguments, **settings)
+
+
+def _columns(
+    whole: Ensemble, listed: tuple[str, ...], levels: bool
+) -> tuple[tuple[str, ...], Ensemble | str, list[int] | None]:
+    """(names of the columns of X; an ensemble with these columns, or why X has none; columns of the cube for levels)."""
+    scene, names, cube_columns = whole.scene, listed, None
+    of_sampling = [*whole.sampling.own_values(), *whole.sampling.distributions()]
+    if of_sampling:
+        dropped = ", ".join(of_sampling[:4])
+        return (
+            (),
+            f"would drop {dropped}, to which the ensemble's {whole.sampling.kind} gives values; name what varies",
+            None,
+        )
+    if not listed and whole.vary:
+        described = as_given(whole)
+        joint = [variation for variation in described if variation.distribution.joint]
+        if joint and not levels:
+            remedy = "give levels=True, or let members be drawn: run(seed=...)"
+            return (
+                (),
+                f'vary."{joint[0].key}" is a joint distribution, whose values are not single numbers; {remedy}',
+                None,
+            )
+        cube_columns = [column for variation in described for column in columns_of(whole.space, variation.key)]
+        cube = salib_problem(whole.space)["names"]
+        names = tuple(cube[column] for column in cube_columns)
+        if levels:
+            return names, whole, cube_columns
+    if not names:
+        return (), "has no columns, since nothing varies; name what varies: prepare(scene, vary=[...])", None
+    values = {name: np.array([float(scene_value(scene, name))]) for name in names}
+    return names, Ensemble(scene, None, whole.seed, None, Table(values=values)), None

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`resume`: continue a run in a store that was stopped."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.engine.executors import executor_of
+from lgvi_warp.engine.executors.base import Executor
+from lgvi_warp.engine.keepers.observation import Observing, observation_of
+from lgvi_warp.engine.keepers.protocol import Keeper
+from lgvi_warp.results.provenance import provenance
+from lgvi_warp.results.result import Result
+from lgvi_warp.runs.run import finished
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.store.folder import ROOT, Folder
+from lgvi_warp.store.kept import KeptRun
+from lgvi_warp.store.layout_check import understood
+from lgvi_warp.store.open import folder_of, result_of
+from lgvi_warp.store.recipe import of_store, refuse_another
+from lgvi_warp.store.run import StoredRun
+from lgvi_warp.store.solve import went_on
+from lgvi_warp.store.state import store_of
+
+
+@shows_progress
+def resume(
+    path: str | os.PathLike[str],
+    fleet: Ensemble | Scene | None = None,
+    *,
+    executor: str | Executor = "threads",
+    threads: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[float], None] | bool | None = None,
+    force: bool = False,
+    keepers: Sequence[Keeper] = (),
+    statistics: Sequence[Any] | None = None,
+) -> Result:
+    """Continue a run in a store: it ends with the same bytes as a run that was never stopped.
+
+    Every finished block is read and compared with its checksums; blocks that are torn, missing or changed run again.
+
+    Args:
+        path: A store, or a folder with one store.
+        fleet: The run's Ensemble, or Scene. Needed if a scene file cannot describe it (distributions of your own).
+        executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
+        threads: Number of threads; default all cores.
+        scheduler: Address of Dask's scheduler.
+        progress: As in solve.
+        force: Whether to continue on another machine or with other versions, where the bits may differ.
+        keepers: The keepers that the run was given.
+        statistics: The statistics that the run was given. Needed if they are of functions.
+
+    Returns:
+        The result of the complete run, which reads from the store.
+
+    Raises:
+        SceneError: If there is no run, or it is not the same run.
+        OSError: If the disk cannot be written.
+        MembersFailed: If members failed and the run's on_failure is "raise".
+    """
+    folder = Folder(folder_of(path))
+    ensemble = Ensemble.from_scene(fleet) if isinstance(fleet, Scene) else fleet
+    plan = folder.plan(ensemble)
+    observed_content = folder.provenance.get("observed")
+    with understood(folder.path / ROOT):
+        observed = observation_of(observed_content, statistics)
+    observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
+    now = of_store(provenance(plan, observed), plan.ensemble)
+    now |= {} if observed_content is None else {"observed": observed_content}
+    messages = refuse_another(folder.path, folder.provenance, now, force)
+    runner = executor_of(executor, threads, scheduler)
+    # Provenance and messages stay those of the start of the run, on whatever machine it goes on.
+    run = StoredRun(
+        plan, store_of(folder, force), folder.provenance, folder.messages, (*keepers, *observing.keepers), None,
+        observing.enough, KeptRun(observed, tuple((observed_content or {}).get("fields", ()))),
+    )  # fmt: skip
+    finished_folder = run.run(runner, callback(progress))
+    remarks = messages + went_on(finished_folder)
+    result = result_of(finished_folder, None, folder.messages + remarks, plan.ensemble.scene.terms, observing)
+    return finished(result, plan, observed, (observed_content or {}).get("fields", ()), threads)

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`solve`: from an ensemble and its settings to a result, in memory or in a store."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from lgvi_warp.common import machine
+from lgvi_warp.common.arguments import function_of
+from lgvi_warp.common.errors import Faults, SceneError, shown
+from lgvi_warp.common.progress import callback, shows_progress
+from lgvi_warp.engine.executors import executor_of
+from lgvi_warp.engine.executors.base import Executor
+from lgvi_warp.engine.keepers.observation import Observation, observe
+from lgvi_warp.methods.method import Method
+from lgvi_warp.methods.saveat import SaveAt
+from lgvi_warp.results.result import Result
+from lgvi_warp.runs.run import completed, finished
+from lgvi_warp.runs.settle import blocks_there, fields_of, make_plan
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.store.settings import Store
+from lgvi_warp.store.solve import run_stored
+
+
+@shows_progress
+def solve(
+    fleet: Ensemble | Scene,
+    method: str | Method | None = None,
+    h: float | None = None,
+    t1: float | None = None,
+    save: SaveAt | None = None,
+    dtype: str | None = None,
+    *,
+    threads: int | None = None,
+    width: int | None = None,
+    checks: str | None = None,
+    on_failure: str | None = None,
+    progress: Callable[[float], None] | bool | None = None,
+    statistics: Sequence[Any] | None = None,
+    keep: str | Sequence[int] | None = None,
+    until: Any = None,
+    store: Store | str | os.PathLike[str] | None = None,
+    executor: Executor | str = "threads",
+    scheduler: str | None = None,
+    only: range | None = None,
+    on_block: Callable[[Result], None] | None = None,
+) -> Result:
+    """Advance every member of the fleet from t = 0 to t1 and return the samples and statistics asked for.
+
+    What is left out is taken from the scene's [run] section; the defaults below hold where that says nothing. Nothing is
+    printed unless `progress` says so. The same inputs give the same bits for any number of threads, on one type of machine.
+
+    Args:
+        fleet: An Ensemble, or a Scene, which stands for its own ensemble (one vehicle if it has none).
+        method: A name or a Method. Default: chosen by what acts, "psi_s" where nothing damps the motion.
+        h: Step [s].
+        t1: End of the run [s].
+        save: Which samples to save, and when; default every [run] save_every of the scene, else the start and the end.
+        dtype: "float64" (default), "float32", or "float32_compensated", which keeps each number of the state as a sum of two
+            (for many short steps, far from the origin).
+        threads: Number of threads; default all cores.
+        width: Vehicles per packet; default from the CPU.
+        checks: "safe" (default) gives each member a status, freezes it when it fails, and warns if its parameters and its
+            start do not suit the step; "all" also warns of what arises on the way; "none" leaves all that code out.
+        on_failure: "freeze" (default) keeps a member that fails at its last good state. "raise" raises MembersFailed after
+            the run. "substep" repeats a step that has no solution in 2, 4, ... 1024 parts, for that member alone: order and
+            the symmetry of each step are kept, symplecticity is not.
+        progress: True shows a bar on a terminal and in a notebook, lines elsewhere, on stderr; a function is called with the
+            fraction of the work that is done, in [0, 1], from the threads that do it. Default: nothing is shown.
+        statistics: Statistics gathered over the members at every sample time during the run, such as lw.Mean("position");
+            they are in result.statistics. An empty sequence gathers none, whatever the scene says.
+        keep: Members whose samples are kept. "all" (default). "none": memory grows with neither members nor steps.
+            "failed" (without those that an event stopped) or indices of members: these are run again after the run, with the
+            same bits, and are in result.kept.
+        until: lw.Until(...) ends the run before the last member, once the interval of a statistic is narrow enough. False
+            runs all members, whatever the scene says.
+        store: A folder "runs/x/run.zarr", or a Store with more settings. Samples are written there block by block and are
+            not held in memory; lw.resume continues such a run after it was stopped.
+        executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
+        scheduler: Address of Dask's scheduler.
+        only: With a store, the blocks to run, such as range(0, 100), for a run in parts. The last part may ask for more
+            blocks than there are. The result is of the members of these blocks.
+        on_block: Called with the Result of each block of members as soon as it is finished, a copy, in order, in the thread
+            that called: to look at a run while it goes on. Default: nothing is called.
+
+    Returns:
+        A Result, of every member unless `until` or `only` says otherwise.
+
+    Raises:
+        SceneError: If arguments are at fault; the message names every fault.
+        MembersFailed: If members failed and on_failure is "raise".
+        Interrupted: If Ctrl-C interrupts a run in memory. It is a KeyboardInterrupt whose `result` has the members that
+            were finished.
+    """
+    if not isinstance(fleet, Ensemble | Scene):
+        problem = "is neither an Ensemble nor a Scene"
+        raise SceneError([f"fleet = {shown(fleet)}: {problem}; give lw.Scene(...) or lw.Ensemble(...)"])
+    ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
+    faults = Faults()
+    observed, runner = Observation(), None
+    with faults.including():
+        scene = ensemble.scene
+        observed = observe(ensemble.members, scene.run, statistics, keep, until, scene.events, scene.controller)
+    with faults.including():
+        runner = executor_of(executor, threads, scheduler)
+    with faults.including():
+        function_of("on_block", on_block)
+    if only is not None and store is None:
+        faults.add("only", only, "is for a run into a store", "give store=..., or leave it out")
+    if only is not None and observed.until is not None:
+        faults.add("only", only, "runs in parts, where until looks at the whole", "leave out one of them")
+    faults.raise_if_any()
+    assert runner is not None
+    plan = make_plan(
+        ensemble, method, h, t1, save, dtype, width=width, checks=checks, on_failure=on_failure, fields=observed.fields,
+        survey_all=store is not None, looks=observed.looks,
+        read_at_looks=observed.read_at_looks())  # fmt: skip
+    fields, count = fields_of(save, ensemble.scene.run), threads or machine.thread_count()
+    try:
+        if store is None:
+            return completed(plan, count, observed, fields, progress=callback(progress), executor=runner, partial=True,
+                             on_block=on_block)  # fmt: skip
+        only = blocks_there(only, plan)
+        into = store if isinstance(store, Store) else Store(store)
+        result = run_stored(plan, into, runner, callback(progress), only, observed, fields, on_block)
+        return result if only is not None else finished(result, plan, observed, fields, count)
+    finally:
+        # Packets and their plan refer to each other: their arrays would stay until Python looks for such circles.
+        plan.idle.clear()

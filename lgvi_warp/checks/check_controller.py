@@ -1,0 +1,370 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether a part of a controller is right: its device code at random looks, alone and in packets, and against a twin."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.checks.bench import MOST_SAMPLES, of_scene
+from lgvi_warp.checks.part_bench import (
+    COLUMNS,
+    EVERY,
+    LOOKS,
+    OUT_FIELDS,
+    SPEED,
+    Answers,
+    PartBench,
+    RandomLooks,
+    corner_looks,
+)
+from lgvi_warp.checks.report import EPS, ROUNDINGS, Check, LawReport, attempt, judged, packed_numbers, unpacked
+from lgvi_warp.common.arguments import whole
+from lgvi_warp.common.errors import SceneError, refusal
+from lgvi_warp.control.base import SECTIONS, Allocation, Part
+from lgvi_warp.control.controller import Controller
+from lgvi_warp.control.heading_pid import HeadingPID
+from lgvi_warp.control.set_point import SetPoint
+from lgvi_warp.physics.terms.base import word_of
+from lgvi_warp.physics.terms.control_wrench import ControlWrench
+from lgvi_warp.scene.scene import Scene
+
+# The rows of an attitude.
+AXES = ("north", "east", "down")
+# By how much a part's numbers differ from one member to the next.
+OTHER = 1.125
+TWIN_ROLES = ("measure", "guide", "control", "allocate")
+# A twin computes in another order: so many times the roundings of a sum.
+TWIN = 100.0
+# Time between two looks of a part that is checked without a controller [s].
+PERIOD = 0.1
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """What a twin takes for the motion at a look, as lgvi_warp.reference.control has it.
+
+    Attributes:
+        position: (3,) [m], inertial axes.
+        R: (3, 3), body to inertial axes.
+        velocity: (3,) [m/s], over ground, body axes.
+        water_velocity: (3,) [m/s], through the water, body axes.
+        angular_velocity: (3,) [rad/s], body axes.
+        t: time [s].
+        period: time between two looks [s].
+        h: step [s].
+        step: number of the step that begins.
+        look: number of the look.
+        member: index of the member.
+    """
+
+    position: np.ndarray
+    R: np.ndarray
+    velocity: np.ndarray
+    water_velocity: np.ndarray
+    angular_velocity: np.ndarray
+    t: float
+    period: float
+    h: float
+    step: int
+    look: int
+    member: int
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The wanted motion of a twin, as lgvi_warp.reference.control has it.
+
+    Attributes:
+        position: (3,) [m], inertial axes.
+        velocity: (3,) [m/s], inertial axes.
+        R: (3, 3), body to inertial axes.
+        angular_velocity: (3,) [rad/s], axes of R.
+        angular_acceleration: (3,) [rad/s^2], axes of R.
+        speed: [m/s], through the water ahead.
+    """
+
+    position: np.ndarray
+    velocity: np.ndarray
+    R: np.ndarray
+    angular_velocity: np.ndarray
+    angular_acceleration: np.ndarray
+    speed: float
+
+
+def check_controller(
+    part: Part, *, scene: Scene | None = None, twin: Any = None, samples: int = 64, seed: int = 0
+) -> LawReport:
+    """Check the device code of a part of a controller at random looks, which follow one another.
+
+    Each new part costs the compilation of two small kernels. The checks:
+
+    * `packed` fills the fields that `params` names, and gives the same in all axes that a method may choose.
+    * Numbers are finite: at random looks, where nothing is left to do, half a turn away and at rest, and with each number of
+      the part at its bounds.
+    * Lanes do not mix: a lane answers the same whatever the others are, and the same as a packet of one.
+    * Numbers that vary by member give what shared ones give.
+    * Memory stays in its rows. Only allocation and faults write commands.
+    * The truth is not reached: nothing depends on the true position behind the measurement.
+    * A twin, where given, agrees at every look.
+
+    The last line tells the processor time for a vehicle and a look.
+
+    Args:
+        part: a sensor, a guidance, a law, an allocation or a fault, built-in or the user's own.
+        scene: scene with the vehicle, the actuators and, where the part needs others, a controller: the part joins it, or
+            replaces the one of its name. None (default) for a simple vehicle with a `lw.ControlWrench`.
+        twin: an object with the same role for one vehicle in NumPy, as the parts in `lgvi_warp/reference/control`: some of
+            `begin()`, `measure(y)`, `guide(r, y)`, `control(w, r, y, unmet)`, `allocate(w, actuators)`. None (default): none.
+        samples: number of members (default 64), of four looks each: any attitudes, positions some metres around the scene's
+            start, velocities, angular velocities and demands of order 1.
+        seed: seed of the random looks (default 0).
+
+    Returns:
+        A report of all checks; `ok` says whether all passed.
+
+    Raises:
+        SceneError: if `part` is no part, does not fit the scene, or its device code lacks something, has a wrong signature or
+            does not compile.
+    """
+    if not isinstance(part, Part) or part.section not in SECTIONS:
+        remedy = "give an object such as lw.HeadingPID(kp=1.0), not its class; lw.check_law checks terms"
+        raise SceneError([f"part = {part!r}: is no part of a controller; {remedy}"])
+    if twin is not None:
+        roles = [role for role in TWIN_ROLES if callable(getattr(twin, role, None))]
+        if not roles or isinstance(twin, type):
+            raise refusal("twin", twin, "has no role", f"give an object with {', '.join(TWIN_ROLES)}, or leave it out")
+    completed = _with_part(part, of_scene(scene))
+    (wired,) = (candidate for candidate in completed.controller.parts if candidate.key == part.key)
+    numbers = {name: np.asarray(value)[None] for name, value in wired.parameters().items()}
+    wired = wired.with_features(frozenset(f"{part.key}.{word}" for word in wired.features(numbers)))
+    bench = PartBench(wired, completed, whole("samples", samples, 1, MOST_SAMPLES), whole("seed", seed, 0))
+    with np.errstate(all="ignore"):  # what is not finite is found by its check
+        packed, checks = packed_numbers(wired, bench.Params, bench.packed)
+        if packed is None or not all(check.ok for check in checks):
+            return LawReport(part, tuple(checks))
+        here = attempt(lambda: bench.answers(packed, bench.looks), "with shared numbers")
+        if isinstance(here, str):
+            return LawReport(part, (*checks, unpacked(here)))
+        for examine in (_finite, _lanes, _packing, _memory, functools.partial(_twin, twin=twin)):
+            checks += examine(bench, packed, here)
+    text = "note: nanoseconds for a vehicle and a look"
+    checks.append(Check(f"{_name(bench)}: time", bench.nanoseconds(packed), np.inf, True, text))
+    return LawReport(part, tuple(checks))
+
+
+def _with_part(part: Part, scene: Scene) -> Scene:
+    """The scene with the part in its controller; with guidance, a law and an actuator where it has none."""
+    controller = scene.controller
+    if controller is None:
+        lists: dict[str, list[Part]] = {section: [] for section in SECTIONS}
+        if part.section != "guidance":
+            lists["guidance"] = [SetPoint(name="other_guidance", position=(0.0, 0.0, 0.0), heading=0.0, speed=0.0)]
+        elif "heading" not in part.gives:
+            lists["guidance"] = [SetPoint(name="other_guidance", heading=0.0)]
+        if part.section != "laws":
+            lists["laws"] = [HeadingPID(name="other_law", kp=1.0)]
+    else:
+        # An allocation that the controller chose by itself has no name of its own, and follows again.
+        lists = {section: [listed for listed in getattr(controller, section) if listed.type] for section in SECTIONS}
+    same = [listed.key for listed in lists[part.section]]
+    if part.key in same:
+        lists[part.section][same.index(part.key)] = part
+    else:
+        lists[part.section].append(part)
+    if isinstance(part, Allocation):
+        others = [listed for listed in lists["allocation"] if isinstance(listed, Allocation) and listed.to != part.to]
+        lists["allocation"] = [*others, part]
+    terms = list(scene.terms)
+    if not any(term.channels for term in terms):
+        to = getattr(part, "to", "") or (getattr(part, "of", "") if part.section == "faults" else "")
+        terms.append(ControlWrench(name=to or ""))
+    period, delay = (controller.period, controller.delay) if controller is not None else (PERIOD, 0.0)
+    return replace(scene, terms=terms, controller=Controller(period=period, delay=delay, **lists))
+
+
+def _name(bench: PartBench) -> str:
+    """The roles of the part, for the names of checks."""
+    return ", ".join(bench.roles)
+
+
+def _finite(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
+    """Whether all numbers are finite; notes a part that does nothing."""
+    name = f"{_name(bench)}: finite"
+    at_random = _all_finite(name, here, bench.looks)
+    asleep = not _does(bench, here)
+    note = "note: changes nothing at any look, so little was checked; give a scene in which it acts"
+    yield at_random._replace(text=note) if asleep and at_random.ok else at_random
+    for looks in corner_looks(bench.looks):
+        at_corners = _all_finite(
+            f"{name} without error, half a turn away, at rest", bench.answers(packed, looks), looks
+        )
+        if not at_corners.ok:
+            break
+    yield at_corners
+    bounds = _numbers_at_bounds(bench)
+    if bounds:
+        answers = attempt(lambda: bench.answers(bench.packed(bounds), bench.looks), "with numbers at their bounds")
+        if isinstance(answers, str):
+            yield Check(f"{name} at bounds of numbers", np.inf, 0.0, False, answers)
+        else:
+            remedy = "guard divisions and roots, or declare lw.number(..., above=0.0)"
+            yield _all_finite(f"{name} at bounds of numbers", answers, bench.looks, remedy)
+
+
+def _does(bench: PartBench, here: Answers) -> bool:
+    """Whether the part changes anything."""
+    before = bench.looks.rows[..., :OUT_FIELDS].transpose(1, 0, 2).reshape(bench.count, -1)
+    return not np.array_equal(here.looks, before) or not np.array_equal(
+        here.memory[:, : bench.bus.rows], bench.looks.bus
+    )
+
+
+def _all_finite(name: str, answers: Answers, looks: RandomLooks, remedy: str = "guard divisions and roots") -> Check:
+    """Whether the part gives numbers at every look."""
+    finite = np.isfinite(answers.all()).all(axis=1)
+    return judged(name, (~finite).astype(float), 0.0, looks, remedy)
+
+
+def _numbers_at_bounds(bench: PartBench) -> dict[str, np.ndarray]:
+    """All parameters, with each number of the part at its least, at its most, and as it is; empty where none has bounds."""
+    part, moved = bench.part, {}
+    rng = np.random.default_rng(bench.seed)
+    for item in part.number_fields():
+        word, meta = word_of(item), item.metadata
+        least, most = meta["least"], meta["most"]
+        if word not in part.parameters() or meta["rising"] or not (np.isfinite(least) or np.isfinite(most)):
+            continue
+        value = np.repeat(bench.parameters[f"{part.key}.{word}"], bench.count, axis=0)
+        chosen = rng.integers(3, size=bench.count)
+        for i, bound in enumerate((least, most)):
+            if np.isfinite(bound):
+                value[chosen == i] = bound
+        moved[f"{part.key}.{word}"] = value
+    return {**bench.parameters, **moved} if moved else {}
+
+
+def _lanes(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
+    """A lane answers the same whatever the others are, and alone; nothing follows from the true position."""
+    name, width = _name(bench), bench.widths[0]
+    mixed = np.zeros_like(here.all())
+    for stays in (0, width - 1):
+        lane_that_stays = np.arange(bench.count) % width == stays
+        mixed[lane_that_stays] += (bench.answers(packed, bench.looks.but_lane(stays, width)).all() - here.all())[
+            lane_that_stays
+        ]
+    yield judged(f"{name}: lanes apart", mixed, 0.0, bench.looks, "a lane must not look at others")
+    alone = bench.answers(packed, bench.looks, 1).all() - here.all()
+    limit = ROUNDINGS * EPS * np.abs(here.all()).max()
+    yield judged(f"{name}: packets of one", alone, limit, bench.looks, "a lane must not look at others")
+    blind = bench.answers(packed, bench.looks.elsewhere()).all() - here.all()
+    yield judged(f"{name}: blind to the truth", blind, 0.0, bench.looks, "read y.position, which is measured, not y.b")
+
+
+def _packing(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
+    """The same part however its numbers are given, in whatever axes."""
+    names = [f"{bench.part.key}.{name}" for name in bench.part.parameters()]
+    others = bench.parameters | {name: OTHER * bench.parameters[name] for name in names}
+    odd = np.arange(bench.count) % 2 == 1
+    varied = dict(bench.parameters)
+    for name in names:
+        value, changed = (np.repeat(numbers[name], bench.count, axis=0) for numbers in (bench.parameters, others))
+        varied[name] = np.where(odd.reshape(-1, *(1,) * (value.ndim - 1)), changed, value)
+
+    def by_member() -> np.ndarray:
+        shared = np.where(odd[:, None], bench.answers(bench.packed(others), bench.looks).looks, here.looks)
+        return bench.answers(bench.packed(varied), bench.looks).looks - shared
+
+    def in_other_axes() -> np.ndarray:
+        return bench.answers(bench.packed(elsewhere=True), bench.looks).looks - here.looks
+
+    for words, compare, where, remedy in (
+        ("varied numbers", by_member, "where numbers have one entry a member",
+         "packed() must give n entries where its numbers have n"),
+        ("any axes", in_other_axes, "in other axes of the body",
+         "leave numbers as they are: a controller works in the user's axes"),
+    ):  # fmt: skip
+        name, difference = f"{_name(bench)}: {words}", attempt(compare, where)
+        if isinstance(difference, str):
+            yield Check(name, np.inf, 0.0, False, difference)
+        else:
+            yield judged(name, difference, ROUNDINGS * EPS * np.abs(here.looks).max(), bench.looks, remedy)
+
+
+def _memory(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
+    """Nothing changes outside the part's rows but the commands, and those by allocation and faults alone."""
+    bus, first, last = bench.bus, *here.own
+    before = here.memory.copy()
+    before[:, : bus.rows], before[:, last:] = bench.looks.bus, np.nan
+    may = np.zeros(before.shape[1], bool)
+    may[first:last] = True
+    if isinstance(bench.part, Allocation):
+        row, count = bus.commands[bench.part.to]
+        may[row : row + count] = True
+    if "send" in bench.roles:
+        may[: bus.channels] = may[bus.acting : bus.answer] = True
+    changed = (here.memory != before) & ~(np.isnan(here.memory) & np.isnan(before)) & ~may
+    rows = sorted(set(np.flatnonzero(changed.any(axis=0)).tolist()))
+    written = ", ".join(f"p.memory + {row - first}" for row in rows[:3])
+    remedy = f"its rows are the {last - first} from p.memory on; it writes {written}"
+    yield judged(f"{_name(bench)}: memory in its rows", changed.any(axis=1).astype(float), 0.0, bench.looks, remedy)
+
+
+def _twin(bench: PartBench, packed: Any, here: Answers, twin: Any) -> Iterator[Check]:
+    """The twin's numbers at every look of every member."""
+    if twin is None:
+        return
+    wanted, commands = (
+        np.stack(each) for each in zip(*(_of_twin(bench, twin, i) for i in range(bench.count)), strict=True)
+    )
+    row, count = bench.bus.commands[bench.part.to] if isinstance(bench.part, Allocation) else (0, 0)
+    pairs = [("as the twin", here.looks, wanted), ("commands of the twin", here.memory[:, row : row + count], commands)]
+    for words, got, right in pairs[: 1 + bool(count)]:
+        limit = TWIN * ROUNDINGS * EPS * max(np.abs(right).max(), np.abs(got).max())
+        yield judged(f"{_name(bench)}: {words}", got - right, limit, bench.looks, "the twin says otherwise")
+
+
+def _of_twin(bench: PartBench, twin: Any, i: int) -> tuple[np.ndarray, np.ndarray]:
+    """What the twin makes of the looks of a member (LOOKS * OUT_FIELDS,), and its last commands."""
+    looks, unmet, to = bench.looks, bench.looks.bus[i, bench.bus.unmet :][:6], getattr(bench.part, "to", "")
+    actuator, out = SimpleNamespace(command=np.zeros(0)), looks.rows[:, i, :OUT_FIELDS].copy()
+    if isinstance(bench.part, Allocation):
+        actuator.limit = bench.parameters[f"{to}.limit"][0]
+    if hasattr(twin, "begin"):
+        twin.begin()
+    for k in range(LOOKS):
+        step = k * EVERY
+        h = bench.period / EVERY
+        y = Measurement(
+            **_motion(looks, "measured", k, i), t=step * h, period=bench.period, h=h, step=step, look=k, member=i
+        )
+        r = Reference(**_motion(looks, "wanted", k, i), speed=float(looks.rows[k, i, SPEED]))
+        w = np.concatenate([looks.vector("demanded", name)[k, i] for name in ("force", "torque")])
+        if "measure" in bench.roles:
+            y = twin.measure(y)
+        if "guide" in bench.roles:
+            r = twin.guide(r, y)
+        if "control" in bench.roles:
+            w = twin.control(w, r, y, unmet)
+        if "allocate" in bench.roles:
+            w = twin.allocate(w, {to: actuator})
+        for (group, name), first in COLUMNS.items():
+            if group == "demanded":
+                value = w[:3] if name == "force" else w[3:]
+            else:
+                motion: Any = y if group == "measured" else r
+                value = motion.R[AXES.index(name)] if name in AXES else getattr(motion, name)
+            out[k, first : first + 3] = value
+        out[k, SPEED] = r.speed
+    return out.reshape(-1), np.asarray(actuator.command)
+
+
+def _motion(looks: RandomLooks, group: str, k: int, i: int) -> dict[str, np.ndarray]:
+    """The vectors of a look of a member by name, the attitude as R."""
+    names = [name for of, name in COLUMNS if of == group and name not in AXES]
+    return {name: looks.vector(group, name)[k, i].copy() for name in names} | {"R": looks.attitude(group)[k, i].copy()}

@@ -1,0 +1,261 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A part of a controller evaluated alone, its numbers packed as for a run, at random looks: the means of check_controller."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import warp as wp
+
+from lgvi_kernels import built_in
+from lgvi_kernels.advance import examine_part
+from lgvi_kernels.advance.examine_part import LOOK_FIELDS, OUT_FIELDS, make_examine_part
+from lgvi_kernels.maps.in_turn import ROLES
+from lgvi_warp.checks import bench
+from lgvi_warp.checks.bench import packing_context, short, sizes
+from lgvi_warp.common import warp_setup
+from lgvi_warp.common.machine import register_width
+from lgvi_warp.common.warp_setup import build_lock
+from lgvi_warp.control.base import Part
+from lgvi_warp.engine import kernel_choice
+from lgvi_warp.engine.arrays import Group, Lanes, LawArrays, memory_rows, put_rows
+from lgvi_warp.physics import notation
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+
+# Steps between two looks, and how many looks follow one another.
+EVERY, LOOKS = 10, 4
+# Rows behind those of the part, which it must not touch.
+GUARD = 16
+# Times that all packets are evaluated for a timing, and timings of which the least counts.
+REPEATS, ROUNDS = 400, 7
+REMEDY = (
+    "return what the role was given; name fields as Measurement, Reference, Wrench and params() do; import the operators of "
+    "lanes that are used; no `if` on a lane, no plain number times a lane: docs/develop/add_a_controller.md"
+)
+# Column of the wanted speed.
+SPEED = examine_part.SPEED
+# First columns of the vectors of a look, by group and name.
+COLUMNS = {
+    (group, name): 3 * i
+    for i, (group, name) in enumerate(
+        (group, name)
+        for group, names in (
+            ("measured", examine_part.MEASURED), ("wanted", examine_part.WANTED), ("demanded", examine_part.DEMANDED)
+        )
+        for name in names
+    )
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class RandomLooks:
+    """What is measured, wanted and demanded before a part acts, at looks that follow one another.
+
+    Attributes:
+        rows: (LOOKS, k, LOOK_FIELDS), the columns of `lgvi_kernels.advance.examine_part` for k members.
+        bus: (k, rows), what others left in the first rows of the memory.
+    """
+
+    rows: np.ndarray
+    bus: np.ndarray
+
+    def vector(self, group: str, name: str) -> np.ndarray:
+        """A vector of all looks.
+
+        Returns: (LOOKS, k, 3), a view of the rows.
+        """
+        first = COLUMNS[group, name]
+        return self.rows[..., first : first + 3]
+
+    def attitude(self, group: str) -> np.ndarray:
+        """The attitude that is measured or wanted.
+
+        Returns: (LOOKS, k, 3, 3), body to inertial axes.
+        """
+        return np.stack([self.vector(group, name) for name in ("north", "east", "down")], axis=-2)
+
+    def elsewhere(self) -> RandomLooks:
+        """The same looks at another true position, which only sensors before the part may know."""
+        rows = self.rows.copy()
+        rows[..., examine_part.TRUE_POSITION :] += 17.0
+        return replace(self, rows=rows)
+
+    def but_lane(self, lane: int, width: int) -> RandomLooks:
+        """Looks in which all lanes of a packet differ but one."""
+        others = np.arange(self.rows.shape[1]) % width != lane
+        rows, bus = self.rows.copy(), self.bus.copy()
+        rows[:, others], bus[others] = np.roll(rows, 1, axis=1)[:, others] + 0.5, bus[others] + 0.5
+        return replace(self, rows=rows, bus=bus)
+
+    def description(self, i: int) -> str:
+        """The first look of a member in words, for a message."""
+        place, wanted, velocity, rate = (
+            self.vector(*name)[0, i]
+            for name in (("measured", "position"), ("wanted", "position"), ("measured", "velocity"),
+                         ("measured", "angular_velocity"))
+        )  # fmt: skip
+        turn = notation.quaternion_from_matrix(self.attitude("measured")[0, i])
+        where = f"at position {short(place)} m, quaternion {short(turn)}, velocity {sizes(velocity)} m/s"
+        return f"{where}, rate {sizes(rate)} rad/s, wanted position {short(wanted)} m"
+
+
+class Answers(NamedTuple):
+    """What a part made of looks.
+
+    Attributes:
+        looks: (k, LOOKS * OUT_FIELDS), what is measured, wanted and demanded after it.
+        memory: (k, rows), the bus, the part's rows and the guard behind them, after the last look.
+        own: first and last but one of the part's rows.
+    """
+
+    looks: np.ndarray
+    memory: np.ndarray
+    own: tuple[int, int]
+
+    def all(self) -> np.ndarray:
+        """The numbers that must be the same where the part is: (k, numbers)."""
+        return np.concatenate([self.looks, self.memory[:, : self.own[1]]], axis=1)
+
+
+class PartBench:
+    """A part with its numbers packed as for a run, ready to be evaluated at looks.
+
+    Attributes:
+        roles: the roles that its device code has.
+        widths: lanes of a packet, of each kernel: those of a register, and one.
+        count: number of members.
+        period: time between two looks [s].
+        looks: random looks.
+    """
+
+    def __init__(self, part: Part, scene: Scene, samples: int, seed: int):
+        self.part, self.seed = part, seed
+        module = kernel_choice.device_module(part, part.device_in(False), built_in)
+        assert part.bus is not None
+        self.bus = part.bus
+        self.roles = tuple(role for role in ROLES if hasattr(module, role))
+        self.widths = (register_width("float64"), 1)
+        self.count = -(-samples // self.widths[0]) * self.widths[0]
+        self.period = float(scene.controller.period)
+        self.parameters = {name: np.asarray(value)[None] for name, value in scene.parameters().items()}
+        self.looks = random_looks(self.count, self.bus.rows, seed, scene.start.given()["position"])
+        warp_setup.start()
+        self.kernels = {width: bench.built(part, module, width, make_examine_part, REMEDY) for width in self.widths}
+        self.Params = np.dtype(self.kernels[1].Params.numpy_dtype())
+
+    def packed(self, parameters: Mapping[str, np.ndarray] | None = None, elsewhere: bool = False) -> Any:
+        """What the part packs.
+
+        parameters: parameters of the scene by name, each (1, ...) or (n, ...); by default those of the scene.
+        """
+        numbers = self.parameters if parameters is None else parameters
+        context = packing_context(numbers, self.count, self.seed, self.period / EVERY, elsewhere)
+        return self.part.packed(Ensemble.own(self.part, numbers), context)
+
+    def answers(self, packed: Any, looks: RandomLooks, width: int | None = None) -> Answers:
+        """Let the part act at each look, from its memory at the start."""
+        launch = _Launch(self, packed, looks, width or self.widths[0])
+        out = np.stack([launch.look(k) for k in range(LOOKS)], axis=1)
+        first = self.bus.rows
+        return Answers(out.reshape(self.count, -1), launch.memory(), (first, first + memory_rows(packed)))
+
+    def nanoseconds(self, packed: Any) -> float:
+        """Processor time of the part for a member and a look, less that of a kernel that only copies.
+
+        Returns: The time [ns], at least 0; the least of some rounds.
+        """
+        bench_launch, spent = _Launch(self, packed, self.looks, self.widths[0]), []
+        for acts in (1, 0):
+            rounds = []
+            for _ in range(ROUNDS):
+                begin = time.process_time_ns()
+                bench_launch.launch(0, acts, REPEATS)
+                rounds.append(time.process_time_ns() - begin)
+            spent.append(min(rounds) / (REPEATS * self.count))
+        return max(0.0, spent[0] - spent[1])
+
+
+class _Launch:
+    """The arrays of a kernel for a part and its looks."""
+
+    def __init__(self, part: PartBench, packed: Any, looks: RandomLooks, width: int):
+        self.examine, self.looks, self.bench = part.kernels[width], looks, part
+        Lane, self.packets = self.examine.Lane, part.count // width
+        kind = self.examine.Params, np.dtype(self.examine.Params.numpy_dtype())
+        self.laws = LawArrays(self.packets, [kind], Lane)
+        self.laws.write([Group([packed], [False])], GUARD, part.bus.rows)
+        self.end = part.bus.rows + memory_rows(packed)
+        # Behind the part's rows are no numbers, so that what it reads or writes there shows.
+        rows = self.laws.memory.view
+        rows[:, self.end :] = np.nan
+        put_rows(rows[:, : part.bus.rows], looks.bus)
+        self.rows = Lanes(self.packets, LOOK_FIELDS, Lane)
+        self.out = wp.zeros((self.packets, OUT_FIELDS), dtype=Lane, device="cpu")
+
+    def look(self, k: int) -> np.ndarray:
+        """Let the part act once: (count, OUT_FIELDS)."""
+        put_rows(self.rows.view, self.looks.rows[k])
+        self.launch(k, 1, 1)
+        out = self.out.numpy().reshape(self.packets, OUT_FIELDS, -1).transpose(0, 2, 1)
+        # A copy: a packet of one is not laid out anew, and the next look writes here.
+        return np.array(out.reshape(-1, OUT_FIELDS))
+
+    def launch(self, k: int, acts: int, repeats: int) -> None:
+        """Launch the kernel for all packets, some times over."""
+        period, laws = self.bench.period, self.laws
+        inputs = [laws.structs[0].array, laws.table.array, self.rows.array, k, k * EVERY, period / EVERY, period, acts]
+        with build_lock:
+            wp.launch(self.examine.kernel, self.packets * repeats, [*inputs, laws.memory.array, self.out], device="cpu")
+
+    def memory(self) -> np.ndarray:
+        """The memory without its backup: (count, rows)."""
+        rows = self.laws.memory.view[:, : self.end + GUARD]
+        return np.array(rows.transpose(0, 2, 1).reshape(-1, rows.shape[1]))
+
+
+def random_looks(count: int, bus: int, seed: int, around: np.ndarray) -> RandomLooks:
+    """Random looks around a position.
+
+    around: (3,) [m], mean of the positions, whose standard deviation is 4 m.
+    Returns: Any attitude; velocities [m/s], angular velocities [rad/s], demands [N, N m] and what others left in the memory of
+        order 1.
+    """
+    rng = np.random.default_rng(seed)
+    looks = RandomLooks(rng.normal(size=(LOOKS, count, LOOK_FIELDS)), rng.normal(size=(count, bus)))
+    for group in ("measured", "wanted"):
+        place = looks.vector(group, "position")
+        place[...] = around + 4.0 * place
+        turn(looks, group, notation.matrix_from_quaternion(rng.normal(size=(LOOKS, count, 4))))
+    looks.rows[..., examine_part.TRUE_POSITION :] = looks.vector("measured", "position")
+    return looks
+
+
+def turn(looks: RandomLooks, group: str, attitude: np.ndarray) -> None:
+    """Write an attitude into looks.
+
+    attitude: (..., 3, 3), body to inertial axes.
+    """
+    for i, name in enumerate(("north", "east", "down")):
+        looks.vector(group, name)[...] = attitude[..., i, :]
+
+
+def corner_looks(looks: RandomLooks) -> list[RandomLooks]:
+    """Looks at which a careless part divides by zero.
+
+    Returns: What is wanted is what is measured; the wanted attitude is turned by half a turn; everything is at rest, level, at
+        the origin, and nothing is demanded.
+    """
+    same, turned, rest = (replace(looks, rows=looks.rows.copy(), bus=np.zeros_like(looks.bus)) for _ in range(3))
+    for name in ("position", "velocity", "angular_velocity"):
+        same.vector("wanted", name)[...] = same.vector("measured", name)
+    turn(same, "wanted", same.attitude("measured"))
+    turn(turned, "wanted", turned.attitude("measured") @ np.diag([-1.0, -1.0, 1.0]))
+    rest.rows[...] = 0.0
+    for group in ("measured", "wanted"):
+        turn(rest, group, np.eye(3))
+    return [same, turned, rest]

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A law that is a Python function of all members of a block, called once a period."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.common.identity import check_version
+from lgvi_warp.control.base import Allocation, ControlLaw
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext
+
+PROBLEM = "cannot stand in a scene file, which runs no code"
+REMEDY = "give lw.Callback(function) to lw.Controller in Python; lw.resume(path, fleet) goes on with such a run"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Callback(ControlLaw):
+    """A law in Python: `function(t, y, r, members)` returns the demand of all members of a block, (m, 6) [N, N m].
+
+    t is the time of the look [s]; y what is measured and r what is wanted, each with arrays of m members (see
+    `lw.Looks`); members are their indices (m,). NumPy, PyTorch, JAX or any solver may compute it. It costs a launch
+    a period: docs/controllers/callback.md has the price. Calls for one block come in the order of time; blocks run in threads.
+
+    Args:
+        function: The function; it must be picklable where other processes run it.
+        to: Key of a term: then the function returns the commands of its channels, (m, channels), and no law or allocation
+            acts on them. None, the default, for demands.
+        version: What tells the function from others in sweeps and stores, a text or a number, changed whenever the function
+            does. None, the default: what its code says. Give one where it reads files, or holds what cannot be compared.
+    """
+
+    type: ClassVar[str] = "callback"
+    demands: ClassVar[tuple[str, ...]] = ("X", "Y", "Z", "K", "M", "N")
+
+    function: Callable[..., Any] | None = None
+    to: str | None = None
+    version: Any = None
+
+    def __init__(
+        self,
+        function: Callable[..., Any] | None = None,
+        *,
+        to: str | None = None,
+        version: str | int | float | None = None,
+        name: str = "",
+    ) -> None:
+        for key, value in (("function", function), ("to", to), ("version", version), ("name", name)):
+            object.__setattr__(self, key, value)
+        super().__post_init__()
+
+    def check(self, faults: Faults) -> None:
+        """Adds a fault where there is no function."""
+        if not callable(self.function):
+            faults.add("function", self.function, PROBLEM if self.function is None else "is no function", REMEDY)
+        check_version(faults, self.version)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Its type and the name of its function, which a scene file cannot hold."""
+        name = getattr(self.function, "__qualname__", repr(self.function))
+        given = {"to": self.to or None, "version": self.version}
+        return {"type": self.type, "function": name} | {key: value for key, value in given.items() if value is not None}
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """The place of the host's answer in the memory."""
+        assert self.bus is not None
+        return Packed({"answer": self.bus.answer})
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class CallbackCommands(Allocation):
+    """The allocation by which the answer of a `Callback` with `to` reaches its actuator; a `Controller` makes it."""
+
+    device: ClassVar[str] = "callback_commands"
+
+    def reach(self) -> np.ndarray:
+        """Everything: no law asks it for a demand."""
+        return np.eye(6)
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """Where the answer is, and the limits of the commands."""
+        assert self.bus is not None
+        first, count = self.bus.commands[self.to]
+        limit = context.own(self.actuator)["limit"]
+        return Packed({"answer": self.bus.answer, "commands": first, "count": count}, limit)
+
+
+def refuse_second(callbacks: list[Callback]) -> None:
+    """Refuse more than one callback: each asks for a launch of its own."""
+    if len(callbacks) > 1:
+        raise refusal(
+            "laws", f"{len(callbacks)} callbacks", "are more than one", "call the other function from the first"
+        )

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An estimator of the attitude."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.control.base import MeasuringPart
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ComplementaryFilter(MeasuringPart):
+    """The attitude from measured rates in the short run, and from a measured attitude in the long run.
+
+    R <- R exp(T (Omega_old + Omega) / 2), T the period; then R <- R exp((1 - exp(-T / time_constant)) e), e the rotation
+    vector from R to the measured attitude. It starts at the first measured attitude, and stands after the sensors that it
+    uses. Mahony, Hamel & Pflimlin, IEEE Trans. Automatic Control 53 (2008); here without an estimate of the rates' bias.
+
+    Args:
+        time_constant: Time after which the measured attitude counts more than the rates [s].
+
+    Raises:
+        SceneError: As `Term`.
+    """
+
+    type: ClassVar[str] = "complementary_filter"
+
+    time_constant: Any = number((), "s", least=0.0)
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """The time constant, and the rows of attitude and angular velocity."""
+        return Packed(dict(numbers), memory=np.zeros((1, 12)))

@@ -1,0 +1,353 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A controller: what it looks at, what it wants, how it acts, and how often."""
+
+from __future__ import annotations
+
+import copy
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, closest
+from lgvi_warp.control.base import READINGS, SECTIONS, Allocation, Bus, Part
+from lgvi_warp.control.callback import Callback, CallbackCommands, refuse_second
+from lgvi_warp.control.delay import MOST_PERIODS, Delay
+from lgvi_warp.control.fault import Fault
+from lgvi_warp.control.pseudo_inverse import PseudoInverse
+from lgvi_warp.control.sensor import Sensor
+from lgvi_warp.physics.terms import from_list
+from lgvi_warp.physics.terms.base import Term, build, check_list
+from lgvi_warp.physics.terms.control_wrench import COMPONENTS
+
+# A time and a whole number of steps that differ by less than this part of the step are the same.
+ROUND_OFF = 1e-9
+# A part of a component below this is round-off, when it is asked what actuators can make.
+SPANNED = 1e-8
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Controller:
+    """A controller that looks once a period, and whose commands are held until the next look.
+
+    Each list holds parts such as lw.HeadingPID(...), or tables as in a scene file.
+
+    Args:
+        period: Time between two looks [s], a whole number of steps.
+        delay: From a look until its commands act [s], a whole number of steps; may vary by member. 0 by default.
+        sensors: What changes the truth into what is measured, in this order; by default the truth is measured.
+        guidance: What says which motion is wanted, in this order.
+        laws: What demands a wrench; their demands are added.
+        allocation: What turns the demand into commands, in this order: each takes what those before it did not deliver. By
+            default the pseudo-inverse, where there is one term that takes commands.
+        faults: What happens to commands and to sensors.
+
+    Raises:
+        SceneError: Where anything is wrong; the message lists every fault.
+    """
+
+    period: float
+    delay: Any = 0.0
+    sensors: Sequence[Any] = ()
+    guidance: Sequence[Any] = ()
+    laws: Sequence[Any] = ()
+    allocation: Sequence[Any] = ()
+    faults: Sequence[Any] = ()
+    # Set by `wired`.
+    bus: Any = field(default=None, init=False, repr=False)
+    actuators: Mapping[str, Term] = field(default_factory=dict, init=False, repr=False)
+
+    key = "controller"
+
+    def __post_init__(self) -> None:
+        faults = Faults("controller.")
+        faults.positive("period", self.period)
+        delay = faults.number("delay", self.delay, "s", 0.0)
+        if delay is not None:
+            object.__setattr__(self, "delay", np.asarray(delay))
+            if not faults and delay > MOST_PERIODS * self.period:
+                remedy = f"give at most {MOST_PERIODS * self.period:.9g} s, or a longer period"
+                faults.add("delay", float(delay), f"is more than {MOST_PERIODS} periods", remedy)
+        for section, base in SECTIONS.items():
+            with faults.including():
+                object.__setattr__(self, section, _parts(section, base, getattr(self, section)))
+        if not faults and not self.laws:
+            faults.add("laws", "", "are missing", "give at least one, such as lw.HeadingPID(kp=...)")
+        if not faults:
+            refuse_second([part for part in self.laws if isinstance(part, Callback)])
+            self._check_wishes(faults)
+        faults.raise_if_any()
+
+    def _check_wishes(self, faults: Faults) -> None:
+        """Require that what laws and guidance read of the wanted motion is given."""
+        wishes: set[str] = set()
+        for part in (*self.guidance, *self.laws):
+            for wish in part.needs:
+                if wish not in wishes:
+                    remedy = 'give guidance that wants it, such as [[controller.guidance]] type = "set_point"'
+                    faults.add(part.section, part.key, f"needs a wanted {wish}, which no guidance gives", remedy)
+            wishes |= set(part.gives)
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """All parts that have numbers, sensors first, as the user gave them; with their bus where the controller is wired."""
+        return tuple(part for section in SECTIONS for part in getattr(self, section))
+
+    @property
+    def delay_part(self) -> Delay:
+        """The delay as a part, whose key is that of the section."""
+        part = Delay(name=self.key, period=self.period, delay=self.delay)
+        object.__setattr__(part, "bus", self.bus)
+        return part
+
+    @property
+    def acting_parts(self) -> tuple[Part, ...]:
+        """The parts in the order in which the kernel has them: faults of a sensor right after it, others after the delay."""
+        assert self.bus is not None
+        callback, parts = self.callback, list[Part]()
+        # The commands of a callback reach their actuator by an allocation of their own.
+        idle = callback if callback is not None and callback.to else None
+        for part in (part for section in tuple(SECTIONS)[:-1] for part in getattr(self, section) if part is not idle):
+            of_sensor = (fault for fault in self.faults if getattr(fault, "sensor", None) and fault.of == part.key)
+            parts += [part, *of_sensor]
+        others = tuple(part for part in self.faults if part not in parts)
+        return (*parts, *((self.delay_part,) if self.bus.delayed else ()), *others)
+
+    @property
+    def callback(self) -> Callback | None:
+        """The law that is a function of the host; None where there is none."""
+        return next((part for part in self.laws if isinstance(part, Callback)), None)
+
+    def parameters(self) -> dict[str, np.ndarray]:
+        """The numbers that may vary by member.
+
+        Returns:
+            "controller.delay", and the numbers of the parts by "key.field".
+        """
+        values = {f"{part.key}.{name}": value for part in self.parts for name, value in part.parameters().items()}
+        return {f"{self.key}.delay": self.delay} | values
+
+    def wired(self, terms: Sequence[Term], nominal: Mapping[str, np.ndarray] | None = None) -> Controller:
+        """The same controller, whose parts know their actuators and the rows of the memory.
+
+        Args:
+            terms: Terms of the scene.
+            nominal: Numbers of the vehicle and its environment by name, as the scene has them; none by default.
+
+        Returns:
+            A copy.
+
+        Raises:
+            SceneError: Where an allocation or a fault names a term that takes no commands. The message lists every fault.
+        """
+        faults = Faults("controller.")
+        able = {term.key: term for term in terms if term.channels}
+        allocation = self._allocation(faults, able)
+        faults.raise_if_any()
+        actuators = {key: term for key, term in able.items() if key in {part.to for part in allocation}}
+        self._check_faults(faults, actuators)
+        faults.raise_if_any()
+        wired = copy.copy(self)
+        object.__setattr__(wired, "allocation", tuple(part.informed(self.faults, self.asked) for part in allocation))
+        object.__setattr__(wired, "actuators", actuators)
+        object.__setattr__(wired, "laws", tuple(part.of_vehicle(nominal or {}) for part in self.laws))
+        channels = {key: term.channels for key, term in actuators.items()}
+        callback = self.callback
+        answers = 0 if callback is None else channels[callback.to] if callback.to else 6
+        shared = max(law.shared_rows for law in self.laws)
+        controller = wired.on(Bus.of(channels, self.period, max(answers, shared)))
+        for part in controller.allocation:
+            part.check_actuator(faults)
+        faults.raise_if_any()
+        controller._check_laws(faults)
+        faults.raise_if_any()
+        return controller
+
+    @property
+    def asked(self) -> np.ndarray:
+        """1 for each of X Y Z K M N that some law asks for, else 0, (6,)."""
+        names = {name for law in self.laws for name in law.demands or COMPONENTS}
+        return np.array([float(name in names) for name in COMPONENTS])
+
+    def _effect(self) -> np.ndarray:
+        """What all channels make of the components that are asked for, each column of unit size, (6, channels)."""
+        effect = self.asked[:, None] * np.concatenate([part.reach() for part in self.allocation], axis=1)
+        sizes = np.linalg.norm(effect, axis=0)
+        return np.asarray(effect / np.where(sizes > 0.0, sizes, 1.0))
+
+    @property
+    def unspanned(self) -> tuple[str, ...]:
+        """Components that laws ask for and the actuators cannot make, alone or each by itself."""
+        effect = self._effect()
+        apart = np.eye(6) - effect @ np.linalg.pinv(effect, rcond=SPANNED)
+        missed = self.asked * np.linalg.norm(apart, axis=0) > SPANNED
+        return tuple(name for name, bad in zip(COMPONENTS, missed, strict=True) if bad)
+
+    def _check_laws(self, faults: Faults) -> None:
+        """Add a fault for each law of whose demand the actuators can make nothing at all."""
+        idle = {name for name, row in zip(COMPONENTS, self._effect(), strict=True) if np.all(np.abs(row) < SPANNED)}
+        for law in self.laws:
+            wanted = law.demands or COMPONENTS
+            if idle.issuperset(wanted):
+                made_by = " and ".join(self.actuators)
+                fault = f"asks for {', '.join(wanted)}, of which {made_by} can make nothing"
+                faults.add("laws", law.key, fault, "give actuators that can, or leave the law out")
+
+    def on(self, bus: Bus) -> Controller:
+        """The same controller with another bus.
+
+        Args:
+            bus: Rows of the memory.
+
+        Returns:
+            A copy, whose parts have this bus.
+        """
+        controller = copy.copy(self)
+        object.__setattr__(controller, "bus", bus)
+        actuators = {key: term.driven_by(bus) for key, term in self.actuators.items()}
+        object.__setattr__(controller, "actuators", actuators)
+        others = {**actuators, **{part.key: part for part in self.sensors}}
+        for section in SECTIONS:
+            parts = tuple(part.wired(bus, others) for part in getattr(self, section))
+            object.__setattr__(controller, section, parts)
+        return controller
+
+    def _allocation(self, faults: Faults, able: Mapping[str, Term]) -> tuple[Allocation, ...]:
+        """The allocation, or the default one, checked."""
+        parts = tuple(self.allocation)
+        if self.callback is not None and self.callback.to:
+            parts = (CallbackCommands(to=self.callback.to), *(part for part in parts if part.type))
+        if not parts:
+            if len(able) != 1:
+                fault = "is missing" if able else "has no actuator: no term of the scene takes commands"
+                which = " or ".join(map(repr, able)) if able else "thrusters, control_fins or control_wrench"
+                faults.add("allocation", "", fault, f"give [[controller.allocation]] to = {which}")
+                return ()
+            parts = (PseudoInverse(to=next(iter(able))),)
+        wrong = [part.to for part in parts if not isinstance(part.to, str)]
+        for value in wrong:
+            faults.add("allocation.to", value, "is not a text", "give the name of a term that takes commands")
+        if wrong:
+            return ()
+        counts = Counter(part.to for part in parts)
+        for part in parts:
+            if part.to not in able:
+                faults.add("allocation.to", part.to, "is no term that takes commands", closest(part.to, able))
+            elif able[part.to].own_commands:
+                problem = "has commands of its own"
+                faults.add("allocation.to", part.to, problem, f"leave {part.to}.command and its schedule out")
+        for key in (key for key, count in counts.items() if count > 1):
+            faults.add("allocation.to", key, f"is named by {counts[key]} allocations", "keep one of them")
+        return parts
+
+    def _check_faults(self, faults: Faults, actuators: Mapping[str, Term]) -> None:
+        counts = {part.key: READINGS[part.of] for part in self.sensors if isinstance(part, Sensor)}
+        counts |= {key: term.channels for key, term in actuators.items()}
+        for part in (part for part in self.faults if isinstance(part, Fault)):
+            key, count = f"{part.key}.channel", counts.get(part.of, 0)
+            if part.of not in counts:
+                remedy = closest(part.of, counts)
+                faults.add(f"{part.key}.of", part.of, "is no actuator and no sensor of this controller", remedy)
+            elif not 0 <= part.channel < count:
+                remedy = f"give 0 to {count - 1}" if count > 1 else "give 0"
+                faults.add(key, part.channel, f"is beyond the {count} of {part.of}", remedy)
+
+    def every(self, h: float) -> int:
+        """Steps between two looks.
+
+        Args:
+            h: Step of the run [s].
+
+        Returns:
+            The whole number nearest to period / h, at least 1.
+        """
+        return max(1, round(self.period / h))
+
+    def check_step(self, faults: Faults, h: float) -> None:
+        """Add a fault where period or delay is no whole number of steps.
+
+        Args:
+            faults: Collects the faults.
+            h: Step of the run [s].
+        """
+        for name, value in (("period", float(self.period)), ("delay", float(self.delay))):
+            low = int(value / h + ROUND_OFF)
+            none = name == "period" and value < 0.5 * h
+            if none or abs(value - round(value / h) * h) > ROUND_OFF * h:
+                near = " or ".join(f"{max(i, 1) * h:.9g}" for i in sorted({max(low, 1), low + 1}))
+                faults.add(
+                    f"controller.{name}",
+                    value,
+                    f"is no whole number of steps of {h:.9g} s",
+                    f"give {near} s, or another step",
+                )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The controller as the section of a scene file.
+
+        Returns:
+            Its numbers, and the lists that are not empty.
+        """
+        content: dict[str, Any] = {"period": float(self.period)}
+        content |= {"delay": float(self.delay)} if self.delay else {}
+        lists = {section: [part.to_dict() for part in getattr(self, section) if part.type] for section in SECTIONS}
+        return content | {section: parts for section, parts in lists.items() if parts}
+
+
+def from_table(given: Any) -> Controller | None:
+    """A controller from the section of a scene file.
+
+    given: A Controller, a table, or None.
+    Returns: The controller; None for None.
+    """
+    if given is None or isinstance(given, Controller):
+        return given
+    faults = Faults()
+    if not isinstance(given, Mapping):
+        faults.add(
+            "controller", given, "is no table", "write [controller] and its keys below, or give lw.Controller(...)"
+        )
+        faults.raise_if_any()
+    known = [item.name for item in fields(Controller) if item.init]
+    faults.keys("controller", given, known)
+    if "period" not in given:
+        faults.add("controller.period", "", "is missing", "give the time between two looks [s]")
+    faults.raise_if_any()
+    return Controller(**given)
+
+
+def terms_of(scene: Mapping[str, Any]) -> tuple[Term, ...]:
+    """The terms of a scene from its content, each of which knows whether a controller drives it.
+
+    The controller itself is not built: a law may be a function, of which the content has the name alone.
+    """
+    terms, table = from_list(scene.get("terms", ())), scene.get("controller")
+    lists = (table.get(section) for section in ("laws", "allocation")) if isinstance(table, Mapping) else ()
+    parts = [part for entries in lists if isinstance(entries, list) for part in entries if isinstance(part, Mapping)]
+    actuators = {to for part in parts if isinstance(to := part.get("to"), str)}
+    bus = Bus.of({term.key: term.channels for term in terms if term.key in actuators}, 1.0)
+    return tuple(term.driven_by(bus if term.key in actuators else None) for term in terms)
+
+
+def _parts(section: str, base: type[Part], given: Any) -> tuple[Part, ...]:
+    """The parts of a list, from objects or tables."""
+    check_list(section, given, f"write [[controller.{section}]] and type = ... below")
+    faults, parts = Faults(), []
+    known = base.kinds
+    for i, entry in enumerate(given):
+        where = f"{section}[{i}]"
+        with faults.including():
+            if isinstance(entry, Mapping):
+                word = entry.get("type", "fault" if section == "faults" else "")
+                if not isinstance(word, str) or word not in known:
+                    faults.add(f"{where}.type", word, "is not known", closest(str(word), known))
+                else:
+                    parts.append(build(where, known[word], entry))
+            elif isinstance(entry, base):
+                parts.append(entry)
+            else:
+                faults.add(where, entry, "is no part of this list", f"give one of {', '.join(known)}")
+    faults.raise_if_any()
+    return tuple(parts)

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An estimator of the position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.control.base import MeasuringPart
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
+
+# Weights of the velocities of the last look and of this one.
+RULES = {"trapezoid": (0.5, 0.5), "euler": (1.0, 0.0)}
+VELOCITIES = ("velocity", "water_velocity")
+DEPTHS = ("reckoned", "measured")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DeadReckoning(MeasuringPart):
+    """The position from measured attitude and velocity, from the position that is measured at the first look.
+
+    It stands after the sensors that it uses. Without a sensor of the position it starts at the true one.
+
+    Args:
+        rule: "trapezoid", the default, takes the mean of the velocities at both looks; "euler" that of the last look.
+        velocity: "velocity", the default, over ground; or "water_velocity", through the water: then a current carries the
+            estimate away.
+        depth: "reckoned", the default, as the rest of the position; or "measured", left as it is.
+        start_error: Added to the position of the first look, (3,) [m], inertial axes; 0 by default.
+
+    Raises:
+        SceneError: Where a word is not known; and as `Term`.
+    """
+
+    type: ClassVar[str] = "dead_reckoning"
+
+    rule: str = "trapezoid"
+    velocity: str = "velocity"
+    depth: str = "reckoned"
+    start_error: Any = number((3,), "m", (0.0, 0.0, 0.0))
+
+    def check(self, faults: Faults) -> None:
+        """Adds a fault for each word that is not known."""
+        faults.choice("rule", self.rule, RULES)
+        faults.choice("velocity", self.velocity, VELOCITIES)
+        faults.choice("depth", self.depth, DEPTHS)
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """The weights of the rule, what it takes, the start's error, and the rows of position and velocity."""
+        last, now = RULES[self.rule]
+        words = {
+            "through_water": int(self.velocity == "water_velocity"),
+            "measured_depth": int(self.depth == "measured"),
+        }
+        values = {"weight": last, "weight_now": now, "start_error": numbers["start_error"], **words}
+        return Packed(values, memory=np.zeros((1, 6)))

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The delay from a controller's look to its actuators."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.control.base import Part
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
+
+# Periods that a delay may last: the commands of each are kept.
+MOST_PERIODS = 1000
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Delay(Part):
+    """The delay of a controller, a part that `Controller` makes of its numbers. Its key is that of the section.
+
+    period: Time between two looks [s].
+    delay: From a look until its commands act [s].
+    """
+
+    device: ClassVar[str] = "delay"
+    kinds: ClassVar[dict[str, Any]] = {}
+
+    period: float = 1.0
+    delay: Any = number((), "s", 0.0, least=0.0)
+
+    def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
+        """In addition, members whose delay is longer than so many commands are kept."""
+        outside = super().unphysical(numbers)
+        return {"delay": outside["delay"] | (numbers["delay"] > MOST_PERIODS * self.period)}
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """Whole periods and whole steps of each member; a ring of as many sets of commands as some member needs.
+
+        A delay that varies is that of the nearest whole step.
+        """
+        assert self.bus is not None
+        bus, every = self.bus, round(self.period / context.h)
+        steps = np.rint(numbers["delay"] / context.h)
+        periods = steps // every
+        sets = int(periods.max()) + 2
+        acting, count = bus.acting, bus.channels
+        rows = {"fresh": 0, "acting": acting, "before": acting + count, "begin": acting + 2 * count}
+        values = {"periods": periods, "steps": steps - every * periods, "sets": sets, "count": count, **rows}
+        return Packed(values, memory=np.zeros((1, sets * count)))

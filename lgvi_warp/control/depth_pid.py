@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""PID of the depth by way of the pitch angle."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.control.base import IntegralLaw
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DepthPID(IntegralLaw):
+    """PID of the depth by successive loop closure: the depth asks for a pitch angle, the pitch for a moment M.
+
+    theta_d = -(kp e + ki I) within the pitch limit, e the wanted depth less the measured one: pitch up is positive, depth
+    grows downward. M = kp_pitch (theta_d - theta) + ki_pitch I_theta - kd_pitch q - k_heave w. For vehicles that move ahead.
+
+    Args:
+        kp: Gain from depth to pitch [rad/m].
+        ki: Gain from the integral of the depth's error to pitch [rad/(m s)]; 0 by default.
+        pitch_limit: Largest pitch that is wanted [rad]; 0.5 by default.
+        kp_pitch: Gain of the pitch [N m/rad].
+        ki_pitch: Gain of the integral of the pitch's error [N m/(rad s)]; 0 by default.
+        kd_pitch: Gain of the pitch rate q [N m s/rad]; 0 by default.
+        k_heave: Gain of the heave velocity w [N s]; 0 by default.
+        integral_limit: Largest sizes of both integrals, (2,) [m s, rad s]; 1e6 by default.
+        anti_windup: As of `IntegralLaw`; the depth's integral waits while the wanted pitch is at its limit.
+    """
+
+    type: ClassVar[str] = "depth_pid"
+    needs: ClassVar[tuple[str, ...]] = ("depth",)
+    demands: ClassVar[tuple[str, ...]] = ("M",)
+
+    kp: Any = number((), "rad/m")
+    ki: Any = number((), "rad/(m s)", 0.0)
+    pitch_limit: Any = number((), "rad", 0.5, least=0.0)
+    kp_pitch: Any = number((), "N m/rad")
+    ki_pitch: Any = number((), "N m/(rad s)", 0.0)
+    kd_pitch: Any = number((), "N m s/rad", 0.0)
+    k_heave: Any = number((), "N s", 0.0)
+    integral_limit: Any = number((2,), "m s, rad s", (1e6, 1e6), least=0.0)
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """The numbers, each limit by itself, and a row more for what the wanted pitch has beyond its limit."""
+        limits = numbers["integral_limit"]
+        values = {name: value for name, value in numbers.items() if name != "integral_limit"}
+        packed = super().packed(values | {"depth_limit": limits[:, 0], "angle_limit": limits[:, 1]}, context)
+        return packed._replace(memory=np.zeros((1, 5)))

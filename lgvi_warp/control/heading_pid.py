@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""PID of the heading."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from lgvi_warp.control.base import IntegralLaw
+from lgvi_warp.physics.terms.base import number
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class HeadingPID(IntegralLaw):
+    """PID of the heading: N = kp e + ki I + kd (wanted rate - r), with e the wanted heading less the measured one.
+
+    e is in [-pi, pi]. The integral I gains e times the period at each look.
+
+    Args:
+        kp: Proportional gain [N m/rad].
+        ki: Integral gain [N m/(rad s)]; 0 by default.
+        kd: Gain of the yaw rate [N m s/rad]; 0 by default.
+        integral_limit: Largest size of I [rad s]; 1e6 by default.
+        anti_windup: As of `IntegralLaw`.
+    """
+
+    type: ClassVar[str] = "heading_pid"
+    needs: ClassVar[tuple[str, ...]] = ("heading",)
+    demands: ClassVar[tuple[str, ...]] = ("N",)
+
+    kp: Any = number((), "N m/rad")
+    ki: Any = number((), "N m/(rad s)", 0.0)
+    kd: Any = number((), "N m s/rad", 0.0)
+    integral_limit: Any = number((), "rad s", 1e6, least=0.0)

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""PID of the depth by a force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from lgvi_warp.control.base import IntegralLaw
+from lgvi_warp.physics.terms.base import number
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class HeavePID(IntegralLaw):
+    """PID of the depth by a force: Z = kp e + ki I + kd (wanted - measured depth rate), e the wanted less the measured depth.
+
+    For vehicles that can push up and down. The integral I gains e times the period at each look.
+
+    Args:
+        kp: Proportional gain [N/m].
+        ki: Integral gain [N/(m s)]; 0 by default.
+        kd: Gain of the depth's rate, which is downward over ground [N s/m]; 0 by default.
+        integral_limit: Largest size of I [m s]; 1e6 by default.
+        anti_windup: As of `IntegralLaw`.
+    """
+
+    type: ClassVar[str] = "heave_pid"
+    needs: ClassVar[tuple[str, ...]] = ("depth",)
+    demands: ClassVar[tuple[str, ...]] = ("Z",)
+
+    kp: Any = number((), "N/m")
+    ki: Any = number((), "N/(m s)", 0.0)
+    kd: Any = number((), "N s/m", 0.0)
+    integral_limit: Any = number((), "m s", 1e6, least=0.0)

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A factor on the demand of some laws, by which margins are measured: no part of a scene that a user writes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from lgvi_warp.control.base import ControlLaw, Numbers, Packed, PackingContext
+from lgvi_warp.physics.terms.base import number
+from lgvi_warp.physics.terms.control_wrench import COMPONENTS
+
+BEGIN, END = "loop_begin", "loop_gain"
+FACTOR = f"{END}.factor"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LoopBegin(ControlLaw):
+    """Notes the demand before the laws of a loop."""
+
+    device: ClassVar[str] = "loop_gain:begin"
+    shared_rows: ClassVar[int] = 6
+
+    asks: Sequence[str] = ()
+
+    @property
+    def demands(self) -> tuple[str, ...]:  # type: ignore[override]
+        """What the laws demand, whose gain is measured."""
+        return tuple(self.asks)
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """The rows that both share."""
+        assert self.bus is not None
+        return Packed(dict(numbers) | {"demand": self.bus.answer})
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LoopGain(LoopBegin):
+    """Multiplies the demand of the laws since `LoopBegin`."""
+
+    device: ClassVar[str] = "loop_gain:end"
+
+    factor: Any = number((), "1", 1.0)
+
+
+def with_factor(laws: Sequence[ControlLaw], loop: str | None) -> list[ControlLaw]:
+    """The laws of a controller, with a factor on the demand of one of them.
+
+    loop: Key of the law; None for all laws.
+    """
+    chosen = [law for law in laws if loop in (None, law.key)]
+    asks = tuple(name for name in COMPONENTS if any(name in (law.demands or COMPONENTS) for law in chosen))
+    first, last = laws.index(chosen[0]), laws.index(chosen[-1])
+    begin, end = LoopBegin(asks=asks, name=BEGIN), LoopGain(asks=asks, name=END)
+    return [*laws[:first], begin, *laws[first : last + 1], end, *laws[last + 1 :]]

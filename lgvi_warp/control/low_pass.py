@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A filter over what is measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.control.base import READINGS, MeasuringPart
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LowPass(MeasuringPart):
+    """A low-pass filter of the first order over one thing that is measured, exact for readings that are held over a period.
+
+    x <- x + (1 - exp(-T / time_constant)) (measured - x), T the period; it starts at the first reading. The difference of two
+    headings is within half a turn; an attitude goes the same part of the turn to the measured one.
+
+    Args:
+        of: What it filters, as of `lw.Sensor`.
+        time_constant: Its time constant [s]; 0 for no filter.
+
+    Raises:
+        SceneError: Where `of` is not known; and as `Term`.
+    """
+
+    type: ClassVar[str] = "low_pass"
+
+    of: str = ""
+    time_constant: Any = number((), "s", least=0.0)
+
+    def check(self, faults: Faults) -> None:
+        """Adds a fault where `of` is not known."""
+        faults.choice("of", self.of, READINGS)
+
+    def device_in(self, aligned: bool) -> Any:
+        """The device code for what it filters."""
+        return f"low_pass:{self.of}"
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """The time constant, and the rows of the estimate."""
+        return Packed(dict(numbers), memory=np.zeros((1, 9 if self.of == "attitude" else READINGS[self.of])))

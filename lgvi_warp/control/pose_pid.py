@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""PID of position and attitude on SE(3)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from lgvi_warp.control.base import PoseLaw
+from lgvi_warp.physics.terms.base import number
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PosePID(PoseLaw):
+    """Geometric PID of the pose, without Euler angles, stable from almost every attitude (Bullo & Murray 1995).
+
+    f = R^T (kp e_b + ki I) + kd (R^T v_d - nu), tau = -kr e_R - kw (Omega - R^T R_d Omega_d) - ki_r I_R, with
+    e_b = b_d - b and e_R = vee(R_d^T R - R^T R_d) / 2. The integrals I and I_R gain e_b and e_R times the period at each look.
+
+    Args:
+        kp: Gains of the position (3,) [N/m], inertial axes.
+        ki: Gains of its integral (3,) [N/(m s)], inertial axes; 0 by default.
+        kd: Gains of the velocity (3,) [N s/m], body axes.
+        kr: Gains of the attitude (3,) [N m], body axes.
+        ki_r: Gains of its integral (3,) [N m/s], body axes; 0 by default.
+        kw: Gains of the angular velocity (3,) [N m s], body axes.
+        integral_limit: Largest sizes of each number of I and of I_R, (2,) [m s, s]; 1e6 by default.
+        feedforward: As of `PoseLaw`.
+        anti_windup: As of `IntegralLaw`; the error of the position waits along the body's axes, along which actuators push.
+    """
+
+    type: ClassVar[str] = "pose_pid"
+
+    kp: Any = number((3,), "N/m")
+    ki: Any = number((3,), "N/(m s)", (0.0, 0.0, 0.0))
+    kd: Any = number((3,), "N s/m")
+    kr: Any = number((3,), "N m")
+    ki_r: Any = number((3,), "N m/s", (0.0, 0.0, 0.0))
+    kw: Any = number((3,), "N m s")
+    integral_limit: Any = number((2,), "m s, s", (1e6, 1e6), least=0.0)

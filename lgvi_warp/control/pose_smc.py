@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sliding mode control of position and attitude."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from lgvi_warp.control.base import Numbers, Packed, PackingContext, PoseLaw
+from lgvi_warp.physics.terms.base import number
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PoseSMC(PoseLaw):
+    """Integral sliding mode control of the pose, each body axis by itself (the form of Fossen 2021, 16.4, on SE(3)).
+
+    s = (R^T v_d - nu) + 2 lambda R^T e_b + lambda^2 R^T I, and f = k_d s + k_sigma sat(s / boundary); the same of the attitude
+    with s_r = -(Omega - R^T R_d Omega_d) - 2 lambda_r e_R - lambda_r^2 I_R; e_b, e_R, I and I_R as of `PosePID`, sat(x) is x
+    within -1 and 1.
+
+    Args:
+        lambda_: Rates at which errors of position decay while s is 0 (3,) [1/s]; `lambda` in a scene file.
+        boundary: Half the thickness of the layer about s = 0 in which f is continuous (3,) [m/s].
+        k_sigma: Strength of the switching part (3,) [N].
+        k_d: Strength of the linear part (3,) [N s/m].
+        lambda_r: The same as lambda, of the attitude (3,) [1/s].
+        boundary_r: The same as boundary, of the attitude (3,) [rad/s].
+        k_sigma_r: The same as k_sigma, of the attitude (3,) [N m].
+        k_d_r: The same as k_d, of the attitude (3,) [N m s].
+        integral_limit: Largest sizes of each number of I and of I_R, (2,) [m s, s]; 1e6 by default.
+        feedforward: As of `PoseLaw`.
+        anti_windup: As of `PosePID`.
+    """
+
+    type: ClassVar[str] = "pose_smc"
+
+    lambda_: Any = number((3,), "1/s", least=0.0)
+    boundary: Any = number((3,), "m/s", above=0.0)
+    k_sigma: Any = number((3,), "N", least=0.0)
+    k_d: Any = number((3,), "N s/m", least=0.0)
+    lambda_r: Any = number((3,), "1/s", least=0.0)
+    boundary_r: Any = number((3,), "rad/s", above=0.0)
+    k_sigma_r: Any = number((3,), "N m", least=0.0)
+    k_d_r: Any = number((3,), "N m s", least=0.0)
+    integral_limit: Any = number((2,), "m s, s", (1e6, 1e6), least=0.0)
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """The numbers, with a word for lambda that Python allows."""
+        values = {"rate" if name == "lambda" else name: value for name, value in numbers.items()}
+        return super().packed(values, context)

@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Allocation by a weighted pseudo-inverse of the actuators' effect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.control.base import Allocation, rest_rows
+from lgvi_warp.physics.notation import repeated
+from lgvi_warp.physics.terms.actuators import UNLIMITED
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number, side_by_side
+from lgvi_warp.physics.terms.thrusters import side_of_table
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PseudoInverse(Allocation):
+    """Commands for the efforts t of least sum of weight t^2 whose wrench B t is nearest to the demand (Fossen 2021, 11.2).
+
+    t = W^-1 B^T (B W^-1 B^T)^+ w. Components for which no law asks do not count. Effort is thrust of thrusters, by the
+    inverse of their curve; angle of fins, whose effect B is that at `speed`; force or moment of a control_wrench. Thrust is
+    that at rest: what it loses by the advance speed is not made up for, and counts as delivered. Thrusters with a polynomial
+    need a `limit`, up to which, or to where the polynomial turns, it is inverted.
+
+    Args:
+        to: Key of the term that takes the commands.
+        weights: Cost of each effort, (channels,), above 0; 1 by default.
+        speed: Speed ahead [m/s] at which fins are judged; 1 by default.
+    """
+
+    type: ClassVar[str] = "pseudo_inverse"
+
+    weights: Any = number(("n",), "1", None, above=0.0, optional=True)
+    speed: Any = number((), "m/s", 1.0, above=0.0)
+
+    def check_actuator(self, faults: Faults) -> None:
+        """Adds a fault where there are other weights than channels."""
+        count = self.actuator.channels
+        if self.weights is not None and len(self.weights) != count:
+            fault = f"has {len(self.weights)} numbers"
+            faults.add(f"{self.key}.weights", self.weights, fault, f"give {count}, one for each channel of {self.to}")
+
+        self._check_curve(faults)
+        lost = self.lost_channels
+        if len(lost) > MOST_LOST:
+            faults.add(
+                f"{self.key}.to",
+                self.to,
+                f"has {len(lost)} channels with known faults",
+                f"let at most {MOST_LOST} be known",
+            )
+
+    def _check_curve(self, faults: Faults) -> None:
+        if self.shape == "polynomial" and np.any(self.actuator.limit >= UNLIMITED):
+            fault = "does not end: the inverse of a polynomial needs the range of the commands"
+            faults.add(f"{self.to}.limit", self.actuator.limit, fault, "give the largest command")
+
+    @property
+    def shape(self) -> str:
+        """How effort follows from the command: "square", "polynomial" or "table" of thrusters, else "linear"."""
+        return str(getattr(self.actuator, "shape", "linear"))
+
+    def device_in(self, aligned: bool) -> str:
+        """The code for the curve of the actuator."""
+        return f"pseudo_inverse:{self.shape}{',lost' if self.losses else ''}"
+
+    def reach(self) -> np.ndarray:
+        """The wrench of a unit of effort of each channel."""
+        numbers = {name: value[None] for name, value in self.actuator.parameters().items()}
+        effect = self.actuator.effect(numbers, {"environment.water_density": np.ones(1)}, np.reshape(self.speed, 1))
+        return np.asarray(effect[0])
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """For each set of losses the lines of the pseudo-inverse; each channel's wrench and numbers; curves and inverses."""
+        actuator_numbers = context.own(self.actuator)
+        B = self.asked[:, None] * self.actuator.effect(actuator_numbers, context.parameters, numbers["speed"])
+        weights = numbers.get("weights", np.ones((1, B.shape[2])))
+        lost, limit = self.lost_channels, actuator_numbers["limit"]
+        rows = []
+        for s in range(1 << len(lost)):
+            lines = _lines(B, weights, [channel for j, channel in enumerate(lost) if s >> j & 1])
+            rows += [rest_rows(B @ lines), lines.reshape(len(lines), -1)]
+        keys = {"coefficient": np.ones_like(limit), "coefficient_astern": np.ones_like(limit), "dead_band": 0.0 * limit}
+        curve = [actuator_numbers.get(key, value) for key, value in keys.items()]
+        share = np.zeros((1, B.shape[2]))
+        share[0, list(lost)] = 2.0 ** np.arange(len(lost))
+        columns = (
+            limit,
+            *curve,
+            self.steps_of_loss(context),
+            share,
+            *self._largest(actuator_numbers, limit - curve[2]),
+        )
+        channels = side_by_side(np.swapaxes(B, -1, -2), *(column[..., None] for column in columns))
+        rows.append(channels.reshape(len(channels), -1))
+        curves, size = self._curves(actuator_numbers)
+        assert self.bus is not None
+        first, count = self.bus.commands[self.to]
+        words = {
+            "commands": first,
+            "count": count,
+            "sets": 1 << len(lost),
+            "size": size,
+            "sided": self._sided(actuator_numbers),
+        }
+        return Packed(words | {"shared": sum(block.shape[1] for block in rows)}, side_by_side(*rows, curves))
+
+    def _sided(self, own: Numbers) -> int:
+        """1 where the thrusters have polynomials, and some of those astern are others than those ahead; else 0."""
+        return int(self.shape == "polynomial" and not np.array_equal(own["polynomial"], own["polynomial_astern"]))
+
+    def _largest(self, own: Numbers, reach: np.ndarray) -> tuple[np.ndarray, ...]:
+        """The largest efforts (1 or n, channels) ahead and astern, without the coefficient; reach: of commands."""
+        reach = np.maximum(reach, 0.0)
+        if self.shape == "table":
+            at, values = own["table_commands"], own["table_thrusts"]
+            return tuple(side * _at(at, values, side * reach) for side in (1.0, -1.0))
+        if self.shape == "polynomial":
+            curves = [own[key] for key in ("polynomial", "polynomial_astern")]
+            turns = (highest(curve, np.max(reach, axis=-1))[:, None] for curve in curves)
+            return tuple(_values(curve, np.minimum(reach, turn)) for curve, turn in zip(curves, turns, strict=True))
+        return (reach if self.shape == "linear" else reach**2,) * 2
+
+    def _curves(self, own: Numbers) -> tuple[np.ndarray, int]:
+        """Rows of the curves and of their inverses, and how many there are of a kind."""
+        if self.shape in ("linear", "square"):
+            return np.zeros((1, 0)), 0
+        curves, size = self.actuator.curve_rows(own)
+        if self.shape == "table":
+            at, values = own["table_commands"], own["table_thrusts"]
+            each = (
+                side_of_table(at, values[:, :, i], side) for i in range(self.actuator.channels) for side in (1.0, -1.0)
+            )
+            return side_by_side(curves, *(rising_knots(thrusts, commands) for commands, thrusts in each)), size
+        reach = np.max(np.maximum(own["limit"] - own["dead_band"], 0.0), axis=-1)
+        sides = (inverse_rows(own[key], reach) for key in ("polynomial", "polynomial_astern"))
+        return side_by_side(curves, *sides), size
+
+
+# The most channels with known faults of one actuator: there is a set of lines for each subset of them.
+MOST_LOST = 4
+# Singular values below this part of the largest count as zero.
+RANK = 1e-10
+
+
+def _lines(B: np.ndarray, weights: np.ndarray, lost: Sequence[int]) -> np.ndarray:
+    """The pseudo-inverse (n, channels, 6) of the effect of those channels that are not lost."""
+    scaled = B / np.sqrt(weights)[:, None, :]
+    scaled[:, :, list(lost)] = 0.0
+    return np.asarray(np.linalg.pinv(scaled, rcond=RANK) / np.sqrt(weights)[:, :, None])
+
+
+def rising_knots(at: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """As `knots`, where several knots may be at one place: those change nothing.
+
+    at: Places of the knots (n, k), rising or equal.
+    values: Values at the knots (n, k), equal where the places are.
+    """
+    width = np.diff(at, axis=1)
+    inverse = np.divide(1.0, width, out=np.zeros_like(width), where=width > 0.0)
+    steps = np.stack([at[:, :-1], inverse, np.diff(values, axis=1)], axis=-1)
+    return np.concatenate([values[:, :1], steps.reshape(len(at), -1)], axis=1)
+
+
+# Points at which a polynomial is looked at for its turn, and coefficients of the start of its inverse.
+POINTS, START_SIZE = 1025, 16
+# Chebyshev's points for the start of its inverse, both ends among them: there it is exact, where Newton's steps crawl. And
+# from the values there to the coefficients.
+POINTS_OF_START = np.cos(np.pi * np.arange(START_SIZE) / (START_SIZE - 1))
+TO_COEFFICIENTS = np.linalg.inv(np.polynomial.polynomial.polyvander(POINTS_OF_START, START_SIZE - 1))
+
+
+def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
+    """The start of the inverse of polynomials f without a constant, from 0 to where they turn, or to their reach.
+
+    It is a polynomial in 2 s - 1, f = (largest f) (1 - (1 - s^2)^2), in which the inverse is smooth where f begins as a square
+    and where it turns (lgvi_kernels.laws.thrust_curves).
+
+    polynomial: Coefficients (1 or n, powers) from the first power up.
+    reach: Largest arguments (1 or n,).
+    Returns: Rows (1 or n, 20): 1 / largest value, that value, its argument, least slope, and the coefficients.
+    """
+    polynomial, reach = repeated(polynomial, reach)
+    top = highest(polynomial, reach)
+    most = _values(polynomial, top[:, None])[:, 0]
+    wanted = most[:, None] * (1.0 - (1.0 - (0.5 * (POINTS_OF_START + 1.0)) ** 2) ** 2)
+    inverses = _last(lambda w: _values(polynomial, w) < wanted, np.zeros_like(wanted), top[:, None] + 0.0 * wanted)
+    acts = most > 0.0
+    inverse = np.divide(1.0, most, out=np.zeros_like(most), where=acts)
+    slope = np.where(acts, 1e-3 * most / np.where(acts, top, 1.0), 1.0)
+    return side_by_side(*(x[:, None] for x in (inverse, most, top, slope)), inverses @ TO_COEFFICIENTS.T)
+
+
+def highest(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
+    """Where polynomials without a constant cease to rise.
+
+    polynomial: Coefficients (1 or n, powers) from the first power up.
+    reach: Largest arguments (1 or n,).
+    Returns: Where each turns first (1 or n,), or its reach.
+    """
+    polynomial, reach = repeated(polynomial, reach)
+    points = reach[:, None] * np.linspace(0.0, 1.0, POINTS)
+    values = _values(polynomial, points)
+    falls = np.diff(values, axis=1) <= 0.0
+    turns = falls.any(axis=1)
+    turn = np.where(turns, falls.argmax(axis=1), POINTS - 1)
+    # The slope changes its sign within one of the two intervals beside that point.
+    row, slopes = np.arange(len(points)), polynomial * np.arange(1, polynomial.shape[1] + 1)
+    before, after = points[row, np.maximum(turn - 1, 0)], points[row, np.minimum(turn + 1, POINTS - 1)]
+    peak = _last(lambda w: _values(slopes, w) > 0.0, before[:, None], after[:, None])[:, 0]
+    return np.where(turns, np.where(turn > 0, peak, 0.0), reach)
+
+
+def _at(at: np.ndarray, values: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """Tables with knots at (1 or n, t) and values (1 or n, t, channels), at w (1 or n, channels)."""
+    share = np.clip((w[:, None] - at[:, :-1, None]) / np.diff(at, axis=1)[..., None], 0.0, 1.0)
+    return np.asarray(values[:, 0] + np.sum(share * np.diff(values, axis=1), axis=1))
+
+
+def _last(holds: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Where a condition of an array, which holds at low and not at high, ceases to hold, by bisection."""
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        inside = holds(middle)
+        low, high = np.where(inside, middle, low), np.where(inside, high, middle)
+    return high
+
+
+def _values(polynomial: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """p_1 w + p_2 w^2 + ... of each member's polynomial (n, powers) at w (n, k)."""
+    value = np.zeros_like(w)
+    for coefficient in polynomial.T[::-1]:
+        value = (value + coefficient[:, None]) * w
+    return value

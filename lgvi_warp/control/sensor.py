@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sensors: what is measured in place of the truth."""
+
+from __future__ import annotations
+
+from dataclasses import Field, dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.control.base import READINGS, MeasuringPart
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
+from lgvi_warp.physics.terms.noisy import key_of
+
+# Numbers of a sensor, in the order of its device code, with the value that has no effect; those of each axis, those of looks.
+VECTORS = ("bias", "noise", "drift", "quantum")
+IDLE = dict.fromkeys(VECTORS, 0.0) | {"every": 1.0, "latency": 0.0, "dropout": 0.0}
+DRAWING = frozenset({"noise", "drift", "dropout"})
+KEEPING = frozenset({"every", "latency", "dropout"})
+MOST_LOOKS = 1000.0
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Sensor(MeasuringPart):
+    """A sensor of one thing: truth + bias + walk + noise, rounded to the quantum; new at some looks, late, and lost at times.
+
+    The numbers are in the unit of what is measured: m, rad, m/s or rad/s; of a 3-vector each is one number, which stands for
+    all axes, or three. An attitude is turned by the errors as a rotation vector of the body's axes, and the quantum is that of
+    roll, pitch and yaw; a heading is turned about the vertical. The random numbers follow from the seed, the member, the look
+    and the sensor's name: they are the same for all gains, methods and steps.
+
+    Args:
+        of: What it measures: "depth", "heading", "position", "attitude", "velocity" (over ground), "water_velocity" or
+            "angular_velocity"; velocities in the body's axes.
+        noise: Standard deviation of each reading; 0 by default.
+        bias: Added to each reading; 0 by default.
+        drift: Random walk: its standard deviation after 1 s, in the unit of the reading / s^1/2; 0 by default.
+        quantum: Readings are rounded to whole multiples of this; 0 by default, not at all.
+        every: Looks from one new reading to the next, a whole number; 1 by default. In between the last one is kept.
+        latency: Looks until a reading arrives, a whole number; 0 by default. Until then the first one is there.
+        dropout: Probability with which a reading is lost, so that the last one is kept; 0 by default. The first is never lost.
+
+    Raises:
+        SceneError: Where `of` is not known, or `every` or `latency` is no whole number; and as `Term`.
+    """
+
+    type: ClassVar[str] = "sensor"
+    every_feature: ClassVar[tuple[str, ...]] = tuple(IDLE)
+
+    of: str = ""
+    noise: Any = number((3,), "unit", 0.0, least=0.0)
+    bias: Any = number((3,), "unit", 0.0)
+    drift: Any = number((3,), "unit/s^1/2", 0.0, least=0.0)
+    quantum: Any = number((3,), "unit", 0.0, least=0.0)
+    every: Any = number((), "looks", IDLE["every"], least=1.0, most=MOST_LOOKS)
+    latency: Any = number((), "looks", IDLE["latency"], least=0.0, most=MOST_LOOKS)
+    dropout: Any = number((), "1", IDLE["dropout"], least=0.0, most=1.0)
+
+    def __post_init__(self) -> None:
+        faults = Faults(f"{self.key}.")
+        faults.choice("of", self.of, READINGS)
+        faults.raise_if_any()
+        if READINGS[self.of] > 1:
+            self.repeat(READINGS[self.of], *VECTORS)
+        super().__post_init__()
+
+    def shape_of(self, item: Field[Any]) -> tuple[Any, ...]:
+        """One number for each that it reads; a sensor of a scalar has scalars."""
+        return () if READINGS[self.of] == 1 else super().shape_of(item)
+
+    def check(self, faults: Faults) -> None:
+        """Adds a fault for each number of looks that is not whole."""
+        for name in ("every", "latency"):
+            value = float(getattr(self, name))
+            if value != round(value):
+                near = f"{np.floor(value):g} or {np.ceil(value):g}"
+                faults.add(name, value, "is no whole number of looks", f"give {near}")
+
+    def features(self, numbers: Numbers) -> tuple[str, ...]:
+        """The names of the numbers that matter for some member."""
+        return tuple(name for name, idle in IDLE.items() if np.any(_whole(name, numbers[name]) != idle))
+
+    def device_in(self, aligned: bool) -> Any:
+        """The device code for what it reads and for the numbers that matter."""
+        return f"sensor:{','.join((self.of, *self.chosen))}"
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """The numbers that matter, the key of the random numbers, and the rows of what it keeps."""
+        from scipy.special import ndtri
+
+        chosen, count = set(self.chosen), READINGS[self.of]
+        values: dict[str, Any] = {name: _vector(numbers[name]) for name in VECTORS if name in chosen}
+        values |= {name: _whole(name, numbers[name]) for name in ("every", "latency") if name in chosen}
+        if "dropout" in chosen:
+            # A reading is lost where a standard normal is below this.
+            values["dropout"] = np.clip(ndtri(numbers["dropout"]), -1e30, 1e30)
+        if chosen & DRAWING:
+            values["key"] = key_of(self.key, context)
+        sets = 1 + (int(values["latency"].max()) if "latency" in chosen else 0)
+        rows = 9 if self.of == "attitude" else count
+        kept = (sets + 1) * rows + 1 if chosen & KEEPING else 0
+        memory = np.zeros((1, count * ("drift" in chosen) + kept))
+        return Packed(values | {"sets": sets}, memory=memory)
+
+
+def _vector(values: np.ndarray) -> np.ndarray:
+    """Values (n,) or (n, 3) as 3-vectors; a scalar is the first number."""
+    return values if values.ndim > 1 else values[:, None] * np.eye(3)[0]
+
+
+def _whole(name: str, values: np.ndarray) -> np.ndarray:
+    """Numbers of looks rounded, as they may vary by member; others as they are."""
+    return np.rint(values) if name in ("every", "latency") else values

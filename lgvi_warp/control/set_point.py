@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Guidance by a set-point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.control.base import Guidance
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SetPoint(Guidance):
+    """A place, a heading and a speed that are wanted all the time. What is not given stays as guidance before it wants it.
+
+    Args:
+        position: Wanted position, (3,) [m], inertial axes.
+        depth: Wanted depth [m]; in place of `position`, whose third number it is.
+        heading: Wanted heading [rad], from north to east, of an upright attitude; 0 by default where a position is given.
+        speed: Wanted speed ahead through the water [m/s].
+
+    Raises:
+        SceneError: Where nothing is given, or position and depth both; and as `Term`.
+    """
+
+    type: ClassVar[str] = "set_point"
+
+    position: Any = number((3,), "m", None, optional=True)
+    depth: Any = number((), "m", None, optional=True)
+    heading: Any = number((), "rad", None, optional=True)
+    speed: Any = number((), "m/s", None, optional=True)
+
+    def check(self, faults: Faults) -> None:
+        """Adds a fault where nothing is wanted, or the depth twice."""
+        if not self.parameters():
+            faults.add("", "", "wants nothing", "give position, depth, heading or speed")
+        if self.position is not None and self.depth is not None:
+            faults.add("depth", self.depth, "is given beside position", "keep one of them: position[2] is the depth")
+
+    @property
+    def gives(self) -> tuple[str, ...]:
+        """What it wants, among `WISHES`."""
+        position = ("position", "depth", "velocity") if self.position is not None else ()
+        depth = ("depth",) if self.depth is not None else ()
+        upright = self.heading is not None or self.position is not None
+        heading = ("heading", "attitude", "angular_velocity") if upright else ()
+        return (*position, *depth, *heading, *(("speed",) if self.speed is not None else ()))
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """All numbers, and which of them are wanted; what is not stays as guidance before it wants it."""
+        position = numbers.get("position", np.zeros((1, 3)))
+        zero = np.zeros(1)
+        depth = numbers.get("depth", position[:, 2])
+        values = {"heading": numbers.get("heading", zero), "speed": numbers.get("speed", zero)}
+        wishes = {"place": "position", "level": "depth", "turn": "heading", "pace": "speed"}
+        wanted = {name: int(wish in self.gives) for name, wish in wishes.items()}
+        return Packed({"position": position, "depth": depth, **values, **wanted})

@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Linear feedback of the whole state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from lgvi_warp.control.base import ControlLaw, Numbers, Packed, PackingContext
+from lgvi_warp.physics.terms.base import number
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class StateFeedback(ControlLaw):
+    """The demand w = -K x of the error x (12,), such as of a linear quadratic regulator.
+
+    x = (b - b_d, e_R, nu - R^T v_d, Omega - R^T R_d Omega_d): position in inertial axes [m], attitude as of `PosePID` [1],
+    velocity over ground [m/s] and angular velocity [rad/s] in body axes.
+
+    Args:
+        K: Gains (6, 12) [N, N m per unit of x].
+    """
+
+    type: ClassVar[str] = "state_feedback"
+    needs: ClassVar[tuple[str, ...]] = ("position", "attitude")
+    demands: ClassVar[tuple[str, ...]] = ("X", "Y", "Z", "K", "M", "N")
+
+    K: Any = number((6, 12), "N, N m per m, 1, m/s, rad/s")
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """K line by line in the table."""
+        K = numbers["K"]
+        return Packed({}, K.reshape(len(K), -1))

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Guidance along waypoints by line of sight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.control.base import Guidance, Numbers, Packed, PackingContext
+from lgvi_warp.physics.terms.base import number
+
+# How the heading follows from the way off the leg, and what is done at the last point.
+METHODS = ("los", "ilos", "alos")
+AT_END = ("stop", "go_on")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Waypoints(Guidance):
+    """A way from point to point in straight legs, whose heading is found by line of sight (Fossen 2021, 12.3-12.5).
+
+    With y the way to starboard off the leg and D the look-ahead, the wanted heading is the leg's less
+    "los": atan(y / D);
+    "ilos": atan((y + kappa J) / D), where J gains D y / (D^2 + (y + kappa J)^2) a second (Borhaug, Pavlov & Pettersen 2008);
+    "alos": beta + atan(y / D), where the estimate beta of the crab angle gains gamma D y / sqrt(D^2 + y^2) a second (Fossen &
+    Aguiar 2024). Wanted depth and position are those of the leg abeam of the vehicle. A leg is done within the radius of its
+    end, or abeam of it; then the next one is sailed.
+
+    Args:
+        points: The points, (k, 3) [m], inertial axes: at least two, each at another place of the map than the one before.
+        speed: Wanted speed ahead through the water [m/s].
+        look_ahead: D [m].
+        radius: Radius of acceptance [m], horizontal.
+        method: "los", "ilos" or "alos"; by default "los".
+        kappa: Gain of "ilos" [1/s]; 0.1 by default.
+        gamma: Gain of "alos" [rad/(m s)]; 0.002 by default.
+        at_end: At the last point "stop", the default: heading of the last leg, speed 0, the point itself as wanted position;
+            or "go_on": along the last leg, beyond its end.
+    """
+
+    type: ClassVar[str] = "waypoints"
+
+    points: Any = number(("k", 3), "m")
+    speed: Any = number((), "m/s")
+    look_ahead: Any = number((), "m", above=0.0)
+    radius: Any = number((), "m", above=0.0)
+    method: str = "los"
+    kappa: Any = number((), "1/s", 0.1, least=0.0)
+    gamma: Any = number((), "rad/(m s)", 0.002, least=0.0)
+    at_end: str = "stop"
+
+    def check(self, faults: Faults) -> None:
+        """Adds a fault where points are too few or the same twice, or a word is unknown."""
+        faults.choice("method", self.method, METHODS)
+        faults.choice("at_end", self.at_end, AT_END)
+        if len(self.points) < 2:
+            faults.add("points", self.points, "are less than two", "give where the way begins and where it ends")
+        same = np.flatnonzero(np.all(np.diff(self.points[:, :2], axis=0) == 0.0, axis=1))
+        for i in same:
+            where, problem = f"points[{i + 1}]", "is at the same place of the map as the one before"
+            faults.add(where, self.points[i + 1], problem, "leave it out: a leg needs a direction")
+
+    @property
+    def gives(self) -> tuple[str, ...]:
+        """All that a reference can have."""
+        return ("depth", "position", "velocity", "heading", "attitude", "angular_velocity", "speed")
+
+    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
+        """The points in the table; memory of the leg, and of J or beta."""
+        points = numbers["points"]
+        values = {name: value for name, value in numbers.items() if name != "points"}
+        words = {"legs": points.shape[1] - 1, "method": METHODS.index(self.method), "stops": int(self.at_end == "stop")}
+        return Packed(values | words, points.reshape(len(points), -1), np.zeros((1, 2)))

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The exchange with a function of the host at a controller's looks: what it is told, and its answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.real_numbers import answered
+from lgvi_warp.control.callback import Callback
+from lgvi_warp.engine.packets import Packets
+
+
+@dataclass(frozen=True)
+class Looks:
+    """What a controller measures, or wants, of m members at a look.
+
+    Args:
+        position: Positions (m, 3) [m], inertial axes.
+        attitude: Attitudes (m, 3, 3), body to inertial axes.
+        velocity: Velocities (m, 3) [m/s]: measured over ground in body axes; wanted in inertial axes.
+        angular_velocity: Angular velocities (m, 3) [rad/s], body axes.
+        heading: Headings (m,) [rad].
+        water_velocity: Measured velocities through the water (m, 3) [m/s], body axes; None, the default, of what is wanted.
+        speed: Wanted speed ahead (m,) [m/s]; None, the default, of what is measured.
+        angular_acceleration: Wanted angular accelerations (m, 3) [rad/s^2], axes of the wanted attitude; None, the default, of
+            what is measured.
+    """
+
+    position: np.ndarray
+    attitude: np.ndarray
+    velocity: np.ndarray
+    angular_velocity: np.ndarray
+    heading: np.ndarray
+    water_velocity: np.ndarray | None = None
+    speed: np.ndarray | None = None
+    angular_acceleration: np.ndarray | None = None
+
+    @property
+    def depth(self) -> np.ndarray:
+        """Depths of the members, shape (m,) [m]."""
+        return self.position[:, 2]
+
+
+def last_look(packets: Packets, members: np.ndarray | None = None) -> tuple[Looks, Looks]:
+    """What was measured and what was wanted at the last look.
+
+    members: which of their members (m,); default None for all.
+    Returns: (measured, wanted), copies.
+    """
+    y, r = (_numbers(packets, packets.plan.noted_rows[name], members) for name in ("measured", "reference"))
+    measured_attitude, wanted_attitude = (rows[:, 3:12].reshape(-1, 3, 3) for rows in (y, r))
+    headings = [np.arctan2(R[:, 1, 0], R[:, 0, 0]) for R in (measured_attitude, wanted_attitude)]
+    measured = Looks(y[:, :3], measured_attitude, y[:, 12:15], y[:, 18:21], headings[0], water_velocity=y[:, 15:18])
+    rates = {"speed": r[:, 19], "angular_acceleration": r[:, 20:23]}
+    return measured, Looks(r[:, :3], wanted_attitude, r[:, 12:15], r[:, 15:18], headings[1], **rates)
+
+
+def _numbers(packets: Packets, places: range, members: np.ndarray | None) -> np.ndarray:
+    """Rows of the memory by member, (m, rows) of float64."""
+    rows = packets.laws.memory.view[:, places.start : places.stop]
+    if members is not None:
+        packet, lane = np.divmod(members, rows.shape[2])
+        return rows[packet, :, lane].astype(np.float64)
+    copied = np.array(rows.transpose(0, 2, 1), np.float64, order="C")
+    return copied.reshape(-1, len(places))[: packets.members.count]
+
+
+def answer(packets: Packets, values: np.ndarray) -> None:
+    """Write the host's answer to the last look.
+
+    values: demands (m, 6), or commands (m, channels).
+    """
+    controller = packets.plan.kernel_choice.controller
+    assert controller is not None
+    view, first = packets.laws.memory.view, controller.bus.answer
+    count, width = values.shape[1], view.shape[2]
+    padded = np.empty((view.shape[0] * width, count))
+    padded[: len(values)], padded[len(values) :] = values, values[-1]
+    view[:, first : first + count] = padded.reshape(-1, width, count).transpose(0, 2, 1)
+
+
+def ask(packets: Packets, t: float) -> None:
+    """Call the function of a plan's controller with the last look, and write its answer.
+
+    t: time of the look [s].
+    """
+    controller = packets.plan.kernel_choice.controller
+    assert controller is not None
+    callback: Any = controller.callback
+    assert isinstance(callback, Callback) and callback.function is not None
+    measured, wanted = last_look(packets)
+    members = packets.members.indices
+    where = f"callback {callback.key!r} at t = {t:.9g} s, members {members[0]} to {members[-1]}"
+    try:
+        given = callback.function(t, measured, wanted, members)
+    except Exception as error:
+        error.add_note(where)
+        raise
+    values, shape = answered(where, given), (packets.members.count, controller.bus.rows - controller.bus.answer)
+    if values.shape != shape:
+        raise ValueError(f"{where}: returned shape {values.shape}; return {shape}, a row for each member")
+    answer(packets, values)

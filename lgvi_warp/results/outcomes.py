@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How the members of a run ended, in words: a sentence for each status that occurs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from lgvi_warp.common.status import Status, stop_time, stopped
+from lgvi_warp.methods.limits import too_large
+from lgvi_warp.methods.method import Method
+
+if TYPE_CHECKING:
+    from lgvi_warp.results.result import Result
+
+
+def outcomes(result: Result) -> list[Status]:
+    """List the statuses that occur among the members of a result.
+
+    Args:
+        result: Result of a run.
+
+    Returns:
+        The statuses in order of their codes: OK first.
+    """
+    return [Status(int(code)) for code in np.unique(np.asarray(result.status))]
+
+
+def outcome_text(result: Result, code: Status) -> str:
+    """Describe one status: how many members have it, which of them had it first, and what it means."""
+    members = np.flatnonzero(np.asarray(result.status) == code)
+    many = f"{code.name.lower()}, {len(members):,} of {result.members:,} members"
+    if code == Status.OK:
+        return f"{many}: {code.text}"
+    first = int(members[stop_time(result)[members].argmin()])
+    value = "" if code.stopped else f", value {result.failure_value[first]:.4g}"
+    text = too_large(Method(result.provenance["method"]["name"])) if code == Status.STEP_TOO_LARGE else code.text
+    return f"{many} (first: member {first} at {stop_time(result)[first]:g} s{value}): {text}"
+
+
+def begun_beyond(status: np.ndarray, failure_time: np.ndarray) -> tuple[str, ...]:
+    """Tell of members that an event stopped before their first step.
+
+    status: Status of each member, (n,).
+    failure_time: When each was stopped or failed [s], (n,).
+    """
+    begun = stopped(status) & (np.asarray(failure_time) == 0.0)
+    if not begun.any():
+        return ()
+    codes, numbers = np.unique(np.asarray(status)[begun], return_counts=True)
+    by = ", ".join(f"{Status(int(code)).name.lower()} {number:,}" for code, number in zip(codes, numbers, strict=True))
+    some = f"{int(begun.sum()):,} of {len(status):,} members begin at or beyond an event ({by}; the first: member "
+    return (
+        f"{some}{int(begun.argmax())}) and count as stopped at t = 0; start them before it, or leave the event out",
+    )
+
+
+def failure_text(result: Result) -> str:
+    """Describe each kind of failure in a line with its remedy."""
+    failures = [code for code in outcomes(result) if code != Status.OK and not code.stopped]
+    return "\n".join(outcome_text(result, code) for code in failures)

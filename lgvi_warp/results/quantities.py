@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Quantities of interest: one or a few numbers of each member of a result, named by a text or computed by a function."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.common.real_numbers import NotReal, real_results
+from lgvi_warp.control.signals import SAVED
+from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.physics.terms.events import Event
+from lgvi_warp.physics.terms.events import from_list as events_of
+from lgvi_warp.results.result import Result
+from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.statistics.ends import Ends, check_outcomes, outcomes
+from lgvi_warp.statistics.outcomes import EndTime
+from lgvi_warp.statistics.paths.each import Each
+from lgvi_warp.statistics.values.functional import Functional, functional
+from lgvi_warp.statistics.values.quantity import Quantity
+
+REMEDY = 'write "position[2]", "depth", "norm(velocity)", "max(depth)", or give a function of a Result'
+
+OfInterest = str | Quantity | Callable[..., Any]
+
+
+@dataclass(frozen=True)
+class OfResult:
+    """A quantity of interest of a result: a `Functional`, or a function of a Result.
+
+    "position[2]" is the value at the end; max(...), min(...), mean(...) and range(...) are over the path, as its
+    samples were kept; norm(...) is the length of a vector.
+
+    Attributes:
+        label: Its name.
+        of: The functional or function.
+        looks_at_members: Whether it may use more of the members than their parameters.
+    """
+
+    label: str
+    of: Functional | Callable[[Result], Any]
+    looks_at_members: bool = False
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of the samples it needs; all of them for a function, because what that uses cannot be known."""
+        return self.of.quantity.fields if isinstance(self.of, Functional) else FIELDS
+
+    @property
+    def unit(self) -> str:
+        """Its unit; "" where that is not known."""
+        return self.of.unit if isinstance(self.of, Functional) else ""
+
+    @property
+    def over_path(self) -> bool:
+        """Whether it needs the samples at all times."""
+        return isinstance(self.of, Functional) and self.of.over_path
+
+    @property
+    def is_function(self) -> bool:
+        """Whether it is a function of a Result."""
+        return not isinstance(self.of, Functional)
+
+    def values(self, result: Result, members: Any = None) -> np.ndarray:
+        """Compute its numbers for each member.
+
+        members: As lw.Ensemble.select gives them, for a Quantity that looks at them; by default the result's own parameters
+            and first samples.
+        Returns: float64 array, shape (n, m).
+        """
+        if isinstance(self.of, Functional):
+            numbers = self.of(*samples_of(result, slice(None) if self.over_path else slice(-1, None), members))
+            return numbers if self.over_path else numbers[-1]
+        faults = Faults()
+        try:
+            numbers = real_results(self.of(result)).astype(np.float64)
+        except NotReal as error:
+            faults.add(self.label, "...", error.what, "return an array of real numbers")
+        faults.raise_if_any()
+        if numbers.ndim not in (1, 2) or len(numbers) != result.members:
+            remedy = f"return an array of shape ({result.members},) or ({result.members}, m)"
+            faults.add(self.label, "...", f"gave an array of shape {numbers.shape}", remedy)
+            faults.raise_if_any()
+        return numbers.reshape(result.members, -1)
+
+    def labels(self, count: int) -> list[str]:
+        """Name each of its numbers."""
+        if isinstance(self.of, Functional):
+            return list(self.of.labels)
+        return [self.label] if count == 1 else [f"{self.label}[{i}]" for i in range(count)]
+
+
+@dataclass(frozen=True)
+class OfEnds(OfResult):
+    """How or when members ended, or a quantity there or at a time.
+
+    "outcome floor" is 1 for members that ended so, else 0; "end_time floor" says when, and "depth at floor" gives the depth
+    there, NaN for members that ended otherwise; "depth at 30" is the depth after 30 s.
+
+    Attributes:
+        kind: "outcome", "end_time" or "at".
+        outcome: Name of the outcome; "" for a time.
+        when: The time [s].
+    """
+
+    kind: str = "at"
+    outcome: str = ""
+    when: float | None = None
+
+    @property
+    def fields(self) -> tuple[str, ...]:
+        """Names of the samples it needs."""
+        return super().fields if self.kind == "at" else ("position",)
+
+    @property
+    def unit(self) -> str:
+        """Its unit."""
+        return {"outcome": "1", "end_time": "s"}.get(self.kind, super().unit)
+
+    def gathered(self, events: Sequence[Event]) -> dict[str, Statistic]:
+        """What a run must gather, where several events have the status of this one, which then does not tell them apart."""
+        if not self.outcome:
+            return {}
+        check_outcomes(
+            "of", [self.outcome], outcomes([event.key for event in events], [event.status for event in events])
+        )
+        named = {event.key: event.status for event in events}.get(self.outcome)
+        alone = named is None or sum(event.status == named for event in events) == 1
+        return {} if alone else {f"each end_time {self.outcome}": EndTime(self.outcome, then=Each())}
+
+    def values(self, result: Result, members: Any = None) -> np.ndarray:
+        """Compute its numbers for each member.
+
+        Returns: float64 array, shape (n, m).
+        """
+        if self.when is not None:
+            rows = np.flatnonzero(np.abs(result.time - self.when) <= 1e-9 * max(1.0, result.time[-1]))
+            if not len(rows):
+                raise refusal("of", self.label, "names no sample time", "keep one there: save=lw.SaveAt(at=[...])")
+            return self._numbers(result, slice(rows[0], rows[0] + 1), members)
+        so = self._so(result)
+        if self.kind == "outcome":
+            return so[:, None].astype(np.float64)
+        numbers = (
+            result.end_time[:, None] if self.kind == "end_time" else self._numbers(result, slice(-1, None), members)
+        )
+        return np.where(so[:, None], numbers, np.nan)
+
+    def _so(self, result: Result) -> np.ndarray:
+        """Which members ended so, (n,)."""
+        events = events_of(result.provenance["scene"].get("events", ()))
+        status, named = np.asarray(result.status), {event.key: event.status for event in events}
+        for name in self.gathered(events):
+            if name in result.statistics:
+                return ~np.isnan(result.statistics[name].value[0, 0])
+            problem = f"is one of several events of the status {named[self.outcome].name.lower()}"
+            raise refusal("of", self.label, problem, "gather lw.Outcome, or ask lw.uq or lw.prepare for it")
+        if self.outcome in named:
+            return np.asarray(status == named[self.outcome])
+        return Ends(status, np.zeros_like(status), result.end_time).are(self.outcome)
+
+    def _numbers(self, result: Result, when: slice, members: Any) -> np.ndarray:
+        """The quantity at one sample time, (n, m)."""
+        assert isinstance(self.of, Functional)
+        return self.of(*samples_of(result, when, members))[0]
+
+    def labels(self, count: int) -> list[str]:
+        """Name each of its numbers."""
+        if self.kind != "at":
+            return [self.label]
+        end = self.label.partition(" at ")[2]
+        return [f"{label} at {end}" for label in super().labels(count)]
+
+
+def _of_ends(text: str) -> OfEnds | None:
+    """The quantity that a text names by an outcome or a time; None where it names neither. Raises SceneError."""
+    kind, _, outcome = text.partition(" ")
+    if kind in ("outcome", "end_time") and outcome.strip():
+        return OfEnds(text, functional("of", "position"), kind=kind, outcome=outcome.strip())
+    name, _, end = (part.strip() for part in text.partition(" at "))
+    if not end:
+        return None
+    function = functional("of", name)
+    if function.over_path:
+        raise refusal("of", text, "looks over the path, which has no time", f"give {name!r} alone")
+    label = f"{function.label} at {end}"
+    try:
+        when = float(end)
+    except ValueError:
+        return OfEnds(label, function, outcome=end)
+    if not 0.0 <= when < np.inf:
+        raise refusal("of", text, "is at no time of a run", "give a time from 0 [s]")
+    return OfEnds(label, function, when=when)
+
+
+class _Samples(dict[str, np.ndarray]):
+    """Samples of a result in the form that functions of (samples, members) take."""
+
+    def __init__(self, fields: Mapping[str, np.ndarray], time: np.ndarray, terms: Sequence[Any]):
+        super().__init__(fields)
+        self.time, self.terms = time, terms
+
+
+def samples_of(result: Result, when: slice = slice(None), members: Any = None) -> tuple[Any, Any]:
+    """Give the samples and members of a result in the form that a Quantity's function takes.
+
+    Returns: The pair (samples, members).
+    """
+    fields = {name: result.samples[name][when] for name in SAVED if name in result.samples}
+    start = {name: result.samples[name][0] for name in fields}
+    known = SimpleNamespace(parameters=result.parameters, count=result.members, **start)
+    return _Samples(fields, result.time[when], result.terms), known if members is None else members
+
+
+def quantities(of: OfInterest | Sequence[OfInterest]) -> tuple[OfResult, ...]:
+    """Read one or several quantities of interest.
+
+    of: A text such as "max(depth)", "outcome floor", "end_time floor" or "depth at 30", a Quantity, a function of a Result or
+        of (samples, members), or several of these.
+    """
+    requests = list(of) if isinstance(of, list | tuple) else [of]
+    faults = Faults()
+    results: list[OfResult] = []
+    for request in requests:
+        if callable(request) and not isinstance(request, Quantity) and not _of_samples(request):
+            results.append(OfResult(getattr(request, "__name__", type(request).__name__), request))
+        elif isinstance(request, str | Quantity) or callable(request):
+            with faults.including():
+                if isinstance(request, str) and (of_ends := _of_ends(request)) is not None:
+                    results.append(of_ends)
+                    continue
+                function = functional("of", request)
+                results.append(OfResult(function.label, function, not isinstance(request, str)))
+        else:
+            faults.add("of", request, "is no quantity", REMEDY)
+    if not requests:
+        faults.add("of", of, "names nothing", REMEDY)
+    faults.raise_if_any()
+    return tuple(results)
+
+
+def _of_samples(function: Callable[..., Any]) -> bool:
+    """Whether a function is one of (samples, members), as statistics take them, and not one of a Result."""
+    try:
+        parameters = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):
+        return False
+    wanted = [parameter for parameter in parameters if parameter.default is parameter.empty]
+    return sum(item.kind in (item.POSITIONAL_ONLY, item.POSITIONAL_OR_KEYWORD) for item in wanted) == 2

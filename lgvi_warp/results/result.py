@@ -1,0 +1,401 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The result of a run: samples, status of each member, statistics, and the provenance they follow from."""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common import npy_files, summaries
+from lgvi_warp.common.errors import MissingExtra
+from lgvi_warp.common.phases import Phases
+from lgvi_warp.common.reading import understood
+from lgvi_warp.common.status import Status, StatusArray, WarningArray
+from lgvi_warp.common.summaries import Summarized
+from lgvi_warp.control.controller import terms_of
+from lgvi_warp.control.signals import IN_FILES, SIGNALS
+from lgvi_warp.physics import energy as invariants
+from lgvi_warp.physics import notation
+from lgvi_warp.physics.fields import FIELDS, TABLE, dims_of
+from lgvi_warp.physics.terms.base import Term
+from lgvi_warp.results import member_fields, result_file
+from lgvi_warp.statistics.estimates.estimate import Estimates
+from lgvi_warp.statistics.values.quantity import KNOWN
+
+if TYPE_CHECKING:
+    import xarray
+
+    from lgvi_warp.scene.ensemble import Ensemble
+
+TIME = {"units": "s", "long_name": "time since the start"}
+END_TIME = {"units": "s", "long_name": "time of the event or of the failure of a member, or the end of the run"}
+
+
+# Most members in the picture of a notebook.
+PICTURED = 20
+
+
+class _Signal:
+    """A signal of the controller as an attribute of a result."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, result: Any, owner: type | None = None) -> Any:
+        return self if result is None else result._kept(self._name)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Result(Summarized):
+    """Samples of n members at k times, the status of each member, and the provenance they follow from.
+
+    Sample 0 is the initial state. Samples are float64 or float32, as the run's dtype. With float32_compensated everything is
+    float32 except position, which is float64 so that no digit of the compensated sum is lost.
+
+    Attributes:
+        time: Times of the samples [s], shape (k,).
+        samples: Arrays of the fields that were kept, by name. Each is also an attribute: position (k, n, 3) [m, inertial],
+            attitude (k, n, 3, 3) body to inertial, velocity (k, n, 3) [m/s, body], angular_velocity (k, n, 3) [rad/s, body].
+            Signals of a controller, where SaveAt(fields=...) names them, are those after the look at each time: command and
+            actuator (k, n, channels), where the latter is after delay, fault, limit and lag; demand and unmet (k, n, 6) [N,
+            N m]; measured_position, _attitude, _velocity, _water_velocity, _angular_velocity, _depth, _heading;
+            reference_position, _attitude, _velocity (inertial), _angular_velocity, _depth, _heading, _speed.
+        status: Status of each member, shape (n,). A member that an event stopped stays at its state from then on.
+        failure_time: Time of each member's last good state, or of the event that stopped it [s], shape (n,); NaN where there
+            was neither.
+        failure_value: The value that crossed its limit, shape (n,): |J^-1 a| or the relative residual (psi_x: half the angle
+            of its turns); 0 for a non-finite state and for an event, NaN without.
+        warnings: Bits of Warnings, shape (n,). Motion is checked every 128 steps and at the end, with checks="all" only.
+        warning_time: When each member's most serious warning was first seen [s], shape (n,); 0 for one that follows from its
+            start, NaN without.
+        warning_value: The value at that time, shape (n,); NaN without.
+        substeps: Number of steps that were divided (on_failure="substep"), shape (n,).
+        parameters: Parameters of the members by name, each with a leading dimension of 1 or n.
+        messages: What the user should know.
+        provenance: Scene, ensemble with its seed, settings, versions and machine.
+        terms: The scene's terms.
+        statistics: Estimates of the statistics gathered during the run, by name.
+        kept: Samples of the members in kept_members, where not those of all members were kept; else None.
+        kept_members: Indices of these members, shape (m,).
+        store: Folder from which samples and parameters are read each time they are used; None for a result in memory.
+        compile_seconds: Time to load the kernel [s].
+        compile_phases: Of this, `source` to write its C++, `clang` to compile it (0 where the cache had it), `load` [s].
+        run_seconds: Time of the run without that [s].
+    """
+
+    time: np.ndarray
+    samples: Mapping[str, np.ndarray]
+    status: StatusArray
+    failure_time: np.ndarray
+    failure_value: np.ndarray
+    warnings: WarningArray
+    warning_time: np.ndarray
+    warning_value: np.ndarray
+    substeps: np.ndarray
+    parameters: Mapping[str, np.ndarray]
+    messages: tuple[str, ...]
+    provenance: dict[str, Any]
+    terms: tuple[Term, ...] = ()
+    statistics: Estimates = field(default_factory=Estimates)
+    kept: Result | None = None
+    kept_members: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+    store: Path | None = None
+    compile_seconds: float = field(default=0.0, compare=False)
+    compile_phases: Phases = field(default=Phases(), compare=False)
+    run_seconds: float = field(default=0.0, compare=False)
+
+    def summary_rows(self) -> tuple[str, summaries.Rows]:
+        """Outcomes, settings, fields with their units, statistics and messages."""
+        how, fields = self.provenance, TABLE | {name: signal.field for name, signal in SIGNALS.items()}
+        units = (f"{name} [{fields[name].unit}]" if fields[name].unit != "1" else name for name in self.samples)
+        method = (
+            f"{how['method']['name']}, {how['dtype']}, step {how['step']:g} s, {how['steps']:,} steps" if how else ""
+        )
+        rows = [
+            ("outcomes", summaries.counted(self.status.counts())),
+            ("warnings", summaries.counted(self.warnings.counts())),
+            ("method", method),
+            ("samples", summaries.listed(units)),
+            ("kept", f"samples of {self.kept.members:,} members" if self.kept is not None else ""),
+            ("statistics", summaries.listed(self.statistics)),
+            ("store", str(self.store or "")),
+            *(("message", text) for text in self.messages),
+        ]
+        title = (
+            f"Result of {self.members:,} members at {len(self.time):,} times, {self.time[0]:g} to {self.time[-1]:g} s"
+        )
+        return title, [row for row in rows if row[1]]
+
+    def summary_picture(self) -> str:
+        """Depths of a few members over time; of a run in memory alone, since a store may be slow."""
+        drawn = self if self.samples and self.store is None else self.kept
+        if drawn is None or "position" not in drawn.samples:
+            return ""
+        chosen = np.unique(np.linspace(0, drawn.members - 1, min(drawn.members, PICTURED)).astype(int))
+        few = "" if len(chosen) == self.members else f" of {len(chosen)} of {self.members:,} members"
+        label = f"depth [m], down, over {drawn.time[0]:g} to {drawn.time[-1]:g} s{few}; dashed: did not end ok"
+        return summaries.curves(
+            drawn.time, drawn.depth[:, chosen], np.asarray(drawn.status)[chosen] != Status.OK, label
+        )
+
+    def _kept(self, name: str) -> np.ndarray:
+        if not self.samples:
+            remedy = "give keep='all', or indices of members, which are result.kept then"
+            raise AttributeError(f"{name} was not kept: {remedy}")
+        if name not in self.samples:
+            raise AttributeError(f"{name} was not kept: add {name!r} to SaveAt(fields=...)")
+        return self.samples[name]
+
+    @property
+    def position(self) -> np.ndarray:
+        """Positions in inertial axes (north, east, down) [m], shape (k, n, 3)."""
+        return self._kept("position")
+
+    @property
+    def attitude(self) -> np.ndarray:
+        """Rotations from body to inertial axes, shape (k, n, 3, 3)."""
+        return self._kept("attitude")
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Velocities in body axes [m/s], shape (k, n, 3)."""
+        return self._kept("velocity")
+
+    @property
+    def angular_velocity(self) -> np.ndarray:
+        """Angular velocities in body axes [rad/s], shape (k, n, 3)."""
+        return self._kept("angular_velocity")
+
+    command, actuator, demand, unmet = _Signal(), _Signal(), _Signal(), _Signal()
+    measured_position, measured_attitude, measured_velocity = _Signal(), _Signal(), _Signal()
+    measured_water_velocity, measured_angular_velocity = _Signal(), _Signal()
+    measured_depth, measured_heading = _Signal(), _Signal()
+    reference_position, reference_attitude, reference_velocity = _Signal(), _Signal(), _Signal()
+    reference_angular_velocity, reference_depth = _Signal(), _Signal()
+    reference_heading, reference_speed, reference_angular_acceleration = _Signal(), _Signal(), _Signal()
+
+    @functools.cached_property
+    def quaternion_wxyz(self) -> np.ndarray:
+        """Unit quaternions of the attitudes, scalar first and not negative, shape (k, n, 4)."""
+        return notation.quaternion_from_matrix(self.attitude).astype(self.attitude.dtype)
+
+    def _quantity(self, name: str) -> np.ndarray:
+        """A quantity that statistics know, float64, of the samples that it needs."""
+        quantity = KNOWN[name]
+        samples: Any = {field: self._kept(field) for field in quantity.fields}
+        return np.asarray(quantity.function(samples, None), dtype=np.float64)  # type: ignore[arg-type]
+
+    @property
+    def depth(self) -> np.ndarray:
+        """Depth of the body's origin below the surface [m], float64, shape (k, n)."""
+        return self._quantity("depth")
+
+    @property
+    def speed(self) -> np.ndarray:
+        """Length of the velocity [m/s], float64, shape (k, n)."""
+        return self._quantity("speed")
+
+    @property
+    def euler(self) -> np.ndarray:
+        """Roll, pitch and yaw, R = Rz(yaw) Ry(pitch) Rx(roll) [rad], float64, shape (k, n, 3)."""
+        return self._quantity("euler")
+
+    @functools.cached_property
+    def energy(self) -> np.ndarray:
+        """Kinetic and potential energy [J], float64, shape (k, n)."""
+        return invariants.energy(self)
+
+    @property
+    def end_time(self) -> np.ndarray:
+        """Time up to which each member ran [s], shape (n,): its event, its failure, or the end of the run.
+
+        With `status` these are the event times and event types of survival analysis.
+        """
+        return np.where(np.isnan(self.failure_time), self.time[-1], self.failure_time)
+
+    def own(self, term: Term) -> dict[str, np.ndarray]:
+        """Select the parameters of a term.
+
+        Args:
+            term: A term of the scene.
+
+        Returns:
+            Arrays by field of the term, each with a leading dimension of 1 or n.
+        """
+        return {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
+
+    def part(self, places: np.ndarray) -> Result:
+        """Select members, in the order given.
+
+        Args:
+            places: Indices of the members in this result, shape (m,).
+
+        Returns:
+            A result of these members alone; statistics stay those of the whole run.
+        """
+        parameters = {name: values[places] if len(values) > 1 else values for name, values in self.parameters.items()}
+        samples = {name: values[:, places] for name, values in self.samples.items()}
+        of_members = {item.name: getattr(self, item.name)[places] for item in member_fields.EVERY}
+        return replace(self, samples=samples, parameters=parameters, **of_members)
+
+    @property
+    def members(self) -> int:
+        """Number of members in the result, n."""
+        return len(self.status)
+
+    @functools.cached_property
+    def dataset(self) -> xarray.Dataset:
+        """The samples as an xarray Dataset with dimensions time, realization, component (needs the extra `store`).
+
+        For a run in a store it is a view: values are read when they are used, and energy is left out.
+
+        Raises:
+            ImportError: If xarray is not installed.
+        """
+        try:
+            import xarray as xr
+        except ImportError as error:
+            raise MissingExtra("datasets", "xarray", "store") from error
+        if self.store is not None:
+            stored: Any = self.samples
+            return stored.dataset(self.store)
+        names = [*self.samples] + ["energy"] * (self.samples.keys() >= set(FIELDS))
+        fields = TABLE | {name: signal.field for name, signal in SIGNALS.items()}
+        data = {}
+        for name in names:
+            values = getattr(self, name)
+            data[name] = (("time", "realization", *dims_of(name, values.shape[2:])), values, fields[name].attributes)
+        for item in member_fields.EVERY:
+            data[item.name] = (("realization",), np.asarray(getattr(self, item.name)), item.attributes)
+        data["end_time"] = (("realization",), self.end_time, END_TIME)
+        coordinates = {"time": ("time", self.time, TIME)}
+        attributes = {"Conventions": "CF-1.11", "provenance": json.dumps(self.provenance)}
+        return xr.Dataset(data, coordinates, attributes)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the result to an .npz file, durable, and either whole or not at all.
+
+        Where no samples were kept, parameters are left out too: they follow from the provenance's ensemble.
+
+        Args:
+            path: The file; one that exists is replaced.
+
+        Returns:
+            The path.
+
+        Raises:
+            OSError: If the file cannot be written.
+        """
+        arrays = {"time": self.time, **self.samples}
+        arrays |= {item.name: np.asarray(getattr(self, item.name)) for item in member_fields.EVERY}
+        if self.samples:
+            arrays |= {f"parameters/{name}": value for name, value in self.parameters.items()}
+        texts = {"messages": json.dumps(self.messages), "provenance": json.dumps(self.provenance)}
+        if self.statistics:
+            estimates, texts["statistics"] = self.statistics.to_arrays()
+            arrays |= {f"statistics/{name}": value for name, value in estimates.items()}
+        if self.kept is not None:
+            arrays |= {f"kept/{name}": value for name, value in self.kept.samples.items()}
+            arrays |= {"kept/members": self.kept_members}
+            arrays |= {f"kept/parameters/{name}": value for name, value in self.kept.parameters.items()}
+        return npy_files.write_npz(path, arrays | texts)
+
+    @classmethod
+    def per_member(cls, arrays: Mapping[str, np.ndarray]) -> dict[str, Any]:
+        """Select from arrays those that are arguments of a result, one number for each member.
+
+        Args:
+            arrays: Arrays of shape (n,), by name, status and warnings among them.
+
+        Returns:
+            Arguments of Result, by name.
+        """
+        values: dict[str, Any] = {item.name: arrays[item.name] for item in member_fields.EVERY if item.name in arrays}
+        status, warnings = values["status"].view(StatusArray), values["warnings"].view(WarningArray)
+        return values | {"status": status, "warnings": warnings}
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Result:
+        """Read a file that `save` wrote, also one from elsewhere: nothing in it is executed.
+
+        Reading takes no more memory than the size of the file.
+
+        Args:
+            path: The .npz file.
+
+        Returns:
+            The result, in memory.
+
+        Raises:
+            OSError: If the file cannot be read.
+            SceneError: If it is damaged, or no result (SceneError is a ValueError).
+        """
+        with understood(path, "no result of lgvi-warp", "run the scene again, or ask for the file anew"):
+            content = npy_files.of_npz(path)
+            return cls._from(content, result_file.checked(content))
+
+    @classmethod
+    def _from(cls, content: Mapping[str, np.ndarray], texts: Mapping[str, Any]) -> Result:
+        """A result from arrays and texts that were checked."""
+        estimates = Estimates()
+        if "statistics" in content:
+            estimates = Estimates.from_arrays(_below("statistics/", content), str(content["statistics"]))
+        provenance = texts["provenance"]
+        result = cls(
+            time=content["time"],
+            samples={name: content[name] for name in content if name in IN_FILES},
+            **cls.per_member(content),
+            parameters=_below("parameters/", content),
+            messages=tuple(texts["messages"]),
+            provenance=provenance,
+            terms=terms_of(provenance["scene"]),
+            statistics=estimates,
+        )
+        kept = _below("kept/", content)
+        if not kept:
+            return result
+        members = kept["members"]
+        few = replace(result.part(members), parameters=_below("parameters/", kept), statistics=Estimates())
+        few = replace(few, samples={name: kept[name] for name in kept if name in IN_FILES})
+        return replace(result, kept=few, kept_members=members)
+
+
+def _below(prefix: str, content: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The arrays whose names begin with a prefix, under their names without it."""
+    return {name.removeprefix(prefix): value for name, value in content.items() if name.startswith(prefix)}
+
+
+class Drawn(Mapping[str, np.ndarray]):
+    """Parameters of members of an ensemble that follow each other, drawn when they are first read.
+
+    Before that they take no memory.
+
+    Args:
+        ensemble: The ensemble.
+        stop: Index after the last member.
+        first: Index of the first member; default 0.
+    """
+
+    def __init__(self, ensemble: Ensemble, stop: int, first: int = 0):
+        self._ensemble, self._first, self._stop = ensemble, first, stop
+
+    @functools.cached_property
+    def _drawn(self) -> dict[str, np.ndarray]:
+        parameters = self._ensemble.parameters(self._first, self._stop)
+        return {name: values.copy() for name, values in parameters.items()}
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self._drawn[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._drawn)
+
+    def __len__(self) -> int:
+        return len(self._drawn)

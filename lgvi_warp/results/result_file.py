@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checks of the arrays in a result.npz, so that a damaged or foreign file is rejected with one clear line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.safe_files import parsed
+from lgvi_warp.control.signals import IN_FILES, has_shape
+from lgvi_warp.results import member_fields
+
+TEXTS = ("messages", "provenance", "statistics")
+
+
+def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """Check that the arrays of a result fit each other, and read its texts."""
+    if missing := [name for name in ("time", "status", *TEXTS[:2]) if name not in content]:
+        raise ValueError(f"it has no {', '.join(missing)}")
+    of_members = {item.name: np.dtype(item.dtype) for item in member_fields.FIELDS}
+    k, n = content["time"].size, content["status"].size
+    m = content["kept/members"].size if "kept/members" in content else 0
+    for name, array in content.items():
+        base = name.removeprefix("kept/")
+        if base in IN_FILES:
+            good = array.shape[:2] == (k, n if base == name else m) and array.dtype.kind == "f"
+            good = good and has_shape(base, array.shape[2:])
+        elif name in TEXTS:
+            good = array.dtype.kind == "U" and array.shape == ()
+        elif name == "time":
+            good = array.shape == (k,) and array.dtype == np.float64
+        elif name in of_members:
+            good = array.shape == (n,) and array.dtype == of_members[name]
+        elif name == "kept/members":
+            good = array.shape == (m,) and array.dtype.kind == "i" and (not m or 0 <= array.min() <= array.max() < n)
+        elif name.startswith(("parameters/", "kept/parameters/")):
+            lengths = (1, m if name.startswith("kept/") else n)
+            good = array.dtype.kind == "f" and array.ndim > 0 and len(array) in lengths
+        else:
+            good = name.startswith("statistics/") and array.dtype.kind in "biufU"
+        if not good:
+            raise ValueError(f"{name[:100]!r} has the type {array.dtype} and shape {array.shape}")
+    texts = {name: parsed(str(content[name])) for name in TEXTS[:2]}
+    if not isinstance(texts["messages"], list) or not all(isinstance(item, str) for item in texts["messages"]):
+        raise ValueError("its messages are no texts")
+    _provenance(texts["provenance"])
+    return texts
+
+
+def _provenance(told: Any) -> None:
+    """Check what the summary and the pictures read of the provenance. Raises ValueError."""
+    good = isinstance(told, dict) and isinstance(told.get("scene"), dict) and isinstance(told.get("method"), dict)
+    if not good or not isinstance(told["method"].get("name"), str) or not isinstance(told.get("step"), int | float):
+        raise ValueError("its provenance tells no scene, method or step")

@@ -1,0 +1,332 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Metrics of what a controller does, of how long members last, and the user's own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.arguments import listed
+from lgvi_warp.common.errors import Faults, among, closest, refusal
+from lgvi_warp.common.identity import check_version
+from lgvi_warp.common.real_numbers import NotReal, real_results
+from lgvi_warp.control.signals import CHANNELS, SAVED, SIGNALS, ordered
+from lgvi_warp.physics.fields import TABLE
+from lgvi_warp.statistics.metrics.tracking_metrics import Looks, Metric, State, accumulated
+from lgvi_warp.statistics.values.quantity import Quantity, named
+
+if TYPE_CHECKING:
+    from lgvi_warp.sampling.members import Members
+    from lgvi_warp.statistics.values.samples import Fields
+
+# A command counts as at its limit from this part of it on: numbers of float32 are as close as that.
+AT_LIMIT = 1.0 - 1e-6
+
+
+class _AllOf(Quantity):
+    """Numbers of the samples side by side, as many as the scene has: (k, d, n) with d not known before the run."""
+
+    def __call__(self, samples: Fields, members: Members) -> np.ndarray:
+        """Return the numbers of all fields, (k, d, n)."""
+        k, n = len(samples.time), members.count
+        columns = [np.moveaxis(samples[name].reshape(k, n, -1), 2, 1) for name in self.fields]
+        return np.concatenate(columns, axis=1, dtype=np.float64)
+
+
+def all_of(*names: str) -> Quantity:
+    """Return all numbers of some samples as a quantity."""
+    return _AllOf(
+        ", ".join(names), _nothing, SIGNALS[names[0]].field.unit if names[0] in SIGNALS else "", ordered(names)
+    )
+
+
+def _nothing(samples: Fields, members: Members) -> np.ndarray:
+    """What numbers are made of that need no samples."""
+    return np.zeros((len(samples.time), members.count))
+
+
+@dataclass(frozen=True, eq=False)
+class OfChannels(Metric):
+    """A metric of all channels of a signal, or of one. Abstract.
+
+    Args:
+        of: "command" or "actuator", for the sum over all channels, whatever their units; or one of them, "command[2]".
+    """
+
+    def meant(self) -> Quantity:
+        """Return the channels."""
+        if among(self.of, CHANNELS):
+            return _ALL[self.of]
+        names = [*CHANNELS, *(f"{name}[0]" for name in CHANNELS)]
+        if not isinstance(self.of, str) or self.of.split("[")[0] not in CHANNELS:
+            raise refusal(f"{self.type}.of", self.of, "is no signal of actuators", closest(str(self.of), names))
+        return named(f"{self.type}.of", self.of, self.of)
+
+    def begin(self, x: np.ndarray) -> State:
+        """Return a sum of 0."""
+        return {"sum": np.zeros(x.shape[1])}
+
+    def finish(self, state: State) -> np.ndarray:
+        """Return the sum."""
+        return state["sum"]
+
+
+_ALL = {name: all_of(name) for name in CHANNELS}
+
+
+@dataclass(frozen=True, eq=False)
+class Effort(OfChannels):
+    """The integral over time of |command|, summed over channels [unit of the commands, s]; then statistics of it.
+
+    A command counts from its look to the next one: exact, since it is held between them. Faults are in it, delays are not.
+
+    Args:
+        of: "command" (the default), "actuator", or one channel, "command[2]".
+        then: see `Metric`.
+    """
+
+    type: ClassVar[str] = "effort"
+    form: ClassVar[str] = "{0} s"
+    default: ClassVar[str | None] = "command"
+
+    def follow(self, state: State, looks: Looks) -> State:
+        size = np.abs(looks.before).sum(axis=1) * looks.dt[:, None]
+        return {"sum": accumulated(state["sum"], looks, size)}
+
+
+@dataclass(frozen=True, eq=False)
+class Travel(OfChannels):
+    """How far the actuators move, |change| from look to look summed over channels [unit of the commands]; then statistics.
+
+    Args:
+        of: "actuator" (the default: where they are, after delay, fault, limit and lag), "command", or one channel.
+        then: see `Metric`.
+    """
+
+    type: ClassVar[str] = "travel"
+    default: ClassVar[str | None] = "actuator"
+
+    def follow(self, state: State, looks: Looks) -> State:
+        return {"sum": accumulated(state["sum"], looks, np.abs(looks.x - looks.before).sum(axis=1))}
+
+
+def _saturated(samples: Fields, members: Members) -> np.ndarray:
+    """Whether some command is at its limit or beyond, (k, n)."""
+    at_limit = np.zeros((len(samples.time), members.count), bool)
+    for key, (row, count) in samples.controller.bus.commands.items():
+        limit = members.parameters.get(f"{key}.limit")
+        if limit is not None:
+            at_limit |= (np.abs(samples["command"][..., row : row + count]) >= AT_LIMIT * limit).any(axis=-1)
+    return at_limit
+
+
+@dataclass(frozen=True, eq=False)
+class SaturationShare(OfChannels):
+    """The share of each member's time under way in which some command is at its limit or beyond [1]; then statistics of it.
+
+    Limits are those of the terms that take the commands, `limit`; one without a limit never saturates.
+
+    Args:
+        of: "command", the default.
+        then: see `Metric`.
+    """
+
+    type: ClassVar[str] = "saturation_share"
+    form: ClassVar[str] = "1"
+    default: ClassVar[str | None] = "command"
+
+    def meant(self) -> Quantity:
+        """Return whether some command is at its limit."""
+        if not among(self.of, ("command",)):
+            raise refusal("saturation_share.of", self.of, "is not the command", "leave it out")
+        return _SATURATED
+
+    def follow(self, state: State, looks: Looks) -> State:
+        return {"sum": accumulated(state["sum"], looks, looks.before[:, 0] * looks.dt[:, None])}
+
+    def finish(self, state: State) -> np.ndarray:
+        return state["sum"] / state["until"]
+
+
+_SATURATED = Quantity("command", _saturated, "1", ("command",))
+
+
+def _power(samples: Fields, members: Members) -> np.ndarray:
+    """Size of the power (k, n) [W] of what the commands deliver of the demand, at the vehicle's motion over ground."""
+    w = samples["demand"].astype(np.float64, copy=False) - samples["unmet"]
+    parts = (
+        w[..., i] * samples[name][..., i % 3] for i, name in enumerate(["velocity"] * 3 + ["angular_velocity"] * 3)
+    )
+    return np.abs(sum(parts))
+
+
+@dataclass(frozen=True, eq=False)
+class Energy(OfChannels):
+    """The integral over time of |power| that the delivered wrench gives to the motion [J]; then statistics of it.
+
+    The power is (demand - unmet) . (velocity, angular velocity), by the trapezoidal rule between looks: mechanical, without
+    the losses of motors and propellers, which no term tells.
+
+    Args:
+        of: "demand", the default.
+        then: see `Metric`.
+    """
+
+    type: ClassVar[str] = "energy"
+    form: ClassVar[str] = "J"
+    default: ClassVar[str | None] = "demand"
+
+    def meant(self) -> Quantity:
+        """Return the power."""
+        if not among(self.of, ("demand",)):
+            raise refusal("energy.of", self.of, "is not the demand", "leave it out")
+        return _POWER
+
+    def follow(self, state: State, looks: Looks) -> State:
+        mean = 0.5 * (looks.before[:, 0] + looks.x[:, 0])
+        return {"sum": accumulated(state["sum"], looks, mean * looks.dt[:, None])}
+
+
+_POWER = Quantity("demand", _power, "W", ("velocity", "angular_velocity", "demand", "unmet"))
+
+
+@dataclass(frozen=True, eq=False)
+class TimeToFailure(Metric):
+    """When each member failed or an event stopped it [s], infinite for those that went on to the end; then statistics of it.
+
+    Only lw.Each() tells all of it: other statistics leave out what is infinite, and members that failed. lw.Outcome is the
+    probability to have ended by each time.
+
+    Args:
+        of: "end", the default.
+        then: lw.Each(), the default, or other statistics.
+    """
+
+    type: ClassVar[str] = "time_to_failure"
+    form: ClassVar[str] = "s"
+    default: ClassVar[str | None] = "end"
+
+    def then_default(self) -> Sequence[Any]:
+        """Return the number of each member."""
+        from lgvi_warp.statistics.paths.each import Each
+
+        return [Each()]
+
+    def meant(self) -> Quantity:
+        """Return a quantity that needs no samples."""
+        if not among(self.of, ("end",)):
+            raise refusal("time_to_failure.of", self.of, "is not the end", "leave it out")
+        return _END
+
+    def finish(self, state: State) -> np.ndarray:
+        return state["ended"]
+
+
+_END = Quantity("end", _nothing, "s", ())
+
+
+class Look(dict[str, np.ndarray]):
+    """What a metric of the user's own is told of one look: samples (n, ...) by name.
+
+    Attributes:
+        t: time [s].
+        dt: time since the look before [s]; 0 at the first one.
+    """
+
+    def __init__(self, samples: Mapping[str, np.ndarray], t: float, dt: float):
+        super().__init__(samples)
+        self.t, self.dt = t, dt
+
+
+@dataclass(frozen=True, eq=False)
+class OwnMetric(Metric):
+    """A metric of the user's own: a function that sees each look of a block of members in turn; then statistics of it.
+
+    The function is called as function(state, look): `state` is None at the first look, then what the function returned at the
+    look before; `look` has the samples of n members by name, look["position"] (n, 3), and look.t, look.dt [s]. It returns
+    numbers (n,), or (m, n) for m numbers of each member. A member that is no longer under way keeps its last state.
+
+    Args:
+        of: the function; its name is the metric's.
+        then: see `Metric`.
+        fields: names of the samples that the function reads, as for lw.SaveAt.
+        last: function of the last state that returns the metric (n,); by default the state itself.
+        unit_of: unit of the metric, a text; by default "1".
+        version: what tells the functions from others in sweeps and stores, a text or a number, changed whenever they do; by
+            default None: what their code says.
+    """
+
+    type: ClassVar[str] = "own_metric"
+
+    fields: Any = ("position",)
+    last: Callable[[np.ndarray], np.ndarray] | None = None
+    unit_of: str = "1"
+    version: Any = None
+
+    def check(self, faults: Faults) -> None:
+        """Note fields that there are not."""
+        super().check(faults)
+        for name in listed("fields", self.fields, "names of fields"):
+            faults.choice("fields", name, SAVED)
+        check_version(faults, self.version)
+
+    def meant(self) -> Quantity:
+        """Return the samples that the function reads."""
+        if not callable(self.of):
+            remedy = "give a function of (state, look), such as def heel(state, look): ..."
+            raise refusal("own_metric.of", self.of, "is no function", remedy)
+        if not all(isinstance(name, str) and name in SAVED for name in self.fields):
+            raise refusal("own_metric.fields", self.fields, "are no names of samples", closest(str(self.fields), SAVED))
+        label = str(getattr(self.of, "__name__", type(self.of).__name__))
+        return replace(all_of(*self.fields), name=label, labels=(label,), unit=self.unit_of)
+
+    @property
+    def key(self) -> str:
+        """The name of the function."""
+        return self.name or self.quantity.name
+
+    def begin(self, x: np.ndarray) -> State:
+        return {"own": self._asked(None, x, 0.0, 0.0)}
+
+    def follow(self, state: State, looks: Looks) -> State:
+        own = state["own"]
+        for (t, x, alive), dt in zip(looks.rows(looks.x), looks.dt, strict=True):
+            own = np.where(alive, self._asked(own, x, float(t), float(dt)), own)
+        return {"own": own}
+
+    def finish(self, state: State) -> np.ndarray:
+        own = state["own"] if self.last is None else self._real(self.last(state["own"]))
+        if own.shape != state["begun"].shape:
+            wanted = f"({len(state['begun'])},) is wanted, a number for each member"
+            raise ValueError(f"metric {self.key}: ended with shape {own.shape}; {wanted}")
+        return own
+
+    def _asked(self, state: np.ndarray | None, x: np.ndarray, t: float, dt: float) -> np.ndarray:
+        """What the function returns at a look; x: (d, n)."""
+        own = self._real(self.of(state, Look(dict(self._divided(x)), t, dt)))
+        if own.shape[-1:] != x.shape[1:] or (state is not None and own.shape != state.shape):
+            wanted = f"(..., {x.shape[1]})" if state is None else f"{state.shape}"
+            raise ValueError(f"metric {self.key}: gave shape {own.shape}; {wanted} is wanted, members last")
+        return own
+
+    def _real(self, values: Any) -> np.ndarray:
+        try:
+            return np.asarray(real_results(values), np.float64)
+        except NotReal as error:
+            raise ValueError(f"metric {self.key}: {error.what}; real numbers are wanted") from None
+
+    def _divided(self, x: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+        """The samples by name, (n, ...)."""
+        names = self.quantity.fields
+        shapes = {name: (TABLE[name] if name in TABLE else SIGNALS[name].field).shape for name in names}
+        channels = [name for name in names if name in CHANNELS]
+        rest = len(x) - sum(int(np.prod(shapes[name])) for name in names if name not in CHANNELS)
+        shapes |= {name: (rest // len(channels),) for name in channels}
+        first = 0
+        for name in names:
+            size = int(np.prod(shapes[name]))
+            yield name, x[first : first + size].T.reshape(x.shape[1], *shapes[name])
+            first += size

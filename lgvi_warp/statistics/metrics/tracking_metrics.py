@@ -1,0 +1,668 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Metrics of a control loop: one number of each member, gathered look by look; definitions are those of control theory.
+
+A look is a sample at a controller's period. With looks at t_0 = 0, t_1, ... a member counts from the first look to the last
+one at which it was still under way: a member that stops or fails has the numbers of its time under way. y is the actual
+number, r what is wanted at each look, e = r - y.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.arguments import flag
+from lgvi_warp.common.errors import Faults, among
+from lgvi_warp.common.status import failed
+from lgvi_warp.control.controller import Controller
+from lgvi_warp.statistics.base import Gatherer, Statistic
+from lgvi_warp.statistics.ends import Ends
+from lgvi_warp.statistics.estimates.tree import Part
+from lgvi_warp.statistics.paths.each import Each
+from lgvi_warp.statistics.paths.member_statistic import Then
+from lgvi_warp.statistics.values import tracking
+from lgvi_warp.statistics.values.quantity import Quantity
+from lgvi_warp.statistics.values.values import Values
+
+State = dict[str, np.ndarray]
+
+# Times that differ by less than this part of the run are the same.
+ROUND_OFF = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Looks:
+    """Some looks in turn at n members, of d numbers, with the look before each.
+
+    Args:
+        t: their times (k,) [s].
+        dt: times since the look before each (k,) [s].
+        start: numbers at the look before the first of them (d, n).
+        x: numbers (k, d, n).
+        alive: which members were still under way (k, n); None if all were.
+    """
+
+    t: np.ndarray
+    dt: np.ndarray
+    start: np.ndarray
+    x: np.ndarray
+    alive: np.ndarray | None
+
+    @functools.cached_property
+    def before(self) -> np.ndarray:
+        """Numbers at the look before each, (k, d, n)."""
+        return np.concatenate([self.start[None], self.x[:-1]])
+
+    def rows(self, *arrays: np.ndarray) -> Iterator[tuple[Any, ...]]:
+        """Yield for each look its time, its numbers in these arrays, and which members were under way.
+
+        Args:
+            *arrays: (k, ...).
+        """
+        everyone: Any = [True] * len(self.t) if self.alive is None else self.alive
+        yield from zip(self.t, *arrays, everyone, strict=True)
+
+    def of_living(self, values: np.ndarray, otherwise: float) -> np.ndarray:
+        """Return values, with another number where a member was no longer under way.
+
+        Args:
+            values: (k, n).
+            otherwise: that number.
+        """
+        return values if self.alive is None else np.where(self.alive, values, otherwise)
+
+
+class _Follow(Gatherer):
+    """Follows a block's members from look to look."""
+
+    def __init__(self, metric: Metric, time: np.ndarray):
+        self._metric, self._time = metric, time
+        self._state: State = {}
+        self._last: np.ndarray | None = None
+        self._place = (0, 0, 0, 1)
+
+    def take(self, values: Values, when: slice) -> None:
+        """Take in these looks."""
+        R = values.replicates
+        k, d, n = len(values.x) // R, *values.x.shape[1:]
+        # Members of the replicates one after the other.
+        x = values.x if R == 1 else np.swapaxes(values.x.reshape(k, R, d, n), 1, 2).reshape(k, d, R * n)
+        alive = None if values.good is None else values.good.reshape(k, R * n)
+        t, first = self._time[when], 0
+        if self._last is None:
+            begun = np.ones(R * n, bool) if alive is None else alive[0]
+            self._state = {
+                "begun": begun,
+                "until": np.full(R * n, t[0]),
+                "end": self._time[-1],
+                **self._metric.begin(x[0]),
+            }
+            self._last, first = x[0], 1
+        if k > first:
+            step = np.diff(self._time[max(when.start - 1, 0) : when.stop])
+            looks = Looks(t[first:], step, self._last, x[first:], None if alive is None else alive[first:])
+            self._state |= self._metric.follow(self._state, looks)
+            self._state["until"] = np.maximum(self._state["until"], looks.of_living(looks.t[:, None], 0.0).max(axis=0))
+        self._last = x[-1].copy()
+        self._place = (values.first, values.block, values.size, R)
+
+    def end(self, ends: Ends, replicates: int) -> None:
+        """Note how the members ended."""
+
+        def in_order(values: np.ndarray) -> np.ndarray:
+            return values.reshape(-1, replicates).T.ravel()
+
+        self._state["ended"] = in_order(np.where(ends.status != 0, ends.time, np.inf))
+        self._state["failed"] = in_order(failed(ends.status))
+
+    def close(self) -> Part:
+        """Return the parts of all statistics of the members' numbers."""
+        state = self._state
+        with np.errstate(invalid="ignore", divide="ignore"):
+            x = np.where(state["begun"], self._metric.finish(state), np.nan)
+        R = self._place[3]
+        return self._metric.gathered(x.reshape(R, 1, -1), state["failed"].reshape(R, -1), self._place, self._time)
+
+
+@dataclass(frozen=True, eq=False)
+class Metric(Then):
+    """One number of each member over all looks of a controller, then statistics of it. Abstract.
+
+    It takes the samples at every look, whatever the run keeps; in a scene without a controller, at the times of samples. A
+    member that stops or fails has the number of its time under way, up to its last look. Statistics leave out members that
+    failed, and those whose number is not finite; lw.Each() has all of them.
+
+    Args:
+        of: what is tracked; see the classes derived from it.
+        then: a statistic, or a list, without `of`: lw.Mean() (the default), lw.Quantiles(levels=(0.5, 0.99)), lw.Each().
+        measured: whether the actual number is what sensors measure, in place of the truth; by default False.
+    """
+
+    of_numbers: ClassVar[bool] = False
+    looks: ClassVar[bool] = True
+    # The unit of the number, with {0} for that of what it is of.
+    form: ClassVar[str] = "{0}"
+
+    stopped: str = "left_out"
+    measured: bool = False
+
+    def check(self, faults: Faults) -> None:
+        """Note faults of `then`, and of `stopped`, which is not to be chosen."""
+        super().check(faults)
+        if not among(self.stopped, ("left_out",)):
+            faults.add("stopped", self.stopped, "has no meaning for a metric", "leave it out")
+
+    def begin(self, x: np.ndarray) -> State:
+        """Return the state after the first look.
+
+        Args:
+            x: numbers at the first look (d, n).
+        """
+        return {}
+
+    def follow(self, state: State, looks: Looks) -> State:
+        """Return what changes of the state by some more looks.
+
+        Args:
+            state: the state before them.
+            looks: the looks.
+        """
+        return {}
+
+    def finish(self, state: State) -> np.ndarray:
+        """Return the members' numbers (n,).
+
+        Args:
+            state: the state after the last look, with "until" (n,) [s], the time of each member's last look under way,
+                "ended" (n,) [s], when it stopped or failed, else infinite, "failed" (n,), and "end" [s], that of the run.
+        """
+        raise TypeError(f"{type(self).__name__} is abstract")
+
+    def gathered(self, x: np.ndarray, lost: np.ndarray, place: tuple[int, int, int, int], time: np.ndarray) -> Part:
+        """Return the part of a block: the parts of all statistics of `then`.
+
+        Args:
+            x: the numbers (replicates, 1, members).
+            lost: which members failed (replicates, members).
+            place: first member, block, its size, and number of replicates.
+            time: times of all looks [s].
+        """
+        left = Values(x, ~lost, *place)
+        parts: Part = {}
+        for i, statistic in enumerate(self.then_of(time)):
+            if isinstance(statistic, Each):
+                part = statistic.rows_of(x, place[3])
+            else:
+                gatherer = statistic.open(time[-1:], x.shape[2])
+                gatherer.take(left, slice(0, 1))
+                part = gatherer.close()
+            parts |= {f"{i}/{key}": array for key, array in part.items()}
+        return parts
+
+    def then_of(self, time: np.ndarray) -> tuple[Statistic, ...]:
+        """Return the statistics of `then`, each of this metric's number."""
+        return tuple(replace(statistic, stopped="held") for statistic in super().then_of(time))
+
+    @property
+    def unit(self) -> str:
+        """The unit of the number."""
+        unit = self.quantity.unit
+        return self.form.format(unit) if unit != "1" else self.form.format("").strip() or "1"
+
+    @property
+    def key(self) -> str:
+        """The name of the number: "overshoot depth", or "effort" where what it is of needs no word."""
+        return self.name or (self.type if self.of == self.default else f"{self.type} {self.quantity.name}")
+
+    @property
+    def _labels(self) -> tuple[str, ...]:
+        return (self.key,)
+
+    def open(self, time: np.ndarray, count: int) -> _Follow:
+        """Return the object that follows the members of a block."""
+        return _Follow(self, time)
+
+
+def accumulated(total: np.ndarray, looks: Looks, parts: np.ndarray) -> np.ndarray:
+    """Return a sum with the parts of some looks added in turn, so that its bits do not depend on how many come at once.
+
+    total: the sum so far (n,).
+    parts: what each adds (k, n).
+    """
+    total = total.copy()
+    for addend in looks.of_living(parts, 0.0):
+        total += addend
+    return total
+
+
+@dataclass(frozen=True, eq=False)
+class OfTracking(Metric):
+    """A metric of the error of tracking e = wanted - actual. Abstract.
+
+    Args:
+        of: "depth", "heading" (differences wrapped to within pi), "speed" (ahead through the water, as measured), "north",
+            "east"; or a distance from what is wanted: "position", "attitude" (angle), "cross_track".
+    """
+
+    def meant(self) -> Quantity:
+        """Return the error."""
+        return tracking.error(
+            tracking.check(f"{self.type}.of", self.of, tracking.ERRORS), flag(f"{self.type}.measured", self.measured)
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class OfCourse(Metric):
+    """A metric of the way to a goal. Abstract.
+
+    The goal is the set point of the scene, before any reference model; where other guidance leads, what is wanted at the
+    first look. It is that of the first look throughout. d is the goal less the actual number, s its value at the first look
+    (the step); what is below or beyond is meant in the direction of the step, upward if the step is 0.
+
+    Args:
+        of: "depth", "heading", "speed", "north" or "east".
+    """
+
+    def meant(self) -> Quantity:
+        """Return the number and its goal."""
+        known = tuple(tracking.CHANNELS[False])
+        return tracking.course(tracking.check(f"{self.type}.of", self.of, known), bool(self.measured))
+
+    def begin(self, x: np.ndarray) -> State:
+        """Return goal, step and direction, and the way left at first."""
+        goal = x[1].copy()
+        step = self._difference(goal, x[0])
+        return {"goal": goal, "step": np.abs(step), "sign": np.where(step < 0.0, -1.0, 1.0)}
+
+    def left(self, state: State, looks: Looks) -> np.ndarray:
+        """Return the way left to the goal in the direction of the step, (k, n): below 0 beyond the goal.
+
+        Args:
+            state: the state.
+            looks: the looks.
+        """
+        return state["sign"] * self._difference(state["goal"], looks.x[:, 0])
+
+    def _difference(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return tracking.CHANNELS[False][self.quantity.name].difference(a, b)
+
+
+@dataclass(frozen=True, eq=False)
+class OfStep(OfCourse):
+    """A metric of the way to a goal that may be told as a part of the step. Abstract.
+
+    Args:
+        percent: whether the number is in percent of the step, as python-control's step_info has it; by default False, in the
+            unit of what it is of. NaN where the step is 0.
+    """
+
+    percent: bool = False
+
+    @property
+    def unit(self) -> str:
+        """The unit of the number."""
+        return "%" if self.percent else super().unit
+
+    def told(self, state: State, size: np.ndarray) -> np.ndarray:
+        """Return a size, in percent of the step where that is asked for.
+
+        Args:
+            state: the state.
+            size: (n,).
+        """
+        return np.where(state["step"] > 0.0, 100.0 * size / state["step"], np.nan) if self.percent else size
+
+
+@dataclass(frozen=True, eq=False)
+class Overshoot(OfStep):
+    """How far each member goes beyond its goal at most [unit, or % of the step], 0 if it never does; then statistics of it.
+
+    Args:
+        of: "depth", "heading", "speed", "north" or "east"; see `OfCourse` for goal and step.
+        then: see `Metric`, also for measured.
+        percent: whether in percent of the step; by default False.
+    """
+
+    type: ClassVar[str] = "overshoot"
+
+    def begin(self, x: np.ndarray) -> State:
+        state = super().begin(x)
+        return state | {"least": state["step"]}
+
+    def follow(self, state: State, looks: Looks) -> State:
+        left = looks.of_living(self.left(state, looks), np.inf)
+        return {"least": np.minimum(state["least"], left.min(axis=0))}
+
+    def finish(self, state: State) -> np.ndarray:
+        return self.told(state, np.maximum(0.0, -state["least"]))
+
+
+@dataclass(frozen=True, eq=False)
+class Undershoot(OfStep):
+    """How far each member goes the wrong way from its start at most [unit, or % of the step]; then statistics of it.
+
+    Args:
+        of: "depth", "heading", "speed", "north" or "east"; see `OfCourse` for goal and step.
+        then: see `Metric`, also for measured.
+        percent: whether in percent of the step; by default False.
+    """
+
+    type: ClassVar[str] = "undershoot"
+
+    def begin(self, x: np.ndarray) -> State:
+        state = super().begin(x)
+        return state | {"most": state["step"]}
+
+    def follow(self, state: State, looks: Looks) -> State:
+        left = looks.of_living(self.left(state, looks), -np.inf)
+        return {"most": np.maximum(state["most"], left.max(axis=0))}
+
+    def finish(self, state: State) -> np.ndarray:
+        return self.told(state, state["most"] - state["step"])
+
+
+@dataclass(frozen=True, eq=False)
+class PeakTime(OfCourse):
+    """When each member is farthest in the direction of its step [s], the first such look; then statistics of it.
+
+    Args:
+        of: "depth", "heading", "speed", "north" or "east"; see `OfCourse` for goal and step.
+        then: see `Metric`, also for measured.
+    """
+
+    type: ClassVar[str] = "peak_time"
+    form: ClassVar[str] = "s"
+
+    def begin(self, x: np.ndarray) -> State:
+        state = super().begin(x)
+        return state | {"least": state["step"], "at": np.zeros(len(state["step"]))}
+
+    def follow(self, state: State, looks: Looks) -> State:
+        left = looks.of_living(self.left(state, looks), np.inf)
+        i = left.argmin(axis=0)
+        least = np.take_along_axis(left, i[None], axis=0)[0]
+        farther = least < state["least"]
+        return {"least": np.where(farther, least, state["least"]), "at": np.where(farther, looks.t[i], state["at"])}
+
+    def finish(self, state: State) -> np.ndarray:
+        return state["at"]
+
+
+@dataclass(frozen=True, eq=False)
+class Peak(Overshoot):
+    """The number that each member has where it is farthest in the direction of its step [unit]; then statistics of it.
+
+    That of a heading is not wrapped: it lies within pi of the goal. It is step_info's Peak for a step from 0.
+
+    Args:
+        of: "depth", "heading", "speed", "north" or "east"; see `OfCourse` for goal and step.
+        then: see `Metric`, also for measured.
+    """
+
+    type: ClassVar[str] = "peak"
+
+    def finish(self, state: State) -> np.ndarray:
+        return np.asarray(state["goal"] - state["sign"] * state["least"])
+
+
+@dataclass(frozen=True, eq=False)
+class RiseTime(OfCourse):
+    """How long each member takes from 10 % to 90 % of its step [s]; then statistics of it.
+
+    From the first look with at least 10 % of the step done to the first one with at least 90 %. Infinite where a member never
+    gets there.
+
+    Args:
+        of: "depth", "heading", "speed", "north" or "east"; see `OfCourse` for goal and step.
+        then: see `Metric`, also for measured.
+        limits: the two parts of the step; by default (0.1, 0.9).
+    """
+
+    type: ClassVar[str] = "rise_time"
+    form: ClassVar[str] = "s"
+
+    limits: Any = (0.1, 0.9)
+
+    def check(self, faults: Faults) -> None:
+        super().check(faults)
+        numbers = faults.finite("limits", self.limits)
+        if numbers is not None and (numbers.shape != (2,) or not 0.0 <= numbers[0] < numbers[1] <= 1.0):
+            faults.add("limits", self.limits, "are no two rising parts of a step", "give (0.1, 0.9)")
+
+    def begin(self, x: np.ndarray) -> State:
+        state = super().begin(x)
+        done = np.where(state["step"] > 0.0, np.inf, 0.0)
+        return state | {"low": np.where(self.limits[0] == 0.0, 0.0, done), "high": done}
+
+    def follow(self, state: State, looks: Looks) -> State:
+        left = looks.of_living(self.left(state, looks), np.inf)
+        found = {}
+        for name, part in zip(("low", "high"), self.limits, strict=True):
+            done = state["step"] - left >= part * state["step"]
+            first = np.where(done.any(axis=0), looks.t[done.argmax(axis=0)], np.inf)
+            found[name] = np.minimum(state[name], first)
+        return found
+
+    def finish(self, state: State) -> np.ndarray:
+        return np.where(np.isinf(state["high"]), np.inf, state["high"] - state["low"])
+
+
+@dataclass(frozen=True, eq=False)
+class SettlingTime(OfCourse):
+    """When each member comes within a band about its goal for good [s]; then statistics of it.
+
+    The time of the first look from which on |d| <= within at every look of its time under way; infinite where it is outside
+    at the last one.
+
+    Args:
+        of: "depth", "heading", "speed", "north" or "east"; see `OfCourse` for goal and step.
+        then: see `Metric`, also for measured.
+        within: half the width of the band, in the unit of what it is of; by default 2 % of each member's step.
+    """
+
+    type: ClassVar[str] = "settling_time"
+    form: ClassVar[str] = "s"
+
+    within: Any = None
+
+    def check(self, faults: Faults) -> None:
+        super().check(faults)
+        if self.within is not None:
+            faults.positive("within", self.within, "in the unit of what it is of")
+
+    def begin(self, x: np.ndarray) -> State:
+        state = super().begin(x)
+        band = 0.02 * state["step"] if self.within is None else np.full(len(state["step"]), float(self.within))
+        return state | {"band": band, "since": np.where(state["step"] <= band, 0.0, np.inf)}
+
+    def follow(self, state: State, looks: Looks) -> State:
+        outside, since = np.abs(self.left(state, looks)) > state["band"], state["since"].copy()
+        for t, out, alive in looks.rows(outside):
+            np.minimum(since, t, out=since, where=alive)
+            np.copyto(since, np.inf, where=out & alive)
+        return {"since": since}
+
+    def finish(self, state: State) -> np.ndarray:
+        return state["since"]
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyStateError(OfTracking):
+    """The mean error over the last part of the run [unit], of its looks; then statistics of it.
+
+    NaN for members that stopped or failed before the last look.
+
+    Args:
+        of: see `OfTracking`.
+        then: see `Metric`, also for measured.
+        share: the part of the run's time, above 0 to 1; by default 0.1.
+    """
+
+    type: ClassVar[str] = "steady_state_error"
+
+    share: float = 0.1
+
+    def check(self, faults: Faults) -> None:
+        super().check(faults)
+        share = faults.number("share", self.share, "1")
+        if share is not None and not 0.0 < share <= 1.0:
+            faults.add("share", self.share, "is no part of the run", "give a number above 0 and up to 1")
+
+    def begin(self, x: np.ndarray) -> State:
+        return {"sum": np.zeros(x.shape[1]), "count": np.zeros(1)}
+
+    def follow(self, state: State, looks: Looks) -> State:
+        last = looks.t >= state["end"] * (1.0 - self.share - ROUND_OFF)
+        part = np.where(last[:, None], looks.x[:, 0], 0.0)
+        return {"sum": accumulated(state["sum"], looks, part), "count": state["count"] + last.sum()}
+
+    def finish(self, state: State) -> np.ndarray:
+        return np.where(state["until"] >= state["end"], state["sum"] / state["count"], np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class MaxError(OfTracking):
+    """The largest |e| of each member [unit]; then statistics of it.
+
+    Args:
+        of: see `OfTracking`.
+        then: see `Metric`, also for measured.
+    """
+
+    type: ClassVar[str] = "max_error"
+
+    def begin(self, x: np.ndarray) -> State:
+        return {"most": np.abs(x[0])}
+
+    def follow(self, state: State, looks: Looks) -> State:
+        size = looks.of_living(np.abs(looks.x[:, 0]), 0.0)
+        return {"most": np.maximum(state["most"], size.max(axis=0))}
+
+    def finish(self, state: State) -> np.ndarray:
+        return state["most"]
+
+
+@dataclass(frozen=True, eq=False)
+class CrossTrack(MaxError):  # noqa: N818  (no exception)
+    """The largest horizontal distance of each member from the line through the wanted place along the wanted velocity [m].
+
+    Where no velocity is wanted, from the wanted place. Then statistics of it.
+
+    Args:
+        of: "cross_track", the default.
+        then: see `Metric`, also for measured.
+    """
+
+    type: ClassVar[str] = "cross_track"
+    default: ClassVar[str | None] = "cross_track"
+
+
+@dataclass(frozen=True, eq=False)
+class OverTime(OfTracking):
+    """A metric that is an integral over time, by the trapezoidal rule between looks. Abstract."""
+
+    def integrand(self, t: np.ndarray, e: np.ndarray) -> np.ndarray:
+        """Return what is integrated over time.
+
+        Args:
+            t: times (k, 1) [s].
+            e: errors (k, n).
+        """
+        raise TypeError(f"{type(self).__name__} is abstract")
+
+    def begin(self, x: np.ndarray) -> State:
+        return {"sum": np.zeros(x.shape[1])}
+
+    def follow(self, state: State, looks: Looks) -> State:
+        t, dt = looks.t[:, None], looks.dt[:, None]
+        ends = self.integrand(t - dt, looks.before[:, 0]), self.integrand(t, looks.x[:, 0])
+        return {"sum": accumulated(state["sum"], looks, 0.5 * dt * (ends[0] + ends[1]))}
+
+    def finish(self, state: State) -> np.ndarray:
+        return state["sum"]
+
+
+@dataclass(frozen=True, eq=False)
+class IAE(OverTime):
+    """The integral of |e| over time [unit s]; then statistics of it.
+
+    Args:
+        of: see `OfTracking`.
+        then: see `Metric`, also for measured.
+    """
+
+    type: ClassVar[str] = "iae"
+    form: ClassVar[str] = "{0} s"
+
+    def integrand(self, t: np.ndarray, e: np.ndarray) -> np.ndarray:
+        return np.abs(e)
+
+
+@dataclass(frozen=True, eq=False)
+class ISE(OverTime):
+    """The integral of e^2 over time [unit^2 s]; then statistics of it.
+
+    Args:
+        of: see `OfTracking`.
+        then: see `Metric`, also for measured.
+    """
+
+    type: ClassVar[str] = "ise"
+    form: ClassVar[str] = "{0}^2 s"
+
+    def integrand(self, t: np.ndarray, e: np.ndarray) -> np.ndarray:
+        return e * e
+
+
+@dataclass(frozen=True, eq=False)
+class ITAE(OverTime):
+    """The integral of t |e| over time [unit s^2]; then statistics of it.
+
+    Args:
+        of: see `OfTracking`.
+        then: see `Metric`, also for measured.
+    """
+
+    type: ClassVar[str] = "itae"
+    form: ClassVar[str] = "{0} s^2"
+
+    def integrand(self, t: np.ndarray, e: np.ndarray) -> np.ndarray:
+        return t * np.abs(e)
+
+
+@dataclass(frozen=True, eq=False)
+class RMSError(ISE):
+    """The root of the mean of e^2 over the time under way [unit]; then statistics of it. |e| where that time is 0.
+
+    Args:
+        of: see `OfTracking`.
+        then: see `Metric`, also for measured.
+    """
+
+    type: ClassVar[str] = "rms"
+    form: ClassVar[str] = "{0}"
+
+    def begin(self, x: np.ndarray) -> State:
+        return super().begin(x) | {"first": np.abs(x[0])}
+
+    def finish(self, state: State) -> np.ndarray:
+        return np.where(state["until"] > 0.0, np.sqrt(state["sum"] / state["until"]), state["first"])
+
+
+def check_wanted(faults: Faults, key: str, metrics: Mapping[str, Statistic], controller: Controller | None) -> None:
+    """Add a fault for each metric of what no guidance wants: its errors would be those from zero.
+
+    controller: the controller of the scene; None for none, which is a fault of its own.
+    """
+    if controller is None:
+        return
+    wishes = {wish for part in controller.guidance for wish in part.gives}
+    for name, metric in metrics.items():
+        tracked = metric.quantity.name if isinstance(metric, OfTracking | OfCourse) else None
+        if tracked is not None and tracking.NEEDED[tracked] not in wishes:
+            problem = f"is of the {tracked}, and no guidance of the scene wants a {tracking.NEEDED[tracked]}"
+            faults.add(key, name, problem, "give guidance that wants it, or another metric")

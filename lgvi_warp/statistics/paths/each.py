@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The number of every member, where statistics of them are not enough."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.statistics.estimates.estimate import Estimate
+from lgvi_warp.statistics.estimates.tree import Part
+from lgvi_warp.statistics.moments import estimate
+from lgvi_warp.statistics.values.values import Values
+
+
+@dataclass(frozen=True, eq=False)
+class Each(Statistic):
+    """The number of every member, in the order of the members: eight bytes a member, component and row.
+
+    It is meant for `then`, which has one row: lw.Overshoot("depth", then=[lw.Mean(), lw.Each()]). Of a metric it has the
+    numbers of members that failed too; otherwise those of members that are left out are NaN. It has no interval.
+
+    Arrays of the estimate:
+
+    * value (k, d, n): the numbers.
+    * count (k,): number of members that have numbers, infinite ones among them.
+
+    Args:
+        of: a quantity; see `Statistic`, also for name and stopped.
+    """
+
+    type: ClassVar[str] = "each"
+
+    def rows(self, values: Values) -> Part:
+        """Return the numbers of a block, (k, d, n), in the order of its members."""
+        return self.rows_of(values.filled(np.nan), values.replicates)
+
+    def rows_of(self, x: np.ndarray, replicates: int) -> Part:
+        """Return the numbers of a block, (k, d, n), in the order of its members.
+
+        Args:
+            x: (k R, d, n / R), with one row for each time and replicate.
+            replicates: number R of replicates.
+        """
+        R = replicates
+        k, d, n = len(x) // R, x.shape[1], x.shape[2] * R
+        return {"x": np.ascontiguousarray(np.moveaxis(x.reshape(k, R, d, n // R), 1, 3).reshape(k, d, n))}
+
+    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+        # The numbers of both sets of members, one after the other.
+        return {"x": np.concatenate([left["x"], right["x"]], axis=2)}
+
+    def read(self, part: Part, time: np.ndarray) -> Estimate:
+        """Return the numbers."""
+        x = part["x"]
+        arrays = {"value": x, "count": (~np.isnan(x)).all(axis=1).sum(axis=1)}
+        dims = {"value": ("time", "component", "member"), "count": ("time",)}
+        return estimate(self, "none", dims, arrays, time, {"member": np.arange(x.shape[2])})
+
+    def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
+        # Numbers are in the order of the members already.
+        return self.estimates(parts, time)

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Statistics of one number of each member, such as the maximum of its path or the time of its end."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.statistics.base import Statistic, from_list
+from lgvi_warp.statistics.estimates.estimate import Estimate
+from lgvi_warp.statistics.estimates.tree import Part, below
+from lgvi_warp.statistics.moments import Mean
+from lgvi_warp.statistics.values.quantity import Quantity
+from lgvi_warp.statistics.values.values import Values
+
+
+@dataclass(frozen=True, eq=False)
+class Then(Statistic):
+    """One number for each component of each member, then statistics of that number. Abstract.
+
+    Args:
+        of: see the classes derived from it.
+        then: a statistic, or a list, without `of`: lw.Mean(), lw.Quantiles(levels=(0.5, 0.99)),
+            lw.Exceedance(above=2.0).
+    """
+
+    then: Any = None
+
+    def check(self, faults: Faults) -> None:
+        """Note what in `then` is no statistic over members, or says what it is of."""
+        super().check(faults)
+
+        entries = self.then_default() if self.then is None else self.then
+        entries = entries if isinstance(entries, list | tuple) else [entries]
+        statistics: list[Statistic] = []
+        with faults.including():
+            statistics = list(from_list(entries, f"{self.type}.then", whole=False))
+        for i, statistic in enumerate(statistics):
+            if statistic.of_numbers and statistic.of is not None:
+                faults.add(f"then[{i}].of", statistic.of, "is given already", f"leave it out: it is of the {self.type}")
+            else:
+                statistic.check_one_number(faults, f"then[{i}].", f"a {self.type}")
+        object.__setattr__(self, "then", tuple(statistics))
+        if self.of is not None and not faults:
+            with faults.including():  # report a missing limit now, not during the run
+                self.parts()
+
+    def then_default(self) -> Sequence[Statistic]:
+        """Return the statistics where `then` is not given."""
+        return [Mean()]
+
+    def then_of(self, time: np.ndarray) -> tuple[Statistic, ...]:
+        """Return the statistics of `then`, each of this class's number.
+
+        Args:
+            time: (k,) [s], all sample times of the run.
+        """
+        inner = self.quantity
+        derived = Quantity(self.key, inner.function, self.unit, inner.fields, self._labels, self.needs_limit)
+        return tuple(replace(statistic.over(time), of=derived, stopped=self.stopped) for statistic in self.then)
+
+    @property
+    def unit(self) -> str:
+        """The unit of the number."""
+        return self.quantity.unit
+
+    @property
+    def needs_limit(self) -> bool:
+        """Whether a condition on the number needs a limit."""
+        return self.quantity.needs_limit
+
+    @property
+    def _labels(self) -> tuple[str, ...]:
+        return tuple(f"{self.type} {label}" for label in self.quantity.labels)
+
+    def parts(self) -> tuple[Statistic, ...]:
+        """Return the statistics of `then`, each of this class's number."""
+        return self.then_of(np.array([0.0, 1.0]))
+
+    def gather(self, values: Values, time: np.ndarray) -> Part:
+        """Return the part of a block: the parts of all statistics of `then`, their keys numbered.
+
+        Args:
+            values: the numbers of the block's members, as of one time.
+            time: (k,) [s], all sample times of the run.
+        """
+        gatherers = [statistic.open(time[-1:], values.x.shape[2]) for statistic in self.then_of(time)]
+        for gatherer in gatherers:
+            gatherer.take(values, slice(0, 1))
+        return _numbered(gatherer.close() for gatherer in gatherers)
+
+    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+        pairs = ((below(left, f"{i}/"), below(right, f"{i}/")) for i in range(len(self.then)))
+        return _numbered(statistic.join(*pair, place) for statistic, pair in zip(self.then, pairs, strict=True))
+
+    def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
+        """Return the estimates of each statistic, at the end."""
+        estimates: list[Estimate] = []
+        for i, statistic in enumerate(self.then_of(time)):
+            estimates += statistic.estimates([below(part, f"{i}/") for part in parts], time[-1:])
+        return estimates
+
+    def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
+        each = enumerate(self.then)
+        return _numbered(statistic.of_replicate(below(part, f"{i}/"), replicate, replicates) for i, statistic in each)
+
+    def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
+        # The estimates of each statistic from its replicates, at the end.
+        estimates: list[Estimate] = []
+        for i, statistic in enumerate(self.then_of(time)):
+            inner = [below(part, f"{i}/") for part in parts]
+            estimates += statistic.estimates_of_replicates(inner, time[-1:], replicates)
+        return estimates
+
+
+def _numbered(parts: Iterable[Part]) -> Part:
+    """Parts of several statistics as one: the number of the statistic stands before each name."""
+    return {f"{i}/{key}": array for i, part in enumerate(parts) for key, array in part.items()}

@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Statistics of one number of each member's whole path, such as its maximum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+
+from lgvi_warp.statistics.base import Gatherer, Statistic
+from lgvi_warp.statistics.counts import Condition
+from lgvi_warp.statistics.estimates.tree import Part
+from lgvi_warp.statistics.paths.member_statistic import Then
+from lgvi_warp.statistics.values import reductions
+from lgvi_warp.statistics.values.functional import Functional, functional
+from lgvi_warp.statistics.values.quantity import Quantity
+from lgvi_warp.statistics.values.reductions import Reduction
+from lgvi_warp.statistics.values.values import Values
+
+
+class _Walk(Gatherer):
+    """Follows the paths of a block's members, sample by sample, and whether all samples counted."""
+
+    def __init__(self, statistic: OfPath, time: np.ndarray):
+        self._statistic, self._time, self._reduction = statistic, time, statistic.reduction
+        # One row for each replicate; one row without replicates.
+        self._state: np.ndarray | None = None
+        self._last = np.empty(0)
+        self._whole: np.ndarray | None = None
+        self._place, self._single = (0, 0, 0, 1), False
+
+    def take(self, values: Values, when: slice) -> None:
+        """Take in the samples at these times."""
+        rows = (-1, values.replicates)
+        samples = values.x.reshape(*rows, *values.x.shape[1:])
+        # Samples are taken one by one, so that the bits do not depend on how many come at once.
+        for t, x in zip(range(when.start, when.stop), samples, strict=True):
+            self._state = self._reduction.start(x) if self._state is None else self._stepped(self._state, t, x)
+            self._last = x
+        self._last = self._last.copy()
+        if values.good is not None:
+            complete = values.good.reshape(*rows, values.good.shape[1]).all(axis=0)
+            self._whole = complete if self._whole is None else self._whole & complete
+        self._place = (values.first, values.block, values.size, values.replicates)
+        self._single = values.single and self._reduction.of_samples
+
+    def _stepped(self, state: np.ndarray, t: int, x: np.ndarray) -> np.ndarray:
+        dt = float(self._time[t] - self._time[t - 1])
+        return self._reduction.step(state, self._last, x, dt, dt / float(self._time[t] - self._time[0]))
+
+    def close(self) -> Part:
+        """Return the parts of all statistics of the paths' numbers."""
+        assert self._state is not None
+        x = self._reduction.finish(self._state)
+        good = None if self._whole is None or self._whole.all() else self._whole
+        values = Values(x.astype(np.float32) if self._single else x, good, *self._place)
+        return self._statistic.gather(values, self._time)
+
+
+@dataclass(frozen=True, eq=False)
+class OfPath(Then):
+    """One number for each component of each member's whole path, then statistics of that number. Abstract.
+
+    Members that failed are left out: the rest of their path is not known. The name of an estimate has both types: "mean
+    path_maximum speed". Its one row is at the time of the end.
+
+    Args:
+        of: a quantity; see `Statistic`, also for name, confidence and stopped.
+        then: a statistic, or a list, without `of`: lw.Mean() (the default), lw.Quantiles(levels=(0.5, 0.99)),
+            lw.Exceedance(above=2.0).
+    """
+
+    of_numbers: ClassVar[bool] = False
+    _reduction: ClassVar[Reduction]
+
+    @property
+    def reduction(self) -> Reduction:
+        """How samples (replicates, d components, members) become the number of each path."""
+        return self._reduction
+
+    def open(self, time: np.ndarray, count: int) -> _Walk:
+        """Return the object that follows the members of a block."""
+        return _Walk(self, time)
+
+
+@dataclass(frozen=True, eq=False)
+class PathMaximum(OfPath):
+    """The largest value of a quantity over all sample times of each member, then statistics of it.
+
+    Members that failed are left out: the rest of their path is not known. The name of an estimate has both types: "mean
+    path_maximum speed". Its one row is at the time of the end.
+
+    Args:
+        of: a quantity; see `Statistic`, also for name, confidence and stopped.
+        then: a statistic, or a list, without `of`: lw.Mean() (the default), lw.Quantiles(levels=(0.5, 0.99)),
+            lw.Exceedance(above=2.0).
+    """
+
+    type: ClassVar[str] = "path_maximum"
+    _reduction: ClassVar[Reduction] = reductions.MAXIMUM
+
+
+@dataclass(frozen=True, eq=False)
+class PathMinimum(OfPath):
+    """The smallest value of a quantity over all sample times of each member, then statistics of it.
+
+    Args:
+        of: a quantity; see PathMaximum.
+        then: a statistic, or a list, without `of`; by default lw.Mean().
+    """
+
+    type: ClassVar[str] = "path_minimum"
+    _reduction: ClassVar[Reduction] = reductions.MINIMUM
+
+
+@dataclass(frozen=True, eq=False)
+class PathRange(OfPath):
+    """The largest less the smallest value of a quantity over all sample times of each member, then statistics of it.
+
+    Args:
+        of: a quantity; see PathMaximum.
+        then: a statistic, or a list, without `of`; by default lw.Mean().
+    """
+
+    type: ClassVar[str] = "path_range"
+    _reduction: ClassVar[Reduction] = reductions.RANGE
+
+
+@dataclass(frozen=True, eq=False)
+class PathMean(OfPath):
+    """The average over time of a quantity of each member, then statistics of it.
+
+    Linear between samples: the trapezoidal rule over the sample times, divided by the time from the first to the last.
+    With one sample it is that sample.
+
+    Args:
+        of: a quantity; see PathMaximum.
+        then: a statistic, or a list, without `of`; by default lw.Mean().
+    """
+
+    type: ClassVar[str] = "path_mean"
+    _reduction: ClassVar[Reduction] = reductions.MEAN
+
+
+@dataclass(frozen=True, eq=False)
+class PathRms(OfPath):
+    """The root of the average over time of a quantity's square for each member, then statistics of it.
+
+    The square is taken as linear between samples.
+
+    Args:
+        of: a quantity; see PathMaximum.
+        then: a statistic, or a list, without `of`; by default lw.Mean().
+    """
+
+    type: ClassVar[str] = "path_rms"
+    _reduction: ClassVar[Reduction] = reductions.ROOT_MEAN_SQUARE
+
+
+@dataclass(frozen=True, eq=False)
+class PathTime(OfPath, Condition):
+    """The time [s] for which a condition holds for each member, then statistics of it: "mean path_time depth above 2".
+
+    Linear between samples: a time between two samples counts by the fraction of the line between them that satisfies
+    the condition. A quantity that is true or false has no line: half of the time counts for each of its ends at which
+    it holds.
+
+    Args:
+        of: a quantity; see PathMaximum.
+        then: a statistic, or a list, without `of`; by default lw.Mean().
+        above: one number, or one for each component, in the quantity's unit.
+        below: the same for the upper limit; with both, the time between them.
+    """
+
+    type: ClassVar[str] = "path_time"
+
+    @property
+    def unit(self) -> str:
+        """The unit of the number, seconds."""
+        return "s"
+
+    @property
+    def needs_limit(self) -> bool:
+        """Whether a condition on the time needs a limit: without one, the question is whether it ever holds."""
+        return False
+
+    @property
+    def _labels(self) -> tuple[str, ...]:
+        return tuple(f"{label}{self.limits_text}" for label in super()._labels)
+
+    @property
+    def reduction(self) -> Reduction:
+        """The sum of the parts of time for which the condition holds."""
+        return Reduction(self._step, lambda x: np.zeros(x.shape))
+
+    def _step(self, state: np.ndarray, before: np.ndarray, x: np.ndarray, dt: float, share: float) -> np.ndarray:
+        above, below = self.limits(x.shape[-2])
+        if above is None and below is None:
+            fraction = 0.5 * ((before != 0.0) + 1.0 * (x != 0.0))
+        else:
+            low, high = np.minimum(before, x), np.maximum(before, x)
+            over = 1.0 if above is None else _part(high - above, high - low)
+            under = 1.0 if below is None else _part(below - low, high - low)
+            # Each point of the line satisfies at least one of the two limits.
+            fraction = np.maximum(over + under - 1.0, 0.0)
+        return np.asarray(state + dt * fraction)
+
+
+def _part(beyond: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """Fraction of lines of this length that lies beyond a number, 0 to 1; of a line of no length either 0 or 1."""
+    moves = length > 0.0
+    return np.where(moves, np.clip(beyond / np.where(moves, length, 1.0), 0.0, 1.0), 1.0 * (beyond > 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class OfExpression(OfPath):
+    """The number that an expression such as "max(depth)" gives for each member's path, then a statistic of it.
+
+    The name of an estimate has the expression: "mean max(depth)".
+    """
+
+    def meant(self) -> Quantity:
+        """Return the quantity at each time, of which the path's number is made."""
+        return self._functional.inner
+
+    @property
+    def _functional(self) -> Functional:
+        return functional("of", self.of)
+
+    @property
+    def key(self) -> str:
+        """The name of the number: the expression."""
+        return self._functional.label
+
+    @property
+    def reduction(self) -> Reduction:
+        """How the expression reduces a member's samples to a number."""
+        return self._functional.reduction
+
+    @property
+    def _labels(self) -> tuple[str, ...]:
+        return self._functional.labels
+
+
+def followed(statistic: Statistic) -> Statistic:
+    """Return the statistic that is gathered for one: of paths, where it is of an expression that looks over them."""
+    if statistic.path is None:
+        return statistic
+    return OfExpression(statistic.path.label, then=replace(statistic, of=None), stopped=statistic.stopped)

@@ -1,0 +1,188 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Expressions for quantities: a name, a component of it, a norm, and a reduction over the path.
+
+"position[2]" and "norm(velocity)" give numbers of each member at each time; "max(depth)" and "range(norm(velocity))"
+give one number of each member, over its path. Statistics, sensitivity, trade-offs and stability maps all read them
+here.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, closest, refusal
+from lgvi_warp.statistics.values import reductions
+from lgvi_warp.statistics.values.quantity import KNOWN, Quantity, joined, named
+from lgvi_warp.statistics.values.reductions import Reduction
+
+if TYPE_CHECKING:
+    from lgvi_warp.sampling.members import Members
+    from lgvi_warp.statistics.values.samples import Fields
+
+OVER_TIME = {
+    "max": reductions.MAXIMUM,
+    "min": reductions.MINIMUM,
+    "mean": reductions.MEAN,
+    "range": reductions.RANGE,
+}
+FUNCTIONS = (*OVER_TIME, "norm")
+
+
+@dataclass(frozen=True)
+class Functional:
+    """A quantity with the functions applied to it.
+
+    entry: index of the component that is taken of the result; None (the default): all.
+    """
+
+    label: str
+    quantity: Quantity
+    functions: tuple[str, ...] = ()
+    entry: int | None = None
+
+    @property
+    def _turn(self) -> int | None:
+        """Index of the function that reduces the path."""
+        return next((i for i, name in enumerate(self.functions) if name in OVER_TIME), None)
+
+    @property
+    def over_path(self) -> bool:
+        """Whether it reduces the path: one row for each member instead of one for each time."""
+        return self._turn is not None
+
+    @property
+    def inner(self) -> Quantity:
+        """The quantity at each time: all of it, or what is reduced over the path."""
+        if not self.over_path:
+            return self.as_quantity()
+        functions = self.functions[: self._turn]
+        label = reduce(lambda text, name: f"{name}({text})", functions, self.quantity.name)
+        return Functional(label, self.quantity, functions).as_quantity()
+
+    @property
+    def reduction(self) -> Reduction:
+        """The reduction of the path, with the functions and the entry that are taken of it."""
+        assert self._turn is not None
+        reduction, functions = OVER_TIME[self.functions[self._turn]], self.functions[self._turn + 1 :]
+        if not functions and self.entry is None:
+            return reduction
+
+        def finish(state: np.ndarray) -> np.ndarray:
+            values = self._applied(functions, np.moveaxis(reduction.finish(state), -2, -1))
+            return np.ascontiguousarray(np.moveaxis(values, -1, -2))
+
+        return replace(reduction, finish=finish, of_samples=reduction.of_samples and not functions)
+
+    def _applied(self, functions: Sequence[str], values: np.ndarray) -> np.ndarray:
+        """The lengths that the functions name, and the entry, along the last axis."""
+        for _ in functions:
+            values = np.sqrt(np.sum(values**2, axis=-1, keepdims=True))
+        return values if self.entry is None else values[..., self.entry : self.entry + 1]
+
+    @property
+    def unit(self) -> str:
+        """The unit of its numbers."""
+        return self.quantity.unit
+
+    @property
+    def size(self) -> int:
+        """Number of components of the result."""
+        return 1 if self.entry is not None or "norm" in self.functions else self.quantity.size
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Names of the components; each is an expression for that component."""
+        if self.size == 1:
+            return (self.label,)
+        if not self.functions:
+            return tuple(label.replace(" ", "") for label in self.quantity.labels)
+        return tuple(f"{self.label}[{i}]" for i in range(self.quantity.size))
+
+    def __call__(self, samples: Fields, members: Members) -> np.ndarray:
+        """Evaluate the expression.
+
+        Returns: float64: (k, n, size), or (n, size) if it reduces the path.
+        """
+        if self.over_path:
+            values = self.inner(samples, members).astype(np.float64, copy=False)
+            return self.reduction.over(values, samples.time).T
+        values = self.quantity(samples, members).astype(np.float64, copy=False).transpose(0, 2, 1)
+        return self._applied(self.functions, values)
+
+    def as_quantity(self) -> Quantity:
+        """Return the same as a Quantity; where it reduces the path, that has a name, and no number at each time."""
+        if not self.functions and self.entry is None:
+            return self.quantity
+        return replace(self.quantity, name=self.label, labels=self.labels, function=self)
+
+
+def functional(key: str, of: Any) -> Functional:
+    """Return the expression that `of` gives."""
+    if isinstance(of, Functional):
+        return of
+    if not isinstance(of, str):
+        meaning = quantity(key, of)
+        return Functional(meaning.name, meaning)
+    text = of.replace(" ", "")
+    outer, entry = text, None
+    if match := re.fullmatch(r"(\w+\(.*\))\[(\d+)\]", text):
+        outer, entry = match[1], int(match[2])
+    names, inner = _nested(outer)
+    faults = Faults()
+    for name in names:
+        if name not in FUNCTIONS:
+            faults.add(key, of, f"has a function {name!r} that is not known", closest(name, FUNCTIONS))
+    if sum(name in OVER_TIME for name in names) > 1:
+        faults.add(key, of, "looks over the path twice", f"keep one of {', '.join(OVER_TIME)}")
+    faults.raise_if_any()
+    if not re.fullmatch(r"\w+(\[[\d,]+\])?", inner):
+        form = 'write "position[2]", "depth", "norm(velocity)" or "max(depth)"'
+        raise refusal(key, of, "is no quantity", f"{form}, of {', '.join(KNOWN)}")
+    base = Functional(text, named(key, of, inner), tuple(reversed(names)))
+    if entry is not None and (base.size == 1 or entry >= base.size):
+        fault = f"{outer} has {base.size} component{'s' * (base.size > 1)}"
+        raise refusal(key, of, fault, f"give one of them from 0, or {outer} alone")
+    return replace(base, entry=entry)
+
+
+def _nested(text: str) -> tuple[list[str], str]:
+    """Names of the functions around a name, the outermost first; and the name."""
+    functions = []
+    while match := re.fullmatch(r"(\w+)\((.*)\)", text):
+        functions.append(match[1])
+        text = match[2]
+    return functions, text
+
+
+def quantity(key: str, of: Any) -> Quantity:
+    """Return the quantity that `of` gives.
+
+    of: a name, a name with an index, a Quantity, a function of (samples, members), or a list of these, taken as one quantity.
+    """
+    if isinstance(of, Quantity):
+        return of
+    if isinstance(of, str):
+        return functional(key, of).as_quantity()
+    if callable(of):
+        return Quantity(str(getattr(of, "__name__", type(of).__name__)), of)
+    if isinstance(of, Sequence) and len(of):
+        parts = [quantity(f"{key}[{i}]", item) for i, item in enumerate(of)]
+        for i, (part, item) in enumerate(zip(parts, of, strict=True)):
+            if len(of) > 1 and over_path(part):
+                fault = "looks over the path, and a list is of numbers at each time"
+                raise refusal(f"{key}[{i}]", item, fault, "ask for it alone")
+        return joined(parts)
+    remedy = f"give one of {', '.join(KNOWN)}, one component as in 'position[2]', or a function of (samples, members)"
+    raise refusal(key, of, "is no quantity", remedy)
+
+
+def over_path(quantity: Quantity) -> Functional | None:
+    """Return the expression of a quantity that reduces the path; None for a quantity at each time."""
+    expression = quantity.function
+    return expression if isinstance(expression, Functional) and expression.over_path else None

@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Quantities of each member at each sample time: known by name, or functions of the samples."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.arguments import listed
+from lgvi_warp.common.errors import closest, refusal
+from lgvi_warp.common.real_numbers import NotReal, real_results
+from lgvi_warp.control.signals import CHANNELS, SIGNALS, ordered
+from lgvi_warp.physics import energy as invariants
+from lgvi_warp.physics import notation
+from lgvi_warp.physics.fields import FIELDS, TABLE, Field
+
+if TYPE_CHECKING:
+    from lgvi_warp.physics.terms.base import Term
+    from lgvi_warp.sampling.members import Members
+    from lgvi_warp.statistics.values.samples import Fields
+
+Function = Callable[["Fields", "Members"], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A function of a block's samples, for k sample times and n members.
+
+    A member whose number is not finite is left out at that time.
+
+    Args:
+        name: name in results and messages.
+        function: function(samples, members) that returns (k, n) numbers, or (k, n, d) for d components.
+            samples["position"] is (k, n, 3) and so on, samples.time (k,) [s], samples.terms the scene's terms; members
+            are those that lw.Ensemble.select returns.
+        unit: unit of the numbers; by default "".
+        fields: names of the samples that the function reads; by default all.
+        labels: names of the d components; by default `name`, for one component.
+        needs_limit: whether a condition on it needs a number to compare with; by default False: the function may return
+            true or false.
+        entries: (field, numbers) for each field of the motion of which the function reads these alone, counted from 0; at a
+            controller's looks the others are NaN. By default none: it reads whole fields.
+    """
+
+    name: str
+    function: Function
+    unit: str = ""
+    fields: tuple[str, ...] = FIELDS
+    labels: tuple[str, ...] = ()
+    needs_limit: bool = False
+    entries: tuple[tuple[str, tuple[int, ...]], ...] = ()
+
+    def __post_init__(self) -> None:
+        labels = listed("labels", () if self.labels is None else self.labels, "texts")
+        object.__setattr__(self, "labels", tuple(labels))
+        if not labels:
+            object.__setattr__(self, "labels", (self.name,))
+
+    @property
+    def size(self) -> int:
+        """The number d of components."""
+        return len(self.labels)
+
+    def __call__(self, samples: Fields, members: Members) -> np.ndarray:
+        """Evaluate the quantity.
+
+        Returns: (k, d, n), contiguous; float32 where the function returns float32, else float64.
+        """
+        try:
+            values = real_results(self.function(samples, members))
+        except NotReal as error:
+            raise ValueError(f"quantity {self.name}: {error.what}; real numbers, true or false are wanted") from None
+        k, n = len(samples.time), members.count
+        if values.shape not in ((k, n), (k, n, self.size)) or (values.ndim == 2 and self.size != 1):
+            wanted = f"({k}, {n})" if self.size == 1 else f"({k}, {n}, {self.size})"
+            raise ValueError(f"quantity {self.name}: gave shape {values.shape}; {wanted} is wanted: times, members")
+        real = np.float32 if values.dtype == np.float32 else np.float64
+        return np.ascontiguousarray(values.reshape(k, n, self.size).transpose(0, 2, 1), dtype=real)
+
+
+def _field(name: str) -> Function:
+    return lambda samples, members: samples[name].reshape(*samples[name].shape[:2], -1)
+
+
+def _speed(samples: Fields, members: Members) -> np.ndarray:
+    v = samples["velocity"].astype(np.float64, copy=False)
+    return np.sqrt(v[..., 0] ** 2 + v[..., 1] ** 2 + v[..., 2] ** 2)
+
+
+def _velocity_inertial(samples: Fields, members: Members) -> np.ndarray:
+    R, v = samples["attitude"], samples["velocity"].astype(np.float64, copy=False)
+    return R[..., 0] * v[..., :1] + R[..., 1] * v[..., 1:2] + R[..., 2] * v[..., 2:]
+
+
+def _quaternion_wxyz(samples: Fields, members: Members) -> np.ndarray:
+    return notation.quaternion_from_matrix(samples["attitude"].astype(np.float64, copy=False))
+
+
+def _euler(samples: Fields, members: Members) -> np.ndarray:
+    """(roll, pitch, yaw) of R = Rz(yaw) Ry(pitch) Rx(roll), Fossen's zyx convention."""
+    R = samples["attitude"].astype(np.float64, copy=False)
+    pitch = -np.arcsin(np.clip(R[..., 2, 0], -1.0, 1.0))
+    return np.stack([np.arctan2(R[..., 2, 1], R[..., 2, 2]), pitch, np.arctan2(R[..., 1, 0], R[..., 0, 0])], axis=-1)
+
+
+def _energy(samples: Fields, members: Members) -> np.ndarray:
+    """Mechanical energy [J], as `Result.energy`."""
+    terms: Sequence[Term] = samples.terms
+
+    def own(term: Term) -> dict[str, np.ndarray]:
+        return {name: members.parameters[f"{term.key}.{name}"] for name in term.parameters()}
+
+    fields = {name: samples[name] for name in FIELDS}
+    block: Any = SimpleNamespace(**fields, time=samples.time, parameters=members.parameters, terms=terms, own=own)
+    return invariants.energy(block)
+
+
+def _known(name: str, fields: tuple[str, ...], function: Function) -> Quantity:
+    return _of(TABLE[name], fields, function)
+
+
+def _of(field: Field, fields: tuple[str, ...], function: Function) -> Quantity:
+    return Quantity(field.name, function, field.unit, fields, field.labels, needs_limit=True)
+
+
+KNOWN: dict[str, Quantity] = {
+    quantity.name: quantity
+    for quantity in (
+        _known("position", ("position",), _field("position")),
+        _known("depth", ("position",), lambda samples, members: samples["position"][..., 2]),
+        _known("velocity", ("velocity",), _field("velocity")),
+        _known("velocity_inertial", ("attitude", "velocity"), _velocity_inertial),
+        _known("speed", ("velocity",), _speed),
+        _known("angular_velocity", ("angular_velocity",), _field("angular_velocity")),
+        _known("attitude", ("attitude",), _field("attitude")),
+        _known("quaternion_wxyz", ("attitude",), _quaternion_wxyz),
+        _known("euler", ("attitude",), _euler),
+        _known("energy", FIELDS, _energy),
+    )
+}
+# Signals of a controller whose shape is the same in all scenes.
+SIGNAL_QUANTITIES = {
+    name: _of(signal.field, (name,), _field(name)) for name, signal in SIGNALS.items() if name not in CHANNELS
+}
+
+
+def named(key: str, of: str, text: str) -> Quantity:
+    """Return the quantity of a name, or one component of it."""
+    match = re.fullmatch(r"(\w+)(\[[\d, ]+\])?", text.strip())
+    if match and match[1] in CHANNELS:
+        return _channel(key, of, match[1], match[2] or "")
+    if match is None or (base := KNOWN.get(match[1]) or SIGNAL_QUANTITIES.get(match[1])) is None:
+        raise refusal(key, of, "is not known", closest(text, (*KNOWN, *SIGNALS)))
+    if match[2] is None:
+        return base
+    label = f"{base.name}[{', '.join(match[2][1:-1].replace(' ', '').split(','))}]"
+    if label not in base.labels:
+        if base.size == 1:
+            raise refusal(key, of, f"{base.name} has one component", f"give {base.name!r}")
+        raise refusal(key, of, f"{base.name} has the components {', '.join(base.labels)}", "give one of them")
+    return component(base, base.labels.index(label))
+
+
+def _channel(key: str, of: str, name: str, index: str) -> Quantity:
+    """One channel of the actuators: only the scene knows how many there are."""
+    if not re.fullmatch(r"\[\d+\]", index):
+        raise refusal(key, of, f"is not one channel of {name}", f"give one: '{name}[0]'")
+    i, label = int(index[1:-1]), name + index
+
+    def function(samples: Fields, members: Members) -> np.ndarray:
+        count = samples[name].shape[-1]
+        if i >= count:
+            remedy = f"give '{name}[0]' to '{name}[{count - 1}]'"
+            raise refusal(key, of, f"is beyond the {count} channels of this scene", remedy)
+        return samples[name][..., i]
+
+    return Quantity(label, function, SIGNALS[name].field.unit, (name,), needs_limit=True)
+
+
+def component(base: Quantity, i: int) -> Quantity:
+    """Return one component of a quantity as a quantity."""
+    if base.size == 1:
+        return base
+    inner = base.function
+    return replace(base, name=base.labels[i], labels=(base.labels[i],), function=lambda s, m: inner(s, m)[..., i])
+
+
+def joined(parts: Sequence[Quantity]) -> Quantity:
+    """Return several quantities as one, with their components side by side."""
+    if len(parts) == 1:
+        return parts[0]
+
+    def function(samples: Fields, members: Members) -> np.ndarray:
+        return np.concatenate([part(samples, members) for part in parts], axis=1).transpose(0, 2, 1)
+
+    fields = ordered(name for part in parts for name in part.fields)
+    units: Mapping[str, None] = dict.fromkeys(part.unit for part in parts)
+    labels = tuple(label for part in parts for label in part.labels)
+    needs_limit = any(part.needs_limit for part in parts)
+    return Quantity(", ".join(part.name for part in parts), function, ", ".join(units), fields, labels, needs_limit)

@@ -1,0 +1,286 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A run on disk: a zarr v3 group, written block by block, each block marked when all of it is safe.
+
+    run.zarr/zarr.json            attributes: provenance, recipe, messages, complete
+    run.zarr/position/c.0.3.0     chunk: times 0, block 3 (see layout)
+    run.zarr/parts/000000768.npy  the block's parts of the keepers
+    run.zarr/blocks/000000768.json   marker of the finished block that begins with member 768: its files, sizes, checksums
+    run.zarr/kept/                a group like the run's own, of members that were run again for their samples (see kept)
+
+No file holds a date or time of day: the same run leaves the same bytes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections.abc import Container, Iterator, Sequence
+from pathlib import Path, PurePosixPath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common import files as durable
+from lgvi_warp.common import machine, safe_files, scratch
+from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.safe_files import parsed
+from lgvi_warp.common.write_lock import write_lock
+from lgvi_warp.engine.block import Block, blocks
+from lgvi_warp.statistics import TYPES
+from lgvi_warp.store import layout_check as store_check
+from lgvi_warp.store import texts as store_texts
+from lgvi_warp.store.block_files import BlockFiles, damaged, name_of, read_marker
+from lgvi_warp.store.layout import StoreArray
+from lgvi_warp.store.layout_check import understood
+from lgvi_warp.store.recipe import ensemble_of, plan_of
+from lgvi_warp.store.settings import needed
+
+if TYPE_CHECKING:
+    from lgvi_warp.engine.plan import Plan
+    from lgvi_warp.scene.ensemble import Ensemble
+
+FORMAT = 2
+ROOT, CREATED, KEPT = "zarr.json", "created.json", "kept"
+
+
+class Folder:
+    """An existing store, which may come from elsewhere: everything it says is checked before it is used.
+
+    Attributes:
+        attributes: The attributes of its zarr group.
+        provenance: Scene, ensemble, settings, versions and machine of the run.
+        recipe: Settings of its plan.
+        shared: Parameters that all members have in common.
+        messages: What the user should know.
+        layout: Its arrays.
+        found: Blocks that this process found finished.
+        ran: Blocks that this process ran.
+        ran_kept: Blocks of kept members that this process ran.
+        noted: What cannot be promised of going on with it.
+    """
+
+    def __init__(self, path: Path, within: Path | None = None):
+        self.path, self.within = path, within or path
+        needed()
+        try:
+            content = self._root()
+            self.attributes: dict[str, Any] = content["attributes"]
+            texts = [self.attributes[name] for name in ("provenance", "recipe", "messages", "shared")]
+            good = self.attributes["format"] == FORMAT and self.attributes["crc32c"] == checksum_of(texts)
+        except FileNotFoundError:
+            raise SceneError([f"{path}: holds no run; give a folder that `lgvi-warp run --store zarr` made"]) from None
+        except SceneError:
+            raise
+        except (ValueError, KeyError, TypeError, AttributeError):
+            good = False
+        if not good:
+            problem = "is damaged, or of another version of the format"
+            raise SceneError([f"{path / ROOT}: {problem}; run again (--overwrite)"])
+        with understood(path / ROOT):
+            self.provenance, self.recipe, messages, self.shared = (parsed(text) for text in texts)
+            store_texts.check(self.attributes, self.provenance, self.recipe, messages, self.shared)
+            self.messages: tuple[str, ...] = tuple(messages)
+            self.layout = store_check.layout_of(content, int(self.recipe["members"]))
+        # Blocks that this process found finished, those that it ran, and those of kept members that it ran.
+        self.found, self.ran, self.ran_kept = 0, 0, 0
+        self.noted: tuple[str, ...] = ()
+
+    def _root(self) -> Any:
+        """Read the root's metadata. Raises ValueError, SceneError, OSError."""
+        if not self.path.is_dir():
+            raise FileNotFoundError
+        return safe_files.read_json(self.within, (self.path / ROOT).relative_to(self.within).as_posix())
+
+    def kept(self) -> Folder | None:
+        """Open the group of the kept members; None if there is none."""
+        return Folder(self.path / KEPT, self.path) if os.path.lexists(self.path / KEPT) else None
+
+    @property
+    def complete(self) -> bool:
+        """Whether every block was finished when the run ended."""
+        return bool(self.attributes["complete"])
+
+    @property
+    def members(self) -> int:
+        """Number of members; fewer than the ensemble has where `until` ended the run."""
+        return int(self.attributes.get("members", self.recipe["members"]))
+
+    @property
+    def runs(self) -> list[Block]:
+        """The blocks of these members, in order."""
+        return [block for block in blocks(int(self.recipe["members"])) if block.first < self.members]
+
+    @property
+    def block_files(self) -> BlockFiles:
+        """The keeper that knows its blocks and their files."""
+        return BlockFiles(self.path, self.layout.columns)
+
+    def checked(self) -> Any:
+        """Return the zarr store through which zarr and xarray read the folder, with all checks."""
+        from lgvi_warp.store.zarr_access import checked_store
+
+        present = {name: value for name, value in self.attributes.items() if value is not None}
+        return checked_store(self.path, self.layout, self.layout.root(present))
+
+    def group(self) -> Any:
+        """Open the zarr group, for reading only."""
+        import zarr
+
+        return zarr.open_group(self.checked(), mode="r", zarr_format=3)
+
+    def refuse_too_large(self) -> None:
+        """Check that what is read at once, numbers of members without times, fits into memory."""
+        each = sum(column.bytes for column in self.layout.columns if not column.times) * len(self.runs)
+        memory = machine.memory_bytes() or 2**40
+        if each > memory:
+            size = f"has {self.members:,} members, of which {each / 1e9:.0f} GB are read at once"
+            remedy = f"the memory is {memory / 1e9:.0f} GB; read it on a larger machine, or run it again"
+            raise SceneError([f"{self.path}: {size}, and {remedy}"])
+
+    def unfinished(self) -> list[Block]:
+        """List the blocks that have no valid marker."""
+        files, marked = self.block_files, safe_files.names(self.path, "blocks")
+        return [b for b in self.runs if f"{name_of(b)}.json" not in marked or files.sums(b) is None]
+
+    def lost(self) -> list[str]:
+        """List the files of blocks that are not there; none is read.
+
+        A missing chunk raises no error: it reads as NaN or 0.
+        """
+        files, samples = self.block_files, self.layout.times
+        wanted = [f"blocks/{name_of(block)}.json" for block in self.runs]
+        wanted += [key for block in self.runs for column in files.columns for key in column.keys(block, samples)]
+        folders = {str(PurePosixPath(key).parent) for key in wanted}
+        present = {f"{folder}/{name}" for folder in folders for name in safe_files.names(self.path, folder)}
+        return [key for key in wanted if key not in present]
+
+    def plan(self, ensemble: Ensemble | None = None) -> Plan:
+        """Build the plan of the run again."""
+        try:
+            # A missing chunk raises no error: it reads as NaN or 0.
+            lost = [text for text in self.damage() if text.startswith(("time/", "step/", "explicit/"))]
+            group = self.group()
+            steps, times = group["step"][:].astype(np.int64), group["time"][:]
+            explicit = {name: np.asarray(array[:]) for name, array in group["explicit"].arrays()}
+            if lost or not np.isfinite(times).all():
+                raise ValueError("times are missing")
+        except (ValueError, OSError, KeyError) as error:
+            remedy = "run the same scene again with --store zarr --resume, which mends it"
+            raise SceneError([f"{self.path}: {'; '.join(self.damage()) or error}; {remedy}"]) from error
+        with understood(self.path / ROOT):
+            if ensemble is None:
+                noise, content = explicit.pop("indices", None), self.provenance
+                ensemble = ensemble_of(content["scene"], content["ensemble"], explicit, noise, self.path)
+            gathered = (self.provenance.get("observed") or {}).get("statistics", ())
+            looks = any(TYPES[table["type"]].looks for table in gathered if table.get("type") in TYPES)
+            return plan_of(self.recipe, ensemble, steps, times, looks)
+
+    def damage(self) -> list[str]:
+        """List what is wrong with the files that belong to no block."""
+        sums, wanted = read_marker(self.path, CREATED), self.layout.frame()
+        if sums is None:
+            return [f"{CREATED} is damaged"]
+        if sums.keys() != wanted.keys() or any(size not in (None, sums[key][0]) for key, size in wanted.items()):
+            return [f"{CREATED} does not fit the arrays in {ROOT}"]
+        faults = damaged(self.path, sums)
+        return [f"{key} {text}" for key, text in faults.items()] + self._unlike(faults)
+
+    def _unlike(self, damaged: Container[str]) -> list[str]:
+        """Arrays whose own metadata is undamaged but differs from that in the root."""
+        unlike = []
+        for name, array in self.layout.arrays.items():
+            key = f"{name}/{ROOT}"
+            if key not in damaged and safe_files.read_json(self.path, key) != array.metadata():
+                unlike.append(f"{key} says something else than {ROOT}")
+        return unlike
+
+    def finish(self, members: int | None = None) -> None:
+        """Mark the run as complete."""
+        if not self.complete:
+            self._say({"complete": True} | ({} if members is None else {"members": members}), below(self.path / KEPT))
+
+    def take_layout(self, other: Path) -> None:
+        """Take over the layout in the root's metadata of another folder of the same run.
+
+        If it differs from this folder's, the run is marked as incomplete.
+        """
+        content, right = self._root(), safe_files.read_json(other, ROOT)
+        if Folder(other).layout != self.layout:
+            right["attributes"] = content["attributes"] | {"complete": False}
+            durable.write_whole(self.path / ROOT, json.dumps(right, indent=2).encode())
+
+    def reopen(self) -> None:
+        """Mark the run as incomplete."""
+        if self.complete:
+            self._say({"complete": False}, {})
+
+    def _say(self, said: dict[str, Any], kept: dict[str, Any]) -> None:
+        """Write attributes of the run, and the metadata of the group of its kept members."""
+        content = self._root()
+        content["attributes"] |= said
+        arrays = content["consolidated_metadata"]["metadata"]
+        of_run = {name: metadata for name, metadata in arrays.items() if name.partition("/")[0] != KEPT}
+        content["consolidated_metadata"]["metadata"] = of_run | kept
+        durable.write_whole(self.path / ROOT, json.dumps(content, indent=2).encode())
+        self.attributes |= said
+
+
+def below(path: Path) -> dict[str, Any]:
+    """Read the metadata of a group and its arrays, in the form that the enclosing group holds them."""
+    if not path.exists():
+        return {}
+    root = safe_files.read_json(path.parent, f"{path.name}/{ROOT}")
+    arrays = root["consolidated_metadata"]["metadata"]
+    root["consolidated_metadata"] = {**root["consolidated_metadata"], "metadata": {}}
+    return {path.name: root} | {f"{path.name}/{name}": metadata for name, metadata in arrays.items()}
+
+
+def checksum_of(texts: Sequence[str]) -> int:
+    """Compute one checksum of several texts."""
+    return durable.checksum("\0".join(texts).encode())
+
+
+def check_names(found: Sequence[StoreArray]) -> None:
+    """Check that each array's name can be that of a folder."""
+    faults = Faults("store.")
+    for name in (column.name for column in found if not store_check.is_name(column.name)):
+        remedy = 'give the term or event another name, without / \\ : * ? " < > | and of 200 bytes at most'
+        faults.add("fields", name, "cannot be the name of a folder", remedy)
+    faults.raise_if_any()
+
+
+@contextlib.contextmanager
+def held(path: Path) -> Iterator[None]:
+    """Hold the lock of a store, which need not exist yet, and clean up what a killed run left."""
+    with write_lock(path):
+        place = Path(os.path.realpath(path))
+        durable.restored(place)
+        for beside in scratch.left_behind(place):
+            if beside.suffix in (scratch.NEW, scratch.OLD) and not foreign(beside):
+                scratch.remove_folder(beside)
+        yield
+
+
+def foreign(path: Path) -> str | None:
+    """Find what no run wrote in a folder.
+
+    Returns: A text on the first such file, or on why the folder is none of a run; None if it holds a run alone.
+    """
+    if path.is_symlink() or not path.is_dir():
+        return "is no folder of a run"
+    names = []
+    for name, entry in safe_files.entries(path):
+        folder = entry.is_dir(follow_symlinks=False)
+        if not folder and not (entry.is_file(follow_symlinks=False) and store_check.is_file_of_store(name)):
+            return f"holds {name}, which no run wrote"
+        names += [] if folder else [name]
+    if names and not any(name in (ROOT, CREATED) or scratch.is_unfinished(name) for name in names):
+        return f"holds {names[0]}, and nothing that says that it is a run"
+    return None
+
+
+def refuse_foreign(path: Path) -> None:
+    """Check that a folder that is to be replaced holds only what a run wrote."""
+    if os.path.lexists(path) and (fault := foreign(Path(os.path.realpath(path)))):
+        raise SceneError([f"{path}: {fault}; it is not overwritten: move it away, or give another folder"])

@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The arrays of a store and their chunks: every block of members is one column of chunks in each array."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from lgvi_warp.common import machine
+from lgvi_warp.engine.block import Block, blocks
+from lgvi_warp.physics.fields import dims_of
+from lgvi_warp.results import member_fields
+
+if TYPE_CHECKING:
+    from lgvi_warp.engine.plan import Plan
+
+# Dimension of the members of a run, and that of kept members, whose coordinate is their index in the run.
+MEMBER, KEPT_MEMBER = "realization", "member"
+
+
+class Chunking(Protocol):
+    """The settings that decide the chunks of a store; Store has them."""
+
+    @property
+    def fields(self) -> Sequence[str] | None:
+        """Names of the fields whose samples are stored; None: all."""
+
+    @property
+    def dtype(self) -> str | None:
+        """Number type of the stored samples; None: that of the run."""
+
+    @property
+    def chunk_bytes(self) -> int:
+        """Size that a chunk has at most, about [bytes]."""
+
+    @property
+    def along(self) -> str:
+        """Name of the dimension of members."""
+
+
+@dataclass(frozen=True)
+class StoreArray:
+    """One array of a store, of shape (k, n, *tail), or (n, *tail) without times.
+
+    Attributes:
+        name: Name of the array.
+        tail: Shape of one member's value at one time.
+        dtype: NumPy's type string.
+        length: Members in a chunk: those of a block.
+        times: Samples in a chunk; 0 for an array without times.
+        attributes: CF attributes.
+        along: Name of the dimension of members.
+    """
+
+    name: str
+    tail: tuple[int, ...]
+    dtype: str
+    length: int
+    times: int
+    attributes: dict[str, Any]
+    along: str = MEMBER
+
+    @property
+    def chunk(self) -> tuple[int, ...]:
+        """Shape of one chunk of the array."""
+        return (*((self.times,) if self.times else ()), self.length, *self.tail)
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Names of the array's dimensions."""
+        return (*(("time",) if self.times else ()), self.along, *dims_of(self.name, self.tail))
+
+    @property
+    def fill(self) -> float | int:
+        """Value in a chunk beyond the last member or time."""
+        return np.nan if np.dtype(self.dtype).kind == "f" else 0
+
+    def shape(self, samples: int, members: int) -> tuple[int, ...]:
+        """Return the shape of the whole array.
+
+        Returns: (k, n, *tail), or (n, *tail) without times.
+        """
+        return (*((samples,) if self.times else ()), members, *self.tail)
+
+    def key(self, block: Block, time: int = 0) -> str:
+        """Return the path of a chunk's file."""
+        index = (*((time,) if self.times else ()), block.first // self.length, *(0,) * len(self.tail))
+        return f"{self.name}/c." + ".".join(map(str, index))
+
+    def keys(self, block: Block, samples: int) -> list[str]:
+        """Return the paths of all chunks of a block."""
+        return [self.key(block, time) for time in range(-(-samples // self.times) if self.times else 1)]
+
+    @property
+    def bytes(self) -> int:
+        """Size of a chunk's file [bytes]: its numbers and their checksum."""
+        return int(np.prod(self.chunk)) * np.dtype(self.dtype).itemsize + 4
+
+
+def columns(plan: Plan, store: Chunking) -> tuple[StoreArray, ...]:
+    """List the arrays that a run fills block by block."""
+    length = blocks(plan.ensemble.members)[0].count
+    index = {"standard_name": "realization", "long_name": "member of the ensemble"}
+    arrays = (
+        *_samples(plan, length, store),
+        StoreArray(MEMBER, (), "<i8", length, 0, index),
+        *(StoreArray(item.name, (), item.dtype, length, 0, item.attributes) for item in member_fields.present(plan)),
+        *_parameters(plan, length),
+    )
+    return tuple(dataclasses.replace(column, along=store.along) for column in arrays)
+
+
+def _samples(plan: Plan, length: int, store: Chunking) -> list[StoreArray]:
+    real = np.dtype(machine.DTYPES[plan.dtype])
+    k = len(plan.grid.times)
+    arrays = []
+    for name in (name for name in plan.fields if store.fields is None or name in store.fields):
+        computed = np.dtype("f8") if plan.spec.compensated and name == "position" else real
+        field = plan.table[name]
+        stored = np.dtype(store.dtype) if store.dtype else computed
+        row = length * int(np.prod(field.shape)) * stored.itemsize
+        # Chunks of equal length along the times, so that the last one is nearly full as well.
+        pieces = -(-k // max(1, store.chunk_bytes // row))
+        kind = stored.newbyteorder("<").str
+        arrays.append(StoreArray(name, field.shape, kind, length, -(-k // pieces), field.attributes))
+    return arrays
+
+
+def _parameters(plan: Plan, length: int) -> list[StoreArray]:
+    ensemble = plan.ensemble
+    first = ensemble.parameters(0, 1)
+    units = parameter_units(ensemble.scene)
+    arrays = []
+    for name in ensemble.varied():
+        attributes = {"long_name": f"parameter {name}", "units": units[name]}
+        arrays.append(StoreArray(name, first[name].shape[1:], "<f8", length, 0, attributes))
+    return arrays
+
+
+def parameter_units(scene: Any) -> dict[str, str]:
+    """Look up the units of a scene's parameters."""
+    from lgvi_warp.physics import vehicle
+    from lgvi_warp.physics.terms.base import word_of
+
+    known: dict[str, str | None] = {f"vehicle.{name}": unit for name, unit in vehicle.UNITS.items()}
+    known |= {"environment.gravity": "m s-2", "environment.water_density": "kg m-3"}
+    for term in scene.parts:
+        known |= {f"{term.key}.{word_of(item)}": item.metadata.get("unit") for item in dataclasses.fields(term)}
+    return {name: known.get(name) or "1" for name in scene.parameters()}
+
+
+def size(plan: Plan, store: Chunking) -> int:
+    """Compute the size of all chunks of a run.
+
+    Returns: Size [bytes].
+    """
+    k, runs = len(plan.grid.times), len(blocks(plan.ensemble.members))
+    each = sum(column.bytes * len(column.keys(Block(0, column.length), k)) for column in columns(plan, store))
+    return each * runs

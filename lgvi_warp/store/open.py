@@ -1,0 +1,305 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Results that read from a store: opening a run, its statistics and its kept members."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from lgvi_warp.common.arguments import path_of
+from lgvi_warp.common.errors import SceneError
+from lgvi_warp.common.status import Status
+from lgvi_warp.common.write_lock import writer_of
+from lgvi_warp.control.controller import terms_of
+from lgvi_warp.control.signals import IN_FILES
+from lgvi_warp.engine.block import Block
+from lgvi_warp.engine.keepers.observation import Observation, Observing, observation_of, replicates_of
+from lgvi_warp.physics.terms.base import Term
+from lgvi_warp.results.outcomes import begun_beyond
+from lgvi_warp.results.provenance import at_end
+from lgvi_warp.results.result import END_TIME, Result
+from lgvi_warp.scene.functions import functions_of, identities
+from lgvi_warp.statistics.estimates.estimate import Estimates
+from lgvi_warp.store.block_files import damaged, name_of
+from lgvi_warp.store.folder import KEPT, ROOT, Folder
+from lgvi_warp.store.kept import keep_of, members_kept
+from lgvi_warp.store.layout import KEPT_MEMBER, MEMBER
+from lgvi_warp.store.layout_check import understood
+from lgvi_warp.store.recipe import noted_functions
+
+if TYPE_CHECKING:
+    import xarray
+
+
+@dataclass(frozen=True)
+class Arrays(Mapping[str, np.ndarray]):
+    """Arrays of a store by name, read from disk at each access.
+
+    Attributes:
+        group: zarr group of the store.
+        names: Names of the arrays.
+        axis: Axis of the members.
+        members: Slice with start, stop and step, or indices, of the members to read.
+        whole: Further arrays by name, which are in memory.
+    """
+
+    group: Any
+    names: tuple[str, ...]
+    axis: int
+    members: Any
+    whole: Mapping[str, np.ndarray] | None = None
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if self.whole is not None and name in self.whole:
+            return self.whole[name]
+        if name not in self.names:
+            raise KeyError(name)
+        at = (*(slice(None),) * self.axis, self.members)
+        array = self.group[name]
+        return np.asarray(array[at] if isinstance(self.members, slice) else array.oindex[at])
+
+    def part(self, places: slice | np.ndarray) -> Arrays:
+        """Select members of those that these arrays read."""
+        if not isinstance(self.members, slice):
+            return replace(self, members=self.members[places])
+        of_slice = range(self.members.start, self.members.stop, self.members.step)
+        if not isinstance(places, slice):
+            return replace(self, members=np.asarray(of_slice)[places])
+        chosen_range = of_slice[places]
+        return replace(self, members=slice(chosen_range.start, chosen_range.stop, chosen_range.step))
+
+    def dataset(self, path: Path) -> xarray.Dataset:
+        """Open the whole store as an xarray Dataset."""
+        return dataset(path)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names or name in (self.whole or {})
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((*self.names, *(self.whole or {})))
+
+    def __len__(self) -> int:
+        return len(self.names) + len(self.whole or {})
+
+
+def folder_of(path: str | os.PathLike[str]) -> Path:
+    """Find the store at a path: the path itself if it ends in .zarr, else the one .zarr in that folder."""
+    location = path_of("path", path)
+    if location.suffix == ".zarr":
+        return location
+    stores = sorted(location.glob("*.zarr")) if location.is_dir() else []
+    if len(stores) == 1 and stores[0].is_symlink():
+        # A folder from elsewhere could otherwise lead to any run of the user.
+        raise SceneError([f"{stores[0]}: is a link; name the store that it leads to: {stores[0].resolve()}"])
+    if len(stores) == 1:
+        return stores[0]
+    if stores:
+        fault, remedy = f"holds {len(stores)} stores", f"name one: {', '.join(map(str, stores[:5]))}"
+    else:
+        fault = "is not there" if not location.exists() else "is a file" if location.is_file() else "holds no store"
+        remedy = "give the folder of a run made with --store zarr"
+    raise SceneError([f"{location}: {fault}; {remedy}"])
+
+
+def open_run(
+    path: str | os.PathLike[str],
+    members: slice | Sequence[int] | None = None,
+    incomplete: bool = False,
+    statistics: Sequence[Any] | None = None,
+) -> Result:
+    """Open a run in a store as a Result that reads samples and parameters when they are used.
+
+    `result.dataset` is a view of the whole run by xarray, read piece by piece. `result.statistics` and `result.kept` are
+    those of all members of a complete run; opened with `members`, a result has neither.
+
+    Args:
+        path: A store, or a folder with one store.
+        members: Indices or a slice of the members to open; default all.
+        incomplete: Whether to open a run that has not ended as well; members that were not reached read as NaN and status 0.
+        statistics: The statistics that the run was given. Needed if they are of functions, which a store does not hold.
+
+    Returns:
+        The result.
+
+    Raises:
+        SceneError: If there is no run, or it is not complete, or a file of it is missing.
+        IndexError: If there are no such members.
+    """
+    folder = Folder(folder_of(path))
+    messages = folder.messages
+    if not folder.complete:
+        blocks = len(folder.unfinished())
+        missing = f"{blocks} blocks are missing" if blocks else "the members that it keeps have not been run again yet"
+        text = f"{folder.path}: is not complete: {missing}"
+        if not incomplete and (writer := writer_of(folder.path)):
+            raise SceneError([f"{text}; it is being written ({writer}): wait for it, or give incomplete=True"])
+        if not incomplete:
+            raise SceneError([f"{text}; go on with `lgvi-warp resume {folder.path.parent}`, or give incomplete=True"])
+        return result_of(folder, members, (*messages, text))
+    if lost := folder.lost():
+        more = f", and {len(lost) - 1:,} more" if len(lost) > 1 else ""
+        text = f"{folder.path}: {lost[0]} is missing{more}"
+        if not incomplete:
+            raise SceneError([f"{text}; mend it with `lgvi-warp resume {folder.path.parent}`, or give incomplete=True"])
+        return result_of(folder, members, (*messages, text))
+    observed_content = folder.provenance.get("observed")
+    if members is not None or observed_content is None or (statistics is None and observed_content.get("functions")):
+        return result_of(folder, members, messages)
+    with understood(folder.path / ROOT):
+        observed = observation_of(observed_content, statistics)
+    now = {"functions": identities(functions_of(None, observed.statistics))}
+    noted = noted_functions(folder.provenance, now)
+    return result_of(folder, None, (*messages, *noted), observing=gathered(folder, observed))
+
+
+def times_of(folder: Folder) -> np.ndarray:
+    """Read the times of a run's samples.
+
+    Returns: Times [s], shape (k,).
+    """
+    try:
+        time = np.asarray(folder.group()["time"][:])
+        if np.isfinite(time).all():
+            return time
+    except (ValueError, KeyError):
+        pass
+    remedy = "run the same scene again with --store zarr --resume, which mends it"
+    raise SceneError([f"{folder.path}: {'; '.join(folder.damage()) or 'times are lost'}; {remedy}"])
+
+
+def gathered(folder: Folder, observed: Observation) -> Observing:
+    """Read the statistics of a complete run from the parts of its blocks."""
+    replicates = replicates_of(folder.provenance["ensemble"])
+    observing = Observing(observed, times_of(folder), int(folder.recipe["members"]), replicates)
+    block_files = folder.block_files
+    for block in folder.runs:
+        _check_parts(folder, block_files.sums(block), block)
+        with understood(folder.path / block_files.parts_key(block)):
+            for keeper, part in zip(observing.keepers, block_files.parts(block, observing.keepers) or (), strict=True):
+                keeper.merge(block, part)
+    return observing
+
+
+def _check_parts(folder: Folder, sums: Mapping[str, Sequence[int]] | None, block: Block) -> None:
+    """Check that a block's parts are those that were written. Raises SceneError."""
+    key = folder.block_files.parts_key(block)
+    if sums is None:
+        faults = [f"blocks/{name_of(block)}.json is missing or damaged"]
+    elif key in sums:
+        faults = [f"{key} {text}" for key, text in damaged(folder.path, {key: sums[key]}).items()]
+    else:
+        faults = [f"{key} is not in the marker of its block"] if folder.recipe["keepers"] else []
+    if faults:
+        raise SceneError(f"{folder.path}: {text}; `lgvi-warp resume {folder.path}` mends it" for text in faults)
+
+
+def result_of(
+    folder: Folder,
+    members: Any = None,
+    messages: tuple[str, ...] = (),
+    terms: Sequence[Term] | None = None,
+    observing: Observing | None = None,
+) -> Result:
+    """Build the Result of a store.
+
+    members: Indices or a slice of the members; None: all.
+    observing: Keepers of its statistics, with all blocks merged; None: no statistics.
+    """
+    folder.refuse_too_large()
+    group, time = folder.group(), times_of(folder)
+    n = folder.members
+    at = _places(members, n)
+    arrays = {name: array for name, array in group.arrays()}
+    fields = tuple(name for name in arrays if name in IN_FILES)
+    varied = tuple(name for name in arrays if "." in name)
+    small = Arrays(group, tuple(name for name in arrays if name not in (*fields, *varied, "time", "step")), 0, at)
+    with understood(folder.path / ROOT):
+        shared = {name: np.asarray(value, dtype=np.float64) for name, value in folder.shared.items()}
+    strange = np.setdiff1d(small["status"], np.array([int(code) for code in Status]))
+    if len(strange):
+        raise SceneError([f"{folder.path}: has the status {strange[0]}, which no member ends with; run it again"])
+    provenance = at_end(folder.provenance, small, n, int(folder.recipe["members"]))
+    estimates, remarks = Estimates(), tuple[str, ...]()
+    if observing is not None:
+        estimates, remarks = observing.read(provenance["ensemble"], small["status"])
+    with understood(folder.path / ROOT):
+        of_scene = tuple(terms_of(provenance["scene"]) if terms is None else terms)
+    indices, kept = kept_of(folder, of_scene) if members is None else (np.empty(0, np.int64), None)
+    return Result(
+        time=time,
+        samples=Arrays(group, fields, 1, at),
+        **Result.per_member(small),
+        parameters=Arrays(group, varied, 0, at, shared),
+        messages=messages + remarks + begun_beyond(small["status"], small["failure_time"]),
+        provenance=provenance,
+        statistics=estimates,
+        terms=of_scene,
+        kept=kept,
+        kept_members=indices,
+        store=folder.path,
+    )
+
+
+def kept_of(folder: Folder, terms: Sequence[Term]) -> tuple[np.ndarray, Result | None]:
+    """Read the members that a complete run keeps.
+
+    Returns: Indices of the members, shape (m,), and their result; None if there are none.
+    """
+    wanted = members_kept(keep_of(folder.provenance), folder) if folder.complete else np.empty(0, np.int64)
+    if not len(wanted):
+        return wanted, None
+    group = folder.kept()
+    if group is None:
+        raise SceneError([f"{folder.path / KEPT}: is missing; `lgvi-warp resume {folder.path}` makes it again"])
+    kept = result_of(group, _chosen_places(group.group()), group.messages, terms)
+    ensemble = kept.provenance["ensemble"]
+    if kept.members != len(wanted):
+        count = f"holds {kept.members} members, not {len(wanted)}"
+        raise SceneError([f"{group.path}: {count}; `lgvi-warp resume` mends it"])
+    with understood(folder.path / ROOT):
+        places = np.asarray(ensemble.get("indices", range(folder.members)))[wanted]
+    return wanted, replace(kept, provenance=kept.provenance | {"ensemble": ensemble | {"indices": places.tolist()}})
+
+
+def _chosen_places(group: Any) -> np.ndarray | None:
+    """Places of the kept members among those that were run with them; None where these are all."""
+    return np.flatnonzero(group["chosen"][:]) if "chosen" in group else None
+
+
+def _places(members: Any, n: int) -> slice | np.ndarray:
+    """Slice or indices of the members asked for among n; all by default. Raises IndexError."""
+    if members is None or isinstance(members, slice):
+        return slice(*(members or slice(None)).indices(n))
+    indices = np.asarray(members, dtype=int)
+    if len(indices) and (indices.min() < 0 or indices.max() >= n):
+        raise IndexError(f"members {indices.min()} to {indices.max()} of {n}")
+    return indices
+
+
+def chosen(result: Result, members: Sequence[int]) -> Result:
+    """Read some members of a run in a store into memory."""
+    selection = result_of(Folder(Path(result.store or "")), members, result.messages, result.terms)
+    return replace(selection, samples=dict(selection.samples), parameters=dict(selection.parameters), store=None)
+
+
+def dataset(path: Path) -> xarray.Dataset:
+    """Open a store as an xarray Dataset, in pieces of its chunks if dask is installed."""
+    import importlib.util
+
+    import xarray
+
+    chunks: Any = {} if importlib.util.find_spec("dask") else None
+    stored = xarray.open_dataset(Folder(path).checked(), engine="zarr", chunks=chunks)
+    if KEPT_MEMBER in stored.dims:
+        stored = stored.swap_dims({KEPT_MEMBER: MEMBER})
+    if "chosen" in stored:
+        stored = stored.isel(realization=np.flatnonzero(stored.chosen.values))
+    if "failure_time" in stored:
+        ends = stored.failure_time.fillna(stored.time[-1]).drop_vars("time", errors="ignore")
+        stored = stored.assign(end_time=ends.assign_attrs(END_TIME))
+    return stored.isel(realization=slice(0, stored.attrs["members"])) if "members" in stored.attrs else stored

@@ -1,0 +1,201 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The run loop of a store: what is missing or damaged is run, what is finished is kept."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from lgvi_warp.common import safe_files, scratch
+from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.engine.block import Block, blocks
+from lgvi_warp.engine.executors.base import Executor
+from lgvi_warp.engine.keepers.protocol import Keeper, PartKeeper
+from lgvi_warp.engine.loop import RunProgress, run_blocks
+from lgvi_warp.engine.plan import Plan
+from lgvi_warp.engine.work import Work
+from lgvi_warp.store.block_files import BlockFiles, check
+from lgvi_warp.store.create import create, names_of, skeleton
+from lgvi_warp.store.folder import ROOT, Folder, foreign, held, refuse_foreign
+from lgvi_warp.store.layout import columns
+from lgvi_warp.store.recipe import refuse_another
+from lgvi_warp.store.settings import Store
+
+# Errors of the system for a full disk, a quota and a file that is too large.
+FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+
+
+@dataclass(frozen=True)
+class StoredRun:
+    """A run into a store, new or continued.
+
+    It is complete when every block is there, or as many as `enough` asks for, and `last` is done.
+
+    Attributes:
+        plan: Plan of the run.
+        store: Folder and settings of the store.
+        provenance: Provenance as the store keeps it.
+        messages: What the user should know.
+        keepers: Further keepers, whose parts lie in the store.
+        only: Indices of the blocks to run; None: all.
+        enough: Tells whether this many members are enough (see run_blocks).
+        last: Last stage of the run; called with this run, its members, the executor and the progress, it returns how many
+            blocks it ran.
+        after: Called with each block as soon as it is in the store, in order; default nothing.
+    """
+
+    plan: Plan
+    store: Store
+    provenance: dict[str, Any]
+    messages: tuple[str, ...] = ()
+    keepers: tuple[Keeper, ...] = ()
+    only: range | None = None
+    enough: Callable[[int], bool] = lambda members: False
+    last: Callable[[StoredRun, int, Executor, Callable[[float], None] | None], int] = lambda *_: 0
+    after: Callable[[Block], None] | None = None
+
+    def run(self, executor: Executor, progress: Callable[[float], None] | None = None) -> Folder:
+        """Run the blocks that are missing or damaged."""
+        check_keepers(self.keepers)
+        path = self.store.folder
+        with self._alone():
+            noted = self._begin()
+            block_files = BlockFiles(path, columns(self.plan, self.store))
+            block_files.remove_unfinished()
+            self._mend()
+            missing = self._left(block_files)
+            try:
+                with explained(self.store.whole), block_files.commits:
+                    members = self._blocks(block_files, missing, executor, progress)
+            finally:
+                block_files.remove_unfinished()
+            folder = Folder(path, self.store.whole)
+            folder.noted = noted
+            folder.ran = sum(block.first < members for block in missing)
+            folder.found = sum(block.first < members for block in self._runs()) - folder.ran
+            beyond = [] if self.only else [block for block in self._runs() if block.first >= members]
+            if beyond:
+                # How many blocks ran beyond the last one depends on the number of threads: the store keeps none of them.
+                block_files.remove(beyond, len(self.plan.grid.times))
+            if beyond or not folder.unfinished():
+                folder.ran_kept = self.last(self, members if beyond else self.plan.ensemble.members, executor, progress)
+                folder.finish(members if beyond else None)
+        return folder
+
+    @contextlib.contextmanager
+    def _alone(self) -> Iterator[None]:
+        """Lock the store from the first look at it to the end of the run; a group is locked by the run that it belongs to."""
+        if self.store.whole != self.store.folder:
+            yield
+            return
+        with contextlib.ExitStack() as stack:
+            with explained(self.store.whole):
+                stack.enter_context(held(self.store.folder))
+            yield
+
+    def _runs(self) -> list[Block]:
+        """The blocks of this run, in order."""
+        runs = blocks(self.plan.ensemble.members)
+        return runs if self.only is None else [runs[i] for i in self.only]
+
+    def _begin(self) -> tuple[str, ...]:
+        """Make the folder, or check that what lies there is this run, and say what of it cannot be promised."""
+        path, store = self.store.folder, self.store
+        exists = os.path.lexists(path) and bool(os.listdir(path) if path.is_dir() else True)
+        if exists and store.existing == "refuse":
+            if fault := foreign(path):
+                raise SceneError([f"{path}: {fault}; give another folder"])
+            remedy = 'go on with `lgvi-warp resume` (existing="resume"), or replace it with --overwrite (existing="overwrite")'
+            raise SceneError([f"{path}: holds a run already; {remedy}"])
+        if exists and store.existing == "resume":
+            safe_files.refuse_links(path)
+            folder = Folder(path, store.whole)
+            noted = refuse_another(path, folder.provenance, self.provenance, store.force)
+            recipe = folder.recipe
+            for present, wanted in ((recipe["store"], store.layout()), (recipe["keepers"], names_of(self.keepers))):
+                if present != wanted:
+                    raise SceneError([f"{path}: stores {present}, not {wanted}; ask for the same, or overwrite"])
+            return noted
+        refuse_foreign(path)
+        with explained(store.whole):
+            create(store, self.plan, self.provenance, self.messages, self.keepers)
+        return ()
+
+    def _mend(self) -> None:
+        """Write those files anew that belong to no block and are damaged."""
+        path = self.store.folder
+        for name in ("blocks", "parts"):
+            (path / name).mkdir(exist_ok=True)
+        folder = Folder(path, self.store.whole)
+        if not folder.damage():
+            return
+        beside = scratch.beside(path, scratch.NEW)
+        try:
+            skeleton(beside, self.store, self.plan, self.provenance, self.messages, self.keepers)
+            folder.take_layout(beside)
+            for file in sorted(beside.rglob("*")):
+                target = path / file.relative_to(beside)
+                if file.is_file() and file != beside / ROOT:
+                    target.parent.mkdir(parents=True, exist_ok=True)
+                    file.replace(target)
+        finally:
+            scratch.remove_folder(beside)
+
+    def _left(self, block_files: BlockFiles) -> list[Block]:
+        """Blocks that are not finished or not whole; a damaged one loses its marker."""
+        missing = []
+        for block, faults in check(block_files, self._runs(), len(self.plan.grid.times), self.keepers):
+            if faults:
+                block_files.marker(block).unlink(missing_ok=True)
+                missing.append(block)
+        return missing
+
+    def _blocks(
+        self,
+        block_files: BlockFiles,
+        left: Sequence[Block],
+        executor: Executor,
+        progress: Callable[[float], None] | None,
+    ) -> int:
+        """Run the blocks left, and merge the parts of all in order. Returns where their members end."""
+        runs, n, steps = self._runs(), self.plan.ensemble.members, self.plan.grid.steps
+        overall = RunProgress(n * steps, progress)
+        for block in set(runs) - set(left):
+            overall.at(block, block.count * steps)
+        members = run_blocks(
+            Work(self.plan, self.keepers, block_files), runs, executor, overall.at, left, self.enough, after=self.after
+        )
+        if progress and members < runs[-1].stop:
+            progress(1.0)
+        return members
+
+
+def check_keepers(keepers: Sequence[Keeper]) -> None:
+    """Check that each keeper can leave its parts in a store, under its own name."""
+    faults = Faults("keepers.")
+    for keeper in keepers:
+        if not isinstance(keeper, PartKeeper):
+            faults.add(type(keeper).__name__, keeper, "cannot be stored", "give it name, to_arrays and from_arrays")
+    names = names_of(keepers)
+    for name in sorted({name for name in names if names.count(name) > 1 or "/" in name}):
+        faults.add("name", name, "is no name of its own", "give each keeper another name, without /")
+    faults.raise_if_any()
+
+
+@contextlib.contextmanager
+def explained(path: os.PathLike[str]) -> Iterator[None]:
+    """Add to errors of the disk what they mean for the run."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno in FULL:
+            remedy = f"the blocks that were finished are kept; make room, then `lgvi-warp resume {path}`"
+        elif error.errno in (errno.EROFS, errno.EACCES, errno.EPERM):
+            remedy = "choose a folder that can be written"
+        else:
+            raise
+        raise OSError(error.errno, f"{error.strerror}: {remedy}", error.filename or str(path)) from error

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`Store`: the folder and the settings of a run that is written to disk."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lgvi_warp.common.arguments import listed
+from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.control.signals import SAVED
+from lgvi_warp.store.arrays import whole_array
+from lgvi_warp.store.layout import MEMBER, parameter_units
+
+if TYPE_CHECKING:
+    from lgvi_warp.engine.plan import Plan
+
+
+# Small enough for the memory of the blocks at work, large enough that files and their syncs cost little [bytes].
+CHUNK_BYTES = 10_000_000
+
+
+EXISTING = ("refuse", "resume", "overwrite")
+
+
+@dataclass(frozen=True)
+class Store:
+    """Folder and settings of a run that is written to disk as a zarr store.
+
+    Args:
+        path: A folder whose name ends in .zarr.
+        dtype: "float32" stores the samples of a float64 run in single precision; default the dtype of the run.
+        fields: Names of the fields whose samples are stored; default all that are kept.
+        existing: What to do if the folder holds a run already: "refuse" (default), "resume" (continue it, if it is the same
+            run) or "overwrite".
+        force: Whether to continue on another machine or with other versions, where the bits may differ; default False.
+        chunk_bytes: Size that a chunk has at most, about [bytes]; default 10 MB. Each block at work holds one chunk per field.
+
+    Raises:
+        SceneError: If settings are at fault or a library is missing; the message names every fault.
+    """
+
+    path: str | os.PathLike[str]
+    dtype: str | None = None
+    fields: tuple[str, ...] | None = None
+    existing: str = "refuse"
+    force: bool = False
+    chunk_bytes: int = CHUNK_BYTES
+
+    def __post_init__(self) -> None:
+        faults = Faults("store.")
+        if not isinstance(self.path, str | os.PathLike) or self.whole.suffix != ".zarr":
+            faults.add("path", self.path, "is no folder of a store", 'end its name in .zarr: "runs/x/run.zarr"')
+        if self.dtype is not None:
+            faults.choice("dtype", self.dtype, ("float32", "float64"))
+        faults.choice("existing", self.existing, EXISTING)
+        with faults.including():
+            for name in () if self.fields is None else listed("fields", self.fields, "names of fields"):
+                faults.choice("fields", name, SAVED)
+        faults.number("chunk_bytes", self.chunk_bytes, "bytes", least=1)
+        faults.raise_if_any()
+        needed()
+
+    def layout(self) -> dict[str, Any]:
+        """Return the settings that the bytes in the store depend on, as JSON holds them."""
+        fields = None if self.fields is None else list(self.fields)
+        return {"dtype": self.dtype, "fields": fields, "chunk_bytes": int(self.chunk_bytes)}
+
+    @property
+    def folder(self) -> Path:
+        """The store's folder as a Path."""
+        return Path(self.path)
+
+    @property
+    def along(self) -> str:
+        """Name of the dimension of members in its arrays."""
+        return MEMBER
+
+    @property
+    def whole(self) -> Path:
+        """Folder of the whole run that the store is part of: here its own."""
+        return self.folder
+
+    def write_given(self, group: Any, plan: Plan) -> None:
+        """Write the states and parameters that the ensemble was given as arrays: nothing else in the store holds them.
+
+        Args:
+            group: zarr group of the store.
+            plan: Plan of the run.
+        """
+        arrays, units = plan.ensemble.explicit(), parameter_units(plan.ensemble.scene)
+        explicit = group.create_group("explicit")
+        for name, values in arrays.items():
+            along = MEMBER if name == "indices" else f"{MEMBER}_given"
+            dims = (along, *(f"{name}_{i}" for i in range(values.ndim - 1)))
+            whole_array(explicit, name, values, dims, {"units": units.get(name, "1")})
+
+
+def needed() -> None:
+    """Raise SceneError if the libraries that stores need are not installed."""
+    try:
+        import google_crc32c  # noqa: F401
+        import xarray  # noqa: F401
+        import zarr  # noqa: F401
+    except ImportError as error:
+        raise SceneError([f"store: {error}; install it: pip install 'lgvi-warp[store]'"]) from error

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The quantity that two results are compared in: any that statistics know, with its unit and its distance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import SceneError
+from lgvi_warp.physics.fields import FIELDS, TABLE
+from lgvi_warp.results.quantities import samples_of
+from lgvi_warp.results.result import Result
+from lgvi_warp.statistics.values.functional import Functional, functional
+
+# Quantities that results are always compared in, and their units. Attitudes differ by the angle between them.
+QUANTITIES = {name: TABLE[name].unit for name in (*FIELDS, "energy")} | {"attitude": "rad"}
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Quantity that errors are measured in.
+
+    Attributes:
+        name: name of the quantity.
+        unit: its unit.
+        functional: computes its numbers at each time; None for those of QUANTITIES.
+        mean: whether the error is that of its mean over the members, in place of the largest of any member. Default False.
+    """
+
+    name: str
+    unit: str
+    functional: Functional | None = None
+    mean: bool = False
+
+    def values(self, result: Result) -> np.ndarray:
+        """Compute the quantity at each time.
+
+        Returns: Its numbers (k, n, components), float64 [unit].
+        """
+        if self.functional is None:
+            values = np.asarray(getattr(result, self.name), dtype=np.float64)
+            return values.reshape(len(result.time), result.members, -1)
+        return self.functional(*samples_of(result))
+
+    def distance(self, result: Result, reference: Result) -> np.ndarray:
+        """Measure the distance of two results in this quantity.
+
+        Returns: Length of the difference (k, n) [unit]; of angles [rad] the short way round. Of a mean, for every member
+            alike, the upper end of the 95 % interval of the difference of the means, whose members are paired.
+        """
+        with np.errstate(invalid="ignore"):
+            apart = self.values(result) - self.values(reference)
+            if self.unit == "rad":
+                apart -= 2.0 * np.pi * np.round(apart / (2.0 * np.pi))
+            if self.mean:
+                return np.broadcast_to(_bias(apart)[:, None], apart.shape[:2])
+        return np.linalg.norm(apart, axis=-1)
+
+    def largest(self, result: Result) -> float:
+        """Return the largest size of the quantity.
+
+        Returns: Largest absolute value over times, members and components [unit].
+        """
+        return float(np.nanmax(np.abs(self.values(result))))
+
+
+def _bias(apart: np.ndarray) -> np.ndarray:
+    """Length of the mean of paired differences (k, n, components) and of two standard errors of it, (k,)."""
+    n = apart.shape[1]
+    error = 2.0 * apart.std(axis=1, ddof=1) / np.sqrt(n) if n > 1 else np.zeros(apart[:, 0].shape)
+    return np.asarray(np.linalg.norm(np.abs(apart.mean(axis=1)) + error, axis=-1))
+
+
+# What begins the name of a mean over the members, as lw.Mean has it.
+MEAN = "mean "
+
+
+def compared_in(of: Any) -> Compared:
+    """Find the quantity that a name or a lw.Quantity means.
+
+    of: a name such as "position", "depth", "position[2]" or "norm(velocity)", a lw.Quantity, or a Compared; "mean position[0]"
+        for the mean over the members.
+    """
+    if isinstance(of, Compared):
+        return of
+    if isinstance(of, str) and of.strip() in QUANTITIES:
+        return Compared(of.strip(), QUANTITIES[of.strip()])
+    if isinstance(of, str) and of.strip().startswith(MEAN):
+        entry = compared_in(of.strip().removeprefix(MEAN))
+        if entry.name == "attitude" or entry.mean:
+            raise SceneError(
+                [f"of = {of!r}: is no mean of numbers; give the mean of an entry, such as 'mean attitude[2,2]'"]
+            )
+        return replace(
+            entry, name=MEAN + entry.name, functional=entry.functional or functional("of", entry.name), mean=True
+        )
+    if isinstance(of, list | tuple):
+        raise SceneError([f"of = {of!r}: is several quantities; errors are of one of them: give its name"])
+    parsed = functional("of", of)
+    if parsed.over_path:
+        remedy = f"give {parsed.inner.name!r}, whose largest error over the path is reported"
+        raise SceneError(
+            [f"of = {parsed.label!r}: looks over the path, and errors are of a quantity at each time; {remedy}"]
+        )
+    return Compared(parsed.label, parsed.unit or "1", parsed)

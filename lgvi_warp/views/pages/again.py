@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How to run a run again: its scene as it was written, and the command."""
+
+from __future__ import annotations
+
+import json
+import math
+import shlex
+from collections.abc import Mapping
+from typing import Any
+
+from lgvi_warp.common.errors import MissingExtra, SceneError
+
+# What a run has where neither its scene nor a script says otherwise.
+DEFAULTS = {"dtype": "float64", "checks": "safe", "on_failure": "freeze"}
+
+
+def again(provenance: Mapping[str, Any]) -> tuple[str | None, str, str]:
+    """Say how to run a run again.
+
+    Returns: The command, None where no file holds all of the run; what a reader has to know; and the text of the scene file:
+        as it was written, else of the scene's tables. An ensemble that was given in Python stands in it in place of the file's
+        own.
+    """
+    scene, source = provenance["scene"], provenance.get("source", {})
+    written = isinstance(source.get("text"), str)
+    name, changes = (str(source["file"]), dict(source["changes"])) if written else ("scene.toml", {})
+    ensemble = _given_ensemble(provenance)
+    if any(law.get("type") == "callback" for law in scene.get("controller", {}).get("laws", ())):
+        reason = "A law is a Python function, which no file holds"
+    elif ensemble is not None and not _is_scene(whole := {**scene, "ensemble": ensemble}):
+        reason = "The ensemble was given in Python, with numbers that no file holds"
+    else:
+        reason, said = "", f"Save this scene as {name}, then:"
+    text = source["text"] if written else ""
+    if not reason and ensemble is not None:
+        said = f"The ensemble was given in Python: it stands here in place of the file's own. {said}"
+        changes = {key: value for key, value in changes.items() if not key.startswith("ensemble.")}
+        text = _with_ensemble(text, ensemble) if written else toml_of(shortened(whole))
+    text = text or toml_of(shortened(scene))
+    if reason:
+        return None, f"{reason}: run the script again. The scene but for it:", text
+    sets = [word for key, value in changes.items() for word in ("--set", f"{key}={value}")]
+    return shlex.join(["lgvi-warp", "run", name, *sets, *_given(provenance)]), said, text
+
+
+def _given_ensemble(provenance: Mapping[str, Any]) -> Mapping[str, Any] | None:
+    """The section [ensemble] that a run had, where that is not its scene's own; None where it is."""
+    had, own = provenance.get("ensemble"), provenance["scene"].get("ensemble", {"members": 1, "seed": 0})
+    if had is None or json.dumps(had, sort_keys=True) == json.dumps({"members": had["members"]} | own, sort_keys=True):
+        return None
+    return dict(had)
+
+
+def _is_scene(content: Mapping[str, Any]) -> bool:
+    """Whether tables are a scene's."""
+    from lgvi_warp.scene.scene import Scene
+
+    try:
+        Scene.from_dict(content)
+    except SceneError:
+        return False
+    return True
+
+
+def _with_ensemble(text: str, ensemble: Mapping[str, Any]) -> str:
+    """The text of a scene file with another section [ensemble], all else as it was written."""
+    toml = _tomlkit()
+    document = toml.parse(text)
+    if "ensemble" in document:
+        document.remove("ensemble")
+    return f"{toml.dumps(document).rstrip()}\n\n{toml.dumps({'ensemble': ensemble})}"
+
+
+def _given(provenance: Mapping[str, Any]) -> list[str]:
+    """Options for what a run was given in place of its scene's own settings."""
+    settings, method = provenance["scene"].get("run", {}), provenance["method"]
+    options = {
+        "method": method["name"],
+        "step": provenance["step"],
+        "duration": provenance["step"] * provenance["steps"],
+        "dtype": provenance["dtype"],
+        "rtol": method.get("rtol"),
+        "atol": method.get("atol"),
+        "checks": provenance.get("checks"),
+        "on_failure": provenance.get("on_failure"),
+    }
+    unsaid = {"method"} if method.get("chosen") else set()
+    return [word for name, value in options.items()
+            if value is not None and name not in unsaid and not _same(settings.get(name, DEFAULTS.get(name)), value)
+            for word in (f"--{name.replace('_', '-')}", value if isinstance(value, str) else f"{value:.12g}")]  # fmt: skip
+
+
+def _same(setting: Any, value: Any) -> bool:
+    """Whether a setting of a scene is what a run had."""
+    if isinstance(value, str):
+        return bool(setting == value)
+    return isinstance(setting, int | float) and math.isclose(setting, value, rel_tol=1e-9)
+
+
+def shortened(scene: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Name a vehicle of the package in place of its numbers, where that is the same scene."""
+    from lgvi_warp.scene.scene import Scene
+    from lgvi_warp.vehicles.fossen import vehicles
+
+    name = scene.get("vehicle", {}).get("title")
+    if name not in vehicles():
+        return scene
+    known = Scene.named(name).to_dict()
+    short = dict(scene)
+    for section in ("vehicle", "environment"):
+        own = {key: value for key, value in scene[section].items() if known[section].get(key) != value}
+        short[section] = {"name": name} | own if section == "vehicle" else own
+    short["terms"] = [term for term in scene.get("terms", ()) if term not in known.get("terms", ())]
+    short = {section: content for section, content in short.items() if content}
+    try:
+        return short if Scene.from_dict(short).to_dict() == scene else scene
+    except SceneError:
+        return scene
+
+
+def toml_of(content: Mapping[str, Any]) -> str:
+    """Content as the text of a TOML file."""
+    return str(_tomlkit().dumps(content))
+
+
+def _tomlkit() -> Any:
+    """Load tomlkit. Raises ImportError where it is not installed."""
+    try:
+        import tomlkit
+    except ModuleNotFoundError as error:
+        raise MissingExtra("reports", "tomlkit", "viz") from error
+    return tomlkit

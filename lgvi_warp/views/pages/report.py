@@ -1,0 +1,302 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The report of a run or of studies: one HTML file with pictures, tables, the scene and how to run it again."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import html
+import io
+import json
+import os
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lgvi_warp.common.arguments import file_path, path_of, result_of
+from lgvi_warp.common.errors import NothingToDraw, SceneError
+from lgvi_warp.common.files import place_of, write_text
+from lgvi_warp.common.reading import file_bytes, file_json, file_text, understood
+from lgvi_warp.common.safe_files import inside
+from lgvi_warp.common.status import Warnings
+from lgvi_warp.results.outcomes import outcome_text, outcomes
+from lgvi_warp.statistics.estimates.table import table
+from lgvi_warp.studies.files import STUDY_FILES, of_study
+from lgvi_warp.views.commands import faults
+from lgvi_warp.views.fleet import LOOKS, title
+from lgvi_warp.views.pages.again import again
+from lgvi_warp.views.plots import drawable, plot, plot_statistics
+from lgvi_warp.views.plots import outcomes as draw_outcomes
+from lgvi_warp.views.plots.inputs import inputs_by_outcome, varied
+from lgvi_warp.views.plots.sweep_pictures import PICTURES
+
+if TYPE_CHECKING:
+    from lgvi_warp.results.result import Result
+
+# A picture of more bytes is drawn in pixels, so that the file stays small.
+MOST_SVG = 1_000_000
+# Most bytes of the pictures of studies that it holds; one has some tens of kilobytes.
+MOST_PICTURES = 100_000_000
+# Rows of a table of a study that the report shows; its CSV file has all.
+MOST_ROWS = 200
+# Pictures that lgvi-warp run writes.
+OF_A_RUN = ("fleet.png", "statistics.png")
+STYLE = """
+body { font: 15px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
+h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin-top: 2.2rem; border-bottom: 1px solid #ccc; }
+table { border-collapse: collapse; } th, td { text-align: left; padding: .2rem .8rem .2rem 0; vertical-align: top; }
+th { font-weight: 600; } td.number { text-align: right; font-variant-numeric: tabular-nums; }
+pre { background: #f5f5f5; padding: .8rem; overflow-x: auto; font-size: 13px; }
+@media print { pre { white-space: pre-wrap; } }
+svg, img { max-width: 100%; height: auto; } .outcome { display: inline-block; width: .8rem; height: .8rem; }
+"""
+
+
+def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]) -> Path:
+    """Write one HTML file that says what a run or studies found; it opens without a network.
+
+    Of a run it has the outcomes of the members with remedies, notes and warnings, the pictures that suit it, the statistics
+    with their intervals, how it was run, the scene as it was written, and how to run it again. Of a study it has the pictures
+    and tables that lie in its folder.
+
+    Args:
+        result: A result, or the folder of a run, a trade-off, a stability map, a sensitivity study or a sweep, or of several.
+        path: The file.
+
+    Returns:
+        The path.
+
+    Raises:
+        ImportError: Matplotlib or tomlkit is not installed (extra: viz).
+        SceneError: The folder holds no run and no study.
+        OSError: The file cannot be written.
+    """
+    place_of(file_path("path", path))  # before anything is drawn
+    if isinstance(result, str | os.PathLike):
+        name, parts = _of_folder(path_of("result", result))
+    else:
+        found = result_of(result)
+        name, parts = name_of(found.provenance), [_paragraph(f"Written on {_day(time.time())}."), *_of_run(found)]
+    heading = html.escape(name)
+    head = f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{heading}</title><style>{STYLE}</style></head>'
+    return write_text(path, f"{head}<body><h1>{heading}</h1>{''.join(parts)}</body></html>\n")
+
+
+def _of_folder(folder: Path) -> tuple[str, list[str]]:
+    """Name and parts of the page of what a folder holds. Raises SceneError where that is damaged."""
+    with understood(folder, "not what a verb wrote", "write it again"):
+        run, studies = run_in(folder), studies_in(folder)
+        if run is None and not studies:
+            fault = "holds no run and no study"
+            remedy = "give a folder that lgvi-warp run, tradeoff, stability, sensitivity or sweep wrote"
+            raise SceneError([f"{folder}: {fault}; {remedy}"])
+        place, parts = folder.resolve().name, list[str]()
+        if run is not None:
+            found, file = run
+            parts += [_paragraph(f"Run of {_day(file.stat().st_mtime)}, in {place}."), *_of_run(found)]
+        parts += [_paragraph(f"{_words(study)} of {_day(study.stat().st_mtime)}, in {place}.") for study in studies]
+        if studies:
+            parts += [_section(_words(picture), _pixels(picture)) for picture in _pictures_in(folder, run is not None)]
+        for study in studies:
+            parts += _of_study(study)
+        return name_of(found.provenance) if run is not None else f"{_words(studies[0])} of {place}", parts
+
+
+def run_in(folder: Path) -> tuple[Result, Path] | None:
+    """Read the run that a folder holds.
+
+    Returns: The result, and the file or the store; None without one.
+    """
+    from lgvi_warp.results.result import Result
+    from lgvi_warp.store.open import open_run
+
+    if os.path.lexists(folder / "result.npz"):
+        held = inside(folder, "result.npz")
+        return Result.load(held), held
+    if (folder / "run.zarr").exists() or folder.suffix == ".zarr":
+        return open_run(folder), folder
+    return None
+
+
+def studies_in(folder: Path) -> list[Path]:
+    """Find the studies that a folder holds."""
+    return [inside(folder, path.name) for pattern in STUDY_FILES.values() for path in sorted(folder.glob(pattern))]
+
+
+def name_of(provenance: Mapping[str, Any]) -> str:
+    """Name a run: by its scene file, and by its vehicle."""
+    source, vehicle = provenance.get("source", {}), provenance["scene"].get("vehicle", {})
+    names = (Path(str(source.get("file", ""))).stem, str(vehicle.get("title") or ""))
+    return ": ".join(name for name in names if name) or "Run"
+
+
+def _day(seconds: float) -> str:
+    """The day of a time since the epoch [s], in local time."""
+    return time.strftime("%Y-%m-%d", time.localtime(seconds))
+
+
+def _words(path: Path) -> str:
+    """Name of a file in words."""
+    return path.stem.replace("_", " ").capitalize()
+
+
+def _of_run(result: Result) -> Iterator[str]:
+    """The parts of a run's page."""
+    yield _paragraph(title(result))
+    yield _section("What became of the members", _outcome_table(result))
+    remarks = [*result.messages, *_warnings(result), *(fault.text for fault in faults(result))]
+    if remarks:
+        yield _section("Notes and warnings", _list(remarks))
+    pictures = [_picture(draw, result) for draw in _pictures_of(result)]
+    if any(pictures):
+        yield _section("Pictures", "".join(pictures))
+    if result.statistics:
+        at = f"At {result.time[-1]:g} s, with intervals."
+        yield _section("Statistics", _paragraph(at) + _preformatted("\n".join(table(result.statistics))))
+    yield _section("How it was run", _table((), _settings(result)))
+    yield _section("Run it again", _again(result))
+
+
+def _outcome_table(result: Result) -> str:
+    counts = result.status.counts()
+    rows = []
+    for code in outcomes(result):
+        number = counts[code.name.lower()]
+        mark = f'<span class="outcome" style="background:{LOOKS[code].color}"></span> {html.escape(code.name.lower())}'
+        share = f"{100.0 * number / result.members:.3g} %"
+        rows.append((_Html(mark), f"{number:,}", share, outcome_text(result, code)))
+    return _table(("outcome", "members", "share", "meaning and remedy"), rows)
+
+
+def _warnings(result: Result) -> list[str]:
+    """A line for each warning that arose."""
+    texts = {str(warning.name).lower(): warning.text for warning in Warnings}
+    return [f"{name}, {number:,} members: {texts[name]}" for name, number in result.warnings.counts().items()]
+
+
+def _pictures_of(result: Result) -> list[Callable[[Any, Path], Path]]:
+    """Functions that draw what suits a run: a summary, inputs of members that ended differently, statistics."""
+
+    def inputs(result: Result, path: Path) -> Path:
+        inputs_by_outcome(result, path=path)
+        return path
+
+    def shares(result: Result, path: Path) -> Path:
+        draw_outcomes(result, path=path)
+        return path
+
+    differ = len(outcomes(result)) > 1
+    drawn: list[Callable[[Any, Path], Path]] = (
+        [plot] if result.samples or result.kept is not None else [shares] * differ
+    )
+    drawn += [inputs] if differ and varied(result) else []
+    return drawn + ([plot_statistics] if drawable(result) else [])
+
+
+def _picture(draw: Callable[[Any, Path], Path], result: Result) -> str:
+    """A picture as SVG, or in pixels where that is large; a sentence where there is nothing to draw."""
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            drawn = draw(result, Path(folder) / "picture.svg")
+            if drawn.stat().st_size > MOST_SVG:
+                return _pixels(draw(result, Path(folder) / "picture.png"))
+        except NothingToDraw as reason:
+            return _paragraph(str(reason))
+        text = file_text(drawn, "picture")
+    return text[text.index("<svg") :]
+
+
+def _pixels(path: Path) -> str:
+    code = base64.b64encode(file_bytes(path, "picture")).decode()
+    return f'<img alt="{html.escape(path.stem)}" src="data:image/png;base64,{code}">'
+
+
+def _settings(result: Result) -> Iterator[tuple[str, str]]:
+    """Names and values of how the run was made."""
+    provenance = result.provenance
+    method = provenance["method"]
+    yield "method", f"{method['name']}, {method['chosen']}" if method.get("chosen") else str(method["name"])
+    yield "step", f"{provenance['step']:g} s, {provenance['steps']:,} steps"
+    yield "numbers", str(provenance["dtype"])
+    yield "members", f"{result.members:,}"
+    if (seed := provenance.get("ensemble", {}).get("seed")) is not None:
+        yield "seed", str(seed)
+    yield "versions", ", ".join(f"{name} {version}" for name, version in provenance["versions"].items())
+    yield "machine", ", ".join(str(value) for value in provenance["machine"].values())
+
+
+def _again(result: Result) -> str:
+    """The command that runs it again, and the scene."""
+    command, said, text = again(result.provenance)
+    return _paragraph(said) + (_preformatted(command) if command else "") + _preformatted(text)
+
+
+def _of_study(path: Path) -> Iterator[str]:
+    """The parts of a study's page but for its pictures: words, its table, and its settings."""
+    with of_study(path):
+        short = {key: value for key, value in file_json(path).items() if not isinstance(value, list)}
+    table_file = "table.csv" if path.stem == "sweep" else f"{path.stem}.csv"
+    if path.stem == "sweep" and os.path.lexists(path.with_name("summary.md")):
+        yield _section("Summary", _preformatted(file_text(inside(path.parent, "summary.md"), "text file")))
+    if os.path.lexists(path.with_name(table_file)):
+        head, *rows = _rows_in(inside(path.parent, table_file)) or [[]]
+        more = f"The first {MOST_ROWS:,} of {len(rows):,} rows; {table_file} has all." if len(rows) > MOST_ROWS else ""
+        yield _section("Table", _paragraph(more) + _table(head, rows[:MOST_ROWS]))
+    yield _section("How it was made", _preformatted(json.dumps(short, indent=1)))
+
+
+def _pictures_in(folder: Path, has_run: bool) -> list[Path]:
+    """Pictures of studies in a folder, those of a sweep in their order; those of a run are drawn anew."""
+    drawn = {path.name for path in folder.glob("*.png")} - set(OF_A_RUN if has_run else ())
+    of_sweeps = [name for name in PICTURES if name in drawn]
+    pictures = [inside(folder, name) for name in (*of_sweeps, *sorted(drawn.difference(of_sweeps)))]
+    # One large file may have many names.
+    if (size := sum(path.stat().st_size for path in pictures)) > MOST_PICTURES:
+        fault = f"its pictures have {size / 1e6:,.0f} MB, more than the {MOST_PICTURES / 1e6:,.0f} MB of a report"
+        raise SceneError([f"{folder}: {fault}; take some away"])
+    return pictures
+
+
+def _rows_in(path: Path) -> list[list[str]]:
+    """Rows of a CSV file of a study. Raises SceneError for one that is damaged."""
+    text = file_text(path, "CSV file")
+    with of_study(path):
+        try:
+            return list(csv.reader(io.StringIO(text, newline="")))
+        except csv.Error as error:
+            raise ValueError(str(error)) from None
+
+
+class _Html(str):
+    """Text that is HTML already."""
+
+    __slots__ = ()
+
+
+def _escaped(value: str) -> str:
+    return value if isinstance(value, _Html) else html.escape(value)
+
+
+def _section(heading: str, content: str) -> str:
+    return f"<h2>{html.escape(heading)}</h2>{content}"
+
+
+def _paragraph(text: str) -> str:
+    return f"<p>{html.escape(text)}</p>" if text else ""
+
+
+def _preformatted(text: str) -> str:
+    return f"<pre>{html.escape(text)}</pre>"
+
+
+def _list(items: Sequence[str]) -> str:
+    return f"<ul>{''.join(f'<li>{html.escape(item)}</li>' for item in items)}</ul>"
+
+
+def _table(head: Sequence[str], rows: Iterator[Sequence[str]] | Sequence[Sequence[str]]) -> str:
+    """A table; head: titles of its columns, none for a table of names and values."""
+    titles = "".join(f"<th>{html.escape(text)}</th>" for text in head)
+    body = "".join(f"<tr>{''.join(f'<td>{_escaped(text)}</td>' for text in row)}</tr>" for row in rows)
+    return f"<table>{f'<tr>{titles}</tr>' if titles else ''}{body}</table>"

@@ -1,0 +1,319 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of sweeps: success by case and over the grid, metrics by case, paired differences, what failures go with.
+
+Each draws on `figure=` or on a figure of its own, writes a file where `path` names one, and returns its axes.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.common.status import failed, under_way
+from lgvi_warp.methods.saveat import SaveAt
+from lgvi_warp.results.quantities import samples_of
+from lgvi_warp.statistics.values import tracking
+from lgvi_warp.studies.sweeps.output import Sweep, against_baseline
+from lgvi_warp.studies.sweeps.setup import END, Cell
+from lgvi_warp.studies.sweeps.sweep_table import SUCCESS
+from lgvi_warp.views.plots.canvas import COLORS, GREY, MARKERS, below, panels, point_down, style, wrapped
+from lgvi_warp.views.plots.fans import draw_bands
+
+# Most boxes of one panel, and most members that are drawn as points.
+MOST_BOXES, MOST_POINTS = 40, 4000
+# Most members, and most times, of a fan.
+MOST_PATHS = 200
+# Most fans side by side.
+MOST_COLUMNS = 3
+# Names of cases stand upright where there are more.
+MOST_LEVEL = 6
+QUARTILES = {"whislo": 0.05, "q1": 0.25, "med": 0.5, "q3": 0.75, "whishi": 0.95}
+
+FilePath = str | os.PathLike[str]
+
+
+def _ran(sweep: Sweep, case: str | None = None) -> list[Cell]:
+    """The cells that ran, of all cases or of one; NothingToDraw where no cell of the sweep did."""
+    cells = [cell for cell in sweep.cells if not sweep.record(cell).refused]
+    if not cells:
+        raise NothingToDraw("all cells were refused")
+    return [cell for cell in cells if case in (None, cell.case.name)]
+
+
+def _long(sweep: Sweep) -> list[str]:
+    """Names of the axes of the grid with two values or more."""
+    return [name for name, values in sweep.setup.axes.items() if len(values) > 1]
+
+
+def _short(sweep: Sweep, case: str, point: Mapping[str, Any]) -> str:
+    """A case and a point of the grid in few words: values alone, of axes with several."""
+    return ", ".join([case, *(str(point[name]) for name in _long(sweep))])
+
+
+def _meaning(sweep: Sweep) -> str:
+    """What the words of `_short` stand for."""
+    return ", ".join(["case", *_long(sweep)])
+
+
+def plot_success(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
+    """Draw the success of each case with its intervals: by case, over the axis of the grid, or a map over its first two axes.
+
+    A map has the interval in each field, and is drawn at the first value of any further axis.
+
+    path: of the picture; default None, which writes none.
+    figure: Matplotlib figure to draw on; default None, one of its own.
+    Returns: The axes, (panels,).
+    """
+    cells, long = _ran(sweep), _long(sweep)
+    if len(long) >= 2:
+        return _maps(sweep, long, path, figure)
+    with panels(figure, path, (1, 1), (8.0, 5.0)) as grid:
+        axes = grid[0, 0]
+        if long:
+            values = sweep.setup.axes[long[0]]
+            for i, case in enumerate(sweep.cases):
+                _ends(
+                    axes, sweep, _ran(sweep, case), _places(values), long[0], marker=MARKERS[i], label=case, **style(i)
+                )
+            axes.set_xticks(_places(values), [str(value) for value in values])
+            axes.set_xlabel(long[0])
+            axes.legend()
+        else:
+            _ends(axes, sweep, cells, list(map(float, range(len(cells)))), None, marker="o", linestyle="none")
+            turned = 0.0 if len(cells) <= MOST_LEVEL else 90.0
+            axes.set_xticks(range(len(cells)), [cell.case.name for cell in cells], rotation=turned)
+        axes.set_ylabel(f"passes [%], {sweep.confidence:.0%} interval")
+        axes.grid(alpha=0.3)
+    return grid.ravel()
+
+
+def _ends(axes: Any, sweep: Sweep, cells: list[Cell], places: list[float], name: str | None, **look: Any) -> None:
+    """Success of cells with error bars [%]: one a place, or each at the place of its value of an axis of the grid."""
+    if not cells:
+        return
+    if name is not None:
+        values = sweep.setup.axes[name]
+        places = [places[values.index(cell.point[name])] for cell in cells]
+    value, lower, upper = 100.0 * np.array([sweep.success(cell.case.name, cell.point) for cell in cells]).T
+    bars = np.maximum(0.0, [value - lower, upper - value])
+    axes.errorbar(places, value, bars, capsize=4.0, **look)
+
+
+def _places(values: list[Any]) -> list[float]:
+    """Where values stand on an axis: numbers where they are, if all are finite, else evenly."""
+    if all(isinstance(value, int | float) and np.isfinite(value) for value in values):
+        return [float(value) for value in values]
+    return [float(i) for i in range(len(values))]
+
+
+def _maps(sweep: Sweep, long: list[str], path: FilePath | None, figure: Any) -> np.ndarray:
+    """Success over two axes, one map a case, at the first value of any other axis."""
+    x, y = (sweep.setup.axes[name] for name in long[:2])
+    further = {name: values[0] for name, values in sweep.setup.axes.items() if name not in long[:2]}
+    size = (1.6 + 1.1 * len(x)) * len(sweep.cases), 1.8 + 0.6 * len(y)
+    with panels(figure, path, (1, len(sweep.cases)), size, sharey=True) as grid:
+        for axes, case in zip(grid[0], sweep.cases, strict=True):
+            values = np.full((len(y), len(x)), np.nan)
+            for cell in sweep.cells_of(case, further):
+                i, j = y.index(cell.point[long[1]]), x.index(cell.point[long[0]])
+                words, color = "refused", "black"
+                if not sweep.record(cell).refused:
+                    value, lower, upper = 100.0 * np.array(sweep.success(case, cell.point))
+                    values[i, j] = value
+                    words, color = f"{value:.1f}\n{lower:.1f} to {upper:.1f}", "white" if value < 50.0 else "black"
+                axes.text(j, i, words, ha="center", va="center", fontsize=8, color=color)
+            axes.imshow(values, origin="lower", vmin=0.0, vmax=100.0, cmap="viridis", aspect="auto")
+            axes.set_xticks(range(len(x)), [str(value) for value in x])
+            axes.set_yticks(range(len(y)), [str(value) for value in y])
+            axes.set_xlabel(long[0])
+            axes.set_title(f"{case}: passes [%]")
+        grid[0, 0].set_ylabel(long[1])
+        if remark := ", ".join(f"{name} = {further[name]}" for name in long[2:]):
+            grid[0, 0].figure.suptitle(f"at {remark}")
+    return grid.ravel()
+
+
+def plot_metrics(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
+    """Draw boxes of each metric by case, at each point of the grid: quartiles, whiskers at 5 and 95 %.
+
+    Boxes are of members that did not fail and whose number is finite. The first 40 cells that ran are drawn.
+
+    path: of the picture; default None, which writes none.
+    figure: Matplotlib figure to draw on; default None, one of its own.
+    Returns: The axes, (metrics,).
+    """
+    every = _ran(sweep)
+    cells, names = every[:MOST_BOXES], [name for name in sweep.metrics if name != END]
+    if not names:
+        raise NothingToDraw("there are no metrics")
+    places, size = range(1, len(cells) + 1), (max(7.0, 1.5 + 0.35 * len(cells)), 1.5 + 2.2 * len(names))
+    with panels(figure, path, (len(names), 1), size, sharex=True) as grid:
+        for axes, name in zip(grid[:, 0], names, strict=True):
+            boxes = [_box(sweep, cell, name) for cell in cells]
+            drawn = axes.bxp(boxes, showfliers=False, patch_artist=True, medianprops={"color": "black"})
+            for patch, cell in zip(drawn["boxes"], cells, strict=True):
+                patch.set(facecolor=COLORS[sweep.cases.index(cell.case.name) % len(COLORS)], alpha=0.6)
+            unit = sweep.unit(name)
+            axes.set_ylabel(name if unit == "1" else f"{name}\n[{unit}]")
+            axes.grid(alpha=0.3, axis="y")
+        turned = 0.0 if len(cells) <= MOST_LEVEL else 90.0
+        grid[-1, 0].set_xticks(places, [_short(sweep, cell.case.name, cell.point) for cell in cells], rotation=turned)
+        hidden = f"; {len(every) - len(cells)} more are not shown" if len(every) > len(cells) else ""
+        grid[-1, 0].set_xlabel(_meaning(sweep) + hidden)
+    return grid.ravel()
+
+
+def _box(sweep: Sweep, cell: Cell, name: str) -> dict[str, float]:
+    """Quantiles of a metric in a cell, by Matplotlib's names; NaN where no member has one."""
+    record = sweep.record(cell)
+    numbers = record.numbers[name][np.isfinite(record.numbers[name]) & ~failed(record.status)]
+    levels = list(QUARTILES.values())
+    return dict(zip(QUARTILES, np.quantile(numbers, levels) if len(numbers) else np.full(5, np.nan), strict=True))
+
+
+def plot_differences(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
+    """Draw the differences of success to the baseline on the same members, with their intervals.
+
+    path: of the picture; default None, which writes none.
+    figure: Matplotlib figure to draw on; default None, one of its own.
+    Returns: The axes, (1,).
+    """
+    rows = [row for row in against_baseline(sweep) if row.of == SUCCESS]
+    if not rows:
+        raise NothingToDraw("there is no other case that ran to compare with the baseline")
+    with panels(figure, path, (1, 1), (8.0, 1.4 + 0.3 * len(rows))) as grid:
+        axes = grid[0, 0]
+        for real, color, marker, label in ((True, COLORS[0], "o", "real"), (False, GREY, "s", "not real")):
+            places = [i for i, row in enumerate(rows) if bool(row.real) is real]
+            if places:
+                ends = [(row.difference.value, row.difference.lower, row.difference.upper) for row in rows]
+                value, lower, upper = 100.0 * np.array(ends)[places].T
+                bars = np.maximum(0.0, [value - lower, upper - value])
+                axes.errorbar(value, places, xerr=bars, fmt=marker, capsize=4.0, color=color, label=label)
+        axes.set_yticks(range(len(rows)), [_short(sweep, row.second, row.point) for row in rows])
+        axes.set(ylim=(len(rows) - 0.5, -0.5), ylabel=_meaning(sweep))
+        axes.axvline(0.0, color="0.3", linewidth=0.8)
+        axes.set_xlabel(f"passes more than {sweep.baseline} [points], {sweep.confidence:.0%} interval")
+        axes.grid(alpha=0.3, axis="x")
+        below(axes, ncols=2)
+    return grid.ravel()
+
+
+def plot_causes(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
+    """Draw which members pass over the two inputs that explain most of it, in the cell where most is open.
+
+    path: of the picture; default None, which writes none.
+    figure: Matplotlib figure to draw on; default None, one of its own.
+    Returns: The axes, (1,).
+    """
+    away, _, cell = min((abs(sweep.passed(cell).mean() - 0.5), cell.index, cell) for cell in _ran(sweep))
+    rows = sweep.causes(cell.case.name, cell.point)[:2]
+    if away == 0.5 or not rows:
+        raise NothingToDraw("in no case some members pass and some do not, or nothing varies")
+    passed, inputs = sweep.passed(cell)[:MOST_POINTS], sweep.inputs(cell)
+    x = inputs[rows[0]["input"]][:MOST_POINTS]
+    y = inputs[rows[1]["input"]][:MOST_POINTS] if len(rows) > 1 else np.arange(len(x))
+    with panels(figure, path, (1, 1), (7.0, 5.5)) as grid:
+        axes = grid[0, 0]
+        for chosen, label, color, marker in ((passed, "passes", COLORS[0], "."), (~passed, "fails", COLORS[1], "x")):
+            axes.plot(
+                x[chosen], y[chosen], marker, color=color, markersize=4.0, label=f"{label}: {int(chosen.sum()):,}"
+            )
+        words = [f"{row['input']}: explains {100.0 * row['share']:.3g} % of success" for row in rows]
+        axes.set(xlabel=words[0], ylabel=words[1] if len(rows) > 1 else "member", title=cell.name)
+        axes.legend()
+    return grid.ravel()
+
+
+def plot_responses(
+    sweep: Sweep, path: FilePath | None = None, of: str = "", members: int = MOST_PATHS, *, figure: Any = None
+) -> np.ndarray:
+    """Draw fans of what is tracked over time, by case at one point of the grid, of members that are run again.
+
+    The point is the one where the success of the cases differs most; the first one of equals.
+
+    path: of the picture; default None, which writes none.
+    of: "depth", "heading", "speed", "north" or "east"; or a distance from what is wanted, "position", "attitude" or
+        "cross_track". By default what that metric is of whose medians differ most between cases there, in interquartile
+        ranges; the first one of equals.
+    figure: Matplotlib figure to draw on; default None, one of its own.
+    Returns: The axes, (cases that ran,).
+    """
+    cells = _most_apart(sweep)
+    of = of or _tracked(sweep, cells)
+    if of not in tracking.ERRORS:
+        raise NothingToDraw("no metric is of a number that is tracked over time")
+    count = min(members, sweep.members_count)
+    columns = min(MOST_COLUMNS, len(cells))
+    rows = -(-len(cells) // columns)
+    with panels(figure, path, (rows, columns), (4.5 * columns, 4.0 * rows), sharex=True, sharey=True) as grid:
+        for axes, cell in zip(grid.flat, cells, strict=False):
+            _response(axes, sweep, cell, of, count)
+            axes.set_title(wrapped(cell.name, axes.figure, 0.9 / columns))
+        for axes in grid.flat[len(cells) :]:
+            axes.set_axis_off()
+        grid[0, 0].figure.supxlabel("time [s]")
+        unit = tracking.error(of, False).unit
+        away = "" if of in tracking.CHANNELS[False] else " from what is wanted"
+        grid[0, 0].figure.supylabel(f"{of}{away} [{unit}]: {count} members")
+        if of == "depth":
+            point_down(grid[0, -1])
+        grid[0, 0].legend()
+    return grid.ravel()[: len(cells)]
+
+
+def _most_apart(sweep: Sweep) -> list[Cell]:
+    """The cells that ran at the point of the grid where the success of the cases differs most."""
+    by_point: dict[tuple[Any, ...], list[Cell]] = {}
+    for cell in _ran(sweep):
+        by_point.setdefault(tuple(cell.point.values()), []).append(cell)
+    return max(by_point.values(), key=lambda cells: np.ptp([sweep.passed(cell).mean() for cell in cells]))
+
+
+def _tracked(sweep: Sweep, cells: list[Cell]) -> str:
+    """What the metric is of whose medians differ most between cells, of numbers tracked over time; "" without one."""
+
+    def apart(name: str) -> float:
+        boxes = [_box(sweep, cell, name) for cell in cells]
+        medians = [box["med"] for box in boxes if np.isfinite(box["med"])]
+        width = np.nansum([box["q3"] - box["q1"] for box in boxes])
+        return float(np.ptp(medians) / (width + 1e-300)) if medians else 0.0
+
+    known = [name for name, metric in sweep.setup.metrics.items() if str(metric.of) in tracking.ERRORS]
+    return str(sweep.setup.metrics[max(known, key=apart)].of) if known else ""
+
+
+def _response(axes: Any, sweep: Sweep, cell: Cell, of: str, count: int) -> None:
+    """Draw the fan of the first members of a cell, and what is wanted of a number."""
+    assert cell.fleet is not None and cell.fleet.scene.controller is not None
+    duration = float(sweep.setup.settings.get("t1") or cell.fleet.scene.run.duration or 0.0)
+    period = float(cell.fleet.scene.controller.period)
+    every = period * max(1, int(duration / period / MOST_PATHS))
+    channel, error = tracking.CHANNELS[False].get(of), tracking.error(of, False)
+    fields = error.fields if channel is None else (*channel.of_actual, channel.wanted)
+    result = sweep.again(cell.case.name, range(count), cell.point, SaveAt(every=every, fields=fields))
+    numbers = error(*samples_of(result)) if channel is None else channel.actual(result.samples)
+    draw_bands(axes, result.time, numbers.reshape(len(result.time), -1), under_way(result))
+    if channel is not None:
+        wanted = np.median(channel.reference(result.samples), axis=1)
+        axes.plot(result.time, wanted, "k:", linewidth=1.0, label="wanted")
+
+
+# Functions that draw a sweep, by the name of the file.
+PICTURES: dict[str, Callable[[Any, Path], Any]] = {
+    "success.png": plot_success,
+    "metrics.png": plot_metrics,
+    "differences.png": plot_differences,
+    "causes.png": plot_causes,
+    "responses.png": plot_responses,
+}
+
+
+def pictures(sweep: Sweep) -> dict[str, Callable[[Any, Path], Any]]:
+    """Return the functions that draw a sweep, by the name of the file; paired differences where there are cases to compare."""
+    return {name: draw for name, draw in PICTURES.items() if draw is not plot_differences or len(sweep.cases) > 1}

@@ -1,0 +1,169 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Recordings of fleets for the rerun viewer: written to a file, sent to a stream or a viewer, or shown at once."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from lgvi_warp.common import files as durable
+from lgvi_warp.common.arguments import file_path, of_kind, result_of
+from lgvi_warp.common.errors import NothingToDraw, SceneError
+from lgvi_warp.views.fleet import identity, title
+from lgvi_warp.views.recording import viewer
+from lgvi_warp.views.recording.drawn import Drawn, drawn_of
+from lgvi_warp.views.recording.eye import ASPECT
+from lgvi_warp.views.recording.graphs import COLORS, log_graphs
+from lgvi_warp.views.recording.layout import layout
+from lgvi_warp.views.recording.words import log_words
+from lgvi_warp.views.recording.world import Box, box_of, log_world, scale_of
+
+if TYPE_CHECKING:
+    from lgvi_warp.results.result import Result
+
+
+def log_rerun(
+    result: Result | Mapping[str, Result],
+    path: str | os.PathLike[str] | None = None,
+    *,
+    members: Any = None,
+    to: Any = None,
+) -> Path | None:
+    """Record the fleet for the rerun viewer; a file is there whole or not at all.
+
+    Hulls of the vehicle's shape are drawn for the members and times of `lgvi_warp.shown`, each in the colour of its outcome
+    from the moment it has it. Curves are of the members under way at each time. The same run always gives the recording and
+    the application the same ids: the viewer keeps recordings and layouts apart by them.
+
+    Args:
+        result: A result with position, attitude and velocity, in memory or in a store; or several by name, which are shown
+            side by side, in one colour each.
+        path: The file; None (default) only with `to`.
+        members: Indices of the members to draw, as [3, 17]; default those that `lgvi_warp.shown` chooses.
+        to: Where else to send it: an rr.RecordingStream, or the address of a viewer, as
+            "rerun+http://127.0.0.1:9876/proxy"; default nowhere.
+
+    Returns:
+        The path; None without one.
+
+    Raises:
+        ImportError: rerun-sdk is not installed (extra: viz).
+        NothingToDraw: No samples were kept, or no member has a finite start.
+        SceneError: There are no such members, or the vehicle's mesh cannot be read.
+        OSError: The file cannot be written, no viewer answers at the address, or it ends meanwhile; then the file is whole.
+        ValueError: There is no result; a SceneError, which is one, where there is neither a path nor a `to`.
+    """
+    viewer.rerun()
+    if path is None and to is None:
+        words = "neither path nor to is given: the recording would go nowhere"
+        raise SceneError([f'{words}; give path="fleet.rrd"'])
+    if to is not None and not isinstance(to, str):
+        of_kind("to", to, "flush", "a recording", "give the address of a viewer, or a rerun.RecordingStream")
+    runs = _runs(result, members)
+    address = to if isinstance(to, str) else None
+    if address is not None:
+        viewer.reach(address)
+    ended: OSError | None = None
+    with contextlib.ExitStack() as stack:
+        beside = None if path is None else stack.enter_context(durable.placed(file_path("path", path)))
+        try:
+            if beside or address:
+                _write(runs, beside, address)
+        except OSError as error:
+            if address is None or viewer.answers(address):
+                raise
+            ended = error
+            if beside:
+                # The stream that failed may still have its file open: this is another one.
+                beside.unlink(missing_ok=True)
+                _write(runs, beside, None)
+    if ended is not None:
+        written = "" if path is None else f", which is in {path}: open that"
+        raise OSError(f"to = {address!r}: the viewer ended before it had the recording{written}") from ended
+    if to is not None and address is None:
+        _send(to, runs)
+        to.flush()
+    return None if path is None else Path(path)
+
+
+def show(result: Result | Mapping[str, Result], *, members: Any = None) -> None:
+    """Show the fleet in the rerun viewer: a window of its own, or one that is open already.
+
+    Args:
+        result: As for `log_rerun`.
+        members: Indices of the members to draw; default those that `lgvi_warp.shown` chooses.
+
+    Raises:
+        ImportError: rerun-sdk is not installed (extra: viz).
+        NothingToDraw: No samples were kept, or no member has a finite start.
+        SceneError: There are no such members, or the vehicle's mesh cannot be read.
+        OSError: The viewer cannot be started, as where there is no display; the message has the path of the recording.
+    """
+    viewer.rerun()
+    # The viewer reads the file after this returns; the system clears its folder for temporary files.
+    path = Path(tempfile.mkdtemp(prefix="lgvi_warp_")) / "fleet.rrd"
+    log_rerun(result, path, members=members)
+    viewer.is_open()
+    viewer.start([path], f"the recording is {path}: open it where there is a display")
+
+
+def _runs(result: Result | Mapping[str, Result], members: Any) -> list[Drawn]:
+    """What is drawn of each run."""
+    if not isinstance(result, Mapping):
+        return [drawn_of(result_of(result), members)]
+    if not result:
+        raise NothingToDraw("there is no result to draw; give {name: result}")
+    colors = [COLORS[i % len(COLORS)] for i in range(len(result))]
+    return [
+        drawn_of(result_of(compared), members, str(name), rgb)
+        for (name, compared), rgb in zip(result.items(), colors, strict=True)
+    ]
+
+
+def _write(runs: list[Drawn], path: Path | None, address: str | None) -> None:
+    """Write a recording of its own to a file, to the viewer at an address, or to both at once. Raises OSError."""
+    rr = viewer.rerun()
+    names = [identity(run.source) for run in runs]
+    name = names[0] if len(runs) == 1 else hashlib.sha256(" ".join(names).encode()).hexdigest()[:16]
+    box = box_of(runs)
+    recording = rr.RecordingStream(f"lgvi_warp_{name}", recording_id=name)
+    sinks = ([rr.FileSink(path)] if path else []) + ([rr.GrpcSink(address)] if address else [])
+
+    def written() -> None:
+        recording.set_sinks(*sinks, default_blueprint=layout(runs, box, _scales(runs, box)))
+        _send(recording, runs, laid_out=True)
+        recording.flush()
+        recording.disconnect()
+
+    try:
+        if address:
+            viewer.watched(written, address)
+        else:
+            written()
+    except RuntimeError as error:
+        # rerun raises it for a writer that could not start or continue, and prints the reason on stderr.
+        text = f"the recording could not be written ({error}); is the disk full, or the folder read-only?"
+        raise OSError(text) from error
+
+
+def _scales(runs: list[Drawn], box: Box) -> list[int]:
+    """How many times their size hulls are drawn, of each run in a view of its own."""
+    return [scale_of(run, box, ASPECT / len(runs)) for run in runs]
+
+
+def _send(recording: Any, runs: list[Drawn], laid_out: bool = False) -> None:
+    """Log all of the runs, and their layout where the stream has none."""
+    box = box_of(runs)
+    scales = _scales(runs, box)
+    if not laid_out:
+        recording.send_blueprint(layout(runs, box, scales))
+    recording.send_recording_name(title(runs[0].result) if len(runs) == 1 else " | ".join(run.label for run in runs))
+    for run, scale in zip(runs, scales, strict=True):
+        log_world(recording, run, box, scale)
+        log_graphs(recording, run)
+    log_words(recording, runs, box, scales)

@@ -31,7 +31,8 @@ MODEL = """
 
 def make_model(problem: Problem, integrator: str, h: float) -> mujoco.MjModel:
     """The vehicle as a free body."""
-    assert np.ptp(problem.M) == 0.0 and not np.any(problem.d)
+    assert np.ptp(problem.M) == 0.0
+    assert not np.any(problem.d)
     mass, J = float(problem.M[0]), [float(x) for x in problem.J]
     text = MODEL.format(h=h, integrator=integrator, gravity=problem.net / mass, mass=mass, J=J)
     return mujoco.MjModel.from_xml_string(text)

@@ -25,7 +25,8 @@ SOLVERS = {
 
 def make_model(problem: Problem) -> Any:
     """A free body for each member, its inertia kept as given, the net weight as gravity."""
-    assert np.ptp(problem.M) == 0.0 and not np.any(problem.d)
+    assert np.ptp(problem.M) == 0.0
+    assert not np.any(problem.d)
     mass, inertia = float(problem.M[0]), wp.mat33(*np.diag(problem.J).ravel())
     builder = newton.ModelBuilder(gravity=wp.vec3(0.0, 0.0, problem.net / mass))
     for one in problem.state():

@@ -29,7 +29,8 @@ class Episodes:
     """
 
     def __init__(self, plan: Plan, members: Members):
-        assert plan.asks and plan.kernel_choice.controller is not None
+        assert plan.asks
+        assert plan.kernel_choice.controller is not None
         self.plan, self.packets, self.steps = plan, Packets(plan, members), 0
         self._controller = plan.kernel_choice.controller
         self.every = self._controller.every(plan.grid.h)

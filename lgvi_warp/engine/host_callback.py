@@ -90,7 +90,8 @@ def ask(packets: Packets, t: float) -> None:
     controller = packets.plan.kernel_choice.controller
     assert controller is not None
     callback: Any = controller.callback
-    assert isinstance(callback, Callback) and callback.function is not None
+    assert isinstance(callback, Callback)
+    assert callback.function is not None
     measured, wanted = last_look(packets)
     members = packets.members.indices
     where = f"callback {callback.key!r} at t = {t:.9g} s, members {members[0]} to {members[-1]}"

@@ -225,7 +225,8 @@ class Statistic:
         Returns:
             Numbers (1, d, n), and which members count (1, n); None in place of the latter if all do.
         """
-        assert self.at is not None and last is not None
+        assert self.at is not None
+        assert last is not None
         return last, ends.are(self.at)[None]
 
     def over(self, time: np.ndarray) -> Statistic:

@@ -200,7 +200,8 @@ def _array(name: str, one: dict[str, Any]) -> StoredArray:
             raise NotOursError(f"{name} has the shape {_short(value)}")
     if dtype is None or not isinstance(dims, list) or not all(is_name(dim) for dim in dims):
         raise NotOursError(f"{name} has the type {_short(one.get('data_type'))} and the dimensions {_short(dims)}")
-    assert isinstance(shape, list) and isinstance(chunk, list)
+    assert isinstance(shape, list)
+    assert isinstance(chunk, list)
     if not 0 < len(shape) == len(chunk) == len(dims) <= MOST_DIMENSIONS:
         raise NotOursError(f"{name} has the shape {_short(shape)} and chunks {_short(chunk)}")
     attributes = _table(one.get("attributes"), f"attributes of {name}")

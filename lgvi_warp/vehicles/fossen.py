@@ -104,7 +104,9 @@ class Coefficients:
     def to_dict(self, faults: Faults) -> dict[str, Any]:
         """Return the tables of a scene file, after the checks that need all numbers."""
         faults.raise_if_any()
-        assert self.mass is not None and self.inertia is not None and self.center_of_gravity is not None
+        assert self.mass is not None
+        assert self.inertia is not None
+        assert self.center_of_gravity is not None
         rigid = rigid_body_matrix(self.mass, self.inertia, self.center_of_gravity)
         for key, matrix in (("rigid_body_mass_matrix", rigid), ("total mass matrix", rigid + self.added_mass)):
             if np.linalg.eigvalsh(matrix)[0] <= 0.0:
@@ -128,7 +130,8 @@ class Coefficients:
 
     def unstable(self) -> list[str]:
         """Return a warning if the centre of gravity is above the centre of buoyancy: such a vehicle turns upside down."""
-        assert self.center_of_gravity is not None and self.center_of_buoyancy is not None
+        assert self.center_of_gravity is not None
+        assert self.center_of_buoyancy is not None
         above = float(self.center_of_buoyancy[2] - self.center_of_gravity[2])
         if not self.buoyancy or above <= RELATIVE:
             return []

@@ -233,4 +233,5 @@ def test_psi_x_meets_other_methods(name):
         np.abs(solved(name, "psi_x", h, round(8.0 / h), round(8.0 / h))[-1] - truth).max() for h in (H, H / 2, H / 4)
     ]
     assert errors[0] < 0.05
-    assert 2.5 < errors[0] / errors[1] < 6.0 and 2.5 < errors[1] / errors[2] < 6.0
+    assert 2.5 < errors[0] / errors[1] < 6.0
+    assert 2.5 < errors[1] / errors[2] < 6.0

@@ -107,7 +107,8 @@ def test_the_examples_of_the_pages():
 def test_two_faults_without_names_are_told_to_have_some():
     faults = [{"of": "cell", "time": 1.0}, {"of": "control_wrench", "time": 2.0}]
     text = refused(lambda: of_table(sensors=[CELL], faults=faults))
-    assert "'fault': is the name of two parts" in text and 'name = "fault_2"' in text
+    assert "'fault': is the name of two parts" in text
+    assert 'name = "fault_2"' in text
 
 
 def test_a_part_and_a_term_of_one_name_are_told_apart():
@@ -129,4 +130,5 @@ def test_a_scene_with_sensors_is_its_own_file():
     first = scene(sensors, [lw.Fault(of="log", channel=2, time=np.inf)])
     again = lw.Scene.from_dict(first.to_dict())
     assert again.to_dict() == first.to_dict()
-    assert first.parameters()["cell.noise"].shape == () and first.parameters()["log.bias"].tolist() == [0.2] * 3
+    assert first.parameters()["cell.noise"].shape == ()
+    assert first.parameters()["log.bias"].tolist() == [0.2] * 3

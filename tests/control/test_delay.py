@@ -54,7 +54,8 @@ def test_a_delay_is_whole_periods_and_steps(method):
         # (rate h)^2 / 24 of the angle of a step at most: here the rate stays below 0.2 rad/s.
         allowed = 1e-11 if method == "rk4" else 0.3 * (0.2 * H) ** 2
         assert np.abs(heading[:, i] - wanted(delay)).max() < allowed, delay
-        assert np.all(heading[: delay + 1, i] == 0.0) and heading[delay + 1, i] > 0.0
+        assert np.all(heading[: delay + 1, i] == 0.0)
+        assert heading[delay + 1, i] > 0.0
     ends = lw.solve(fleet, method, h=H, t1=STEPS * H, save=lw.SaveAt(every=STEPS * H))
     assert np.array_equal(ends.attitude[-1], result.attitude[-1])
 

@@ -36,7 +36,8 @@ def test_remus_dives_by_what_its_sensors_say_and_its_rudder_sticks():
     rudder, depth = result.command[:, :, 0], result.position[:, :, 2]
     # Stuck from 40 s on at its offset [rad], at the actuator a delay of 0.02 s later.
     stuck = result.time >= 40.0
-    assert np.all(rudder[stuck] == 0.1) and not np.any(rudder[~stuck] == 0.1)
+    assert np.all(rudder[stuck] == 0.1)
+    assert not np.any(rudder[~stuck] == 0.1)
     assert np.all(result.actuator[result.time >= 40.5, :, 0] == 0.1)
     # The reference model has gone 0.986 of the way from 0 to 10 m at 40 s: 8 / s of its frequency.
     assert np.all(np.abs(depth[result.time == 40.0] - 10.0) < 1.0)
@@ -53,9 +54,8 @@ def test_remus_dives_by_what_its_sensors_say_and_its_rudder_sticks():
 def test_bluerov2_holds_its_place_though_a_thruster_dies():
     result = solved("bluerov2_dead_thruster", 30.0)
     dead = result.time >= 20.0
-    assert np.all(result.command[dead, 0, 4] == 0.0) and np.all(
-        result.command[(result.time > 0.0) & ~dead, 0, 4] != 0.0
-    )
+    assert np.all(result.command[dead, 0, 4] == 0.0)
+    assert np.all(result.command[(result.time > 0.0) & ~dead, 0, 4] != 0.0)
     # A second is 35 of the thrusters' time constants.
     assert np.abs(result.actuator[result.time >= 21.0, 0, 4]).max() < 1e-12
     # Its integral takes it beyond the place, as is usual of one that starts 5 m off; from then on it stays.

@@ -54,7 +54,8 @@ def test_waypoints_are_their_twin(method, words):
         numbers = {name: values[i] for name, values in parameters.items()}
         b, R = twin_states(way, numbers, [x[i] for x in given], EVERY, H, steps)
         # 160 looks of a stable loop: round-off of numbers of size 10, as in test_laws.py.
-        assert np.abs(result.position[:, i] - b).max() < 1e-9 and np.abs(result.attitude[:, i] - R).max() < 1e-9
+        assert np.abs(result.position[:, i] - b).max() < 1e-9
+        assert np.abs(result.attitude[:, i] - R).max() < 1e-9
 
 
 def across(result):
@@ -74,7 +75,8 @@ def test_a_current_drives_off_the_way_and_the_integral_comes_back():
         ends[method] = across(result)
     # Along the leg the vehicle heads into the current by the angle whose sine is 0.3 / 1: los holds it by its way off alone.
     assert abs(ends["los"] - 4.0 * np.tan(np.arcsin(0.3))) < 0.2
-    assert ends["ilos"] < 0.02 and ends["alos"] < 0.02
+    assert ends["ilos"] < 0.02
+    assert ends["alos"] < 0.02
 
 
 @pytest.mark.slow
@@ -85,4 +87,6 @@ def test_it_stops_at_the_last_point_or_goes_on():
         way = dataclasses.replace(way, start=lw.Start(position=(0.0, 0.0, 2.0), velocity=(1.0, 0.0, 0.0)))
         result = lw.solve(way, "psi_s", h=H, t1=60.0, save=lw.SaveAt(every=30.0))
         end.append(result.position[1:, 0, 0])
-    assert 4.2 - 1e-9 < end[0][1] < 8.0 and abs(end[0][1] - end[0][0]) < 0.2 and end[1][1] - end[1][0] > 25.0
+    assert 4.2 - 1e-9 < end[0][1] < 8.0
+    assert abs(end[0][1] - end[0][0]) < 0.2
+    assert end[1][1] - end[1][0] > 25.0

@@ -57,7 +57,8 @@ def env():
 
 def test_the_bits_of_a_run(env):
     observed, info = env.reset()
-    assert info == {} and env.time == 0.0
+    assert info == {}
+    assert env.time == 0.0
     observed = steer(env, observed, 50)[0]
     assert np.isclose(env.time, 50 * PERIOD)
     assert np.array_equal(observed[:, 1:], solved(scene([lw.Callback(heading)]), 50))
@@ -90,7 +91,8 @@ def test_members_that_come_again_have_other_noise():
         observed, _ = env.reset()
         members += env.members.tolist()
         ends += list(steer(env, observed, 3)[0])
-    assert members == [0, 1, 2] * 4 and len({end.tobytes() for end in ends}) == 12
+    assert members == [0, 1, 2] * 4
+    assert len({end.tobytes() for end in ends}) == 12
     run = lw.solve(fleet.in_scene(replace(fleet.scene, controller=scene([lw.Callback(heading)]).scene.controller)), "psi_s",
                    h=H, t1=3 * PERIOD, save=lw.SaveAt())  # fmt: skip
     np.testing.assert_array_equal([end[1:4] for end in ends[:3]], run.position[-1])
@@ -118,11 +120,13 @@ def test_members_that_start_while_others_go_on():
 
 def test_seeds(env):
     runs = [[env.reset(seed=seed)[0], env.reset()[0]] for seed in (3, 4, 3)]
-    assert np.array_equal(runs[0], runs[2]) and not np.array_equal(runs[0][0], runs[0][1])
+    assert np.array_equal(runs[0], runs[2])
+    assert not np.array_equal(runs[0][0], runs[0][1])
     assert not np.any(runs[0][0][:, -3:] == runs[1][0][:, -3:])
     mask = np.arange(N) == 5
     partly, _ = env.reset(seed=4, options={"reset_mask": mask})
-    assert np.array_equal(partly[mask], runs[1][0][mask]) and np.array_equal(partly[~mask], runs[2][1][~mask])
+    assert np.array_equal(partly[mask], runs[1][0][mask])
+    assert np.array_equal(partly[~mask], runs[2][1][~mask])
     with pytest.raises(TypeError, match="one for all"):
         env.reset(seed=[1, 2])
 
@@ -142,7 +146,8 @@ def test_the_next_step_begins_anew():
     assert not any(step[2].any() or step[4] for step in steps)
     fresh = environment()
     fresh.reset(seed=1)
-    assert np.array_equal(steps[3][0], fresh.reset()[0]) and not np.array_equal(steps[3][0], begun)
+    assert np.array_equal(steps[3][0], fresh.reset()[0])
+    assert not np.array_equal(steps[3][0], begun)
 
 
 def test_the_same_step_begins_anew():
@@ -151,8 +156,10 @@ def test_the_same_step_begins_anew():
     assert [step[1][0] for step in steps] == [1.5] * 6
     usual = episodes("NextStep")[2]
     final = steps[2][4]
-    assert final["_final_obs"].all() and np.array_equal(np.stack(final["final_obs"]), usual[2][0])
-    assert np.array_equal(steps[2][0], usual[3][0]) and np.array_equal(steps[3][0], usual[4][0])
+    assert final["_final_obs"].all()
+    assert np.array_equal(np.stack(final["final_obs"]), usual[2][0])
+    assert np.array_equal(steps[2][0], usual[3][0])
+    assert np.array_equal(steps[3][0], usual[4][0])
 
 
 def test_without_autoreset():
@@ -213,7 +220,8 @@ def test_gymnasiums_checker():
 
 def test_gymnasiums_own_wrappers():
     env = environment(duration=3 * PERIOD, reward=lambda t, y, r: np.ones(N))
-    assert isinstance(env, gymnasium.vector.VectorEnv) and type(env).__name__ == "VectorEnv"
+    assert isinstance(env, gymnasium.vector.VectorEnv)
+    assert type(env).__name__ == "VectorEnv"
     env = RecordEpisodeStatistics(env)
     assert env.reset(seed=0)[0] in env.observation_space
     env.action_space.seed(0)
@@ -324,7 +332,8 @@ def test_events_and_sensors_of_later_episodes(falling):
         if previous is not None and previous[1].any():
             again = previous[1]
             # A late sensor has nothing but the first reading, the filter begins with what it sees: at rest.
-            assert np.all(observed[again, 0] < 4.9) and np.all(observed[again, 1] == 0.0)
+            assert np.all(observed[again, 0] < 4.9)
+            assert np.all(observed[again, 1] == 0.0)
             ends += again.sum()
         if previous is not None and previous[2].any():
             assert np.array_equal(observed[previous[2], 0], previous[0][previous[2], 0])
@@ -332,4 +341,5 @@ def test_events_and_sensors_of_later_episodes(falling):
             assert np.all(infos["status"][ended] == lw.Status.FLOOR)
         started = np.zeros(N, bool) if previous is None else previous[1]
         previous = observed, ended, started
-    assert ends > N / 2 and begun.shape == (N, 2)
+    assert ends > N / 2
+    assert begun.shape == (N, 2)

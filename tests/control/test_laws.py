@@ -150,7 +150,8 @@ def check(law, steps, scene, run):
     for got, expected in ((result.position[: len(b), i], b), (result.attitude[: len(b), i], R)):
         error = np.abs(got - expected).reshape(len(b), -1).max(axis=1)
         # A look is some hundred roundings of numbers of size 10; 200 looks of a stable loop add up what they leave.
-        assert error[1] < 1e-12 and error.max() < 1e-9
+        assert error[1] < 1e-12
+        assert error.max() < 1e-9
 
 
 @pytest.mark.parametrize("steps", [60, pytest.param(STEPS, marks=pytest.mark.slow)])
@@ -210,4 +211,5 @@ def test_guidance_keeps_what_others_want():
         given = states(1)
         result = lw.solve(lw.Ensemble.from_states(way, *given), "psi_s", h=H, t1=6.0, save=lw.SaveAt(every=EVERY * H))
         b, R = twin_states(way, {}, [x[0] for x in given], EVERY, H, 120)
-        assert np.abs(result.position[:, 0] - b).max() < 1e-10 and np.abs(result.attitude[:, 0] - R).max() < 1e-10
+        assert np.abs(result.position[:, 0] - b).max() < 1e-10
+        assert np.abs(result.attitude[:, 0] - R).max() < 1e-10

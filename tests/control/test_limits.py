@@ -108,7 +108,9 @@ def stable(gains, steps):
 def turns(values, settled):
     """The neighbours between which loops turn from unstable to stable, and back."""
     (changes,) = np.nonzero(settled[1:] != settled[:-1])
-    assert len(changes) == 2 and not settled[0] and not settled[-1]
+    assert len(changes) == 2
+    assert not settled[0]
+    assert not settled[-1]
     return [(values[i], values[i + 1]) for i in changes]
 
 

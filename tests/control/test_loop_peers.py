@@ -44,4 +44,5 @@ def test_a_second_call_begins_at_the_start(ends):
     ways, _ = case.make_ways(Problem(MEMBERS, LOOKS, *STEPS[1]))
     case.ends_of(ways)
     for name, (position, attitude) in case.ends_of(ways).items():
-        assert np.array_equal(position, ends[1][name][0]) and np.array_equal(attitude, ends[1][name][1])
+        assert np.array_equal(position, ends[1][name][0])
+        assert np.array_equal(attitude, ends[1][name][1])

@@ -61,12 +61,15 @@ duration = 20.0
 
 def test_the_law_on_the_page_is_right_and_keeps_the_depth(page):
     report = lw.check_controller(page.Bang(level=3.0))
-    assert report.ok and "nanoseconds" in str(report), str(report)
+    assert report.ok, str(report)
+    assert "nanoseconds" in str(report), str(report)
     scene = scenes.loads(SCENE)
-    assert isinstance(scene.controller.laws[0], page.Bang) and "bang.level" in scene.parameters()
+    assert isinstance(scene.controller.laws[0], page.Bang)
+    assert "bang.level" in scene.parameters()
     result = lw.solve(lw.Ensemble.from_scene(scene))
     # It swings around the depth: a period at 0.2 m/s, the speed at which drag balances it, and a bit.
-    assert result.status.counts() == {"ok": 3} and np.abs(result.position[-1, :, 2] - 1.0).max() < 0.1
+    assert result.status.counts() == {"ok": 3}
+    assert np.abs(result.position[-1, :, 2] - 1.0).max() < 0.1
 
 
 def test_a_type_is_taken_once(monkeypatch):
@@ -132,9 +135,11 @@ def test_what_is_wrong_is_said():
     assert set(wrong) == {
         "finite at bounds of numbers", "lanes apart", "packets of one", "blind to the truth", "any axes", "memory in its rows"
     }, str(report)  # fmt: skip
-    assert "above=0.0" in wrong["finite at bounds of numbers"] and "y.position" in wrong["blind to the truth"]
+    assert "above=0.0" in wrong["finite at bounds of numbers"]
+    assert "y.position" in wrong["blind to the truth"]
     assert "varied numbers" in wrong_checks(lw.check_controller(Forgetful(level=2.0), scene=wide))
-    assert "p.memory + 1" in wrong["memory in its rows"] and "user's axes" in wrong["any axes"]
+    assert "p.memory + 1" in wrong["memory in its rows"]
+    assert "user's axes" in wrong["any axes"]
 
 
 GAINS = dict(kp=1.0, ki=0.2, kd=0.3, integral_limit=0.05)
@@ -197,4 +202,5 @@ PARTS = {
 def test_the_parts_of_the_package_are_right(name):
     part, twin = PARTS[name]
     report = lw.check_controller(part, twin=twin)
-    assert report.ok and not any("note: changes nothing" in check.text for check in report.checks), str(report)
+    assert report.ok, str(report)
+    assert not any("note: changes nothing" in check.text for check in report.checks), str(report)

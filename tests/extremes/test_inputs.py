@@ -27,7 +27,8 @@ def test_one_sick_member_among_many(dtype):
     result = lw.solve(lw.Ensemble.from_states(GENERAL, *states), h=0.01, t1=0.1, dtype=dtype)
     well = np.arange(n) != 70_001
     assert result.status.counts() == {"ok": n - 1, "non_finite": 1}
-    assert finite(result, well) and result.failure_time[70_001] == 0.0
+    assert finite(result, well)
+    assert result.failure_time[70_001] == 0.0
     assert np.isnan(result.velocity[-1, 70_001, 1])  # as it was given: nothing is reset
 
 
@@ -54,10 +55,12 @@ def test_subnormal_states_are_no_fault(dtype):
     beside = Case("subnormal beside normal", nu=(tiny, 1.0, tiny), Om=(tiny, 1.0, 0.0), b=(tiny, 0.0, 0.0))
     group = Group("", 0.1, 60, (alone, beside))
     result = lw.solve(ensemble(group), h=group.h, t1=group.h * group.steps, dtype=dtype)
-    assert result.status.counts() == {"ok": 2} and finite(result, slice(None))
+    assert result.status.counts() == {"ok": 2}
+    assert finite(result, slice(None))
     found = measured(group, "psi_s", dtype)
     # Of a subnormal number nothing but its size is promised: the first member goes nowhere.
-    assert np.abs(result.position[-1, 0]).max() <= 100 * tiny and found.error[1] <= found.bound[1]
+    assert np.abs(result.position[-1, 0]).max() <= 100 * tiny
+    assert found.error[1] <= found.bound[1]
 
 
 @pytest.mark.parametrize("dtype", DTYPES)
@@ -68,8 +71,10 @@ def test_huge_states(dtype):
     b[1] = 1.7e308  # the largest that float64 holds, and infinite in float32
     nu[2], nu[3], Om[4], Om[5] = 1e160, 1e300, 1e160, 1e300
     result = lw.solve(lw.Ensemble.from_states(GENERAL, b, R, nu, Om), h=0.01, t1=1.0, dtype=dtype)
-    assert result.status[0] == Status.OK and np.abs(result.position[-1, 0] / far - 1.0).max() < 1e-6
-    assert (result.status[1] == Status.OK) == (dtype == "float64") and finite(result, np.asarray(result.status) == 0)
+    assert result.status[0] == Status.OK
+    assert np.abs(result.position[-1, 0] / far - 1.0).max() < 1e-6
+    assert (result.status[1] == Status.OK) == (dtype == "float64")
+    assert finite(result, np.asarray(result.status) == 0)
     assert (np.asarray(result.status[2:]) != Status.OK).all()
 
 

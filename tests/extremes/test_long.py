@@ -94,7 +94,8 @@ def test_a_linear_drag_matrix_step(kappa):
     # The difference 1 - ... loses digits where little is left: absolute, in units of what there was.
     assert u == pytest.approx(2.0 * factor, rel=1e-13, abs=1e-15)
     # Against e^-z: order 2, z^3 (1/6 - gamma + gamma^2 ...) < z^3 / 6 for small z; never larger than at the start.
-    assert abs(u) <= 2.0 and (kappa > 1e-2 or abs(u / 2.0 - np.exp(-kappa)) <= kappa**3 / 6.0 + 1e-15)
+    assert abs(u) <= 2.0
+    assert kappa > 1e-2 or abs(u / 2.0 - np.exp(-kappa)) <= kappa**3 / 6.0 + 1e-15
 
 
 def fall(case, h, steps):
@@ -145,7 +146,8 @@ def test_falling_and_rising_for_a_day(dtype):
         assert abs(result.velocity[-1, i, 2] - w) <= bound_w, case.name
         assert abs(result.position[-1, i, 2] - b) <= h * steps * bound_w + unit * place, case.name
         # Nothing else moves: R = I exactly, no drift to the side.
-        assert np.array_equal(result.attitude[-1, i], np.eye(3)) and not result.position[-1, i, :2].any()
+        assert np.array_equal(result.attitude[-1, i], np.eye(3))
+        assert not result.position[-1, i, :2].any()
 
 
 def spheroid(h, steps):

@@ -38,7 +38,8 @@ def test_the_help_names_every_case_and_table():
     text = subprocess.run(run, cwd=pages.ROOT, capture_output=True, text=True, check=True).stdout
     listed = [line.split()[0] for line in text.splitlines() if line.startswith("  ") and len(line.split()) > 1]
     assert set(CASES + TABLES) <= set(listed)
-    assert len(CASES) >= 16 and len(TABLES) >= 12
+    assert len(CASES) >= 16
+    assert len(TABLES) >= 12
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -58,7 +59,8 @@ def test_only_tables_have_pages():
 @pytest.mark.parametrize(("name", "page"), pages.PAGES.items())
 def test_every_page_has_the_marks_of_its_table(name, page):
     before, after = pages.parts(name, pages.ROOT / page)
-    assert before.endswith(f"<!-- {name}: begin -->") and after.startswith(f"<!-- {name}: end -->")
+    assert before.endswith(f"<!-- {name}: begin -->")
+    assert after.startswith(f"<!-- {name}: end -->")
 
 
 def test_a_text_goes_between_its_marks(tmp_path):

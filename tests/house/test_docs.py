@@ -46,7 +46,8 @@ def test_python(text, scene, tmp_path, monkeypatch, capsys):
 
 
 def test_there_are_snippets():
-    assert len(snippets("toml")) >= 6 and len(snippets("python")) >= 6
+    assert len(snippets("toml")) >= 6
+    assert len(snippets("python")) >= 6
 
 
 REMUS = '[vehicle]\nname = "remus_100"\n'
@@ -86,7 +87,8 @@ def test_a_vehicle_from_a_file(tmp_path, monkeypatch):
     (tmp_path / "ocean.world").write_text(world)
     (text,) = blocks("guide/vehicles.md", "python")
     exec(text, names := {"lw": lw})
-    assert names["scene"].environment.gravity == 9.7 and names["scene"].start.position[2] == 5.0
+    assert names["scene"].environment.gravity == 9.7
+    assert names["scene"].start.position[2] == 5.0
 
 
 @pytest.mark.slow
@@ -103,7 +105,8 @@ def test_many_calls(monkeypatch):
     monkeypatch.chdir(ROOT)
     text, noise = blocks("guide/many_calls.md", "python")
     exec(text, names := {})
-    assert names["depths"].shape == (2,) and np.all(names["depths"] > 9.0)
+    assert names["depths"].shape == (2,)
+    assert np.all(names["depths"] > 9.0)
     exec(noise, names)
     still = names["run"](names["x"], seed=7, indices=names["index"])
     # Same noise: the start's 0.1 m alone, to round-off; other noise: other depths.
@@ -120,4 +123,5 @@ def test_a_controller_in_python_and_its_signals():
     scene = lw.Scene.from_dict(sections | terms)
     (text,) = blocks("controllers/signals.md", "python")
     exec(text, names := {"lw": lw, "scene": scene})
-    assert names["result"].command.shape == (21, 1, 6) and names["result"].status.counts() == {"ok": 1}
+    assert names["result"].command.shape == (21, 1, 6)
+    assert names["result"].status.counts() == {"ok": 1}

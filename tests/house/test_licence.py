@@ -24,7 +24,8 @@ def test_every_source_file_names_the_licence():
 
 
 def test_the_licence_is_that_of_the_file():
-    assert "Apache License" in (ROOT / "LICENSE").read_text() and PROJECT["license"] == "Apache-2.0"
+    assert "Apache License" in (ROOT / "LICENSE").read_text()
+    assert PROJECT["license"] == "Apache-2.0"
 
 
 def test_a_file_without_the_line_is_found(tmp_path):

@@ -38,7 +38,8 @@ def test_links_resolve(page):
     for target in relative_links(page):
         path, _, anchor = target.partition("#")
         goal = (page.parent / path).resolve() if path else page
-        assert goal.is_relative_to(ROOT) and goal.exists(), f"{name(page)}: {target} is not there"
+        assert goal.is_relative_to(ROOT), f"{name(page)}: {target} is not there"
+        assert goal.exists(), f"{name(page)}: {target} is not there"
         if anchor:
             assert anchor in anchors(goal), f"{name(page)}: {target} is no heading of {name(goal)}"
 

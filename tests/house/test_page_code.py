@@ -132,4 +132,5 @@ def test_pictures_and_recordings_of_a_result(scene, tmp_path, monkeypatch):
         for code, _ in snippets(page, "python"):
             exec(code, names)
     written = {path.name for path in tmp_path.iterdir()}
-    assert {"speed.pdf", "fleet.svg", "fleet.rrd", "both.rrd"} <= written and len(shown) == len(streamed) == 1
+    assert {"speed.pdf", "fleet.svg", "fleet.rrd", "both.rrd"} <= written
+    assert len(shown) == len(streamed) == 1

@@ -46,7 +46,8 @@ def test_a_stale_picture_is_found(tmp_path):
     drawn, kept = tmp_path / "drawn.png", tmp_path / "kept.png"
     Image.new("RGB", (4, 4), "white").save(drawn)
     pictures.keep(drawn, kept, script=digest)
-    assert pictures.notes(drawn) == {} and pictures.notes(kept) == {"script": digest}
+    assert pictures.notes(drawn) == {}
+    assert pictures.notes(kept) == {"script": digest}
 
 
 def test_the_table_of_fronts_follows_from_its_rows():
@@ -65,8 +66,10 @@ def test_the_rows_are_of_the_methods_that_the_scene_takes_now(name):
     taken, _ = Sample(fleet, t1).accepted(methods)
     content = fronts.kept_rows(name)
     measured = {row[0] for row in content["rows"]} | {text.split()[0] for text in content["missing"]}
-    assert set(taken) <= measured and {"rk4", "rk8", "psi_x"} <= set(taken)
-    assert len(methods) <= 7 and {row[0].split()[0] for row in content["rows"]} <= set(methods)
+    assert set(taken) <= measured
+    assert {"rk4", "rk8", "psi_x"} <= set(taken)
+    assert len(methods) <= 7
+    assert {row[0].split()[0] for row in content["rows"]} <= set(methods)
 
 
 def test_pictures_of_fronts_are_readable_in_a_narrow_column():

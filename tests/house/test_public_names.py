@@ -27,7 +27,8 @@ def test_an_old_name_is_the_new_thing_and_warns_each_time(old, new):
         with pytest.warns(DeprecationWarning, match=rf"lw\.{old} is now lw\.{new};") as warned:
             assert getattr(lw, old) is getattr(lw, new)
         assert warned[0].filename == __file__
-    assert new in lw.__all__ and old not in lw.__all__
+    assert new in lw.__all__
+    assert old not in lw.__all__
 
 
 def test_the_old_name_of_uq():
@@ -41,7 +42,8 @@ def test_an_old_name_pickles_as_the_new_class():
     with pytest.warns(DeprecationWarning, match="UnitCubePoints"):
         design = lw.Levels([[0.25, 0.5]])
     loaded = pickle.loads(pickle.dumps(design))
-    assert type(loaded) is lw.UnitCubePoints and loaded.points.tolist() == [[0.25, 0.5]]
+    assert type(loaded) is lw.UnitCubePoints
+    assert loaded.points.tolist() == [[0.25, 0.5]]
 
 
 def test_an_unknown_name_is_still_unknown():
@@ -51,6 +53,8 @@ def test_an_unknown_name_is_still_unknown():
 
 def test_the_verb_plan_is_the_verb_predict():
     chosen = [vars(parser().parse_args([verb, "scene.toml", "--members", "3"])) for verb in ("plan", "predict")]
-    assert chosen[0].pop("verb") == "plan" and chosen[1].pop("verb") == "predict" and chosen[0] == chosen[1]
+    assert chosen[0].pop("verb") == "plan"
+    assert chosen[1].pop("verb") == "predict"
+    assert chosen[0] == chosen[1]
     assert VERBS["plan"] is VERBS["predict"]
     assert "predict (plan)" in parser().format_help()

@@ -23,7 +23,8 @@ def test_readme(monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
     code, output = code_and_output("README.md")
     exec(code, {})
-    assert capsys.readouterr().out == output and output.count("\n") == 3
+    assert capsys.readouterr().out == output
+    assert output.count("\n") == 3
 
 
 def test_the_readme_is_short_and_shows_what_comes_of_it():
@@ -47,10 +48,12 @@ def test_the_first_example(tmp_path, monkeypatch, capsys):
     runpy.run_path(str(ROOT / "examples" / "01_first_dive.py"), run_name="__main__")
     printed = capsys.readouterr().out.splitlines()
     page = (ROOT / "docs" / "start" / "tutorial.md").read_text()
-    assert len(printed) == 3 and all(f"\n    {line}\n" in page for line in printed)
+    assert len(printed) == 3
+    assert all(f"\n    {line}\n" in page for line in printed)
 
 
 def test_the_methods_of_the_guide():
     code, _ = code_and_output("docs/guide/methods.md")
     methods = [eval(line, {"lw": lw}) for line in code.splitlines()]
-    assert [method.name for method in methods] == ["psi_s", "psi", "rk8"] and methods[2].adaptive
+    assert [method.name for method in methods] == ["psi_s", "psi", "rk8"]
+    assert methods[2].adaptive

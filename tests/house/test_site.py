@@ -74,10 +74,11 @@ class Heir(Base):
 def test_the_check_sees_what_is_not_described():
     assert undescribed("Heir", Heir) == ["Heir: silent", "Heir.method: rest"]
     told, _, a, b = documented.parameters(Heir)
-    assert told.text == "The inherited one, in two lines; and more." and told.note == "int; required"
-    assert (
-        (a.text, b.text) == ("Two [m].",) * 2 and a.note == "default ()" and b.note == "lw.Scene | None; default None"
-    )
+    assert told.text == "The inherited one, in two lines; and more."
+    assert told.note == "int; required"
+    assert (a.text, b.text) == ("Two [m].",) * 2
+    assert a.note == "default ()"
+    assert b.note == "lw.Scene | None; default None"
 
 
 @pytest.mark.parametrize("name", sorted(lw.__all__))

@@ -41,12 +41,14 @@ def test_shapes_are_those_of_the_page(scene):
     names = {"lw": lw, "np": np, "scene": scene}
     exec(snippets("python")[0].values[0], names)
     depth = names["depth"]
-    assert depth.time.shape == depth.count.shape == (6,) and depth.value.shape == depth.lower.shape == (6, 3, 1)
+    assert depth.time.shape == depth.count.shape == (6,)
+    assert depth.value.shape == depth.lower.shape == (6, 3, 1)
     assert names["result"].statistics["mean position"].half_width.shape == (6, 3)
 
 
 def test_there_are_snippets():
-    assert len(snippets("toml")) == 1 and len(snippets("python")) == 6
+    assert len(snippets("toml")) == 1
+    assert len(snippets("python")) == 6
 
 
 def test_every_type_is_on_the_page():
@@ -55,4 +57,5 @@ def test_every_type_is_on_the_page():
     metrics = (ROOT / "docs" / "controllers" / "metrics.md").read_text()
     for name, kind in TYPES.items():
         page = metrics if kind.looks else PAGE
-        assert f"`{name}`" in page and f"`lw.{kind.__name__}`" in page
+        assert f"`{name}`" in page
+        assert f"`lw.{kind.__name__}`" in page

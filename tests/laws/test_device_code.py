@@ -129,4 +129,5 @@ def test_the_distance_of_an_event(event):
     values, _ = measured(bench, False)
     distance = EVENTS[event](bench.views.position, bench.views.time)
     np.testing.assert_allclose(values["distance"][:, 0], distance, rtol=0.0, atol=1e-14)
-    assert np.any(distance > 0.0) and np.any(distance < 0.0)
+    assert np.any(distance > 0.0)
+    assert np.any(distance < 0.0)

@@ -110,7 +110,8 @@ def test_at_rest_fins_do_nothing():
         one(scene(*(CASES[name].terms[0] for name in ("fins", "cross-flow", "body lift")))), h=0.01, t1=0.1
     )
     assert result.status.counts() == {"ok": 1}
-    assert not np.any(result.velocity) and not np.any(result.angular_velocity)
+    assert not np.any(result.velocity)
+    assert not np.any(result.angular_velocity)
 
 
 def deflections(fins, h, steps):
@@ -159,7 +160,8 @@ def test_a_cylinder_falls_at_its_terminal_speed():
     steps, errors = np.array([0.04, 0.02, 0.01]), []
     for h in steps:
         _, _, nu, Om = last(lw.solve(one(scene(hull, other, vehicle=body)), "psi_s", h=h, t1=20.0))
-        assert np.abs(nu[:2]).max() < 1e-12 and np.abs(Om).max() < 1e-12
+        assert np.abs(nu[:2]).max() < 1e-12
+        assert np.abs(Om).max() < 1e-12
         errors.append(abs(nu[2] / terminal - 1.0))
     assert errors[-1] < 1e-3
     assert slope(steps, errors) == pytest.approx(2.0, abs=0.2)

@@ -145,7 +145,8 @@ members = 3
 def test_a_scene_file_may_name_them():
     scene = scenes.loads(SCENE)
     assert [type(term) for term in scene.terms] == [own_law.Dock, own_law.Mud]
-    assert scene.terms[1].key == "silt" and {"dock.reach", "silt.height"} <= scene.parameters().keys()
+    assert scene.terms[1].key == "silt"
+    assert {"dock.reach", "silt.height"} <= scene.parameters().keys()
     result = lw.solve(lw.Ensemble.from_scene(scene), h=0.05, t1=0.5)
     assert result.status.counts() == {"ok": 3}
 
@@ -160,7 +161,8 @@ def test_a_scene_file_without_them_is_refused(monkeypatch):
 def test_a_type_is_taken_once(monkeypatch):
     monkeypatch.setattr(lw.Term, "kinds", dict(lw.Term.kinds))
     taken = type("Harbour", (lw.Term,), {"type": "dock"})
-    assert lw.Term.kinds["dock"] is own_law.Dock and lw.register_term(own_law.Dock) is own_law.Dock
+    assert lw.Term.kinds["dock"] is own_law.Dock
+    assert lw.register_term(own_law.Dock) is own_law.Dock
     for kind in (taken, type("Nameless", (own_law.Dock,), {}), type("Heavy", (lw.Term,), {"type": "weight"})):
         with pytest.raises(ValueError, match="no other term has"):
             lw.register_term(kind)
@@ -169,9 +171,11 @@ def test_a_type_is_taken_once(monkeypatch):
 def test_a_class_made_again_replaces_the_former(monkeypatch):
     monkeypatch.setattr(lw.Term, "kinds", dict(lw.Term.kinds))
     first, second = (type("Cell", (lw.Term,), {"type": "cell"}) for _ in range(2))
-    assert first is not second and lw.Term.kinds["cell"] is second
+    assert first is not second
+    assert lw.Term.kinds["cell"] is second
     # A subclass without a type of its own replaces nothing.
-    assert type("Mine", (lw.Drag,), {}).type == "drag" and lw.Term.kinds["drag"] is lw.Drag
+    assert type("Mine", (lw.Drag,), {}).type == "drag"
+    assert lw.Term.kinds["drag"] is lw.Drag
 
 
 def test_the_law_on_the_page_is_right(tmp_path):
@@ -189,6 +193,8 @@ def test_the_example_runs_as_a_script(tmp_path):
     done = subprocess.run(
         [sys.executable, EXAMPLE], cwd=tmp_path, env=environment, capture_output=True, text=True, check=True
     )
-    assert "Dock (dock): ok" in done.stdout and "Mud (mud): ok" in done.stdout
-    assert "'ok': 500" in done.stdout and done.stderr == ""
+    assert "Dock (dock): ok" in done.stdout
+    assert "Mud (mud): ok" in done.stdout
+    assert "'ok': 500" in done.stdout
+    assert done.stderr == ""
     assert (tmp_path / "own_law.png").stat().st_size > 10_000

@@ -56,7 +56,8 @@ def test_coefficients(name):
 def test_coefficients_of_halves(name):
     # chi over a_i in the odd places and its adjoint in the even ones: sum a = 1, sum (+-) a^2 = 0 by symmetry, sum a^3 = 0.
     a = lw.Method(f"{name}(psi_x)").stages
-    assert a == a[::-1] and len(a) == {"bm4": 12, "bm6": 20}[name]
+    assert a == a[::-1]
+    assert len(a) == {"bm4": 12, "bm6": 20}[name]
     assert power_sum(a, 1) == pytest.approx(1.0, abs=1e-15)
     assert power_sum(a, 3) == pytest.approx(0.0, abs=1e-15)
 

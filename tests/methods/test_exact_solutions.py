@@ -100,7 +100,8 @@ def test_equilibrium_pitch_of_a_trim_moment(method):
     r = run(sphere(center=(0.0, 0.0, -lever)), held, {}, 0.05, 100.0, method, width=1)
     pitch = -np.arcsin(r.attitude[-1, 0, 2, 0])
     assert pitch == pytest.approx(np.arcsin(torque / (200.0 * lever)), abs=1e-12)
-    assert np.abs(r.velocity[-1]).max() < 1e-12 and np.abs(r.angular_velocity[-1]).max() < 1e-12
+    assert np.abs(r.velocity[-1]).max() < 1e-12
+    assert np.abs(r.angular_velocity[-1]).max() < 1e-12
 
 
 @pytest.mark.slow_but("psi_s")

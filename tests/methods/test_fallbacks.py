@@ -51,7 +51,8 @@ def test_a_steady_spin_by_divided_steps(method, part, parts):
     Om = part * 2.0 / h
     scene = scene_of((2.0, 2.0, 2.0))
     result = lw.solve(one(scene, Om=[0.0, 0.0, Om]), method, h=h, t1=h * steps, on_failure="substep")
-    assert result.status.counts() == {"ok": 1} and result.substeps.tolist() == [steps]
+    assert result.status.counts() == {"ok": 1}
+    assert result.substeps.tolist() == [steps]
     angle = steps * 2 * parts * np.arcsin(h * Om / (2 * parts))
     expected = lw.notation.matrix_from_rotation_vector(np.array([0.0, 0.0, np.remainder(angle, 2.0 * np.pi)]))
     # Round-off of the angle of each solve, and of as many products.
@@ -61,7 +62,8 @@ def test_a_steady_spin_by_divided_steps(method, part, parts):
 def test_what_no_division_helps_is_frozen(scene):
     result = lw.solve(one(scene, Om=[0.0, 0.0, 1.1 * 2048 / 0.1]), "psi_s", h=0.1, t1=0.5, on_failure="substep")
     assert list(result.status) == [Status.STEP_TOO_LARGE]
-    assert result.failure_time[0] == 0.0 and result.substeps[0] == 0
+    assert result.failure_time[0] == 0.0
+    assert result.substeps[0] == 0
     np.testing.assert_allclose(result.failure_value, 1.1 * 1024, rtol=1e-12)
 
 
@@ -76,7 +78,8 @@ def test_divided_steps_are_those_of_a_shorter_step(scene, method):
     at = lw.SaveAt(every=5 * h)
     whole = lw.solve(one(scene, *states), method, h=h, t1=10 * h, save=at, on_failure="substep")
     half = lw.solve(one(scene, *states), method, h=0.5 * h, t1=10 * h, save=at)
-    assert whole.status.counts() == half.status.counts() == {"ok": 2} and (whole.substeps == 10).all()
+    assert whole.status.counts() == half.status.counts() == {"ok": 2}
+    assert (whole.substeps == 10).all()
     for name in FIELDS:
         np.testing.assert_allclose(getattr(whole, name), getattr(half, name), rtol=1e-10, atol=1e-10)
 
@@ -91,7 +94,8 @@ def test_the_others_keep_their_bits(scene, dtype):
     Om[[1, 4]] *= 0.01
     quiet = lw.solve(one(scene, b, R, nu, Om), "psi_s", h=0.1, t1=20.0, dtype=dtype, on_failure="substep",
                      save=lw.SaveAt(every=5.0))  # fmt: skip
-    assert loud.status.counts() == {"ok": 5} and (loud.substeps[[1, 4]] == 200).all()
+    assert loud.status.counts() == {"ok": 5}
+    assert (loud.substeps[[1, 4]] == 200).all()
     assert quiet.substeps.sum() == 0 == loud.substeps[[0, 2, 3]].sum()
     plain = lw.solve(one(scene, *fast()), "psi_s", h=0.1, t1=20.0, dtype=dtype, save=lw.SaveAt(every=5.0))
     for name in FIELDS:
@@ -107,7 +111,8 @@ def test_symmetry_is_kept(scene, method):
     # There, all velocities turned round, and back again: a symmetric step undoes itself, divided or not.
     b, R, nu, Om = fast(spin=22.0)
     there = lw.solve(one(scene, b, R, nu, Om), method, h=0.1, t1=2.0, on_failure="substep")
-    assert 0 < there.substeps[1] <= 20 and there.status.counts() == {"ok": 5}
+    assert 0 < there.substeps[1] <= 20
+    assert there.status.counts() == {"ok": 5}
     turned = (there.position[-1], there.attitude[-1], -there.velocity[-1], -there.angular_velocity[-1])
     back = lw.solve(one(scene, *turned), method, h=0.1, t1=2.0, on_failure="substep")
     same = back.substeps == there.substeps
@@ -124,7 +129,8 @@ def test_a_solve_that_did_not_converge_is_divided(scene):
     frozen = lw.solve(one(scene, *states), method, h=0.1, t1=1.0)
     divided = lw.solve(one(scene, *states), method, h=0.1, t1=1.0, on_failure="substep")
     assert frozen.status.counts().get("not_converged") == 4
-    assert divided.status.counts() == {"ok": 4} and (divided.substeps > 0).all()
+    assert divided.status.counts() == {"ok": 4}
+    assert (divided.substeps > 0).all()
     exact = lw.solve(one(scene, *states), "psi_s", h=0.001, t1=1.0)
     coarse = lw.solve(one(scene, *states), "psi_s", h=0.1, t1=1.0)
     assert np.abs(divided.attitude - exact.attitude).max() < np.abs(coarse.attitude - exact.attitude).max()
@@ -137,7 +143,8 @@ def test_forces_that_do_not_settle_are_divided():
     frozen = lw.solve(one(scene, nu=[1.0, 0.0, 0.0]), "psi", h=0.4, t1=2.0)
     divided = lw.solve(one(scene, nu=[1.0, 0.0, 0.0]), "psi", h=0.4, t1=2.0, on_failure="substep")
     assert frozen.status.counts() == {"forces_not_converged": 1}
-    assert divided.status.counts() == {"ok": 1} and divided.substeps[0] > 0
+    assert divided.status.counts() == {"ok": 1}
+    assert divided.substeps[0] > 0
     assert np.abs(divided.velocity[-1]).max() < 1e-3
 
 
@@ -155,7 +162,9 @@ def test_events_stop_a_divided_step():
                 nu=[[0.0, 0.0, 2.0]] * 2, Om=[[0.0, 0.0, 30.0], [0.0, 0.0, 1.0]])  # fmt: skip
     result = lw.solve(fleet, "psi_s", h=0.1, t1=2.0, on_failure="substep", width=2)
     # Both go north at 2 m/s, one of them by divided steps.
-    assert list(result.status) == [Status.BOX, Status.BOX] and result.substeps[0] == 5 and result.substeps[1] == 0
+    assert list(result.status) == [Status.BOX, Status.BOX]
+    assert result.substeps[0] == 5
+    assert result.substeps[1] == 0
     np.testing.assert_allclose(result.failure_time, 0.5, atol=1e-9)
 
 

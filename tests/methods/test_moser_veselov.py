@@ -39,7 +39,8 @@ def test_single_solves(shape, dtype, eps):
         F = case.by_kernel(EXPLICIT, dtype, J, rates)
         for turn, rate in zip(F, rates):
             residual, orthogonality = riccati.quality(turn, J * rate, np.diag(J))
-            assert residual < 50 * eps and orthogonality < 50 * eps
+            assert residual < 50 * eps
+            assert orthogonality < 50 * eps
             np.testing.assert_allclose(turn, rotation.quartic(J * rate, np.diag(J)), atol=50 * eps)
 
 

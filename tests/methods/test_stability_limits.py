@@ -41,7 +41,8 @@ def test_munk_oscillation_of_a_large_angle(method):
 def test_a_right_angle_in_a_step_loses_large_angles_only(method):
     assert close(measured("munk", method, LARGE, high=4.0)[0], math.sqrt(2.0), 0.02)
     near = math.sqrt(2.0) * np.linspace(0.98, 1.02, 64)
-    assert np.all(MOTIONS["munk"](method, near, SMALL)) and not np.all(MOTIONS["munk"](method, near, LARGE))
+    assert np.all(MOTIONS["munk"](method, near, SMALL))
+    assert not np.all(MOTIONS["munk"](method, near, LARGE))
 
 
 def started(method, hw, steps):
@@ -54,14 +55,16 @@ def started(method, hw, steps):
 
 def test_above_two_an_oscillation_jumps_from_side_to_side():
     angle, _ = started("psi_s", 2.05, 400)
-    assert np.all(angle[1:] * angle[:-1] < 0.0) and np.all(np.abs(angle) < 1.5 * LARGE)
+    assert np.all(angle[1:] * angle[:-1] < 0.0)
+    assert np.all(np.abs(angle) < 1.5 * LARGE)
 
 
 @pytest.mark.slow
 def test_explicit_methods_gain_momentum_up_to_the_linear_limit():
     """rk4 is lost at h w = 2.46, .3 rad: |p| grows in the first steps, and w with it, to sqrt(8) / h; psi_s keeps it."""
     _, size = started("rk4", 2.46, 8)
-    assert 2.46 * size[4] > 0.98 * math.sqrt(8.0) and size[1] > 1.05
+    assert 2.46 * size[4] > 0.98 * math.sqrt(8.0)
+    assert size[1] > 1.05
     _, size = started("rk4", 1.0, 8)
     assert np.all(np.abs(size - 1.0) < 0.01)
     _, size = started("psi_s", 2.05, 400)
@@ -100,6 +103,7 @@ def test_the_bisection_finds_what_is_there(monkeypatch):
         MOTIONS, "munk", lambda method, numbers, angle: (numbers <= 1.234) | ((numbers >= 3) & (numbers <= 4))
     )
     first, last = measured("munk", "psi_s")
-    assert 1.233 < first <= 1.234 and last == 4.0
+    assert 1.233 < first <= 1.234
+    assert last == 4.0
     monkeypatch.setitem(MOTIONS, "munk", lambda method, numbers, angle: numbers < 0.0)
     assert measured("munk", "psi_s") == (0.0, 0.0)

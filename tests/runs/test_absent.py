@@ -92,18 +92,21 @@ def test_a_level_of_checks_brings_its_code_and_no_other(checks, tmp_path):
         assert there == (checks in levels), function
     for absent in ("retried", "in_parts", "drag_back", "backward"):
         assert not re.search(rf"^static (?!.*adj_).*{absent}\w*\(", text, re.MULTILINE), absent
-    assert ("NoMonitor" in text) == (checks == "none") and ("warned_step" in text) == (checks == "all")
+    assert ("NoMonitor" in text) == (checks == "none")
+    assert ("warned_step" in text) == (checks == "all")
 
 
 def test_steps_are_divided_only_if_asked_for(tmp_path):
     text = source(lw.Scene(BARE, lw.Environment(gravity=9.8)), tmp_path, on_failure="substep")
-    assert re.search(r"^static (?!.*adj_).*retried_\d+\(", text, re.MULTILINE) and "substeps" in text
+    assert re.search(r"^static (?!.*adj_).*retried_\d+\(", text, re.MULTILINE)
+    assert "substeps" in text
 
 
 def test_energy_is_not_looked_at_where_forces_create_it(tmp_path):
     wrench = list(CASES["wrench"].terms)
     text = source(lw.Scene(BARE, lw.Environment(gravity=9.8), terms=wrench), tmp_path)
-    assert "energy_alarm" not in text and "NoMonitor" in text
+    assert "energy_alarm" not in text
+    assert "NoMonitor" in text
 
 
 @pytest.mark.parametrize(("name", "there"), [("current harmonics", False), ("waves", True)])
@@ -125,7 +128,8 @@ def test_a_term_of_zeros_is_absent():
     zeros = [terms.Drag(), terms.Current(velocity=(0.0, 0.0, 0.0)), terms.Wrench(), terms.DragMatrix()]
     plain = make_plan(one(lw.Scene(VEHICLE), **STATE), h=0.01, t1=0.1)
     asked = make_plan(one(lw.Scene(VEHICLE, terms=zeros), **STATE), h=0.01, t1=0.1)
-    assert asked.spec == plain.spec and asked.advance is plain.advance
+    assert asked.spec == plain.spec
+    assert asked.advance is plain.advance
 
 
 def test_a_grid_of_noise_is_there_only_if_asked_for(tmp_path):
@@ -242,4 +246,5 @@ def test_a_controller_that_is_absent_is_no_code(tmp_path):
         (tmp_path / name).mkdir()
         texts[name] = source(scene, tmp_path / name)
     for word in ("feed", "held", "Measurement", "heading_error", "signals"):
-        assert word not in texts["plain"] and word in texts["steered"], word
+        assert word not in texts["plain"], word
+        assert word in texts["steered"], word

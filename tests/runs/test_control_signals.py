@@ -110,7 +110,8 @@ def test_a_scene_names_what_is_saved(whole):
     members = fleet()
     members.scene = run
     result = lw.solve(members, "psi_s", h=H, t1=STEPS * H)
-    assert tuple(result.samples) == names and same(result, whole, names=names)
+    assert tuple(result.samples) == names
+    assert same(result, whole, names=names)
     # The call decides, where it says something.
     assert lw.solve(members, "psi_s", h=H, t1=H, save=lw.SaveAt(fields=("velocity",))).samples.keys() == {"velocity"}
     bare = lw.Scene.from_dict({**scene(controller=False).to_dict(), "run": {"save_fields": ["command"]}})
@@ -125,7 +126,8 @@ def free(result):
 
 def test_a_sample_on_a_look_shows_what_that_look_demands(whole):
     at, well = looked(), free(whole)
-    assert 50 < len(well) < MEMBERS and set(whole.status) == {0, Status.FLOOR}
+    assert 50 < len(well) < MEMBERS
+    assert set(whole.status) == {0, Status.FLOOR}
     R, Om = whole.attitude[:, well], whole.angular_velocity[:, well]
     heading = np.arctan2(R[..., 1, 0], R[..., 0, 0])
     error = np.arctan2(np.sin(0.5 - heading), np.cos(0.5 - heading))
@@ -134,7 +136,8 @@ def test_a_sample_on_a_look_shows_what_that_look_demands(whole):
     demand[..., 2], demand[..., 5] = LEVEL, (KP * error - KD * Om[..., 2])[at]
     np.testing.assert_allclose(whole.demand[:, well], demand, atol=1e-13)
     delivered = np.clip(whole.demand, [-1e3] * 5 + [-LIMIT], [1e3] * 5 + [LIMIT])
-    assert (delivered != whole.demand).any() and (delivered[..., 5] == whole.demand[..., 5]).any()
+    assert (delivered != whole.demand).any()
+    assert (delivered[..., 5] == whole.demand[..., 5]).any()
     np.testing.assert_allclose(whole.command, delivered, atol=1e-13)
     np.testing.assert_allclose(whole.unmet, whole.demand - delivered, atol=1e-13)
 
@@ -172,7 +175,8 @@ def test_a_member_that_an_event_stops_keeps_the_signals_of_its_last_whole_step(w
     stopped = np.flatnonzero(whole.status == Status.FLOOR)
     last = np.floor(whole.failure_time[stopped] / H).astype(int)
     # In the first step after a look, and in others.
-    assert len(stopped) > 50 and set(last % EVERY) == set(range(EVERY))
+    assert len(stopped) > 50
+    assert set(last % EVERY) == set(range(EVERY))
     for name in SIGNALS:
         values = getattr(whole, name)
         for member, k in zip(stopped, last, strict=True):
@@ -193,7 +197,9 @@ def test_threads_launches_and_blocks_give_the_same_bits(whole, monkeypatch):
 def test_signals_change_nothing_of_the_motion_and_cost_nothing_where_nobody_asks(whole):
     settings = SETTINGS | {"save": lw.SaveAt(every=H)}
     plan = make_plan(fleet(), "psi_s", **settings)
-    assert not plan.spec.control.reports and not plan.spec.control.headings and plan.signal_rows == ()
+    assert not plan.spec.control.reports
+    assert not plan.spec.control.headings
+    assert plan.signal_rows == ()
     assert same(whole, lw.solve(fleet(), "psi_s", **settings), names=FIELDS)
     # What a look writes anyway needs no other kernel.
     everything = SETTINGS | {"save": lw.SaveAt(every=H, fields=("demand", "measured_position", "reference_attitude"))}
@@ -201,7 +207,8 @@ def test_signals_change_nothing_of_the_motion_and_cost_nothing_where_nobody_asks
     held = SETTINGS | {"save": lw.SaveAt(every=H, fields=("command", "unmet"))}
     assert make_plan(fleet(), "psi_s", **held).spec == plan.spec
     result = lw.solve(fleet(), "psi_s", **held)
-    assert set(result.samples) == {"command", "unmet"} and same(whole, result, names=("command", "unmet"))
+    assert set(result.samples) == {"command", "unmet"}
+    assert same(whole, result, names=("command", "unmet"))
     with pytest.raises(AttributeError, match=r"demand was not kept: add 'demand' to SaveAt\(fields="):
         _ = result.demand
 
@@ -236,7 +243,8 @@ def check_spoiled(whole, spoiled):
                 assert values[: k + 1].tobytes() == getattr(whole, name)[: k + 1, member].tobytes(), name
             assert values[k:].tobytes() == np.repeat(values[k : k + 1], len(values) - k, axis=0).tobytes(), name
         if not k:
-            assert np.isnan(spoiled.demand[0, member, 2]) and (spoiled.command[:, member] == 0.0).all()
+            assert np.isnan(spoiled.demand[0, member, 2])
+            assert (spoiled.command[:, member] == 0.0).all()
 
 
 def test_a_law_that_gives_no_number_ends_its_member_alone(whole):
@@ -267,7 +275,8 @@ def test_a_look_sees_both_parts_of_compensated_sums():
     # Without events the lead of the next step is merged with the end of this one, and undone for a look.
     result = lw.solve(fleet(events=False), "psi_s", dtype="float32_compensated", **SETTINGS)
     well = free(result)
-    assert result.position.dtype == np.float64 and result.measured_position.dtype == np.float32
+    assert result.position.dtype == np.float64
+    assert result.measured_position.dtype == np.float32
     for name in ("position", "attitude", "velocity", "angular_velocity"):
         # Half a step at these speeds moves a body by 1e-2 m.
         here, there = getattr(result, name)[looked()][:, well], getattr(result, f"measured_{name}")[:, well]
@@ -289,7 +298,8 @@ def test_a_store_holds_them_and_goes_on(whole, tmp_path):
         here, there = whole.dataset[name], opened.dataset[name]
         assert (here.dims, here.attrs) == (there.dims, there.attrs), name
     loaded = lw.Result.load(whole.save(tmp_path / "result.npz"))
-    assert same(whole, loaded) and set(loaded.samples) == set(SAVED)
+    assert same(whole, loaded)
+    assert set(loaded.samples) == set(SAVED)
 
 
 @pytest.mark.slow_for("laws1")
@@ -325,7 +335,8 @@ def test_a_recording_shows_commands_and_actuators(whole, tmp_path):
     for name in ("command", "actuator"):
         median = np.median(getattr(whole, name)[3, early, 5])
         assert rows(path, f"/{name}/5", "scalars")[3 * H] == pytest.approx([median])
-    assert not rows(path, "/demand/5", "scalars") and not rows(path, "/command/6", "scalars")
+    assert not rows(path, "/demand/5", "scalars")
+    assert not rows(path, "/command/6", "scalars")
 
 
 @pytest.mark.slow

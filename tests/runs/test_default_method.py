@@ -164,13 +164,15 @@ def test_a_drive_brings_speed_where_a_start_has_none():
 def test_it_is_told_and_kept():
     plan = planned(torpedo(DRAG))
     told = provenance(plan)
-    assert told["method"]["name"] == "rk4" and "method" not in told["scene"]["run"]
+    assert told["method"]["name"] == "rk4"
+    assert "method" not in told["scene"]["run"]
     assert members_line(2, told).endswith("\nmethod      rk4, chosen since the scene is damped")
     assert "chosen" not in provenance(planned(torpedo(DRAG), method="rk4"))["method"]
     written = recipe.recipe(plan)
     grid = plan.grid
     again = recipe.plan_of(written, plan.ensemble, grid.sample_steps, grid.times)
-    assert again.method == plan.method and again.method.reason == plan.method.reason
+    assert again.method == plan.method
+    assert again.method.reason == plan.method.reason
     # A store from before has no reason in its recipe.
     del written["method"]["reason"]
     assert recipe.plan_of(written, plan.ensemble, grid.sample_steps, grid.times).method == lw.Method("rk4")
@@ -280,7 +282,9 @@ def test_remus_in_a_turn_is_not_off_by_metres():
     fleet, t1 = FLEETS["REMUS that rolls"]()
     plan = make_plan(fleet, h=0.375, t1=t1)
     (lost, kept) = (measured(fleet, t1, method, [80])[0] for method in ("rk4", "rk8"))
-    assert lost > 0.1 and kept < 1e-3 and plan.method.name == "rk8"
+    assert lost > 0.1
+    assert kept < 1e-3
+    assert plan.method.name == "rk8"
 
 
 @pytest.mark.kernel
@@ -288,7 +292,9 @@ def test_near_its_limit_a_method_is_taken_before_one_that_is_off_by_more():
     for (fleet, t1), h in ((spinning_bluerov(), 0.5), (turning_remus((0.3, 0.2, 0.1)), 0.375)):
         plan = make_plan(fleet, h=h, t1=t1)
         (taken,), (other,) = (measured(fleet, t1, method, [round(t1 / h)]) for method in (plan.method.name, "rkw3"))
-        assert plan.method.name == "rk8" and taken < 0.01 and other > 4.0 * taken
+        assert plan.method.name == "rk8"
+        assert taken < 0.01
+        assert other > 4.0 * taken
     fleet, t1 = spinning_bluerov()
     (text,) = make_plan(fleet, h=0.5, t1=t1).grid.messages
     assert "rk8 may be off by more than 1 % of the path" in text
@@ -304,7 +310,8 @@ def test_the_choice_does_not_depend_on_the_length_of_the_run_or_the_number_of_me
 def test_a_long_step_is_told_and_a_method_that_is_named_is_not_looked_at():
     fleet, t1 = turning_remus((0.1, 0.2, 0.3))
     (text,) = make_plan(fleet, h=1.5, t1=t1).grid.messages
-    assert text.startswith("step h = 1.5 s is long for this motion: by its rates ") and "lw.suggest" in text
+    assert text.startswith("step h = 1.5 s is long for this motion: by its rates ")
+    assert "lw.suggest" in text
     assert make_plan(fleet, "rk4", h=1.5, t1=t1).grid.messages == ()
     assert make_plan(fleet, h=0.1, t1=t1).grid.messages == ()
 
@@ -327,10 +334,12 @@ def test_the_modes_are_those_of_the_motion():
                         center_of_buoyancy=[0.0, 0.0, -0.05])  # fmt: skip
     scene = lw.Scene(swings, lw.Environment(gravity=9.8), start=lw.Start(position=[0.0, 0.0, 10.0]))
     found = step_error.rates(lw.Ensemble.from_scene(scene))
-    assert np.abs(found.modes).max() == pytest.approx(np.sqrt(10.0 * 9.8 * 0.05 / 2.0)) and found.drag == 0.0
+    assert np.abs(found.modes).max() == pytest.approx(np.sqrt(10.0 * 9.8 * 0.05 / 2.0))
+    assert found.drag == 0.0
     braked = dataclasses.replace(scene, terms=[lw.Drag(linear=[30.0] * 3 + [0.0] * 3)])
     found = step_error.rates(lw.Ensemble.from_scene(braked))
-    assert found.modes.real.min() == pytest.approx(-30.0 / 15.0) and found.drag == pytest.approx(2.0)
+    assert found.modes.real.min() == pytest.approx(-30.0 / 15.0)
+    assert found.drag == pytest.approx(2.0)
 
 
 def test_a_drive_is_that_of_the_members_own_commands():
@@ -340,7 +349,9 @@ def test_a_drive_is_that_of_the_members_own_commands():
     fleet, _ = driven_bluerov()
     numbers = fleet.own(term, fleet.select(0, 4).parameters)
     own = step_error.drive(term, numbers)
-    assert own.shape == (4, 6) and (own[0] == own[1]).all() and own[0].max() > 1.0
+    assert own.shape == (4, 6)
+    assert (own[0] == own[1]).all()
+    assert own[0].max() > 1.0
     assert not term.drive().any()
     ahead = np.sign(term.direction[:, 0]) * (abs(term.direction[:, 2]) < 0.5)
     held = dataclasses.replace(term, command=0.5 * ahead, times=None, command_schedule=None)

@@ -49,14 +49,16 @@ def test_surface_and_floor_at_the_crossing():
         sink < 0.0, -depth / np.where(sink < 0.0, sink, 1.0), (8.0 - depth) / np.where(sink > 0.0, sink, 1.0)
     )
     stopped = expected < 20.0 - 0.1
-    assert stopped.sum() > 50 and set(np.unique(r.status)) == {0, lw.Status.SURFACE, lw.Status.FLOOR}
+    assert stopped.sum() > 50
+    assert set(np.unique(r.status)) == {0, lw.Status.SURFACE, lw.Status.FLOOR}
     np.testing.assert_allclose(r.failure_time[stopped], expected[stopped], rtol=1e-9)
     np.testing.assert_array_equal(r.status[stopped & (sink < 0)], lw.Status.SURFACE)
     np.testing.assert_array_equal(r.status[stopped & (sink > 0)], lw.Status.FLOOR)
     # A stopped member stands at the event, and a spacing of its numbers beyond it.
     last = r.position[-1, stopped, 2]
     beyond = np.where(sink[stopped] < 0.0, -last, last - 8.0)
-    assert (beyond > 0.0).all() and beyond.max() < 1e-13
+    assert (beyond > 0.0).all()
+    assert beyond.max() < 1e-13
     np.testing.assert_allclose(last, (depth + sink * expected)[stopped], atol=1e-12)
     np.testing.assert_array_equal(r.end_time[stopped], r.failure_time[stopped])
     assert (r.end_time[r.status == lw.Status.OK] == 20.0).all()
@@ -104,7 +106,8 @@ def test_events_look_at_the_users_origin(method):
         start=lw.Start(position=(0, 0, 1.0), velocity=(0, 0, -1.0)),
     )
     r = lw.solve(scene, method, h=0.03, t1=3.0)
-    assert r.status[0] == lw.Status.SURFACE and r.failure_time[0] == pytest.approx(1.0, abs=1e-9)
+    assert r.status[0] == lw.Status.SURFACE
+    assert r.failure_time[0] == pytest.approx(1.0, abs=1e-9)
 
 
 def test_a_users_condition():
@@ -112,7 +115,8 @@ def test_a_users_condition():
     assert r.status.counts().keys() == {"ok", "condition"}
     away = r.position[0, :, 0] < 2.0
     hit = away & (r.status == lw.Status.CONDITION)
-    assert hit.sum() > 10 and np.abs(r.position[-1, hit, 0] - 2.0).max() < 1e-13
+    assert hit.sum() > 10
+    assert np.abs(r.position[-1, hit, 0] - 2.0).max() < 1e-13
     # A member that starts beyond stops at once, where it is.
     assert (r.failure_time[~away] == 0.0).all()
     np.testing.assert_array_equal(r.position[-1, ~away], r.position[0, ~away])
@@ -131,7 +135,9 @@ def test_all_that_begin_beyond_an_event_are_stopped_at_once(method, dtype):
     asked = [lw.Outcome("floor"), lw.EndTime("floor", lw.Mean())]
     r = lw.solve(members, method, h=0.1, t1=0.3, dtype=dtype, statistics=asked)
     beyond = b[:, 2] > 7.0
-    assert beyond.sum() == 8 and (r.status[beyond] == lw.Status.FLOOR).all() and (r.end_time[beyond] == 0.0).all()
+    assert beyond.sum() == 8
+    assert (r.status[beyond] == lw.Status.FLOOR).all()
+    assert (r.end_time[beyond] == 0.0).all()
     # Momenta are rounded once, and positions to their spacing; an arrival is sought to three spacings.
     spacing = float(np.finfo(dtype).eps)
     for field in FIELDS:
@@ -151,7 +157,8 @@ def test_a_start_at_the_surface_is_no_end():
         VEHICLE, lw.Environment(gravity=GRAVITY), events=stops(surface=0.0), start=lw.Start(velocity=(0, 0, 1.0))
     )
     r = lw.solve(scene, "psi_s", h=0.1, t1=0.3)
-    assert r.status[0] == lw.Status.OK and not any("begin" in message for message in r.messages)
+    assert r.status[0] == lw.Status.OK
+    assert not any("begin" in message for message in r.messages)
 
 
 def test_what_begins_beyond_in_moving_water_or_under_control_keeps_its_start(tmp_path):
@@ -162,7 +169,9 @@ def test_what_begins_beyond_in_moving_water_or_under_control_keeps_its_start(tmp
     r = lw.solve(lw.Ensemble(scene, 20, 1, {"start.position[2]": lw.Uniform(low=19.0, high=23.0)}), h=0.05, t1=2.0,
                  save=lw.SaveAt(every=0.5), store=tmp_path / "run.zarr")  # fmt: skip
     beyond = r.position[0, :, 2] > 20.0
-    assert 5 < beyond.sum() < 20 and (r.end_time[beyond] == 0.0).all() and (r.end_time[~beyond] > 0.0).all()
+    assert 5 < beyond.sum() < 20
+    assert (r.end_time[beyond] == 0.0).all()
+    assert (r.end_time[~beyond] > 0.0).all()
     for field in FIELDS:
         whole = np.asarray(getattr(r, field))
         np.testing.assert_allclose(
@@ -211,7 +220,8 @@ def true():
 
 def error(result, true):
     """How far a member's arrival is from the true one, in place and in time."""
-    assert result.status[0] == lw.Status.FLOOR and abs(result.position[-1, 0, 2] - 6.5) < 1e-13
+    assert result.status[0] == lw.Status.FLOOR
+    assert abs(result.position[-1, 0, 2] - 6.5) < 1e-13
     return max(difference(last(result), true[0]), abs(result.end_time[0] - true[1]))
 
 
@@ -262,7 +272,8 @@ def test_single_precision_stands_at_the_event(dtype):
     assert round(float(r.statistics["out"].value[-1, 0]) * 200) == counts["surface"] > 20
     floor = r.position[-1, r.status == lw.Status.FLOOR, 2]
     # Positions of some 30 m are known to 4e-6 m; the margin is a few spacings of the sum of their sizes.
-    assert (floor > 8.0).all() and floor.max() < 8.0 + 1e-4
+    assert (floor > 8.0).all()
+    assert floor.max() < 8.0 + 1e-4
 
 
 def test_the_first_of_two_events_in_a_step():
@@ -342,7 +353,9 @@ def test_an_event_in_a_step_that_was_divided():
     r = lw.solve(lw.Ensemble.from_states(scene, b, R, nu, Om), h=0.1, t1=20.0, on_failure="substep")
     hit = np.asarray(r.status) >= lw.Status.SURFACE
     inside = np.abs(b[:, 2]) < 2.0
-    assert hit[:4].sum() >= 2 and ((r.substeps[:4] > 0) == inside[:4]).all() and inside[:4].sum() >= 2
+    assert hit[:4].sum() >= 2
+    assert ((r.substeps[:4] > 0) == inside[:4]).all()
+    assert inside[:4].sum() >= 2
     np.testing.assert_allclose(np.abs(r.position[-1, hit & inside, 2]), 2.0, atol=1e-12)
 
 

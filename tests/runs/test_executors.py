@@ -95,7 +95,8 @@ def children():
 
 def check_killed(killer, store, whole):
     """One was killed, what was finished then was not run again, and the bytes are those of the whole run."""
-    assert killer.killed is not None and 0 < len(killer.finished) < 16
+    assert killer.killed is not None
+    assert 0 < len(killer.finished) < 16
     after = markers(store)
     assert all(after[name] == written for name, written in killer.finished.items())
     assert differing(store, whole) == []
@@ -122,10 +123,12 @@ def check_run_and_kill(work, killed, finished, told):
     """Every block once, what was finished by then begun once, what the killed worker was at twice; both told how far."""
     assert sorted(first for first, _ in finished) == list(range(0, 2048, 256))
     times = Counter(first for first, _ in work.begun())
-    assert times[killed] == 2 and all(times[first] == 1 for first, _ in finished[:4])
+    assert times[killed] == 2
+    assert all(times[first] == 1 for first, _ in finished[:4])
     pids = dict(finished)
     half_done = {pids[first] for first, steps in told if 0 < steps < 256 * STEPS and first in dict(finished[:4])}
-    assert half_done == {pid for _, pid in finished[:4]} and len(half_done) == 2
+    assert half_done == {pid for _, pid in finished[:4]}
+    assert len(half_done) == 2
     return times
 
 
@@ -149,7 +152,9 @@ def test_a_killed_dask_worker_costs_the_block_it_is_at(client, tmp_path):
 def test_processes(memory):
     shown = []
     result = lw.solve(fleet(), **SETTINGS, executor="processes", threads=2, progress=shown.append)
-    assert same(result, memory) and shown == sorted(shown) and shown[-1] == 1.0
+    assert same(result, memory)
+    assert shown == sorted(shown)
+    assert shown[-1] == 1.0
 
 
 @pytest.mark.slow
@@ -164,7 +169,8 @@ def test_a_killed_process_costs_its_block_only(tmp_path, whole):
 def test_a_killed_process_in_memory(whole):
     killer = Killer(children)
     result = lw.solve(fleet(MANY), **LONG, executor="processes", threads=2, progress=killer)
-    assert killer.killed is not None and same(result, lw.open_run(whole))
+    assert killer.killed is not None
+    assert same(result, lw.open_run(whole))
 
 
 def test_dask(client, memory, tmp_path):
@@ -172,7 +178,8 @@ def test_dask(client, memory, tmp_path):
 
     shown = []
     result = lw.solve(fleet(), **SETTINGS, executor=Dask(client), progress=shown.append)
-    assert same(result, memory) and shown[-1] == 1.0
+    assert same(result, memory)
+    assert shown[-1] == 1.0
     address = client.scheduler_info()["address"]
     stored = lw.solve(fleet(), **SETTINGS, executor="dask", scheduler=address, store=tmp_path / "run.zarr")
     assert same(stored, memory)
@@ -193,7 +200,9 @@ def test_threads_of_one_dask_worker_share_it(memory):
         for _ in dask.Dask(client).run(work, blocks(2048), lambda *_: None):
             at_once.append(work.most)
             break
-        assert at_once == [2] and sum(dask.tasks_at_work.values()) == 0 and work.whole == [0]
+        assert at_once == [2]
+        assert sum(dask.tasks_at_work.values()) == 0
+        assert work.whole == [0]
 
 
 @pytest.mark.slow
@@ -211,7 +220,8 @@ def test_the_client_of_a_run_is_not_the_default_one(memory):
             Client.current()
 
     assert same(lw.solve(fleet(), **SETTINGS, executor="dask", progress=shown), memory)
-    assert seen and "distributed" not in (*seen, get_dask_scheduler())
+    assert seen
+    assert "distributed" not in (*seen, get_dask_scheduler())
 
 
 class Overlapping:
@@ -253,7 +263,8 @@ def test_statistics_on_dask_end_with_the_run(client, tmp_path):
     settings = {**SETTINGS, "statistics": STATISTICS, "until": UNTIL}
     lw.solve(fleet(), **settings, threads=1, store=tmp_path / "one.zarr")
     result = lw.solve(fleet(), **settings, executor=Dask(client), store=tmp_path / "run.zarr")
-    assert result.members == 512 and bits(result) == bits(lw.open_run(tmp_path / "one.zarr"))
+    assert result.members == 512
+    assert bits(result) == bits(lw.open_run(tmp_path / "one.zarr"))
     time.sleep(0.5)
     assert differing(tmp_path / "one.zarr", tmp_path / "run.zarr") == []
 
@@ -275,7 +286,8 @@ def test_a_killed_dask_worker_in_memory(client, whole):
     pids = list(client.run(os.getpid).values())
     killer = Killer(lambda: pids)
     result = lw.solve(fleet(MANY), **LONG, executor=Dask(client), progress=killer)
-    assert killer.killed is not None and same(result, lw.open_run(whole))
+    assert killer.killed is not None
+    assert same(result, lw.open_run(whole))
 
 
 def test_a_worker_of_another_kind_is_refused(client, monkeypatch):
@@ -352,7 +364,8 @@ def test_an_interrupted_command_ends_in_a_line_and_goes_on(executor, tmp_path, c
     line = f"lgvi-warp: interrupted; finished blocks are kept: go on with lgvi-warp resume {out}\n"
     assert (process.returncode, *said) == (130, "", line)
     assert 0 < len(list(tmp_path.glob("run.zarr/blocks/*.json"))) < 16
-    assert cli.main(["info", out]) == 1 and "of 16 finished; not complete" in capsys.readouterr().out
+    assert cli.main(["info", out]) == 1
+    assert "of 16 finished; not complete" in capsys.readouterr().out
 
 
 def own_law(base):

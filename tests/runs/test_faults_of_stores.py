@@ -100,7 +100,8 @@ def test_runs_that_start_together(whole, tmp_path, mode, count):
     for one in refused:
         text = (here / f"said{one.pid}").read_text()
         assert "another run is writing into it" in text or "holds a run already" in text
-    assert differing(whole, path) == [] and [one.name for one in path.parent.iterdir()] == ["run.zarr"]
+    assert differing(whole, path) == []
+    assert [one.name for one in path.parent.iterdir()] == ["run.zarr"]
 
 
 def test_threads_of_one_process_are_kept_apart_as_well(whole, tmp_path):
@@ -117,7 +118,8 @@ def test_threads_of_one_process_are_kept_apart_as_well(whole, tmp_path):
         one.start()
     for one in threads:
         one.join()
-    assert len(said) == 2 and differing(whole, path) == []
+    assert len(said) == 2
+    assert differing(whole, path) == []
 
 
 @pytest.mark.slow
@@ -133,8 +135,10 @@ def test_the_holder_is_named(tmp_path):
     with store.held(path), pytest.raises(lw.SceneError) as refused, store.held(path):
         pass
     text = str(refused.value)
-    assert f"another run is writing into it (process {os.getpid()} on " in text and "since 20" in text
-    assert "wait for it, or end it" in text and list(tmp_path.iterdir()) == []
+    assert f"another run is writing into it (process {os.getpid()} on " in text
+    assert "since 20" in text
+    assert "wait for it, or end it" in text
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_lock_ends_with_its_process(tmp_path):
@@ -182,7 +186,8 @@ def test_a_file_of_the_users_is_not_taken_for_a_lock(tmp_path):
         make()
         with pytest.raises(lw.SceneError, match=r"is no lock of lgvi-warp, but has its name; move it away"):
             lw.solve(fleet(10), **SETTINGS, store=tmp_path / "run.zarr")
-        assert not (tmp_path / "run.zarr").exists() and not (tmp_path / "other").exists()
+        assert not (tmp_path / "run.zarr").exists()
+        assert not (tmp_path / "other").exists()
         path.rmdir() if path.is_dir() else path.unlink()
 
 
@@ -213,7 +218,8 @@ def test_two_who_save_into_one_file(results, tmp_path):
     while any(one.is_alive() for one in processes):
         assert lw.Result.load(target).members in (20, 30)
     assert [one.exitcode for one in processes] == [0, 0]
-    assert lw.Result.load(target).members in (20, 30) and [one.name for one in tmp_path.iterdir()] == ["result.npz"]
+    assert lw.Result.load(target).members in (20, 30)
+    assert [one.name for one in tmp_path.iterdir()] == ["result.npz"]
 
 
 def test_two_threads_who_save_into_one_file(results, tmp_path):
@@ -223,7 +229,8 @@ def test_two_threads_who_save_into_one_file(results, tmp_path):
         one.start()
     for one in threads:
         one.join()
-    assert lw.Result.load(target).members in (20, 30) and [one.name for one in tmp_path.iterdir()] == ["result.npz"]
+    assert lw.Result.load(target).members in (20, 30)
+    assert [one.name for one in tmp_path.iterdir()] == ["result.npz"]
 
 
 def test_killed_while_it_saves(results, tmp_path):
@@ -273,7 +280,8 @@ def test_two_runs_that_end_together_leave_the_files_of_one(results, tmp_path, mo
         one.start()
     for one in threads:
         one.join()
-    assert order in ([20, 20, 30, 30], [30, 30, 20, 20]) and [one.name for one in tmp_path.iterdir()] == ["result.npz"]
+    assert order in ([20, 20, 30, 30], [30, 30, 20, 20])
+    assert [one.name for one in tmp_path.iterdir()] == ["result.npz"]
     assert lw.Result.load(tmp_path / "result.npz").members == order[-1]
 
 
@@ -282,7 +290,8 @@ def test_a_saved_result_is_on_the_disk_before_it_has_its_name(results, tmp_path,
     monkeypatch.setattr(os, "fsync", lambda fd: (order.append(os.readlink(f"/proc/self/fd/{fd}")), fsync(fd)))
     monkeypatch.setattr(durable.Path, "replace", lambda self, to: (order.append("name"), replace(self, to))[1])
     lw.Result.load(results[0]).save(tmp_path / "result.npz")
-    assert order[0].endswith(".part") and order[1:] == ["name", str(tmp_path)]
+    assert order[0].endswith(".part")
+    assert order[1:] == ["name", str(tmp_path)]
 
 
 # What a folder called run.zarr may hold that no run wrote, and whether there is a run beside it.
@@ -313,7 +322,8 @@ def test_what_no_run_wrote_is_not_overwritten(whole, tmp_path, name, verb, capsy
     }[verb]
     assert cli.main([verb, *arguments, "--out", str(tmp_path), "--overwrite"]) == 2
     said = capsys.readouterr().err
-    assert said.count("\n") == 1 and "not overwritten: move it away, or give another folder" in said
+    assert said.count("\n") == 1
+    assert "not overwritten: move it away, or give another folder" in said
     assert tree(tmp_path) == before
 
 
@@ -322,7 +332,8 @@ def test_a_link_is_not_overwritten_but_what_it_leads_to(whole, tmp_path):
     shutil.copytree(whole, tmp_path / "disk" / "run.zarr")
     (tmp_path / "run.zarr").symlink_to(tmp_path / "disk" / "run.zarr")
     lw.solve(fleet(), **SETTINGS, store=lw.Store(tmp_path / "run.zarr", existing="overwrite"))
-    assert (tmp_path / "run.zarr").is_symlink() and differing(whole, tmp_path / "disk" / "run.zarr") == []
+    assert (tmp_path / "run.zarr").is_symlink()
+    assert differing(whole, tmp_path / "disk" / "run.zarr") == []
     shutil.rmtree(tmp_path / "disk" / "run.zarr" / "status")
     (tmp_path / "notes").mkdir()
     (tmp_path / "disk" / "run.zarr" / "status").symlink_to(tmp_path / "notes")
@@ -372,7 +383,8 @@ def test_folders_are_exchanged_in_one_step(tmp_path):
         (tmp_path / name / name).touch()
     if not durable.exchanged(tmp_path / "a", tmp_path / "b"):
         pytest.skip("this system cannot")
-    assert os.listdir(tmp_path / "a") == ["b"] and os.listdir(tmp_path / "b") == ["a"]
+    assert os.listdir(tmp_path / "a") == ["b"]
+    assert os.listdir(tmp_path / "b") == ["a"]
 
 
 def test_nobody_elses_folder_beside_a_run_is_removed(whole, tmp_path):
@@ -413,8 +425,10 @@ def test_a_disk_that_takes_no_more(whole, tmp_path, monkeypatch, number, file, s
         patch.setattr(safe_files, "created", refused)
         with pytest.raises(OSError, match=said) as told:
             lw.solve(fleet(), **SETTINGS, store=path)
-    assert "\n" not in str(told.value) and file in str(told.value)
-    assert not list(tmp_path.rglob("*.part")) and {one.name for one in tmp_path.iterdir()} <= {"run.zarr"}
+    assert "\n" not in str(told.value)
+    assert file in str(told.value)
+    assert not list(tmp_path.rglob("*.part"))
+    assert {one.name for one in tmp_path.iterdir()} <= {"run.zarr"}
     lw.solve(fleet(), **SETTINGS, store=lw.Store(path, existing="resume"))
     assert differing(whole, path) == []
 
@@ -439,7 +453,8 @@ def test_a_full_disk_does_not_undo_a_saved_result(results, tmp_path, monkeypatch
     monkeypatch.setattr(np, "savez", full)
     with pytest.raises(OSError, match="No space left"):
         lw.Result.load(results[1]).save(target)
-    assert lw.Result.load(target).members == 20 and [one.name for one in tmp_path.iterdir()] == ["result.npz"]
+    assert lw.Result.load(target).members == 20
+    assert [one.name for one in tmp_path.iterdir()] == ["result.npz"]
 
 
 def test_a_full_disk_does_not_undo_what_is_overwritten(whole, tmp_path, monkeypatch):
@@ -455,7 +470,8 @@ def test_a_full_disk_does_not_undo_what_is_overwritten(whole, tmp_path, monkeypa
         lw.solve(fleet(300), **SETTINGS, store=lw.Store(path, existing="overwrite"))
     with pytest.raises(OSError, match="No space left"):
         lw.merge([path], tmp_path, overwrite=True)
-    assert differing(whole, path) == [] and [one.name for one in tmp_path.iterdir()] == ["run.zarr"]
+    assert differing(whole, path) == []
+    assert [one.name for one in tmp_path.iterdir()] == ["run.zarr"]
 
 
 def test_the_page_names_tests_that_there_are():
@@ -471,6 +487,8 @@ def test_the_page_names_tests_that_there_are():
     )
     tests = re.findall(r"`(test_\w+)`", text)
     named = re.findall(r'"([^"]+)"', " ".join(re.findall(r"\(`stores`:([^)]*)\)", text.replace("\n", " "))))
-    assert len(tests) > 10 and all(f"def {name}(" in source for name in tests)
+    assert len(tests) > 10
+    assert all(f"def {name}(" in source for name in tests)
     rows = [*hostile.STORES, *hostile.RESULTS]
-    assert len(named) > 25 and all(any(row.startswith(name.removesuffix(" ...")) for row in rows) for name in named)
+    assert len(named) > 25
+    assert all(any(row.startswith(name.removesuffix(" ...")) for row in rows) for name in named)

@@ -68,5 +68,6 @@ def test_the_parent_goes_on_as_before(quick):
 
 def test_a_daemon_is_told_that_it_may_start_no_processes(quick):
     processes, dask = quick["refused"]
-    assert "executor = 'processes'" in processes and "executor = 'dask'" in dask
+    assert "executor = 'processes'" in processes
+    assert "executor = 'dask'" in dask
     assert all('executor="threads"' in text for text in (processes, dask))

@@ -122,16 +122,21 @@ def test_a_hostile_folder_is_refused_in_a_line_by_every_verb(name, theirs, home,
         code = call(verb, path, out)
         text = capsys.readouterr()
         assert verb in ("run", "sweep") or (time.perf_counter() - begun < SECONDS and peak() - memory < MEGABYTES), verb
-        assert code in (0, 1, 2) and "Traceback" not in text.err, verb
+        assert code in (0, 1, 2), verb
+        assert "Traceback" not in text.err, verb
         assert not set("\x1b\x07\x9b") & set(text.out + text.err), verb
         assert text.err.count("\n") <= 4, text.err
         if verb == "info" and said is not None:
-            assert code != 0 and said in text.out + text.err
+            assert code != 0
+            assert said in text.out + text.err
         if verb in ("export", "merge", "resume"):
-            assert code == 2 and text.err.count("\n") == 1
-        assert snapshot(home) == before and special(path).items() >= odd.items(), verb
+            assert code == 2
+            assert text.err.count("\n") == 1
+        assert snapshot(home) == before, verb
+        assert special(path).items() >= odd.items(), verb
         memory = max(memory, peak() if verb in ("run", "sweep") else 0)
-    assert b"S" * 200 not in read(out) + read(path) and b"UzNTU1NT" not in read(out) + read(path)
+    assert b"S" * 200 not in read(out) + read(path)
+    assert b"UzNTU1NT" not in read(out) + read(path)
 
 
 def test_a_link_within_the_folder_is_followed(theirs, home, capsys):  # noqa: F811
@@ -139,7 +144,8 @@ def test_a_link_within_the_folder_is_followed(theirs, home, capsys):  # noqa: F8
     path = theirs("tradeoff")
     hostile.beside_itself("tradeoff.json")(path, home)
     assert cli.main(["info", str(path)]) == cli.main(["plot", str(path)]) == cli.main(["report", str(path)]) == 0
-    assert (path / "tradeoff.json").is_symlink() and (path / "tradeoff.png").is_file()
+    assert (path / "tradeoff.json").is_symlink()
+    assert (path / "tradeoff.png").is_file()
 
 
 def test_what_a_report_may_not_read_is_not_in_it(theirs, home, capsys):  # noqa: F811
@@ -147,7 +153,8 @@ def test_what_a_report_may_not_read_is_not_in_it(theirs, home, capsys):  # noqa:
         path = theirs("tradeoff").rename(home.parent / f"again{i}")
         harm(path, home)
         assert cli.main(["report", str(path), "--out", str(home.parent / "page.html")]) == 2
-        assert hostile.OUT in capsys.readouterr().err and not (home.parent / "page.html").exists()
+        assert hostile.OUT in capsys.readouterr().err
+        assert not (home.parent / "page.html").exists()
 
 
 @pytest.mark.parametrize("name", hostile.STORES)
@@ -164,8 +171,11 @@ def test_a_hostile_store_is_drawn_by_no_verb_with_harm(name, good, home, tmp_pat
         begun = time.perf_counter()
         code = call(verb, path.parent, out)
         text = capsys.readouterr()
-        assert code in (0, 1, 2) and "Traceback" not in text.err and text.err.count("\n") <= 4, (verb, text.err)
-        assert time.perf_counter() - begun < SECONDS and not set("\x1b\x07") & set(text.out + text.err), verb
+        assert code in (0, 1, 2), (verb, text.err)
+        assert "Traceback" not in text.err, (verb, text.err)
+        assert text.err.count("\n") <= 4, (verb, text.err)
+        assert time.perf_counter() - begun < SECONDS, verb
+        assert not set("\x1b\x07") & set(text.out + text.err), verb
         assert snapshot(home) == before, verb
     page = path.parent / "report.html"
     assert b"S" * 200 not in read(out) + (page.read_bytes() if page.is_file() else b"")
@@ -183,8 +193,11 @@ def test_a_hostile_result_is_refused_by_the_verbs(name, good, home, tmp_path, ca
     for verb in ("info", "plot", "report", "view"):
         code = call(verb, path, out)
         text = capsys.readouterr()
-        assert code in (0, 1, 2) and "Traceback" not in text.err and text.err.count("\n") <= 4, (verb, text.err)
-        assert not set("\x1b\x07") & set(text.out + text.err) and snapshot(home) == before, verb
+        assert code in (0, 1, 2), (verb, text.err)
+        assert "Traceback" not in text.err, (verb, text.err)
+        assert text.err.count("\n") <= 4, (verb, text.err)
+        assert not set("\x1b\x07") & set(text.out + text.err), verb
+        assert snapshot(home) == before, verb
 
 
 # What is written into a folder ------------------------------------------------------------------------------------------
@@ -211,8 +224,11 @@ def test_verbs_replace_nothing_but_plain_files_of_the_folder(base, kind, theirs,
         before, odd = snapshot(home), special(path)
         assert call(verb, path, path) in (1, 2)
         text = capsys.readouterr().err
-        assert name in text and text.count("\n") == 1 and ("not replaced" in text or hostile.OUT in text)
-        assert snapshot(home) == before and special(path) == odd
+        assert name in text
+        assert text.count("\n") == 1
+        assert "not replaced" in text or hostile.OUT in text
+        assert snapshot(home) == before
+        assert special(path) == odd
         if (home / "pipe").exists():
             (home / "pipe").unlink()
         if verb == "run":
@@ -240,8 +256,11 @@ def test_a_study_that_is_run_replaces_nothing_but_plain_files_of_its_folder(verb
         before, odd = snapshot(home), special(out)
         assert cli.main([*map(str, asked), str(out)]) in (1, 2)
         text = capsys.readouterr().err
-        assert name in text and text.count("\n") == 1 and ("not replaced" in text or hostile.OUT in text)
-        assert snapshot(home) == before and special(out) == odd
+        assert name in text
+        assert text.count("\n") == 1
+        assert "not replaced" in text or hostile.OUT in text
+        assert snapshot(home) == before
+        assert special(out) == odd
         shutil.rmtree(out)
         out.mkdir()
         (home / "pipe").unlink(missing_ok=True)
@@ -255,7 +274,9 @@ def test_the_place_is_told_and_not_the_run(verb, kind, theirs, good, home, capsy
     before = out.lstat()
     assert cli.main([verb, str(run), "--out", str(out)]) == 2
     text = capsys.readouterr().err
-    assert text.startswith(f"lgvi-warp: {out}: is a ") and text.count("\n") == 1 and out.lstat().st_ino == before.st_ino
+    assert text.startswith(f"lgvi-warp: {out}: is a ")
+    assert text.count("\n") == 1
+    assert out.lstat().st_ino == before.st_ino
 
 
 WRITERS = {
@@ -277,10 +298,14 @@ def test_a_writer_follows_the_links_of_the_user_and_replaces_plain_files_alone(n
     real.write_text("old")
     path.symlink_to(real)
     WRITERS[name](path)
-    assert path.is_symlink() and real.read_bytes() != b"old" and os.listdir(real.parent) == [real.name]
+    assert path.is_symlink()
+    assert real.read_bytes() != b"old"
+    assert os.listdir(real.parent) == [real.name]
     real.unlink()
     WRITERS[name](path)  # a link that leads nowhere yet
-    assert path.is_symlink() and real.is_file() and not real.is_symlink()
+    assert path.is_symlink()
+    assert real.is_file()
+    assert not real.is_symlink()
     path.unlink()
     for make, words in (
         (os.mkfifo, "is a named pipe"),
@@ -293,7 +318,8 @@ def test_a_writer_follows_the_links_of_the_user_and_replaces_plain_files_alone(n
         before = path.lstat()
         with pytest.raises(lw.SceneError, match=words) as refused:
             WRITERS[name](path)
-        assert str(path) in str(refused.value) and path.lstat().st_ino == before.st_ino
+        assert str(path) in str(refused.value)
+        assert path.lstat().st_ino == before.st_ino
         path.rmdir() if words == "is a folder" else path.unlink()
     assert os.listdir(tmp_path) == ["real"]
 
@@ -310,7 +336,8 @@ def test_a_device_is_not_replaced(tmp_path):
             write(node)
             assert node.with_suffix(".png").is_file()  # the picture has an ending of its own
             node.with_suffix(".png").unlink()
-    assert node.is_char_device() and os.listdir(tmp_path) == ["null"]
+    assert node.is_char_device()
+    assert os.listdir(tmp_path) == ["null"]
 
 
 @pytest.mark.parametrize("found", [tradeoff_of(4.0), sobol(), region()], ids=["tradeoff", "sensitivity", "stability"])
@@ -372,7 +399,8 @@ def test_a_damaged_cell_runs_anew(name, swept, home, capsys):  # noqa: F811
     hostile.CELLS[name](the_cell(out), home)
     before = snapshot(home)
     assert cli.main(["sweep", str(swept / "sweep.toml"), "--out", str(out)]) == 0
-    assert "Traceback" not in capsys.readouterr().err and snapshot(home) == before
+    assert "Traceback" not in capsys.readouterr().err
+    assert snapshot(home) == before
     for file in ("sweep.json", "table.csv", "worst.csv", "summary.md"):
         assert (out / file).read_bytes() == (swept / "out" / file).read_bytes(), file
     assert the_cell(out).read_bytes() == the_cell(swept / "out").read_bytes()
@@ -384,7 +412,8 @@ def test_a_cell_of_another_is_not_taken(swept, home, capsys):  # noqa: F811
     other = home.parent / path.name.replace(path.name[0], "0" if path.name[0] != "0" else "1", 1)
     shutil.copy(path, other)
     asked = (["max(norm(velocity))", "time_to_failure"], 5)
-    assert records.Record.load(path, *asked) is not None and records.Record.load(other, *asked) is None
+    assert records.Record.load(path, *asked) is not None
+    assert records.Record.load(other, *asked) is None
 
 
 @pytest.mark.parametrize("kind", hostile.PLACES)
@@ -401,7 +430,9 @@ def test_a_sweep_replaces_nothing_but_plain_files_of_its_folder(place, kind, swe
     before = snapshot(home)
     assert cli.main(["sweep", str(swept / "sweep.toml"), "--out", str(out)]) in (1, 2)
     text = capsys.readouterr().err
-    assert text.count("\n") == 1 and path.name in text and snapshot(home) == before
+    assert text.count("\n") == 1
+    assert path.name in text
+    assert snapshot(home) == before
 
 
 def test_a_run_is_not_stored_behind_a_link(home, capsys):  # noqa: F811
@@ -411,4 +442,5 @@ def test_a_run_is_not_stored_behind_a_link(home, capsys):  # noqa: F811
     before = snapshot(home)
     for more in ([], ["--overwrite"], ["--resume"]):
         assert cli.main(["run", str(SCENE), "--store", "zarr", "--members", "4", "--out", str(out), *more]) == 2
-        assert hostile.OUT in capsys.readouterr().err and snapshot(home) == before
+        assert hostile.OUT in capsys.readouterr().err
+        assert snapshot(home) == before

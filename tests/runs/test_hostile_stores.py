@@ -128,11 +128,14 @@ def test_a_hostile_store_is_refused_in_a_line(name, good, home, tmp_path, capsys
         code = call(verb, path.parent, out)
         codes.append(code)
         text = capsys.readouterr()
-        assert time.perf_counter() - begun < SECONDS and peak() - memory < MEGABYTES
-        assert "Traceback" not in text.err and "\x1b" not in text.out + text.err
+        assert time.perf_counter() - begun < SECONDS
+        assert peak() - memory < MEGABYTES
+        assert "Traceback" not in text.err
+        assert "\x1b" not in text.out + text.err
         assert text.err.count("\n") <= (1 if code == 2 else 3), text.err
         if verb == "info" and said is not None:
-            assert code != 0 and said in text.out + text.err
+            assert code != 0
+            assert said in text.out + text.err
         # What is not refused ends as the bytes of the run.
         if verb == "resume" and code == 0 and said is not None:
             assert differing(whole, path) == []
@@ -156,9 +159,13 @@ def test_a_hostile_result_is_refused_in_a_line(name, good, home, tmp_path):
     else:
         with pytest.raises(lw.SceneError) as refused:
             lw.Result.load(path)
-        assert said in str(refused.value) and str(path) in str(refused.value) and "\n" not in str(refused.value)
-    assert time.perf_counter() - begun < SECONDS and peak() - memory < MEGABYTES
-    assert snapshot(home) == before and "evil_module" not in sys.modules
+        assert said in str(refused.value)
+        assert str(path) in str(refused.value)
+        assert "\n" not in str(refused.value)
+    assert time.perf_counter() - begun < SECONDS
+    assert peak() - memory < MEGABYTES
+    assert snapshot(home) == before
+    assert "evil_module" not in sys.modules
 
 
 def leaves(value, path=()):
@@ -207,7 +214,8 @@ def test_any_value_of_its_metadata_may_be_another(seed, good, home, tmp_path):
         for look in (lw.open_run, state, lambda path: store.Folder(path).plan()):
             with contextlib.suppress(lw.SceneError, OSError):
                 look(path)
-    assert snapshot(home) == before and "evil_module" not in sys.modules
+    assert snapshot(home) == before
+    assert "evil_module" not in sys.modules
 
 
 def test_a_link_that_is_put_there_meanwhile_is_not_followed(good, home, tmp_path, monkeypatch):
@@ -222,7 +230,8 @@ def test_a_link_that_is_put_there_meanwhile_is_not_followed(good, home, tmp_path
     files = store.durable.Files(path)
     with pytest.raises(lw.SceneError, match="status: is a link"):
         files.write("status/c.0", b"theirs")
-    assert (home / "work" / "c.0").read_text() == "mine" and os.listdir(home / "work") == ["c.0"]
+    assert (home / "work" / "c.0").read_text() == "mine"
+    assert os.listdir(home / "work") == ["c.0"]
 
 
 def test_a_link_that_is_put_there_before_a_file_is_named_is_not_followed(good, home, tmp_path):
@@ -234,7 +243,8 @@ def test_a_link_that_is_put_there_before_a_file_is_named_is_not_followed(good, h
     (path / "status").symlink_to(home / "work")
     with pytest.raises((lw.SceneError, OSError)):
         files.finish()
-    assert (home / "work" / "c.0").read_text() == "mine" and os.listdir(home / "work") == ["c.0"]
+    assert (home / "work" / "c.0").read_text() == "mine"
+    assert os.listdir(home / "work") == ["c.0"]
 
 
 def test_the_user_may_name_a_link_himself(good, tmp_path):
@@ -243,7 +253,8 @@ def test_the_user_may_name_a_link_himself(good, tmp_path):
     link = tmp_path / "mine.zarr"
     link.symlink_to(tmp_path / "disk" / "run.zarr")
     (link / "blocks" / "000000000.json").unlink()
-    assert lw.resume(link).members == 300 and link.is_symlink()
+    assert lw.resume(link).members == 300
+    assert link.is_symlink()
     assert differing(good / "run.zarr", tmp_path / "disk" / "run.zarr") == []
 
 

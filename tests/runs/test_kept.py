@@ -48,10 +48,12 @@ def copy(whole, tmp_path):
 
 def test_it_has_the_bits_of_a_run_in_memory(whole, memory):
     failed = np.flatnonzero(memory.status)
-    assert 256 < len(failed) < 512 and set(memory.status[failed]) == {Status.STEP_TOO_LARGE}
+    assert 256 < len(failed) < 512
+    assert set(memory.status[failed]) == {Status.STEP_TOO_LARGE}
     result, asked = lw.open_run(whole), lw.solve(failing(), **SETTINGS, keep="failed")
     np.testing.assert_array_equal(result.kept_members, failed)
-    assert not result.samples and result.kept.members == len(failed)
+    assert not result.samples
+    assert result.kept.members == len(failed)
     for name in FIELDS:
         assert getattr(result.kept, name).tobytes() == getattr(memory, name)[:, failed].tobytes()
     for name in ("status", "failure_time", "failure_value"):
@@ -66,22 +68,27 @@ def test_xarray_opens_the_group_alone_and_with_the_run(whole, memory, recwarn):
 
     failed = np.flatnonzero(memory.status)
     group = xarray.open_zarr(whole, group="kept")
-    assert group.position.dims == ("time", "member", "component") and group.position.attrs["units"] == "m"
+    assert group.position.dims == ("time", "member", "component")
+    assert group.position.attrs["units"] == "m"
     np.testing.assert_array_equal(group.member.values, failed)
     one = group.position.sel(member=failed[7]).isel(time=-1)
     np.testing.assert_array_equal(one.values, memory.position[-1, failed[7]])
     tree = xarray.open_datatree(whole, engine="zarr")
-    assert tree["kept"].sizes["member"] == len(failed) and tree.sizes["realization"] == MEMBERS
-    assert lw.open_run(whole).kept.dataset.sizes["realization"] == len(failed) and len(recwarn) == 0
+    assert tree["kept"].sizes["member"] == len(failed)
+    assert tree.sizes["realization"] == MEMBERS
+    assert lw.open_run(whole).kept.dataset.sizes["realization"] == len(failed)
+    assert len(recwarn) == 0
 
 
 @pytest.mark.parametrize("executor", [pytest.param("processes", marks=pytest.mark.slow), "threads"])
 def test_the_same_run_leaves_the_same_bytes(executor, whole, tmp_path):
     path = tmp_path / "run.zarr"
     result = lw.solve(failing(), **SETTINGS, keep="failed", store=path, executor=executor, threads=1)
-    assert differing(whole, path) == [] and result.kept.members == len(result.kept_members) > 256
+    assert differing(whole, path) == []
+    assert result.kept.members == len(result.kept_members) > 256
     before = tree(path)
-    assert lw.resume(path).kept is not None and tree(path) == before
+    assert lw.resume(path).kept is not None
+    assert tree(path) == before
 
 
 def test_a_part_is_sent_as_what_it_is():
@@ -94,13 +101,17 @@ def test_a_part_is_sent_as_what_it_is():
     part = plan.subplan([1], ("position",))
     assert part.spec.mass == plan.spec.mass != make_plan(own.subset([1]), **SETTINGS).spec.mass
     again = pickle.loads(pickle.dumps(part))
-    assert again.spec == part.spec and again.fields == ("position",) and again.ensemble.members == 1
+    assert again.spec == part.spec
+    assert again.fields == ("position",)
+    assert again.ensemble.members == 1
 
 
 def test_no_failures_leave_no_group(tmp_path):
     result = lw.solve(fleet(), **SETTINGS, keep="failed", store=tmp_path / "run.zarr")
-    assert result.kept is None and not (tmp_path / "run.zarr" / "kept").exists()
-    assert lw.open_run(tmp_path).kept is None and state(tmp_path)["complete"]
+    assert result.kept is None
+    assert not (tmp_path / "run.zarr" / "kept").exists()
+    assert lw.open_run(tmp_path).kept is None
+    assert state(tmp_path)["complete"]
 
 
 DAMAGED = (
@@ -122,9 +133,11 @@ def test_damage_is_seen_and_mended(copy, whole, name, harm, word, capsys):
     harm(copy / name)
     assert cli.main(["info", str(copy)]) == 1
     said = capsys.readouterr().out
-    assert f"damage      {name} {word}" in said and "not complete: lgvi-warp resume" in said
+    assert f"damage      {name} {word}" in said
+    assert "not complete: lgvi-warp resume" in said
     lw.resume(copy)
-    assert differing(whole, copy) == [] and cli.main(["info", str(copy)]) == 0
+    assert differing(whole, copy) == []
+    assert cli.main(["info", str(copy)]) == 0
 
 
 @pytest.mark.parametrize(
@@ -162,17 +175,20 @@ def test_a_run_is_complete_only_with_them(whole, tmp_path, capsys):
     path = interrupted(tmp_path / "run.zarr", whole)
     with pytest.raises(lw.SceneError, match=r"members that it keeps have not been run again yet.*resume"):
         lw.open_run(path)
-    assert lw.open_run(path, incomplete=True).kept is None and cli.main(["info", str(path)]) == 1
+    assert lw.open_run(path, incomplete=True).kept is None
+    assert cli.main(["info", str(path)]) == 1
     # What is left of others that were killed there.
     shutil.copytree(whole / "kept", path / "kept.new")
     result = lw.resume(path)
-    assert differing(whole, path) == [] and result.kept.members == len(result.kept_members)
+    assert differing(whole, path) == []
+    assert result.kept.members == len(result.kept_members)
 
 
 def test_other_members_than_those_that_failed_are_run_anew(whole, tmp_path):
     path = interrupted(tmp_path / "run.zarr", whole)
     other = lw.solve(failing(), **SETTINGS, keep=[3, 5], store=tmp_path / "other.zarr")
-    assert list(other.kept_members) == [3, 5] and other.kept.members == 2
+    assert list(other.kept_members) == [3, 5]
+    assert other.kept.members == 2
     shutil.copytree(tmp_path / "other.zarr" / "kept", path / "kept")
     lw.resume(path)
     assert differing(whole, path) == []
@@ -202,14 +218,16 @@ def test_with_statistics_until_and_fewer_fields(tmp_path):
     save = lw.SaveAt(every=0.1, fields=("position", "attitude"))
     result = lw.solve(failing(), **SETTINGS | {"save": save}, **own, store=chosen)
     every = lw.solve(failing(), **SETTINGS)
-    assert result.members == 512 and list(result.kept.samples) == ["position"]
+    assert result.members == 512
+    assert list(result.kept.samples) == ["position"]
     np.testing.assert_array_equal(result.kept_members, np.flatnonzero(every.status[:512]))
     assert result.kept.position.dtype == np.float32
     np.testing.assert_array_equal(result.kept.position, every.position[:, result.kept_members].astype(np.float32))
     before = tree(tmp_path)
     shutil.rmtree(tmp_path / "run.zarr" / "kept")
     (tmp_path / "run.zarr" / "blocks" / "000000256.json").unlink()
-    assert lw.resume(tmp_path).kept.position.tobytes() == result.kept.position.tobytes() and tree(tmp_path) == before
+    assert lw.resume(tmp_path).kept.position.tobytes() == result.kept.position.tobytes()
+    assert tree(tmp_path) == before
 
 
 @pytest.mark.slow  # for its kernels: rk5 that chooses its steps
@@ -219,9 +237,11 @@ def test_members_that_share_their_steps_lie_beside_those_that_are_kept(tmp_path)
     every = lw.solve(fleet(30), **settings)
     result = lw.solve(fleet(30), **settings, keep=[5, 6, 29], store=tmp_path / "run.zarr")
     group = stored.Folder(tmp_path / "run.zarr" / "kept").group()
-    assert list(group["member"][:]) == [4, 5, 6, 7, 28, 29] and list(group["chosen"][:]) == [0, 1, 1, 0, 0, 1]
+    assert list(group["member"][:]) == [4, 5, 6, 7, 28, 29]
+    assert list(group["chosen"][:]) == [0, 1, 1, 0, 0, 1]
     for one in (result, lw.open_run(tmp_path)):
-        assert list(one.kept_members) == [5, 6, 29] and one.kept.members == 3
+        assert list(one.kept_members) == [5, 6, 29]
+        assert one.kept.members == 3
         assert one.kept.position.tobytes() == every.position[:, [5, 6, 29]].tobytes()
         assert one.kept.dataset.realization.values.tolist() == [5, 6, 29]
         assert one.kept.provenance["ensemble"]["indices"] == [5, 6, 29]
@@ -232,9 +252,11 @@ def test_parts_are_merged_with_their_kept_members(whole, tmp_path):
         lw.solve(failing(), **SETTINGS, keep="failed", store=tmp_path / name / "run.zarr", only=only)
         assert not (tmp_path / name / "run.zarr" / "kept").exists()
     folder = lw.merge([tmp_path / "a", tmp_path / "b"], tmp_path / "all")
-    assert folder.complete and differing(whole, folder.path) == []
+    assert folder.complete
+    assert differing(whole, folder.path) == []
     again = lw.merge([folder.path], tmp_path / "again")
-    assert again.complete and differing(whole, again.path) == []
+    assert again.complete
+    assert differing(whole, again.path) == []
 
 
 def test_the_last_part_into_one_folder_runs_them(whole, tmp_path):
@@ -251,9 +273,12 @@ def test_all_are_told_with_exit_code_and_files(tmp_path, capsys):
     run = ["run", scene, "--members", "20", "--duration", "2", "--set", "run.save_every=0.5", "--store", "zarr"]
     assert cli.main([*run, "--out", str(tmp_path), *fast]) == 1
     said = capsys.readouterr()
-    assert "step_too_large, 20 of 20 members" in said.err and "kept        20 members' samples" in said.out
-    assert cli.main(["resume", str(tmp_path), "--quiet"]) == 1 and lw.open_run(tmp_path).kept.members == 20
-    assert cli.main(["info", str(tmp_path)]) == 0 and "kept        20 members" in capsys.readouterr().out
+    assert "step_too_large, 20 of 20 members" in said.err
+    assert "kept        20 members' samples" in said.out
+    assert cli.main(["resume", str(tmp_path), "--quiet"]) == 1
+    assert lw.open_run(tmp_path).kept.members == 20
+    assert cli.main(["info", str(tmp_path)]) == 0
+    assert "kept        20 members" in capsys.readouterr().out
 
 
 def cli_scene():
@@ -271,9 +296,11 @@ def test_netcdf_has_them_in_a_group(whole, memory, tmp_path):
     with xarray.open_dataset(path, group="kept", engine="netcdf4") as group:
         np.testing.assert_array_equal(group.member.values, failed)
         np.testing.assert_array_equal(group.attitude.values, memory.attitude[:, failed])
-        assert group.position.attrs["units"] == "m" and group.attrs["Conventions"] == "CF-1.11"
+        assert group.position.attrs["units"] == "m"
+        assert group.attrs["Conventions"] == "CF-1.11"
     with xarray.open_datatree(path, engine="netcdf4") as tree:
-        assert tree.sizes["realization"] == MEMBERS and tree["kept"].sizes["member"] == len(failed)
+        assert tree.sizes["realization"] == MEMBERS
+        assert tree["kept"].sizes["member"] == len(failed)
 
 
 def test_parquet_has_the_rows_of_those_that_are_kept(whole, memory, tmp_path):
@@ -281,7 +308,8 @@ def test_parquet_has_the_rows_of_those_that_are_kept(whole, memory, tmp_path):
 
     failed = np.flatnonzero(memory.status)
     table = pandas.read_parquet(lw.export(whole, "parquet", tmp_path / "run.parquet"))
-    assert len(table) == len(failed) * 31 and table.attrs["units"]["velocity_2"] == "m s-1"
+    assert len(table) == len(failed) * 31
+    assert table.attrs["units"]["velocity_2"] == "m s-1"
     one = table[table.realization == failed[300]]
     np.testing.assert_array_equal(one.position_2, memory.position[:, failed[300], 2])
     assert set(one["vehicle.mass"]) == {memory.parameters["vehicle.mass"][failed[300]]}

@@ -119,7 +119,9 @@ def test_what_is_damaged_is_compiled_anew(cache, damage):
     damage(cache)
     assert not kernel_cache.is_whole(code)
     forget()
-    assert works() and code.read_bytes() == whole and kernel_cache.is_whole(code)
+    assert works()
+    assert code.read_bytes() == whole
+    assert kernel_cache.is_whole(code)
     assert sorted(path.name for path in cache.iterdir()) == sorted(
         [kernel_cache.LOCKS, kernel_cache.HEADERS, code.parent.name]
     )
@@ -130,11 +132,14 @@ def test_phases(cache):
     phases = kernel_cache.load(MODULE)
     seconds = time.perf_counter() - begun
     # Times of files are as fine as the system's clock: 1/100 s.
-    assert min(phases) >= 0.0 and phases.clang > 0.01 and abs(sum(phases) - seconds) < 0.03
+    assert min(phases) >= 0.0
+    assert phases.clang > 0.01
+    assert abs(sum(phases) - seconds) < 0.03
     assert kernel_cache.load(MODULE) == (0.0, 0.0, 0.0)
     forget()
     phases = kernel_cache.load(MODULE)
-    assert phases.clang == 0.0 < phases.load and "Clang 0.00 s" in str(phases)
+    assert phases.clang == 0.0 < phases.load
+    assert "Clang 0.00 s" in str(phases)
 
 
 @pytest.fixture
@@ -166,12 +171,14 @@ def headers_while_it_compiles():
 
 
 def test_a_precompiled_header_serves_the_next_process(header, capfd):
-    assert headers_while_it_compiles() == 1 and capfd.readouterr() == ("", "")
+    assert headers_while_it_compiles() == 1
+    assert capfd.readouterr() == ("", "")
 
 
 def test_a_damaged_header_is_made_anew(header, capfd):
     header.write_bytes(header.read_bytes()[:-1000] + bytes(1000))
-    assert headers_while_it_compiles() == 0 and capfd.readouterr() == ("", "")
+    assert headers_while_it_compiles() == 0
+    assert capfd.readouterr() == ("", "")
     assert kernel_cache.is_whole(header)
 
 
@@ -196,7 +203,8 @@ def test_what_is_whole_is_not_compiled(cache):
     assert works()
     written = only(cache, ".o").stat().st_mtime_ns
     forget()
-    assert works() and only(cache, ".o").stat().st_mtime_ns == written
+    assert works()
+    assert only(cache, ".o").stat().st_mtime_ns == written
 
 
 def test_code_of_other_processors_stays(cache):
@@ -206,7 +214,8 @@ def test_code_of_other_processors_stays(cache):
     (own,) = (path for path in cache.glob("wp_*/*.o") if path != other)
     os.truncate(own, 10)
     forget()
-    assert works() and other.read_bytes() == b"code"
+    assert works()
+    assert other.read_bytes() == b"code"
 
 
 def test_a_full_disk_is_told_before_llvm_ends_the_process(cache):
@@ -217,7 +226,8 @@ def test_a_full_disk_is_told_before_llvm_ends_the_process(cache):
             works()
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    assert caught.value.errno == errno.EFBIG and caught.value.filename == str(cache)
+    assert caught.value.errno == errno.EFBIG
+    assert caught.value.filename == str(cache)
     assert [path.name for path in cache.iterdir()] == [kernel_cache.LOCKS]
     # In the same process, when there is room again.
     assert works()
@@ -278,9 +288,11 @@ def test_a_temporary_folder_without_room_is_not_needed(cache, monkeypatch, capfd
     load_module = wp.load_module
     monkeypatch.setattr(wp, "load_module", lambda *given, **named: made.append(
         [folder.name for folder in folders.values()]) or load_module(*given, **named))  # fmt: skip
-    assert works() and capfd.readouterr() == ("", "")
+    assert works()
+    assert capfd.readouterr() == ("", "")
     ((folder,),) = made
-    assert folder.startswith(f"{cache}/{kernel_cache.SCRATCH}") and not folders
+    assert folder.startswith(f"{cache}/{kernel_cache.SCRATCH}")
+    assert not folders
     folders.update(before)
 
 
@@ -317,7 +329,8 @@ def test_threads_compile_once(cache, monkeypatch):
         thread.start()
     for thread in threads:
         thread.join()
-    assert compiled.call_count == 1 and works()
+    assert compiled.call_count == 1
+    assert works()
 
 
 def test_threads_that_start_warp_leave_stderr_as_it_was(monkeypatch):
@@ -346,15 +359,20 @@ def run(arguments, cache, **settings):
 def test_the_command_names_a_cache_that_it_cannot_write(tmp_path):
     (tmp_path / "file").write_text("")
     done = run(["info"], tmp_path / "file")
-    assert done.returncode == 1 and done.stderr.count("\n") == 1
-    assert str(tmp_path / "file") in done.stderr and "WARP_CACHE_PATH" in done.stderr
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert str(tmp_path / "file") in done.stderr
+    assert "WARP_CACHE_PATH" in done.stderr
 
 
 @pytest.mark.slow
 def test_the_command_leaves_a_full_disk_as_it_was(tmp_path):
     done = run(["info"], tmp_path, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000)))
-    assert done.returncode == 1 and done.stderr.count("\n") == 1 and "WARP_CACHE_PATH" in done.stderr
-    assert not list(tmp_path.rglob("wp_*")) and not list(tmp_path.rglob(f"{kernel_cache.SCRATCH}*"))
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert "WARP_CACHE_PATH" in done.stderr
+    assert not list(tmp_path.rglob("wp_*"))
+    assert not list(tmp_path.rglob(f"{kernel_cache.SCRATCH}*"))
 
 
 @pytest.mark.slow
@@ -371,5 +389,6 @@ def test_one_that_is_killed_while_it_compiles_leaves_nothing_for_long(tmp_path):
     subprocess.run([sys.executable, "-c", code], env=env, check=True, timeout=120)
     (cache,) = tmp_path.iterdir()
     names = {path.name for path in cache.iterdir()}
-    assert len(names) == 3 and {kernel_cache.LOCKS, kernel_cache.HEADERS} < names
+    assert len(names) == 3
+    assert {kernel_cache.LOCKS, kernel_cache.HEADERS} < names
     assert [kernel_cache.is_whole(path) for path in cache.rglob("*.o")] == [True]

@@ -123,7 +123,8 @@ def test_metrics_are_the_twins(fleet, paths):
     expected = by_twin(paths, limit)
     assert 20 < np.count_nonzero(paths.status) < 280
     share = np.array(expected["saturation_share"])
-    assert np.any(share > 0.0) and np.isinf(expected["settling_time heading"]).any()
+    assert np.any(share > 0.0)
+    assert np.isinf(expected["settling_time heading"]).any()
     for name, numbers in expected.items():
         found = paths.statistics[f"each {name}"].value[0, 0]
         # Sums of 120 terms in another order; a settled angle of 1e-3 rad by the trace has 1e-13 / 1e-3 of round-off.
@@ -213,7 +214,8 @@ def test_the_arrays_of_a_run_are_freed_at_its_end(fleet, monkeypatch):
     gc.disable()
     try:
         lw.solve(fleet, **COARSE, statistics=metrics(), keep="none")
-        assert packets and not any(packet() for packet in packets)
+        assert packets
+        assert not any(packet() for packet in packets)
     finally:
         gc.enable()
 

@@ -99,10 +99,8 @@ def test_several_events_by_their_names():
     asked = [lw.Outcome("sea floor"), lw.Outcome("surface"), lw.Outcome("stopped"), lw.Mean("depth", at="surface")]
     result = lw.solve(fleet(1000, ends), **SETTINGS | {"statistics": asked})
     counts, s = result.status.counts(), result.statistics
-    assert (
-        s["outcome sea floor"]["ended"][-1] == counts["floor"]
-        and s["outcome surface"]["ended"][-1] == counts["surface"]
-    )
+    assert s["outcome sea floor"]["ended"][-1] == counts["floor"]
+    assert s["outcome surface"]["ended"][-1] == counts["surface"]
     assert s["outcome stopped"].value[-1] == (counts["floor"] + counts["surface"]) / 1000
     # Those that rise do not sink; had nothing stopped them, they would have sunk as often as the others.
     assert s["outcome sea floor"]["alone"][-1] > s["outcome sea floor"].value[-1] == counts["floor"] / 1000
@@ -139,12 +137,14 @@ def test_an_own_monte_carlo_with_three_competing_events():
         # Five standard deviations of both numbers; of 1 / n, none of which either may see.
         error = 5.0 * np.sqrt((true * (1.0 - true) + 1.0 / n) * (1.0 / n + 1.0 / many))
         assert (np.abs(found.value - true) < error).all(), name
-        assert 0.05 < true[-1] < 0.6 and found.value[-1] == (found["ended"][-1] / n)
+        assert 0.05 < true[-1] < 0.6
+        assert found.value[-1] == (found["ended"][-1] / n)
         sum_of += found.value[-1]
     assert sum_of == pytest.approx(1.0, abs=1e-15)
     assert s["first_passage depth above 26"].value[-1] == s["outcome floor"].value[-1] < s["outcome floor"]["alone"][-1]
     # The half of the members never reaches the floor, and no time is said for it.
-    assert np.isfinite(s["outcome floor"]["end_time"][0]) and s["outcome floor"]["end_time"][2] == np.inf
+    assert np.isfinite(s["outcome floor"]["end_time"][0])
+    assert s["outcome floor"]["end_time"][2] == np.inf
 
 
 def named(name, vary, ends, **start):
@@ -198,7 +198,8 @@ def test_the_sum_over_outcomes_and_ok_is_1_over_ten_scenes(name, stored, monkeyp
     assert each[:, -1].sum() + s["outcome ok"].value[-1] == pytest.approx(1.0, abs=1e-13)
     np.testing.assert_allclose(each.sum(axis=0), s["outcome stopped"].value, atol=1e-13)
     failed = np.asarray(result.status.failed).sum()
-    assert s["outcome failed"].value[-1] == failed / n and (failed > 20) == ("fail" in name)
+    assert s["outcome failed"].value[-1] == failed / n
+    assert (failed > 20) == ("fail" in name)
     if not failed:
         np.testing.assert_array_equal(each, [s[f"outcome {end.key}"]["fraction"] for end in ends])
     assert name == "nobody ends" or (each[:, -1] > 0.0).sum() >= 2 - (name == "bluerov2_dead_thruster")
@@ -236,9 +237,11 @@ def test_quantities_of_outcomes_and_times():
     )
     Y = f([[1205.0], [1220.0]])
     np.testing.assert_array_equal(Y[:, 0], [1.0, np.nan])  # the second has no end_time
-    assert 20.0 < Y[0, 1] < 26.0 and 8.0 < Y[0, 2] < 40.0
+    assert 20.0 < Y[0, 1] < 26.0
+    assert 8.0 < Y[0, 2] < 40.0
     found = lw.uq.sobol(members, ["outcome floor", "outcome surface"], samples=64, second_order=False, **how)
-    assert found.quantities == ("outcome floor", "outcome surface") and found.mean.sum() <= 1.0
+    assert found.quantities == ("outcome floor", "outcome surface")
+    assert found.mean.sum() <= 1.0
     refused = {"outcome flor": "is no outcome of this scene; did you mean 'floor'", "depth at flor": "did you mean",
                "max(depth) at floor": "looks over the path", "depth at -1": "is at no time of a run"}  # fmt: skip
     for text, words in refused.items():
@@ -281,12 +284,14 @@ def test_an_outcome_that_no_member_can_have_is_refused():
             statistics=[lw.Outcome("surface"), lw.Mean("depth", at="flor")],
         )
     text = str(error.value)
-    assert "outcome.of = 'surface': is no outcome of this scene" in text and "did you mean 'floor'" in text
+    assert "outcome.of = 'surface': is no outcome of this scene" in text
+    assert "did you mean 'floor'" in text
 
 
 def test_until_an_outcome_is_sure_enough():
     asked = SETTINGS | {"statistics": [lw.Outcome("floor"), lw.EndTime("floor", lw.Mean())]}
     for watched, half in (("outcome floor", 0.03), ("mean end_time floor", 1.0)):
         result = lw.solve(fleet(4000), **asked, until=lw.Until(watched, half, members=512))
-        assert len(result.status) < 4000 and "reached" in result.messages[-1]
+        assert len(result.status) < 4000
+        assert "reached" in result.messages[-1]
         assert result.statistics[watched].half_width[-1] <= half

@@ -94,7 +94,8 @@ def test_failed_and_stopped_are_told_apart():
     assert stopped(codes).tolist() == [False, False, False, True, True, True, False]
     assert all(bool(stopped(code)) == code.stopped for code in Status)
     of_result = codes.view(StatusArray)
-    assert (of_result.failed == failed(codes)).all() and (of_result.stopped == stopped(codes)).all()
+    assert (of_result.failed == failed(codes)).all()
+    assert (of_result.stopped == stopped(codes)).all()
 
 
 def test_members_are_under_way_until_they_end(mixed):
@@ -119,9 +120,8 @@ def test_the_first_in_time_is_named(mixed):
     assert outcomes.failure_text(mixed) == ""
     two = ending(mixed, [1, 0, 1, 0, 17, 0, 0], [8.0, np.nan, 2.0, np.nan, 1.0, np.nan, np.nan])
     said = outcomes.failure_text(two).splitlines()
-    assert len(said) == 1 and said[0].startswith(
-        "step_too_large, 2 of 7 members (first: member 2 at 2 s, value 1): the step"
-    )
+    assert len(said) == 1
+    assert said[0].startswith("step_too_large, 2 of 7 members (first: member 2 at 2 s, value 1): the step")
 
 
 def test_a_run_that_all_sink_is_drawn(sunk, tmp_path):
@@ -142,14 +142,16 @@ def test_the_fan_is_of_those_under_way(mixed):
 def test_the_fan_ends_where_all_have(sunk):
     depth = drawn(sunk)[0]["Depth"]
     median = next(line for line in depth.lines if line.get_label() == "median").get_ydata()
-    assert np.isfinite(median[:11]).all() and np.isnan(median[11:]).all()
+    assert np.isfinite(median[:11]).all()
+    assert np.isnan(median[11:]).all()
 
 
 def test_ends_are_marked_and_counted_by_outcome(mixed):
     panels, head = drawn(mixed)
     depth, above = panels["Depth"], panels["7 members from above"]
     assert head == "7 members, psi_s, step 0.1 s: 2 ok, 2 surface, 3 floor"
-    assert {"floor (3)", "surface (2)"} <= set(texts(depth)) and {"ok", "floor", "surface"} <= set(texts(above))
+    assert {"floor (3)", "surface (2)"} <= set(texts(depth))
+    assert {"ok", "floor", "surface"} <= set(texts(above))
     at = marks(depth, Status.FLOOR)
     np.testing.assert_allclose(np.sort(at[:, 0]), [3.0, 6.0, 12.0], rtol=1e-9)
     np.testing.assert_allclose(at[:, 1], FLOOR, atol=1e-6)
@@ -173,7 +175,8 @@ def test_failures_are_drawn_until_they_fail(mixed):
 
 def test_outcomes_look_different():
     seen = [(look.color, look.marker) for look in looks.LOOKS.values()]
-    assert set(looks.LOOKS) == set(Status) and len(set(seen)) == len(seen)
+    assert set(looks.LOOKS) == set(Status)
+    assert len(set(seen)) == len(seen)
     assert len({look.color for code, look in looks.LOOKS.items() if code == Status.OK or code.stopped}) == 6
 
 
@@ -290,9 +293,11 @@ def test_every_run_has_ids_of_its_own(mixed, sunk, tmp_path):
     for i, result in enumerate((mixed, again, sunk, part, other)):
         entry = entry_of(lw.log_rerun(result, tmp_path / f"{i}.rrd"))
         blueprint = RrdReader(tmp_path / f"{i}.rrd").blueprints()[0]
-        assert entry.recording_id in entry.application_id and blueprint.application_id == entry.application_id
+        assert entry.recording_id in entry.application_id
+        assert blueprint.application_id == entry.application_id
         ids.append((entry.application_id, entry.recording_id))
-    assert ids[0] == ids[1] and len(set(ids)) == 4
+    assert ids[0] == ids[1]
+    assert len(set(ids)) == 4
     assert len({application for application, _ in ids}) == len({recording for _, recording in ids}) == 4
 
 
@@ -324,15 +329,19 @@ def test_a_recording_shows_each_member_by_its_outcome_from_then_on(mixed, tmp_pa
 def test_the_curves_of_a_recording_are_of_those_under_way(sunk, mixed, tmp_path):
     path = lw.log_rerun(sunk, tmp_path / "sunk.rrd")
     median = rows(path, "/curves/height/median", "scalars")
-    assert median[2.0][0] == pytest.approx(-5.0 - 0.65 * 2.0) and np.isnan(median[15.0][0])
+    assert median[2.0][0] == pytest.approx(-5.0 - 0.65 * 2.0)
+    assert np.isnan(median[15.0][0])
     middle, variance = (rows(path, "/curves/height/all", ending)[2.0][0] for ending in (":values", "variances"))
-    assert middle - np.sqrt(variance) == pytest.approx(-7.0) and middle + np.sqrt(variance) == pytest.approx(-5.6)
+    assert middle - np.sqrt(variance) == pytest.approx(-7.0)
+    assert middle + np.sqrt(variance) == pytest.approx(-5.6)
     shares = [rows(path, f"/members/{name}", "scalars") for name in ("floor", "under_way")]
-    assert shares[0][20.0] == [100.0] and shares[1][0.0] == [100.0]
+    assert shares[0][20.0] == [100.0]
+    assert shares[1][0.0] == [100.0]
     assert rows(path, "/curves/energy/median", "scalars")
     driven = lw.log_rerun(acted_on(mixed, ACTING["thrust"][0]), tmp_path / "driven.rrd")
     said = [text_of(one, "/run/summary") for one in (path, driven)]
-    assert "| energy | drift " in said[0] and "| energy | not conserved: wrench do work |" in said[1]
+    assert "| energy | drift " in said[0]
+    assert "| energy | not conserved: wrench do work |" in said[1]
 
 
 def test_a_stored_run_is_recorded_in_pieces_as_one_in_memory(mixed, tmp_path, monkeypatch):
@@ -347,7 +356,8 @@ def test_a_stored_run_is_recorded_in_pieces_as_one_in_memory(mixed, tmp_path, mo
         ("/curves/energy/median", "scalars"), ("/members/floor", "scalars"),
     ):  # fmt: skip
         first, second = (rows(path, entity, ending) for path in paths)
-        assert first.keys() == second.keys() and len(first) == 21
+        assert first.keys() == second.keys()
+        assert len(first) == 21
         for t in first:
             np.testing.assert_array_equal(np.array(first[t]), np.array(second[t]))
     assert [entry_of(lw.log_rerun(stored, tmp_path / "2.rrd")).recording_id] == [entry_of(paths[1]).recording_id]
@@ -363,7 +373,9 @@ def test_statistics_of_all_make_the_fan_where_few_members_were_kept(mixed):
     expected = np.quantile(-mixed.position[..., 2], LEVELS, axis=1)
     np.testing.assert_allclose(run.fans[0].levels[[0, -1]], expected[[0, -1]], rtol=1e-6)
     between = (run.fans[0].levels[1:-1] >= expected[0] - 1e-6) & (run.fans[0].levels[1:-1] <= expected[-1] + 1e-6)
-    assert between.all() and run.text == "2 of 7 members" and run.members.tolist() == [0, 3]
+    assert between.all()
+    assert run.text == "2 of 7 members"
+    assert run.members.tolist() == [0, 3]
     assert run.shares[Status.FLOOR][-1] == pytest.approx(3 / 7)
 
 
@@ -429,35 +441,37 @@ def run(scene_file, capsys, *options):
 
 def test_a_run_that_all_sink_exits_with_0_and_has_its_pictures(scene_file, capsys):
     code, said, errors = run(scene_file, capsys)
-    assert code == 0 and "nan" not in said and "not written" not in errors
+    assert code == 0
+    assert "nan" not in said
+    assert "not written" not in errors
     files = sorted(path.name for path in (scene_file.parent / "out").iterdir())
     assert files == ["fleet.png", "fleet.rrd", "result.npz"]
-    assert (
-        "status      floor 4" in said
-        and "drift       energy " in said
-        and "floor, 4 of 4 members (first: member" in said
-    )
+    assert "status      floor 4" in said
+    assert "drift       energy " in said
+    assert "floor, 4 of 4 members (first: member" in said
 
 
 def test_members_that_are_kept_since_they_failed_are_drawn(mixed, tmp_path):
     few = ending(mixed, [1] * 7, [2.0] * 7)
     written = report.write(few, few, tmp_path)
-    assert (written.faults, written.empty) == ([], []) and len(written.files) == 3
+    assert (written.faults, written.empty) == ([], [])
+    assert len(written.files) == 3
     # One that failed at once has no picture, which is no fault of the run.
     at_once = ending(mixed, [1] * 7, [0.0] * 7)
     written = report.write(mixed, at_once, tmp_path)
-    assert written.faults == [] and "fleet.png was not written: every member failed before" in written.empty[0]
+    assert written.faults == []
+    assert "fleet.png was not written: every member failed before" in written.empty[0]
 
 
 def test_the_summary_says_work_where_forces_do_some(mixed):
     driven = acted_on(mixed, ACTING["thrust"][0])
     (line,) = report.energy_lines(driven, driven)
-    assert (
-        line.startswith("work        energy changed by up to ") and "J, through wrench (largest of all members)" in line
-    )
+    assert line.startswith("work        energy changed by up to ")
+    assert "J, through wrench (largest of all members)" in line
     tethered = acted_on(mixed, ACTING["an anchor"][0])
     (line,) = report.energy_lines(tethered, tethered)
-    assert line.startswith("drift       energy ") and "momentum" not in line
+    assert line.startswith("drift       energy ")
+    assert "momentum" not in line
     lost = ending(mixed, [1] * 7, [2.0] * 7)
     assert report.energy_lines(lost, lost) == []
 
@@ -475,7 +489,8 @@ def test_a_plain_installation_runs(scene_file, capsys, monkeypatch, absent, file
         for module in [name, *(one for one in sys.modules if one.startswith(f"{name}."))]:
             monkeypatch.setitem(sys.modules, module, None)
     code, said, errors = run(scene_file, capsys)
-    assert code == 0 and "not written" not in errors
+    assert code == 0
+    assert "not written" not in errors
     assert f"note        {words}to have pictures: pip install 'lgvi-warp[viz]'\n" in said
     assert sorted(path.name for path in (scene_file.parent / "out").iterdir()) == files
 
@@ -499,7 +514,8 @@ def test_an_interrupt_while_drawing_leaves_whole_files(mixed, tmp_path, monkeypa
     names = {path.name for path in tmp_path.iterdir()}
     assert "result.npz" in names <= {"result.npz", "fleet.png", "fleet.rrd"}
     said = str(caught.value)
-    assert said.startswith("written: ") and all(str(path) in said for path in tmp_path.iterdir())
+    assert said.startswith("written: ")
+    assert all(str(path) in said for path in tmp_path.iterdir())
     assert lw.Result.load(tmp_path / "result.npz").status.counts() == mixed.status.counts()
 
 
@@ -551,7 +567,9 @@ def test_remus_100_that_all_sink(tmp_path, capsys):
     path = tmp_path / "sink.toml"
     path.write_text(REMUS)
     code, said, _ = run(path, capsys)
-    assert code == 0 and "status      floor 8" in said and "nan" not in said
+    assert code == 0
+    assert "status      floor 8" in said
+    assert "nan" not in said
     assert "J, through drag_matrix, control_fins, wrench, body_lift (largest of all members)" in said
     assert len(list((tmp_path / "out").iterdir())) == 3
     result = lw.Result.load(tmp_path / "out" / "result.npz")

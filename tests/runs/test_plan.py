@@ -30,9 +30,12 @@ def test_an_absent_term_is_no_code(tmp_path):
     both = generated(plan_of(scene_of(net=1.0, moment=(0.0, 0.0, 1.0))), tmp_path / "both")
     weight = generated(plan_of(scene_of(net=1.0)), tmp_path / "weight")
     none = generated(plan_of(scene_of()), tmp_path / "none")
-    assert "Weight" in both and "Restoring" in both
-    assert "Weight" in weight and "Restoring" not in weight
-    assert "Weight" not in none and "Restoring" not in none
+    assert "Weight" in both
+    assert "Restoring" in both
+    assert "Weight" in weight
+    assert "Restoring" not in weight
+    assert "Weight" not in none
+    assert "Restoring" not in none
 
 
 def test_terms_are_those_of_the_scene():
@@ -53,12 +56,11 @@ def test_an_absent_term_is_no_parameter():
 
 def test_munk_moment_only_for_anisotropic_mass():
     isotropic, diagonal = plan_of(scene_of((2.0, 2.0, 2.0), net=1.0)), plan_of(scene_of((1.0, 2.0, 3.0)))
-    assert (
-        isotropic.spec.mass == "isotropic"
-        and "anisotropy" not in isotropic.advance.types.Inertia.numpy_dtype()["names"]
-    )
+    assert isotropic.spec.mass == "isotropic"
+    assert "anisotropy" not in isotropic.advance.types.Inertia.numpy_dtype()["names"]
     assert {letter for letter, _ in (*isotropic.spec.maps, isotropic.spec.lead)} == {"Ab", "D", "K"}
-    assert diagonal.spec.mass == "diagonal" and diagonal.spec.lead == ("T", 0.5)
+    assert diagonal.spec.mass == "diagonal"
+    assert diagonal.spec.lead == ("T", 0.5)
     assert plan_of(scene_of(TURN @ np.diag((1.0, 2.0, 3.0)) @ TURN.T)).spec.mass == "full"
 
 
@@ -90,7 +92,8 @@ def test_compositions_of_a_method_share_its_kernel(names):
 def test_varying_a_parameter_compiles_nothing_else(scene):
     shared = make_plan(lw.Ensemble(scene, 16), h=0.01, t1=1.0)
     varied = make_plan(lw.Ensemble(scene, 16, vary={"vehicle.mass": lw.Normal(relative=0.01)}), h=0.01, t1=1.0)
-    assert shared.spec == varied.spec and shared.advance is varied.advance
+    assert shared.spec == varied.spec
+    assert shared.advance is varied.advance
 
 
 def test_varied_parameters_act_on_their_member():
@@ -108,7 +111,8 @@ def test_varied_parameters_act_on_their_member():
 @pytest.mark.parametrize("n", [1, 255, 256, 257, 4096, 100_000, 1_000_000])
 def test_blocks_cover_the_members(n):
     runs = blocks(n)
-    assert runs[0].first == 0 and runs[-1].stop == n
+    assert runs[0].first == 0
+    assert runs[-1].stop == n
     assert all(a.stop == b.first for a, b in zip(runs, runs[1:], strict=False))
     assert all(run.count == runs[0].count for run in runs[:-1])
 
@@ -128,8 +132,11 @@ def test_pack_fills_up_with_the_last_member():
 def test_shares_keep_all_threads_at_work(n, steps, threads):
     size = shares(n, threads, steps)
     runs = parts(n, steps, threads, joined=False)
-    assert size % 256 == 0 and 256 <= size <= 16_384 and {run.count for run in runs[:-1]} <= {size}
-    assert runs[0].first == 0 and runs[-1].stop == n
+    assert size % 256 == 0
+    assert 256 <= size <= 16_384
+    assert {run.count for run in runs[:-1]} <= {size}
+    assert runs[0].first == 0
+    assert runs[-1].stop == n
     # Blocks of 256 are the smallest; else a block is a few million steps of vehicles, or a quarter of a thread's members.
     assert size == 256 or (size - 256) * steps < 4_000_000
     assert threads == 1 or size == 256 or len(runs) >= 4 * threads * (1 - 256 / size)
@@ -140,7 +147,9 @@ def test_segments_are_contiguous_and_their_buffer_is_bounded(scene):
     plan = make_plan(lw.Ensemble(scene, 4096), h=0.01, t1=1000.0, save=lw.SaveAt(every=0.01))
     segments = list(plan.segments(4096))
     samples = [plan.due(k0, k1) for k0, k1 in segments]
-    assert segments[0][0] == 0 and segments[-1][1] == plan.grid.steps and samples[-1][1] == len(plan.grid.times)
+    assert segments[0][0] == 0
+    assert segments[-1][1] == plan.grid.steps
+    assert samples[-1][1] == len(plan.grid.times)
     assert all(a[1] == b[0] for runs in (segments, samples) for a, b in zip(runs, runs[1:], strict=False))
     assert max(s1 - s0 for s0, s1 in samples) * 4096 * 18 * 8 <= SEGMENT_SAMPLE_BYTES
 
@@ -174,7 +183,8 @@ def test_any_choice_of_fields_takes_the_same_kernel_and_its_own_memory(scene):
 def test_progress_reaches_one(scene):
     seen = []
     lw.solve(lw.Ensemble(scene, 300), h=0.01, t1=0.5, threads=1, progress=seen.append)
-    assert seen == sorted(seen) and seen[-1] == 1.0
+    assert seen == sorted(seen)
+    assert seen[-1] == 1.0
 
 
 @pytest.mark.parametrize(("named", "text"), [
@@ -212,10 +222,12 @@ def test_method_is_data():
     settings = {"solver": "quartic", "iterations": None, "tolerance": None, "alpha": 0.5, "beta": 0.5}
     settings |= {"rtol": None, "atol": None, "reason": ""}
     assert dataclasses.asdict(Method()) == {"name": "psi_s"} | settings
-    assert Method("kl8(psi_1)").order == 8 and len(Method("kl8(psi_1)").stages) == 17
+    assert Method("kl8(psi_1)").order == 8
+    assert len(Method("kl8(psi_1)").stages) == 17
     for name in ("tj4", "su4", "kl6", "kl8"):
         stages = Method(f"{name}(psi_s)").stages
-        assert sum(stages) == pytest.approx(1.0, abs=1e-14) and stages == stages[::-1]
+        assert sum(stages) == pytest.approx(1.0, abs=1e-14)
+        assert stages == stages[::-1]
 
 
 @pytest.mark.slow
@@ -233,7 +245,8 @@ def test_kernels_compile_for_cuda(tmp_path):
 def test_as_many_newton_steps_as_the_start_needs(scene, solver, h, n):
     fleet = lw.Ensemble(scene, 20, 1, {"start.angular_velocity": lw.Normal(relative=0.1)})
     chosen = lw.solve(fleet, lw.Method("psi_s", solver, "auto"), h=h, t1=10 * h, save=lw.SaveAt())
-    assert chosen.provenance["method"]["iterations"] == n and str(n) in chosen.messages[0]
+    assert chosen.provenance["method"]["iterations"] == n
+    assert str(n) in chosen.messages[0]
     assert chosen.status.counts() == {"ok": 20}
     # Each of 20 solves leaves a residual below 1e-12 of a turn of h |Omega| / 2 < 0.02 rad.
     exact = lw.solve(fleet, lw.Method("psi_s", solver), h=h, t1=10 * h, save=lw.SaveAt())
@@ -245,4 +258,5 @@ def test_a_member_that_spins_up_is_told():
     body = lw.Vehicle(20.0, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=0.0)
     resting = lw.Scene(body, lw.Environment(gravity=0.0), [lw.Wrench(torque=(1.5, 3.0, 4.0))])
     result = lw.solve(resting, lw.Method("psi_s", iterations="auto"), h=0.1, t1=5.0)
-    assert result.status.counts() == {"not_converged": 1} and 0.0 < result.failure_time[0] < 5.0
+    assert result.status.counts() == {"not_converged": 1}
+    assert 0.0 < result.failure_time[0] < 5.0

@@ -31,7 +31,8 @@ def short(monkeypatch):
 def test_the_disk_is_that_of_the_run(tmp_path):
     path = tmp_path / "run.zarr"
     found = lw.predict(fleet(), **SETTINGS, store=path)
-    assert list(tmp_path.iterdir()) == [] and found.blocks == 4
+    assert list(tmp_path.iterdir()) == []
+    assert found.blocks == 4
     lw.solve(fleet(), **SETTINGS, store=path)
     # Apart from the digits of sizes and checksums in markers and lists of files.
     assert found.disk == pytest.approx(sum(map(len, tree(path).values())), rel=1e-3)
@@ -40,7 +41,8 @@ def test_the_disk_is_that_of_the_run(tmp_path):
 def test_a_step_that_does_not_fit_is_said_to_be_shortened():
     found = lw.predict(fleet(), **{**SETTINGS, "h": 0.9 * SETTINGS["h"]})
     (message,) = found.messages
-    assert message.startswith("step shortened from") and f"note        {message}" in str(found)
+    assert message.startswith("step shortened from")
+    assert f"note        {message}" in str(found)
     assert lw.predict(fleet(), **SETTINGS).messages == ()
 
 
@@ -100,15 +102,18 @@ def test_the_command(tmp_path, capsys):
 def test_too_little_room_is_said():
     given = dict(members=1, steps=1, blocks=1, threads=1, compile=0.0, set_up=1.0, advance=7300.0, write=10.0)
     text = str(prediction.Prediction(**given, memory=10**10, disk=10**12, free_memory=10**10, free_disk=10**11))
-    assert "2.0 h" in text and "100% of the memory" in text
-    assert "use --store zarr" in text and "more than the disk holds" in text
+    assert "2.0 h" in text
+    assert "100% of the memory" in text
+    assert "use --store zarr" in text
+    assert "more than the disk holds" in text
 
 
 def test_statistics_without_samples_take_little(tmp_path):
     own = {"statistics": [lw.Mean("position")], "keep": "none"}
     path = tmp_path / "run.zarr"
     found = lw.predict(fleet(), **SETTINGS, **own, store=path)
-    assert found.advance > 0.0 and lw.predict(fleet(), **SETTINGS, **own).disk < 100_000
+    assert found.advance > 0.0
+    assert lw.predict(fleet(), **SETTINGS, **own).disk < 100_000
     lw.solve(fleet(), **SETTINGS, **own, store=path)
     assert found.disk == pytest.approx(sum(map(len, tree(path).values())), rel=0.02)
 
@@ -119,7 +124,8 @@ def test_statistics_and_kept_members_are_counted(tmp_path):
     with_all, without = (lw.predict(fleet(), **SETTINGS, **one, store=path) for one in (own, {"keep": "none"}))
     result = lw.solve(fleet(), **SETTINGS, **own, store=path)
     disk = sum(map(len, tree(path).values()))
-    assert with_all.disk == pytest.approx(disk, rel=0.02) and without.disk < 0.2 * disk
+    assert with_all.disk == pytest.approx(disk, rel=0.02)
+    assert without.disk < 0.2 * disk
     # The trees of all parts are at least what is joined at the end, the estimates what was read from them.
     statistics = observe(1003, fleet().scene.run, STATISTICS, None, None).statistics
     found = sizes(make_plan(fleet(), **SETTINGS), statistics)
@@ -141,7 +147,8 @@ def gathered_of(folder, statistics):
 def test_members_that_are_kept_take_their_share_of_the_time(monkeypatch):
     monkeypatch.setattr(prediction, "costs", lambda plan, runs, threads, observed: (0.0, 1e-3))
     few, many = (lw.predict(fleet(), **SETTINGS, keep=range(n)) for n in (1, 1003))
-    assert many.advance / few.advance == pytest.approx(2 * 1003 / 1004) and many.disk > 3 * few.disk
+    assert many.advance / few.advance == pytest.approx(2 * 1003 / 1004)
+    assert many.disk > 3 * few.disk
 
 
 MEASURED = """

@@ -162,7 +162,8 @@ def test_failed_members_are_refused_or_have_no_number(paper):
     with pytest.raises(FailedMembers, match=r"1 of 4 members failed .*member 2.*failed=\"nan\""):
         lw.prepare(paper, NAMES, of="depth", **SETTINGS)(X)
     Y = lw.prepare(paper, NAMES, of="depth", failed="nan", **SETTINGS)(X)
-    assert np.isnan(Y[2]) and np.isfinite(np.delete(Y, 2)).all()
+    assert np.isnan(Y[2])
+    assert np.isfinite(np.delete(Y, 2)).all()
 
 
 def test_unphysical_numbers_are_refused(paper):
@@ -210,7 +211,10 @@ def test_paths_are_kept_of_some_members_at_a_time(paper, monkeypatch):
     monkeypatch.setattr(prepared.Runner, "run", lambda *given, **named: (
         sizes.append(given[1].members), whole(*given, **named))[1])  # fmt: skip
     np.testing.assert_array_equal(run(X, progress=told.append), expected)
-    assert sizes == [128, 128, 44] and told == sorted(told) and told[-1] == 1.0 and np.isnan(expected[290]).all()
+    assert sizes == [128, 128, 44]
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    assert np.isnan(expected[290]).all()
     with pytest.raises(FailedMembers, match=r"1 of 300 members failed .*member 290"):
         lw.prepare(paper, NAMES, of="max(depth)", save=lw.SaveAt(every=0.1), **SETTINGS)(X)
 
@@ -393,7 +397,8 @@ def test_a_late_member_that_the_run_does_not_need_changes_nothing(surveyed, drif
     fleet = late(drifting.scene, 2000, 1900, values)
     enough = lw.Until("mean position[0]", 1e3, members=256)
     one, ahead = (lw.solve(fleet, until=enough, **SHORT, **each) for each in ({"threads": 1}, {"executor": Ahead()}))
-    assert len(one.status) < 1900 and one.provenance["terms"] == ahead.provenance["terms"]
+    assert len(one.status) < 1900
+    assert one.provenance["terms"] == ahead.provenance["terms"]
     np.testing.assert_array_equal(one.position, ahead.position)
 
 

@@ -80,9 +80,12 @@ def ended(process):
 def check_part(path, total=4096):
     """A part of the run, in whole blocks."""
     part = lw.Result.load(path)
-    assert 0 < part.members < total and part.members % 256 == 0
-    assert part.provenance["members"] == part.members and not part.status.any()
-    assert np.isfinite(part.position).all() and "were finished" in part.messages[-1]
+    assert 0 < part.members < total
+    assert part.members % 256 == 0
+    assert part.provenance["members"] == part.members
+    assert not part.status.any()
+    assert np.isfinite(part.position).all()
+    assert "were finished" in part.messages[-1]
     return part.members
 
 
@@ -96,7 +99,8 @@ def test_a_run_in_memory_saves_what_is_finished(name, tmp_path):
         code, out, lines = ended(process)
     members = check_part(tmp_path / "result.npz")
     text = "interrupted" if name == "SIGINT" else f"interrupted by {name}"
-    assert (code, out) == (CODES[name], "") and lines == [
+    assert (code, out) == (CODES[name], "")
+    assert lines == [
         f"lgvi-warp: {text}; the first {members:,} of 4,096 members are saved in {tmp_path / 'result.npz'}; a run with "
         "--store zarr can go on where it stopped"
     ]
@@ -110,7 +114,8 @@ def test_the_result_of_an_earlier_run_stays(tmp_path):
         until(process, 0.3)
         process.terminate()
         code, _, (line,) = ended(process)
-    assert code == 143 and (tmp_path / "result.npz").read_bytes() == b"of a week"
+    assert code == 143
+    assert (tmp_path / "result.npz").read_bytes() == b"of a week"
     check_part(tmp_path / "result_part.npz")
     assert "result_part.npz" in line
 
@@ -124,14 +129,17 @@ def test_a_run_in_a_store_goes_on(name, executor, tmp_path):
         until(process, 0.3)
         os.killpg(process.pid, getattr(signal, name))
         code, out, lines = ended(process)
-    assert (code, out) == (CODES[name], "") and len(lines) == 1
+    assert (code, out) == (CODES[name], "")
+    assert len(lines) == 1
     assert lines[0].endswith(f"finished blocks are kept: go on with lgvi-warp resume {tmp_path}")
     assert 0 < len(list(tmp_path.glob("run.zarr/blocks/*.json"))) < 16
     with begun(["resume", str(tmp_path), "--threads", "1"]) as process:
         until(process, 0.6)
         process.send_signal(getattr(signal, name))
         code, _, lines = ended(process)
-    assert code == CODES[name] and len(lines) == 1 and "resume" in lines[0]
+    assert code == CODES[name]
+    assert len(lines) == 1
+    assert "resume" in lines[0]
     with begun(["resume", str(tmp_path), "--quiet"]) as process:
         assert ended(process)[:2] == (0, "")
 
@@ -148,7 +156,9 @@ def test_other_verbs_end_in_a_line(verb, tmp_path):
         time.sleep(4.0)
         process.terminate()
         code, _, lines = ended(process)
-    assert code == 143 and len(lines) == 1 and lines[0].startswith("lgvi-warp: interrupted by SIGTERM; nothing was")
+    assert code == 143
+    assert len(lines) == 1
+    assert lines[0].startswith("lgvi-warp: interrupted by SIGTERM; nothing was")
 
 
 @pytest.mark.parametrize(
@@ -161,7 +171,9 @@ def test_a_signal_while_libraries_are_imported(seconds, tmp_path):
         time.sleep(seconds)
         process.send_signal(signal.SIGINT)
         code, out, lines = ended(process)
-    assert (code, out) == (130, "") and len(lines) == 1 and lines[0].startswith("lgvi-warp: interrupted; ")
+    assert (code, out) == (130, "")
+    assert len(lines) == 1
+    assert lines[0].startswith("lgvi-warp: interrupted; ")
 
 
 @pytest.mark.slow
@@ -187,7 +199,8 @@ entry()
         time.sleep(0.2)
         process.send_signal(signal.SIGINT)
         code, out, lines = ended(process)
-    assert (code, out) == (130, "") and time.monotonic() - began < 10.0
+    assert (code, out) == (130, "")
+    assert time.monotonic() - began < 10.0
     assert lines in (
         ["lgvi-warp: interrupted twice, ended at once; nothing was to be written"],
         ["lgvi-warp: interrupted; nothing was to be written"],
@@ -216,7 +229,8 @@ def test_closed_streams_lose_nothing(closed, tmp_path):
 
     with begun([*SHORT, "--out", str(tmp_path)], preexec_fn=close) as process:
         code, _, lines = ended(process)
-    assert code == 0 and lines == []
+    assert code == 0
+    assert lines == []
     assert lw.Result.load(tmp_path / "result.npz").members == 20
 
 
@@ -235,7 +249,8 @@ def test_a_terminal_that_vanished_loses_nothing(tmp_path):
 def test_a_full_disk_below_stdout_is_told(tmp_path):
     with open("/dev/full", "w") as full, begun([*SHORT, "--out", str(tmp_path)], stdout=full) as process:
         code, _, lines = ended(process)
-    assert code == 1 and lines == ["lgvi-warp: No space left on device"]
+    assert code == 1
+    assert lines == ["lgvi-warp: No space left on device"]
     assert (tmp_path / "result.npz").exists()
 
 
@@ -262,7 +277,8 @@ def test_ignored_signals_stay_ignored_within(monkeypatch):
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
         monkeypatch.setitem(command.VERBS, "info", lambda chosen: signal.raise_signal(signal.SIGHUP) or 0)
-        assert cli.main(["info"]) == 0 and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+        assert cli.main(["info"]) == 0
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGHUP, before)
 
@@ -301,7 +317,8 @@ def test_other_threads_leave_signals_alone(monkeypatch):
     thread = threading.Thread(target=lambda: codes.append(cli.main(["info"])))
     thread.start()
     thread.join(SECONDS)
-    assert codes == [7] and signal.getsignal(signal.SIGTERM) is before
+    assert codes == [7]
+    assert signal.getsignal(signal.SIGTERM) is before
 
 
 def test_the_second_signal_ends_the_process(monkeypatch):
@@ -313,7 +330,8 @@ def test_the_second_signal_ends_the_process(monkeypatch):
             signal.raise_signal(signal.SIGHUP)
         assert not ends.wait(0.1)
         signal.raise_signal(signal.SIGINT)
-        assert ends.wait(SECONDS) and (signals.exit_code, signals.text) == (129, "interrupted by SIGHUP")
+        assert ends.wait(SECONDS)
+        assert (signals.exit_code, signals.text) == (129, "interrupted by SIGHUP")
 
 
 def test_solve_gives_what_is_finished():
@@ -321,8 +339,10 @@ def test_solve_gives_what_is_finished():
     with pytest.raises(lw.Interrupted, match="the first 512 of 1,003 members were finished") as caught:
         lw.solve(fleet(), **SETTINGS, statistics=[lw.Mean("position")], executor=Interrupting(2))
     part = caught.value.result
-    assert isinstance(caught.value, KeyboardInterrupt) and part.members == part.provenance["members"] == 512
-    assert part.position.tobytes() == whole.position[:, :512].tobytes() and part.status.shape == (512,)
+    assert isinstance(caught.value, KeyboardInterrupt)
+    assert part.members == part.provenance["members"] == 512
+    assert part.position.tobytes() == whole.position[:, :512].tobytes()
+    assert part.status.shape == (512,)
     again = lw.solve(lw.Ensemble.subset(fleet(), range(512)), **SETTINGS, statistics=[lw.Mean("position")])
     assert bits(part) == bits(again)
 
@@ -394,7 +414,8 @@ def test_an_interrupt_among_the_pictures_saves_the_result(there, tmp_path, monke
 def test_an_interrupt_while_a_kernel_is_compiled_leaves_nothing(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(Plan, "compile", lambda plan: signal.raise_signal(signal.SIGINT))
     assert cli.main([*SHORT, "--out", str(tmp_path), "--quiet"]) == 130
-    assert capsys.readouterr().err == "lgvi-warp: interrupted; nothing was written\n" and list(tmp_path.iterdir()) == []
+    assert capsys.readouterr().err == "lgvi-warp: interrupted; nothing was written\n"
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.slow
@@ -441,8 +462,10 @@ def test_twice_while_files_are_written_names_what_is_there(tmp_path):
             time.sleep(0.5)
         code, _, (line,) = ended(process)
     there = [path.name for path in tmp_path.iterdir() if not path.name.startswith(".")]
-    assert code == 130 and re.fullmatch(
-        rf"lgvi-warp: interrupted twice, ended at once; {len(there)} files were written, the last one .*", line)  # fmt: skip
+    assert code == 130
+    assert re.fullmatch(
+        rf"lgvi-warp: interrupted twice, ended at once; {len(there)} files were written, the last one .*", line
+    )
     assert line.rsplit("/", 1)[1] in there
 
 
@@ -460,9 +483,11 @@ def test_an_interrupt_while_files_are_written_leaves_them_whole(tmp_path, monkey
     monkeypatch.setattr(plots, "plot", slow)
     assert cli.main([*SHORT, "--out", str(tmp_path), "--quiet"]) == 130
     there = sorted(path.name for path in tmp_path.iterdir())
-    assert there == ["fleet.png", "fleet.rrd", "result.npz"] and lw.Result.load(tmp_path / "result.npz").members == 20
+    assert there == ["fleet.png", "fleet.rrd", "result.npz"]
+    assert lw.Result.load(tmp_path / "result.npz").members == 20
     said = capsys.readouterr().err
-    assert said.startswith("lgvi-warp: interrupted; written: ") and said.count("\n") == 1
+    assert said.startswith("lgvi-warp: interrupted; written: ")
+    assert said.count("\n") == 1
     assert all(str(tmp_path / name) in said for name in there)
 
 
@@ -495,10 +520,12 @@ def test_lasting_streams():
         shown(0.5)
         shown(0.6)
         shown.close()
-        assert gone.written == 1 and not stream.isatty()
+        assert gone.written == 1
+        assert not stream.isatty()
     with pytest.raises(OSError, match="No space left"):
         Lasting(Gone(28)).write("text")
-    assert Lasting(None).write("text") == 4 and not Lasting(None).isatty()
+    assert Lasting(None).write("text") == 4
+    assert not Lasting(None).isatty()
 
 
 def test_stores_of_one_interrupted_run_are_those_of_one_that_was_not(tmp_path):

@@ -98,9 +98,11 @@ def test_statistics_of_paths_are_those_of_the_samples(whole):
         inside += dt * (np.abs(line) < 0.5).mean(axis=0)
         over += dt * (line > 0.25).mean(axis=0)
     found = s["mean path_time depth above -0.5 below 0.5"]
-    assert found.value[0, 0] == pytest.approx(inside.mean(), abs=1e-4) and found.unit == "s"
+    assert found.value[0, 0] == pytest.approx(inside.mean(), abs=1e-4)
+    assert found.unit == "s"
     assert s["exceedance path_time depth above 0.25 above 0.3"].value[0, 0] == (over > 0.3).mean()
-    assert found.time.tolist() == [t[-1]] and found.count.tolist() == [1003]
+    assert found.time.tolist() == [t[-1]]
+    assert found.count.tolist() == [1003]
 
 
 def test_quantities_are_those_of_the_result(fleet, whole):
@@ -127,10 +129,8 @@ def test_what_is_too_large_to_square_says_so(fleet):
     huge = lw.solve(
         one(fleet.scene, *states), **SETTINGS, keep="none", statistics=[lw.Mean("depth"), lw.Covariance("depth")]
     )
-    assert (
-        np.all(huge.statistics["mean depth"].value > 1e197)
-        and not np.isfinite(huge.statistics["mean depth"].half_width).any()
-    )
+    assert np.all(huge.statistics["mean depth"].value > 1e197)
+    assert not np.isfinite(huge.statistics["mean depth"].half_width).any()
 
 
 def test_euler_angles_are_fossens():
@@ -150,7 +150,9 @@ def test_every_statistic_is_among_them():
 @pytest.mark.parametrize("threads", [1, 2, 3])
 def test_threads_change_no_bit(fleet, whole, threads):
     alone = lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none", threads=threads)
-    assert same(alone.statistics, whole.statistics) and alone.samples == {} and alone.members == 1003
+    assert same(alone.statistics, whole.statistics)
+    assert alone.samples == {}
+    assert alone.members == 1003
     with pytest.raises(AttributeError, match="keep='all'"):
         _ = alone.position
 
@@ -218,17 +220,21 @@ def test_intervals_of_dependent_members_are_said_to_be(scene, whole, sampling, w
     )
     apart = Gathered(np.zeros(1), 1003, EVERY).apart
     (text,) = observation.notes(whole.statistics, sampled.to_dict(), np.zeros(1003, np.uint8), apart) or ("",)
-    assert words in text and bool(text) == bool(words)
+    assert words in text
+    assert bool(text) == bool(words)
 
 
 def test_the_result_keeps_its_statistics(fleet, whole, tmp_path):
     r = lw.solve(fleet, **SETTINGS, statistics=EVERY, keep=[3, 1002])
     back = lw.Result.load(r.save(tmp_path / "r.npz"))
-    assert same(back.statistics, whole.statistics) and back.statistics["mean position"].unit == "m"
-    assert back.kept_members.tolist() == [3, 1002] and back.kept.position.tobytes() == r.kept.position.tobytes()
+    assert same(back.statistics, whole.statistics)
+    assert back.statistics["mean position"].unit == "m"
+    assert back.kept_members.tolist() == [3, 1002]
+    assert back.kept.position.tobytes() == r.kept.position.tobytes()
     np.testing.assert_array_equal(back.kept.energy, r.kept.energy)
     observed = r.provenance["observed"]
-    assert observed["keep"] == [3, 1002] and observed["statistics"][0] == {"type": "mean", "of": "position"}
+    assert observed["keep"] == [3, 1002]
+    assert observed["statistics"][0] == {"type": "mean", "of": "position"}
     json.dumps(r.provenance)
 
 
@@ -248,11 +254,13 @@ def test_kept_members_of_a_method_that_chooses_its_steps(fleet):
 
 def test_dataset(whole):
     data = whole.statistics.dataset
-    assert data["mean_position"].dims[0] == "time" and data["mean_position"].shape == (4, 3)
+    assert data["mean_position"].dims[0] == "time"
+    assert data["mean_position"].shape == (4, 3)
     np.testing.assert_array_equal(
         data["covariance_position_speed_upper"], whole.statistics["covariance position, speed"].upper
     )
-    assert data["mean_path_maximum_speed"].shape == (1, 1) and data["mean_position"].attrs["units"] == "m"
+    assert data["mean_path_maximum_speed"].shape == (1, 1)
+    assert data["mean_position"].attrs["units"] == "m"
 
 
 @pytest.fixture(scope="module")
@@ -282,7 +290,8 @@ def test_members_that_fail_are_left_out_from_then_on(spinning):
     good[:, 7] = r.time == 0.0  # its depth is known at the start
     found = r.statistics["mean depth"]
     np.testing.assert_array_equal(found.count, good.sum(axis=1))
-    assert found.count[0] == 600 and len(set(found.count.tolist())) > 5
+    assert found.count[0] == 600
+    assert len(set(found.count.tolist())) > 5
     expected = [r.position[t, good[t], 2].mean() for t in range(len(r.time))]
     np.testing.assert_allclose(found.value[:, 0], expected, rtol=1e-14)
     assert r.statistics["mean path_maximum depth"].count.tolist() == [(~failed).sum()]
@@ -325,7 +334,8 @@ def test_what_is_left_out_is_said_with_its_reason(spinning):
         said = [text for text in r.messages if "leave out" in text]
         assert (words is None and not said) or words in said[0], (kind, said)
         if words is left_out:
-            assert f"leave out {(r.status == lw.Status.FLOOR).sum()} members" in said[0] and "finite" not in said[0]
+            assert f"leave out {(r.status == lw.Status.FLOOR).sum()} members" in said[0]
+            assert "finite" not in said[0]
 
 
 def grounding(n=300):
@@ -430,20 +440,26 @@ def test_a_run_stops_when_it_knows_enough(threads):
     until = lw.Until("mean position[2]", 0.05)
     r = lw.solve(falling(), h=0.1, t1=1.0, statistics=[lw.Mean("position")], keep="none", until=until, threads=threads)
     # 1.96 / sqrt(n) <= 0.05 from 1,537 members on: a block is 512; looks come at 1,024 and at each block from there.
-    assert len(blocks(20_000)) == 40 and r.members in (1536, 2048)
+    assert len(blocks(20_000)) == 40
+    assert r.members in (1536, 2048)
     found = r.statistics["mean position"]
-    assert found.count.tolist() == [r.members] * 2 and found.half_width[-1, 2] <= 0.05
+    assert found.count.tolist() == [r.members] * 2
+    assert found.half_width[-1, 2] <= 0.05
     assert found.half_width[-1, 2] == pytest.approx(1.96 / np.sqrt(r.members), rel=0.1)
-    assert any("reached with" in message for message in r.messages) and r.provenance["members"] == r.members
+    assert any("reached with" in message for message in r.messages)
+    assert r.provenance["members"] == r.members
     first = lw.solve(falling(), h=0.1, t1=1.0, statistics=[lw.Mean("position")], keep="none", until=until, threads=1)
-    assert same(first.statistics, r.statistics) and first.members == r.members
-    assert r.parameters["vehicle.mass"].shape == (1,) and len(r.failure_time) == r.members
+    assert same(first.statistics, r.statistics)
+    assert first.members == r.members
+    assert r.parameters["vehicle.mass"].shape == (1,)
+    assert len(r.failure_time) == r.members
 
 
 def test_a_run_stops_when_it_knows_enough_of_paths():
     ask = {"h": 0.1, "t1": 1.0, "keep": "none", "statistics": [lw.PathTime("depth", above=10)]}
     r = lw.solve(falling(), **ask, until=lw.Until("mean path_time depth above 10.0", 0.02))
-    assert r.members < 20_000 and r.statistics["mean path_time depth above 10"].half_width[0, 0] <= 0.02
+    assert r.members < 20_000
+    assert r.statistics["mean path_time depth above 10"].half_width[0, 0] <= 0.02
 
 
 def test_an_expression_over_the_path_is_what_the_statistic_of_paths_is():
@@ -460,21 +476,27 @@ def test_an_expression_over_the_path_is_what_the_statistic_of_paths_is():
     found = list(r.statistics.values())
     assert [estimate.name for estimate in found[:5]] == [*(f"mean {text}" for text in pairs), "quantiles max(depth)"]
     for estimate, of_path in zip(found[:5], found[5:], strict=True):
-        assert estimate.arrays.keys() == of_path.arrays.keys() and estimate.unit == of_path.unit
+        assert estimate.arrays.keys() == of_path.arrays.keys()
+        assert estimate.unit == of_path.unit
         assert all(estimate[name].tobytes() == of_path[name].tobytes() for name in estimate.arrays)
         assert estimate.time.tolist() == [1.0]
-    assert 1024 <= r.members < 5000 and found[4].half_width[0, 1, 0] <= 0.15 and "reached with" in r.messages[-1]
+    assert 1024 <= r.members < 5000
+    assert found[4].half_width[0, 1, 0] <= 0.15
+    assert "reached with" in r.messages[-1]
 
 
 def test_a_run_says_when_it_does_not_know_enough():
     r = lw.solve(falling(2000), h=0.1, t1=1.0, keep="none", until=lw.Until("mean depth", 1e-9))
-    assert r.members == 2000 and any("not reached with 2000" in message for message in r.messages)
+    assert r.members == 2000
+    assert any("not reached with 2000" in message for message in r.messages)
     kept = lw.solve(falling(3000), h=0.1, t1=1.0, until=lw.Until("mean position[2]", 0.1))
-    assert kept.position.shape == (2, kept.members, 3) and kept.members == 1024
+    assert kept.position.shape == (2, kept.members, 3)
+    assert kept.members == 1024
     watched = lw.Until("deep", 0.03, at=0.5)
     found = lw.solve(falling(), h=0.1, t1=1.0, save=lw.SaveAt(every=0.5), keep="none", until=watched,
                      statistics=[lw.Exceedance("depth", above=10.0, name="deep")])  # fmt: skip
-    assert found.statistics["deep"].half_width[1, 0] <= 0.03 and found.members < 2000
+    assert found.statistics["deep"].half_width[1, 0] <= 0.03
+    assert found.members < 2000
 
 
 REPLICATED = [
@@ -506,7 +528,8 @@ def test_a_smooth_mean_is_known_much_better_by_replicates(designed):
     halves = {name: r.statistics["mean position"].half_width[-1] for name, r in designed.items()}
     replicated, latin = (halves[name] for name in halves if not isinstance(name, str))
     # What 16 sequences of 64 points err by is 1/8 to 1/30 of what 1,024 independent members do (sampling_cost.md).
-    assert np.all(8.0 * replicated < halves["random"]) and np.all(8.0 * latin < halves["random"])
+    assert np.all(8.0 * replicated < halves["random"])
+    assert np.all(8.0 * latin < halves["random"])
     np.testing.assert_allclose(halves["sobol"], halves["random"], rtol=0.1)
     assert [len(r.messages) for r in designed.values()] == [0, 1, 0, 0]
     for r in designed.values():
@@ -527,7 +550,8 @@ def test_values_of_replicates_are_those_of_the_samples(designed):
     np.testing.assert_array_equal(deepest["maximum"][:, 0], b[..., 2].max(axis=1))
     average = np.trapezoid(b[..., 2], r.time, axis=0) / r.time[-1]
     path = found["mean path_mean depth"]
-    assert path.value[0, 0] == pytest.approx(average.mean(), rel=1e-13) and "16 replicates" in path.interval
+    assert path.value[0, 0] == pytest.approx(average.mean(), rel=1e-13)
+    assert "16 replicates" in path.interval
     passed = (b[..., 2] > 12.0).any(axis=0).mean()
     assert found["first_passage depth above 12.0"].value[-1] == pytest.approx(passed, rel=1e-12)
 
@@ -554,13 +578,14 @@ def test_a_run_of_replicates_stops_at_a_power_of_two():
     fleet_of = {"h": 0.1, "t1": 1.0, "keep": "none", "statistics": [lw.Quantiles("position", (0.5, 0.95))]}
     r = lw.solve(fleet, **fleet_of, until=lw.Until("quantiles position[2] 0.5", 0.02))
     found = r.statistics["quantiles position"]
-    assert r.members in (1024, 2048, 4096) and found.half_width[-1, 0, 2] <= 0.02
+    assert r.members in (1024, 2048, 4096)
+    assert found.half_width[-1, 0, 2] <= 0.02
     # Of 0.95 it takes more: the density there is a quarter of that in the middle.
     both = lw.solve(fleet, **fleet_of, until=lw.Until("quantiles position[2] 0.95", 0.02))
-    assert both.members > r.members and both.statistics["quantiles position"].half_width[-1, 1, 2] <= 0.02
-    assert any("reached with" in text for text in both.messages) and not any(
-        "balanced" in text for text in both.messages
-    )
+    assert both.members > r.members
+    assert both.statistics["quantiles position"].half_width[-1, 1, 2] <= 0.02
+    assert any("reached with" in text for text in both.messages)
+    assert not any("balanced" in text for text in both.messages)
 
 
 @pytest.mark.parametrize(("given", "text"), [
@@ -616,7 +641,8 @@ def test_float32_is_summed_up_in_float64(fleet):
 
 def test_only_the_fields_that_statistics_need_are_written(fleet):
     settings = observation.observe(1003, fleet.scene.run, [lw.Mean("depth")], "none", None)
-    assert settings.fields(FIELDS) == ("position",) and observation.Observation(keep="none").fields(FIELDS) == ()
+    assert settings.fields(FIELDS) == ("position",)
+    assert observation.Observation(keep="none").fields(FIELDS) == ()
     assert observation.Observation((lw.Mean("speed"),)).fields(("position",)) == ("position", "velocity")
     shown = lw.solve(fleet, **(SETTINGS | {"save": lw.SaveAt(fields=("position",))}), statistics=[lw.Mean("speed")])
     assert list(shown.samples) == ["position"]
@@ -626,9 +652,11 @@ def test_what_a_moved_origin_needs_is_written_too():
     # psi_x puts the origin where mass and inertia fall apart: positions come back with the help of attitudes.
     fleet = lw.Ensemble(lw.Scene.named("remus_100"))
     plan = make_plan(fleet, "psi_x", 0.01, 0.1, lw.SaveAt(fields=("position",)))
-    assert plan.fields == ("position",) and plan.sample_fields == {"position": 3, "attitude": 9}
+    assert plan.fields == ("position",)
+    assert plan.sample_fields == {"position": 3, "attitude": 9}
     plan = make_plan(fleet, "psi_x", 0.01, 0.1, lw.SaveAt(fields=("velocity", "position")))
-    assert plan.fields == ("position", "velocity") and tuple(plan.sample_fields) == FIELDS
+    assert plan.fields == ("position", "velocity")
+    assert tuple(plan.sample_fields) == FIELDS
     plan = make_plan(one(scene_of(net=1.0)), "psi_s", 0.01, 0.1, lw.SaveAt(fields=("position",)))
     assert plan.fields == tuple(plan.sample_fields) == ("position",)
 
@@ -640,7 +668,8 @@ def test_positions_alone_where_the_origin_is_moved():
     whole = lw.solve(scene, **settings)
     few = lw.solve(scene, **settings, save=lw.SaveAt(fields=("position", "velocity")))
     assert list(few.samples) == ["position", "velocity"]
-    assert few.position.tobytes() == whole.position.tobytes() and few.velocity.tobytes() == whole.velocity.tobytes()
+    assert few.position.tobytes() == whole.position.tobytes()
+    assert few.velocity.tobytes() == whole.velocity.tobytes()
 
 
 TABLES = """
@@ -680,7 +709,8 @@ def path(tmp_path):
 def test_scene_files(path):
     scene = lw.Scene.load(path)
     assert [one.type for one in scene.run.statistics] == ["mean", "quantiles", "path_maximum", "quantiles", "path_time"]
-    assert scene.run.keep == "none" and scene.run.until == lw.Until("mean position[2]", 1.0)
+    assert scene.run.keep == "none"
+    assert scene.run.until == lw.Until("mean position[2]", 1.0)
     content = scene.to_dict()
     assert from_dict(content).to_dict() == content
     assert content["run"]["until"] == tomllib.loads(TABLES.replace("run.", ""))["until"]
@@ -707,7 +737,8 @@ statistic = "mean depth"
     with pytest.raises(lw.SceneError) as caught:
         scenes.loads("[vehicle]\nmass = 10.0\ninertia = [1.0, 2.0, 2.5]\n" + text)
     faults = caught.value.faults
-    assert len(faults) == 6 and all(f.startswith(("run.", "until.")) for f in faults)
+    assert len(faults) == 6
+    assert all(f.startswith(("run.", "until.")) for f in faults)
     for i, word in enumerate(
         ("keep", "did you mean 'mean'", "did you mean 'levels'", "run.statistics[2]", "size", "half_width")
     ):
@@ -742,7 +773,8 @@ def test_the_command_prints_and_draws_them(path, tmp_path, capsys):
 
 def test_no_statistics_cost_nothing(fleet):
     settings = observation.observe(1003, fleet.scene.run, None, None, None)
-    assert settings == observation.Observation() and settings.watch(np.zeros(1)) == ((), None)
+    assert settings == observation.Observation()
+    assert settings.watch(np.zeros(1)) == ((), None)
     plain = make_plan(fleet, **SETTINGS)
     asked = make_plan(fleet, **SETTINGS, fields=settings.fields)
     assert plain.advance is asked.advance
@@ -777,4 +809,5 @@ def test_a_run_stops_at_the_same_block_in_whatever_order_they_finish():
     one, other = (
         lw.solve(falling(), **settings, **how) for how in ({"threads": 1}, {"executor": Ordered(range(39, -1, -1))})
     )
-    assert one.members == other.members < 20_000 and same(one.statistics, other.statistics)
+    assert one.members == other.members < 20_000
+    assert same(one.statistics, other.statistics)

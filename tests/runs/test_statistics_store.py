@@ -35,13 +35,17 @@ def whole(tmp_path_factory):
 
 def test_a_store_without_samples_has_statistics_and_arrays_of_members(whole, memory):
     stored = lw.open_run(whole)
-    assert bits(stored) == bits(memory) and len(stored.samples) == 0
-    assert not (whole / "position").exists() and len(list((whole / "parts").glob("*.npy"))) == 4
+    assert bits(stored) == bits(memory)
+    assert len(stored.samples) == 0
+    assert not (whole / "position").exists()
+    assert len(list((whole / "parts").glob("*.npy"))) == 4
     np.testing.assert_array_equal(stored.parameters["vehicle.mass"], memory.parameters["vehicle.mass"])
     for name in ("status", "failure_time", "warnings", "warning_time", "warning_value", "substeps"):
         np.testing.assert_array_equal(getattr(stored, name), getattr(memory, name))
-    assert stored.provenance["observed"] == memory.provenance["observed"] and stored.messages == memory.messages
-    assert "mean_position" in stored.statistics.dataset and "position" not in stored.dataset
+    assert stored.provenance["observed"] == memory.provenance["observed"]
+    assert stored.messages == memory.messages
+    assert "mean_position" in stored.statistics.dataset
+    assert "position" not in stored.dataset
 
 
 @pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
@@ -52,7 +56,8 @@ def test_it_is_exported_with_its_statistics(whole, memory, tmp_path):
     with xarray.open_dataset(lw.export(whole, "netcdf", tmp_path / "run.nc"), group="statistics") as found:
         np.testing.assert_array_equal(found.mean_position.values, memory.statistics["mean position"].value)
     table = pq.read_table(lw.export(whole, "parquet", tmp_path / "run.parquet"))
-    assert table.column_names == ["realization", "vehicle.mass", "status", "failure_time"] and table.num_rows == 1003
+    assert table.column_names == ["realization", "vehicle.mass", "status", "failure_time"]
+    assert table.num_rows == 1003
 
 
 def test_statistics_of_damaged_parts_are_refused(whole, tmp_path):
@@ -77,7 +82,8 @@ def test_a_damaged_part_is_seen_and_its_block_alone_runs_again(harm, whole, memo
     {"flip": lambda: part.write_bytes(data), "tear": lambda: part.write_bytes(data[:-7]), "remove": part.unlink}[harm]()
     assert any("parts/000000512.npy" in text for text in state(path)["damage"])
     before = markers(path)
-    assert bits(lw.resume(path)) == bits(memory) and differing(whole, path) == []
+    assert bits(lw.resume(path)) == bits(memory)
+    assert differing(whole, path) == []
     after = markers(path)
     assert [name for name in after if after[name] != before[name]] == ["000000512.json"]
 
@@ -85,7 +91,8 @@ def test_a_damaged_part_is_seen_and_its_block_alone_runs_again(harm, whole, memo
 def test_samples_and_statistics_together(memory, tmp_path):
     save = lw.SaveAt(every=0.1, fields=("attitude",))
     result = lw.solve(fleet(), **SETTINGS | {"save": save}, statistics=STATISTICS, store=tmp_path / "run.zarr")
-    assert list(result.samples) == ["attitude"] and bits(result) == bits(memory)
+    assert list(result.samples) == ["attitude"]
+    assert bits(result) == bits(memory)
 
 
 def test_members_kept_are_run_again_and_after_a_resume(whole, tmp_path):
@@ -94,7 +101,8 @@ def test_members_kept_are_run_again_and_after_a_resume(whole, tmp_path):
     (tmp_path / "run.zarr/blocks/000000256.json").unlink()
     for one in (result, lw.resume(tmp_path)):
         assert one.kept.position.tobytes() == every.position[:, [3, 1002]].tobytes()
-        assert len(one.samples) == 0 and list(one.kept_members) == [3, 1002]
+        assert len(one.samples) == 0
+        assert list(one.kept_members) == [3, 1002]
 
 
 @pytest.mark.parametrize("executor", [pytest.param("processes", marks=pytest.mark.slow), "threads"])
@@ -109,7 +117,8 @@ def test_executors_give_the_same_bits(executor, memory, whole, tmp_path):
 def test_until_and_samples_in_processes(tmp_path):
     settings = {**SETTINGS, "statistics": STATISTICS, "until": UNTIL}
     one, two = (lw.solve(fleet(), **settings, executor=name, threads=2) for name in ("threads", "processes"))
-    assert bits(one) == bits(two) and one.position.tobytes() == two.position.tobytes()
+    assert bits(one) == bits(two)
+    assert one.position.tobytes() == two.position.tobytes()
 
 
 @pytest.fixture(scope="module")
@@ -126,8 +135,11 @@ def test_until_stops_a_store_at_the_same_block(stopped, tmp_path):
     stored = lw.solve(fleet(), **SETTINGS, statistics=STATISTICS, until=UNTIL, store=tmp_path / "run.zarr", threads=2)
     assert differing(stopped, tmp_path / "run.zarr") == []
     for one in (stored, lw.open_run(stopped)):
-        assert one.members == memory.members and bits(one) == bits(memory) and one.messages == memory.messages
-        assert one.provenance["members"] == memory.members and one.position.tobytes() == memory.position.tobytes()
+        assert one.members == memory.members
+        assert bits(one) == bits(memory)
+        assert one.messages == memory.messages
+        assert one.provenance["members"] == memory.members
+        assert one.position.tobytes() == memory.position.tobytes()
     assert lw.open_run(stopped).dataset.sizes["realization"] == memory.members
     with pytest.raises(IndexError, match=f"of {memory.members}"):
         lw.open_run(stopped, [memory.members])
@@ -136,10 +148,12 @@ def test_until_stops_a_store_at_the_same_block(stopped, tmp_path):
 def test_until_stops_a_resumed_store_at_the_same_block(stopped, tmp_path):
     path = shutil.copytree(stopped, tmp_path / "run.zarr")
     before = tree(path)
-    assert lw.resume(path).members == 512 and tree(path) == before
+    assert lw.resume(path).members == 512
+    assert tree(path) == before
     (path / "blocks/000000000.json").unlink()
     (path / "position/c.0.0.0.0").unlink(missing_ok=True)
-    assert lw.resume(path, threads=2).members == 512 and tree(path) == before
+    assert lw.resume(path, threads=2).members == 512
+    assert tree(path) == before
 
 
 def lasting_run(path, keep, threads=None):
@@ -156,8 +170,10 @@ def test_killed_and_gone_on_with(keep, tmp_path):
         time.sleep(0.002)
     process.kill()
     process.join()
-    assert process.exitcode != 0 and 0 < len(list(path.glob("blocks/*.json"))) < 8
-    assert bits(lw.resume(path)) == bits(undisturbed) and differing(other, path) == []
+    assert process.exitcode != 0
+    assert 0 < len(list(path.glob("blocks/*.json"))) < 8
+    assert bits(lw.resume(path)) == bits(undisturbed)
+    assert differing(other, path) == []
 
 
 def test_the_command_restores_the_statistics_of_the_scene(tmp_path, capsys):
@@ -177,15 +193,19 @@ def test_the_command_restores_the_statistics_of_the_scene(tmp_path, capsys):
     ]
     assert cli.main(["run", str(tmp_path / "scene.toml"), *options]) == 0
     before, said = tree(tmp_path / "run.zarr"), capsys.readouterr().out
-    assert "mean position" in said and "reached with 256 members" in said
+    assert "mean position" in said
+    assert "reached with 256 members" in said
     (tmp_path / "run.zarr/blocks/000000000.json").unlink()
     (tmp_path / "statistics.png").unlink()
     assert cli.main(["resume", str(tmp_path)]) == 0
     said = capsys.readouterr().out
-    assert "mean position" in said and "reached with 256 members" in said and (tmp_path / "statistics.png").exists()
+    assert "mean position" in said
+    assert "reached with 256 members" in said
+    assert (tmp_path / "statistics.png").exists()
     assert tree(tmp_path / "run.zarr") == before
     assert cli.main(["info", str(tmp_path)]) == 0
-    assert "statistics of each block" in (said := capsys.readouterr().out) and "1 of 1 finished; complete" in said
+    assert "statistics of each block" in (said := capsys.readouterr().out)
+    assert "1 of 1 finished; complete" in said
 
 
 def shallow(samples, members):
@@ -202,7 +222,8 @@ def test_statistics_of_functions_are_asked_for_again(tmp_path):
     with pytest.raises(lw.SceneError, match="are not the run's"):
         lw.resume(tmp_path, statistics=[lw.Mean("depth")])
     assert bits(lw.resume(tmp_path, statistics=statistics)) == bits(first)
-    assert not lw.open_run(tmp_path).statistics and bits(lw.open_run(tmp_path, statistics=statistics)) == bits(first)
+    assert not lw.open_run(tmp_path).statistics
+    assert bits(lw.open_run(tmp_path, statistics=statistics)) == bits(first)
 
 
 def test_another_observation_is_another_run(whole):
@@ -236,7 +257,8 @@ def test_parts_of_a_run_are_merged_with_their_statistics(whole, memory, tmp_path
     for i, only in enumerate((range(0, 2), range(2, 4))):
         lw.solve(fleet(), **SETTINGS, statistics=STATISTICS, keep="none", store=tmp_path / f"{i}.zarr", only=only)
     lw.merge([tmp_path / "0.zarr", tmp_path / "1.zarr"], tmp_path / "run.zarr")
-    assert differing(whole, tmp_path / "run.zarr") == [] and bits(lw.open_run(tmp_path / "run.zarr")) == bits(memory)
+    assert differing(whole, tmp_path / "run.zarr") == []
+    assert bits(lw.open_run(tmp_path / "run.zarr")) == bits(memory)
 
 
 @pytest.mark.parametrize("given", [[], STATISTICS])
@@ -276,7 +298,9 @@ def test_the_plan_of_a_store_is_the_plan_of_the_run(vary, sampling, chosen, tmp_
     plan = make_plan(members, method, h=0.1, t1=1.0, checks="all", on_failure="substep")
     create(lw.Store(tmp_path / "run.zarr"), plan, provenance(plan), messages(plan))
     for again in (Folder(tmp_path / "run.zarr").plan(), pickle.loads(pickle.dumps(plan))):
-        assert known(again) == known(plan) and again.method == plan.method and again.spec == plan.spec
+        assert known(again) == known(plan)
+        assert again.method == plan.method
+        assert again.spec == plan.spec
         one, other = again.ensemble.select(0, members.members), members.select(0, members.members)
         for name in ("position", "attitude", "velocity", "angular_velocity", "indices"):
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name))

@@ -31,7 +31,8 @@ def test_step_too_large(scene, method, solver, axis):
     result = lw.solve(one(scene, Om=Om), lw.Method(method, solver), h=h, t1=h)
     assert list(result.status) == [Status.OK, Status.STEP_TOO_LARGE, Status.STEP_TOO_LARGE]
     np.testing.assert_allclose(result.failure_value[1:], [1.01, 3.0], rtol=1e-9)
-    assert result.failure_time[1] == 0.0 and np.isnan(result.failure_time[0])
+    assert result.failure_time[1] == 0.0
+    assert np.isnan(result.failure_time[0])
     np.testing.assert_array_equal(result.angular_velocity[1, 1:], Om[1:])
 
 
@@ -81,7 +82,8 @@ def test_failure_on_the_way(scene):
     result = lw.solve(fleet, "psi_s", h=h, t1=5.0, save=lw.SaveAt(every=h))
     assert result.status.counts() == {"step_too_large": 1}
     t = result.failure_time[0]
-    assert 0.0 < t < 5.0 and result.failure_value[0] >= 1.0
+    assert 0.0 < t < 5.0
+    assert result.failure_value[0] >= 1.0
     good = lw.solve(fleet, "psi_s", h=h, t1=t)
     k = int(np.searchsorted(result.time, t - 0.5 * h))
     assert good.status.counts() == {"ok": 1}
@@ -98,7 +100,8 @@ def test_not_converged(scene):
     loose = lw.solve(one(scene, *states), lw.Method("psi_s", iterations=0, tolerance=0.1), h=0.2, t1=1.0)
     settled = lw.solve(one(scene, *states), lw.Method("psi_s"), h=0.2, t1=1.0)
     assert rough.status.counts() == {"not_converged": 9}
-    assert (rough.failure_value > 1e-12).all() and (rough.failure_value < 0.1).all()
+    assert (rough.failure_value > 1e-12).all()
+    assert (rough.failure_value < 0.1).all()
     assert loose.status.counts() == settled.status.counts() == {"ok": 9}
 
 
@@ -110,7 +113,8 @@ def test_non_finite_start(scene, field, bad):
     states[field][4].flat[1] = bad
     result = lw.solve(lw.Ensemble.from_states(scene, *states.values()), h=0.01, t1=0.1)
     assert result.status[4] in (Status.NON_FINITE, Status.STEP_TOO_LARGE)
-    assert (np.delete(result.status, 4) == 0).all() and result.failure_time[4] == 0.0
+    assert (np.delete(result.status, 4) == 0).all()
+    assert result.failure_time[4] == 0.0
     assert all(np.isfinite(np.delete(getattr(result, name), 4, axis=1)).all() for name in names)
 
 
@@ -126,7 +130,8 @@ def test_every_member_fails(scene):
 def test_ragged_packets(scene, n):
     states = random_states(8, n)
     result = lw.solve(lw.Ensemble.from_states(scene, *states), h=0.01, t1=0.1)
-    assert result.position.shape == (2, n, 3) and result.status.counts() == {"ok": n}
+    assert result.position.shape == (2, n, 3)
+    assert result.status.counts() == {"ok": n}
 
 
 def test_checks_none_leaves_the_code_out(scene):

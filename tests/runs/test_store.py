@@ -62,7 +62,8 @@ def test_it_has_the_bits_of_a_run_in_memory(whole, memory):
     assert stored.parameters.keys() == memory.parameters.keys()
     for name, values in memory.parameters.items():
         np.testing.assert_array_equal(stored.parameters[name], values)
-    assert stored.provenance == json.loads(json.dumps(memory.provenance)) and stored.messages == memory.messages
+    assert stored.provenance == json.loads(json.dumps(memory.provenance))
+    assert stored.messages == memory.messages
     np.testing.assert_array_equal(stored.energy, memory.energy)
 
 
@@ -71,7 +72,8 @@ def test_blocks_are_handed_over_in_order_with_the_bits_of_the_run(into, memory, 
     handed = []
     store = {} if into == "memory" else {"store": tmp_path / "run.zarr"}
     result = lw.solve(fleet(), **SETTINGS, **store, threads=2, on_block=handed.append)
-    assert len(handed) > 1 and sum(block.members for block in handed) == result.members
+    assert len(handed) > 1
+    assert sum(block.members for block in handed) == result.members
     whole = {name: np.concatenate([block.samples[name] for block in handed], axis=1) for name in FIELDS}
     for name in FIELDS:
         assert whole[name].tobytes() == memory.samples[name].tobytes()
@@ -112,7 +114,8 @@ def test_what_takes_blocks_cannot_change_the_run(into, memory, tmp_path):
 
 def test_some_members_alone_are_read(whole, memory):
     some = lw.open_run(whole, [5, 1002, 300])
-    assert some.position.tobytes() == memory.position[:, [5, 1002, 300]].tobytes() and some.members == 3
+    assert some.position.tobytes() == memory.position[:, [5, 1002, 300]].tobytes()
+    assert some.members == 3
     assert lw.open_run(whole, slice(250, 260)).parameters["vehicle.mass"].shape == (10,)
 
 
@@ -131,12 +134,16 @@ def test_xarray_opens_it_without_a_remark(whole, memory, recwarn):
     import xarray
 
     dataset = xarray.open_zarr(whole)
-    assert dataset.attrs["Conventions"] == "CF-1.11" and dataset.attrs["complete"]
-    assert dataset.position.dims == ("time", "realization", "component") and dataset.position.attrs["units"] == "m"
-    assert dataset.status.attrs["flag_meanings"].split()[0] == "ok" and dataset["vehicle.mass"].attrs["units"] == "kg"
+    assert dataset.attrs["Conventions"] == "CF-1.11"
+    assert dataset.attrs["complete"]
+    assert dataset.position.dims == ("time", "realization", "component")
+    assert dataset.position.attrs["units"] == "m"
+    assert dataset.status.attrs["flag_meanings"].split()[0] == "ok"
+    assert dataset["vehicle.mass"].attrs["units"] == "kg"
     np.testing.assert_array_equal(dataset.position.values, memory.position)
     np.testing.assert_array_equal(dataset.realization.values, np.arange(MEMBERS))
-    assert dataset.provenance == json.dumps(json.loads(dataset.provenance)) and len(recwarn) == 0
+    assert dataset.provenance == json.dumps(json.loads(dataset.provenance))
+    assert len(recwarn) == 0
     view = lw.open_run(whole).dataset
     assert float(view.position.isel(time=-1, realization=7, component=2)) == memory.position[-1, 7, 2]
 
@@ -184,7 +191,8 @@ def test_time_chunks_come_together(tmp_path, memory):
 def test_float32_and_fewer_fields(tmp_path, memory):
     chosen = lw.Store(tmp_path / "run.zarr", dtype="float32", fields=("position",))
     result = lw.solve(fleet(), **SETTINGS, store=chosen)
-    assert list(result.samples) == ["position"] and result.position.dtype == np.float32
+    assert list(result.samples) == ["position"]
+    assert result.position.dtype == np.float32
     np.testing.assert_array_equal(result.position, memory.position.astype(np.float32))
     with pytest.raises(AttributeError, match="velocity was not kept"):
         _ = result.velocity
@@ -210,7 +218,8 @@ def test_samples_may_be_larger_than_the_memory_of_the_run(tmp_path):
     arguments = [sys.executable, "-c", LARGER, str(tmp_path / "run.zarr")]
     peak = int(subprocess.run(arguments, capture_output=True, text=True, env=env, check=True).stdout)
     stored = sum(path.stat().st_size for path in tmp_path.rglob("c.*"))
-    assert stored > 1.4e9 and peak < stored / 2
+    assert stored > 1.4e9
+    assert peak < stored / 2
 
 
 def test_the_same_run_leaves_the_same_bytes(whole, tmp_path):
@@ -237,7 +246,11 @@ def test_bad_settings_are_refused_at_once(tmp_path):
     with pytest.raises(lw.SceneError) as refused:
         lw.Store(tmp_path / "run", dtype="float16", fields=("speed",), existing="keep")
     text = str(refused.value)
-    assert "4 faults" in text and ".zarr" in text and "float16" in text and "speed" in text and "keep" in text
+    assert "4 faults" in text
+    assert ".zarr" in text
+    assert "float16" in text
+    assert "speed" in text
+    assert "keep" in text
 
 
 def test_a_run_in_use_is_left_alone(copy):
@@ -279,7 +292,8 @@ def test_damage_is_seen_and_its_block_alone_runs_again(copy, whole, name, harm, 
     assert f"damage      {name} {word}" in capsys.readouterr().out
     before = markers(copy)
     lw.resume(copy)
-    assert differing(whole, copy) == [] and cli.main(["info", str(copy)]) == 0
+    assert differing(whole, copy) == []
+    assert cli.main(["info", str(copy)]) == 0
     after = markers(copy)
     again = [int(one.removesuffix(".json")) for one in after if after[one] != before[one]]
     assert again == ([BLOCK_OF[name]] if name in BLOCK_OF else [])
@@ -319,7 +333,8 @@ def test_what_was_there_is_told(copy):
     (copy / "blocks" / "000000256.json").unlink()
     assert "went on: 3 of 4 blocks were there and whole, 1 ran" in lw.resume(copy).messages
     result = lw.solve(fleet(), **SETTINGS, store=lw.Store(copy, existing="resume"))
-    assert result.messages == ("nothing was missing: 4 of 4 blocks were there and whole",) and not result.run_seconds
+    assert result.messages == ("nothing was missing: 4 of 4 blocks were there and whole",)
+    assert not result.run_seconds
 
 
 @pytest.mark.parametrize("name", ["blocks/000000256.json", "velocity/c.0.2.0"])
@@ -332,7 +347,8 @@ def test_a_missing_block_is_one_line_with_the_remedy(copy, name, tmp_path, capsy
     for verb in (["view", "--out", str(tmp_path / "a.rrd")], ["plot"], ["report"]):
         assert cli.main([verb[0], str(copy.parent), *verb[1:]]) == 2
         said = capsys.readouterr().err
-        assert f"{name} is missing" in said and said.count("\n") == 1
+        assert f"{name} is missing" in said
+        assert said.count("\n") == 1
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.zarr"]
     lw.resume(copy)
     assert lw.open_run(copy).members == MEMBERS
@@ -364,7 +380,8 @@ def test_a_full_disk_is_told_by_an_export(whole, tmp_path, to, capsys):
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     said = capsys.readouterr().err
-    assert said.startswith(f"lgvi-warp: {tmp_path / 'run.out'}: ") and said.count("\n") == 1
+    assert said.startswith(f"lgvi-warp: {tmp_path / 'run.out'}: ")
+    assert said.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
 
 
@@ -410,13 +427,15 @@ def test_damaged_settings_are_refused(copy):
 
 def test_a_run_that_is_not_complete_is_not_opened_by_mistake(tmp_path):
     part = lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr", only=range(1, 3))
-    assert part.members == 512 and np.isfinite(part.position).all()
+    assert part.members == 512
+    assert np.isfinite(part.position).all()
     with pytest.raises(lw.SceneError, match=r"2 blocks are missing.*lgvi-warp resume"):
         lw.open_run(tmp_path)
     with pytest.raises(lw.SceneError, match="not complete"):
         lw.export(tmp_path, "netcdf")
     some = lw.open_run(tmp_path, incomplete=True)
-    assert np.isnan(some.position[:, 0]).all() and "2 blocks are missing" in some.messages[-1]
+    assert np.isnan(some.position[:, 0]).all()
+    assert "2 blocks are missing" in some.messages[-1]
 
 
 def test_parts_of_a_run_are_merged(tmp_path, whole):
@@ -424,7 +443,8 @@ def test_parts_of_a_run_are_merged(tmp_path, whole):
         lw.solve(fleet(), **SETTINGS, store=tmp_path / name / "run.zarr", only=only)
     assert not lw.merge([tmp_path / "a", tmp_path / "b"], tmp_path / "some").complete
     folder = lw.merge([tmp_path / name for name in "abc"], tmp_path / "all")
-    assert folder.complete and differing(whole, folder.path) == []
+    assert folder.complete
+    assert differing(whole, folder.path) == []
     lw.resume(tmp_path / "some")
     assert differing(whole, tmp_path / "some" / "run.zarr") == []
     with pytest.raises(lw.SceneError, match="holds a run already"):
@@ -432,7 +452,9 @@ def test_parts_of_a_run_are_merged(tmp_path, whole):
     # Nor is what comes of a complete run that has lost a block.
     (folder.path / "blocks" / "000000256.json").unlink()
     lost = lw.merge([folder.path], tmp_path / "lost")
-    assert not lost.complete and lw.resume(lost.path).members == MEMBERS and differing(whole, lost.path) == []
+    assert not lost.complete
+    assert lw.resume(lost.path).members == MEMBERS
+    assert differing(whole, lost.path) == []
 
 
 def test_a_store_in_use_is_not_replaced_by_a_merge(copy, tmp_path):
@@ -593,7 +615,8 @@ def test_a_full_disk_keeps_what_is_finished(tmp_path, whole, monkeypatch, capsys
         OSError, match=r"No space left on device: the blocks that were finished are kept.*lgvi-warp resume"
     ):
         lw.solve(fleet(), **SETTINGS, store=path, threads=1)
-    assert not list(path.rglob(f"*{durable.UNFINISHED}")) and state(path)["damage"] == []
+    assert not list(path.rglob(f"*{durable.UNFINISHED}"))
+    assert state(path)["damage"] == []
     monkeypatch.undo()
     lw.resume(path)
     assert differing(whole, path) == []
@@ -611,8 +634,10 @@ def test_a_disk_that_is_full_when_a_block_was_written_already(tmp_path, whole, m
     path = tmp_path / "run.zarr"
     with pytest.raises(OSError, match=r"No space left on device: the blocks that were finished are kept"):
         lw.solve(fleet(), **SETTINGS, store=path, threads=1)
-    assert state(path)["damage"] == [] and 1 <= state(path)["finished"] <= 3
-    assert not list(path.rglob(f"*{durable.UNFINISHED}")) and not state(path)["complete"]
+    assert state(path)["damage"] == []
+    assert 1 <= state(path)["finished"] <= 3
+    assert not list(path.rglob(f"*{durable.UNFINISHED}"))
+    assert not state(path)["complete"]
     monkeypatch.undo()
     lw.resume(path)
     assert differing(whole, path) == []
@@ -626,7 +651,8 @@ def test_an_interrupted_run_keeps_the_blocks_that_were_written(tmp_path, whole):
     path = tmp_path / "run.zarr"
     with pytest.raises(KeyboardInterrupt):
         lw.solve(fleet(), **SETTINGS, store=path, threads=1, progress=interrupted)
-    assert state(path)["finished"] == 3 and not list(path.rglob(f"*{durable.UNFINISHED}"))
+    assert state(path)["finished"] == 3
+    assert not list(path.rglob(f"*{durable.UNFINISHED}"))
     lw.resume(path)
     assert differing(whole, path) == []
 
@@ -641,7 +667,8 @@ def test_a_file_that_may_not_grow_is_told_as_a_full_disk(tmp_path, capsys):
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     text = capsys.readouterr().err
-    assert "File too large: the blocks that were finished are kept" in text and "run.zarr" in text
+    assert "File too large: the blocks that were finished are kept" in text
+    assert "run.zarr" in text
 
 
 def test_too_small_a_disk_is_refused_before_the_run(tmp_path, monkeypatch):
@@ -690,7 +717,8 @@ def test_chunks_are_synced_before_their_block_is_marked(tmp_path, monkeypatch):
     written = [
         i for i, (what, name) in enumerate(order) if what == "name" and name.startswith(f"{root}/") and "/c." in name
     ]
-    assert len(written) == 13 and max(written) < marked
+    assert len(written) == 13
+    assert max(written) < marked
     for i in written:
         name = order[i][1]
         assert any(what == "sync" and one.startswith(f"{name}.") for what, one in order[:i])
@@ -742,7 +770,8 @@ def test_keepers_that_cannot_be_stored_are_refused(tmp_path):
     named = [DepthSum(plan), DepthSum(plan), object()]
     with pytest.raises(lw.SceneError) as refused:
         StoredRun(plan, lw.Store(tmp_path / "a.zarr"), {}, (), tuple(named)).run(Threads(1))
-    assert "to_arrays" in str(refused.value) and "'depth sum'" in str(refused.value)
+    assert "to_arrays" in str(refused.value)
+    assert "'depth sum'" in str(refused.value)
 
 
 @pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
@@ -752,8 +781,10 @@ def test_netcdf(whole, memory, tmp_path):
     path = lw.export(whole, "netcdf", tmp_path / "run.nc")
     with xarray.open_dataset(path, engine="netcdf4") as dataset:
         np.testing.assert_array_equal(dataset.attitude.values, memory.attitude)
-        assert dataset.position.attrs["units"] == "m" and dataset.attrs["Conventions"] == "CF-1.11"
-        assert dataset.status.values.dtype == np.uint8 and json.loads(dataset.attrs["provenance"])["steps"] == 300
+        assert dataset.position.attrs["units"] == "m"
+        assert dataset.attrs["Conventions"] == "CF-1.11"
+        assert dataset.status.values.dtype == np.uint8
+        assert json.loads(dataset.attrs["provenance"])["steps"] == 300
     assert [one.name for one in tmp_path.iterdir()] == ["run.nc"]
 
 
@@ -763,7 +794,8 @@ def test_parquet(whole, memory, tmp_path):
     table = pq.read_table(lw.export(whole, "parquet", tmp_path / "run.parquet"))
     assert table.num_rows == MEMBERS * 31
     at = 700 * 31 + 11
-    assert table["realization"][at].as_py() == 700 and table["time"][at].as_py() == memory.time[11]
+    assert table["realization"][at].as_py() == 700
+    assert table["time"][at].as_py() == memory.time[11]
     assert table["position_2"][at].as_py() == memory.position[11, 700, 2]
     assert table["attitude_12"][at].as_py() == memory.attitude[11, 700, 1, 2]
     assert table["vehicle.mass"][at].as_py() == memory.parameters["vehicle.mass"][700]

@@ -96,14 +96,17 @@ def test_a_sweep_finds_its_cells(tmp_path, capsys):
     for _ in range(2):
         assert cli.main(["sweep", str(tmp_path / "sweep.toml"), "--out", str(tmp_path / "out"), "--json"]) == 0
     cells = list((tmp_path / "out" / "cells").iterdir())
-    assert len(cells) == 1 and (tmp_path / "out" / "summary.md").read_text(encoding="utf-8").startswith("# Sweep")
+    assert len(cells) == 1
+    assert (tmp_path / "out" / "summary.md").read_text(encoding="utf-8").startswith("# Sweep")
 
 
 def test_a_folder_in_the_place_of_a_file_is_refused(tmp_path, capsys):
     (tmp_path / "out" / "result.npz").mkdir(parents=True)
-    assert run(tmp_path / "out") == 2 and "is a folder, which is not replaced" in capsys.readouterr().err
+    assert run(tmp_path / "out") == 2
+    assert "is a folder, which is not replaced" in capsys.readouterr().err
     (tmp_path / "scene.toml").mkdir()
-    assert cli.main(["check", str(tmp_path / "scene.toml")]) == 2 and "is a folder" in capsys.readouterr().err
+    assert cli.main(["check", str(tmp_path / "scene.toml")]) == 2
+    assert "is a folder" in capsys.readouterr().err
 
 
 def test_a_scene_is_begun_and_checked(tmp_path, capsys):
@@ -128,4 +131,5 @@ def test_all_of_them_without_what_windows_has_not():
         pytest.skip("this is that process")
     found = subprocess.run([sys.executable, "-m", "pytest", *words], capture_output=True, text=True, timeout=240,
                            cwd=ROOT, env=environment, check=False)  # fmt: skip
-    assert found.returncode == 0 and "10 passed" in found.stdout, found.stdout[-4000:] + found.stderr[-2000:]
+    assert found.returncode == 0, found.stdout[-4000:] + found.stderr[-2000:]
+    assert "10 passed" in found.stdout, found.stdout[-4000:] + found.stderr[-2000:]

@@ -46,7 +46,8 @@ def test_munk_at_the_start(checks, method):
     nu = np.outer(munk_speed(limit / h * BOTH, scene), [0.0, 0.0, 1.0])
     result = lw.solve(one(scene, nu=nu), method, h=h, t1=h, checks=checks)
     assert warned(result, Warnings.MUNK_COARSE) == [False, True]
-    assert result.warning_time[1] == 0.0 and np.isnan(result.warning_time[0])
+    assert result.warning_time[1] == 0.0
+    assert np.isnan(result.warning_time[0])
     np.testing.assert_allclose(result.warning_value, [np.nan, limit * ABOVE], rtol=1e-12)
 
 
@@ -156,7 +157,8 @@ def test_orthogonality():
     fleet = one(scene_of(**PLAIN), Om=[0.0, 0.0, 1.0])
     coarse, fine = (lw.solve(fleet, "rk4", h=h, t1=128 * h, checks="all") for h in (0.4, 0.1))
     R = coarse.attitude[-1, 0]
-    assert coarse.warnings.counts() == {"orthogonality": 1} and fine.warnings.counts() == {}
+    assert coarse.warnings.counts() == {"orthogonality": 1}
+    assert fine.warnings.counts() == {}
     np.testing.assert_allclose(coarse.warning_value[0], np.abs(R.T @ R - np.eye(3)).max(), rtol=1e-6)
 
 
@@ -180,7 +182,8 @@ def test_an_attitude_that_is_no_rotation_is_told_by_default(kept):
     fleet = one(scene, Om=[[0.0, 0.0, 0.5], [0.0, 0.0, 1.0]])
     result = lw.solve(fleet, None, h=h, t1=steps * h, **kept)
     assert result.provenance["method"]["name"] == "rk4"
-    assert result.warnings.counts() == {"orthogonality": 1} and warned(result, Warnings.ORTHOGONALITY) == [False, True]
+    assert result.warnings.counts() == {"orthogonality": 1}
+    assert warned(result, Warnings.ORTHOGONALITY) == [False, True]
     np.testing.assert_allclose(result.warning_value[1], shrunk(0.4, steps), rtol=1e-4)
     np.testing.assert_allclose(result.warning_time[1], steps * h)
     assert lw.solve(fleet, None, h=h, t1=steps * h, checks="none", **kept).warnings.counts() == {}
@@ -263,7 +266,8 @@ def test_a_splitting_loses_order_where_its_drag_is_called_stiff(method):
         errors = [np.abs(run.attitude[-1, 0].ravel() - truth).max() for run in runs]
         orders[number] = np.log2(np.divide(errors[:-1], errors[1:]))
     # Order 2, as it should be, and less than 1.5 in stiff drag.
-    assert (np.abs(orders[2.0] - 2.0) < 0.25).all() and (orders[80.0] < 1.5).all(), orders
+    assert (np.abs(orders[2.0] - 2.0) < 0.25).all(), orders
+    assert (orders[80.0] < 1.5).all(), orders
 
 
 def test_inertia_that_no_rigid_body_has():
@@ -271,7 +275,8 @@ def test_inertia_that_no_rigid_body_has():
     scene = scene_of(**PLAIN)
     fleet = lw.Ensemble.from_states(scene, *random_states(1, 2, 0.1, 0.1), {"vehicle.inertia": J})
     result = lw.solve(fleet, h=0.01, t1=0.01)
-    assert warned(result, Warnings.INERTIA) == [False, True] and result.warning_value[1] == pytest.approx(3.1 / 3.0)
+    assert warned(result, Warnings.INERTIA) == [False, True]
+    assert result.warning_value[1] == pytest.approx(3.1 / 3.0)
     rigid = np.diag([10.0, 10.0, 10.0, 1.0, 2.0, 3.1])
     with pytest.raises(lw.SceneError, match="two of which sum to less than the third"):
         lw.Vehicle(rigid_body_mass_matrix=rigid)
@@ -305,7 +310,8 @@ def test_energy_that_explodes_is_a_failure(unstable, dtype):
     # Frozen at the last good state: its energy is below the limit, and samples stay from there on.
     k = int(np.searchsorted(result.time, result.failure_time[1]))
     created = (result.energy[:, 1] - result.energy[0, 1]) / result.energy[0, 1]
-    assert 0.5 < created[k:].max() <= 100.0 and np.ptp(created[k:]) < 1e-5
+    assert 0.5 < created[k:].max() <= 100.0
+    assert np.ptp(created[k:]) < 1e-5
     alone = lw.solve(unstable.subset([0]), "psi_s", h=1.0, t1=3000.0, save=lw.SaveAt(every=4.0), dtype=dtype)
     for name in ("position", "attitude", "velocity", "angular_velocity"):
         assert getattr(alone, name)[:, 0].tobytes() == getattr(result, name)[:, 0].tobytes()
@@ -328,7 +334,8 @@ def test_energy_of_healthy_scenes_is_quiet():
         for dtype in ("float64", "float32"):
             result = lw.solve(one(scene, R=R), "psi_s", h=0.05, t1=50.0, dtype=dtype, checks="all")
             assert result.status.counts() == {"ok": 1}
-            assert not warned(result, Warnings.ENERGY)[0] and not warned(result, Warnings.ORTHOGONALITY)[0]
+            assert not warned(result, Warnings.ENERGY)[0]
+            assert not warned(result, Warnings.ORTHOGONALITY)[0]
 
 
 def test_a_swing_from_rest_is_no_failure():
@@ -337,7 +344,8 @@ def test_a_swing_from_rest_is_no_failure():
     R = lw.notation.matrix_from_rotation_vector(np.array([0.3, 0.0, 0.0]))
     for every in (1.0, 500.0):
         result = lw.solve(one(scene, R=R), "phi", h=1.0, t1=500.0, save=lw.SaveAt(every=every), checks="all")
-        assert result.status.counts() == {"ok": 1} and np.abs(result.angular_velocity[-1]).max() < 1.0
+        assert result.status.counts() == {"ok": 1}
+        assert np.abs(result.angular_velocity[-1]).max() < 1.0
 
 
 @pytest.mark.slow_for("psi_x", "rk4*")
@@ -375,7 +383,8 @@ def test_energy_where_the_forces_have_another_origin(monkeypatch):
     fleet = one(scene, *random_states(5, 16, 0.5, 0.5))
     plan = make_plan(fleet, "psi_x", h=0.02, t1=1.0)
     frame, _, _ = frame_of(plan.method, fleet.parameters(0, 1))
-    assert np.any(frame.origin != frame.forces) and "origin" in plan.spec.parts
+    assert np.any(frame.origin != frame.forces)
+    assert "origin" in plan.spec.parts
     result = lw.solve(fleet, "psi_x", h=0.02, t1=128 * 0.02, checks="all")
     nu = np.concatenate([result.velocity, result.angular_velocity], axis=-1)
     I6 = scene.vehicle.rigid_body_mass_matrix + scene.vehicle.added_mass_matrix
@@ -428,7 +437,8 @@ def test_a_neighbour_that_warns_or_fails_changes_no_bit():
     nu[3] *= 300.0
     Om[5] *= 300.0
     loud = lw.solve(one(scene, b, R, nu, Om), "psi_s", h=0.1, t1=30.0, checks="all")
-    assert loud.status[5] != 0 and loud.warnings[3] != 0
+    assert loud.status[5] != 0
+    assert loud.warnings[3] != 0
     well = [0, 1, 2, 4, 6, 7]
     for name in ("position", "attitude", "velocity", "angular_velocity"):
         assert getattr(quiet, name)[:, well].tobytes() == getattr(loud, name)[:, well].tobytes()
@@ -442,20 +452,24 @@ def test_warnings_do_not_depend_on_what_is_kept():
         lw.solve(one(scene), "psi_s", h=0.02, t1=20.0, save=lw.SaveAt(every=every), checks="all")
         for every in (0.1, 20.0)
     ]
-    assert runs[0].warning_time[0] == runs[1].warning_time[0] and runs[0].warnings[0] == runs[1].warnings[0] != 0
+    assert runs[0].warning_time[0] == runs[1].warning_time[0]
+    assert runs[0].warnings[0] == runs[1].warnings[0] != 0
 
 
 def test_checks_none_warns_of_nothing():
     scene = scene_of(**MUNK)
     result = lw.solve(one(scene, nu=[0.0, 0.0, 1e3]), h=0.1, t1=0.1, checks="none")
-    assert result.warnings.counts() == {} and np.isnan(result.warning_time).all()
+    assert result.warnings.counts() == {}
+    assert np.isnan(result.warning_time).all()
 
 
 def test_every_warning_says_what_to_do():
     for one_of in Warnings:
-        assert len(one_of.text) > 40 and one_of.value_name
+        assert len(one_of.text) > 40
+        assert one_of.value_name
     both = Warnings.ENERGY | Warnings.INERTIA
-    assert both.text.count(";") >= 2 and both.value_name == Warnings.ENERGY.value_name
+    assert both.text.count(";") >= 2
+    assert both.value_name == Warnings.ENERGY.value_name
 
 
 def test_bits_and_codes_are_those_of_the_kernel():

@@ -43,20 +43,25 @@ def test_a_trim_balances_the_forces_of_the_equations():
     found = lw.trim(hover(), 1.5, method="psi_s", h=0.02)
     R, nu = found.start.attitude, found.start.velocity
     assert np.abs(R @ nu - (1.5, 0.0, 0.0)).max() < 1e-12 or found.values["drift"] != 0.0
-    assert abs((R @ nu)[2]) < 1e-12 and abs(np.linalg.norm(nu) - 1.5) < 1e-12
+    assert abs((R @ nu)[2]) < 1e-12
+    assert abs(np.linalg.norm(nu) - 1.5) < 1e-12
     w = found.commands["control_wrench"]
     down, p = R[2], np.diag(MASS + np.array((5.0, 22.0, 25.0))) @ nu
     force = w[:3] + (MASS * GRAVITY - BUOYANCY) * down - DRAG[:3] * np.abs(nu) * nu
     torque = w[3:] - BUOYANCY * np.cross(CENTER, down) + np.cross(p, nu)
     # The steady motion of a step is that of the equations but for the splitting, h^2 times products of their rates.
-    assert np.abs(force).max() < 0.02**2 * 50.0 and np.abs(torque).max() < 0.02**2 * 50.0
+    assert np.abs(force).max() < 0.02**2 * 50.0
+    assert np.abs(torque).max() < 0.02**2 * 50.0
     assert found.free == ("roll", "pitch", "drift", *(f"control_wrench[{i}]" for i in range(6)))
-    assert found.fixed == {"speed": 1.5} and np.abs(found.residual).max() < 1e-8 and "speed 1.5 m/s" in str(found)
+    assert found.fixed == {"speed": 1.5}
+    assert np.abs(found.residual).max() < 1e-8
+    assert "speed 1.5 m/s" in str(found)
 
 
 def test_a_run_from_a_trim_stays_there():
     found = lw.trim(hover(), 1.0, free=("control_wrench",), fixed={"pitch": 0.1}, method="psi_s", h=0.02)
-    assert found.free == tuple(f"control_wrench[{i}]" for i in range(6)) and found.fixed["pitch"] == 0.1
+    assert found.free == tuple(f"control_wrench[{i}]" for i in range(6))
+    assert found.fixed["pitch"] == 0.1
     scene = dataclasses.replace(hover(), start=found.start)
     bench = Bench(lw.Ensemble(plant(scene, 10.0), 1), "psi_s", 0.02, 20.0, 10.0)
     motion = bench.start(np.zeros(1, int))
@@ -124,7 +129,9 @@ def test_a_double_integrator_and_a_lag():
     mass = MASS + 22.0
     np.testing.assert_allclose(linear.A[np.ix_(rows, rows)], [[1.0, PERIOD], [0.0, 1.0]], atol=1e-9)
     np.testing.assert_allclose(linear.B[rows, push], [0.5 * PERIOD**2 / mass, PERIOD / mass], atol=1e-10)
-    assert linear.outputs == linear.states[:12] and np.array_equal(linear.C, np.eye(12, 18)) and not linear.D.any()
+    assert linear.outputs == linear.states[:12]
+    assert np.array_equal(linear.C, np.eye(12, 18))
+    assert not linear.D.any()
     assert linear.inputs == tuple(f"control_wrench[{i}]" for i in range(6))
 
 
@@ -150,7 +157,9 @@ def test_a_part_and_a_state_space():
     linear = lw.linearize(neutral(), period=PERIOD, method="psi_s", h=0.02)
     surge = linear.part(("position[0]", "velocity[0]", "control_wrench.place[0]"), ("control_wrench[0]",))
     system = surge.state_space()
-    assert isinstance(system, control.StateSpace) and system.dt == PERIOD and system.nstates == 3
+    assert isinstance(system, control.StateSpace)
+    assert system.dt == PERIOD
+    assert system.nstates == 3
     np.testing.assert_array_equal(system.A, surge.A)
     assert linear.part(("velocity",)).states == ("velocity[0]", "velocity[1]", "velocity[2]")
     with pytest.raises(lw.SceneError, match="velocities"):
@@ -187,7 +196,8 @@ def test_a_regulator_in_the_loop(regulator):
     # Commands are states of the loop after a look; they add poles at 0.
     expected = np.concatenate([regulator.poles, np.zeros(len(closed.poles) - 12)])
     apart = np.abs(closed.poles[:, None] - expected)
-    assert apart.min(axis=0).max() < 1e-6 and apart.min(axis=1).max() < 1e-6
+    assert apart.min(axis=0).max() < 1e-6
+    assert apart.min(axis=1).max() < 1e-6
     assert np.abs(closed.poles).max() < 1.0
 
 
@@ -206,7 +216,8 @@ def test_the_law_of_a_moving_vehicle_has_the_gains_of_the_model(regulator):
         e, e_R, velocity, rate = pose_errors(wanted, Measurement(x[:3], turned, v + x[6:9], v + x[6:9], x[9:]))
         left.append(np.abs(law.K @ np.concatenate([-e, e_R, -velocity, -rate]) - K @ x).max())
     # Errors of second order: a quarter at half the size.
-    assert left[0] < 1e-5 and 3.8 < left[0] / left[1] < 4.2
+    assert left[0] < 1e-5
+    assert 3.8 < left[0] / left[1] < 4.2
 
 
 def cost(result, start=0):
@@ -236,7 +247,8 @@ def test_the_cost_of_a_run_is_that_of_the_matrix_and_no_other_gains_have_less(re
         gain = factor * regulator.K
         closed = regulator.model.A - regulator.model.B @ gain
         P = solve_discrete_lyapunov(closed.T, np.diag(WEIGHTS[0]) + gain.T @ np.diag(WEIGHTS[1]) @ gain)
-        assert of_run > costs[0] and abs(of_run / (x @ P @ x) - 1.0) < 1e-4
+        assert of_run > costs[0]
+        assert abs(of_run / (x @ P @ x) - 1.0) < 1e-4
 
 
 def test_what_has_no_regulator(regulator):
@@ -298,7 +310,10 @@ def test_trim_and_model_of_remus_beside_equations_written_once_more():
     # The steady speed is known, and so is the roll that the propeller's torque holds.
     assert abs(found.values["speed"] - equations.CRUISE) < 1e-4
     roll = np.arcsin(equations.TORQUE / (equations.LEVER * equations.WEIGHT))
-    assert abs(found.values["roll"] - roll) < 1e-4 and left[1] < 1e-4
+    assert abs(found.values["roll"] - roll) < 1e-4
+    assert left[1] < 1e-4
     # Order 2 of the steps, but for the differences of |v| v, which are first order in their own size, 1e-5.
     ratios = np.array(errors[0]) / np.array(errors[1])
-    assert np.all(ratios > 3.5) and np.all(ratios < 4.5) and np.max(errors[1]) < 1e-2
+    assert np.all(ratios > 3.5)
+    assert np.all(ratios < 4.5)
+    assert np.max(errors[1]) < 1e-2

@@ -95,7 +95,8 @@ def by_hand(fleet, least):
 
 def test_margins_by_eigenvalues_are_those_of_the_system_by_hand(fleet, found):
     expected = by_hand(fleet, 1.0)
-    assert found.steady.all() and len(set(np.round(expected["delay"] / H))) > 2
+    assert found.steady.all()
+    assert len(set(np.round(expected["delay"] / H))) > 2
     for name in ("gain_lower", "gain_upper"):
         # The differences err by 1e-10, the brackets end at 1e-6; a slow edge moves more than the eigenvalue does.
         np.testing.assert_allclose(found.values[name], expected[name], rtol=1e-5)
@@ -129,10 +130,13 @@ def test_a_distribution(found):
     table = found.percentiles((0.0, 100.0))
     assert table["gain_upper"].tolist() == [found.values["gain_upper"].min(), found.values["gain_upper"].max()]
     values, part = found.curve("delay")
-    assert np.all(np.diff(values) >= 0.0) and part[-1] == 1.0 and found.members == MEMBERS
+    assert np.all(np.diff(values) >= 0.0)
+    assert part[-1] == 1.0
+    assert found.members == MEMBERS
     assert found.worst(1)[0] == np.argmin(found.values["gain_upper"])
     assert found.worst(1, "gain_lower")[0] == np.argmax(found.values["gain_lower"])
-    assert "gain_upper" in str(found) and "delay s" in str(found)
+    assert "gain_upper" in str(found)
+    assert "delay s" in str(found)
 
 
 def test_a_loop_that_does_not_settle_has_no_margins():
@@ -140,9 +144,12 @@ def test_a_loop_that_does_not_settle_has_no_margins():
         scene(delay=0.06), np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), np.zeros((2, 3)),
         {"heading_pid.kd": np.array([9.0, 2.1 * J / PERIOD])})  # fmt: skip
     found = lw.margins(loops, None, "gain", about=1.0, method="psi_s", h=H)
-    assert found.steady.tolist() == [True, False] and found.loop == "all laws"
-    assert np.isnan(found.values["gain_upper"][1]) and np.isfinite(found.values["gain_upper"][0])
-    assert found.why.tolist() == ["", "does not settle"] and "1 of them have none" in str(found)
+    assert found.steady.tolist() == [True, False]
+    assert found.loop == "all laws"
+    assert np.isnan(found.values["gain_upper"][1])
+    assert np.isfinite(found.values["gain_upper"][0])
+    assert found.why.tolist() == ["", "does not settle"]
+    assert "1 of them have none" in str(found)
     assert set(found.values) == {"gain_lower", "gain_upper"}
     assert found.worst(1).tolist() == [1]
 
@@ -166,7 +173,10 @@ def test_edges_beside_known_ones():
     found = edges(holds, start, last, guess, 1e-3)
     middle = np.sqrt(found[4:, 0] * found[4:, 1])
     np.testing.assert_allclose(middle, true[4:], rtol=1e-3)
-    assert found[0, 1] == np.inf and found[1, 1] == 0.0 and found[2, 1] == np.inf and np.isnan(found[3]).all()
+    assert found[0, 1] == np.inf
+    assert found[1, 1] == 0.0
+    assert found[2, 1] == np.inf
+    assert np.isnan(found[3]).all()
     counts = rng.integers(0, 100, 50).astype(float)
     inside = edges(lambda v, i: v <= counts[i], np.zeros(50), np.full(50, 60.0), np.full(50, np.nan), 1.0, whole=True)
     np.testing.assert_array_equal(inside[:, 0], np.minimum(counts, 60.0))
@@ -297,7 +307,9 @@ def test_of_loops_that_do_not_settle_none_is_steady():
 @pytest.mark.parametrize("vehicle", ["remus", "rov"])
 def test_loops_that_settle_have_margins(vehicle):
     found = lw.margins(fleet_of(vehicle, {}, 16), None, "gain", by=("eigenvalues", "runs"), method="psi_x", h=STEP)
-    assert found.steady.all() and set(found.why) == {""} and (found.values["gain_upper"] > 1.2).all()
+    assert found.steady.all()
+    assert set(found.why) == {""}
+    assert (found.values["gain_upper"] > 1.2).all()
 
 
 def sampled(limit=49.85, heading=0.0, most=1e6, **gains):
@@ -317,7 +329,8 @@ def test_a_gain_limit_that_is_known_for_any_length_of_runs_heading_and_limit(sec
     for by, asked in (("eigenvalues", ("eigenvalues",)), ("runs", ("runs",)), ("runs", ("eigenvalues", "runs"))):
         found = lw.margins(one, "heading_pid", "gain", by=asked, seconds=seconds, tilt=tilt, method="psi_s", h=0.01)
         values = found.to_dict()[by]
-        assert found.steady.all() and values["gain_lower"][0] < 0.02  # below, 60 s are short
+        assert found.steady.all()
+        assert values["gain_lower"][0] < 0.02
         # Of the eigenvalues by differences, 1e-10, and brackets; of runs 3 % in a third of them, 1e-4, and half of a bracket.
         assert values["gain_upper"][0] == pytest.approx(49.85, rel=1e-5 if by == "eigenvalues" else 3e-3)
 
@@ -363,12 +376,14 @@ def test_saturated_members_whose_sampled_loop_grows_are_never_steady():
     numbers = {f"heading_pid.{name}": values for name, values in gains.items()}
     one = dataclasses.replace(scene(), terms=[lw.ControlWrench(limit=[2.0] * 6)])
     fleet = lw.Ensemble.from_states(one, zero, eye, zero, spins * [0.0, 0.0, 1.0], numbers)
-    assert (radii > 1.0).sum() > n / 4 and (radii < 0.99).any()
+    assert (radii > 1.0).sum() > n / 4
+    assert (radii < 0.99).any()
     for by in ("eigenvalues", "runs"):
         found = lw.margins(fleet, None, "gain", by=by, about=5.0, method="psi_s", h=H)
         assert not found.steady[radii > 1.0].any(), by
         assert set(found.why[radii > 1.0]) <= {"does not settle", "at its limit: control_wrench[5]"}
-        assert found.steady.any() and (radii[found.steady] < 1.0).all()
+        assert found.steady.any()
+        assert (radii[found.steady] < 1.0).all()
 
 
 def turning(terms, allocation, laws=(), **wanted):
@@ -401,8 +416,10 @@ def test_a_loop_within_a_dead_band_moves_nothing():
     one = turning([pushes, lw.Drag(linear=[10.0] * 3 + [1.0] * 3)], lw.AllocationMatrix(to="thrusters", matrix=matrix))
     one = dataclasses.replace(one, start=lw.Start(euler_deg=[0.0, 0.0, np.rad2deg(0.3)]))
     found = lw.margins(one, None, "gain", method="psi_s", h=0.03)
-    assert "step shortened from 0.03 s to 0.025 s" in str(found) and found.to_dict()["messages"] == list(found.messages)
-    assert found.why.tolist() == ["moves nothing"] and np.isnan(found.values["gain_upper"][0])
+    assert "step shortened from 0.03 s to 0.025 s" in str(found)
+    assert found.to_dict()["messages"] == list(found.messages)
+    assert found.why.tolist() == ["moves nothing"]
+    assert np.isnan(found.values["gain_upper"][0])
 
 
 def test_noise_lets_no_motion_be_steady():

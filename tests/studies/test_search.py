@@ -24,9 +24,12 @@ def rastrigin(inside):
 def test_a_search_among_many_valleys():
     found = search(rastrigin, 2, 2000, 1, 3)
     np.testing.assert_allclose(found.at, 0.6, atol=1e-4)
-    assert found.cost < 1e-5 and len(found.restarts) == 3 and found.runs <= 2000
+    assert found.cost < 1e-5
+    assert len(found.restarts) == 3
+    assert found.runs <= 2000
     again = search(rastrigin, 2, 2000, 1, 3)
-    assert np.array_equal(again.at, found.at) and again.runs == found.runs
+    assert np.array_equal(again.at, found.at)
+    assert again.runs == found.runs
 
 
 def test_a_search_finds_a_corner_that_evolution_misses():
@@ -37,12 +40,14 @@ def test_a_search_finds_a_corner_that_evolution_misses():
         return np.linalg.norm(inside - 0.3, axis=1) - 5.0 * np.exp(-((apart / 1e-3) ** 2))
 
     found = search(spike, 2, 400, 1, 1)
-    assert found.at.tolist() == [1.0, 0.0] and found.restarts[0] > -1.0
+    assert found.at.tolist() == [1.0, 0.0]
+    assert found.restarts[0] > -1.0
 
 
 def test_a_search_ends_where_it_is_good_enough():
     found = search(lambda x: np.where(x[:, 0] > 0.5, -np.inf, x[:, 0]), 1, 10_000, 1, 3, good_enough=-1e300)
-    assert found.cost == -np.inf and found.runs < 100
+    assert found.cost == -np.inf
+    assert found.runs < 100
 
 
 def test_infinite_costs_do_not_stop_a_search():
@@ -67,10 +72,13 @@ def test_risks():
     costs = np.array([[3.0, 1.0, 2.0, 4.0, 5.0], [1.0, 1.0, 1.0, 1.0, np.inf]])
     # The worst 30 % of five members are one and a half.
     assert lw.CVaR(0.3)(costs[:1])[0] == pytest.approx((5.0 + 0.5 * 4.0) / 1.5)
-    assert lw.CVaR(1.0)(costs[:1])[0] == pytest.approx(3.0) and lw.CVaR(0.2)(costs).tolist() == [5.0, np.inf]
+    assert lw.CVaR(1.0)(costs[:1])[0] == pytest.approx(3.0)
+    assert lw.CVaR(0.2)(costs).tolist() == [5.0, np.inf]
     faults = Faults()
     mean, quantile = risk_of(faults, "mean"), risk_of(faults, 0.8)
-    assert not faults and mean(costs[:1])[0] == 3.0 and quantile(costs).tolist() == [4.0, 1.0]
+    assert not faults
+    assert mean(costs[:1])[0] == 3.0
+    assert quantile(costs).tolist() == [4.0, 1.0]
     assert [str(risk) for risk in (lw.CVaR(0.05), mean, quantile)] == ["mean of the worst 5 %", "mean", "80 % quantile"]
     for wrong in ("median", 2.0, None):
         with pytest.raises(lw.SceneError, match="is no risk"):
@@ -88,20 +96,26 @@ def test_a_known_worst_corner():
     found = lw.worst_case(scene, within, "norm(position)", budget=600, progress=told.append, **RUN)
     assert found.parameters == {"start.velocity[2]": -2.0, "start.position[2]": -1.0}
     # Of drag 1e-12 of that of test_linear is left, some 1e-10 m.
-    assert found.value == pytest.approx(2.0 * 20.0 + 1.0, abs=1e-9) and found.runs <= 600
-    assert found.at_bounds == {"start.velocity[2]": "low", "start.position[2]": "low"} and told[-1] <= 1.0
+    assert found.value == pytest.approx(2.0 * 20.0 + 1.0, abs=1e-9)
+    assert found.runs <= 600
+    assert found.at_bounds == {"start.velocity[2]": "low", "start.position[2]": "low"}
+    assert told[-1] <= 1.0
     again = lw.solve(found.fleet, "psi_s", h=PERIOD, t1=20.0)
     assert np.linalg.norm(again.position[-1, 0]) == pytest.approx(found.value, abs=1e-10)
-    assert "a lower bound of the largest" in str(found) and "(low)" in str(found)
+    assert "a lower bound of the largest" in str(found)
+    assert "(low)" in str(found)
     least = lw.worst_case(scene, within, "norm(position)", worst="smallest", budget=600, **RUN)
-    assert 0.0 <= least.value < 1e-2 and "an upper bound of the smallest" in str(least)
+    assert 0.0 <= least.value < 1e-2
+    assert "an upper bound of the smallest" in str(least)
 
 
 def test_a_failure_is_the_worst_case():
     # Beyond h |Omega| = 2 the step of psi_s has no solution.
     found = lw.worst_case(regulated(), {"start.angular_velocity[2]": (0.0, 40.0)}, "norm(position)", budget=600, **RUN)
-    assert found.value == np.inf and found.parameters["start.angular_velocity[2]"] > 19.0
-    assert str(found).startswith("a member fails: start.angular_velocity[2]") and found.runs < 100
+    assert found.value == np.inf
+    assert found.parameters["start.angular_velocity[2]"] > 19.0
+    assert str(found).startswith("a member fails: start.angular_velocity[2]")
+    assert found.runs < 100
 
 
 @pytest.mark.parametrize(
@@ -141,9 +155,14 @@ def test_tuned_gains_are_those_of_the_regulator(regulator, risk):  # noqa: F811
     assert abs(found.cost / expected - 1.0) < 1e-5
     # Near the least a cost that is 1e-6 larger is that of gains 1e-3 beside.
     np.testing.assert_allclose(list(found.parameters.values()), best, rtol=1e-2)
-    assert found.members == 12 and found.fresh == 24 and found.fresh_before > found.fresh_cost
-    assert found.optimism == found.fresh_cost - found.cost and not found.at_bounds and found.runs <= 12 * 700 + 48
-    assert "optimism" in str(found) and str(risk) in str(found)
+    assert found.members == 12
+    assert found.fresh == 24
+    assert found.fresh_before > found.fresh_cost
+    assert found.optimism == found.fresh_cost - found.cost
+    assert not found.at_bounds
+    assert found.runs <= 12 * 700 + 48
+    assert "optimism" in str(found)
+    assert str(risk) in str(found)
 
 
 def test_what_is_told_of_fresh_members():
@@ -203,11 +222,13 @@ def test_searches_by_metrics_of_a_loop():
         result = lw.solve(lw.Ensemble(wanted, members, seed, STARTS), "psi_s", h=PERIOD, t1=20.0, statistics=[iae])
         each = result.statistics["each iae depth"].value[0]
         assert risk == pytest.approx(lw.CVaR(0.5)(each)[0], rel=1e-12)
-    assert tuned.of == "iae depth" and tuned.fresh_before > tuned.fresh_cost
+    assert tuned.of == "iae depth"
+    assert tuned.fresh_before > tuned.fresh_cost
     within = {"start.position[2]": (-1.0, 2.0)}
     for of in (lw.MaxError("depth"), {"type": "max_error", "of": "depth"}):
         far = lw.worst_case(regulated(), within, of, budget=64, **RUN)
-        assert far.value == pytest.approx(2.0, abs=1e-9) and far.of == "max_error depth"
+        assert far.value == pytest.approx(2.0, abs=1e-9)
+        assert far.of == "max_error depth"
         assert far.at_bounds == {"start.position[2]": "high"}
     # Nothing acts: what starts away from its goal never settles.
     never = lw.worst_case(regulated(), within, "settling_time depth", budget=64, **RUN)

@@ -55,12 +55,14 @@ def test_what_a_scene_keeps_of_its_own_runs_is_no_matter(scene, found):
     told = scene.to_dict()
     other = lw.Scene.from_dict(told | {"run": told.get("run", {}) | own})
     again = uq.sobol(other, [ishigami, "position[1]"], samples=2048, vary=BOX, seed=3, **RUN)
-    assert again.members == found.members and np.array_equal(again.first, found.first)
+    assert again.members == found.members
+    assert np.array_equal(again.first, found.first)
     X = np.random.default_rng(0).uniform(-PI, PI, (1500, 3))
     np.testing.assert_array_equal(*(uq.model(one, BOX, "position[1]", **RUN)(X) for one in (scene, other)))
     # A run may leave them out as well.
     whole = lw.solve(lw.Ensemble(other, 2000), keep="all", statistics=(), until=False, **RUN)
-    assert whole.position.shape[1] == 2000 and not whole.statistics
+    assert whole.position.shape[1] == 2000
+    assert not whole.statistics
 
 
 def assert_close(values, errors, exact):
@@ -68,7 +70,8 @@ def assert_close(values, errors, exact):
 
 
 def test_indices_of_ishigamis_function(found):
-    assert found.factors == tuple(BOX) and found.quantities == ("ishigami", "position[1]")
+    assert found.factors == tuple(BOX)
+    assert found.quantities == ("ishigami", "position[1]")
     assert (found.samples, found.members, found.failed) == (2048, 2048 * 8, 0)
     assert_close(found.first[0], found.first_confidence[0], FIRST)
     assert_close(found.total[0], found.total_confidence[0], TOTAL)
@@ -76,7 +79,8 @@ def test_indices_of_ishigamis_function(found):
     at = ~np.eye(3, dtype=bool)
     assert_close(found.second[0][at], found.second_confidence[0][at], second[at])
     # The intervals mean something: a factor taken for another would be outside.
-    assert found.first_confidence[0].max() < 0.08 and found.second_confidence[0][at].max() < 0.1
+    assert found.first_confidence[0].max() < 0.08
+    assert found.second_confidence[0][at].max() < 0.1
     # Points of a sequence: the variance is much better than the 1 % of as many random ones.
     assert abs(found.std[0] ** 2 / V - 1.0) < 0.02
     # In 0.02 s the vehicle drifts by 4 mm: its place is where it starts.
@@ -99,13 +103,15 @@ def sobols_g(result):
 
 def test_indices_of_sobols_g(scene):
     found = uq.sobol(scene, sobols_g, samples=2048, vary=UNIT, seed=5, second_order=False, **RUN)
-    assert found.factors == tuple(UNIT) and found.members == 2048 * 7
+    assert found.factors == tuple(UNIT)
+    assert found.members == 2048 * 7
     # V_i = 1 / 3 / (1 + a_i)^2 are the variances of its factors, whose means are 1.
     V = 1.0 / 3.0 / (1.0 + WEIGHTS) ** 2
     whole = np.prod(1.0 + V) - 1.0
     assert_close(found.first[0], found.first_confidence[0], V / whole)
     assert_close(found.total[0], found.total_confidence[0], V * np.prod(1.0 + V) / (1.0 + V) / whole)
-    assert found.first_confidence[0].max() < 0.1 and found.total_confidence[0].max() < 0.1
+    assert found.first_confidence[0].max() < 0.1
+    assert found.total_confidence[0].max() < 0.1
     assert abs(found.std[0] ** 2 / whole - 1.0) < 0.02
 
 
@@ -119,11 +125,11 @@ def test_the_table_and_its_files(found, tmp_path):
         rows = list(csv.DictReader(file))
     # 2 quantities: 3 factors with first and total, 3 pairs.
     assert len(rows) == 2 * (3 * 2 + 3)
-    assert float(rows[0]["value"]) == found.first[0, 0] and rows[0]["index"] == "first"
+    assert float(rows[0]["value"]) == found.first[0, 0]
+    assert rows[0]["index"] == "first"
     content = json.loads(paths[2].read_text())
-    assert content["provenance"]["ensemble"]["sampling"] == {"saltelli": {"replicates": 8}} and len(
-        content["rows"]
-    ) == len(rows)
+    assert content["provenance"]["ensemble"]["sampling"] == {"saltelli": {"replicates": 8}}
+    assert len(content["rows"]) == len(rows)
     back = lw.Ensemble.from_scene(
         lw.Scene.from_dict(content["provenance"]["scene"] | {"ensemble": content["provenance"]["ensemble"]})
     )
@@ -134,7 +140,8 @@ def test_the_picture(found, tmp_path):
     from matplotlib.image import imread
 
     picture = imread(lw.plot_sensitivity(found, tmp_path / "bars.png"))
-    assert picture.shape[0] > 150 and picture[..., :3].std() > 0.05
+    assert picture.shape[0] > 150
+    assert picture[..., :3].std() > 0.05
 
 
 # A vehicle with a known answer -----------------------------------------------------------------------------------------
@@ -159,7 +166,8 @@ def depth(mass, buoyancy, speed):
 
 def test_parts_of_the_variance_of_a_sinking_vehicle(sinking):
     found = uq.sobol(sinking, "position[2]", samples=2048, vary=LAWS, second_order=False, **SINK)
-    assert found.second is None and found.members == 2048 * 5
+    assert found.second is None
+    assert found.members == 2048 * 5
     assert found.factors == tuple(LAWS)
     M = 123.8 + 75.0
     slopes = np.array([0.5 * T1**2 * (9.8 * M - (123.8 * 9.8 - 1215.8)) / M**2, -0.5 * T1**2 / M, T1])
@@ -182,7 +190,8 @@ def test_an_adaptor_gives_the_numbers_themselves(sinking):
     np.testing.assert_array_equal(f.scipy(X.T), f(X))
     np.testing.assert_array_equal(f({name: X[:, f.names.index(name)] for name in sorted(f.names)}), f(X))
     two = uq.model(sinking, list(f.names), ["position[2]", "norm(velocity)"], **SINK)
-    assert two(X).shape == (3, 2) and two.scipy(X.T).shape == (2, 3)
+    assert two(X).shape == (3, 2)
+    assert two.scipy(X.T).shape == (2, 3)
     np.testing.assert_array_equal(two(X)[:, 0], f(X))
 
 
@@ -192,7 +201,8 @@ def test_the_adaptor_serves_scipy_and_salib(sinking):
 
     f = uq.model(sinking, LAWS, "position[2]", **SINK)
     by_scipy = stats.sobol_indices(func=f.scipy, n=1024, dists=f.distributions, rng=1).first_order
-    assert f.problem["dists"] == ["norm"] * 3 and f.problem["bounds"][1] == [1215.8, 2.0]
+    assert f.problem["dists"] == ["norm"] * 3
+    assert f.problem["bounds"][1] == [1215.8, 2.0]
     X = sample.sample(f.problem, 1024, calc_second_order=False, seed=1)
     S = analyze.analyze(f.problem, f(X), calc_second_order=False, seed=1)
     assert_close(by_scipy, S["S1_conf"], S["S1"])
@@ -230,20 +240,25 @@ def test_morris_of_a_linear_quantity(sinking):
     np.testing.assert_allclose(found.mu[0], effects, rtol=0, atol=1e-12)
     np.testing.assert_allclose(found.mu_star[0], np.abs(effects), rtol=0, atol=1e-12)
     np.testing.assert_allclose(found.sigma[0], 0.0, rtol=0, atol=1e-12)
-    assert found.members == 8 * 4 and "Morris" in str(found)
+    assert found.members == 8 * 4
+    assert "Morris" in str(found)
 
 
 def test_a_joint_law_is_one_factor_of_a_screening(sinking):
     vary = {"start.attitude": lw.RotationNormal(std=0.1), "vehicle.buoyancy": lw.Normal(std=1.0)}
     found = uq.morris(sinking, ["position[0]", "position[2]"], samples=4, vary=vary, **SINK)
-    assert found.factors == ("start.attitude", "vehicle.buoyancy") and found.mu_star.shape == (2, 2)
-    assert np.isnan(found.mu[:, 0]).all() and np.isfinite(found.mu_star).all()
+    assert found.factors == ("start.attitude", "vehicle.buoyancy")
+    assert found.mu_star.shape == (2, 2)
+    assert np.isnan(found.mu[:, 0]).all()
+    assert np.isfinite(found.mu_star).all()
 
 
 def test_what_does_not_vary_has_no_indices_and_says_so(sinking):
     found = uq.sobol(sinking, ["position[0]", "position[2]"], samples=8, vary=LAWS, **SINK)
-    assert np.isnan(found.first[0]).all() and np.isfinite(found.first[1]).all()
-    assert "position[0] does not vary" in found.messages[0] and "does not vary" in str(found)
+    assert np.isnan(found.first[0]).all()
+    assert np.isfinite(found.first[1]).all()
+    assert "position[0] does not vary" in found.messages[0]
+    assert "does not vary" in str(found)
 
 
 def test_noise_that_acts_alike_belongs_to_no_factor(sinking):
@@ -253,7 +268,8 @@ def test_noise_that_acts_alike_belongs_to_no_factor(sinking):
         uq.sobol(noisy, "position[2]", samples=16, vary=vary, common_noise=c, **SINK) for c in (False, True)
     )
     # Nothing depends on the water's density: its total is what the noise makes of a pair of members.
-    assert alone.total[0, 1] > 1e-6 and alike.total[0, 1] < 1e-20
+    assert alone.total[0, 1] > 1e-6
+    assert alike.total[0, 1] < 1e-20
 
 
 NOISE = lw.WrenchNoise(force=(1.0, 1.0, 1.0), torque=(0.0, 0.0, 0.0))
@@ -296,7 +312,8 @@ FAST = {"start.angular_velocity[2]": lw.Uniform(low=0.0, high=210.0), "vehicle.b
 
 def test_members_that_fail_are_counted_and_refused(scene):
     message = fault(uq.sobol, scene, "position[2]", samples=64, vary=FAST, **RUN)
-    assert "of 384 members failed (step_too_large" in message and 'failed="drop"' in message
+    assert "of 384 members failed (step_too_large" in message
+    assert 'failed="drop"' in message
     with pytest.raises(uq.FailedMembers):
         uq.morris(
             scene,
@@ -309,8 +326,11 @@ def test_members_that_fail_are_counted_and_refused(scene):
 
 def test_whole_groups_are_used_alone(scene):
     found = uq.sobol(scene, "position[2]", samples=64, vary=FAST, failed="drop", **RUN)
-    assert 30 < found.samples < 64 and found.failed > 0 and found.members == 384
-    assert f"the {64 - found.samples} of 64 groups" in found.messages[0] and np.isfinite(found.first).all()
+    assert 30 < found.samples < 64
+    assert found.failed > 0
+    assert found.members == 384
+    assert f"the {64 - found.samples} of 64 groups" in found.messages[0]
+    assert np.isfinite(found.first).all()
     message = fault(uq.sobol, scene, "position[2]", samples=8, failed="drop", **RUN,
                     vary=FAST | {"start.angular_velocity[2]": lw.Uniform(low=300.0, high=400.0)})  # fmt: skip
     assert "0 groups" in message
@@ -347,7 +367,8 @@ def test_members_that_reach_the_surface_count_with_where_they_arrive():
     vary = {"start.position[2]": lw.Uniform(low=1.0, high=7.0), "start.velocity[0]": lw.Uniform(low=0.2, high=0.4)}
     found = uq.sobol(rising, "position[2]", samples=256, vary=vary, seed=1, **settings)
     # z - 4 above 4 m, else 0: half of the members arrive, and the speed to the north is no matter.
-    assert found.failed == 0 and found.std[0] ** 2 == pytest.approx(15.0 / 16.0, rel=0.05)
+    assert found.failed == 0
+    assert found.std[0] ** 2 == pytest.approx(15.0 / 16.0, rel=0.05)
     np.testing.assert_allclose(found.total.ravel(), [1.0, 0.0], atol=0.02)
 
 

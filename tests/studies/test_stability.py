@@ -35,7 +35,8 @@ def number(found):
 def test_beyond_the_solvable_step_every_cell_is_flagged(found):
     # h |J^-1 pi| = 2 for psi_s; a little less, since weight and Munk moment spin some starts up, or down by h |Om| / 2.
     beyond = number(found) > 2.0 * 1.2
-    assert beyond.sum() > 8 and np.all(found.classes["psi_s"][beyond] == Cell.FLAGGED)
+    assert beyond.sum() > 8
+    assert np.all(found.classes["psi_s"][beyond] == Cell.FLAGGED)
     assert np.all(found.statuses["psi_s"][beyond] == lw.Status.STEP_TOO_LARGE)
 
 
@@ -49,16 +50,17 @@ def test_short_steps_are_accurate(found):
 def test_between_they_are_bounded(found):
     h_w = found.x.values * 1.42  # w of the Munk oscillation at the start, the fastest besides the spin
     middle = (number(found) > 0.5) & (number(found) < 1.5) & (h_w < 0.5)
-    assert middle.sum() >= 4 and np.all(found.classes["psi_s"][middle] == Cell.BOUNDED)
-    assert np.all(found.energies["psi_s"][middle] <= 1.0) and np.all(found.errors["psi_s"][middle] > 1e-2)
+    assert middle.sum() >= 4
+    assert np.all(found.classes["psi_s"][middle] == Cell.BOUNDED)
+    assert np.all(found.energies["psi_s"][middle] <= 1.0)
+    assert np.all(found.errors["psi_s"][middle] > 1e-2)
 
 
 def test_the_measured_limit_is_the_analytic_one(found):
     limit = found.limit("psi_s")
     ratios = found.ratios["psi_s"]["rotation"]
-    assert np.allclose(ratios, number(found) / 2.0) and np.allclose(
-        found.ratios["psi_x"]["rotation"], number(found) / 4.0
-    )
+    assert np.allclose(ratios, number(found) / 2.0)
+    assert np.allclose(found.ratios["psi_x"]["rotation"], number(found) / 4.0)
     fast = found.y.values > 4.0
     factor = found.x.values[1] / found.x.values[0]
     # The last good step lies within a cell below, and never beyond h |Om| = 2.
@@ -78,7 +80,8 @@ def test_classes_and_numbers_agree(found):
         assert np.all(found.errors[method][classes == Cell.ACCURATE] <= found.error_bound)
         assert np.all(found.energies[method][classes < Cell.FAILED] <= 1.0)
         assert sum(found.counts(method).values()) == 64
-    assert found.unverified == 0 and found.judged == "conservative"
+    assert found.unverified == 0
+    assert found.judged == "conservative"
 
 
 def test_errors_are_those_of_a_run_of_its_own(found, scene):
@@ -114,7 +117,9 @@ def test_what_acts_decides_how_energy_is_judged(scene):
         return judged(StabilityGrid(one, "h", "angular_velocity", (2, 2), 1, 0, None), ["psi_s"])
 
     drag, current = lw.Drag(linear=[1.0] * 6), lw.Current(velocity=[0.3, 0.0, 0.0])
-    assert kind() == "conservative" and kind(drag) == "dissipative" and kind(current) == "conservative"
+    assert kind() == "conservative"
+    assert kind(drag) == "dissipative"
+    assert kind(current) == "conservative"
     assert kind(drag, current) == "dissipative"
     assert kind(lw.Current(velocity=[0.0, 0.0, 0.1])) == "driven"
     assert kind(current, lw.Tether(anchor=[0.0, 0.0, 0.0], stiffness=5.0)) == "driven"
@@ -136,7 +141,8 @@ def test_growth_of_energy_is_over_what_the_start_can_hold(scene):
 
     faster, slower, lost = (altered(factor) for factor in (2.0, 0.5, np.nan))
     # Four times the kinetic energy of translation: three times what it was too much, of M from 189 to 199 kg.
-    assert 2.5 < invariants.energy_growth(faster)[0] < 3.5 and invariants.energy_growth(lost)[0] == np.inf
+    assert 2.5 < invariants.energy_growth(faster)[0] < 3.5
+    assert invariants.energy_growth(lost)[0] == np.inf
     assert invariants.energy_growth(slower)[0] > 0.6 > invariants.energy_growth(slower, dissipative=True)[0]
 
 
@@ -157,13 +163,16 @@ def test_progress_rises_to_one(scene):
     seen = []
     lw.stability_map(scene, ("h", 0.05, 1.0), ("angular_velocity", 1.0, 4.0), ["psi_s"], points=2, t1=4.0,
                      error_time=1.0, progress=seen.append)  # fmt: skip
-    assert seen == sorted(seen) and seen[-1] == 1.0 and len(seen) > 2
+    assert seen == sorted(seen)
+    assert seen[-1] == 1.0
+    assert len(seen) > 2
 
 
 def test_a_step_on_no_axis(scene):
     one = lw.stability_map(scene, ("speed", 0.1, 2.0), ("angular_velocity", 1.0, 4.0), ["psi_s"], points=(3, 2), t1=4.0,
                            error_time=1.0, h=0.01)  # fmt: skip
-    assert one.classes["psi_s"].shape == (2, 3) and np.all(one.classes["psi_s"] == Cell.ACCURATE)
+    assert one.classes["psi_s"].shape == (2, 3)
+    assert np.all(one.classes["psi_s"] == Cell.ACCURATE)
     assert np.all(one.limit("psi_s") == one.x.values[-1])
 
 
@@ -175,22 +184,24 @@ def test_exact_drag_has_no_limit_and_explicit_drag_has(scene):
     drag = one.x.values * one.y.values[:, None]
     # Half a second is coarse for the Munk oscillation, which is said of its cells whatever the drag; 2 is its limit.
     resolved = 2.0 * one.ratios["psi_s"]["munk"] <= COARSE
-    assert np.all(resolved[:, :-1]) and not np.any(resolved[:, -1])
-    assert one.judged == "dissipative" and np.all(one.classes["psi_s"][resolved] <= Cell.BOUNDED)
-    assert np.all(one.classes["psi_s"][~resolved] == Cell.FLAGGED) and np.all(one.statuses["psi_s"] == lw.Status.OK)
+    assert np.all(resolved[:, :-1])
+    assert not np.any(resolved[:, -1])
+    assert one.judged == "dissipative"
+    assert np.all(one.classes["psi_s"][resolved] <= Cell.BOUNDED)
+    assert np.all(one.classes["psi_s"][~resolved] == Cell.FLAGGED)
+    assert np.all(one.statuses["psi_s"] == lw.Status.OK)
     # Beyond its limit every member of rk4 gets a status, and is frozen before or after its energy passed the bound. Short of
     # it none does, though near it the warning that its matrices leave the rotations flags some cells.
     beyond, short = one.statuses["rk4"][drag > 2.785 * 1.1], one.statuses["rk4"][drag < 2.0]
-    assert (
-        np.all(beyond != lw.Status.OK)
-        and np.all(short == lw.Status.OK)
-        and np.all(one.energies["rk4"][drag < 2.0] <= 1.0)
-    )
+    assert np.all(beyond != lw.Status.OK)
+    assert np.all(short == lw.Status.OK)
+    assert np.all(one.energies["rk4"][drag < 2.0] <= 1.0)
     assert np.all(one.classes["rk4"][drag > 2.785 * 1.1] >= Cell.FLAGGED)
     assert np.allclose(one.ratios["rk4"]["drag"] * 2.785, drag, rtol=1e-3)
     refused = one.statuses["kl8(psi_x)"] == 255
     # The longest stage that goes backward is .6055 of a step, and is to have a drag number of .5 at most.
-    assert np.all(refused[drag * 0.6055 > 0.55]) and not np.any(refused[drag * 0.6055 < 0.45])
+    assert np.all(refused[drag * 0.6055 > 0.55])
+    assert not np.any(refused[drag * 0.6055 < 0.45])
     assert np.all(one.classes["kl8(psi_x)"][refused] == Cell.FLAGGED)
     assert any("goes backward" in text for text in one.messages)
 
@@ -199,7 +210,8 @@ def test_exact_drag_has_no_limit_and_explicit_drag_has(scene):
 def test_what_drives_a_scene_is_compared_with_the_reference(scene):
     pushed = dataclasses.replace(scene, terms=[lw.Wrench(force=[500.0, 0.0, 0.0])])
     one = lw.stability_map(pushed, ("h", 0.01, 0.3), "angular_velocity", ["psi_s"], points=4)
-    assert one.judged == "driven" and one.t1 == one.error_time
+    assert one.judged == "driven"
+    assert one.t1 == one.error_time
     assert np.all(one.classes["psi_s"][:2, 0] == Cell.ACCURATE)
 
 
@@ -222,7 +234,8 @@ def test_the_picture_shows_every_class(found, tmp_path):
 
     path = lw.plot_stability(found, tmp_path / "map.png")
     picture = imread(path)[..., :3]
-    assert picture.shape[0] > 400 and picture.shape[1] > 900
+    assert picture.shape[0] > 400
+    assert picture.shape[1] > 900
     for method, part in zip(found.methods, panels(picture, len(found.methods)), strict=True):
         for cell in set(found.classes[method].ravel()) - {Cell.SILENT}:
             color = [int(CELLS[cell][k : k + 2], 16) / 255 for k in (1, 3, 5)]
@@ -247,9 +260,13 @@ def test_the_command(tmp_path, capsys):
     out = capsys.readouterr().out
     assert sorted(path.name for path in tmp_path.iterdir()) == ["stability.csv", "stability.json", "stability.png"]
     again = StabilityMap.load(tmp_path / "stability.json")
-    assert again.t1 == 8.0 and again.classes["psi_s"].shape == (5, 5) and again.provenance["seed"] == 3
-    assert "limit of h over angular_velocity" in out and "stability.png" in out
-    assert again.provenance["scene"]["vehicle"]["mass"] == 123.8 and "warp-lang" in again.provenance["versions"]
+    assert again.t1 == 8.0
+    assert again.classes["psi_s"].shape == (5, 5)
+    assert again.provenance["seed"] == 3
+    assert "limit of h over angular_velocity" in out
+    assert "stability.png" in out
+    assert again.provenance["scene"]["vehicle"]["mass"] == 123.8
+    assert "warp-lang" in again.provenance["versions"]
 
 
 @pytest.mark.parametrize(
@@ -265,7 +282,8 @@ def test_the_command(tmp_path, capsys):
 def test_a_bad_argument_is_refused_with_the_remedy(arguments, words, tmp_path, capsys):
     assert cli.main(["stability", PAPER, "--out", str(tmp_path / "out"), *arguments]) == 2
     text = capsys.readouterr().err
-    assert all(word in text for word in words) and "Traceback" not in text
+    assert all(word in text for word in words)
+    assert "Traceback" not in text
 
 
 def test_a_map_of_whatever_statistics_know(scene):
@@ -273,13 +291,15 @@ def test_a_map_of_whatever_statistics_know(scene):
     axes = ("h", 0.02, 0.5), ("angular_velocity", 0.5, 5.0)
     asked = {"points": 3, "t1": 4.0, "error_time": 2.0, "directions": 2, "error": 1e-4}
     depth, position = (lw.stability_map(scene, *axes, ["psi_x"], of=of, **asked) for of in ("depth", "position"))
-    assert (depth.of, depth.unit) == ("depth", "m") and "accurate    depth to 0.0001 m" in report_text(depth)
-    assert (depth.errors["psi_x"] <= position.errors["psi_x"] * (1.0 + 1e-9)).all() and (
-        depth.errors["psi_x"] > 0.0
-    ).all()
+    assert (depth.of, depth.unit) == ("depth", "m")
+    assert "accurate    depth to 0.0001 m" in report_text(depth)
+    assert (depth.errors["psi_x"] <= position.errors["psi_x"] * (1.0 + 1e-9)).all()
+    assert (depth.errors["psi_x"] > 0.0).all()
     good = position.classes["psi_x"] == Cell.ACCURATE
-    assert good.any() and (depth.classes["psi_x"][good] == Cell.ACCURATE).all()
+    assert good.any()
+    assert (depth.classes["psi_x"][good] == Cell.ACCURATE).all()
     back = StabilityMap.from_dict(depth.to_dict())
-    assert back.unit == "m" and "error_depth" in back.rows()[0]
+    assert back.unit == "m"
+    assert "error_depth" in back.rows()[0]
     old = {name: value for name, value in position.to_dict().items() if name != "unit"}
     assert StabilityMap.from_dict(old).unit == "m"

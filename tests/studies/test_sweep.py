@@ -95,8 +95,10 @@ def test_a_case_that_is_refused_is_noted_and_the_others_go_on(found):
     rows = found.rows()
     assert [row["case"] for row in rows] == [name for name in ("soft", "stiff", "unknown") for _ in range(2)]
     assert [bool(row["refused"]) for row in rows] == [False] * 4 + [True] * 2
-    assert "did you mean 'heading_pid.kp'" in rows[4]["refused"] and "refused" in str(found)
-    assert found.table["success"].shape == (3, 2) and np.isnan(found.table["success"].values[2]).all()
+    assert "did you mean 'heading_pid.kp'" in rows[4]["refused"]
+    assert "refused" in str(found)
+    assert found.table["success"].shape == (3, 2)
+    assert np.isnan(found.table["success"].values[2]).all()
     with pytest.raises(lw.SceneError, match="was refused"):
         found.success("unknown", {"controller.delay": 0.02})
 
@@ -110,7 +112,8 @@ def test_members_are_the_same_in_all_cells_bit_by_bit(found, scene):
     # What the compass shows at the first look, before the loop has acted, has the same noise in every case.
     save = lw.SaveAt(every=4.0, fields=("attitude", "measured_heading"))
     first = [found.again(cell.case.name, [0, 7, 299], cell.point, save).measured_heading[0] for cell in cells]
-    assert all(heading.tobytes() == first[0].tobytes() for heading in first) and len(np.unique(first[0])) == 3
+    assert all(heading.tobytes() == first[0].tobytes() for heading in first)
+    assert len(np.unique(first[0])) == 3
     # The members are those of a run by itself, of any number of them.
     alone = lw.Ensemble(scene, 20, 3, VARY)
     assert alone.parameters(0, 20)["vehicle.mass"].tobytes() == inputs[0]["vehicle.mass"][:20].tobytes()
@@ -120,7 +123,8 @@ def test_cells_that_differ_in_numbers_share_a_kernel(found):
     soft, late, stiff = (found.cells[i].fleet for i in (0, 1, 2))
     signals = ("attitude", "position", "reference_heading", "reference_position")
     kernels = [make_plan(fleet, fields=lambda asked: signals).advance for fleet in (soft, stiff)]
-    assert kernels[0] is kernels[1] and late is not None
+    assert kernels[0] is kernels[1]
+    assert late is not None
 
 
 def test_success_is_that_of_the_normal_distribution(found):
@@ -129,7 +133,8 @@ def test_success_is_that_of_the_normal_distribution(found):
     x = found.inputs(found.cells[0])["start.position[0]"]
     for cell in found.cells[:4]:
         value, lower, upper = found.success(cell.case.name, cell.point)
-        assert value == np.mean(np.abs(x) < 1.0) and lower < expected < upper
+        assert value == np.mean(np.abs(x) < 1.0)
+        assert lower < expected < upper
         assert (lower, upper) == pytest.approx(
             tuple(stats.binomtest(int(value * 300 + 0.5), 300).proportion_ci(0.95, "wilson"))
         )
@@ -140,11 +145,14 @@ def test_causes_are_what_decides(found):
     at = {"controller.delay": 0.02}
     rows = found.causes("soft", at)
     # Success is a function of the start alone: a band of it, which no slope shows. 13 bins, of which two are mixed.
-    assert rows[0]["input"] == "start.position[0]" and rows[0]["share"] > 0.8 and rows[0]["p"] < 1e-9
+    assert rows[0]["input"] == "start.position[0]"
+    assert rows[0]["share"] > 0.8
+    assert rows[0]["p"] < 1e-9
     assert all(row["p"] > 0.01 and row["share"] < 0.1 for row in rows[1:])
     gain = found.causes("soft", at, of="rms heading")[0]
     x, y = found.inputs(found.cells[0])["heading_pid.kp"], found.values("soft", "rms heading", at)
-    assert gain["input"] == "heading_pid.kp" and np.sign(gain["slope"]) == np.sign(np.corrcoef(x, y)[0, 1])
+    assert gain["input"] == "heading_pid.kp"
+    assert np.sign(gain["slope"]) == np.sign(np.corrcoef(x, y)[0, 1])
     assert "start.position[0] (explains" in str(found)
 
 
@@ -152,7 +160,8 @@ def test_the_worst_corner_is_the_one_known(found):
     x = found.inputs(found.cells[0])["start.position[0]"]
     worst = found.worst(3, by="way", case="stiff")
     assert {row["member"] for row in worst[:2]} == {int(np.argmax(np.abs(x)))}
-    assert worst[0]["way"] == np.abs(x).max() and worst[0]["start.position[0]"] == x[np.argmax(np.abs(x))]
+    assert worst[0]["way"] == np.abs(x).max()
+    assert worst[0]["start.position[0]"] == x[np.argmax(np.abs(x))]
 
 
 def test_the_worst_again_alone_have_their_bits(found, scene):
@@ -171,13 +180,19 @@ def test_the_worst_again_alone_have_their_bits(found, scene):
 def test_a_comparison_sees_what_common_members_show(found):
     rows = {row.of: row for row in found.compare("soft", "stiff", {"controller.delay": 0.02})}
     same = rows["success"]
-    assert same.difference.value == 0.0 and same.only == (0, 0) and not same.real and same.p == 1.0
-    assert rows["way"].difference[:3] == (0.0, 0.0, 0.0) and not rows["way"].real
+    assert same.difference.value == 0.0
+    assert same.only == (0, 0)
+    assert not same.real
+    assert same.p == 1.0
+    assert rows["way"].difference[:3] == (0.0, 0.0, 0.0)
+    assert not rows["way"].real
     x, y = (found.values(case, "rms heading", {"controller.delay": 0.02}) for case in ("soft", "stiff"))
     expected = stats.ttest_rel(y, x)
-    assert rows["rms heading"].difference.p == pytest.approx(expected.pvalue, rel=1e-9) and rows["rms heading"].real
+    assert rows["rms heading"].difference.p == pytest.approx(expected.pvalue, rel=1e-9)
+    assert rows["rms heading"].real
     many = found.compare("soft", "stiff")
-    assert len(many) == 2 * 5 and all(row.p >= row.difference.p for row in many)
+    assert len(many) == 2 * 5
+    assert all(row.p >= row.difference.p for row in many)
     above = found.compare("soft", "stiff", {"controller.delay": 0.02}, quantile=0.9)
     level = {row.of: row for row in above}["rms heading"]
     assert level.difference.lower < level.difference.value < level.difference.upper
@@ -190,10 +205,10 @@ def test_ranks_say_which_differences_are_real(scene, found):
     ranks = strict.ranking()
     x, y = (strict.passed(strict.cell(case)) for case in ("soft", "stiff"))
     p = stats.binomtest(int((y & ~x).sum()), int((x ^ y).sum()), 0.5).pvalue
-    assert p < 0.05 and [row["case"] for row in ranks] == (
-        ["stiff", "soft"] if y.mean() > x.mean() else ["soft", "stiff"]
-    )
-    assert ranks[0]["better_than"] == ranks[1]["case"] and ranks[1]["better_than"] == ""
+    assert p < 0.05
+    assert [row["case"] for row in ranks] == (["stiff", "soft"] if y.mean() > x.mean() else ["soft", "stiff"])
+    assert ranks[0]["better_than"] == ranks[1]["case"]
+    assert ranks[1]["better_than"] == ""
     assert strict.survival("soft", [1.0, 7.0])[1] == (1.0, *strict.survival("soft", [7.0])[0][1:])
 
 
@@ -219,7 +234,9 @@ def test_a_sweep_that_was_stopped_goes_on_with_the_same_bytes(scene, tmp_path, f
     swept(scene, tmp_path / "stopped", progress=shares.append).save(tmp_path / "stopped")
     swept(scene, tmp_path / "whole", threads=1).save(tmp_path / "whole")
     one, other = files_of(tmp_path / "stopped"), files_of(tmp_path / "whole")
-    assert one == other and kept.items() <= one.items() and shares[-1] == 1.0
+    assert one == other
+    assert kept.items() <= one.items()
+    assert shares[-1] == 1.0
     assert {
         "table.csv",
         "sweep.json",
@@ -236,7 +253,8 @@ def test_a_sweep_that_was_stopped_goes_on_with_the_same_bytes(scene, tmp_path, f
     swept(scene, tmp_path / "whole")
     assert files_of(tmp_path / "whole") == other
     more = swept(scene, tmp_path / "whole", cases=[*CASES, {"name": "third", "set": {"heading_pid.kd": 5.0}}])
-    assert len(list((tmp_path / "whole" / "cells").iterdir())) == 6 and len(more.cells) == 8
+    assert len(list((tmp_path / "whole" / "cells").iterdir())) == 6
+    assert len(more.cells) == 8
     assert more.values("soft", "rms heading", {"controller.delay": 0.02}).tobytes() == found.values(
         "soft", "rms heading", {"controller.delay": 0.02}).tobytes()  # fmt: skip
 
@@ -247,7 +265,8 @@ def test_all_failing_and_none_failing_say_their_limit(found):
     assert "none of 300 fails: at most 0.994 % do" in str(all_pass)
     none = replace(found, conditions=type(found.conditions)(limits={"way": (-1.0, 0.0)}), interval="clopper_pearson")
     lower, upper = none.success("soft", {"controller.delay": 0.02})[1:]
-    assert lower == 0.0 and upper == pytest.approx(1.0 - 0.025 ** (1.0 / 300.0))
+    assert lower == 0.0
+    assert upper == pytest.approx(1.0 - 0.025 ** (1.0 / 300.0))
     assert "none of 300 passes" in str(none)
 
 
@@ -265,10 +284,12 @@ def test_members_that_fail_do_not_pass_and_come_first(scene):
     bad = swept(scene, grid=None, cases=None, vary={**VARY, "start.velocity[0]": lw.Choice([0.0, 1e307], [0.9, 0.1])})
     record = bad.record(bad.cells[0])
     lost = failed(record.status)
-    assert 0 < lost.sum() < MEMBERS and not bad.passed(bad.cells[0])[lost].any()
+    assert 0 < lost.sum() < MEMBERS
+    assert not bad.passed(bad.cells[0])[lost].any()
     worst, ends = bad.worst(2), record.numbers["time_to_failure"]
     assert all(lost[row["member"]] for row in worst)
-    assert [row["time_to_failure"] for row in worst] == sorted(ends)[:2] and min(ends) < 8.0
+    assert [row["time_to_failure"] for row in worst] == sorted(ends)[:2]
+    assert min(ends) < 8.0
     (row,) = bad.rows()
     assert row["failed"] == row["way missing"] == lost.sum()
 
@@ -330,8 +351,10 @@ baseline = "stiff"
     ):
         assert main([*given, "--json", "-q"]) == code
         assert differing(json.loads(capsys.readouterr().out), name) == []
-    assert main(["info", str(out)]) == 0 and "# Sweep" in capsys.readouterr().out
-    assert main(["plot", str(out)]) == 0 and "by the same lgvi-warp sweep" in capsys.readouterr().err
+    assert main(["info", str(out)]) == 0
+    assert "# Sweep" in capsys.readouterr().out
+    assert main(["plot", str(out)]) == 0
+    assert "by the same lgvi-warp sweep" in capsys.readouterr().err
     (tmp_path / "sweep.toml").write_text(text.replace('overshoot heading" = { below', 'overshot heading" = { below'))
     assert main(["sweep", str(tmp_path / "sweep.toml"), "--out", str(out)]) == 2
     assert "did you mean 'overshoot heading'" in capsys.readouterr().err
@@ -373,8 +396,10 @@ def test_a_grid_of_a_million_cells_is_refused_with_its_time(scene):
 def test_other_samplings_refuse_what_would_change_the_members(scene):
     found = swept(scene, sampling="sobol", cases=CASES[:2], grid=None, members=256)
     rows = found.rows()
-    assert "which a sobol does not give" in str(found) and repr(found) == "Sweep(2 cases, 1 points, 256 members)"
-    assert not rows[0]["refused"] and "the other numbers would be others too" in rows[1]["refused"]
+    assert "which a sobol does not give" in str(found)
+    assert repr(found) == "Sweep(2 cases, 1 points, 256 members)"
+    assert not rows[0]["refused"]
+    assert "the other numbers would be others too" in rows[1]["refused"]
 
 
 @pytest.mark.slow
@@ -407,7 +432,8 @@ of = "heading"
     assert before == {name: (cells / name).stat().st_mtime_ns for name in done}
     drawn = {name: {path: data for path, data in files_of(tmp_path / name).items() if not path.endswith(".png")}
              for name in ("killed", "whole")}  # fmt: skip
-    assert drawn["killed"] == drawn["whole"] and len(drawn["whole"]) == 6 + 7
+    assert drawn["killed"] == drawn["whole"]
+    assert len(drawn["whole"]) == 6 + 7
 
 
 @pytest.mark.slow

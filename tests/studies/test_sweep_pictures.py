@@ -35,7 +35,8 @@ def test_success_over_one_axis_has_a_line_for_each_case(found, tmp_path):  # noq
     expected = [100.0 * np.array(found.success(cell.case.name, cell.point)) for cell in cells]
     np.testing.assert_allclose(bars_of(axes), expected, atol=1e-9)
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["soft", "stiff"]
-    assert axes.get_xlabel() == "controller.delay" and "95% interval" in axes.get_ylabel()
+    assert axes.get_xlabel() == "controller.delay"
+    assert "95% interval" in axes.get_ylabel()
 
 
 def test_success_of_cases_alone(plain):
@@ -60,7 +61,8 @@ def test_success_over_two_axes_is_a_map_with_intervals(scene):  # noqa: F811
                 assert text.get_text() == "refused"
                 continue
             value, lower, upper = 100.0 * np.array(wide.success(case, cell.point))
-            assert image[j, i] == value and text.get_text() == f"{value:.1f}\n{lower:.1f} to {upper:.1f}"
+            assert image[j, i] == value
+            assert text.get_text() == f"{value:.1f}\n{lower:.1f} to {upper:.1f}"
         assert len(axes.texts) == 4
 
 
@@ -89,7 +91,8 @@ def test_differences_are_paired_ones_from_the_top_down(found):  # noqa: F811
         d = row.difference
         np.testing.assert_allclose(drawn[i][:3], 100.0 * np.array([d.value, d.lower, d.upper]), atol=1e-9)
         assert drawn[i][3] == bool(row.real)
-    assert len(drawn) == len(rows) and axes.get_ylim()[0] > axes.get_ylim()[1]
+    assert len(drawn) == len(rows)
+    assert axes.get_ylim()[0] > axes.get_ylim()[1]
 
 
 def test_causes_are_drawn_where_most_is_open(found):  # noqa: F811
@@ -97,10 +100,12 @@ def test_causes_are_drawn_where_most_is_open(found):  # noqa: F811
     cells = [cell for cell in found.cells if not found.record(cell).refused]
     cell = min(cells, key=lambda cell: abs(found.passed(cell).mean() - 0.5))
     rows = found.causes(cell.case.name, cell.point)
-    assert axes.get_title() == cell.name and axes.get_xlabel().startswith(f"{rows[0]['input']}: explains ")
+    assert axes.get_title() == cell.name
+    assert axes.get_xlabel().startswith(f"{rows[0]['input']}: explains ")
     passed, x = found.passed(cell), found.inputs(cell)[rows[0]["input"]]
     for line, chosen in zip(axes.get_lines(), (passed, ~passed), strict=True):
-        assert line.get_xdata().tolist() == x[chosen].tolist() and line.get_label().endswith(f": {chosen.sum():,}")
+        assert line.get_xdata().tolist() == x[chosen].tolist()
+        assert line.get_label().endswith(f": {chosen.sum():,}")
 
 
 def test_responses_are_fans_of_members_run_again(plain):

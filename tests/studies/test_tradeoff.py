@@ -55,7 +55,9 @@ def found(scene):
 def test_the_front_is_monotone_and_nothing_beats_it(found, of, kind):
     front = found.front(of, kind)
     costs, errors = [one.us_per_vehicle_second for one in front], [one.error(of, kind) for one in front]
-    assert len(front) > 3 and costs == sorted(costs) and errors == sorted(errors, reverse=True)
+    assert len(front) > 3
+    assert costs == sorted(costs)
+    assert errors == sorted(errors, reverse=True)
     for one in found.shown(of, kind):
         assert any(
             c <= one.us_per_vehicle_second and e <= one.error(of, kind) for c, e in zip(costs, errors, strict=True)
@@ -73,7 +75,8 @@ def test_errors_scale_with_the_order(found, method, order, least):
     line = [one for one in found.shown("attitude") if one.setting.name == method and one.setting.dtype == "float64"]
     fine = [one for one in line if least < one.error("attitude") < 1e-3]
     slope = np.polyfit(np.log([one.setting.h for one in fine]), np.log([one.error("attitude") for one in fine]), 1)[0]
-    assert len(fine) >= 3 and abs(slope - order) < 0.3
+    assert len(fine) >= 3
+    assert abs(slope - order) < 0.3
 
 
 def test_the_reference_is_the_truth(found, scene):
@@ -81,7 +84,8 @@ def test_the_reference_is_the_truth(found, scene):
     reference = comparison.make_reference(sample, seconds=ENOUGH)
     other = sample.run(sample.candidate("kl6(psi_x)", 40))
     apart = comparison.errors(comparison.distances(other, reference.result), -1 + len(sample.times))
-    assert apart["position"]["path_max"] < 1e-11 and reference.error("position") < 1e-11
+    assert apart["position"]["path_max"] < 1e-11
+    assert reference.error("position") < 1e-11
 
 
 def test_a_bad_reference_is_refused(scene, monkeypatch):
@@ -126,24 +130,26 @@ def test_cpu_time_is_that_of_the_run(scene):
     few, many = (sample.candidate("psi_s", m) for m in (4, 400_000))
     tried = [tradeoffs.tried(sample, one, None).cpu_seconds for one in (few, many)]
     predicted = [suggestion.seconds_of(sample.ensemble, one, 4.0) for one in (few, many)]
-    assert tried[1] > 5.0 * tried[0] and predicted[1] > 5.0 * predicted[0]
+    assert tried[1] > 5.0 * tried[0]
+    assert predicted[1] > 5.0 * predicted[0]
 
 
 def test_errors_of_whatever_statistics_know(scene, tmp_path):
     of = "depth"
     fleet = lw.Ensemble(scene, 8, 1, scene.ensemble_settings.vary)
     found = lw.tradeoff(fleet, 4.0, of, methods=["su4(psi_x)"], seconds=ENOUGH)
-    assert found.of == of and found.units[of] == "m" and len(found.front()) > 2
+    assert found.of == of
+    assert found.units[of] == "m"
+    assert len(found.front()) > 2
     for one in found.measurements:
         assert one.error(of) <= one.error("position") * (1.0 + 1e-9)
-    assert (
-        f"{of}_path_max" in found.rows()[0]
-        and json.loads(found.to_json())["units"][of]
-        and of in tradeoffs.report_text(found)
-    )
+    assert f"{of}_path_max" in found.rows()[0]
+    assert json.loads(found.to_json())["units"][of]
+    assert of in tradeoffs.report_text(found)
     assert lw.plot_tradeoff(found, tmp_path / "of.png").stat().st_size > 10_000
     suggested = lw.suggest(fleet, 1e-4, of, t1=4.0, methods=["su4(psi_x)"], seconds=ENOUGH)
-    assert suggested.of == of and suggested.margin >= 1.0
+    assert suggested.of == of
+    assert suggested.margin >= 1.0
     times = lw.SaveAt(at=list(Sample(fleet, 4.0).times[1:]))
     result = lw.solve(fleet, t1=4.0, save=times, threads=1, **suggested.settings)
     assert suggestion.verified(fleet, result, suggested)[0] <= 1.05e-4
@@ -224,11 +230,14 @@ def test_steps_near_the_front_are_between_those_tried_first(found):
 def test_growth_of_exponential_and_power():
     t = np.linspace(0.0, 50.0, 21)
     grown = comparison.fitted(t, np.exp(0.3 * t), 50.0)
-    assert grown.power is None and math.isclose(grown.doubling, math.log(2.0) / 0.3, rel_tol=1e-9)
+    assert grown.power is None
+    assert math.isclose(grown.doubling, math.log(2.0) / 0.3, rel_tol=1e-9)
     assert math.isclose(grown.predictable["float64"], math.log(1e-2 / 2.0**-53) / 0.3, rel_tol=1e-6)
     assert grown.predictable["float32"] <= 42.5  # within the run
     slow = comparison.fitted(t, 1.0 + 2.0 * t, 50.0)
-    assert slow.power is not None and slow.doubling == math.inf and slow.predictable["float64"] == math.inf
+    assert slow.power is not None
+    assert slow.doubling == math.inf
+    assert slow.predictable["float64"] == math.inf
 
 
 def test_biases_shrink_with_the_step_and_are_one_for_other_members(scene):
@@ -239,7 +248,8 @@ def test_biases_shrink_with_the_step_and_are_one_for_other_members(scene):
     assert near[0] / near[1] == pytest.approx(16.0, rel=0.2)
     others = Sample(lw.Ensemble(scene, 64, 2, scene.ensemble_settings.vary), 4.0)
     chance = comparison.biases(others.run(others.candidate("kl8(psi_x)", 8)), fine)
-    assert 0.3 < chance["position_mean"] < 4.0 and 0.3 < chance["position_std"] < 4.0
+    assert 0.3 < chance["position_mean"] < 4.0
+    assert 0.3 < chance["position_std"] < 4.0
 
 
 @wp.func
@@ -291,7 +301,8 @@ def noisy_fleet(term):
 def test_noise_without_a_grid_compares_statistics_only(tmp_path):
     fleet = noisy_fleet(Shaken(strength=5.0))
     found = lw.tradeoff(fleet, 4.0, methods=["psi_x"], seconds=60.0)
-    assert found.front() == [] and "noise acts" in found.messages[0]
+    assert found.front() == []
+    assert "noise acts" in found.messages[0]
     assert all(0.0 < one.biases["position_mean"] < 5.0 for one in found.measurements)
     assert lw.plot_tradeoff(found, tmp_path / "noise.png").stat().st_size > 10_000
     with pytest.raises(lw.SceneError, match=r"error = 0.001: noise acts.*tradeoff"):
@@ -301,7 +312,8 @@ def test_noise_without_a_grid_compares_statistics_only(tmp_path):
 @pytest.mark.slow
 def test_noise_is_compared_on_one_path():
     found = lw.tradeoff(noisy_fleet(CURRENT), 4.0, methods=["psi_x", "psi_s"], seconds=60.0)
-    assert "all runs see one path" in found.messages[0] and len(found.front(kind="path_rms")) > 3
+    assert "all runs see one path" in found.messages[0]
+    assert len(found.front(kind="path_rms")) > 3
     steps, errors = np.array([(one.setting.h, one.error(kind="path_rms")) for one in found.shown()
                               if one.setting.text == "psi_x float64"]).T  # fmt: skip
     # Of order 1, each by 32 members, three axes and as many times as there are.
@@ -313,27 +325,31 @@ def test_noise_is_compared_on_one_path():
 def test_a_suggestion_in_noise_keeps_the_error(noise_step):
     fleet = noisy_fleet(dataclasses.replace(CURRENT, noise_step=noise_step))
     found = lw.suggest(fleet, 0.02, t1=4.0, methods=["psi_x"], seconds=ENOUGH)
-    assert "all runs see one path" in str(found) and found.expected <= 0.02
+    assert "all runs see one path" in str(found)
+    assert found.expected <= 0.02
     # Half the cost of float64, whatever number of draws the longest steps take.
     assert found.setting.dtype == "float32"
     result = lw.solve(fleet, t1=4.0, threads=1, **found.settings)
     error, members = suggestion.verified(fleet, result, found)
     # Another path, and the largest of 32 members: not the same error, but one of its size.
-    assert 0.2 * found.expected < error < 0.04 and members == 32
+    assert 0.2 * found.expected < error < 0.04
+    assert members == 32
 
 
 @pytest.mark.slow
 def test_events_end_what_is_compared(scene, tmp_path):
     falling = dataclasses.replace(scene, events=[{"type": "floor", "depth": 11.0}])
     found = lw.tradeoff(lw.Ensemble(falling, 1, 1), 4.0, methods=["psi_x"], seconds=ENOUGH)
-    assert found.front()[-1].error() < 1e-6 and found.measurements[0].biases == {}
+    assert found.front()[-1].error() < 1e-6
+    assert found.measurements[0].biases == {}
     assert lw.plot_tradeoff(found, tmp_path / "one.png").stat().st_size > 10_000
 
 
 def test_time_that_is_up_leaves_the_first_method(scene):
     # As on a busy machine, where the reference's kernels alone take longer to compile than the whole is to take.
     found = lw.tradeoff(lw.Ensemble(scene, 8, 1), 4.0, methods=METHODS, seconds=1e-6)
-    assert found.front() and found.measurements[0].setting.name == METHODS[0]
+    assert found.front()
+    assert found.measurements[0].setting.name == METHODS[0]
     assert "no time for " in " ".join(found.messages)
 
 
@@ -381,10 +397,14 @@ def test_a_suggestion_keeps_the_error(seed):
     times = lw.SaveAt(at=list(sample.times[1:]))
     result = lw.solve(fleet, t1=asked["t1"], save=times, threads=1, **found.settings)
     apart = comparison.distances(result, reference.result)[asked["of"]]
-    assert apart.max() <= asked["error"] and found.margin >= 1.0
+    assert apart.max() <= asked["error"]
+    assert found.margin >= 1.0
     error, members = suggestion.verified(fleet, result, found)
-    assert error <= 1.05 * asked["error"] and members == 64
-    assert found.memory_bytes > 0 and found.run_seconds > 0.0 and found.setting.method in str(found)
+    assert error <= 1.05 * asked["error"]
+    assert members == 64
+    assert found.memory_bytes > 0
+    assert found.run_seconds > 0.0
+    assert found.setting.method in str(found)
 
 
 @pytest.mark.slow
@@ -394,7 +414,8 @@ def test_suggestions_for_twenty_scenes():
         fleet, asked = random_scene(seed)
         error, cost, _ = judged(fleet, lw.suggest(fleet, **asked), asked, rounds=15)
         kept, cheap = kept + (error <= 1.0), cheap + (cost <= 1.5)
-    assert kept >= 19 and cheap >= 19
+    assert kept >= 19
+    assert cheap >= 19
 
 
 @pytest.mark.parametrize(
@@ -432,13 +453,15 @@ def test_the_command_writes_files_that_load_again(tmp_path, capsys):
     content = json.loads((tmp_path / "tradeoff.json").read_text())
     with (tmp_path / "tradeoff.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert len(rows) == len(content["measurements"]) > 8 and content["units"]["position"] == "m"
+    assert len(rows) == len(content["measurements"]) > 8
+    assert content["units"]["position"] == "m"
     assert [float(row["h"]) for row in rows] == [one["setting"]["h"] for one in content["measurements"]]
     assert sum(row["front"] == "True" for row in rows) == len(content["front"])
     from matplotlib.image import imread
 
     picture = imread(tmp_path / "tradeoff.png")
-    assert picture.shape[1] > 1200 and all(third.std() > 0.05 for third in np.array_split(picture[..., :3], 3, axis=1))
+    assert picture.shape[1] > 1200
+    assert all(third.std() > 0.05 for third in np.array_split(picture[..., :3], 3, axis=1))
 
 
 def test_run_with_an_error_chooses_and_checks(tmp_path, capsys):
@@ -478,4 +501,5 @@ def test_a_suggestion_keeps_its_error_on_fresh_members(seed):
     result = lw.solve(fresh, t1=8.0, save=save, **found.settings)
     truth = lw.solve(fresh, "rk8", h=1.0 / 400.0, t1=8.0, save=save)
     errors = np.linalg.norm(result.position - truth.position, axis=2).max(axis=0)
-    assert errors.max() <= found.error and errors.max() > 0.02 * found.expected
+    assert errors.max() <= found.error
+    assert errors.max() > 0.02 * found.expected

@@ -94,7 +94,8 @@ def receiver(path):
         end = time.monotonic() + PATIENCE
         size = -1
         while size != (size := path.stat().st_size if path.exists() else 0) or not size:
-            assert time.monotonic() < end and process.poll() is None
+            assert time.monotonic() < end
+            assert process.poll() is None
             time.sleep(0.2)
     # A server's file has no table of contents.
     raw = path.rename(path.with_suffix(".raw.rrd"))

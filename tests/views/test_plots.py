@@ -172,14 +172,18 @@ def texts(figure):
 def test_nothing_is_cut_off(drawn, name):
     figure = drawn[name]
     box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
-    assert box.x0 >= -0.01 and box.y0 >= -0.01 and box.x1 <= width + 0.01 and box.y1 <= height + 0.01
+    assert box.x0 >= -0.01
+    assert box.y0 >= -0.01
+    assert box.x1 <= width + 0.01
+    assert box.y1 <= height + 0.01
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_text_can_be_read_at_700_pixels(drawn, name):
     figure = drawn[name]
     pixels = [text.get_fontsize() / 72.0 * 700.0 / figure.get_figwidth() for text in texts(figure)]
-    assert len(pixels) > 5 and min(pixels) >= 8.0
+    assert len(pixels) > 5
+    assert min(pixels) >= 8.0
 
 
 # Axes of numbers without a unit, and of names.
@@ -256,19 +260,22 @@ def test_the_fan_is_of_those_under_way_and_says_how_many(solved, drawn):
     median = next(line for line in axes.lines if line.get_label() == "median")
     np.testing.assert_allclose(median.get_ydata(), np.nanmedian(depth, axis=1))
     all_of_them = axes.collections[0].get_paths()[0].vertices[:, 1]
-    assert all_of_them.min() == pytest.approx(np.nanmin(depth)) and all_of_them.max() == pytest.approx(np.nanmax(depth))
+    assert all_of_them.min() == pytest.approx(np.nanmin(depth))
+    assert all_of_them.max() == pytest.approx(np.nanmax(depth))
     assert axes.get_legend().get_title().get_text() == f"under way: {N} at 0 s,\n{going[-1].sum()} at 20 s"
     points = next(one for one in axes.collections if one.get_label().startswith("floor")).get_offsets()
     stopped = np.asarray(solved.status) == Status.FLOOR
     np.testing.assert_allclose(np.sort(points[:, 0]), np.sort(solved.failure_time[stopped]))
-    assert axes.yaxis_inverted() and {"surface", "floor"} <= {text.get_text() for text in axes.texts}
+    assert axes.yaxis_inverted()
+    assert {"surface", "floor"} <= {text.get_text() for text in axes.texts}
     above = int((depth < 0.0).any(axis=0).sum())
     assert f"unbounded water: {above} of {N} members pass above depth 0" in axes.get_title()
 
 
 def test_one_vehicle_is_a_line_and_two_samples_have_marks_and_a_hint(drawn):
     depth = drawn["one vehicle"].axes[1]
-    assert not depth.collections and depth.get_legend() is None
+    assert not depth.collections
+    assert depth.get_legend() is None
     assert "1 members" not in "".join(text.get_text() for text in texts(drawn["one vehicle"]))
     two = drawn["two samples"]
     assert "SaveAt(every=...)" in two.get_suptitle()
@@ -282,9 +289,11 @@ def test_a_far_surface_is_told_not_drawn():
     assert [text.get_text() for text in axes.texts] == ["floor", "surface\n100 m\nabove"]
     # Both stand beside the axes, and the one above the other.
     boxes = [text.get_window_extent() for text in axes.texts]
-    assert all(box.x0 > axes.bbox.x1 for box in boxes) and boxes[0].y1 < boxes[1].y0
+    assert all(box.x0 > axes.bbox.x1 for box in boxes)
+    assert boxes[0].y1 < boxes[1].y0
     low, high = axes.get_ylim()
-    assert 101.3 < low < 102.0 and 99.0 < high < 100.0
+    assert 101.3 < low < 102.0
+    assert 99.0 < high < 100.0
 
 
 def test_angles_are_drawn_about_their_mean_direction(solved):
@@ -305,7 +314,8 @@ def test_statistics_stand_for_samples(solved, drawn):
     np.testing.assert_array_equal(median, middle[:, middle.shape[1] // 2])
     assert axes.get_legend().get_title().get_text() == f"{N} members, from statistics"
     bars = lw.plots.histogram(bare, at=0.0)
-    assert sum(bar.get_width() for bar in bars.patches) == pytest.approx(100.0) and bars.yaxis_inverted()
+    assert sum(bar.get_width() for bar in bars.patches) == pytest.approx(100.0)
+    assert bars.yaxis_inverted()
     assert lw.plots.summary(bare)[0].get_title() == "quantiles depth"
     assert lw.plots.outcomes(bare).get_ylabel() == "share of members [%]"
     for name in ("paths", "plan_view", "phase", "attitude", "pairs", "drift"):
@@ -317,17 +327,16 @@ def test_a_panel_of_statistics_says_unit_direction_and_what_is_left_out(solved, 
     figure = drawn["statistics"]
     panels = {axes.get_title(): axes for axes in figure.axes if axes.get_title()}
     histogram = panels["histogram depth"]
-    assert (
-        histogram.get_ylabel() == "depth [m], down"
-        and histogram.yaxis_inverted()
-        and not panels["mean velocity"].yaxis_inverted()
-    )
+    assert histogram.get_ylabel() == "depth [m], down"
+    assert histogram.yaxis_inverted()
+    assert not panels["mean velocity"].yaxis_inverted()
     # At the start all members are in one bin: on an even scale all else would be dark.
     (cells,) = histogram.collections
     norm = cells.norm
     assert (norm(0.25 * norm.vmax) - norm(0.0)) / (norm(norm.vmax) - norm(0.0)) == pytest.approx(0.5)
     (bar,) = (axes for axes in figure.axes if axes.get_label() == "<colorbar>")
-    assert bar.axison and bar.get_ylabel() == "share of members [%]"
+    assert bar.axison
+    assert bar.get_ylabel() == "share of members [%]"
     assert "not drawn, see the table: covariance position, mean path_maximum speed" in figure.get_suptitle().replace(
         "\n", " "
     )
@@ -344,9 +353,8 @@ def test_shares_of_outcomes(solved, drawn):
     (axes,) = drawn["outcomes"].axes
     stopped = int((np.asarray(solved.status) == Status.FLOOR).sum())
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels[0] == f"under way, {N - stopped} to the end" and labels[1].startswith(
-        f"floor: {stopped} of {N}, the first at "
-    )
+    assert labels[0] == f"under way, {N - stopped} to the end"
+    assert labels[1].startswith(f"floor: {stopped} of {N}, the first at ")
     at_end = axes.collections[0].get_paths()[0].vertices
     assert at_end[at_end[:, 0] == 20.0, 1].max() == pytest.approx(100.0 * (N - stopped) / N)
 
@@ -355,10 +363,8 @@ def test_a_histogram_counts_every_member_once(solved, drawn):
     (axes,) = drawn["histogram"].axes
     assert sum(bar.get_width() for bar in axes.patches) == pytest.approx(100.0)
     speed = lw.plots.histogram(solved, "max(speed)")
-    assert (
-        sum(bar.get_height() for bar in speed.patches) == pytest.approx(100.0)
-        and speed.get_xlabel() == "max(speed) [m/s]"
-    )
+    assert sum(bar.get_height() for bar in speed.patches) == pytest.approx(100.0)
+    assert speed.get_xlabel() == "max(speed) [m/s]"
     same = dataclasses.replace(solved, samples={**solved.samples, "position": np.full_like(solved.position, 20.0)})
     assert sum(bar.get_width() for bar in lw.plots.histogram(same).patches) == pytest.approx(100.0)
 
@@ -372,7 +378,8 @@ def test_the_front_is_in_colour_and_named_at_its_lines(drawn):
         if line.get_label() != "cheapest for each error":
             assert (line.get_color() == canvas.GREY) == (name not in best), name
     labels = [text.get_text() for text in costs.texts]
-    assert best < set(labels) and any(label.endswith(", float32_compensated") for label in labels)
+    assert best < set(labels)
+    assert any(label.endswith(", float32_compensated") for label in labels)
     styles = {line.get_label().split(", ")[1]: line.get_linestyle() for line in costs.lines if ", " in line.get_label()}
     assert len(set(styles.values())) == 3
     boxes = [Text.get_window_extent(text) for text in costs.texts]
@@ -384,9 +391,13 @@ def test_files_and_axes(solved, tmp_path, ending_of_name):
     figure = Figure()
     left, right = figure.subplots(1, 2)
     path = tmp_path / f"picture.{ending_of_name}"
-    assert lw.plots.fan(solved, "speed", ax=left) is left and not list(tmp_path.iterdir())
-    assert lw.plots.paths(solved, ax=right, path=path) is right and path.stat().st_size > 5000 and len(figure.axes) == 2
-    assert lw.plot(solved, tmp_path / "all.svg") == tmp_path / "all.svg" and len(lw.plot(solved)) == 4
+    assert lw.plots.fan(solved, "speed", ax=left) is left
+    assert not list(tmp_path.iterdir())
+    assert lw.plots.paths(solved, ax=right, path=path) is right
+    assert path.stat().st_size > 5000
+    assert len(figure.axes) == 2
+    assert lw.plot(solved, tmp_path / "all.svg") == tmp_path / "all.svg"
+    assert len(lw.plot(solved)) == 4
 
 
 def test_refusals_name_the_remedy(solved):

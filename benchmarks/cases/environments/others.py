@@ -114,7 +114,8 @@ def mujoco_rollout(members, steps, rounds):
         state[...] = pool.rollout(model, [data], state.copy(), commands, nstep=EVERY)[0][:, -1]
 
     speed = speed_of(act, members, steps, rounds)
-    assert np.isfinite(state).all() and (np.abs(state[:, 1:4]).max(axis=1) > 0.0).all()
+    assert np.isfinite(state).all()
+    assert (np.abs(state[:, 1:4]).max(axis=1) > 0.0).all()
     return speed
 
 

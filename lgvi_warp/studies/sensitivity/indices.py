@@ -206,7 +206,8 @@ class SobolIndices(Indices):
         """List the records of every analysis, then those of two factors together."""
         yield from super().rows()
         for q, j, k in self._pairs():
-            assert self.second is not None and self.second_confidence is not None
+            assert self.second is not None
+            assert self.second_confidence is not None
             yield {"quantity": self.quantities[q], "factor": self.factors[j], "other": self.factors[k], "index": "second",
                    "value": float(self.second[q, j, k]), "confidence": float(self.second_confidence[q, j, k])}  # fmt: skip
 

@@ -87,7 +87,8 @@ class Axis:
 
         Returns: Values from low to high (points,), in the unit of the axis.
         """
-        assert self.low is not None and self.high is not None
+        assert self.low is not None
+        assert self.high is not None
         return np.geomspace(self.low, self.high, points) if self.log else np.linspace(self.low, self.high, points)
 
 

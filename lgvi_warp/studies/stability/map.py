@@ -334,7 +334,8 @@ def stability_map(
         both = (points, points) if isinstance(points, int) else tuple(listed("points", points, "two numbers"))
         grid = StabilityGrid(scene, x, y, both, directions, whole("seed", seed, 0), h)
     faults.raise_if_any()
-    assert grid is not None and compared is not None
+    assert grid is not None
+    assert compared is not None
     error_time, t1 = (None if value is None else float(value) for value in (error_time, t1))
     refused = refusals(grid, names, dtype)
     if len(refused) == len(names):

@@ -290,7 +290,8 @@ def _tracked(sweep: Sweep, cells: list[Cell]) -> str:
 
 def _response(axes: Any, sweep: Sweep, cell: Cell, of: str, count: int) -> None:
     """Draw the fan of the first members of a cell, and what is wanted of a number."""
-    assert cell.fleet is not None and cell.fleet.scene.controller is not None
+    assert cell.fleet is not None
+    assert cell.fleet.scene.controller is not None
     duration = float(sweep.setup.settings.get("t1") or cell.fleet.scene.run.duration or 0.0)
     period = float(cell.fleet.scene.controller.period)
     every = period * max(1, int(duration / period / MOST_PATHS))

@@ -101,7 +101,8 @@ def _length(run: Drawn) -> tuple[Mesh | tuple[float, float], float]:
     if shape.mesh is not None:
         mesh = mesh_of(shape.mesh)
         return mesh, mesh.length
-    assert shape.length is not None and shape.diameter is not None
+    assert shape.length is not None
+    assert shape.diameter is not None
     return (shape.length, shape.diameter), max(shape.length, shape.diameter)
 
 

@@ -44,10 +44,10 @@ def test_lines_of_a_store(store, tmp_path):
                                   "blocks      2 of 3 finished; complete"]  # fmt: skip
     store["provenance"]["scene"]["controller"] = {"period": 0.5, "laws": [{"type": "pid"}]}
     said = lines_of(store, "-v")
-    assert said[2] == "controller  looks every 0.5 s; laws pid" and said[3].startswith(
-        "how         seed 1, checks safe"
-    )
-    assert said[4] == "versions    lgvi-warp 1.0" and len(said) == 7
+    assert said[2] == "controller  looks every 0.5 s; laws pid"
+    assert said[3].startswith("how         seed 1, checks safe")
+    assert said[4] == "versions    lgvi-warp 1.0"
+    assert len(said) == 7
 
 
 @pytest.mark.parametrize(("options", "count", "shown", "more"), [
@@ -101,17 +101,20 @@ def test_info_of_a_folder_with_everything(store, tmp_path, monkeypatch, capsys):
     said = [line.partition(" (")[0] for line in text.split("\n")]
     others = ["a.png", "b.rrd", "c.nc", "d.parquet", "e.html", "f.csv", "g.txt", "tradeoff.csv"]
     assert said[-9:] == [*(f"file        {tmp_path}/{name}" for name in others), ""]
-    assert said[0] == f"file        {tmp_path}/result.npz" and said[1].startswith("members     4, psi_s")
+    assert said[0] == f"file        {tmp_path}/result.npz"
+    assert said[1].startswith("members     4, psi_s")
     places = [text.index(words) for words in ("tradeoff.json (", "# A sweep\nrun         ", "2 of 3 finished")]
     assert places == sorted(places)
     assert "how  " not in text
     assert cli.main(["info", str(tmp_path), "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
-    assert document["path"] == str(tmp_path) and document["complete"] is True
+    assert document["path"] == str(tmp_path)
+    assert document["complete"] is True
     assert [held["kind"] for held in document["holds"]] == ["result", "tradeoff", "sweep", "store"]
     assert [held["path"] for held in document["holds"]] == [
         f"{tmp_path}/{name}" for name in ("result.npz", "tradeoff.json", "sweep.json", "run.zarr")]  # fmt: skip
-    assert document["holds"][0]["members"] == 4 and document["holds"][2]["content"] == {"seed": 3}
+    assert document["holds"][0]["members"] == 4
+    assert document["holds"][2]["content"] == {"seed": 3}
     assert document["files"] == [f"{tmp_path}/{name}" for name in others]
     assert states.calls[0] == ((tmp_path / "run.zarr",), {})
     (tmp_path / "run.zarr" / "a.png").write_text("x")
@@ -183,14 +186,16 @@ def test_the_last_run_of_a_folder_is_viewed(monkeypatch):
     monkeypatch.setattr(Content, "load", lambda self: self)
     held = [Content("result", Path("a")), Content("store", Path("b")), Content("sweep", Path("c"))]
     monkeypatch.setattr(view, "contents", lambda _: held)
-    assert view.run_in(Path("x")) == held[1] and view.run_in(Path("x.npz")) == Content("result", Path("x.npz"))
+    assert view.run_in(Path("x")) == held[1]
+    assert view.run_in(Path("x.npz")) == Content("result", Path("x.npz"))
     held[:2] = []
     with pytest.raises(lw.SceneError, match=r"^x: holds a study, and no run; give the folder of a run$"):
         view.run_in(Path("x"))
 
 
 def test_members_to_view_are_a_list():
-    assert view.indices(None) is None and view.indices(" 3, 17") == [3, 17]
+    assert view.indices(None) is None
+    assert view.indices(" 3, 17") == [3, 17]
     for text in ("3,,4", "-1", "", "3;4"):
         with pytest.raises(lw.SceneError, match="is no list of members; write --members 3,17"):
             view.indices(text)
@@ -203,8 +208,10 @@ def test_a_viewed_run_says_its_file(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("lgvi_warp.views.recording.rerun.log_rerun", log)
     monkeypatch.setattr("lgvi_warp.views.recording.rerun.show", lambda result, members: shown.append(members))
     assert cli.main(["view", str(tmp_path), "--out", str(tmp_path / "a.rrd"), "--members", "1,2"]) == 0
-    assert capsys.readouterr().out == f"file        {tmp_path}/a.rrd (0.2 MB)\n" and logged == [(4, [1, 2])]
-    assert cli.main(["view", str(tmp_path), "--json"]) == 0 and shown == [None]
+    assert capsys.readouterr().out == f"file        {tmp_path}/a.rrd (0.2 MB)\n"
+    assert logged == [(4, [1, 2])]
+    assert cli.main(["view", str(tmp_path), "--json"]) == 0
+    assert shown == [None]
     assert json.loads(capsys.readouterr().out)["files"] == []
     for error in (lw_error("no member"), OSError("no display")):
         monkeypatch.setattr("lgvi_warp.views.recording.rerun.show", Study(error))
@@ -243,7 +250,8 @@ def test_merging_says_what_is_missing(tmp_path, monkeypatch, capsys):
                  f"the members that it keeps are missing; {resume}, or says why not"):  # fmt: skip
         assert cli.main(verb) == 1
         assert capsys.readouterr() == (f"{line}\n", f"lgvi-warp: {path}: {text}\n")
-    assert cli.main([*verb, "--overwrite"]) == 0 and capsys.readouterr() == (f"{line}, complete\n", "")
+    assert cli.main([*verb, "--overwrite"]) == 0
+    assert capsys.readouterr() == (f"{line}, complete\n", "")
     assert cli.main([*verb, "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert {name: document[name] for name in ("file", "complete", "blocks", "missing")} == {
@@ -263,14 +271,16 @@ def test_a_run_is_exported_and_reported(tmp_path, monkeypatch, capsys):
     assert cli.main(["export", "a", "--to", "netcdf", "--out", "b"]) == 0
     assert capsys.readouterr().out == f"file        {tmp_path}/a.nc (0.1 MB)\n"
     assert write.calls == [((Path("a"), "netcdf", Path("b")), {})]
-    assert cli.main(["report", "a"]) == 0 and opened == []
+    assert cli.main(["report", "a"]) == 0
+    assert opened == []
     assert capsys.readouterr().out == f"file        {tmp_path}/report.html (0.1 MB)\n"
     assert cli.main(["report", "a", "--out", "b", "--open", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert (document["file"], document["bytes"]) == (f"{tmp_path}/b.html", 100_000)
     assert opened == [f"file://{tmp_path}/b.html"]
     assert [values for values, _ in page.calls] == [(Path("a"), Path("a/report.html")), (Path("a"), Path("b"))]
-    assert stores.export(parsed(["export", "a", "--to", "x", "-q"])) == 0 and capsys.readouterr().out == ""
+    assert stores.export(parsed(["export", "a", "--to", "x", "-q"])) == 0
+    assert capsys.readouterr().out == ""
 
 
 def test_files_that_were_written_and_why_not(tmp_path):
@@ -282,12 +292,15 @@ def test_files_that_were_written_and_why_not(tmp_path):
                         ("f", Study(MissingExtra("tables", "pandas", "io"))),
                         ("g", Study(MissingExtra("plots", "matplotlib", "viz")))):  # fmt: skip
         written.take(tmp_path / name, study)
-    assert written.files == [tmp_path / "a"] and written.empty == [f"{tmp_path}/c was not written: nothing"]
+    assert written.files == [tmp_path / "a"]
+    assert written.empty == [f"{tmp_path}/c was not written: nothing"]
     assert written.faults == [f"{tmp_path}/{name}" for name in ("b was not written: odd", "e was not written: broken")]
     libraries = "not made without matplotlib and pandas; to have pictures: pip install 'lgvi-warp[viz,io]'"
-    assert written.note_lines() == [f"note        d, f, g: {libraries}"] and Written().note_lines() == []
+    assert written.note_lines() == [f"note        d, f, g: {libraries}"]
+    assert Written().note_lines() == []
     with pytest.raises(KeyError):
         written.take(tmp_path / "h", Study(KeyError("a bug")))
     calls = []
     written.draw(lambda *given: calls.append(given), "numbers", tmp_path / "i")
-    assert calls == [("numbers", tmp_path / "i")] and written.files[-1] == tmp_path / "i"
+    assert calls == [("numbers", tmp_path / "i")]
+    assert written.files[-1] == tmp_path / "i"

@@ -61,14 +61,16 @@ packets     vehicles, table: dense float64 8
     )
     assert cli.main(["info", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
-    assert document["memory"] == 3 * 2**30 and document["peak"] == {"float64": 1.25e10, "float32": 2.5e10}
+    assert document["memory"] == 3 * 2**30
+    assert document["peak"] == {"float64": 1.25e10, "float32": 2.5e10}
     assert document["packets"]["plain float32"] == {"vehicles": 16, "source": "tuned"}
     for memory, physical in ((0, 1), (2**30, 2**30), (2**30, None)):
         monkeypatch.setattr(common, "memory_bytes", lambda memory=memory: memory)
         monkeypatch.setattr(common, "physical_memory", lambda physical=physical: physical)
         cli.main(["info"])
         said = capsys.readouterr().out
-        assert ("memory      1.0 GiB\n" in said) == bool(memory) and ("memory  " in said) == bool(memory)
+        assert ("memory      1.0 GiB\n" in said) == bool(memory)
+        assert ("memory  " in said) == bool(memory)
     for quota in (4.0, None, 5.0):
         monkeypatch.setattr(container, "cpu_quota", lambda quota=quota: quota)
         cli.main(["info"])
@@ -80,7 +82,8 @@ def test_bench_and_tune_in_full(known, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(
         "lgvi_warp.studies.speed.measure", lambda *given: study.calls.append(given) or iter(study.result)
     )
-    assert cli.main(["bench"]) == 0 and capsys.readouterr().out == '{"a": 1}\n{"a": 2}\n'
+    assert cli.main(["bench"]) == 0
+    assert capsys.readouterr().out == '{"a": 1}\n{"a": 2}\n'
     assert cli.main(["bench", "--members", "5", "--steps", "7", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["readings"] == [{"a": 1}, {"a": 2}]
     assert study.calls == [(4096, 1000), (5, 7)]
@@ -88,7 +91,8 @@ def test_bench_and_tune_in_full(known, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("lgvi_warp.studies.packet_width.tune", lambda: readings)
     kept = []
     monkeypatch.setattr(widths, "keep", lambda best: kept.append(best) or "a file")
-    assert cli.main(["tune"]) == 0 and kept == [{"plain float64": 16, "dense float64": 8}]
+    assert cli.main(["tune"]) == 0
+    assert kept == [{"plain float64": 16, "dense float64": 8}]
     assert capsys.readouterr().out == (
         "plain float64       8: 2.00 ns, 16: 1.52 ns: 16, 8 by the table\n"
         "dense float64       8: 1.00 ns: 8, as by the table\n"
@@ -120,15 +124,14 @@ def test_check_in_full(capsys):
     assert cli.main(["check", PAPER, "--members", "1200"]) == 0
     said = capsys.readouterr().out
     assert said.startswith(f"scene       {PAPER}, members 1,200, psi_s, step 0.01 s, 15,000 steps\n")
-    assert said.endswith("result      can run\n") and said.count("\n") == 2
+    assert said.endswith("result      can run\n")
+    assert said.count("\n") == 2
     assert cli.main(["check", PAPER, "--set", "vehicle.buoyancy=9000.0", "--json"]) == 0
     (note, *_) = json.loads(capsys.readouterr().out)["notes"]
     assert cli.main(["check", PAPER, "--set", "vehicle.buoyancy=9000.0"]) == 0
     lines = capsys.readouterr().out.split("\n")
-    assert (
-        lines[1] == f"note        {note}"
-        and lines[-2] == "result      can run, with notes: nothing is refused for them"
-    )
+    assert lines[1] == f"note        {note}"
+    assert lines[-2] == "result      can run, with notes: nothing is refused for them"
     assert cli.main(["check", PAPER, "--set", 'run.iterations="auto"']) == 0
     assert "psi_s, step 0.01 s" in capsys.readouterr().out
 
@@ -140,7 +143,8 @@ def test_lists_in_full(capsys):
     width = max(map(len, said))
     assert all(line[width : width + 2] == "  " and line[width + 2] != " " for line in said.values())
     texts = {name: line[width + 2 :] for name, line in said.items()}
-    assert texts["psi_s"] == "order 2, splitting" and texts["rk4"] == "order 4, explicit"
+    assert texts["psi_s"] == "order 2, splitting"
+    assert texts["rk4"] == "order 4, explicit"
     assert texts["gauss6"] == "order 6, Gauss collocation"
     assert texts["kl8(psi_x)"] == "order 8, composition of 17 stages, of psi_x or another symmetric method of order 2"
     assert texts["bm4(psi_x)"] == "order 4, composition of the halves of psi_x or another such method"
@@ -150,13 +154,13 @@ def test_lists_in_full(capsys):
         assert cli.main(["list", what, "--json"]) == 0
         names[what] = {entry["name"]: entry["text"] for entry in json.loads(capsys.readouterr().out)["names"]}
     terms, laws = names["terms"], names["laws"]
-    assert list(names["vehicles"]) == lw.vehicles() and names["vehicles"]["sphere"]
-    assert list(terms) == sorted(terms) and terms["drag"] == inspect.getdoc(lw.Drag).partition("\n")[0]
+    assert list(names["vehicles"]) == lw.vehicles()
+    assert names["vehicles"]["sphere"]
+    assert list(terms) == sorted(terms)
+    assert terms["drag"] == inspect.getdoc(lw.Drag).partition("\n")[0]
     sections = [text.partition(":")[0] for text in laws.values()]
-    assert (
-        sections[0] == "laws"
-        and len(dict.fromkeys(sections)) == sum(a != b for a, b in zip(sections, sections[1:])) + 1
-    )
+    assert sections[0] == "laws"
+    assert len(dict.fromkeys(sections)) == sum(a != b for a, b in zip(sections, sections[1:])) + 1
     assert [name for name, text in laws.items() if text.startswith("laws:")] == sorted(
         name for name, text in laws.items() if text.startswith("laws:"))  # fmt: skip
 
@@ -169,7 +173,8 @@ def test_comments_of_a_new_scene_stand_in_a_column(tmp_path, capsys):
     for start in ('name = "remus_100"', "# buoyancy = "):
         (line,) = (line for line in lines if line.startswith(start))
         assert line.rindex("#") == lists.COLUMN
-    assert "lgvi-warp check dive.toml says" in text and "{" + '"' not in text
+    assert "lgvi-warp check dive.toml says" in text
+    assert "{" + '"' not in text
     assert '"start.angular_velocity" = { normal = { std = 0.01 } }' in text
     named = lw.Scene.named("remus_100")
     assert f"# buoyancy = {named.vehicle.buoyancy:g} " in text
@@ -191,7 +196,8 @@ def test_scripts_for_shells_in_full():
     assert values.endswith(
         '    case "$verb $before" in\n        "go --to") words="x y" ;;\n        " --color") words="auto always never" ;;\n'
     )
-    assert "if" not in values and '[[ " go see " == *" $each "* ]]' in values
+    assert "if" not in values
+    assert '[[ " go see " == *" $each "* ]]' in values
     cases = (
         'go) words="up down -q --to --out" ;;',
         'see) words="--all" files=1 ;;',
@@ -216,14 +222,19 @@ def test_scripts_for_shells_in_full():
 
 def test_verbs_are_read_from_the_parser():
     known = {verb.name: verb for verb in completion.verbs()}
-    assert known["list"].words == ("methods", "vehicles", "terms", "laws") and known["run"].words == ()
+    assert known["list"].words == ("methods", "vehicles", "terms", "laws")
+    assert known["run"].words == ()
     options = known["run"].options
-    assert set(options["--method"][1]) >= {"psi_s", "rk4", "gauss6"} and options["--dtype"][1][0] == "float64"
+    assert set(options["--method"][1]) >= {"psi_s", "rk4", "gauss6"}
+    assert options["--dtype"][1][0] == "float64"
     assert known["new"].options["--vehicle"][1] == tuple(lw.vehicles())
     assert known["export"].options["--to"][1] == ("netcdf", "parquet")
     assert known["help"].words == tuple(known)
-    assert options["--store"][1] == ("npz", "zarr") and options["--out"][1] == () and options["--live"][1] is None
-    assert options["--quiet"] == options["-q"] and options["--out"][0].startswith("folder for the files")
+    assert options["--store"][1] == ("npz", "zarr")
+    assert options["--out"][1] == ()
+    assert options["--live"][1] is None
+    assert options["--quiet"] == options["-q"]
+    assert options["--out"][0].startswith("folder for the files")
     assert known["list"].text == "Names of methods, vehicles, terms, or laws of controllers."
 
 
@@ -237,7 +248,8 @@ def test_values_become_plain():
     }
     plain = output.plain(value)
     assert plain == {"1": 0.5, "a": [[1, 2]], "b": [str(ROOT), None], "c": True, "d": [None, None]}
-    assert type(plain["1"]) is float and plain["c"] is True
+    assert type(plain["1"]) is float
+    assert plain["c"] is True
 
 
 @pytest.mark.parametrize(
@@ -283,8 +295,10 @@ def test_labels_have_their_colors(monkeypatch):
 )
 def test_how_the_command_ends(monkeypatch, capsys, error, code, text):
     monkeypatch.setitem(command.VERBS, "info", Study(error))
-    assert cli.main(["info"]) == code and capsys.readouterr() == ("", f"lgvi-warp: {text}\n")
-    assert cli.main(["info", "-v"]) == code and "Traceback" in capsys.readouterr().err
+    assert cli.main(["info"]) == code
+    assert capsys.readouterr() == ("", f"lgvi-warp: {text}\n")
+    assert cli.main(["info", "-v"]) == code
+    assert "Traceback" in capsys.readouterr().err
     signals = Signals(str)
     command.code_of(error, cli.parser().parse_args(["info"]), signals)
     assert signals.said
@@ -306,7 +320,8 @@ def test_what_verbs_leave(tmp_path):
     assert left("sweep", "a", "--plan") == left("info") == left("plan", "a") == nothing
     assert left("new", "a") == left("run", "a", "--store", "zarr", "--out", out) == "nothing was written"
     (tmp_path / "run.zarr").mkdir()
-    assert left("run", "a", "--store", "zarr", "--out", out) == f"{kept} {out}" and left("resume", "b") == f"{kept} b"
+    assert left("run", "a", "--store", "zarr", "--out", out) == f"{kept} {out}"
+    assert left("resume", "b") == f"{kept} b"
     assert left("run", "a", "--out", out) == "nothing was written"
 
 
@@ -333,12 +348,17 @@ def test_the_console_script_ends_the_process(monkeypatch, end, code):
         patched.setattr(os, "fstat", fstat)
         patched.setattr(os, "open", lambda *given: opened.append(given))
         command.entry()
-    assert codes == [code] and ended == ["gc", True] and os.environ["RUST_LOG"] == "off"
-    assert closed == [0, 1, 2] and opened == [(os.devnull, os.O_RDWR)]
+    assert codes == [code]
+    assert ended == ["gc", True]
+    assert os.environ["RUST_LOG"] == "off"
+    assert closed == [0, 1, 2]
+    assert opened == [(os.devnull, os.O_RDWR)]
     monkeypatch.setenv("RUST_LOG", "debug")
     monkeypatch.delitem(sys.modules, "lgvi_warp.common.warp_setup")
     command.entry()
-    assert codes == [code, code] and os.environ["RUST_LOG"] == "debug" and len(ended) == 3
+    assert codes == [code, code]
+    assert os.environ["RUST_LOG"] == "debug"
+    assert len(ended) == 3
 
 
 def test_a_stream_that_is_gone_is_silent():
@@ -354,14 +374,17 @@ def test_a_stream_that_is_gone_is_silent():
 
     for number in (errno.EPIPE, errno.EIO, errno.ESHUTDOWN):
         stream = Lasting(Gone(number))
-        assert stream.write("abc") == 3 and stream.write("ab") == 2 and not stream.isatty()
+        assert stream.write("abc") == 3
+        assert stream.write("ab") == 2
+        assert not stream.isatty()
         stream.flush()
     for act in (lambda stream: stream.write("a"), lambda stream: stream.flush()):
         full = Lasting(Gone(errno.ENOSPC))
         for _ in range(2):
             with pytest.raises(OSError, match="gone"):
                 act(full)
-    assert Lasting(None).write("ab") == 2 and Lasting(None).isatty() is False
+    assert Lasting(None).write("ab") == 2
+    assert Lasting(None).isatty() is False
 
 
 def test_files_are_written_side_by_side(tmp_path):
@@ -370,7 +393,8 @@ def test_files_are_written_side_by_side(tmp_path):
     jobs = writing.side_by_side(
         {names[0]: lambda path: path.write_text("x") and path, names[1]: Study(OSError("full"))}
     )
-    assert list(jobs) == names and jobs[names[0]].result() == names[0]
+    assert list(jobs) == names
+    assert jobs[names[0]].result() == names[0]
     with pytest.raises(OSError, match="full"):
         jobs[names[1]].result()
 
@@ -390,4 +414,5 @@ def test_an_interrupt_names_the_files_that_are_finished(tmp_path, monkeypatch):
         writing.side_by_side({names[0]: lambda path: path, names[1]: Study(OSError("full"))})
     with pytest.raises(KeyboardInterrupt) as caught:
         writing.side_by_side({names[1]: Study(OSError("full"))})
-    assert not isinstance(caught.value, writing.Ended) and waited == [0.2, 0.2]
+    assert not isinstance(caught.value, writing.Ended)
+    assert waited == [0.2, 0.2]

@@ -60,9 +60,11 @@ def test_the_folder_is_named_after_the_scene(tmp_path, monkeypatch):
         words = parsed(["run", scene])
         assert str(settings.out_of(words, suffix)) == f"runs/{name}"
     assert not list(tmp_path.iterdir())
-    assert settings.folder(parsed(["run", "dive.toml"]), "_y").is_dir() and (tmp_path / "runs" / "dive_y").is_dir()
+    assert settings.folder(parsed(["run", "dive.toml"]), "_y").is_dir()
+    assert (tmp_path / "runs" / "dive_y").is_dir()
     given = parsed(["run", "dive.toml", "--out", str(tmp_path / "a" / "b")])
-    assert settings.folder(given, "_y") == tmp_path / "a" / "b" and (tmp_path / "a" / "b").is_dir()
+    assert settings.folder(given, "_y") == tmp_path / "a" / "b"
+    assert (tmp_path / "a" / "b").is_dir()
     assert settings.folder(given) == tmp_path / "a" / "b"  # a second time
 
 

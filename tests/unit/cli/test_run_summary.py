@@ -42,10 +42,13 @@ def test_a_plain_run_is_summed_up():
     result = told()
     lines = summary(result)
     assert lines[:2] == ["members     4, psi_s, float64, step 0.01 s, 100 steps", "status      ok 4"]
-    assert lines[2].startswith("drift       ") and lines[2].endswith(" (largest of all members)") and len(lines) == 3
+    assert lines[2].startswith("drift       ")
+    assert lines[2].endswith(" (largest of all members)")
+    assert len(lines) == 3
     verbose = summary(result, verbose=True)
     assert verbose[1] == "how         seed 1, checks safe, packets of 8, 2 threads on a cpu (avx2)"
-    assert verbose[2] == "versions    numpy 2, warp 1" and verbose[3:] == lines[1:]
+    assert verbose[2] == "versions    numpy 2, warp 1"
+    assert verbose[3:] == lines[1:]
 
 
 def test_notes_come_first_and_the_speed_before_the_outcomes():
@@ -66,7 +69,9 @@ def test_outcomes_but_ok_have_a_line_each():
     lines = summary(result)
     (first,) = (i for i, line in enumerate(lines) if line.startswith("status"))
     said = [line.split(",")[0].split(":")[0] for line in lines if line.startswith("  ")]
-    assert lines[first].count(",") == 2 and len(said) == 2 and not any("  ok" in line for line in said)
+    assert lines[first].count(",") == 2
+    assert len(said) == 2
+    assert not any("  ok" in line for line in said)
 
 
 def test_what_was_not_kept_is_said():
@@ -116,7 +121,8 @@ def test_the_first_member_with_a_warning_is_named():
 def test_divided_steps_are_counted():
     result = dataclasses.replace(told(), substeps=np.array([0, 1, 1200, 0]))
     text = "substeps    1,201 steps of 2 members were divided: those paths are not symplectic"
-    assert text in summary(result) and not any("substeps" in line for line in summary(told()))
+    assert text in summary(result)
+    assert not any("substeps" in line for line in summary(told()))
 
 
 def test_members_that_ask_for_too_much_are_counted(monkeypatch):
@@ -140,7 +146,8 @@ def test_a_controller_is_one_line():
         "controller  looks every 0.25 s, 0.5 s until they act; sensors compass, sensor; laws pid; faults stuck"
     ]
     short = report.controller_lines({"controller": {"period": 2.0, "delay": 0.0, "laws": [{"type": "pid"}]}})
-    assert short == ["controller  looks every 2 s; laws pid"] and report.controller_lines({"controller": None}) == []
+    assert short == ["controller  looks every 2 s; laws pid"]
+    assert report.controller_lines({"controller": None}) == []
 
 
 def test_a_chosen_method_has_its_reason():
@@ -222,7 +229,8 @@ def test_files_that_a_run_has(tmp_path, monkeypatch):
     monkeypatch.setattr(f"{plots}.drawable", lambda _: False)
     assert report.pictures(result, None) == {}
     written = report.write(result, None, tmp_path)
-    assert written.files == [tmp_path / "result.npz"] and lw.Result.load(tmp_path / "result.npz").members == 4
+    assert written.files == [tmp_path / "result.npz"]
+    assert lw.Result.load(tmp_path / "result.npz").members == 4
     stored = dataclasses.replace(result, store=tmp_path / "run.zarr")
     assert report.write(stored, None, tmp_path / "b").files == [tmp_path / "run.zarr"]
     (tmp_path / "file").touch()
@@ -242,12 +250,17 @@ def test_the_end_of_a_run_is_told(tmp_path, monkeypatch, capsys):
     begun = time.perf_counter() - 5.0
     result = dataclasses.replace(result, run_seconds=1.0)
     assert report.report(result, tmp_path, chosen, begun, ["b"], "a viewer") == ["a fault", "b"]
-    assert writing.calls == [((result, result, tmp_path, "a viewer"), {})] and shown == [(False, "writing")]
+    assert writing.calls == [((result, result, tmp_path, "a viewer"), {})]
+    assert shown == [(False, "writing")]
     out, err = capsys.readouterr()
     lines = out.split("\n")
-    assert lines[0].startswith("note        a.rrd: not made without rerun-sdk") and lines[1].startswith("members     4")
-    assert "; 5.0" in out and lines[2].startswith("how  ") and err == "lgvi-warp: a is empty\n"
-    assert lines[-3].startswith("file        ") and lines[-2] == f"look        open {tmp_path}/fleet.png"
+    assert lines[0].startswith("note        a.rrd: not made without rerun-sdk")
+    assert lines[1].startswith("members     4")
+    assert "; 5.0" in out
+    assert lines[2].startswith("how  ")
+    assert err == "lgvi-warp: a is empty\n"
+    assert lines[-3].startswith("file        ")
+    assert lines[-2] == f"look        open {tmp_path}/fleet.png"
 
 
 def test_a_part_of_a_run_is_to_be_merged(tmp_path, monkeypatch, capsys):
@@ -272,18 +285,22 @@ def test_documents_of_a_run_by_hand(tmp_path):
         "versions": MACHINE["versions"], "machine": MACHINE["machine"],
     }  # fmt: skip
     assert (content["members"], content["failed"], content["stopped"]) == (4, 1, 2)
-    assert content["divided"] == {"members": 2, "steps": 6} and content["messages"] == ["odd"]
+    assert content["divided"] == {"members": 2, "steps": 6}
+    assert content["messages"] == ["odd"]
     assert content["samples"] == {"times": 3, "fields": list(result.samples), "kept": 0}
-    assert (
-        content["seconds"] == {"compile": 0.25, "run": 0.5, "all": 2.5} and content["vehicle_steps_per_second"] == 800.0
-    )
-    assert content["faults"] == ["a fault", "b"] and content["files"] == [tmp_path / "a"]
+    assert content["seconds"] == {"compile": 0.25, "run": 0.5, "all": 2.5}
+    assert content["vehicle_steps_per_second"] == 800.0
+    assert content["faults"] == ["a fault", "b"]
+    assert content["files"] == [tmp_path / "a"]
     assert content["notes"] == ["empty", *written.note_lines()]
     energy = content["energy"]
-    assert (energy["members"], energy["all"]) == (3, False) and energy["conserved"] == sorted(energy["conserved"])
-    assert documents.of_energy(told(3), 3)["all"] and documents.of_energy(None, 3) is None
+    assert (energy["members"], energy["all"]) == (3, False)
+    assert energy["conserved"] == sorted(energy["conserved"])
+    assert documents.of_energy(told(3), 3)["all"]
+    assert documents.of_energy(None, 3) is None
     bare = documents.of_run(dataclasses.replace(result, samples={}, run_seconds=0.0), told(3), written, [], 0.0)
-    assert bare["energy"] is None and bare["vehicle_steps_per_second"] is None
+    assert bare["energy"] is None
+    assert bare["vehicle_steps_per_second"] is None
     stored = documents.of_store({"blocks": 3, "provenance": result.provenance})
     assert stored == {"blocks": 3, "settings": content["settings"]}
     named = SimpleNamespace(steps=4)
@@ -296,7 +313,8 @@ def test_progress_is_shown_and_closed(monkeypatch, quiet, kind):
     ended, close = [], progress.Progress.close
     monkeypatch.setattr(progress.Progress, "close", lambda self: (ended.append(self), close(self)))
     with pytest.raises(ZeroDivisionError), progress.shown(quiet) as shown:
-        assert type(shown) is kind and not ended
+        assert type(shown) is kind
+        assert not ended
         raise ZeroDivisionError
     assert ended == ([] if quiet else [shown])
 

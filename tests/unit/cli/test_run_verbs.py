@@ -57,10 +57,12 @@ def test_arguments_of_a_run(solved, tmp_path, monkeypatch):
     more = ["--threads", "3", "--width", "4", "--executor", "dask", "--scheduler", "tcp://x", "--store", "zarr"]
     assert cli.main(["run", PAPER, "--out", out, "--members", "9", *more, "--blocks", "1:2"]) == 0
     ((scene,), plain), ((other,), named) = calls
-    assert scene.run.step == 0.01 and other.ensemble_settings.members == 9
+    assert scene.run.step == 0.01
+    assert other.ensemble_settings.members == 9
     assert plain == {"threads": None, "width": None, "progress": None, "store": None, "executor": "threads",
                      "scheduler": None, "only": None, "on_block": None}  # fmt: skip
-    assert named.pop("progress") is not None and named.pop("store").path == tmp_path / "run.zarr"
+    assert named.pop("progress") is not None
+    assert named.pop("store").path == tmp_path / "run.zarr"
     assert named == {"threads": 3, "width": 4, "executor": "dask", "scheduler": "tcp://x", "only": range(1, 2),
                      "on_block": None}  # fmt: skip
     assert reports == [(result, tmp_path, [], None)] * 2
@@ -80,7 +82,9 @@ def test_libraries_are_imported_until_one_is_missing(monkeypatch):
         monkeypatch.setattr(importlib, "import_module", import_module)
         thread = runs._import_in_background()
         thread.join()
-        assert names == tried and isinstance(thread, threading.Thread) and thread.daemon
+        assert names == tried
+        assert isinstance(thread, threading.Thread)
+        assert thread.daemon
 
 
 @pytest.mark.parametrize(
@@ -109,7 +113,8 @@ def test_an_interrupted_run_says_what_is_saved(solved, tmp_path, capsys):
         path = tmp_path / name
         assert cli.main(["run", PAPER, "--out", str(tmp_path), "-q"]) == 130
         words = f"interrupted; the first 2 of 6 members are saved in {path}; {go_on}"
-        assert capsys.readouterr().err == f"lgvi-warp: {words}\n" and lw.Result.load(path).members == 2
+        assert capsys.readouterr().err == f"lgvi-warp: {words}\n"
+        assert lw.Result.load(path).members == 2
     assert sorted(path.name for path in tmp_path.iterdir()) == ["result.npz", "result_part.npz"]
 
 
@@ -157,7 +162,8 @@ def test_a_live_run_hands_over_its_blocks(solved, tmp_path, monkeypatch):
         assert cli.main(["run", PAPER, "--out", str(tmp_path), "-q", "--live", *options]) == 0
         assert asked.pop() == address
     assert [settings["on_block"] for _, settings in calls] == ["takes", "takes"]
-    assert [given[1] for given in views] == ["rerun+http://a"] * 2 and views[0][0] is calls[0][0][0]
+    assert [given[1] for given in views] == ["rerun+http://a"] * 2
+    assert views[0][0] is calls[0][0][0]
     assert [address for *_, address in reports] == ["rerun+http://a"] * 2
 
 
@@ -171,8 +177,10 @@ def test_a_live_run_needs_its_library_and_what_it_shows(solved, tmp_path, monkey
     none = "--live: shows members as they are done, and the run keeps none; add --keep all"
     cases |= {("--live", "--keep", "none"): none, ("--live", "--keep", "1,2"): none}
     for options, words in cases.items():
-        assert cli.main([*verb, *options]) == 2 and words in capsys.readouterr().err
-    assert calls == [] and not (tmp_path / "out").exists()
+        assert cli.main([*verb, *options]) == 2
+        assert words in capsys.readouterr().err
+    assert calls == []
+    assert not (tmp_path / "out").exists()
 
 
 class Suggestion:
@@ -199,14 +207,19 @@ def test_a_run_with_an_error_takes_what_is_suggested_and_checks_it(solved, tmp_p
     for options, number in ((["-q", "--method", "rk4", "--of", "depth", "--threads", "2"], "5.1e-01"), (["-q"], "nan")):
         assert cli.main([*verb, *options]) == 1
         text = f"error of speed {number} m/s, {again}: missed; ask for a smaller one"
-        assert capsys.readouterr() == ("", f"lgvi-warp: {text}\n") and reports[-1][2] == [text]
+        assert capsys.readouterr() == ("", f"lgvi-warp: {text}\n")
+        assert reports[-1][2] == [text]
     (first, settings), (_, named), _ = suggest.calls
-    assert settings.pop("progress") is not None and first[1:] == (0.5, "position")
+    assert settings.pop("progress") is not None
+    assert first[1:] == (0.5, "position")
     assert settings == {"methods": None, "threads": None}
-    assert suggest.calls[1][0][1:] == (0.5, "depth") and named == {"methods": ["rk4"], "threads": 2, "progress": None}
+    assert suggest.calls[1][0][1:] == (0.5, "depth")
+    assert named == {"methods": ["rk4"], "threads": 2, "progress": None}
     assert all(settings["h"] == 0.25 and settings["dtype"] == "float32" for _, settings in calls)
     (ensemble, checked, suggested), _ = verified.calls[0]
-    assert isinstance(ensemble, lw.Ensemble) and checked is result and isinstance(suggested, Suggestion)
+    assert isinstance(ensemble, lw.Ensemble)
+    assert checked is result
+    assert isinstance(suggested, Suggestion)
 
 
 @pytest.mark.parametrize(
@@ -240,7 +253,9 @@ def test_arguments_of_resume(solved, tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().err.endswith("lgvi-warp: all failed\n")
     (place, plain), (_, named), *_ = study.calls
     common = {"executor": "threads", "threads": None, "scheduler": None, "progress": None, "force": False}
-    assert place == (tmp_path,) and plain == common and named.pop("progress") is not None
+    assert place == (tmp_path,)
+    assert plain == common
+    assert named.pop("progress") is not None
     assert named == {"executor": "processes", "threads": 2, "scheduler": "tcp://x", "force": True}
     assert [given[:3] for given in reports] == [(result, tmp_path / "there", [])] * 2 + [
         (result, tmp_path / "there", ["all failed"]), (failed, tmp_path / "there", [])]  # fmt: skip
@@ -261,9 +276,11 @@ def test_arguments_of_predict(tmp_path, monkeypatch, capsys):
         "--members",
         "3",
     ]
-    assert cli.main(["predict", PAPER, "-q"]) == 0 and cli.main(["predict", PAPER, *options]) == 0
+    assert cli.main(["predict", PAPER, "-q"]) == 0
+    assert cli.main(["predict", PAPER, *options]) == 0
     (_, plain), ((scene,), named) = study.calls
     assert plain == {"threads": None, "store": None}
-    assert scene.ensemble_settings.members == 3 and named["threads"] == 2
+    assert scene.ensemble_settings.members == 3
+    assert named["threads"] == 2
     assert (named["store"].path, named["store"].dtype) == (Path(tmp_path) / "run.zarr", "float32")
     assert capsys.readouterr().out == f"{study.result}\n"

@@ -57,7 +57,8 @@ def test_a_method_that_was_asked_for_and_has_no_measurement_ends_with_1(tmp_path
     assert cli.main(["tradeoff", PAPER, "--methods", "rk4,rk8", "--out", "b"]) == 1
     out, err = capsys.readouterr()
     assert "lgvi-warp: --methods rk8: has no measurement: members failed at every step" in err
-    assert out.startswith("missing     rk8: members failed") and drawn == [("tradeoff", "tradeoff.png")]
+    assert out.startswith("missing     rk8: members failed")
+    assert drawn == [("tradeoff", "tradeoff.png")]
     assert json.loads((tmp_path / "b" / "tradeoff.json").read_text())["missing"] == found.missing
 
 
@@ -80,7 +81,8 @@ def test_arguments_of_a_tradeoff(tmp_path, monkeypatch, drawn, capsys):
             "tradeoff.csv", "tradeoff.json", "tradeoff.png"]  # fmt: skip
     said = capsys.readouterr().out.split("\n")
     files = [line.partition(" (")[0] for line in said[-4:-1]]
-    assert said[-5] == "" and files == [f"file        b/tradeoff.{end}" for end in ("json", "csv", "png")]
+    assert said[-5] == ""
+    assert files == [f"file        b/tradeoff.{end}" for end in ("json", "csv", "png")]
 
 
 def test_a_picture_that_fails_is_an_exit_code(tmp_path, monkeypatch, capsys):
@@ -97,27 +99,32 @@ def test_arguments_of_a_sensitivity_study(tmp_path, monkeypatch, drawn, capsys):
     for name, study in analyses.items():
         monkeypatch.setattr(uq, name, study)
     verb = ["sensitivity", PAPER, "--out", str(tmp_path)]
-    assert cli.main([*verb, "-q"]) == 0 and cli.main([*verb, "--first-order", "--samples", "0", "-q"]) == 0
+    assert cli.main([*verb, "-q"]) == 0
+    assert cli.main([*verb, "--first-order", "--samples", "0", "-q"]) == 0
     assert cli.main([*verb, "--analysis", "morris", "-q"]) == 0
     grouped = ["--replicates", "4", "--group", "start=start.position,start.velocity"]
-    assert cli.main([*verb, *grouped, "-q"]) == 0 and cli.main([*verb, "--group", "start", "-q"]) == 2
+    assert cli.main([*verb, *grouped, "-q"]) == 0
+    assert cli.main([*verb, "--group", "start", "-q"]) == 2
     assert "--group = 'start': names no factors" in capsys.readouterr().err
     more = ["--of", "depth", "--of", "speed", "--samples", "5", "--failed", "drop", "--threads", "3", "--seed", "4"]
     assert cli.main([*verb, "--analysis", "morris", *more]) == 0
     (plain, first, together), (coarse, named) = (study.calls for study in analyses.values())
     common = {"failed": "refuse", "threads": None, "progress": None}
     plainly = common | {"samples": 256, "second_order": True, "replicates": 8, "groups": {}}
-    assert plain[0][1] == ["position[2]"] and plain[1] == plainly
+    assert plain[0][1] == ["position[2]"]
+    assert plain[1] == plainly
     assert first[1] == plainly | {"samples": 0, "second_order": False}
     assert together[1] == plainly | {"replicates": 4, "groups": {"start": ["start.position", "start.velocity"]}}
     assert coarse[1] == common | {"samples": 64}
-    assert named[0][0].ensemble_settings.seed == 4 and named[0][1] == ["depth", "speed"]
+    assert named[0][0].ensemble_settings.seed == 4
+    assert named[0][1] == ["depth", "speed"]
     assert named[1].pop("progress") is not None
     assert named[1] == {"failed": "drop", "threads": 3, "samples": 5}
     assert drawn == [("sensitivity", "sensitivity.png")] * 5
     said = capsys.readouterr().out
     assert said.startswith(f"{sobol()}\n\nfile        {tmp_path}/sensitivity.")
-    assert said.count("file  ") == 4 and said.endswith("MB)\n")
+    assert said.count("file  ") == 4
+    assert said.endswith("MB)\n")
 
 
 @pytest.mark.parametrize(
@@ -126,7 +133,8 @@ def test_arguments_of_a_sensitivity_study(tmp_path, monkeypatch, drawn, capsys):
 def test_a_sensitivity_study_that_fails_is_one_line(tmp_path, monkeypatch, capsys, error, code):
     monkeypatch.setattr(uq, "sobol", Study(error))
     assert cli.main(["sensitivity", PAPER, "--out", str(tmp_path), "-q"]) == code
-    assert capsys.readouterr() == ("", f"lgvi-warp: {error}\n") and not list(tmp_path.iterdir())
+    assert capsys.readouterr() == ("", f"lgvi-warp: {error}\n")
+    assert not list(tmp_path.iterdir())
 
 
 def test_arguments_of_a_stability_map(tmp_path, monkeypatch, drawn):
@@ -147,7 +155,8 @@ def test_arguments_of_a_stability_map(tmp_path, monkeypatch, drawn):
         "--of",
         "depth",
     ]
-    assert cli.main(verb) == 0 and cli.main([*verb, *more, "--duration", "9", "--seed", "11"]) == 0
+    assert cli.main(verb) == 0
+    assert cli.main([*verb, *more, "--duration", "9", "--seed", "11"]) == 0
     (plain, named) = study.calls
     assert plain[0][1:] == ("h", "angular_velocity", None)
     seed = lw.Scene.load(PAPER).ensemble_settings.seed
@@ -164,7 +173,8 @@ def test_a_scene_without_an_ensemble_has_the_seed_0(tmp_path, monkeypatch, drawn
     scene.write_text('[vehicle]\nname = "sphere"\n')
     assert cli.main(["stability", str(scene), "-q", "--x", "speed", "--out", str(tmp_path / "out")]) == 0
     ((values, settings),) = study.calls
-    assert settings["seed"] == 0 and values[1:3] == ("speed", "angular_velocity")
+    assert settings["seed"] == 0
+    assert values[1:3] == ("speed", "angular_velocity")
 
 
 def test_grids_of_a_stability_study(tmp_path, monkeypatch, drawn, capsys):
@@ -180,9 +190,12 @@ def test_grids_of_a_stability_study(tmp_path, monkeypatch, drawn, capsys):
     monkeypatch.setattr("lgvi_warp.cli.progress.Progress", lambda *_: Calling(whole, closing))
     verb = ["stability", PAPER, "--out", str(tmp_path)]
     assert cli.main([*verb, "--grid", "mass"]) == 0
-    assert fractions == [GRIDS["mass"]] and whole == [0.5] and drawn == [("stability", "stability_mass.png")]
+    assert fractions == [GRIDS["mass"]]
+    assert whole == [0.5]
+    assert drawn == [("stability", "stability_mass.png")]
     assert cli.main([*verb, "--grid", "all"]) == 0
-    assert fractions[1:] == list(GRIDS.values()) and whole[1:] == pytest.approx([0.5 / 3, 1.5 / 3, 2.5 / 3])
+    assert fractions[1:] == list(GRIDS.values())
+    assert whole[1:] == pytest.approx([0.5 / 3, 1.5 / 3, 2.5 / 3])
     assert {path.name for path in tmp_path.glob("*.json")} == {f"stability_{name}.json" for name in GRIDS}
     # One report for each, and a blank line between them.
     said = capsys.readouterr().out
@@ -274,14 +287,27 @@ def sweep(tmp_path, monkeypatch):
 def test_arguments_of_a_sweep(sweep, tmp_path, capsys):
     code, (((), settings),), _ = sweep("-q", "--members", "1e3", "--seed", "-2", "--threads", "3", "--executor", "dask",
                                        "--scheduler", "tcp://x")  # fmt: skip
-    assert code == 0 and settings == {
-        "file": "laws.toml", "scene": "a scene", "cases": "cases", "members": 1000, "seed": -2, "baseline": "a",
-        "metrics": ("m",), "step": 0.1, "threads": 3, "executor": "dask", "scheduler": "tcp://x",
-        "out": tmp_path / "out", "progress": None,
-    }  # fmt: skip
-    assert capsys.readouterr() == ("", "") and (tmp_path / "out" / "a.png").read_text() == "a"
+    assert code == 0
+    assert settings == {
+        "file": "laws.toml",
+        "scene": "a scene",
+        "cases": "cases",
+        "members": 1000,
+        "seed": -2,
+        "baseline": "a",
+        "metrics": ("m",),
+        "step": 0.1,
+        "threads": 3,
+        "executor": "dask",
+        "scheduler": "tcp://x",
+        "out": tmp_path / "out",
+        "progress": None,
+    }
+    assert capsys.readouterr() == ("", "")
+    assert (tmp_path / "out" / "a.png").read_text() == "a"
     _, (((), settings),), found = sweep("--members", "many")
-    assert (settings["members"], settings["seed"]) == ("many", 1) and settings["progress"] is not None
+    assert (settings["members"], settings["seed"]) == ("many", 1)
+    assert settings["progress"] is not None
     assert found.runs == []  # nothing is recorded that was not asked for
     lines = capsys.readouterr().out.split("\n")
     assert lines[:2] == ["the sweep in words", ""]
@@ -292,7 +318,8 @@ def test_arguments_of_a_sweep(sweep, tmp_path, capsys):
 
 
 def test_a_sweep_of_refused_cells_alone_failed(sweep):
-    assert sweep("-q", refused=("", "no", "no"))[0] == 0 and sweep("-q", refused=("no",) * 3)[0] == 1
+    assert sweep("-q", refused=("", "no", "no"))[0] == 0
+    assert sweep("-q", refused=("no",) * 3)[0] == 1
 
 
 def test_the_worst_members_are_recorded_by_cell(sweep, tmp_path, monkeypatch, capsys):
@@ -304,7 +331,8 @@ def test_the_worst_members_are_recorded_by_cell(sweep, tmp_path, monkeypatch, ca
 
     monkeypatch.setattr("lgvi_warp.views.recording.rerun.log_rerun", log)
     code, _, found = sweep("--record", "3", "--json")
-    assert code == 0 and found.runs == [("a", [5, 9], {"delay": 2}), ("b", [4], {"delay": 1})]
+    assert code == 0
+    assert found.runs == [("a", [5, 9], {"delay": 2}), ("b", [4], {"delay": 1})]
     assert recorded == [("members [5, 9] of a", "worst_0001.rrd"), ("members [4] of b", "worst_0002.rrd")]
     names = [path.rpartition("/")[2] for path in json.loads(capsys.readouterr().out)["files"]]
     assert names == ["sweep.json", "a.png", "worst_0001.rrd", "worst_0002.rrd"]
@@ -317,9 +345,10 @@ def test_the_plan_of_a_sweep_runs_nothing(sweep, tmp_path, monkeypatch, capsys):
         "lgvi_warp.studies.sweeps.setup.plan_text", lambda *given: calls.append(given) or "cells 4\ntime 2"
     )
     code, runs, _ = sweep("--plan", "--threads", "2", "--members", "5")
-    assert (
-        code == 0 and runs == [] and capsys.readouterr().out == "cells 4\ntime 2\n" and not (tmp_path / "out").exists()
-    )
+    assert code == 0
+    assert runs == []
+    assert capsys.readouterr().out == "cells 4\ntime 2\n"
+    assert not (tmp_path / "out").exists()
     assert calls == [({
         "scene": "a scene", "metrics": ("m",), "cases": "cases", "grid": None, "vary": None, "members": 5, "seed": 1,
         "sampling": None, "settings": {"file": "laws.toml", "step": 0.1},

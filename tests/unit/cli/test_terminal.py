@@ -46,7 +46,8 @@ def ended(arguments):
 
 
 def test_the_version(capsys):
-    assert ended(["--version"]) == 0 and capsys.readouterr().out == f"lgvi-warp {lw.__version__}\n"
+    assert ended(["--version"]) == 0
+    assert capsys.readouterr().out == f"lgvi-warp {lw.__version__}\n"
 
 
 @pytest.mark.parametrize("module", ["lgvi_warp", "lgvi_warp.cli"])
@@ -58,7 +59,8 @@ def test_python_runs_the_package(module):
 def test_alone_it_helps(capsys):
     assert cli.main([]) == 0
     out = capsys.readouterr()
-    assert out.out == cli.parser().format_help() and out.err == ""
+    assert out.out == cli.parser().format_help()
+    assert out.err == ""
 
 
 @pytest.mark.parametrize(
@@ -81,14 +83,16 @@ def test_alone_it_helps(capsys):
 def test_a_fault_has_the_verbs_usage_and_the_nearest_name(given, usage, words, capsys):
     assert ended(given) == 2
     text = capsys.readouterr().err
-    assert text.startswith(f"usage: {usage} [-h]") and words in text.splitlines()[-1]
+    assert text.startswith(f"usage: {usage} [-h]")
+    assert words in text.splitlines()[-1]
 
 
 def test_every_verb_says_what_it_does(capsys):
     for verb in cli.parser().verbs:
         assert ended([verb, "--help"]) == 0
         out = " ".join(capsys.readouterr().out.split())
-        assert cli.parser().verbs[verb].description in out and "--json" in out
+        assert cli.parser().verbs[verb].description in out
+        assert "--json" in out
 
 
 @pytest.mark.parametrize("place", [0, 1])
@@ -104,10 +108,12 @@ def test_the_options_of_every_verb_stand_before_or_after_it(name, place):
 
 def test_verbose_says_where_an_error_came_from(capsys):
     bad = ["check", PAPER, "--set", "vehicle.mass=-1"]
-    assert cli.main(bad) == 2 and "Traceback" not in capsys.readouterr().err
+    assert cli.main(bad) == 2
+    assert "Traceback" not in capsys.readouterr().err
     assert cli.main([*bad, "-v"]) == 2
     text = capsys.readouterr().err
-    assert "Traceback" in text and text.splitlines()[-1].startswith("lgvi-warp: vehicle.mass = -1")
+    assert "Traceback" in text
+    assert text.splitlines()[-1].startswith("lgvi-warp: vehicle.mass = -1")
 
 
 def test_every_verb_is_of_those_that_write_or_of_those_that_do_not():
@@ -166,7 +172,8 @@ def test_labels_and_faults_are_in_colors_and_texts_stay_the_same(capsys):
         assert cli.main(["check", PAPER, "--color", color]) == 0
         texts += capsys.readouterr()
     assert "\x1b" not in "".join(plain)
-    assert "\x1b[1mscene\x1b[0m       " in painted[0] and painted[1].startswith("\x1b[31mlgvi-warp:\x1b[0m ")
+    assert "\x1b[1mscene\x1b[0m       " in painted[0]
+    assert painted[1].startswith("\x1b[31mlgvi-warp:\x1b[0m ")
     assert [re.sub(r"\x1b\[\d*m", "", text) for text in painted] == plain
 
 
@@ -188,9 +195,12 @@ def test_every_method_that_is_listed_is_one(capsys):
 def test_vehicles_terms_and_laws_are_those_of_the_tables(capsys):
     assert list(listed("vehicles", capsys)) == lw.vehicles()
     terms = listed("terms", capsys)
-    assert "drag" in terms and "weight" not in terms and set(terms) <= set(lw.Term.kinds)
+    assert "drag" in terms
+    assert "weight" not in terms
+    assert set(terms) <= set(lw.Term.kinds)
     laws = listed("laws", capsys)
-    assert laws["heading_pid"].startswith("laws: PID of the heading") and laws["sensor"].startswith("sensors: ")
+    assert laws["heading_pid"].startswith("laws: PID of the heading")
+    assert laws["sensor"].startswith("sensors: ")
 
 
 @pytest.mark.parametrize("name", lw.vehicles())
@@ -203,16 +213,19 @@ def test_a_new_scene_can_run_and_is_not_odd(name, tmp_path, capsys):
     # What is in comments is right too.
     free = re.sub(r"^# (?=\w+ = |\[\[?\w+\]\]?$)", "", path.read_text(), flags=re.MULTILINE)
     path.write_text(free)
-    assert lw.Scene.load(path).run.method == "psi_x" and "current" in [term.type for term in lw.Scene.load(path).terms]
+    assert lw.Scene.load(path).run.method == "psi_x"
+    assert "current" in [term.type for term in lw.Scene.load(path).terms]
 
 
 def test_new_keeps_a_file_that_is_there_and_knows_its_vehicles(tmp_path, capsys):
     path = tmp_path / "dive.toml"
     path.write_text("mine")
-    assert cli.main(["new", str(path)]) == 2 and "is there already" in capsys.readouterr().err
+    assert cli.main(["new", str(path)]) == 2
+    assert "is there already" in capsys.readouterr().err
     assert path.read_text() == "mine"
     assert cli.main(["new", str(tmp_path / "a.toml"), "--vehicle", "remus"]) == 2
-    assert "did you mean 'remus_100'?" in capsys.readouterr().err and list(tmp_path.iterdir()) == [path]
+    assert "did you mean 'remus_100'?" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_the_schema_is_json(capsys):
@@ -248,15 +261,21 @@ def bash(tmp_path_factory):
 
 
 def test_bash_completes_verbs_options_values_and_files(bash):
-    assert bash("res") == ["resume"] and set(bash("")) >= set(cli.parser().verbs) | {"--version"}
+    assert bash("res") == ["resume"]
+    assert set(bash("")) >= set(cli.parser().verbs) | {"--version"}
     assert bash("run", "x", "--store-") == ["--store-dtype"]
-    assert bash("run", "x", "--store", "") == ["npz", "zarr"] and bash("list", "ve") == ["vehicles"]
-    assert bash("--json", "check", "--colo") == ["--color"] and bash("-q", "run", "--color", "a") == ["auto", "always"]
+    assert bash("run", "x", "--store", "") == ["npz", "zarr"]
+    assert bash("list", "ve") == ["vehicles"]
+    assert bash("--json", "check", "--colo") == ["--color"]
+    assert bash("-q", "run", "--color", "a") == ["auto", "always"]
     assert {"psi", "psi_s", "psi_x"} <= set(bash("run", "x", "--method", "ps")) <= set(listed_methods())
-    assert bash("new", "x", "--vehicle", "re") == ["remus_100"] and bash("export", "x", "--to", "n") == ["netcdf"]
+    assert bash("new", "x", "--vehicle", "re") == ["remus_100"]
+    assert bash("export", "x", "--to", "n") == ["netcdf"]
     assert bash("run", "x", "--dtype", "f") == ["float64", "float32", "float32_compensated"]
-    assert bash("--color", "ne") == ["never"] and bash("--color", "never", "exp") == ["export"]
-    assert bash("help", "tr") == ["tradeoff"] and bash("--color", "auto", "run", "--solver", "new") == ["newton"]
+    assert bash("--color", "ne") == ["never"]
+    assert bash("--color", "never", "exp") == ["export"]
+    assert bash("help", "tr") == ["tradeoff"]
+    assert bash("--color", "auto", "run", "--solver", "new") == ["newton"]
     assert bash("check", "sce") == ["scene file.toml"]
     # Readline's words of --method=psi_, and of a list.
     assert bash("run", "x", "--dtype", "=", "float32_") == ["float32_compensated"]
@@ -274,7 +293,8 @@ def test_help_of_a_verb_is_what_its_option_prints(capsys):
                 cli.main(same)
         else:
             assert cli.main(same) == 0
-        assert text == capsys.readouterr().out and "usage: lgvi-warp" in text
+        assert text == capsys.readouterr().out
+        assert "usage: lgvi-warp" in text
     with pytest.raises(SystemExit):
         cli.main(["help", "rum"])
     assert "did you mean 'run'?" in capsys.readouterr().err
@@ -283,9 +303,12 @@ def test_help_of_a_verb_is_what_its_option_prints(capsys):
 def test_the_options_of_run_stand_in_groups():
     groups = {group.title: [option for action in group._group_actions for option in action.option_strings]
               for group in cli.parser().verbs["run"]._action_groups}  # fmt: skip
-    assert all(len(options) <= 9 for options in groups.values()) and len(groups) >= 7
-    assert {"--method", "--step"} <= set(groups["method, step and precision"]) and "--store" in groups["files"]
-    assert groups["options"] == ["-h", "--help"] and "--color" in groups["options of every verb"]
+    assert all(len(options) <= 9 for options in groups.values())
+    assert len(groups) >= 7
+    assert {"--method", "--step"} <= set(groups["method, step and precision"])
+    assert "--store" in groups["files"]
+    assert groups["options"] == ["-h", "--help"]
+    assert "--color" in groups["options of every verb"]
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
@@ -342,7 +365,8 @@ def test_documents_of_verbs_that_run_nothing(tmp_path, capsys):
         assert document(["list", what], capsys)["names"]
     assert document(["new", str(tmp_path / "a.toml")], capsys)["vehicle"] == "remus_100"
     assert "complete" in document(["completion", "fish"], capsys)["script"]
-    assert document(["help", "run"], capsys)["of"] == "run" and document(["help"], capsys)["of"] is None
+    assert document(["help", "run"], capsys)["of"] == "run"
+    assert document(["help"], capsys)["of"] is None
 
 
 def test_a_refused_verb_prints_no_document(capsys):
@@ -380,8 +404,11 @@ def test_documents_of_kernels_and_predictions(monkeypatch, capsys):
         return SimpleNamespace(close=lambda: phases.append("closed"))
 
     monkeypatch.setattr(progress, "Progress", began)
-    assert cli.main(["predict", PAPER, "-q"]) == 0 and capsys.readouterr().out == "" and not phases
-    assert cli.main(["predict", PAPER]) == 0 and phases == ["measuring", "closed"]
+    assert cli.main(["predict", PAPER, "-q"]) == 0
+    assert capsys.readouterr().out == ""
+    assert not phases
+    assert cli.main(["predict", PAPER]) == 0
+    assert phases == ["measuring", "closed"]
 
 
 @pytest.mark.kernel
@@ -390,7 +417,9 @@ def test_documents_of_a_run_and_its_folder(tmp_path, capsys):
     statistics = 'run.statistics=[{type = "mean", of = "depth"}, {type = "extremes", of = "speed"}]'
     run = ["run", PAPER, *SMALL, "--set", statistics, "--out", out]
     ran = document(run, capsys)
-    assert ran["outcomes"] == {"ok": 20} and ran["energy"]["all"] and ran["samples"]["times"] == 5
+    assert ran["outcomes"] == {"ok": 20}
+    assert ran["energy"]["all"]
+    assert ran["samples"]["times"] == 5
     assert [path.rpartition("/")[2] for path in ran["files"]] == [
         "result.npz",
         "fleet.png",
@@ -399,7 +428,8 @@ def test_documents_of_a_run_and_its_folder(tmp_path, capsys):
     ]
     depth = next(entry for entry in ran["statistics"] if entry["label"] == "mean depth")
     result = lw.Result.load(tmp_path / "paper" / "result.npz")
-    assert depth["value"] == result.statistics["mean depth"].value[-1, 0] and depth["unit"] == "m"
+    assert depth["value"] == result.statistics["mean depth"].value[-1, 0]
+    assert depth["unit"] == "m"
     assert next(entry for entry in ran["statistics"] if "maximum" in entry["label"])["lower"] is None
     (held,) = document(["info", out], capsys, name="info of a folder")["holds"]
     assert {key: held[key] for key in ran.keys() & held.keys()} == {key: ran[key] for key in ran.keys() & held.keys()}
@@ -410,7 +440,8 @@ def test_documents_of_a_run_and_its_folder(tmp_path, capsys):
     assert (tmp_path / "paper" / "fleet.png").exists()
     assert cli.main(["info", out, "-v"]) == 0
     said = capsys.readouterr().out
-    assert "mean depth" in said and "how         seed 1, " in said
+    assert "mean depth" in said
+    assert "how         seed 1, " in said
 
 
 @pytest.mark.kernel
@@ -420,7 +451,8 @@ def test_documents_of_stores(tmp_path, capsys):
         content = document([*run, "--out", str(tmp_path / name), "--blocks", part], capsys)
         assert content["files"] == [str(tmp_path / name / "run.zarr")]
     one = document(["info", str(tmp_path / "a")], capsys, 1, "info of a folder")
-    assert not one["complete"] and one["holds"][0]["finished"] == 1
+    assert not one["complete"]
+    assert one["holds"][0]["finished"] == 1
     parts = [str(tmp_path / "a"), str(tmp_path / "b")]
     assert document(["merge", parts[0], "--out", str(tmp_path / "half")], capsys, 1)["missing"] == 1
     assert document(["merge", *parts, "--out", str(tmp_path / "all")], capsys)["complete"]
@@ -455,10 +487,8 @@ def test_a_run_on_a_terminal(tmp_path):
     phases, _, summary = text.rpartition("\r")
     parts = [part.strip() for part in phases.split("\r")]
     names = [part.partition(",")[0].partition(" ")[0] for part in parts if part]
-    assert (
-        list(dict.fromkeys(names)) in (["compiling", "writing"], ["compiling", "running", "writing"])
-        and parts[-1] == ""
-    )
+    assert list(dict.fromkeys(names)) in (["compiling", "writing"], ["compiling", "running", "writing"])
+    assert parts[-1] == ""
     assert summary.startswith("\x1b[1mmembers\x1b[0m     20, psi_s")
     assert "\x1b[1mhow\x1b[0m         seed 1, " in summary
     assert summary.endswith(f"\x1b[1mlook\x1b[0m        rerun {tmp_path}/fleet.rrd, or open {tmp_path}/fleet.png\n")
@@ -519,9 +549,11 @@ def test_a_study_is_read_back_from_its_file(make, tmp_path):
     path = next(path for path in found.save(tmp_path) if path.suffix == ".json")
     kind = Indices if isinstance(found, Indices) else type(found)
     again = kind.load(path)
-    assert type(again) is type(found) and again.to_dict() == found.to_dict() == json.loads(path.read_text())
+    assert type(again) is type(found)
+    assert again.to_dict() == found.to_dict() == json.loads(path.read_text())
     if isinstance(found, Tradeoff):
-        assert again.measurements == found.measurements and again.front() == found.front()
+        assert again.measurements == found.measurements
+        assert again.front() == found.front()
 
 
 @pytest.mark.parametrize("verb", STUDIES)
@@ -530,7 +562,8 @@ def test_studies_print_a_document_and_info_and_plot_know_their_folders(verb, tmp
     monkeypatch.setattr(function, lambda *given, **settings: make())
     out = str(tmp_path)
     content = document([verb, PAPER, "--out", out], capsys)
-    assert content["content"] == {verb: make().to_dict()} and content["faults"] == []
+    assert content["content"] == {verb: make().to_dict()}
+    assert content["faults"] == []
     assert f"{out}/{verb}.png" in content["files"]
     assert cli.main([verb, PAPER, "--out", out]) == 0
     said = capsys.readouterr().out

@@ -22,7 +22,8 @@ def folder(tmp_path_factory):
 def test_a_recording_of_some_members(folder, tmp_path, capsys, name):
     path = tmp_path / "few.rrd"
     assert main(["view", str(folder / name), "--members", "3, 5", "--out", str(path)]) == 0
-    assert "2 of 6 drawn" in text_of(path, "/run/summary") and str(path) in capsys.readouterr().out
+    assert "2 of 6 drawn" in text_of(path, "/run/summary")
+    assert str(path) in capsys.readouterr().out
 
 
 def test_the_viewer_is_started(folder, monkeypatch):
@@ -30,7 +31,8 @@ def test_the_viewer_is_started(folder, monkeypatch):
     monkeypatch.setattr(
         "lgvi_warp.views.recording.rerun.show", lambda result, members: seen.append((result.members, members))
     )
-    assert main(["view", str(folder)]) == 0 and main(["view", str(folder), "--members", "0"]) == 0
+    assert main(["view", str(folder)]) == 0
+    assert main(["view", str(folder), "--members", "0"]) == 0
     assert seen == [(6, None), (6, [0])]
 
 
@@ -45,7 +47,9 @@ def test_the_viewer_is_started(folder, monkeypatch):
 def test_bad_members_are_refused(folder, tmp_path, capsys, arguments, words):
     assert main(["view", str(folder), "--out", str(tmp_path / "a.rrd"), *arguments]) == 2
     said = capsys.readouterr().err
-    assert words in said and said.count("\n") == 1 and not list(tmp_path.iterdir())
+    assert words in said
+    assert said.count("\n") == 1
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
@@ -57,7 +61,8 @@ def test_a_folder_without_a_run_is_refused(tmp_path, capsys, name, words, code):
     (tmp_path / "study" / "sweep.json").write_text("{}")
     assert main(["view", str(tmp_path / name)]) == code
     said = capsys.readouterr().err
-    assert words in said and said.count("\n") == 1
+    assert words in said
+    assert said.count("\n") == 1
 
 
 def test_json_names_the_file(folder, tmp_path, capsys):
@@ -77,8 +82,10 @@ def test_a_disk_that_is_full_while_recording_is_one_line_and_leaves_no_file(tmp_
     arguments = [sys.executable, "-c", code, "view", str(tmp_path), "--out", str(tmp_path / "a.rrd"), "-q"]
     limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))  # noqa: E731
     done = subprocess.run(arguments, capture_output=True, text=True, preexec_fn=limit)
-    assert done.returncode == 1 and "is the disk full, or the folder read-only?" in done.stderr
-    assert done.stderr.count("\n") == 1 and [path.name for path in tmp_path.iterdir()] == ["result.npz"]
+    assert done.returncode == 1
+    assert "is the disk full, or the folder read-only?" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["result.npz"]
 
 
 def test_no_rerun_is_one_line_with_the_remedy(folder, tmp_path, capsys, monkeypatch):

@@ -80,7 +80,8 @@ def test_files_that_cannot_be_read_say_nothing(tmp_path):
 def test_threads_by_default(quota, cores, threads, monkeypatch):
     monkeypatch.setattr(machine, "affinity", lambda: cores)
     monkeypatch.setattr(container, "cpu_quota", lambda: quota)
-    assert machine.thread_count() == threads and machine.describe()["threads"] == threads
+    assert machine.thread_count() == threads
+    assert machine.describe()["threads"] == threads
 
 
 def test_cores_are_those_that_the_process_may_use(monkeypatch):
@@ -126,4 +127,5 @@ def test_plan_counts_by_what_a_container_leaves(monkeypatch, capsys):
     monkeypatch.setattr(container, "memory_limit", lambda: 10**7)
     assert cli.main(["predict", str(ROOT / "examples" / "paper.toml"), "--members", "20", "--duration", "2"]) == 0
     told = capsys.readouterr().out
-    assert "1 threads" in told and "more than the memory holds" in told
+    assert "1 threads" in told
+    assert "more than the memory holds" in told

@@ -55,8 +55,11 @@ def test_errors(name, way):
     error = ERRORS[name]()
     error.add_note("in block 3")
     again = WAYS[way](error)
-    assert type(again) is type(error) and str(again) == str(error) and again.__notes__ == error.__notes__
-    assert repr(vars(again)) == repr(vars(error)) and getattr(again, "name", None) == getattr(error, "name", None)
+    assert type(again) is type(error)
+    assert str(again) == str(error)
+    assert again.__notes__ == error.__notes__
+    assert repr(vars(again)) == repr(vars(error))
+    assert getattr(again, "name", None) == getattr(error, "name", None)
 
 
 def test_every_public_error_is_among_them():
@@ -157,7 +160,8 @@ def content(value):
 def test_objects(name, way):
     value = MADE[name]
     again = WAYS[way](value)
-    assert type(again) is type(value) and repr(content(again)) == repr(content(value))
+    assert type(again) is type(value)
+    assert repr(content(again)) == repr(content(value))
     if UNKNOWN not in (told := (identity(again), identity(value))):
         assert told[0] == told[1]
 
@@ -172,7 +176,8 @@ def test_a_policy_without_its_file(way, tmp_path):
     one = lw.Policy(file=tmp_path / "policy.npz", inputs=["depth_error"], outputs=["Z"])
     (tmp_path / "policy.npz").unlink()
     again = WAYS[way](one)
-    assert type(again) is lw.Policy and again.to_dict() == one.to_dict()
+    assert type(again) is lw.Policy
+    assert again.to_dict() == one.to_dict()
 
 
 def test_public_functions_and_classes_are_themselves():
@@ -243,7 +248,9 @@ def test_what_studies_give():
     for name, value in found.items():
         for way in WAYS.values():
             again = way(value)
-            assert type(again) is type(value) and type(value).__name__ == name and repr(again) == repr(value)
+            assert type(again) is type(value)
+            assert type(value).__name__ == name
+            assert repr(again) == repr(value)
 
 
 def all_fail():

@@ -123,7 +123,8 @@ def test_a_model_reads_columns_by_their_names(drifting, seen, form, vary):
 def test_levels_are_read_in_the_order_of_the_laws(drifting, seen):
     u = np.array([[0.1, 0.2, 0.3, 0.4, 0.6], [0.9, 0.7, 0.8, 0.5, 0.45]])
     model = uq.model(drifting, VARY, "position[2]", levels=True, h=0.01, t1=0.02)
-    assert model.names == NAMES and model.problem["names"] == list(NAMES)
+    assert model.names == NAMES
+    assert model.problem["names"] == list(NAMES)
     exact = lw.uq.model(drifting, VARY, "position[2]", h=0.01, t1=0.02).distributions
     for given in (u, pd.DataFrame(columns(u))[sorted(NAMES)]):
         model(given)
@@ -142,7 +143,8 @@ def test_a_joint_law_keeps_its_place_among_levels(drifting, seen):
     assert model.names == ("vehicle.mass", *joint, "environment.gravity")
     assert model.problem["groups"] == ["vehicle.mass", *["start.attitude"] * 3, "environment.gravity"]
     model([[0.9, 0.1, 0.2, 0.3, 0.1]])
-    assert seen["vehicle.mass"][0] > 123.8 and seen["environment.gravity"][0] < 9.8
+    assert seen["vehicle.mass"][0] > 123.8
+    assert seen["environment.gravity"][0] < 9.8
 
 
 def test_problem_and_distributions_have_the_order_of_the_names(drifting, seen):
@@ -196,7 +198,8 @@ def test_entries_that_do_not_vary_stay_the_scenes(drifting, seen):
     np.testing.assert_array_equal(seen["current.velocity"], velocity)
     np.testing.assert_array_equal(seen["vehicle.inertia"], inertia)
     message = faults(model, {"current.velocity": velocity + 0.1, "vehicle.inertia": inertia})
-    assert "changes entries that do not vary" in message and "current.velocity[0]" in message
+    assert "changes entries that do not vary" in message
+    assert "current.velocity[0]" in message
     skew = inertia + np.eye(3, k=1)
     assert "not symmetric" in faults(model, {"current.velocity": velocity, "vehicle.inertia": skew})
 
@@ -261,7 +264,8 @@ def test_states_with_names_are_read_by_them(drifting):
         fleet = lw.Ensemble.from_states(drifting, frame, R, zero, zero)
         np.testing.assert_array_equal(fleet.select(0, 3).position, p)
     message = faults(lw.Ensemble.from_states, drifting, pd.DataFrame(p, columns=["z", "y", "x"]), R, zero, zero)
-    assert "position[0]" in message and "is missing" in message
+    assert "position[0]" in message
+    assert "is missing" in message
 
 
 def test_levels_with_names(drifting):
@@ -282,5 +286,6 @@ def test_levels_with_names(drifting):
 def test_labels_that_no_door_reads_are_refused():
     frame = pd.DataFrame(np.eye(2), index=["a", "b"], columns=["a", "b"])
     message = faults(lw.CorrelatedNormal, covariance=frame)
-    assert "names of columns (a, b), which are not read here" in message and "to_numpy()" in message
+    assert "names of columns (a, b), which are not read here" in message
+    assert "to_numpy()" in message
     assert lw.CorrelatedNormal(covariance=frame.to_numpy()).kind == "correlated_normal"

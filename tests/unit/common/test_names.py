@@ -58,7 +58,9 @@ def test_a_name_that_is_no_folder_everywhere_is_refused(name, words, section):
     with pytest.raises(lw.SceneError) as caught:
         from_dict({"vehicle": BODY, section: [table | {"name": name}]})
     (fault,) = caught.value.faults
-    assert fault.isprintable() and ".name = " in fault and "; " in fault
+    assert fault.isprintable()
+    assert ".name = " in fault
+    assert "; " in fault
     assert one_line(words) in fault
 
 

@@ -33,7 +33,9 @@ def test_lines_name_the_phase_and_the_time_left():
     progress(0.5)
     progress.close()
     first, second, third = stream.getvalue().splitlines()
-    assert first == "compiling, 0 s" and second == "running 25.0%" and third == "running 50.0%, 0 s left"
+    assert first == "compiling, 0 s"
+    assert second == "running 25.0%"
+    assert third == "running 50.0%, 0 s left"
 
 
 def test_the_time_left_follows_from_the_share_since_the_first(monkeypatch):
@@ -63,7 +65,8 @@ def test_what_takes_long_without_a_fraction_is_shown_too():
     stream, told = Terminal(), module.threading.Event()
     progress = Progress(stream, "writing")
     progress._show = lambda now: told.set()
-    assert stream.getvalue() == "\rwriting, 0 s" and told.wait(10.0)
+    assert stream.getvalue() == "\rwriting, 0 s"
+    assert told.wait(10.0)
     progress.close()
 
 
@@ -76,8 +79,12 @@ def test_the_progress_line_is_clean_whatever_happens(monkeypatch):
         progress(0.75)
         raise KeyboardInterrupt
     first, second, third, blank, rest = stream.getvalue().removeprefix("\r").split("\r")
-    assert first == "compiling, 0 s" and "[############............] 50.0%" in second and "75.0%, 0 s left" in third
-    assert not blank.strip() and not rest and len(blank) >= len(third.rstrip())
+    assert first == "compiling, 0 s"
+    assert "[############............] 50.0%" in second
+    assert "75.0%, 0 s left" in third
+    assert not blank.strip()
+    assert not rest
+    assert len(blank) >= len(third.rstrip())
     with shown(True) as progress:
         assert progress is None
 
@@ -102,16 +109,21 @@ def work(shares, *, progress=None):
 
 def test_a_function_is_called_as_before():
     told = []
-    assert work([0.5, 1.0], progress=told.append) == told.append and told == [0.5, 1.0]
-    assert work([0.5]) is None and work([0.5], progress=None) is None and work.__name__ == "work"
+    assert work([0.5, 1.0], progress=told.append) == told.append
+    assert told == [0.5, 1.0]
+    assert work([0.5]) is None
+    assert work([0.5], progress=None) is None
+    assert work.__name__ == "work"
 
 
 def test_true_shows_and_false_is_silent(monkeypatch):
     stream = Terminal()
     monkeypatch.setattr(sys, "stderr", stream)
-    assert work([0.5], progress=False) is False and stream.getvalue() == ""
+    assert work([0.5], progress=False) is False
+    assert stream.getvalue() == ""
     work([0.5], progress=True)
-    assert stream.getvalue().startswith("\rcompiling") and stream.getvalue().endswith("\r")
+    assert stream.getvalue().startswith("\rcompiling")
+    assert stream.getvalue().endswith("\r")
 
 
 def test_true_is_cleaned_up_after_an_error(monkeypatch):
@@ -172,7 +184,8 @@ def test_the_real_bar_of_tqdm_takes_the_same_calls():
     bar(0.5)
     bar(1.0)
     bar.close()
-    assert "100%" in stream.getvalue() and "running" in stream.getvalue()
+    assert "100%" in stream.getvalue()
+    assert "running" in stream.getvalue()
 
 
 @pytest.mark.parametrize(

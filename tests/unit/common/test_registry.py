@@ -20,23 +20,28 @@ def kind(name, word=None, module=__name__):
 
 def test_the_first_class_keeps_its_word():
     known, first = {}, kind("First", "wave")
-    assert registry.add(known, first) and registry.add(known, first)
-    assert not registry.add(known, kind("Second", "wave")) and not registry.add(known, kind("First", "wave", "other"))
+    assert registry.add(known, first)
+    assert registry.add(known, first)
+    assert not registry.add(known, kind("Second", "wave"))
+    assert not registry.add(known, kind("First", "wave", "other"))
     assert known == {"wave": first}
 
 
 def test_a_class_made_again_replaces_the_former():
     known, again = {}, kind("First", "wave")
     registry.add(known, kind("First", "wave"))
-    assert registry.add(known, again) and known == {"wave": again}
+    assert registry.add(known, again)
+    assert known == {"wave": again}
 
 
 @pytest.mark.parametrize("word", ["", None])
 def test_a_class_without_a_word_is_not_added(word):
     known = {}
-    assert not registry.add(known, kind("First", word)) and known == {}
+    assert not registry.add(known, kind("First", word))
+    assert known == {}
     inherits = type("Second", (kind("First", "wave"),), {})
-    assert not registry.add(known, inherits) and known == {}
+    assert not registry.add(known, inherits)
+    assert known == {}
 
 
 def test_each_family_knows_its_classes():

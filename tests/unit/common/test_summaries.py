@@ -78,7 +78,9 @@ OBJECTS = {
 @pytest.mark.parametrize("name", OBJECTS)
 def test_every_object_is_short(name):
     text = repr(OBJECTS[name])
-    assert len(text.splitlines()) <= 20 and len(text) <= 2000 and text.strip()
+    assert len(text.splitlines()) <= 20
+    assert len(text) <= 2000
+    assert text.strip()
 
 
 @pytest.mark.parametrize("name", OBJECTS)
@@ -98,7 +100,8 @@ def test_units_and_values_are_shown():
     for words in (r"vehicle.weight +299 N", r"start.velocity +\[1.54, 0, 0\] m/s", "gravity 9.81 m/s2", "control_fins",
                   r"controller +every 0.1 s: depth_cell", "members 10000, varied: vehicle.buoyancy", "step 0.01"):  # fmt: skip
         assert re.search(words, text), words
-    assert "Ensemble of 10,000 members" in repr(OBJECTS["ensemble"]) and "heading_pid.kp" in repr(OBJECTS["ensemble"])
+    assert "Ensemble of 10,000 members" in repr(OBJECTS["ensemble"])
+    assert "heading_pid.kp" in repr(OBJECTS["ensemble"])
     shown = repr(result(6, statuses=(0, 0, 17)))
     assert shown.startswith("Result of 6 members at 4 times, 0 to 3 s\n")
     for words in (f"ok 4, {Status(17).name.lower()} 2", "psi_s, float64, step 0.1 s, 10 steps", "position [m]",
@@ -109,8 +112,11 @@ def test_units_and_values_are_shown():
 def test_a_status_array_counts_and_its_masks_are_arrays():
     status = OBJECTS["status"]
     assert repr(status) == f"StatusArray of 10,000 members: {summaries.counted(status.counts())}"
-    assert "ok 3,334" in repr(status) and "True" in repr(status == Status.OK) and "[" in repr(status[:4].reshape(2, 2))
-    assert repr(status[:0]) == "StatusArray of 0 members: none" and str(status[:3]) == "[ 0 16  3]"
+    assert "ok 3,334" in repr(status)
+    assert "True" in repr(status == Status.OK)
+    assert "[" in repr(status[:4].reshape(2, 2))
+    assert repr(status[:0]) == "StatusArray of 0 members: none"
+    assert str(status[:3]) == "[ 0 16  3]"
 
 
 def test_texts_are_escaped_and_cut():
@@ -118,11 +124,13 @@ def test_texts_are_escaped_and_cut():
         def summary_rows(self):
             return "<b>", [("<i>", "a & b"), ("two\nlines", "y" * 5000)]
 
-    assert (
-        "<i>" not in Odd()._repr_html_() and "&lt;i&gt;" in Odd()._repr_html_() and "a &amp; b" in Odd()._repr_html_()
-    )
+    assert "<i>" not in Odd()._repr_html_()
+    assert "&lt;i&gt;" in Odd()._repr_html_()
+    assert "a &amp; b" in Odd()._repr_html_()
     first, *lines = repr(Odd()).splitlines()
-    assert first == "<b>" and len(lines) == 2 and all(len(line) <= summaries.WIDTH for line in lines)
+    assert first == "<b>"
+    assert len(lines) == 2
+    assert all(len(line) <= summaries.WIDTH for line in lines)
 
 
 @pytest.mark.parametrize(
@@ -146,7 +154,9 @@ def test_the_thumbnail_has_depth_down_and_marks_who_did_not_end_ok():
     lines = [[tuple(map(float, point.split(","))) for point in line.get("points").split()] for line in svg]
     assert [len(line) for line in lines] == [3, 2]  # the sample that is not finite is left out
     (x, y), (_, middle), (last, lower) = lines[0]
-    assert (x, y) == (6.0, 6.0) and last == 254.0 and lower > middle > y  # deeper is lower
+    assert (x, y) == (6.0, 6.0)
+    assert last == 254.0
+    assert lower > middle > y
     assert max(point[1] for line in lines for point in line) == 84.0
     assert [line.get("stroke-dasharray") for line in svg] == [None, "4 2"]
     assert "depth [m], down, over 0 to 2 s; dashed: did not end ok: 10 to 30" in one.summary_picture()
@@ -154,8 +164,10 @@ def test_the_thumbnail_has_depth_down_and_marks_who_did_not_end_ok():
 
 def test_the_thumbnail_says_of_how_many_and_is_left_out_where_there_are_no_paths():
     svg = result(1000).summary_picture()
-    assert svg.count("<polyline") == 20 and "of 20 of 1,000 members" in svg
-    assert result(samples=False).summary_picture() == "" and result(times=1).summary_picture() == ""
+    assert svg.count("<polyline") == 20
+    assert "of 20 of 1,000 members" in svg
+    assert result(samples=False).summary_picture() == ""
+    assert result(times=1).summary_picture() == ""
 
 
 def test_a_notebook_loads_no_library_of_pictures():
@@ -170,7 +182,8 @@ def test_a_notebook_loads_no_library_of_pictures():
 
 def test_depth_speed_and_euler_are_those_of_the_statistics():
     one = result()
-    assert one.depth.shape == one.speed.shape == (4, 5) and one.euler.shape == (4, 5, 3)
+    assert one.depth.shape == one.speed.shape == (4, 5)
+    assert one.euler.shape == (4, 5, 3)
     np.testing.assert_array_equal(one.depth[:, 0], [10.0, 11.0, 12.0, 13.0])
     np.testing.assert_array_equal(one.speed, 5.0)
     np.testing.assert_allclose(one.euler[2, 3], [0.5, 0.0, 0.0], atol=1e-15)
@@ -198,7 +211,9 @@ def test_a_statistic_that_is_not_there_is_answered_with_those_that_are():
         statistics["xyz"]
     with pytest.raises(KeyError, match="none were asked for"):
         Estimates()["mean depth"]
-    assert "mean dept" not in statistics and statistics.get("mean dept") is None and "mean depth" in statistics
+    assert "mean dept" not in statistics
+    assert statistics.get("mean dept") is None
+    assert "mean depth" in statistics
 
 
 def test_an_estimate_shows_its_numbers_and_no_whole_arrays():
@@ -206,7 +221,8 @@ def test_an_estimate_shows_its_numbers_and_no_whole_arrays():
     assert lines == [text.split() for text in (
         "Estimate 'mean depth' at 2 s", "mean depth 2 m, 1 to 3, 7 members", "arrays value, lower, upper, count")]  # fmt: skip
     lines = repr(result().statistics).splitlines()
-    assert lines[0] == "Estimates of 2 statistics at 2 s" and "2 m/s, 1 to 3, 7 members" in lines[2]
+    assert lines[0] == "Estimates of 2 statistics at 2 s"
+    assert "2 m/s, 1 to 3, 7 members" in lines[2]
 
 
 def test_an_estimate_has_the_attributes_that_it_has():
@@ -226,5 +242,7 @@ def test_completion_of_names():
     code = "import lgvi_warp as lw; print(*dir(lw)); print(*lw.__all__)"
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     names, public = (line.split() for line in done.stdout.splitlines())
-    assert sorted(names) == sorted([*public, "__version__"]) and "solve" in names
-    assert sorted(dir(lw.uq)) == sorted(lw.uq.__all__) and all(hasattr(lw.uq, name) for name in dir(lw.uq))
+    assert sorted(names) == sorted([*public, "__version__"])
+    assert "solve" in names
+    assert sorted(dir(lw.uq)) == sorted(lw.uq.__all__)
+    assert all(hasattr(lw.uq, name) for name in dir(lw.uq))

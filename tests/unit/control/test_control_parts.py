@@ -58,7 +58,9 @@ def test_what_is_wrong_is_said(make, said):
 
 def test_lambda_is_a_key_of_scenes_and_of_members():
     law = lw.HeadingSMC(lambda_=0.4, boundary=0.1, k_sigma=1.0, nomoto_gain=1.0)
-    assert law.to_dict()["lambda"] == 0.4 and "lambda" in law.parameters() and "lambda_" not in law.to_dict()
+    assert law.to_dict()["lambda"] == 0.4
+    assert "lambda" in law.parameters()
+    assert "lambda_" not in law.to_dict()
     controller = lw.Controller(period=0.1, guidance=[{"type": "set_point", "heading": 1.0}], laws=[law.to_dict()])
     assert controller.laws[0].lambda_ == 0.4
     with pytest.raises(lw.SceneError, match=r"lambda_.*unknown key.*lambda"):
@@ -103,10 +105,8 @@ def test_a_policy_that_does_not_fit(arrays, words, said, tmp_path):
 def test_a_policy_knows_its_file_again(tmp_path):
     law = policy(tmp_path)
     told = law.to_dict()
-    assert (
-        told["checksum"] == law.checksum
-        and lw.Policy(**{k: v for k, v in told.items() if k != "type"}).to_dict() == told
-    )
+    assert told["checksum"] == law.checksum
+    assert lw.Policy(**{k: v for k, v in told.items() if k != "type"}).to_dict() == told
     with pytest.raises(lw.SceneError, match="checksum"):
         policy(tmp_path, ONE | {"biases_0": np.ones(1)}, checksum=law.checksum)
 

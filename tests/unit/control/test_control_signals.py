@@ -37,11 +37,13 @@ def test_a_signal_is_noted_by_one_bit():
 def test_rows_of_the_memory():
     bus = Bus.of({"fins": 2, "thrusters": 3})
     noted = {"demand": 50, "measured": 56, "reference": 78}
-    assert row_of("command", bus, noted) == 0 and row_of("unmet", bus, noted) == bus.unmet == 5
+    assert row_of("command", bus, noted) == 0
+    assert row_of("unmet", bus, noted) == bus.unmet == 5
     assert row_of("actuator", bus, noted) == bus.report == 11
     assert row_of("demand", bus, noted) == 50
     # Depth is the third number of the position.
-    assert row_of("measured_depth", bus, noted) == 58 and row_of("reference_depth", bus, noted) == 80
+    assert row_of("measured_depth", bus, noted) == 58
+    assert row_of("reference_depth", bus, noted) == 80
 
 
 def test_order_and_shapes():
@@ -49,7 +51,8 @@ def test_order_and_shapes():
     assert ordered(["demand", "command", "position", "demand"]) == ("position", "command", "demand")
     shapes = {name: tuple(np.shape(np.zeros(SIGNALS[name].field.shape))) for name in SIGNALS if name not in CHANNELS}
     assert all(has_shape(name, shape) and not has_shape(name, (*shape, 1)) for name, shape in shapes.items())
-    assert has_shape("command", (8,)) and not any(has_shape("actuator", shape) for shape in ((), (0,), (2, 2)))
+    assert has_shape("command", (8,))
+    assert not any(has_shape("actuator", shape) for shape in ((), (0,), (2, 2)))
 
 
 def test_the_page_lists_all():

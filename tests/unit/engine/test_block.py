@@ -21,5 +21,6 @@ def test_the_size_at_its_borders(members, size):
 def test_each_member_is_in_one_block(members):
     found = blocks(members)
     assert [i for block in found for i in range(block.first, block.stop)] == list(range(members))
-    assert {block.count for block in found[:-1]} <= {block_size(members)} and 0 < found[-1].count <= block_size(members)
+    assert {block.count for block in found[:-1]} <= {block_size(members)}
+    assert 0 < found[-1].count <= block_size(members)
     assert found[0] == Block(0, min(members, block_size(members)))

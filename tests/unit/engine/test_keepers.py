@@ -19,4 +19,5 @@ def test_statistics_are_sent_without_what_they_gathered():
     sent = pickle.dumps(gathered)
     assert len(sent) == len(empty) < part["samples"].nbytes / 100
     received = pickle.loads(sent)
-    assert received.statistics[0].key == statistics[0].key and received.time.tolist() == [0.0, 1.0, 2.0]
+    assert received.statistics[0].key == statistics[0].key
+    assert received.time.tolist() == [0.0, 1.0, 2.0]

@@ -42,21 +42,25 @@ def test_what_varies_is_computed_each_time_and_nothing_else(way):
         WAYS[way](numbers)
         return len(calls)
 
-    assert [shared("sum", NUMBERS, compute) for _ in range(3)] == [1, 2, 3] and not shared.keeps("sum")
+    assert [shared("sum", NUMBERS, compute) for _ in range(3)] == [1, 2, 3]
+    assert not shared.keeps("sum")
     kept = [shared("x", NUMBERS, lambda n: n["a.x"].sum() + len(calls)) for _ in range(2)]
     calls.append(1)
-    assert kept == [6.0, 6.0] == [shared("x", NUMBERS, lambda n: 0.0)] * 2 and shared.keeps("x")
+    assert kept == [6.0, 6.0] == [shared("x", NUMBERS, lambda n: 0.0)] * 2
+    assert shared.keeps("x")
 
 
 @pytest.mark.parametrize(("name", "field"), [(FRAME, "frame"), (MEMBERS, "members"), (SEED, "seed")])
 def test_a_context_notes_what_it_is_asked_for(name, field):
     reads = Reads(NUMBERS)
     asked = context(reads, "frame", np.arange(5), 7, 0.01, True)
-    assert asked.h == 0.01 and not reads.names
+    assert asked.h == 0.01
+    assert not reads.names
     getattr(asked, field)
     assert reads.names == {name}
     reads.names.clear()
-    assert vars(asked)[field] is not None and name in reads.names
+    assert vars(asked)[field] is not None
+    assert name in reads.names
     assert type(context(NUMBERS, "frame", np.arange(5), 7, 0.01, True)).__name__ == "PackingContext"
 
 

@@ -45,15 +45,24 @@ def test_one_odd_member_decides(at_once):
     ball = replace(scene_of((2.0, 2.0, 2.0)), terms=(lw.Drag(),))
     none = seen(fleet(ball))
     assert SHAPES_OF_MASS[none.mass] == "isotropic"
-    assert not (none.turned or none.bent or none.coupled or none.moved or none.felt or none.couplings)
+    assert not (none.turned)
+    assert not (none.bent)
+    assert not (none.coupled)
+    assert not (none.moved)
+    assert not (none.felt)
+    assert not (none.couplings)
     long = seen(fleet(ball, vehicle__added_mass=np.diag((0.0, 1.0, 1.0))))
-    assert SHAPES_OF_MASS[long.mass] == "diagonal" and not long.bent
+    assert SHAPES_OF_MASS[long.mass] == "diagonal"
+    assert not long.bent
     skew = seen(fleet(ball, vehicle__added_mass=[[1.0, 0.3, 0.0], [0.3, 1.0, 0.0], [0.0, 0.0, 1.0]]))
-    assert SHAPES_OF_MASS[skew.mass] == "full" and skew.bent and not skew.turned
+    assert SHAPES_OF_MASS[skew.mass] == "full"
+    assert skew.bent
+    assert not skew.turned
     without_drag = fleet(scene_of((2.0, 2.0, 2.0)), vehicle__added_mass=np.ones((3, 3)) + np.eye(3))
     assert not seen(without_drag).bent
     turned = seen(fleet(ball, vehicle__inertia=[[2.0, 0.3, 0.0], [0.3, 3.0, 0.0], [0.0, 0.0, 4.0]]))
-    assert turned.turned and turned.bent
+    assert turned.turned
+    assert turned.bent
     assert seen(fleet(ball, vehicle__buoyancy=1.0)).buoyant
     heavy = fleet(ball, vehicle__buoyancy=1.0, vehicle__center_of_buoyancy=(0.0, 0.0, -0.1))
     assert seen(heavy).felt == {"weight", "restoring"}
@@ -86,9 +95,12 @@ def test_laws_that_one_member_feels(at_once):
     scene = lw.Scene(bare.vehicle, bare.environment, terms=[lw.Drag(), lw.Current(velocity=(0.0, 0.0, 0.0))])
     assert not seen(fleet(scene)).felt
     one = seen(fleet(scene, drag__linear=(0.0, 0.0, 0.0, 0.0, 1.0, 0.0)))
-    assert one.felt == {"drag"} and one.drag == {"linear_torque"}
+    assert one.felt == {"drag"}
+    assert one.drag == {"linear_torque"}
     level, rising = (seen(fleet(scene, current__velocity=v)) for v in ((0.1, 0.0, 0.0), (0.1, 0.0, 0.2)))
-    assert level.felt == rising.felt == {"current"} and not level.rising and rising.rising == {"current"}
+    assert level.felt == rising.felt == {"current"}
+    assert not level.rising
+    assert rising.rising == {"current"}
 
 
 def test_parts_join_to_the_whole(monkeypatch):

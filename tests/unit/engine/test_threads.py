@@ -42,7 +42,8 @@ def test_a_run_that_ends_early_halts_what_is_at_work(kind):
         assert running.throw(kind()) == (BLOCKS[1], 1)
     with pytest.raises(kind):
         next(running) if kind is KeyboardInterrupt else running.throw(kind())
-    assert work.ended.wait(SECONDS) and work.halted
+    assert work.ended.wait(SECONDS)
+    assert work.halted
 
 
 def test_an_exception_of_one_block_halts_the_other():
@@ -56,4 +57,5 @@ def test_an_exception_of_one_block_halts_the_other():
 
     with pytest.raises(ValueError, match="no number"):
         list(Threads(2).run(fails, BLOCKS, lambda *_: None))
-    assert work.ended.wait(SECONDS) and work.halted
+    assert work.ended.wait(SECONDS)
+    assert work.halted

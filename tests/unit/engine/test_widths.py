@@ -59,7 +59,8 @@ def test_kept_widths_count_on_this_machine_alone(file, monkeypatch):
     monkeypatch.undo()
     monkeypatch.setattr(widths, "path", lambda: file)
     widths.read.cache_clear()
-    assert widths.tuned() == {"plain float64": 4} and len(json.loads(file.read_bytes())) == 2
+    assert widths.tuned() == {"plain float64": 4}
+    assert len(json.loads(file.read_bytes())) == 2
 
 
 def contents():
@@ -132,5 +133,8 @@ def test_every_kind_is_measured():
     readings = list(tuning.tune(rounds=1))
     assert [reading.kernel for reading in readings] == list(widths.KERNELS)
     for _, ns, of_table, best in readings:
-        assert of_table in ns and best in ns and set(ns) <= set(WIDTHS) and all(one > 0.0 for one in ns.values())
+        assert of_table in ns
+        assert best in ns
+        assert set(ns) <= set(WIDTHS)
+        assert all(one > 0.0 for one in ns.values())
         assert best == of_table or ns[best] < ns[of_table]

@@ -127,6 +127,8 @@ def test_each_step_squares_the_error(iterates, solver):
     errors = np.linalg.norm(values - values[-1], axis=2) / size
     before, after = errors[:3], errors[1:4]
     seen = (before > 1e-6) & (before < 0.1)
-    assert seen[0].sum() > COUNT // 4 and seen[1].sum() > COUNT // 8
+    assert seen[0].sum() > COUNT // 4
+    assert seen[1].sum() > COUNT // 8
     assert (after[seen] < 3.0 * before[seen] ** 2 + 1e-14).all(), (after[seen] / before[seen] ** 2).max()
-    assert errors[3].max() < 1e-6 and errors[4].max() < 1e-13
+    assert errors[3].max() < 1e-6
+    assert errors[4].max() < 1e-13

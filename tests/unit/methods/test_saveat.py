@@ -10,7 +10,9 @@ from lgvi_warp.methods.saveat import time_grid
 
 def test_a_step_that_fits_is_kept():
     grid = time_grid(0.01, 150.0, lw.SaveAt(every=1.0))
-    assert grid.h == 0.01 and grid.steps == 15_000 and grid.messages == ()
+    assert grid.h == 0.01
+    assert grid.steps == 15_000
+    assert grid.messages == ()
     np.testing.assert_array_equal(grid.sample_steps, np.arange(0, 15_001, 100))
     np.testing.assert_array_equal(grid.times, np.arange(151.0))
 
@@ -34,12 +36,14 @@ def test_a_step_that_does_not_fit_is_shortened_with_a_message(h, t1, save, step)
     grid = time_grid(h, t1, save)
     assert grid.h == pytest.approx(step, rel=1e-15)
     np.testing.assert_allclose(grid.sample_steps * grid.h, grid.times, rtol=1e-15)
-    assert len(grid.messages) == 1 and str(h) in grid.messages[0]
+    assert len(grid.messages) == 1
+    assert str(h) in grid.messages[0]
 
 
 def test_decimals_are_taken_as_meant():
     grid = time_grid(0.1, 0.1 + 0.2, lw.SaveAt())
-    assert grid.steps == 3 and grid.h == 0.1
+    assert grid.steps == 3
+    assert grid.h == 0.1
     assert time_grid(1.0 / 3.0, 2.0, lw.SaveAt()).steps == 6
     assert time_grid(1e-12, 1e-9, lw.SaveAt(every=1e-10)).steps == 1000
     assert time_grid(1e6, 1e8, lw.SaveAt()).steps == 100
@@ -48,13 +52,15 @@ def test_decimals_are_taken_as_meant():
 @pytest.mark.kernel
 def test_a_spacing_of_the_scene_longer_than_the_run_is_dropped_with_a_message(scene):
     result = lw.solve(lw.Ensemble(scene), h=0.01, t1=0.1)
-    assert list(result.time) == [0.0, 0.1] and "save_every" in result.messages[0]
+    assert list(result.time) == [0.0, 0.1]
+    assert "save_every" in result.messages[0]
 
 
 @pytest.mark.kernel
 def test_the_message_reaches_the_result(scene):
     result = lw.solve(lw.Ensemble(scene), h=0.03, t1=0.1)
-    assert "shortened" in result.messages[0] and result.provenance["step"] == pytest.approx(0.025)
+    assert "shortened" in result.messages[0]
+    assert result.provenance["step"] == pytest.approx(0.025)
 
 
 @pytest.mark.parametrize(

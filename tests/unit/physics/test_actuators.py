@@ -109,7 +109,8 @@ def test_the_sides_of_a_table(side):
     term = thrusters(**TABLE)
     at, values = side_of_table(term.table_commands[None], term.table_thrusts[None, :, 0], side)
     assert (at[0].min(), values[0].min()) == ((0.1, 0.0) if side > 0.0 else (0.2, 0.0))
-    assert np.all(np.diff(values) >= 0.0) and values.max() == (20.0 if side > 0.0 else 8.0)
+    assert np.all(np.diff(values) >= 0.0)
+    assert values.max() == (20.0 if side > 0.0 else 8.0)
 
 
 def test_thrust_and_command_of_a_table():
@@ -126,7 +127,8 @@ def test_the_inverse_of_a_polynomial():
     rows = inverse_rows(np.array([[1.0, 3.0], [1.0, -1.0], [-1.0, 0.0]]), np.array([2.0, 2.0, 2.0]))
     np.testing.assert_allclose(rows[:2, 1:3], [[14.0, 2.0], [0.25, 0.5]], rtol=1e-15)
     assert rows[2, 0] == rows[2, 1] == 0.0
-    assert rows.shape == (3, 4 + START_SIZE) and pseudo_inverse.START_SIZE == START_SIZE
+    assert rows.shape == (3, 4 + START_SIZE)
+    assert pseudo_inverse.START_SIZE == START_SIZE
     s = np.linspace(0.0, 1.0, 101)
     start = np.polynomial.polynomial.polyval(2.0 * s - 1.0, rows[:2, 4:].T)
     exact = np.sqrt(1.0 + 12.0 * 14.0 * (1.0 - (1.0 - s**2) ** 2)) - 1.0, 3.0 * (1.0 - (1.0 - s**2))
@@ -146,7 +148,8 @@ def test_the_inverse_of_bluerov2s_polynomial():
         w = np.clip(w + (t - value(w)) / np.maximum(slope(w), floor), 0.0, top)
     assert np.abs(value(w) - t).max() < 1e-8 * most
     # The polynomial turns before its limit: beyond the largest thrust the command is that of the turn.
-    assert 0.97 < w[-1] < 0.972 and abs(slope(w[-1])) < 1e-6 * most
+    assert 0.97 < w[-1] < 0.972
+    assert abs(slope(w[-1])) < 1e-6 * most
 
 
 def test_effect_of_a_table_of_lift():

@@ -18,7 +18,8 @@ def starts(start, members, seed=1):
 
 def test_the_start_has_the_stationary_spread():
     u = starts("stationary", np.arange(4000))
-    assert u.shape == (4000, 3) and not starts("zero", np.arange(4000)).any()
+    assert u.shape == (4000, 3)
+    assert not starts("zero", np.arange(4000)).any()
     for i, spread in enumerate(SPREAD[0]):
         assert stats.kstest(u[:, i], stats.norm(scale=spread).cdf).pvalue > 1e-4
     assert abs(np.corrcoef(u.T)[np.triu_indices(3, 1)]).max() < 0.08

@@ -87,7 +87,8 @@ def test_quaternion_length_does_not_matter(length):
 def test_quaternion_and_matrix_there_and_back():
     R = random_rotations(2000)
     q = notation.quaternion_from_matrix(R)
-    assert q.shape == (2000, 4) and (q[:, 0] >= 0.0).all()
+    assert q.shape == (2000, 4)
+    assert (q[:, 0] >= 0.0).all()
     np.testing.assert_allclose(np.linalg.norm(q, axis=1), 1.0, rtol=0, atol=ROUND)
     np.testing.assert_allclose(notation.matrix_from_quaternion(q), R, rtol=0, atol=ROUND)
 

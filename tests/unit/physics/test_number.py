@@ -63,7 +63,9 @@ def context(origin):
 def test_numbers_are_packed_as_they_are_declared():
     term, origin = Buoys(pull=1.0), np.array([0.1, 0.2, 0.3])
     packed = term.packed({name: value[None] for name, value in term.parameters().items()}, context(origin))
-    assert packed.rows is None and packed.memory is None and packed.work == 0
+    assert packed.rows is None
+    assert packed.memory is None
+    assert packed.work == 0
     expected = {"pull": 1.0, "least_pull": 2.0, "anchor": term.anchor, "side": TURN.T @ term.side,
                 "knot": TURN.T @ (term.knot - origin)}  # fmt: skip
     assert packed.values.keys() == expected.keys()

@@ -29,7 +29,8 @@ BODY = "[vehicle]\nmass = 30.0\ninertia = [0.2, 3.0, 3.0]\nbuoyancy = 290.0\n"
 def test_a_wrong_shape_is_refused(shape, words):
     with pytest.raises(lw.SceneError) as caught:
         lw.Vehicle(30.0, inertia=(0.2, 3.0, 3.0), shape=shape)
-    assert words in str(caught.value) and all(";" in fault for fault in caught.value.faults)
+    assert words in str(caught.value)
+    assert all(";" in fault for fault in caught.value.faults)
 
 
 @pytest.mark.parametrize("name", lw.vehicles())
@@ -51,9 +52,11 @@ def test_it_is_no_part_of_the_dynamics():
         make_plan(lw.Ensemble(lw.Scene(lw.Vehicle(30.0, inertia=(0.2, 3.0, 3.0), shape=shape)), 2), h=0.1, t1=1.0)
         for shape in (None, {"length": 2.0, "diameter": 0.3})
     )
-    assert plain.kernel_hash == shaped.kernel_hash and plain.spec == shaped.spec
+    assert plain.kernel_hash == shaped.kernel_hash
+    assert plain.spec == shaped.spec
     tables = [provenance(plan) for plan in (plain, shaped)]
-    assert tables[0] != tables[1] and same_run(*tables) == []
+    assert tables[0] != tables[1]
+    assert same_run(*tables) == []
 
 
 def load(folder, mesh):

@@ -27,10 +27,13 @@ def test_shapes(result):
     r, _ = result
     k, n = 5, 5
     shapes = {"position": (k, n, 3), "attitude": (k, n, 3, 3), "quaternion_wxyz": (k, n, 4), "velocity": (k, n, 3)}
-    assert r.time.shape == (k,) and r.energy.shape == (k, n) and r.status.shape == (n,)
+    assert r.time.shape == (k,)
+    assert r.energy.shape == (k, n)
+    assert r.status.shape == (n,)
     assert all(getattr(r, name).shape == shape for name, shape in shapes.items())
     assert all(x.dtype == np.float64 for x in r.samples.values())
-    assert r.status.counts() == {"ok": 4, "step_too_large": 1} and list(np.flatnonzero(r.status)) == [3]
+    assert r.status.counts() == {"ok": 4, "step_too_large": 1}
+    assert list(np.flatnonzero(r.status)) == [3]
 
 
 def test_energy_and_momenta(result):
@@ -58,7 +61,8 @@ def test_save_and_load(result, tmp_path):
     again = lw.Result.load(path)
     for name in (*FIELDS, "energy", "quaternion_wxyz", "status", "failure_time", "failure_value", "time"):
         np.testing.assert_array_equal(getattr(again, name), getattr(r, name))
-    assert again.provenance == json.loads(json.dumps(r.provenance)) and again.messages == r.messages
+    assert again.provenance == json.loads(json.dumps(r.provenance))
+    assert again.messages == r.messages
     assert again.status.counts() == r.status.counts()
     assert [p.name for p in tmp_path.iterdir()] == ["result.npz"]
 
@@ -79,16 +83,21 @@ def test_a_save_that_fails_leaves_the_old_file(result, tmp_path, monkeypatch):
     monkeypatch.setattr(np, "savez", full_disk)
     with pytest.raises(OSError, match="No space"):
         r.save(path)
-    assert path.read_bytes() == before and len(list(tmp_path.iterdir())) == 1
+    assert path.read_bytes() == before
+    assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_provenance_names_what_the_result_follows_from(result):
     p = result[0].provenance
-    assert p["terms"] == ["weight", "restoring"] and p["method"]["name"] == "psi_s" and p["step"] == 0.05
-    assert {"python", "lgvi-warp", "warp-lang", "numpy"} <= p["versions"].keys() and p["machine"]["threads"] >= 1
+    assert p["terms"] == ["weight", "restoring"]
+    assert p["method"]["name"] == "psi_s"
+    assert p["step"] == 0.05
+    assert {"python", "lgvi-warp", "warp-lang", "numpy"} <= p["versions"].keys()
+    assert p["machine"]["threads"] >= 1
 
 
 def test_dataset(result):
     dataset = result[0].dataset
     assert dict(dataset.sizes) == {"time": 5, "realization": 5, "component": 3, "row": 3, "column": 3}
-    assert dataset.position.attrs["units"] == "m" and dataset.attrs["Conventions"] == "CF-1.11"
+    assert dataset.position.attrs["units"] == "m"
+    assert dataset.attrs["Conventions"] == "CF-1.11"

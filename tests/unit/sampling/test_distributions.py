@@ -64,7 +64,8 @@ def test_uniforms_depend_on_seed_name_and_member():
 
 def test_uniforms_are_uniform_and_their_components_independent():
     u = uniforms(3, "x", 0, N, 3)
-    assert u.min() > 0.0 and u.max() < 1.0
+    assert u.min() > 0.0
+    assert u.max() < 1.0
     grid = (np.arange(N) + 0.5) / N
     for component in u.T:
         # Kolmogorov: P(sqrt(N) D > 2.5) = 2 exp(-2 * 2.5^2) = 7e-6
@@ -141,7 +142,8 @@ def test_a_spread_of_zero_is_the_value_itself():
 def test_truncated_values_stay_within_their_bounds():
     extremes = np.array([2.0**-54, 1.0 - 2.0**-53])
     got = lw.TruncatedNormal(std=1.0, low=0.1, high=0.3).quantile(extremes, np.array(0.0))
-    assert (got >= 0.1).all() and (got <= 0.3).all()
+    assert (got >= 0.1).all()
+    assert (got <= 0.3).all()
 
 
 @pytest.mark.parametrize("bound", [15.0, 19.9, 20.1, 37.0, 40.0, 200.0])
@@ -154,7 +156,9 @@ def test_far_tails_against_scipy(bound):
         exact = stats.truncnorm(bound, np.inf).ppf(u)
         np.testing.assert_allclose(sign * got - bound, exact - bound, rtol=1e-6, atol=0)
     both = lw.TruncatedNormal(std=1.0, low=bound, high=bound + 0.5).quantile(u, np.array(0.0))
-    assert (np.diff(both) > 0.0).all() and both.min() > bound and both.max() < bound + 0.5
+    assert (np.diff(both) > 0.0).all()
+    assert both.min() > bound
+    assert both.max() < bound + 0.5
 
 
 def test_a_law_relative_to_nothing_is_refused(scene):
@@ -207,7 +211,8 @@ def test_tables_are_laws_in_code_too(scene):
 )
 def test_bad_numbers(kind, values, key):
     message = refused(kind, **values)
-    assert key in message and "\n" not in message
+    assert key in message
+    assert "\n" not in message
 
 
 def test_all_faults_of_a_law_come_at_once():

@@ -61,7 +61,8 @@ def test_uniforms_of_scattered_members():
 
 def test_correlated_normals_have_their_covariance():
     a, b = drawn(lw.CorrelatedNormal(covariance=COVARIANCE), 10.0, [1.0, -2.0])
-    assert a.shape == (N,) and b.shape == (N, 2)
+    assert a.shape == (N,)
+    assert b.shape == (N, 2)
     assert_covariance(np.column_stack([a, b]), [10.0, 1.0, -2.0], COVARIANCE)
 
 
@@ -108,7 +109,8 @@ def test_bad_covariances(values, text):
 
 def test_all_faults_of_a_covariance_come_at_once():
     message = refused(lw.CorrelatedNormal, covariance="wide", mean=np.nan)
-    assert "covariance = 'wide'" in message and "mean = nan" in message
+    assert "covariance = 'wide'" in message
+    assert "mean = nan" in message
 
 
 def test_a_singular_covariance_of_six_digits():
@@ -244,7 +246,8 @@ def test_a_rigid_body_of_six_dimensions_keeps_its_centre():
     np.testing.assert_array_equal(found[:, 3:, :3], np.swapaxes(found[:, :3, 3:], 1, 2))
     about = found[:, 3:, 3:] + masses[:, None, None] * (H @ H)
     small, middle, large = np.linalg.eigvalsh(about).T
-    assert (small > 0.0).all() and (small + middle > large).all()
+    assert (small > 0.0).all()
+    assert (small + middle > large).all()
 
 
 def notation_hat(r):
@@ -268,7 +271,8 @@ def test_matrix_laws_that_do_not_fit(scene):
     )
     assert "rigid body's inertia" in found("vehicle.added_mass", lw.PhysicalInertia(sigma=0.1))
     assert "mass_sigma" in found("vehicle.inertia", lw.PhysicalInertia(sigma=0.1, mass_sigma=0.1))
-    assert "width" in refused(lw.PositiveDefinite) and "negative" in refused(lw.PositiveDefinite, sigma=-0.1)
+    assert "width" in refused(lw.PositiveDefinite)
+    assert "negative" in refused(lw.PositiveDefinite, sigma=-0.1)
     assert "not one number" in refused(lw.PositiveDefinite, sigma=0.1, off_diagonal=(0.1, 0.2))
 
 
@@ -289,7 +293,8 @@ FROZEN = {
 def test_laws_of_scipy_by_name(kind):
     exact, values = FROZEN[kind]
     law = from_dict("key", {kind: values})
-    assert law == lw.ScipyDistribution(exact) and law.to_dict() == {kind: values}
+    assert law == lw.ScipyDistribution(exact)
+    assert law.to_dict() == {kind: values}
     u = uniforms(5, kind, 0, 20_000, 1)[:, 0]
     x = law.quantile(u, np.array(10.0))
     np.testing.assert_array_equal(x, exact.ppf(u))
@@ -303,7 +308,8 @@ def test_any_law_of_scipy():
         (stats.norm([1.0, 2.0, 3.0], 0.1), {"name": "norm", "loc": [1.0, 2.0, 3.0], "scale": 0.1}),
     ):
         mine = lw.ScipyDistribution(law)
-        assert mine.to_dict() == {"scipy": content} and from_dict("key", mine.to_dict()) == mine
+        assert mine.to_dict() == {"scipy": content}
+        assert from_dict("key", mine.to_dict()) == mine
 
 
 @pytest.mark.parametrize(
@@ -397,14 +403,16 @@ def test_choices_come_as_often_as_they_weigh():
     for value, chance in zip((1.0, -2.0, 5.0), (0.125, 0.25, 0.625)):
         share = (x == value).mean(axis=0)
         assert (np.abs(share - chance) < ERRORS * np.sqrt(chance * (1.0 - chance) / N)).all()
-    assert set(x.ravel()) == {1.0, -2.0, 5.0} and (x[:, 0] != x[:, 1]).any()
+    assert set(x.ravel()) == {1.0, -2.0, 5.0}
+    assert (x[:, 0] != x[:, 1]).any()
     whole = lw.Choice(values=[[1.0, 2.0], [3.0, 4.0]])
     assert whole.joint
     assert set(map(tuple, whole.draw(uniforms(1, "x", 0, 100, 1), [np.zeros(2)])[0])) == {(1.0, 2.0), (3.0, 4.0)}
 
 
 def test_bad_choices():
-    assert "no list of values" in refused(lw.Choice) and "not numeric" in refused(lw.Choice, values=("a",))
+    assert "no list of values" in refused(lw.Choice)
+    assert "not numeric" in refused(lw.Choice, values=("a",))
     assert "weigh 2 values" in refused(lw.Choice, values=(1.0, 2.0), weights=(1.0,))
     assert "negative" in refused(lw.Choice, values=(1.0, 2.0), weights=(1.0, -1.0))
 
@@ -421,4 +429,5 @@ def test_bad_choices():
     ],
 )
 def test_there_and_back(law):
-    assert from_dict("key", law.to_dict()) == law and list(law.to_dict()) == [law.kind]
+    assert from_dict("key", law.to_dict()) == law
+    assert list(law.to_dict()) == [law.kind]

@@ -107,7 +107,8 @@ def test_the_last_members_there_can_be(scene, content):
     fleet = lw.Ensemble(scene, n, 3, vary, content)
     last = fleet.select(n - 50, n)
     assert_same(fleet.member(n - 1).select(0, 1), last, [49])
-    assert last.indices[-1] == n - 1 and len(np.unique(last.position[:, 0])) == 50
+    assert last.indices[-1] == n - 1
+    assert len(np.unique(last.position[:, 0])) == 50
     # As the kernels have the index, which keys a member's noise.
     assert last.indices.astype(np.int32)[-1] == n - 1
 
@@ -115,17 +116,20 @@ def test_the_last_members_there_can_be(scene, content):
 def test_no_sampling_has_more_members_than_there_can_be(scene):
     for content in ("random", "sobol", {"sobol": {"replicates": 64}}, "halton"):
         (fault,) = faults(lw.Ensemble, scene, MOST_MEMBERS + 64, 0, None, content)
-        assert "ensemble.members = 2147483712: are more members than the 2147483648" in fault and "or less" in fault
+        assert "ensemble.members = 2147483712: are more members than the 2147483648" in fault
+        assert "or less" in fault
     uniform = lw.Uniform(low=0.0, high=1.0)
     names = ("start.position", "start.angular_velocity")
     grid = {"grid": dict.fromkeys(names, 3000)}
     content = scene.to_dict() | {"ensemble": {"vary": dict.fromkeys(names, uniform.to_dict()), "sampling": grid}}
     (fault,) = faults(lw.Scene.from_dict, content)
-    assert f"ensemble.sampling.grid = {3000**6}: are more members" in fault and "fewer values" in fault
+    assert f"ensemble.sampling.grid = {3000**6}: are more members" in fault
+    assert "fewer values" in fault
     # Beyond whole numbers of 64 bits.
     assert "more members" in faults(lw.Ensemble, scene, None, 0, {names[0]: uniform}, lw.Grid({names[0]: 10**30}))[0]
     fleet = lw.Ensemble(scene, None, 0, {names[0]: uniform}, lw.Grid({names[0]: 2**10}))
-    assert fleet.members == 2**30 and len(fleet.select(2**30 - 3, 2**30).position) == 3
+    assert fleet.members == 2**30
+    assert len(fleet.select(2**30 - 3, 2**30).position) == 3
 
 
 @pytest.mark.parametrize("content", [*SEQUENCES, *REPLICATED], ids=str)
@@ -169,7 +173,8 @@ def test_varying_more_does_not_change_the_rest(scene, content):
 def test_levels_are_uniform_within_the_open_cube(content):
     n = 8000
     u = cube(content, np.arange(n))
-    assert u.min() > 0.0 and u.max() < 1.0
+    assert u.min() > 0.0
+    assert u.max() < 1.0
     grid = (np.arange(n) + 0.5) / n
     # Saltelli's members repeat the points A and B: n / 4 of them are their own, in each column.
     own = n / 4 if content == "saltelli" else n
@@ -231,7 +236,8 @@ def test_replicates_of_a_latin_hypercube_fill_its_groups_in_turn():
 def test_replicates_are_told_and_read(scene, content):
     fleet = lw.Ensemble(scene, 80, 3, VARY, content)
     told = fleet.to_dict()
-    assert told["sampling"] == content and fleet.replicates == next(iter(content.values()))["replicates"]
+    assert told["sampling"] == content
+    assert fleet.replicates == next(iter(content.values()))["replicates"]
     again = lw.Scene.from_dict(scene.to_dict() | {"ensemble": told})
     assert_same(lw.Ensemble.from_scene(again).select(0, 80), fleet.select(0, 80), slice(0, 80))
     assert fleet.subset(range(40)).replicates == fleet.member(3).replicates == 1
@@ -285,7 +291,8 @@ def test_a_joint_law_moves_as_one_factor():
     np.testing.assert_array_equal(u[2], [*A[:3], B[3]])
     path = cube("morris", np.arange(3), space)
     moved = np.diff(path, axis=0) != 0.0
-    assert sorted(moved.sum(axis=1)) == [1, 3] and (moved.sum(axis=0) == 1).all()
+    assert sorted(moved.sum(axis=1)) == [1, 3]
+    assert (moved.sum(axis=0) == 1).all()
 
 
 def test_a_path_moves_one_factor_at_a_time_by_half_the_levels():
@@ -394,7 +401,8 @@ def test_columns_that_no_scene_has_are_left_out(scene, tmp_path):
     path = tmp_path / "members.csv"
     frame.to_csv(path)
     found = faults(lw.Table, path, columns=["vehicle.mass", "id"])
-    assert len(found) == 2 and all('leave the column out: ignore = ["id"]' in fault for fault in found)
+    assert len(found) == 2
+    assert all('leave the column out: ignore = ["id"]' in fault for fault in found)
     tables = [
         lw.Table(path, ignore=["", "id"]),
         lw.Table(path, columns=("start.position[2]", "vehicle.mass")),
@@ -448,7 +456,8 @@ def test_an_ensemble_comes_back_from_its_provenance(scene, content):
     for one in (fleet, fleet.subset([2, 0])):
         written = json.loads(json.dumps(scene.to_dict() | {"ensemble": one.to_dict()}))
         back = lw.Ensemble.from_scene(lw.Scene.from_dict(written))
-        assert back.members == one.members and back.to_dict() == one.to_dict()
+        assert back.members == one.members
+        assert back.to_dict() == one.to_dict()
         assert_same(back.select(0, one.members), one.select(0, one.members), slice(None))
 
 
@@ -593,7 +602,8 @@ def test_files_that_are_none(scene, tmp_path):
     assert "no text in UTF-8" in faults(lw.Table, path)[0]
     path.write_text("vehicle.mass [kg],vehicle.buoyancy\n120,1000\n")
     (fault,) = faults(lw.Ensemble, scene, sampling=lw.Table(path))
-    assert '"vehicle.mass [kg]"' in fault and "did you mean 'vehicle.mass'?" in fault
+    assert '"vehicle.mass [kg]"' in fault
+    assert "did you mean 'vehicle.mass'?" in fault
 
 
 def test_bad_names_and_laws_come_in_one_message(scene):
@@ -657,7 +667,8 @@ def test_attitudes_that_are_no_rotations(scene):
     R[2, 0] *= -1.0
     for sampling_, vary in ((lw.Grid({"start.attitude": R}), None), ("random", {"start.attitude": lw.Choice(R)})):
         (fault,) = faults(lw.Ensemble, scene, None, 0, vary, sampling_)
-        assert 'vary."start.attitude"' in fault and "no rotation to 1e-9 (number 3)" in fault
+        assert 'vary."start.attitude"' in fault
+        assert "no rotation to 1e-9 (number 3)" in fault
     assert "by entry" in faults(lw.Ensemble, scene, 4, 0, {"start.attitude": lw.Choice([0.0, 1.0])})[0]
     assert "shape (2, 2)" in faults(lw.Ensemble, scene, 4, 0, {"start.attitude": lw.Choice([np.eye(2)])})[0]
 
@@ -713,7 +724,8 @@ def test_many_members_take_little_memory(scene):
 def test_a_grid_names_what_it_is_a_grid_of(axes):
     """What is no table of axes is one fault, and no error of Python's follows."""
     (fault,) = faults(lw.Grid, axes)
-    assert fault.startswith("ensemble.sampling.grid.axes = ") and "names nothing" in fault
+    assert fault.startswith("ensemble.sampling.grid.axes = ")
+    assert "names nothing" in fault
 
 
 def test_a_hypercube_without_its_group_is_told_so():

@@ -74,12 +74,14 @@ def test_nothing_varied_is_shared(scene):
 def test_everything_varied_has_its_own(scene):
     m = lw.Ensemble(scene, 50, 3, EVERYTHING).select(0, 50)
     for name, value in numbers(m).items():
-        assert len(value) == 50 and value.dtype == np.float64, name
+        assert len(value) == 50, name
+        assert value.dtype == np.float64, name
         assert len(np.unique(value.reshape(50, -1), axis=0)) == 50, name
     # Of a diagonal matrix the diagonal varies.
     off = m.parameters["vehicle.inertia"][:, ~np.eye(3, dtype=bool)]
     assert not off.any()
-    assert (m.parameters["environment.gravity"] >= 9.78).all() and (m.parameters["environment.gravity"] <= 9.83).all()
+    assert (m.parameters["environment.gravity"] >= 9.78).all()
+    assert (m.parameters["environment.gravity"] <= 9.83).all()
 
 
 def test_the_inertial_velocity_is_turned_by_each_members_attitude(scene):
@@ -138,7 +140,8 @@ def test_few_members_are_drawn_once(scene):
     few, some = fleet.select(0, 5), fleet.select(1, 3)
     for name in ("vehicle.mass", "vehicle.added_mass"):
         values = few.parameters[name]
-        assert fleet.parameters(0, 5)[name] is values and not values.flags.writeable
+        assert fleet.parameters(0, 5)[name] is values
+        assert not values.flags.writeable
         np.testing.assert_array_equal(some.parameters[name], values[1:3])
     assert fleet.with_seed(4).select(0, 5).parameters["vehicle.mass"][0] != few.parameters["vehicle.mass"][0]
 
@@ -225,7 +228,8 @@ def test_wrong_shapes_are_refused_together(scene):
     found = faults(lw.Ensemble.from_states, scene, b, R[:, :2], nu[:3], Om[0])
     assert len(found) == 3
     for fault, key in zip(found, ("attitude", "velocity", "angular_velocity"), strict=True):
-        assert key in fault and "(4, 3" in fault
+        assert key in fault
+        assert "(4, 3" in fault
     assert len(faults(lw.Ensemble.from_states, scene, "here", R, nu, "fast")) == 2
 
 
@@ -235,7 +239,8 @@ def test_given_attitudes_must_be_rotations(scene):
     R[4] *= 1.001
     R[0] = np.nan
     (fault,) = faults(lw.Ensemble.from_states, scene, b, R, nu, Om)
-    assert "member 3" in fault and "2 of 5" in fault
+    assert "member 3" in fault
+    assert "2 of 5" in fault
 
 
 def test_bad_parameters_are_refused(scene):
@@ -284,7 +289,8 @@ def test_one_member(scene):
 )
 def test_names_that_the_scene_does_not_have(scene, name, text):
     (fault,) = faults(lw.Ensemble, scene, 4, 0, {name: lw.Normal(std=0.1)})
-    assert f'ensemble.vary."{name}"' in fault and text in fault
+    assert f'ensemble.vary."{name}"' in fault
+    assert text in fault
 
 
 def test_an_attitude_matrix_cannot_vary_by_entry(scene):
@@ -338,7 +344,8 @@ def test_all_bad_laws_come_in_one_message(scene):
 def test_unphysical_draws_are_counted_and_shown(scene, name, law, key):
     (fault,) = faults(lw.Ensemble, scene, 200, 0, {name: law})
     assert fault.startswith(f"{key} of member ")
-    assert " of 200 members)" in fault and "TruncatedNormal" in fault
+    assert " of 200 members)" in fault
+    assert "TruncatedNormal" in fault
     # At one standard deviation per mean 16 % of 200 are negative: 32 +- 5 standard errors of 5.2.
     if "relative=1.0" in str(law) and name == "vehicle.mass":
         assert 6 <= int(fault.split("(")[1].split()[0]) <= 58, fault
@@ -348,4 +355,5 @@ def test_provenance(scene):
     fleet = lw.Ensemble.from_scene(scene)
     assert fleet.to_dict() == scene.to_dict()["ensemble"]
     explicit = lw.Ensemble.from_states(scene, *states(2), {"vehicle.mass": [1.0, 2.0]})
-    assert explicit.to_dict()["members"] == 2 and "vehicle.mass" in explicit.to_dict()["explicit"]
+    assert explicit.to_dict()["members"] == 2
+    assert "vehicle.mass" in explicit.to_dict()["explicit"]

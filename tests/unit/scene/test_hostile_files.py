@@ -40,7 +40,8 @@ def refused(call, *arguments, words=(), **named):
     assert time.thread_time() - begun < MOST_SECONDS
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < MOST_KB
     lines = str(caught.value).splitlines()
-    assert len(lines) <= errors.MOST_FAULTS + 2 and max(map(len, lines)) <= errors.HEAD + errors.END + 20
+    assert len(lines) <= errors.MOST_FAULTS + 2
+    assert max(map(len, lines)) <= errors.HEAD + errors.END + 20
     assert all(line.isprintable() for line in lines)
     assert all(word in str(caught.value) for word in words), str(caught.value)[:2000]
     return caught.value
@@ -376,19 +377,23 @@ def test_an_argument_is_refused(arguments, words, tmp_path, monkeypatch, capsys)
     assert main(arguments) == 2
     assert time.thread_time() - begun < 2.0 * MOST_SECONDS  # libraries are loaded
     text = capsys.readouterr().err
-    assert words in text and "Traceback" not in text and len(text.splitlines()) <= 3
+    assert words in text
+    assert "Traceback" not in text
+    assert len(text.splitlines()) <= 3
 
 
 def test_a_list_over_many_lines_is_one_value(tmp_path):
     scene = lw.Scene.load(PAPER, {"start.position": "[1.0,\n 2.0,\n 3.0]\n", "vehicle.mass": "120 # kg"})
-    assert scene.start.position.tolist() == [1.0, 2.0, 3.0] and scene.vehicle.mass == 120
+    assert scene.start.position.tolist() == [1.0, 2.0, 3.0]
+    assert scene.vehicle.mass == 120
 
 
 def test_a_scene_whose_name_means_another_folder_writes_below_runs():
     class Chosen:
         out, scene = None, "...toml"
 
-    assert str(out_of(Chosen())) == "runs/scene" and str(out_of(Chosen(), "_x")) == "runs/scene_x"
+    assert str(out_of(Chosen())) == "runs/scene"
+    assert str(out_of(Chosen(), "_x")) == "runs/scene_x"
 
 
 # The command, here and as a process: exit code, a line, no traceback.
@@ -416,8 +421,11 @@ def test_the_command_refuses_in_a_line(where, name, tmp_path, monkeypatch, capsy
     Path("deep.toml").write_text("a = " + "[" * 100_000)
     arguments, words = COMMANDS[name]
     code, out, error = (main(arguments), *capsys.readouterr()) if where == "here" else in_a_process(arguments)
-    assert code == 2 and words in error and out == ""
-    assert len(error.splitlines()) == 1 and "Traceback" not in error
+    assert code == 2
+    assert words in error
+    assert out == ""
+    assert len(error.splitlines()) == 1
+    assert "Traceback" not in error
 
 
 # Faults are counted.
@@ -430,8 +438,12 @@ def test_so_many_faults_are_said_and_the_rest_is_counted():
         faults.add(f"key{i}", i, "is odd", lambda i=i: asked.append(i) or "mend it")
     error = refused(faults.raise_if_any)
     lines = str(error).splitlines()
-    assert lines[0] == "63 faults:" and lines[1] == "  key0 = 0: is odd; mend it" and lines[-1] == "  and 43 more"
-    assert len(lines) == 22 and len(error.faults) == 20 and error.more == 43
+    assert lines[0] == "63 faults:"
+    assert lines[1] == "  key0 = 0: is odd; mend it"
+    assert lines[-1] == "  and 43 more"
+    assert len(lines) == 22
+    assert len(error.faults) == 20
+    assert error.more == 43
     assert asked == list(range(20))  # what is not said costs nothing
 
 
@@ -444,7 +456,8 @@ def test_faults_within_faults_are_counted_once():
         with outer.including():
             raise inner.prefixed("here: ")
     error = refused(outer.raise_if_any)
-    assert (len(error.faults), error.more) == (20, 81) and error.faults[1] == "here: fault 0"
+    assert (len(error.faults), error.more) == (20, 81)
+    assert error.faults[1] == "here: fault 0"
     again = error.__reduce__()
     assert str(again[0](*again[1])) == str(error)
 

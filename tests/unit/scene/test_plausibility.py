@@ -193,7 +193,8 @@ def test_a_number_that_is_set_or_varies_is_seen_as_the_one_in_a_scene(name):
 def test_a_command_of_a_shipped_vehicle_that_varies_in_radians_or_in_degrees():
     remus = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0})
     (message,) = said(lw.Ensemble(remus, 50, 1, {"control_fins.command[1]": lw.Uniform(low=4.0, high=20.0)}))
-    assert message.startswith("control_fins.command: an angle of") and "all 50 members" in message
+    assert message.startswith("control_fins.command: an angle of")
+    assert "all 50 members" in message
     assert said(lw.Ensemble(remus, 50, 1, {"control_fins.command[1]": lw.Uniform(low=-0.3, high=0.3)})) == ()
 
 
@@ -222,7 +223,8 @@ def test_members_are_counted_and_the_first_is_named(monkeypatch):
     states[0][-1, 2] = -4.0
     fleet = lw.Ensemble.from_states(scene(), *states, {"vehicle.buoyancy": buoyancy})
     expected = said(fleet)
-    assert "812 of 1,000 members; first: member 5)" in expected[0] and "291.2 N" in expected[0]
+    assert "812 of 1,000 members; first: member 5)" in expected[0]
+    assert "291.2 N" in expected[0]
     assert "(1 of 1,000 members; first: member 999)" in expected[1]
     for at_once in (7, 111, 1000):  # the last of them alone, too
         monkeypatch.setattr(ensembles, "AT_ONCE", at_once)
@@ -258,7 +260,10 @@ def test_what_becomes_odd_on_the_way_is_said():
     v = [[[29.0, 0, 0]] * 3, [[0, 31.0, 0], [np.nan, 0, 0], [0, 0, 30.0]], [[1.0, 0, 0]] * 3]
     found = plausibility.on_the_way(scene(), samples(position=z, velocity=v)).messages(3)
     # Members that begin at the surface, or above it as is said already, say nothing of where they mean it to be.
-    assert len(found) == 2 and "31 m/s" in found[0] and "rises 0.5 m" in found[1] and "lw.Surface()" in found[1]
+    assert len(found) == 2
+    assert "31 m/s" in found[0]
+    assert "rises 0.5 m" in found[1]
+    assert "lw.Surface()" in found[1]
     assert all("(1 of 3 members; first: member 0)" in text for text in found)
     assert len(plausibility.on_the_way(scene(events=[{"type": "surface"}]), samples(position=z)).messages(3)) == 0
     assert plausibility.on_the_way(scene(), samples(position=z)).messages(3) == found[1:]
@@ -281,7 +286,8 @@ def test_a_result_says_what_is_odd():
     )
     texts = lw.solve(fleet, h=0.01, t1=1.0).messages
     assert [text.split(":")[0] for text in texts] == ["vehicle.buoyancy", "start.velocity", "position"]
-    assert "(all 20 members)" in texts[0] and " of 20 members; first: member " in texts[1]
+    assert "(all 20 members)" in texts[0]
+    assert " of 20 members; first: member " in texts[1]
 
 
 NAMED = {name: lw.Scene.named(name) for name in lw.vehicles()}
@@ -308,7 +314,8 @@ def test_no_scene_of_the_benchmarks_is_odd():
 def test_every_limit_has_its_reason_and_is_on_the_page():
     page = (ROOT / "docs" / "guide" / "plausibility.md").read_text()
     for name, limit in LIMITS.items():
-        assert f"| {name} |" in page and limit.reason in page, name
+        assert f"| {name} |" in page, name
+        assert limit.reason in page, name
 
 
 # The verb check.
@@ -325,15 +332,19 @@ PLAIN = "[vehicle]\nmass = 30.0\ninertia = [0.2, 3.0, 3.0]\nbuoyancy = 290.0\n[r
 def test_check_says_that_a_scene_can_run(tmp_path, capsys):
     assert main(["check", written(tmp_path, PLAIN)]) == 0
     out = capsys.readouterr().out
-    assert out.splitlines()[-1] == "result      can run" and "psi_s, step 0.01 s, 100 steps" in out
-    assert main(["check", written(tmp_path, PLAIN), "--quiet"]) == 0 and capsys.readouterr().out == ""
+    assert out.splitlines()[-1] == "result      can run"
+    assert "psi_s, step 0.01 s, 100 steps" in out
+    assert main(["check", written(tmp_path, PLAIN), "--quiet"]) == 0
+    assert capsys.readouterr().out == ""
 
 
 def test_check_says_what_is_odd_and_refuses_nothing_for_it(tmp_path, capsys):
     options = ["--set", "environment.water_density=1.025", "--members", "5", "--step", "0.003"]
     assert main(["check", written(tmp_path, PLAIN), *options]) == 0
     notes = [line for line in capsys.readouterr().out.splitlines() if line.startswith("note")]
-    assert len(notes) == 2 and "shortened" in notes[0] and "(all 5 members)" in notes[1]
+    assert len(notes) == 2
+    assert "shortened" in notes[0]
+    assert "(all 5 members)" in notes[1]
 
 
 def test_check_refuses_what_run_refuses(tmp_path, capsys):

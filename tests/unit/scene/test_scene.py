@@ -26,7 +26,9 @@ def faults(make, *arguments, **named):
 
 def test_a_start_left_out_is_at_rest():
     b, R, nu, Om = resolved()
-    assert not b.any() and not nu.any() and not Om.any()
+    assert not b.any()
+    assert not nu.any()
+    assert not Om.any()
     np.testing.assert_array_equal(R, np.eye(3))
 
 
@@ -55,7 +57,9 @@ def test_an_attitude_must_be_a_rotation():
     R[0, 1] = 2e-9
     for bad in (R, -np.eye(3), 1.001 * np.eye(3), np.zeros((3, 3)), np.full((3, 3), 1e200)):
         (fault,) = faults(lw.Start, attitude=bad)
-        assert "start.attitude" in fault and "rotation" in fault and "quaternion_wxyz" in fault
+        assert "start.attitude" in fault
+        assert "rotation" in fault
+        assert "quaternion_wxyz" in fault
     R[0, 1] = 5e-10
     lw.Start(attitude=R)  # the round-off of printing it
 
@@ -123,7 +127,9 @@ def test_bad_ensemble_settings(key, bads):
 
 def test_other_laws_are_refused_with_the_reason():
     (fault,) = faults(lw.Scene, VEHICLE, terms=["drag"])
-    assert "terms[0]" in fault and "drag" in fault and "lw.Drag" in fault
+    assert "terms[0]" in fault
+    assert "drag" in fault
+    assert "lw.Drag" in fault
     (fault,) = faults(lw.Scene, VEHICLE, terms=[{"type": "buoyancy"}])
     assert "follows from the vehicle" in fault
     assert "controller" in faults(lw.Scene, VEHICLE, controller="pid")[0]
@@ -137,7 +143,8 @@ def test_parts_of_the_wrong_kind_are_refused():
 
 def test_the_remedy_for_settings_of_a_run_names_what_is_public():
     (fault,) = faults(lw.Scene, VEHICLE, run={"step": 0.02})
-    assert "lw.solve(scene, h=..., t1=..., ...)" in fault and "lw.RunSettings" not in fault
+    assert "lw.solve(scene, h=..., t1=..., ...)" in fault
+    assert "lw.RunSettings" not in fault
     table = lw.Scene(VEHICLE).to_dict() | {"run": {"step": 0.02}}
     assert lw.Scene.from_dict(table).run.step == 0.02
 
@@ -149,16 +156,20 @@ def fins_of(scene):
 def test_with_numbers_sets_what_a_scene_may_vary():
     scene = lw.Scene.named("remus_100")
     turned = scene.with_numbers({"control_fins.command": [0.1, 0.2]})
-    assert fins_of(turned)["command"] == [0.1, 0.2] and "times" not in fins_of(turned)
+    assert fins_of(turned)["command"] == [0.1, 0.2]
+    assert "times" not in fins_of(turned)
     assert turned.parameters()["control_fins.command_schedule"].tolist() == [[0.1, 0.2]]
     assert fins_of(lw.Scene.from_dict(turned.to_dict()))["command"] == [0.1, 0.2]
     assert fins_of(scene.with_numbers({"control_fins.command[1]": 0.3}))["command"] == [0.0, 0.3]
     limited = turned.with_numbers(
         {"control_fins.limit": [0.5, 0.6], "start.velocity": [1.5, 0.0, 0.0], "run.step": 0.02}
     )
-    assert fins_of(limited)["command"] == [0.1, 0.2] and fins_of(limited)["limit"] == [0.5, 0.6]
-    assert limited.start.velocity.tolist() == [1.5, 0.0, 0.0] and limited.run.step == 0.02
-    assert scene.with_numbers({}) is scene and fins_of(scene)["command"] == [0.0, 0.0]
+    assert fins_of(limited)["command"] == [0.1, 0.2]
+    assert fins_of(limited)["limit"] == [0.5, 0.6]
+    assert limited.start.velocity.tolist() == [1.5, 0.0, 0.0]
+    assert limited.run.step == 0.02
+    assert scene.with_numbers({}) is scene
+    assert fins_of(scene)["command"] == [0.0, 0.0]
     assert fins_of(Case("hard over", set={"control_fins.command[0]": 0.3}).of(scene))["command"] == [0.3, 0.0]
     copied = fins_of(scene) | {"command": [0.1, 0.2]}
     assert lw.Scene.named("remus_100", terms=[copied]).parameters()["control_fins.command"].tolist() == [0.1, 0.2]
@@ -169,13 +180,12 @@ def test_a_schedule_takes_the_place_of_a_held_command_and_is_kept():
     rows = {"thrusters.times": [0.0, 5.0], "thrusters.command_schedule": [[0.1] * 8, [0.2] * 8]}
     driven = scene.with_numbers(rows)
     table = next(table for table in driven.to_dict()["terms"] if table["type"] == "thrusters")
-    assert "command" not in table and table["times"] == [0.0, 5.0]
+    assert "command" not in table
+    assert table["times"] == [0.0, 5.0]
     assert driven.parameters()["thrusters.command"].tolist() == [0.1] * 8
     later = driven.with_numbers({"thrusters.command_schedule": [[0.3] * 8, [0.2] * 8], "thrusters.limit[2]": 0.9})
-    assert (
-        later.parameters()["thrusters.command"].tolist() == [0.3] * 8
-        and later.parameters()["thrusters.limit"][2] == 0.9
-    )
+    assert later.parameters()["thrusters.command"].tolist() == [0.3] * 8
+    assert later.parameters()["thrusters.limit"][2] == 0.9
     with pytest.raises(lw.SceneError, match=r"thrusters\.command = .*command_schedule; keep one"):
         driven.with_numbers({"thrusters.command": [0.5] * 8})
 

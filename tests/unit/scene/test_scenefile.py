@@ -68,7 +68,8 @@ def test_nothing_of_the_papers_example_rises_above_the_surface():
     slowest = np.minimum(down / masses.max(axis=1), down / masses.min(axis=1))
     turned = 0.5 * (1.0 / masses.min(axis=1) - 1.0 / masses.max(axis=1)) * np.hypot(momentum[:, 0], momentum[:, 1])
     depth = members.position[:, 2] + np.cumsum(slowest - turned, axis=0) * time[1]
-    assert depth.shape == (301, 4096) and depth.min() > 0.0
+    assert depth.shape == (301, 4096)
+    assert depth.min() > 0.0
 
 
 def test_round_trip():
@@ -82,7 +83,9 @@ def test_round_trip():
 
 def test_a_small_scene_needs_a_vehicle_only():
     scene = scenes.loads(SMALL)
-    assert scene.ensemble_settings is None and scene.run.step is None and scene.run.method is None
+    assert scene.ensemble_settings is None
+    assert scene.run.step is None
+    assert scene.run.method is None
     assert from_dict(scene.to_dict()).to_dict() == scene.to_dict()
     assert lw.Ensemble.from_scene(scene).members == 1
 
@@ -130,11 +133,13 @@ def test_a_faulty_term_is_no_reason_to_doubt_the_names_of_its_numbers():
     text = SMALL + '[[terms]]\ntype = "drag"\nlinear = [1.0, 2.0]\n[ensemble.vary]\n'
     text += '"drag.linear[0]" = { normal = { std = 1.0 } }\n"vehicle.mas" = { normal = { std = 1.0 } }\n'
     term, name = faults(text)
-    assert term.startswith("drag.linear = [1.0, 2.0]") and "did you mean 'vehicle.mass'?" in name
+    assert term.startswith("drag.linear = [1.0, 2.0]")
+    assert "did you mean 'vehicle.mass'?" in name
 
 
 def test_what_is_missing_is_named():
-    assert "vehicle" in only_fault("") and "mass and inertia" in only_fault("")
+    assert "vehicle" in only_fault("")
+    assert "mass and inertia" in only_fault("")
     assert only_fault("[vehicle]\nmass = 1.0\n").startswith("vehicle.inertia = None: is missing")
 
 
@@ -201,7 +206,8 @@ def test_sections_must_be_tables(section):
 def test_start_and_run_may_be_objects():
     start, run = lw.Start(position=[0.0, 0.0, 5.0]), RunSettings(step=0.02)
     scene = lw.Scene.named("remus_100", start=start, run=run)
-    assert scene.start is start and scene.run is run
+    assert scene.start is start
+    assert scene.run is run
     with pytest.raises(lw.SceneError, match="is not a table"):
         lw.Scene.named("remus_100", start=run)
 

@@ -90,7 +90,9 @@ def test_a_registered_term_is_in_it():
             type = "anchor_of_a_test"
 
         types = [entry["properties"]["type"]["const"] for entry in schema()["properties"]["terms"]["items"]["anyOf"]]
-        assert "anchor_of_a_test" in types and "restoring" not in types and "weight" not in types
+        assert "anchor_of_a_test" in types
+        assert "restoring" not in types
+        assert "weight" not in types
     finally:
         lw.Term.kinds.clear()
         lw.Term.kinds.update(before)
@@ -102,4 +104,5 @@ def test_the_scene_of_new_has_comments_on_every_key():
         for line in SCENE.splitlines()
         if "=" in line and not line.startswith(("#", "[", '"', "type", "of", "members"))
     ]
-    assert lines and all("#" in line for line in lines if not line.startswith("seed"))
+    assert lines
+    assert all("#" in line for line in lines if not line.startswith("seed"))

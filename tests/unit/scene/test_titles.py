@@ -28,13 +28,19 @@ def path(tmp_path):
 
 def test_a_scene_names_its_vehicle(path):
     for scene in (lw.Scene.named("remus_100"), lw.Scene.load(path), lw.Scene.from_dict(lw.Scene.load(path).to_dict())):
-        assert scene.vehicle.title == "remus_100" and scene.to_dict()["vehicle"]["title"] == "remus_100"
-        assert "  vehicle  " in repr(scene) and "remus_100" in repr(scene) and "remus_100" in repr(scene.vehicle)
+        assert scene.vehicle.title == "remus_100"
+        assert scene.to_dict()["vehicle"]["title"] == "remus_100"
+        assert "  vehicle  " in repr(scene)
+        assert "remus_100" in repr(scene)
+        assert "remus_100" in repr(scene.vehicle)
     moved = dataclasses.replace(lw.Scene.named("sphere"), start=lw.Start([0.0, 0.0, 5.0]))
-    assert moved.vehicle.title == "sphere" and lw.Scene(moved.vehicle).vehicle.title == "sphere"
+    assert moved.vehicle.title == "sphere"
+    assert lw.Scene(moved.vehicle).vehicle.title == "sphere"
     assert lw.Scene.named("sphere", vehicle={"title": "a ball"}).vehicle.title == "a ball"
     nameless = lw.Vehicle(mass=1.0, inertia=(1.0, 1.0, 1.0))
-    assert nameless.title is None and "title" not in nameless.to_dict() and "title" not in repr(nameless)
+    assert nameless.title is None
+    assert "title" not in nameless.to_dict()
+    assert "title" not in repr(nameless)
     with pytest.raises(lw.SceneError, match=r"vehicle\.title = 3: is no text"):
         lw.Vehicle(mass=1.0, inertia=(1.0, 1.0, 1.0), title=3)
 
@@ -50,7 +56,8 @@ def test_a_scene_keeps_the_text_of_its_file(path):
 @pytest.mark.kernel
 def test_the_provenance_of_a_run_has_both(path, tmp_path):
     result = lw.solve(lw.Scene.load(path))
-    assert result.provenance["source"]["text"] == TEXT and result.provenance["scene"]["vehicle"]["title"] == "remus_100"
+    assert result.provenance["source"]["text"] == TEXT
+    assert result.provenance["scene"]["vehicle"]["title"] == "remus_100"
     result.save(tmp_path / "result.npz")
     assert lw.Result.load(tmp_path / "result.npz").provenance == result.provenance
 

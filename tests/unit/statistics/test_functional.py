@@ -90,22 +90,26 @@ def test_each_door_gives_the_same_numbers(result, text):
     unit, size = (AT_EACH_TIME | OVER_PATH)[text]
     (interest,) = quantities(text)
     values = interest.values(result)
-    assert values.shape == (N, size) and len(interest.labels(size)) == size
+    assert values.shape == (N, size)
+    assert len(interest.labels(size)) == size
     extremes, mean = (estimated(kind(text), result) for kind in (lw.Extremes, lw.Mean))
     assert extremes["maximum"][-1].tolist() == values.max(axis=0).tolist()
     assert extremes["minimum"][-1].tolist() == values.min(axis=0).tolist()
     np.testing.assert_allclose(mean.value[-1], values.mean(axis=0), rtol=1e-13, atol=1e-15)
-    assert mean.unit == unit and len(mean.coordinates["component"]) == size
+    assert mean.unit == unit
+    assert len(mean.coordinates["component"]) == size
     watched = watch(lw.Until(f"mean {text}", 1.0), (), result.time)
     assert watched.name == mean.name
     if text in AT_EACH_TIME:
         compared = compared_in(text)
         np.testing.assert_array_equal(compared.values(result)[-1], values)
         # Attitudes as a whole are compared by an angle; no entry of one is.
-        assert compared.unit == unit and mean.value.shape == (K, size)
+        assert compared.unit == unit
+        assert mean.value.shape == (K, size)
     else:
         np.testing.assert_allclose(values, by_hand(text, result), rtol=1e-13, atol=1e-15)
-        assert mean.time.tolist() == [3.0] and mean.name == f"mean {text.replace(' ', '')}"
+        assert mean.time.tolist() == [3.0]
+        assert mean.name == f"mean {text.replace(' ', '')}"
 
 
 @pytest.mark.parametrize("text", SAME)
@@ -117,9 +121,9 @@ def test_an_expression_over_the_path_has_the_bits_of_the_statistic_of_paths(resu
 
 def test_names_and_labels_of_paths(result):
     covariance = estimated(lw.Covariance("max(velocity)", stopped="left_out", confidence=0.5), result)
-    assert (
-        covariance.name == "covariance max(velocity)" and covariance.unit == "(m/s)^2" and covariance.confidence == 0.5
-    )
+    assert covariance.name == "covariance max(velocity)"
+    assert covariance.unit == "(m/s)^2"
+    assert covariance.confidence == 0.5
     assert covariance.coordinates["component"].tolist() == [f"max(velocity)[{i}]" for i in range(3)]
     settings = {"type": "covariance", "of": "max(velocity)", "stopped": "left_out", "confidence": 0.5}
     assert (
@@ -165,7 +169,9 @@ def test_each_door_refuses_with_the_same_words(scene, text, tmp_path, capsys):
     }  # fmt: skip
     for name, door in doors.items():
         message = said_by(door, capsys)
-        assert REFUSED[text] in message and repr(text) in message and "\n" not in message, name
+        assert REFUSED[text] in message, name
+        assert repr(text) in message, name
+        assert "\n" not in message, name
 
 
 def test_what_has_no_number_at_each_time_is_refused_with_a_remedy(scene, capsys):
@@ -213,4 +219,5 @@ def test_the_table_of_fields_is_the_only_one():
     files = [file for file in (ROOT / "lgvi_warp").rglob("*.py") if "reference" not in file.parts]
     assert [file.name for file in files if pattern.search(file.read_text())] == ["fields.py"]
     assert TABLE["angular_velocity"].attributes == {"units": "rad s-1", "long_name": "angular velocity in body axes"}
-    assert TABLE["attitude"].labels[5] == "attitude[1, 2]" and TABLE["energy"].labels == ("energy",)
+    assert TABLE["attitude"].labels[5] == "attitude[1, 2]"
+    assert TABLE["energy"].labels == ("energy",)

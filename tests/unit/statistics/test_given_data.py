@@ -15,9 +15,13 @@ def test_indices_of_ishigami():
         # Bins of a 64th leave (2 pi / 64)^2 / 12 of the slope's variance, half a percent; chance adds about as much.
         assert found[name].share == pytest.approx(index, abs=0.012)
         assert found[name].lower - 0.005 <= index <= found[name].upper + 0.005
-    assert found["x"].p < 1e-6 and found["y"].p < 1e-6 and found["z"].p > 1e-3
+    assert found["x"].p < 1e-6
+    assert found["y"].p < 1e-6
+    assert found["z"].p > 1e-3
     # A linear regression sees x, whose slope is 3 / pi^2 of a standard deviation's worth, and neither of the others.
-    assert found["x"].slope > 0.3 and abs(found["y"].slope) < 0.02 and abs(found["z"].slope) < 0.02
+    assert found["x"].slope > 0.3
+    assert abs(found["y"].slope) < 0.02
+    assert abs(found["z"].slope) < 0.02
 
 
 def test_slopes_are_those_of_the_regression():
@@ -32,14 +36,18 @@ def test_what_decides_success_is_found_and_a_step_is_seen():
     x, y = np.random.default_rng(3).normal(size=(2, 4000))
     found = explained({"ballast": x, "bias": y}, x > -1.0, 0.95)
     # A bin of 32 holds the limit: it alone is mixed.
-    assert found["ballast"].share > 0.95 and abs(found["bias"].share) < 0.02 and found["ballast"].slope > 0.3
+    assert found["ballast"].share > 0.95
+    assert abs(found["bias"].share) < 0.02
+    assert found["ballast"].slope > 0.3
 
 
 def test_choices_and_constants():
     rng = np.random.default_rng(4)
     choice = rng.choice([1.0, 2.0, 5.0], 3000)
     found = explained({"choice": choice, "constant": np.ones(3000)}, choice == 2.0, 0.95)
-    assert found["choice"].share == 1.0 and np.isnan(found["constant"].share) and np.isnan(found["constant"].slope)
+    assert found["choice"].share == 1.0
+    assert np.isnan(found["constant"].share)
+    assert np.isnan(found["constant"].slope)
     assert np.isnan(explained({"choice": choice}, np.ones(3000), 0.95)["choice"].share)
     lost = np.where(rng.random(3000) < 0.1, np.nan, choice == 2.0)
     assert explained({"choice": choice}, lost, 0.95)["choice"].share == 1.0

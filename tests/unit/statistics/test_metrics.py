@@ -127,7 +127,8 @@ def test_members_that_end_have_the_numbers_of_their_time_under_way():
     )
     assert number(each(lw.TimeToFailure), held, t, good, ended).tolist() == [np.inf, 2.2]
     last = number(each(lw.SteadyStateError, "depth"), held, t, good, ended)
-    assert last[0] == pytest.approx(np.mean([10.0, 10.5, 11.0])) and np.isnan(last[1])
+    assert last[0] == pytest.approx(np.mean([10.0, 10.5, 11.0]))
+    assert np.isnan(last[1])
     # Statistics count members that stopped, and leave out those that failed.
     assert number(lw.IAE("depth"), held, t, good, ended) == pytest.approx(32.0)
     assert number(lw.IAE("depth"), held, t, good, ended, lost=True) == pytest.approx(60.0)

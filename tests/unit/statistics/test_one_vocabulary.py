@@ -66,16 +66,20 @@ def test_every_door_knows_what_has_a_number_at_each_time(result, text):
     (at_end,) = quantities(text)
     assert at_end.values(result).shape == (N, functional("of", text).size)
     asked = compared_in(text)
-    assert asked.distance(result, result).shape == (K, N) and not asked.distance(result, result).any()
-    assert asked.name == text.replace(" ", "") and asked.unit
+    assert asked.distance(result, result).shape == (K, N)
+    assert not asked.distance(result, result).any()
+    assert asked.name == text.replace(" ", "")
+    assert asked.unit
 
 
 @pytest.mark.parametrize("text", OVER_PATH)
 def test_what_looks_over_the_path(result, text):
     (found,) = quantities(text)
-    assert found.over_path and len(found.values(result)) == N
+    assert found.over_path
+    assert len(found.values(result)) == N
     message = refused(compared_in, text)
-    assert "looks over the path" in message and "largest error over the path" in message
+    assert "looks over the path" in message
+    assert "largest error over the path" in message
     assert lw.Mean(text).key == f"mean {text}"
 
 
@@ -83,9 +87,8 @@ def test_what_looks_over_the_path(result, text):
 def test_what_is_not_known_is_known_nowhere(text):
     for make in (compared_in, quantities, lw.Mean, lambda of: functional("of", of)):
         message = refused(make, text)
-        assert "of = " in message and (
-            "give" in message or "write" in message or "did you" in message or "known" in message
-        )
+        assert "of = " in message
+        assert "give" in message or "write" in message or "did you" in message or "known" in message
 
 
 def test_statistics_and_sensitivity_have_the_same_numbers(result):
@@ -185,4 +188,5 @@ def test_a_quantity_of_the_users_may_be_asked_for_everywhere(result):
 def test_each_component_is_named_by_an_expression_for_it(of, labels):
     assert functional("of", of).labels == labels
     for label in labels:
-        assert functional("of", label).labels == (label,) and functional("of", label).size == 1
+        assert functional("of", label).labels == (label,)
+        assert functional("of", label).size == 1

@@ -76,7 +76,8 @@ def test_an_outcome_is_aalen_and_johansens(step):
         np.testing.assert_array_equal(found[name], [(which & (ends.time <= t)).sum() for t in TIMES])
     np.testing.assert_array_equal(found["fraction"], found["ended"] / 1000)
     np.testing.assert_array_equal(found.count, 1000 - found["ended"] - found["otherwise"])
-    assert (found.lower <= found.value).all() and (found.value <= found.upper).all()
+    assert (found.lower <= found.value).all()
+    assert (found.value <= found.upper).all()
     # The time of each level: the first end at which the curve reaches it.
     times = np.unique(ends.time[floor])
     curve = np.array([incidence(ends, FLOOR, t) for t in times])
@@ -85,7 +86,8 @@ def test_an_outcome_is_aalen_and_johansens(step):
     # If nothing else stopped members: Kaplan & Meier's.
     alone = stats.ecdf(stats.CensoredData.right_censored(ends.time, ~floor)).cdf
     np.testing.assert_allclose(found["alone"], alone.evaluate(TIMES), rtol=1e-12)
-    assert (found["alone_lower"] <= found["alone"]).all() and (found["alone"] <= found["alone_upper"]).all()
+    assert (found["alone_lower"] <= found["alone"]).all()
+    assert (found["alone"] <= found["alone_upper"]).all()
 
 
 @pytest.mark.parametrize("rates", [(0.1, 0.05, 0.02), (0.1, 0.05, 0.0), (0.0, 0.1, 0.2), (0.2, 0.0, 0.2)])
@@ -124,8 +126,10 @@ def test_all_that_are_left_fail():
     (found,) = gathered(lw.Outcome("floor"), ends)
     assert found.value.tolist() == [0.0, 0.2, 0.2, 0.2, 0.2, 0.2]
     wilson = stats.binomtest(20, 100).proportion_ci(0.95, "wilson")
-    assert found.upper[1] == pytest.approx(wilson.high) and 0.3 + wilson.high <= found.upper[-1] < 1.0
-    assert found.lower[1] == pytest.approx(wilson.low) and found.lower[-1] <= wilson.low
+    assert found.upper[1] == pytest.approx(wilson.high)
+    assert 0.3 + wilson.high <= found.upper[-1] < 1.0
+    assert found.lower[1] == pytest.approx(wilson.low)
+    assert found.lower[-1] <= wilson.low
     (alone,) = gathered(lw.Outcome("floor"), part_of(ends, slice(70, 100)))
     assert (alone.value[-1], alone.lower[-1], alone.upper[-1]) == (0.0, 0.0, 1.0)
 
@@ -158,20 +162,23 @@ def test_end_times_of_those_that_ended_so():
     counts, edges = np.histogram(time, 20, (0.0, 10.0))
     np.testing.assert_array_equal(histogram["counts"][0, 0], counts)
     np.testing.assert_allclose(histogram.coordinates["edge"], edges)
-    assert mean.count == quantiles.count == histogram.count == len(time) and mean.unit == "s"
+    assert mean.count == quantiles.count == histogram.count == len(time)
+    assert mean.unit == "s"
 
 
 def test_a_statistic_at_an_outcome_is_of_those_that_had_it():
     ends, last = ends_of(900), np.random.default_rng(3).normal(size=(900, 3))
     (mean,) = gathered(lw.Mean("position", at="floor"), ends, last=last)
     floor = ends.status == FLOOR
-    assert mean.name == "mean position at floor" and mean.count == floor.sum()
+    assert mean.name == "mean position at floor"
+    assert mean.count == floor.sum()
     np.testing.assert_allclose(mean.value[0], last[floor].mean(axis=0), rtol=1e-12)
     (beyond,) = gathered(lw.Exceedance("position", above=0.5, at="top"), ends, last=last)
     assert beyond.name == "exceedance position above 0.5 at top"
     np.testing.assert_allclose(beyond.value[0], (last[ends.event == 2] > 0.5).mean(axis=0))
     lines = "\n".join(table(Estimates([mean, beyond])))
-    assert "mean position[2] at floor" in lines and f"{floor.sum()} members" in lines
+    assert "mean position[2] at floor" in lines
+    assert f"{floor.sum()} members" in lines
 
 
 OF_ENDS = {"outcome": lw.Outcome("floor"), "end_time": lw.EndTime("floor", [lw.Mean(), lw.Quantiles(size=64)])}
@@ -197,7 +204,8 @@ def test_replicates_give_the_value_of_all_and_an_interval_of_their_spread():
     assert "8 replicates" in found.interval
     # Student's t with 7 degrees of freedom is 1.2 times wider than the normal's, and a spread of 8 errs by a quarter.
     ratio = (found.upper - found.lower)[1:] / (whole.upper - whole.lower)[1:]
-    assert (ratio > 0.4).all() and (ratio < 2.5).all()
+    assert (ratio > 0.4).all()
+    assert (ratio < 2.5).all()
 
 
 @pytest.mark.parametrize("rates", [(0.1, 0.05, 0.02), (0.01, 0.3, 0.0), (0.1, 0.1, 0.2), (0.03, 0.2, 0.1)])
@@ -214,7 +222,8 @@ def test_coverage(rates):
         values.append(found.value[-1])
         sizes.append(found.upper[-1] - found.lower[-1])
     # Of 1,000 intervals of 95 %: 5 standard deviations are 3.4 %; few ends, as of 7, make them hold a little more often.
-    assert 0.915 < hold / 1000.0 < 0.985 and alone_hold / 1000.0 > 0.915
+    assert 0.915 < hold / 1000.0 < 0.985
+    assert alone_hold / 1000.0 > 0.915
     # The interval is as wide as 1,000 estimates are spread, which is known to 1 / sqrt(2000); Wilson's adds some percent where
     # the normal interval would reach below 0.
     assert np.mean(sizes) == pytest.approx(2.0 * 1.96 * np.std(values), rel=0.12)
@@ -223,9 +232,12 @@ def test_coverage(rates):
 def test_nobody():
     (found,) = gathered(lw.Outcome("floor"), part_of(ends_of(10, rates=(0.0, 0.0, 0.0)), slice(0, 10)))
     np.testing.assert_array_equal(found.value, 0.0)
-    assert np.isinf(found["end_time"]).all() and (found.upper > 0.1).all()
+    assert np.isinf(found["end_time"]).all()
+    assert (found.upper > 0.1).all()
     mean, quantiles, _ = gathered(lw.EndTime("top"), ends_of(10, rates=(0.0, 0.0, 0.0)))
-    assert np.isnan(mean.value).all() and np.isnan(quantiles.value).all() and mean.count == 0
+    assert np.isnan(mean.value).all()
+    assert np.isnan(quantiles.value).all()
+    assert mean.count == 0
 
 
 def test_first_passage_knows_when_a_member_was_stopped():
@@ -238,7 +250,8 @@ def test_first_passage_knows_when_a_member_was_stopped():
     gathers.end(Ends(np.full(4, FLOOR), np.ones(4, int), np.full(4, 3.0), EVENTS), 1)
     (found,) = statistic.estimates([gathers.close()], TIMES)
     # A piece is 0.25 s.
-    assert found["passage_time"][0] == pytest.approx(2.5, abs=0.25) and found.value.tolist() == [0, 0, 1, 1, 1, 1]
+    assert found["passage_time"][0] == pytest.approx(2.5, abs=0.25)
+    assert found.value.tolist() == [0, 0, 1, 1, 1, 1]
 
 
 @pytest.mark.parametrize("replicates", [1, 2])
@@ -259,8 +272,11 @@ def test_first_passage_takes_stopped_members_for_what_they_are(replicates):
         else statistic.estimates_of_replicates(parts, TIMES, replicates)
     )
     np.testing.assert_allclose(found.value, [0, 0, 0, 0, 0.5, 0.5], rtol=1e-15)
-    assert found["stopped"].tolist() == [0, 50, 0, 0, 0, 0] and found["lost"].tolist() == [0, 0, 0, 26, 0, 0]
-    assert found["passage_time"][0] < 8.0 and found["passage_time"][1] == np.inf and found["censored"] == 0
+    assert found["stopped"].tolist() == [0, 50, 0, 0, 0, 0]
+    assert found["lost"].tolist() == [0, 0, 0, 26, 0, 0]
+    assert found["passage_time"][0] < 8.0
+    assert found["passage_time"][1] == np.inf
+    assert found["censored"] == 0
     (outcome,) = gathered(lw.Outcome("floor"), Ends(
         np.where(ends.status == OK, FLOOR, ends.status), np.where(ends.status == OK, 1, ends.event), end, EVENTS))  # fmt: skip
     assert outcome.value[-1] == pytest.approx(found.value[-1], rel=1e-15)

@@ -43,7 +43,8 @@ def score(delta, more, less, n):
 @pytest.mark.parametrize(("less", "more", "n"), [(2, 12, 50), (0, 7, 60), (9, 9, 30), (1, 0, 400)])
 def test_the_score_is_at_its_limit_at_both_ends(less, more, n):
     found = paired.proportions(less, more, n, 0.95)
-    assert found.lower < found.value < found.upper and found.value == (more - less) / n
+    assert found.lower < found.value < found.upper
+    assert found.value == (more - less) / n
     # The numerical maximum knows q to the root of the round-off, 1e-8.
     assert score(found.lower, more, less, n) == pytest.approx(stats.norm.ppf(0.975), abs=1e-5)
     assert score(found.upper, more, less, n) == pytest.approx(-stats.norm.ppf(0.975), abs=1e-5)
@@ -53,11 +54,9 @@ def test_where_nothing_differs_the_interval_is_of_the_number_of_pairs():
     # With no member that differs the score is -n d / sqrt(n d (1 - d)): n d / (1 - d) = z^2 at the end.
     z2 = stats.norm.ppf(0.975) ** 2
     none = paired.proportions(0, 0, 54, 0.95)
-    assert (
-        none.lower == pytest.approx(-none.upper)
-        and none.upper == pytest.approx(z2 / (54 + z2), rel=1e-9)
-        and none.p == 1.0
-    )
+    assert none.lower == pytest.approx(-none.upper)
+    assert none.upper == pytest.approx(z2 / (54 + z2), rel=1e-9)
+    assert none.p == 1.0
 
 
 def test_mcnemar_is_the_binomial_test():
@@ -73,7 +72,8 @@ def test_paired_t_is_scipys():
     good = np.isfinite(a) & np.isfinite(b)
     expected = stats.ttest_rel(b[good], a[good])
     found = paired.means(a, b, 0.95)
-    assert found.pairs == 38 and found.p == pytest.approx(expected.pvalue, rel=1e-12)
+    assert found.pairs == 38
+    assert found.p == pytest.approx(expected.pvalue, rel=1e-12)
     np.testing.assert_allclose(found[1:3], expected.confidence_interval(0.95), rtol=1e-12)
     assert paired.means(a, a, 0.95)[:4] == (0.0, 0.0, 0.0, 1.0)
 
@@ -125,7 +125,8 @@ def test_where_few_are_expected_the_coverage_is_what_the_page_says(least, most, 
         return (weights * ((lower <= p[:, None]) & (p[:, None] <= upper))).sum(axis=1)
 
     wilson = coverage(*intervals.wilson(hits / n, np.full(n + 1, n), 0.95), p)
-    assert low <= wilson.min() and wilson.max() <= high
+    assert low <= wilson.min()
+    assert wilson.max() <= high
     lower, upper = (end[::-1] for end in intervals.wilson(hits / n, np.full(n + 1, n), 0.95))
     np.testing.assert_allclose(coverage(lower, upper, 1.0 - p), wilson, atol=1e-12)
     assert coverage(*intervals.clopper_pearson(hits, np.full(n + 1, n), 0.95), p).min() >= 0.95

@@ -88,12 +88,14 @@ def test_two_members_say_nothing_of_a_spread():
     cov, circle = of(lw.Covariance, x), of(lw.CircularMean, x)
     np.testing.assert_allclose(cov.value[0], np.cov(x[0].T), rtol=1e-12)
     np.testing.assert_array_equal(cov.lower[0], [[0.0, -np.inf], [-np.inf, 0.0]])
-    assert np.all(np.isposinf(cov.upper)) and np.all(np.isfinite(cov["standard_error"]))
-    assert np.all(circle["resultant_length_lower"] == 0.0) and np.all(circle["resultant_length_upper"] == 1.0)
+    assert np.all(np.isposinf(cov.upper))
+    assert np.all(np.isfinite(cov["standard_error"]))
+    assert np.all(circle["resultant_length_lower"] == 0.0)
+    assert np.all(circle["resultant_length_upper"] == 1.0)
     three, circle = (of(kind, np.concatenate([x, x[:, :1] + 1.0], axis=1)) for kind in (lw.Covariance, lw.CircularMean))
-    assert (
-        np.all(np.isfinite(three.half_width)) and np.all(three.lower < three.value) and np.all(three.half_width > 0.0)
-    )
+    assert np.all(np.isfinite(three.half_width))
+    assert np.all(three.lower < three.value)
+    assert np.all(three.half_width > 0.0)
     assert np.all(circle["resultant_length_upper"] - circle["resultant_length_lower"] > 0.0)
     # Members that are all alike are no few members.
     alike = of(lw.Covariance, np.ones((1, 5, 1)))
@@ -152,7 +154,8 @@ def test_counts_are_numpys(values):
         assert np.all(total[t] == len(own))
         np.testing.assert_allclose(above.value[t], (own > [1000.0, 0.0, -5.0]).mean(axis=0), rtol=1e-15)
     on_edges = of(lw.Histogram, np.array([0.0, 1.0, 2.0, 2.5, -1.0]).reshape(1, 5, 1), (0.0, 1.0, 2.0))
-    assert on_edges["counts"].tolist() == [[[1, 2]]] and (on_edges["below"], on_edges["above"]) == (1, 1)
+    assert on_edges["counts"].tolist() == [[[1, 2]]]
+    assert (on_edges["below"], on_edges["above"]) == (1, 1)
 
 
 def test_first_passage_is_kaplan_and_meiers():
@@ -168,7 +171,8 @@ def test_first_passage_is_kaplan_and_meiers():
     for t in range(k):
         risk = np.sum((passed >= t) & (known > t))
         survival *= 1.0 - np.sum(passed == t) / max(risk, 1)
-        assert found["count"][t] == risk and found["passed"][t] == np.sum(passed == t)
+        assert found["count"][t] == risk
+        assert found["passed"][t] == np.sum(passed == t)
         assert found["survival"][t] == pytest.approx(survival, rel=1e-13)
         assert found["lost"][t] == np.sum((passed == k) & (known == t))
     assert found["passed"].sum() + found["lost"].sum() + found["censored"] == n
@@ -180,11 +184,13 @@ def test_first_passage_is_kaplan_and_meiers():
 def test_a_passage_of_nobody_is_not_known():
     for replicates in (1, 4):
         found = of(lw.FirstPassage, np.full((3, 8, 1), np.nan), 1.0, replicates=replicates)
-        assert (
-            found["count"].tolist() == [0, 0, 0] and np.isnan(found.value).all() and np.isnan(found["survival"]).all()
-        )
-        assert found.lower.tolist() == [0.0] * 3 and found.upper.tolist() == [1.0] * 3
-        assert np.isnan(found["passage_time"]).all() and np.isposinf(found["passage_time_upper"]).all()
+        assert found["count"].tolist() == [0, 0, 0]
+        assert np.isnan(found.value).all()
+        assert np.isnan(found["survival"]).all()
+        assert found.lower.tolist() == [0.0] * 3
+        assert found.upper.tolist() == [1.0] * 3
+        assert np.isnan(found["passage_time"]).all()
+        assert np.isposinf(found["passage_time_upper"]).all()
 
 
 def test_without_losses_a_passage_has_wilsons_interval():
@@ -205,7 +211,9 @@ def test_who_is_lost_last_may_pass_at_once():
     x[1, 0] = 1.0
     found = of(lw.FirstPassage, x, 0.5, good=good)
     np.testing.assert_allclose(found.value, [0.0, 1 / 3, 1 / 3, 1 / 3])
-    assert np.all(found.upper[:2] < 1.0) and found.upper[2:].tolist() == [1.0, 1.0] and np.all(found.lower[1:] > 0.0)
+    assert np.all(found.upper[:2] < 1.0)
+    assert found.upper[2:].tolist() == [1.0, 1.0]
+    assert np.all(found.lower[1:] > 0.0)
 
 
 @pytest.mark.parametrize("replicates", [1, 4])
@@ -219,7 +227,8 @@ def test_a_passage_lies_on_the_line_between_two_samples(replicates):
     # Of n members a quantile lies within one piece's width of that of all; below 1/12 all passed before the start.
     exact = np.quantile(np.maximum(crossing, 0.0), (0.05, 0.3, 0.5, 0.9))
     np.testing.assert_allclose(found["passage_time"][:4], exact, atol=0.01)
-    assert found["passage_time"][0] == 0.0 and np.isinf(found["passage_time"][4])
+    assert found["passage_time"][0] == 0.0
+    assert np.isinf(found["passage_time"][4])
     inside = slice(1, 4)
     assert np.all(found["passage_time_lower"][inside] < found["passage_time"][inside])
     assert np.all(found["passage_time"][inside] < found["passage_time_upper"][inside])
@@ -281,7 +290,8 @@ def test_paths_come_to_what_numpy_says(replicates):
         np.testing.assert_allclose(least["minimum"][0], truth.min(axis=0), rtol=1e-12, atol=1e-15)
         np.testing.assert_allclose(least["maximum"][0], truth.max(axis=0), rtol=1e-12)
         np.testing.assert_array_equal(least["maximum_member"][0], truth.argmax(axis=0))
-        assert mean.name == f"mean {kind.type} x" and mean.unit == "m"
+        assert mean.name == f"mean {kind.type} x"
+        assert mean.unit == "m"
 
 
 @pytest.mark.parametrize(("limits", "holds"), [
@@ -331,7 +341,8 @@ def test_a_path_counts_once():
     best = x[:, 100:].max(axis=0)
     np.testing.assert_allclose(highest.value[0], best.mean(axis=0), rtol=1e-14)
     np.testing.assert_allclose(quantiles.value[0], np.quantile(best, LEVELS, axis=0), rtol=1e-14)
-    assert (highest.name, high.name) == ("mean path_maximum x", "high") and highest.count.tolist() == [800]
+    assert (highest.name, high.name) == ("mean path_maximum x", "high")
+    assert highest.count.tolist() == [800]
     np.testing.assert_allclose(high.value[0], (best > 1.0).mean(axis=0), rtol=1e-15)
     (lowest,) = gathered(lw.PathMinimum(scalar(2)), x, good=good)
     np.testing.assert_allclose(lowest.value[0], x[:, 100:].min(axis=0).mean(axis=0), rtol=1e-14)
@@ -341,9 +352,11 @@ def test_what_is_not_finite_is_left_out_and_counted():
     x = np.ones((2, 300, 2))
     x[1, 7, 0], x[1, 8, 1] = np.nan, np.inf
     found = of(lw.Mean, x)
-    assert found.count.tolist() == [300, 298] and np.all(found.value == 1.0)
+    assert found.count.tolist() == [300, 298]
+    assert np.all(found.value == 1.0)
     empty = of(lw.Mean, np.full((1, 3, 1), np.nan))
-    assert empty.count.tolist() == [0] and np.isnan(empty.value).all()
+    assert empty.count.tolist() == [0]
+    assert np.isnan(empty.value).all()
     for kind, more in ((lw.Covariance, {}), (lw.Quantiles, {}), (lw.Extremes, {}), (lw.Exceedance, {"above": 0.0}),
                        (lw.CircularMean, {}), (lw.Histogram, {"edges": (0, 1)})):  # fmt: skip
         assert np.isnan(of(kind, np.full((1, 3, 1), np.nan), **more).value).all()
@@ -354,7 +367,8 @@ def test_a_mean_of_angles_knows_the_circle():
     x = (np.pi + 0.1 * rng.normal(size=(1, 2000, 1)) + np.pi) % (2 * np.pi) - np.pi
     found = of(lw.CircularMean, x)
     z = np.exp(1j * x).mean()
-    assert found.value[0, 0] == pytest.approx(np.angle(z), abs=1e-14) and abs(found.value[0, 0]) > 3.1
+    assert found.value[0, 0] == pytest.approx(np.angle(z), abs=1e-14)
+    assert abs(found.value[0, 0]) > 3.1
     assert found["resultant_length"][0, 0] == pytest.approx(abs(z), rel=1e-14)
     assert found["circular_deviation"][0, 0] == pytest.approx(0.1, rel=0.05)
     around = of(lw.CircularMean, rng.uniform(-np.pi, np.pi, (1, 400, 1)))
@@ -418,7 +432,8 @@ def test_coverage_of_quantiles(repeated):
     between(coverage(found, ndtri([0.1, 0.5, 0.9])[:, None]))
     # 1,000 members in a sketch of 128: the interval is widened by a bound on its variance, so that it holds more often.
     rough = of(lw.Quantiles, repeated, (0.1, 0.5, 0.9), size=128)
-    assert np.all(rough["rank_error"] > 0.0) and np.all(rough.half_width[:, 1].mean() > found.half_width[:, 1].mean())
+    assert np.all(rough["rank_error"] > 0.0)
+    assert np.all(rough.half_width[:, 1].mean() > found.half_width[:, 1].mean())
     held = coverage(rough, ndtri([0.1, 0.5, 0.9])[:, None])
     assert np.all((held >= 0.93) & (held <= 0.985)), held
 
@@ -456,7 +471,8 @@ def test_coverage_of_first_passage_where_few_are_at_risk():
         held.append((found.lower[1:] <= truth) & (truth <= found.upper[1:]))
     part = np.mean(held, axis=0)
     # Greenwood's variance holds 79 % and 68 % at the last two times.
-    assert np.all(part >= 0.925) and np.all(part <= 0.975), part
+    assert np.all(part >= 0.925), part
+    assert np.all(part <= 0.975), part
 
 
 def test_coverage_on_the_circle_and_on_rotations():
@@ -560,9 +576,8 @@ def test_a_replicate_without_members_leaves_no_interval():
         with np.errstate(invalid="ignore"):
             found = of(kind, x, good=good, replicates=8, **more)
         at = (1, slice(None))
-        assert np.all(np.isfinite(found.value)) and np.all(
-            np.isfinite(found.half_width[0, ...]) | (kind is lw.Quantiles)
-        )
+        assert np.all(np.isfinite(found.value))
+        assert np.all(np.isfinite(found.half_width[0, ...]) | (kind is lw.Quantiles))
         open_ = found.upper[at] - (found.value[at] if kind is lw.CircularMean else 0.0)
         assert np.all(open_ == end), kind
 
@@ -673,7 +688,8 @@ def test_one_entry_is_watched(name, estimate, shape, entries):
 def test_what_is_watched_has_a_name(name, hint):
     with pytest.raises(lw.SceneError) as caught:
         watch(lw.Until(name, 1.0), WATCHED, np.zeros(1))
-    assert hint in caught.value.faults[0] and "until.statistic" in caught.value.faults[0]
+    assert hint in caught.value.faults[0]
+    assert "until.statistic" in caught.value.faults[0]
 
 
 def test_intervals_are_those_of_the_definitions():
@@ -710,8 +726,10 @@ def test_the_sketchs_bound_holds_for_every_order(order, size):
     statistic = lw.Quantiles(scalar(), LEVELS, size=size)
     part = statistic.whole(trees(statistic, x.reshape(1, n, 1)).parts())
     bound = n * (np.log2(n / size) + 2) / (4 * size)
-    assert part["error"][0] <= bound and part["variance"][0] <= (0.5 * n / size) ** 2
-    assert part["weights"].sum() == n and len(part["weights"]) <= size * 17
+    assert part["error"][0] <= bound
+    assert part["variance"][0] <= (0.5 * n / size) ** 2
+    assert part["weights"].sum() == n
+    assert len(part["weights"]) <= size * 17
     kept, weights = part["values"][0, 0], part["weights"]
     at = np.argsort(kept, kind="stable")
     ranks = np.concatenate([[0], np.cumsum(weights[at])])
@@ -770,7 +788,8 @@ def test_blocks_in_any_order_give_the_same_bits(kind, values):
         order = np.random.default_rng(16 + seed).permutation(6)
         again = statistic.estimates(trees(statistic, x, good=good, order=order).parts(), times)
         for one, other in zip(first, again, strict=True):
-            assert one.arrays.keys() == other.arrays.keys() and len(one.arrays) > 1
+            assert one.arrays.keys() == other.arrays.keys()
+            assert len(one.arrays) > 1
             assert all(one[key].tobytes() == other[key].tobytes() for key in one.arrays)
 
 
@@ -789,7 +808,8 @@ def check_as_files_hold_it(found):
         for name, values in one.arrays.items():
             np.testing.assert_array_equal(dataset[name].values, values)
             np.testing.assert_array_equal(other[name], values)
-            assert dataset[name].dims == one.dims[name] and set(one.dims[name]) <= set(one.coordinates)
+            assert dataset[name].dims == one.dims[name]
+            assert set(one.dims[name]) <= set(one.coordinates)
         for name, values in one.coordinates.items():
             np.testing.assert_array_equal(other.coordinates[name], values)
             assert name not in dataset.dims or len(values) == dataset.sizes[name]
@@ -806,7 +826,8 @@ def test_every_kind_is_the_same_from_a_file(kind, replicates, values):
 def test_coins_are_fair_and_fixed():
     thrown = [sketch.coin(level, i, 2) for level in range(8) for i in range(512)]
     # 4,096 throws: five standard deviations are 160.
-    assert abs(sum(thrown) - 2048) < 160 and thrown == [sketch.coin(s, i, 2) for s in range(8) for i in range(512)]
+    assert abs(sum(thrown) - 2048) < 160
+    assert thrown == [sketch.coin(s, i, 2) for s in range(8) for i in range(512)]
 
 
 @pytest.mark.parametrize(("make", "text"), [
@@ -839,7 +860,9 @@ def test_whole_numbers_of_numpy_are_whole_numbers():
     histogram = lw.Histogram("depth", bins=np.int64(4), limits=(0, 1))
     quantiles, until = lw.Quantiles("depth", size=np.uint16(128)), lw.Until("mean depth", 1.0, members=np.int32(64))
     assert [type(one) for one in (histogram.bins, quantiles.size, until.members)] == [int] * 3
-    assert histogram.to_dict()["bins"] == 4 and quantiles.size == 128 and until.to_dict()["members"] == 64
+    assert histogram.to_dict()["bins"] == 4
+    assert quantiles.size == 128
+    assert until.to_dict()["members"] == 64
     x = np.random.default_rng(38).random((1, 50, 1))
     assert of(lw.Histogram, x, bins=np.int64(4), limits=(0, 1)).value.shape == (1, 1, 4)
 
@@ -867,11 +890,12 @@ def dataset(*statistics):
 
 def test_estimates_are_found_by_numbers_written_otherwise():
     found = dataset(lw.Exceedance(scalar(), above=10), lw.Exceedance(scalar(), above=0.5, name="half of 1.0"))
-    assert list(found) == ["exceedance x above 10", "half of 1.0"] and "exceedance x above 10.0" in found
-    assert (
-        found["exceedance x above 10.0"] is found["exceedance x above 10"] and found["half of 1"].name == "half of 1.0"
-    )
-    assert "exceedance x above 1" not in found and 3 not in found
+    assert list(found) == ["exceedance x above 10", "half of 1.0"]
+    assert "exceedance x above 10.0" in found
+    assert found["exceedance x above 10.0"] is found["exceedance x above 10"]
+    assert found["half of 1"].name == "half of 1.0"
+    assert "exceedance x above 1" not in found
+    assert 3 not in found
 
 
 def test_variables_of_a_dataset_are_distinct():

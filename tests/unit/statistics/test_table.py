@@ -108,7 +108,9 @@ def test_the_fullest_bin_of_a_histogram():
 def test_lines_of_a_passage():
     (one,) = gathered(lw.FirstPassage(scalar(1), above=8.0, levels=(0.1, 0.3)), X[..., :1], good=GOOD)
     (label, *first), *times = rows_of(one)
-    assert label == one.name and first[0] == float(f"{one.value[-1]:.6g}") and first[3] == len(X[0])
+    assert label == one.name
+    assert first[0] == float(f"{one.value[-1]:.6g}")
+    assert first[3] == len(X[0])
     assert [row[1] for row in times] == [float(f"{t:.6g}") for t in one["passage_time"]]
     assert [row[0] for row in times] == [f"{one.name}: time [s] of {level}" for level in (0.1, 0.3)]
     ends = [float(f"{one[f'passage_time_{end}'][j]:.5g}") for j in (0, 1) for end in ("lower", "upper")]
@@ -121,7 +123,8 @@ def test_lines_of_an_outcome():
     whole, of_all, *times = rows_of(one)
     assert whole == said([(one.name, one.value[-1], one.lower[-1], one.upper[-1], 1000)])[0]
     share = np.mean(members.status == test_outcomes.FLOOR)
-    assert of_all[:2] == (f"{one.name}: of all members", share) and of_all[2] < share < of_all[3]
+    assert of_all[:2] == (f"{one.name}: of all members", share)
+    assert of_all[2] < share < of_all[3]
     ends = ("end_time", "end_time_lower", "end_time_upper")
     expected = [
         (f"{one.name}: time [s] of {level}", *(one[name][j] for name in ends), 1000)

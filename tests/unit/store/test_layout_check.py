@@ -38,7 +38,9 @@ def read(found, groups=("explicit",), members=MEMBERS):
 def test_what_is_written_is_read():
     found = arrays()
     layout = read(found)
-    assert layout.arrays == found and layout.times == TIMES and layout.groups == ("explicit",)
+    assert layout.arrays == found
+    assert layout.times == TIMES
+    assert layout.groups == ("explicit",)
     columns = {column.name: column for column in layout.columns}
     assert set(columns) == set(found) - {"time", "step", "chosen", "explicit/vehicle.mass"}
     for name, column in columns.items():
@@ -123,7 +125,8 @@ def test_only_files_of_the_layout_have_a_size():
     ):
         assert layout.chunk_bytes(key) is None
     frame = layout.frame()
-    assert (
-        frame["time/c.0"] == TIMES * 8 + 4 and frame["explicit/zarr.json"] is None and "position/c.0.0.0" not in frame
-    )
-    assert frame["chosen/c.0"] == MEMBERS + 4 and frame["explicit/vehicle.mass/c.0"] == 50 * 8 + 4
+    assert frame["time/c.0"] == TIMES * 8 + 4
+    assert frame["explicit/zarr.json"] is None
+    assert "position/c.0.0.0" not in frame
+    assert frame["chosen/c.0"] == MEMBERS + 4
+    assert frame["explicit/vehicle.mass/c.0"] == 50 * 8 + 4

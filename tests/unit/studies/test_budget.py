@@ -24,7 +24,8 @@ def test_waiting_and_other_threads_cost_nothing():
     other.join()
     assert budget.spent < 0.05
     work(0.1)
-    assert 0.1 <= budget.spent < 0.2 and not budget.over
+    assert 0.1 <= budget.spent < 0.2
+    assert not budget.over
 
 
 def test_what_is_free_does_not_count():
@@ -33,12 +34,14 @@ def test_what_is_free_does_not_count():
     now[0] += 2.0
     with budget.free():
         now[0] += 100.0
-    assert budget.spent == 2.0 and not budget.over
+    assert budget.spent == 2.0
+    assert not budget.over
     with pytest.raises(KeyError), budget.free():
         now[0] += 50.0
         raise KeyError
     now[0] += 1.5
-    assert budget.spent == 3.5 and budget.over
+    assert budget.spent == 3.5
+    assert budget.over
 
 
 @pytest.mark.parametrize(("seconds", "said"), [(0.011, 0.02), (1.0, 1.0), (40.0, 50.0), (51.0, 100.0), (2.1, 3.0)])

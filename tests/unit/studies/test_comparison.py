@@ -101,29 +101,33 @@ def test_a_sample_takes_the_scenes_times_where_they_divide(scene):
         one = dataclasses.replace(scene, run=dataclasses.replace(scene.run, save_every=every))
         return Sample(lw.Ensemble(one, 4, 1), t1, 2, samples)
 
-    assert sample(0.5).spacing == 1 / 2 and sample(0.5).times.tolist() == [0.0, 1.0, 1.5, 2.5, 3.0, 4.0]
-    assert sample(0.5).index.tolist() == [0, 2, 3, 5, 6, 8] and sample(4.0).times.tolist() == [0.0, 4.0]
+    assert sample(0.5).spacing == 1 / 2
+    assert sample(0.5).times.tolist() == [0.0, 1.0, 1.5, 2.5, 3.0, 4.0]
+    assert sample(0.5).index.tolist() == [0, 2, 3, 5, 6, 8]
+    assert sample(4.0).times.tolist() == [0.0, 4.0]
     for every in (0.3, 8.0, None):
-        assert float(sample(every).spacing) == 0.8 and sample(every).times == pytest.approx(0.8 * np.arange(6))
+        assert float(sample(every).spacing) == 0.8
+        assert sample(every).times == pytest.approx(0.8 * np.arange(6))
     one = sample(0.5)
     assert (one.members, one.whole.members, one.t1, one.draws, one.fixed_draws) == (2, 4, 4.0, 0, 0)
     more = one.more(3)
-    assert (more.members, more.t1, more.samples) == (3, 4.0, 5) and Sample(one.whole, 4.0).members == 4
-    assert one.h(4) == 0.125 and one.candidate("rk4", 2, "float32") == Candidate("rk4", 0.25, "float32")
+    assert (more.members, more.t1, more.samples) == (3, 4.0, 5)
+    assert Sample(one.whole, 4.0).members == 4
+    assert one.h(4) == 0.125
+    assert one.candidate("rk4", 2, "float32") == Candidate("rk4", 0.25, "float32")
     assert one.candidate("psi", 2, solver=("newton", 3)) == Candidate("psi", 0.25, "float64", "newton", 3)
     plan = one.plan(Candidate("rk4", 0.125))
-    assert (
-        plan.grid.steps == 32
-        and plan.grid.times.tolist() == one.times.tolist()
-        and plan.method.name == "rk4"
-        and plan.dtype == "float64"
-        and plan.ensemble.members == 2
-    )
+    assert plan.grid.steps == 32
+    assert plan.grid.times.tolist() == one.times.tolist()
+    assert plan.method.name == "rk4"
+    assert plan.dtype == "float64"
+    assert plan.ensemble.members == 2
 
 
 def test_the_end_of_a_sample_is_the_scenes_or_given(scene):
     fleet = lw.Ensemble(scene, 2)
-    assert Sample(fleet).t1 == scene.run.duration and Sample(fleet, 3.0).t1 == 3.0
+    assert Sample(fleet).t1 == scene.run.duration
+    assert Sample(fleet, 3.0).t1 == 3.0
     endless = lw.Ensemble(dataclasses.replace(scene, run=dataclasses.replace(scene.run, duration=None)), 2)
     with pytest.raises(
         lw.SceneError, match=r"t1 = None: is missing; give the end in seconds: t1=150.0 or \[run\] duration"
@@ -138,11 +142,13 @@ def test_the_coarsest_step_turns_by_an_angle(scene):
     assert sample.rate == max(rates.max(), slowest) == slowest
     fast = dataclasses.replace(scene, start=dataclasses.replace(scene.start, angular_velocity=[0.0, 3.0, 4.0]))
     assert Sample(lw.Ensemble(fast, 1), 4.0, samples=5).rate == 5.0
-    assert sample.coarsest(0.5) == math.ceil(0.8 * slowest / 0.5) == 3 and sample.coarsest(100.0) == 1
+    assert sample.coarsest(0.5) == math.ceil(0.8 * slowest / 0.5) == 3
+    assert sample.coarsest(100.0) == 1
     assert sample.allowed(7) == 7
     noisy = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[CURRENT]), 2), 4.0, samples=5).on_grid(12)
     assert [noisy.allowed(m) for m in (1, 4, 5, 7, 12, 13)] == [1, 4, 6, 12, 12, 12]
-    assert noisy.draws == 12 and noisy.ensemble.scene.terms[0].noise_step == pytest.approx(0.8 / 12)
+    assert noisy.draws == 12
+    assert noisy.ensemble.scene.terms[0].noise_step == pytest.approx(0.8 / 12)
 
 
 def test_draws_that_the_scene_fixes(scene):
@@ -169,22 +175,31 @@ def test_noise_is_none_or_on_a_grid(scene):
 def test_methods_are_taken_refused_or_the_same_as_others(scene):
     sample = Sample(fleet_of(scene), 4.0)
     names = ["psi_x", "rk4", "psi_s"]
-    assert sample.accepted(names) == (names, {}) and sample.accepted(names, most=2)[0] == names[:2]
+    assert sample.accepted(names) == (names, {})
+    assert sample.accepted(names, most=2)[0] == names[:2]
     damped = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[lw.Drag(linear=[1.0] * 6)]), 2), 4.0)
     taken, refused = damped.accepted(["gauss4", "rk4"])
-    assert taken == ["rk4"] and list(refused) == ["gauss4"] and "gauss4" in refused["gauss4"]
+    assert taken == ["rk4"]
+    assert list(refused) == ["gauss4"]
+    assert "gauss4" in refused["gauss4"]
     same, refused = sample.accepted(["rk4", "rk4", "cg3"])
-    assert same == ["rk4", "cg3"] and refused == {"rk4": "method rk4: in this scene it is rk4"}
+    assert same == ["rk4", "cg3"]
+    assert refused == {"rk4": "method rk4: in this scene it is rk4"}
 
 
 def test_settings_in_words_and_as_options():
     plain = Candidate("psi_s", 0.1)
-    assert plain.plain and plain.name == "psi_s" and plain.text == "psi_s float64"
+    assert plain.plain
+    assert plain.name == "psi_s"
+    assert plain.text == "psi_s float64"
     assert plain.options() == {"method": "psi_s", "h": 0.1, "dtype": "float64"}
     newton = Candidate("psi_s", 0.1, "float32", "newton")
     few = Candidate("psi_s", 0.1, "float32", "quartic", 2)
-    assert newton.text == "psi_s newton float32" and few.name == "psi_s quartic 2"
-    assert not newton.plain and not few.plain and few.options()["method"].iterations == 2
+    assert newton.text == "psi_s newton float32"
+    assert few.name == "psi_s quartic 2"
+    assert not newton.plain
+    assert not few.plain
+    assert few.options()["method"].iterations == 2
     assert newton.options()["method"].solver == "newton"
 
 
@@ -199,16 +214,20 @@ def test_distances_of_two_results():
     moved = path + np.array([3.0, 4.0, 0.0])
     one, other = made(path), made(moved, attitude=attitude)
     apart = comparison.distances(one, other)
-    assert list(apart) == NAMES and np.allclose(apart["position"], 5.0)
+    assert list(apart) == NAMES
+    assert np.allclose(apart["position"], 5.0)
     assert apart["attitude"] == pytest.approx(np.array([[0.0, 0.0], [0.3, 0.0], [0.0, np.pi]]))
     assert apart["energy"] == pytest.approx(np.abs(one.energy - other.energy))
     asked = comparison.distances(one, other, compared.compared_in("position[1]"))
-    assert np.allclose(asked["position[1]"], 4.0) and list(asked) == [*NAMES, "position[1]"]
+    assert np.allclose(asked["position[1]"], 4.0)
+    assert list(asked) == [*NAMES, "position[1]"]
     assert list(comparison.distances(one, other, compared.compared_in("position"))) == NAMES
     stopped = made(moved, status=[0, Status.FLOOR], end=[np.nan, 1.0])
     for pair in ((one, stopped), (stopped, one)):
         apart = comparison.distances(*pair)["position"]
-        assert np.isnan(apart[1:, 1]).all() and np.isfinite(apart[:, 0]).all() and np.isfinite(apart[0, 1])
+        assert np.isnan(apart[1:, 1]).all()
+        assert np.isfinite(apart[:, 0]).all()
+        assert np.isfinite(apart[0, 1])
 
 
 def test_errors_are_four_norms_up_to_a_time():
@@ -233,25 +252,29 @@ def test_agreement_rises_and_is_infinite_where_a_run_failed():
     asked = compared.compared_in("depth")
     for pair in ((one, failed), (failed, one)):
         found = comparison.agreement(*pair, asked)
-        assert list(found) == [*NAMES, "depth"] and all(v.tolist() == [0.0, *[np.inf] * 3] for v in found.values())
+        assert list(found) == [*NAMES, "depth"]
+        assert all(v.tolist() == [0.0, *[np.inf] * 3] for v in found.values())
     assert list(comparison.agreement(one, failed)) == NAMES
     lost = made(np.where(np.arange(4.0)[:, None, None] == 2.0, np.inf, path))
     with np.errstate(all="ignore"):
         found = comparison.agreement(one, lost)
     assert found["position"].tolist() == [0.0, 0.0, np.inf, np.inf]
-    assert not comparison.failed(stopped) and comparison.failed(failed)
+    assert not comparison.failed(stopped)
+    assert comparison.failed(failed)
 
 
 def test_a_reference_reaches_as_far_as_it_agrees():
     reference = Reference(None, "", {"x": np.array([0.0, 1e-3, 1e-2, 1e-2, 1.0])}, None)
     assert [reference.reaches("x", error) for error in (1e-4, 1e-3, 5e-3, 1e-2, 2.0)] == [0, 1, 1, 3, 4]
-    assert reference.error("x") == 1.0 and reference.error("x", 2) == 1e-2
+    assert reference.error("x") == 1.0
+    assert reference.error("x", 2) == 1e-2
 
 
 def test_two_methods_of_a_reference_are_of_like_order():
     assert comparison.paired(["rk8", "kl8(psi_x)"]) == ("rk8", "kl8(psi_x)")
     assert comparison.paired(["kl6(psi_x)", "rk4"]) == ("kl6(psi_x)", "rk4")
-    assert comparison.paired(["rk8", "rk5"]) == ("rk8", "rk8") and comparison.paired(["rk8"]) == ("rk8", "rk8")
+    assert comparison.paired(["rk8", "rk5"]) == ("rk8", "rk8")
+    assert comparison.paired(["rk8"]) == ("rk8", "rk8")
 
 
 def test_extrapolation_takes_out_two_orders(scene):
@@ -268,7 +291,8 @@ def test_extrapolation_takes_out_two_orders(scene):
         np.testing.assert_allclose(found.position, exact(sample.times, 4), atol=1e-13)
         assert found.compile_seconds == pytest.approx(0.4 + 0.2 + 0.1)
         plain = comparison.extrapolated(sample, "rk4", 2)
-        assert plain.compile_seconds == 0.4 and np.abs(plain.position - exact(sample.times, 4)).max() > 1.0
+        assert plain.compile_seconds == 0.4
+        assert np.abs(plain.position - exact(sample.times, 4)).max() > 1.0
         noisy = comparison.extrapolated(sample.on_grid(8), "psi_s", 2)
         assert noisy.compile_seconds == 0.4
 
@@ -287,15 +311,19 @@ def test_a_reference_is_refined_until_it_agrees(scene):
         if error <= 1e-3:
             break
         m *= 2
-    assert coarse.error("position") == pytest.approx(error, rel=1e-6) and coarse.methods == ("kl8(psi_x)", "rk8")
-    assert (
-        coarse.text == f"rk8 at h = {h:.4g} s against kl8(psi_x) at h = {H:.4g} s" and coarse.asked.name == "position"
-    )
-    assert runs.settings[-2:] == [("kl8(psi_x)", "float64", H, 1), ("rk8", "float64", h, 1)] and len(shares) >= 1
-    assert coarse.result.provenance["step"] == h and coarse.sample is sample
+    assert coarse.error("position") == pytest.approx(error, rel=1e-6)
+    assert coarse.methods == ("kl8(psi_x)", "rk8")
+    assert coarse.text == f"rk8 at h = {h:.4g} s against kl8(psi_x) at h = {H:.4g} s"
+    assert coarse.asked.name == "position"
+    assert runs.settings[-2:] == [("kl8(psi_x)", "float64", H, 1), ("rk8", "float64", h, 1)]
+    assert len(shares) >= 1
+    assert coarse.result.provenance["step"] == h
+    assert coarse.sample is sample
     with Runs(sizes) as runs:
         best = comparison.make_reference(sample, "position[0]", seconds=ENOUGH, methods=["rk8", "rk4", "psi_s"])
-    assert best.methods == ("rk8", "psi_s") and best.asked.name == "position[0]" and best.error("position") < 1e-12
+    assert best.methods == ("rk8", "psi_s")
+    assert best.asked.name == "position[0]"
+    assert best.error("position") < 1e-12
     # No better twice, and it ends.
     with Runs({}) as runs:
         comparison.make_reference(sample, seconds=ENOUGH, methods=["rk8", "rk5"], goal=-1.0)
@@ -311,13 +339,15 @@ def test_a_reference_in_noise_shares_its_draws(scene):
     with Runs({}) as runs:
         reference = comparison.make_reference(sample, seconds=0.0)
     m = 3 * 2 ** math.ceil(math.log2(8.0 * sample.coarsest(0.5) / 3.0))
-    assert reference.methods == ("psi_x", "psi_s") and reference.sample.draws == 2 * m
+    assert reference.methods == ("psi_x", "psi_s")
+    assert reference.sample.draws == 2 * m
     assert [h for _, _, h, _ in runs.settings] == [sample.h(m), sample.h(2 * m)]
     fixed = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[dataclasses.replace(CURRENT, noise_step=0.1)]), 2), 4.0,
                    samples=5)  # fmt: skip
     with Runs({}) as runs:
         reference = comparison.make_reference(fixed, seconds=ENOUGH)
-    assert [h for _, _, h, _ in runs.settings] == [fixed.h(4), fixed.h(8)] and reference.sample.draws == 8
+    assert [h for _, _, h, _ in runs.settings] == [fixed.h(4), fixed.h(8)]
+    assert reference.sample.draws == 8
 
 
 def test_a_scene_without_a_precise_method_has_no_reference(scene):
@@ -334,16 +364,22 @@ def test_a_scene_without_a_precise_method_has_no_reference(scene):
 def test_growth_needs_two_times_and_counts_only_those_later():
     t = np.array([0.0, 1.0])
     few = comparison.fitted(t, np.array([1.0, 2.0]), 1.0)
-    assert all(np.isnan(value) for value in (few.rate, few.doubling, few.factor)) and few.power is None
-    assert few.predictable == {"float64": 0.0, "float32": 0.0} and few.times is t
+    assert all(np.isnan(value) for value in (few.rate, few.doubling, few.factor))
+    assert few.power is None
+    assert few.predictable == {"float64": 0.0, "float32": 0.0}
+    assert few.times is t
     two = comparison.fitted(np.array([0.0, 1.0, 2.0]), np.array([7.0, 2.0, 4.0]), 2.0)
-    assert two.rate == pytest.approx(math.log(2.0)) and two.factor == 4.0
+    assert two.rate == pytest.approx(math.log(2.0))
+    assert two.factor == 4.0
     # Between an exponential and a power that fit alike the power is taken, but no steep one.
-    assert two.power == pytest.approx(1.0) and two.doubling == math.inf
+    assert two.power == pytest.approx(1.0)
+    assert two.doubling == math.inf
     steep = comparison.fitted(np.array([0.0, 1.0, 2.0]), np.array([1.0, 2.0, 20.0]), 2.0)
-    assert steep.power is None and steep.doubling == pytest.approx(math.log(2.0) / math.log(10.0))
+    assert steep.power is None
+    assert steep.doubling == pytest.approx(math.log(2.0) / math.log(10.0))
     falling = comparison.fitted(np.array([0.0, 1.0, 2.0, 3.0]), np.array([1.0, 0.5, 0.3, 0.2]), 3.0)
-    assert falling.power < 0.0 and falling.predictable["float64"] == math.inf
+    assert falling.power < 0.0
+    assert falling.predictable["float64"] == math.inf
     t = np.linspace(0.0, 10.0, 11)
     fast = comparison.fitted(t, np.exp(3.0 * t), 10.0)
     assert fast.predictable["float32"] == t[np.flatnonzero(np.exp(3.0 * t) * 2.0**-24 > 1e-2)[0]] == 5.0
@@ -388,7 +424,8 @@ def test_biases_are_in_standard_errors():
     assert found["position_mean"] == pytest.approx(0.5 * math.sqrt(n))
     assert found["position_std"] == pytest.approx(0.3 * math.sqrt(2.0 * (n - 1)))
     # What does not vary has no standard error; neither has one member, nor one that failed.
-    assert "attitude_mean" not in found and "angular_velocity_std" not in found
+    assert "attitude_mean" not in found
+    assert "angular_velocity_std" not in found
     assert comparison.biases(made(path[:, :1]), made(path[:, :1])) == {}
     assert (
         comparison.biases(made(path, status=[Status.NON_FINITE] + [0] * (n - 1), end=[1.0] + [np.nan] * (n - 1)), one)
@@ -396,7 +433,8 @@ def test_biases_are_in_standard_errors():
     )
     assert set(comparison.biases(made(path[:, :2]), made(path[:, :2]))) >= {"position_mean", "position_std"}
     asked = comparison.biases(made(scaled), one, compared.compared_in("depth"))
-    assert asked["depth_mean"] == pytest.approx(0.5 * math.sqrt(n)) and "depth_mean" not in found
+    assert asked["depth_mean"] == pytest.approx(0.5 * math.sqrt(n))
+    assert "depth_mean" not in found
 
 
 def test_statistics_are_of_vectors_energies_and_momenta():
@@ -405,7 +443,8 @@ def test_statistics_are_of_vectors_energies_and_momenta():
     result = made(path, attitude=turn)
     values = comparison.statistics(result)
     names = ["position", "velocity", "angular_velocity", "attitude", "energy", "linear_momentum", "angular_momentum"]
-    assert list(values) == names and values["energy"].shape == (3, 2, 1)
+    assert list(values) == names
+    assert values["energy"].shape == (3, 2, 1)
     np.testing.assert_array_equal(values["attitude"], turn[..., 2, :])
     np.testing.assert_array_equal(values["linear_momentum"], invariants.linear_momentum(result))
     np.testing.assert_array_equal(values["angular_momentum"], invariants.angular_momentum(result))
@@ -430,9 +469,13 @@ def test_a_quantitys_distance_and_size():
     assert np.allclose(compared.compared_in(" position ").distance(one, other), 5.0)
     assert compared.compared_in("position").largest(other) == np.abs(path + np.array([0.0, 3.0, 4.0])).max()
     attitude = compared.compared_in("attitude")
-    assert attitude.unit == "rad" and attitude.functional is None and attitude.values(one).shape == (3, 2, 9)
+    assert attitude.unit == "rad"
+    assert attitude.functional is None
+    assert attitude.values(one).shape == (3, 2, 9)
     asked = compared.compared_in("depth")
-    assert compared.compared_in(asked) is asked and asked.unit == "m" and not asked.mean
+    assert compared.compared_in(asked) is asked
+    assert asked.unit == "m"
+    assert not asked.mean
     assert compared.compared_in("norm(velocity)").unit == "m/s"
 
 
@@ -451,10 +494,14 @@ def test_a_mean_is_compared_by_the_end_of_its_interval():
     apart = np.zeros_like(path)
     apart[1, :, 0] = np.arange(n) - 2.0
     entry = compared.compared_in("mean position[0]")
-    assert entry.name == "mean position[0]" and entry.mean and entry.unit == "m"
+    assert entry.name == "mean position[0]"
+    assert entry.mean
+    assert entry.unit == "m"
     found = entry.distance(made(path + apart), made(path))
     error = 2.0 * np.std(np.arange(n), ddof=1) / 3.0
-    assert found.shape == (3, n) and np.allclose(found[1], 2.0 + error) and np.allclose(found[[0, 2]], 0.0)
+    assert found.shape == (3, n)
+    assert np.allclose(found[1], 2.0 + error)
+    assert np.allclose(found[[0, 2]], 0.0)
     alone = entry.distance(made((path + apart)[:, :1]), made(path[:, :1]))
     assert alone[1] == pytest.approx([2.0])
     whole = compared.compared_in("mean position").distance(made(path + apart), made(path))
@@ -500,10 +547,11 @@ def test_the_front_leaves_out_what_is_dearer_and_no_better():
     found = traded(*ones)
     assert [one.setting.method for one in found.shown()] == ["b", "c", "a", "d"]
     assert [one.setting.method for one in found.front()] == ["b", "a"]
-    assert found.front("attitude") == [] and ones[0].error("attitude") == math.inf
-    assert (
-        ones[0].cost_spread == 1.0 and ones[0].error() == 1e-4 and ones[0].error(kind="end_rms") == pytest.approx(5e-6)
-    )
+    assert found.front("attitude") == []
+    assert ones[0].error("attitude") == math.inf
+    assert ones[0].cost_spread == 1.0
+    assert ones[0].error() == 1e-4
+    assert ones[0].error(kind="end_rms") == pytest.approx(5e-6)
     assert [row["front"] for row in found.rows()] == [True, True] + [False] * 5
 
 
@@ -514,8 +562,11 @@ def test_rows_of_a_tradeoff_have_every_number():
                                          "compile_seconds", "energy_drift", "bias_position_mean")} == {
         "method": "psi_s", "h": 0.1, "dtype": "float32", "order": 2, "front": True, "us_per_vehicle_second": 3.0,
         "cost_spread": 1.2, "compile_seconds": 2.0, "energy_drift": 1e-3, "bias_position_mean": 0.5}  # fmt: skip
-    assert row["position_path_max"] == 1e-4 and row["position_end_rms"] == pytest.approx(5e-6)
-    assert row["position_trusted"] and not row["attitude_trusted"] and row["attitude_end_max"] == math.inf
+    assert row["position_path_max"] == 1e-4
+    assert row["position_end_rms"] == pytest.approx(5e-6)
+    assert row["position_trusted"]
+    assert not row["attitude_trusted"]
+    assert row["attitude_end_max"] == math.inf
     assert (row["solver"], row["iterations"]) == ("quartic", None)
 
 
@@ -530,18 +581,24 @@ def test_a_tradeoff_comes_back_from_its_file(tmp_path):
     assert [path.name for path in files] == ["tradeoff.json", "tradeoff.csv"]
     again = Tradeoff.load(files[0])
     assert again.to_dict() == found.to_dict() == json.loads(files[0].read_text())
-    assert (
-        again.messages == ("one", "two")
-        and again.refused == {"gauss4": "why"}
-        and again.reference_error["position"] == math.inf
-    )
+    assert again.messages == ("one", "two")
+    assert again.refused == {"gauss4": "why"}
+    assert again.reference_error["position"] == math.inf
     first, second = again.measurements
-    assert first == found.measurements[0] and second.error() == math.inf and math.isnan(second.energy_drift)
-    assert math.isnan(second.biases["energy_mean"]) and isinstance(first.setting, Candidate)
+    assert first == found.measurements[0]
+    assert second.error() == math.inf
+    assert math.isnan(second.energy_drift)
+    assert math.isnan(second.biases["energy_mean"])
+    assert isinstance(first.setting, Candidate)
     grown = again.growth
-    assert math.isnan(grown.rate) and grown.doubling == math.inf and grown.power == 1.5
-    assert grown.predictable == {"float64": math.inf, "float32": 66.0} and math.isnan(grown.curve[1])
-    assert isinstance(grown.times, np.ndarray) and grown.times.tolist() == [0.0, 1.0, 2.0] and grown.factor == 54.6
+    assert math.isnan(grown.rate)
+    assert grown.doubling == math.inf
+    assert grown.power == 1.5
+    assert grown.predictable == {"float64": math.inf, "float32": 66.0}
+    assert math.isnan(grown.curve[1])
+    assert isinstance(grown.times, np.ndarray)
+    assert grown.times.tolist() == [0.0, 1.0, 2.0]
+    assert grown.factor == 54.6
     assert traded(measured("a", 3.0, 1e-4), growth=None).to_dict()["growth"] is None
     assert Tradeoff.from_dict(traded(measured("a", 3.0, 1e-4), growth=None).to_dict()).growth is None
     assert found.to_dict()["front"] == [
@@ -571,7 +628,8 @@ def test_a_tradeoff_in_words():
                    refused={"gauss4": "a", "gauss6": "b"})  # fmt: skip
     assert tradeoffs.report_text(found) == REPORT
     lost = traded(measured("psi_x", 1.0, 1e-2, energy_drift=math.nan))
-    assert "energy drift" not in tradeoffs.report_text(lost) and "note" not in tradeoffs.report_text(lost)
+    assert "energy drift" not in tradeoffs.report_text(lost)
+    assert "note" not in tradeoffs.report_text(lost)
     bare = tradeoffs.report_text(traded(growth=None, reference_error={}))
     assert bare == "sample      8 members, 0 to 4 s, 0 settings in 12 s"
 
@@ -593,13 +651,13 @@ def test_biases_in_words():
             one("psi_s", 0.4, 2, "float32", position_mean=8.0)]  # fmt: skip
     lines = tradeoffs.bias_lines(traded(*ones))
     assert lines[1] == "Bias of statistics up to 4 s by psi_s, in standard errors of 8 members (1.4: chance):"
-    assert lines[2].split("  ")[-1].strip() == "ang.mom. mean" and lines[2].startswith(
-        "    step [s]  position mean   position std"
-    )
+    assert lines[2].split("  ")[-1].strip() == "ang.mom. mean"
+    assert lines[2].startswith("    step [s]  position mean   position std")
     assert [line.split() for line in lines[3:]] == [
         ["0.2", "1.0e+00", "3.0e+00", "-", "-", "-", "-"], ["0.1", "5.0e-01", "-", "-", "-", "2.0e+00", "-"]]  # fmt: skip
     deep = tradeoffs.bias_lines(traded(*ones, of="depth"))
-    assert deep[2].startswith("    step [s]     depth mean  position mean") and deep[3].split()[1] == "7.0e+00"
+    assert deep[2].startswith("    step [s]     depth mean  position mean")
+    assert deep[3].split()[1] == "7.0e+00"
     assert "speed" not in tradeoffs.bias_lines(traded(*ones, of="speed"))[2]
     assert tradeoffs.bias_lines(traded(ones[4], measured("psi_s", 1.0, 1.0))) == []
 
@@ -617,13 +675,13 @@ def test_a_trial_has_the_errors_of_its_run(scene):
         early = tradeoffs.tried(sample, sample.candidate("psi_s", 4), reference, 2)
         blind = tradeoffs.tried(sample, sample.candidate("psi_s", 4), None)
     size = 2.0 * sample.h(4) ** 2
-    assert trial.error("position") == pytest.approx(4 * 4.0 * size) and early.error("position") == pytest.approx(
-        4 * 1.6 * size
-    )
-    assert (
-        blind.error("position") == math.inf and blind.errors == {} and trial.candidate == sample.candidate("psi_s", 4)
-    )
-    assert trial.plan.grid.h == sample.h(4) and trial.plan.method.name == "psi_s"
+    assert trial.error("position") == pytest.approx(4 * 4.0 * size)
+    assert early.error("position") == pytest.approx(4 * 1.6 * size)
+    assert blind.error("position") == math.inf
+    assert blind.errors == {}
+    assert trial.candidate == sample.candidate("psi_s", 4)
+    assert trial.plan.grid.h == sample.h(4)
+    assert trial.plan.method.name == "psi_s"
     with Runs({"psi_s": math.inf}):
         assert tradeoffs.tried(sample, sample.candidate("psi_s", 4), reference).errors == {}
     noisy = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[CURRENT]), 2), 4.0, samples=5).on_grid(12)
@@ -640,7 +698,9 @@ def test_a_sweep_halves_steps_until_round_off(scene):
         trials, skipped = tradeoffs.sweep(
             sample, ["psi_s"], reference, 5, Budget(ENOUGH), Budget(ENOUGH), shares.append
         )
-    assert skipped == [] and shares[:4] == pytest.approx([0.0, 0.125, 0.25, 0.375]) and min(shares[4:]) >= 0.5
+    assert skipped == []
+    assert shares[:4] == pytest.approx([0.0, 0.125, 0.25, 0.375])
+    assert min(shares[4:]) >= 0.5
     ladders = {}
     for trial in trials:
         ladders.setdefault((trial.candidate.name, trial.candidate.dtype), []).append(trial)
@@ -651,7 +711,8 @@ def test_a_sweep_halves_steps_until_round_off(scene):
     # Steps between, near the front, follow.
     rise = np.flatnonzero(np.diff(halved) > 0.0)
     halved = halved[: rise[0] + 1] if len(rise) else halved
-    assert halved[0] == sample.h(sample.coarsest(1.0)) and np.allclose(np.divide(halved[:-1], halved[1:]), 2.0)
+    assert halved[0] == sample.h(sample.coarsest(1.0))
+    assert np.allclose(np.divide(halved[:-1], halved[1:]), 2.0)
     # The finest step is the first whose error is below ten times the reference's.
     finest = min(first, key=lambda trial: trial.candidate.h)
     assert finest.error("position") < 1e-8 < 4.001 * finest.error("position")
@@ -705,7 +766,8 @@ def test_a_sweep_without_time_tries_what_was_asked_for_by_name(scene):
             [*rest, "psi_x float64 at fine steps", "rk4 float64 at fine steps"],
         )
         statistics, _ = tradeoffs.sweep(sample, ["psi_x"], None, 5, Budget(ENOUGH), Budget(ENOUGH), lambda part: None)
-    assert len(statistics) == 2 * 5 and all(trial.errors == {} for trial in statistics)
+    assert len(statistics) == 2 * 5
+    assert all(trial.errors == {} for trial in statistics)
 
 
 @pytest.mark.parametrize("study", ["tradeoff", "suggest"])
@@ -741,12 +803,16 @@ def test_what_was_asked_for_and_has_no_reading_is_named(scene):
     assert brief.missing == {
         "rk4": "members failed at every step down to 0.2 s; for shorter ones give more seconds than 1e-06"
     }
-    assert found.missing["rk4"].startswith("members failed at every step down to ") and "rk4" not in unasked.missing
-    assert set(found.missing) <= {"rk4", "gauss4"} and unasked.missing == {}
+    assert found.missing["rk4"].startswith("members failed at every step down to ")
+    assert "rk4" not in unasked.missing
+    assert set(found.missing) <= {"rk4", "gauss4"}
+    assert unasked.missing == {}
     text = tradeoffs.report_text(found)
-    assert text.startswith("missing     rk4: members failed") and "path; nothing of rk4" in text
+    assert text.startswith("missing     rk4: members failed")
+    assert "path; nothing of rk4" in text
     again = Tradeoff.from_dict(json.loads(found.to_json()))
-    assert again.missing == found.missing and json.loads(found.to_json())["missing"] == found.missing
+    assert again.missing == found.missing
+    assert json.loads(found.to_json())["missing"] == found.missing
     import matplotlib.pyplot as plt
 
     figure = plt.figure()
@@ -807,7 +873,8 @@ def trial(seconds, position, attitude=0.0, h=0.1, method="psi_s"):
 def test_a_setting_is_hopeless_where_a_tenth_of_its_time_does_better():
     slow = trial(10.0, 1e-3)
     assert tradeoffs.hopeless(slow, [slow, trial(0.9, 1e-4)])
-    assert not tradeoffs.hopeless(slow, [slow, trial(1.0, 1e-4)]) and not tradeoffs.hopeless(slow, [trial(0.9, 1e-3)])
+    assert not tradeoffs.hopeless(slow, [slow, trial(1.0, 1e-4)])
+    assert not tradeoffs.hopeless(slow, [trial(0.9, 1e-3)])
     assert not tradeoffs.hopeless(slow, [trial(0.9, 1e-4, 1e-2)])
     assert tradeoffs.hopeless(trial(10.0, 1e-6, 1e-3), [trial(0.9, 1e-4)])
     assert not tradeoffs.hopeless(trial(10.0, math.inf), [trial(0.9, 1e-4)])
@@ -819,13 +886,16 @@ def test_steps_between_are_tried_near_the_front(scene):
     reference, more = object(), []
 
     def tried(one, candidate, against, until, budget):
-        assert one is sample and against is reference and until == 4
+        assert one is sample
+        assert against is reference
+        assert until == 4
         more.append(candidate)
         return trial(1.0, 1.0, h=candidate.h)
 
     with mock.patch.object(tradeoffs, "tried", tried):
         tradeoffs.between(sample, trials, reference, 4, Budget(ENOUGH))
-        assert sorted(one.h for one in more) == sorted(sample.h(m) for m in (7, 14)) and len(trials) == 5
+        assert sorted(one.h for one in more) == sorted(sample.h(m) for m in (7, 14))
+        assert len(trials) == 5
         more.clear()
         tradeoffs.between(sample, trials[:2], reference, 4, Budget(-1.0))
     assert more == []
@@ -846,8 +916,10 @@ def test_measurements_are_of_trials_that_did_not_fail(scene):
     limit = [one.errors["position"]["path_max"] >= 1e-2 for one in both]
     assert [one.trusted["position"] for one in both] == limit == [True, False]
     drift = invariants.drift(trials[0].result)["energy"]
-    assert both[0].energy_drift == drift and both[0].biases == comparison.biases(trials[0].result, reference.result)
-    assert len(blind) == 1 and blind[0].trusted == {}
+    assert both[0].energy_drift == drift
+    assert both[0].biases == comparison.biases(trials[0].result, reference.result)
+    assert len(blind) == 1
+    assert blind[0].trusted == {}
 
 
 def test_a_tradeoff_says_how_far_its_reference_reaches(scene):
@@ -861,10 +933,15 @@ def test_a_tradeoff_says_how_far_its_reference_reaches(scene):
         part = comparison.make_reference(Sample(fleet_of(scene), 4.0), seconds=ENOUGH)
         with mock.patch.object(comparison, "make_reference", return_value=dataclasses.replace(part, own=late)):
             short = lw.tradeoff(fleet_of(scene), 4.0, "depth", methods=["psi_s"], seconds=ENOUGH)
-    assert (found.members, found.t1, found.until, found.of) == (3, 4.0, 4.0, "position") and found.messages == ()
-    assert found.units == compared.QUANTITIES and found.growth is GROWN and list(found.reference_error) == NAMES
-    assert found.front() and {threads for *_, threads in runs.settings} == {1}
-    assert short.until == 2.0 and short.units["depth"] == "m"
+    assert (found.members, found.t1, found.until, found.of) == (3, 4.0, 4.0, "position")
+    assert found.messages == ()
+    assert found.units == compared.QUANTITIES
+    assert found.growth is GROWN
+    assert list(found.reference_error) == NAMES
+    assert found.front()
+    assert {threads for *_, threads in runs.settings} == {1}
+    assert short.until == 2.0
+    assert short.units["depth"] == "m"
     assert short.messages[0] == ("errors of single members are up to 2 s, where the reference still agrees with itself; "
                                  "beyond it only statistics are meaningful")  # fmt: skip
 
@@ -873,7 +950,8 @@ def test_a_tradeoff_says_how_far_its_reference_reaches(scene):
     (["psi_z"], "methods = 'psi_z': is not known; known: "), ([], "methods = []: is empty; name one method or more"),
 ])  # fmt: skip
 def test_methods_that_are_none_are_refused(methods, words):
-    assert tradeoffs.chosen_methods(None, ("a",)) == ("a",) and tradeoffs.chosen_methods(["rk4"]) == ("rk4",)
+    assert tradeoffs.chosen_methods(None, ("a",)) == ("a",)
+    assert tradeoffs.chosen_methods(["rk4"]) == ("rk4",)
     with pytest.raises(lw.SceneError) as caught:
         tradeoffs.chosen_methods(methods)
     assert words in str(caught.value)
@@ -888,7 +966,8 @@ def test_a_reference_too_rough_for_members(scene):
         return Reference(result, "a and b", {"position": np.array(own)}, sample)
 
     good = reference(0.0, 1e-4, 1e-4, 1e-3, 1.0, 1.0)
-    assert tradeoffs.trusted_until(good, of, 1.0) == 2 and not tradeoffs.reaches_nothing(good, of)
+    assert tradeoffs.trusted_until(good, of, 1.0) == 2
+    assert not tradeoffs.reaches_nothing(good, of)
     bad = reference(0.0, 0.0123, 1.0, 1.0, 1.0, 1.0)
     assert tradeoffs.reaches_nothing(bad, of)
     with pytest.raises(lw.SceneError) as caught:
@@ -907,7 +986,9 @@ def test_growth_is_measured_at_the_references_step(scene):
         with mock.patch.object(comparison, "growth") as growth:
             tradeoffs.growth_of(one, ["psi_s", "rk8", "rk4"], Reference(result, "", {}, one))
         (seen, candidate), _ = growth.call_args
-        assert candidate.method == "rk8" and len(seen.times) == often + 1 and seen.members == 4
+        assert candidate.method == "rk8"
+        assert len(seen.times) == often + 1
+        assert seen.members == 4
         assert candidate.h == pytest.approx(0.1)
 
 
@@ -932,19 +1013,25 @@ def test_a_suggestion_is_the_cheapest_by_arithmetic(scene, error):
     # float32 has an error of 1.6e-4 of its own.
     least = min(exact_price, key=exact_price.get)
     assert (found.setting.method, found.setting.dtype) == (least, "float64" if error < 1e-3 else "float32")
-    assert found.expected <= error and found.margin == error / found.expected and found.setting.h <= longest(
-        found.setting.method, error)  # fmt: skip
+    assert found.expected <= error
+    assert found.margin == error / found.expected
+    assert found.setting.h <= longest(found.setting.method, error)
     assert found.setting.h > 0.75 * longest(found.setting.method, error)
     assert found.us_per_vehicle_second == PRICES[found.setting.method, found.setting.dtype] / found.setting.h
-    assert found.settings == found.setting.options() and (found.members, found.t1, found.of, found.unit) == (
+    assert found.settings == found.setting.options()
+    assert (found.members, found.t1, found.of, found.unit) == (
         4,
         4.0,
         "position",
         "m",
     )
-    assert found.threads == 1 and found.worst == (3, 2, 1, 0) and found.error == error and found.messages == ()
+    assert found.threads == 1
+    assert found.worst == (3, 2, 1, 0)
+    assert found.error == error
+    assert found.messages == ()
     prices = [price for _, price, _ in found.rivals]
-    assert prices == sorted(prices) and all(price >= found.us_per_vehicle_second for price in prices)
+    assert prices == sorted(prices)
+    assert all(price >= found.us_per_vehicle_second for price in prices)
     assert runs.settings
 
 
@@ -1013,7 +1100,8 @@ def test_a_step_is_lengthened_as_far_as_the_target_allows(scene):
         assert suggest.lengthened(sample, one, 1, 1e9, reference, "position", 1e8) is one
         # A step that misses the target is shortened by its order, at most twice each time.
         short, size = suggest.refined(sample, sample.candidate("psi_s", 32), reference, "position", target, 4)
-        assert size == short.error("position") <= target and short.candidate.h == sample.h(46)
+        assert size == short.error("position") <= target
+        assert short.candidate.h == sample.h(46)
         same, _ = suggest.refined(sample, sample.candidate("psi_s", 45), reference, "position", target, 4)
         assert same.candidate.h == sample.h(45)
         far, _ = suggest.refined(sample, sample.candidate("psi_s", 1), reference, "position", target, 4)
@@ -1049,8 +1137,10 @@ def test_a_suggestion_in_words():
         "reference   a against b: they agree to 1.0e-09 m",
         "  next best rk4, float32, step 0.1 s: 1.50 times the time, position to 2.0e-04 m",
     ]
-    assert "on 1 thread, " in str(suggested(threads=1)) and "note" not in str(suggested())
-    assert suggested().margin == pytest.approx(2.5) and suggested(expected=0.0).margin == math.inf
+    assert "on 1 thread, " in str(suggested(threads=1))
+    assert "note" not in str(suggested())
+    assert suggested().margin == pytest.approx(2.5)
+    assert suggested(expected=0.0).margin == math.inf
 
 
 def test_memory_and_time_are_those_of_all_members(scene):
@@ -1063,7 +1153,9 @@ def test_memory_and_time_are_those_of_all_members(scene):
         timed.side_effect = lambda calls, rounds: (calls[0](), np.array([[3.0, 2.0]]))[1]
         seconds = suggest.seconds_of(fleet, Candidate("psi_s", 0.1), 4.0)
         few = suggest.seconds_of(fleet.subset(range(10)), Candidate("psi_s", 0.1), 4.0)
-    assert seconds == pytest.approx(2.0 * 1000 / 256) and few == 2.0 and timed.call_args.args[1] == 2
+    assert seconds == pytest.approx(2.0 * 1000 / 256)
+    assert few == 2.0
+    assert timed.call_args.args[1] == 2
     assert {setting[:3] for setting in runs.settings} == {("psi_s", "float64", 0.1)}
 
 
@@ -1087,8 +1179,12 @@ def test_a_finished_run_is_checked_with_half_the_step(scene):
         with mock.patch.object(suggest, "run_plan", run):
             error, members = suggest.verified(fleet, result, found)
     (one,) = checks
-    assert members == 64 and list(one.ensemble.indices) == [99, 7, *range(7), *range(8, 63)]
-    assert one.grid.h == 0.05 and one.grid.steps == 80 and one.dtype == "float64" and one.method.name == "psi_s"
+    assert members == 64
+    assert list(one.ensemble.indices) == [99, 7, *range(7), *range(8, 63)]
+    assert one.grid.h == 0.05
+    assert one.grid.steps == 80
+    assert one.dtype == "float64"
+    assert one.method.name == "psi_s"
     # The finer run is exact here: all of the error is seen, and more is concluded of order 2.
     assert error == pytest.approx(100 * 4.0 * 0.1**2 / (1.0 - 2.0**-2))
 
@@ -1109,9 +1205,11 @@ def test_ladders_give_up_what_is_dear_or_stalls(scene):
             except StopIteration as end:
                 return end.value
 
-    assert ladders(1e-3).dtypes == list(tradeoffs.PRECISIONS) and ladders(1e-12).dtypes == ["float64"]
+    assert ladders(1e-3).dtypes == list(tradeoffs.PRECISIONS)
+    assert ladders(1e-12).dtypes == ["float64"]
     size = of.largest(reference.result)
-    assert ladders(4.0 * 2.0**-24 * size).dtypes == ["float64"] and ladders(4.1 * 2.0**-24 * size).dtypes != ["float64"]
+    assert ladders(4.0 * 2.0**-24 * size).dtypes == ["float64"]
+    assert ladders(4.1 * 2.0**-24 * size).dtypes != ["float64"]
     assert ladders(1e-30).dtypes == ["float64"]
     prices = {("psi_s", "float64"): 3.0, ("psi_x", "float64"): 100.0}
     with Runs({"psi_s": 1e-2, "psi_x": 1e-2, "rk4": 1e12}, prices, round_off=1e-3):
@@ -1119,14 +1217,18 @@ def test_ladders_give_up_what_is_dear_or_stalls(scene):
         h = (1e-3 / (1e-2 * 16.0)) ** 0.5
         price = longest(one, "psi_s", "float64")
         assert price == one.priced[0][0] == 3.0 / sample.h(math.ceil(0.8 / h))
-        assert longest(one, "psi_x", "float64") == math.inf and longest(one, "psi_s", "float32") is None
-        assert one.cheapest() == [one.priced[0][1]] and len(one.priced) == 1
+        assert longest(one, "psi_x", "float64") == math.inf
+        assert longest(one, "psi_s", "float32") is None
+        assert one.cheapest() == [one.priced[0][1]]
+        assert len(one.priced) == 1
         assert longest(ladders(1e-3, -1.0), "rk4", "float64") is None
         one.priced += [(1.49 * price, "near"), (1.5 * price, "far"), (1.2 * price, "nearer")]
         assert one.cheapest()[1:] == ["nearer", "near"]
-    assert ladders(1e-3).limited_by_damping and ladders(1e-3).cheapest() == []
+    assert ladders(1e-3).limited_by_damping
+    assert ladders(1e-3).cheapest() == []
     for rate, limited in ((2.0, False), (2.1, True)):
         with mock.patch.object(suggest, "h_rates", return_value={"drag": rate}) as h_rates:
             one = ladders(1e-3)
             one.priced = [(1.0, SimpleNamespace(candidate=Candidate("psi_s", 0.25)))]
-            assert one.limited_by_damping is limited and h_rates.call_args.args[1] == 0.25
+            assert one.limited_by_damping is limited
+            assert h_rates.call_args.args[1] == 0.25

@@ -54,7 +54,8 @@ def test_where_longer_steps_are_more_work_they_cost_no_less():
     kinds = [Kind("newton", h, grows=True) for h in STEPS]
     true = np.array([4.0, 3.0, 2.0, 1.0])
     quiet = of_steps(kinds, np.repeat(true[:, None], 3, axis=1))
-    assert [least for least, _ in quiet] == true.tolist() and all(spread == 1.0 for _, spread in quiet)
+    assert [least for least, _ in quiet] == true.tolist()
+    assert all(spread == 1.0 for _, spread in quiet)
     # The second and the last were disturbed: a longer step bounds each from above.
     disturbed = [least for least, _ in of_steps(kinds, np.array([4.0, 9.0, 2.0, 30.0])[:, None])]
     assert disturbed == [4.0, 4.0, 2.0, 2.0]
@@ -67,7 +68,9 @@ def test_readings_that_disagree_are_told(noise, told):
     text = cost.disagreement([("psi_x float64", spread), ("rk4 float64", 1.0)])
     assert spread == noise
     if told:
-        assert f"psi_x float64 ({noise:.2g} times)" in text and "rk4" not in text and "idle machine" in text
+        assert f"psi_x float64 ({noise:.2g} times)" in text
+        assert "rk4" not in text
+        assert "idle machine" in text
     else:
         assert text is None
 
@@ -82,7 +85,9 @@ def test_a_least_reading_is_met_again():
 
 def test_many_are_told_few_by_name():
     text = cost.disagreement([(f"m{i}", 2.0 + i) for i in range(9)])
-    assert "m8 (10 times), m7 (9 times)" in text and "and 3 more" in text and "m0" not in text
+    assert "m8 (10 times), m7 (9 times)" in text
+    assert "and 3 more" in text
+    assert "m0" not in text
 
 
 def clock(monkeypatch, seconds):
@@ -146,9 +151,12 @@ def found(spread):
 
 def test_the_report_says_how_costs_were_read():
     quiet, busy = report_text(found(1.01)), report_text(found(4.0))
-    assert "note" not in quiet and "at most 1.01 times" in quiet
-    assert "note        readings of cost disagree" in busy and "at most 4.00 times" in busy
-    assert found(4.0).rows()[0]["cost_spread"] == 4.0 and found(4.0).to_dict()["measurements"][0]["cost_spread"] == 4.0
+    assert "note" not in quiet
+    assert "at most 1.01 times" in quiet
+    assert "note        readings of cost disagree" in busy
+    assert "at most 4.00 times" in busy
+    assert found(4.0).rows()[0]["cost_spread"] == 4.0
+    assert found(4.0).to_dict()["measurements"][0]["cost_spread"] == 4.0
 
 
 def test_time_of_other_threads_does_not_count():
@@ -167,7 +175,8 @@ def test_time_of_other_threads_does_not_count():
     finally:
         stop.set()
         other.join()
-    assert waited >= 0.2 and (took < 0.5 * waited or cost.os.name == "nt")
+    assert waited >= 0.2
+    assert took < 0.5 * waited or cost.os.name == "nt"
 
 
 @pytest.mark.parametrize(

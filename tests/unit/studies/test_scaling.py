@@ -48,9 +48,9 @@ def test_members_and_threads_by_default(clock, monkeypatch):
     monkeypatch.setattr(machine, "thread_count", lambda: 6)
     rows = lw.scaling(speed.fleet(64), method="psi_s", h=0.01, t1=1.0)
     assert [(row["members"], row["threads"]) for row in rows] == [(n, k) for n in (1, 10, 64) for k in (1, 2, 4, 6)]
-    assert (
-        scaling.rising(10, 1) == [1] and scaling.rising(10, 10) == [1, 10] and scaling.rising(10, 100) == [1, 10, 100]
-    )
+    assert scaling.rising(10, 1) == [1]
+    assert scaling.rising(10, 10) == [1, 10]
+    assert scaling.rising(10, 100) == [1, 10, 100]
     assert scaling.rising(2, 9) == [1, 2, 4, 8, 9]
 
 
@@ -82,16 +82,18 @@ def test_what_each_term_costs(clock, monkeypatch):
     assert rows == [{"term": name, "method": "psi_x", "dtype": "float32", "ns_per_vehicle_step": ns,
                      "more_than_none": ns - 10.0} for name, ns in names]  # fmt: skip
     ((plans, rounds),) = asked
-    assert rounds == 3 and all(
-        plan.ensemble.members == 16 and plan.grid.h == 0.02 and plan.grid.steps == 10 for plan in plans
-    )
+    assert rounds == 3
+    assert all(plan.ensemble.members == 16 and plan.grid.h == 0.02 and plan.grid.steps == 10 for plan in plans)
     assert [row["term"] for row in lw.term_cost(dataclasses.replace(scene, terms=[drag]), method="psi_x", h=0.02)] == [
         "none", "drag"]  # fmt: skip
     run = dataclasses.replace(scene.run, method="rk4", step=0.05)
     rows = lw.term_cost(dataclasses.replace(scene, run=run, events=[{"type": "floor", "depth": 20.0}]))
-    assert {row["method"] for row in rows} == {"rk4"} and asked[-1][1] == 5
+    assert {row["method"] for row in rows} == {"rk4"}
+    assert asked[-1][1] == 5
     for plan in asked[-1][0]:
-        assert plan.grid.h == 0.05 and plan.ensemble.members == 64 and plan.dtype == "float64"
+        assert plan.grid.h == 0.05
+        assert plan.ensemble.members == 64
+        assert plan.dtype == "float64"
         assert not plan.ensemble.scene.events
     with pytest.raises(
         lw.SceneError, match=r"scene\.terms: is empty; give the scene terms whose cost is to be measured"
@@ -125,14 +127,19 @@ def test_the_width_of_each_kernel_is_the_fastest(clock, monkeypatch, faster, bet
         ns = {
             n * lanes: 1e6 / (512 * 128) * (faster if n == 1 else 1.0) for n in (1, 2, 4) if n * lanes in widths.WIDTHS
         }
-        assert one.ns == pytest.approx(ns) and one.before == widths.of_table(kind, dtype).lanes
+        assert one.ns == pytest.approx(ns)
+        assert one.before == widths.of_table(kind, dtype).lanes
         assert one.best == (lanes if better or one.before == lanes else one.before)
     assert {(plan.ensemble.members, plan.grid.steps, plan.grid.h) for plan in plans} == {(512, 128, 0.01)}
     methods = [plan.method.name for plan in plans if plan.dtype == "float64"]
-    assert set(methods) == {"psi_s", "psi_x", "rk8"} and any(plan.ensemble.scene.terms for plan in plans)
+    assert set(methods) == {"psi_s", "psi_x", "rk8"}
+    assert any(plan.ensemble.scene.terms for plan in plans)
     dense = tuning.TERMS["dense"][0].linear
-    assert (dense != 0.0).all() and np.array_equal(dense, dense.T) and dense[0, 0] == 22.0
-    assert dense[1, 0] == pytest.approx(0.1 * math.sqrt(20.0 * 60.0)) and np.linalg.eigvalsh(dense)[0] > 0.0
+    assert (dense != 0.0).all()
+    assert np.array_equal(dense, dense.T)
+    assert dense[0, 0] == 22.0
+    assert dense[1, 0] == pytest.approx(0.1 * math.sqrt(20.0 * 60.0))
+    assert np.linalg.eigvalsh(dense)[0] > 0.0
     assert len(seen) == 2 * len(plans)
 
 
@@ -144,7 +151,8 @@ def test_the_least_reading_counts_without_a_first_call(clock):
         calls.append(name)
         clock.time += next(lengths[name])
 
-    assert speed.least([lambda: call("a"), lambda: call("b")], 3) == [1.0, 4.0] and calls == ["a", "b"] * 3
+    assert speed.least([lambda: call("a"), lambda: call("b")], 3) == [1.0, 4.0]
+    assert calls == ["a", "b"] * 3
 
 
 # Costs
@@ -169,11 +177,13 @@ def test_costs_that_are_unsure_are_read_again(monkeypatch):
     quiet, busy = cost.costs(plans, 2)
     assert timed == [["quiet", "busy"], ["busy"], ["busy"], ["busy"]]
     assert quiet == Cost(1e6 * 0.25 / 0.5, 1.0)
-    assert busy.us_per_vehicle_second == 1e6 * 0.25 / 0.5 and busy.spread == np.median([1, 9, 5, 3, 2, 2.05, 1, 1])
+    assert busy.us_per_vehicle_second == 1e6 * 0.25 / 0.5
+    assert busy.spread == np.median([1, 9, 5, 3, 2, 2.05, 1, 1])
 
 
 def test_disagreement_is_above_its_bound():
-    assert cost.disagreement([("a", 1.3)]) is None and cost.disagreement([]) is None
+    assert cost.disagreement([("a", 1.3)]) is None
+    assert cost.disagreement([]) is None
     text = cost.disagreement([("b", 1.31), ("a", 2.0), ("b", 4.0), ("b", 3.0)])
     assert text == ("readings of cost disagree: their median is above the least, which is taken, for b (4 times), a (2 "
                     "times); other programs run at the same time, and costs that lie closer are not told apart; run again "
@@ -219,7 +229,8 @@ def test_launches_are_long_enough_to_time(monkeypatch):
                                ensemble=SimpleNamespace(members=n, select=lambda a, b: ("members", a, b)))  # fmt: skip
 
     calls, steps = cost.launches([plan(20e-9), plan(1.0), plan(1e-15), plan(20e-9, 100, 10), plan(20e-9, 2)])
-    assert [stop for _, stop in asked] == [200, 200, 200, 20, 2500] and all(first == 0 for first, _ in asked)
+    assert [stop for _, stop in asked] == [200, 200, 200, 20, 2500]
+    assert all(first == 0 for first, _ in asked)
     assert steps[:, 0] == pytest.approx([1000 * 100, 10 * 100, 100_000 * 100, 1000 * 100, 50_000 * 2], rel=1e-2)
     begun = now.time
     calls[0]()
@@ -264,11 +275,11 @@ def test_a_study_writes_two_files(tmp_path):
         "new/folder/example.json",
         "new/folder/example.csv",
     ]
-    assert paths[0].read_text() == '{\n "x": 1.5\n}' and paths[1].read_text().split() == ["x,y", "1.5,a"]
+    assert paths[0].read_text() == '{\n "x": 1.5\n}'
+    assert paths[1].read_text().split() == ["x,y", "1.5,a"]
     named = Study().save(tmp_path, "other")
-    assert [path.name for path in named] == ["other.json", "other.csv"] and json.loads(named[0].read_text()) == {
-        "x": 1.5
-    }
+    assert [path.name for path in named] == ["other.json", "other.csv"]
+    assert json.loads(named[0].read_text()) == {"x": 1.5}
 
 
 def test_a_damaged_file_is_said_to_be_damaged(tmp_path):
@@ -276,7 +287,8 @@ def test_a_damaged_file_is_said_to_be_damaged(tmp_path):
         with pytest.raises(lw.SceneError) as caught, files.of_study(tmp_path / "x.json"):
             raise error
         head = f"{tmp_path / 'x.json'}: is damaged, or of another version"
-        assert str(caught.value) == f"{head}: {error}; run the study again" and caught.value.__cause__ is error
+        assert str(caught.value) == f"{head}: {error}; run the study again"
+        assert caught.value.__cause__ is error
     with pytest.raises(lw.SceneError, match="itself"), files.of_study(tmp_path):
         raise lw.SceneError(["itself"])
     with pytest.raises(OSError, match="gone"), files.of_study(tmp_path):
@@ -285,11 +297,9 @@ def test_a_damaged_file_is_said_to_be_damaged(tmp_path):
 
 def test_whose_members_a_study_is_about(scene):
     fleet = lw.Ensemble(scene, 3)
-    assert (
-        members.ensemble_of(fleet) is fleet
-        and members.scene_of(fleet) is fleet.scene
-        and members.scene_of(scene) is scene
-    )
+    assert members.ensemble_of(fleet) is fleet
+    assert members.scene_of(fleet) is fleet.scene
+    assert members.scene_of(scene) is scene
     assert members.ensemble_of(scene).members == scene.ensemble_settings.members
     with pytest.raises(lw.SceneError) as caught:
         members.ensemble_of(3)
@@ -305,18 +315,21 @@ def test_speeds_beside_the_peak_of_the_core():
                       "operations": 239 + 8 * 2 * 2, "peak_gfma": 50.0,
                       "part_of_peak": round((239 + 32) / 1e-8 / 5e10, 3)}  # fmt: skip
     other = speed.record(SimpleNamespace(name="rk4", iterations=None), "float64", 8, 1e-8, 5e10)
-    assert other["operations"] is None and other["part_of_peak"] is None
-    assert (
-        speed.operations("phi") == 133 + 8
-        and speed.operations("psi_x", 5) == 171
-        and speed.operations("psi_s", 0) == 239
-    )
+    assert other["operations"] is None
+    assert other["part_of_peak"] is None
+    assert speed.operations("phi") == 133 + 8
+    assert speed.operations("psi_x", 5) == 171
+    assert speed.operations("psi_s", 0) == 239
     example = speed.fleet(5, lw.Drag(linear=[1.0] * 6))
-    assert example.members == 5 and example.seed == 1 and [term.key for term in example.scene.terms] == ["drag"]
-    assert example.vary["start.angular_velocity"].relative == 0.1 and example.scene.vehicle.mass == 123.8
+    assert example.members == 5
+    assert example.seed == 1
+    assert [term.key for term in example.scene.terms] == ["drag"]
+    assert example.vary["start.angular_velocity"].relative == 0.1
+    assert example.scene.vehicle.mass == 123.8
     with mock.patch.object(speed, "Packets") as packets, mock.patch.object(Plan, "compile") as compiled:
         plan = scaling.make_plan(example, "psi_s", h=0.01, t1=1.0)
         call = speed.stepper(plan)
-        assert compiled.called and packets.call_args.args[0] is plan
+        assert compiled.called
+        assert packets.call_args.args[0] is plan
         call()
     packets.return_value.advance.assert_called_once_with(0, 100)

@@ -31,21 +31,28 @@ def test_a_search_spends_its_budget_in_generations_corners_and_a_walk():
 
     def cost(places):
         asked.append(len(places))
-        assert (places >= 0.0).all() and (places <= 1.0).all()
+        assert (places >= 0.0).all()
+        assert (places <= 1.0).all()
         return np.abs(places - (0.3, 0.8)).sum(axis=1)
 
     found = box.search(cost, 2, 640, 5, 3)
     # Three evolutions of 149 candidates each have nine generations of sixteen; then the four corners, then steps of four.
-    assert len(found.restarts) == 3 and sum(asked) == found.runs <= 640
-    assert asked[:27] == [16] * 27 and asked[27] == 4 and set(asked[28:]) == {4}
-    assert np.abs(found.at - (0.3, 0.8)).max() < 1e-4 and found.cost == np.abs(found.at - (0.3, 0.8)).sum()
+    assert len(found.restarts) == 3
+    assert sum(asked) == found.runs <= 640
+    assert asked[:27] == [16] * 27
+    assert asked[27] == 4
+    assert set(asked[28:]) == {4}
+    assert np.abs(found.at - (0.3, 0.8)).max() < 1e-4
+    assert found.cost == np.abs(found.at - (0.3, 0.8)).sum()
     assert found.cost <= found.restarts.min()
     one = box.search(lambda places: places[:, 0], 1, 100, 0, 3)
-    assert len(one.restarts) == 1 and one.runs <= 100
+    assert len(one.restarts) == 1
+    assert one.runs <= 100
     # Too few are left for the corners of ten dimensions.
     sizes = []
     box.search(lambda places: (sizes.append(len(places)), places.sum(axis=1))[1], 10, 400, 0, 1)
-    assert 1024 not in sizes and sizes[-1] == 20
+    assert 1024 not in sizes
+    assert sizes[-1] == 20
     with pytest.raises(ValueError, match="mine"):
         box.search(lambda places: (_ for _ in ()).throw(ValueError("mine")), 1, 100, 0, 1)
 
@@ -57,7 +64,8 @@ def test_a_search_differs_by_its_seed_alone():
         return np.concatenate(asked)
 
     one, same, other = places(1), places(1), places(2)
-    assert np.array_equal(one, same) and not np.array_equal(one[:16], other[:16])
+    assert np.array_equal(one, same)
+    assert not np.array_equal(one[:16], other[:16])
     assert not np.array_equal(one[:16], one[80:96])
 
 
@@ -82,19 +90,19 @@ def test_bounds_that_are_none(bounds, words):
 
 def test_risks_at_their_ends():
     costs = np.array([[4.0, 1.0, 3.0, 2.0]])
-    assert (
-        lw.CVaR(0.25)(costs).tolist() == [4.0]
-        and lw.CVaR(0.5)(costs).tolist() == [3.5]
-        and lw.CVaR()(costs).tolist() == [4.0]
-    )
-    assert lw.CVaR(0.375)(costs)[0] == pytest.approx((4.0 + 0.5 * 3.0) / 1.5) and lw.CVaR(1.0)(costs)[0] == 2.5
-    assert lw.CVaR().share == 0.05 and str(lw.CVaR(0.125)) == "mean of the worst 12.5 %"
-    assert risk.risk_of(Faults(), 0.25)(costs).tolist() == [1.0] and risk.risk_of(Faults(), 0.26)(costs).tolist() == [
-        2.0
-    ]
+    assert lw.CVaR(0.25)(costs).tolist() == [4.0]
+    assert lw.CVaR(0.5)(costs).tolist() == [3.5]
+    assert lw.CVaR()(costs).tolist() == [4.0]
+    assert lw.CVaR(0.375)(costs)[0] == pytest.approx((4.0 + 0.5 * 3.0) / 1.5)
+    assert lw.CVaR(1.0)(costs)[0] == 2.5
+    assert lw.CVaR().share == 0.05
+    assert str(lw.CVaR(0.125)) == "mean of the worst 12.5 %"
+    assert risk.risk_of(Faults(), 0.25)(costs).tolist() == [1.0]
+    assert risk.risk_of(Faults(), 0.26)(costs).tolist() == [2.0]
     for wrong in (0.0, 1.0, 1, "means"):
         faults = Faults()
-        assert str(risk.risk_of(faults, wrong)) == "mean" and faults
+        assert str(risk.risk_of(faults, wrong)) == "mean"
+        assert faults
     for wrong in (0.0, 1.1, -1.0):
         with pytest.raises(
             lw.SceneError, match=r"CVaR\.share = .*: is no part; give a number in \(0, 1\], such as 0\.05"
@@ -131,7 +139,8 @@ class Told:
 def test_numbers_of_quantities_and_of_metrics(monkeypatch):
     told = Told(monkeypatch, lambda X: np.array([1.0, np.inf]))
     plain = numbers.Numbers(SCENE, ["a"], "of", "max(depth)", {"h": 0.1})
-    assert (plain.label, plain.of_metric) == ("max(depth)", False) and plain(lambda run: run(None)).tolist() == [
+    assert (plain.label, plain.of_metric) == ("max(depth)", False)
+    assert plain(lambda run: run(None)).tolist() == [
         1.0,
         np.inf,
     ]
@@ -144,7 +153,9 @@ def test_numbers_of_quantities_and_of_metrics(monkeypatch):
         metric = numbers.Numbers(SCENE, None, "minimise", of, {"h": 0.1})
         assert (metric.label, metric.of_metric) == ("iae depth", True)
         ((arguments, settings),) = told.asked
-        assert arguments == (SCENE, None, None) and settings["h"] == 0.1 and settings["save"].fields == ("position",)
+        assert arguments == (SCENE, None, None)
+        assert settings["h"] == 0.1
+        assert settings["save"].fields == ("position",)
         assert [one.key for one in settings["statistics"]] == ["iae depth"]
         each = SimpleNamespace(value=np.array([[[1.0, 2.0, np.inf]]]))
         status = np.array([0, lw.Status.NON_FINITE, lw.Status.FLOOR], np.uint8)
@@ -156,30 +167,35 @@ def test_the_worst_case_of_a_sum(monkeypatch):
     told = Told(monkeypatch, lambda X: X[:, 0] - np.log10(X[:, 1]))
     shares = []
     found = worst_case.worst_case(SCENE, OVER, "depth", budget=400, seed=2, progress=shares.append, h=0.1)
-    assert found.parameters == {"vehicle.mass": 4.0, "drag.linear[0]": 1.0} and found.value == 4.0
-    assert found.at_bounds == {"vehicle.mass": "high", "drag.linear[0]": "low"} and (found.of, found.worst) == (
+    assert found.parameters == {"vehicle.mass": 4.0, "drag.linear[0]": 1.0}
+    assert found.value == 4.0
+    assert found.at_bounds == {"vehicle.mass": "high", "drag.linear[0]": "low"}
+    assert (found.of, found.worst) == (
         "depth",
         "largest",
     )
     ((scene, names, of), settings) = told.asked[0]
-    assert (scene, names, of) == (SCENE, list(OVER), "depth") and settings == {
+    assert (scene, names, of) == (SCENE, list(OVER), "depth")
+    assert settings == {
         "failed": "nan",
         "h": 0.1,
         "common_noise": True,
     }
-    assert (
-        shares == sorted(shares)
-        and shares[-1] == found.runs / 400
-        and len(found.restarts) == 3
-        and found.restarts.max() <= 4.0
-    )
-    assert found.fleet.members == 1 and found.fleet.select(0, 1).parameters["vehicle.mass"] == 4.0
+    assert shares == sorted(shares)
+    assert shares[-1] == found.runs / 400
+    assert len(found.restarts) == 3
+    assert found.restarts.max() <= 4.0
+    assert found.fleet.members == 1
+    assert found.fleet.select(0, 1).parameters["vehicle.mass"] == 4.0
     least = worst_case.worst_case(lw.Ensemble(SCENE, 3, 1), OVER, "depth", worst="smallest", budget=400)
-    assert least.value == 1.0 - 2.0 and least.parameters == {"vehicle.mass": 1.0, "drag.linear[0]": 100.0}
+    assert least.value == 1.0 - 2.0
+    assert least.parameters == {"vehicle.mass": 1.0, "drag.linear[0]": 100.0}
     lost = Told(monkeypatch, lambda X: np.where(X[:, 0] > 3.0, np.nan, X[:, 0]))
     for worst in ("largest", "smallest"):
         failed = worst_case.worst_case(SCENE, OVER, "depth", worst=worst, budget=400)
-        assert failed.value == math.inf and failed.parameters["vehicle.mass"] > 3.0 and failed.runs < 100
+        assert failed.value == math.inf
+        assert failed.parameters["vehicle.mass"] > 3.0
+        assert failed.runs < 100
     assert lost.asked
     for budget in (15, 16.0):
         with pytest.raises(lw.SceneError, match=r"budget = .*: is less than a generation; give 16 or more"):
@@ -211,33 +227,44 @@ def test_tuning_meets_the_same_members_and_then_fresh_ones(monkeypatch):
     found = tune.tune(fleet, OVER, "depth", budget=5 * 300, seed=3, progress=shares.append, h=0.1)
     depth = fleet.select(0, 5).position[:, 2]
     assert list(found.parameters.values()) == pytest.approx([2.5, 10.0], rel=1e-3)
-    assert found.cost == pytest.approx((depth**2).mean(), rel=1e-5) and found.before == {
+    assert found.cost == pytest.approx((depth**2).mean(), rel=1e-5)
+    assert found.before == {
         "vehicle.mass": 2.0,
         "drag.linear[0]": 1.0,
     }
     others = lw.Ensemble(SCENE, 20, 8, STARTS).select(0, 20).position[:, 2]
-    assert found.fresh_cost == pytest.approx((others**2).mean(), rel=1e-5) and (found.members, found.fresh) == (5, 20)
-    assert (
-        found.fresh_before == pytest.approx((others**2).mean() + 0.25 + 1.0)
-        and found.optimism == found.fresh_cost - found.cost
-    )
-    assert (found.of, found.risk, found.at_bounds) == ("depth", "mean", ()) and len(found.restarts) == 1
+    assert found.fresh_cost == pytest.approx((others**2).mean(), rel=1e-5)
+    assert (found.members, found.fresh) == (5, 20)
+    assert found.fresh_before == pytest.approx((others**2).mean() + 0.25 + 1.0)
+    assert found.optimism == found.fresh_cost - found.cost
+    assert (found.of, found.risk, found.at_bounds) == ("depth", "mean", ())
+    assert len(found.restarts) == 1
     searched = sum(len(position) for position, *_ in told.asked[1:]) - 2 * 20
-    assert found.runs == searched + 40 and shares[-1] == min(1.0, searched / 1500) and searched <= 1500
+    assert found.runs == searched + 40
+    assert shares[-1] == min(1.0, searched / 1500)
+    assert searched <= 1500
     position, parameters, indices, seed = told.asked[1]
-    assert seed == 7 and indices.tolist() == [0, 1, 2, 3, 4] * 16 and np.array_equal(position[:5, 2], depth)
+    assert seed == 7
+    assert indices.tolist() == [0, 1, 2, 3, 4] * 16
+    assert np.array_equal(position[:5, 2], depth)
     assert (np.ptp(parameters["vehicle.mass"].reshape(16, 5), axis=1) == 0.0).all()
-    assert told.asked[-1][3] == 8 and told.asked[-1][2].tolist() == list(range(20))
+    assert told.asked[-1][3] == 8
+    assert told.asked[-1][2].tolist() == list(range(20))
     worst = tune.tune(fleet, {"vehicle.mass": (3.0, 4.0)} | {"drag.linear[0]": (1.0, 100.0)}, "depth", budget=600, fresh=0,
                       risk=lw.CVaR(0.2))  # fmt: skip
-    assert worst.at_bounds == ("vehicle.mass",) and math.isnan(worst.fresh_cost) and worst.fresh == 0
-    assert worst.cost == pytest.approx((depth**2).max() + 0.25, rel=1e-4) and worst.runs <= 600
+    assert worst.at_bounds == ("vehicle.mass",)
+    assert math.isnan(worst.fresh_cost)
+    assert worst.fresh == 0
+    assert worst.cost == pytest.approx((depth**2).max() + 0.25, rel=1e-4)
+    assert worst.runs <= 600
     alone = tune.tune(lw.Ensemble(SCENE, 5, 7), OVER, "depth", budget=100)
-    assert alone.fresh == 0 and math.isnan(alone.fresh_before)
+    assert alone.fresh == 0
+    assert math.isnan(alone.fresh_before)
     lost = Told(
         monkeypatch, lambda depth, parameters, indices, seed: np.where(parameters["vehicle.mass"] > 2.0, np.nan, 1.0)
     )
-    assert tune.tune(fleet, OVER, "depth", budget=200).parameters["vehicle.mass"] <= 2.0 and lost.asked
+    assert tune.tune(fleet, OVER, "depth", budget=200).parameters["vehicle.mass"] <= 2.0
+    assert lost.asked
     for budget, words in (
         (79, "budget = 79: is less than a generation of all members; give 80 or more"),
         (1e3, "budget = 1000.0"),
@@ -275,7 +302,8 @@ def test_margins_in_words_and_by_member():
         "heading_pid: margins of 4 members",
         "1 of them have none (1: at its limit: fins[1]); the others:",
     ]
-    assert found.steady.tolist() == [True, True, False, True] and found.reasons == {"at its limit: fins[1]": 1}
+    assert found.steady.tolist() == [True, True, False, True]
+    assert found.reasons == {"at its limit: fins[1]": 1}
     plain = found.to_dict()
     assert plain["why"] == ["", "", "at its limit: fins[1]", ""]
     assert plain["eigenvalues"]["gain_upper"] == [
@@ -286,26 +314,31 @@ def test_margins_in_words_and_by_member():
     ]
     assert json.loads(json.dumps(plain, allow_nan=False))["runs"]["delay"] == [3.0, 1.0, None, 2.0]
     assert lines[2].split() == ["0", "%", "5", "%", "25", "%", "50", "%", "75", "%", "95", "%", "100", "%"]
-    assert lines[4].split() == ["gain_upper", "2", "2", "2", "4", "8", "8", "8"] and lines[5].split()[:3] == [
+    assert lines[4].split() == ["gain_upper", "2", "2", "2", "4", "8", "8", "8"]
+    assert lines[5].split()[:3] == [
         "delay",
         "s",
         "0.1",
     ]
-    assert found.percentiles([50.0])["delay"].tolist() == [0.2] and found.members == 4
+    assert found.percentiles([50.0])["delay"].tolist() == [0.2]
+    assert found.members == 4
     x, share = found.curve("gain_upper")
-    assert x.tolist() == [2.0, 4.0, 8.0] and share == pytest.approx([1 / 3, 2 / 3, 1.0])
-    assert (
-        found.curve("delay", "runs")[0].tolist() == [1.0, 2.0, 3.0] and found.curve("delay", "eigenvalues")[0][0] == 0.1
-    )
-    assert found.worst().tolist() == [2, 0, 3, 1] and found.worst(2, "delay").tolist() == [2, 1]
+    assert x.tolist() == [2.0, 4.0, 8.0]
+    assert share == pytest.approx([1 / 3, 2 / 3, 1.0])
+    assert found.curve("delay", "runs")[0].tolist() == [1.0, 2.0, 3.0]
+    assert found.curve("delay", "eigenvalues")[0][0] == 0.1
+    assert found.worst().tolist() == [2, 0, 3, 1]
+    assert found.worst(2, "delay").tolist() == [2, 1]
     assert found.worst(name="gain_lower").tolist() == [2, 0, 1, 3]
     runs = Margins("all laws", {}, {"delay": np.array([0.2, np.inf])}, np.array(["", ""], dtype=object), 0.01)
-    assert (
-        runs.worst(1).tolist() == [0] and "none" not in str(runs) and runs.curve("delay")[0].tolist() == [0.2, np.inf]
-    )
-    assert runs.to_dict()["runs"] == {"delay": [0.2, "inf"]} and "eigenvalues" not in runs.to_dict()
+    assert runs.worst(1).tolist() == [0]
+    assert "none" not in str(runs)
+    assert runs.curve("delay")[0].tolist() == [0.2, np.inf]
+    assert runs.to_dict()["runs"] == {"delay": [0.2, "inf"]}
+    assert "eigenvalues" not in runs.to_dict()
     none = Margins("all laws", {"delay": np.full(2, np.nan)}, {}, np.array(["failed", "failed"], dtype=object), 0.01)
-    assert np.isnan(none.percentiles()["delay"]).all() and len(none.percentiles()["delay"]) == 7
+    assert np.isnan(none.percentiles()["delay"]).all()
+    assert len(none.percentiles()["delay"]) == 7
     assert [len(column) for column in none.curve("delay")] == [0, 0]
 
 
@@ -321,10 +354,11 @@ def test_edges_are_found_from_any_guess(guess):
 
     found = edges(holds, np.ones(4), last, np.full(4, guess), 1e-3)
     inner, outer = found.T
-    assert inner[0] < 3.3 <= outer[0] < inner[0] * np.exp(1.0011e-3) and outer[3] <= 0.2 < inner[3]
-    assert (
-        inner[1] <= 1.0000001 <= outer[1] < np.exp(1.0011e-3) and outer[2] == np.inf and inner[2] == pytest.approx(40.0)
-    )
+    assert inner[0] < 3.3 <= outer[0] < inner[0] * np.exp(1.0011e-3)
+    assert outer[3] <= 0.2 < inner[3]
+    assert inner[1] <= 1.0000001 <= outer[1] < np.exp(1.0011e-3)
+    assert outer[2] == np.inf
+    assert inner[2] == pytest.approx(40.0)
     assert inner[3] / outer[3] < np.exp(1.0011e-3)
     whole = edges(
         lambda values, members: values <= 7.0, np.zeros(2), np.array([100.0, 5.0]), np.full(2, guess), 1.0, whole=True

@@ -60,7 +60,8 @@ def test_a_table_in_words():
     ]
     lines = str(effects()).splitlines()
     assert lines[0] == "Morris screening: 8 samples, 48 members, 1 failed"
-    assert lines[4].split() == ["factor", "mu_star", "mu", "sigma"] and lines[5].split() == [
+    assert lines[4].split() == ["factor", "mu_star", "mu", "sigma"]
+    assert lines[5].split() == [
         "a",
         "0.5",
         "+-",
@@ -100,8 +101,11 @@ def test_records_of_every_index():
     }
     assert [row["quantity"] for row in rows[8:]] == ["depth", "energy"]
     rows = list(effects().rows())
-    assert [row["index"] for row in rows[:3]] == ["mu_star", "mu", "sigma"] and rows[1]["value"] == -0.5
-    assert rows[0]["confidence"] == 0.05 and np.isnan(rows[1]["confidence"]) and len(rows) == 12
+    assert [row["index"] for row in rows[:3]] == ["mu_star", "mu", "sigma"]
+    assert rows[1]["value"] == -0.5
+    assert rows[0]["confidence"] == 0.05
+    assert np.isnan(rows[1]["confidence"])
+    assert len(rows) == 12
 
 
 @pytest.mark.parametrize("made", [sobol_indices, lambda: sobol_indices(second=False), effects])
@@ -113,14 +117,15 @@ def test_an_analysis_comes_back_from_its_files(made, tmp_path):
     with paths[1].open() as file:
         assert [row["index"] for row in csv.DictReader(file)] == [row["index"] for row in found.rows()]
     again = Indices.load(paths[2])
-    assert type(again) is type(found) and json.loads(paths[2].read_text()) == found.to_dict()
+    assert type(again) is type(found)
+    assert json.loads(paths[2].read_text()) == found.to_dict()
     for field in dataclasses.fields(found):
         one, other = getattr(found, field.name), getattr(again, field.name)
         assert np.array_equal(one, other, equal_nan=True) if isinstance(one, np.ndarray) else one == other, field.name
     content = json.loads(paths[2].read_text())
-    assert (
-        content["mean"] == [1.23456789, None] and content["provenance"] == {"seed": 3} and content["name"] == found.name
-    )
+    assert content["mean"] == [1.23456789, None]
+    assert content["provenance"] == {"seed": 3}
+    assert content["name"] == found.name
     (tmp_path / "x.json").write_text(json.dumps(content | {"name": "heat"}))
     with pytest.raises(ValueError, match=r"x\.json: .*'heat' is no analysis"):
         Indices.load(tmp_path / "x.json")
@@ -135,7 +140,9 @@ def test_ten_pairs_are_named_those_above_their_interval():
     many = dataclasses.replace(many, second=second, second_confidence=np.full((1, d, d), 0.02), **{
         name: np.zeros((1, d)) for name in ("first", "total", "first_confidence", "total_confidence")})  # fmt: skip
     pairs = [line.split(":")[0].strip() for line in str(many).splitlines() if " with " in line]
-    assert len(pairs) == 10 and pairs[0] == "e with f" and pairs[-1] == "b with c"
+    assert len(pairs) == 10
+    assert pairs[0] == "e with f"
+    assert pairs[-1] == "b with c"
     few = dataclasses.replace(many, second_confidence=np.full((1, d, d), 0.13))
     assert [line.split(":")[0].strip() for line in str(few).splitlines() if " with " in line] == ["e with f"]
 
@@ -157,33 +164,32 @@ def test_indices_are_saltellis_of_a_sum_and_a_product():
     """q = x + y, of variances 1/12 and 4/12; r = (x - 1/2) (m - 2), which is all of the pair."""
     fleet, made = of_design(Saltelli(True, 8), 1024, lambda x, y, m: (x + y, (x - 0.5) * (m - 2.0)))
     found = analyses.sobol_of(fleet, made, confidence=0.9)
-    assert found.factors == ("start.position[0]", "start.position[1]", "vehicle.mass") and found.quantities == (
+    assert found.factors == ("start.position[0]", "start.position[1]", "vehicle.mass")
+    assert found.quantities == (
         "q",
         "r",
     )
-    assert found.first[0] == pytest.approx([0.2, 0.8, 0.0], abs=0.03) and found.total[0] == pytest.approx(
-        [0.2, 0.8, 0.0], abs=0.03
-    )
-    assert found.first[1] == pytest.approx([0.0, 0.0, 0.0], abs=0.1) and found.total[1] == pytest.approx(
-        [1.0, 0.0, 1.0], abs=0.1
-    )
-    assert found.second[1, 0, 2] == found.second[1, 2, 0] == pytest.approx(1.0, abs=0.1) and np.isnan(
-        found.second[0, 1, 1]
-    )
+    assert found.first[0] == pytest.approx([0.2, 0.8, 0.0], abs=0.03)
+    assert found.total[0] == pytest.approx([0.2, 0.8, 0.0], abs=0.03)
+    assert found.first[1] == pytest.approx([0.0, 0.0, 0.0], abs=0.1)
+    assert found.total[1] == pytest.approx([1.0, 0.0, 1.0], abs=0.1)
+    assert found.second[1, 0, 2] == found.second[1, 2, 0] == pytest.approx(1.0, abs=0.1)
+    assert np.isnan(found.second[0, 1, 1])
     assert found.second_confidence[1, 2, 0] == found.second_confidence[1, 0, 2] > 0.0
     assert (found.samples, found.members, found.failed, found.confidence) == (1024, 1024 * 8, 0, 0.9)
-    assert found.mean == pytest.approx([1.5, 0.0], abs=0.01) and found.std == pytest.approx(
-        made.values.std(axis=0, ddof=1)
-    )
+    assert found.mean == pytest.approx([1.5, 0.0], abs=0.01)
+    assert found.std == pytest.approx(made.values.std(axis=0, ddof=1))
     wide = analyses.sobol_of(fleet, made, confidence=0.99)
     # Student's t of 7 degrees of freedom: 3.50 for 99 %, 1.89 for 90 %.
-    assert (wide.first_confidence[0, :2] > 1.8 * found.first_confidence[0, :2]).all() and np.array_equal(
-        wide.first, found.first
-    )
+    assert (wide.first_confidence[0, :2] > 1.8 * found.first_confidence[0, :2]).all()
+    assert np.array_equal(wide.first, found.first)
     alone, few = of_design(Saltelli(False), 64, lambda x, y, m: (x + y,))
     without = analyses.sobol_of(alone, few)
-    assert np.isnan(without.first_confidence).all() and "there are no intervals" in without.messages[0]
-    assert without.second is None and without.second_confidence is None and without.members == 64 * 5
+    assert np.isnan(without.first_confidence).all()
+    assert "there are no intervals" in without.messages[0]
+    assert without.second is None
+    assert without.second_confidence is None
+    assert without.members == 64 * 5
 
 
 def test_estimates_are_those_of_salib():
@@ -235,7 +241,8 @@ def test_intervals_of_indices_hold_and_are_no_wider_than_they_need(function, sam
     # Of 1,800 intervals, those of one seed depending on each other: 0.5 % to 1.3 % is one standard deviation.
     assert 0.91 <= np.mean(held) <= 0.975
     # Student's t of 7 degrees of freedom is 1.2 times the normal's; its median spread is 0.95 of the true one.
-    assert 0.8 <= np.median(ratios) <= 1.2 and np.max(ratios) < 1.4
+    assert 0.8 <= np.median(ratios) <= 1.2
+    assert np.max(ratios) < 1.4
 
 
 def test_factors_are_in_the_users_order_and_in_groups():
@@ -253,16 +260,19 @@ def test_factors_are_in_the_users_order_and_in_groups():
     assert alone.factors == labels
     assert alone.total[0] == pytest.approx(np.array([16.0, 0.0, 9.0, 0.0, 0.0]) / 25.0, abs=0.05)
     screened = analyses.morris_of(*of(Morris(4), lambda x, m: 4.0 * m + 3.0 * x[1]), resamples=5)
-    assert screened.factors == labels and screened.mu_star[0] == pytest.approx([8.0, 0.0, 6.0, 0.0, 0.0])
+    assert screened.factors == labels
+    assert screened.mu_star[0] == pytest.approx([8.0, 0.0, 6.0, 0.0, 0.0])
     # The interaction of two entries of a group is the group's own.
     design = Saltelli(True, 8, {"start": ["start.position"], "rest": ["environment.gravity"]})
     grouped = analyses.sobol_of(*of(design, lambda x, m: 10.0 * (x[0] - 0.5) * (x[1] - 1.0) + m))
-    assert grouped.factors == ("vehicle.mass", "start", "rest") and grouped.members == 64 * 8
+    assert grouped.factors == ("vehicle.mass", "start", "rest")
+    assert grouped.members == 64 * 8
     # Variances: 100 / 12 / 3 and 1 / 3.
     assert grouped.first[0] == pytest.approx([3.0 / 28.0, 25.0 / 28.0, 0.0], abs=0.1)
     assert grouped.total[0] == pytest.approx(grouped.first[0], abs=0.1)
     again = lw.Ensemble(BARE, 64 * 8, 3, vary, sampling_of(design.to_dict()))
-    assert again.sampling == design and again.to_dict()["sampling"] == {
+    assert again.sampling == design
+    assert again.to_dict()["sampling"] == {
         "saltelli": {"replicates": 8, "groups": {"start": ["start.position"], "rest": ["environment.gravity"]}}
     }
 
@@ -308,14 +318,17 @@ def test_effects_of_a_linear_quantity_are_its_slopes():
     for levels in (4, 6):
         fleet, made = of_design(Morris(levels), 16, lambda x, y, m: (x + y - 3.0 * m,))
         found = analyses.morris_of(fleet, made, resamples=10)
-        assert found.mu[0] == pytest.approx([1.0, 2.0, -6.0]) and found.mu_star[0] == pytest.approx([1.0, 2.0, 6.0])
-        assert found.sigma[0] == pytest.approx([0.0] * 3, abs=1e-9) and (found.samples, found.members) == (16, 64)
+        assert found.mu[0] == pytest.approx([1.0, 2.0, -6.0])
+        assert found.mu_star[0] == pytest.approx([1.0, 2.0, 6.0])
+        assert found.sigma[0] == pytest.approx([0.0] * 3, abs=1e-9)
+        assert (found.samples, found.members) == (16, 64)
 
 
 def test_a_quantity_that_does_not_vary_has_no_indices():
     fleet, made = of_design(Saltelli(False, 8), 16, lambda x, y, m: (x, 1e6 + 1e-9 * y))
     found = analyses.sobol_of(fleet, made)
-    assert np.isnan(found.first[1]).all() and np.isfinite(found.first[0]).all()
+    assert np.isnan(found.first[1]).all()
+    assert np.isfinite(found.first[0]).all()
     assert found.messages == ("r does not vary: it has no indices",)
     messages = []
     assert analyses.varying(np.array([[0.0, 1.0, 1.0], [0.0, 1.0 + 2e-14, 1.0 + 5e-15]]), "abc", messages) == [1]
@@ -335,10 +348,8 @@ def test_groups_with_failures_are_refused_or_left_out():
     Y, messages = analyses.whole_groups(made, 4, "drop")
     assert Y[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 8.0, 9.0, 10.0, 11.0]
     assert "the 1 of 3 groups that they are in were left out, and what remains may not be typical" in messages[0]
-    assert (
-        messages[1] == "2 of 12 members were stopped by events: their numbers are those at the stop"
-        and len(messages) == 2
-    )
+    assert messages[1] == "2 of 12 members were stopped by events: their numbers are those at the stop"
+    assert len(messages) == 2
     with pytest.raises(outputs.FailedMembers, match="1 groups of the design are whole, too few for an estimate"):
         analyses.whole_groups(outputs.Outputs(values, ("q",), lost, {}, {}), 6, "drop")
     whole = outputs.Outputs(values, ("q",), np.zeros(12, bool), {"OK": 12}, {})
@@ -362,11 +373,13 @@ def test_settings_of_an_analysis_that_are_none(arguments, words):
 def test_a_design_takes_what_varies_and_the_seed_unless_given(scene):
     fleet = lw.Ensemble(BARE, 5, 7, VARY)
     own = analyses.designed(fleet, None, None, Saltelli(True), 4)
-    assert (own.seed, own.members, set(own.vary)) == (7, 4 * 8, set(VARY)) and own.scene is fleet.scene
+    assert (own.seed, own.members, set(own.vary)) == (7, 4 * 8, set(VARY))
+    assert own.scene is fleet.scene
     other = analyses.designed(fleet, {"vehicle.mass": VARY["vehicle.mass"]}, 9, Saltelli(False), 4)
     assert (other.seed, other.members, list(other.vary)) == (9, 4 * 3, ["vehicle.mass"])
     paper = analyses.designed(scene, None, None, Morris(4), 3)
-    assert paper.seed == scene.ensemble_settings.seed and set(paper.vary) == set(scene.ensemble_settings.vary)
+    assert paper.seed == scene.ensemble_settings.seed
+    assert set(paper.vary) == set(scene.ensemble_settings.vary)
     with pytest.raises(lw.SceneError, match=r"scene = 3: is neither a Scene nor an Ensemble; give lw\.Scene"):
         analyses.designed(3, None, None, Saltelli(True), 4)
 
@@ -389,8 +402,11 @@ def test_what_an_analysis_asks_for_reaches_its_runs():
         pairs = analyses.sobol(BARE, "depth", samples=8, vary=VARY)
         screened = analyses.morris(BARE, "depth", vary=VARY)
     (first, of, settings), (second, *_, more), (third, *_), (fourth, *_) = asked
-    assert (of, settings, more) == ("depth", {"h": 0.1}, {"t1": 2.0}) and (first.seed, second.seed) == (5, 5)
-    assert not first.sampling.second_order and third.sampling.second_order and second.sampling.levels == 6
+    assert (of, settings, more) == ("depth", {"h": 0.1}, {"t1": 2.0})
+    assert (first.seed, second.seed) == (5, 5)
+    assert not first.sampling.second_order
+    assert third.sampling.second_order
+    assert second.sampling.levels == 6
     assert (first.sampling.replicates, third.sampling.replicates) == (4, 8)
     assert (sobol.confidence, morris.confidence, pairs.confidence, screened.confidence) == (0.8, 0.8, 0.95, 0.95)
     assert (sobol.members, morris.members, fourth.members, fourth.sampling.levels) == (4 * 5, 6 * 4, 64 * 4, 4)
@@ -419,19 +435,23 @@ def test_outputs_are_of_all_groups_of_members(monkeypatch):
     monkeypatch.setattr(outputs, "PATHS_AT_ONCE", 4)
     fleet = lw.Ensemble(BARE, 10, 3, VARY)
     found = outputs.evaluate(fleet, quantity, progress=shares.append, threads=2, h=0.1, executor="processes")
-    assert (
-        runs[0][0] is fleet.scene and runs[0][2] == {"threads": 2, "executor": "processes"} and runs[0][1]["h"] == 0.1
-    )
+    assert runs[0][0] is fleet.scene
+    assert runs[0][2] == {"threads": 2, "executor": "processes"}
+    assert runs[0][1]["h"] == 0.1
     assert [list(group.indices) for group in runs[1:]] == [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9]]
-    assert found.values[:, 0].tolist() == list(range(10)) and found.labels == ("quantity[0]", "quantity[1]")
-    assert np.flatnonzero(found.failed).tolist() == [5, 9] and found.provenance["run"] == 4
-    assert found.provenance["ensemble"] == fleet.to_dict() and shares == pytest.approx([0.2, 0.6, 0.9])
+    assert found.values[:, 0].tolist() == list(range(10))
+    assert found.labels == ("quantity[0]", "quantity[1]")
+    assert np.flatnonzero(found.failed).tolist() == [5, 9]
+    assert found.provenance["run"] == 4
+    assert found.provenance["ensemble"] == fleet.to_dict()
+    assert shares == pytest.approx([0.2, 0.6, 0.9])
     assert "again" in found.text("again")
     runs.clear()
     outputs.evaluate(
         fleet, lambda result: np.zeros((result.group.members, 1)), common_noise=True, progress=lambda part: None
     )
-    assert all((group.indices == 0).all() for group in runs[1:]) and [group.members for group in runs[1:]] == [4, 4, 2]
+    assert all((group.indices == 0).all() for group in runs[1:])
+    assert [group.members for group in runs[1:]] == [4, 4, 2]
 
 
 # Adaptors
@@ -442,9 +462,8 @@ def test_distributions_in_salibs_words():
         one = SimpleNamespace(bases=(np.array(base),), distribution=distribution)
         return [adaptor.salib_distribution(*each) for each in adaptor.entries_of(one)]
 
-    assert told(lw.Normal(std=0.5)) == [("norm", [2.0, 0.5])] and told(lw.Normal(mean=1.0, std=0.5)) == [
-        ("norm", [1.0, 0.5])
-    ]
+    assert told(lw.Normal(std=0.5)) == [("norm", [2.0, 0.5])]
+    assert told(lw.Normal(mean=1.0, std=0.5)) == [("norm", [1.0, 0.5])]
     assert told(lw.Normal(relative=0.1), -2.0) == [("norm", [-2.0, 0.2])]
     assert told(lw.Uniform(low=1.0, high=3.0)) == [("unif", [1.0, 3.0])]
     assert told(lw.Uniform(half_width=0.5)) == [("unif", [1.5, 2.5])]
@@ -452,9 +471,11 @@ def test_distributions_in_salibs_words():
     assert told(lw.Uniform(relative=[0.5, 0.25]), [-2.0, 4.0]) == [("unif", [-3.0, -1.0]), ("unif", [3.0, 5.0])]
     assert told(lw.Uniform(low=[1.0, 2.0], high=[3.0, 5.0]), [0.0, 0.0]) == [("unif", [1.0, 3.0]), ("unif", [2.0, 5.0])]
     ((name, (log, sigma)),) = told(lw.LogNormal(median=3.0, sigma=0.2))
-    assert (name, sigma) == ("lognorm", 0.2) and log == pytest.approx(np.log(3.0))
+    assert (name, sigma) == ("lognorm", 0.2)
+    assert log == pytest.approx(np.log(3.0))
     assert told(lw.LogNormal(sigma=0.2))[0][1][0] == pytest.approx(np.log(2.0))
-    assert told(lw.LogNormal(sigma=0.2), -2.0) == [None] and told(lw.Choice([1.0, 2.0])) == [None]
+    assert told(lw.LogNormal(sigma=0.2), -2.0) == [None]
+    assert told(lw.Choice([1.0, 2.0])) == [None]
 
 
 def test_a_model_describes_its_columns(monkeypatch):
@@ -463,17 +484,26 @@ def test_a_model_describes_its_columns(monkeypatch):
     vary = {"vehicle.mass": lw.Normal(std=0.1), "start.position": lw.Uniform(half_width=[1.0, 2.0, 3.0])}
     model = adaptor.model(BARE, vary, "depth", **settings)
     names = ["vehicle.mass", "start.position[0]", "start.position[1]", "start.position[2]"]
-    assert list(model.names) == names and model.problem == {"num_vars": 4, "names": names, "bounds": [
-        [1.0, 0.1], [-1.0, 1.0], [-2.0, 2.0], [-3.0, 3.0]], "dists": ["norm", "unif", "unif", "unif"]}  # fmt: skip
+    assert list(model.names) == names
+    assert model.problem == {
+        "num_vars": 4,
+        "names": names,
+        "bounds": [[1.0, 0.1], [-1.0, 1.0], [-2.0, 2.0], [-3.0, 3.0]],
+        "dists": ["norm", "unif", "unif", "unif"],
+    }
     u = np.array([[0.25, 0.5], [0.75, 1.0]])
     ends = [distribution.ppf(u) for distribution in model.distributions]
-    assert ends[0].shape == (2, 2) and ends[0][0, 1] == 1.0 and np.isfinite(ends[0]).all()
+    assert ends[0].shape == (2, 2)
+    assert ends[0][0, 1] == 1.0
+    assert np.isfinite(ends[0]).all()
     for i, width in enumerate((1.0, 2.0, 3.0)):
         np.testing.assert_allclose(ends[i + 1], width * (2.0 * u - 1.0), atol=1e-12)
     levels = adaptor.model(BARE, vary, "depth", levels=True, **settings)
     np.testing.assert_array_equal(levels.distributions[0].ppf([0.1, 0.2]), [0.1, 0.2])
     problem = levels.problem
-    assert problem["num_vars"] == 4 and problem["bounds"] == [[0.0, 1.0]] * 4 and problem["names"] == names
+    assert problem["num_vars"] == 4
+    assert problem["bounds"] == [[0.0, 1.0]] * 4
+    assert problem["names"] == names
     bare = adaptor.model(BARE, ["vehicle.mass"], "depth", **settings)
     with pytest.raises(lw.SceneError, match=r"vary\.names = .*: have no distributions; map names to distributions"):
         _ = bare.problem
@@ -497,8 +527,10 @@ def test_a_model_is_called_in_two_shapes(monkeypatch):
 
     model._prepared = prepared
     X = np.ones((3, 1))
-    assert model(X).shape == (3, 2) and asked[-1] == (X, "p")
+    assert model(X).shape == (3, 2)
+    assert asked[-1] == (X, "p")
     np.testing.assert_array_equal(model.scipy(X.T), np.arange(6).reshape(3, 2).T)
     np.testing.assert_array_equal(asked[-1][0], X)
     table = {"vehicle.mass": np.ones(3)}
-    assert model.scipy(table).shape == (2, 3) and asked[-1][0] is table
+    assert model.scipy(table).shape == (2, 3)
+    assert asked[-1][0] is table

@@ -62,7 +62,8 @@ def test_values_rise_by_equal_factors_or_equal_steps():
 def test_axes_without_a_range_fit_the_scenes_own_rate(scene):
     grid = grid_of(scene)
     w = grid.rate
-    assert w > 0.0 and abs(w - 1.0) > 0.1  # at 1 rad/s a product is a quotient
+    assert w > 0.0
+    assert abs(w - 1.0) > 0.1
     assert (grid.x.low, grid.x.high) == pytest.approx((0.01 / w, 4.0 / w))
     assert (grid.y.low, grid.y.high) == pytest.approx((0.1 * w, 10.0 * w))
     damped = grid_of(drag_scene(scene), "drag_number", "speed", h=0.01)
@@ -86,7 +87,8 @@ def test_other_starts_keep_their_size(scene):
     grid = grid_of(scene, ("h", 0.1, 0.4), ("vehicle.mass", 100.0, 200.0), directions=5)
     for name in ("velocity", "angular_velocity"):
         sizes = np.linalg.norm(by_cell(grid, grid.state[name])[0, 0], axis=-1)
-        assert np.allclose(sizes, sizes[0]) and sizes[0] > 0.0
+        assert np.allclose(sizes, sizes[0])
+        assert sizes[0] > 0.0
 
 
 def test_a_start_at_rest_is_given_a_direction():
@@ -96,7 +98,8 @@ def test_a_start_at_rest_is_given_a_direction():
         np.linalg.norm(by_cell(grid, grid.state["velocity"]), axis=-1), np.array([1, 2, 4])[None, :, None]
     )
     still = grid_of(scene, ("h", 1.0, 4.0), ("environment.gravity", 1.0, 2.0))
-    assert not np.any(still.state["velocity"]) and not np.any(still.state["angular_velocity"])
+    assert not np.any(still.state["velocity"])
+    assert not np.any(still.state["angular_velocity"])
 
 
 def test_added_mass_by_its_ratio(scene):
@@ -123,7 +126,8 @@ def test_numbers_are_set_and_matrices_multiplied(scene):
     assert np.allclose(by_cell(grid, p["vehicle.mass"])[0, :, 0], [100.0, 200.0, 400.0])
     assert np.allclose(by_cell(grid, p["vehicle.inertia"])[:, 0, 0, 0, 0], 5.46 * np.array([0.5, 1.0, 2.0, 4.0]))
     x, y = grid.lines
-    assert (x.unit, y.unit) == ("kg", "1") and "/ the scene's" in y.label
+    assert (x.unit, y.unit) == ("kg", "1")
+    assert "/ the scene's" in y.label
     scaled = grid_of(scene, Axis("vehicle.mass", 1.0, 4.0, scaled=True), "h")
     assert np.allclose(by_cell(scaled, scaled.varied["vehicle.mass"])[0, :, 0], 123.8 * np.array([1.0, 2.0, 4.0]))
 
@@ -138,7 +142,8 @@ def test_every_name_makes_a_fleet(scene, name):
 def test_columns_hold_every_member_once(scene):
     grid = grid_of(scene)
     columns = grid.columns()
-    assert len(columns) == 3 and sorted(np.concatenate([members for _, members in columns])) == list(range(24))
+    assert len(columns) == 3
+    assert sorted(np.concatenate([members for _, members in columns])) == list(range(24))
     assert all(np.all(grid.h[members] == h) for h, members in columns)
 
 
@@ -194,7 +199,9 @@ def test_linear_theory():
 def test_composed_limits_are_of_their_longest_stage():
     g = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))
     assert math.isclose(rotation_limit("tj4(psi_s)"), 2.0 / abs(1.0 - 2.0 * g))
-    assert rotation_limit("psi_s") == 2.0 and rotation_limit("psi_1") == 1.0 and rotation_limit("rkmk4") == math.inf
+    assert rotation_limit("psi_s") == 2.0
+    assert rotation_limit("psi_1") == 1.0
+    assert rotation_limit("rkmk4") == math.inf
     assert rotation_limit("psi_x") == rotation_limit("psi_x8") == 4.0
     assert math.isclose(rotation_limit("tj4(psi_x)"), 4.0 / abs(1.0 - 2.0 * g))
     # One step of the triple jump as the product of three leapfrogs, at the limit: a trace of 2.
@@ -208,7 +215,8 @@ def test_composed_limits_are_of_their_longest_stage():
 
 def test_drag_limits_of_the_rest():
     assert drag_limit("psi_s") == drag_limit("psi_x") == math.inf
-    assert drag_limit("phi") == 2.0 and math.isclose(drag_limit("tj4(psi_s)"), 0.5 / 1.7024, rel_tol=1e-4)
+    assert drag_limit("phi") == 2.0
+    assert math.isclose(drag_limit("tj4(psi_s)"), 0.5 / 1.7024, rel_tol=1e-4)
 
 
 def test_rates_of_the_example(scene):
@@ -216,8 +224,10 @@ def test_rates_of_the_example(scene):
     found = rates(m.parameters, m.velocity, m.angular_velocity)
     p = (123.8 + np.array([65.0, 70.0, 75.0])) * m.velocity[0]
     w = np.linalg.norm(p) * math.sqrt((1 / 188.8 - 1 / 198.8) / 5.29)
-    assert math.isclose(found["munk"][0], w) and math.isclose(found["rotation"][0], math.sqrt(0.14))
-    assert math.isclose(found["restoring"][0], math.sqrt(1215.8 * 0.007 / 5.29)) and found["drag"][0] == 0.0
+    assert math.isclose(found["munk"][0], w)
+    assert math.isclose(found["rotation"][0], math.sqrt(0.14))
+    assert math.isclose(found["restoring"][0], math.sqrt(1215.8 * 0.007 / 5.29))
+    assert found["drag"][0] == 0.0
 
 
 # Classes and files
@@ -253,7 +263,8 @@ def made_map(classes):
 
 def test_limits_are_the_last_good_step_of_a_row():
     found = made_map([[0, 1, 2], [2, 0, 0]])
-    assert found.limit("psi_s")[0] == 2.0 and np.isnan(found.limit("psi_s")[1])
+    assert found.limit("psi_s")[0] == 2.0
+    assert np.isnan(found.limit("psi_s")[1])
     assert found.limit("psi_s", Cell.ACCURATE)[0] == 1.0
     assert list(found.limit("psi_s", Cell.FLAGGED)) == [4.0, 4.0]
     assert found.counts("psi_s") == {"accurate": 3, "bounded": 1, "flagged": 2, "failed": 0, "silent": 0}
@@ -270,9 +281,11 @@ def test_json_round_trip(tmp_path):
     files = found.save(tmp_path)
     again = StabilityMap.load(files[0])
     assert again.to_dict() == found.to_dict() == json.loads(files[0].read_text())
-    assert np.array_equal(again.errors["psi_s"], found.errors["psi_s"]) and again.classes["psi_s"].dtype == np.int64
+    assert np.array_equal(again.errors["psi_s"], found.errors["psi_s"])
+    assert again.classes["psi_s"].dtype == np.int64
     rows = files[1].read_text().splitlines()
-    assert len(rows) == 7 and rows[0].startswith("method,h,angular_velocity,class,error_attitude")
+    assert len(rows) == 7
+    assert rows[0].startswith("method,h,angular_velocity,class,error_attitude")
     assert rows[3].startswith("psi_s,4.0,1.0,flagged,0.2,0.5,refused")
 
 
@@ -290,7 +303,8 @@ def test_attitudes_of_a_map_are_the_first_and_any():
 def test_classes_are_counted_by_name():
     found = made_map([[0, 1, 4], [0, 4, 0]])
     counts = found.counts("psi_s")
-    assert set(counts) == {cell.name.lower() for cell in Cell} and sum(counts.values()) == 6
+    assert set(counts) == {cell.name.lower() for cell in Cell}
+    assert sum(counts.values()) == 6
     assert [counts[Cell(code).name.lower()] for code in (0, 1, 4)] == [3, 1, 2]
 
 
@@ -319,7 +333,9 @@ def test_the_report_of_a_map_in_words():
         "psi_s                      2         1         2         0         1   2 to 2 s",
     ]
     plain = report_text(dataclasses.replace(made_map([[2, 0, 0], [2, 0, 0]]), messages=()))
-    assert "note" not in plain and "refused" not in plain and "reference   two runs\n" in plain
+    assert "note" not in plain
+    assert "refused" not in plain
+    assert "reference   two runs\n" in plain
     assert plain.endswith("   none s")
     assert report_text(made_map([[0, 1, 2], [0, 0, 0]])).endswith("   2 to 4 s")
 
@@ -327,20 +343,22 @@ def test_the_report_of_a_map_in_words():
 def test_a_map_as_content_and_records():
     found = dataclasses.replace(made_map([[0, 1, 2], [2, 0, 4]]), unit="deg", refused={"rk4": "why"})
     content = found.to_dict()
-    assert (
-        content["limits"] == {"psi_s": [2.0, None]} and content["legend"]["4"] == "silent: unbounded without any flag"
-    )
-    assert content["legend"]["0"] == "accurate: error below the bound" and len(content["legend"]) == 5
-    assert content["errors"]["psi_s"] == [[0.1, None, 0.2], [0.3] * 3] and content["x"]["values"] == [1.0, 2.0, 4.0]
+    assert content["limits"] == {"psi_s": [2.0, None]}
+    assert content["legend"]["4"] == "silent: unbounded without any flag"
+    assert content["legend"]["0"] == "accurate: error below the bound"
+    assert len(content["legend"]) == 5
+    assert content["errors"]["psi_s"] == [[0.1, None, 0.2], [0.3] * 3]
+    assert content["x"]["values"] == [1.0, 2.0, 4.0]
     again = StabilityMap.from_dict(content)
-    assert (
-        again.refused == {"rk4": "why"}
-        and again.messages == ("a",)
-        and again.unit == "deg"
-        and again.methods == ("psi_s",)
-    )
-    assert again.ratios["psi_s"]["rotation"].dtype == np.float64 and again.errors["psi_s"][0, 1] == np.inf
-    assert again.x.values.dtype == np.float64 and again.x.log and again.y.unit == "rad/s"
+    assert again.refused == {"rk4": "why"}
+    assert again.messages == ("a",)
+    assert again.unit == "deg"
+    assert again.methods == ("psi_s",)
+    assert again.ratios["psi_s"]["rotation"].dtype == np.float64
+    assert again.errors["psi_s"][0, 1] == np.inf
+    assert again.x.values.dtype == np.float64
+    assert again.x.log
+    assert again.y.unit == "rad/s"
     assert made_map([[0, 1, 2], [2, 0, 4]]).unit == "rad"
     unknown = dataclasses.replace(made_map([[0, 1, 2], [2, 0, 4]]), of="heat", unit="")
     assert unknown.unit == "1"
@@ -355,8 +373,10 @@ def test_a_map_as_content_and_records():
 
 def test_axes_are_read_in_every_form():
     axis = Axis("h", 0.1, 1.0)
-    assert axis_of(axis) is axis and axis_of(("h", 0.1, 1.0)) == axis == axis_of(["h", 0.1, 1.0])
-    assert axis_of(" h = 0.1:1") == axis and {axis_of(f"{name}=1:2").key for name in ALIASES} == {
+    assert axis_of(axis) is axis
+    assert axis_of(("h", 0.1, 1.0)) == axis == axis_of(["h", 0.1, 1.0])
+    assert axis_of(" h = 0.1:1") == axis
+    assert {axis_of(f"{name}=1:2").key for name in ALIASES} == {
         "angular_velocity",
         "speed",
     }
@@ -401,7 +421,8 @@ def test_members_are_numbered_by_y_x_and_direction(scene):
     assert np.array_equal(grid.h, np.tile(np.repeat([0.1, 0.2], 3), 2))
     assert np.array_equal(grid.varied["vehicle.mass"], np.repeat([100.0, 200.0], 6))
     fleet = grid.fleet(np.array([1, 7]))
-    assert fleet.members == 2 and fleet.select(0, 2).parameters["vehicle.mass"].tolist() == [100.0, 200.0]
+    assert fleet.members == 2
+    assert fleet.select(0, 2).parameters["vehicle.mass"].tolist() == [100.0, 200.0]
     for name in ("velocity", "angular_velocity"):
         assert np.array_equal(getattr(fleet.select(0, 2), name), grid.state[name][[1, 7]])
     assert np.array_equal(grid.parameters(np.array([7]))["vehicle.mass"], [200.0])
@@ -409,18 +430,23 @@ def test_members_are_numbered_by_y_x_and_direction(scene):
     assert np.array_equal(other.state["velocity"][0], grid.state["velocity"][0])
     assert not np.allclose(other.state["velocity"][1], grid.state["velocity"][1])
     steps = grid_of(scene, ("angular_velocity", 1.0, 2.0), ("vehicle.mass", 100.0, 200.0), (2, 2), 1, h=0.3)
-    assert steps.h.tolist() == [0.3] * 4 and len(steps.columns()) == 1
+    assert steps.h.tolist() == [0.3] * 4
+    assert len(steps.columns()) == 1
 
 
 def test_axes_without_a_range_are_around_the_scenes_number(scene):
     grid = grid_of(scene, "vehicle.mass", "vehicle.inertia", h=0.1)
-    assert (grid.x.low, grid.x.high) == pytest.approx((12.38, 1238.0)) and (grid.y.low, grid.y.high) == (0.1, 10.0)
+    assert (grid.x.low, grid.x.high) == pytest.approx((12.38, 1238.0))
+    assert (grid.y.low, grid.y.high) == (0.1, 10.0)
     scaled = grid_of(scene, Axis("vehicle.mass", scaled=True), "added_mass_ratio", h=0.1)
-    assert (scaled.x.low, scaled.x.high) == (0.1, 10.0) and (scaled.y.low, scaled.y.high) == (0.01, 100.0)
+    assert (scaled.x.low, scaled.x.high) == (0.1, 10.0)
+    assert (scaled.y.low, scaled.y.high) == (0.01, 100.0)
     half = grid_of(scene, Axis("h", low=0.5), "vehicle.mass", h=0.1)
-    assert half.x.low == 0.5 and half.x.high == pytest.approx(4.0 / half.rate)
+    assert half.x.low == 0.5
+    assert half.x.high == pytest.approx(4.0 / half.rate)
     bare = lw.Scene(lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0)), run=RunSettings(step=0.1))
-    assert grid_of(bare, "speed", "angular_velocity").x.low == 0.1 and grid_of(bare, "speed", "h").rate == 1.0
+    assert grid_of(bare, "speed", "angular_velocity").x.low == 0.1
+    assert grid_of(bare, "speed", "h").rate == 1.0
     with pytest.raises(lw.SceneError, match=r"axis vehicle\.buoyancy = None: is not a finite number"):
         grid_of(bare, "vehicle.buoyancy", "h")
 
@@ -429,19 +455,22 @@ def test_a_vehicle_without_added_mass_gets_that_of_a_slender_body():
     scene = lw.Scene(lw.Vehicle(2.0, inertia=(1.0, 1.0, 1.0)), run=RunSettings(step=0.1))
     grid = grid_of(scene, ("added_mass_ratio", 0.5, 1.0), ("vehicle.mass", 2.0, 4.0), (2, 2), 1)
     added = grid.varied["vehicle.added_mass"].reshape(2, 2, 3, 3)
-    assert np.allclose(added[0, 0], np.diag([0.0, 1.0, 1.0])) and np.allclose(added[1, 1], np.diag([0.0, 4.0, 4.0]))
+    assert np.allclose(added[0, 0], np.diag([0.0, 1.0, 1.0]))
+    assert np.allclose(added[1, 1], np.diag([0.0, 4.0, 4.0]))
     label = grid.lines[0]
-    assert (label.name, label.unit) == ("added_mass_ratio", "1") and np.allclose(label.values, [0.5, 1.0])
+    assert (label.name, label.unit) == ("added_mass_ratio", "1")
+    assert np.allclose(label.values, [0.5, 1.0])
 
 
 def test_units_and_labels_of_lines(scene):
     grid = grid_of(scene, ("environment.gravity", 1.0, 2.0), ("speed", 1.0, 2.0), h=0.1)
     x, y = grid.lines
-    assert (x.unit, x.label, x.log) == ("m/s2", "environment.gravity", True) and y.unit == "m/s"
+    assert (x.unit, x.label, x.log) == ("m/s2", "environment.gravity", True)
+    assert y.unit == "m/s"
     linear = grid_of(scene, Axis("vehicle.mass", 1.0, 2.0, log=False), "h").lines[0]
-    assert (
-        not linear.log and linear.values.tolist() == [1.0, 1.5, 2.0] and linear.to_dict()["values"] == [1.0, 1.5, 2.0]
-    )
+    assert not linear.log
+    assert linear.values.tolist() == [1.0, 1.5, 2.0]
+    assert linear.to_dict()["values"] == [1.0, 1.5, 2.0]
     assert Line.from_dict(linear.to_dict()).values.tolist() == [1.0, 1.5, 2.0]
 
 
@@ -450,14 +479,21 @@ def test_units_and_labels_of_lines(scene):
 
 def test_columns_hold_both_times_in_whole_steps():
     one = column(0.1, np.arange(3), 1.0, 10.0)
-    assert one.error_steps.tolist() == [0, 1, 2, 4, 5, 6, 8, 9, 10] and one.steps[-1] == 100 and len(one.steps) >= 65
+    assert one.error_steps.tolist() == [0, 1, 2, 4, 5, 6, 8, 9, 10]
+    assert one.steps[-1] == 100
+    assert len(one.steps) >= 65
     assert set(one.error_steps) <= set(one.steps)
     assert column(0.3, np.arange(1), 1.0, 0.5).steps.tolist() == [0, 1, 2, 3, 4]
     least = column(1.0, np.arange(1), 1.0, 1.0, 16)
-    assert least.error_steps.tolist() == [0, 2, 4, 6, 8, 10, 12, 14, 16] and least.steps.tolist() == list(range(17))
+    assert least.error_steps.tolist() == [0, 2, 4, 6, 8, 10, 12, 14, 16]
+    assert least.steps.tolist() == list(range(17))
     finer, whole = one.grid(4, whole=False), one.grid()
-    assert finer.h == 0.025 and finer.steps == 40 and finer.times == pytest.approx(0.1 * one.error_steps)
-    assert whole.h == 0.1 and whole.steps == 100 and whole.times == pytest.approx(0.1 * one.steps)
+    assert finer.h == 0.025
+    assert finer.steps == 40
+    assert finer.times == pytest.approx(0.1 * one.error_steps)
+    assert whole.h == 0.1
+    assert whole.steps == 100
+    assert whole.times == pytest.approx(0.1 * one.steps)
 
 
 def ran(plan, error=0.0, **more):
@@ -484,17 +520,16 @@ def test_references_are_refined_where_they_do_not_agree(scene):
     rate = max(values.max() for values in grid.rates().values())
     finer = math.ceil(h * rate / 0.2)
     first, second = runs.precise_pair(grid)
-    assert (
-        text == f"{second} against {first}, steps that turn by 0.2 rad or less, halved until they agree"
-        and shares == [1.0]
-    )
+    assert text == f"{second} against {first}, steps that turn by 0.2 rad or less, halved until they agree"
+    assert shares == [1.0]
     counts = [4, 4, 2, 2, 1, 1]
     assert [(name, n, threads) for name, _, n, threads in asked] == [
         ((first, second)[i % 2], counts[i], 1) for i in range(6)
     ]
     steps = [k for i in range(3) for k in (finer * 2**i, math.ceil(1.5 * finer * 2**i))]
     assert [h / step for _, step, _, _ in asked] == pytest.approx(steps)
-    assert one.verified.tolist() == [True] * 4 and one.reference.members == 4
+    assert one.verified.tolist() == [True] * 4
+    assert one.reference.members == 4
 
 
 def test_a_scene_without_a_precise_method_has_no_map(scene):
@@ -515,8 +550,10 @@ def test_parts_of_a_reference_are_put_in_their_places():
     assert runs.joined(None, part, np.array([0, 1])) is part
     before = whole.energy
     joined = runs.joined(whole, part, np.array([2, 0]))
-    assert joined is whole and joined.position[0, :, 0].tolist() == [1.0, 0.0, 1.0]
-    assert list(joined.status) == [Status.NON_FINITE, 0, 0] and joined.failure_time[0] == 0.5
+    assert joined is whole
+    assert joined.position[0, :, 0].tolist() == [1.0, 0.0, 1.0]
+    assert list(joined.status) == [Status.NON_FINITE, 0, 0]
+    assert joined.failure_time[0] == 0.5
     assert joined.energy is not before
 
 
@@ -540,10 +577,12 @@ def test_errors_and_growth_of_a_run_are_written_down():
     seen = found()
     runs.judge(result, one, np.arange(3), seen, of, "conservative")
     # Members 2, 0 and 1 of the map; the last failed, and the error counts up to its time alone.
-    assert seen.error.tolist() == [0.0, np.inf, 0.5] and seen.status.tolist() == [0, Status.NON_FINITE, 0]
+    assert seen.error.tolist() == [0.0, np.inf, 0.5]
+    assert seen.status.tolist() == [0, Status.NON_FINITE, 0]
     assert seen.warned.tolist() == [True, False, False]
     growth = invariants.energy_growth(result)
-    assert seen.growth[0] == pytest.approx(max(growth[1], 0.21 / 0.1)) and seen.growth[2] == growth[0]
+    assert seen.growth[0] == pytest.approx(max(growth[1], 0.21 / 0.1))
+    assert seen.growth[2] == growth[0]
     assert seen.growth[1] == np.inf
     damped = found()
     runs.judge(result, one, np.arange(3), damped, of, "dissipative")
@@ -555,7 +594,8 @@ def test_errors_and_growth_of_a_run_are_written_down():
     assert driven.growth[2] == change[0] > 0.0
     bare = found()
     runs.judge(result, dataclasses.replace(one, reference=None), np.arange(3), bare, of, "conservative")
-    assert bare.error.tolist() == [-1.0] * 3 and bare.growth.tolist() == seen.growth.tolist()
+    assert bare.error.tolist() == [-1.0] * 3
+    assert bare.growth.tolist() == seen.growth.tolist()
     stopped = made(moved, t, status=[Status.FLOOR, 0, 0], end=[1.5, np.nan, np.nan])
     early = found()
     runs.judge(stopped, one, np.arange(3), early, of, "conservative")
@@ -579,8 +619,10 @@ def test_a_column_that_is_refused_is_tried_in_halves(scene):
 
     with mock.patch.multiple(runs, plan_of=plan_of, run_plan=run_plan):
         found, why = runs.run_method(grid, [one], "psi_s", "float32", compared_in("position"), "conservative", 1)
-    assert why == "too heavy" and asked[0] == (10, "psi_s", "float32", "all")
-    assert found.status.tolist() == [0] * 6 + [REFUSED] * 4 and (found.error[6:] == np.inf).all()
+    assert why == "too heavy"
+    assert asked[0] == (10, "psi_s", "float32", "all")
+    assert found.status.tolist() == [0] * 6 + [REFUSED] * 4
+    assert (found.error[6:] == np.inf).all()
     # Halves are of whole cells.
     assert [n for n, *_ in asked[1:]] == [10, 4, 6, 2, 4, 2, 2]
 
@@ -604,27 +646,37 @@ def test_a_map_of_runs_made_by_hand(scene):
         found = lw.stability_map(damped, ("h", 0.1, 0.4), ("angular_velocity", 0.5, 2.0), ["psi_s", "gauss4", "rk4"],
                                  points=(3, 2), directions=2, t1=3.0, error_time=1.0, error=0.1, of="position",
                                  energy_bound=4.0, seed=5, dtype="float32", threads=1, progress=shares.append)  # fmt: skip
-    assert found.classes["psi_s"].tolist() == [[0, 1, 2]] * 2 and found.classes["rk4"].tolist() == [[0, 0, 3]] * 2
-    assert found.statuses["rk4"].tolist() == [[0, 0, 3]] * 2 and list(found.refused) == ["gauss4"]
-    assert (
-        found.errors["psi_s"][:, 1] == pytest.approx([0.5 * 1.0] * 2, rel=0.25) and found.errors["rk4"][0, 2] == np.inf
-    )
+    assert found.classes["psi_s"].tolist() == [[0, 1, 2]] * 2
+    assert found.classes["rk4"].tolist() == [[0, 0, 3]] * 2
+    assert found.statuses["rk4"].tolist() == [[0, 0, 3]] * 2
+    assert list(found.refused) == ["gauss4"]
+    assert found.errors["psi_s"][:, 1] == pytest.approx([0.5 * 1.0] * 2, rel=0.25)
+    assert found.errors["rk4"][0, 2] == np.inf
     assert (found.of, found.unit, found.error_bound, found.error_time, found.t1) == ("position", "m", 0.1, 1.0, 3.0)
     assert (found.directions, found.judged, found.unverified, found.messages) == (2, "dissipative", 0, ())
-    assert found.provenance["methods"] == ["psi_s", "rk4"] and found.provenance["seed"] == 5
-    assert found.provenance["dtype"] == "float32" and found.provenance["energy_bound"] == 4.0
-    assert found.provenance["axes"]["x"]["low"] == 0.1 and set(found.provenance) >= {
+    assert found.provenance["methods"] == ["psi_s", "rk4"]
+    assert found.provenance["seed"] == 5
+    assert found.provenance["dtype"] == "float32"
+    assert found.provenance["energy_bound"] == 4.0
+    assert found.provenance["axes"]["x"]["low"] == 0.1
+    assert set(found.provenance) >= {
         "scene",
         "versions",
         "machine",
         "checks",
     }
     assert {dtype for name, _, dtype, *_ in asked if name in ("psi_s", "rk4")} == {"float32"}
-    assert {n for *_, n, _ in asked} == {4} and shares[-1] == 1.0 and shares == sorted(shares) and 0.4 in shares
-    assert found.x.values == pytest.approx([0.1, 0.2, 0.4]) and found.limit("rk4") == pytest.approx([0.2, 0.2])
+    assert {n for *_, n, _ in asked} == {4}
+    assert shares[-1] == 1.0
+    assert shares == sorted(shares)
+    assert 0.4 in shares
+    assert found.x.values == pytest.approx([0.1, 0.2, 0.4])
+    assert found.limit("rk4") == pytest.approx([0.2, 0.2])
     drag = found.ratios["rk4"]["drag"]
-    assert drag[0] == pytest.approx(drag[1]) and drag[0] / drag[0, 0] == pytest.approx([1.0, 2.0, 4.0])
-    assert "drag" not in found.ratios["psi_s"] and "rotation" in found.ratios["psi_s"]
+    assert drag[0] == pytest.approx(drag[1])
+    assert drag[0] / drag[0, 0] == pytest.approx([1.0, 2.0, 4.0])
+    assert "drag" not in found.ratios["psi_s"]
+    assert "rotation" in found.ratios["psi_s"]
     bound = dataclasses.replace(found)
     assert (bound.energies["psi_s"] <= 1.0).all()
 
@@ -641,11 +693,13 @@ def test_times_of_a_map_follow_the_fastest_motion(scene):
 
         period = 2.0 * math.pi / grid_of(scene).rate
         assert (of().error_time, of().t1) == pytest.approx((period, 10.0 * period))
-        assert (of(t1=1.0).error_time, of(t1=1.0).t1) == (1.0, 1.0) and of(t1=1.0, error_time=2.0).t1 == 2.0
+        assert (of(t1=1.0).error_time, of(t1=1.0).t1) == (1.0, 1.0)
+        assert of(t1=1.0, error_time=2.0).t1 == 2.0
         pushed = dataclasses.replace(scene, terms=[lw.Wrench(force=[500.0, 0.0, 0.0])])
         driven = of(pushed, error_time=0.5, t1=9.0)
         assert (driven.judged, driven.t1, driven.error_time) == ("driven", 0.5, 0.5)
-        assert of().reference.startswith("rk8 against kl8(psi_x), steps") and of().directions == 1
+        assert of().reference.startswith("rk8 against kl8(psi_x), steps")
+        assert of().directions == 1
 
 
 def test_what_drives_a_scene_by_kind(scene):
@@ -681,5 +735,7 @@ def test_limits_of_methods_of_two_parts(name, first):
 
 
 def test_methods_that_iterate_have_no_limit_by_theory():
-    assert math.isnan(oscillation_limit("gauss4")) and math.isnan(rotation_limit("gauss4"))
-    assert rotation_limit("rk4") == oscillation_limit("rk4") and rotation_limit("cg3") == math.inf
+    assert math.isnan(oscillation_limit("gauss4"))
+    assert math.isnan(rotation_limit("gauss4"))
+    assert rotation_limit("rk4") == oscillation_limit("rk4")
+    assert rotation_limit("cg3") == math.inf

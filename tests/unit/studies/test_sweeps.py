@@ -100,7 +100,8 @@ def test_rows_count_and_summarize_members_that_did_not_fail(found):
     assert named == pytest.approx(expected | {"missing": 2})
     end = [stiff[f"time_to_failure {name}"] for name in ("mean", "std", "median", "missing")]
     assert end == pytest.approx([4.0, np.nan, 4.0, N - 1], nan_ok=True)
-    assert np.isnan(soft["time_to_failure mean"]) and np.isnan(soft["time_to_failure q05"])
+    assert np.isnan(soft["time_to_failure mean"])
+    assert np.isnan(soft["time_to_failure q05"])
     refused = "\"heading_pid.kq\" = 1.0: is no number of this scene; did you mean 'heading_pid.kp'?"
     assert unknown == {"case": "unknown", "refused": refused}
 
@@ -110,17 +111,21 @@ def test_two_members_have_a_spread_and_one_has_none():
     pair[:2] = 1.0, 3.0
     alone = np.where(np.arange(N) == 0, 1.0, np.nan)
     first, second = swept([record(pair), record(alone)], CASES[:2]).rows()
-    assert first["overshoot heading std"] == pytest.approx(np.sqrt(2.0)) and first["overshoot heading mean"] == 2.0
-    assert np.isnan(second["overshoot heading std"]) and second["overshoot heading mean"] == 1.0
+    assert first["overshoot heading std"] == pytest.approx(np.sqrt(2.0))
+    assert first["overshoot heading mean"] == 2.0
+    assert np.isnan(second["overshoot heading std"])
+    assert second["overshoot heading mean"] == 1.0
 
 
 def test_the_table_has_the_rows_by_case_and_axis(gridded, found):
     table = gridded.table
-    assert list(table["case"].values) == ["soft", "stiff"] and list(table["controller.delay"].values) == [0.02, 0.04]
+    assert list(table["case"].values) == ["soft", "stiff"]
+    assert list(table["controller.delay"].values) == [0.02, 0.04]
     assert table["success"].values.tolist() == [[0.7, 0.7], [0.7, 38 / 40]]
     assert table["iae heading mean"].values == pytest.approx(
         np.array([[1.0, 2.0], [1.0, 1.0]]) + MASS.mean(), rel=1e-12)  # fmt: skip
-    assert list(found.table["refused"].values)[:2] == ["", ""] and np.isnan(found.table["success"].values[2])
+    assert list(found.table["refused"].values)[:2] == ["", ""]
+    assert np.isnan(found.table["success"].values[2])
     assert coordinates([[{"type": "drag"}], 1.5, 2, "a"]) == ["[{'type': 'drag'}]", 1.5, 2, "a"]
 
 
@@ -131,10 +136,25 @@ def test_rows_of_a_comparison(found):
     only = int((passed[0] & ~passed[1]).sum()), int((passed[1] & ~passed[0]).sum())
     d = paired.proportions(*only, N, 0.95)
     head = {"first": "soft", "second": "stiff"}
-    assert only == (3, 6) and rows[0] == pytest.approx(head | {
-        "of": "success", "value_first": 0.7, "value_second": 31 / 40, "difference": 3 / 40, "lower": d.lower,
-        "upper": d.upper, "p": d.p, "p_holm": d.p, "real": False, "pairs": N, "test": "McNemar, exact",
-        "only_first": 3, "only_second": 6})  # fmt: skip
+    assert only == (3, 6)
+    assert rows[0] == pytest.approx(
+        head
+        | {
+            "of": "success",
+            "value_first": 0.7,
+            "value_second": 31 / 40,
+            "difference": 3 / 40,
+            "lower": d.lower,
+            "upper": d.upper,
+            "p": d.p,
+            "p_holm": d.p,
+            "real": False,
+            "pairs": N,
+            "test": "McNemar, exact",
+            "only_first": 3,
+            "only_second": 6,
+        }
+    )
     good = [i for i in range(N) if i not in (3, 7)]
     x, y = RISING[good], half_of_them().numbers["overshoot heading"][good]
     test = stats.ttest_rel(y, x)
@@ -143,7 +163,8 @@ def test_rows_of_a_comparison(found):
         "lower": test.confidence_interval().low, "upper": test.confidence_interval().high, "p": test.pvalue,
         "p_holm": 2.0 * test.pvalue, "real": True, "pairs": 38, "test": "paired t", "only_first": None,
         "only_second": None})  # fmt: skip
-    assert [row["of"] for row in rows] == ["success", *METRICS] and rows[2]["difference"] == pytest.approx(2.0)
+    assert [row["of"] for row in rows] == ["success", *METRICS]
+    assert rows[2]["difference"] == pytest.approx(2.0)
 
 
 def test_quantiles_are_compared_by_a_bootstrap_with_the_sweeps_seed(found):
@@ -151,26 +172,34 @@ def test_quantiles_are_compared_by_a_bootstrap_with_the_sweeps_seed(found):
     good = [i for i in range(N) if i not in (3, 7)]
     x, y = RISING[good], half_of_them().numbers["overshoot heading"][good]
     d = paired.quantiles(x, y, 0.9, 0.95, seed=3)
-    assert rows[1].difference == pytest.approx(d, nan_ok=True) and rows[1].test == "bootstrap of members"
-    assert rows[1].values == pytest.approx((np.quantile(x, 0.9), np.quantile(y, 0.9))) and np.isnan(rows[1].p)
+    assert rows[1].difference == pytest.approx(d, nan_ok=True)
+    assert rows[1].test == "bootstrap of members"
+    assert rows[1].values == pytest.approx((np.quantile(x, 0.9), np.quantile(y, 0.9)))
+    assert np.isnan(rows[1].p)
     # A difference without a test is real where its interval leaves out 0: this one does not, that of the constant does.
-    assert d.lower < 0.0 < d.upper and not rows[1].real
-    assert rows[2].difference.lower > 0.0 and rows[2].real
+    assert d.lower < 0.0 < d.upper
+    assert not rows[1].real
+    assert rows[2].difference.lower > 0.0
+    assert rows[2].real
     back = found.compare("stiff", "soft", quantile=0.9)[2]
-    assert back.difference.upper < 0.0 and back.real
+    assert back.difference.upper < 0.0
+    assert back.real
 
 
 def test_metrics_that_nobody_has_are_compared_as_nan():
     none = record(np.full(N, np.nan))
     rows = swept([record(), none], CASES[:2]).compare("soft", "stiff")
-    assert all(np.isnan(value) for value in rows[1].values) and rows[1].difference.pairs == 0 and not rows[1].real
+    assert all(np.isnan(value) for value in rows[1].values)
+    assert rows[1].difference.pairs == 0
+    assert not rows[1].real
     quantile = swept([record(), none], CASES[:2]).compare("soft", "stiff", quantile=0.5)[1]
     assert all(np.isnan(value) for value in quantile.values)
 
 
 def test_points_are_compared_with_the_same_point(gridded, found):
     rows = gridded.compare("soft", "stiff")
-    assert [row.point["controller.delay"] for row in rows if row.of == "success"] == [0.02, 0.04] and len(rows) == 6
+    assert [row.point["controller.delay"] for row in rows if row.of == "success"] == [0.02, 0.04]
+    assert len(rows) == 6
     assert [row.values for row in rows if row.of == "success"] == [(0.7, 0.7), (0.7, 0.95)]
     assert rows[0].row()["controller.delay"] == 0.02
     assert len(gridded.compare("soft", "stiff", {"controller.delay": 0.04})) == 3
@@ -188,7 +217,8 @@ def test_ranks_of_one_cell_are_by_mcnemar_and_of_a_grid_by_shares(found, gridded
     interval = stats.ttest_1samp(shares, 0.0).confidence_interval()
     assert [first[key] for key in ("value", "lower", "upper")] == pytest.approx([shares.mean(), *interval])
     p = stats.ttest_rel(shares, (RISING < 1.5).astype(float)).pvalue
-    assert p < 0.05 and (first["better_than"], second["better_than"]) == ("soft", "")
+    assert p < 0.05
+    assert (first["better_than"], second["better_than"]) == ("soft", "")
     at = {"controller.delay": 0.02}
     assert [row["better_than"] for row in gridded.ranking(at)] == ["", ""]
     strict = replace(gridded, confidence=1.0 - 0.5 * p)
@@ -199,7 +229,8 @@ def test_shares_of_all_or_none_stay_probabilities():
     few = record(np.where(np.arange(N) < 1, 0.1, 2.0))
     many = record(np.where(np.arange(N) < 39, 0.1, 2.0))
     ranks = swept([many, many, few, few], CASES[:2], grid={"controller.delay": [0.02, 0.04]}).ranking()
-    assert ranks[0]["upper"] == 1.0 > ranks[0]["lower"] > 0.9 and ranks[1]["lower"] == 0.0 < ranks[1]["upper"] < 0.1
+    assert ranks[0]["upper"] == 1.0 > ranks[0]["lower"] > 0.9
+    assert ranks[1]["lower"] == 0.0 < ranks[1]["upper"] < 0.1
 
 
 def test_all_pairs_of_three_cases_are_tested_together():
@@ -257,7 +288,8 @@ def test_causes_are_those_of_the_members_that_did_not_fail(found):
     expected = explained(inputs, y, 0.95)
     p = dict(zip(expected, paired.holm(np.array([one.p for one in expected.values()])), strict=True))
     shares = [row["share"] for row in rows]
-    assert rows[0]["input"] == "vehicle.mass" and shares == sorted(shares, reverse=True)
+    assert rows[0]["input"] == "vehicle.mass"
+    assert shares == sorted(shares, reverse=True)
     for row in rows:
         one, passed = expected[row["input"]], found.passed(found.cells[1])
         values = inputs[row["input"]]
@@ -266,20 +298,21 @@ def test_causes_are_those_of_the_members_that_did_not_fail(found):
                                      "median_failed": np.median(values[~passed])})  # fmt: skip
     nobody = swept([record()], CASES[:1], success={})
     row = nobody.causes("soft")[0]
-    assert np.isnan(row["median_failed"]) and np.isfinite(row["median_passed"])
+    assert np.isnan(row["median_failed"])
+    assert np.isfinite(row["median_passed"])
 
 
 def test_members_that_pass_and_that_do_not(found):
-    assert found.members("soft").tolist() == list(range(28, N)) and found.members("soft", False).tolist() == [
-        *range(28)
-    ]
+    assert found.members("soft").tolist() == list(range(28, N))
+    assert found.members("soft", False).tolist() == [*range(28)]
     assert found.values("stiff", "time_to_failure")[[3, 5]].tolist() == [2.5, 4.0]
     ends = [found.survival("stiff", [time])[0].value for time in (2.0, 2.5, 3.0, 4.0)]
     assert ends == [1.0, 39 / 40, 39 / 40, 38 / 40]
     exact = replace(found, interval="clopper_pearson", confidence=0.9)
     ends = stats.binomtest(28, N).proportion_ci(0.9, "exact")
     assert exact.success("soft") == pytest.approx((0.7, *ends))
-    assert repr(found) == "Sweep(3 cases, 1 points, 40 members)" and found.unit("iae heading") == "rad s"
+    assert repr(found) == "Sweep(3 cases, 1 points, 40 members)"
+    assert found.unit("iae heading") == "rad s"
     assert found.unit("time_to_failure") == "s"
 
 
@@ -306,7 +339,8 @@ def test_a_refused_case_is_named_where_it_is_asked_for(found):
         found.cell("unknown")
     with pytest.raises(lw.SceneError, match="case = 'unknown': was refused; run a member of another one"):
         setup.again(found.setup, found.cells[2], [0], None, None)
-    assert found.cells[2].fleet is None and [cell.index for cell in found.cells] == [0, 1, 2]
+    assert found.cells[2].fleet is None
+    assert [cell.index for cell in found.cells] == [0, 1, 2]
 
 
 # Words and files
@@ -362,7 +396,9 @@ def test_the_summary_of_a_grid(gridded):
     shares = [np.mean([gridded.passed(c) for c in gridded.cells_of(name)], axis=0) for name in ("stiff", "soft")]
     least, most = stats.ttest_rel(*shares).confidence_interval(0.95)
     by = f"soft by {100.0 * least:.4g} to {100.0 * most:.4g} points"
-    assert 0.0 < least < most and best["better_by"] == by and gridded.ranking()[1]["better_by"] == ""
+    assert 0.0 < least < most
+    assert best["better_by"] == by
+    assert gridded.ranking()[1]["better_by"] == ""
     assert f"1. stiff: 82.5 % ({low:.4g} to {high:.4g}); better than {by}" in lines
     rows = {row.point["controller.delay"]: row for row in gridded.compare("soft", "stiff") if row.of == "success"}
     d = rows[0.04].difference
@@ -378,7 +414,8 @@ def test_a_summary_where_the_second_is_worse_and_a_cause_is_known():
     text = str(swept([record(np.full(N, 0.1)), by_mass], CASES[:2]))
     assert "- soft: passes 91.24 to 100 % (40 of 40, 100 %); none of 40 fails: at most 7.22 % do, at 95%\n" in text
     few = int((MASS <= 47.0).sum())
-    assert "- stiff: worse by " in text and f"(0 pass only there, {few} only with soft)" in text
+    assert "- stiff: worse by " in text
+    assert f"(0 pass only there, {few} only with soft)" in text
     low, high = np.median(MASS[MASS <= 47.0]), np.median(MASS[MASS > 47.0])
     assert "- stiff: vehicle.mass (explains " in text
     assert f"median {low:.4g} where it fails, {high:.4g} where it passes)" in text
@@ -389,7 +426,8 @@ def test_a_summary_where_the_second_is_worse_and_a_cause_is_known():
 
 def test_a_summary_of_one_case_has_no_rank():
     text = str(swept([record()], CASES[:1]))
-    assert "Rank" not in text and "Against" not in text
+    assert "Rank" not in text
+    assert "Against" not in text
     same = str(swept([record(), record()], CASES[:2]))
     assert "- No difference of success is real." in same
     sobol = str(swept([record()], CASES[:1], sampling="sobol"))
@@ -400,11 +438,13 @@ def test_a_summary_of_one_case_has_no_rank():
 def test_files_hold_the_tables(found, tmp_path):
     files = found.save(tmp_path / "new")
     names = ["table.csv", "comparison.csv", "ranking.csv", "worst.csv", "causes.csv", "sweep.json", "summary.md"]
-    assert [path.name for path in files] == names and all(path.parent == tmp_path / "new" for path in files)
+    assert [path.name for path in files] == names
+    assert all(path.parent == tmp_path / "new" for path in files)
     tables = {path.stem: list(csv.DictReader(path.open())) for path in files[:5]}
     assert [row["case"] for row in tables["table"]] == ["soft", "stiff", "unknown"]
     assert [row["of"] for row in tables["comparison"]] == ["success", *METRICS]
-    assert [row["case"] for row in tables["ranking"]] == ["stiff", "soft"] and len(tables["worst"]) == 20
+    assert [row["case"] for row in tables["ranking"]] == ["stiff", "soft"]
+    assert len(tables["worst"]) == 20
     causes = [(row["case"], row["of"]) for row in tables["causes"]]
     assert causes == [(case, of) for case in ("soft", "stiff") for of in ("success", *METRICS) for _ in range(4)]
     assert files[6].read_text() == SUMMARY
@@ -412,9 +452,12 @@ def test_files_hold_the_tables(found, tmp_path):
     assert {name: content[name] for name in ("baseline", "confidence", "interval", "settings", "success")} == {
         "baseline": "soft", "confidence": 0.95, "interval": "wilson", "settings": {},
         "success": {"status": "ok", "overshoot heading": {"below": 1.5}}}  # fmt: skip
-    assert content["ensemble"]["members"] == N and content["ensemble"]["seed"] == 3
-    assert content["scene"]["vehicle"]["mass"] == 50.0 and "ensemble" not in content["scene"]
-    assert content["metrics"]["iae heading"]["unit"] == "rad s" and list(content["metrics"]) == [
+    assert content["ensemble"]["members"] == N
+    assert content["ensemble"]["seed"] == 3
+    assert content["scene"]["vehicle"]["mass"] == 50.0
+    assert "ensemble" not in content["scene"]
+    assert content["metrics"]["iae heading"]["unit"] == "rad s"
+    assert list(content["metrics"]) == [
         *METRICS,
         "time_to_failure",
     ]
@@ -470,12 +513,17 @@ def test_a_case_changes_numbers_lists_vehicle_and_scene():
     numbers = {"heading_pid.kp": 8.0, "controller.period": 0.2, "run.step": 0.01, "start.position[2]": 4.0,
                "drag.quadratic[5]": 3.0, "drag.quadratic[0]": 1.0, "environment.gravity": 9.7}  # fmt: skip
     changed = cases.Case("a", numbers).of(SCENE)
-    assert changed.controller.laws[0].kp == 8.0 and changed.controller.laws[0].kd == 4.0
-    assert changed.controller.period == 0.2 and changed.controller.delay == 0.02 and changed.run.step == 0.01
-    assert changed.run.duration == 8.0 and changed.environment.gravity == 9.7
+    assert changed.controller.laws[0].kp == 8.0
+    assert changed.controller.laws[0].kd == 4.0
+    assert changed.controller.period == 0.2
+    assert changed.controller.delay == 0.02
+    assert changed.run.step == 0.01
+    assert changed.run.duration == 8.0
+    assert changed.environment.gravity == 9.7
     assert list(changed.start.position) == [0.0, 0.0, 4.0]
     drag = {term.key: term for term in changed.terms}["drag"]
-    assert list(drag.quadratic) == [1.0, 0, 0, 0, 0, 3.0] and list(drag.linear) == [0, 0, 0, 2.0, 2.0, 2.0]
+    assert list(drag.quadratic) == [1.0, 0, 0, 0, 0, 3.0]
+    assert list(drag.linear) == [0, 0, 0, 2.0, 2.0, 2.0]
     assert SCENE.with_numbers({}) is SCENE
     with pytest.raises(lw.SceneError, match="vehicle = 3: is no Vehicle; give"):
         cases.Case("a", vehicle=3).of(SCENE)
@@ -485,11 +533,14 @@ def test_lists_replace_and_terms_join():
     lists = {"terms": [{"type": "drag", "linear": [1.0] * 6}, {"type": "wrench", "force": [1.0, 0.0, 0.0]}]}
     joined = cases.with_lists(SCENE, lists)
     assert [term.key for term in joined.terms] == ["control_wrench", "drag", "wrench"]
-    assert list(joined.terms[1].linear) == [1.0] * 6 and joined.controller.laws[0].kp == 3.0
+    assert list(joined.terms[1].linear) == [1.0] * 6
+    assert joined.controller.laws[0].kp == 3.0
     floor = cases.with_lists(SCENE, {"events": [{"type": "floor", "depth": 9.0}]})
-    assert floor.events[0].depth == 9.0 and len(floor.terms) == 2
+    assert floor.events[0].depth == 9.0
+    assert len(floor.terms) == 2
     laws = cases.with_lists(SCENE, {"laws": [{"type": "heading_pid", "kp": 1.0}]})
-    assert laws.controller.laws[0].kp == 1.0 and laws.controller.guidance[0].heading == 1.0
+    assert laws.controller.laws[0].kp == 1.0
+    assert laws.controller.guidance[0].heading == 1.0
     whole = cases.with_lists(BARE, {"controller": TABLES["controller"], "laws": [{"type": "heading_pid", "kp": 2.0}]})
     assert whole.controller.laws[0].kp == 2.0
     assert cases.with_lists(SCENE, {}) is SCENE
@@ -524,7 +575,8 @@ def test_grids_that_are_none_are_refused(given, words):
 
 def test_points_go_through_the_last_axis_first():
     axes = cases.grid_of({"a": np.array([1.0, 2.0]), "b": ("x", "y")})
-    assert axes == {"a": [1.0, 2.0], "b": ["x", "y"]} and cases.grid_of(None) == {}
+    assert axes == {"a": [1.0, 2.0], "b": ["x", "y"]}
+    assert cases.grid_of(None) == {}
     assert [tuple(point.values()) for point in cases.points_of(axes)] == [
         (1.0, "x"), (1.0, "y"), (2.0, "x"), (2.0, "y")]  # fmt: skip
     assert cases.points_of({}) == [{}]
@@ -534,7 +586,9 @@ def test_what_a_case_sets_does_not_vary_in_it():
     vary = VARY | {"heading_pid.kp": lw.Uniform(low=1.0, high=2.0)}
     like = lw.Ensemble(SCENE, 5, 3, vary)
     fleet, dropped = cases.ensemble_of(SCENE, {"heading_pid.kp": 2.0}, vary, like)
-    assert dropped == ["heading_pid.kp"] and set(fleet.vary) == set(VARY) and (fleet.members, fleet.seed) == (5, 3)
+    assert dropped == ["heading_pid.kp"]
+    assert set(fleet.vary) == set(VARY)
+    assert (fleet.members, fleet.seed) == (5, 3)
     fleet, dropped = cases.ensemble_of(SCENE, {"start.position[0]": 1.0}, vary, like)
     assert dropped == ["start.position"]
     assert cases.ensemble_of(BARE, {}, vary, like)[1] == ["heading_pid.kp"]
@@ -554,7 +608,8 @@ def test_numbers_that_only_a_case_has_vary_in_it():
     found = swept([record(), record()], names, vary=VARY | {"heave_pid.kp": lw.Uniform(low=1.0, high=3.0)},
                   metrics=METRICS)  # fmt: skip
     assert [cell.fixed for cell in found.cells] == [("heave_pid.kp",), ()]
-    assert "heave_pid.kp" in found.inputs(found.cells[1]) and "heave_pid.kp" not in found.setup.members.vary
+    assert "heave_pid.kp" in found.inputs(found.cells[1])
+    assert "heave_pid.kp" not in found.setup.members.vary
     with pytest.raises(lw.SceneError, match=r"heave_pid\.kq"):
         swept([], names, vary={"heave_pid.kq": lw.Uniform(low=1.0, high=3.0)})
 
@@ -578,9 +633,12 @@ def test_success_by_status_and_limits():
 def test_conditions_are_read_and_written():
     table = {"status": ["ok", "floor"], "x": {"above": 0.0, "below": 1.0}, "y": {"below": 2}}
     read = success.success_of(table, ("x", "y"))
-    assert read.status == ("ok", "floor") and read.limits == {"x": (0.0, 1.0), "y": (-np.inf, 2.0)}
-    assert read.to_dict() == table and success.success_of(read, ("x", "y")) == read
-    assert success.success_of(None, ()) == success.Success() and success.Success().to_dict() == {"status": "ok"}
+    assert read.status == ("ok", "floor")
+    assert read.limits == {"x": (0.0, 1.0), "y": (-np.inf, 2.0)}
+    assert read.to_dict() == table
+    assert success.success_of(read, ("x", "y")) == read
+    assert success.success_of(None, ()) == success.Success()
+    assert success.Success().to_dict() == {"status": "ok"}
     with pytest.raises(lw.SceneError) as caught:
         success.success_of({"status": 3, "z": {}, "x": {}, "y": {"below": "a"}}, ("x", "y"))
     for words in ("success.status = 3",
@@ -623,10 +681,13 @@ def test_a_sweep_asks_solve_for_its_metrics_alone():
                          scheduler="steal", h=0.01)  # fmt: skip
     record = found.record(found.cells[0])
     assert [values.tolist() for values in record.numbers.values()] == [[i] * N for i in range(3)]
-    assert list(record.numbers) == [*METRICS, "time_to_failure"] and record.messages == ("slow",) and not record.refused
+    assert list(record.numbers) == [*METRICS, "time_to_failure"]
+    assert record.messages == ("slow",)
+    assert not record.refused
     assert {name: asked[name] for name in ("threads", "executor", "scheduler", "h", "keep", "until")} == {
         "threads": 2, "executor": "processes", "scheduler": "steal", "h": 0.01, "keep": "none", "until": False}  # fmt: skip
-    assert asked["save"] == lw.SaveAt(fields=()) and [one.key for one in asked["statistics"]] == list(record.numbers)
+    assert asked["save"] == lw.SaveAt(fields=())
+    assert [one.key for one in asked["statistics"]] == list(record.numbers)
     # Of an expression over the path there is a sample at each look; without a controller, as the scene says.
     by_samples = setup.metrics_of(["max(depth)"])
     assert replace(found.setup, metrics=by_samples).kept(found.cells[0].fleet)["save"] == lw.SaveAt(
@@ -641,7 +702,8 @@ def test_keys_are_of_all_that_decides_the_numbers(found):
     fleet = found.cells[0].fleet
     key = one.key(fleet)
     named = replace(SCENE, ensemble_settings=None)
-    assert len(key) == 32 and one.key(lw.Ensemble(named, N, 3, VARY)) == key
+    assert len(key) == 32
+    assert one.key(lw.Ensemble(named, N, 3, VARY)) == key
     others = [one.key(lw.Ensemble(SCENE, N, 4, VARY)), one.key(lw.Ensemble(SCENE, N + 1, 3, VARY)),
               one.key(found.cells[1].fleet), replace(one, settings={"h": 0.01}).key(fleet),
               replace(one, metrics=setup.metrics_of(["iae heading"])).key(fleet)]  # fmt: skip
@@ -650,10 +712,12 @@ def test_keys_are_of_all_that_decides_the_numbers(found):
     metrics = [lw.OwnMetric(function, name="own", fields=("position",), **more) for function, more in (
         (twice, {}), (thrice, {}), (twice, {"last": np.sin}), (twice, {"last": np.cos}), (twice, {"version": 1}))]  # fmt: skip
     keys = [replace(one, metrics=setup.metrics_of([metric])).key(fleet) for metric in (*metrics, metrics[0])]
-    assert keys[0] == keys[-1] and len(set(keys)) == 5
+    assert keys[0] == keys[-1]
+    assert len(set(keys)) == 5
     arrays = [key_of({"x": values}) for values in (np.array([1.0, 2.0]), [1.0, 2.0], np.array([1.0, 3.0]))]
     assert arrays[0] == arrays[1] != arrays[2]
-    assert key_of({"a": 1, "b": 2}) == key_of({"b": 2, "a": 1}) and key_of({"x": np.float64(1.0)}) == key_of({"x": 1.0})
+    assert key_of({"a": 1, "b": 2}) == key_of({"b": 2, "a": 1})
+    assert key_of({"x": np.float64(1.0)}) == key_of({"x": 1.0})
 
 
 def test_records_are_kept_in_files_and_refusals_in_memory(tmp_path):
@@ -665,17 +729,22 @@ def test_records_are_kept_in_files_and_refusals_in_memory(tmp_path):
     again = Records(tmp_path, list(shown.numbers), len(shown.status))
     again.check()
     read = again["a"]
-    assert read.messages == ("slow", "late") and read.refused == "" and list(read.numbers) == list(shown.numbers)
+    assert read.messages == ("slow", "late")
+    assert read.refused == ""
+    assert list(read.numbers) == list(shown.numbers)
     np.testing.assert_array_equal(read.status, shown.status)
     for name, values in shown.numbers.items():
         np.testing.assert_array_equal(read.numbers[name], values)
-    assert again.get("b") is None and records["b"].refused == "no" and len(records["b"].status) == 0
+    assert again.get("b") is None
+    assert records["b"].refused == "no"
+    assert len(records["b"].status) == 0
     assert again.get("c") is None
     with pytest.raises(AssertionError):
         again["c"]
     kept = Records()
     kept.put("a", shown)
-    assert kept["a"] is shown and kept.get("b") is None
+    assert kept["a"] is shown
+    assert kept.get("b") is None
 
 
 def test_progress_is_that_of_all_cells():
@@ -696,12 +765,13 @@ def test_the_sweep_keeps_what_the_ensemble_says_unless_it_is_asked():
     base = lw.Ensemble(SCENE, 6, 7, VARY, "sobol")
     one = setup.made(base, None, None, {"vehicle.mass": lw.Uniform(low=1.0, high=2.0)}, None, None, None, [], {})
     assert (one.members.members, one.members.seed, one.members.sampling.kind) == (6, 7, "sobol")
-    assert (
-        set(one.vary) == set(VARY) and one.members.vary["vehicle.mass"].high == 2.0 and list(one.metrics) == [setup.END]
-    )
+    assert set(one.vary) == set(VARY)
+    assert one.members.vary["vehicle.mass"].high == 2.0
+    assert list(one.metrics) == [setup.END]
     other = setup.made(base, None, None, None, 8, 9, "random", ["max(depth)"], {"h": 0.01})
     assert (other.members.members, other.members.seed, other.members.sampling.kind) == (8, 9, "random")
-    assert other.settings == {"h": 0.01} and list(other.metrics) == ["max(depth)", "time_to_failure"]
+    assert other.settings == {"h": 0.01}
+    assert list(other.metrics) == ["max(depth)", "time_to_failure"]
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
@@ -746,8 +816,11 @@ def test_a_plan_in_words():
                      "time        about 30 s, and 2.5 s for each kernel", "memory      3 MB",
                      "disk        0.3 MB"]  # fmt: skip
     (fleet,), asked = predict.call_args
-    assert asked["threads"] == 2 and asked["h"] == 0.01 and asked["keep"] == "none"
-    assert fleet.scene.controller.delay == 0.02 and fleet.members == 2000
+    assert asked["threads"] == 2
+    assert asked["h"] == 0.01
+    assert asked["keep"] == "none"
+    assert fleet.scene.controller.delay == 0.02
+    assert fleet.members == 2000
     durations = [setup.duration_text(seconds) for seconds in (119.0, 120.0, 7200.0, 3 * 86400.0, 6.3e7, 6.2e7)]
     assert durations == ["1.2e+02 s", "2 minutes", "2 hours", "3 days", "2 years", "7.2e+02 days"]
     with mock.patch.object(setup, "_prediction", return_value=prediction):
@@ -799,12 +872,17 @@ vehicle = { mass = 52.0 }
         "members": 5, "seed": 4, "sampling": "sobol", "confidence": 0.9, "interval": "clopper_pearson",
         "metrics": ["max(depth)"], "baseline": "b"}  # fmt: skip
     assert (read["method"], read["h"], read["t1"], read["dtype"]) == ("rk4", 0.01, 3.0, "float32")
-    assert read["success"] == {"max(depth)": {"below": 1.0}} and read["grid"] == {"environment.gravity": [9.7, 9.8]}
-    assert read["vary"]["vehicle.mass"].high == 55.0 and read["scene"].vehicle.mass == 50.0
+    assert read["success"] == {"max(depth)": {"below": 1.0}}
+    assert read["grid"] == {"environment.gravity": [9.7, 9.8]}
+    assert read["vary"]["vehicle.mass"].high == 55.0
+    assert read["scene"].vehicle.mass == 50.0
     a, b, c, d = read["cases"]
-    assert a == {"name": "a", "set": {"vehicle.mass": 51.0}} and b["scene"].vehicle.mass == 60.0
-    assert "vehicle" not in c and c["scene"].vehicle.mass == lw.Scene.named("sphere").vehicle.mass
-    assert c["scene"].run.duration == 8.0 and d == {"name": "d", "vehicle": {"mass": 52.0}}
+    assert a == {"name": "a", "set": {"vehicle.mass": 51.0}}
+    assert b["scene"].vehicle.mass == 60.0
+    assert "vehicle" not in c
+    assert c["scene"].vehicle.mass == lw.Scene.named("sphere").vehicle.mass
+    assert c["scene"].run.duration == 8.0
+    assert d == {"name": "d", "vehicle": {"mass": 52.0}}
     (tmp_path / "short.toml").write_text('scene = "scene.toml"\n')
     assert set(arguments_of_file(tmp_path / "short.toml")) == {"scene"}
 

@@ -50,7 +50,8 @@ def test_one_of_a_pair_suffices(left_out):
 
 def test_a_pair_that_differs_is_refused():
     message = refused(from_fossen, DIAGONAL | PAIRS | {"N_vdot": -1.93}, count=1, **BODY)
-    assert "Y_rdot = 1.93" in message and "N_vdot = -1.93" in message
+    assert "Y_rdot = 1.93" in message
+    assert "N_vdot = -1.93" in message
 
 
 def test_rigid_body_matrix_about_the_origin():
@@ -98,7 +99,9 @@ def test_cross_terms_become_matrices():
     (term,) = from_fossen({"Y_v|v|": -1310.0, "Y_rr": 0.632, "N_r": -2.0, "M_ww": 3.18}, **BODY)["terms"]
     assert term["type"] == "drag_matrix"
     quadratic = np.array(term["quadratic"])
-    assert quadratic[1, 1] == 1310.0 and quadratic[1, 5] == -0.632 and quadratic[4, 2] == -3.18
+    assert quadratic[1, 1] == 1310.0
+    assert quadratic[1, 5] == -0.632
+    assert quadratic[4, 2] == -3.18
     assert np.array(term["linear"])[5, 5] == 2.0
     assert np.count_nonzero(quadratic) == 3
 
@@ -110,7 +113,9 @@ def test_without_drag_there_is_no_term():
 @pytest.mark.parametrize("name", [*DIAGONAL, "X_u", "N_r", "X_uu", "N_r|r|"])
 def test_positive_diagonal_derivatives_are_refused(name):
     message = refused(from_fossen, {name: 3.0}, count=1, **BODY)
-    assert f"{name} = 3.0" in message and "Fossen" in message and "-3" in message
+    assert f"{name} = 3.0" in message
+    assert "Fossen" in message
+    assert "-3" in message
 
 
 @pytest.mark.parametrize("name", ["X_qq", "X_vv", "M_rr"])
@@ -238,7 +243,8 @@ def test_sdf_buoyancy():
     text = sdf(coefficients="<xU>-1</xU><water_density>1025</water_density>")
     assert from_sdf(text, volume=0.02)["vehicle"]["buoyancy"] == pytest.approx(0.02 * 1025.0 * 9.80665)
     made = from_sdf(sdf(), buoyancy=200.0, center_of_buoyancy=(0.0, 0.1, 0.2))["vehicle"]
-    assert made["buoyancy"] == 200.0 and made["center_of_buoyancy"] == [0.0, -0.1, -0.2]
+    assert made["buoyancy"] == 200.0
+    assert made["center_of_buoyancy"] == [0.0, -0.1, -0.2]
 
 
 def test_sdf_faults():
@@ -248,7 +254,8 @@ def test_sdf_faults():
     assert "base" in refused(from_sdf, sdf(), link="bse")
     assert "give the path" in refused(from_sdf, "nowhere.sdf")
     message = refused(from_sdf, sdf("0 0", "<fluid_added_mass><xx>-1</xx></fluid_added_mass>"), count=2)
-    assert "<pose>" in message and "<fluid_added_mass>" in message
+    assert "<pose>" in message
+    assert "<fluid_added_mass>" in message
 
 
 def test_sdf_from_a_file_and_by_the_name_of_the_link(tmp_path):
@@ -281,8 +288,10 @@ def yaml():
 def test_yaml_positions_are_flu_and_matrices_frd(yaml):
     made = from_yaml(UUV)
     vehicle, (term,) = made["vehicle"], made["terms"]
-    assert vehicle["center_of_gravity"] == [0.1, -0.2, -0.3] and vehicle["center_of_buoyancy"] == [0.0, 0.0, -0.4]
-    assert np.array(vehicle["added_mass_matrix"])[1, 5] == -1.5 and np.array(vehicle["added_mass_matrix"])[2, 4] == 2.0
+    assert vehicle["center_of_gravity"] == [0.1, -0.2, -0.3]
+    assert vehicle["center_of_buoyancy"] == [0.0, 0.0, -0.4]
+    assert np.array(vehicle["added_mass_matrix"])[1, 5] == -1.5
+    assert np.array(vehicle["added_mass_matrix"])[2, 4] == 2.0
     assert vehicle["buoyancy"] == pytest.approx(0.02 * 1000.0 * 9.80665)
     assert term == {"type": "drag", "linear": [1.0, 2, 3, 4, 5, 6], "quadratic": [7.0, 8, 9, 10, 11, 12]}
     assert vehicle["rigid_body_mass_matrix"] == from_sdf(sdf("0.1 0.2 0.3 0 0 0"))["vehicle"]["rigid_body_mass_matrix"]

@@ -134,11 +134,14 @@ def test_the_remus_fins_have_the_printed_coefficients():
     for letter, (i, force, k, moment) in printed.items():
         motion = {"v": 0.0, "w": 0.0, "q": 0.0, "r": 0.0} | {letter: small}
         found = fin_forces(2.0, command=(0.0, 0.0), **motion) / (2.0 * small)
-        assert found[i] == pytest.approx(force, abs=0.01) and found[k] == pytest.approx(moment, abs=0.01), letter
+        assert found[i] == pytest.approx(force, abs=0.01), letter
+        assert found[k] == pytest.approx(moment, abs=0.01), letter
     rudder = fin_forces(2.0, 0.0, 0.0, 0.0, 0.0, (small, 0.0)) / (4.0 * small)
     stern = fin_forces(2.0, 0.0, 0.0, 0.0, 0.0, (0.0, small)) / (4.0 * small)
-    assert rudder[1] == pytest.approx(9.64, abs=0.01) and rudder[5] == pytest.approx(-6.15, abs=0.01)
-    assert stern[2] == pytest.approx(-9.64, abs=0.01) and stern[4] == pytest.approx(-6.15, abs=0.01)
+    assert rudder[1] == pytest.approx(9.64, abs=0.01)
+    assert rudder[5] == pytest.approx(-6.15, abs=0.01)
+    assert stern[2] == pytest.approx(-9.64, abs=0.01)
+    assert stern[4] == pytest.approx(-6.15, abs=0.01)
 
 
 @pytest.mark.parametrize("name", ["remus_100", "bluerov2_heavy"])
@@ -257,9 +260,12 @@ def test_the_rov_that_pitches_over_is_said_to(capsys):
     scene, said = lw.Scene.named("bluerov2_heavy"), "15.5 N"
     body, (thrusters,) = scene.vehicle, [term for term in scene.terms if term.type == "thrusters"]
     arm, righting = thrusters.position[:4, 2], float(body.buoyancy) * abs(body.center_of_buoyancy[2])
-    assert np.all(arm == 0.085) and f"{righting / 0.085:.1f} N" == said and f"{righting:.2f}" == "1.32"
+    assert np.all(arm == 0.085)
+    assert f"{righting / 0.085:.1f} N" == said
+    assert f"{righting:.2f}" == "1.32"
     ahead = np.abs(thrusters.direction[:4, 0]) @ thrusters.thrust(np.ones(8))[:4]
-    assert f"{ahead:.0f}" == "86" and ahead * 0.085 > 5.0 * righting
+    assert f"{ahead:.0f}" == "86"
+    assert ahead * 0.085 > 5.0 * righting
     assert cli.main(["list", "vehicles"]) == 0
     (line,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("bluerov2_heavy")]
     page = (ROOT / "docs" / "guide" / "vehicles.md").read_text()

@@ -30,7 +30,8 @@ def points(kind):
 def test_the_choice_is_fair(kind):
     all_points = points(kind)
     few = lw.shown(straight(all_points))
-    assert len(few.members) == 1000 and few.text == "1,000 of 10,000 members"
+    assert len(few.members) == 1000
+    assert few.text == "1,000 of 10,000 members"
     for axis in range(3):
         assert stats.ks_2samp(all_points[few.members, axis], all_points[:, axis]).pvalue > 1e-3
     # The first members, and evenly spread ones of a grid, would not pass.
@@ -44,8 +45,10 @@ def test_few_that_failed_are_all_shown():
     status[lost], end[lost] = Status.NON_FINITE, 0.5
     path = np.random.default_rng(3).normal(size=(2, n, 3))
     few = lw.shown(made(path, status=status, end=end))
-    assert set(lost) <= set(few.members.tolist()) and len(few.members) == 1000
-    assert len(few.ranked) == choice.MOST_RANKED and len(np.unique(few.ranked)) == choice.MOST_RANKED
+    assert set(lost) <= set(few.members.tolist())
+    assert len(few.members) == 1000
+    assert len(few.ranked) == choice.MOST_RANKED
+    assert len(np.unique(few.ranked)) == choice.MOST_RANKED
 
 
 def test_outcomes_share_a_third_of_the_places():
@@ -57,7 +60,8 @@ def test_outcomes_share_a_third_of_the_places():
     result = made(np.random.default_rng(4).normal(size=(2, n, 3)), status=status, end=np.where(status, 1.0, np.nan))
     counts = {code: np.count_nonzero(status[lw.shown(result, 300).members] == code) for code in np.unique(status)}
     # 100 places: all 10 that failed, 45 of each event, which most of those on the floor have by their number already.
-    assert counts[Status.STEP_TOO_LARGE] == 10 and counts[Status.SURFACE] >= 45
+    assert counts[Status.STEP_TOO_LARGE] == 10
+    assert counts[Status.SURFACE] >= 45
     assert counts[Status.FLOOR] / counts[Status.OK] == pytest.approx(4000 / 1890, rel=0.35)
     assert sum(counts.values()) == 300
 
@@ -66,7 +70,8 @@ def test_the_farthest_are_shown():
     path = np.random.default_rng(5).normal(size=(3, 5000, 3))
     path[1, 123, 2], path[2, 456, 0], path[0, 789, 1] = 50.0, -60.0, 70.0
     few = lw.shown(made(path), most=20)
-    assert {123, 456, 789} <= set(few.members.tolist()) and len(few.members) == 20
+    assert {123, 456, 789} <= set(few.members.tolist())
+    assert len(few.members) == 20
     # What a member is at after its end is not drawn as its path, so it is no reach.
     status, end = np.zeros(5000, int), np.full(5000, np.nan)
     status[456], end[456] = Status.FLOOR, 1.0
@@ -89,7 +94,10 @@ def test_frames_are_even_and_have_both_ends():
     rng = np.random.default_rng(8)
     for time in (np.linspace(0.0, 60.0, 6001), np.sort(rng.uniform(0.0, 9.0, 5000)), 1.1 ** np.arange(500)):
         frames = choice.frames_of(time)
-        assert frames[0] == 0 and frames[-1] == len(time) - 1 and len(frames) <= 240 and (np.diff(frames) > 0).all()
+        assert frames[0] == 0
+        assert frames[-1] == len(time) - 1
+        assert len(frames) <= 240
+        assert (np.diff(frames) > 0).all()
         spacing = (time[-1] - time[0]) / 239
         nearest = np.abs(time[frames][:, None] - np.linspace(time[0], time[-1], 240)).min(axis=0)
         assert (nearest <= np.maximum(0.5 * spacing, np.diff(time).max())).all()
@@ -112,13 +120,17 @@ def test_large_runs_are_read_in_pieces(monkeypatch):
     whole = lw.shown(made(path), most=100)
     monkeypatch.setattr(choice, "AT_ONCE", 4 * 64)
     seen = [(members.start, members.stop) for members, _ in choice.pieces(made(path), ("position",))]
-    assert seen[0] == (0, 64) and seen[-1] == (960, 1000) and len(seen) == 16
+    assert seen[0] == (0, 64)
+    assert seen[-1] == (960, 1000)
+    assert len(seen) == 16
     assert (lw.shown(made(path), most=100).members == whole.members).all()
 
 
 def test_one_member_two_times():
     few = lw.shown(made(np.zeros((2, 1, 3))))
-    assert few.members.tolist() == [0] and few.frames.tolist() == [0, 1] and few.text == "1 member"
+    assert few.members.tolist() == [0]
+    assert few.frames.tolist() == [0, 1]
+    assert few.text == "1 member"
 
 
 def test_what_cannot_be_shown_says_why():

@@ -55,10 +55,8 @@ def test_a_mean_has_its_interval():
     np.testing.assert_allclose(axes.lines[0].get_ydata(), DEPTH.mean(axis=1))
     np.testing.assert_allclose(edges(axes.collections[0]), DEPTH[0].mean() + np.array([-1.0, 1.0]))
     legend = axes.get_legend()
-    assert (
-        axes.lines[0].get_label() == f"a: {N} members, mean and its 95% interval"
-        and legend.get_title().get_text() == ""
-    )
+    assert axes.lines[0].get_label() == f"a: {N} members, mean and its 95% interval"
+    assert legend.get_title().get_text() == ""
 
 
 def test_nothing_kept_and_nothing_gathered_is_refused():

@@ -32,7 +32,10 @@ def assert_readable(figure):
     """Nothing is cut off, and no text is smaller than 8 pixels where the picture is 700 wide."""
     figure.draw_without_rendering()
     box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
-    assert box.x0 >= -0.01 and box.y0 >= -0.01 and box.x1 <= width + 0.01 and box.y1 <= height + 0.01
+    assert box.x0 >= -0.01
+    assert box.y0 >= -0.01
+    assert box.x1 <= width + 0.01
+    assert box.y1 <= height + 0.01
     labels = [label for axes in figure.axes for label in (axes.xaxis.label, axes.yaxis.label, *axes.get_xticklabels())]
     assert min(label.get_fontsize() for label in labels) / 72.0 * 700.0 / width >= 8.0
 
@@ -53,8 +56,10 @@ def test_each_term_has_its_bar_beside_the_bare_scene():
     axes = lw.plots.term_cost(TERMS)
     widths = [[bar.get_width() for bar in bars] for bars in axes.containers]
     assert widths == [[14.0, 16.0, 72.0], [7.0, 8.0, 36.0]]  # of the first method alone
-    assert [text.get_text() for text in axes.get_yticklabels()] == ["none", "drag", "waves"] and axes.yaxis_inverted()
-    assert [line.get_xdata()[0] for line in axes.lines] == [14.0, 7.0] and "[ns]" in axes.get_xlabel()
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["none", "drag", "waves"]
+    assert axes.yaxis_inverted()
+    assert [line.get_xdata()[0] for line in axes.lines] == [14.0, 7.0]
+    assert "[ns]" in axes.get_xlabel()
     assert len({bars[0].get_hatch() for bars in axes.containers}) == 2
     assert_readable(axes.figure)
 
@@ -65,7 +70,8 @@ def test_files_of_the_benchmarks_are_read_and_pictures_written(tmp_path):
     figure = Figure(figsize=(12.0, 5.0), layout="constrained")
     assert lw.plots.scaling(lines, figure=figure)[0].figure is figure
     axes = Figure().subplots()
-    assert lw.plots.term_cost(str(lines), ax=axes, path=tmp_path / "terms.svg") is axes and axes.get_title() == ""
+    assert lw.plots.term_cost(str(lines), ax=axes, path=tmp_path / "terms.svg") is axes
+    assert axes.get_title() == ""
     assert (tmp_path / "terms.svg").stat().st_size > 5000
 
 
@@ -96,7 +102,8 @@ def test_measured_rows_fit_the_pictures(scene):
     drag = {"type": "drag", "linear": [1.0] * 6}
     named = lw.Scene(scene.vehicle, scene.environment, [drag, waves], scene.start)
     costs = {row["term"]: row for row in lw.term_cost(named, h=0.1)}
-    assert list(costs) == ["none", "drag", "waves", "all terms"] and costs["none"]["more_than_none"] == 0.0
+    assert list(costs) == ["none", "drag", "waves", "all terms"]
+    assert costs["none"]["more_than_none"] == 0.0
     # A sum of sines costs more than nothing, and less than with drag beside it, on a machine however busy.
     assert costs["none"]["ns_per_vehicle_step"] < costs["waves"]["ns_per_vehicle_step"]
     lw.plots.term_cost(costs.values())

@@ -71,7 +71,8 @@ def test_an_attitude_is_of_a_member_that_goes_on():
     result, _ = turning(1.0, [0.0, np.nan, np.nan, 0.0])
     axes = lw.plots.attitude(result)
     path = next(line for line in axes.lines if line.get_label() == "forward (x)")
-    assert np.isfinite(np.asarray(path.get_data_3d())).all() and path.get_data_3d()[0].size == 61
+    assert np.isfinite(np.asarray(path.get_data_3d())).all()
+    assert path.get_data_3d()[0].size == 61
 
 
 def test_a_folder_that_is_not_there_is_named(tmp_path):
@@ -80,4 +81,5 @@ def test_a_folder_that_is_not_there_is_named(tmp_path):
     for write in (lambda: lw.plots.fan(result, path=path), lambda: lw.log_rerun(result, path.with_suffix(".rrd"))):
         with pytest.raises(FileNotFoundError) as missing:
             write()
-        assert missing.value.filename == str(path.parent) and "no such folder" in str(missing.value)
+        assert missing.value.filename == str(path.parent)
+        assert "no such folder" in str(missing.value)

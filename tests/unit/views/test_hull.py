@@ -17,7 +17,8 @@ def test_a_hull_has_the_size_of_its_shape(length, diameter):
     of_hull = hull.points[hull.parts < 2]
     np.testing.assert_allclose(np.ptp(of_hull, axis=0), [length, diameter, diameter], rtol=1e-6)
     np.testing.assert_allclose(of_hull[:, 0].max(), 0.5 * length, rtol=1e-6)
-    assert np.isfinite(hull.points).all() and np.isfinite(hull.normals).all()
+    assert np.isfinite(hull.points).all()
+    assert np.isfinite(hull.normals).all()
     np.testing.assert_allclose(np.linalg.norm(hull.normals, axis=1), 1.0, rtol=1e-6)
     assert hull.triangles.max() == len(hull.points) - 1
 
@@ -35,7 +36,8 @@ def test_its_normals_and_triangles_point_outward():
 
 def test_nose_and_fin_tell_the_attitude():
     hull = hulls.hull_of(2.0, 0.5)
-    assert (hull.points[hull.parts == 1, 0] > 0.75).all() and (hull.points[hull.parts == 2, 2] < -0.1).all()
+    assert (hull.points[hull.parts == 1, 0] > 0.75).all()
+    assert (hull.points[hull.parts == 2, 2] < -0.1).all()
     colors = hull.colors((10, 20, 30))
     assert {tuple(color) for color in colors.tolist()} == {(10, 20, 30), hulls.LIGHT, hulls.FIN}
 
@@ -47,7 +49,8 @@ def test_without_a_shape_the_hull_holds_the_displaced_water():
     parameters = {name: np.asarray(value, dtype=float)[None] for name, value in scene.parameters().items()}
     shape, words = hulls.shape_of(scene.to_dict(), parameters)
     assert np.pi / 6.0 * shape.length * shape.diameter**2 == pytest.approx(0.03)
-    assert shape.length == pytest.approx(4.0 * shape.diameter) and "no [vehicle.shape] is given" in words
+    assert shape.length == pytest.approx(4.0 * shape.diameter)
+    assert "no [vehicle.shape] is given" in words
 
 
 def glb(path, size=2.0, **changes):
@@ -79,7 +82,8 @@ def glb(path, size=2.0, **changes):
 def test_a_mesh_is_read_with_its_size(tmp_path):
     path = glb(tmp_path / "hull.glb", 3.0)
     mesh = hulls.mesh_of(str(path))
-    assert mesh.length == 3.0 and mesh.content == path.read_bytes()
+    assert mesh.length == 3.0
+    assert mesh.content == path.read_bytes()
 
 
 @pytest.mark.parametrize(
@@ -105,4 +109,5 @@ def test_what_is_no_mesh_is_refused_in_one_line(tmp_path, content, words):
         path.write_bytes(content)
     with pytest.raises(lw.SceneError, match=words) as caught:
         hulls.mesh_of(str(path))
-    assert len(caught.value.faults) == 1 and "length and diameter" in str(caught.value)
+    assert len(caught.value.faults) == 1
+    assert "length and diameter" in str(caught.value)

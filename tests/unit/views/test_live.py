@@ -65,7 +65,8 @@ def test_every_member_is_drawn_once_in_its_outcomes_colour(grown):
 def test_the_text_has_the_counts_so_far(grown):
     result, path = grown
     text = text_of(path, "/run/summary")
-    assert "30 of 80 members done: " in text and "60 of 80 members done: " in text
+    assert "30 of 80 members done: " in text
+    assert "60 of 80 members done: " in text
     assert text.index("30 of 80") < text.index("60 of 80") < text.index("'80 members done: ")
     for name, number in result.status.counts().items():
         assert f"{name} {number}" in text[text.index("'80 members done: ") :]
@@ -75,7 +76,8 @@ def test_curves_are_of_single_members_while_under_way(grown):
     result, path = grown
     names = {chunk.entity_path for chunk in RrdReader(path).stream().filter(content="/curves/height/**")}
     members = sorted(int(name.rsplit("/", 1)[1]) for name in names)
-    assert len(members) == 40 and members[0] < 30 < members[-1]
+    assert len(members) == 40
+    assert members[0] < 30 < members[-1]
     counted = under_way(result)
     assert not counted[:, members].all()
     for member in members:
@@ -114,7 +116,8 @@ def test_a_viewer_gets_what_the_file_gets(tmp_path):
     with receiver(tmp_path / "sent.rrd") as address:
         lw.log_rerun(fleet(20), tmp_path / "written.rrd", to=address)
     sent, written = (rows(tmp_path / name, "/world/bodies/ok", "translations") for name in ("sent.rrd", "written.rrd"))
-    assert sent == written and len(sent) == 31
+    assert sent == written
+    assert len(sent) == 31
 
 
 def test_a_viewer_that_is_closed_ends_the_view_and_not_the_run(tmp_path):
@@ -163,13 +166,15 @@ def test_run_shows_members_as_they_are_done_then_the_whole_run(tmp_path, capsys)
     ]
     with receiver(tmp_path / "sent.rrd") as address:
         assert cli.main([*command, "--set", "run.save_every=0.5", "--live", "--viewer", address]) == 0
-    assert "fleet.rrd" in capsys.readouterr().out and (tmp_path / "fleet.rrd").exists()
+    assert "fleet.rrd" in capsys.readouterr().out
+    assert (tmp_path / "fleet.rrd").exists()
     entries = {entry.recording_id[:5]: entry for entry in RrdReader(tmp_path / "sent.rrd").recordings()}
     (whole,) = (entry for start, entry in entries.items() if start != "live_")
     poses = rows(tmp_path / "sent.rrd", "/world/from_0/bodies/ok", "translations", entries["live_"])
     assert "20 members done: ok 20" in text_of(tmp_path / "sent.rrd", "/run/summary", entries["live_"])
     assert "| outcome | ok 20 |" in text_of(tmp_path / "sent.rrd", "/run/summary", whole)
-    assert sorted(poses) == [0.0, 0.5, 1.0, 1.5, 2.0] and all(len(frame) == 20 for frame in poses.values())
+    assert sorted(poses) == [0.0, 0.5, 1.0, 1.5, 2.0]
+    assert all(len(frame) == 20 for frame in poses.values())
 
 
 # What peers that are no viewer say to whoever comes: nothing; settings of HTTP/2 and nothing more; settings and an answer that
@@ -221,7 +226,9 @@ def test_what_is_no_viewer_is_named_with_the_remedy(tmp_path, monkeypatch, capsy
                 ask()
         assert cli.main(run) == 1
     said = capsys.readouterr().err
-    assert said.count("\n") == 2 and "is no viewer" in said and not (tmp_path / "run").exists()
+    assert said.count("\n") == 2
+    assert "is no viewer" in said
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_viewer_that_falls_silent_ends_the_sending(tmp_path, monkeypatch):
@@ -256,7 +263,9 @@ def test_a_viewer_that_falls_silent_ends_the_sending(tmp_path, monkeypatch):
 def test_live_is_refused_where_it_shows_nothing(options, words, tmp_path, capsys):
     assert cli.main(["run", str(ROOT / "examples" / "paper.toml"), "--out", str(tmp_path / "run"), *options]) == 2
     said = capsys.readouterr().err
-    assert words in said and said.count("\n") == 1 and not (tmp_path / "run").exists()
+    assert words in said
+    assert said.count("\n") == 1
+    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize(
@@ -280,5 +289,7 @@ def test_a_viewer_that_does_not_start_is_told_of(tmp_path, monkeypatch, text, wo
 def test_an_open_viewer_is_used(tmp_path, monkeypatch):
     with receiver(tmp_path / "sent.rrd") as address:
         monkeypatch.setattr(viewer, "ADDRESS", address)
-        assert viewer.is_open() and viewer.opened(None) == address and viewer.opened(address) == address
+        assert viewer.is_open()
+        assert viewer.opened(None) == address
+        assert viewer.opened(address) == address
         lw.log_rerun(fleet(3, 5), to=address)

@@ -125,19 +125,23 @@ def test_colours_change_when_members_end(mixed, path):
         for member in np.flatnonzero(mixed.status == code):
             before, after = (max(t for t in count if t <= end[member] + side) for side in (-1e-9, spacing + 1e-9))
             ended = (end[mixed.status == code] < after - 1e-9).sum()
-            assert count[after] == ended and count[before] < ended
+            assert count[after] == ended
+            assert count[before] < ended
         assert count[mixed.time[-1]] == (mixed.status == code).sum()
 
 
 def test_texts_have_the_counts_and_ten_lines(mixed, path):
     summary = text_of(path, "/run/summary")
     counts = ", ".join(f"{name} {number:,}" for name, number in mixed.status.counts().items())
-    assert f"| outcome | {counts} |" in summary and "| members | 40, all drawn, all in the curves |" in summary
+    assert f"| outcome | {counts} |" in summary
+    assert "| members | 40, all drawn, all in the curves |" in summary
     assert summary.count("|\\n| ") == 10
-    assert "surface and floor at 16 m; grid of 10 m" in summary and "seed | 1" in summary
+    assert "surface and floor at 16 m; grid of 10 m" in summary
+    assert "seed | 1" in summary
     log = text_of(path, "/log")
     first = int(np.flatnonzero(mixed.status == Status.FLOOR)[stop_time(mixed)[mixed.status == Status.FLOOR].argmin()])
-    assert f"first: member {first} at {mixed.failure_time[first]:g} s" in log and "value 1.5" in log
+    assert f"first: member {first} at {mixed.failure_time[first]:g} s" in log
+    assert "value 1.5" in log
     assert '"seed": 1' in text_of(path, "/run/provenance")
 
 
@@ -161,7 +165,8 @@ def test_two_recordings_together_are_each_as_alone(mixed, path, tmp_path):
     program = str(Path(rerun_cli.__file__).with_name("rerun"))
     subprocess.run([program, "rrd", "merge", str(path), str(other), "-o", str(both)], check=True, capture_output=True)
     entries = {entry.recording_id: entry for entry in RrdReader(both).recordings()}
-    assert len(entries) == 2 and len({entry.application_id for entry in entries.values()}) == 2
+    assert len(entries) == 2
+    assert len({entry.application_id for entry in entries.values()}) == 2
     for alone in (path, other):
         (entry,) = RrdReader(alone).recordings()
         for entity, ending in (("/world/bodies/ok", "translations"), ("/curves/height/median", "scalars")):
@@ -185,7 +190,8 @@ def test_the_ellipsoid_holds_those_under_way_and_stays_in_the_water():
     cloud[..., 2] = rng.exponential(2.0, size=(2, 4000))
     spread = drawn.drawn_of(made(cloud)).spread
     top = spread.center[0, 2] - np.linalg.norm(spread.axes[0][2] * spread.half[0])
-    assert top > -0.2 and cloud[0, :, 2].mean() - 2.8 * cloud[0, :, 2].std() < -3.0
+    assert top > -0.2
+    assert cloud[0, :, 2].mean() - 2.8 * cloud[0, :, 2].std() < -3.0
     along = (cloud[0] - spread.center[0]) @ spread.axes[0] / spread.half[0]
     np.testing.assert_allclose((np.abs(along) <= 1.0).mean(axis=0), 0.95, atol=0.002)
     np.testing.assert_allclose(np.linalg.det(spread.axes), 1.0, rtol=1e-6)
@@ -272,7 +278,8 @@ def test_the_eye_sees_the_whole_box(spans, aspect):
     depth = corners @ layout.SIGHT + far
     across, above = corners @ right / depth, corners @ np.cross(right, layout.SIGHT) / depth
     inside = max(np.abs(across).max() / aspect, np.abs(above).max()) / np.tan(np.radians(27.5))
-    assert (depth > 0.0).all() and inside == pytest.approx(0.9)
+    assert (depth > 0.0).all()
+    assert inside == pytest.approx(0.9)
 
 
 @pytest.mark.parametrize("span", [(30.0, 30.0, 15.0), (600.0, 40.0, 60.0), (2.0, 3.0, 900.0), (0.1, 0.1, 0.1)])
@@ -287,7 +294,8 @@ def test_a_hull_across_the_sight_is_25_by_5_pixels_wherever_it_is(span, many):
     eye = 0.5 * (box.low + box.high) - layout.distance(box.low, box.high, layout.ASPECT / many) * layout.SIGHT
     pixels = 600.0 / (2.0 * np.tan(np.radians(27.5)) * ((corners - eye) @ layout.SIGHT))
     length, diameter = 1.33, 0.191
-    assert (scale * length * pixels).min() >= 25.0 and (scale * diameter * pixels).min() >= 5.0
+    assert (scale * length * pixels).min() >= 25.0
+    assert (scale * diameter * pixels).min() >= 5.0
     least = (scale - 1) * min(length / 25.0, diameter / 5.0) * pixels.min()
     assert scale == 1 or least < 1.4, "no larger than is needed"
 
@@ -307,7 +315,8 @@ def test_each_run_has_its_own_floors(tmp_path):
     assert drawn_planes["one"] == sorted(["floor", "floor_grid", *surface])
     assert drawn_planes["none"] == sorted(["depth_grid", *surface])
     assert drawn_planes["two"] == sorted(["floor", "floor_grid", "floor_1", "floor_1_grid", *surface])
-    assert "floor at 16 m" in text_of(path, "/run/summary/one") and "no floor" in text_of(path, "/run/summary/none")
+    assert "floor at 16 m" in text_of(path, "/run/summary/one")
+    assert "no floor" in text_of(path, "/run/summary/none")
     assert "floor at 18 and 25 m" in text_of(path, "/run/summary/two")
 
 
@@ -316,7 +325,8 @@ def test_outcomes_of_compared_runs_have_marks_of_their_own(tmp_path):
     path = lw.log_rerun({"a": fleet(40), "b": fleet(40, seed=2)}, tmp_path / "both.rrd")
     marks = {name: text_of(path, f"/members/a/{name}/marks") for name in ("floor", "surface", "non_finite")}
     shapes = {name: re.search(r"markers.*?\[(\d+)\]|\[(\d+)\]", text) for name, text in marks.items()}
-    assert all(shapes.values()) and len(set(marks.values())) == 3
+    assert all(shapes.values())
+    assert len(set(marks.values())) == 3
     assert "/members/a/under_way/marks" not in entities(path)
     alone = lw.log_rerun(fleet(40), tmp_path / "alone.rrd")
     assert not any(name.endswith("/marks") for name in entities(alone))
@@ -342,8 +352,10 @@ def test_members_that_ended_stand_out_from_the_floor():
 def test_all_bodies_lie_in_the_box(mixed):
     for result in (mixed, made(np.zeros((2, 1, 3)) + 5.0), fleet(3, 5)):
         box = world.box_of([drawn.drawn_of(result)])
-        assert (result.position >= box.low - 1e-5).all() and (result.position <= box.high + 1e-5).all()
-        assert box.size > 0.0 and (box.high > box.low).all()
+        assert (result.position >= box.low - 1e-5).all()
+        assert (result.position <= box.high + 1e-5).all()
+        assert box.size > 0.0
+        assert (box.high > box.low).all()
 
 
 ODD = {
@@ -371,7 +383,8 @@ def test_odd_runs_have_a_recording_that_fits(name, tmp_path):
     bands = {"/curves/height/all", "/curves/height/90_percent", "/curves/height/50_percent"}
     assert bool(bands & names) == (result.members > 1)
     assert ("SaveAt(every=...)" in summary) == (len(result.time) < 3)
-    assert "nan" not in summary and "1 members" not in summary
+    assert "nan" not in summary
+    assert "1 members" not in summary
     counts = ", ".join(f"{name} {number}" for name, number in result.status.counts().items())
     assert f"| outcome | {counts} |" in summary
     poses = [rows(path, one, "translations") for one in names if one.startswith("/world/bodies/")]
@@ -424,7 +437,8 @@ def test_the_runs_own_statistics_make_the_fan_where_no_samples_of_all_were_kept(
     height, *others = drawn.drawn_of(lean(mixed, statistics=statistics)).fans
     expected = np.quantile(-depth, drawn.LEVELS, axis=1)
     np.testing.assert_allclose(height.levels, expected, rtol=1e-6)
-    assert height.title.endswith("by the run's statistics") and not any("by the run" in fan.title for fan in others)
+    assert height.title.endswith("by the run's statistics")
+    assert not any("by the run" in fan.title for fan in others)
     assert np.abs(drawn.drawn_of(lean(mixed)).fans[0].levels - expected).max() > 0.1
 
 
@@ -456,7 +470,8 @@ def test_a_mesh_is_drawn_times_a_whole_number(tmp_path):
     run = drawn.drawn_of(result)
     box = world.box_of([run])
     scale = world.scale_of(run, box)
-    assert scale > 5 and rows(path, "/world/bodies/ok", "scales")[1.0][0] == [scale] * 3
+    assert scale > 5
+    assert rows(path, "/world/bodies/ok", "scales")[1.0][0] == [scale] * 3
     assert f"drawn {scale} times their size" in text_of(path, "/run/summary")
     mesh.unlink()
     with pytest.raises(lw.SceneError, match=r"vehicle\.shape\.mesh = 'hull\.glb': cannot be read"):
@@ -491,7 +506,8 @@ def test_a_disk_that_is_full(tmp_path, mixed, monkeypatch):
     monkeypatch.setattr(rr.RecordingStream, "flush", flush)
     with pytest.raises(OSError, match="is the disk full"):
         lw.log_rerun(mixed, old)
-    assert [path.name for path in tmp_path.iterdir()] == ["fleet.rrd"] and old.read_bytes() == b"before"
+    assert [path.name for path in tmp_path.iterdir()] == ["fleet.rrd"]
+    assert old.read_bytes() == b"before"
 
 
 @pytest.mark.parametrize(
@@ -565,7 +581,8 @@ def test_2000_members_take_no_second(tmp_path):
         begun = time.process_time()
         path = lw.log_rerun(large, tmp_path / "large.rrd")
         costs.append(time.process_time() - begun)
-    assert min(costs) < 1.0 and path.stat().st_size < 8e6
+    assert min(costs) < 1.0
+    assert path.stat().st_size < 8e6
 
 
 @pytest.mark.slow
@@ -573,7 +590,8 @@ def test_100000_members_take_5_seconds(tmp_path):
     large = fleet(100_000, 200)
     begun = time.process_time()
     path = lw.log_rerun(large, tmp_path / "large.rrd")
-    assert time.process_time() - begun < 5.0 and path.stat().st_size < 15e6
+    assert time.process_time() - begun < 5.0
+    assert path.stat().st_size < 15e6
 
 
 def test_the_ten_lines_have_room(mixed):
@@ -581,4 +599,5 @@ def test_the_ten_lines_have_room(mixed):
     run = drawn.drawn_of(mixed)
     box = world.box_of([run])
     told = ten_words.lines(run, box, world.scale_of(run, box))
-    assert len(told) == 10 and max(map(len, told.values())) <= 66, told
+    assert len(told) == 10, told
+    assert max(map(len, told.values())) <= 66, told

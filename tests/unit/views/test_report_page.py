@@ -72,7 +72,9 @@ def last_pre(text):
 
 def test_the_scene_is_as_the_user_wrote_it(tmp_path):
     text = page_of(of_file(tmp_path, overrides={"vehicle.buoyancy": "286.0", "ensemble.members": "3"}), tmp_path)
-    assert last_pre(text) == TEXT and "<title>dive: remus_100</title>" in text and "<h1>dive: remus_100</h1>" in text
+    assert last_pre(text) == TEXT
+    assert "<title>dive: remus_100</title>" in text
+    assert "<h1>dive: remus_100</h1>" in text
     assert "lgvi-warp run dive.toml --set vehicle.buoyancy=286.0 --set ensemble.members=3</pre>" in text
     assert time.strftime("%Y-%m-%d") in text
 
@@ -101,7 +103,8 @@ def test_an_ensemble_of_python_is_in_the_scene_that_runs_it_again(tmp_path, tail
     drawn = lw.Ensemble(scene, members=4, seed=7, vary=vary, sampling=sampling).subset([1, 3])
     command, said, text = again(with_ensemble(result, drawn).provenance)
     assert command == "lgvi-warp run dive.toml --set vehicle.buoyancy=286.0"
-    assert "given in Python" in said and "# A heavy REMUS, as ballasted in May." in text
+    assert "given in Python" in said
+    assert "# A heavy REMUS, as ballasted in May." in text
     (tmp_path / "dive.toml").write_text(text)
     loaded = lw.Ensemble.from_scene(lw.Scene.load(tmp_path / "dive.toml", {"vehicle.buoyancy": "286.0"}))
     ours, theirs = (ensemble.select(0, 2) for ensemble in (drawn, loaded))
@@ -109,7 +112,9 @@ def test_an_ensemble_of_python_is_in_the_scene_that_runs_it_again(tmp_path, tail
     np.testing.assert_array_equal(ours.parameters["vehicle.buoyancy"], theirs.parameters["vehicle.buoyancy"])
     # The scene's own ensemble is no such one.
     command, said, text = again(with_ensemble(result, lw.Ensemble.from_scene(scene)).provenance)
-    assert text == TEXT + tail and "--set ensemble.members=3" in command and "Python" not in said
+    assert text == TEXT + tail
+    assert "--set ensemble.members=3" in command
+    assert "Python" not in said
 
 
 def test_numbers_of_python_are_in_no_file(tmp_path):
@@ -119,7 +124,9 @@ def test_numbers_of_python_are_in_no_file(tmp_path):
         scene, np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), np.ones((2, 3))
     )
     command, said, text = again(with_ensemble(result, given).provenance)
-    assert command is None and "run the script again" in said and text == TEXT
+    assert command is None
+    assert "run the script again" in said
+    assert text == TEXT
 
 
 def test_a_scene_of_no_file_names_its_vehicle(tmp_path):
@@ -129,7 +136,8 @@ def test_a_scene_of_no_file_names_its_vehicle(tmp_path):
         "remus_100", vehicle={"buoyancy": 285.0}, terms=[{"type": "current", "velocity": [0.1, 0.0, 0.0]}]
     )
     short = shortened(scene.to_dict())
-    assert short["vehicle"] == {"name": "remus_100", "buoyancy": 285.0} and len(short["terms"]) == 1
+    assert short["vehicle"] == {"name": "remus_100", "buoyancy": 285.0}
+    assert len(short["terms"]) == 1
     page = page_of(with_ensemble(fleet(scene=scene), lw.Ensemble.from_scene(scene)), tmp_path)
     assert lw.Scene.from_dict(tomllib.loads(last_pre(page))).to_dict() == scene.to_dict()
     # Where the vehicle's own terms are not there, its numbers are written out.
@@ -144,7 +152,8 @@ def test_what_a_file_says_is_text(tmp_path):
     result = of_file(tmp_path, TEXT + "# </pre><script>alert(1)</script>\n")
     result.provenance["source"]["file"] = "<b>;rm -rf.toml"
     text = page_of(result, tmp_path)
-    assert "<script>" not in text and "<b>" not in text
+    assert "<script>" not in text
+    assert "<b>" not in text
     assert "lgvi-warp run '<b>;rm -rf.toml'" in unescape(text)
 
 
@@ -175,7 +184,8 @@ def test_pictures_suit_the_run(tmp_path):
     marks = {one.get_label(): len(one.get_offsets()) for one in axes.collections}
     counts = ends.status.counts()
     assert marks == {f"{name} ({number})": number for name, number in counts.items()}
-    assert "vehicle.buoyancy" in varied(varies) and "vehicle.center_of_buoyancy" not in varied(varies)
+    assert "vehicle.buoyancy" in varied(varies)
+    assert "vehicle.center_of_buoyancy" not in varied(varies)
 
 
 def test_faults_are_told(tmp_path):
@@ -195,10 +205,11 @@ def sweep_in(folder):
 def test_a_sweep_has_a_page(tmp_path):
     sweep_in(tmp_path)
     text = page_of(tmp_path, tmp_path)
-    assert "lqr passes &lt;95 %&gt; of 20" in text and "<td>lqr</td><td>0.95</td>" in text
-    assert (
-        text.count("<img") == 1 and f"<h1>Sweep of {tmp_path.name}</h1>" in text and "&quot;members&quot;: 20" in text
-    )
+    assert "lqr passes &lt;95 %&gt; of 20" in text
+    assert "<td>lqr</td><td>0.95</td>" in text
+    assert text.count("<img") == 1
+    assert f"<h1>Sweep of {tmp_path.name}</h1>" in text
+    assert "&quot;members&quot;: 20" in text
 
 
 def test_pictures_of_a_sweep_come_after_its_date_in_their_order(tmp_path):
@@ -227,8 +238,11 @@ def test_a_folder_of_several_has_all_of_them(tmp_path):
     (tmp_path / "fleet.png").write_bytes(b"an old picture of the run, which is drawn anew")
     text = page_of(tmp_path, tmp_path)
     for name in ("stability_mass", "stability_omega", "sensitivity"):
-        assert f"<td>{name}</td>" in text and f'<img alt="{name}"' in text
-    assert "<h1>remus_100</h1>" in text and 'alt="fleet"' not in text and "<td>lqr</td>" in text
+        assert f"<td>{name}</td>" in text
+        assert f'<img alt="{name}"' in text
+    assert "<h1>remus_100</h1>" in text
+    assert 'alt="fleet"' not in text
+    assert "<td>lqr</td>" in text
     assert text.count("<svg") == 2
 
 
@@ -236,7 +250,8 @@ def test_a_folder_of_several_has_all_of_them(tmp_path):
 def test_a_damaged_study_is_told_in_a_line(tmp_path, damage, capsys):
     (tmp_path / "tradeoff.json").write_text(damage)
     assert cli.main(["report", str(tmp_path)]) == 2
-    assert "tradeoff.json: is damaged" in capsys.readouterr().err and not (tmp_path / "report.html").exists()
+    assert "tradeoff.json: is damaged" in capsys.readouterr().err
+    assert not (tmp_path / "report.html").exists()
 
 
 WITHOUT = {
@@ -269,4 +284,5 @@ def test_a_plain_install_ends_in_a_line_and_one_exit_code(verb, tmp_path, monkey
     assert re.fullmatch(r"lgvi-warp: .* need .*: pip install 'lgvi-warp\[\w+\]'\n", said.err.rpartition("\r")[2]), (
         said.err
     )
-    assert "Traceback" not in said.err and not (tmp_path / "report.html").exists()
+    assert "Traceback" not in said.err
+    assert not (tmp_path / "report.html").exists()

@@ -72,7 +72,8 @@ def test_commands_have_their_limits_and_faults():
 def test_faults_are_those_that_begin_during_the_run():
     result = steered()
     (fault,) = faults(result)
-    assert fault.time == 40.0 and faults(dataclasses.replace(result, time=result.time / 2.0)) == []
+    assert fault.time == 40.0
+    assert faults(dataclasses.replace(result, time=result.time / 2.0)) == []
     parts = AUTOPILOT.to_dict()
     parts["controller"]["faults"] += [
         {"name": "late", "type": "fault", "of": "compass", "time": float("inf")},

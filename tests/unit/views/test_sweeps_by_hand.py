@@ -86,25 +86,30 @@ def test_success_by_case_and_when_names_stand_upright():
         assert places == list(range(len(names)))
         np.testing.assert_allclose(values, expected[:, 0])
         np.testing.assert_allclose(ends[:, :, 1], expected[:, 1:])
-        assert look(container[0])[1:] == ("o", "None") and axes.get_ylabel() == "passes [%], 90% interval"
+        assert look(container[0])[1:] == ("o", "None")
+        assert axes.get_ylabel() == "passes [%], 90% interval"
         labels = axes.get_xticklabels()
-        assert [label.get_text() for label in labels] == list(names) and labels[0].get_rotation() == turned
-        assert axes.get_legend() is None and axes.figure.get_size_inches().tolist() == [8.0, 5.0]
-        assert (
-            container[2][0].get_linewidth()[0] > 0 and container[1][0].get_markersize() == 8.0
-        )  # caps of 4 to each side
+        assert [label.get_text() for label in labels] == list(names)
+        assert labels[0].get_rotation() == turned
+        assert axes.get_legend() is None
+        assert axes.figure.get_size_inches().tolist() == [8.0, 5.0]
+        assert container[2][0].get_linewidth()[0] > 0
+        assert container[1][0].get_markersize() == 8.0
 
 
 def test_success_over_an_axis_has_places_by_value():
     found = swept(lambda i: 0.5, {"delay": [0.5, 2.0, 4], "gain": [1.0]}, refused=(0, 3, 4, 5))
     (axes,) = sweeps.plot_success(found)
     (container,) = axes.containers
-    assert bars(container)[0] == [2.0, 4.0] and look(container[0]) == (sweeps.COLORS[0], "o", "-")
+    assert bars(container)[0] == [2.0, 4.0]
+    assert look(container[0]) == (sweeps.COLORS[0], "o", "-")
     assert [label.get_text() for label in axes.get_legend().get_texts()] == ["a"]
-    assert axes.get_xticks().tolist() == [0.5, 2.0, 4.0] and axes.get_xlabel() == "delay"
+    assert axes.get_xticks().tolist() == [0.5, 2.0, 4.0]
+    assert axes.get_xlabel() == "delay"
     assert [label.get_text() for label in axes.get_xticklabels()] == ["0.5", "2.0", "4"]
     named = sweeps.plot_success(swept(lambda i: 0.5, {"law": ["p", 3.0]}))[0]
-    assert bars(named.containers[1])[0] == [0.0, 1.0] and look(named.containers[1][0]) == (sweeps.COLORS[1], "s", "--")
+    assert bars(named.containers[1])[0] == [0.0, 1.0]
+    assert look(named.containers[1][0]) == (sweeps.COLORS[1], "s", "--")
     assert named.get_xticks().tolist() == [0.0, 1.0]
     endless = sweeps.plot_success(swept(lambda i: 0.5, {"gain": [3.0, float("inf")]}))[0]
     assert endless.get_xticks().tolist() == [0.0, 1.0]
@@ -120,8 +125,11 @@ def test_a_map_has_a_field_for_each_point():
     assert [panel.get_title() for panel in panels] == ["a: passes [%]", "b: passes [%]"]
     assert (panels[0].get_xlabel(), panels[0].get_ylabel(), panels[1].get_ylabel()) == ("x", "y", "")
     image = panels[0].get_images()[0]
-    assert image.get_array().shape == (2, 3) and image.get_clim() == (0.0, 100.0) and image.origin == "lower"
-    assert image.get_cmap().name == "viridis" and panels[0].get_aspect() == "auto"
+    assert image.get_array().shape == (2, 3)
+    assert image.get_clim() == (0.0, 100.0)
+    assert image.origin == "lower"
+    assert image.get_cmap().name == "viridis"
+    assert panels[0].get_aspect() == "auto"
     assert [tick.get_text() for tick in panels[0].get_xticklabels()] == ["1", "2", "3"]
     assert [tick.get_text() for tick in panels[0].get_yticklabels()] == ["5", "6"]
     words = {text.get_position(): text for text in panels[0].texts}
@@ -134,11 +142,13 @@ def test_a_map_has_a_field_for_each_point():
         if (j, i) == (0, 1):
             continue
         value, lower, upper = 100.0 * np.array(found.success("a", point))
-        assert text.get_text() == f"{value:.1f}\n{lower:.1f} to {upper:.1f}" and image.get_array()[i, j] == value
+        assert text.get_text() == f"{value:.1f}\n{lower:.1f} to {upper:.1f}"
+        assert image.get_array()[i, j] == value
         assert text.get_color() == ("white" if value < 50.0 else "black")
         assert (text.get_fontsize(), text.get_ha(), text.get_va()) == (8, "center", "center")
     exact = sweeps.plot_success(swept(lambda i: 0.5, {"x": [1, 2], "y": [1, 2]}))
-    assert {text.get_color() for text in exact[0].texts} == {"black"} and exact[0].figure.get_suptitle() == ""
+    assert {text.get_color() for text in exact[0].texts} == {"black"}
+    assert exact[0].figure.get_suptitle() == ""
 
 
 def test_boxes_of_metrics():
@@ -160,8 +170,10 @@ def test_boxes_of_metrics():
     ]
     assert any(line.get_ydata()[0] == np.median(np.arange(3, N)) for line in medians)
     labels = lower.get_xticklabels()
-    assert [label.get_text() for label in labels] == ["a, 1", "a, 2", "b, 1"] and labels[0].get_rotation() == 0.0
-    assert lower.get_xlabel() == "case, delay" and lower.get_xticks().tolist() == [1, 2, 3]
+    assert [label.get_text() for label in labels] == ["a, 1", "a, 2", "b, 1"]
+    assert labels[0].get_rotation() == 0.0
+    assert lower.get_xlabel() == "case, delay"
+    assert lower.get_xticks().tolist() == [1, 2, 3]
     with pytest.raises(NothingToDraw, match="there are no metrics"):
         sweeps.plot_metrics(swept(lambda i: 0.5, metrics=()))
 
@@ -169,9 +181,9 @@ def test_boxes_of_metrics():
 def test_boxes_beyond_the_most_are_counted():
     for count, words in ((20, "case, k"), (21, "case, k; 2 more are not shown")):
         (axes,) = sweeps.plot_metrics(swept(lambda i: 0.5, {"k": list(range(count))}))
-        assert (
-            axes.get_xlabel() == words and len(axes.patches) == 40 and axes.get_xticklabels()[0].get_rotation() == 90.0
-        )
+        assert axes.get_xlabel() == words
+        assert len(axes.patches) == 40
+        assert axes.get_xticklabels()[0].get_rotation() == 90.0
         assert axes.figure.get_size_inches()[0] == 1.5 + 0.35 * 40
 
 
@@ -187,14 +199,15 @@ def test_differences_to_the_baseline():
         np.testing.assert_allclose(
             (x, *segments.get_segments()[0][:, 0]), 100.0 * np.array([d.value, d.lower, d.upper])
         )
-        assert y == place and bool(row.real) == (place == 0)
-    assert axes.get_ylim() == (1.5, -0.5) and axes.get_ylabel() == "case"
+        assert y == place
+        assert bool(row.real) == (place == 0)
+    assert axes.get_ylim() == (1.5, -0.5)
+    assert axes.get_ylabel() == "case"
     assert axes.get_xlabel() == "passes more than a [points], 90% interval"
     assert [label.get_text() for label in axes.get_yticklabels()] == ["b", "c"]
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["real", "not real"]
-    assert axes.lines[-1].get_xdata() == [0.0, 0.0] and axes.figure.get_size_inches().tolist() == pytest.approx(
-        [8.0, 2.0]
-    )
+    assert axes.lines[-1].get_xdata() == [0.0, 0.0]
+    assert axes.figure.get_size_inches().tolist() == pytest.approx([8.0, 2.0])
     with pytest.raises(NothingToDraw, match="no other case that ran"):
         sweeps.plot_differences(swept(lambda i: 0.5, cases="ab", refused=(1,)))
 
@@ -203,16 +216,20 @@ def test_causes_where_most_is_open(monkeypatch):
     found = swept(lambda i: (0.9, 0.4, 0.65)[i], cases="abc")
     (axes,) = sweeps.plot_causes(found)
     passes, fails = axes.lines
-    assert axes.get_title() == "b" and axes.get_xlabel() == "mass: explains 75.4 % of success"
+    assert axes.get_title() == "b"
+    assert axes.get_xlabel() == "mass: explains 75.4 % of success"
     assert axes.get_ylabel() == "delay: explains 25 % of success"
-    assert passes.get_xdata().tolist() == list(range(16)) and fails.get_xdata().tolist() == list(range(16, N))
-    assert fails.get_ydata().tolist() == [i**2 for i in range(16, N)] and passes.get_ydata()[-1] == 225.0
+    assert passes.get_xdata().tolist() == list(range(16))
+    assert fails.get_xdata().tolist() == list(range(16, N))
+    assert fails.get_ydata().tolist() == [i**2 for i in range(16, N)]
+    assert passes.get_ydata()[-1] == 225.0
     assert [look(line)[:2] for line in (passes, fails)] == [(sweeps.COLORS[0], "."), (sweeps.COLORS[1], "x")]
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["passes: 16", "fails: 24"]
     monkeypatch.setattr(sweeps, "MOST_POINTS", 10)
     found.__class__ = type("OneCause", (ByHand,), {"explained": ("delay",)})
     (axes,) = sweeps.plot_causes(found)
-    assert axes.get_ylabel() == "member" and axes.lines[0].get_ydata().tolist() == list(range(10))
+    assert axes.get_ylabel() == "member"
+    assert axes.lines[0].get_ydata().tolist() == list(range(10))
     assert axes.lines[0].get_xdata().tolist() == [i**2 for i in range(10)]
     found.__class__ = type("NoCause", (ByHand,), {"explained": ()})
     for nothing in (found, swept(lambda i: i % 2)):
@@ -226,14 +243,18 @@ def test_responses_by_case():
     assert found.asked == [(name, range(7), {"k": 1}, lw.SaveAt(every=0.5, fields=("position", "reference_depth"))) for name in
                            "abcd"]  # fmt: skip
     figure = panels[0].figure
-    assert figure.get_size_inches().tolist() == [13.5, 8.0] and figure.get_supylabel() == "depth [m]: 7 members"
-    assert figure.get_supxlabel() == "time [s]" and panels[0].yaxis_inverted() and panels.shape == (4,)
+    assert figure.get_size_inches().tolist() == [13.5, 8.0]
+    assert figure.get_supylabel() == "depth [m]: 7 members"
+    assert figure.get_supxlabel() == "time [s]"
+    assert panels[0].yaxis_inverted()
+    assert panels.shape == (4,)
     assert [panel.get_title() for panel in panels] == [f"{name} at k = 1" for name in "abcd"]
     assert [panel.axison for panel in figure.axes] == [True] * 4 + [False] * 2
     lines = {line.get_label(): line for line in panels[0].lines}
     np.testing.assert_allclose(lines["median"].get_ydata(), np.arange(5.0) + 13.0)
     np.testing.assert_allclose(lines["wanted"].get_ydata(), np.arange(5.0) + 15.0)
-    assert look(lines["wanted"]) == ("#000000", "None", ":") and lines["wanted"].get_linewidth() == 1.0
+    assert look(lines["wanted"]) == ("#000000", "None", ":")
+    assert lines["wanted"].get_linewidth() == 1.0
     assert "wanted" in [text.get_text() for text in panels[0].get_legend().get_texts()]
 
 
@@ -256,10 +277,13 @@ def test_responses_of_a_distance_and_their_times():
     (axes,) = sweeps.plot_responses(found, of="position")
     (asked,) = found.asked
     # 800 looks are too many: every fourth.
-    assert asked[1] == range(N) and asked[3] == lw.SaveAt(every=2.0, fields=("position", "reference_position"))
-    assert axes.figure.get_supylabel() == "position from what is wanted [m]: 40 members" and not axes.yaxis_inverted()
+    assert asked[1] == range(N)
+    assert asked[3] == lw.SaveAt(every=2.0, fields=("position", "reference_position"))
+    assert axes.figure.get_supylabel() == "position from what is wanted [m]: 40 members"
+    assert not axes.yaxis_inverted()
     lines = {line.get_label(): line for line in axes.lines}
-    assert "wanted" not in lines and set(lines["median"].get_ydata()) == {5.0}
+    assert "wanted" not in lines
+    assert set(lines["median"].get_ydata()) == {5.0}
     assert axes.figure.get_size_inches().tolist() == [4.5, 4.0]
 
 
@@ -267,4 +291,5 @@ def test_pictures_have_their_files():
     names = ["success.png", "metrics.png", "causes.png", "responses.png"]
     assert list(sweeps.pictures(swept(lambda i: 0.5, cases="a"))) == names
     two = sweeps.pictures(swept(lambda i: 0.5))
-    assert list(two) == [*names[:2], "differences.png", *names[2:]] and two["success.png"] is sweeps.plot_success
+    assert list(two) == [*names[:2], "differences.png", *names[2:]]
+    assert two["success.png"] is sweeps.plot_success

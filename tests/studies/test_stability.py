@@ -178,7 +178,7 @@ def test_a_step_on_no_axis(scene):
 
 @pytest.mark.slow
 def test_exact_drag_has_no_limit_and_explicit_drag_has(scene):
-    """h (l + 2 q |v|) / I: none for psi_s; 2.785 for rk4, whose drag grows beyond; what goes backward is refused."""
+    """h (l + 2 q |v|) / I: none for psi_s, told beyond 5; 2.785 for rk4, whose drag grows beyond; backward is refused."""
     axes = ("h", 0.02, 0.5), ("drag_number", 0.5, 500.0)
     one = lw.stability_map(scene, *axes, ["psi_s", "rk4", "kl8(psi_x)"], points=8, t1=10.0, error_time=2.0)
     drag = one.x.values * one.y.values[:, None]
@@ -187,8 +187,10 @@ def test_exact_drag_has_no_limit_and_explicit_drag_has(scene):
     assert np.all(resolved[:, :-1])
     assert not np.any(resolved[:, -1])
     assert one.judged == "dissipative"
-    assert np.all(one.classes["psi_s"][resolved] <= Cell.BOUNDED)
-    assert np.all(one.classes["psi_s"][~resolved] == Cell.FLAGGED)
+    # A splitting keeps drag bounded at any step, and loses its order where drag is stiff.
+    told = ~resolved | (drag > 5.0)
+    assert np.all(one.classes["psi_s"][~told] <= Cell.BOUNDED)
+    assert np.all(one.classes["psi_s"][told] == Cell.FLAGGED)
     assert np.all(one.statuses["psi_s"] == lw.Status.OK)
     # Beyond its limit every member of rk4 gets a status, and is frozen before or after its energy passed the bound. Short of
     # it none does, though near it the warning that its matrices leave the rotations flags some cells.

@@ -16,7 +16,7 @@ from lgvi_warp.statistics.base import Statistic
 
 # Users give the parameters of what scene files name by type, and call no methods of it.
 NAMED_IN_FILES = (lw.Term, Distribution, Sampling, Statistic)
-SECTION = r"^(Args|Attributes|Returns|Yields|Raises):\n((?:    .*(?:\n|\Z)|\n)+)"
+SECTION = r"^(Args|Attributes|Returns|Yields|Raises|Examples):\n((?:    .*(?:\n|\Z)|\n)+)"
 # A line that begins an item of a list, or any space.
 SPACE = re.compile(r"\n\s*(\* )|\s+")
 # What stands for the text of a base.

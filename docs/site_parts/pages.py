@@ -5,6 +5,7 @@ import argparse
 import inspect
 import os
 import re
+import textwrap
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -195,6 +196,8 @@ def fields(subject: Any, docstring: str) -> list[str]:
             lines += [f":{title.lower()}: {escaped(' '.join(found[title].split()))}"]
     raised = documented.entries(found.get("Raises", ""))
     lines += [f":raises {name}: {escaped(value)}" for name, value in raised.items()]
+    if "Examples" in found:
+        lines += ["", ".. code-block:: pycon", "", textwrap.indent(found["Examples"].strip(), "   ")]
     return "\n".join([*lines, ""]).splitlines()
 
 

@@ -133,6 +133,14 @@ def predict(
 
     Raises:
         SceneError: If arguments are at fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> prediction = lw.predict(fleet, h=0.1, t1=2.0)
+        >>> prediction.members, prediction.steps, prediction.seconds > 0.0
+        (8, 20, True)
     """
     from lgvi_warp.runs.settle import fields_of, make_plan
     from lgvi_warp.store.solve import settled

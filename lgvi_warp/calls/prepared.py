@@ -452,6 +452,13 @@ def prepare(
 
     Raises:
         SceneError: For faulty arguments, all in one message.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> run = lw.prepare(scene, vary=["vehicle.buoyancy"], of="depth", h=0.1, t1=2.0)
+        >>> run([[300.0], [306.0]]).shape
+        (2,)
     """
     faults = Faults()
     if not isinstance(fleet, Ensemble | Scene):

@@ -62,6 +62,14 @@ def resume(
         SceneError: If there is no run, or it is not the same run.
         OSError: If the disk cannot be written.
         MembersFailed: If members failed and the run's on_failure is "raise".
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, store="run.zarr")
+        >>> lw.resume("run.zarr").members
+        8
     """
     folder = Folder(folder_of(path))
     ensemble = Ensemble.from_scene(fleet) if isinstance(fleet, Scene) else fleet

@@ -94,6 +94,16 @@ def solve(
         MembersFailed: If members failed and on_failure is "raise".
         Interrupted: If Ctrl-C interrupts a run in memory. It is a KeyboardInterrupt whose `result` has the members that
             were finished.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0), statistics=[lw.Mean("depth")])
+        >>> result.position.shape
+        (3, 8, 3)
+        >>> print(f"{result.statistics['mean depth'].value[-1, 0]:.2f} m")
+        -0.02 m
     """
     if not isinstance(fleet, Ensemble | Scene):
         problem = "is neither an Ensemble nor a Scene"

@@ -55,6 +55,12 @@ def check_law(
 
     Raises:
         SceneError: if `term` is no term, or its device code lacks something, has a wrong signature or does not compile.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> report = lw.check_law(lw.Drag(linear=[10.0, 20.0, 20.0, 1.0, 2.0, 2.0]))
+        >>> report.ok
+        True
     """
     if not isinstance(term, Term):
         raise SceneError([f"term = {term!r}: is no term; give an object such as lw.Drag(...), not its class"])

@@ -33,6 +33,14 @@ class SceneError(ValueError):
     Attributes:
         faults: The texts, each on one line.
         more: Number of faults without a text.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> try:
+        ...     lw.Vehicle(mass=-1.0, inertia=[0.1, 0.1, 0.1])
+        ... except lw.SceneError as error:
+        ...     print(error)
+        vehicle.mass = -1.0: is not positive; give a number above 0 [kg]
     """
 
     def __init__(self, faults: Iterable[str], more: int = 0):
@@ -70,6 +78,17 @@ class MembersFailed(RuntimeError):  # noqa: N818
     Args:
         text: The message.
         result: The whole `Result` of the run, kept as an attribute.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> fast = scene.with_numbers({"start.angular_velocity": [0.0, 900.0, 0.0]})
+        >>> try:
+        ...     lw.solve(fast, "rk4", h=0.1, t1=2.0, on_failure="raise")
+        ... except lw.MembersFailed as error:
+        ...     error.result.status.counts()
+        {'non_finite': 1}
     """
 
     def __init__(self, text: str, result: Any):

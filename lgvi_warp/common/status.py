@@ -22,6 +22,16 @@ class Status(IntEnum):
     """Outcome of one member: OK, the reason of its failure, or the event that stopped it.
 
     A member that failed stays at its last good state; no other member is affected. Codes from 16 on are events.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
+        >>> result.status.counts()
+        {'ok': 8}
+        >>> lw.Status.FLOOR.text
+        'stopped by an event: sank to the sea floor'
     """
 
     OK = 0
@@ -112,6 +122,13 @@ class Warnings(IntFlag):
     """Signs that the step, the precision or a member's numbers do not suit its motion, as bits.
 
     A warning stops nothing. Of two warnings, the higher bit is the more serious.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> result = lw.solve(scene, "rk4", h=0.2, t1=1.0)
+        >>> result.warnings.counts()
+        {'munk_coarse': 1, 'restoring_coarse': 1, 'munk_unstable': 1}
     """
 
     INERTIA = 1

@@ -46,6 +46,19 @@ class Controller:
 
     Raises:
         SceneError: Where anything is wrong; the message lists every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> controller = lw.Controller(
+        ...     period=0.1,
+        ...     guidance=[lw.SetPoint(heading=0.5)],
+        ...     laws=[lw.HeadingPID(kp=1.0, ki=0.02, kd=2.0)],
+        ...     allocation=[lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
+        ... )
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]}, controller=controller)
+        >>> result = lw.solve(scene, h=0.05, t1=60.0)
+        >>> print(f"{result.euler[-1, 0, 2]:.2f} rad")
+        0.44 rad
     """
 
     period: float

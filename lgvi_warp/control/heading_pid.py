@@ -22,6 +22,19 @@ class HeadingPID(IntegralLaw):
         kd: Gain of the yaw rate [N m s/rad]; 0 by default.
         integral_limit: Largest size of I [rad s]; 1e6 by default.
         anti_windup: As of `IntegralLaw`.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> controller = lw.Controller(
+        ...     period=0.1,
+        ...     guidance=[lw.SetPoint(heading=0.5)],
+        ...     laws=[lw.HeadingPID(kp=1.0, ki=0.02, kd=2.0)],
+        ...     allocation=[lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
+        ... )
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]}, controller=controller)
+        >>> heading = lw.solve(scene, h=0.05, t1=60.0).euler[-1, 0, 2]
+        >>> print(f"{heading:.2f} rad")
+        0.44 rad
     """
 
     type: ClassVar[str] = "heading_pid"

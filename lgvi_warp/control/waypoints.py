@@ -38,6 +38,13 @@ class Waypoints(Guidance):
         gamma: Gain of "alos" [rad/(m s)]; 0.002 by default.
         at_end: At the last point "stop", the default: heading of the last leg, speed 0, the point itself as wanted position;
             or "go_on": along the last leg, beyond its end.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> points = [[0.0, 0.0, 5.0], [100.0, 0.0, 5.0], [100.0, 100.0, 5.0]]
+        >>> guidance = lw.Waypoints(points=points, speed=1.5, look_ahead=10.0, radius=5.0)
+        >>> guidance.points.shape
+        (3, 3)
     """
 
     type: ClassVar[str] = "waypoints"

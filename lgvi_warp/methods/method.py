@@ -153,6 +153,13 @@ class Method(Summarized):
 
     Raises:
         SceneError: A setting is wrong; the message names every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> method = lw.Method("psi_s", tolerance=1e-12)
+        >>> result = lw.solve(lw.Scene.named("sphere"), method, h=0.1, t1=1.0)
+        >>> result.provenance["method"]["name"]
+        'psi_s'
     """
 
     name: str = "psi_s"

@@ -33,6 +33,15 @@ class SaveAt:
 
     Raises:
         SceneError: A setting is wrong; the message names every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> result = lw.solve(scene, h=0.1, t1=2.0, save=lw.SaveAt(every=0.5, fields=("position",)))
+        >>> result.time.tolist()
+        [0.0, 0.5, 1.0, 1.5, 2.0]
+        >>> sorted(result.samples)
+        ['position']
     """
 
     every: float | None = None

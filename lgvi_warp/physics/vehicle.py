@@ -73,6 +73,16 @@ class Vehicle(Summarized):
     Raises:
         SceneError: Where a number is not finite, not positive, of the wrong shape, not symmetric or not positive definite.
             The message lists every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.Vehicle(mass=10.0, inertia=[0.1, 0.1, 0.1], added_mass=[5.0, 5.0, 5.0], buoyancy=98.0)
+        Vehicle, simple form
+          mass                10 kg
+          added_mass          diagonal [5, 5, 5] kg
+          inertia             diagonal [0.1, 0.1, 0.1] kg m2
+          buoyancy            98 N
+          center_of_buoyancy  [0, 0, 0] m
     """
 
     mass: float | None = None

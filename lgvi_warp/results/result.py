@@ -88,6 +88,17 @@ class Result(Summarized):
         compile_seconds: Time to load the kernel [s].
         compile_phases: Of this, `source` to write its C++, `clang` to compile it (0 where the cache had it), `load` [s].
         run_seconds: Time of the run without that [s].
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
+        >>> result.status.counts()
+        {'ok': 8}
+        >>> result.depth.shape
+        (3, 8)
+        >>> again = lw.Result.load(result.save("run.npz"))
     """
 
     time: np.ndarray

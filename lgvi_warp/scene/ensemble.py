@@ -58,6 +58,14 @@ class Ensemble(Summarized):
     Raises:
         SceneError: If anything is wrong; the message lists every fault. Unphysical members are counted, and the first
             of them is shown.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> vary = {"vehicle.buoyancy": lw.Normal(std=1.0), "start.velocity": lw.Normal(std=[0.1, 0.0, 0.0])}
+        >>> fleet = lw.Ensemble(scene, members=1000, seed=1, vary=vary)
+        >>> fleet.parameters(0, 1000)["vehicle.buoyancy"].shape
+        (1000,)
     """
 
     def __init__(

@@ -53,6 +53,13 @@ class Scene(Summarized):
 
     Raises:
         SceneError: If anything is wrong; the message lists every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", events=[lw.Floor(depth=40.0)])
+        >>> heavier = scene.with_numbers({"vehicle.weight": 310.0})
+        >>> scene.vehicle.weight, heavier.vehicle.weight
+        (299.0, 310.0)
     """
 
     vehicle: Vehicle

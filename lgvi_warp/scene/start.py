@@ -29,6 +29,11 @@ class Environment:
 
     Raises:
         SceneError: If a number is negative or not finite; the message lists every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.Environment(water_density=1000.0)
+        Environment(gravity=9.80665, water_density=1000.0)
     """
 
     gravity: float = 9.80665
@@ -68,6 +73,12 @@ class Start:
 
     Raises:
         SceneError: If anything is wrong; the message lists every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> start = lw.Start(position=[0.0, 0.0, 5.0], euler_deg=[0.0, 0.0, 90.0], velocity=[1.5, 0.0, 0.0])
+        >>> lw.Scene.named("remus_100", start=start).start.velocity
+        array([1.5, 0. , 0. ])
     """
 
     position: Any = None

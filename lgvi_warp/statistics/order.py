@@ -99,6 +99,14 @@ class Quantiles(Statistic):
         levels: fractions between 0 and 1; by default (0.05, 0.25, 0.5, 0.75, 0.95).
         size: number of values that each level of the sketch keeps, a power of two from 64; by default 2048. Below 256
             no block is exact, however few its members.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, statistics=[lw.Quantiles("depth", levels=[0.1, 0.9])])
+        >>> result.statistics["quantiles depth"].value.shape
+        (2, 2, 1)
     """
 
     type: ClassVar[str] = "quantiles"

@@ -108,6 +108,14 @@ class Outcome(OfEnds):
         of: "floor", "surface", the name of any event of the scene, "stopped" (by any event), a failure, or "failed" (by
             any). See `Statistic` for name and confidence.
         levels: fractions of members between 0 and 1; by default (0.05, 0.5, 0.95).
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0}, events=[lw.Floor(depth=1.0)])
+        >>> fleet = lw.Ensemble(scene, members=64, vary={"vehicle.buoyancy": lw.Normal(std=2.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=20.0, statistics=[lw.Outcome("floor")])
+        >>> print(f"{result.statistics['outcome floor'].value[-1]:.2f}")
+        0.27
     """
 
     type: ClassVar[str] = "outcome"

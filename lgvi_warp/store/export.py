@@ -47,6 +47,14 @@ def export(path: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | 
     Raises:
         SceneError: If the run is not complete or is damaged, or a library is missing.
         OSError: If the file cannot be written.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, store="run.zarr")
+        >>> print(lw.export("run.zarr", to="netcdf"))
+        run.nc
     """
     faults = Faults()
     faults.choice("to", to, FORMATS)

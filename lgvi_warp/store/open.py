@@ -129,6 +129,14 @@ def open_run(
     Raises:
         SceneError: If there is no run, or it is not complete, or a file of it is missing.
         IndexError: If there are no such members.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, store="run.zarr")
+        >>> lw.open_run("run.zarr", members=slice(2, 4)).position.shape
+        (2, 2, 3)
     """
     folder = Folder(folder_of(path))
     messages = folder.messages

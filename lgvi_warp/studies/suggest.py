@@ -183,6 +183,15 @@ def suggest(
     Raises:
         SceneError: for faulty arguments, all in one message; where noise acts that is no NoisyTerm; and where no reference is
             ten times better than the error, with the time up to which one is.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> suggestion = lw.suggest(fleet, error=1e-3, t1=2.0, methods=["rk4"], members=4, seconds=5.0)
+        >>> suggestion.settings["method"], suggestion.expected < 1e-3
+        ('rk4', True)
+        >>> result = lw.solve(fleet, t1=2.0, **suggestion.settings)
     """
     compared = compared_in(of)
     faults = Faults()

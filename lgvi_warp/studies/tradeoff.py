@@ -333,6 +333,14 @@ def tradeoff(
 
     Raises:
         SceneError: for faulty arguments, all in one message; and where no reference can be found.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> found = lw.tradeoff(fleet, t1=1.0, methods=["rk4"], members=2, seconds=2.0)
+        >>> found.front()[0].setting.method
+        'rk4'
     """
     compared = compared_in(of)
     faults = Faults()

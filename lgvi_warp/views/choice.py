@@ -76,6 +76,14 @@ def shown(result: Result, most: int = MOST_BODIES) -> Shown:
     Raises:
         NothingToDraw: No samples were kept, or no member has a finite start.
         SceneError: most is no whole number from 1, or the result is none.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
+        >>> lw.shown(result, most=3).members.tolist()
+        [0, 1, 3]
     """
     result_of(result)
     if not is_whole(most, 1):

@@ -34,6 +34,13 @@ class Drag(Term):
     Args:
         linear: Linear coefficients, (6,) [N s/m, N m s], from 0; 0 by default.
         quadratic: Quadratic coefficients, (6,) [N s2/m2, N m s2], from 0; 0 by default.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> drag = lw.Drag(quadratic=[2.0, 50.0, 50.0, 0.5, 20.0, 20.0])
+        >>> result = lw.solve(lw.Scene.named("torpedo", start={"velocity": [1.5, 0, 0]}, terms=[drag]), h=0.05, t1=10.0)
+        >>> print(f"{result.velocity[-1, 0, 0]:.2f} m/s")
+        0.81 m/s
     """
 
     type: ClassVar[str] = "drag"

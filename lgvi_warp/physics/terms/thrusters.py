@@ -61,6 +61,13 @@ class Thrusters(Term):
     Raises:
         SceneError: Where a direction has no length, times do not rise, the command is given twice, or neither a coefficient
             nor a polynomial nor a table is given; where a table does not rise, or stands beside a polynomial. Also as `Term`.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> thrusters = lw.Thrusters(position=[[-0.7, 0, 0]], direction=[[1, 0, 0]], coefficient=[4e-6], command=[1200.0])
+        >>> result = lw.solve(lw.Scene.named("torpedo", terms=[thrusters]), h=0.05, t1=1.0)
+        >>> print(f"{result.velocity[-1, 0, 0]:.2f} m/s")
+        0.16 m/s
     """
 
     type: ClassVar[str] = "thrusters"

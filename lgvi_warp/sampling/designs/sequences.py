@@ -27,6 +27,13 @@ class Sobol(Replicated):
 
     Args:
         replicates: R, the number of sequences, scrambled independently, a member of each in turn; 1 by default.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, 64, vary={"vehicle.buoyancy": lw.Normal(std=1.0)}, sampling=lw.Sobol())
+        >>> print(f"{fleet.parameters(0, 64)['vehicle.buoyancy'].mean() - scene.vehicle.buoyancy:.3f} N")
+        -0.011 N
     """
 
     kind: ClassVar[str] = "sobol"

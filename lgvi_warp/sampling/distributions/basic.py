@@ -166,6 +166,13 @@ class Normal(Distribution):
         std: Standard deviation, in the unit of the quantity.
         relative: Standard deviation as a fraction of the scene's value; instead of `std`.
         mean: Mean; by default the scene's value.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> fleet.parameters(0, 8)["vehicle.buoyancy"].round(1)
+        array([308.3, 306.5, 308.7, 309.8, 308.3, 306.9, 307.5, 308.3])
     """
 
     std: Spread | None = None

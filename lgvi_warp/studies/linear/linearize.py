@@ -148,6 +148,14 @@ def linearize(
     Raises:
         SceneError: If an argument is at fault, a part of the controller acts by chance or at some looks only, or a member that
             is a little beside the motion fails.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("bluerov2_heavy")
+        >>> steady = lw.trim(scene, speed=0.5, fixed={"pitch": 0.0}, method="psi_s", h=0.02)
+        >>> model = lw.linearize(scene, steady, period=0.1)
+        >>> model.A.shape, model.B.shape
+        ((20, 20), (20, 8))
     """
     scene = scene_of(scene)
     calm(scene, "linear models")

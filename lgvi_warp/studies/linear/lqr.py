@@ -76,6 +76,15 @@ def lqr(model: LinearModel, Q: Any, R: Any) -> Regulator:
 
     Raises:
         SceneError: If a matrix is at fault, or no gains hold every state: the message names the poles that none moves.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("bluerov2_heavy")
+        >>> steady = lw.trim(scene, speed=0.5, fixed={"pitch": 0.0}, method="psi_s", h=0.02)
+        >>> model = lw.linearize(scene, steady, period=0.1, inputs="wrench")
+        >>> regulator = lw.lqr(model, Q=[4.0] * 3 + [9.0] * 3 + [1.0] * 6, R=[0.01] * 6)
+        >>> regulator.K.shape, bool((abs(regulator.poles) < 1.0).all())
+        ((6, 12), True)
     """
     from scipy.linalg import solve_discrete_are
 

@@ -94,6 +94,13 @@ def trim(
 
     Raises:
         SceneError: If there is no such motion, or waves or noise act.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("bluerov2_heavy")
+        >>> steady = lw.trim(scene, speed=0.5, fixed={"pitch": 0.0}, method="psi_s", h=0.02)
+        >>> steady.start.velocity.round(3)
+        array([0.5, 0. , 0. ])
     """
     from scipy.optimize import least_squares
 

@@ -113,6 +113,19 @@ def tune(
 
     Raises:
         SceneError: If an argument is at fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> controller = lw.Controller(
+        ...     period=0.1,
+        ...     guidance=[lw.SetPoint(heading=0.5)],
+        ...     laws=[lw.HeadingPID(kp=1.0, ki=0.02, kd=2.0)],
+        ...     allocation=[lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
+        ... )
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]}, controller=controller)
+        >>> best = lw.tune(scene, {"heading_pid.kp": (0.5, 3.0)}, lw.IAE("heading"), budget=500, h=0.05, t1=10.0)
+        >>> print(f"{best.parameters['heading_pid.kp']:.1f}")
+        3.0
     """
     ensemble = ensemble_of(fleet)
     scene: Any = ensemble.scene

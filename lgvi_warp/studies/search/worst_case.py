@@ -100,6 +100,14 @@ def worst_case(
 
     Raises:
         SceneError: If an argument is at fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> within = {"vehicle.buoyancy": (300.0, 310.0)}
+        >>> worst = lw.worst_case(scene, within, "depth", worst="smallest", budget=400, h=0.1, t1=2.0)
+        >>> worst.parameters
+        {'vehicle.buoyancy': 310.0}
     """
     scene = scene_of(fleet)
     faults = Faults()

@@ -313,6 +313,16 @@ def stability_map(
 
     Raises:
         SceneError: for faulty arguments, all in one message; where the scene takes none of the methods; and where noise acts.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("sphere")
+        >>> found = lw.stability_map(scene, ("h", 0.01, 1.0), ("angular_velocity", 0.1, 10.0), ["psi_s"], points=4, t1=1.0)
+        >>> found.classes["psi_s"]
+        array([[0, 0, 0, 0],
+               [0, 0, 0, 0],
+               [0, 0, 1, 2],
+               [0, 1, 2, 2]])
     """
     begun, report = time.perf_counter(), callback(progress) or void
     scene = scene_of(scene)

@@ -82,6 +82,27 @@ def sweep(
     Raises:
         SceneError: If arguments are at fault; the message names every fault.
         OSError: If the folder cannot be written.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> controller = lw.Controller(
+        ...     period=0.1,
+        ...     guidance=[lw.SetPoint(heading=0.5)],
+        ...     laws=[lw.HeadingPID(kp=1.0, ki=0.02, kd=2.0)],
+        ...     allocation=[lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
+        ... )
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]}, controller=controller)
+        >>> table = lw.sweep(
+        ...     scene,
+        ...     {"slow": {}, "quick": {"heading_pid.kp": 2.0}},
+        ...     members=16,
+        ...     vary={"control_fins.area": lw.Normal(relative=0.05)},
+        ...     metrics=[lw.IAE("heading")],
+        ...     h=0.05,
+        ...     t1=30.0,
+        ... )
+        >>> table.cases, table.members_count
+        (('slow', 'quick'), 16)
     """
     setup = made(scene, cases, grid, vary, members, seed, sampling, metrics, settings)
     faults = Faults()

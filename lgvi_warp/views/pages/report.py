@@ -72,6 +72,14 @@ def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]
         ImportError: Matplotlib or tomlkit is not installed (extra: viz).
         SceneError: The folder holds no run and no study.
         OSError: The file cannot be written.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
+        >>> print(lw.report(result, "report.html"))
+        report.html
     """
     place_of(file_path("path", path))  # before anything is drawn
     if isinstance(result, str | os.PathLike):

@@ -57,6 +57,14 @@ def log_rerun(
         SceneError: There are no such members, or the vehicle's mesh cannot be read.
         OSError: The file cannot be written, no viewer answers at the address, or it ends meanwhile; then the file is whole.
         ValueError: There is no result; a SceneError, which is one, where there is neither a path nor a `to`.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
+        >>> print(lw.log_rerun(result, "fleet.rrd"))
+        fleet.rrd
     """
     viewer.rerun()
     if path is None and to is None:

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The examples in the docstrings of public names run, and print what they say."""
+
+import doctest
+import inspect
+
+import pytest
+
+import lgvi_warp as lw
+
+# Those whose kernels no other quick test needs, or that search.
+LONG = {"Until", "linearize", "lqr", "stability_map", "sweep", "tradeoff", "trim", "tune", "worst_case"}
+
+
+def examples() -> dict[str, doctest.DocTest]:
+    """Name -> the example of each public name that has one."""
+    parser = doctest.DocTestParser()
+    texts = {name: inspect.getdoc(getattr(lw, name)) or "" for name in lw.__all__ if "Examples:" in documented(name)}
+    return {name: parser.get_doctest(text, {}, name, None, None) for name, text in texts.items()}
+
+
+def documented(name: str) -> str:
+    """The docstring of the name itself, not that of a base."""
+    return vars(getattr(lw, name)).get("__doc__") or getattr(getattr(lw, name), "__doc__", "") or ""
+
+
+EXAMPLES = examples()
+
+
+def test_the_main_names_have_examples():
+    assert len(EXAMPLES) >= 30
+    assert set(EXAMPLES) >= LONG | {
+        "Scene",
+        "solve",
+        "prepare",
+        "Result",
+        "Ensemble",
+        "Controller",
+        "open_run",
+        "suggest",
+    }
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] if name in LONG else []) for name in EXAMPLES]
+)
+def test_an_example_prints_what_it_says(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    said: list[str] = []
+    result = doctest.DocTestRunner(verbose=False).run(EXAMPLES[name], out=said.append)
+    assert result.attempted >= 2
+    assert result.failed == 0, "".join(said)

@@ -139,9 +139,9 @@ class Sample:
         self.rate = float(max(np.nanmax(np.linalg.norm(start.angular_velocity, axis=1)), 2.0 * math.pi / self.t1))
         self.draws, self.fixed_draws = 0, self._fixed_draws()
 
-    def more(self, members: int) -> Sample:
-        """Make the same sample with more members."""
-        return Sample(self.whole, self.t1, members, self.samples)
+    def more(self, members: int, times: int = 1) -> Sample:
+        """Make the same sample with more members, and so many times as many times."""
+        return Sample(self.whole, self.t1, members, self.samples * times)
 
     def on_grid(self, draws: int) -> Sample:
         """Make the same sample with noise on a grid that all its runs share."""

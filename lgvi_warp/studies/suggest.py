@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -61,8 +61,8 @@ SHORT = {
 STIFFLY_DAMPED, STIFF = ("psi_x", "rkw3"), 2.0
 # A step in float32 costs at least this part of one in float64.
 LEAST_FLOAT32 = 0.4
-# Number of members that the choice is checked on.
-CHECKED = 1024
+# Number of members that the choice is checked on, and how many times as many times, where steps become no shorter than this.
+CHECKED, DENSER, SHORTER = 1024, 4, 1.1
 # The largest errors that tell how errors fall off: a 64th of the members, at least 8; below 40 members none tell.
 TAIL, FEWEST_IN_TAIL, FEWEST = 64, 8, 40
 # Chance that another fleet, as large and drawn alike, has a larger error than is expected.
@@ -227,13 +227,21 @@ def suggest(
             cause = f"{seconds:g} s were over before a step was short enough; try seconds={rounded_up(4.0 * seconds):g}"
             raise SceneError([f"{cause}. {problem}; or ask for a larger error or a shorter t1"])
         raise SceneError([f"{problem}; ask for a larger error or a shorter t1"])
-    more = sample.more(CHECKED) if sample.whole.members > sample.members else sample
+    times = times_to_check(sample, [trial.candidate for trial in trials[:FINALISTS]])
+    more = sample.more(CHECKED, times) if times > 1 or sample.whole.members > sample.members else sample
     if more is not sample:
         reference = checked_reference(more, compared, error, seconds, taken)
         more = reference.sample
     goal = error / SAFETY**0.5
     size = sample.whole.members
-    final = [refined(more, trial.candidate, reference, compared.name, goal, size) for trial in trials[:FINALISTS]]
+
+    def checked(candidate: Candidate) -> tuple[Trial, float]:
+        return refined(more, candidate, reference, compared.name, goal, size)
+
+    final = [checked(trial.candidate) for trial in trials[:FINALISTS]]
+    # Where the sample did not show what float32 rounds off, no shorter step mends it.
+    missed = [trial.candidate for trial, (_, apart) in zip(trials, final, strict=False) if apart > error]
+    final += [checked(replace(candidate, dtype="float64")) for candidate in missed if candidate.dtype == "float32"]
     final = [(trial, apart) for trial, apart in final if apart <= error] or final[:1]
     priced = list(zip(final, cost.costs([trial.plan for trial, _ in final], rounds=ROUNDS), strict=True))
     text = cost.disagreement([(trial.candidate.text, price.spread) for (trial, _), price in priced])
@@ -480,6 +488,14 @@ def lengthened(
     return good
 
 
+def times_to_check(sample: Sample, candidates: Sequence[Candidate]) -> int:
+    """Find by how much the times of comparison may grow in number for the steps of some settings: 1 where noise acts."""
+    steps = [round(float(sample.spacing) / candidate.h) for candidate in candidates]
+    grid = sample.draws or sample.fixed_draws
+    allowed = [n for n in range(1, DENSER + 1) if not grid and all(n * -(-m // n) <= SHORTER * m for m in steps)]
+    return max(allowed, default=1)
+
+
 def refined(
     sample: Sample, candidate: Candidate, reference: Reference, of: str, target: float, members: int
 ) -> tuple[Trial, float]:
@@ -489,7 +505,7 @@ def refined(
     Returns: The last trial, and the largest error expected in the fleet [unit of `of`]; after six shorter steps it may still
         miss the target.
     """
-    m = sample.allowed(round(float(sample.spacing) / candidate.h))
+    m = sample.allowed(math.ceil(float(sample.spacing) / candidate.h * (1.0 - 1e-9)))
     order = 1 if sample.draws else Method(candidate.method).order
     for left in reversed(range(7)):
         trial = tried(sample, sample.candidate(candidate.method, m, candidate.dtype), reference)

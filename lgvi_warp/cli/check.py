@@ -10,8 +10,20 @@ from typing import Any
 from lgvi_warp.cli.output import tell
 from lgvi_warp.cli.report import controller_lines
 from lgvi_warp.cli.settings import load_scene
+from lgvi_warp.cli.verb import add_shared, as_verb
 
 
+def check_arguments(verb: Any) -> None:
+    """Add the arguments of the verb check."""
+    add_shared(verb, "scene --method --step --dtype --duration --members --seed --set")
+
+
+@as_verb(
+    "check",
+    "say whether a scene can run, and which of its numbers look wrong; nothing runs",
+    check_arguments,
+    reads=True,
+)
 def check(chosen: argparse.Namespace) -> int:
     """Run the verb check: print what is odd about a scene, without running it."""
     from lgvi_warp.scene import plausibility

@@ -8,33 +8,13 @@ import gc
 import os
 import sys
 import traceback
-from collections.abc import Callable
 
-from lgvi_warp.cli.arguments import parsed, parser
-from lgvi_warp.cli.check import check
-from lgvi_warp.cli.completion import completion
-from lgvi_warp.cli.lists import list_names, new, schema, show_help
-from lgvi_warp.cli.machine import bench, info, tune
+from lgvi_warp.cli.arguments import READING, VERBS, parsed, parser
 from lgvi_warp.cli.output import print_faults
-from lgvi_warp.cli.plot import plot
-from lgvi_warp.cli.runs import predict, resume, run
 from lgvi_warp.cli.settings import RUN, out_of
 from lgvi_warp.cli.signals import Ended, Signals, Streams
-from lgvi_warp.cli.stores import export, merge, report
-from lgvi_warp.cli.studies import sensitivity, stability, sweep, tradeoff
-from lgvi_warp.cli.view import view
-from lgvi_warp.cli.warm import warm
 from lgvi_warp.common.errors import MissingExtra, SceneError
 from lgvi_warp.common.files import WRITTEN
-
-_VERBS = (run, check, resume, predict, merge, export, tradeoff, sensitivity, stability, sweep, info, bench, tune, warm,
-          new, schema, view, plot, report, completion)  # fmt: skip
-VERBS: dict[str, Callable[[argparse.Namespace], int]] = {verb.__name__: verb for verb in _VERBS}
-# plan is the name of predict before.
-VERBS |= {"list": list_names, "plan": predict, "help": show_help}
-
-# Verbs that write no files of the user's.
-READING = ("info", "check", "predict", "plan", "bench", "tune", "warm", "list", "schema", "completion", "help")
 
 
 def main(arguments: list[str] | None = None) -> int:

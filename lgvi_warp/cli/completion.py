@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from lgvi_warp.cli.arguments import COMMON, parser
 from lgvi_warp.cli.output import tell
+from lgvi_warp.cli.verb import COMMON, as_verb
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
 
 
-class Verb(NamedTuple):
+class CompletedVerb(NamedTuple):
     """A verb and the words that may follow it.
 
     options: Option -> (its help, words that may be its value; none for a file, None for an option without a value).
@@ -93,18 +93,24 @@ _lgvi_warp() {{
 """
 
 
+def completion_arguments(verb: Any) -> None:
+    """Add the arguments of the verb completion."""
+    verb.add_argument("shell", metavar="SHELL", choices=("bash", "zsh", "fish"), help="bash, zsh or fish")
+
+
+@as_verb("completion", "print what completes the command in a shell", completion_arguments, reads=True)
 def completion(chosen: argparse.Namespace) -> int:
     """Run the verb completion: print a script for a shell."""
     chosen.quiet = False
-    text = {"bash": bash, "zsh": zsh, "fish": fish}[chosen.shell](list(verbs()))
+    text = {"bash": bash, "zsh": zsh, "fish": fish}[chosen.shell](list(verbs(chosen.parser)))
     tell(chosen, lambda: {"shell": chosen.shell, "script": text}, text.rstrip)
     return 0
 
 
-def verbs() -> Iterator[Verb]:
-    """Read the verbs from the parser."""
+def verbs(parser: Any) -> Iterator[CompletedVerb]:
+    """Read the verbs from the parser of the command."""
     known = values()
-    for name, verb in parser().verbs.items():
+    for name, verb in parser.verbs.items():
         options: dict[str, tuple[str, tuple[str, ...] | None]] = {}
         words: tuple[str, ...] = ()
         for action in verb._actions:
@@ -113,10 +119,10 @@ def verbs() -> Iterator[Verb]:
                 words_of = choices or known.get(option, ())
                 options[option] = (action.help or "", None if action.nargs == 0 else words_of)
             words = words if action.option_strings else words + choices
-        yield Verb(name, verb.description or "", options, words)
+        yield CompletedVerb(name, verb.description or "", options, words)
 
 
-def bash(known: list[Verb]) -> str:
+def bash(known: list[CompletedVerb]) -> str:
     """Write the script for bash."""
     lines = [f'        "{verb.name} {option}") words="{" ".join(words)}" ;;' for verb in known
               for option, (_, words) in verb.options.items() if words]  # fmt: skip
@@ -131,7 +137,7 @@ def bash(known: list[Verb]) -> str:
     return BASH.format(values="\n".join(lines), verbs="\n".join(lists), names=names, known=verbs_alone)
 
 
-def zsh(known: list[Verb]) -> str:
+def zsh(known: list[CompletedVerb]) -> str:
     """Write the script for zsh."""
     names = "\n".join(f"        {_quoted(f'{verb.name}:{verb.text}')}" for verb in known)
     lists = []
@@ -142,7 +148,7 @@ def zsh(known: list[Verb]) -> str:
     return ZSH.format(names=names, verbs="\n".join(lists))
 
 
-def fish(known: list[Verb]) -> str:
+def fish(known: list[CompletedVerb]) -> str:
     """Write the script for fish."""
     lines = [
         f"complete -c lgvi-warp -n __fish_use_subcommand -f -a {verb.name} -d {_quoted(verb.text)}" for verb in known

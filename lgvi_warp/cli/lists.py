@@ -7,15 +7,16 @@ import argparse
 import inspect
 import json
 import os
+from pathlib import Path
 from typing import Any
 
-from lgvi_warp.cli.arguments import parser
 from lgvi_warp.cli.output import tell
+from lgvi_warp.cli.verb import as_verb
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.files import place_of, write_text
 
 # A scene to begin with; {} are filled by `new`.
-SCENE = """# {title}
+NEW_SCENE = """# {title}
 # lgvi-warp check {file} says whether it can run and what is odd; lgvi-warp run {file} runs it.
 # SI units, angles in rad unless a key says degrees. Inertial axes: north, east, down; body axes: ahead, starboard, down.
 
@@ -68,6 +69,15 @@ of = "depth"
 COLUMN = 41
 
 
+def new_arguments(verb: Any) -> None:
+    """Add the arguments of the verb new."""
+    verb.add_argument("scene", metavar="SCENE", type=Path, help="the file, which must not be there yet")
+    verb.add_argument(
+        "--vehicle", metavar="NAME", default="remus_100", help="as list vehicles has it (default remus_100)"
+    )
+
+
+@as_verb("new", "write a scene file to begin with, with comments", new_arguments)
 def new(chosen: argparse.Namespace) -> int:
     """Run the verb new: write a scene file with comments."""
     from lgvi_warp.vehicles.fossen import vehicle_tables
@@ -77,7 +87,7 @@ def new(chosen: argparse.Namespace) -> int:
         raise SceneError([f"{chosen.scene}: is there already; give another name, or remove it"])
     types = [term["type"] for term in content.get("terms", ())]
     name, buoyancy = chosen.vehicle, f"{content['vehicle'].get('buoyancy', 0.0):g}"
-    text = SCENE.format(
+    text = NEW_SCENE.format(
         title=content["source"]["title"], file=chosen.scene.name, vehicle=name,
         pad=" " * (COLUMN - len(f'name = "{name}"')), buoyancy=buoyancy,
         pad_buoyancy=" " * (COLUMN - len(f"# buoyancy = {buoyancy}")),
@@ -90,6 +100,13 @@ def new(chosen: argparse.Namespace) -> int:
     return 0
 
 
+def list_arguments(verb: Any) -> None:
+    """Add the arguments of the verb list."""
+    kinds = ("methods", "vehicles", "terms", "laws")
+    verb.add_argument("of", metavar="WHAT", choices=kinds, help="methods, vehicles, terms or laws")
+
+
+@as_verb("list", "names of methods, vehicles, terms, or laws of controllers", list_arguments, reads=True)
 def list_names(chosen: argparse.Namespace) -> int:
     """Run the verb list: names of methods, vehicles, terms, or parts of a controller."""
     entries = {"methods": _methods, "vehicles": _vehicles, "terms": _terms, "laws": _laws}[chosen.of]()
@@ -146,6 +163,7 @@ def _summary(kind: Any) -> str:
     return (inspect.getdoc(kind) or "").partition("\n")[0]
 
 
+@as_verb("schema", "print the JSON schema of scene files, for editors", reads=True)
 def schema(chosen: argparse.Namespace) -> int:
     """Run the verb schema: print the JSON schema of scene files."""
     from lgvi_warp.scene.schema import schema as of_scenes
@@ -154,10 +172,15 @@ def schema(chosen: argparse.Namespace) -> int:
     return 0
 
 
+def help_arguments(verb: Any) -> None:
+    """Add the arguments of the verb help."""
+    verb.add_argument("of", metavar="VERB", nargs="?", choices=verb.verbs, help="a verb")
+
+
+@as_verb("help", "print the options of a verb; without one, all verbs", help_arguments, reads=True)
 def show_help(chosen: argparse.Namespace) -> int:
     """Run the verb help: print the options of a verb, or all verbs."""
     chosen.quiet = False
-    top = parser()
-    text = (top.verbs[chosen.of] if chosen.of else top).format_help()
+    text = (chosen.parser.verbs[chosen.of] if chosen.of else chosen.parser).format_help()
     tell(chosen, lambda: {"of": chosen.of, "text": text}, text.rstrip)
     return 0

@@ -5,16 +5,30 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.folders import info_of_folder
 from lgvi_warp.cli.output import say, tell
 from lgvi_warp.cli.progress import shown
+from lgvi_warp.cli.verb import as_verb
 from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.engine import widths
 from lgvi_warp.engine.peak import fma_peak
 
 
+def info_arguments(verb: Any) -> None:
+    """Add the arguments of the verb info."""
+    verb.add_argument("dir", nargs="?", metavar="DIR", type=Path, help="a folder that a verb wrote, or a store")
+    verb.set_defaults(scene=None)
+
+
+@as_verb(
+    "info",
+    "say what is in a folder that a verb wrote; without one, the machine, versions, the core's peak",
+    info_arguments,
+    reads=True,
+)
 def info(chosen: argparse.Namespace) -> int:
     """Run the verb info: describe a stored run, or this machine."""
     if chosen.dir is not None:
@@ -72,6 +86,13 @@ def _of_limit(memory: int) -> str:
     return f" (the container's limit; {physical / 2**30:.1f} GiB in the machine)"
 
 
+def bench_arguments(verb: Any) -> None:
+    """Add the arguments of the verb bench."""
+    verb.add_argument("--members", type=int, default=4096, help="vehicles (default 4096)")
+    verb.add_argument("--steps", type=int, default=1000, help="steps (default 1000)")
+
+
+@as_verb("bench", "speed of the kernel on this machine, beside the core's peak", bench_arguments, reads=True)
 def bench(chosen: argparse.Namespace) -> int:
     """Run the verb bench: measure the kernel's speed on this machine."""
     from lgvi_warp.studies.speed import measure
@@ -84,6 +105,7 @@ def bench(chosen: argparse.Namespace) -> int:
     return 0
 
 
+@as_verb("tune", "measure how many vehicles a packet should hold on this machine, for runs from now on", reads=True)
 def tune(chosen: argparse.Namespace) -> int:
     """Run the verb tune: measure the widths of packets on this machine, and keep the best ones for later runs.
 

@@ -15,9 +15,17 @@ from lgvi_warp.cli.output import print_faults, tell
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.report import file_line, pictures, shown_members
 from lgvi_warp.cli.settings import writable
+from lgvi_warp.cli.verb import add_shared, as_verb
 from lgvi_warp.cli.writing import Written
 
 
+def plot_arguments(verb: Any) -> None:
+    """Add the arguments of the verb plot."""
+    verb.add_argument("dir", metavar="DIR", type=Path, help="a folder that run or a study wrote")
+    add_shared(verb, "--out", out="folder for the pictures, replaced if they exist (default: DIR)")
+
+
+@as_verb("plot", "draw the pictures of a folder again, from the numbers in it", plot_arguments)
 def plot(chosen: argparse.Namespace) -> int:
     """Run the verb plot: draw the pictures of a run or of studies from their numbers.
 

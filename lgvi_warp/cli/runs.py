@@ -16,6 +16,7 @@ from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.report import report
 from lgvi_warp.cli.settings import RUN, block_range, folder, load_scene, store_settings
 from lgvi_warp.cli.signals import Ended
+from lgvi_warp.cli.verb import EXECUTOR, FOLDER, OF, SCENE, WORKERS, add_shared, as_verb
 from lgvi_warp.common.errors import Interrupted, MembersFailed, MissingExtra, SceneError
 from lgvi_warp.common.files import place_of
 from lgvi_warp.common.safe_files import inside
@@ -24,6 +25,81 @@ from lgvi_warp.common.safe_files import inside
 RESULT, PART = "result.npz", "result_part.npz"
 
 
+def run_arguments(verb: Any) -> None:
+    """Add the arguments of the verb run."""
+    add_shared(verb, "scene")
+    what = verb.add_argument_group("what runs")
+    add_shared(what, "--duration --members --seed --set")
+    _how(verb.add_argument_group("method, step and precision"))
+    _solves(verb.add_argument_group("solves and checks"))
+    files = verb.add_argument_group("files")
+    add_shared(files, "--out --keep", out=FOLDER.format("runs/NAME of the scene"))
+    _stored(files)
+    live = verb.add_argument_group("a look while it runs")
+    live.add_argument(
+        "--live", action="store_true", help="show members in the rerun viewer as they are done, then the whole run"
+    )
+    live.add_argument(
+        "--viewer",
+        metavar="ADDRESS",
+        help="with --live: a viewer that is open (default: one on this machine, or a new one)",
+    )
+    machine = verb.add_argument_group("the machine")
+    add_shared(machine, EXECUTOR, threads=WORKERS)
+    machine.add_argument("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
+
+
+def _how(group: Any) -> None:
+    """Add what chooses the method, the step and the precision of a run."""
+    add_shared(
+        group,
+        "--method --step --dtype",
+        method="rk4, rk8, rkw3, psi_s, psi_x ...: see list methods (default: the scene's, else chosen by what acts)",
+        dtype="float64, float32, or float32_compensated: sums of two float32",
+    )
+    add = group.add_argument
+    add(
+        "--error",
+        metavar="E",
+        type=float,
+        help="choose the cheapest method, step and precision that keep this error, and check it after the run",
+    )
+    add("--of", help=f"what --error is of (default: position [m]); {OF}")
+    add("--rtol", metavar="R", help="with --atol, rk5 and rk8 choose their own steps: relative error of each")
+    add("--atol", metavar="A", help="with --rtol: absolute error of each step")
+
+
+def _solves(group: Any) -> None:
+    """Add what is solved and checked in each step of a run."""
+    add = group.add_argument
+    add("--solver", help="of equation (24): quartic, cayley, newton or moser_veselov")
+    add("--iterations", metavar="N", help='of every solve: a number, or "auto" (default: to the tolerance)')
+    add("--tolerance", metavar="T", help="relative residual above which a solve is not converged")
+    add("--checks", help="none, safe (statuses, default) or all (warnings of what arises on the way as well)")
+    add("--on-failure", help="freeze a member that fails (default), raise: exit code 1, or substep: divide its step")
+
+
+def _stored(group: Any) -> None:
+    """Add what a run in a store takes."""
+    add_shared(
+        group,
+        "--store --store-dtype",
+        store="result.npz when the run ends (default), or run.zarr block by block, which resume can go on with",
+        store_dtype="float32: samples of a float64 run take half the room in the store",
+    )
+    group.add_argument(
+        "--blocks",
+        metavar="A:B",
+        help="with --store zarr: run only these blocks, to be merged later (as many of them as there are)",
+    )
+    existing = group.add_mutually_exclusive_group()
+    add_shared(existing, "--overwrite")
+    existing.add_argument(
+        "--resume", action="store_true", help="go on with a run.zarr that is there, if it is this run"
+    )
+
+
+@as_verb("run", "run a scene's ensemble: result.npz, fleet.png, fleet.rrd and a summary", run_arguments)
 def run(chosen: argparse.Namespace) -> int:
     """Run the verb run: simulate a scene's ensemble, write its files and print its summary."""
     begun = time.perf_counter()
@@ -177,6 +253,13 @@ def _import_in_background() -> threading.Thread:
     return thread
 
 
+def resume_arguments(verb: Any) -> None:
+    """Add the arguments of the verb resume."""
+    add_shared(verb, f"dir {EXECUTOR}", threads=WORKERS)
+    verb.add_argument("--force", action="store_true", help="even on another machine or with other versions")
+
+
+@as_verb("resume", "go on with a run that was stopped, and mend what is damaged of it", resume_arguments)
 def resume(chosen: argparse.Namespace) -> int:
     """Run the verb resume: finish a stored run that was stopped, and mend what is damaged of it.
 
@@ -206,6 +289,19 @@ def resume(chosen: argparse.Namespace) -> int:
     return 1 if print_faults(faults) or all_failed(result) else 0
 
 
+def predict_arguments(verb: Any) -> None:
+    """Add the arguments of the verb predict."""
+    names = f"{SCENE} --method --step --dtype --keep --threads --store --store-dtype"
+    add_shared(verb, names, out=FOLDER.format("runs/NAME of the scene"))
+
+
+@as_verb(
+    "predict",
+    "time, memory and disk that a run would take, from a small one on this machine",
+    predict_arguments,
+    reads=True,
+    aliases=("plan",),
+)
 def predict(chosen: argparse.Namespace) -> int:
     """Run the verb predict: the time, memory and disk that a run would take.
 

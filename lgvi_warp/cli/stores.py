@@ -4,13 +4,24 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
+from typing import Any
 
 from lgvi_warp.cli.output import print_faults, tell
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.report import file_line
+from lgvi_warp.cli.verb import add_shared, as_verb
 from lgvi_warp.common.files import place_of
 
 
+def merge_arguments(verb: Any) -> None:
+    """Add the arguments of the verb merge."""
+    verb.add_argument("dirs", metavar="DIR", type=Path, nargs="+", help="stores, or folders with one each")
+    verb.add_argument("--out", metavar="DIR", type=Path, required=True, help="folder for the whole run")
+    add_shared(verb, "--overwrite")
+
+
+@as_verb("merge", "put runs of some blocks each (run --blocks) together", merge_arguments)
 def merge(chosen: argparse.Namespace) -> int:
     """Run the verb merge: put runs of some blocks each together.
 
@@ -38,6 +49,16 @@ def merge(chosen: argparse.Namespace) -> int:
     return 0 if folder.complete else 1
 
 
+def export_arguments(verb: Any) -> None:
+    """Add the arguments of the verb export."""
+    add_shared(verb, "dir")
+    verb.add_argument("--to", required=True, help="netcdf or parquet")
+    verb.add_argument(
+        "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: beside the store)"
+    )
+
+
+@as_verb("export", "write a run as one NetCDF or Parquet file", export_arguments)
 def export(chosen: argparse.Namespace) -> int:
     """Run the verb export: write a stored run as one NetCDF or Parquet file.
 
@@ -58,6 +79,18 @@ def export(chosen: argparse.Namespace) -> int:
     return 0
 
 
+def report_arguments(verb: Any) -> None:
+    """Add the arguments of the verb report."""
+    verb.add_argument(
+        "dir", metavar="DIR", type=Path, help="folder that run, tradeoff, stability, sensitivity or sweep wrote"
+    )
+    verb.add_argument(
+        "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: DIR/report.html)"
+    )
+    verb.add_argument("--open", action="store_true", help="show it in the browser")
+
+
+@as_verb("report", "write one HTML file about a run or studies: report.html", report_arguments)
 def report(chosen: argparse.Namespace) -> int:
     """Run the verb report: write one HTML file about a run or a study.
 

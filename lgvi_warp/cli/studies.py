@@ -15,6 +15,7 @@ from lgvi_warp.cli.progress import part_of, shown
 from lgvi_warp.cli.report import file_line
 from lgvi_warp.cli.settings import folder, load_scene, whole
 from lgvi_warp.cli.signals import Ended
+from lgvi_warp.cli.verb import EXECUTOR, FOLDER, OF, SCENE, WORKERS, add_shared, as_verb
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.errors import SceneError, refusal
 from lgvi_warp.common.reading import file_json
@@ -31,6 +32,19 @@ def finish(written: Written, chosen: argparse.Namespace, content: Mapping[str, A
     return 1 if print_faults(written.faults) else 0
 
 
+def tradeoff_arguments(verb: Any) -> None:
+    """Add the arguments of the verb tradeoff."""
+    add_shared(verb, SCENE, out=FOLDER.format("runs/NAME_tradeoff"))
+    add_shared(verb, "--methods", methods="names, such as psi_s,kl8(psi_x) (default: all that fit)")
+    verb.add_argument("--of", default="position", help=f"what errors are of (default: position); {OF}")
+    verb.add_argument("--seconds", metavar="S", type=float, default=45.0, help="processor time to measure (default 45)")
+
+
+@as_verb(
+    "tradeoff",
+    "speed against accuracy of every method, step and precision: tradeoff.json, .csv and .png",
+    tradeoff_arguments,
+)
 def tradeoff(chosen: argparse.Namespace) -> int:
     """Run the verb tradeoff: measure speed against accuracy of methods, steps and precisions.
 
@@ -58,6 +72,36 @@ def tradeoff(chosen: argparse.Namespace) -> int:
     return 1 if print_faults(missing) else code
 
 
+def sensitivity_arguments(verb: Any) -> None:
+    """Add the arguments of the verb sensitivity."""
+    add = verb.add_argument
+    add_shared(verb, "scene", scene="scene file (TOML) with [ensemble.vary]")
+    add("--of", metavar="Q", action="append", help='quantity of interest: "position[2]" (the default), depth, speed, '
+        '"norm(velocity)", "max(energy)" ...; may be given several times')  # fmt: skip
+    add_shared(verb, "--out", out="folder for the files (default: runs/NAME_sensitivity)")
+    add("--analysis", choices=("sobol", "morris"), default="sobol", help="default sobol")
+    add("--samples", metavar="N", type=int, help="groups of the design (default: sobol 256, morris 64)")
+    add("--first-order", action="store_true", help="sobol without pairs of factors: about half the members")
+    add("--replicates", metavar="R", type=int, default=8, help="sobol: independent sequences, whose spread gives the "
+        "intervals (default 8)")  # fmt: skip
+    add("--group", metavar="NAME=FACTORS", action="append", default=[], help="sobol: factors to take for one, as "
+        '"start=start.position,start.velocity"; may be given several times')  # fmt: skip
+    add("--failed", choices=("refuse", "drop"), default="refuse",
+        help="what to do about groups with a failed member (default refuse)")  # fmt: skip
+    add_shared(
+        verb,
+        "--method --step --dtype --duration --seed --threads --set",
+        method="integration method, as of run",
+        dtype="float64, float32, or float32_compensated",
+        seed="seed of the design",
+    )
+
+
+@as_verb(
+    "sensitivity",
+    "which of the varied parameters matter: Sobol indices or Morris screening; .txt, .csv, .json, .png",
+    sensitivity_arguments,
+)
 def sensitivity(chosen: argparse.Namespace) -> int:
     """Run the verb sensitivity: find which of the varied parameters matter.
 
@@ -108,6 +152,29 @@ def _groups(given: Sequence[str]) -> dict[str, list[str]]:
     return groups
 
 
+def stability_arguments(verb: Any) -> None:
+    """Add the arguments of the verb stability."""
+    add = verb.add_argument
+    add_shared(verb, "scene --out --duration --seed --set", out=FOLDER.format("runs/NAME_stability"))
+    add(
+        "--grid",
+        choices=("omega", "mass", "drag", "all"),
+        help="step against angular velocity (default), added-mass ratio or drag number, or all three",
+    )
+    axis = "NAME or NAME=LOW:HIGH[:linear], such as"
+    add("--x", metavar="AXIS", help=f"instead of --grid: {axis} h=0.01:3")
+    add("--y", metavar="AXIS", help=f"instead of --grid: {axis} angular_velocity, vehicle.mass=50:500")
+    add_shared(verb, "--methods", methods="names, such as psi_s,kl8(psi_x) (default: psi,psi_s,psi_x,rk4)")
+    add("--points", metavar="N", type=int, default=24, help="cells along each axis (default 24)")
+    add("--error", metavar="E", type=float, default=1e-2, help="an accurate cell's bound (default 0.01)")
+    add("--of", default="attitude", help=f"what --error is of (default: attitude); {OF}")
+
+
+@as_verb(
+    "stability",
+    "where methods are accurate, bounded, flagged or fail, over two parameters: .json, .csv and .png",
+    stability_arguments,
+)
 def stability(chosen: argparse.Namespace) -> int:
     """Run the verb stability: map where methods are accurate, bounded, flagged or fail.
 
@@ -155,6 +222,24 @@ def stability(chosen: argparse.Namespace) -> int:
     return finish(written, chosen, {name: regions.to_dict() for name, regions in regions_by_name.items()}, text)
 
 
+def sweep_arguments(verb: Any) -> None:
+    """Add the arguments of the verb sweep."""
+    add = verb.add_argument
+    add("scene", metavar="SWEEP", help="sweep file (TOML)")
+    add_shared(
+        verb, "--out", out="folder for the files; what is finished there is not run again (default: runs/NAME_sweep)"
+    )
+    add("--plan", action="store_true", help="say what the sweep would take, and run nothing")
+    add("--record", metavar="N", type=int, default=0, help="run the N worst members again into recordings (default 0)")
+    add_shared(verb, "--members --seed")
+    add_shared(verb, EXECUTOR, threads=WORKERS)
+
+
+@as_verb(
+    "sweep",
+    "cases of a controller on the same members: what holds, which is better, the worst members; tables, pictures",
+    sweep_arguments,
+)
 def sweep(chosen: argparse.Namespace) -> int:
     """Run the verb sweep: cases of a closed loop on the same members, what holds and which is better.
 

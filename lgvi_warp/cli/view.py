@@ -5,15 +5,25 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 from lgvi_warp.cli.folders import Content, contents
 from lgvi_warp.cli.output import tell
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.report import file_line
+from lgvi_warp.cli.verb import as_verb
 from lgvi_warp.common.errors import NothingToDraw, SceneError
 from lgvi_warp.common.files import place_of
 
 
+def view_arguments(verb: Any) -> None:
+    """Add the arguments of the verb view."""
+    verb.add_argument("dir", metavar="DIR", type=Path, help="the folder of a run, a store, or a result.npz")
+    verb.add_argument("--members", metavar="LIST", help="draw these members, as 3,17 (default: a fair choice of 1,000)")
+    verb.add_argument("--out", metavar="FILE", type=Path, help="write the recording there, and open no viewer")
+
+
+@as_verb("view", "look at a run in the rerun viewer", view_arguments)
 def view(chosen: argparse.Namespace) -> int:
     """Run the verb view: open a run in the rerun viewer, or write its recording."""
     members, content = indices(chosen.members), run_in(chosen.dir)

@@ -5,12 +5,23 @@ from __future__ import annotations
 
 import argparse
 import time
+from typing import Any
 
 from lgvi_warp.cli.output import say, tell
 from lgvi_warp.cli.settings import load_scene
+from lgvi_warp.cli.verb import SHARED, add_shared, as_verb
 from lgvi_warp.common import machine
 
 
+def warm_arguments(verb: Any) -> None:
+    """Add the arguments of the verb warm."""
+    add_shared(verb, "scene --methods", methods="names, such as psi_s,rk4 (default: the scene's)")
+    names = SHARED["--methods"] | {"help": "float64, float32, float32_compensated (default: the scene's)"}
+    verb.add_argument("--dtypes", **names)
+    add_shared(verb, "--step --duration --set --threads", threads="processes (default: all cores)")
+
+
+@as_verb("warm", "compile the kernels of a scene ahead of its runs, several at a time", warm_arguments, reads=True)
 def warm(chosen: argparse.Namespace) -> int:
     """Run the verb warm: compile what runs of a scene need, and print how long each phase took."""
     from lgvi_warp.calls import warm as kernels

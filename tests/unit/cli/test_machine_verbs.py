@@ -185,9 +185,9 @@ def test_comments_of_a_new_scene_stand_in_a_column(tmp_path, capsys):
 
 
 VERBS = [
-    completion.Verb("go", "Go: it's on.", {"-q": ("quiet [a]: b", None), "--to": ("where", ("x", "y")),
+    completion.CompletedVerb("go", "Go: it's on.", {"-q": ("quiet [a]: b", None), "--to": ("where", ("x", "y")),
                                            "--out": ("a file", ())}, ("up", "down")),
-    completion.Verb("see", "See.", {"--all": ("all", None)}, ()),
+    completion.CompletedVerb("see", "See.", {"--all": ("all", None)}, ()),
 ]  # fmt: skip
 
 
@@ -221,7 +221,7 @@ def test_scripts_for_shells_in_full():
 
 
 def test_verbs_are_read_from_the_parser():
-    known = {verb.name: verb for verb in completion.verbs()}
+    known = {verb.name: verb for verb in completion.verbs(cli.parser())}
     assert known["list"].words == ("methods", "vehicles", "terms", "laws")
     assert known["run"].words == ()
     options = known["run"].options

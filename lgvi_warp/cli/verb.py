@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a verb of the command is: a function, its name, its help and its arguments, in one place."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+OF = 'position, attitude, velocity, angular_velocity, energy, depth, speed, euler, "position[2]", "norm(velocity)" ...'
+
+
+# Arguments that several verbs have.
+SHARED: dict[str, dict[str, Any]] = {
+    "scene": {"metavar": "SCENE", "help": "scene file (TOML)"},
+    "dir": {"metavar": "DIR", "type": Path, "help": "a store, or a folder with one"},
+    "--out": {"metavar": "DIR", "type": Path},
+    "--duration": {"metavar": "S", "help": "end of the run [s]"},
+    "--members": {"metavar": "N", "help": "number of vehicles"},
+    "--seed": {"metavar": "N", "help": "seed of what varies"},
+    "--set": {"metavar": "KEY=VALUE", "action": "append", "default": [], "help": "replace a key of the scene file"},
+    "--method": {"help": "as for run"},
+    "--methods": {"metavar": "A,B", "type": lambda text: [name.strip() for name in text.split(",")]},
+    "--step": {"metavar": "S", "help": "time step [s]"},
+    "--dtype": {"help": "as for run"},
+    "--keep": {
+        "help": "samples of members to keep: all (default), none, failed, or indices 3,17 (statistics are those of the scene)"
+    },
+    "--threads": {"metavar": "N", "type": int, "help": "threads (default: all cores)"},
+    "--executor": {"default": "threads", "help": "threads (default), processes or dask"},
+    "--scheduler": {"metavar": "ADDRESS", "help": "of Dask; without one, a cluster on this machine"},
+    "--store": {"choices": ["npz", "zarr"], "default": "npz", "help": "as for run"},
+    "--store-dtype": {"metavar": "D", "help": "as for run"},
+    "--overwrite": {"action": "store_true", "help": "replace a run.zarr that is there"},
+}
+# Arguments of the verbs that write files about a scene's ensemble.
+SCENE = "scene --out --duration --members --seed --set"
+EXECUTOR = "--threads --executor --scheduler"
+WORKERS = "threads, processes or workers (default: all cores)"
+FOLDER = "folder for the files, replaced if they exist (default: {})"
+
+# Options of every verb, which may stand before it too -> what they are without being given.
+COMMON: dict[tuple[str, ...], dict[str, Any]] = {
+    ("-q", "--quiet"): {"action": "store_true", "help": "no progress and no results but those of --json: faults alone"},
+    ("-v", "--verbose"): {"action": "store_true", "help": "also how it was run, and where an error came from"},
+    ("--json",): {"action": "store_true", "help": "results as one JSON document (docs/reference/json.md)"},
+    ("--color",): {
+        "choices": ("auto", "always", "never"),
+        "help": "colors: auto (default, on a terminal without NO_COLOR), always or never",
+    },
+}
+
+
+@dataclass(frozen=True)
+class Verb:
+    """A verb: a function of its arguments that returns the exit code.
+
+    Attributes:
+        help: what it does, in one line.
+        arguments: adds its arguments to a parser.
+        reads: whether it writes no files of the user's.
+        aliases: other names of it.
+    """
+
+    call: Callable[[argparse.Namespace], int]
+    name: str
+    help: str
+    arguments: Callable[[Any], None]
+    reads: bool
+    aliases: tuple[str, ...]
+
+    def __call__(self, chosen: argparse.Namespace) -> int:
+        """Run the verb."""
+        return self.call(chosen)
+
+    def add(self, verbs: Any) -> None:
+        """Add its parser to those of all verbs; its own help says what it does, too."""
+        text = self.help[0].upper() + self.help[1:] + "."
+        parser = verbs.add_parser(self.name, help=self.help, description=text, aliases=self.aliases)
+        parser.verbs = verbs.choices
+        self.arguments(parser)
+
+
+def without(parser: Any) -> None:
+    """Add nothing: for verbs without arguments."""
+
+
+def as_verb(
+    name: str, help: str, arguments: Callable[[Any], None] = without, reads: bool = False, aliases: tuple[str, ...] = ()
+) -> Callable[[Callable[[argparse.Namespace], int]], Verb]:
+    """Make a function a verb; `arguments.VERBS` lists all of them."""
+    return lambda call: Verb(call, name, help, arguments, reads, aliases)
+
+
+def add_shared(verb: Any, names: str, **helps: str) -> None:
+    """Add shared arguments to a verb; helps: name without dashes -> its help for this verb."""
+    for name in names.split():
+        own_help = helps.get(name.strip("-").replace("-", "_"))
+        verb.add_argument(name, **SHARED[name] | ({"help": own_help} if own_help else {}))

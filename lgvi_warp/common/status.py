@@ -142,6 +142,11 @@ class Warnings(IntFlag):
     RESTORING_UNSTABLE = 256
     ENERGY = 512
 
+    @classmethod
+    def _missing_(cls, value: object) -> Any:
+        """Take NumPy's whole numbers as well: those of result.warnings."""
+        return cls(int(value)) if isinstance(value, np.integer) else super()._missing_(value)
+
     @property
     def text(self) -> str:
         """What was seen and the remedy, in one sentence for each warning set."""

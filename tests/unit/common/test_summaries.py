@@ -11,7 +11,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common import summaries
-from lgvi_warp.common.status import Status, StatusArray, WarningArray
+from lgvi_warp.common.status import Status, StatusArray, WarningArray, Warnings
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.results.quantities import samples_of
 from lgvi_warp.statistics.estimates.estimate import Estimate, Estimates
@@ -246,3 +246,11 @@ def test_completion_of_names():
     assert "solve" in names
     assert sorted(dir(lw.uq)) == sorted(lw.uq.__all__)
     assert all(hasattr(lw.uq, name) for name in dir(lw.uq))
+
+
+def test_a_member_s_warnings_are_read_from_their_bits():
+    bits = np.array([2 | 128, 0], np.uint16).view(WarningArray)
+    assert Warnings(bits[0]) == Warnings(130)
+    assert Warnings(bits[1]) == Warnings(0)
+    with pytest.raises(ValueError, match=r"3\.5"):
+        Warnings(3.5)

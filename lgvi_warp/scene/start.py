@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.declared import array, positive, read, real
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import TABLE
@@ -31,13 +32,12 @@ class Environment:
         SceneError: If a number is negative or not finite; the message lists every fault.
     """
 
-    gravity: float = 9.80665
-    water_density: float = 1025.0
+    gravity: float = real("m/s2", 9.80665, least=0.0)
+    water_density: float = positive("kg/m3", 1025.0)
 
     def __post_init__(self) -> None:
         faults = Faults("environment.")
-        faults.number("gravity", self.gravity, "m/s2", least=0.0)
-        faults.positive("water_density", self.water_density, "kg/m3")
+        read(self, faults)
         faults.raise_if_any()
 
     def to_dict(self) -> dict[str, float]:
@@ -70,14 +70,14 @@ class Start:
         SceneError: If anything is wrong; the message lists every fault.
     """
 
-    position: Any = None
-    attitude: Any = None
-    rotation_vector: Any = None
-    quaternion_wxyz: Any = None
-    euler_deg: Any = None
-    velocity: Any = None
-    velocity_inertial: Any = None
-    angular_velocity: Any = None
+    position: Any = array((3,), "m", None)
+    attitude: Any = array((3, 3), "1", None)
+    rotation_vector: Any = array((3,), "rad", None)
+    quaternion_wxyz: Any = array((4,), "1", None)
+    euler_deg: Any = array((3,), "deg", None)
+    velocity: Any = array((3,), "m/s", None)
+    velocity_inertial: Any = array((3,), "m/s", None)
+    angular_velocity: Any = array((3,), "rad/s", None)
 
     def __post_init__(self) -> None:
         faults = Faults("start.")
@@ -85,20 +85,15 @@ class Start:
             chosen = [name for name in names if getattr(self, name) is not None]
             if len(chosen) > 1:
                 faults.add(" and ".join(chosen), "...", "say the same thing twice", "keep one of them")
-        for name in NAMES:
-            value = getattr(self, name)
-            if value is not None:
-                object.__setattr__(self, name, faults.finite(name, value, TABLE[name].shape, TABLE[name].unit))
-        self._check_attitude(faults)
-        faults.raise_if_any()
-
-    def _check_attitude(self, faults: Faults) -> None:
+        for name, value in read(self, faults).items():
+            object.__setattr__(self, name, value)
         R, q = self.attitude, self.quaternion_wxyz
         if R is not None and not notation.rotations(R):
             fault = "is not a rotation (R^T R = I, det R = 1, to 1e-9)"
             faults.add("attitude", R, fault, "give more digits, or quaternion_wxyz")
         if q is not None and not np.any(q):
             faults.add("quaternion_wxyz", q, "is zero", "give a quaternion that is not")
+        faults.raise_if_any()
 
     def given(self) -> dict[str, np.ndarray]:
         """Return the start as the user gave it, completed with zeros.

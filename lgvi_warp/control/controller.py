@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.declared import positive, read, real
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.control.base import READINGS, SECTIONS, Allocation, Bus, Part
 from lgvi_warp.control.callback import Callback, CallbackCommands, refuse_second
@@ -48,8 +49,8 @@ class Controller:
         SceneError: Where anything is wrong; the message lists every fault.
     """
 
-    period: float
-    delay: Any = 0.0
+    period: float = positive("s")
+    delay: Any = real("s", 0.0, least=0.0)
     sensors: Sequence[Any] = ()
     guidance: Sequence[Any] = ()
     laws: Sequence[Any] = ()
@@ -63,8 +64,7 @@ class Controller:
 
     def __post_init__(self) -> None:
         faults = Faults("controller.")
-        faults.positive("period", self.period)
-        delay = faults.number("delay", self.delay, "s", 0.0)
+        delay = read(self, faults)["delay"]
         if delay is not None:
             object.__setattr__(self, "delay", np.asarray(delay))
             if not faults and delay > MOST_PERIODS * self.period:

@@ -214,7 +214,7 @@ class IntegralLaw(ControlLaw):
 
     integrals: ClassVar[int] = 1
 
-    anti_windup: str = word(ANTI_WINDUP, "conditional")
+    anti_windup: str = word("conditional", known=ANTI_WINDUP)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The numbers, the memory of the integrals, and where the law finds what was not delivered."""
@@ -240,7 +240,7 @@ class PoseLaw(IntegralLaw):
     demands: ClassVar[tuple[str, ...]] = ("X", "Y", "Z", "K", "M", "N")
     integrals: ClassVar[int] = 6
 
-    feedforward: str = word(FEEDFORWARD, "none")
+    feedforward: str = word("none", known=FEEDFORWARD)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """In addition, each limit by itself, and the nominal weight less buoyancy with the moment of both."""

@@ -49,8 +49,8 @@ class Controller:
         SceneError: Where anything is wrong; the message lists every fault.
     """
 
-    period: float = positive("s")
-    delay: Any = real("s", 0.0, least=0.0)
+    period: float = positive(unit="s")
+    delay: Any = real(0.0, unit="s", least=0.0)
     sensors: Sequence[Any] = ()
     guidance: Sequence[Any] = ()
     laws: Sequence[Any] = ()

@@ -37,9 +37,9 @@ class DeadReckoning(MeasuringPart):
 
     type: ClassVar[str] = "dead_reckoning"
 
-    rule: str = word(RULES, "trapezoid")
-    velocity: str = word(VELOCITIES, "velocity")
-    depth: str = word(DEPTHS, "reckoned")
+    rule: str = word("trapezoid", known=RULES)
+    velocity: str = word("velocity", known=VELOCITIES)
+    depth: str = word("reckoned", known=DEPTHS)
     start_error: Any = number((3,), "m", (0.0, 0.0, 0.0))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:

@@ -30,7 +30,7 @@ class LowPass(MeasuringPart):
 
     type: ClassVar[str] = "low_pass"
 
-    of: str = word(READINGS, "")
+    of: str = word("", known=READINGS)
     time_constant: Any = number((), "s", least=0.0)
 
     def device_in(self, aligned: bool) -> Any:

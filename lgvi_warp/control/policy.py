@@ -78,8 +78,8 @@ class Policy(ControlLaw):
     inputs: Sequence[str]
     outputs: Sequence[str]
     scale: Any = number(("n",), "N, N m", None, optional=True)
-    activation: str = word(HIDDEN, "tanh")
-    output_activation: str = word(LAST, "linear")
+    activation: str = word("tanh", known=HIDDEN)
+    output_activation: str = word("linear", known=LAST)
     checksum: int | None = None
 
     def check(self, faults: Faults) -> None:

@@ -40,7 +40,7 @@ class Trajectory(Guidance):
     positions: Any = number(("k", 3), "m")
     headings: Any = number(("k",), "rad", None, optional=True)
     speed: Any = number(("k",), "m/s", None, optional=True)
-    interpolation: str = word(INTERPOLATIONS, "linear")
+    interpolation: str = word("linear", known=INTERPOLATIONS)
 
     def check(self, faults: Faults) -> None:
         """Adds a fault where times are too few, or something changes too fast."""

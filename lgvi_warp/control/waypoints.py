@@ -47,10 +47,10 @@ class Waypoints(Guidance):
     speed: Any = number((), "m/s")
     look_ahead: Any = number((), "m", above=0.0)
     radius: Any = number((), "m", above=0.0)
-    method: str = word(METHODS, "los")
+    method: str = word("los", known=METHODS)
     kappa: Any = number((), "1/s", 0.1, least=0.0)
     gamma: Any = number((), "rad/(m s)", 0.002, least=0.0)
-    at_end: str = word(AT_END, "stop")
+    at_end: str = word("stop", known=AT_END)
 
     def check(self, faults: Faults) -> None:
         """Adds a fault where points are too few or the same twice."""

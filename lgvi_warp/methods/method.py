@@ -180,7 +180,7 @@ class Method(Summarized):
     """
 
     name: str = "psi_s"
-    solver: str = word(SOLVERS, "quartic")
+    solver: str = word("quartic", known=SOLVERS)
     iterations: int | str | None = checked(_is_count, *_COUNT, None)
     tolerance: float | None = checked(_is_tolerance, _BETWEEN, "give a relative residual such as 1e-12", None)
     alpha: float = checked(_is_weight, *_WEIGHT, 0.5)

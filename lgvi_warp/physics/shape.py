@@ -27,8 +27,8 @@ class Shape:
         SceneError: Where neither or both are given, or a number is not positive. The message lists every fault.
     """
 
-    length: float | None = positive("m", None)
-    diameter: float | None = positive("m", None)
+    length: float | None = positive(None, unit="m")
+    diameter: float | None = positive(None, unit="m")
     mesh: str | None = None
 
     def __post_init__(self) -> None:

@@ -73,17 +73,17 @@ class Vehicle(Summarized):
             The message lists every fault.
     """
 
-    mass: float | None = positive("kg", None)
+    mass: float | None = positive(None, unit="kg")
     _: KW_ONLY
-    inertia: Any = symmetric(3, "kg m2", None)
-    added_mass: Any = symmetric(3, "kg", None)
-    buoyancy: float = real("N", 0.0, least=0.0)
-    center_of_buoyancy: Any = array((3,), "m", (0.0, 0.0, 0.0))
-    rigid_body_mass_matrix: Any = symmetric(6, "kg, kg m, kg m2", None)
-    added_mass_matrix: Any = symmetric(6, "kg, kg m, kg m2", None)
-    weight: float | None = real("N", None, least=0.0)
-    center_of_gravity: Any = array((3,), "m", None)
-    inertia_tolerance: float = real("1", 0.0, least=0.0)
+    inertia: Any = symmetric(None, unit="kg m2")
+    added_mass: Any = symmetric(None, unit="kg")
+    buoyancy: float = real(0.0, unit="N", least=0.0)
+    center_of_buoyancy: Any = array((0.0, 0.0, 0.0), shape=(3,), unit="m")
+    rigid_body_mass_matrix: Any = symmetric(None, unit="kg, kg m, kg m2", size=6)
+    added_mass_matrix: Any = symmetric(None, unit="kg, kg m, kg m2", size=6)
+    weight: float | None = real(None, unit="N", least=0.0)
+    center_of_gravity: Any = array(None, shape=(3,), unit="m")
+    inertia_tolerance: float = real(0.0, unit="1", least=0.0)
     warnings: Sequence[str] = checked(_are_texts, "is not a list of texts", 'give ["..."], or leave it out', ())
     shape: Any = None
     title: str | None = text("is no text", 'give title = "my glider", or leave it out', None)

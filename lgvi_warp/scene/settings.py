@@ -72,18 +72,18 @@ class RunSettings:
     """
 
     method: str | None = text("is not a text", 'give the name of a method, such as "psi_s"', None)
-    step: float | None = positive("s", None)
-    duration: float | None = positive("s", None)
-    save_every: float | None = positive("s", None)
+    step: float | None = positive(None, unit="s")
+    duration: float | None = positive(None, unit="s")
+    save_every: float | None = positive(None, unit="s")
     save_fields: Sequence[str] | None = None
-    dtype: str = word(DTYPES, "float64")
+    dtype: str = word("float64", known=DTYPES)
     solver: str | None = None
     iterations: int | str | None = None
     tolerance: float | None = None
     rtol: float | None = None
     atol: float | None = None
-    checks: str = word(CHECKS, "safe")
-    on_failure: str = word(ON_FAILURE, "freeze")
+    checks: str = word("safe", known=CHECKS)
+    on_failure: str = word("freeze", known=ON_FAILURE)
     keep: Any = "all"
     statistics: Sequence[Any] = ()
     until: Any = None

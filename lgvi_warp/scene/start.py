@@ -32,8 +32,8 @@ class Environment:
         SceneError: If a number is negative or not finite; the message lists every fault.
     """
 
-    gravity: float = real("m/s2", 9.80665, least=0.0)
-    water_density: float = positive("kg/m3", 1025.0)
+    gravity: float = real(9.80665, unit="m/s2", least=0.0)
+    water_density: float = positive(1025.0, unit="kg/m3")
 
     def __post_init__(self) -> None:
         faults = Faults("environment.")
@@ -70,14 +70,14 @@ class Start:
         SceneError: If anything is wrong; the message lists every fault.
     """
 
-    position: Any = array((3,), "m", None)
-    attitude: Any = array((3, 3), "1", None)
-    rotation_vector: Any = array((3,), "rad", None)
-    quaternion_wxyz: Any = array((4,), "1", None)
-    euler_deg: Any = array((3,), "deg", None)
-    velocity: Any = array((3,), "m/s", None)
-    velocity_inertial: Any = array((3,), "m/s", None)
-    angular_velocity: Any = array((3,), "rad/s", None)
+    position: Any = array(None, shape=(3,), unit="m")
+    attitude: Any = array(None, shape=(3, 3), unit="1")
+    rotation_vector: Any = array(None, shape=(3,), unit="rad")
+    quaternion_wxyz: Any = array(None, shape=(4,), unit="1")
+    euler_deg: Any = array(None, shape=(3,), unit="deg")
+    velocity: Any = array(None, shape=(3,), unit="m/s")
+    velocity_inertial: Any = array(None, shape=(3,), unit="m/s")
+    angular_velocity: Any = array(None, shape=(3,), unit="rad/s")
 
     def __post_init__(self) -> None:
         faults = Faults("start.")

@@ -51,7 +51,7 @@ class Until:
     """
 
     statistic: str = text("is no name", 'give "mean position[2]"')
-    half_width: float = positive("in the unit of the statistic")
+    half_width: float = positive(unit="in the unit of the statistic")
     at: Any = declared(_time_or_all, None)
     members: int = whole(2, "is no whole number from 2", "give 1024", 1024)
 

@@ -44,11 +44,11 @@ class Store:
     """
 
     path: str | os.PathLike[str]
-    dtype: str | None = word(("float32", "float64"), None)
+    dtype: str | None = word(None, known=("float32", "float64"))
     fields: tuple[str, ...] | None = None
-    existing: str = word(EXISTING, "refuse")
+    existing: str = word("refuse", known=EXISTING)
     force: bool = False
-    chunk_bytes: int = real("bytes", CHUNK_BYTES, least=1)
+    chunk_bytes: int = real(CHUNK_BYTES, unit="bytes", least=1)
 
     def __post_init__(self) -> None:
         faults = Faults("store.")

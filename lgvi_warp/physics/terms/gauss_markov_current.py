@@ -34,7 +34,7 @@ class GaussMarkovCurrent(NoisyTerm):
 
     standard_deviation: Any = number((3,), "m/s", least=0.0)
     time_constant: Any = number((), "s", above=0.0)
-    start: str = word(STARTS, "zero")
+    start: str = word("zero", known=STARTS)
 
     @property
     def memory(self) -> bool:

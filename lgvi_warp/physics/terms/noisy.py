@@ -53,7 +53,7 @@ class NoisyTerm(Term):
 
     timed: ClassVar[bool] = True
 
-    noise_step: float | None = positive("s", None)
+    noise_step: float | None = positive(None, unit="s")
 
     def draws(self, h: float) -> int:
         """How many draws one step of a run takes.

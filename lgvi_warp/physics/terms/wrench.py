@@ -64,7 +64,7 @@ class WrenchSchedule(Term):
     times: Any = number(("k",), "s", rising=True)
     force: Any = number(("k", 3), "N")
     torque: Any = number(("k", 3), "N m", None)
-    interpolation: str = word(SHAPES, "linear")
+    interpolation: str = word("linear", known=SHAPES)
 
     def __post_init__(self) -> None:
         if self.torque is None:

@@ -16,8 +16,9 @@ from lgvi_kernels.lanes.state import struct
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene import scene as scenes
 from lgvi_warp.scene.scene import from_dict
+from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 
-NAN = float("nan")
+NAN, INF = float("nan"), float("inf")
 BODY = {"mass": 10.0, "inertia": [1.0, 2.0, 2.5]}
 CREATES = np.diag([1.0, -1.0, 1.0, 1.0, 1.0, 1.0]).tolist()
 LOPSIDED = (np.eye(6) + 3.0 * np.eye(6, k=1)).tolist()
@@ -50,12 +51,8 @@ def from_table(table, section="terms"):
 TERMS = [
     # drag that creates energy, coefficients of the wrong sign
     ({"type": "drag_matrix", "linear": CREATES}, "drag_matrix.linear = [[1.0, 0.0", "creates energy", "minus Fossen's"),
-    (
-        {"type": "drag_matrix", "linear": LOPSIDED},
-        "drag_matrix.linear = [[1.0, 3.0",
-        "at the velocity",
-        "positive on the",
-    ),
+    ({"type": "drag_matrix", "linear": LOPSIDED}, "drag_matrix.linear = [[1.0, 3.0", "at the velocity",
+     "positive on the"),
     ({"type": "drag_matrix", "quadratic": CREATES}, "drag_matrix.quadratic", "creates energy", "minus Fossen's"),
     ({"type": "drag_matrix", "linear": [1.0] * 6}, "drag_matrix.linear", "shape (6,)", "give numbers of shape (6, 6)"),
     ({"type": "drag", "linear": [-4, 0, 0, 0, 0, 0]}, "drag.linear = [-4, 0", "out of bounds", "from 0 [N s/m, N m s]"),
@@ -63,12 +60,8 @@ TERMS = [
     (TETHER | {"stiffness": -5.0}, "tether.stiffness = -5.0", "out of bounds", "from 0 [N/m]"),
     (TETHER | {"rest_length": float("inf")}, "tether.rest_length = inf", "not finite", "[m]"),
     (TETHER | {"anchor": [0.0, 0.0]}, "tether.anchor = [0.0, 0.0]", "shape (2,)", "(3,) [m]"),
-    (
-        {key: value for key, value in THRUSTER.items() if key != "coefficient"},
-        "thrusters.coefficient = None",
-        "is missing",
-        "or a polynomial [N]",
-    ),
+    ({key: value for key, value in THRUSTER.items() if key != "coefficient"}, "thrusters.coefficient = None",
+     "is missing", "or a polynomial [N]"),
     (THRUSTER | {"polynomial": [[1.0]]}, "thrusters.polynomial = [[1.0]]", "has shape (1, 1)", "give p numbers"),
     (THRUSTER | {"coefficient": [-1.0]}, "thrusters.coefficient = [-1.0]", "out of bounds", "from 0"),
     (THRUSTER | {"time_constant": -0.1}, "thrusters.time_constant", "out of bounds", "from 0 [s]"),
@@ -84,11 +77,8 @@ TERMS = [
     (SCHEDULE | {"times": [1.0, 1.0]}, "wrench_schedule.times = [1.0, 1.0]", "not rising", "drop repetitions"),
     (HULL | {"stations": [1.0, -1.0]}, "cross_flow.stations = [1.0, -1.0]", "not rising", "sort the table"),
     (HULL | {"stations": [1.0], "diameters": [1.0]}, "cross_flow.stations = [1.0]", "one station", "give two or more"),
-    (
-        THRUSTER | {"times": [2.0, 1.0], "command_schedule": [[0.0], [1.0]]},
-        "thrusters.times = [2.0, 1.0]",
-        "not rising",
-    ),
+    (THRUSTER | {"times": [2.0, 1.0], "command_schedule": [[0.0], [1.0]]}, "thrusters.times = [2.0, 1.0]",
+     "not rising"),
     (PROFILE | {"depths": []}, "current_profile.depths = []", "shape (0,)", "give k numbers [m]"),
     (PROFILE | {"velocities": AHEAD}, "current_profile.velocities", "shape (1, 3)", "give 2 x 3 numbers [m/s]"),
     (PROFILE | {"velocities": [[1.0], [2.0, 3.0]]}, "current_profile.velocities", "not numeric", "give numbers [m/s]"),
@@ -99,18 +89,11 @@ TERMS = [
     (THRUSTER | {"direction": POINT}, "thrusters.direction[0] = [0.0, 0.0, 0.0]", "zero length", "such as [1, 0, 0]"),
     (THRUSTER | {"command_schedule": 3.0, "times": [0.0]}, "thrusters.command_schedule = 3.0", "give 1 x 1 numbers"),
     (THRUSTER | {"command_schedule": [[1.0, 2.0], [3.0]]}, "thrusters.command_schedule", "not numeric", "give numbers"),
-    (
-        THRUSTER | {"command": [[1.0], [2.0, 3.0]]},
-        "thrusters.command = [[1.0], [2.0, 3.0]]",
-        "not numeric",
-        "give numbers",
-    ),
+    (THRUSTER | {"command": [[1.0], [2.0, 3.0]]}, "thrusters.command = [[1.0], [2.0, 3.0]]", "not numeric",
+     "give numbers"),
     (THRUSTER | {"limit": [[1.0, 2.0], [3.0]]}, "thrusters.limit = [[1.0, 2.0], [3.0]]", "not numeric", "give numbers"),
-    (
-        THRUSTER | {"command": [1.0], "times": [0.0], "command_schedule": [[2.0]]},
-        "thrusters.command",
-        "keep one of them",
-    ),
+    (THRUSTER | {"command": [1.0], "times": [0.0], "command_schedule": [[2.0]]}, "thrusters.command",
+     "keep one of them"),
     (FIN | {"chord": POINT}, "fins.chord[0] = [0.0, 0.0, 0.0]", "zero length", "trailing to leading edge"),
     (FIN | {"normal": AHEAD}, "fins.normal[0] = [1.0, 0.0, 0.0]", "along the chord", "across the fin's plane"),
     # names and types
@@ -123,7 +106,7 @@ TERMS = [
     ({"type": "drag", "name": 3}, "name = 3", "not a text", "give a name"),
     ({"type": "drag", "name": "vehicle"}, "terms = 'vehicle'", "section of the scene", 'name = "vehicle_term"'),
     (3, "terms[0] = 3", "is no term", "write a table with type"),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("table", "words"), [(row[0], row[1:]) for row in TERMS])
@@ -181,41 +164,93 @@ def test_a_list_of_terms(terms, words):
     assert all(word in fault for word in words), fault
 
 
+# Key, values of it that are refused, and words of what is said of each, the remedy among them.
+SIX = [0.0, -0.01, NAN, INF, "soon", True]
+SIZES = ["heavy", True, [None], [[1.0, 2.0], [3.0]], [True, 1.0, 1.0], [1.0, 2.0]]
+TURNED = [[5.0, 0.1, 0.0], [0.0, 6.0, 0.0], [0.0, 0.0, 7.0]]
+SETTINGS = [
+    ("environment.gravity", [-9.8, NAN, True], "[m/s2]"),
+    ("environment.water_density", [0.0], "not positive", "above 0 [kg/m3]"),
+    ("start.position", [(1.0, 2.0), (1.0, NAN, 2.0)], "(3,) [m]"),
+    ("start.velocity", ["fast"], "not numeric", "(3,) [m/s]"),
+    ("start.angular_velocity", [1.0], "has shape ()", "(3,) [rad/s]"),
+    ("start.euler_deg", [(0.0, INF, 0.0)], "not finite", "(3,) [deg]"),
+    ("start.quaternion_wxyz", [np.zeros(4)], "is zero", "that is not"),
+    ("start.quaternion_wxyz", [(1.0, 0.0, 0.0)], "has shape (3,)", "(4,) [1]"),
+    *((f"run.{name}", SIX, "give a number", "[s]") for name in ("step", "duration", "save_every")),
+    ("run.dtype", ["float16", "double", np.float64, 64], "is not known", "float"),
+    ("run.method", [3], "is not a text", 'such as "psi_s"'),
+    ("run.save_fields", [3, "position"], "is no list of names", "give one"),
+    ("run.save_fields", [["positoin"]], "= 'positoin': is not known", "did you mean 'position'?"),
+    ("run.save_fields", [[[1]]], "= [1]: is not known", "known: "),
+    ("run.solver", ["cayly"], "is not known", "did you mean 'cayley'"),
+    ("run.iterations", [-1], "from 0 to 100", 'or None to iterate'),
+    ("run.tolerance", [2.0], "between 0 and 1", "such as 1e-12"),
+    ("run.atol", [1e-9], "is given alone", "give both"),
+    ("run.checks", ["some"], "is not known", "safe"),
+    ("run.on_failure", ["panic"], "is not known", "substep"),
+    ("ensemble.members", [0, -3, 1.5, 2.0, True, "4"], "whole number from 1", "give 1 or more"),
+    ("ensemble.members", [2**31 + 1], "more members than the 2147483648", "or less"),
+    ("ensemble.seed", [-1, 0.5, False, "x", None], "whole number from 0", "give 0 or more"),
+    ("vehicle.mass", [0.0, -1.0], "not positive", "above 0 [kg]"),
+    ("vehicle.buoyancy", [-1.0], "below 0", "from 0"),
+    *((f"vehicle.{name}", [NAN, INF], "not finite", unit) for name, unit in (("mass", "[kg]"), ("buoyancy", "[N]"))),
+    *((f"vehicle.{name}", [(1.0, NAN, 1.0), (1.0, INF, 1.0)], "not finite", unit)
+      for name, unit in (("inertia", "[kg m2]"), ("added_mass", "[kg]"), ("center_of_buoyancy", "[m]"))),
+    *((f"vehicle.{name}", SIZES, "; give") for name in ("mass", "buoyancy", "inertia", "added_mass", "center_of_buoyancy")),
+    *((f"vehicle.{name}", [TURNED], "not symmetric", "give a symmetric matrix") for name in ("inertia", "added_mass")),
+    ("vehicle.inertia", [(1.0, 0.0, 1.0)], "not positive definite", "above 0 [kg m2]"),
+    # Positive diagonal, yet eigenvalues 3 and -1 in the plane of x and y.
+    ("vehicle.inertia", [[[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]]], "not positive definite", "[kg m2]"),
+    ("vehicle.added_mass", [[-11.0, 0.0, 0.0]], "not positive definite", "minus Fossen's X_udot"),
+]  # fmt: skip
+SECTIONS = {"vehicle": lw.Vehicle, "environment": lw.Environment, "start": lw.Start, "run": RunSettings,
+            "ensemble": EnsembleSettings}  # fmt: skip
+
+
+@pytest.mark.parametrize(("key", "value", "words"), [(row[0], value, row[2:]) for row in SETTINGS for value in row[1]])
+def test_a_setting_of_a_section(key, value, words):
+    section, _, name = key.partition(".")
+    good = BODY if section == "vehicle" else {}
+    of_python = refused(SECTIONS[section], **good | {name: value})
+    (fault,) = refused(from_dict, {"vehicle": BODY} | {section: good | {name: value}})
+    assert of_python == (fault,)
+    assert fault.startswith(f"{key} = ")
+    assert all(word in fault for word in words), fault
+
+
+PAIRS = [
+    ({"velocity": (1, 0, 0), "velocity_inertial": (1, 0, 0)}, "start.velocity and velocity_inertial = "),
+    ({"rotation_vector": (1, 0, 0), "euler_deg": (1, 0, 0)}, "start.rotation_vector and euler_deg = "),
+]
+
+
+@pytest.mark.parametrize(("values", "start"), PAIRS)
+def test_a_start_that_says_the_same_twice(values, start):
+    (fault,) = refused(lw.Start, **values)
+    assert fault.startswith(start)
+    assert "keep one of them" in fault
+
+
 def full(rigid=DIAGONAL, **more):
     return {"rigid_body_mass_matrix": rigid} | more
 
 
 VEHICLES = [
     ({}, "vehicle.mass = None", "is missing", "[kg]"),
-    (BODY | {"mass": -1}, "vehicle.mass = -1", "not positive", "above 0 [kg]"),
-    (BODY | {"inertia": [1.0, NAN, 2.0]}, "vehicle.inertia = [1.0, nan, 2.0]", "not finite", "[kg m2]"),
-    (
-        BODY | {"added_mass": [-11.0, 0.0, 0.0]},
-        "vehicle.added_mass = [-11.0",
-        "not positive definite",
-        "minus Fossen's",
-    ),
     (BODY | {"weight": 98.0}, "vehicle.weight = 98.0", "6x6 form", "give rigid_body_mass_matrix"),
     (full(DIAGONAL + np.eye(6, k=1)), "vehicle.rigid_body_mass_matrix", "not symmetric", "give a symmetric matrix"),
     (full(-DIAGONAL), "vehicle.rigid_body_mass_matrix", "not positive definite", "[[m I, -m hat(r_g)]"),
-    (
-        full(np.diag([1.0, 2, 3, 1, 1, 1])),
-        "vehicle.rigid_body_mass_matrix",
-        "not have m I as its upper left block",
-        "[[m I",
-    ),
+    (full(np.diag([1.0, 2, 3, 1, 1, 1])), "vehicle.rigid_body_mass_matrix", "not have m I as its upper left block",
+     "[[m I"),
     (full(np.eye(3)), "vehicle.rigid_body_mass_matrix", "shape (3, 3)", "symmetric 6x6 matrix"),
     (full(added_mass_matrix=-2.0 * DIAGONAL), "vehicle.added_mass_matrix", "not positive definite", "X_udot"),
-    (
-        {"added_mass_matrix": DIAGONAL},
-        "vehicle.rigid_body_mass_matrix = None",
-        "is missing",
-        "beside added_mass_matrix",
-    ),
+    ({"added_mass_matrix": DIAGONAL}, "vehicle.rigid_body_mass_matrix = None", "is missing",
+     "beside added_mass_matrix"),
     (full(mass=10.0), "vehicle.mass = 10.0", "repeats what", "keep one of the two forms"),
     (full(weight=NAN), "vehicle.weight = nan", "not finite", "[N]"),
     (full(center_of_gravity=[1.0]), "vehicle.center_of_gravity = [1.0]", "shape (1,)", "(3,) [m]"),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("values", "words"), [(row[0], row[1:]) for row in VEHICLES])
@@ -385,24 +420,14 @@ def test_numbers_that_would_do_nothing(table, name, remedy):
 
 NOISE = {"type": "wrench_noise", "force": [1.0, 1.0, 1.0]}
 MATRIX = {"type": "drag_matrix", "linear": np.eye(6).tolist()}
-SETTINGS = [
+RUNS = [
     (MATRIX, {"method": "kl6(psi_s)"}, "method = 'kl6(psi_s)'", "a damping matrix prevents that", "use psi_s"),
-    (
-        MATRIX,
-        {"method": "tj4(psi_x)"},
-        "method = 'tj4(psi_x)'",
-        "keeps its order only if a step of -h undoes",
-        "use psi_x",
-    ),
+    (MATRIX, {"method": "tj4(psi_x)"}, "method = 'tj4(psi_x)'", "keeps its order only if a step of -h undoes",
+     "use psi_x"),
     (TIDE, {"method": "su4(psi_s)"}, "method = 'su4(psi_s)'", "water that varies prevents that", "use psi_s"),
     (NOISE, {"method": "psi"}, "method = 'psi'", "noise more than once a step", "use psi_s"),
-    (
-        {"type": "drag", "linear": [0.0, 0.0, 3e5, 0.0, 0.0, 0.0]},
-        {"method": "kl6(psi_s)"},
-        "goes backward by",
-        "drag number up to",
-        "use psi_s, or a step",
-    ),
+    ({"type": "drag", "linear": [0.0, 0.0, 3e5, 0.0, 0.0, 0.0]}, {"method": "kl6(psi_s)"}, "goes backward by",
+     "drag number up to", "use psi_s, or a step"),
     (MATRIX, {"method": "psi_q"}, "method = 'psi_q'", "not known", "did you mean 'psi_"),
     (MATRIX, {"method": "kl6(phi)"}, "method = 'kl6(phi)'", "not symmetric", "compose psi_s"),
     (MATRIX, {"dtype": "float16"}, "dtype = 'float16'", "did you mean 'float64'?"),
@@ -411,10 +436,10 @@ SETTINGS = [
     (MATRIX, {"h": "a"}, "h = 'a'", "not numeric", "[s]"),
     (MATRIX, {"t1": [1.0]}, "t1 = [1.0]", "shape", "[s]"),
     (MATRIX, {"save": 0.1}, "save = 0.1", "is no SaveAt", "lw.SaveAt("),
-]
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(("table", "settings", "words"), [(row[0], row[1], row[2:]) for row in SETTINGS])
+@pytest.mark.parametrize(("table", "settings", "words"), [(row[0], row[1], row[2:]) for row in RUNS])
 def test_a_method_that_cannot_do_it(table, settings, words):
     (fault,) = refused(make_plan, lw.Ensemble(from_table(table)), **({"h": 0.01, "t1": 0.1} | settings))
     assert all(word in fault for word in words), fault

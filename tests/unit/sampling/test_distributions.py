@@ -12,16 +12,11 @@ from scipy import stats
 import lgvi_warp as lw
 from lgvi_warp.common.random import uniforms
 from lgvi_warp.sampling.distributions.named import as_distribution, from_dict
+from tests.support.refusals import refused
 
 LEVELS = np.array([1e-12, 1e-6, 0.02, 0.3, 0.5, 0.77, 0.999, 1.0 - 1e-9])
 N = 200_000
 ERRORS = 5.0
-
-
-def refused(kind, **values):
-    with pytest.raises(lw.SceneError) as caught:
-        kind(**values)
-    return str(caught.value)
 
 
 # Uniform numbers ---------------------------------------------------------------------------------------------------

@@ -15,16 +15,11 @@ from lgvi_warp.common.random import uniforms, uniforms_of
 from lgvi_warp.physics import notation
 from lgvi_warp.sampling.distributions import joint as joint_laws
 from lgvi_warp.sampling.distributions.named import from_dict
+from tests.support.refusals import refused
 
 N = 100_000
 ERRORS = 5.0
 COVARIANCE = np.array([[4.0, 1.2, -0.5], [1.2, 1.0, 0.3], [-0.5, 0.3, 2.0]])
-
-
-def refused(kind, **values):
-    with pytest.raises(lw.SceneError) as caught:
-        kind(**values)
-    return str(caught.value)
 
 
 def drawn(law, *bases, count=N, seed=5):

@@ -17,6 +17,7 @@ from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene import scene as scenes
 from lgvi_warp.scene.scene import from_dict
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
+from tests.support.refusals import faults
 
 NAN, INF = float("nan"), float("inf")
 BODY = {"mass": 10.0, "inertia": [1.0, 2.0, 2.5]}
@@ -34,13 +35,6 @@ WAVES = {"type": "waves", "amplitudes": [1.0], "periods": [5.0], "headings_deg":
 WANDERING = {"type": "gauss_markov_current", "standard_deviation": [0.1, 0.1, 0.1], "time_constant": 10.0}
 TETHER = {"type": "tether", "anchor": [0.0, 0.0, 0.0], "stiffness": 5.0}
 HULL = {"type": "cross_flow", "stations": [-1.0, 1.0], "diameters": [0.1, 0.1], "drag_coefficient": 1.0}
-
-
-def refused(make, *arguments, **named):
-    """The faults with which a call is refused."""
-    with pytest.raises(lw.SceneError) as caught:
-        make(*arguments, **named)
-    return caught.value.faults
 
 
 def from_table(table, section="terms"):
@@ -111,7 +105,7 @@ TERMS = [
 
 @pytest.mark.parametrize(("table", "words"), [(row[0], row[1:]) for row in TERMS])
 def test_a_term_of_a_scene_file(table, words):
-    (fault,) = (one for one in refused(from_table, table) if words[0] in one)
+    (fault,) = (one for one in faults(from_table, table) if words[0] in one)
     assert all(word in fault for word in words), fault
 
 
@@ -122,7 +116,7 @@ def from_python(table):
 
 @pytest.mark.parametrize(("table", "words"), [(row[0], row[1:]) for row in TERMS if not row[1].startswith("terms")])
 def test_the_same_from_python(table, words):
-    (fault,) = (one for one in refused(from_python, table) if words[0] in one)
+    (fault,) = (one for one in faults(from_python, table) if words[0] in one)
     assert all(word in fault for word in words), fault
 
 
@@ -143,7 +137,7 @@ EVENTS = [
 
 @pytest.mark.parametrize(("table", "words"), [(row[0], row[1:]) for row in EVENTS])
 def test_an_event(table, words):
-    (fault,) = refused(from_table, table, "events")
+    (fault,) = faults(from_table, table, "events")
     assert all(word in fault for word in words), fault
 
 
@@ -160,7 +154,7 @@ LISTS = [
 
 @pytest.mark.parametrize(("terms", "words"), [(row[0], row[1:]) for row in LISTS])
 def test_a_list_of_terms(terms, words):
-    (fault,) = refused(lw.Scene, lw.Vehicle(**BODY), terms=terms)
+    (fault,) = faults(lw.Scene, lw.Vehicle(**BODY), terms=terms)
     assert all(word in fault for word in words), fault
 
 
@@ -212,8 +206,8 @@ SECTIONS = {"vehicle": lw.Vehicle, "environment": lw.Environment, "start": lw.St
 def test_a_setting_of_a_section(key, value, words):
     section, _, name = key.partition(".")
     good = BODY if section == "vehicle" else {}
-    of_python = refused(SECTIONS[section], **good | {name: value})
-    (fault,) = refused(from_dict, {"vehicle": BODY} | {section: good | {name: value}})
+    of_python = faults(SECTIONS[section], **good | {name: value})
+    (fault,) = faults(from_dict, {"vehicle": BODY} | {section: good | {name: value}})
     assert of_python == (fault,)
     assert fault.startswith(f"{key} = ")
     assert all(word in fault for word in words), fault
@@ -227,7 +221,7 @@ PAIRS = [
 
 @pytest.mark.parametrize(("values", "start"), PAIRS)
 def test_a_start_that_says_the_same_twice(values, start):
-    (fault,) = refused(lw.Start, **values)
+    (fault,) = faults(lw.Start, **values)
     assert fault.startswith(start)
     assert "keep one of them" in fault
 
@@ -255,7 +249,7 @@ VEHICLES = [
 
 @pytest.mark.parametrize(("values", "words"), [(row[0], row[1:]) for row in VEHICLES])
 def test_a_vehicle(values, words):
-    fault = next(one for one in refused(lw.Vehicle, **values) if words[0] in one)
+    fault = next(one for one in faults(lw.Vehicle, **values) if words[0] in one)
     assert all(word in fault for word in words), fault
 
 
@@ -276,13 +270,13 @@ FOSSEN = [
 
 @pytest.mark.parametrize(("given", "words"), [(row[0], row[1:]) for row in FOSSEN])
 def test_fossens_coefficients(given, words):
-    (fault,) = refused(lw.vehicle_tables_from_fossen, given, **BODY)
+    (fault,) = faults(lw.vehicle_tables_from_fossen, given, **BODY)
     assert all(word in fault for word in words), fault
 
 
 def test_fossens_drag_that_creates_energy():
     made = lw.vehicle_tables_from_fossen({"X_u": -1.0, "X_v": -100.0, "Y_v": -1.0}, **BODY)
-    (fault,) = refused(from_dict, made)
+    (fault,) = faults(from_dict, made)
     assert "drag_matrix.linear" in fault
     assert "creates energy" in fault
     assert "minus Fossen's" in fault
@@ -308,7 +302,7 @@ SDF = [
 
 @pytest.mark.parametrize(("text", "more", "words"), [(row[0], row[1], row[2:]) for row in SDF])
 def test_sdf(text, more, words):
-    fault = next(one for one in refused(lw.vehicle_tables_from_sdf, text, **more) if words[0] in one)
+    fault = next(one for one in faults(lw.vehicle_tables_from_sdf, text, **more) if words[0] in one)
     assert all(word in fault for word in words), fault
 
 
@@ -328,7 +322,7 @@ YAML = [
 @pytest.mark.parametrize(("text", "words"), [(row[0], row[1:]) for row in YAML])
 def test_yaml(text, words):
     pytest.importorskip("yaml")
-    (fault,) = refused(lw.vehicle_tables_from_yaml, text)
+    (fault,) = faults(lw.vehicle_tables_from_yaml, text)
     assert all(word in fault for word in words), fault
 
 
@@ -350,7 +344,7 @@ def test_all_faults_of_a_scene_file_at_once():
     lower = [1, 1, 1]
     upper = [0, 0, 0]
     """
-    found = refused(scenes.loads, text)
+    found = faults(scenes.loads, text)
     keys = ("vehicle.mass = -10", "run.method = 'psi_q'", "drag.linear", "terms[1].type = 'harpoon'", "box.upper")
     assert len(found) == len(keys)
     assert all(any(one.startswith(key) for one in found) for key in keys)
@@ -358,7 +352,7 @@ def test_all_faults_of_a_scene_file_at_once():
 
 @pytest.mark.parametrize("path", ["missing.toml", None])
 def test_a_scene_file_that_is_not_there(path):
-    (fault,) = refused(lw.Scene.load, path)
+    (fault,) = faults(lw.Scene.load, path)
     assert str(path) in fault
     assert "give the path of a TOML file" in fault
 
@@ -377,7 +371,7 @@ VARIED = [
 
 @pytest.mark.parametrize(("table", "name", "law"), VARIED)
 def test_members_that_would_be_unphysical(table, name, law):
-    (fault,) = refused(lw.Ensemble, from_table(table), 50, 0, {name: law})
+    (fault,) = faults(lw.Ensemble, from_table(table), 50, 0, {name: law})
     assert name in fault
     assert "unphysical" in fault
     assert "of 50 members" in fault
@@ -392,7 +386,7 @@ NAMES = [
 
 @pytest.mark.parametrize(("table", "name", "remedy"), NAMES)
 def test_what_cannot_vary(table, name, remedy):
-    (fault,) = refused(lw.Ensemble, from_table(table), 5, 0, {name: lw.Normal(std=1.0)})
+    (fault,) = faults(lw.Ensemble, from_table(table), 5, 0, {name: lw.Normal(std=1.0)})
     assert f'ensemble.vary."{name}"' in fault
     assert "does not name what the scene has" in fault
     assert remedy in fault
@@ -412,7 +406,7 @@ IDLE = [
 
 @pytest.mark.parametrize(("table", "name", "remedy"), IDLE)
 def test_numbers_that_would_do_nothing(table, name, remedy):
-    (fault,) = refused(lw.Ensemble, from_table(table), 5, 0, {name: lw.Uniform(0.1, 0.2)})
+    (fault,) = faults(lw.Ensemble, from_table(table), 5, 0, {name: lw.Uniform(0.1, 0.2)})
     assert name in fault
     assert "does not act: the scene has" in fault
     assert remedy in fault
@@ -441,7 +435,7 @@ RUNS = [
 
 @pytest.mark.parametrize(("table", "settings", "words"), [(row[0], row[1], row[2:]) for row in RUNS])
 def test_a_method_that_cannot_do_it(table, settings, words):
-    (fault,) = refused(make_plan, lw.Ensemble(from_table(table)), **({"h": 0.01, "t1": 0.1} | settings))
+    (fault,) = faults(make_plan, lw.Ensemble(from_table(table)), **({"h": 0.01, "t1": 0.1} | settings))
     assert all(word in fault for word in words), fault
 
 
@@ -506,7 +500,7 @@ def test_a_users_law(made, words):
     term = type("Bad", (Pull,), {"device": made, "__annotations__": {}})(k=1.0)
     fleet = lw.Ensemble(lw.Scene(lw.Vehicle(**BODY), terms=[term]))
     for check in (lambda: lw.check_law(term), lambda: make_plan(fleet, h=0.01, t1=0.1)):
-        (fault,) = refused(check)
+        (fault,) = faults(check)
         assert all(word in fault for word in words), fault
 
 
@@ -517,14 +511,14 @@ class Wide(Pull):
 
 def test_a_law_without_a_struct_whose_numbers_make_none():
     bare = type("Bare", (Wide,), {"device": device(law=pull_law, params=None), "__annotations__": {}})
-    (fault,) = refused(lw.check_law, bare(k=1.0))
+    (fault,) = faults(lw.check_law, bare(k=1.0))
     assert all(word in fault for word in ("pull.device", "has no params(width, real)", "add_a_force.md")), fault
 
 
 @pytest.mark.kernel
 def test_a_law_that_returns_nothing():
     term = type("Bad", (Packs,), {"device": device(law=pull_silent), "__annotations__": {}})(k=1.0)
-    (fault,) = refused(lw.check_law, term)
+    (fault,) = faults(lw.check_law, term)
     assert "pull.device" in fault
     assert "does not compile" in fault
     assert "return what the role adds to" in fault
@@ -560,16 +554,16 @@ def test_numbers_of_the_wrong_shape():
 
 def test_what_is_no_fleet():
     for make in (lw.solve, lw.Ensemble):
-        (fault,) = refused(make, lw.Vehicle(1.0, inertia=1.0 * np.ones(3), added_mass=np.ones(3), buoyancy=0.0))
+        (fault,) = faults(make, lw.Vehicle(1.0, inertia=1.0 * np.ones(3), added_mass=np.ones(3), buoyancy=0.0))
         assert "give lw.Scene(" in fault
-    (fault,) = refused(lw.Ensemble, from_table(MATRIX), 5, 0, [1])
+    (fault,) = faults(lw.Ensemble, from_table(MATRIX), 5, 0, [1])
     assert "vary = [1]" in fault
     assert "lw.Normal" in fault
 
 
 def test_two_events_of_one_name():
     events = [lw.Floor(depth=1.0), lw.Floor(depth=2.0)]
-    (fault,) = refused(lw.Scene, from_table(MATRIX).vehicle, events=events)
+    (fault,) = faults(lw.Scene, from_table(MATRIX).vehicle, events=events)
     assert "events = 'floor'" in fault
     assert 'name = "floor_2"' in fault
     second = lw.Floor(depth=2.0, name="lower")
@@ -578,7 +572,7 @@ def test_two_events_of_one_name():
 
 def test_a_quadratic_matrix_of_members_that_creates_energy():
     scene = from_table({"type": "drag_matrix", "quadratic": np.eye(6).tolist()})
-    (fault,) = refused(lw.Ensemble, scene, 2000, 0, {"drag_matrix.quadratic": lw.Normal(std=1.0)})
+    (fault,) = faults(lw.Ensemble, scene, 2000, 0, {"drag_matrix.quadratic": lw.Normal(std=1.0)})
     assert "drag_matrix.quadratic of member" in fault
     assert "unphysical" in fault
     lw.Ensemble(scene, 2000, 0, {"drag_matrix.quadratic": lw.Uniform(relative=0.3)})
@@ -591,7 +585,7 @@ def test_a_broken_law_in_solve():
     with pytest.raises(lw.SceneError, match=r"(?s)law pull: .*does not compile.*lw.check_law"):
         lw.solve(lw.Scene(from_table(MATRIX).vehicle, terms=[Broken(k=1.0)]), h=0.01, t1=0.1)
     wavy = type("Wavy", (Pull,), {"device": device(law=pull_law, FLOW="wavy")})
-    (fault,) = refused(lw.solve, lw.Scene(from_table(MATRIX).vehicle, terms=[wavy(k=1.0)]), h=0.01, t1=0.1)
+    (fault,) = faults(lw.solve, lw.Scene(from_table(MATRIX).vehicle, terms=[wavy(k=1.0)]), h=0.01, t1=0.1)
     assert "pull.FLOW = 'wavy'" in fault
     assert "varying" in fault
 

@@ -7,6 +7,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.physics import notation
 from lgvi_warp.studies.sweeps.cases import Case
+from tests.support.refusals import faults
 
 VEHICLE = lw.Vehicle(mass=10.0, inertia=(1.0, 2.0, 2.5))
 
@@ -15,12 +16,6 @@ def resolved(**start):
     """Position, attitude, velocity and angular velocity that a Start comes to."""
     m = lw.Ensemble(lw.Scene(VEHICLE, start=lw.Start(**start))).select(0, 1)
     return m.position[0], m.attitude[0], m.velocity[0], m.angular_velocity[0]
-
-
-def faults(make, *arguments, **named):
-    with pytest.raises(lw.SceneError) as caught:
-        make(*arguments, **named)
-    return caught.value.faults
 
 
 def test_a_start_left_out_is_at_rest():

@@ -256,8 +256,9 @@ def test_a_vehicle(values, words):
 FOSSEN = [
     ({"X_udot": 5.0}, "X_udot = 5.0", "is positive", "write -5"),
     ({"X_u|u|": 5.0}, "X_u|u| = 5.0", "is positive", "write -5"),
-    ({"Y_rdot": -1.0, "N_vdot": -2.0}, "Y_rdot = -1.0", "differs from its partner N_vdot", "mend one or leave it out"),
+    ({"Y_rdot": -1.0, "N_vdot": -2.0}, "Y_rdot = -1.0", "differs from its partner N_vdot = -2.0", "mend one or leave it out"),
     ({"X_u": -1.0, "Xu": -2.0}, "Xu = -2.0", "given twice", "leave one out"),
+    ({"X_udot": -1.0, "Xdu": -1.0}, "Xdu = -1.0", "also as X_udot", "leave one out"),
     ({"Y_uv": -1.0}, "Y_uv = -1.0", "product of two velocities", "ignore="),
     ({"X_qq": -1.0}, "X_qq = -1.0", "no drag", "X_|q|q"),
     ({"Q_u": -1.0}, "Q_u = -1.0", "not a coefficient's name", "known: X_udot"),
@@ -294,6 +295,7 @@ SDF = [
     (LINK.replace(">10<", ">ten<"), {}, "<mass> = 'ten'", "does not hold 1 finite numbers"),
     (LINK.replace("<xU>-1</xU>", "<xU>-1</xU><yV>1</yV>"), {}, "plugin's linear drag", "both signs", "Fossen's signs"),
     (LINK.replace("xU", "xUabsV"), {}, "<xUabsV> = -1.0", "product of velocities", "leave it out"),
+    ("<sdf><link></sdf>", {}, "not XML", "mend that line"),
     (LINK, {"link": "c"}, "SDF link = 'c'", "not in the file", "known: b"),
     (LINK, {"volume": -1.0}, "volume = -1.0", "not positive", "[m3]"),
     (LINK, {"volume": 0.01, "gravity": "g"}, "gravity = 'g'", "not numeric", "[m/s2]"),
@@ -315,6 +317,7 @@ YAML = [
     ("mass: 10\ninertia: [1, 2, 2.5]\nadded_mass: [1, 2]\n", "added_mass = [1, 2]", "shape (2,)", "6x6 matrix"),
     ("mass: 10\ninertia: [1, 2, 2.5]\ncoefficients: [1]\n", "coefficients = [1]", "not a map", "X_udot"),
     ("- 1\n- 2\n", "is not a map", "write mass: ..."),
+    ("nowhere.yaml", "nowhere.yaml", "give the path"),
     ("mass: [1\n", "YAML", "mend that line"),
 ]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.real_numbers import is_whole
 
 
@@ -65,6 +65,26 @@ def read(settings: Any, faults: Faults, *names: str) -> dict[str, Any]:
         skipped = value is None and item.default is None
         values[name] = None if skipped else item.metadata["reader"](faults, name, value, **item.metadata["arguments"])
     return values
+
+
+Made = TypeVar("Made")
+
+
+def from_table(kind: type[Made], key: str, given: Any, example: str, **needed: str) -> Made:
+    """Build settings from a table of a scene file; settings themselves are kept.
+
+    needed: Keys that the table must have, each with the remedy where it is missing.
+    """
+    if isinstance(given, kind):
+        return given
+    if not isinstance(given, Mapping):
+        raise refusal(key, given, "is no table", example)
+    faults = Faults()
+    faults.keys(key, given, [item.name for item in dataclasses.fields(kind) if item.init])  # type: ignore[arg-type]
+    for name in (name for name in needed if name not in given):
+        faults.add(f"{key}.{name}", "", "is missing", needed[name])
+    faults.raise_if_any()
+    return kind(**given)
 
 
 def units(kind: Any) -> dict[str, str]:

@@ -6,11 +6,12 @@ from __future__ import annotations
 import copy
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common import declared
 from lgvi_warp.common.declared import positive, read, real
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.control.base import READINGS, SECTIONS, Allocation, Bus, Part
@@ -302,20 +303,10 @@ def from_table(given: Any) -> Controller | None:
     given: A Controller, a table, or None.
     Returns: The controller; None for None.
     """
-    if given is None or isinstance(given, Controller):
-        return given
-    faults = Faults()
-    if not isinstance(given, Mapping):
-        faults.add(
-            "controller", given, "is no table", "write [controller] and its keys below, or give lw.Controller(...)"
-        )
-        faults.raise_if_any()
-    known = [item.name for item in fields(Controller) if item.init]
-    faults.keys("controller", given, known)
-    if "period" not in given:
-        faults.add("controller.period", "", "is missing", "give the time between two looks [s]")
-    faults.raise_if_any()
-    return Controller(**given)
+    if given is None:
+        return None
+    example = "write [controller] and its keys below, or give lw.Controller(...)"
+    return declared.from_table(Controller, "controller", given, example, period="give the time between two looks [s]")
 
 
 def terms_of(scene: Mapping[str, Any]) -> tuple[Term, ...]:

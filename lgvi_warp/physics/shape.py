@@ -3,12 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
-from lgvi_warp.common.declared import positive, read
-from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.declared import from_table, positive, read
+from lgvi_warp.common.errors import Faults
 
 REMEDY = 'give length and diameter [m], or mesh = "hull.glb"'
 
@@ -61,11 +60,4 @@ def shape_from(value: Any) -> Shape | None:
     value: A table as in a scene file, a Shape, or None for none.
     Returns: The shape.
     """
-    if value is None or isinstance(value, Shape):
-        return value
-    if not isinstance(value, Mapping):
-        raise SceneError([f"vehicle.shape = {value!r}: is no table; {REMEDY}"])
-    faults = Faults()
-    faults.keys("vehicle.shape", value, [field.name for field in fields(Shape)])
-    faults.raise_if_any()
-    return Shape(**value)
+    return None if value is None else from_table(Shape, "vehicle.shape", value, REMEDY)

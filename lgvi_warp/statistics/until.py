@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.declared import declared, positive, read, text, whole
+from lgvi_warp.common.declared import declared, from_table, positive, read, text, whole
 from lgvi_warp.common.errors import Faults, SceneError, among, closest, refusal
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.estimates.estimate import Estimate
@@ -69,18 +69,8 @@ class Until:
 
 def from_dict(given: Any) -> Until:
     """Return the stopping rule of a table, or the rule itself."""
-    if isinstance(given, Until):
-        return given
     example = 'write [run.until] and statistic = "mean position[2]", half_width = 0.01'
-    if not isinstance(given, dict):
-        raise refusal("until", given, "is no table", example)
-    faults = Faults()
-    faults.keys("until", given, Until.__dataclass_fields__)
-    for name in ("statistic", "half_width"):
-        if name not in given:
-            faults.add(f"until.{name}", "", "is missing", example)
-    faults.raise_if_any()
-    return Until(**given)
+    return from_table(Until, "until", given, example, statistic=example, half_width=example)
 
 
 @dataclass

@@ -85,9 +85,3 @@ def from_table(kind: type[Made], key: str, given: Any, example: str, **needed: s
         faults.add(f"{key}.{name}", "", "is missing", needed[name])
     faults.raise_if_any()
     return kind(**given)
-
-
-def units(kind: Any) -> dict[str, str]:
-    """The units of the fields that a class declares with one, by name."""
-    arguments = {name: item.metadata["arguments"] for name, item in _declared_fields(kind).items()}
-    return {name: given["unit"] for name, given in arguments.items() if "unit" in given}

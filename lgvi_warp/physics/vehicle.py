@@ -4,13 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from lgvi_warp.common import summaries
-from lgvi_warp.common.declared import array, checked, positive, read, real, symmetric, text, units
+from lgvi_warp.common.declared import array, checked, positive, read, real, symmetric, text
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics import inertia as inertias
@@ -230,7 +230,7 @@ class Vehicle(Summarized):
 
 
 # Of each number of a vehicle.
-UNITS = {name: unit for name, unit in units(Vehicle).items() if name in (*SIMPLE, *FULL)}
+UNITS = {item.name: item.metadata["arguments"]["unit"] for item in fields(Vehicle) if item.name in (*SIMPLE, *FULL)}
 SIGN = "added mass is positive here: minus Fossen's X_udot, Y_vdot, Z_wdot ..."
 
 

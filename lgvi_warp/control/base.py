@@ -11,6 +11,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
+from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics import vehicle
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, word_of
@@ -213,11 +214,7 @@ class IntegralLaw(ControlLaw):
 
     integrals: ClassVar[int] = 1
 
-    anti_windup: str = "conditional"
-
-    def check(self, faults: Faults) -> None:
-        """Adds a fault where `anti_windup` is unknown."""
-        faults.choice("anti_windup", self.anti_windup, ANTI_WINDUP)
+    anti_windup: str = word("conditional", known=ANTI_WINDUP)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The numbers, the memory of the integrals, and where the law finds what was not delivered."""
@@ -243,12 +240,7 @@ class PoseLaw(IntegralLaw):
     demands: ClassVar[tuple[str, ...]] = ("X", "Y", "Z", "K", "M", "N")
     integrals: ClassVar[int] = 6
 
-    feedforward: str = "none"
-
-    def check(self, faults: Faults) -> None:
-        """In addition, a fault where `feedforward` is unknown."""
-        super().check(faults)
-        faults.choice("feedforward", self.feedforward, FEEDFORWARD)
+    feedforward: str = word("none", known=FEEDFORWARD)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """In addition, each limit by itself, and the nominal weight less buoyancy with the moment of both."""

@@ -6,11 +6,13 @@ from __future__ import annotations
 import copy
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common import declared
+from lgvi_warp.common.declared import positive, read, real
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.control.base import READINGS, SECTIONS, Allocation, Bus, Part
 from lgvi_warp.control.callback import Callback, CallbackCommands, refuse_second
@@ -61,8 +63,8 @@ class Controller:
         0.44 rad
     """
 
-    period: float
-    delay: Any = 0.0
+    period: float = positive(unit="s")
+    delay: Any = real(0.0, unit="s", least=0.0)
     sensors: Sequence[Any] = ()
     guidance: Sequence[Any] = ()
     laws: Sequence[Any] = ()
@@ -76,8 +78,7 @@ class Controller:
 
     def __post_init__(self) -> None:
         faults = Faults("controller.")
-        faults.positive("period", self.period)
-        delay = faults.number("delay", self.delay, "s", 0.0)
+        delay = read(self, faults)["delay"]
         if delay is not None:
             object.__setattr__(self, "delay", np.asarray(delay))
             if not faults and delay > MOST_PERIODS * self.period:
@@ -315,20 +316,10 @@ def from_table(given: Any) -> Controller | None:
     given: A Controller, a table, or None.
     Returns: The controller; None for None.
     """
-    if given is None or isinstance(given, Controller):
-        return given
-    faults = Faults()
-    if not isinstance(given, Mapping):
-        faults.add(
-            "controller", given, "is no table", "write [controller] and its keys below, or give lw.Controller(...)"
-        )
-        faults.raise_if_any()
-    known = [item.name for item in fields(Controller) if item.init]
-    faults.keys("controller", given, known)
-    if "period" not in given:
-        faults.add("controller.period", "", "is missing", "give the time between two looks [s]")
-    faults.raise_if_any()
-    return Controller(**given)
+    if given is None:
+        return None
+    example = "write [controller] and its keys below, or give lw.Controller(...)"
+    return declared.from_table(Controller, "controller", given, example, period="give the time between two looks [s]")
 
 
 def terms_of(scene: Mapping[str, Any]) -> tuple[Term, ...]:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.declared import word
 from lgvi_warp.control.base import MeasuringPart
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 
@@ -37,16 +37,10 @@ class DeadReckoning(MeasuringPart):
 
     type: ClassVar[str] = "dead_reckoning"
 
-    rule: str = "trapezoid"
-    velocity: str = "velocity"
-    depth: str = "reckoned"
+    rule: str = word("trapezoid", known=RULES)
+    velocity: str = word("velocity", known=VELOCITIES)
+    depth: str = word("reckoned", known=DEPTHS)
     start_error: Any = number((3,), "m", (0.0, 0.0, 0.0))
-
-    def check(self, faults: Faults) -> None:
-        """Adds a fault for each word that is not known."""
-        faults.choice("rule", self.rule, RULES)
-        faults.choice("velocity", self.velocity, VELOCITIES)
-        faults.choice("depth", self.depth, DEPTHS)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The weights of the rule, what it takes, the start's error, and the rows of position and velocity."""

@@ -7,10 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.declared import checked, flag, text
 from lgvi_warp.control.base import Bus, Sending, first_step
 from lgvi_warp.control.sensor import Sensor
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
+
+
+def _is_int(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -34,24 +38,15 @@ class Fault(Sending):
 
     type: ClassVar[str] = "fault"
 
-    of: str = ""
-    channel: int = 0
+    of: str = text("is not a text", "give the name of an actuator or of a sensor", "")
+    channel: int = checked(_is_int, "is no whole number", "give the number of a channel, from 0", 0)
     time: Any = number((), "s", 0.0, least=0.0, infinite=True)
     gain: Any = number((), "1", 0.0)
     offset: Any = number((), "unit", 0.0)
-    known: bool = False
+    known: bool = flag(False)
 
     # The sensor that has it; set for a part of a scene.
     sensor: ClassVar[Any] = None
-
-    def check(self, faults: Faults) -> None:
-        """Adds a fault where `of` is no text, the channel no whole number, or `known` neither true nor false."""
-        if not isinstance(self.of, str):
-            faults.add("of", self.of, "is not a text", "give the name of an actuator or of a sensor")
-        if not isinstance(self.channel, int) or isinstance(self.channel, bool):
-            faults.add("channel", self.channel, "is no whole number", "give the number of a channel, from 0")
-        if not isinstance(self.known, bool):
-            faults.add("known", self.known, "is neither true nor false", "give one of them")
 
     def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
         """In addition, knows its sensor."""

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.declared import word
 from lgvi_warp.control.base import READINGS, MeasuringPart
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 
@@ -30,12 +30,8 @@ class LowPass(MeasuringPart):
 
     type: ClassVar[str] = "low_pass"
 
-    of: str = ""
+    of: str = word("", known=READINGS)
     time_constant: Any = number((), "s", least=0.0)
-
-    def check(self, faults: Faults) -> None:
-        """Adds a fault where `of` is not known."""
-        faults.choice("of", self.of, READINGS)
 
     def device_in(self, aligned: bool) -> Any:
         """The device code for what it filters."""

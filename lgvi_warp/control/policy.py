@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import Faults, among
 from lgvi_warp.common.npy_files import of_npz
 from lgvi_warp.control.base import ControlLaw, Numbers, Packed, PackingContext
@@ -77,14 +78,12 @@ class Policy(ControlLaw):
     inputs: Sequence[str]
     outputs: Sequence[str]
     scale: Any = number(("n",), "N, N m", None, optional=True)
-    activation: str = "tanh"
-    output_activation: str = "linear"
+    activation: str = word("tanh", known=HIDDEN)
+    output_activation: str = word("linear", known=LAST)
     checksum: int | None = None
 
     def check(self, faults: Faults) -> None:
         """Adds a fault where a name is unknown, and where the file does not fit."""
-        faults.choice("activation", self.activation, HIDDEN)
-        faults.choice("output_activation", self.output_activation, LAST)
         places = _named(faults, "inputs", self.inputs, {name: name for name in (*INPUTS, *PLACES)})
         outputs = _named(faults, "outputs", self.outputs, dict.fromkeys(OUTPUTS))
         if self.scale is not None and len(self.scale) != len(outputs):

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.control.base import Guidance, Numbers, Packed, PackingContext
 from lgvi_warp.physics.terms.base import number
@@ -53,15 +54,13 @@ class Waypoints(Guidance):
     speed: Any = number((), "m/s")
     look_ahead: Any = number((), "m", above=0.0)
     radius: Any = number((), "m", above=0.0)
-    method: str = "los"
+    method: str = word("los", known=METHODS)
     kappa: Any = number((), "1/s", 0.1, least=0.0)
     gamma: Any = number((), "rad/(m s)", 0.002, least=0.0)
-    at_end: str = "stop"
+    at_end: str = word("stop", known=AT_END)
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where points are too few or the same twice, or a word is unknown."""
-        faults.choice("method", self.method, METHODS)
-        faults.choice("at_end", self.at_end, AT_END)
+        """Adds a fault where points are too few or the same twice."""
         if len(self.points) < 2:
             faults.add("points", self.points, "are less than two", "give where the way begins and where it ends")
         same = np.flatnonzero(np.all(np.diff(self.points[:, :2], axis=0) == 0.0, axis=1))

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, fields
 from typing import Any
 
 from lgvi_warp.common import summaries
+from lgvi_warp.common.declared import checked, read, word
 from lgvi_warp.common.errors import Faults, among
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.methods.tableaux import CG3, DOP853, DOPRI5, RK4, RKW3, Tableau
@@ -118,6 +119,29 @@ HALVES: dict[str, tuple[int, tuple[float, ...]]] = {
 }  # fmt: skip
 
 
+def _is_count(value: Any) -> bool:
+    """Whether a value is a whole number from 0 to 100, or "auto"."""
+    return among(value, ("auto",)) or (isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= 100)
+
+
+def _is_weight(value: Any) -> bool:
+    """Whether a value is a number from 0 to 1."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and 0.0 <= value <= 1.0
+
+
+def _is_tolerance(value: Any) -> bool:
+    """Whether a value is a number above 0 and below 1."""
+    return _is_weight(value) and 0.0 < value < 1.0
+
+
+_COUNT = (
+    "is not a whole number from 0 to 100",
+    'give a number of Newton steps, "auto", or None to iterate to the tolerance',
+)
+_WEIGHT = "is not a number from 0 to 1", "give the weight of the old configuration"
+_BETWEEN = "is not between 0 and 1"
+
+
 @dataclass(frozen=True)
 class Method(Summarized):
     """An integration method by name, and how it solves its implicit equations.
@@ -163,13 +187,13 @@ class Method(Summarized):
     """
 
     name: str = "psi_s"
-    solver: str = "quartic"
-    iterations: int | str | None = None
-    tolerance: float | None = None
-    alpha: float = 0.5
-    beta: float = 0.5
-    rtol: float | None = None
-    atol: float | None = None
+    solver: str = word("quartic", known=SOLVERS)
+    iterations: int | str | None = checked(_is_count, *_COUNT, None)
+    tolerance: float | None = checked(_is_tolerance, _BETWEEN, "give a relative residual such as 1e-12", None)
+    alpha: float = checked(_is_weight, *_WEIGHT, 0.5)
+    beta: float = checked(_is_weight, *_WEIGHT, 0.5)
+    rtol: float | None = checked(_is_tolerance, _BETWEEN, "give a tolerance such as 1e-9", None)
+    atol: float | None = checked(_is_tolerance, _BETWEEN, "give a tolerance such as 1e-9", None)
     reason: str = field(default="", compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -187,21 +211,7 @@ class Method(Summarized):
                 middle = PROGRAMS[base][len(PROGRAMS[base]) // 2][0]
                 faults.add("method", self.name, f"would divide {middle}, and only exact flows can be divided",
                            f"use {composition}(psi_s)")  # fmt: skip
-        faults.choice("solver", self.solver, SOLVERS)
-        n = self.iterations
-        if (
-            n is not None
-            and not among(n, ("auto",))
-            and (isinstance(n, bool) or not isinstance(n, int) or not 0 <= n <= 100)
-        ):
-            remedy = 'give a number of Newton steps, "auto", or None to iterate to the tolerance'
-            faults.add("iterations", n, "is not a whole number from 0 to 100", remedy)
-        for name in ("alpha", "beta"):
-            value = getattr(self, name)
-            if not isinstance(value, int | float) or isinstance(value, bool) or not 0.0 <= value <= 1.0:
-                faults.add(name, value, "is not a number from 0 to 1", "give the weight of the old configuration")
-        if self.tolerance is not None and not _between_0_and_1(self.tolerance):
-            faults.add("tolerance", self.tolerance, "is not between 0 and 1", "give a relative residual such as 1e-12")
+        read(self, faults)
         self._check_steps(faults)
         faults.raise_if_any()
 
@@ -215,9 +225,6 @@ class Method(Summarized):
     def _check_steps(self, faults: Faults) -> None:
         """Note a fault unless both tolerances or none are set, and for a method that estimates no error."""
         tolerances = {name: value for name in ("rtol", "atol") if (value := getattr(self, name)) is not None}
-        for name, value in tolerances.items():
-            if not _between_0_and_1(value):
-                faults.add(name, value, "is not between 0 and 1", "give a tolerance such as 1e-9")
         if len(tolerances) == 1:
             faults.add(*tolerances.popitem(), "is given alone", "give both rtol and atol, or none for a fixed step")
         elif tolerances and self.name in ORDERS and not (self.tableau and self.tableau.errors):
@@ -363,11 +370,6 @@ class Method(Summarized):
         if self.iterations is None:
             return 1e-14 if dtype == "float64" else 1e-6
         return 1e-12 if dtype == "float64" else 1e-5
-
-
-def _between_0_and_1(value: Any) -> bool:
-    """Whether a value is a number above 0 and below 1."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < 1.0
 
 
 @functools.cache

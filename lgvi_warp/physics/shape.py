@@ -3,11 +3,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
-from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.declared import from_table, positive, read
+from lgvi_warp.common.errors import Faults
 
 REMEDY = 'give length and diameter [m], or mesh = "hull.glb"'
 
@@ -26,24 +26,22 @@ class Shape:
         SceneError: Where neither or both are given, or a number is not positive. The message lists every fault.
     """
 
-    length: float | None = None
-    diameter: float | None = None
+    length: float | None = positive(None, unit="m")
+    diameter: float | None = positive(None, unit="m")
     mesh: str | None = None
 
     def __post_init__(self) -> None:
         faults = Faults("vehicle.shape.")
-        sizes = {"length": self.length, "diameter": self.diameter}
         if self.mesh is None:
-            for name, size in sizes.items():
-                if size is None:
+            for name, size in read(self, faults).items():
+                if getattr(self, name) is None:
                     faults.add(name, size, "is missing", REMEDY)
-                else:
-                    object.__setattr__(self, name, faults.positive(name, size, "m"))
+                object.__setattr__(self, name, size)
         elif not isinstance(self.mesh, str) or not self.mesh.lower().endswith(".glb"):
             faults.add(
                 "mesh", self.mesh, "is no name of a .glb file", "give a binary glTF file, or length and diameter"
             )
-        elif any(size is not None for size in sizes.values()):
+        elif self.length is not None or self.diameter is not None:
             faults.add("mesh", self.mesh, "stands beside a length or a diameter", REMEDY)
         faults.raise_if_any()
 
@@ -62,11 +60,4 @@ def shape_from(value: Any) -> Shape | None:
     value: A table as in a scene file, a Shape, or None for none.
     Returns: The shape.
     """
-    if value is None or isinstance(value, Shape):
-        return value
-    if not isinstance(value, Mapping):
-        raise SceneError([f"vehicle.shape = {value!r}: is no table; {REMEDY}"])
-    faults = Faults()
-    faults.keys("vehicle.shape", value, [field.name for field in fields(Shape)])
-    faults.raise_if_any()
-    return Shape(**value)
+    return None if value is None else from_table(Shape, "vehicle.shape", value, REMEDY)

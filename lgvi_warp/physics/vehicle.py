@@ -4,12 +4,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, fields
 from typing import Any
 
 import numpy as np
 
 from lgvi_warp.common import summaries
+from lgvi_warp.common.declared import array, checked, positive, read, real, symmetric, text
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics import inertia as inertias
@@ -19,16 +20,8 @@ from lgvi_warp.physics.shape import shape_from
 Numbers = Mapping[str, np.ndarray]
 
 # The two forms of a vehicle: uncoupled about the centre of gravity, or 6x6 about any origin.
-SIMPLE = {"mass": "kg", "added_mass": "kg", "inertia": "kg m2", "buoyancy": "N", "center_of_buoyancy": "m"}
-FULL = {
-    "rigid_body_mass_matrix": "kg, kg m, kg m2",
-    "added_mass_matrix": "kg, kg m, kg m2",
-    "weight": "N",
-    "center_of_gravity": "m",
-    "buoyancy": "N",
-    "center_of_buoyancy": "m",
-}
-UNITS = SIMPLE | FULL
+SIMPLE = ("mass", "added_mass", "inertia", "buoyancy", "center_of_buoyancy")
+FULL = ("rigid_body_mass_matrix", "added_mass_matrix", "weight", "center_of_gravity", "buoyancy", "center_of_buoyancy")
 # The smallest mass or inertia that has an inverse in float64.
 LEAST = float(np.finfo(np.float64).tiny)
 # The fraction of the third principal inertia by which the other two may sum to less than it: by round-off, and as
@@ -39,6 +32,11 @@ SYMMETRIC = ("added_mass", "inertia", "rigid_body_mass_matrix", "added_mass_matr
 
 class Seen(str):
     """A warning that a vehicle raises about its own numbers, and raises again when it is rebuilt from another's fields."""
+
+
+def _are_texts(value: Any) -> bool:
+    """Whether a value is a list of texts."""
+    return isinstance(value, list | tuple) and all(isinstance(text, str) for text in value)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,36 +83,31 @@ class Vehicle(Summarized):
           center_of_buoyancy  [0, 0, 0] m
     """
 
-    mass: float | None = None
+    mass: float | None = positive(None, unit="kg")
     _: KW_ONLY
-    inertia: Any = None
-    added_mass: Any = None
-    buoyancy: float = 0.0
-    center_of_buoyancy: Any = (0.0, 0.0, 0.0)
-    rigid_body_mass_matrix: Any = None
-    added_mass_matrix: Any = None
-    weight: float | None = None
-    center_of_gravity: Any = None
-    inertia_tolerance: float = 0.0
-    warnings: Sequence[str] = ()
+    inertia: Any = symmetric(None, unit="kg m2")
+    added_mass: Any = symmetric(None, unit="kg")
+    buoyancy: float = real(0.0, unit="N", least=0.0)
+    center_of_buoyancy: Any = array((0.0, 0.0, 0.0), shape=(3,), unit="m")
+    rigid_body_mass_matrix: Any = symmetric(None, unit="kg, kg m, kg m2", size=6)
+    added_mass_matrix: Any = symmetric(None, unit="kg, kg m, kg m2", size=6)
+    weight: float | None = real(None, unit="N", least=0.0)
+    center_of_gravity: Any = array(None, shape=(3,), unit="m")
+    inertia_tolerance: float = real(0.0, unit="1", least=0.0)
+    warnings: Sequence[str] = checked(_are_texts, "is not a list of texts", 'give ["..."], or leave it out', ())
     shape: Any = None
-    title: str | None = None
+    title: str | None = text("is no text", 'give title = "my glider", or leave it out', None)
 
     def __post_init__(self) -> None:
         faults = Faults("vehicle.")
-        values: dict[str, Any] = {
-            "buoyancy": faults.number("buoyancy", self.buoyancy, "N", least=0.0),
-            "center_of_buoyancy": faults.finite("center_of_buoyancy", self.center_of_buoyancy, (3,), "m"),
-        }
-        user_warnings = _texts(faults, self.warnings)
-        tolerance = faults.number("inertia_tolerance", self.inertia_tolerance, "1", least=0.0)
-        object.__setattr__(self, "inertia_tolerance", tolerance or 0.0)
+        values = read(self, faults, "buoyancy", "center_of_buoyancy", "warnings", "inertia_tolerance")
+        object.__setattr__(self, "inertia_tolerance", values["inertia_tolerance"] or 0.0)
+        user_warnings = (warning for warning in values["warnings"] or () if not isinstance(warning, Seen))
         values |= self._full(faults) if self.full else self._simple(faults)
         values["warnings"] = (*user_warnings, *map(Seen, values["warnings"]))
         with faults.including():
             values["shape"] = shape_from(self.shape)
-        if self.title is not None and not isinstance(self.title, str):
-            faults.add("title", self.title, "is no text", 'give title = "my glider", or leave it out')
+        values |= read(self, faults, "title")
         faults.raise_if_any()
         for name, value in values.items():
             if isinstance(value, np.ndarray):
@@ -140,42 +133,38 @@ class Vehicle(Summarized):
         for name in ("mass", "inertia"):
             if getattr(self, name) is None:
                 faults.add(name, None, "is missing", f"give it [{UNITS[name]}]")
-        mass = None if self.mass is None else faults.positive("mass", self.mass, "kg")
-        added_as_given = (0.0, 0.0, 0.0) if self.added_mass is None else self.added_mass
+        if self.added_mass is None:
+            object.__setattr__(self, "added_mass", (0.0, 0.0, 0.0))
+        values = read(self, faults, "mass", "added_mass", "inertia")
+        mass, added, inertia = values.values()
         if mass is not None and mass < LEAST:
             faults.add("mass", self.mass, "has no inverse in float64", f"give a mass from {LEAST:.3g} kg")
-        added = faults.symmetric("added_mass", added_as_given, "kg")
-        inertia = None if self.inertia is None else faults.symmetric("inertia", self.inertia, "kg m2")
         if inertia is not None and not _definite(inertia):
             faults.add("inertia", self.inertia, "is not positive definite", "give principal inertias above 0 [kg m2]")
         if mass is not None and added is not None and not _definite(added, mass * np.eye(3)):
-            faults.add("added_mass", added_as_given, "with the mass is not positive definite", SIGN)
-        warnings = unusual("inertia", inertia) if inertia is not None else ()
-        return {"mass": mass, "added_mass": added, "inertia": inertia, "warnings": warnings}
+            faults.add("added_mass", self.added_mass, "with the mass is not positive definite", SIGN)
+        return values | {"warnings": unusual("inertia", inertia) if inertia is not None else ()}
 
     def _full(self, faults: Faults) -> dict[str, Any]:
         for name in ("mass", "inertia", "added_mass"):
             if getattr(self, name) is not None:
                 faults.add(name, getattr(self, name), "repeats what the 6x6 matrices say", "keep one of the two forms")
-        unit = UNITS["rigid_body_mass_matrix"]
-        rigid = center = None
         warnings: tuple[str, ...] = ()
         if self.rigid_body_mass_matrix is None:
+            unit = UNITS["rigid_body_mass_matrix"]
             faults.add("rigid_body_mass_matrix", None, "is missing", f"give it beside added_mass_matrix [{unit}]")
-        else:
-            rigid = faults.symmetric("rigid_body_mass_matrix", self.rigid_body_mass_matrix, unit, 6)
-        added_as_given = np.zeros((6, 6)) if self.added_mass_matrix is None else self.added_mass_matrix
-        added = faults.symmetric("added_mass_matrix", added_as_given, unit, 6)
-        weight = None if self.weight is None else faults.number("weight", self.weight, "N", least=0.0)
-        if self.center_of_gravity is not None:
-            center = faults.finite("center_of_gravity", self.center_of_gravity, (3,), "m")
+        if self.added_mass_matrix is None:
+            object.__setattr__(self, "added_mass_matrix", np.zeros((6, 6)))
+        values = read(self, faults, "rigid_body_mass_matrix", "added_mass_matrix", "weight", "center_of_gravity")
+        rigid, added, _, center = values.values()
         if rigid is not None:
             center, warnings = self._rigid(faults, rigid, center)
             if _definite(rigid):
                 warnings += self._triangle(faults, rigid)
         if rigid is not None and added is not None and _definite(rigid) and not _definite(added, rigid):
-            faults.add("added_mass_matrix", added_as_given, "with the rigid body's is not positive definite", SIGN)
-        values = {"rigid_body_mass_matrix": rigid, "added_mass_matrix": added, "weight": weight}
+            faults.add(
+                "added_mass_matrix", self.added_mass_matrix, "with the rigid body's is not positive definite", SIGN
+            )
         return values | {"center_of_gravity": center, "warnings": warnings}
 
     def _triangle(self, faults: Faults, rigid: np.ndarray) -> tuple[str, ...]:
@@ -250,14 +239,8 @@ class Vehicle(Summarized):
         return content | ({"title": self.title} if self.title else {})
 
 
-def _texts(faults: Faults, given: Any) -> tuple[str, ...]:
-    """The texts given as warnings, without those that a vehicle raised itself; () after adding a fault."""
-    if isinstance(given, list | tuple) and all(isinstance(text, str) for text in given):
-        return tuple(text for text in given if not isinstance(text, Seen))
-    faults.add("warnings", given, "is not a list of texts", 'give ["..."], or leave it out')
-    return ()
-
-
+# Of each number of a vehicle.
+UNITS = {item.name: item.metadata["arguments"]["unit"] for item in fields(Vehicle) if item.name in (*SIMPLE, *FULL)}
 SIGN = "added mass is positive here: minus Fossen's X_udot, Y_vdot, Z_wdot ..."
 
 

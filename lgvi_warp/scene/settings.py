@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.declared import positive, read, text, whole, word
 from lgvi_warp.common.errors import Faults, SceneError, among, ragged
 from lgvi_warp.common.machine import DTYPES
-from lgvi_warp.common.real_numbers import holds_words, is_whole
+from lgvi_warp.common.real_numbers import holds_words
 from lgvi_warp.common.status import CHECKS, ON_FAILURE
 from lgvi_warp.methods.method import Method
 from lgvi_warp.sampling.designs import sampling_of
@@ -70,19 +71,19 @@ class RunSettings:
         SceneError: If anything is wrong; the message lists every fault.
     """
 
-    method: str | None = None
-    step: float | None = None
-    duration: float | None = None
-    save_every: float | None = None
+    method: str | None = text("is not a text", 'give the name of a method, such as "psi_s"', None)
+    step: float | None = positive(None, unit="s")
+    duration: float | None = positive(None, unit="s")
+    save_every: float | None = positive(None, unit="s")
     save_fields: Sequence[str] | None = None
-    dtype: str = "float64"
+    dtype: str = word("float64", known=DTYPES)
     solver: str | None = None
     iterations: int | str | None = None
     tolerance: float | None = None
     rtol: float | None = None
     atol: float | None = None
-    checks: str = "safe"
-    on_failure: str = "freeze"
+    checks: str = word("safe", known=CHECKS)
+    on_failure: str = word("freeze", known=ON_FAILURE)
     keep: Any = "all"
     statistics: Sequence[Any] = ()
     until: Any = None
@@ -105,15 +106,8 @@ class RunSettings:
 
             with faults.including():
                 object.__setattr__(self, "until", until.from_dict(self.until))
-        for name in ("step", "duration", "save_every"):
-            if getattr(self, name) is not None:
-                faults.positive(name, getattr(self, name))
-        faults.choice("dtype", self.dtype, DTYPES)
-        faults.choice("checks", self.checks, CHECKS)
-        faults.choice("on_failure", self.on_failure, ON_FAILURE)
-        if not isinstance(self.method, str | None):
-            faults.add("method", self.method, "is not a text", 'give the name of a method, such as "psi_s"')
-        else:
+        read(self, faults)
+        if isinstance(self.method, str | None):
             with faults.including():
                 try:
                     self.method_of(self.method)
@@ -181,23 +175,17 @@ class EnsembleSettings:
         SceneError: If anything is wrong; the message lists every fault.
     """
 
-    members: int | None = None
-    seed: int = 0
+    members: int | None = whole(1, "is not a whole number from 1", "give 1 or more", None)
+    seed: int = whole(0, "is not a whole number from 0", "give 0 or more", 0)
     vary: Mapping[str, Any] = field(default_factory=dict)
     sampling: Any = "random"
     indices: Any = None
 
     def __post_init__(self) -> None:
         faults = Faults("ensemble.")
-        for name, least in (("members", 1), ("seed", 0)):
-            value = getattr(self, name)
-            if name == "members" and value is None:
-                continue
-            if not is_whole(value, least):
-                faults.add(name, value, f"is not a whole number from {least}", f"give {least} or more")
-            elif name == "members" and value > MOST_MEMBERS:
-                problem = f"are more members than the {MOST_MEMBERS} that there can be"
-                faults.add(name, value, problem, f"give {MOST_MEMBERS} or less")
+        if (read(self, faults)["members"] or 0) > MOST_MEMBERS:
+            problem = f"are more members than the {MOST_MEMBERS} that there can be"
+            faults.add("members", self.members, problem, f"give {MOST_MEMBERS} or less")
         if self.indices is not None and not _whole_numbers(self.indices):
             faults.add("indices", self.indices, "is no list of whole numbers from 0", "give members: indices = [17]")
         if isinstance(self.vary, Mapping):

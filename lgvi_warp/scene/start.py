@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.declared import array, positive, read, real
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import TABLE
@@ -36,13 +37,12 @@ class Environment:
         Environment(gravity=9.80665, water_density=1000.0)
     """
 
-    gravity: float = 9.80665
-    water_density: float = 1025.0
+    gravity: float = real(9.80665, unit="m/s2", least=0.0)
+    water_density: float = positive(1025.0, unit="kg/m3")
 
     def __post_init__(self) -> None:
         faults = Faults("environment.")
-        faults.number("gravity", self.gravity, "m/s2", least=0.0)
-        faults.positive("water_density", self.water_density, "kg/m3")
+        read(self, faults)
         faults.raise_if_any()
 
     def to_dict(self) -> dict[str, float]:
@@ -81,14 +81,14 @@ class Start:
         array([1.5, 0. , 0. ])
     """
 
-    position: Any = None
-    attitude: Any = None
-    rotation_vector: Any = None
-    quaternion_wxyz: Any = None
-    euler_deg: Any = None
-    velocity: Any = None
-    velocity_inertial: Any = None
-    angular_velocity: Any = None
+    position: Any = array(None, shape=(3,), unit="m")
+    attitude: Any = array(None, shape=(3, 3), unit="1")
+    rotation_vector: Any = array(None, shape=(3,), unit="rad")
+    quaternion_wxyz: Any = array(None, shape=(4,), unit="1")
+    euler_deg: Any = array(None, shape=(3,), unit="deg")
+    velocity: Any = array(None, shape=(3,), unit="m/s")
+    velocity_inertial: Any = array(None, shape=(3,), unit="m/s")
+    angular_velocity: Any = array(None, shape=(3,), unit="rad/s")
 
     def __post_init__(self) -> None:
         faults = Faults("start.")
@@ -96,20 +96,15 @@ class Start:
             chosen = [name for name in names if getattr(self, name) is not None]
             if len(chosen) > 1:
                 faults.add(" and ".join(chosen), "...", "say the same thing twice", "keep one of them")
-        for name in NAMES:
-            value = getattr(self, name)
-            if value is not None:
-                object.__setattr__(self, name, faults.finite(name, value, TABLE[name].shape, TABLE[name].unit))
-        self._check_attitude(faults)
-        faults.raise_if_any()
-
-    def _check_attitude(self, faults: Faults) -> None:
+        for name, value in read(self, faults).items():
+            object.__setattr__(self, name, value)
         R, q = self.attitude, self.quaternion_wxyz
         if R is not None and not notation.rotations(R):
             fault = "is not a rotation (R^T R = I, det R = 1, to 1e-9)"
             faults.add("attitude", R, fault, "give more digits, or quaternion_wxyz")
         if q is not None and not np.any(q):
             faults.add("quaternion_wxyz", q, "is zero", "give a quaternion that is not")
+        faults.raise_if_any()
 
     def given(self) -> dict[str, np.ndarray]:
         """Return the start as the user gave it, completed with zeros.

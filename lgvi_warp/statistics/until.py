@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from lgvi_warp.common.declared import declared, from_table, positive, read, text, whole
 from lgvi_warp.common.errors import Faults, SceneError, among, closest, refusal
-from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.estimates.estimate import Estimate
 from lgvi_warp.statistics.estimates.naming import canonical
@@ -22,6 +22,10 @@ from lgvi_warp.statistics.values.functional import quantity
 
 # After a look, the number of members grows by at least this fraction before the next one.
 GROWTH = 0.05
+
+
+def _time_or_all(faults: Faults, key: str, value: Any) -> Any:
+    return value if among(value, ("all",)) else faults.number(key, value, "s", least=0.0)
 
 
 @dataclass(frozen=True)
@@ -55,20 +59,14 @@ class Until:
         True
     """
 
-    statistic: str
-    half_width: float
-    at: Any = None
-    members: int = 1024
+    statistic: str = text("is no name", 'give "mean position[2]"')
+    half_width: float = positive(unit="in the unit of the statistic")
+    at: Any = declared(_time_or_all, None)
+    members: int = whole(2, "is no whole number from 2", "give 1024", 1024)
 
     def __post_init__(self) -> None:
         faults = Faults("until.")
-        if not isinstance(self.statistic, str):
-            faults.add("statistic", self.statistic, "is no name", 'give "mean position[2]"')
-        faults.positive("half_width", self.half_width, "in the unit of the statistic")
-        if self.at is not None and not among(self.at, ("all",)):
-            faults.number("at", self.at, "s", least=0.0)
-        if not is_whole(self.members, 2):
-            faults.add("members", self.members, "is no whole number from 2", "give 1024")
+        read(self, faults)
         faults.raise_if_any()
         object.__setattr__(self, "members", int(self.members))
 
@@ -80,18 +78,8 @@ class Until:
 
 def from_dict(given: Any) -> Until:
     """Return the stopping rule of a table, or the rule itself."""
-    if isinstance(given, Until):
-        return given
     example = 'write [run.until] and statistic = "mean position[2]", half_width = 0.01'
-    if not isinstance(given, dict):
-        raise refusal("until", given, "is no table", example)
-    faults = Faults()
-    faults.keys("until", given, Until.__dataclass_fields__)
-    for name in ("statistic", "half_width"):
-        if name not in given:
-            faults.add(f"until.{name}", "", "is missing", example)
-    faults.raise_if_any()
-    return Until(**given)
+    return from_table(Until, "until", given, example, statistic=example, half_width=example)
 
 
 @dataclass

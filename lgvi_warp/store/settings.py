@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from lgvi_warp.common.arguments import listed
+from lgvi_warp.common.declared import read, real, word
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.control.signals import SAVED
 from lgvi_warp.store.arrays import whole_array
@@ -51,23 +52,20 @@ class Store:
     """
 
     path: str | os.PathLike[str]
-    dtype: str | None = None
+    dtype: str | None = word(None, known=("float32", "float64"))
     fields: tuple[str, ...] | None = None
-    existing: str = "refuse"
+    existing: str = word("refuse", known=EXISTING)
     force: bool = False
-    chunk_bytes: int = CHUNK_BYTES
+    chunk_bytes: int = real(CHUNK_BYTES, unit="bytes", least=1)
 
     def __post_init__(self) -> None:
         faults = Faults("store.")
         if not isinstance(self.path, str | os.PathLike) or self.whole.suffix != ".zarr":
             faults.add("path", self.path, "is no folder of a store", 'end its name in .zarr: "runs/x/run.zarr"')
-        if self.dtype is not None:
-            faults.choice("dtype", self.dtype, ("float32", "float64"))
-        faults.choice("existing", self.existing, EXISTING)
+        read(self, faults)
         with faults.including():
             for name in () if self.fields is None else listed("fields", self.fields, "names of fields"):
                 faults.choice("fields", name, SAVED)
-        faults.number("chunk_bytes", self.chunk_bytes, "bytes", least=1)
         faults.raise_if_any()
         needed()
 

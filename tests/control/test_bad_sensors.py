@@ -10,6 +10,7 @@ import pytest
 import lgvi_warp as lw
 from tests.conftest import ROOT
 from tests.control.bench import scene
+from tests.support.refusals import refused
 
 CONTROLLER = {
     "period": 0.1,
@@ -18,79 +19,55 @@ CONTROLLER = {
 }
 
 
-def refused(make):
-    with pytest.raises(lw.SceneError) as error:
-        make()
-    return "; ".join(error.value.faults)
-
-
 def of_table(**tables):
     """A scene from tables as in a file."""
     return lw.Scene.from_dict(scene([]).to_dict() | {"controller": CONTROLLER | tables})
 
 
-@pytest.mark.parametrize(
-    ("sensor", "words"),
-    [
-        ({"of": "dept"}, ("sensor.of = 'dept': is not known", "'depth'")),
-        ({}, ("sensor.of = '': is not known",)),
-        ({"of": ["depth"]}, ("sensor.of", "is not known")),
-        ({"of": "depth", "noise": -0.1}, ("sensor.noise = -0.1: is out of bounds", "from 0")),
-        ({"of": "depth", "noise": float("nan")}, ("sensor.noise", "is not finite")),
-        ({"of": "depth", "noise": [0.1, 0.1, 0.1]}, ("sensor.noise", "has shape (3,)")),
-        ({"of": "velocity", "bias": [0.1, 0.1]}, ("sensor.bias", "has shape (2,)")),
-        ({"of": "velocity", "bias": "much"}, ("sensor.bias",)),
-        ({"of": "velocity", "bias": None}, ("sensor.bias",)),
-        ({"of": "depth", "every": 1.5}, ("sensor.every = 1.5: is no whole number of looks; give 1 or 2",)),
-        ({"of": "depth", "every": 0}, ("sensor.every = 0", "from 1 to 1000")),
-        ({"of": "depth", "latency": -1}, ("sensor.latency = -1", "from 0 to 1000")),
-        ({"of": "depth", "dropout": 1.1}, ("sensor.dropout = 1.1", "from 0 to 1")),
-        ({"of": "depth", "nois": 0.1}, ("sensors[0].nois", "noise")),
-    ],
-)
-def test_a_wrong_sensor(sensor, words):
-    text = refused(lambda: of_table(sensors=[{"type": "sensor"} | sensor]))
-    assert all(word in text for word in words), text
-
-
-@pytest.mark.parametrize(
-    ("estimator", "words"),
-    [
-        ({"type": "low_pas"}, ("sensors[0].type = 'low_pas': is not known", "'low_pass'")),
-        ({"type": "low_pass", "of": "depth"}, ("sensors[0].time_constant", "is missing; give it [s]")),
-        ({"type": "low_pass", "of": "speed", "time_constant": 1.0}, ("low_pass.of = 'speed': is not known",)),
-        ({"type": "complementary_filter", "time_constant": -1.0}, ("complementary_filter.time_constant = -1.0",)),
-        ({"type": "dead_reckoning", "rule": "simpson"}, ("dead_reckoning.rule = 'simpson': is not known",)),
-        ({"type": "dead_reckoning", "velocity": "wind"}, ("dead_reckoning.velocity = 'wind'",)),
-        ({"type": "dead_reckoning", "depth": 3.0}, ("dead_reckoning.depth = 3.0",)),
-    ],
-)
-def test_a_wrong_estimator(estimator, words):
-    text = refused(lambda: of_table(sensors=[estimator]))
-    assert all(word in text for word in words), text
-
-
 CELL = {"type": "sensor", "name": "cell", "of": "depth"}
+# A table of a sensor or an estimator (with its type), or of a fault -> words of the message.
+WRONG = [
+    ("sensors", {"type": "sensor", "of": "dept"}, "sensor.of = 'dept': is not known", "'depth'"),
+    ("sensors", {"type": "sensor"}, "sensor.of = '': is not known"),
+    ("sensors", {"type": "sensor", "of": ["depth"]}, "sensor.of", "is not known"),
+    ("sensors", {"type": "sensor", "of": "depth", "noise": -0.1}, "sensor.noise = -0.1: is out of bounds", "from 0"),
+    ("sensors", {"type": "sensor", "of": "depth", "noise": float("nan")}, "sensor.noise", "is not finite"),
+    ("sensors", {"type": "sensor", "of": "depth", "noise": [0.1, 0.1, 0.1]}, "sensor.noise", "has shape (3,)"),
+    ("sensors", {"type": "sensor", "of": "velocity", "bias": [0.1, 0.1]}, "sensor.bias", "has shape (2,)"),
+    ("sensors", {"type": "sensor", "of": "velocity", "bias": "much"}, "sensor.bias"),
+    ("sensors", {"type": "sensor", "of": "velocity", "bias": None}, "sensor.bias"),
+    ("sensors", {"type": "sensor", "of": "depth", "every": 1.5},
+     "sensor.every = 1.5: is no whole number of looks; give 1 or 2"),
+    ("sensors", {"type": "sensor", "of": "depth", "every": 0}, "sensor.every = 0", "from 1 to 1000"),
+    ("sensors", {"type": "sensor", "of": "depth", "latency": -1}, "sensor.latency = -1", "from 0 to 1000"),
+    ("sensors", {"type": "sensor", "of": "depth", "dropout": 1.1}, "sensor.dropout = 1.1", "from 0 to 1"),
+    ("sensors", {"type": "sensor", "of": "depth", "nois": 0.1}, "sensors[0].nois", "noise"),
+    ("sensors", {"type": "low_pas"}, "sensors[0].type = 'low_pas': is not known", "'low_pass'"),
+    ("sensors", {"type": "low_pass", "of": "depth"}, "sensors[0].time_constant", "is missing; give it [s]"),
+    ("sensors", {"type": "low_pass", "of": "speed", "time_constant": 1.0}, "low_pass.of = 'speed': is not known"),
+    ("sensors", {"type": "complementary_filter", "time_constant": -1.0}, "complementary_filter.time_constant = -1.0"),
+    ("sensors", {"type": "dead_reckoning", "rule": "simpson"}, "dead_reckoning.rule = 'simpson': is not known"),
+    ("sensors", {"type": "dead_reckoning", "velocity": "wind"}, "dead_reckoning.velocity = 'wind'"),
+    ("sensors", {"type": "dead_reckoning", "depth": 3.0}, "dead_reckoning.depth = 3.0"),
+    ("faults", {"of": "cel", "time": 1.0},
+     "fault.of = 'cel': is no actuator and no sensor of this controller", "'cell'"),
+    ("faults", {"of": "cell", "time": 1.0, "channel": 1}, "fault.channel = 1: is beyond the 1 of cell; give 0"),
+    ("faults", {"of": "control_wrench", "time": 1.0, "channel": 6},
+     "fault.channel = 6", "is beyond the 6", "give 0 to 5"),
+    ("faults", {"of": "control_wrench", "time": 1.0, "channel": -1}, "fault.channel = -1", "give 0 to 5"),
+    ("faults", {"of": "control_wrench", "time": 1.0, "channel": 1.5}, "fault.channel = 1.5: is no whole number"),
+    ("faults", {"of": "control_wrench", "time": 1.0, "channel": True}, "fault.channel = True: is no whole number"),
+    ("faults", {"of": ["cell"], "time": 1.0}, "fault.of", "is not a text"),
+    ("faults", {"of": "cell", "time": -1.0}, "fault.time = -1.0"),
+    ("faults", {"of": "cell", "time": float("nan")}, "fault.time"),
+    ("faults", {"of": "cell", "time": 1.0, "gain": float("inf")}, "fault.gain"),
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("fault", "words"),
-    [
-        ({"of": "cel", "time": 1.0}, ("fault.of = 'cel': is no actuator and no sensor of this controller", "'cell'")),
-        ({"of": "cell", "time": 1.0, "channel": 1}, ("fault.channel = 1: is beyond the 1 of cell; give 0",)),
-        ({"of": "control_wrench", "time": 1.0, "channel": 6}, ("fault.channel = 6", "is beyond the 6", "give 0 to 5")),
-        ({"of": "control_wrench", "time": 1.0, "channel": -1}, ("fault.channel = -1", "give 0 to 5")),
-        ({"of": "control_wrench", "time": 1.0, "channel": 1.5}, ("fault.channel = 1.5: is no whole number",)),
-        ({"of": "control_wrench", "time": 1.0, "channel": True}, ("fault.channel = True: is no whole number",)),
-        ({"of": ["cell"], "time": 1.0}, ("fault.of", "is not a text")),
-        ({"of": "cell", "time": -1.0}, ("fault.time = -1.0",)),
-        ({"of": "cell", "time": float("nan")}, ("fault.time",)),
-        ({"of": "cell", "time": 1.0, "gain": float("inf")}, ("fault.gain",)),
-    ],
-)
-def test_a_wrong_fault(fault, words):
-    text = refused(lambda: of_table(sensors=[CELL], faults=[fault]))
-    assert all(word in text for word in words), text
+@pytest.mark.parametrize(("section", "table", "words"), [(row[0], row[1], row[2:]) for row in WRONG])
+def test_a_wrong_part(section, table, words):
+    message = refused(of_table, **({"sensors": [CELL]} | {section: [table]}))
+    assert all(word in message for word in words), message
 
 
 def test_the_examples_of_the_pages():
@@ -106,20 +83,19 @@ def test_the_examples_of_the_pages():
 
 def test_two_faults_without_names_are_told_to_have_some():
     faults = [{"of": "cell", "time": 1.0}, {"of": "control_wrench", "time": 2.0}]
-    text = refused(lambda: of_table(sensors=[CELL], faults=faults))
+    text = refused(of_table, sensors=[CELL], faults=faults)
     assert "'fault': is the name of two parts" in text
     assert 'name = "fault_2"' in text
 
 
 def test_a_part_and_a_term_of_one_name_are_told_apart():
-    text = refused(lambda: of_table(sensors=[CELL | {"name": "control_wrench"}]))
+    text = refused(of_table, sensors=[CELL | {"name": "control_wrench"}])
     assert "'control_wrench': is the name of two parts or of a term too" in text
 
 
 def test_all_faults_at_once():
-    text = refused(
-        lambda: of_table(sensors=[CELL | {"noise": -1.0}, {"type": "sensor", "of": "x"}], faults=[{"of": 3}])
-    )
+    sensors = [CELL | {"noise": -1.0}, {"type": "sensor", "of": "x"}]
+    text = refused(of_table, sensors=sensors, faults=[{"of": 3}])
     assert all(word in text for word in ("cell.noise", "sensor.of", "fault.of"))
 
 

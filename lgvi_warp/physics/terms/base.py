@@ -14,6 +14,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 import numpy as np
 
 from lgvi_warp.common import names, registry
+from lgvi_warp.common.declared import read
 from lgvi_warp.common.errors import Faults, SceneError, ragged, refusal
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.notation import repeated
@@ -182,6 +183,7 @@ class Term:
             value, told = getattr(self, item.name), Faults() if item.name in self.following else faults
             object.__setattr__(self, item.name, _checked(told, item, value, lengths, self.shape_of(item)))
         if not faults:
+            read(self, faults)
             self.check(faults)
         faults.raise_if_any()
 

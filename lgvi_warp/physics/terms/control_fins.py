@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common import declared
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.physics.notation import repeated
@@ -65,7 +66,7 @@ class ControlFins(Fins):
     lift_slope: Any = number(("n",), "1/rad", None, least=0.0)
     lift_angles: Any = number(("a",), "rad", None, least=0.0, rising=True, optional=True)
     lift_coefficients: Any = number(("a",), "1", None, optional=True)
-    flow_angle: bool = True
+    flow_angle: bool = declared.flag(True)
     limit: Any = number(("n",), "rad", 0.35, least=0.0)
     rate_limit: Any = number(("n",), "rad/s", UNLIMITED, least=0.0)
     time_constant: Any = number(("n",), "s", None, least=0.0, optional=True)
@@ -104,8 +105,6 @@ class ControlFins(Fins):
         elif self.lift_angles is not None and (self.lift_angles[0] != 0.0 or self.lift_coefficients[0] != 0.0):
             first = (self.lift_angles[0], self.lift_coefficients[0])
             faults.add("lift_angles", first, "does not begin with no lift at 0", "let both tables begin with 0")
-        if not isinstance(self.flow_angle, bool):
-            faults.add("flow_angle", self.flow_angle, "is neither true nor false", "give one of them")
 
     def with_fields(self, fields: Mapping[str, Any]) -> Any:
         """In addition, leaves out the commands in whose place others stand."""

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.declared import word
 from lgvi_warp.common.random import uniforms_of
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 from lgvi_warp.physics.terms.noisy import NoisyTerm
@@ -34,12 +34,7 @@ class GaussMarkovCurrent(NoisyTerm):
 
     standard_deviation: Any = number((3,), "m/s", least=0.0)
     time_constant: Any = number((), "s", above=0.0)
-    start: str = "zero"
-
-    def check(self, faults: Faults) -> None:
-        """Adds a fault where `start` is unknown, and as `NoisyTerm`."""
-        super().check(faults)
-        faults.choice("start", self.start, STARTS)
+    start: str = word("zero", known=STARTS)
 
     @property
     def memory(self) -> bool:

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.declared import positive
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term
 
 
@@ -53,12 +53,7 @@ class NoisyTerm(Term):
 
     timed: ClassVar[bool] = True
 
-    noise_step: float | None = None
-
-    def check(self, faults: Faults) -> None:
-        """Adds a fault where `noise_step` is no time."""
-        if self.noise_step is not None:
-            faults.positive("noise_step", self.noise_step)
+    noise_step: float | None = positive(None, unit="s")
 
     def draws(self, h: float) -> int:
         """How many draws one step of a run takes.

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import Faults, ragged
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number, side_by_side
@@ -63,16 +64,12 @@ class WrenchSchedule(Term):
     times: Any = number(("k",), "s", rising=True)
     force: Any = number(("k", 3), "N")
     torque: Any = number(("k", 3), "N m", None)
-    interpolation: str = "linear"
+    interpolation: str = word("linear", known=SHAPES)
 
     def __post_init__(self) -> None:
         if self.torque is None:
             object.__setattr__(self, "torque", np.zeros(() if ragged(self.force) else np.shape(self.force)))
         super().__post_init__()
-
-    def check(self, faults: Faults) -> None:
-        """Adds a fault where the interpolation is unknown."""
-        faults.choice("interpolation", self.interpolation, SHAPES)
 
     def drive(self) -> np.ndarray:
         """The largest sizes of force and torque in the schedule."""

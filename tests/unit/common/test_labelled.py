@@ -9,6 +9,7 @@ import xarray as xr
 import lgvi_warp as lw
 from lgvi_warp.calls.prepared import Runner
 from lgvi_warp.studies import sensitivity as uq
+from tests.support.refusals import refused
 
 MASS, BUOYANCY, DENSITY = "vehicle.mass", "vehicle.buoyancy", "environment.water_density"
 VARY = {MASS: lw.Normal(std=0.1), BUOYANCY: lw.Normal(std=1.0), "current.velocity": lw.Uniform(half_width=0.5)}
@@ -41,12 +42,6 @@ class Series:
 @pytest.fixture(scope="module")
 def drifting(scene):
     return lw.Scene(scene.vehicle, scene.environment, [lw.Current(velocity=[0.2, 0.0, 0.0])], scene.start)
-
-
-def faults(make, *arguments, **named):
-    with pytest.raises(lw.SceneError) as caught:
-        make(*arguments, **named)
-    return str(caught.value)
 
 
 @pytest.fixture
@@ -132,7 +127,7 @@ def test_levels_are_read_in_the_order_of_the_laws(drifting, seen):
             base, _, index = name.partition("[")
             values = seen[base][:, int(index[:-1])] if index else seen[base]
             np.testing.assert_allclose(values, exact[j].ppf(u[:, j]), rtol=1e-15)
-    assert "is not a level between 0 and 1" in faults(model, ROWS)
+    assert "is not a level between 0 and 1" in refused(model, ROWS)
 
 
 def test_a_joint_law_keeps_its_place_among_levels(drifting, seen):
@@ -184,7 +179,7 @@ BAD = {
 @pytest.mark.parametrize("case", BAD)
 def test_a_model_refuses_what_does_not_fit(drifting, seen, case):
     make, words = BAD[case]
-    message = faults(uq.model(drifting, VARY, "position[2]", h=0.01, t1=0.02), make())
+    message = refused(uq.model(drifting, VARY, "position[2]", h=0.01, t1=0.02), make())
     assert all(word in message for word in words), message
     assert not seen
 
@@ -197,11 +192,11 @@ def test_entries_that_do_not_vary_stay_the_scenes(drifting, seen):
     model({"current.velocity": velocity, "vehicle.inertia": inertia})
     np.testing.assert_array_equal(seen["current.velocity"], velocity)
     np.testing.assert_array_equal(seen["vehicle.inertia"], inertia)
-    message = faults(model, {"current.velocity": velocity + 0.1, "vehicle.inertia": inertia})
+    message = refused(model, {"current.velocity": velocity + 0.1, "vehicle.inertia": inertia})
     assert "changes entries that do not vary" in message
     assert "current.velocity[0]" in message
     skew = inertia + np.eye(3, k=1)
-    assert "not symmetric" in faults(model, {"current.velocity": velocity, "vehicle.inertia": skew})
+    assert "not symmetric" in refused(model, {"current.velocity": velocity, "vehicle.inertia": skew})
 
 
 @pytest.mark.parametrize(
@@ -211,7 +206,7 @@ def test_entries_that_do_not_vary_stay_the_scenes(drifting, seen):
      (["vehicle.inertia[0,1]", "vehicle.inertia[1,0]"], ["is varied by"]), ([MASS, 3], ["is neither a list of names"])],
 )  # fmt: skip
 def test_names_that_are_no_list(drifting, vary, words):
-    message = faults(uq.model, drifting, vary, "position[2]", h=0.01, t1=0.02)
+    message = refused(uq.model, drifting, vary, "position[2]", h=0.01, t1=0.02)
     assert all(word in message for word in words), message
 
 
@@ -245,7 +240,7 @@ def test_given_parameters_that_do_not_fit(drifting):
     R, zero = np.array([np.eye(3)] * 3), np.zeros((3, 3))
 
     def message(parameters):
-        return faults(lw.Ensemble.from_states, drifting, zero, R, zero, zero, parameters)
+        return refused(lw.Ensemble.from_states, drifting, zero, R, zero, zero, parameters)
 
     assert "did you mean 'vehicle.mass'" in message(pd.DataFrame({"vehicle.masss": ROWS[:, 0]}))
     assert "columns of one name" in message(pd.concat([FRAME, FRAME], axis=1))
@@ -263,7 +258,7 @@ def test_states_with_names_are_read_by_them(drifting):
     for frame in (pd.DataFrame(p), pd.DataFrame(p, columns=names), pd.DataFrame(p, columns=names)[names[::-1]]):
         fleet = lw.Ensemble.from_states(drifting, frame, R, zero, zero)
         np.testing.assert_array_equal(fleet.select(0, 3).position, p)
-    message = faults(lw.Ensemble.from_states, drifting, pd.DataFrame(p, columns=["z", "y", "x"]), R, zero, zero)
+    message = refused(lw.Ensemble.from_states, drifting, pd.DataFrame(p, columns=["z", "y", "x"]), R, zero, zero)
     assert "position[0]" in message
     assert "is missing" in message
 
@@ -278,14 +273,14 @@ def test_levels_with_names(drifting):
         for one in (fleet, back):
             np.testing.assert_array_equal(one.parameters(0, 2)[MASS], by_order[MASS])
             np.testing.assert_array_equal(one.parameters(0, 2)[BUOYANCY], by_order[BUOYANCY])
-    message = faults(lw.Ensemble, drifting, None, 0, vary, lw.UnitCubePoints({"mass": u[:, 0], BUOYANCY: u[:, 1]}))
+    message = refused(lw.Ensemble, drifting, None, 0, vary, lw.UnitCubePoints({"mass": u[:, 0], BUOYANCY: u[:, 1]}))
     assert "did you mean 'vehicle.mass'" in message
-    assert "do not name 2 columns" in faults(lw.UnitCubePoints, u, [MASS])
+    assert "do not name 2 columns" in refused(lw.UnitCubePoints, u, [MASS])
 
 
 def test_labels_that_no_door_reads_are_refused():
     frame = pd.DataFrame(np.eye(2), index=["a", "b"], columns=["a", "b"])
-    message = faults(lw.CorrelatedNormal, covariance=frame)
+    message = refused(lw.CorrelatedNormal, covariance=frame)
     assert "names of columns (a, b), which are not read here" in message
     assert "to_numpy()" in message
     assert lw.CorrelatedNormal(covariance=frame.to_numpy()).kind == "correlated_normal"

@@ -15,42 +15,27 @@ POINTS = [(0.0, 0.0, 1.0), (5.0, 0.0, 1.0)]
 THREE = (1.0, 1.0, 1.0)
 
 
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        (
-            lambda: lw.Waypoints(points=POINTS[:1], speed=1.0, look_ahead=1.0, radius=1.0),
-            "waypoints.points.*less than two",
-        ),
-        (
-            lambda: lw.Waypoints(points=[*POINTS, (5.0, 0.0, 9.0)], speed=1.0, look_ahead=1.0, radius=1.0),
-            r"waypoints.points\[2\].*same place.*leave it out",
-        ),
-        (
-            lambda: lw.Waypoints(points=POINTS, speed=1.0, look_ahead=0.0, radius=1.0),
-            "waypoints.look_ahead.*not positive",
-        ),
-        (lambda: lw.Waypoints(points=POINTS, speed=1.0, look_ahead=1.0, radius=1.0, method="lose"), "method.*los"),
-        (lambda: lw.Trajectory(times=(0.0, 2.0, 1.0), positions=[THREE] * 3), "trajectory.times.*not rising"),
-        (lambda: lw.Trajectory(times=(0.0, 2.0), positions=[THREE] * 3), "trajectory.positions.*give 2 x 3 numbers"),
-        (lambda: lw.Trajectory(times=(0.0,), positions=[THREE]), "trajectory.times.*less than two"),
-        (
-            lambda: lw.ReferenceModel(natural_frequency=THREE),
-            "natural_frequency.*has 3 numbers.*2 numbers, of depth and heading",
-        ),
-        (lambda: lw.ReferenceModel(natural_frequency=(1.0, 0.0)), "natural_frequency.*not positive"),
-        (lambda: lw.HeadingSMC(lambda_=-1.0, boundary=0.1, k_sigma=1.0, nomoto_gain=1.0), r"heading_smc.lambda = -1"),
-        (
-            lambda: lw.PosePID(kp=THREE, kd=THREE, kr=THREE, kw=THREE, feedforward="restore"),
-            "pose_pid.feedforward.*restoring",
-        ),
-        (
-            lambda: lw.PosePID(kp=THREE, kd=THREE, kr=THREE, kw=THREE, anti_windup="on"),
-            "pose_pid.anti_windup = .*not known",
-        ),
-        (lambda: lw.StateFeedback(K=np.ones((6, 11))), "state_feedback.K.*shape"),
-    ],
-)
+@pytest.mark.parametrize(("make", "said"), [
+    (lambda: lw.Waypoints(points=POINTS[:1], speed=1.0, look_ahead=1.0, radius=1.0),
+     "waypoints.points.*less than two"),
+    (lambda: lw.Waypoints(points=[*POINTS, (5.0, 0.0, 9.0)], speed=1.0, look_ahead=1.0, radius=1.0),
+     r"waypoints.points\[2\].*same place.*leave it out"),
+    (lambda: lw.Waypoints(points=POINTS, speed=1.0, look_ahead=0.0, radius=1.0),
+     "waypoints.look_ahead.*not positive"),
+    (lambda: lw.Waypoints(points=POINTS, speed=1.0, look_ahead=1.0, radius=1.0, method="lose"), "method.*los"),
+    (lambda: lw.Trajectory(times=(0.0, 2.0, 1.0), positions=[THREE] * 3), "trajectory.times.*not rising"),
+    (lambda: lw.Trajectory(times=(0.0, 2.0), positions=[THREE] * 3), "trajectory.positions.*give 2 x 3 numbers"),
+    (lambda: lw.Trajectory(times=(0.0,), positions=[THREE]), "trajectory.times.*less than two"),
+    (lambda: lw.ReferenceModel(natural_frequency=THREE),
+     "natural_frequency.*has 3 numbers.*2 numbers, of depth and heading"),
+    (lambda: lw.ReferenceModel(natural_frequency=(1.0, 0.0)), "natural_frequency.*not positive"),
+    (lambda: lw.HeadingSMC(lambda_=-1.0, boundary=0.1, k_sigma=1.0, nomoto_gain=1.0), r"heading_smc.lambda = -1"),
+    (lambda: lw.PosePID(kp=THREE, kd=THREE, kr=THREE, kw=THREE, feedforward="restore"),
+     "pose_pid.feedforward.*restoring"),
+    (lambda: lw.PosePID(kp=THREE, kd=THREE, kr=THREE, kw=THREE, anti_windup="on"),
+     "pose_pid.anti_windup = .*not known"),
+    (lambda: lw.StateFeedback(K=np.ones((6, 11))), "state_feedback.K.*shape"),
+])  # fmt: skip
 def test_what_is_wrong_is_said(make, said):
     with pytest.raises(lw.SceneError, match=said):
         make()

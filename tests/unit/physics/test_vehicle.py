@@ -12,14 +12,6 @@ from lgvi_warp.physics import notation
 GOOD = {"mass": 123.8, "added_mass": (65.0, 70.0, 75.0), "inertia": (5.46, 5.29, 5.72), "buoyancy": 1215.8}
 
 
-def refused(**changes):
-    """The message that refuses GOOD with these changes; it must be one fault."""
-    with pytest.raises(lw.SceneError) as caught:
-        lw.Vehicle(**GOOD | changes)
-    assert len(caught.value.faults) == 1
-    return str(caught.value)
-
-
 def test_diagonals_become_matrices():
     v = lw.Vehicle(**GOOD)
     np.testing.assert_array_equal(v.inertia, np.diag([5.46, 5.29, 5.72]))
@@ -50,52 +42,8 @@ def test_it_is_frozen_and_apart_from_the_callers_arrays():
     assert dataclasses.replace(v, mass=100.0).mass_matrix[0, 0] == 165.0
 
 
-@pytest.mark.parametrize("mass", [0.0, -1.0])
-def test_mass_must_be_positive(mass):
-    message = refused(mass=mass)
-    assert "vehicle.mass" in message
-    assert str(mass) in message
-    assert "above 0" in message
-
-
-@pytest.mark.parametrize("key", ["mass", "buoyancy", "inertia", "added_mass", "center_of_buoyancy"])
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_what_is_not_finite_is_refused(key, bad):
-    value = bad if key in ("mass", "buoyancy") else (1.0, bad, 1.0)
-    message = refused(**{key: value})
-    assert f"vehicle.{key}" in message
-    assert "finite" in message
-
-
-@pytest.mark.parametrize("key", ["mass", "buoyancy", "inertia", "added_mass", "center_of_buoyancy"])
-@pytest.mark.parametrize("bad", ["heavy", True, [None], [[1.0, 2.0], [3.0]], [True, 1.0, 1.0], [1.0, 2.0]])
-def test_what_is_no_number_or_of_the_wrong_shape_is_refused(key, bad):
-    assert f"vehicle.{key}" in refused(**{key: bad})
-
-
-def test_negative_buoyancy_is_refused():
-    assert "vehicle.buoyancy = -1.0" in refused(buoyancy=-1.0)
-
-
-def test_matrices_must_be_symmetric():
-    J = np.diag([5.0, 6.0, 7.0])
-    J[0, 1] = 0.1
-    assert "vehicle.inertia" in refused(inertia=J)
-    assert "not symmetric" in refused(inertia=J)
-    assert "vehicle.added_mass" in refused(added_mass=J)
-
-
-def test_inertia_must_be_positive_definite():
-    assert "not positive definite" in refused(inertia=(1.0, 0.0, 1.0))
-    # Positive diagonal, yet eigenvalues 3 and -1 in the plane of x and y.
-    assert "not positive definite" in refused(inertia=[[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-
-
-def test_the_mass_matrix_must_be_positive_definite():
-    message = refused(added_mass=(-200.0, 0.0, 0.0))
-    assert "vehicle.added_mass" in message
-    assert "X_udot" in message
-    lw.Vehicle(**GOOD | {"added_mass": (-10.0, 0.0, 0.0)})  # mass + added mass is positive: allowed
+def test_an_added_mass_may_be_negative_where_the_sum_is_positive():
+    assert lw.Vehicle(**GOOD | {"added_mass": (-10.0, 0.0, 0.0)}).mass_matrix[0, 0] == 113.8
 
 
 def test_triangle_inequality_warns():

@@ -12,16 +12,11 @@ from scipy import stats
 import lgvi_warp as lw
 from lgvi_warp.common.random import uniforms
 from lgvi_warp.sampling.distributions.named import as_distribution, from_dict
+from tests.support.refusals import refused
 
 LEVELS = np.array([1e-12, 1e-6, 0.02, 0.3, 0.5, 0.77, 0.999, 1.0 - 1e-9])
 N = 200_000
 ERRORS = 5.0
-
-
-def refused(kind, **values):
-    with pytest.raises(lw.SceneError) as caught:
-        kind(**values)
-    return str(caught.value)
 
 
 # Uniform numbers ---------------------------------------------------------------------------------------------------
@@ -207,6 +202,36 @@ def test_tables_are_laws_in_code_too(scene):
         (lw.TruncatedNormal, {"std": 1.0, "low": 2.0, "high": 1.0}, "truncated_normal.low and high"),
         (lw.TruncatedNormal, {"std": 1.0, "low": 2.0, "width": 1.0}, "truncated_normal.width"),
         (lw.TruncatedNormal, {"std": 1.0, "width": -1.0}, "truncated_normal.width"),
+        (lw.CorrelatedNormal, {}, "nothing given"),
+        (lw.CorrelatedNormal, {"covariance": np.eye(2), "std": 1.0}, "covariance and std given"),
+        (lw.CorrelatedNormal, {"correlation": np.eye(2)}, "correlation given"),
+        (lw.CorrelatedNormal, {"covariance": [[1.0, 2.0], [2.0, 1.0]]}, "positive semidefinite"),
+        (lw.CorrelatedNormal, {"covariance": [[1.0, 0.5], [0.2, 1.0]]}, "no symmetric matrix"),
+        (lw.CorrelatedNormal, {"covariance": [1.0, 2.0]}, "no symmetric matrix"),
+        (lw.CorrelatedNormal, {"covariance": [[np.nan]]}, "not finite"),
+        (lw.CorrelatedNormal, {"covariance": "wide"}, "not numeric"),
+        (lw.CorrelatedNormal, {"std": (1.0, -1.0)}, "negative"),
+        (lw.CorrelatedNormal, {"std": (1.0, 1.0, 1.0), "correlation": np.eye(2)}, "does not fit 2"),
+        (lw.CorrelatedNormal, {"std": 1.0, "correlation": 2.0 * np.eye(2)}, "diagonal that is not 1"),
+        # Metres beside newtons: the sizes of the entries say nothing about whether they can go together.
+        (lw.CorrelatedNormal, {"std": (1e-3, 1e3), "correlation": [[1.0, 1.2], [1.2, 1.0]]}, "positive semidefinite"),
+        (lw.CorrelatedNormal, {"covariance": [[1e-10, 50.0 * 1e-2], [50.0 * 1e-2, 1e6]]}, "positive semidefinite"),
+        (lw.CorrelatedNormal, {"covariance": [[0.0, 0.1], [0.1, 1.0]]}, "positive semidefinite"),
+        (lw.CorrelatedNormal, {"covariance": [[-1.0, 0.0], [0.0, 1.0]]}, "negative variance"),
+        (lw.RotationNormal, {}, "nothing given"),
+        (lw.RotationNormal, {"std": (0.1, 0.2)}, "does not fit 3"),
+        (lw.RotationNormal, {"covariance": np.eye(2)}, "not 3 x 3"),
+        (lw.RotationNormal, {"std": -0.1}, "negative"),
+        (lw.RotationNormal, {"std": np.inf}, "not finite"),
+        (lw.PositiveDefinite, {}, "width"),
+        (lw.PositiveDefinite, {"sigma": -0.1}, "negative"),
+        (lw.PositiveDefinite, {"sigma": 0.1, "off_diagonal": (0.1, 0.2)}, "not one number"),
+        (lw.Choice, {}, "no list of values"),
+        (lw.Choice, {"values": ("a",)}, "not numeric"),
+        (lw.Choice, {"values": (1.0, 2.0), "weights": (1.0,)}, "weigh 2 values"),
+        (lw.Choice, {"values": (1.0, 2.0), "weights": (2.0, -1.0)}, "negative"),
+        (lw.ScipyDistribution, {"distribution": stats.gamma}, "no frozen distribution"),
+        (lw.ScipyDistribution, {"distribution": stats.gamma(-1.0)}, "scipy.stats refuses"),
     ],
 )
 def test_bad_numbers(kind, values, key):
@@ -245,6 +270,17 @@ def test_there_and_back(law):
         ({"normal": 1.0}, "is not a table"),
         ({"normal": {"sd": 1.0}}, "did you mean 'std'?"),
         ({"normal": {"std": -1.0}}, "negative"),
+        ({"gamma": {"scale": 3.0}}, "key.gamma.a = None: is missing"),
+        ({"gamma": {"a": 1.0, "sale": 3.0}}, "did you mean 'scale'"),
+        ({"gamma": {"a": -1.0}}, "scipy.stats refuses"),
+        ({"gamma": {"a": "x"}}, "not numeric"),
+        ({"scipy": {"name": "gama"}}, "no distribution of scipy.stats"),
+        ({"scipy": {}}, "no distribution of scipy.stats"),
+        ({"scipy": 3}, "is not a table"),
+        ({"gammma": {"a": 1.0}}, "did you mean 'gamma'"),
+        ({"histogram": {"counts": [0.0], "edges": [0.0, 1.0]}}, "weigh no bin"),
+        ({"histogram": {"counts": [1.0], "edges": [0.0]}}, "bound 1"),
+        ({"histogram": {"counts": [1.0, 1.0], "edges": [0.0, 1.0, 1.0]}}, "rising"),
     ],
 )
 def test_bad_tables_name_the_key(content, text):

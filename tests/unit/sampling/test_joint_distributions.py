@@ -15,16 +15,11 @@ from lgvi_warp.common.random import uniforms, uniforms_of
 from lgvi_warp.physics import notation
 from lgvi_warp.sampling.distributions import joint as joint_laws
 from lgvi_warp.sampling.distributions.named import from_dict
+from tests.support.refusals import refused
 
 N = 100_000
 ERRORS = 5.0
 COVARIANCE = np.array([[4.0, 1.2, -0.5], [1.2, 1.0, 0.3], [-0.5, 0.3, 2.0]])
-
-
-def refused(kind, **values):
-    with pytest.raises(lw.SceneError) as caught:
-        kind(**values)
-    return str(caught.value)
 
 
 def drawn(law, *bases, count=N, seed=5):
@@ -80,31 +75,6 @@ def test_a_singular_covariance_keeps_what_it_says():
     # The root of a matrix with eigenvalues of round-off, 1e-16 of 5, is good to the square root of that.
     np.testing.assert_allclose(x[:, 1], 2.0 * x[:, 0], rtol=0, atol=1e-7)
     np.testing.assert_allclose(x[:, 2], 3.0, rtol=0, atol=1e-7)
-
-
-@pytest.mark.parametrize(
-    ("values", "text"),
-    [
-        ({}, "nothing given"),
-        ({"covariance": np.eye(2), "std": 1.0}, "covariance and std given"),
-        ({"correlation": np.eye(2)}, "correlation given"),
-        ({"covariance": [[1.0, 2.0], [2.0, 1.0]]}, "positive semidefinite"),
-        ({"covariance": [[1.0, 0.5], [0.2, 1.0]]}, "no symmetric matrix"),
-        ({"covariance": [1.0, 2.0]}, "no symmetric matrix"),
-        ({"covariance": [[np.nan]]}, "not finite"),
-        ({"covariance": "wide"}, "not numeric"),
-        ({"std": (1.0, -1.0)}, "negative"),
-        ({"std": (1.0, 1.0, 1.0), "correlation": np.eye(2)}, "does not fit 2"),
-        ({"std": 1.0, "correlation": 2.0 * np.eye(2)}, "diagonal that is not 1"),
-        # Metres beside newtons: the sizes of the entries say nothing about whether they can go together.
-        ({"std": (1e-3, 1e3), "correlation": [[1.0, 1.2], [1.2, 1.0]]}, "positive semidefinite"),
-        ({"covariance": [[1e-10, 50.0 * 1e-2], [50.0 * 1e-2, 1e6]]}, "positive semidefinite"),
-        ({"covariance": [[0.0, 0.1], [0.1, 1.0]]}, "positive semidefinite"),
-        ({"covariance": [[-1.0, 0.0], [0.0, 1.0]]}, "negative variance"),
-    ],
-)
-def test_bad_covariances(values, text):
-    assert text in refused(lw.CorrelatedNormal, **values)
 
 
 def test_all_faults_of_a_covariance_come_at_once():
@@ -167,15 +137,6 @@ def test_uniform_attitudes_are_haars():
     # The turn's angle has the density (1 - cos a) / pi.
     angle = np.linalg.norm(log(R), axis=1)
     assert stats.kstest(angle, lambda a: (a - np.sin(a)) / np.pi).statistic * np.sqrt(N) < 2.5
-
-
-@pytest.mark.parametrize(
-    ("values", "text"),
-    [({}, "nothing given"), ({"std": (0.1, 0.2)}, "does not fit 3"), ({"covariance": np.eye(2)}, "not 3 x 3"),
-     ({"std": -0.1}, "negative"), ({"std": np.inf}, "not finite")],
-)  # fmt: skip
-def test_bad_turns(values, text):
-    assert text in refused(lw.RotationNormal, **values)
 
 
 # Matrices that stay physical -----------------------------------------------------------------------------------------
@@ -271,9 +232,6 @@ def test_matrix_laws_that_do_not_fit(scene):
     )
     assert "rigid body's inertia" in found("vehicle.added_mass", lw.PhysicalInertia(sigma=0.1))
     assert "mass_sigma" in found("vehicle.inertia", lw.PhysicalInertia(sigma=0.1, mass_sigma=0.1))
-    assert "width" in refused(lw.PositiveDefinite)
-    assert "negative" in refused(lw.PositiveDefinite, sigma=-0.1)
-    assert "not one number" in refused(lw.PositiveDefinite, sigma=0.1, off_diagonal=(0.1, 0.2))
 
 
 # scipy's laws and choices --------------------------------------------------------------------------------------------
@@ -310,30 +268,6 @@ def test_any_law_of_scipy():
         mine = lw.ScipyDistribution(law)
         assert mine.to_dict() == {"scipy": content}
         assert from_dict("key", mine.to_dict()) == mine
-
-
-@pytest.mark.parametrize(
-    ("content", "text"),
-    [
-        ({"gamma": {"scale": 3.0}}, "key.gamma.a = None: is missing"),
-        ({"gamma": {"a": 1.0, "sale": 3.0}}, "did you mean 'scale'"),
-        ({"gamma": {"a": -1.0}}, "scipy.stats refuses"),
-        ({"gamma": {"a": "x"}}, "not numeric"),
-        ({"scipy": {"name": "gama"}}, "no distribution of scipy.stats"),
-        ({"scipy": {}}, "no distribution of scipy.stats"),
-        ({"scipy": 3}, "is not a table"),
-        ({"gammma": {"a": 1.0}}, "did you mean 'gamma'"),
-    ],
-)
-def test_bad_tables_of_scipy(content, text):
-    with pytest.raises(lw.SceneError, match="key") as caught:
-        from_dict("key", content)
-    assert text in str(caught.value)
-
-
-def test_what_is_no_frozen_law():
-    assert "no frozen distribution" in refused(lw.ScipyDistribution, distribution=stats.gamma)
-    assert "scipy.stats refuses" in refused(lw.ScipyDistribution, distribution=stats.gamma(-1.0))
 
 
 class Triangle:
@@ -380,14 +314,6 @@ def test_histograms_are_laws_in_files_too(scene):
             u = np.linspace(0.01, 0.99, 50)
             np.testing.assert_allclose(found.quantile(u, np.zeros(())), mine.ppf(u), rtol=1e-12)
             assert from_dict("key", found.to_dict()).to_dict() == found.to_dict()
-    bad = [
-        ({"counts": [0.0], "edges": [0.0, 1.0]}, "weigh no bin"),
-        ({"counts": [1.0], "edges": [0.0]}, "bound 1"),
-        ({"counts": [1.0, 1.0], "edges": [0.0, 1.0, 1.0]}, "rising"),
-    ]
-    for values, text in bad:
-        with pytest.raises(lw.SceneError, match=text):
-            from_dict("key", {"histogram": values})
 
 
 def test_scipys_multivariate_normal_is_correlated_normals(scene):
@@ -408,13 +334,6 @@ def test_choices_come_as_often_as_they_weigh():
     whole = lw.Choice(values=[[1.0, 2.0], [3.0, 4.0]])
     assert whole.joint
     assert set(map(tuple, whole.draw(uniforms(1, "x", 0, 100, 1), [np.zeros(2)])[0])) == {(1.0, 2.0), (3.0, 4.0)}
-
-
-def test_bad_choices():
-    assert "no list of values" in refused(lw.Choice)
-    assert "not numeric" in refused(lw.Choice, values=("a",))
-    assert "weigh 2 values" in refused(lw.Choice, values=(1.0, 2.0), weights=(1.0,))
-    assert "negative" in refused(lw.Choice, values=(1.0, 2.0), weights=(1.0, -1.0))
 
 
 @pytest.mark.parametrize(

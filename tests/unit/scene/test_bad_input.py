@@ -16,8 +16,10 @@ from lgvi_kernels.lanes.state import struct
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene import scene as scenes
 from lgvi_warp.scene.scene import from_dict
+from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
+from tests.support.refusals import faults
 
-NAN = float("nan")
+NAN, INF = float("nan"), float("inf")
 BODY = {"mass": 10.0, "inertia": [1.0, 2.0, 2.5]}
 CREATES = np.diag([1.0, -1.0, 1.0, 1.0, 1.0, 1.0]).tolist()
 LOPSIDED = (np.eye(6) + 3.0 * np.eye(6, k=1)).tolist()
@@ -35,13 +37,6 @@ TETHER = {"type": "tether", "anchor": [0.0, 0.0, 0.0], "stiffness": 5.0}
 HULL = {"type": "cross_flow", "stations": [-1.0, 1.0], "diameters": [0.1, 0.1], "drag_coefficient": 1.0}
 
 
-def refused(make, *arguments, **named):
-    """The faults with which a call is refused."""
-    with pytest.raises(lw.SceneError) as caught:
-        make(*arguments, **named)
-    return caught.value.faults
-
-
 def from_table(table, section="terms"):
     return from_dict({"vehicle": BODY, section: [table]})
 
@@ -50,12 +45,8 @@ def from_table(table, section="terms"):
 TERMS = [
     # drag that creates energy, coefficients of the wrong sign
     ({"type": "drag_matrix", "linear": CREATES}, "drag_matrix.linear = [[1.0, 0.0", "creates energy", "minus Fossen's"),
-    (
-        {"type": "drag_matrix", "linear": LOPSIDED},
-        "drag_matrix.linear = [[1.0, 3.0",
-        "at the velocity",
-        "positive on the",
-    ),
+    ({"type": "drag_matrix", "linear": LOPSIDED}, "drag_matrix.linear = [[1.0, 3.0", "at the velocity",
+     "positive on the"),
     ({"type": "drag_matrix", "quadratic": CREATES}, "drag_matrix.quadratic", "creates energy", "minus Fossen's"),
     ({"type": "drag_matrix", "linear": [1.0] * 6}, "drag_matrix.linear", "shape (6,)", "give numbers of shape (6, 6)"),
     ({"type": "drag", "linear": [-4, 0, 0, 0, 0, 0]}, "drag.linear = [-4, 0", "out of bounds", "from 0 [N s/m, N m s]"),
@@ -63,12 +54,8 @@ TERMS = [
     (TETHER | {"stiffness": -5.0}, "tether.stiffness = -5.0", "out of bounds", "from 0 [N/m]"),
     (TETHER | {"rest_length": float("inf")}, "tether.rest_length = inf", "not finite", "[m]"),
     (TETHER | {"anchor": [0.0, 0.0]}, "tether.anchor = [0.0, 0.0]", "shape (2,)", "(3,) [m]"),
-    (
-        {key: value for key, value in THRUSTER.items() if key != "coefficient"},
-        "thrusters.coefficient = None",
-        "is missing",
-        "or a polynomial [N]",
-    ),
+    ({key: value for key, value in THRUSTER.items() if key != "coefficient"}, "thrusters.coefficient = None",
+     "is missing", "or a polynomial [N]"),
     (THRUSTER | {"polynomial": [[1.0]]}, "thrusters.polynomial = [[1.0]]", "has shape (1, 1)", "give p numbers"),
     (THRUSTER | {"coefficient": [-1.0]}, "thrusters.coefficient = [-1.0]", "out of bounds", "from 0"),
     (THRUSTER | {"time_constant": -0.1}, "thrusters.time_constant", "out of bounds", "from 0 [s]"),
@@ -84,11 +71,8 @@ TERMS = [
     (SCHEDULE | {"times": [1.0, 1.0]}, "wrench_schedule.times = [1.0, 1.0]", "not rising", "drop repetitions"),
     (HULL | {"stations": [1.0, -1.0]}, "cross_flow.stations = [1.0, -1.0]", "not rising", "sort the table"),
     (HULL | {"stations": [1.0], "diameters": [1.0]}, "cross_flow.stations = [1.0]", "one station", "give two or more"),
-    (
-        THRUSTER | {"times": [2.0, 1.0], "command_schedule": [[0.0], [1.0]]},
-        "thrusters.times = [2.0, 1.0]",
-        "not rising",
-    ),
+    (THRUSTER | {"times": [2.0, 1.0], "command_schedule": [[0.0], [1.0]]}, "thrusters.times = [2.0, 1.0]",
+     "not rising"),
     (PROFILE | {"depths": []}, "current_profile.depths = []", "shape (0,)", "give k numbers [m]"),
     (PROFILE | {"velocities": AHEAD}, "current_profile.velocities", "shape (1, 3)", "give 2 x 3 numbers [m/s]"),
     (PROFILE | {"velocities": [[1.0], [2.0, 3.0]]}, "current_profile.velocities", "not numeric", "give numbers [m/s]"),
@@ -99,18 +83,11 @@ TERMS = [
     (THRUSTER | {"direction": POINT}, "thrusters.direction[0] = [0.0, 0.0, 0.0]", "zero length", "such as [1, 0, 0]"),
     (THRUSTER | {"command_schedule": 3.0, "times": [0.0]}, "thrusters.command_schedule = 3.0", "give 1 x 1 numbers"),
     (THRUSTER | {"command_schedule": [[1.0, 2.0], [3.0]]}, "thrusters.command_schedule", "not numeric", "give numbers"),
-    (
-        THRUSTER | {"command": [[1.0], [2.0, 3.0]]},
-        "thrusters.command = [[1.0], [2.0, 3.0]]",
-        "not numeric",
-        "give numbers",
-    ),
+    (THRUSTER | {"command": [[1.0], [2.0, 3.0]]}, "thrusters.command = [[1.0], [2.0, 3.0]]", "not numeric",
+     "give numbers"),
     (THRUSTER | {"limit": [[1.0, 2.0], [3.0]]}, "thrusters.limit = [[1.0, 2.0], [3.0]]", "not numeric", "give numbers"),
-    (
-        THRUSTER | {"command": [1.0], "times": [0.0], "command_schedule": [[2.0]]},
-        "thrusters.command",
-        "keep one of them",
-    ),
+    (THRUSTER | {"command": [1.0], "times": [0.0], "command_schedule": [[2.0]]}, "thrusters.command",
+     "keep one of them"),
     (FIN | {"chord": POINT}, "fins.chord[0] = [0.0, 0.0, 0.0]", "zero length", "trailing to leading edge"),
     (FIN | {"normal": AHEAD}, "fins.normal[0] = [1.0, 0.0, 0.0]", "along the chord", "across the fin's plane"),
     # names and types
@@ -123,12 +100,12 @@ TERMS = [
     ({"type": "drag", "name": 3}, "name = 3", "not a text", "give a name"),
     ({"type": "drag", "name": "vehicle"}, "terms = 'vehicle'", "section of the scene", 'name = "vehicle_term"'),
     (3, "terms[0] = 3", "is no term", "write a table with type"),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("table", "words"), [(row[0], row[1:]) for row in TERMS])
 def test_a_term_of_a_scene_file(table, words):
-    (fault,) = (one for one in refused(from_table, table) if words[0] in one)
+    (fault,) = (one for one in faults(from_table, table) if words[0] in one)
     assert all(word in fault for word in words), fault
 
 
@@ -139,7 +116,7 @@ def from_python(table):
 
 @pytest.mark.parametrize(("table", "words"), [(row[0], row[1:]) for row in TERMS if not row[1].startswith("terms")])
 def test_the_same_from_python(table, words):
-    (fault,) = (one for one in refused(from_python, table) if words[0] in one)
+    (fault,) = (one for one in faults(from_python, table) if words[0] in one)
     assert all(word in fault for word in words), fault
 
 
@@ -160,7 +137,7 @@ EVENTS = [
 
 @pytest.mark.parametrize(("table", "words"), [(row[0], row[1:]) for row in EVENTS])
 def test_an_event(table, words):
-    (fault,) = refused(from_table, table, "events")
+    (fault,) = faults(from_table, table, "events")
     assert all(word in fault for word in words), fault
 
 
@@ -177,8 +154,76 @@ LISTS = [
 
 @pytest.mark.parametrize(("terms", "words"), [(row[0], row[1:]) for row in LISTS])
 def test_a_list_of_terms(terms, words):
-    (fault,) = refused(lw.Scene, lw.Vehicle(**BODY), terms=terms)
+    (fault,) = faults(lw.Scene, lw.Vehicle(**BODY), terms=terms)
     assert all(word in fault for word in words), fault
+
+
+# Key, values of it that are refused, and words of what is said of each, the remedy among them.
+SIX = [0.0, -0.01, NAN, INF, "soon", True]
+SIZES = ["heavy", True, [None], [[1.0, 2.0], [3.0]], [True, 1.0, 1.0], [1.0, 2.0]]
+TURNED = [[5.0, 0.1, 0.0], [0.0, 6.0, 0.0], [0.0, 0.0, 7.0]]
+SETTINGS = [
+    ("environment.gravity", [-9.8, NAN, True], "[m/s2]"),
+    ("environment.water_density", [0.0], "not positive", "above 0 [kg/m3]"),
+    ("start.position", [(1.0, 2.0), (1.0, NAN, 2.0)], "(3,) [m]"),
+    ("start.velocity", ["fast"], "not numeric", "(3,) [m/s]"),
+    ("start.angular_velocity", [1.0], "has shape ()", "(3,) [rad/s]"),
+    ("start.euler_deg", [(0.0, INF, 0.0)], "not finite", "(3,) [deg]"),
+    ("start.quaternion_wxyz", [np.zeros(4)], "is zero", "that is not"),
+    ("start.quaternion_wxyz", [(1.0, 0.0, 0.0)], "has shape (3,)", "(4,) [1]"),
+    *((f"run.{name}", SIX, "give a number", "[s]") for name in ("step", "duration", "save_every")),
+    ("run.dtype", ["float16", "double", np.float64, 64], "is not known", "float"),
+    ("run.method", [3], "is not a text", 'such as "psi_s"'),
+    ("run.save_fields", [3, "position"], "is no list of names", "give one"),
+    ("run.save_fields", [["positoin"]], "= 'positoin': is not known", "did you mean 'position'?"),
+    ("run.save_fields", [[[1]]], "= [1]: is not known", "known: "),
+    ("run.solver", ["cayly"], "is not known", "did you mean 'cayley'"),
+    ("run.iterations", [-1], "from 0 to 100", 'or None to iterate'),
+    ("run.tolerance", [2.0], "between 0 and 1", "such as 1e-12"),
+    ("run.atol", [1e-9], "is given alone", "give both"),
+    ("run.checks", ["some"], "is not known", "safe"),
+    ("run.on_failure", ["panic"], "is not known", "substep"),
+    ("ensemble.members", [0, -3, 1.5, 2.0, True, "4"], "whole number from 1", "give 1 or more"),
+    ("ensemble.members", [2**31 + 1], "more members than the 2147483648", "or less"),
+    ("ensemble.seed", [-1, 0.5, False, "x", None], "whole number from 0", "give 0 or more"),
+    ("vehicle.mass", [0.0, -1.0], "not positive", "above 0 [kg]"),
+    ("vehicle.buoyancy", [-1.0], "below 0", "from 0"),
+    *((f"vehicle.{name}", [NAN, INF], "not finite", unit) for name, unit in (("mass", "[kg]"), ("buoyancy", "[N]"))),
+    *((f"vehicle.{name}", [(1.0, NAN, 1.0), (1.0, INF, 1.0)], "not finite", unit)
+      for name, unit in (("inertia", "[kg m2]"), ("added_mass", "[kg]"), ("center_of_buoyancy", "[m]"))),
+    *((f"vehicle.{name}", SIZES, "; give") for name in ("mass", "buoyancy", "inertia", "added_mass", "center_of_buoyancy")),
+    *((f"vehicle.{name}", [TURNED], "not symmetric", "give a symmetric matrix") for name in ("inertia", "added_mass")),
+    ("vehicle.inertia", [(1.0, 0.0, 1.0)], "not positive definite", "above 0 [kg m2]"),
+    # Positive diagonal, yet eigenvalues 3 and -1 in the plane of x and y.
+    ("vehicle.inertia", [[[1.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 1.0]]], "not positive definite", "[kg m2]"),
+    ("vehicle.added_mass", [[-11.0, 0.0, 0.0]], "not positive definite", "minus Fossen's X_udot"),
+]  # fmt: skip
+SECTIONS = {"vehicle": lw.Vehicle, "environment": lw.Environment, "start": lw.Start, "run": RunSettings,
+            "ensemble": EnsembleSettings}  # fmt: skip
+
+
+@pytest.mark.parametrize(("key", "value", "words"), [(row[0], value, row[2:]) for row in SETTINGS for value in row[1]])
+def test_a_setting_of_a_section(key, value, words):
+    section, _, name = key.partition(".")
+    good = BODY if section == "vehicle" else {}
+    of_python = faults(SECTIONS[section], **good | {name: value})
+    (fault,) = faults(from_dict, {"vehicle": BODY} | {section: good | {name: value}})
+    assert of_python == (fault,)
+    assert fault.startswith(f"{key} = ")
+    assert all(word in fault for word in words), fault
+
+
+PAIRS = [
+    ({"velocity": (1, 0, 0), "velocity_inertial": (1, 0, 0)}, "start.velocity and velocity_inertial = "),
+    ({"rotation_vector": (1, 0, 0), "euler_deg": (1, 0, 0)}, "start.rotation_vector and euler_deg = "),
+]
+
+
+@pytest.mark.parametrize(("values", "start"), PAIRS)
+def test_a_start_that_says_the_same_twice(values, start):
+    (fault,) = faults(lw.Start, **values)
+    assert fault.startswith(start)
+    assert "keep one of them" in fault
 
 
 def full(rigid=DIAGONAL, **more):
@@ -187,48 +232,33 @@ def full(rigid=DIAGONAL, **more):
 
 VEHICLES = [
     ({}, "vehicle.mass = None", "is missing", "[kg]"),
-    (BODY | {"mass": -1}, "vehicle.mass = -1", "not positive", "above 0 [kg]"),
-    (BODY | {"inertia": [1.0, NAN, 2.0]}, "vehicle.inertia = [1.0, nan, 2.0]", "not finite", "[kg m2]"),
-    (
-        BODY | {"added_mass": [-11.0, 0.0, 0.0]},
-        "vehicle.added_mass = [-11.0",
-        "not positive definite",
-        "minus Fossen's",
-    ),
     (BODY | {"weight": 98.0}, "vehicle.weight = 98.0", "6x6 form", "give rigid_body_mass_matrix"),
     (full(DIAGONAL + np.eye(6, k=1)), "vehicle.rigid_body_mass_matrix", "not symmetric", "give a symmetric matrix"),
     (full(-DIAGONAL), "vehicle.rigid_body_mass_matrix", "not positive definite", "[[m I, -m hat(r_g)]"),
-    (
-        full(np.diag([1.0, 2, 3, 1, 1, 1])),
-        "vehicle.rigid_body_mass_matrix",
-        "not have m I as its upper left block",
-        "[[m I",
-    ),
+    (full(np.diag([1.0, 2, 3, 1, 1, 1])), "vehicle.rigid_body_mass_matrix", "not have m I as its upper left block",
+     "[[m I"),
     (full(np.eye(3)), "vehicle.rigid_body_mass_matrix", "shape (3, 3)", "symmetric 6x6 matrix"),
     (full(added_mass_matrix=-2.0 * DIAGONAL), "vehicle.added_mass_matrix", "not positive definite", "X_udot"),
-    (
-        {"added_mass_matrix": DIAGONAL},
-        "vehicle.rigid_body_mass_matrix = None",
-        "is missing",
-        "beside added_mass_matrix",
-    ),
+    ({"added_mass_matrix": DIAGONAL}, "vehicle.rigid_body_mass_matrix = None", "is missing",
+     "beside added_mass_matrix"),
     (full(mass=10.0), "vehicle.mass = 10.0", "repeats what", "keep one of the two forms"),
     (full(weight=NAN), "vehicle.weight = nan", "not finite", "[N]"),
     (full(center_of_gravity=[1.0]), "vehicle.center_of_gravity = [1.0]", "shape (1,)", "(3,) [m]"),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("values", "words"), [(row[0], row[1:]) for row in VEHICLES])
 def test_a_vehicle(values, words):
-    fault = next(one for one in refused(lw.Vehicle, **values) if words[0] in one)
+    fault = next(one for one in faults(lw.Vehicle, **values) if words[0] in one)
     assert all(word in fault for word in words), fault
 
 
 FOSSEN = [
     ({"X_udot": 5.0}, "X_udot = 5.0", "is positive", "write -5"),
     ({"X_u|u|": 5.0}, "X_u|u| = 5.0", "is positive", "write -5"),
-    ({"Y_rdot": -1.0, "N_vdot": -2.0}, "Y_rdot = -1.0", "differs from its partner N_vdot", "mend one or leave it out"),
+    ({"Y_rdot": -1.0, "N_vdot": -2.0}, "Y_rdot = -1.0", "from its partner N_vdot = -2.0", "mend one or leave it out"),
     ({"X_u": -1.0, "Xu": -2.0}, "Xu = -2.0", "given twice", "leave one out"),
+    ({"X_udot": -1.0, "Xdu": -1.0}, "Xdu = -1.0", "also as X_udot", "leave one out"),
     ({"Y_uv": -1.0}, "Y_uv = -1.0", "product of two velocities", "ignore="),
     ({"X_qq": -1.0}, "X_qq = -1.0", "no drag", "X_|q|q"),
     ({"Q_u": -1.0}, "Q_u = -1.0", "not a coefficient's name", "known: X_udot"),
@@ -241,13 +271,13 @@ FOSSEN = [
 
 @pytest.mark.parametrize(("given", "words"), [(row[0], row[1:]) for row in FOSSEN])
 def test_fossens_coefficients(given, words):
-    (fault,) = refused(lw.vehicle_tables_from_fossen, given, **BODY)
+    (fault,) = faults(lw.vehicle_tables_from_fossen, given, **BODY)
     assert all(word in fault for word in words), fault
 
 
 def test_fossens_drag_that_creates_energy():
     made = lw.vehicle_tables_from_fossen({"X_u": -1.0, "X_v": -100.0, "Y_v": -1.0}, **BODY)
-    (fault,) = refused(from_dict, made)
+    (fault,) = faults(from_dict, made)
     assert "drag_matrix.linear" in fault
     assert "creates energy" in fault
     assert "minus Fossen's" in fault
@@ -265,6 +295,7 @@ SDF = [
     (LINK.replace(">10<", ">ten<"), {}, "<mass> = 'ten'", "does not hold 1 finite numbers"),
     (LINK.replace("<xU>-1</xU>", "<xU>-1</xU><yV>1</yV>"), {}, "plugin's linear drag", "both signs", "Fossen's signs"),
     (LINK.replace("xU", "xUabsV"), {}, "<xUabsV> = -1.0", "product of velocities", "leave it out"),
+    ("<sdf><link></sdf>", {}, "not XML", "mend that line"),
     (LINK, {"link": "c"}, "SDF link = 'c'", "not in the file", "known: b"),
     (LINK, {"volume": -1.0}, "volume = -1.0", "not positive", "[m3]"),
     (LINK, {"volume": 0.01, "gravity": "g"}, "gravity = 'g'", "not numeric", "[m/s2]"),
@@ -273,7 +304,7 @@ SDF = [
 
 @pytest.mark.parametrize(("text", "more", "words"), [(row[0], row[1], row[2:]) for row in SDF])
 def test_sdf(text, more, words):
-    fault = next(one for one in refused(lw.vehicle_tables_from_sdf, text, **more) if words[0] in one)
+    fault = next(one for one in faults(lw.vehicle_tables_from_sdf, text, **more) if words[0] in one)
     assert all(word in fault for word in words), fault
 
 
@@ -286,6 +317,7 @@ YAML = [
     ("mass: 10\ninertia: [1, 2, 2.5]\nadded_mass: [1, 2]\n", "added_mass = [1, 2]", "shape (2,)", "6x6 matrix"),
     ("mass: 10\ninertia: [1, 2, 2.5]\ncoefficients: [1]\n", "coefficients = [1]", "not a map", "X_udot"),
     ("- 1\n- 2\n", "is not a map", "write mass: ..."),
+    ("nowhere.yaml", "nowhere.yaml", "give the path"),
     ("mass: [1\n", "YAML", "mend that line"),
 ]
 
@@ -293,7 +325,7 @@ YAML = [
 @pytest.mark.parametrize(("text", "words"), [(row[0], row[1:]) for row in YAML])
 def test_yaml(text, words):
     pytest.importorskip("yaml")
-    (fault,) = refused(lw.vehicle_tables_from_yaml, text)
+    (fault,) = faults(lw.vehicle_tables_from_yaml, text)
     assert all(word in fault for word in words), fault
 
 
@@ -315,7 +347,7 @@ def test_all_faults_of_a_scene_file_at_once():
     lower = [1, 1, 1]
     upper = [0, 0, 0]
     """
-    found = refused(scenes.loads, text)
+    found = faults(scenes.loads, text)
     keys = ("vehicle.mass = -10", "run.method = 'psi_q'", "drag.linear", "terms[1].type = 'harpoon'", "box.upper")
     assert len(found) == len(keys)
     assert all(any(one.startswith(key) for one in found) for key in keys)
@@ -323,7 +355,7 @@ def test_all_faults_of_a_scene_file_at_once():
 
 @pytest.mark.parametrize("path", ["missing.toml", None])
 def test_a_scene_file_that_is_not_there(path):
-    (fault,) = refused(lw.Scene.load, path)
+    (fault,) = faults(lw.Scene.load, path)
     assert str(path) in fault
     assert "give the path of a TOML file" in fault
 
@@ -342,7 +374,7 @@ VARIED = [
 
 @pytest.mark.parametrize(("table", "name", "law"), VARIED)
 def test_members_that_would_be_unphysical(table, name, law):
-    (fault,) = refused(lw.Ensemble, from_table(table), 50, 0, {name: law})
+    (fault,) = faults(lw.Ensemble, from_table(table), 50, 0, {name: law})
     assert name in fault
     assert "unphysical" in fault
     assert "of 50 members" in fault
@@ -357,7 +389,7 @@ NAMES = [
 
 @pytest.mark.parametrize(("table", "name", "remedy"), NAMES)
 def test_what_cannot_vary(table, name, remedy):
-    (fault,) = refused(lw.Ensemble, from_table(table), 5, 0, {name: lw.Normal(std=1.0)})
+    (fault,) = faults(lw.Ensemble, from_table(table), 5, 0, {name: lw.Normal(std=1.0)})
     assert f'ensemble.vary."{name}"' in fault
     assert "does not name what the scene has" in fault
     assert remedy in fault
@@ -377,7 +409,7 @@ IDLE = [
 
 @pytest.mark.parametrize(("table", "name", "remedy"), IDLE)
 def test_numbers_that_would_do_nothing(table, name, remedy):
-    (fault,) = refused(lw.Ensemble, from_table(table), 5, 0, {name: lw.Uniform(0.1, 0.2)})
+    (fault,) = faults(lw.Ensemble, from_table(table), 5, 0, {name: lw.Uniform(0.1, 0.2)})
     assert name in fault
     assert "does not act: the scene has" in fault
     assert remedy in fault
@@ -385,24 +417,14 @@ def test_numbers_that_would_do_nothing(table, name, remedy):
 
 NOISE = {"type": "wrench_noise", "force": [1.0, 1.0, 1.0]}
 MATRIX = {"type": "drag_matrix", "linear": np.eye(6).tolist()}
-SETTINGS = [
+RUNS = [
     (MATRIX, {"method": "kl6(psi_s)"}, "method = 'kl6(psi_s)'", "a damping matrix prevents that", "use psi_s"),
-    (
-        MATRIX,
-        {"method": "tj4(psi_x)"},
-        "method = 'tj4(psi_x)'",
-        "keeps its order only if a step of -h undoes",
-        "use psi_x",
-    ),
+    (MATRIX, {"method": "tj4(psi_x)"}, "method = 'tj4(psi_x)'", "keeps its order only if a step of -h undoes",
+     "use psi_x"),
     (TIDE, {"method": "su4(psi_s)"}, "method = 'su4(psi_s)'", "water that varies prevents that", "use psi_s"),
     (NOISE, {"method": "psi"}, "method = 'psi'", "noise more than once a step", "use psi_s"),
-    (
-        {"type": "drag", "linear": [0.0, 0.0, 3e5, 0.0, 0.0, 0.0]},
-        {"method": "kl6(psi_s)"},
-        "goes backward by",
-        "drag number up to",
-        "use psi_s, or a step",
-    ),
+    ({"type": "drag", "linear": [0.0, 0.0, 3e5, 0.0, 0.0, 0.0]}, {"method": "kl6(psi_s)"}, "goes backward by",
+     "drag number up to", "use psi_s, or a step"),
     (MATRIX, {"method": "psi_q"}, "method = 'psi_q'", "not known", "did you mean 'psi_"),
     (MATRIX, {"method": "kl6(phi)"}, "method = 'kl6(phi)'", "not symmetric", "compose psi_s"),
     (MATRIX, {"dtype": "float16"}, "dtype = 'float16'", "did you mean 'float64'?"),
@@ -411,12 +433,12 @@ SETTINGS = [
     (MATRIX, {"h": "a"}, "h = 'a'", "not numeric", "[s]"),
     (MATRIX, {"t1": [1.0]}, "t1 = [1.0]", "shape", "[s]"),
     (MATRIX, {"save": 0.1}, "save = 0.1", "is no SaveAt", "lw.SaveAt("),
-]
+]  # fmt: skip
 
 
-@pytest.mark.parametrize(("table", "settings", "words"), [(row[0], row[1], row[2:]) for row in SETTINGS])
+@pytest.mark.parametrize(("table", "settings", "words"), [(row[0], row[1], row[2:]) for row in RUNS])
 def test_a_method_that_cannot_do_it(table, settings, words):
-    (fault,) = refused(make_plan, lw.Ensemble(from_table(table)), **({"h": 0.01, "t1": 0.1} | settings))
+    (fault,) = faults(make_plan, lw.Ensemble(from_table(table)), **({"h": 0.01, "t1": 0.1} | settings))
     assert all(word in fault for word in words), fault
 
 
@@ -481,7 +503,7 @@ def test_a_users_law(made, words):
     term = type("Bad", (Pull,), {"device": made, "__annotations__": {}})(k=1.0)
     fleet = lw.Ensemble(lw.Scene(lw.Vehicle(**BODY), terms=[term]))
     for check in (lambda: lw.check_law(term), lambda: make_plan(fleet, h=0.01, t1=0.1)):
-        (fault,) = refused(check)
+        (fault,) = faults(check)
         assert all(word in fault for word in words), fault
 
 
@@ -492,14 +514,14 @@ class Wide(Pull):
 
 def test_a_law_without_a_struct_whose_numbers_make_none():
     bare = type("Bare", (Wide,), {"device": device(law=pull_law, params=None), "__annotations__": {}})
-    (fault,) = refused(lw.check_law, bare(k=1.0))
+    (fault,) = faults(lw.check_law, bare(k=1.0))
     assert all(word in fault for word in ("pull.device", "has no params(width, real)", "add_a_force.md")), fault
 
 
 @pytest.mark.kernel
 def test_a_law_that_returns_nothing():
     term = type("Bad", (Packs,), {"device": device(law=pull_silent), "__annotations__": {}})(k=1.0)
-    (fault,) = refused(lw.check_law, term)
+    (fault,) = faults(lw.check_law, term)
     assert "pull.device" in fault
     assert "does not compile" in fault
     assert "return what the role adds to" in fault
@@ -535,16 +557,16 @@ def test_numbers_of_the_wrong_shape():
 
 def test_what_is_no_fleet():
     for make in (lw.solve, lw.Ensemble):
-        (fault,) = refused(make, lw.Vehicle(1.0, inertia=1.0 * np.ones(3), added_mass=np.ones(3), buoyancy=0.0))
+        (fault,) = faults(make, lw.Vehicle(1.0, inertia=1.0 * np.ones(3), added_mass=np.ones(3), buoyancy=0.0))
         assert "give lw.Scene(" in fault
-    (fault,) = refused(lw.Ensemble, from_table(MATRIX), 5, 0, [1])
+    (fault,) = faults(lw.Ensemble, from_table(MATRIX), 5, 0, [1])
     assert "vary = [1]" in fault
     assert "lw.Normal" in fault
 
 
 def test_two_events_of_one_name():
     events = [lw.Floor(depth=1.0), lw.Floor(depth=2.0)]
-    (fault,) = refused(lw.Scene, from_table(MATRIX).vehicle, events=events)
+    (fault,) = faults(lw.Scene, from_table(MATRIX).vehicle, events=events)
     assert "events = 'floor'" in fault
     assert 'name = "floor_2"' in fault
     second = lw.Floor(depth=2.0, name="lower")
@@ -553,7 +575,7 @@ def test_two_events_of_one_name():
 
 def test_a_quadratic_matrix_of_members_that_creates_energy():
     scene = from_table({"type": "drag_matrix", "quadratic": np.eye(6).tolist()})
-    (fault,) = refused(lw.Ensemble, scene, 2000, 0, {"drag_matrix.quadratic": lw.Normal(std=1.0)})
+    (fault,) = faults(lw.Ensemble, scene, 2000, 0, {"drag_matrix.quadratic": lw.Normal(std=1.0)})
     assert "drag_matrix.quadratic of member" in fault
     assert "unphysical" in fault
     lw.Ensemble(scene, 2000, 0, {"drag_matrix.quadratic": lw.Uniform(relative=0.3)})
@@ -566,7 +588,7 @@ def test_a_broken_law_in_solve():
     with pytest.raises(lw.SceneError, match=r"(?s)law pull: .*does not compile.*lw.check_law"):
         lw.solve(lw.Scene(from_table(MATRIX).vehicle, terms=[Broken(k=1.0)]), h=0.01, t1=0.1)
     wavy = type("Wavy", (Pull,), {"device": device(law=pull_law, FLOW="wavy")})
-    (fault,) = refused(lw.solve, lw.Scene(from_table(MATRIX).vehicle, terms=[wavy(k=1.0)]), h=0.01, t1=0.1)
+    (fault,) = faults(lw.solve, lw.Scene(from_table(MATRIX).vehicle, terms=[wavy(k=1.0)]), h=0.01, t1=0.1)
     assert "pull.FLOW = 'wavy'" in fault
     assert "varying" in fault
 

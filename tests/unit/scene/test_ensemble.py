@@ -10,6 +10,7 @@ import lgvi_warp as lw
 from lgvi_warp.physics import notation
 from lgvi_warp.results.result import Drawn
 from lgvi_warp.scene import ensemble as ensembles
+from tests.support.refusals import faults
 
 FULL = np.array([[5.0, 0.3, 0.1], [0.3, 6.0, -0.2], [0.1, -0.2, 7.0]])
 EVERYTHING = {
@@ -43,12 +44,6 @@ def assert_same(m, whole, indices):
 
 def states(n):
     return np.zeros((n, 3)), np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3)), np.zeros((n, 3))
-
-
-def faults(make, *arguments, **named):
-    with pytest.raises(lw.SceneError) as caught:
-        make(*arguments, **named)
-    return caught.value.faults
 
 
 # Shapes and sharing ------------------------------------------------------------------------------------------------

@@ -10,6 +10,7 @@ from scipy import stats
 import lgvi_warp as lw
 from lgvi_warp.common.real_numbers import NotReal, real_numbers
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
+from tests.support.refusals import refused
 
 N = 3
 R = np.array([np.eye(3)] * N)
@@ -41,12 +42,6 @@ GOOD = {
     "half precision": ZERO.astype(np.float16),
     "a mask that hides nothing": np.ma.masked_greater(ZERO, 1.0),
 }
-
-
-def refused(make, *arguments, **named):
-    with pytest.raises(lw.SceneError) as caught:
-        make(*arguments, **named)
-    return str(caught.value)
 
 
 @pytest.mark.parametrize("form", ODD)

@@ -54,110 +54,49 @@ def carried(inertia):
 LARGEST = 30.0 * (1.6**2 + 0.2**2) / 4.0
 STRIPS = 40.0 * (0.8**2 + 0.2**2 / 4.0)
 
-# What is at its limit, what is beyond, and words of the message.
-LOOKS = {
-    "net weight down": (
-        scene({"buoyancy": 0.5 * WEIGHT * HOT}),
-        scene({"buoyancy": 0.5 * WEIGHT / HOT}),
-        ("vehicle.buoyancy", "N down", "half the weight"),
-    ),
-    "net weight up": (
-        scene({"buoyancy": 1.5 * WEIGHT / HOT}),
-        scene({"buoyancy": 1.5 * WEIGHT * HOT}),
-        ("vehicle.buoyancy", "N up"),
-    ),
-    "no buoyancy": (scene(), scene({"buoyancy": 0.0}), ("vehicle.buoyancy", "left out")),
-    "light water": (
-        scene(environment={"water_density": 100.0}),
-        scene(environment={"water_density": 99.9}),
-        ("environment.water_density", "99.9 kg/m3"),
-    ),
-    "heavy water": (
-        scene(environment={"water_density": 3000.0}),
-        scene(environment={"water_density": 3000.1}),
-        ("environment.water_density", "3000.1 kg/m3"),
-    ),
-    "current": (
-        scene(**term(type="current", velocity=[3.0, 4.0, 0.0])),
-        scene(**term(type="current", velocity=[3.0, 4.0, 0.1])),
-        ("current.velocity", "m/s"),
-    ),
-    "profile": (
-        scene(**term(type="current_profile", depths=[0.0, 9.0], velocities=[[0.0, 0.0, 0.0], [0.0, 5.0, 0.0]])),
-        scene(**term(type="current_profile", depths=[0.0, 9.0], velocities=[[0.0, 0.0, 0.0], [0.0, 5.1, 0.0]])),
-        ("current_profile.velocities", "5.1 m/s"),
-    ),
-    "tide": (
-        scene(**term(type="current_harmonics", amplitudes=[[5.0, 0.0, 0.0]], periods=[9.0])),
-        scene(**term(type="current_harmonics", amplitudes=[[0.0, -5.1, 0.0]], periods=[9.0])),
-        ("current_harmonics.amplitudes", "5.1 m/s"),
-    ),
-    "wandering current": (
-        scene(**term(type="gauss_markov_current", standard_deviation=[5.0, 0.0, 0.0], time_constant=9.0)),
-        scene(**term(type="gauss_markov_current", standard_deviation=[5.1, 0.0, 0.0], time_constant=9.0)),
-        ("gauss_markov_current.standard_deviation",),
-    ),
-    "fin's limit": (
-        scene(**term(**RUDDER, limit=math.pi / 2.0)),
-        scene(**term(**RUDDER, limit=20.0)),
-        ("control_fins.limit", "20 rad", "degrees"),
-    ),
-    "fin's command": (
-        scene(**term(**RUDDER, command=[-math.pi / 2.0])),
-        scene(**term(**RUDDER, command=[-1.6])),
-        ("control_fins.command:", "1.6 rad"),
-    ),
-    "fin's schedule": (
-        scene(**term(**RUDDER, times=[0.0, 1.0], command_schedule=[[0.0], [1.5]])),
-        scene(**term(**RUDDER, times=[0.0, 1.0], command_schedule=[[0.0], [15.0]])),
-        ("control_fins.command_schedule", "15 rad"),
-    ),
-    "speed": (
-        scene(start={"velocity": [18.0, 24.0, 0.0]}),
-        scene(start={"velocity": [18.0, 24.0, 1.0]}),
-        ("start.velocity", "30.02 m/s"),
-    ),
-    "inertial speed": (
-        scene(start={"velocity_inertial": [0.0, 30.0, 0.0], "euler_deg": [0.0, 0.0, 0.0]}),
-        scene(start={"velocity_inertial": [0.0, 30.1, 0.0], "euler_deg": [10.0, 20.0, 30.0]}),
-        ("start.velocity", "30.1 m/s"),
-    ),
-    "depth": (
-        scene(start={"position": [0.0, 0.0, 0.0]}),
-        scene(start={"position": [0.0, 0.0, -0.1]}),
-        ("start.position", "-0.1 m", "positive down"),
-    ),
-    "floor": (
-        scene(events=[{"type": "floor", "depth": 0.0}]),
-        scene(events=[{"type": "floor", "depth": -26.0}]),
-        ("floor.depth", "-26 m"),
-    ),
-    "heights for depths": (
-        scene(**term(type="current_profile", depths=[-1.0, 9.0], velocities=[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])),
-        scene(**term(type="current_profile", depths=[-9.0, 0.0], velocities=[[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])),
-        ("current_profile.depths", "-9 m"),
-    ),
-    "inertia": (
-        scene({"inertia": [0.2, LARGEST / HOT, 3.0]}, terms=[HULL]),
-        scene({"inertia": [0.2, LARGEST * HOT, 3.0]}, terms=[HULL]),
-        ("vehicle.inertia", "kg m2", "1.6 m"),
-    ),
-    "inertia with added": (
-        scene({"inertia": [0.2, LARGEST + STRIPS / HOT, 3.0], "added_mass": [1.0, 40.0, 40.0]}, terms=[HULL]),
-        scene({"inertia": [0.2, LARGEST + STRIPS * HOT, 3.0], "added_mass": [1.0, 40.0, 40.0]}, terms=[HULL]),
-        ("vehicle.inertia",),
-    ),
-    "rigid body's inertia": (
-        scene(full(LARGEST / HOT), terms=[HULL]),
-        scene(full(LARGEST * HOT), terms=[HULL]),
-        ("vehicle.rigid_body_mass_matrix",),
-    ),
-    "added inertia": (
-        scene(carried(STRIPS / HOT), terms=[HULL]),
-        scene(carried(STRIPS * HOT), terms=[HULL]),
-        ("vehicle.added_mass_matrix",),
-    ),
-}
+PROFILE, STILL = {"type": "current_profile", "depths": [0.0, 9.0]}, [0.0, 0.0, 0.0]
+WANDERING = {"type": "gauss_markov_current", "time_constant": 9.0}
+
+# A scene of a value, the value at its limit, that beyond, and words of the message.
+LIMITED = {
+    "net weight down": (lambda N: scene({"buoyancy": N}), 0.5 * WEIGHT * HOT, 0.5 * WEIGHT / HOT,
+                        "vehicle.buoyancy", "N down", "half the weight"),
+    "net weight up": (lambda N: scene({"buoyancy": N}), 1.5 * WEIGHT / HOT, 1.5 * WEIGHT * HOT, "vehicle.buoyancy", "N up"),
+    "no buoyancy": (lambda N: scene({"buoyancy": N}), 290.0, 0.0, "vehicle.buoyancy", "left out"),
+    "light water": (lambda rho: scene(environment={"water_density": rho}), 100.0, 99.9,
+                    "environment.water_density", "99.9 kg/m3"),
+    "heavy water": (lambda rho: scene(environment={"water_density": rho}), 3000.0, 3000.1,
+                    "environment.water_density", "3000.1 kg/m3"),
+    "current": (lambda w: scene(**term(type="current", velocity=[3.0, 4.0, w])), 0.0, 0.1, "current.velocity", "m/s"),
+    "profile": (lambda v: scene(**term(**PROFILE, velocities=[STILL, [0.0, v, 0.0]])), 5.0, 5.1,
+                "current_profile.velocities", "5.1 m/s"),
+    "tide": (lambda u: scene(**term(type="current_harmonics", amplitudes=[u], periods=[9.0])), [5.0, 0.0, 0.0],
+             [0.0, -5.1, 0.0], "current_harmonics.amplitudes", "5.1 m/s"),
+    "wandering current": (lambda u: scene(**term(**WANDERING, standard_deviation=[u, 0.0, 0.0])), 5.0, 5.1,
+                          "gauss_markov_current.standard_deviation"),
+    "fin's limit": (lambda a: scene(**term(**RUDDER, limit=a)), math.pi / 2.0, 20.0,
+                    "control_fins.limit", "20 rad", "degrees"),
+    "fin's command": (lambda a: scene(**term(**RUDDER, command=[a])), -math.pi / 2.0, -1.6,
+                      "control_fins.command:", "1.6 rad"),
+    "fin's schedule": (lambda a: scene(**term(**RUDDER, times=[0.0, 1.0], command_schedule=[[0.0], [a]])), 1.5, 15.0,
+                       "control_fins.command_schedule", "15 rad"),
+    "speed": (lambda w: scene(start={"velocity": [18.0, 24.0, w]}), 0.0, 1.0, "start.velocity", "30.02 m/s"),
+    "inertial speed": (lambda start: scene(start=start), {"velocity_inertial": [0.0, 30.0, 0.0], "euler_deg": STILL},
+                       {"velocity_inertial": [0.0, 30.1, 0.0], "euler_deg": [10.0, 20.0, 30.0]},
+                       "start.velocity", "30.1 m/s"),
+    "depth": (lambda z: scene(start={"position": [0.0, 0.0, z]}), 0.0, -0.1, "start.position", "-0.1 m", "positive down"),
+    "floor": (lambda z: scene(events=[{"type": "floor", "depth": z}]), 0.0, -26.0, "floor.depth", "-26 m"),
+    "heights for depths": (lambda z: scene(**term(**PROFILE | {"depths": z}, velocities=[STILL, [0.1, 0.0, 0.0]])),
+                           [-1.0, 9.0], [-9.0, 0.0], "current_profile.depths", "-9 m"),
+    "inertia": (lambda J: scene({"inertia": [0.2, J, 3.0]}, terms=[HULL]), LARGEST / HOT, LARGEST * HOT,
+                "vehicle.inertia", "kg m2", "1.6 m"),
+    "inertia with added": (lambda J: scene({"inertia": [0.2, J, 3.0], "added_mass": [1.0, 40.0, 40.0]}, terms=[HULL]),
+                           LARGEST + STRIPS / HOT, LARGEST + STRIPS * HOT, "vehicle.inertia"),
+    "rigid body's inertia": (lambda J: scene(full(J), terms=[HULL]), LARGEST / HOT, LARGEST * HOT,
+                             "vehicle.rigid_body_mass_matrix"),
+    "added inertia": (lambda J: scene(carried(J), terms=[HULL]), STRIPS / HOT, STRIPS * HOT, "vehicle.added_mass_matrix"),
+}  # fmt: skip
+LOOKS = {name: (make(usual), make(odd), words) for name, (make, usual, odd, *words) in LIMITED.items()}
 
 
 @pytest.mark.parametrize("name", LOOKS)

@@ -6,8 +6,8 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.physics import notation
-from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 from lgvi_warp.studies.sweeps.cases import Case
+from tests.support.refusals import faults
 
 VEHICLE = lw.Vehicle(mass=10.0, inertia=(1.0, 2.0, 2.5))
 
@@ -16,12 +16,6 @@ def resolved(**start):
     """Position, attitude, velocity and angular velocity that a Start comes to."""
     m = lw.Ensemble(lw.Scene(VEHICLE, start=lw.Start(**start))).select(0, 1)
     return m.position[0], m.attitude[0], m.velocity[0], m.angular_velocity[0]
-
-
-def faults(make, *arguments, **named):
-    with pytest.raises(lw.SceneError) as caught:
-        make(*arguments, **named)
-    return caught.value.faults
 
 
 def test_a_start_left_out_is_at_rest():
@@ -64,65 +58,14 @@ def test_an_attitude_must_be_a_rotation():
     lw.Start(attitude=R)  # the round-off of printing it
 
 
-@pytest.mark.parametrize(
-    "start, key",
-    [
-        ({"quaternion_wxyz": np.zeros(4)}, "start.quaternion_wxyz"),
-        ({"quaternion_wxyz": (1.0, 0.0, 0.0)}, "start.quaternion_wxyz"),
-        ({"position": (1.0, 2.0)}, "start.position"),
-        ({"position": (1.0, np.nan, 2.0)}, "start.position"),
-        ({"velocity": "fast"}, "start.velocity"),
-        ({"angular_velocity": 1.0}, "start.angular_velocity"),
-        ({"euler_deg": (0.0, np.inf, 0.0)}, "start.euler_deg"),
-        ({"velocity": (1, 0, 0), "velocity_inertial": (1, 0, 0)}, "start.velocity and velocity_inertial"),
-        ({"rotation_vector": (1, 0, 0), "euler_deg": (1, 0, 0)}, "start.rotation_vector and euler_deg"),
-    ],
-)
-def test_bad_starts(start, key):
-    (fault,) = faults(lw.Start, **start)
-    assert fault.startswith(key)
-
-
 def test_all_faults_of_a_start_come_at_once():
     found = faults(lw.Start, position="here", attitude=np.zeros((3, 3)), euler_deg=(0, 0, 0), velocity=(1.0,))
     assert len(found) == 4
 
 
-@pytest.mark.parametrize(
-    "values, key",
-    [
-        ({"gravity": -9.8}, "environment.gravity"),
-        ({"gravity": np.nan}, "environment.gravity"),
-        ({"water_density": 0.0}, "environment.water_density"),
-        ({"gravity": True}, "environment.gravity"),
-    ],
-)
-def test_bad_environments(values, key):
-    assert faults(lw.Environment, **values)[0].startswith(key)
-
-
 def test_gravity_may_be_zero():
     assert lw.Environment(gravity=0.0).gravity == 0.0
     assert lw.Environment().gravity == 9.80665  # standard gravity (CGPM 1901)
-
-
-@pytest.mark.parametrize("key", ["step", "duration", "save_every"])
-@pytest.mark.parametrize("bad", [0.0, -0.01, np.nan, np.inf, "soon", True])
-def test_bad_times(key, bad):
-    assert faults(RunSettings, **{key: bad})[0].startswith(f"run.{key} = ")
-
-
-@pytest.mark.parametrize("bad", ["float16", "double", np.float64, 64])
-def test_bad_dtypes(bad):
-    assert faults(RunSettings, dtype=bad)[0].startswith("run.dtype = ")
-
-
-@pytest.mark.parametrize(
-    "key, bads", [("members", [0, -3, 1.5, 2.0, True, "4", 2**31 + 1]), ("seed", [-1, 0.5, False, "x", None])]
-)
-def test_bad_ensemble_settings(key, bads):
-    for bad in bads:
-        assert faults(EnsembleSettings, **{key: bad})[0].startswith(f"ensemble.{key} = ")
 
 
 def test_other_laws_are_refused_with_the_reason():

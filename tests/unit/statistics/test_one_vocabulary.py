@@ -12,6 +12,7 @@ from lgvi_warp.results.quantities import quantities
 from lgvi_warp.statistics.values.functional import functional, quantity
 from lgvi_warp.statistics.values.quantity import KNOWN
 from lgvi_warp.studies.distance import QUANTITIES, compared_in
+from tests.support.refusals import refused
 
 K, N = 4, 3
 AT_EACH_TIME = [
@@ -45,12 +46,6 @@ def result(scene):
     status = np.zeros(N, np.uint8)
     parameters = {name: value[None] for name, value in scene.parameters().items()}
     return lw.Result(np.arange(float(K)), samples, status, none, none, status, none, none, status, parameters, (), {})
-
-
-def refused(make, *arguments):
-    with pytest.raises(lw.SceneError) as caught:
-        make(*arguments)
-    return str(caught.value)
 
 
 def other(result, change):

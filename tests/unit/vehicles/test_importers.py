@@ -20,19 +20,13 @@ from lgvi_warp.results.provenance import messages
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.vehicles import robot_xml as coefficients_xml
 from tests.support import righting
+from tests.support.refusals import refused
 from tests.support.tools import one
 
 FILES = Path(__file__).parents[2] / "data" / "vehicles"
 MAIN = {"frame_rov": "base_link", "long_auv": "hull"}
 SIX = np.kron(np.eye(2), righting.DOWN)  # velocities and forces: z up <-> z down
 RNG = np.random.default_rng(5)
-
-
-def refused(function, *args, **kwargs):
-    """The message of a refusal: lines of text, no traceback."""
-    with pytest.raises(lw.SceneError) as caught:
-        function(*args, **kwargs)
-    return str(caught.value)
 
 
 def warnings_of(tables):

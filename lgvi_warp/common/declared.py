@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Fields of settings that say what they may hold; `read` reads them all. Those of terms that vary by member: `number`."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.common.real_numbers import is_whole
+
+
+def declared(reader: Callable[..., Any], default: Any = dataclasses.MISSING, **arguments: Any) -> Any:
+    """Declare a field by how it is read; where None is its default, None is not read.
+
+    reader: Notes what is wrong with the value of a key, and returns what it means, as methods of `Faults` do.
+    arguments: More arguments of the reader, such as unit and least.
+    """
+    return dataclasses.field(default=default, metadata={"reader": reader, "arguments": arguments})
+
+
+# real(9.81, unit="m/s2", least=0.0), array(None, shape=(3,), unit="m"), word("refuse", known=("refuse", "resume"))
+real = functools.partial(declared, Faults.number)
+positive = functools.partial(declared, Faults.positive)
+array = functools.partial(declared, Faults.finite)
+symmetric = functools.partial(declared, Faults.symmetric)
+word = functools.partial(declared, Faults.choice)
+
+
+def checked(good: Callable[[Any], bool], problem: str, remedy: str, default: Any = dataclasses.MISSING) -> Any:
+    """Declare a value that a condition lets through, and what a fault says of any other."""
+    return declared(_check, default, good=good, problem=problem, remedy=remedy)
+
+
+def _check(faults: Faults, key: str, value: Any, good: Callable[[Any], bool], problem: str, remedy: str) -> Any:
+    return value if good(value) else faults.add(key, value, problem, remedy)
+
+
+text = functools.partial(checked, lambda value: isinstance(value, str))
+flag = functools.partial(
+    checked, lambda value: isinstance(value, bool), "is neither true nor false", "give one of them"
+)
+
+
+def whole(least: int, problem: str, remedy: str, default: Any = dataclasses.MISSING) -> Any:
+    """Declare a whole number, of Python or of NumPy."""
+    return checked(functools.partial(is_whole, least=least), problem, remedy, default)
+
+
+@functools.cache
+def _declared_fields(kind: Any) -> dict[str, dataclasses.Field[Any]]:
+    return {item.name: item for item in dataclasses.fields(kind) if "reader" in item.metadata}
+
+
+def read(settings: Any, faults: Faults, *names: str) -> dict[str, Any]:
+    """Read declared fields of an object, all or those that are named; note what is wrong.
+
+    Returns: What was read, by name: None after a fault, and for None where that is the default.
+    """
+    values, known = {}, _declared_fields(type(settings))  # type: ignore[arg-type]  # a class is hashable
+    for name in names or known:
+        value, item = getattr(settings, name), known[name]
+        skipped = value is None and item.default is None
+        values[name] = None if skipped else item.metadata["reader"](faults, name, value, **item.metadata["arguments"])
+    return values
+
+
+Made = TypeVar("Made")
+
+
+def from_table(kind: type[Made], key: str, given: Any, example: str, **needed: str) -> Made:
+    """Build settings from a table of a scene file; settings themselves are kept.
+
+    needed: Keys that the table must have, each with the remedy where it is missing.
+    """
+    if isinstance(given, kind):
+        return given
+    if not isinstance(given, Mapping):
+        raise refusal(key, given, "is no table", example)
+    faults = Faults()
+    faults.keys(key, given, [item.name for item in dataclasses.fields(kind) if item.init])  # type: ignore[arg-type]
+    for name in (name for name in needed if name not in given):
+        faults.add(f"{key}.{name}", "", "is missing", needed[name])
+    faults.raise_if_any()
+    return kind(**given)

@@ -11,6 +11,7 @@ from typing import Any
 
 from lgvi_warp.control.base import SECTIONS as LISTS
 from lgvi_warp.control.controller import Controller
+from lgvi_warp.importers.fossen import vehicles
 from lgvi_warp.physics import terms
 from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.physics.terms import events
@@ -24,7 +25,6 @@ from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 from lgvi_warp.scene.start import Environment, Start
 from lgvi_warp.statistics import TYPES as STATISTICS
 from lgvi_warp.statistics.until import Until
-from lgvi_warp.vehicles.fossen import vehicles
 
 Schema = dict[str, Any]
 

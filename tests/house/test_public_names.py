@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Public names that were replaced: the old ones still work, warn, and name the new ones."""
 
+import inspect
 import pickle
+from pathlib import Path
 
 import pytest
 
@@ -58,3 +60,9 @@ def test_the_verb_plan_is_the_verb_predict():
     assert chosen[0] == chosen[1]
     assert VERBS["plan"] is VERBS["predict"]
     assert "predict (plan)" in parser().format_help()
+
+
+def test_no_room_bears_the_name_of_a_function():
+    # Once a room is imported, it is an attribute of the package.
+    rooms = {path.stem for path in Path(lw.__path__[0]).iterdir()}
+    assert {name for name in rooms & set(lw.__all__) if not inspect.ismodule(getattr(lw, name))} == set()

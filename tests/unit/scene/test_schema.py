@@ -8,8 +8,8 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.cli.lists import SCENE
+from lgvi_warp.importers.fossen import vehicle_file, vehicles
 from lgvi_warp.scene.schema import schema
-from lgvi_warp.vehicles.fossen import vehicle_file, vehicles
 from tests.conftest import ROOT
 from tests.support.json_schema import faults
 

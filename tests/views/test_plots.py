@@ -411,11 +411,9 @@ def test_refusals_name_the_remedy(solved):
         lw.plots.compare({})
 
 
-def test_pieces_give_what_the_whole_gives(solved, monkeypatch):
+def test_pieces_give_what_the_whole_gives(solved):
     of = quantity_of("speed")
-    whole = survey_of(solved, of)
-    monkeypatch.setattr("lgvi_warp.views.plots.read.AT_ONCE", 7 * len(solved.time))
-    parts = survey_of(solved, of)
+    whole, parts = survey_of(solved, of), survey_of(solved, of, at_once=7 * len(solved.time))
     for name in ("values", "counted", "low", "high", "last"):
         np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
     assert at_levels(whole.values, whole.counted, [0.0])[0] == pytest.approx(whole.low)

@@ -149,7 +149,7 @@ def _of_run(result: Result) -> Iterator[str]:
     remarks = [*result.messages, *_warnings(result), *(fault.text for fault in faults(result))]
     if remarks:
         yield _section("Notes and warnings", _list(remarks))
-    pictures = [_picture(draw, result) for draw in _pictures_of(result)]
+    pictures = [inline(draw, result) for draw in _pictures_of(result)]
     if any(pictures):
         yield _section("Pictures", "".join(pictures))
     if result.statistics:
@@ -195,7 +195,7 @@ def _pictures_of(result: Result) -> list[Callable[[Any, Path], Path]]:
     return drawn + ([plot_statistics] if drawable(result) else [])
 
 
-def _picture(draw: Callable[[Any, Path], Path], result: Result) -> str:
+def inline(draw: Callable[[Any, Path], Path], result: Result) -> str:
     """A picture as SVG, or in pixels where that is large; a sentence where there is nothing to draw."""
     with tempfile.TemporaryDirectory() as folder:
         try:

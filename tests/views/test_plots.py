@@ -25,6 +25,7 @@ from lgvi_warp.views.plots import canvas
 from lgvi_warp.views.plots.read import quantity_of, survey_of
 from lgvi_warp.views.recording.drawn import at_levels
 from tests.support.made import made
+from tests.unit.views.test_cost_pictures import RUNS, TERMS
 
 N, FLOOR = 40, 20.0
 STATISTICS = [
@@ -132,6 +133,9 @@ def pictures(solved):
     found["tradeoff"] = lw.plots.tradeoff, (of_methods(),)
     found["stability"] = lw.plots.stability, (of_cells(),)
     found["sensitivity"] = lw.plots.sensitivity, (of_factors(),)
+    found["margins"] = lw.plots.margins, (margins_of([True, True, True, True, False]),)
+    found["scaling"] = lw.plots.scaling, (RUNS,)
+    found["term_cost"] = lw.plots.term_cost, (TERMS,)
     found["one vehicle"] = lw.plots.summary, (few(solved, [3]),)
     found["two samples"] = lw.plots.summary, (few(solved, range(9), [0, -1]),)
     found["all stopped"] = lw.plots.summary, (ending(solved, [17] * N, [9.0] * N),)
@@ -139,17 +143,8 @@ def pictures(solved):
     return found
 
 
-NAMES = (
-    *ALL_OF_A_RUN,
-    "compare",
-    "tradeoff",
-    "stability",
-    "sensitivity",
-    "one vehicle",
-    "two samples",
-    "all stopped",
-    "failures",
-)
+NAMES = (*ALL_OF_A_RUN, "compare", "tradeoff", "stability", "sensitivity", "margins", "scaling", "term_cost", "one vehicle",
+         "two samples", "all stopped", "failures")  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -187,7 +182,7 @@ def test_text_can_be_read_at_700_pixels(drawn, name):
 
 
 # Axes of numbers without a unit, and of names.
-NO_UNIT = {"attitude", "sensitivity", "pairs"}
+NO_UNIT = {"attitude", "sensitivity", "pairs", "margins"}
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in NO_UNIT])
@@ -323,25 +318,6 @@ def test_statistics_stand_for_samples(solved, drawn):
             getattr(lw.plots, name)(bare)
 
 
-def test_a_panel_of_statistics_says_unit_direction_and_what_is_left_out(solved, drawn):
-    figure = drawn["statistics"]
-    panels = {axes.get_title(): axes for axes in figure.axes if axes.get_title()}
-    histogram = panels["histogram depth"]
-    assert histogram.get_ylabel() == "depth [m], down"
-    assert histogram.yaxis_inverted()
-    assert not panels["mean velocity"].yaxis_inverted()
-    # At the start all members are in one bin: on an even scale all else would be dark.
-    (cells,) = histogram.collections
-    norm = cells.norm
-    assert (norm(0.25 * norm.vmax) - norm(0.0)) / (norm(norm.vmax) - norm(0.0)) == pytest.approx(0.5)
-    (bar,) = (axes for axes in figure.axes if axes.get_label() == "<colorbar>")
-    assert bar.axison
-    assert bar.get_ylabel() == "share of members [%]"
-    assert "not drawn, see the table: covariance position, mean path_maximum speed" in figure.get_suptitle().replace(
-        "\n", " "
-    )
-
-
 def test_titles_say_east_and_not_the_number_of_a_component(drawn):
     titles = [axes.get_title() for axes in drawn["sensitivity"].axes]
     assert titles[:3] == ["max(north)", "max(east)", "max(depth)"]
@@ -367,6 +343,12 @@ def test_a_histogram_counts_every_member_once(solved, drawn):
     assert speed.get_xlabel() == "max(speed) [m/s]"
     same = dataclasses.replace(solved, samples={**solved.samples, "position": np.full_like(solved.position, 20.0)})
     assert sum(bar.get_width() for bar in lw.plots.histogram(same).patches) == pytest.approx(100.0)
+
+
+def test_a_panel_with_nothing_below_has_numbers_on_its_axis(drawn):
+    panels = drawn["stability"].axes[:3]
+    numbered = [any(tick.label1.get_visible() for tick in axes.xaxis.get_major_ticks()) for axes in panels]
+    assert numbered == [False, True, True]
 
 
 def test_the_front_is_in_colour_and_named_at_its_lines(drawn):

@@ -24,7 +24,7 @@ from lgvi_warp.studies.tradeoff import Measurement, Tradeoff
 from lgvi_warp.views.plots import canvas
 from lgvi_warp.views.plots.read import quantity_of, survey_of
 from lgvi_warp.views.recording.drawn import at_levels
-from tests.support.made import made
+from tests.support.made import made, turned
 from tests.unit.views.test_cost_pictures import RUNS, TERMS
 
 N, FLOOR = 40, 20.0
@@ -293,9 +293,8 @@ def test_a_far_surface_is_told_not_drawn():
 
 def test_angles_are_drawn_about_their_mean_direction(solved):
     heading = np.linspace(3.0, 3.3, N)[None] + np.linspace(0.0, 9.0, len(solved.time))[:, None]
-    c, s, zero = np.cos(heading), np.sin(heading), np.zeros_like(heading)
-    turned = np.stack([c, -s, zero, s, c, zero, zero, zero, zero + 1.0], axis=-1).reshape(*heading.shape, 3, 3)
-    result = dataclasses.replace(ending(solved, [0] * N, [np.nan] * N), samples={**solved.samples, "attitude": turned})
+    samples = {**solved.samples, "attitude": turned(heading)}
+    result = dataclasses.replace(ending(solved, [0] * N, [np.nan] * N), samples=samples)
     (axes,) = lw.plots.fan(result, "euler[2]").figure.axes
     median = next(line for line in axes.lines if line.get_label() == "median").get_ydata()
     np.testing.assert_allclose(np.diff(median), 9.0 / (len(solved.time) - 1), atol=1e-9)
@@ -323,16 +322,6 @@ def test_titles_say_east_and_not_the_number_of_a_component(drawn):
     assert titles[:3] == ["max(north)", "max(east)", "max(depth)"]
     assert not [text.get_text() for name in ("statistics", "pairs", "histogram") for text in texts(drawn[name])
                 if "position[" in text.get_text()]  # fmt: skip
-
-
-def test_shares_of_outcomes(solved, drawn):
-    (axes,) = drawn["outcomes"].axes
-    stopped = int((np.asarray(solved.status) == Status.FLOOR).sum())
-    labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels[0] == f"under way, {N - stopped} to the end"
-    assert labels[1].startswith(f"floor: {stopped} of {N}, the first at ")
-    at_end = axes.collections[0].get_paths()[0].vertices
-    assert at_end[at_end[:, 0] == 20.0, 1].max() == pytest.approx(100.0 * (N - stopped) / N)
 
 
 def test_a_histogram_counts_every_member_once(solved, drawn):

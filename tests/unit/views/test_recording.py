@@ -226,10 +226,14 @@ def test_forces_balance_the_momentum():
     mass = scene.vehicle.mass + scene.vehicle.added_mass[0, 0]
     position = np.zeros((21, 1, 3))
     position[:, 0, 0] = 0.5 * force / mass * t**2
-    forces, points = world.forces_on(drawn.drawn_of(made(position, t)))
+    run = drawn.drawn_of(made(position, t))
+    forces, points = world.forces_on(run)
     np.testing.assert_allclose(forces[2:-2, 2], [[force, 0.0, 0.0]] * 17, atol=1e-3)
     np.testing.assert_allclose(forces[:, 0] + forces[:, 1], 0.0, atol=1e-9)
     assert points.shape == (3, 3)
+    # Speeds are of half a step after the start and before the end.
+    kinetic = 0.5 * mass * (force / mass) ** 2 * (1.95**2 - 0.05**2)
+    assert ten_words.energy_text(run) == f"drift {kinetic:.2g} J, the largest of the members drawn"
 
 
 def test_the_current_is_drawn_as_it_flows(mixed, path):
@@ -360,14 +364,7 @@ def lean(mixed, **named):
     return dataclasses.replace(mixed, samples={}, kept=mixed.part(kept), kept_members=kept, **named)
 
 
-def test_kept_members_are_drawn_where_no_others_were_kept(mixed, tmp_path):
-    path = lw.log_rerun(lean(mixed), tmp_path / "kept.rrd")
-    assert len(rows(path, "/world/bodies/ok", "translations")[0.0]) == 3
-    summary, counts = text_of(path, "/run/summary"), mixed.status.counts()
-    assert "| 3 of 40 drawn, curves of the 3 whose samples were kept |" in summary
-    # Outcomes are those of all.
-    assert f"| outcome | {', '.join(f'{name} {number}' for name, number in counts.items())} |" in summary
-    assert rows(path, "/members/floor", "scalars")[60.0] == pytest.approx([100.0 * counts["floor"] / 40])
+def test_of_kept_members_alone_no_others_are_drawn(mixed, tmp_path):
     assert drawn.drawn_of(lean(mixed), [9, 3]).members.tolist() == [3, 9]
     with pytest.raises(lw.SceneError, match=r"members = 4: has no samples; keep them: keep=\[4\]"):
         lw.log_rerun(lean(mixed), tmp_path / "kept.rrd", members=[4])

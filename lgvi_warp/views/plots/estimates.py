@@ -72,7 +72,7 @@ def _units(axes: Any, result: Result, estimate: Estimate) -> None:
 
 
 def drawable(result: Result) -> list[Estimate]:
-    """Select the statistics that `plot_statistics` draws.
+    """Select the statistics that `lw.plots.statistics` draws.
 
     Args:
         result: A result.

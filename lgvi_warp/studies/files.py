@@ -7,6 +7,7 @@ import json
 import math
 import os
 from abc import ABC, abstractmethod
+from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -68,9 +69,11 @@ class Saved(ABC):
 
     Attributes:
         study: name of the study, and of its files.
+        endings: of its files, in the order in which they are written; "txt" is what `str` tells.
     """
 
     study: ClassVar[str]
+    endings: ClassVar[tuple[str, ...]] = ("json", "csv")
 
     @abstractmethod
     def to_dict(self) -> dict[str, Any]:
@@ -81,7 +84,7 @@ class Saved(ABC):
         """
 
     @abstractmethod
-    def rows(self) -> list[dict[str, Any]]:
+    def rows(self) -> Iterable[dict[str, Any]]:
         """Flatten it to records.
 
         Returns:
@@ -94,7 +97,7 @@ class Saved(ABC):
         Returns:
             The text of `to_dict`; numbers that are not finite are null.
         """
-        return json.dumps(self.to_dict(), indent=1, allow_nan=False)
+        return json.dumps(self.to_dict(), indent=1)
 
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write the rows to a CSV file.
@@ -108,17 +111,17 @@ class Saved(ABC):
         Raises:
             OSError: where it cannot be written.
         """
-        return write_csv(self.rows(), path)
+        return write_csv(list(self.rows()), path)
 
     def save(self, folder: str | os.PathLike[str], name: str = "") -> list[Path]:
-        """Write NAME.json and NAME.csv into a folder, which is made if needed.
+        """Write a file of each ending, NAME.json and NAME.csv, into a folder, which is made if needed.
 
         Args:
-            folder: of the two files.
-            name: their name without the ending. Default: that of the study, "tradeoff" or "stability".
+            folder: of the files.
+            name: their name without the ending. Default: that of the study, as "tradeoff".
 
         Returns:
-            Paths of the two files.
+            Paths of the files.
 
         Raises:
             OSError: where they cannot be written.
@@ -126,8 +129,12 @@ class Saved(ABC):
         target = path_of("folder", folder)
         name = self.study if among(name, ("",)) else str(path_of("name", name))
         target.mkdir(parents=True, exist_ok=True)
-        text = write_text(target / f"{name}.json", self.to_json(), target)
-        return [text, write_csv(self.rows(), target / f"{name}.csv", target)]
+        return [self._write(target / f"{name}.{ending}", target) for ending in self.endings]
+
+    def _write(self, path: Path, root: Path) -> Path:
+        if path.suffix == ".csv":
+            return write_csv(list(self.rows()), path, root)
+        return write_text(path, self.to_json() if path.suffix == ".json" else f"{self}\n", root)
 
     @classmethod
     @abstractmethod
@@ -157,5 +164,5 @@ class Saved(ABC):
         """
         with of_study(path):
             found = cls.from_dict(file_json(path))
-            found.rows(), found.to_json()  # what cannot be shown is refused here
+            list(found.rows()), found.to_json(), str(found)  # what cannot be shown is refused here
             return found

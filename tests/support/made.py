@@ -49,6 +49,12 @@ def made(position, time=None, *, status=None, end=None, attitude=None, scene=Non
     )
 
 
+def turned(heading):
+    """Attitudes (..., 3, 3) of vehicles that are level, by their headings (...) [rad]."""
+    c, s, zero = np.cos(heading), np.sin(heading), np.zeros_like(heading)
+    return np.stack([c, -s, zero, s, c, zero, zero, zero, zero + 1.0], axis=-1).reshape(*heading.shape, 3, 3)
+
+
 def straight(points, k=3):
     """Members that go straight from points (n, 3) [m], the faster the deeper, at k times."""
     points = np.asarray(points, dtype=float)

@@ -58,6 +58,15 @@ class Viewer:
         return views + [message for message in logs if not EXPECTED.search(message)]
 
 
+def started_by(monkeypatch, folder, text):
+    """Let a script of this text stand for the viewer's program; a program that is not there for None."""
+    program = folder / "viewer"
+    if text is not None:
+        program.write_text(f"#!/bin/sh\n{text}\n")
+        program.chmod(0o755)
+    monkeypatch.setattr("lgvi_warp.views.recording.viewer.program", lambda: program)
+
+
 def free_port():
     """A port of this machine that nothing listens at."""
     with socket.socket() as trial:

@@ -24,7 +24,8 @@ from lgvi_warp.studies.tradeoff import Measurement, Tradeoff
 from lgvi_warp.views.plots import canvas
 from lgvi_warp.views.plots.read import quantity_of, survey_of
 from lgvi_warp.views.recording.drawn import at_levels
-from tests.support.made import made
+from tests.support.made import made, turned
+from tests.unit.views.test_cost_pictures import RUNS, TERMS
 
 N, FLOOR = 40, 20.0
 STATISTICS = [
@@ -132,6 +133,9 @@ def pictures(solved):
     found["tradeoff"] = lw.plots.tradeoff, (of_methods(),)
     found["stability"] = lw.plots.stability, (of_cells(),)
     found["sensitivity"] = lw.plots.sensitivity, (of_factors(),)
+    found["margins"] = lw.plots.margins, (margins_of([True, True, True, True, False]),)
+    found["scaling"] = lw.plots.scaling, (RUNS,)
+    found["term_cost"] = lw.plots.term_cost, (TERMS,)
     found["one vehicle"] = lw.plots.summary, (few(solved, [3]),)
     found["two samples"] = lw.plots.summary, (few(solved, range(9), [0, -1]),)
     found["all stopped"] = lw.plots.summary, (ending(solved, [17] * N, [9.0] * N),)
@@ -139,17 +143,8 @@ def pictures(solved):
     return found
 
 
-NAMES = (
-    *ALL_OF_A_RUN,
-    "compare",
-    "tradeoff",
-    "stability",
-    "sensitivity",
-    "one vehicle",
-    "two samples",
-    "all stopped",
-    "failures",
-)
+NAMES = (*ALL_OF_A_RUN, "compare", "tradeoff", "stability", "sensitivity", "margins", "scaling", "term_cost", "one vehicle",
+         "two samples", "all stopped", "failures")  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -187,7 +182,7 @@ def test_text_can_be_read_at_700_pixels(drawn, name):
 
 
 # Axes of numbers without a unit, and of names.
-NO_UNIT = {"attitude", "sensitivity", "pairs"}
+NO_UNIT = {"attitude", "sensitivity", "pairs", "margins"}
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in NO_UNIT])
@@ -298,9 +293,8 @@ def test_a_far_surface_is_told_not_drawn():
 
 def test_angles_are_drawn_about_their_mean_direction(solved):
     heading = np.linspace(3.0, 3.3, N)[None] + np.linspace(0.0, 9.0, len(solved.time))[:, None]
-    c, s, zero = np.cos(heading), np.sin(heading), np.zeros_like(heading)
-    turned = np.stack([c, -s, zero, s, c, zero, zero, zero, zero + 1.0], axis=-1).reshape(*heading.shape, 3, 3)
-    result = dataclasses.replace(ending(solved, [0] * N, [np.nan] * N), samples={**solved.samples, "attitude": turned})
+    samples = {**solved.samples, "attitude": turned(heading)}
+    result = dataclasses.replace(ending(solved, [0] * N, [np.nan] * N), samples=samples)
     (axes,) = lw.plots.fan(result, "euler[2]").figure.axes
     median = next(line for line in axes.lines if line.get_label() == "median").get_ydata()
     np.testing.assert_allclose(np.diff(median), 9.0 / (len(solved.time) - 1), atol=1e-9)
@@ -323,40 +317,11 @@ def test_statistics_stand_for_samples(solved, drawn):
             getattr(lw.plots, name)(bare)
 
 
-def test_a_panel_of_statistics_says_unit_direction_and_what_is_left_out(solved, drawn):
-    figure = drawn["statistics"]
-    panels = {axes.get_title(): axes for axes in figure.axes if axes.get_title()}
-    histogram = panels["histogram depth"]
-    assert histogram.get_ylabel() == "depth [m], down"
-    assert histogram.yaxis_inverted()
-    assert not panels["mean velocity"].yaxis_inverted()
-    # At the start all members are in one bin: on an even scale all else would be dark.
-    (cells,) = histogram.collections
-    norm = cells.norm
-    assert (norm(0.25 * norm.vmax) - norm(0.0)) / (norm(norm.vmax) - norm(0.0)) == pytest.approx(0.5)
-    (bar,) = (axes for axes in figure.axes if axes.get_label() == "<colorbar>")
-    assert bar.axison
-    assert bar.get_ylabel() == "share of members [%]"
-    assert "not drawn, see the table: covariance position, mean path_maximum speed" in figure.get_suptitle().replace(
-        "\n", " "
-    )
-
-
 def test_titles_say_east_and_not_the_number_of_a_component(drawn):
     titles = [axes.get_title() for axes in drawn["sensitivity"].axes]
     assert titles[:3] == ["max(north)", "max(east)", "max(depth)"]
     assert not [text.get_text() for name in ("statistics", "pairs", "histogram") for text in texts(drawn[name])
                 if "position[" in text.get_text()]  # fmt: skip
-
-
-def test_shares_of_outcomes(solved, drawn):
-    (axes,) = drawn["outcomes"].axes
-    stopped = int((np.asarray(solved.status) == Status.FLOOR).sum())
-    labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels[0] == f"under way, {N - stopped} to the end"
-    assert labels[1].startswith(f"floor: {stopped} of {N}, the first at ")
-    at_end = axes.collections[0].get_paths()[0].vertices
-    assert at_end[at_end[:, 0] == 20.0, 1].max() == pytest.approx(100.0 * (N - stopped) / N)
 
 
 def test_a_histogram_counts_every_member_once(solved, drawn):
@@ -367,6 +332,12 @@ def test_a_histogram_counts_every_member_once(solved, drawn):
     assert speed.get_xlabel() == "max(speed) [m/s]"
     same = dataclasses.replace(solved, samples={**solved.samples, "position": np.full_like(solved.position, 20.0)})
     assert sum(bar.get_width() for bar in lw.plots.histogram(same).patches) == pytest.approx(100.0)
+
+
+def test_a_panel_with_nothing_below_has_numbers_on_its_axis(drawn):
+    panels = drawn["stability"].axes[:3]
+    numbered = [any(tick.label1.get_visible() for tick in axes.xaxis.get_major_ticks()) for axes in panels]
+    assert numbered == [False, True, True]
 
 
 def test_the_front_is_in_colour_and_named_at_its_lines(drawn):
@@ -411,11 +382,9 @@ def test_refusals_name_the_remedy(solved):
         lw.plots.compare({})
 
 
-def test_pieces_give_what_the_whole_gives(solved, monkeypatch):
+def test_pieces_give_what_the_whole_gives(solved):
     of = quantity_of("speed")
-    whole = survey_of(solved, of)
-    monkeypatch.setattr("lgvi_warp.views.plots.read.AT_ONCE", 7 * len(solved.time))
-    parts = survey_of(solved, of)
+    whole, parts = survey_of(solved, of), survey_of(solved, of, at_once=7 * len(solved.time))
     for name in ("values", "counted", "low", "high", "last"):
         np.testing.assert_array_equal(getattr(parts, name), getattr(whole, name))
     assert at_levels(whole.values, whole.counted, [0.0])[0] == pytest.approx(whole.low)

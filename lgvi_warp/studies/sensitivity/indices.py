@@ -3,24 +3,17 @@
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.common.arguments import path_of
-from lgvi_warp.common.files import write_text
-from lgvi_warp.common.reading import file_json
-from lgvi_warp.common.tables import write_csv
-from lgvi_warp.studies.files import finite_or_none, numbers, of_study
+from lgvi_warp.studies.files import Saved, finite_or_none, numbers
 
 
 @dataclass(frozen=True, eq=False)
-class Indices:
+class Indices(Saved):
     """Result of a sensitivity analysis of m quantities for d factors.
 
     Attributes:
@@ -46,6 +39,8 @@ class Indices:
     confidence: float
     messages: tuple[str, ...]
     provenance: dict[str, Any] = field(repr=False)
+    study: ClassVar[str] = "sensitivity"
+    endings: ClassVar[tuple[str, ...]] = ("txt", "csv", "json")
     name: ClassVar[str] = ""
     columns: ClassVar[tuple[str, ...]] = ()
     # Column -> field with the half width of its interval.
@@ -103,27 +98,22 @@ class Indices:
         return finite_or_none(content) | {"provenance": self.provenance}
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Indices:
-        """Read a result from the JSON file that `save` wrote.
+    def from_dict(cls, content: dict[str, Any]) -> Indices:
+        """Build the result of an analysis from the content of a JSON file.
 
         Args:
-            path: of the file.
+            content: as `to_dict` returns it.
 
         Returns:
-            Indices of the analysis that the file holds; numbers that were not finite are NaN.
+            Indices of the analysis that it names; numbers that were not finite are NaN.
 
         Raises:
-            OSError: where the file cannot be read.
-            SceneError: where it is no regular file, is damaged, or of no known analysis.
+            ValueError: where it names no known analysis.
         """
-        with of_study(path):
-            content = file_json(path)
-            kinds = [kind for kind in cls.__subclasses__() or [cls] if kind.name == content["name"]]
-            if not kinds:
-                raise ValueError(f"{content['name']!r} is no analysis")
-            found = kinds[0]._from(content)
-            str(found), list(found.rows())  # what cannot be shown is refused here
-            return found
+        kinds = [kind for kind in cls.__subclasses__() or [cls] if kind.name == content["name"]]
+        if not kinds:
+            raise ValueError(f"{content['name']!r} is no analysis")
+        return kinds[0]._from(content)
 
     @classmethod
     def _from(cls, content: dict[str, Any]) -> Indices:
@@ -149,26 +139,6 @@ class Indices:
     def _pairs_from(cls, content: dict[str, Any]) -> dict[str, Any]:
         """Further arguments of this analysis."""
         return {}
-
-    def save(self, folder: str | os.PathLike[str]) -> list[Path]:
-        """Write sensitivity.txt, .csv and .json into a folder, which is made if needed.
-
-        Args:
-            folder: of the three files.
-
-        Returns:
-            Paths of the three files.
-
-        Raises:
-            OSError: where they cannot be written.
-        """
-        target = path_of("folder", folder)
-        target.mkdir(parents=True, exist_ok=True)
-        paths = [target / f"sensitivity.{ending}" for ending in ("txt", "csv", "json")]
-        write_text(paths[0], f"{self}\n", target)
-        write_csv(list(self.rows()), paths[1], target)
-        write_text(paths[2], json.dumps(self.to_dict(), indent=1), target)
-        return paths
 
 
 def _places(content: dict[str, Any]) -> dict[str, dict[str, int]]:

@@ -24,11 +24,10 @@ from lgvi_warp.common.status import Warnings
 from lgvi_warp.results.outcomes import outcome_text, outcomes
 from lgvi_warp.statistics.estimates.table import table
 from lgvi_warp.studies.files import STUDY_FILES, of_study
+from lgvi_warp.views import plots
 from lgvi_warp.views.commands import faults
 from lgvi_warp.views.fleet import LOOKS, title
 from lgvi_warp.views.pages.again import again
-from lgvi_warp.views.plots import drawable, plot, plot_statistics
-from lgvi_warp.views.plots import outcomes as draw_outcomes
 from lgvi_warp.views.plots.inputs import inputs_by_outcome, varied
 from lgvi_warp.views.plots.sweep_pictures import PICTURES
 
@@ -157,7 +156,7 @@ def _of_run(result: Result) -> Iterator[str]:
     remarks = [*result.messages, *_warnings(result), *(fault.text for fault in faults(result))]
     if remarks:
         yield _section("Notes and warnings", _list(remarks))
-    pictures = [_picture(draw, result) for draw in _pictures_of(result)]
+    pictures = [inline(draw, result) for draw in _pictures_of(result)]
     if any(pictures):
         yield _section("Pictures", "".join(pictures))
     if result.statistics:
@@ -184,32 +183,24 @@ def _warnings(result: Result) -> list[str]:
     return [f"{name}, {number:,} members: {texts[name]}" for name, number in result.warnings.counts().items()]
 
 
-def _pictures_of(result: Result) -> list[Callable[[Any, Path], Path]]:
+def _pictures_of(result: Result) -> list[Callable[..., Any]]:
     """Functions that draw what suits a run: a summary, inputs of members that ended differently, statistics."""
-
-    def inputs(result: Result, path: Path) -> Path:
-        inputs_by_outcome(result, path=path)
-        return path
-
-    def shares(result: Result, path: Path) -> Path:
-        draw_outcomes(result, path=path)
-        return path
-
     differ = len(outcomes(result)) > 1
-    drawn: list[Callable[[Any, Path], Path]] = (
-        [plot] if result.samples or result.kept is not None else [shares] * differ
-    )
-    drawn += [inputs] if differ and varied(result) else []
-    return drawn + ([plot_statistics] if drawable(result) else [])
+    sampled = result.samples or result.kept is not None
+    drawn: list[Callable[..., Any]] = [plots.summary] if sampled else [plots.outcomes] * differ
+    drawn += [inputs_by_outcome] if differ and varied(result) else []
+    return drawn + ([plots.statistics] if plots.drawable(result) else [])
 
 
-def _picture(draw: Callable[[Any, Path], Path], result: Result) -> str:
+def inline(draw: Callable[..., Any], result: Result) -> str:
     """A picture as SVG, or in pixels where that is large; a sentence where there is nothing to draw."""
     with tempfile.TemporaryDirectory() as folder:
+        drawn, pixels = (Path(folder) / f"picture.{ending}" for ending in ("svg", "png"))
         try:
-            drawn = draw(result, Path(folder) / "picture.svg")
+            draw(result, path=drawn)
             if drawn.stat().st_size > MOST_SVG:
-                return _pixels(draw(result, Path(folder) / "picture.png"))
+                draw(result, path=pixels)
+                return _pixels(pixels)
         except NothingToDraw as reason:
             return _paragraph(str(reason))
         text = file_text(drawn, "picture")

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from lgvi_warp.common.arguments import of_kind
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views.plots.canvas import COLORS, hatch, panels, wrapped
+from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.words import in_words
 
 if TYPE_CHECKING:
@@ -20,21 +20,18 @@ if TYPE_CHECKING:
 MOST = 12
 
 
-def sensitivity(found: Indices, *, figure: Any = None, path: str | os.PathLike[str] | None = None) -> np.ndarray:
+@picture
+def sensitivity(found: Indices, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
     """Draw the indices of each factor as bars with their confidence intervals, a panel for each quantity.
 
     Args:
         found: Indices of `lw.uq.sobol` or `lw.uq.morris`; the first 12 quantities that vary are drawn.
-        figure: Matplotlib figure to draw on; default None, one of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes, shape (quantities,).
 
     Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
         NothingToDraw: No quantity varies.
-        OSError: The file cannot be written.
     """
     of_kind(
         "found", found, "quantities factors columns", "sensitivity indices", "give what lw.uq.sobol and its like return"
@@ -50,11 +47,9 @@ def sensitivity(found: Indices, *, figure: Any = None, path: str | os.PathLike[s
     columns = min(len(drawn), 3)
     rows = -(-len(drawn) // columns)
     size = 3.0 + 4.5 * columns, 2.2 + rows * (1.4 + 0.4 * d)
-    with panels(figure, path, (rows, columns), size, sharey=True) as grid:
+    with panels(figure, path, (rows, columns), size, len(drawn), sharey=True) as grid:
         for axes, q in zip(grid.flat, drawn, strict=False):
             _bars(axes, found, q, shown)
-        for axes in grid.flat[len(drawn) :]:
-            axes.set_axis_off()
         grid[0, 0].set_yticks(np.arange(d), [found.factors[i] for i in shown])
         grid[0, 0].invert_yaxis()
         figure = grid[0, 0].figure

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 import textwrap
 import threading
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -19,6 +18,7 @@ from lgvi_warp.common.arguments import file_path, of_kind
 from lgvi_warp.common.errors import MissingExtra
 from lgvi_warp.common.status import Status
 from lgvi_warp.views.fleet import LOOKS
+from lgvi_warp.views.plots.picture import FilePath
 
 # Colours of Okabe & Ito 2008, Color universal design, without the yellow, which is hardly seen on white.
 COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
@@ -53,7 +53,7 @@ def figure_class() -> Any:
     return Figure
 
 
-def save_figure(figure: Any, path: str | os.PathLike[str], dpi: int = DPI) -> Path:
+def save_figure(figure: Any, path: FilePath, dpi: int = DPI) -> Path:
     """Write a picture; the file is there whole or not at all.
 
     Args:
@@ -76,7 +76,7 @@ def save_figure(figure: Any, path: str | os.PathLike[str], dpi: int = DPI) -> Pa
 
 @contextmanager
 def panel(
-    ax: Any, path: str | os.PathLike[str] | None, size: tuple[float, float] = (8.0, 5.0), projection: str | None = None
+    ax: Any, path: FilePath | None, size: tuple[float, float] = (8.0, 5.0), projection: str | None = None
 ) -> Iterator[Any]:
     """Give axes to draw on; when the drawing is done, write the file that was asked for.
 
@@ -96,9 +96,10 @@ def panel(
 @contextmanager
 def panels(
     figure: Any,
-    path: str | os.PathLike[str] | None,
+    path: FilePath | None,
     shape: tuple[int, int],
     size: tuple[float, float],
+    used: int | None = None,
     **options: Any,
 ) -> Iterator[np.ndarray]:
     """Give several axes to draw on; when the drawing is done, write the file that was asked for.
@@ -106,6 +107,7 @@ def panels(
     figure: The user's figure; None for one's own.
     path: The file; None for none.
     size: Width and height of an own figure [in].
+    used: How many of them are drawn on; the others are not seen. Default None, all.
     Yields: The axes, shape (rows, columns).
     """
     of_class = figure_class()
@@ -113,11 +115,14 @@ def panels(
         of_kind("figure", figure, "subplots get_figure", "a figure of Matplotlib", "give plt.figure(), or leave it out")
     target = of_class(figsize=size, layout="constrained") if figure is None else figure
     with drawing(target, path, figure is None):
-        yield target.subplots(*shape, squeeze=False, **options)
+        grid = target.subplots(*shape, squeeze=False, **options)
+        for axes in grid.flat[used:] if used is not None else ():
+            axes.set_axis_off()
+        yield grid
 
 
 @contextmanager
-def drawing(figure: Any, path: str | os.PathLike[str] | None, sized: bool) -> Iterator[None]:
+def drawing(figure: Any, path: FilePath | None, sized: bool) -> Iterator[None]:
     """Draw with text that can be read in a small picture; then write the file.
 
     path: The file; None for none.
@@ -165,8 +170,10 @@ def style(i: int) -> dict[str, Any]:
 
 
 def mark(code: Status) -> dict[str, Any]:
-    """Colour and marker of an outcome; filled markers have a black edge."""
+    """Colour and marker of an outcome, a dot for members under way; filled markers have a black edge."""
     look = LOOKS[code]
+    if code == Status.OK:
+        return {"color": look.color, "marker": "o", "linewidths": 0}
     edge = {"edgecolors": "black", "linewidths": 0.5} if code.stopped else {"linewidths": 1.4}
     return {"color": look.color, "marker": look.marker} | edge
 

@@ -14,6 +14,7 @@ from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.reading import file_text
 from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.views.plots.canvas import COLORS, MARKERS, below, hatch, panel, panels, style
+from lgvi_warp.views.plots.picture import FilePath, picture
 
 COST = "ns_per_vehicle_step"
 # The row of a scene without terms, in what `lw.term_cost` and the benchmarks write.
@@ -22,7 +23,8 @@ NONE = "none"
 Rows = Iterable[Mapping[str, Any]] | str | os.PathLike[str]
 
 
-def scaling(rows: Rows, *, figure: Any = None, path: str | os.PathLike[str] | None = None) -> np.ndarray:
+@picture
+def scaling(rows: Rows, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
     """Draw what a member's step costs against the number of members, and against the number of threads.
 
     A dotted line says what as many threads would cost if each were as fast as one alone.
@@ -30,14 +32,11 @@ def scaling(rows: Rows, *, figure: Any = None, path: str | os.PathLike[str] | No
     Args:
         rows: Rows of `lw.scaling`, or a file of JSON lines that `python -m benchmarks run members threads` printed; rows of
             other measurements are left out.
-        figure: Matplotlib figure to draw on; default None, one of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes of members and of threads, shape (2,).
 
     Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
         NothingToDraw: There is no row with members, threads and a cost.
         OSError: A file cannot be read or written.
     """
@@ -62,20 +61,18 @@ def scaling(rows: Rows, *, figure: Any = None, path: str | os.PathLike[str] | No
     return grid[0]
 
 
-def term_cost(rows: Rows, *, ax: Any = None, path: str | os.PathLike[str] | None = None) -> Any:
+@picture
+def term_cost(rows: Rows, *, ax: Any = None, path: FilePath | None = None) -> Any:
     """Draw what a step costs with each term alone, beside the scene without terms, which is a line.
 
     Args:
         rows: Rows of `lw.term_cost`, or a file of JSON lines that `python -m benchmarks run terms` printed; of several methods
             the first is drawn, with a bar for each precision.
-        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes.
 
     Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
         NothingToDraw: There is no row with a term and a cost.
         OSError: A file cannot be read or written.
     """

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from lgvi_warp.common.arguments import of_kind
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views.plots.canvas import panels, style, wrapped
+from lgvi_warp.views.plots.picture import FilePath, picture
 
 if TYPE_CHECKING:
     from lgvi_warp.studies.linear.margins import Margins
@@ -24,7 +24,8 @@ LABELS = {
 MARKED = 0.05
 
 
-def margins(found: Margins, *, figure: Any = None, path: str | os.PathLike[str] | None = None) -> np.ndarray:
+@picture
+def margins(found: Margins, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
     """Draw how margins are distributed over the members that have them, a panel for each margin.
 
     Curves say how many members have at most so much, by eigenvalues and by runs, as far as each was asked for. A line marks
@@ -32,16 +33,12 @@ def margins(found: Margins, *, figure: Any = None, path: str | os.PathLike[str] 
 
     Args:
         found: Margins of `lw.margins`.
-        figure: Matplotlib figure to draw on; default None, one of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes, shape (margins,).
 
     Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
         NothingToDraw: No member has margins; the message says why.
-        OSError: The file cannot be written.
     """
     of_kind("found", found, "steady values by_runs", "of lw.margins", "give what lw.margins returns")
     steady = np.asarray(found.steady)

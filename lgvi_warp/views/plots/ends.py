@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ from lgvi_warp.results.quantities import OfResult, quantities
 from lgvi_warp.views.choice import shown
 from lgvi_warp.views.fleet import LOOKS, title
 from lgvi_warp.views.plots.canvas import COLORS, below, hatch, mark, panel, panels, point_down, widen, wrapped
+from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.read import at_one_time, estimate_for, with_samples
 from lgvi_warp.views.plots.words import DEPTHS, floors, in_words, some_of, unit_of
 
@@ -31,22 +31,17 @@ MOST_BINS = 40
 MOST_POINTS, MOST_PAIRS = 1000, 6
 
 
-def outcomes(result: Result, *, ax: Any = None, path: str | os.PathLike[str] | None = None) -> Any:
+@picture
+def outcomes(result: Result, *, ax: Any = None, path: FilePath | None = None) -> Any:
     """Draw the share of the members under way against time, and of those that ended, by outcome.
 
     It needs no samples: a run with keep="none" and a run in a store have all that is drawn.
 
     Args:
         result: A result.
-        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes.
-
-    Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
-        OSError: The file cannot be written.
     """
     result_of(result)
     with panel(ax, path) as axes:
@@ -81,13 +76,9 @@ def _first(result: Result, code: Status, when: np.ndarray) -> str:
     )
 
 
+@picture
 def histogram(
-    result: Result,
-    of: Any = "depth",
-    at: float | None = None,
-    *,
-    ax: Any = None,
-    path: str | os.PathLike[str] | None = None,
+    result: Result, of: Any = "depth", at: float | None = None, *, ax: Any = None, path: FilePath | None = None
 ) -> Any:
     """Draw how a number of the members is spread at one time, stacked by what had become of them by then.
 
@@ -98,17 +89,13 @@ def histogram(
         result: A result, in memory or in a store.
         of: A quantity of one number, also over the path: "depth", "max(speed)", a `lw.Quantity`; default "depth".
         at: Time [s], of which the nearest sample is taken; default None, the last.
-        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes.
 
     Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
         NothingToDraw: Nothing of the quantity was kept or gathered, or no member has a finite number.
         SceneError: The quantity is not known, or has several numbers.
-        OSError: The file cannot be written.
     """
     (meaning,) = quantities([of])
     faults = Faults()
@@ -170,10 +157,7 @@ def _counted(result: Result, of: OfResult, at: float | None) -> Shares:
     edges, shares = _edges(values[finite, 0]), {}
     for code, group in _groups(result, members, when):
         share = np.histogram(values[finite & group, 0], edges)[0] * (100.0 / len(members))
-        shares[f"{'under way' if code == Status.OK else code.name.lower()} ({int(group.sum()):,})"] = (
-            share,
-            LOOKS[code].color,
-        )
+        shares[_counted_text(code, group)] = share, LOOKS[code].color
     return edges, when, unit, shares
 
 
@@ -196,29 +180,26 @@ def _groups(result: Result, members: np.ndarray, when: float) -> list[tuple[Stat
     return [(code, group) for code, group in groups if group.any()]
 
 
+@picture
 def pairs(
     result: Result,
     of: Sequence[Any] = ("position[0]", "position[1]", "depth", "speed"),
     *,
     figure: Any = None,
-    path: str | os.PathLike[str] | None = None,
+    path: FilePath | None = None,
 ) -> np.ndarray:
     """Draw numbers of the members at the end against each other, coloured by outcome, and how each is spread.
 
     Args:
         result: A result with the samples that the quantities need, in memory or in a store.
         of: Two to six quantities, also over the path, as "max(depth)"; default north, east, depth and speed.
-        figure: Matplotlib figure to draw on; default None, one of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes, shape (m, m) for m numbers.
 
     Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
         NothingToDraw: Samples that are needed were not kept, or no member has a finite start.
         SceneError: A quantity is not known, or there are fewer than two numbers or more than six.
-        OSError: The file cannot be written.
     """
     result = with_samples(result)
     choice = shown(result, MOST_POINTS)
@@ -262,9 +243,12 @@ def _pair(axes: Any, x: np.ndarray, y: np.ndarray, groups: list[tuple[Status, np
         axes.hist(finite, _edges(finite), color=COLORS[0])
         return
     for code, group in groups:
-        look = mark(code) if code != Status.OK else {"color": LOOKS[code].color, "marker": "o", "linewidths": 0}
-        label = f"{'under way' if code == Status.OK else code.name.lower()} ({int(group.sum()):,})"
-        axes.scatter(x[group], y[group], s=12, alpha=0.8, label=label, **look)
+        axes.scatter(x[group], y[group], s=12, alpha=0.8, label=_counted_text(code, group), **mark(code))
+
+
+def _counted_text(code: Status, group: np.ndarray) -> str:
+    """An outcome, or "under way", and how many members of a mask (m,) have it."""
+    return f"{'under way' if code == Status.OK else code.name.lower()} ({int(group.sum()):,})"
 
 
 def _nearest(time: np.ndarray, at: float | None) -> int:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views.choice import of_members
 from lgvi_warp.views.fleet import members_of_run
 from lgvi_warp.views.plots.canvas import COLORS, band, below, hatch, panels, point_down, style, wrapped
+from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.words import DEPTHS, floors, in_words, unit_of
 
 if TYPE_CHECKING:
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 PANELS, LINES = 12, 12
 
 
-def statistics(result: Result, *, figure: Any = None, path: str | os.PathLike[str] | None = None) -> np.ndarray:
+@picture
+def statistics(result: Result, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
     """Draw a run's statistics against time, one panel each.
 
     Quantiles are drawn as a fan, other statistics with their intervals, histograms as colours. Statistics of paths, which have
@@ -31,16 +32,12 @@ def statistics(result: Result, *, figure: Any = None, path: str | os.PathLike[st
 
     Args:
         result: A result with statistics; the first 12 that can be drawn are.
-        figure: Matplotlib figure to draw on; default None, one of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes, shape (panels,).
 
     Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
         NothingToDraw: There is no statistic against time.
-        OSError: The file cannot be written.
     """
     drawn = drawable(result)[:PANELS]
     if not drawn:
@@ -48,14 +45,12 @@ def statistics(result: Result, *, figure: Any = None, path: str | os.PathLike[st
     columns = min(3, len(drawn))
     rows = -(-len(drawn) // columns)
     size = max(7.0, 4.6 * columns), 3.9 * rows + 1.0
-    with panels(figure, path, (rows, columns), size) as grid:
+    with panels(figure, path, (rows, columns), size, len(drawn)) as grid:
         for axes, estimate in zip(grid.flat, drawn, strict=False):
             axes.set(title=wrapped(in_words(estimate.name), axes.figure, 1.0 / columns), xlabel="time [s]")
             axes.grid(True, alpha=0.3)
             _PANEL[estimate.settings["type"]](axes, estimate)
             _units(axes, result, estimate)
-        for axes in grid.flat[len(drawn) :]:
-            axes.set_axis_off()
         names = {estimate.name for estimate in drawn}
         omitted = [name for name in result.statistics if name not in names]
         more = f"; not drawn, see the table: {', '.join(omitted)}" if omitted else ""
@@ -77,7 +72,7 @@ def _units(axes: Any, result: Result, estimate: Estimate) -> None:
 
 
 def drawable(result: Result) -> list[Estimate]:
-    """Select the statistics that `plot_statistics` draws.
+    """Select the statistics that `lw.plots.statistics` draws.
 
     Args:
         result: A result.

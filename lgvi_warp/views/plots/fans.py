@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -18,6 +17,7 @@ from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.views.choice import mixed, of_members
 from lgvi_warp.views.fleet import members_of_run, title
 from lgvi_warp.views.plots.canvas import COLORS, TINTS, band, below, hatch, mark, panel, point_down, style, wrapped
+from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.read import Survey, estimate_for, quantity_of, survey_of, unbounded_text, with_samples
 from lgvi_warp.views.plots.words import HINT, floors, floors_of_each, in_words, is_depth, label_of
 from lgvi_warp.views.recording.drawn import at_levels
@@ -34,7 +34,8 @@ MARKS = 200
 STANDING = ("quantiles", "mean", "extremes")
 
 
-def fan(result: Result, of: Any = "depth", *, ax: Any = None, path: str | os.PathLike[str] | None = None) -> Any:
+@picture
+def fan(result: Result, of: Any = "depth", *, ax: Any = None, path: FilePath | None = None) -> Any:
     """Draw one number of all members against time: the median and bands of quantiles of those under way at each time.
 
     Members that an event stopped, or that failed, are marked where they ended. One vehicle is a line. Angles of `euler` are
@@ -43,17 +44,13 @@ def fan(result: Result, of: Any = "depth", *, ax: Any = None, path: str | os.Pat
     Args:
         result: A result, in memory or in a store.
         of: Name of the quantity or of one component, as "depth", "speed", "position[0]", or a `lw.Quantity`; default "depth".
-        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes.
 
     Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
         NothingToDraw: Nothing of the quantity was kept or gathered, or no member has a finite number.
         SceneError: The quantity is not known, or has several components.
-        OSError: The file cannot be written.
     """
     meaning = quantity_of(of)
     estimate = None if result_of(result).samples else estimate_for(result, meaning.name, STANDING)
@@ -168,9 +165,8 @@ def _draw_estimate(axes: Any, estimate: Estimate, component: int) -> None:
     axes.grid(True, alpha=0.3)
 
 
-def compare(
-    results: Mapping[str, Result], of: Any = "depth", *, ax: Any = None, path: str | os.PathLike[str] | None = None
-) -> Any:
+@picture
+def compare(results: Mapping[str, Result], of: Any = "depth", *, ax: Any = None, path: FilePath | None = None) -> Any:
     """Draw one number of several runs against time: a median and a band of 90 % of the members under way for each.
 
     Without samples a run is drawn by its statistics `lw.Quantiles` or `lw.Mean` of the quantity.
@@ -178,17 +174,13 @@ def compare(
     Args:
         results: Results by label.
         of: Name of the quantity or of one component, or a `lw.Quantity`; default "depth".
-        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes.
 
     Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
         NothingToDraw: Of some run nothing of the quantity was kept or gathered, or no member has a finite number.
         SceneError: There are no results, or the quantity is not known or has several components.
-        OSError: The file cannot be written.
     """
     for result in mapping_of("results", results, "labels to results").values():
         result_of(result)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,7 @@ from lgvi_warp.views.plots.bars import sensitivity
 from lgvi_warp.views.plots.estimates import statistics
 from lgvi_warp.views.plots.maps import stability
 from lgvi_warp.views.plots.overview import summary
+from lgvi_warp.views.plots.picture import FilePath
 from lgvi_warp.views.plots.tradeoffs import tradeoff
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from lgvi_warp.studies.tradeoff import Tradeoff
 
 
-def plot(result: Result, path: str | os.PathLike[str] | None = None) -> Any:
+def plot(result: Result, path: FilePath | None = None) -> Any:
     """Draw a run at a glance; see `lw.plots.summary`.
 
     Args:
@@ -38,7 +38,7 @@ def plot(result: Result, path: str | os.PathLike[str] | None = None) -> Any:
     return _path_or(path, summary(result, path=path))
 
 
-def plot_statistics(result: Result, path: str | os.PathLike[str] | None = None) -> Any:
+def plot_statistics(result: Result, path: FilePath | None = None) -> Any:
     """Draw a run's statistics against time; see `lw.plots.statistics`.
 
     Args:
@@ -56,7 +56,7 @@ def plot_statistics(result: Result, path: str | os.PathLike[str] | None = None) 
     return _path_or(path, statistics(result, path=path))
 
 
-def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str] | None = None, of: str | None = None) -> Any:
+def plot_tradeoff(found: Tradeoff, path: FilePath | None = None, of: str | None = None) -> Any:
     """Draw error against cost; see `lw.plots.tradeoff`.
 
     Args:
@@ -75,7 +75,7 @@ def plot_tradeoff(found: Tradeoff, path: str | os.PathLike[str] | None = None, o
     return _path_or(path, tradeoff(found, of, path=path))
 
 
-def plot_stability(found: StabilityMap, path: str | os.PathLike[str] | None = None) -> Any:
+def plot_stability(found: StabilityMap, path: FilePath | None = None) -> Any:
     """Draw a stability map; see `lw.plots.stability`.
 
     Args:
@@ -92,7 +92,7 @@ def plot_stability(found: StabilityMap, path: str | os.PathLike[str] | None = No
     return _path_or(path, stability(found, path=path))
 
 
-def plot_sensitivity(found: Indices, path: str | os.PathLike[str] | None = None) -> Any:
+def plot_sensitivity(found: Indices, path: FilePath | None = None) -> Any:
     """Draw sensitivity indices; see `lw.plots.sensitivity`.
 
     Args:
@@ -110,5 +110,5 @@ def plot_sensitivity(found: Indices, path: str | os.PathLike[str] | None = None)
     return _path_or(path, sensitivity(found, path=path))
 
 
-def _path_or(path: str | os.PathLike[str] | None, axes: Any) -> Any:
+def _path_or(path: FilePath | None, axes: Any) -> Any:
     return axes if path is None else Path(path)

@@ -3,18 +3,16 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lgvi_warp.common.errors import NothingToDraw
-from lgvi_warp.common.status import Status
 from lgvi_warp.results.outcomes import outcomes
 from lgvi_warp.statistics.estimates.given_data import explained
 from lgvi_warp.views.choice import mixed
-from lgvi_warp.views.fleet import LOOKS
 from lgvi_warp.views.plots.canvas import below, mark, panel, widen, wrapped
+from lgvi_warp.views.plots.picture import FilePath
 
 if TYPE_CHECKING:
     from lgvi_warp.results.result import Result
@@ -24,12 +22,8 @@ MOST_POINTS = 2000
 CONFIDENCE = 0.95
 
 
-def inputs_by_outcome(result: Result, *, ax: Any = None, path: str | os.PathLike[str] | None = None) -> Any:
-    """Draw the outcomes of members over the two inputs that explain most of who had the most frequent one.
-
-    ax: Matplotlib axes to draw on; default None, those of a figure of its own.
-    path: File to write; its ending chooses the format. Default None: none is written.
-    """
+def inputs_by_outcome(result: Result, *, ax: Any = None, path: FilePath | None = None) -> Any:
+    """Draw the outcomes of members over the two inputs that explain most of who had the most frequent one."""
     inputs, status = varied(result), np.asarray(result.status)
     codes = outcomes(result)
     if len(codes) < 2 or not inputs:
@@ -45,9 +39,8 @@ def inputs_by_outcome(result: Result, *, ax: Any = None, path: str | os.PathLike
     with panel(ax, path, (8.0, 6.0)) as axes:
         for code in codes:
             group = members[status[members] == code]
-            look = mark(code) if code != Status.OK else {"color": LOOKS[code].color, "marker": "o", "linewidths": 0}
             label = f"{code.name.lower()} ({int((status == code).sum()):,})"
-            axes.scatter(inputs[first][group], upward[group], s=14, alpha=0.8, label=label, **look)
+            axes.scatter(inputs[first][group], upward[group], s=14, alpha=0.8, label=label, **mark(code))
         axes.set(xlabel=words[first], ylabel=words[others[0]] if others else "member")
         axes.set_title(wrapped(f"Inputs that tell apart who ended as {most.name.lower()}", axes.figure))
         widen(axes.xaxis)

@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from lgvi_warp.common.arguments import of_kind
 from lgvi_warp.views.plots.canvas import panels, wrapped
+from lgvi_warp.views.plots.picture import FilePath, picture
 
 if TYPE_CHECKING:
     from lgvi_warp.studies.stability.grid import Line
@@ -21,20 +21,15 @@ CELLS = ("#0072B2", "#9BD1F0", "#F0E442", "#8C8C8C", "#D55E00")
 STYLES = {"rotation": "-", "munk": "--", "restoring": "-.", "drag": ":"}
 
 
-def stability(found: StabilityMap, *, figure: Any = None, path: str | os.PathLike[str] | None = None) -> np.ndarray:
+@picture
+def stability(found: StabilityMap, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
     """Draw a stability map, a panel for each method, with the analytic limits that lie in it.
 
     Args:
         found: A map of `lw.stability_map`.
-        figure: Matplotlib figure to draw on; default None, one of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes, shape (methods,).
-
-    Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
-        OSError: The file cannot be written.
     """
     of_kind("found", found, "methods classes ratios", "a stability map", "give what lw.stability_map returns")
     n = len(found.methods)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -21,6 +20,7 @@ from lgvi_warp.views.plots.canvas import below, panel, panels, style, wrapped
 from lgvi_warp.views.plots.ends import draw_outcomes
 from lgvi_warp.views.plots.estimates import statistics
 from lgvi_warp.views.plots.fans import draw_fan, notes_on, text_of
+from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.read import check_fields, energy_of, quantity_of, selected, with_samples
 from lgvi_warp.views.plots.steering import draw_angles, draw_commands
 from lgvi_warp.views.plots.tracks import draw_plan
@@ -34,7 +34,8 @@ if TYPE_CHECKING:
 MOST_FOLLOWED = AT_ONCE // 40 // 240 * 10
 
 
-def summary(result: Result, *, figure: Any = None, path: str | os.PathLike[str] | None = None) -> np.ndarray:
+@picture
+def summary(result: Result, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
     """Draw a run at a glance, in up to four panels that suit it.
 
     There are paths of a few members from above, and the depth of all with the ends of those that an event stopped or that
@@ -44,16 +45,12 @@ def summary(result: Result, *, figure: Any = None, path: str | os.PathLike[str] 
 
     Args:
         result: A result, in memory or in a store.
-        figure: Matplotlib figure to draw on; default None, one of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes, shape (panels,).
 
     Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
         NothingToDraw: Every member failed before the second sample, none has a finite position, or nothing was kept.
-        OSError: The file cannot be written.
     """
     result_of(result)
     if not result.samples and result.kept is None and result.statistics:
@@ -70,12 +67,10 @@ def summary(result: Result, *, figure: Any = None, path: str | os.PathLike[str] 
     elif set(FIELDS) <= set(sampled.samples):
         drawings.append(partial(_fan, sampled, energy_of(sampled)))
     rows = -(-len(drawings) // 2)
-    with panels(figure, path, (rows, 2), (12.0, 5.4 * rows)) as grid:
+    with panels(figure, path, (rows, 2), (12.0, 5.4 * rows), len(drawings)) as grid:
         lines = [title(result)]
         for axes, draw in zip(grid.flat, drawings, strict=False):
             lines += draw(axes)
-        for axes in grid.flat[len(drawings) :]:
-            axes.set_axis_off()
         figure = grid[0, 0].figure
         figure.suptitle("\n".join(wrapped(line, figure) for line in dict.fromkeys(lines)))
     return grid.ravel()[: len(drawings)]
@@ -103,21 +98,18 @@ def _outcomes(result: Result, axes: Any) -> list[str]:
     return []
 
 
-def drift(result: Result, *, ax: Any = None, path: str | os.PathLike[str] | None = None) -> Any:
+@picture
+def drift(result: Result, *, ax: Any = None, path: FilePath | None = None) -> Any:
     """Draw the largest change of what the scene's laws conserve, energy and momenta, over the members under way.
 
     Args:
         result: A result with all fields of the motion, in memory or in a store.
-        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes, with a logarithmic scale.
 
     Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
         NothingToDraw: The laws conserve nothing, or fields of the motion were not kept.
-        OSError: The file cannot be written.
     """
     result, choice, some = selected(result, MOST_FOLLOWED, tuple(FIELDS), "the drift")
     kept = sorted(invariants.conserved(result))

@@ -124,7 +124,7 @@ def unbounded_text(result: Result, survey: Survey) -> str:
     return f"unbounded water: {who} above depth 0"
 
 
-def survey_of(result: Result, of: Quantity) -> Survey:
+def survey_of(result: Result, of: Quantity, at_once: int = AT_ONCE) -> Survey:
     """Read one number of all members, in pieces: a large run never lies in memory whole."""
     check_fields(result, of.fields, of.name)
     choice = shown(result) if "position" in result.samples else everyone(result)
@@ -136,7 +136,7 @@ def survey_of(result: Result, of: Quantity) -> Survey:
     low, high = (np.full(len(frames), np.nan) for _ in range(2))
     last, rows, counts, above = np.empty(result.members), [], [], 0
     # Energy reads 18 numbers of a member, and makes as many more.
-    step = max(1, AT_ONCE // len(frames) // (10 if len(of.fields) > 2 else 1))
+    step = max(1, at_once // len(frames) // (10 if len(of.fields) > 2 else 1))
     for first in range(0, result.members, step):
         members = slice(first, min(first + step, result.members))
         values = numbers(result, of, members, frames)

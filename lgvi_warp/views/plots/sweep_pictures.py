@@ -6,7 +6,6 @@ Each draws on `figure=` or on a figure of its own, writes a file where `path` na
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -23,6 +22,7 @@ from lgvi_warp.studies.sweeps.setup import END, Cell
 from lgvi_warp.studies.sweeps.sweep_table import SUCCESS
 from lgvi_warp.views.plots.canvas import COLORS, GREY, MARKERS, below, panels, point_down, style, wrapped
 from lgvi_warp.views.plots.fans import draw_bands
+from lgvi_warp.views.plots.picture import FilePath
 
 # Most boxes of one panel, and most members that are drawn as points.
 MOST_BOXES, MOST_POINTS = 40, 4000
@@ -33,8 +33,6 @@ MOST_COLUMNS = 3
 # Names of cases stand upright where there are more.
 MOST_LEVEL = 6
 QUARTILES = {"whislo": 0.05, "q1": 0.25, "med": 0.5, "q3": 0.75, "whishi": 0.95}
-
-FilePath = str | os.PathLike[str]
 
 
 def _ran(sweep: Sweep, case: str | None = None) -> list[Cell]:
@@ -65,8 +63,6 @@ def plot_success(sweep: Sweep, path: FilePath | None = None, *, figure: Any = No
 
     A map has the interval in each field, and is drawn at the first value of any further axis.
 
-    path: of the picture; default None, which writes none.
-    figure: Matplotlib figure to draw on; default None, one of its own.
     Returns: The axes, (panels,).
     """
     cells, long = _ran(sweep), _long(sweep)
@@ -143,8 +139,6 @@ def plot_metrics(sweep: Sweep, path: FilePath | None = None, *, figure: Any = No
 
     Boxes are of members that did not fail and whose number is finite. The first 40 cells that ran are drawn.
 
-    path: of the picture; default None, which writes none.
-    figure: Matplotlib figure to draw on; default None, one of its own.
     Returns: The axes, (metrics,).
     """
     every = _ran(sweep)
@@ -179,8 +173,6 @@ def _box(sweep: Sweep, cell: Cell, name: str) -> dict[str, float]:
 def plot_differences(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
     """Draw the differences of success to the baseline on the same members, with their intervals.
 
-    path: of the picture; default None, which writes none.
-    figure: Matplotlib figure to draw on; default None, one of its own.
     Returns: The axes, (1,).
     """
     rows = [row for row in against_baseline(sweep) if row.of == SUCCESS]
@@ -207,8 +199,6 @@ def plot_differences(sweep: Sweep, path: FilePath | None = None, *, figure: Any 
 def plot_causes(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
     """Draw which members pass over the two inputs that explain most of it, in the cell where most is open.
 
-    path: of the picture; default None, which writes none.
-    figure: Matplotlib figure to draw on; default None, one of its own.
     Returns: The axes, (1,).
     """
     away, _, cell = min((abs(sweep.passed(cell).mean() - 0.5), cell.index, cell) for cell in _ran(sweep))
@@ -237,11 +227,9 @@ def plot_responses(
 
     The point is the one where the success of the cases differs most; the first one of equals.
 
-    path: of the picture; default None, which writes none.
     of: "depth", "heading", "speed", "north" or "east"; or a distance from what is wanted, "position", "attitude" or
         "cross_track". By default what that metric is of whose medians differ most between cases there, in interquartile
         ranges; the first one of equals.
-    figure: Matplotlib figure to draw on; default None, one of its own.
     Returns: The axes, (cases that ran,).
     """
     cells = _most_apart(sweep)
@@ -251,12 +239,12 @@ def plot_responses(
     count = min(members, sweep.members_count)
     columns = min(MOST_COLUMNS, len(cells))
     rows = -(-len(cells) // columns)
-    with panels(figure, path, (rows, columns), (4.5 * columns, 4.0 * rows), sharex=True, sharey=True) as grid:
+    with panels(
+        figure, path, (rows, columns), (4.5 * columns, 4.0 * rows), len(cells), sharex=True, sharey=True
+    ) as grid:
         for axes, cell in zip(grid.flat, cells, strict=False):
             _response(axes, sweep, cell, of, count)
             axes.set_title(wrapped(cell.name, axes.figure, 0.9 / columns))
-        for axes in grid.flat[len(cells) :]:
-            axes.set_axis_off()
         grid[0, 0].figure.supxlabel("time [s]")
         unit = tracking.error(of, False).unit
         away = "" if of in tracking.CHANNELS[False] else " from what is wanted"

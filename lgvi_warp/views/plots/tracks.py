@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +12,7 @@ from lgvi_warp.common.arguments import listed, whole
 from lgvi_warp.common.errors import refusal
 from lgvi_warp.common.status import Status, under_way
 from lgvi_warp.views.plots.canvas import COLORS, STYLES, below, mark, outcome_style, panel, point_down, wrapped
+from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.read import numbers, quantity_of, selected, with_samples
 from lgvi_warp.views.plots.words import HINT, floors, is_depth, label_of, some_of
 
@@ -25,22 +25,19 @@ MOST_AXES = 1
 LEAST_VIEW = 0.01
 
 
-def paths(result: Result, most: int = MOST_PATHS, *, ax: Any = None, path: str | os.PathLike[str] | None = None) -> Any:
+@picture
+def paths(result: Result, most: int = MOST_PATHS, *, ax: Any = None, path: FilePath | None = None) -> Any:
     """Draw paths of some members from the side: depth against horizontal distance from the mean start.
 
     Args:
         result: A result with positions, in memory or in a store.
         most: The most members to draw, which `lw.shown` chooses; default 12.
-        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes.
 
     Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
         NothingToDraw: No positions were kept, or no member has a finite start.
-        OSError: The file cannot be written.
     """
     result = with_samples(result)
     with panel(ax, path) as axes:
@@ -61,24 +58,19 @@ def draw_paths(axes: Any, result: Result, most: int = MOST_PATHS) -> None:
     point_down(axes, floors(result))
 
 
-def plan_view(
-    result: Result, most: int = MOST_PATHS, *, ax: Any = None, path: str | os.PathLike[str] | None = None
-) -> Any:
+@picture
+def plan_view(result: Result, most: int = MOST_PATHS, *, ax: Any = None, path: FilePath | None = None) -> Any:
     """Draw paths of some members from above: north up, east to the right, in the same scale.
 
     Args:
         result: A result with positions, in memory or in a store.
         most: The most members to draw, which `lw.shown` chooses; default 12.
-        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes.
 
     Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
         NothingToDraw: No positions were kept, or no member has a finite start.
-        OSError: The file cannot be written.
     """
     with panel(ax, path, (8.0, 6.5)) as axes:
         draw_plan(axes, result, most)
@@ -99,13 +91,14 @@ def draw_plan(axes: Any, result: Result, most: int = MOST_PATHS) -> None:
     axes.set_aspect("equal", adjustable="datalim")
 
 
+@picture
 def phase(
     result: Result,
     of: tuple[Any, Any] = ("depth", "velocity_inertial[2]"),
     most: int = MOST_PATHS,
     *,
     ax: Any = None,
-    path: str | os.PathLike[str] | None = None,
+    path: FilePath | None = None,
 ) -> Any:
     """Draw paths of some members in the plane of two quantities.
 
@@ -113,17 +106,13 @@ def phase(
         result: A result with the samples that the quantities need, in memory or in a store.
         of: The horizontal and the vertical quantity; default depth and the velocity downwards.
         most: The most members to draw, which `lw.shown` chooses; default 12.
-        ax: Matplotlib axes to draw on; default None, those of a figure of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes.
 
     Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
         NothingToDraw: Samples that are needed were not kept, or no member has a finite start.
         SceneError: A quantity is not known, or has several components.
-        OSError: The file cannot be written.
     """
     names = listed("of", of, "two quantities")
     if len(names) != 2:
@@ -173,24 +162,20 @@ FAR = 0.866
 BODY_AXES = ("forward (x)", "starboard (y)", "down (z)")
 
 
-def attitude(
-    result: Result, most: int = MOST_AXES, *, ax: Any = None, path: str | os.PathLike[str] | None = None
-) -> Any:
+@picture
+def attitude(result: Result, most: int = MOST_AXES, *, ax: Any = None, path: FilePath | None = None) -> Any:
     """Draw where the body's axes of some members point: their paths on the unit sphere, up at the top.
 
     Args:
         result: A result with attitudes, in memory or in a store.
         most: The most members to draw; default 1.
         ax: Matplotlib axes with projection="3d" to draw on; default None, those of a figure of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes.
 
     Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
         NothingToDraw: No attitudes were kept, or no member has a finite start.
-        OSError: The file cannot be written.
     """
     result, choice, some = selected(
         result, max(whole("most", most, 1), MOST_PATHS), ("position", "attitude"), "attitudes"

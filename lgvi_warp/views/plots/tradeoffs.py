@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import os
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from lgvi_warp.common.arguments import of_kind
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views.plots.canvas import COLORS, GREY, MARKERS, apart, panels, wrapped
+from lgvi_warp.views.plots.picture import FilePath, picture
 
 if TYPE_CHECKING:
     from lgvi_warp.studies.tradeoff import Measurement, Tradeoff
@@ -21,9 +21,8 @@ PRECISIONS = {"float64": ("-", "full"), "float32": ("--", "none"), "float32_comp
 CHANCE = 1.4
 
 
-def tradeoff(
-    found: Tradeoff, of: str | None = None, *, figure: Any = None, path: str | os.PathLike[str] | None = None
-) -> np.ndarray:
+@picture
+def tradeoff(found: Tradeoff, of: str | None = None, *, figure: Any = None, path: FilePath | None = None) -> np.ndarray:
     """Draw error against cost, with a line for each method and precision, and the biases of statistics.
 
     Methods with a setting on the front, which are cheapest for some error, are in colour and named at their lines; all others
@@ -32,16 +31,12 @@ def tradeoff(
     Args:
         found: Measurements of `lw.tradeoff`.
         of: Quantity of the errors, "position" and so on; default that of the trade-off.
-        figure: Matplotlib figure to draw on; default None, one of its own.
-        path: File to write; its ending chooses the format. Default None: none is written.
 
     Returns:
         The axes of costs and of biases, shape (2,).
 
     Raises:
-        ImportError: Matplotlib is not installed (extra: viz).
         NothingToDraw: No setting was measured.
-        OSError: The file cannot be written.
     """
     of_kind("found", found, "measurements of", "a trade-off", "give what lw.tradeoff returns")
     of = found.of if of is None else of

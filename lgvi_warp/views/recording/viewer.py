@@ -47,29 +47,29 @@ def program() -> Path:
     return Path(rerun_cli.__file__).with_name("rerun.exe" if os.name == "nt" else "rerun")
 
 
-def reach(address: str) -> None:
+def reach(address: str, started: float = STARTED) -> None:
     """Require that a viewer answers at an address: rerun would wait without end for anything else that listens there."""
     remedy = f'start a viewer with "rerun", or give to="{ADDRESS}"'
     try:
-        answer = _greeted(address)
+        answer = _greeted(address, started)
     except (OSError, ValueError) as error:
         raise OSError(f"to = {address!r}: no viewer answers ({error}); {remedy}") from None
     if not answer:
         raise OSError(f"to = {address!r}: what answers is no viewer; {remedy}")
 
 
-def answers(address: str) -> bool:
+def answers(address: str, started: float = STARTED) -> bool:
     """Tell whether a viewer answers at an address."""
     try:
-        return _greeted(address)
+        return _greeted(address, started)
     except (OSError, ValueError):
         return False
 
 
-def is_open() -> bool:
-    """Tell whether a viewer is open at the port that viewers have."""
+def is_open(home: str = ADDRESS, started: float = STARTED) -> bool:
+    """Tell whether a viewer is open at the address that viewers have."""
     try:
-        answer = _greeted(ADDRESS)
+        answer = _greeted(home, started)
     except OSError:
         return False
     if not answer:
@@ -78,7 +78,7 @@ def is_open() -> bool:
     return True
 
 
-def _greeted(address: str) -> bool:
+def _greeted(address: str, started: float) -> bool:
     """Whether what listens at an address takes recordings, as viewers do. Raises OSError where nothing listens."""
     parts = urlsplit(address)
     place = parts.hostname or "", parts.port or PORT
@@ -90,7 +90,7 @@ def _greeted(address: str) -> bool:
     with socket.create_connection(place, PATIENCE) as connection:
         try:
             connection.sendall(GREETING + b"".join(asked))
-            return any(content == EMPTY_ANSWER for kind, content in _frames(connection) if kind == DATA)
+            return any(content == EMPTY_ANSWER for kind, content in _frames(connection, started) if kind == DATA)
         except OSError:
             return False
 
@@ -105,9 +105,9 @@ def _frame(kind: int, flags: int, stream: int, content: bytes = b"") -> bytes:
     return len(content).to_bytes(3, "big") + bytes((kind, flags)) + stream.to_bytes(4, "big") + content
 
 
-def _frames(connection: socket.socket) -> Iterator[tuple[int, bytes]]:
-    """Types and contents of the frames of an answer, up to its end and for as long as `STARTED`."""
-    end, read = time.monotonic() + STARTED, b""
+def _frames(connection: socket.socket, started: float) -> Iterator[tuple[int, bytes]]:
+    """Types and contents of the frames of an answer, up to its end and for as long as a viewer takes to start [s]."""
+    end, read = time.monotonic() + started, b""
     while (left := end - time.monotonic()) > 0.0:
         connection.settimeout(left)
         more = connection.recv(2**14)
@@ -122,7 +122,7 @@ def _frames(connection: socket.socket) -> Iterator[tuple[int, bytes]]:
             return
 
 
-def watched(send: Callable[[], None], address: str) -> None:
+def watched(send: Callable[[], None], address: str, patience: float = PATIENCE, started: float = STARTED) -> None:
     """Send to a viewer for as long as it answers: rerun would wait without end for one that does not."""
     raised: list[BaseException] = []
 
@@ -135,14 +135,14 @@ def watched(send: Callable[[], None], address: str) -> None:
     thread = threading.Thread(target=sending, name="viewer", daemon=True)
     thread.start()
     while thread.is_alive():
-        thread.join(PATIENCE)
-        if thread.is_alive() and not answers(address):
+        thread.join(patience)
+        if thread.is_alive() and not answers(address, started):
             raise OSError(f"to = {address!r}: the viewer does not answer any more")
     if raised:
         raise raised[0]
 
 
-def start(words: Sequence[str | Path], remedy: str) -> None:
+def start(words: Sequence[str | Path], remedy: str, started: float = STARTED) -> None:
     """Start a viewer that goes on after this process."""
     # The command silences the recorder, not the viewer, whose words say why it does not start.
     environment = {name: value for name, value in os.environ.items() if (name, value) != ("RUST_LOG", "off")}
@@ -151,7 +151,7 @@ def start(words: Sequence[str | Path], remedy: str) -> None:
             viewer = subprocess.Popen([program(), *words], stdin=subprocess.DEVNULL, stdout=log, stderr=log,
                                       start_new_session=True, env=environment)  # fmt: skip
             # One that finds no display ends at once; one that stays, or hands over to a viewer that is open, is well.
-            code = viewer.wait(STARTED)
+            code = viewer.wait(started)
         except subprocess.TimeoutExpired:
             return
         except OSError as error:
@@ -161,20 +161,20 @@ def start(words: Sequence[str | Path], remedy: str) -> None:
             raise OSError(f"the viewer did not start ({one_line(log.read().strip()[-200:])}); {remedy}")
 
 
-def opened(address: str | None) -> str:
+def opened(address: str | None, home: str = ADDRESS, patience: float = PATIENCE) -> str:
     """Find a viewer for what is sent while it is made, or start one.
 
-    address: Where it listens; None for one on this machine, which is started where none is open.
+    address: Where it listens; None for one on this machine, at `home`, which is started where none is open.
     """
     rerun()
     if address is not None:
         reach(address)
         return address
-    if not is_open():
+    if not is_open(home):
         start(["--port", str(PORT)], 'run where there is a display, or name a viewer that is open: '
               f'--viewer "{ADDRESS.replace("127.0.0.1", "HOST")}"')  # fmt: skip
-        end = time.monotonic() + PATIENCE
-        while not is_open() and time.monotonic() < end:
+        end = time.monotonic() + patience
+        while not is_open(home) and time.monotonic() < end:
             time.sleep(0.1)
-        reach(ADDRESS)
-    return ADDRESS
+        reach(home)
+    return home

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures that are drawn side by side, in threads, have each their own sizes of text."""
+"""What all pictures share: sizes of text, also side by side in threads; legends; and what their help says."""
 
+import inspect
 import threading
 
 import matplotlib as mpl
 import pytest
 from matplotlib.figure import Figure
 
+import lgvi_warp as lw
 from lgvi_warp.views.plots import canvas
 
 
@@ -43,3 +45,13 @@ def test_rows_of_a_legend_are_as_full_as_each_other(entries, columns):
     axes.figure.draw_without_rendering()
     places = [round(text.get_window_extent().x0) for text in axes.get_legend().get_texts()]
     assert len(set(places)) == columns
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in lw.plots.__all__ if name not in ("CELLS", "drawable", "figure_class")]
+)
+def test_help_tells_every_argument_and_the_errors_of_all(name):
+    draw = getattr(lw.plots, name)
+    told = inspect.getdoc(draw)
+    assert [argument for argument in inspect.signature(draw).parameters if f"\n    {argument}: " not in told] == []
+    assert "OSError: " in told

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is shown of a run: a fair choice of members, even times."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -115,15 +117,45 @@ def test_the_hash_has_no_pattern():
     assert stats.kstest(uniform, "uniform").pvalue > 1e-3
 
 
-def test_large_runs_are_read_in_pieces(monkeypatch):
-    path = np.random.default_rng(9).normal(size=(4, 1000, 3))
-    whole = lw.shown(made(path), most=100)
-    monkeypatch.setattr(choice, "AT_ONCE", 4 * 64)
-    seen = [(members.start, members.stop) for members, _ in choice.pieces(made(path), ("position",))]
-    assert seen[0] == (0, 64)
-    assert seen[-1] == (960, 1000)
-    assert len(seen) == 16
-    assert (lw.shown(made(path), most=100).members == whole.members).all()
+def test_large_runs_are_read_in_pieces():
+    k, n = 20_001, 250
+    position = np.zeros((k, n, 3), np.float32)
+    farthest = [3, 120, 240]
+    position[k - 1, farthest] = np.diag([5.0, 6.0, 7.0])
+    position[0, 7, 0] = np.nan
+    result = dataclasses.replace(made(np.zeros((2, n, 3))), time=np.arange(float(k)), samples={"position": position})
+    # Two million states at once are 99 members at these times.
+    seen = [(members.start, members.stop) for members, _ in choice.pieces(result, ("position",))]
+    assert seen == [(0, 99), (99, 198), (198, 250)]
+    few = lw.shown(result, most=20)
+    assert set(farthest) <= set(few.members.tolist())
+    assert 7 not in lw.shown(result).members
+
+
+def test_parameters_of_some_members_are_theirs():
+    result = dataclasses.replace(straight(np.ones((10, 3))), parameters={"own": np.arange(10.0), "shared": np.ones(1)})
+    few = choice.few(result, np.array([3, 5]), ("position", "nothing"), np.array([0, 2]))
+    assert {name: values.tolist() for name, values in few.parameters.items()} == {"own": [3.0, 5.0], "shared": [1.0]}
+    assert few.samples["position"].shape == (2, 2, 3)
+    assert few.time.tolist() == [0.0, 2.0]
+    assert few.members == 2
+
+
+def test_vectors_are_finite_in_all_three():
+    rows = np.ones((4, 3))
+    rows[0, 0], rows[1, 1], rows[2, 2] = np.nan, np.inf, -np.inf
+    assert choice.finite_rows(rows).tolist() == [False, False, False, True]
+
+
+def test_the_hash_is_that_of_the_paper():
+    # The first numbers of SplitMix64 from the seed 0.
+    assert choice.mixed(np.arange(3)).tolist() == [0xE220A8397B1DCDAF, 0x6E789E6AA1B965F4, 0x06C45D188009454F]
+
+
+def test_frames_are_the_nearest():
+    time = np.array([0.0, 1.0, 2.0, 3.4, 3.6, 10.0])
+    assert choice.frames_of(time, 3).tolist() == [0, 4, 5]
+    assert choice.frames_of(np.array([0.0, 4.0, 6.0, 10.0]), 3).tolist() == [0, 2, 3]  # of two as near the later one
 
 
 def test_one_member_two_times():

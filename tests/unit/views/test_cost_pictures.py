@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of what a member's step costs: their data, labels and refusals; and that the measured rows fit them."""
+"""Pictures of what a member's step costs: files and refusals; and that the measured rows fit them."""
 
 import json
 
-import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
@@ -26,42 +25,6 @@ TERMS = [
     for method in ("psi_s", "psi_x")
     for dtype in ("float64", "float32")
 ]
-
-
-def assert_readable(figure):
-    """Nothing is cut off, and no text is smaller than 8 pixels where the picture is 700 wide."""
-    figure.draw_without_rendering()
-    box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
-    assert box.x0 >= -0.01
-    assert box.y0 >= -0.01
-    assert box.x1 <= width + 0.01
-    assert box.y1 <= height + 0.01
-    labels = [label for axes in figure.axes for label in (axes.xaxis.label, axes.yaxis.label, *axes.get_xticklabels())]
-    assert min(label.get_fontsize() for label in labels) / 72.0 * 700.0 / width >= 8.0
-
-
-def test_scaling_has_a_line_for_each_number_and_what_more_threads_could_save():
-    of_members, of_threads = lw.plots.scaling(RUNS)
-    lines = {line.get_label(): line for line in of_members.lines}
-    assert set(lines) == {"1 thread", "2 threads", "4 threads"}
-    np.testing.assert_array_equal(lines["2 threads"].get_xdata(), [10, 1000, 100_000])
-    np.testing.assert_allclose(lines["2 threads"].get_ydata(), [150.0, 51.0, 50.01])
-    dotted = [line for line in of_threads.lines if line.get_label().startswith("_")]
-    np.testing.assert_allclose(dotted[-1].get_ydata(), 100.01 / np.array([1, 2, 4]))
-    assert all("[ns]" in axes.get_ylabel() and axes.get_xscale() == "log" for axes in (of_members, of_threads))
-    assert_readable(of_members.figure)
-
-
-def test_each_term_has_its_bar_beside_the_bare_scene():
-    axes = lw.plots.term_cost(TERMS)
-    widths = [[bar.get_width() for bar in bars] for bars in axes.containers]
-    assert widths == [[14.0, 16.0, 72.0], [7.0, 8.0, 36.0]]  # of the first method alone
-    assert [text.get_text() for text in axes.get_yticklabels()] == ["none", "drag", "waves"]
-    assert axes.yaxis_inverted()
-    assert [line.get_xdata()[0] for line in axes.lines] == [14.0, 7.0]
-    assert "[ns]" in axes.get_xlabel()
-    assert len({bars[0].get_hatch() for bars in axes.containers}) == 2
-    assert_readable(axes.figure)
 
 
 def test_files_of_the_benchmarks_are_read_and_pictures_written(tmp_path):

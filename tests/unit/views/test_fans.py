@@ -7,7 +7,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
 from lgvi_warp.views.plots.words import in_words
-from tests.support.made import made
+from tests.support.made import made, turned
 
 
 def turning(turns, end, k=61):
@@ -16,11 +16,9 @@ def turning(turns, end, k=61):
     n = len(end)
     spread = np.linspace(-0.3, 0.3, n)
     heading = 2.0 * np.pi * turns * np.minimum(time[:, None], np.where(np.isnan(end), np.inf, end)) / 60.0 + spread
-    c, s, zero = np.cos(heading), np.sin(heading), np.zeros_like(heading)
-    attitude = np.stack([c, -s, zero, s, c, zero, zero, zero, zero + 1.0], axis=-1).reshape(k, n, 3, 3)
     status = np.where(np.isnan(end), Status.OK, Status.FLOOR)
     position = np.ones((k, n, 3)) * np.arange(n)[:, None]
-    return made(position, time, status=status, end=end, attitude=attitude), heading[-1]
+    return made(position, time, status=status, end=end, attitude=turned(heading)), heading[-1]
 
 
 @pytest.mark.parametrize("turns", [-2.2, 0.4, 3.0])

@@ -3,7 +3,7 @@
 
 import contextlib
 import dataclasses
-import signal
+import itertools
 import socket
 import threading
 
@@ -15,11 +15,11 @@ from rerun.chunk import RrdReader
 import lgvi_warp as lw
 from lgvi_warp import cli
 from lgvi_warp.common.status import under_way
-from lgvi_warp.views.recording import rerun as drawing
 from lgvi_warp.views.recording import viewer
 from lgvi_warp.views.recording.live import Live
 from tests.conftest import ROOT
-from tests.support.viewer import free_port, receiver, serving
+from tests.support.made import made
+from tests.support.viewer import free_port, receiver, serving, started_by
 from tests.unit.views.test_recording import fleet, rows, text_of
 
 
@@ -104,6 +104,18 @@ def test_the_view_is_laid_out_anew_when_it_is_outgrown(tmp_path):
         assert len(RrdReader(path).blueprints()) == layouts
 
 
+def test_blocks_share_the_places_of_a_large_run(tmp_path):
+    """Of 2,400 members a thousand are drawn: 500 of each half."""
+    recording = rr.RecordingStream("live", recording_id="live")
+    recording.save(tmp_path / "live.rrd")
+    live, large = Live(recording), made(np.zeros((2, 2400, 3)) + 5.0)
+    for block in blocks(large, 1200, 1200):
+        live.add(block)
+    recording.disconnect()
+    for first in (0, 1200):
+        assert len(rows(tmp_path / "live.rrd", f"/world/from_{first}/bodies/ok", "translations")[0.0]) == 500
+
+
 def test_members_without_paths_are_counted(tmp_path):
     recording = rr.RecordingStream("live", recording_id="live")
     recording.save(tmp_path / "live.rrd")
@@ -136,19 +148,11 @@ def test_a_viewer_that_is_closed_ends_the_view_and_not_the_run(tmp_path):
     live.add(third)
 
 
-def test_a_viewer_that_ends_while_a_recording_is_sent_leaves_the_file(tmp_path, monkeypatch):
-    send, port, path = drawing._send, free_port(), tmp_path / "fleet.rrd"
-    command = [str(viewer.program()), "--bind", "127.0.0.1", "--port", str(port), "--save", str(tmp_path / "sent.rrd")]
-    with serving(command, port) as process:
-
-        def ended(recording, runs, laid_out=False):
-            process.kill()
-            process.wait()
-            send(recording, runs, laid_out)
-
-        monkeypatch.setattr(drawing, "_send", ended)
-        with pytest.raises(OSError, match=r"the viewer ended before it had the recording, which is in .*fleet.rrd"):
-            lw.log_rerun(fleet(20), path, to=f"rerun+http://127.0.0.1:{port}/proxy")
+def test_a_viewer_that_ends_before_it_has_a_recording_leaves_the_file(tmp_path):
+    path = tmp_path / "fleet.rrd"
+    told = r"the viewer ended before it had the recording, which is in .*fleet.rrd"
+    with peer(A_VIEWER, times=1) as port, pytest.raises(OSError, match=told):
+        lw.log_rerun(fleet(20), path, to=f"rerun+http://127.0.0.1:{port}/proxy")
     assert len(rows(path, "/world/bodies/ok", "translations")) == 31
 
 
@@ -179,7 +183,9 @@ def test_run_shows_members_as_they_are_done_then_the_whole_run(tmp_path, capsys)
 
 # What peers that are no viewer say to whoever comes: nothing; settings of HTTP/2 and nothing more; settings and an answer that
 # is refused, or is a page; goodbye; too much.
+# A viewer answers with an empty message.
 SETTINGS, ENDED = bytes((0, 0, 0, 4, 0, 0, 0, 0, 0)), bytes((0, 0, 1, 1, 5, 0, 0, 0, 1, 0x88))
+A_VIEWER = SETTINGS + bytes((0, 0, 1, 1, 4, 0, 0, 0, 1, 0x88, 0, 0, 5, 0, 1, 0, 0, 0, 1, *viewer.EMPTY_ANSWER))
 PEERS = {
     "silent": b"", "HTTP/2": SETTINGS, "other calls": SETTINGS + ENDED, "goodbye": SETTINGS + bytes((0, 0, 8, 7, *[0] * 13)),
     "page": SETTINGS + bytes((0, 0, 1, 1, 4, 0, 0, 0, 1, 0x88, 0, 0, 5, 0, 1, 0, 0, 0, 1)) + b"<html",
@@ -188,8 +194,8 @@ PEERS = {
 
 
 @contextlib.contextmanager
-def peer(words):
-    """The port of something that listens, says these words to all, and hears them out."""
+def peer(words, times=None):
+    """The port of something that listens, says these words to all, or to so many, and hears them out."""
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         listener.listen()
@@ -202,52 +208,55 @@ def peer(words):
 
         def greet():
             with contextlib.suppress(OSError):
-                while True:
+                for _ in itertools.repeat(None) if times is None else range(times):
                     threading.Thread(target=hear, args=(listener.accept()[0],), daemon=True).start()
+                listener.close()
 
         threading.Thread(target=greet, daemon=True).start()
         yield listener.getsockname()[1]
-        listener.shutdown(socket.SHUT_RDWR)
+        with contextlib.suppress(OSError):
+            listener.shutdown(socket.SHUT_RDWR)
 
 
 @pytest.mark.parametrize("words", PEERS.values(), ids=PEERS)
-def test_what_is_no_viewer_is_named_with_the_remedy(tmp_path, monkeypatch, capsys, words):
-    monkeypatch.setattr(viewer, "STARTED", 0.3)
-    run = ["run", str(ROOT / "examples" / "paper.toml"), "--out", str(tmp_path / "run"), "--live"]
+def test_what_is_no_viewer_is_told_from_one(words):
     with peer(words) as port:
         address = f"rerun+http://127.0.0.1:{port}/proxy"
-        assert not viewer.answers(address)
+        assert not viewer.answers(address, started=0.3)
+        with pytest.raises(OSError, match='what answers is no viewer; start a viewer with "rerun"'):
+            viewer.reach(address, started=0.3)
+        with pytest.raises(OSError, match="port 9876: is taken by what is no viewer; end that, or start"):
+            viewer.is_open(address, started=0.3)
+
+
+def test_what_is_no_viewer_is_named_with_the_remedy(tmp_path, capsys):
+    run = ["run", str(ROOT / "examples" / "paper.toml"), "--out", str(tmp_path / "run"), "--live"]
+    with peer(PEERS["goodbye"]) as port:
+        address = f"rerun+http://127.0.0.1:{port}/proxy"
         with pytest.raises(OSError, match='what answers is no viewer; start a viewer with "rerun"'):
             lw.log_rerun(fleet(3), to=address)
+        with pytest.raises(OSError, match="port 9876: is taken by what is no viewer; end that, or start"):
+            viewer.opened(None, home=address)
         assert cli.main([*run, "--viewer", address]) == 1
-        monkeypatch.setattr(viewer, "ADDRESS", address)
-        for ask in (lambda: lw.show(fleet(3)), lambda: viewer.opened(None)):
-            with pytest.raises(OSError, match="port 9876: is taken by what is no viewer; end that, or start"):
-                ask()
-        assert cli.main(run) == 1
     said = capsys.readouterr().err
-    assert said.count("\n") == 2
+    assert said.count("\n") == 1
     assert "is no viewer" in said
     assert not (tmp_path / "run").exists()
 
 
-def test_a_viewer_that_falls_silent_ends_the_sending(tmp_path, monkeypatch):
-    """It is stopped while the recording is on its way: its port is open, and nobody answers."""
-    monkeypatch.setattr(viewer, "STARTED", 0.3)
-    monkeypatch.setattr(viewer, "PATIENCE", 1.0)
-    send, port, path = drawing._send, free_port(), tmp_path / "fleet.rrd"
-    command = [str(viewer.program()), "--bind", "127.0.0.1", "--port", str(port), "--save", str(tmp_path / "sent.rrd")]
-    with serving(command, port) as process:
+@pytest.mark.parametrize(("words", "goes_on"), [(b"", False), (A_VIEWER, True)], ids=["silent", "answers"])
+def test_a_sending_goes_on_as_long_as_the_viewer_answers(words, goes_on):
+    sent = threading.Event()
+    with peer(words) as port:
+        threading.Timer(1.5, sent.set).start()
+        with contextlib.nullcontext() if goes_on else pytest.raises(OSError, match="does not answer any more"):
+            viewer.watched(sent.wait, f"rerun+http://127.0.0.1:{port}/proxy", patience=0.2, started=0.3)
+        assert sent.is_set() == goes_on
 
-        def stopped(recording, runs, laid_out=False):
-            process.send_signal(signal.SIGSTOP)
-            send(recording, runs, laid_out)
 
-        monkeypatch.setattr(drawing, "_send", stopped)
-        with pytest.raises(OSError, match=r"the viewer ended before it had the recording, which is in .*fleet.rrd"):
-            lw.log_rerun(fleet(20), path, to=f"rerun+http://127.0.0.1:{port}/proxy")
-        process.send_signal(signal.SIGCONT)
-    assert len(rows(path, "/world/bodies/ok", "translations")) == 31
+def test_an_address_without_a_port_has_that_of_viewers():
+    assert not viewer.answers("rerun+http://127.0.0.1:x")
+    assert not viewer.answers("rerun+http://127.0.0.1/proxy") or viewer.is_open()
 
 
 @pytest.mark.parametrize(
@@ -276,20 +285,14 @@ def test_live_is_refused_where_it_shows_nothing(options, words, tmp_path, capsys
     ],
 )
 def test_a_viewer_that_does_not_start_is_told_of(tmp_path, monkeypatch, text, words):
-    program = tmp_path / "viewer"
-    program.write_text(f"#!/bin/sh\n{text}\n")
-    program.chmod(0o755)
-    monkeypatch.setattr(viewer, "program", lambda: program)
-    monkeypatch.setattr(viewer, "PATIENCE", 0.3)
-    monkeypatch.setattr(viewer, "ADDRESS", f"rerun+http://127.0.0.1:{free_port()}/proxy")
+    started_by(monkeypatch, tmp_path, text)
     with pytest.raises(OSError, match=words):
-        viewer.opened(None)
+        viewer.opened(None, home=f"rerun+http://127.0.0.1:{free_port()}/proxy", patience=0.3)
 
 
-def test_an_open_viewer_is_used(tmp_path, monkeypatch):
+def test_an_open_viewer_is_used(tmp_path):
     with receiver(tmp_path / "sent.rrd") as address:
-        monkeypatch.setattr(viewer, "ADDRESS", address)
-        assert viewer.is_open()
-        assert viewer.opened(None) == address
+        assert viewer.is_open(address)
+        assert viewer.opened(None, home=address) == address
         assert viewer.opened(address) == address
         lw.log_rerun(fleet(3, 5), to=address)

@@ -3,6 +3,7 @@
 
 import dataclasses
 import re
+import shutil
 import subprocess
 import sys
 import time
@@ -15,14 +16,12 @@ from rerun.chunk import RrdReader
 
 import lgvi_warp as lw
 from lgvi_warp.common.errors import NothingToDraw
-from lgvi_warp.common.status import Status, stop_time, under_way
-from lgvi_warp.statistics.estimates.estimate import Estimate, Estimates
-from lgvi_warp.views.commands import channels
+from lgvi_warp.common.status import Status, failed, stop_time, under_way
 from lgvi_warp.views.fleet import LOOKS
 from lgvi_warp.views.recording import drawn, layout, viewer, world
-from lgvi_warp.views.recording import rerun as recordings
 from lgvi_warp.views.recording import words as ten_words
 from tests.support.made import made
+from tests.support.viewer import started_by
 from tests.unit.views.test_hull import glb
 
 rr.set_strict_mode(True)
@@ -130,21 +129,6 @@ def test_colours_change_when_members_end(mixed, path):
         assert count[mixed.time[-1]] == (mixed.status == code).sum()
 
 
-def test_texts_have_the_counts_and_ten_lines(mixed, path):
-    summary = text_of(path, "/run/summary")
-    counts = ", ".join(f"{name} {number:,}" for name, number in mixed.status.counts().items())
-    assert f"| outcome | {counts} |" in summary
-    assert "| members | 40, all drawn, all in the curves |" in summary
-    assert summary.count("|\\n| ") == 10
-    assert "surface and floor at 16 m; grid of 10 m" in summary
-    assert "seed | 1" in summary
-    log = text_of(path, "/log")
-    first = int(np.flatnonzero(mixed.status == Status.FLOOR)[stop_time(mixed)[mixed.status == Status.FLOOR].argmin()])
-    assert f"first: member {first} at {mixed.failure_time[first]:g} s" in log
-    assert "value 1.5" in log
-    assert '"seed": 1' in text_of(path, "/run/provenance")
-
-
 def test_curves_are_quantiles_of_those_under_way(mixed, path):
     counted = under_way(mixed)
     for frame in (0, 7, 20, 30):
@@ -171,16 +155,6 @@ def test_two_recordings_together_are_each_as_alone(mixed, path, tmp_path):
         (entry,) = RrdReader(alone).recordings()
         for entity, ending in (("/world/bodies/ok", "translations"), ("/curves/height/median", "scalars")):
             assert rows(both, entity, ending, entries[entry.recording_id]) == rows(alone, entity, ending)
-
-
-def test_trails_are_of_the_past(mixed, path):
-    strips = rows(path, "/world/trails", "strips")
-    members = np.unique(np.linspace(0, 39, world.TRAILS).astype(int))
-    for frame in (1, 9, 30):
-        going = under_way(mixed)[frame - 1, members]
-        ends = np.array([strip[1] for strip in strips[mixed.time[frame]]], np.float32)
-        np.testing.assert_array_equal(ends, mixed.position[frame, members[going]].astype(np.float32))
-    assert 0.0 not in strips
 
 
 def test_the_ellipsoid_holds_those_under_way_and_stays_in_the_water():
@@ -221,13 +195,10 @@ def test_quantiles_are_those_of_numpy():
     assert np.isnan(got[:, 3]).all()
 
 
-def test_extremes_are_of_all_members_and_quantiles_of_many(monkeypatch):
-    from lgvi_warp.views import choice
-
-    monkeypatch.setattr(choice, "MOST_RANKED", 500)
-    monkeypatch.setattr(choice, "AT_ONCE", 2 * 300)
-    cloud = np.random.default_rng(5).normal(size=(2, 3000, 3))
+def test_extremes_are_of_all_members_and_quantiles_of_many():
+    cloud = np.random.default_rng(5).normal(size=(2, 21_000, 3))
     run = drawn.drawn_of(made(cloud))
+    assert len(run.choice.ranked) == 20_000
     height = run.fans[0].levels
     np.testing.assert_allclose(
         height[[0, -1]].T, np.stack([-cloud[..., 2].max(1), -cloud[..., 2].min(1)], axis=1), rtol=1e-6
@@ -255,10 +226,14 @@ def test_forces_balance_the_momentum():
     mass = scene.vehicle.mass + scene.vehicle.added_mass[0, 0]
     position = np.zeros((21, 1, 3))
     position[:, 0, 0] = 0.5 * force / mass * t**2
-    forces, points = world.forces_on(drawn.drawn_of(made(position, t)))
+    run = drawn.drawn_of(made(position, t))
+    forces, points = world.forces_on(run)
     np.testing.assert_allclose(forces[2:-2, 2], [[force, 0.0, 0.0]] * 17, atol=1e-3)
     np.testing.assert_allclose(forces[:, 0] + forces[:, 1], 0.0, atol=1e-9)
     assert points.shape == (3, 3)
+    # Speeds are of half a step after the start and before the end.
+    kinetic = 0.5 * mass * (force / mass) ** 2 * (1.95**2 - 0.05**2)
+    assert ten_words.energy_text(run) == f"drift {kinetic:.2g} J, the largest of the members drawn"
 
 
 def test_the_current_is_drawn_as_it_flows(mixed, path):
@@ -320,27 +295,6 @@ def test_each_run_has_its_own_floors(tmp_path):
     assert "floor at 18 and 25 m" in text_of(path, "/run/summary/two")
 
 
-def test_outcomes_of_compared_runs_have_marks_of_their_own(tmp_path):
-    """Both runs have one colour each: what a curve is of is told by its marks."""
-    path = lw.log_rerun({"a": fleet(40), "b": fleet(40, seed=2)}, tmp_path / "both.rrd")
-    marks = {name: text_of(path, f"/members/a/{name}/marks") for name in ("floor", "surface", "non_finite")}
-    shapes = {name: re.search(r"markers.*?\[(\d+)\]|\[(\d+)\]", text) for name, text in marks.items()}
-    assert all(shapes.values())
-    assert len(set(marks.values())) == 3
-    assert "/members/a/under_way/marks" not in entities(path)
-    alone = lw.log_rerun(fleet(40), tmp_path / "alone.rrd")
-    assert not any(name.endswith("/marks") for name in entities(alone))
-
-
-def test_faults_are_in_the_log_when_they_begin(mixed, tmp_path):
-    steered = lw.Scene.load(Path(__file__).parents[3] / "examples" / "scenes" / "remus_100_autopilot.toml")
-    path = lw.log_rerun(made(mixed.position, mixed.time, scene=steered), tmp_path / "fleet.rrd")
-    said = rows(path, "/log", "TextLog:text")
-    assert said[40.0] == ["fault stuck_rudder: control_fins[0] times 0 plus 0.1, from 40 s"]
-    later = made(mixed.position[:10], mixed.time[:10], scene=steered)
-    assert "fault" not in text_of(lw.log_rerun(later, tmp_path / "short.rrd"), "/log")
-
-
 def test_members_that_ended_stand_out_from_the_floor():
     """By the ratio of luminances of WCAG 2, section 1.4.11: 3 for what has to be seen."""
     channel = np.array([[*LOOKS[Status.FLOOR].rgb], world.SAND[:3]]) / 255.0
@@ -383,6 +337,9 @@ def test_odd_runs_have_a_recording_that_fits(name, tmp_path):
     bands = {"/curves/height/all", "/curves/height/90_percent", "/curves/height/50_percent"}
     assert bool(bands & names) == (result.members > 1)
     assert ("SaveAt(every=...)" in summary) == (len(result.time) < 3)
+    partly = name == "without rates"
+    assert ("not known: not all of the motion was kept" in summary) == partly
+    assert ("not known: every member drawn failed" in summary) == (failed(result.status).all() and not partly)
     assert "nan" not in summary
     assert "1 members" not in summary
     counts = ", ".join(f"{name} {number}" for name, number in result.status.counts().items())
@@ -407,59 +364,10 @@ def lean(mixed, **named):
     return dataclasses.replace(mixed, samples={}, kept=mixed.part(kept), kept_members=kept, **named)
 
 
-def test_kept_members_are_drawn_where_no_others_were_kept(mixed, tmp_path):
-    path = lw.log_rerun(lean(mixed), tmp_path / "kept.rrd")
-    assert len(rows(path, "/world/bodies/ok", "translations")[0.0]) == 3
-    summary, counts = text_of(path, "/run/summary"), mixed.status.counts()
-    assert "| 3 of 40 drawn, curves of the 3 whose samples were kept |" in summary
-    # Outcomes are those of all.
-    assert f"| outcome | {', '.join(f'{name} {number}' for name, number in counts.items())} |" in summary
-    assert rows(path, "/members/floor", "scalars")[60.0] == pytest.approx([100.0 * counts["floor"] / 40])
+def test_of_kept_members_alone_no_others_are_drawn(mixed, tmp_path):
     assert drawn.drawn_of(lean(mixed), [9, 3]).members.tolist() == [3, 9]
     with pytest.raises(lw.SceneError, match=r"members = 4: has no samples; keep them: keep=\[4\]"):
         lw.log_rerun(lean(mixed), tmp_path / "kept.rrd", members=[4])
-
-
-def test_the_runs_own_statistics_make_the_fan_where_no_samples_of_all_were_kept(mixed):
-    depth = mixed.position[..., 2]
-    names = ("component",)
-
-    def estimate(kind, arrays, **coordinates):
-        settings = {"type": kind, "of": "depth"}
-        return Estimate(
-            kind, settings, "m", 0.95, "", {}, arrays, {"time": mixed.time, "component": names} | coordinates
-        )
-
-    levels = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
-    quantiles = np.moveaxis(np.quantile(depth, levels, axis=1), 0, 1)[..., None]
-    extremes = {"minimum": depth.min(axis=1, keepdims=True), "maximum": depth.max(axis=1, keepdims=True)}
-    statistics = Estimates([estimate("quantiles", {"value": quantiles}, level=levels), estimate("extremes", extremes)])
-    height, *others = drawn.drawn_of(lean(mixed, statistics=statistics)).fans
-    expected = np.quantile(-depth, drawn.LEVELS, axis=1)
-    np.testing.assert_allclose(height.levels, expected, rtol=1e-6)
-    assert height.title.endswith("by the run's statistics")
-    assert not any("by the run" in fan.title for fan in others)
-    assert np.abs(drawn.drawn_of(lean(mixed)).fans[0].levels - expected).max() > 0.1
-
-
-def test_runs_are_compared_side_by_side(mixed, tmp_path):
-    path = lw.log_rerun({"a": mixed, "b, rk4": fleet(20, seed=2)}, tmp_path / "both.rrd")
-    names = entities(path)
-    assert {"/world/a/bodies/ok", "/curves/height/a/median", "/run/summary/a"} <= names
-    b = next(name for name in names if name.startswith("/world/b") and name.endswith("/bodies/ok"))
-    assert len(rows(path, b, "translations")[0.0]) == 20
-    assert "a: floor, " in text_of(path, "/log/a")
-
-
-def test_channels_have_the_names_and_limits_of_their_actuators(mixed):
-    steered = lw.Scene.load(Path(__file__).parents[3] / "examples" / "scenes" / "remus_100_autopilot.toml")
-    result = made(mixed.position, mixed.time, scene=steered)
-    samples = dict(result.samples) | {"actuator": np.full((31, 40, 2), 0.2), "command": np.full((31, 40, 2), 0.1)}
-    run = drawn.drawn_of(dataclasses.replace(result, samples=samples))
-    first, second = channels(run.few)
-    assert (first.name, second.name) == ("control_fins[0]", "control_fins[1]")
-    assert first.limits(np.array([0.1, -0.2])) == pytest.approx([-0.349066, 0.349066], rel=1e-5)
-    assert first.limits(np.array([0.01])) == ()
 
 
 def test_a_mesh_is_drawn_times_a_whole_number(tmp_path):
@@ -544,27 +452,28 @@ def test_nothing_to_draw_is_said(mixed, tmp_path):
     ("text", "words"),
     [
         ("exec sleep 0.5", None),
-        ("exec sleep 30", None),
         ("echo no display >&2; exit 1", r"did not start \(no display\); the recording is .*fleet.rrd: open it"),
         (None, "cannot be started .* the recording is"),
     ],
 )
 def test_show_starts_a_viewer(mixed, tmp_path, monkeypatch, text, words):
-    program = tmp_path / "viewer"
-    if text is not None:
-        program.write_text(f'#!/bin/sh\necho "$1" > "{tmp_path}/opened"\n{text}\n')
-        program.chmod(0o755)
-    monkeypatch.setattr(viewer, "program", lambda: program)
-    monkeypatch.setattr(viewer, "STARTED", 0.7)
-    monkeypatch.setattr(viewer, "is_open", lambda: False)
-    monkeypatch.setattr(recordings.tempfile, "mkdtemp", lambda prefix: str(tmp_path))
+    started_by(monkeypatch, tmp_path, text and f'echo "$1" > "{tmp_path}/opened"\n{text}')
     if words is None:
         lw.show(mixed, members=[3])
         opened = Path((tmp_path / "opened").read_text().strip())
         assert "1 of 40 drawn" in text_of(opened, "/run/summary")
+        shutil.rmtree(opened.parent)
     else:
-        with pytest.raises(OSError, match=words):
+        with pytest.raises(OSError, match=words) as caught:
             lw.show(mixed)
+        shutil.rmtree(Path(re.search(r"the recording is (.*): open it", str(caught.value))[1]).parent)
+
+
+def test_a_viewer_that_stays_is_started(tmp_path, monkeypatch):
+    started_by(monkeypatch, tmp_path, "exec sleep 5")
+    begun = time.monotonic()
+    viewer.start([], "", started=0.3)
+    assert time.monotonic() - begun < 4.0
 
 
 def test_no_viewer_is_loaded_before_it_is_needed():

@@ -9,7 +9,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.views.commands import faults
 from tests.conftest import ROOT
-from tests.support.made import made
+from tests.support.made import made, turned
 from tests.unit.views.test_fans import turning
 from tests.unit.views.test_recording import fleet
 
@@ -104,27 +104,25 @@ def test_yaw_goes_on_through_a_turn():
     np.testing.assert_allclose(yaw, np.linspace(0.0, 720.0, 61), atol=1e-6)
 
 
-def test_an_angle_of_members_that_point_all_ways_is_left_out():
-    """Headings that fan out: the middle 90 % of a spread of s take 0.9 s of a turn."""
-    n, time = 201, np.linspace(0.0, 60.0, 61)
-    heading = np.linspace(-np.pi, np.pi, n) * time[:, None] / 60.0
-    c, s, zero = np.cos(heading), np.sin(heading), np.zeros_like(heading)
-    attitude = np.stack([c, -s, zero, s, c, zero, zero, zero, zero + 1.0], axis=-1).reshape(61, n, 3, 3)
-    axes = lw.plots.summary(made(np.ones((61, n, 3)) * time[:, None, None], time, attitude=attitude))[2]
-    yaw = next(line for line in axes.lines if line.get_label() == "yaw; gaps: all ways")
-    drawn = np.isfinite(yaw.get_ydata())
-    # 0.9 of 360 degrees t / 60 s are 270 degrees at 50 s.
-    np.testing.assert_array_equal(drawn, time <= 50.0)
-    np.testing.assert_allclose(yaw.get_ydata()[drawn], 0.0, atol=1e-6)
+TIME, ALL_ROUND = np.linspace(0.0, 60.0, 61), np.linspace(-np.pi, np.pi, 201)
+# Headings (61, 201) of members that point all ways at some times, and the times at which they do not.
+SCATTERED = {
+    # The middle 90 % of a spread of s take 0.9 s of a turn: of 360 degrees t / 60 s these are 270 degrees at 50 s.
+    "the longer the more": (ALL_ROUND * TIME[:, None] / 60.0, TIME <= 50.0),
+    # One time alone, after a turn and a half, makes no line.
+    "but for the end": (
+        ALL_ROUND * np.where((TIME == 30.0) | (TIME > 50.0), 0.1, 1.0)[:, None] + 0.2 * TIME[:, None],
+        TIME > 50.0,
+    ),
+}
 
 
-def test_an_axis_of_angles_shows_what_is_drawn():
-    """Headings that point all ways but for one time after a turn and a half."""
-    n, time = 201, np.linspace(0.0, 60.0, 61)
-    spread = np.where((time == 30.0) | (time > 50.0), 0.1, 1.0)
-    heading = np.linspace(-np.pi, np.pi, n) * spread[:, None] + 0.2 * time[:, None]
-    c, s, zero = np.cos(heading), np.sin(heading), np.zeros_like(heading)
-    attitude = np.stack([c, -s, zero, s, c, zero, zero, zero, zero + 1.0], axis=-1).reshape(61, n, 3, 3)
-    axes = lw.plots.summary(made(np.ones((61, n, 3)) * time[:, None, None], time, attitude=attitude))[2]
-    yaw = next(line for line in axes.lines if line.get_label() == "yaw; gaps: all ways")
-    np.testing.assert_array_equal(np.isfinite(yaw.get_ydata()), time > 50.0)
+@pytest.mark.parametrize("name", SCATTERED)
+def test_an_angle_of_members_that_point_all_ways_is_left_out(name):
+    heading, told = SCATTERED[name]
+    path = np.ones((61, 201, 3)) * TIME[:, None, None]
+    axes = lw.plots.summary(made(path, TIME, attitude=turned(heading)))[2]
+    yaw = next(line for line in axes.lines if line.get_label() == "yaw; gaps: all ways").get_ydata()
+    np.testing.assert_array_equal(np.isfinite(yaw), told)
+    if name == "the longer the more":
+        np.testing.assert_allclose(yaw[told], 0.0, atol=1e-6)

@@ -76,60 +76,45 @@ def look(line):
     return to_hex(line.get_color()).upper(), line.get_marker(), line.get_linestyle()
 
 
-def test_success_by_case_and_when_names_stand_upright():
-    for names, turned in (("abcdef", 0.0), ("abcdefg", 90.0)):
-        found = swept(lambda i: i / 8, cases=names)
-        (axes,) = sweeps.plot_success(found)
-        (container,) = axes.containers
-        places, values, ends = bars(container)
-        expected = 100.0 * np.array([found.success(name) for name in names])
-        assert places == list(range(len(names)))
-        np.testing.assert_allclose(values, expected[:, 0])
-        np.testing.assert_allclose(ends[:, :, 1], expected[:, 1:])
-        assert look(container[0])[1:] == ("o", "None")
-        assert axes.get_ylabel() == "passes [%], 90% interval"
-        labels = axes.get_xticklabels()
-        assert [label.get_text() for label in labels] == list(names)
-        assert labels[0].get_rotation() == turned
-        assert axes.get_legend() is None
-        assert axes.figure.get_size_inches().tolist() == [8.0, 5.0]
-        assert container[2][0].get_linewidth()[0] > 0
-        assert container[1][0].get_markersize() == 8.0
+@pytest.mark.parametrize(("names", "turned"), [("abcdef", 0.0), ("abcdefg", 90.0)])
+def test_success_by_case_and_when_names_stand_upright(names, turned):
+    found = swept(lambda i: i / 8, cases=names)
+    (axes,) = sweeps.plot_success(found)
+    places, values, ends = bars(*axes.containers)
+    expected = 100.0 * np.array([found.success(name) for name in names])
+    assert places == list(range(len(names)))
+    np.testing.assert_allclose(values, expected[:, 0])
+    np.testing.assert_allclose(ends[:, :, 1], expected[:, 1:])
+    assert axes.get_ylabel() == "passes [%], 90% interval"
+    labels = axes.get_xticklabels()
+    assert [label.get_text() for label in labels] == list(names)
+    assert labels[0].get_rotation() == turned
 
 
 def test_success_over_an_axis_has_places_by_value():
     found = swept(lambda i: 0.5, {"delay": [0.5, 2.0, 4], "gain": [1.0]}, refused=(0, 3, 4, 5))
     (axes,) = sweeps.plot_success(found)
-    (container,) = axes.containers
-    assert bars(container)[0] == [2.0, 4.0]
-    assert look(container[0]) == (sweeps.COLORS[0], "o", "-")
+    assert bars(*axes.containers)[0] == [2.0, 4.0]
     assert [label.get_text() for label in axes.get_legend().get_texts()] == ["a"]
     assert axes.get_xticks().tolist() == [0.5, 2.0, 4.0]
     assert axes.get_xlabel() == "delay"
-    assert [label.get_text() for label in axes.get_xticklabels()] == ["0.5", "2.0", "4"]
-    named = sweeps.plot_success(swept(lambda i: 0.5, {"law": ["p", 3.0]}))[0]
-    assert bars(named.containers[1])[0] == [0.0, 1.0]
-    assert look(named.containers[1][0]) == (sweeps.COLORS[1], "s", "--")
-    assert named.get_xticks().tolist() == [0.0, 1.0]
-    endless = sweeps.plot_success(swept(lambda i: 0.5, {"gain": [3.0, float("inf")]}))[0]
-    assert endless.get_xticks().tolist() == [0.0, 1.0]
+    for values in (["p", 3.0], [3.0, float("inf")]):  # not all are numbers, or finite: evenly
+        axes = sweeps.plot_success(swept(lambda i: 0.5, {"law": values}))[0]
+        assert bars(axes.containers[1])[0] == axes.get_xticks().tolist() == [0.0, 1.0]
+        assert look(axes.containers[0][0]) != look(axes.containers[1][0])
 
 
 def test_a_map_has_a_field_for_each_point():
     axes = {"x": [1, 2, 3], "y": [5, 6], "z": [0.5, 0.6], "w": ["u", "v"], "one": [1]}
     found = swept(lambda i: (i % 24) / 24, axes, refused=(4,))
     panels = sweeps.plot_success(found)
-    figure = panels[0].figure
-    assert figure.get_size_inches().tolist() == pytest.approx([2 * (1.6 + 3.3), 1.8 + 1.2])
-    assert figure.get_suptitle() == "at z = 0.5, w = u"
+    assert panels[0].figure.get_suptitle() == "at z = 0.5, w = u"
     assert [panel.get_title() for panel in panels] == ["a: passes [%]", "b: passes [%]"]
     assert (panels[0].get_xlabel(), panels[0].get_ylabel(), panels[1].get_ylabel()) == ("x", "y", "")
     image = panels[0].get_images()[0]
     assert image.get_array().shape == (2, 3)
     assert image.get_clim() == (0.0, 100.0)
     assert image.origin == "lower"
-    assert image.get_cmap().name == "viridis"
-    assert panels[0].get_aspect() == "auto"
     assert [tick.get_text() for tick in panels[0].get_xticklabels()] == ["1", "2", "3"]
     assert [tick.get_text() for tick in panels[0].get_yticklabels()] == ["5", "6"]
     words = {text.get_position(): text for text in panels[0].texts}
@@ -145,7 +130,6 @@ def test_a_map_has_a_field_for_each_point():
         assert text.get_text() == f"{value:.1f}\n{lower:.1f} to {upper:.1f}"
         assert image.get_array()[i, j] == value
         assert text.get_color() == ("white" if value < 50.0 else "black")
-        assert (text.get_fontsize(), text.get_ha(), text.get_va()) == (8, "center", "center")
     exact = sweeps.plot_success(swept(lambda i: 0.5, {"x": [1, 2], "y": [1, 2]}))
     assert {text.get_color() for text in exact[0].texts} == {"black"}
     assert exact[0].figure.get_suptitle() == ""
@@ -154,26 +138,17 @@ def test_a_map_has_a_field_for_each_point():
 def test_boxes_of_metrics():
     found = swept(lambda i: 0.5, {"delay": [1, 2]}, metrics=("m", "n"), failed=3, refused=(3,))
     upper, lower = sweeps.plot_metrics(found)
-    assert upper.figure.get_size_inches().tolist() == pytest.approx([7.0, 1.5 + 4.4])
     assert (upper.get_ylabel(), lower.get_ylabel()) == ("m\n[m/s]", "n")
     colors = [sweeps.COLORS[0], sweeps.COLORS[0], sweeps.COLORS[1]]
     assert [to_hex(box.get_facecolor()).upper() for box in upper.patches] == colors
-    assert {box.get_alpha() for box in upper.patches} == {0.6}
     for i, box in enumerate(upper.patches):
         numbers = np.arange(3, N) * (1.0 + i)
         corners = box.get_path().vertices[:, 1]
         np.testing.assert_allclose((corners.min(), corners.max()), np.quantile(numbers, (0.25, 0.75)))
         whiskers = np.concatenate([line.get_ydata() for line in upper.lines[5 * i : 5 * i + 5]])
         np.testing.assert_allclose((whiskers.min(), whiskers.max()), np.quantile(numbers, (0.05, 0.95)))
-    medians = [
-        line for line in upper.lines if to_hex(line.get_color()) == "#000000" and len(set(line.get_ydata())) == 1
-    ]
-    assert any(line.get_ydata()[0] == np.median(np.arange(3, N)) for line in medians)
-    labels = lower.get_xticklabels()
-    assert [label.get_text() for label in labels] == ["a, 1", "a, 2", "b, 1"]
-    assert labels[0].get_rotation() == 0.0
+    assert [label.get_text() for label in lower.get_xticklabels()] == ["a, 1", "a, 2", "b, 1"]
     assert lower.get_xlabel() == "case, delay"
-    assert lower.get_xticks().tolist() == [1, 2, 3]
     with pytest.raises(NothingToDraw, match="there are no metrics"):
         sweeps.plot_metrics(swept(lambda i: 0.5, metrics=()))
 
@@ -183,8 +158,6 @@ def test_boxes_beyond_the_most_are_counted():
         (axes,) = sweeps.plot_metrics(swept(lambda i: 0.5, {"k": list(range(count))}))
         assert axes.get_xlabel() == words
         assert len(axes.patches) == 40
-        assert axes.get_xticklabels()[0].get_rotation() == 90.0
-        assert axes.figure.get_size_inches()[0] == 1.5 + 0.35 * 40
 
 
 def test_differences_to_the_baseline():
@@ -192,7 +165,6 @@ def test_differences_to_the_baseline():
     (axes,) = sweeps.plot_differences(found)
     rows = [row for row in against_baseline(found) if row.of == "success"]
     real, unreal = axes.containers
-    assert (look(real[0])[:2], look(unreal[0])[:2]) == ((sweeps.COLORS[0], "o"), (sweeps.GREY, "s"))
     for container, row, place in ((real, rows[0], 0), (unreal, rows[1], 1)):
         line, _, (segments,) = container
         ((x,), (y,)), d = (line.get_xdata(), line.get_ydata()), row.difference
@@ -201,18 +173,14 @@ def test_differences_to_the_baseline():
         )
         assert y == place
         assert bool(row.real) == (place == 0)
-    assert axes.get_ylim() == (1.5, -0.5)
-    assert axes.get_ylabel() == "case"
     assert axes.get_xlabel() == "passes more than a [points], 90% interval"
     assert [label.get_text() for label in axes.get_yticklabels()] == ["b", "c"]
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["real", "not real"]
-    assert axes.lines[-1].get_xdata() == [0.0, 0.0]
-    assert axes.figure.get_size_inches().tolist() == pytest.approx([8.0, 2.0])
     with pytest.raises(NothingToDraw, match="no other case that ran"):
         sweeps.plot_differences(swept(lambda i: 0.5, cases="ab", refused=(1,)))
 
 
-def test_causes_where_most_is_open(monkeypatch):
+def test_causes_where_most_is_open():
     found = swept(lambda i: (0.9, 0.4, 0.65)[i], cases="abc")
     (axes,) = sweeps.plot_causes(found)
     passes, fails = axes.lines
@@ -222,15 +190,12 @@ def test_causes_where_most_is_open(monkeypatch):
     assert passes.get_xdata().tolist() == list(range(16))
     assert fails.get_xdata().tolist() == list(range(16, N))
     assert fails.get_ydata().tolist() == [i**2 for i in range(16, N)]
-    assert passes.get_ydata()[-1] == 225.0
-    assert [look(line)[:2] for line in (passes, fails)] == [(sweeps.COLORS[0], "."), (sweeps.COLORS[1], "x")]
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["passes: 16", "fails: 24"]
-    monkeypatch.setattr(sweeps, "MOST_POINTS", 10)
     found.__class__ = type("OneCause", (ByHand,), {"explained": ("delay",)})
     (axes,) = sweeps.plot_causes(found)
     assert axes.get_ylabel() == "member"
-    assert axes.lines[0].get_ydata().tolist() == list(range(10))
-    assert axes.lines[0].get_xdata().tolist() == [i**2 for i in range(10)]
+    assert axes.lines[0].get_ydata().tolist() == list(range(16))
+    assert axes.lines[0].get_xdata().tolist() == [i**2 for i in range(16)]
     found.__class__ = type("NoCause", (ByHand,), {"explained": ()})
     for nothing in (found, swept(lambda i: i % 2)):
         with pytest.raises(NothingToDraw, match="some members pass and some do not, or nothing varies"):
@@ -243,19 +208,13 @@ def test_responses_by_case():
     assert found.asked == [(name, range(7), {"k": 1}, lw.SaveAt(every=0.5, fields=("position", "reference_depth"))) for name in
                            "abcd"]  # fmt: skip
     figure = panels[0].figure
-    assert figure.get_size_inches().tolist() == [13.5, 8.0]
     assert figure.get_supylabel() == "depth [m]: 7 members"
-    assert figure.get_supxlabel() == "time [s]"
     assert panels[0].yaxis_inverted()
-    assert panels.shape == (4,)
     assert [panel.get_title() for panel in panels] == [f"{name} at k = 1" for name in "abcd"]
     assert [panel.axison for panel in figure.axes] == [True] * 4 + [False] * 2
     lines = {line.get_label(): line for line in panels[0].lines}
     np.testing.assert_allclose(lines["median"].get_ydata(), np.arange(5.0) + 13.0)
     np.testing.assert_allclose(lines["wanted"].get_ydata(), np.arange(5.0) + 15.0)
-    assert look(lines["wanted"]) == ("#000000", "None", ":")
-    assert lines["wanted"].get_linewidth() == 1.0
-    assert "wanted" in [text.get_text() for text in panels[0].get_legend().get_texts()]
 
 
 def test_responses_are_drawn_where_cases_differ_and_of_what_differs():
@@ -284,7 +243,6 @@ def test_responses_of_a_distance_and_their_times():
     lines = {line.get_label(): line for line in axes.lines}
     assert "wanted" not in lines
     assert set(lines["median"].get_ydata()) == {5.0}
-    assert axes.figure.get_size_inches().tolist() == [4.5, 4.0]
 
 
 def test_pictures_have_their_files():

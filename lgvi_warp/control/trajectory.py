@@ -41,6 +41,11 @@ class Trajectory(Guidance):
     speed: Any = number(("k",), "m/s", None, optional=True)
     interpolation: str = "linear"
 
+    @property
+    def looks_before(self) -> int:
+        """One: what is wanted depends on the time."""
+        return 1
+
     def check(self, faults: Faults) -> None:
         """Adds a fault where times are too few, or the interpolation is unknown."""
         faults.choice("interpolation", self.interpolation, INTERPOLATIONS)

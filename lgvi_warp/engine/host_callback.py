@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.real_numbers import answered
-from lgvi_warp.control.callback import Callback
 from lgvi_warp.engine.packets import Packets
 
 
@@ -90,8 +89,6 @@ def ask(packets: Packets, t: float) -> None:
     controller = packets.plan.kernel_choice.controller
     assert controller is not None
     callback: Any = controller.callback
-    assert isinstance(callback, Callback)
-    assert callback.function is not None
     measured, wanted = last_look(packets)
     members = packets.members.indices
     where = f"callback {callback.key!r} at t = {t:.9g} s, members {members[0]} to {members[-1]}"

@@ -30,7 +30,6 @@ from lgvi_warp.engine.step_warnings import (
     orthogonality_limit,
     row_limits,
 )
-from lgvi_warp.physics.terms.events import Event
 from lgvi_warp.sampling.members import Members
 
 
@@ -264,7 +263,6 @@ class Packets:
         code = self._status[:m].astype(np.uint8)
         status, stopped_by = code.copy(), np.zeros(m, np.uint8)
         for number, (event, _) in enumerate(self.plan.kernel_choice.events):
-            assert isinstance(event, Event)
             stopped = code == FIRST + number
             status[stopped], stopped_by[stopped] = event.status, 1 + number
         return Outcome(

@@ -11,9 +11,8 @@ from lgvi_warp.common.status import Warnings
 from lgvi_warp.methods.limits import MUNK, RESTORING, longest_stage, oscillation_limit, rotation_limit
 from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid
-from lgvi_warp.physics import vehicle
+from lgvi_warp.physics import hydrostatics, vehicle
 from lgvi_warp.physics.inertia import Frame
-from lgvi_warp.physics.terms import hydrostatics
 from lgvi_warp.physics.terms.base import Term
 
 if TYPE_CHECKING:

@@ -116,6 +116,21 @@ def test_only_seven_files_of_the_engine_know_the_kernels():
     assert importers("lgvi_kernels") == those
 
 
+def test_the_engine_knows_no_law_by_name():
+    # Base classes, and what all laws share: a law says of itself what a kernel must know (`Term.exact_flow`, `carries` ...).
+    general = {f"physics.terms.{name}" for name in ("base", "noisy", "events")}
+    general |= {f"control.{name}" for name in ("base", "controller", "signals")}
+    single = {
+        (module, found.name)
+        for module, all_of_it in part("lgvi_warp.engine").items()
+        for found in all_of_it
+        if any(within(found.name, f"lgvi_warp.{room}") for room in ("physics.terms", "control"))
+        if found.name != "lgvi_warp.physics.terms"
+        if not any(within(found.name, f"lgvi_warp.{name}") for name in general)
+    }
+    assert single == set()
+
+
 def test_nothing_of_the_product_uses_the_reference():
     assert importers("lgvi_warp.reference") == set()
 

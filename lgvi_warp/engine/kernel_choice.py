@@ -20,8 +20,9 @@ from lgvi_warp.methods.method import FORCED, Method, Program, divided, merged, s
 from lgvi_warp.physics import terms, vehicle
 from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.physics.terms.noisy import NoisyTerm
-from lgvi_warp.scene.ensemble import SURVEYED, Ensemble, over_members
+from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
 from lgvi_warp.scene.oddities import Oddities
+from lgvi_warp.scene.slices import over_members
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,8 @@ from lgvi_warp.physics import inertia, notation, vehicle
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Packed, PackingContext, Term
 from lgvi_warp.sampling.members import Members
-from lgvi_warp.scene.ensemble import KEPT, Ensemble
+from lgvi_warp.scene.draws import KEPT
+from lgvi_warp.scene.ensemble import Ensemble
 
 Fields = dict[str, Any]
 # A Plan, whose module imports this one.

@@ -13,7 +13,7 @@ from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics import hydrostatics, vehicle
 from lgvi_warp.physics.inertia import Frame
-from lgvi_warp.physics.terms.base import Term
+from lgvi_warp.physics.terms.base import Term, own
 
 if TYPE_CHECKING:
     from lgvi_warp.sampling.members import Members
@@ -112,7 +112,7 @@ def _drag_number(plan: Watched, members: Members, water: np.ndarray | None) -> n
     total = np.zeros((1, 6))
     for term, _ in plan.kernel_choice.laws:
         if type(term).braking is not Term.braking:
-            numbers = {name: p[f"{term.key}.{name}"] for name in term.parameters()}
+            numbers = own(term, p)
             brakes = term.braking(numbers, np.abs(twist), p["environment.water_density"])
             total = total + np.einsum("nii->ni", brakes)
     inertias = np.einsum("nii->ni", vehicle.inertia6(p))

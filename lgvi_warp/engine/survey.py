@@ -16,9 +16,10 @@ from lgvi_warp.methods.method import Method, middle_axis
 from lgvi_warp.physics import inertia, notation, terms, vehicle
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Term
-from lgvi_warp.scene.ensemble import Ensemble, over_members
+from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.oddities import Oddities
 from lgvi_warp.scene.plausibility import of_numbers
+from lgvi_warp.scene.slices import over_members
 
 Parameters = Mapping[str, np.ndarray]
 

@@ -12,8 +12,9 @@ from lgvi_warp.common import machine
 from lgvi_warp.engine.keepers.observation import Observation
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.scene import plausibility
-from lgvi_warp.scene.ensemble import AT_ONCE, SURVEYED
+from lgvi_warp.scene.ensemble import SURVEYED
 from lgvi_warp.scene.functions import functions_of, identities
+from lgvi_warp.scene.slices import AT_ONCE
 
 
 def messages(plan: Plan) -> tuple[str, ...]:

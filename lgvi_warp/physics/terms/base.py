@@ -56,7 +56,7 @@ class PackingContext:
         Returns:
             Its numbers by field, each of shape (1, ...) or (n, ...).
         """
-        return {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
+        return own(term, self.parameters)
 
 
 class Packed(NamedTuple):
@@ -464,6 +464,11 @@ class Term:
             if item.name != "name" and value is not None:
                 content[word_of(item)] = value.tolist() if isinstance(value, np.ndarray) else value
         return content
+
+
+def own(term: Term, parameters: Numbers) -> dict[str, np.ndarray]:
+    """The numbers of one term by field, out of those of a scene by name."""
+    return {name: parameters[f"{term.key}.{name}"] for name in term.parameters()}
 
 
 def _checked(

@@ -27,7 +27,7 @@ class Episodes:
     """
 
     def __init__(self, plan: Plan, members: Members):
-        assert plan.asks
+        assert plan.launches.asks
         assert plan.kernel_choice.controller is not None
         self.plan, self.packets, self.steps = plan, Packets(plan, members), 0
         self._controller = plan.kernel_choice.controller

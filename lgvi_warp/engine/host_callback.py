@@ -49,7 +49,7 @@ def last_look(packets: Packets, members: np.ndarray | None = None) -> tuple[Look
     members: which of their members (m,); default None for all.
     Returns: (measured, wanted), copies.
     """
-    y, r = (_numbers(packets, packets.plan.noted_rows[name], members) for name in ("measured", "reference"))
+    y, r = (_numbers(packets, packets.plan.layout.noted_rows[name], members) for name in ("measured", "reference"))
     measured_attitude, wanted_attitude = (rows[:, 3:12].reshape(-1, 3, 3) for rows in (y, r))
     headings = [np.arctan2(R[:, 1, 0], R[:, 0, 0]) for R in (measured_attitude, wanted_attitude)]
     measured = Looks(y[:, :3], measured_attitude, y[:, 12:15], y[:, 18:21], headings[0], water_velocity=y[:, 15:18])

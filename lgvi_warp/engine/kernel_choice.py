@@ -71,6 +71,11 @@ class KernelChoice:
     controller: Controller | None = None
     parts_of_control: tuple[tuple[Part, Any], ...] = ()
 
+    @property
+    def asks(self) -> bool:
+        """Whether a function of the host answers each look."""
+        return self.controller is not None and self.controller.callback is not None
+
 
 def choose_kernel(
     ensemble: Ensemble,

@@ -43,7 +43,7 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
         "checks": plan.checks,
         "on_failure": plan.on_failure,
         "terms": [term.type for term, _ in plan.kernel_choice.laws],
-        "kernel": plan.kernel_hash,
+        "kernel": plan.kernel.hash,
         "versions": machine.versions(),
         "machine": machine.describe() | {"width_source": plan.width_source},
     }
@@ -72,5 +72,5 @@ def odd_before(plan: Plan) -> tuple[str, ...]:
     ensemble = plan.ensemble
     varies = ensemble.starts_vary or bool(ensemble.varied() and plausibility.own_flows(ensemble.scene))
     starts = plausibility.of_start(ensemble.scene, ensemble.select(0, min(AT_ONCE, ensemble.members) if varies else 1))
-    most = None if plan.survey_all else SURVEYED
+    most = None if plan.surveyed_all else SURVEYED
     return plan.kernel_choice.odd.messages(ensemble.members, most) + starts.messages(ensemble.members, AT_ONCE)

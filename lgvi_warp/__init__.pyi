@@ -42,7 +42,6 @@ from lgvi_warp.control.state_feedback import StateFeedback as StateFeedback
 from lgvi_warp.control.trajectory import Trajectory as Trajectory
 from lgvi_warp.control.waypoints import Waypoints as Waypoints
 from lgvi_warp.engine.host_callback import Looks as Looks
-from lgvi_warp.engine.plan import Plan as Plan
 from lgvi_warp.methods.method import Method as Method
 from lgvi_warp.methods.saveat import SaveAt as SaveAt
 from lgvi_warp.physics import notation as notation

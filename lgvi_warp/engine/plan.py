@@ -41,29 +41,14 @@ class NotSurveyed(Exception):  # noqa: N818  (what happened, and no fault of the
 
 @dataclass(frozen=True)
 class Plan:
-    """All that is decided before a run: the kernel, the lanes of a packet, and the steps and samples; made by `choose_plan`.
+    """All that is decided before a run; `choose_plan` makes it.
 
-    Args:
-        ensemble: The members.
-        method: The integration method.
-        grid: The steps and the sample times.
-        fields: Names of the samples to keep, in the order in which they are saved.
-        dtype: Numbers of the kernel: "float64", "float32" or "float32_compensated".
-        checks: "safe", "all" for warnings as well, or "none".
-        on_failure: "freeze", "raise" or "substep".
-        surveyed_all: Whether the kernel was chosen by all members, or by the first SURVEYED.
-        looks: Whether samples are taken at all looks of the controller as well.
-        read_at_looks: Field of the motion -> which of its numbers statistics read at looks; None for all.
-        kernel_choice: The laws that act and the method's program for them.
-        spec: All that decides the kernel's source.
-        width_source: What chose the width (see widths.Width).
-        kernel: The kernel itself.
-        layout: What the kernel writes of a sample.
-        launches: The steps of each launch.
-        facts: What the members that were looked at require of a kernel.
-        shared: What all members share, computed once.
-        idle: Packets of finished blocks, to be used again.
-        whole: Of a plan made by `subplan`, the whole plan, the members and the fields; else None.
+    fields: names of the samples to keep, in the order in which they are saved.
+    surveyed_all: whether the kernel was chosen by all members, or by the first SURVEYED.
+    width_source: what chose the width (see widths.Width).
+    facts: what the members that were looked at require of a kernel.
+    idle: packets of finished blocks, to be used again.
+    whole: of a plan made by `subplan`, the whole plan, the members and the fields; else None.
     """
 
     ensemble: Ensemble
@@ -74,8 +59,6 @@ class Plan:
     checks: str
     on_failure: str
     surveyed_all: bool
-    looks: bool
-    read_at_looks: Mapping[str, tuple[int, ...]] | None
     kernel_choice: KernelChoice
     spec: Spec
     width_source: str = field(compare=False)
@@ -95,12 +78,7 @@ class Plan:
     def compile(self) -> float:
         """Load the kernel, and compile it first if Warp's cache has none.
 
-        Returns:
-            How long it took [s].
-
-        Raises:
-            SceneError: If the device code of a user's law does not compile.
-            OSError: If the kernel cache cannot be written.
+        Returns: How long it took [s].
         """
         start = time.perf_counter()
         self.kernel.load()
@@ -108,22 +86,13 @@ class Plan:
         return time.perf_counter() - start
 
     def replanned(self, **changes: Any) -> Plan:
-        """Plan the run again with other settings, from the beginning.
-
-        Args:
-            changes: Arguments of `choose_plan`.
-
-        Returns:
-            A plan of the same width.
-
-        Raises:
-            SceneError: As `choose_plan`.
-        """
+        """Plan the run from the beginning with other settings, those of `choose_plan`, and the same width."""
         return choose_plan(**{**self._settings(), **changes})
 
     def _settings(self) -> dict[str, Any]:
-        kept = ("ensemble", "method", "grid", "fields", "dtype", "checks", "on_failure", "looks", "read_at_looks")
-        own = {name: getattr(self, name) for name in kept}
+        named = ("ensemble", "method", "grid", "fields", "dtype", "checks", "on_failure")
+        of_looks = {"looks": self.launches.looks, "read_at_looks": self.layout.read_at_looks}
+        own = {name: getattr(self, name) for name in named} | of_looks
         return own | {"width": self.spec.width, "survey_all": self.surveyed_all}
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -134,17 +103,7 @@ class Plan:
         return functools.partial(choose_plan, **self._settings(), width_source=self.width_source), ()
 
     def of(self, ensemble: Ensemble) -> Plan:
-        """The same plan for other members, of the same scene and with the same names that vary.
-
-        Args:
-            ensemble: The members; the survey of the whole plan must hold for them.
-
-        Returns:
-            A plan that shares the kernel and all that members share.
-
-        Raises:
-            SceneError: If a member's drag is too strong for the method.
-        """
+        """The same plan, with the same kernel, for other members of the scene, of which the survey of this one holds."""
         check_backward_drag(ensemble, self.kernel_choice, self.method, self.grid.h)
         return replace(self, ensemble=ensemble)
 
@@ -152,20 +111,12 @@ class Plan:
         """The plan for some of the members, with all choices made for the whole ensemble.
 
         The members' bits are therefore those of the whole run, unless steps are adaptive (see `with_neighbours`).
-
-        Args:
-            indices: Indices of the members, (m,).
-            fields: Names of the sample fields to keep.
-
-        Returns:
-            A plan for m members.
         """
         layout = replace(self.layout, fields=ordered(fields))
         return replace(
             self,
             ensemble=self.ensemble.subset(indices),
             fields=layout.fields,
-            looks=False,
             layout=layout,
             launches=_launches(self.grid, self.method, self.spec, layout, False),
             shared=_shared(self.ensemble),
@@ -174,15 +125,9 @@ class Plan:
         )
 
     def with_neighbours(self, indices: np.ndarray) -> np.ndarray:
-        """The members whose run gives these members the bits of the whole run.
+        """The members whose run gives these members (m,) the bits of the whole run, in rising order.
 
         Adaptive steps are chosen for a whole packet, so a member's bits depend on the others of its packet.
-
-        Args:
-            indices: Indices of members, (m,).
-
-        Returns:
-            Indices of these members, and for adaptive steps of all members of their packets, in rising order.
         """
         if not self.method.adaptive:
             return indices
@@ -191,32 +136,14 @@ class Plan:
         return lanes[lanes < self.ensemble.members]
 
     def check_block(self, block: Block, members: Members) -> None:
-        """Look at members of a block that were not looked at before the run.
-
-        Args:
-            block: The block.
-            members: Its members.
-
-        Raises:
-            SceneError: If a member is unphysical.
-            NotSurveyed: If a member needs what the kernel does not have.
-        """
+        """Look at members that were not looked at before the run; raise NotSurveyed where the kernel lacks something."""
         self.ensemble.check_block(block.first, block.stop, members.parameters)
         unseen = not self.surveyed_all and block.stop > SURVEYED and self.whole is None
         if unseen and not self.serves(self.ensemble, block, members):
             raise NotSurveyed(f"a member of {block.first} to {block.stop - 1} needs what the first {SURVEYED} do not")
 
     def serves(self, ensemble: Ensemble, block: Block, members: Members) -> bool:
-        """Whether the kernel has all that some members need, which may be others than those it was chosen by.
-
-        Args:
-            ensemble: The ensemble that they are of, of the same scene and with the same names that vary.
-            block: Where they are in it.
-            members: The members.
-
-        Returns:
-            False where they need more.
-        """
+        """Whether the kernel has all that some members of the same scene need."""
         return self.facts.covers(survey_of(members.parameters, ensemble, self.method, self.grid.h, self.shared, block))
 
 
@@ -266,8 +193,6 @@ def choose_plan(
         checks=checks,
         on_failure=on_failure,
         surveyed_all=survey_all,
-        looks=looks,
-        read_at_looks=read_at_looks,
         kernel_choice=choice,
         spec=spec,
         width_source=width_source,

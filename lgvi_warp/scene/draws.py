@@ -131,7 +131,7 @@ class Draws:
     def members_of(self, values: dict[str, np.ndarray], indices: np.ndarray, seed: int) -> Members:
         """Members from all their numbers by name, which loses those of the start."""
         m = len(indices)
-        start = {key[6:]: values.pop(key) for key in tuple(values) if key.startswith("start.")}
+        start = {key.removeprefix("start."): values.pop(key) for key in tuple(values) if key.startswith("start.")}
         # In one memory layout, on which the order of the sums of a matrix product depends.
         R = _of_each(np.ascontiguousarray(self._attitude(start)), m)
         if "velocity_inertial" in start:
@@ -200,7 +200,7 @@ def _turned_by_matrix(faults: Faults, start: dict[str, Any], keys: Sequence[str]
     for way in sorted((set(ways) - {variations.ATTITUDE}) & names):
         faults.add(f'"{way}"', "...", f'varies beside "{variations.ATTITUDE}"', "keep one of them")
     faults.raise_if_any()
-    R = resolve_attitude({way[6:]: np.asarray(start[way])[None] for way in ways if way in start})
+    R = resolve_attitude({way.removeprefix("start."): np.asarray(start[way])[None] for way in ways if way in start})
     return {name: value for name, value in start.items() if name not in ways} | {variations.ATTITUDE: R[0]}
 
 

@@ -2,6 +2,7 @@
 """Only what a scene has is compiled; a second solve builds nothing; memory follows the samples kept."""
 
 import dataclasses
+import pickle
 from itertools import combinations
 
 import numpy as np
@@ -260,3 +261,11 @@ def test_a_member_that_spins_up_is_told():
     result = lw.solve(resting, lw.Method("psi_s", iterations="auto"), h=0.1, t1=5.0)
     assert result.status.counts() == {"not_converged": 1}
     assert 0.0 < result.failure_time[0] < 5.0
+
+
+def test_a_plan_from_another_process_has_the_same_kernel():
+    plan = plan_of(scene_of(net=1.0), dtype="float32", checks="all")
+    again = pickle.loads(pickle.dumps(plan))
+    assert again.spec == plan.spec
+    assert again.width_source == plan.width_source
+    assert (again.fields, again.checks, again.surveyed_all) == (plan.fields, plan.checks, plan.surveyed_all)

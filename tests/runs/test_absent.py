@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_kernels.laws import current
 from lgvi_warp.physics import terms
 from lgvi_warp.runs.settle import make_plan
 from tests.laws.cases import CASES
@@ -16,7 +17,8 @@ from tests.support.tools import generated, one
 
 # What the generated source holds if a scene has this term, and only then.
 MARKS = {
-    "drag": r"make_E__locals__slowed", "drag matrix": r"add_three", "current": r"\bflow_0\(", "tether": r"rest_length",
+    "drag": r"make_E__locals__slowed", "drag matrix": r"add_three",
+    "current": rf"\b{current.flow.native_func}\(", "tether": r"rest_length",
     "wrench": r"numbers_wrench", "thrusters": r"commanded", "waves": r"Waves", "fins": r"Fins",
 }  # fmt: skip
 # Functions that some scenes need, and a bare one does not.

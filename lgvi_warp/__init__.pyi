@@ -42,7 +42,6 @@ from lgvi_warp.control.state_feedback import StateFeedback as StateFeedback
 from lgvi_warp.control.trajectory import Trajectory as Trajectory
 from lgvi_warp.control.waypoints import Waypoints as Waypoints
 from lgvi_warp.engine.host_callback import Looks as Looks
-from lgvi_warp.engine.plan import Plan as Plan
 from lgvi_warp.importers.fossen import vehicle_tables_from_fossen as vehicle_tables_from_fossen
 from lgvi_warp.importers.fossen import vehicles as vehicles
 from lgvi_warp.importers.sdf import vehicle_tables_from_sdf as vehicle_tables_from_sdf

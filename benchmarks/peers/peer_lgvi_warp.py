@@ -86,7 +86,7 @@ class Fleet:
             raw = raw[:, -1].transpose(0, 2, 1).reshape(1, -1, raw.shape[2])
             raw = raw[:, : part.members.count].astype(np.float64)
             raw[0, part.outcome().status != 0] = np.nan
-            ends.append(unpacked(self.plan.sample_fields, raw, part.frame))
+            ends.append(unpacked(self.plan.layout.sizes, raw, part.frame))
         return tuple(np.concatenate([one[name][-1] for one in ends]) for name in ("position", "attitude"))
 
 

@@ -25,7 +25,8 @@ from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.keepers.memory import Samples
 from lgvi_warp.engine.keepers.observation import Observation, Observing, observe
 from lgvi_warp.engine.keepers.protocol import Keeper
-from lgvi_warp.engine.plan import SEGMENT_SAMPLE_BYTES, NotSurveyed, Plan
+from lgvi_warp.engine.launches import SEGMENT_SAMPLE_BYTES
+from lgvi_warp.engine.plan import NotSurveyed, Plan
 from lgvi_warp.engine.work import Work
 from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.results import member_fields
@@ -170,7 +171,7 @@ def predict(
     try:
         set_up, step = costs(plan, blocks_of_run, count, observed)
     except NotSurveyed:  # as `solve` goes on
-        plan = replace(plan, survey_all=True)
+        plan = plan.replanned(survey_all=True)
         compile_seconds += plan.compile()
         set_up, step = costs(plan, blocks_of_run, count, observed)
     place = nearest_folder(into.folder) if into else Path.cwd()
@@ -222,7 +223,7 @@ def _seconds(plan: Plan, steps: int, chosen: Sequence[Block], threads: int, obse
     """Time of a trial of these blocks up to a step [s], with the samples due by then."""
     due = plan.grid.sample_steps[plan.grid.sample_steps < steps]
     due = np.append(due, steps)
-    trial = replace(plan, grid=TimeGrid(plan.grid.h, due, due * plan.grid.h), width=plan.spec.width)
+    trial = plan.replanned(grid=TimeGrid(plan.grid.h, due, due * plan.grid.h))
     trial.compile()
     keepers: tuple[Keeper, ...] = (Samples.elsewhere(trial.fields),)
     if observed is not None:
@@ -245,7 +246,9 @@ def result_bytes(plan: Plan, fields: Sequence[str] | None = None) -> int:
     """
     k, n = len(plan.grid.times), plan.ensemble.members
     real = np.dtype(machine.DTYPES[plan.dtype]).itemsize
-    rows = {name: int(np.prod(plan.table[name].shape)) * real for name in (plan.fields if fields is None else fields)}
+    rows = {
+        name: int(np.prod(plan.layout.table[name].shape)) * real for name in (plan.fields if fields is None else fields)
+    }
     if plan.spec.compensated and "position" in rows:
         rows["position"] = 24
     first = plan.ensemble.parameters(0, 1)
@@ -305,10 +308,10 @@ class Sized:
         joined = self.store is not None or self.statistics.part > 0
         runs = parts(plan.ensemble.members, plan.grid.steps, threads, joined)
         count = min(len(runs), threads)
-        row = sum(plan.sample_fields.values()) * np.dtype(machine.DTYPES[plan.dtype]).itemsize
+        row = sum(plan.layout.sizes.values()) * np.dtype(machine.DTYPES[plan.dtype]).itemsize
         segment = min(SEGMENT_SAMPLE_BYTES, row * runs[0].count * len(plan.grid.times))
         # Those gathered at looks are held once, as the kernel wrote them.
-        looks = plan.slots(runs[0].count) * plan.look_bytes(runs[0].count)
+        looks = plan.launches.slots(runs[0].count) * plan.launches.look_bytes(runs[0].count)
         # A segment's samples are held three times: as the kernel wrote them, in order of members, and as rotated or moved
         # copies. Parts are held twice: their rows, and all joined.
         each = 3 * segment + looks + 2 * self.statistics.part + self.statistics.taking

@@ -59,8 +59,8 @@ def sizes(plan: Plan, statistics: Sequence[Statistic]) -> Sizes:
 
     values = {name: at(name, times) for name in ("file", "part", "joined", "estimates")}
     # Samples come one launch at a time; sketches are read at_once times together, which bounds the memory.
-    due = (s1 - s0 for s0, s1 in (plan.due(*segment) for segment in plan.segments(runs[0].count)))
-    launch = max(plan.slots(runs[0].count), *due)
+    due = (s1 - s0 for s0, s1 in (plan.launches.due(*segment) for segment in plan.launches.segments(runs[0].count)))
+    launch = max(plan.launches.slots(runs[0].count), *due)
     at_once = max(1, SORTED_AT_ONCE * times * 8 // max(values["joined"], 1))
     return Sizes(**values, taking=at("taking", launch), reading=at("reading", min(times, at_once)))
 
@@ -79,7 +79,7 @@ def _of_times(plan: Plan, statistics: Sequence[Statistic], count: int) -> Sizes:
 
     def take() -> None:
         samples = samples_of(plan, plan.grid, when, start, packets.ended)
-        for looks_or_not in (gathers.look, gathers.take) if plan.gathered else (gathers.take,):
+        for looks_or_not in (gathers.look, gathers.take) if plan.launches.gathered else (gathers.take,):
             looks_or_not(when, samples)
 
     _, taking = _peak(take)

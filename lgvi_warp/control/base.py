@@ -102,6 +102,11 @@ class Part(Term):
         """What it wants of the motion, among `WISHES`; by default nothing."""
         return ()
 
+    @property
+    def looks_before(self) -> int:
+        """Number of looks that it must have had before a time at which a member starts anew beside others; by default 0."""
+        return 0
+
     def features(self, numbers: Numbers) -> tuple[str, ...]:
         """What its device code must have for some members; by default nothing beyond what it always has.
 

@@ -77,6 +77,12 @@ class Sensor(MeasuringPart):
                 near = f"{np.floor(value):g} or {np.ceil(value):g}"
                 faults.add(name, value, "is no whole number of looks", f"give {near}")
 
+    @property
+    def looks_before(self) -> int:
+        """Those until a reading arrives, and the one at which it does."""
+        late = int(np.max(self.latency))
+        return late + 1 if late else 0
+
     def features(self, numbers: Numbers) -> tuple[str, ...]:
         """The names of the numbers that matter for some member."""
         return tuple(name for name, idle in IDLE.items() if np.any(_whole(name, numbers[name]) != idle))

@@ -42,6 +42,11 @@ class Trajectory(Guidance):
     speed: Any = number(("k",), "m/s", None, optional=True)
     interpolation: str = word("linear", known=INTERPOLATIONS)
 
+    @property
+    def looks_before(self) -> int:
+        """One: what is wanted depends on the time."""
+        return 1
+
     def check(self, faults: Faults) -> None:
         """Adds a fault where times are too few, or something changes too fast."""
         if len(self.times) < 2:

@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import refusal
-from lgvi_warp.control.sensor import Sensor
-from lgvi_warp.control.trajectory import Trajectory
 from lgvi_warp.engine.host_callback import Looks, answer, last_look
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.plan import Plan
@@ -29,7 +27,7 @@ class Episodes:
     """
 
     def __init__(self, plan: Plan, members: Members):
-        assert plan.asks
+        assert plan.launches.asks
         assert plan.kernel_choice.controller is not None
         self.plan, self.packets, self.steps = plan, Packets(plan, members), 0
         self._controller = plan.kernel_choice.controller
@@ -141,10 +139,8 @@ class Episodes:
 
     def _rehearsals(self) -> range:
         """Steps after which those that start are looked at besides: late readings, and what is wanted at times, need it."""
-        late = [int(np.max(part.latency)) for part in self._controller.sensors if isinstance(part, Sensor)]
-        timed = any(isinstance(part, Trajectory) for part in self._controller.guidance)
-        most = max(late, default=0)
-        looks = most + 1 if most or timed else 0
+        parts = (*self._controller.sensors, *self._controller.guidance)
+        looks = max((part.looks_before for part in parts), default=0)
         last = self.steps // self.every
         return range(max(1, last + 1 - looks) * self.every, self.steps + 1, self.every)
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.real_numbers import answered
-from lgvi_warp.control.callback import Callback
 from lgvi_warp.engine.packets import Packets
 
 
@@ -50,7 +49,7 @@ def last_look(packets: Packets, members: np.ndarray | None = None) -> tuple[Look
     members: which of their members (m,); default None for all.
     Returns: (measured, wanted), copies.
     """
-    y, r = (_numbers(packets, packets.plan.noted_rows[name], members) for name in ("measured", "reference"))
+    y, r = (_numbers(packets, packets.plan.layout.noted_rows[name], members) for name in ("measured", "reference"))
     measured_attitude, wanted_attitude = (rows[:, 3:12].reshape(-1, 3, 3) for rows in (y, r))
     headings = [np.arctan2(R[:, 1, 0], R[:, 0, 0]) for R in (measured_attitude, wanted_attitude)]
     measured = Looks(y[:, :3], measured_attitude, y[:, 12:15], y[:, 18:21], headings[0], water_velocity=y[:, 15:18])
@@ -90,8 +89,6 @@ def ask(packets: Packets, t: float) -> None:
     controller = packets.plan.kernel_choice.controller
     assert controller is not None
     callback: Any = controller.callback
-    assert isinstance(callback, Callback)
-    assert callback.function is not None
     measured, wanted = last_look(packets)
     members = packets.members.indices
     where = f"callback {callback.key!r} at t = {t:.9g} s, members {members[0]} to {members[-1]}"

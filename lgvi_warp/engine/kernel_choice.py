@@ -19,10 +19,10 @@ from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey
 from lgvi_warp.methods.method import FORCED, Method, Program, divided, merged, simplified, with_hops
 from lgvi_warp.physics import terms, vehicle
 from lgvi_warp.physics.terms.base import Term
-from lgvi_warp.physics.terms.drag import PARTS, Drag
 from lgvi_warp.physics.terms.noisy import NoisyTerm
-from lgvi_warp.scene.ensemble import SURVEYED, Ensemble, over_members
+from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
 from lgvi_warp.scene.oddities import Oddities
+from lgvi_warp.scene.slices import over_members
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class KernelChoice:
     aligned: bool
     moved: bool
     laws: tuple[tuple[Term, Any], ...]
-    events: tuple[tuple[Term, Any], ...]
+    events: tuple[tuple[Any, Any], ...]
     mass: str
     drag: tuple[str, ...]
     flow: str
@@ -70,6 +70,11 @@ class KernelChoice:
     odd: Oddities
     controller: Controller | None = None
     parts_of_control: tuple[tuple[Part, Any], ...] = ()
+
+    @property
+    def asks(self) -> bool:
+        """Whether a function of the host answers each look."""
+        return self.controller is not None and self.controller.callback is not None
 
 
 def choose_kernel(
@@ -94,10 +99,10 @@ def choose_kernel(
     asks_host = controller is not None and controller.callback is not None
     acting = _acting(ensemble, facts, built_in, controller)
     events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
-    damping = any(hasattr(module, "damping") for term, module in acting if not isinstance(term, Drag))
+    damping = any(hasattr(module, "damping") for term, module in acting if not term.exact_flow)
     flow = max((getattr(module, "FLOW", "none") for _, module in acting), key=FLOWS.index, default="none")
-    drags = [(term, module) for term, module in acting if isinstance(term, Drag)]
-    others = [module for _, module in acting if module is not built_in("laws", "current")]
+    drags = [term for term, _ in acting if term.exact_flow]
+    others = [module for term, module in acting if not term.carries]
     forced = method.base in FORCED and not all(getattr(module, "POTENTIAL", False) for module in others)
     if explicit:
         # Along the kernel's axes drag is six numbers and no matrix.
@@ -106,10 +111,9 @@ def choose_kernel(
         exact = len(drags) == 1 and not damping and flow != "varying" and not forced
     drag: tuple[str, ...] = ()
     if exact:
-        term = drags[0][0]
-        assert isinstance(term, Drag)
-        drag = tuple(part for part in PARTS if part in facts.drag)
-        module = built_in("laws", "drag_directions" if facts.bent else "drag")
+        term = drags[0]
+        drag = tuple(sorted(facts.drag))
+        module = built_in("laws", term.exact_flow[facts.bent])
         acting = [(term, module), *((t, m) for t, m in acting if t is not term)]
     dense = damping or (bool(drags) and not exact) or flow == "varying"
     memory = any(term.memory for term, _ in acting)
@@ -132,7 +136,7 @@ def choose_kernel(
             lead, maps = None, method.program
     elif events or asks_host or (lead is not None and lead[0] == "K" and not undone):
         lead, maps = None, program
-    conservative = checked and _conservative(facts, acting, built_in)
+    conservative = checked and _conservative(facts, acting)
     # Events, water and the potential are evaluated at the user's origin, or at that of the forces.
     elsewhere = controller is not None or bool(events) or flow != "none" or (conservative and facts.apart)
     contents = {"rates": explicit,
@@ -182,16 +186,16 @@ def _steady(module: Any) -> bool:
     return hasattr(module, "steady_force") or not any(hasattr(module, role) for role in ("law", "damping", "evolve"))
 
 
-def _conservative(facts: Survey, acting: list[tuple[Term, Any]], built_in: Callable[[str, str], Any]) -> bool:
+def _conservative(facts: Survey, acting: list[tuple[Term, Any]]) -> bool:
     """Whether no law creates energy, and the device code of each potential computes it.
 
     Kinetic energy is that relative to the water.
     """
-    tethered = any(module is built_in("laws", "tether") for _, module in acting)
+    anchored = any(term.anchored for term, _ in acting)
     for term, module in acting:
-        if module is built_in("laws", "current"):
+        if term.carries:
             # A uniform current does work against a tether, and its vertical part against weight.
-            passive = not tethered and term.key not in facts.rising
+            passive = not anchored and term.key not in facts.rising
         else:
             dissipates = term.dissipative or not hasattr(module, "damping")
             bounded = hasattr(module, "supply") or hasattr(module, "push")
@@ -214,15 +218,15 @@ def check_backward_drag(ensemble: Ensemble, choice: KernelChoice, method: Method
     back = -h * min(0.0, *method.stages)
     if back == 0.0 or not choice.drag:
         return
-    term = choice.laws[0][0]
+    term: Any = choice.laws[0][0]
 
     def largest(first: int, stop: int) -> float:
         members = ensemble.select(first, stop)
-        coefficients = ensemble.own(term, members.parameters)
+        numbers = ensemble.own(term, members.parameters)
         speeds = np.abs(np.concatenate([members.velocity, members.angular_velocity], axis=1))
         # Acceleration per unit force along each of the user's axes, the other axes being free.
         mobilities = np.einsum("nii->ni", np.linalg.inv(vehicle.inertia6(members.parameters)))
-        return float((back * (coefficients["linear"] + coefficients["quadratic"] * speeds) * mobilities).max())
+        return float((back * term.per_speed(numbers, speeds) * mobilities).max())
 
     number = max(over_members(largest, min(ensemble.members, SURVEYED)))
     if number > MOST_BACKWARD_DRAG:
@@ -354,7 +358,7 @@ def _check(
             faults.add("method", method.name, f"needs potentials of position plus those of attitude; {term.key} has none such",
                        "use ss6_13(psi_x), or bm6(psi_x)")  # fmt: skip
         if method.gauss and ("law" not in (roles := [role for role in ROLES if hasattr(module, role)]) or len(roles) > 1
-                             or isinstance(term, Drag) or getattr(module, "NOISE", False)):  # fmt: skip
+                             or term.exact_flow or getattr(module, "NOISE", False)):  # fmt: skip
             problem = f"takes forces of position and time only, which {term.key} is not"
             faults.add("method", method.name, problem, "use psi_s")
     for term, module in acting:

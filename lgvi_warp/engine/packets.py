@@ -30,7 +30,6 @@ from lgvi_warp.engine.step_warnings import (
     orthogonality_limit,
     row_limits,
 )
-from lgvi_warp.physics.terms.events import Event
 from lgvi_warp.sampling.members import Members
 
 
@@ -47,10 +46,10 @@ class Packets:
 
     def __init__(self, plan: Plan, members: Members):
         self.plan = plan
-        width, types = plan.spec.width, plan.advance.types
+        width, types = plan.spec.width, plan.kernel.advance.types
         self.count = -(-members.count // width)
         structs = (types.Inertia, types.Params, types.Events, types.Limits, *([types.Loop] if types.Loop else []))
-        inertia, params, events, limits, *loop = zip(structs, plan.dtypes, strict=True)
+        inertia, params, events, limits, *loop = zip(structs, plan.kernel.dtypes, strict=True)
         self._controlled = bool(loop)
         self.inertia, self._limits = (Structs(*kind) for kind in (inertia, limits))
         self.laws = LawArrays(self.count, (params, *loop, events), types.Lane, types.Number)
@@ -143,13 +142,13 @@ class Packets:
         controller = self.plan.kernel_choice.controller
         if controller is None:
             return 0, 0
-        kept = controller.bus.rows + bool(self.plan.notes) * sum(NOTED.values())
-        return kept + len(self.plan.signal_rows), kept
+        kept = controller.bus.rows + bool(self.plan.layout.notes) * sum(NOTED.values())
+        return kept + len(self.plan.layout.signal_rows), kept
 
     def _monitor(self) -> Any:
         """The arrays where the kernel notes what it saw at intervals."""
-        plan, monitor = self.plan, self.plan.advance.types.Monitor()
-        Lane, Ints = plan.advance.types.Lane, int_lane(plan.spec.width)
+        plan, monitor = self.plan, self.plan.kernel.advance.types.Monitor()
+        Lane, Ints = plan.kernel.advance.types.Lane, int_lane(plan.spec.width)
         if plan.spec.looks:
             for name, kind in (("warned", Ints), ("warned_step", Ints), ("warned_size", Lane)):
                 setattr(monitor, name, wp.zeros(self.count, dtype=kind, device="cpu"))
@@ -161,13 +160,13 @@ class Packets:
             monitor.substeps = wp.zeros(self.count, dtype=Ints, device="cpu")
         controller = plan.kernel_choice.controller
         if controller is not None:
-            rows = plan.signal_rows
+            rows = plan.layout.signal_rows
             monitor.every, monitor.commands = controller.every(plan.grid.h), controller.bus.channels
-            monitor.bus, monitor.kept, monitor.noting = controller.bus.rows, self._bus()[1], self.plan.notes
+            monitor.bus, monitor.kept, monitor.noting = controller.bus.rows, self._bus()[1], self.plan.layout.notes
             monitor.signals = wp.array(np.array(rows, np.int32), dtype=wp.int32, device="cpu")
             monitor.first_signals = wp.zeros((self.count, max(1, len(rows))), dtype=Lane, device="cpu")
-            monitor.slots = plan.slots(self.count * plan.spec.width)
-            monitor.numbers, columns = sum(plan.look_fields.values()), columns_at_looks(plan)
+            monitor.slots = plan.launches.slots(self.count * plan.spec.width)
+            monitor.numbers, columns = sum(plan.layout.look_fields.values()), columns_at_looks(plan)
             monitor.columns = wp.array(columns, dtype=wp.int32, device="cpu")
             if monitor.slots:
                 # An odd number of lanes from row to row: else the rows of a look crowd into a few lines of the cache.
@@ -183,7 +182,7 @@ class Packets:
         fields: dict[str, Any] = {f"{row}_limit": limit**2 for row, limit in row_limits(self.plan).items()}
         if "munk_coarse" in rows:
             fields["munk"] = (h * self.scale) ** 2 * munk_factor(self.frame)
-        if "step" in (self.plan.dtypes[-1].names or ()):
+        if "step" in (self.plan.kernel.dtypes[-1].names or ()):
             fields["step"] = h
         return fields
 
@@ -203,13 +202,13 @@ class Packets:
             that the next launch overwrites.
         """
         plan = self.plan
-        s0, s1 = plan.due(k0, k1)
-        numbers = sum(plan.sample_fields.values())
+        s0, s1 = plan.launches.due(k0, k1)
+        numbers = sum(plan.layout.sizes.values())
         width = plan.spec.width
-        waste = WASTE if SAMPLE_FIELDS.keys() - plan.sample_fields.keys() else 0
+        waste = WASTE if SAMPLE_FIELDS.keys() - plan.layout.sizes.keys() else 0
         shape = (self.count, max(1, (s1 - s0) * numbers) + waste)
         if self.out is None or self.out.shape != shape:
-            self.out = wp.empty(shape, dtype=plan.advance.types.Lane, device="cpu")
+            self.out = wp.empty(shape, dtype=plan.kernel.advance.types.Lane, device="cpu")
             self._samples = self.out.numpy()
             self._launch = None
         tolerances = plan.method.tolerances(plan.dtype)
@@ -226,13 +225,13 @@ class Packets:
     def _recorded(self, tolerances: Any, k0: int, k1: int, s0: int) -> Any:
         """Record a launch of the kernel without launching it."""
         plan = self.plan
-        stage_h, lead_h, sample_step = plan.times
+        stage_h, lead_h, sample_step = plan.launches.times
         inputs = [*self._arrays()[:4], *(plan.spec.real(tolerance) for tolerance in tolerances)]
         inputs += [wp.float64(plan.grid.h), stage_h, lead_h, k0, k1, s0, sample_step]
         inputs += [self.state, self.memory, self.status, self.failed_step, self.failed_size, self.monitor]
-        inputs += [sum(plan.sample_fields.values()), columns_of(plan.sample_fields), self.out]
+        inputs += [sum(plan.layout.sizes.values()), columns_of(plan.layout.sizes), self.out]
         with build_lock:
-            return wp.launch(plan.advance.kernel, dim=self.count, inputs=inputs, device="cpu", record_cmd=True)
+            return wp.launch(plan.kernel.advance.kernel, dim=self.count, inputs=inputs, device="cpu", record_cmd=True)
 
     def gathered(self, when: slice) -> np.ndarray:
         """What the last launch gathered at looks.
@@ -250,7 +249,7 @@ class Packets:
 
         Returns: (1, count * width, numbers of the signals), a copy.
         """
-        rows = self.monitor.first_signals.numpy()[:, : len(self.plan.signal_rows)]
+        rows = self.monitor.first_signals.numpy()[:, : len(self.plan.layout.signal_rows)]
         packets, numbers, width = rows.shape
         return rows.transpose(0, 2, 1).reshape(1, packets * width, numbers).copy()
 
@@ -264,7 +263,6 @@ class Packets:
         code = self._status[:m].astype(np.uint8)
         status, stopped_by = code.copy(), np.zeros(m, np.uint8)
         for number, (event, _) in enumerate(self.plan.kernel_choice.events):
-            assert isinstance(event, Event)
             stopped = code == FIRST + number
             status[stopped], stopped_by[stopped] = event.status, 1 + number
         return Outcome(
@@ -336,12 +334,12 @@ def columns_of(sizes: Mapping[str, int]) -> Any:
 def columns_at_looks(plan: Plan) -> np.ndarray:
     """Where in a look's rows the kernel writes the motion."""
     columns, row, firsts = [], 0, {}
-    for name, size in plan.look_fields.items():
+    for name, size in plan.layout.look_fields.items():
         firsts[name], row = row, row + size
     for name, size in SAMPLE_FIELDS.items():
         rows = np.full(size, -1)
         if name in firsts:
-            entries = plan.look_entries.get(name, range(size))
+            entries = plan.layout.look_entries.get(name, range(size))
             rows[list(entries)] = firsts[name] + np.arange(len(entries))
         columns.append(rows)
     return np.concatenate(columns).astype(np.int32)

@@ -23,9 +23,9 @@ from lgvi_warp.methods import modified_inertia
 from lgvi_warp.physics import inertia, notation, vehicle
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Packed, PackingContext, Term
-from lgvi_warp.physics.terms.drag import Drag
 from lgvi_warp.sampling.members import Members
-from lgvi_warp.scene.ensemble import KEPT, Ensemble
+from lgvi_warp.scene.draws import KEPT
+from lgvi_warp.scene.ensemble import Ensemble
 
 Fields = dict[str, Any]
 # A Plan, whose module imports this one.
@@ -114,15 +114,17 @@ class Packing:
         each = enumerate(self.plan.kernel_choice.laws)
         return [self._shared(("law", i), functools.partial(self._law, i, term, module)) for i, (term, module) in each]
 
-    def _law(self, i: int, term: Term, module: Any, numbers: Any) -> Packed:
+    def _law(self, i: int, term: Any, module: Any, numbers: Any) -> Packed:
         parameters = Ensemble.own(term, numbers)
+        packed: Packed
         if i > 0 or not self.plan.spec.drag:
-            return term.packed(parameters, self._context(numbers))
-        assert isinstance(term, Drag)
-        if module is built_in("laws", "drag"):
+            packed = term.packed(parameters, self._context(numbers))
+        elif module is built_in("laws", term.exact_flow[0]):
             frame = numbers[FRAME][0]
-            return term.packed_exact(parameters, frame, self._scale(frame))
-        return term.packed_directions(parameters, self._context(numbers))
+            packed = term.packed_exact(parameters, frame, self._scale(frame))
+        else:
+            packed = term.packed_directions(parameters, self._context(numbers))
+        return packed
 
     def control(self) -> list[Packed]:
         """The numbers of each part of the controller."""

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from lgvi_warp.physics.terms.base import PackingContext
-from lgvi_warp.scene.ensemble import KEPT
+from lgvi_warp.scene.draws import KEPT
 
 Value = TypeVar("Value")
 

@@ -11,10 +11,9 @@ from lgvi_warp.common.status import Warnings
 from lgvi_warp.methods.limits import MUNK, RESTORING, longest_stage, oscillation_limit, rotation_limit
 from lgvi_warp.methods.method import KINDS, Method
 from lgvi_warp.methods.saveat import TimeGrid
-from lgvi_warp.physics import vehicle
+from lgvi_warp.physics import hydrostatics, vehicle
 from lgvi_warp.physics.inertia import Frame
-from lgvi_warp.physics.terms import hydrostatics
-from lgvi_warp.physics.terms.base import Term
+from lgvi_warp.physics.terms.base import Term, own
 
 if TYPE_CHECKING:
     from lgvi_warp.sampling.members import Members
@@ -34,10 +33,6 @@ class Watched(Protocol):
     @property
     def dtype(self) -> str:
         """The kernel's numbers, such as "float64"."""
-
-    @property
-    def checks(self) -> str:
-        """What the run looks for: "none", "safe" or "all"."""
 
     @property
     def kernel_choice(self) -> Any:
@@ -76,28 +71,26 @@ ORTHOGONAL_TO_ERROR = 1e-3
 ENERGY = 0.5
 
 
-def watched(plan: Watched) -> tuple[str, ...]:
+def watched(method: Method, choice: Any, dtype: str, checks: str) -> tuple[str, ...]:
     """The warnings that the kernel looks for.
 
     Returns: Names of rows of lgvi_kernels.advance.monitor, the least serious first: with checks="all" those that method and
         scene can give; with "safe" that of the attitude, where the method lets it depart.
     """
-    method, choice = plan.method, plan.kernel_choice
-    if plan.checks != "all":
-        return ("orthogonality",) * (plan.checks == "safe" and leaves_rotations(method))
-    rows = ["precision"] * (plan.dtype == "float32") + ["orthogonality"]
+    if checks != "all":
+        return ("orthogonality",) * (checks == "safe" and leaves_rotations(method))
+    rows = ["precision"] * (dtype == "float32") + ["orthogonality"]
     if not method.adaptive:
         munk = choice.mass != "isotropic"
         rows += ["munk_coarse"] * munk
         rows += ["rotation"] * (method.turns or method.tableau is not None)
-        rows += ["drag"] * (_dragged(plan) and not method.linearly_implicit)
+        rows += ["drag"] * (_dragged(choice) and not method.linearly_implicit)
         rows += ["munk_unstable"] * munk
     return (*rows, *["energy"] * choice.conservative)
 
 
-def _dragged(plan: Watched) -> bool:
+def _dragged(choice: Any) -> bool:
     """Whether a law takes speed from the vehicle."""
-    choice = plan.kernel_choice
     return bool(choice.drag) or any(hasattr(module, "damping") for _, module in choice.laws)
 
 
@@ -113,7 +106,7 @@ def _drag_number(plan: Watched, members: Members, water: np.ndarray | None) -> n
     total = np.zeros((1, 6))
     for term, _ in plan.kernel_choice.laws:
         if type(term).braking is not Term.braking:
-            numbers = {name: p[f"{term.key}.{name}"] for name in term.parameters()}
+            numbers = own(term, p)
             brakes = term.braking(numbers, np.abs(twist), p["environment.water_density"])
             total = total + np.einsum("nii->ni", brakes)
     inertias = np.einsum("nii->ni", vehicle.inertia6(p))
@@ -201,7 +194,7 @@ def at_start(
     note(Warnings.MUNK_COARSE, munk, coarse)
     note(Warnings.RESTORING_COARSE, swing, coarse)
     note(Warnings.ROTATION, h * _size(members.angular_velocity), rotation_limit(method))
-    if _split(plan) and _dragged(plan):
+    if _split(plan) and _dragged(plan.kernel_choice):
         with np.errstate(over="ignore", invalid="ignore"):
             note(Warnings.DRAG_STIFF, _drag_number(plan, members, water), SPLIT_DRAG_NUMBER)
     note(Warnings.MUNK_UNSTABLE, munk, oscillation_limit(method, MUNK))

@@ -16,10 +16,10 @@ from lgvi_warp.methods.method import Method, middle_axis
 from lgvi_warp.physics import inertia, notation, terms, vehicle
 from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Term
-from lgvi_warp.physics.terms.drag import Drag, has_exact_flow
-from lgvi_warp.scene.ensemble import Ensemble, over_members
+from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.oddities import Oddities
 from lgvi_warp.scene.plausibility import of_numbers
+from lgvi_warp.scene.slices import over_members
 
 Parameters = Mapping[str, np.ndarray]
 
@@ -222,18 +222,21 @@ def _seen(
             return term.present(numbers_of(term, numbers))
         return any(np.any(value) for value in term.packed({}, context(numbers, *run)).values.values())
 
-    def parts(term: Drag, numbers: Any) -> frozenset[str]:
+    def parts(term: Any, numbers: Any) -> frozenset[str]:
         return frozenset(term.parts(numbers_of(term, numbers)))
 
     def rises(term: Term, numbers: Any) -> bool:
-        return bool(np.any(numbers_of(term, numbers)["velocity"][:, 2]))
+        own = numbers_of(term, numbers)
+        count = max(map(len, own.values()))
+        water = term.water(own, np.zeros((1, count, 3)), np.zeros(1), numbers)
+        return water is not None and bool(np.any(water[..., 2]))
 
     def of_each(name: str, compute: Any, those: Iterable[Term]) -> dict[str, Any]:
         return {t.key: shared((name, t.key), p, functools.partial(compute, t)) for t in those}
 
     felt = of_each("felt", is_felt, (*terms.IMPLIED, *scene.terms))
-    drags = of_each("drag", parts, (term for term in scene.terms if isinstance(term, Drag)))
-    rising = of_each("rises", rises, (term for term in scene.terms if term.type == "current"))
+    drags = of_each("drag", parts, (term for term in scene.terms if term.exact_flow))
+    rising = of_each("rises", rises, (term for term in scene.terms if term.carries))
     parts_of_control = scene.controller.parts if scene.controller else ()
     features = of_each("features", lambda part, numbers: part.features(numbers_of(part, numbers)), parts_of_control)
     of_axes = shared("facts of axes", p, lambda numbers: _facts(*numbers[AXES]))
@@ -241,7 +244,7 @@ def _seen(
     return Survey(
         **of_axes,
         mass=mass,
-        bent=bool(drags) and not shared("exact flow", p, lambda numbers: has_exact_flow(numbers[FRAME][0])),
+        bent=bool(drags) and not shared("exact flow", p, lambda numbers: numbers[FRAME][0].principal),
         felt=frozenset(key for key, yes in felt.items() if yes),
         drag=frozenset().union(*drags.values()),
         rising=frozenset(key for key, yes in rising.items() if yes),

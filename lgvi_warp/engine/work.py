@@ -134,7 +134,9 @@ def run_block(
             ends = functools.cache(packets.ended)
             for first in range(looks.start, looks.stop, at_once):
                 when = slice(first, min(first + at_once, looks.stop))
-                values = divided(plan.look_fields, packets.gathered(when), plan.table, plan.look_entries)
+                values = divided(
+                    plan.layout.look_fields, packets.gathered(when), plan.layout.table, plan.layout.look_entries
+                )
                 samples = samples_of(plan, grid, when, values, ends)
                 for looker in lookers:
                     looker(when, samples)
@@ -143,24 +145,24 @@ def run_block(
             running = np.zeros(block.count, np.uint8), np.zeros(block.count, np.int64)
             keep(slice(0, 1), at_start(plan, members, packets), lambda: running)
 
-        if not plan.signals:
+        if not plan.layout.signals:
             keep_start()
-        if plan.asks:
+        if plan.launches.asks:
             packets.advance(0, 0)
-        for k0, k1 in plan.segments(block.count):
+        for k0, k1 in plan.launches.segments(block.count):
             if halted():
                 return None
-            if plan.asks:
+            if plan.launches.asks:
                 ask(packets, k0 * plan.grid.h)
             raw = packets.advance(k0, k1)[:, : block.count]
-            if k0 == 0 and plan.signals:
+            if k0 == 0 and plan.layout.signals:
                 # The first look of a controller is a part of the first launch.
                 keep_start()
-            if plan.gathered and (looks := plan.looks_of(k0, k1)).start < looks.stop:
-                look(plan.gathered, looks)
-            when = slice(*plan.due(k0, k1))
+            if plan.launches.gathered and (looks := plan.launches.looks_of(k0, k1)).start < looks.stop:
+                look(plan.launches.gathered, looks)
+            when = slice(*plan.launches.due(k0, k1))
             if when.start < when.stop and block_keepers:
-                values = unpacked(plan.sample_fields, raw, packets.frame, plan.table)
+                values = unpacked(plan.layout.sizes, raw, packets.frame, plan.layout.table)
                 keep(when, {name: values[name] for name in plan.fields}, packets.ended)
             advanced(block.count * (k1 - k0))
         outcome = packets.outcome(warned)
@@ -178,10 +180,10 @@ def at_start(plan: Plan, members: Members, packets: Packets) -> dict[str, np.nda
     types = {"position": np.dtype(np.float64)} if plan.spec.compensated else {}
     motion = (name for name in plan.fields if name not in SIGNALS)
     states = {name: getattr(members, name)[None].astype(types.get(name, real), copy=False) for name in motion}
-    if not plan.signals:
+    if not plan.layout.signals:
         return states
-    sizes = {name: plan.sample_fields[name] for name in plan.signals}
-    return states | divided(sizes, packets.first_signals()[:, : members.count], plan.table)
+    sizes = {name: plan.layout.sizes[name] for name in plan.layout.signals}
+    return states | divided(sizes, packets.first_signals()[:, : members.count], plan.layout.table)
 
 
 def in_order(runs: Sequence[Block], done: Iterable[tuple[Block, Any]]) -> Iterator[tuple[Block, Any]]:

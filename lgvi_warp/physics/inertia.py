@@ -18,6 +18,8 @@ from lgvi_warp.physics.notation import hat
 
 # A coupling below this fraction of its possible size is round-off of turned axes and shifted origins.
 ROUND_OFF = 1e-12
+# Off-diagonal elements below this fraction of the largest are round-off of the turned axes.
+DIAGONAL = 1e-12
 
 
 def vee(A: np.ndarray) -> np.ndarray:
@@ -134,6 +136,13 @@ class Frame:
     def shifted(self) -> bool:
         """Whether some member's origin of the state is not the user's."""
         return bool(self.origin.any())
+
+    @property
+    def principal(self) -> bool:
+        """Whether the user's axes are principal axes of M and J, in any order, about the same origin."""
+        off = np.abs(self.M[:, ~np.eye(3, dtype=bool)]).max(axis=1)
+        diagonal = off <= DIAGONAL * np.abs(np.einsum("nii->ni", self.M)).max(axis=1)
+        return bool(np.all(diagonal) and self.aligned and not self.coupled)
 
     @functools.cached_property
     def from_forces(self) -> np.ndarray:

@@ -12,8 +12,9 @@ from lgvi_warp.common import machine
 from lgvi_warp.engine.keepers.observation import Observation
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.scene import plausibility
-from lgvi_warp.scene.ensemble import AT_ONCE, SURVEYED
+from lgvi_warp.scene.ensemble import SURVEYED
 from lgvi_warp.scene.functions import functions_of, identities
+from lgvi_warp.scene.slices import AT_ONCE
 
 
 def messages(plan: Plan) -> tuple[str, ...]:
@@ -42,7 +43,7 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
         "checks": plan.checks,
         "on_failure": plan.on_failure,
         "terms": [term.type for term, _ in plan.kernel_choice.laws],
-        "kernel": plan.kernel_hash,
+        "kernel": plan.kernel.hash,
         "versions": machine.versions(),
         "machine": machine.describe() | {"width_source": plan.width_source},
     }
@@ -71,5 +72,5 @@ def odd_before(plan: Plan) -> tuple[str, ...]:
     ensemble = plan.ensemble
     varies = ensemble.starts_vary or bool(ensemble.varied() and plausibility.own_flows(ensemble.scene))
     starts = plausibility.of_start(ensemble.scene, ensemble.select(0, min(AT_ONCE, ensemble.members) if varies else 1))
-    most = None if plan.survey_all else SURVEYED
+    most = None if plan.surveyed_all else SURVEYED
     return plan.kernel_choice.odd.messages(ensemble.members, most) + starts.messages(ensemble.members, AT_ONCE)

@@ -24,7 +24,7 @@ from lgvi_warp.control.signals import IN_FILES, SIGNALS
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS, TABLE, dims_of
-from lgvi_warp.physics.terms.base import Term
+from lgvi_warp.physics.terms.base import Term, own
 from lgvi_warp.results import member_fields, result_file
 from lgvi_warp.statistics.estimates.estimate import Estimates
 from lgvi_warp.statistics.values.quantity import KNOWN
@@ -240,7 +240,7 @@ class Result(Summarized):
         Returns:
             Arrays by field of the term, each with a leading dimension of 1 or n.
         """
-        return {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
+        return own(term, self.parameters)
 
     def part(self, places: np.ndarray) -> Result:
         """Select members, in the order given.

@@ -37,7 +37,7 @@ def completed(plan: Plan, threads: int, observed: Observation, fields: Sequence[
     try:
         result = run_plan(plan, threads, observed=observed, fields=fields, **settings)
     except NotSurveyed:
-        plan = replace(plan, survey_all=True)
+        plan = plan.replanned(survey_all=True)
         result = run_plan(plan, threads, observed=observed, fields=fields, **settings)
     return finished(result, plan, observed, fields, threads)
 

@@ -13,7 +13,7 @@ from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import Status
 from lgvi_warp.control.signals import check
 from lgvi_warp.engine.block import blocks
-from lgvi_warp.engine.plan import Plan
+from lgvi_warp.engine.plan import Plan, choose_plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt, time_grid
 from lgvi_warp.physics.fields import FIELDS
@@ -95,7 +95,7 @@ def make_plan(
     if method is None and settings.method is None and not settings.method_options:
 
         def plan_of(method: Method, told: tuple[str, ...]) -> Plan:
-            return Plan(ensemble, method, replace(grid, messages=(*grid.messages, *told)), *others)
+            return choose_plan(ensemble, method, replace(grid, messages=(*grid.messages, *told)), *others)
 
         return planned(ensemble, grid, plan_of)
     chosen = method if isinstance(method, Method) else settings.method_of(method)
@@ -105,7 +105,7 @@ def make_plan(
         number = f"{n} a solve, enough for" if n is not None else f"to the tolerance: {MOST_FIXED} are too few for"
         text = f"Newton steps {number} every member's start at twice the step"
         grid = replace(grid, messages=(*grid.messages, text))
-    return Plan(ensemble, chosen, grid, *others)
+    return choose_plan(ensemble, chosen, grid, *others)
 
 
 def fields_of(save: SaveAt | None, settings: RunSettings) -> tuple[str, ...]:

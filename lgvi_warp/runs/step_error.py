@@ -20,9 +20,9 @@ from lgvi_warp.methods.limits import stability_polynomial
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.tableaux import RK4
 from lgvi_warp.physics import vehicle
+from lgvi_warp.physics.hydrostatics import moment, net
 from lgvi_warp.physics.notation import hat
 from lgvi_warp.physics.terms.base import Term, word_of
-from lgvi_warp.physics.terms.hydrostatics import moment, net
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import Ensemble
 

@@ -16,14 +16,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lgvi_warp.physics import vehicle as vehicles
-from lgvi_warp.physics.terms.base import Term
+from lgvi_warp.physics.terms.base import Term, own
 from lgvi_warp.physics.terms.control_fins import ControlFins
 from lgvi_warp.physics.terms.cross_flow import CrossFlow
 from lgvi_warp.physics.terms.wrench import holds
 from lgvi_warp.sampling.members import Members
-from lgvi_warp.scene.ensemble import Ensemble, over_members
+from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.like import SceneLike
 from lgvi_warp.scene.oddities import Look, Oddities, gathered
+from lgvi_warp.scene.slices import over_members
 
 Numbers = Mapping[str, np.ndarray]
 
@@ -239,7 +240,7 @@ def _of_start(scene: SceneLike, members: Members) -> Iterator[Look]:
     if not ends_at_the_surface(scene):
         yield "start.position", depth < LIMITS["depth"].value, _text(HIGH, depth)
     for term in own_flows(scene):
-        numbers = {name: members.parameters[f"{term.key}.{name}"] for name in term.parameters()}
+        numbers = own(term, members.parameters)
         water = term.water(numbers, members.position[None], np.zeros(1), members.parameters)
         if water is not None:
             flow = _speed(water[0])

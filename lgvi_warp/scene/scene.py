@@ -23,10 +23,11 @@ from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.physics.terms import events
 from lgvi_warp.physics.vehicle import UNITS, Vehicle
 from lgvi_warp.sampling.distributions.named import from_dict as distribution_from_dict
-from lgvi_warp.scene.ensemble import Ensemble, check_names
+from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.file import tables_and_text, tables_of_text, with_named_vehicle
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 from lgvi_warp.scene.start import Environment, Start
+from lgvi_warp.scene.variations import check_names
 
 # Sections of a scene that are one object each.
 RUN_REMEDY = (

@@ -21,6 +21,7 @@ from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.sampling.distributions.basic import Distribution, varies_nothing
 from lgvi_warp.sampling.distributions.joint import AttitudeDistribution, PhysicalInertia, PositiveDefinite
+from lgvi_warp.scene.start import NAMES
 
 # Parameters that are symmetric matrices, and stay so when they vary.
 MATRICES = tuple(f"vehicle.{name}" for name in vehicles.SYMMETRIC)
@@ -297,3 +298,15 @@ def space(seed: int, found: Sequence[Variation]) -> Space:
         first += size
     keys, sizes = (tuple(getattr(varied, name) for varied in ordered) for name in ("key", "size"))
     return Space(seed, keys, sizes, tuple(factors))
+
+
+def check_names(vary: Mapping[str, Any], parameters: Sequence[str]) -> None:
+    """Check that a scene has the names that vary."""
+    faults = Faults("ensemble.vary.")
+    known = [*parameters, *(f"start.{name}" for name in NAMES)]
+    for key, distribution in vary.items():
+        for target in targets(key):
+            if target.name not in known:
+                remedy = functools.partial(closest, target.name, known)
+                faults.add(f'"{key}"', distribution, "does not name what a scene has", remedy)
+    faults.raise_if_any()

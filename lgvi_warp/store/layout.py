@@ -120,7 +120,7 @@ def _samples(plan: Plan, length: int, store: Chunking) -> list[StoreArray]:
     arrays = []
     for name in (name for name in plan.fields if store.fields is None or name in store.fields):
         computed = np.dtype("f8") if plan.spec.compensated and name == "position" else real
-        field = plan.table[name]
+        field = plan.layout.table[name]
         stored = np.dtype(store.dtype) if store.dtype else computed
         row = length * int(np.prod(field.shape)) * stored.itemsize
         # Chunks of equal length along the times, so that the last one is nearly full as well.

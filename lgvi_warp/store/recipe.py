@@ -49,12 +49,12 @@ def plan_of(
     sample_steps: Number of steps made until each sample, shape (k,).
     times: Times of the samples [s], shape (k,).
     """
-    from lgvi_warp.engine.plan import Plan
+    from lgvi_warp.engine.plan import choose_plan
 
     grid = TimeGrid(made["step"], sample_steps, times, tuple(made["messages"]))
     method, fields = Method(**made["method"]), tuple(made["fields"])
     settings = {name: made[name] for name in ("dtype", "width", "checks", "on_failure")}
-    return Plan(ensemble, method, grid, fields, **settings, looks=looks)
+    return choose_plan(ensemble, method, grid, fields, **settings, looks=looks)
 
 
 # Key in the stored provenance of an ensemble: SHA-256 of the arrays that it was given, which lie in the group "explicit".

@@ -16,7 +16,7 @@ from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import failed as failed_members
 from lgvi_warp.common.status import stop_time
 from lgvi_warp.engine.executors.threads import ThisThread
-from lgvi_warp.engine.plan import Plan
+from lgvi_warp.engine.plan import Plan, choose_plan
 from lgvi_warp.methods import saveat
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
@@ -196,7 +196,7 @@ class Sample:
         """Make the plan of a run at the sample's times."""
         m = round(float(self.spacing / Fraction(candidate.h)))
         grid = TimeGrid(candidate.h, self.index * m, self.times)
-        return Plan(ensemble or self.ensemble, candidate.resolved(), grid, FIELDS, candidate.dtype)
+        return choose_plan(ensemble or self.ensemble, candidate.resolved(), grid, FIELDS, candidate.dtype)
 
     def plan_to_price(self, candidate: Candidate) -> Plan:
         """Make the plan of a run of a setting outside the comparison."""

@@ -16,7 +16,7 @@ from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.executors import check_threads
 from lgvi_warp.engine.executors.threads import ThisThread
-from lgvi_warp.engine.plan import Plan
+from lgvi_warp.engine.plan import Plan, choose_plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics.terms.noisy import NoisyTerm
@@ -561,8 +561,8 @@ def verified(fleet: Ensemble, result: Result, found: Suggestion) -> tuple[float,
     if any(isinstance(term, NoisyTerm) for term, _ in plan.kernel_choice.laws):
         checked_fleet, share = comparison.drawn_every(checked_fleet, h / 2.0, own=False), math.sqrt(1.0 - 2.0**-2)
         grid_of_run = TimeGrid(h, steps, result.time)
-        done = run_plan(Plan(checked_fleet, plan.method, grid_of_run, plan.fields, candidate.dtype), 1)
-    half = Plan(checked_fleet, plan.method, TimeGrid(h / 2.0, 2 * steps, result.time), plan.fields, "float64")
+        done = run_plan(choose_plan(checked_fleet, plan.method, grid_of_run, plan.fields, candidate.dtype), 1)
+    half = choose_plan(checked_fleet, plan.method, TimeGrid(h / 2.0, 2 * steps, result.time), plan.fields, "float64")
     with np.errstate(all="ignore"):
         apart = comparison.distances(done, run_plan(half, 1), found.asked)
         size = comparison.errors(apart, len(result.time) - 1)[found.of]["path_max"]

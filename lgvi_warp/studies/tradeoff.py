@@ -14,9 +14,10 @@ import numpy as np
 
 from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.engine.executors.threads import ThisThread
-from lgvi_warp.engine.plan import DTYPES, Plan
+from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import COMPOSITIONS, PROGRAMS, Method
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.results.result import Result

@@ -46,7 +46,7 @@ def measured(ensemble, truth, h=0.02, dtype="float64", width=4):
     plan = make_plan(ensemble, "psi_s", h, 1.0, dtype=dtype, width=width)
     n, looks = ensemble.members, len(truth)
     packets = Packets(plan, ensemble.select(0, n))
-    kernel = _kernel(plan.spec.control.parts, plan.advance.types.Loop, width, plan.spec.real)
+    kernel = _kernel(plan.spec.control.parts, plan.kernel.advance.types.Loop, width, plan.spec.real)
     every, kind = controller.every(h), np.float64 if dtype == "float64" else np.float32
     lanes = np.zeros((packets.count * width, looks, FIELDS))
     lanes[:n] = np.broadcast_to(truth, (looks, n, FIELDS)).transpose(1, 0, 2)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 import lgvi_warp as lw
 from lgvi_kernels.advance import kernel
 from lgvi_kernels.lanes.flags import CPU_FLAGS
-from lgvi_warp.engine import plan
+from lgvi_warp.engine import kernel as kernels
 from tests.support.loops import twin_states
 
 H, EVERY, STEPS = 0.05, 2, 400
@@ -177,7 +177,7 @@ def test_laws_act(run):
 def test_widths_give_the_same_bits_and_float32_is_near(scene, run, monkeypatch):
     # As in tests/runs/test_same_bits.py: left free to fuse, the compiler joins other products at another width.
     monkeypatch.setattr(kernel, "CPU_FLAGS", CPU_FLAGS.replace("-ffp-contract=fast", "-ffp-contract=off"))
-    monkeypatch.setattr(plan, "make_advance", kernel.make_advance.__wrapped__)
+    monkeypatch.setattr(kernels, "make_advance", kernel.make_advance.__wrapped__)
     parameters, given, _ = run
     # Within float32.
     idle = parameters | {"heading_smc.nomoto_gain": np.minimum(parameters["heading_smc.nomoto_gain"], 1e30)}

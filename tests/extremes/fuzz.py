@@ -24,7 +24,7 @@ import numpy as np
 
 import lgvi_warp as lw
 from lgvi_warp import cli
-from lgvi_warp.engine import plan as plan_of_run
+from lgvi_warp.engine import kernel as kernel_of_run
 from lgvi_warp.physics import terms
 from lgvi_warp.physics.terms import events
 from lgvi_warp.runs.run import run_plan
@@ -467,8 +467,8 @@ def work(kind, first, stop, most):
     kernels = {make_plan(lw.Ensemble.from_scene(lw.Scene.load(ROOT / "examples" / "paper.toml"))).spec}
     if not most:
         # A plan holds the code of its kernel, half a second's work: here for scenes that are run.
-        make = plan_of_run.make_advance
-        plan_of_run.make_advance = lambda spec: make(spec) if spec in kernels else None
+        make = kernel_of_run.make_advance
+        kernel_of_run.make_advance = lambda spec: make(spec) if spec in kernels else None
     for seed in range(first, stop):
         faulthandler.dump_traceback_later(SECONDS, exit=True)
         print(json.dumps([seed, "begun", ""]), flush=True)

@@ -103,10 +103,15 @@ def test_the_product_imports_what_it_declares():
     )
 
 
-def test_only_seven_files_of_the_engine_know_the_kernels():
+def test_only_these_files_of_the_engine_know_the_kernels():
     those = {
+        "lgvi_warp.engine.kernel",
+        "lgvi_warp.engine.kernel_spec",
+        "lgvi_warp.engine.launches",
         "lgvi_warp.engine.packing",
         "lgvi_warp.engine.plan",
+        "lgvi_warp.engine.plan_checks",
+        "lgvi_warp.engine.sample_layout",
         "lgvi_warp.engine.packets",
         "lgvi_warp.engine.peak",
         "lgvi_warp.checks.bench",
@@ -114,6 +119,21 @@ def test_only_seven_files_of_the_engine_know_the_kernels():
         "lgvi_warp.checks.part_bench",
     }
     assert importers("lgvi_kernels") == those
+
+
+def test_the_engine_knows_no_law_by_name():
+    # Base classes, and what all laws share: a law says of itself what a kernel must know (`Term.exact_flow`, `carries` ...).
+    general = {f"physics.terms.{name}" for name in ("base", "noisy", "events")}
+    general |= {f"control.{name}" for name in ("base", "controller", "signals")}
+    single = {
+        (module, found.name)
+        for module, all_of_it in part("lgvi_warp.engine").items()
+        for found in all_of_it
+        if any(within(found.name, f"lgvi_warp.{room}") for room in ("physics.terms", "control"))
+        if found.name != "lgvi_warp.physics.terms"
+        if not any(within(found.name, f"lgvi_warp.{name}") for name in general)
+    }
+    assert single == set()
 
 
 def test_nothing_of_the_product_uses_the_reference():

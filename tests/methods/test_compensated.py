@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.engine import plan
+from lgvi_warp.engine import launches
 from lgvi_warp.physics import terms
 from lgvi_warp.physics.inertia import moved
 from tests.support.tools import difference, free_scene, last, one, random_states, scene_of
@@ -171,7 +171,7 @@ def test_launches_and_samples_do_not_change_the_path(method, monkeypatch):
     # The low parts are part of a packet's state: many short launches end where one does, to the bit.
     fleet = one(GENERAL, *random_states(3, 9, 0.5, 0.5))
     whole = run(fleet, method, 1e-3, 1.5)
-    monkeypatch.setattr(plan, "SEGMENT_VEHICLE_STEPS", 1)
+    monkeypatch.setattr(launches, "SEGMENT_VEHICLE_STEPS", 1)
     parts = run(fleet, method, 1e-3, 1.5, save=lw.SaveAt(every=0.05))
     for name in FIELDS:
         assert getattr(whole, name)[-1].tobytes() == getattr(parts, name)[-1].tobytes()

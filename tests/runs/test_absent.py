@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_kernels.laws import current
 from lgvi_warp.physics import terms
 from lgvi_warp.runs.settle import make_plan
 from tests.laws.cases import CASES
@@ -16,7 +17,8 @@ from tests.support.tools import generated, one
 
 # What the generated source holds if a scene has this term, and only then.
 MARKS = {
-    "drag": r"make_E__locals__slowed", "drag matrix": r"add_three", "current": r"\bflow_0\(", "tether": r"rest_length",
+    "drag": r"make_E__locals__slowed", "drag matrix": r"add_three",
+    "current": rf"\b{current.flow.native_func}\(", "tether": r"rest_length",
     "wrench": r"numbers_wrench", "thrusters": r"commanded", "waves": r"Waves", "fins": r"Fins",
 }  # fmt: skip
 # Functions that some scenes need, and a bare one does not.
@@ -129,7 +131,7 @@ def test_a_term_of_zeros_is_absent():
     plain = make_plan(one(lw.Scene(VEHICLE), **STATE), h=0.01, t1=0.1)
     asked = make_plan(one(lw.Scene(VEHICLE, terms=zeros), **STATE), h=0.01, t1=0.1)
     assert asked.spec == plain.spec
-    assert asked.advance is plain.advance
+    assert asked.kernel.advance is plain.kernel.advance
 
 
 def test_a_grid_of_noise_is_there_only_if_asked_for(tmp_path):
@@ -152,7 +154,7 @@ def test_a_polynomial_is_there_only_if_asked_for(tmp_path):
     }
     plans = {name: make_plan(one(scene, **STATE), h=0.01, t1=0.1) for name, scene in scenes.items()}
     assert plans["none"].spec == plans["square"].spec != plans["cubic"].spec
-    assert plans["none"].advance is plans["square"].advance
+    assert plans["none"].kernel.advance is plans["square"].kernel.advance
     for name in ("none", "cubic"):
         (tmp_path / name).mkdir()
         assert ("polynomial_law" in source(scenes[name], tmp_path / name)) == (name == "cubic")
@@ -184,9 +186,9 @@ def test_any_parameter_varies_and_compiles_nothing():
     shared = make_plan(lw.Ensemble(scene(), 20), h=0.01, t1=0.1)
     for name, law in VARIED.items():
         varied = make_plan(lw.Ensemble(scene(), 20, 1, {name: law}), h=0.01, t1=0.1)
-        assert varied.advance is shared.advance, name
+        assert varied.kernel.advance is shared.kernel.advance, name
     everything = make_plan(lw.Ensemble(scene(), 20, 1, VARIED), h=0.01, t1=0.1)
-    assert everything.advance is shared.advance
+    assert everything.kernel.advance is shared.kernel.advance
 
 
 @pytest.mark.slow

@@ -13,7 +13,7 @@ from lgvi_kernels.law import div, mul, neg, ones, positive, sub, vec3  # noqa: F
 from lgvi_warp.common.status import Status, under_way
 from lgvi_warp.control.base import ControlLaw
 from lgvi_warp.control.signals import SAVED, SIGNALS
-from lgvi_warp.engine import plan as plans
+from lgvi_warp.engine import launches
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.settle import make_plan
@@ -188,9 +188,9 @@ def test_threads_launches_and_blocks_give_the_same_bits(whole, monkeypatch):
     few = lw.solve(fleet(), "psi_s", **SETTINGS | {"save": lw.SaveAt(at=[0.1, 0.23], fields=SAVED)}, threads=2)
     for name in SAVED:
         assert getattr(few, name).tobytes() == getattr(whole, name)[[0, 10, 23, STEPS]].tobytes()
-    monkeypatch.setattr(plans, "SEGMENT_SAMPLE_BYTES", 7 * 256 * 100 * 8)
+    monkeypatch.setattr(launches, "SEGMENT_SAMPLE_BYTES", 7 * 256 * 100 * 8)
     plan = make_plan(fleet(), "psi_s", **SETTINGS)
-    assert len(list(plan.segments(256))) > 5
+    assert len(list(plan.launches.segments(256))) > 5
     assert same(whole, lw.solve(fleet(), "psi_s", **SETTINGS))
 
 
@@ -199,7 +199,7 @@ def test_signals_change_nothing_of_the_motion_and_cost_nothing_where_nobody_asks
     plan = make_plan(fleet(), "psi_s", **settings)
     assert not plan.spec.control.reports
     assert not plan.spec.control.headings
-    assert plan.signal_rows == ()
+    assert plan.layout.signal_rows == ()
     assert same(whole, lw.solve(fleet(), "psi_s", **settings), names=FIELDS)
     # What a look writes anyway needs no other kernel.
     everything = SETTINGS | {"save": lw.SaveAt(every=H, fields=("demand", "measured_position", "reference_attitude"))}

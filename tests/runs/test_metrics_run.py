@@ -10,8 +10,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.status import stop_time
-from lgvi_warp.engine import plan as plans
-from lgvi_warp.engine import work
+from lgvi_warp.engine import launches, work
 from lgvi_warp.engine.keepers.observation import Observation
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.reference import metrics as twin
@@ -180,7 +179,7 @@ def test_a_scene_without_a_controller_is_told(fleet):
 
 
 def test_numbers_do_not_depend_on_how_many_looks_are_gathered_at_once(fleet, coarse, monkeypatch):
-    monkeypatch.setattr(plans, "GATHERED_BYTES", 1)
+    monkeypatch.setattr(launches, "GATHERED_BYTES", 1)
     monkeypatch.setattr(work, "NUMBERS_AT_ONCE", 1)
     by_look = lw.solve(fleet, **COARSE, statistics=metrics())
     assert by_look.position.tobytes() == coarse.position.tobytes()
@@ -245,7 +244,7 @@ def test_a_look_gathers_only_the_numbers_that_are_read(fleet):
     def gathered(*statistics):
         observed = Observation(statistics, keep="none")
         plan = make_plan(fleet, t1=1.0, fields=observed.fields, looks=True, read_at_looks=observed.read_at_looks())
-        return plan.look_fields
+        return plan.layout.look_fields
 
     assert gathered(lw.IAE("depth"), lw.RMSError("depth")) == {"position": 1, "reference_depth": 1}
     assert gathered(lw.IAE("depth"), lw.IAE("heading")) == {

@@ -2,6 +2,7 @@
 """Only what a scene has is compiled; a second solve builds nothing; memory follows the samples kept."""
 
 import dataclasses
+import pickle
 from itertools import combinations
 
 import numpy as np
@@ -13,8 +14,8 @@ from lgvi_kernels.advance.kernel import make_advance
 from lgvi_kernels.laws import restoring, weight
 from lgvi_warp.engine.arrays import put_rows
 from lgvi_warp.engine.block import blocks, parts, shares
+from lgvi_warp.engine.launches import SEGMENT_SAMPLE_BYTES
 from lgvi_warp.engine.packets import Packets
-from lgvi_warp.engine.plan import SEGMENT_SAMPLE_BYTES
 from lgvi_warp.engine.survey import shape_of_mass
 from lgvi_warp.methods.method import Method
 from lgvi_warp.physics.fields import FIELDS
@@ -49,15 +50,15 @@ def test_an_absent_term_is_no_parameter():
     def names(struct):
         return set(struct.numpy_dtype()["names"])
 
-    assert names(plan_of(scene_of()).advance.types.Params) == {"unused"}
-    params = plan_of(scene_of(net=1.0)).advance.types.Params
+    assert names(plan_of(scene_of()).kernel.advance.types.Params) == {"unused"}
+    params = plan_of(scene_of(net=1.0)).kernel.advance.types.Params
     assert np.zeros(1, params.numpy_dtype())["own"].dtype.names == ("net",)
 
 
 def test_munk_moment_only_for_anisotropic_mass():
     isotropic, diagonal = plan_of(scene_of((2.0, 2.0, 2.0), net=1.0)), plan_of(scene_of((1.0, 2.0, 3.0)))
     assert isotropic.spec.mass == "isotropic"
-    assert "anisotropy" not in isotropic.advance.types.Inertia.numpy_dtype()["names"]
+    assert "anisotropy" not in isotropic.kernel.advance.types.Inertia.numpy_dtype()["names"]
     assert {letter for letter, _ in (*isotropic.spec.maps, isotropic.spec.lead)} == {"Ab", "D", "K"}
     assert diagonal.spec.mass == "diagonal"
     assert diagonal.spec.lead == ("T", 0.5)
@@ -86,14 +87,14 @@ def test_compositions_of_a_method_share_its_kernel(names):
     for terms, kernels in (([], 1), ([held], 1), ([schedule], len(names))):
         scene = lw.Scene(plain.vehicle, plain.environment, terms)
         plans = [make_plan(one(scene), name, h=0.01, t1=1.0) for name in names]
-        assert len({plan.kernel_hash for plan in plans}) == kernels
+        assert len({plan.kernel.hash for plan in plans}) == kernels
 
 
 def test_varying_a_parameter_compiles_nothing_else(scene):
     shared = make_plan(lw.Ensemble(scene, 16), h=0.01, t1=1.0)
     varied = make_plan(lw.Ensemble(scene, 16, vary={"vehicle.mass": lw.Normal(relative=0.01)}), h=0.01, t1=1.0)
     assert shared.spec == varied.spec
-    assert shared.advance is varied.advance
+    assert shared.kernel.advance is varied.kernel.advance
 
 
 def test_varied_parameters_act_on_their_member():
@@ -145,8 +146,8 @@ def test_shares_keep_all_threads_at_work(n, steps, threads):
 
 def test_segments_are_contiguous_and_their_buffer_is_bounded(scene):
     plan = make_plan(lw.Ensemble(scene, 4096), h=0.01, t1=1000.0, save=lw.SaveAt(every=0.01))
-    segments = list(plan.segments(4096))
-    samples = [plan.due(k0, k1) for k0, k1 in segments]
+    segments = list(plan.launches.segments(4096))
+    samples = [plan.launches.due(k0, k1) for k0, k1 in segments]
     assert segments[0][0] == 0
     assert segments[-1][1] == plan.grid.steps
     assert samples[-1][1] == len(plan.grid.times)
@@ -157,8 +158,8 @@ def test_segments_are_contiguous_and_their_buffer_is_bounded(scene):
 def test_segments_change_no_bit(scene, monkeypatch):
     fleet = lw.Ensemble(scene, 16, vary={"start.angular_velocity": lw.Normal(std=0.1)})
     whole = lw.solve(fleet, h=0.01, t1=2.0, save=lw.SaveAt(every=0.5))
-    monkeypatch.setattr("lgvi_warp.engine.plan.SEGMENT_VEHICLE_STEPS", 16 * 48)
-    monkeypatch.setattr("lgvi_warp.engine.plan.SEGMENT_SAMPLE_BYTES", 1)
+    monkeypatch.setattr("lgvi_warp.engine.launches.SEGMENT_VEHICLE_STEPS", 16 * 48)
+    monkeypatch.setattr("lgvi_warp.engine.launches.SEGMENT_SAMPLE_BYTES", 1)
     pieces = lw.solve(fleet, h=0.01, t1=2.0, save=lw.SaveAt(every=0.5))
     assert whole.position.tobytes() == pieces.position.tobytes()
 
@@ -170,7 +171,7 @@ def test_any_choice_of_fields_takes_the_same_kernel_and_its_own_memory(scene):
         for fields in combinations(FIELDS, count):
             save = lw.SaveAt(fields=fields, every=0.05)
             plan = make_plan(fleet, h=0.01, t1=0.1, save=save)
-            assert plan.advance is make_plan(fleet, h=0.01, t1=0.1).advance
+            assert plan.kernel.advance is make_plan(fleet, h=0.01, t1=0.1).kernel.advance
             raw = Packets(plan, fleet.select(0, 4)).launch(0, 10)
             assert raw.shape == (1, 2, sum(sizes[name] for name in fields), plan.spec.width)
             result = lw.solve(fleet, h=0.01, t1=0.1, save=save)
@@ -236,7 +237,7 @@ def test_kernels_compile_for_cuda(tmp_path):
     scene = scene_of(TURN @ np.diag((1.0, 2.0, 3.0)) @ TURN.T, net=1.0, moment=(0.0, 0.0, 1.0))
     for dtype in ("float64", "float32"):
         plan = plan_of(scene, width=1, dtype=dtype)
-        wp.compile_aot_module(plan.advance.kernel.module, arch=90, module_dir=str(tmp_path / dtype))
+        wp.compile_aot_module(plan.kernel.advance.kernel.module, arch=90, module_dir=str(tmp_path / dtype))
         assert any(path.suffix == ".cubin" for path in (tmp_path / dtype).iterdir())
 
 
@@ -260,3 +261,11 @@ def test_a_member_that_spins_up_is_told():
     result = lw.solve(resting, lw.Method("psi_s", iterations="auto"), h=0.1, t1=5.0)
     assert result.status.counts() == {"not_converged": 1}
     assert 0.0 < result.failure_time[0] < 5.0
+
+
+def test_a_plan_from_another_process_has_the_same_kernel():
+    plan = plan_of(scene_of(net=1.0), dtype="float32", checks="all")
+    again = pickle.loads(pickle.dumps(plan))
+    assert again.spec == plan.spec
+    assert again.width_source == plan.width_source
+    assert (again.fields, again.checks, again.surveyed_all) == (plan.fields, plan.checks, plan.surveyed_all)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A prepared run has the bits of solve, whatever varies, however often and from however many threads it is called."""
 
+import dataclasses
 import gc
 import pickle
 import re
@@ -301,7 +302,7 @@ def test_what_is_shared_changes_no_bit(vehicle, paper):
         plan = make_plan(fleet, method, h=0.01, t1=0.01, width=width)
         alone = arrays(Packets(plan, fleet.select(0, 6)))
         everything = {*scene.parameters(), *fleet.varied_names, "frame", "axes", "members", "seed"}
-        plan.__dict__["shared"] = Shared(everything)
+        plan = dataclasses.replace(plan, shared=Shared(everything))
         assert alone == arrays(Packets(plan, fleet.select(0, 6))), name
 
 

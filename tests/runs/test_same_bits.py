@@ -9,7 +9,7 @@ from benchmarks import problems
 from lgvi_kernels.advance import kernel
 from lgvi_kernels.lanes.arithmetic import WIDTHS
 from lgvi_kernels.lanes.flags import CPU_FLAGS
-from lgvi_warp.engine import plan
+from lgvi_warp.engine import kernel as kernels
 from lgvi_warp.engine.block import blocks
 from lgvi_warp.runs.settle import make_plan
 from tests.conftest import ROOT
@@ -106,7 +106,7 @@ def test_any_width(name, method, dtype, monkeypatch):
     flags = CPU_FLAGS.replace("-ffp-contract=fast", "-ffp-contract=off")
     assert flags != CPU_FLAGS
     monkeypatch.setattr(kernel, "CPU_FLAGS", flags)
-    monkeypatch.setattr(plan, "make_advance", kernel.make_advance.__wrapped__)
+    monkeypatch.setattr(kernels, "make_advance", kernel.make_advance.__wrapped__)
     fleet = lw.Ensemble(scene_called(name), 37, 1, {"start.angular_velocity": lw.Normal(std=0.1)})
 
     def solve(width):

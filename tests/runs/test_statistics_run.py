@@ -175,7 +175,7 @@ def test_the_order_in_which_blocks_finish_changes_no_bit(fleet, whole, order):
 
 
 def test_segments_change_no_bit(fleet, whole, monkeypatch):
-    monkeypatch.setattr("lgvi_warp.engine.plan.SEGMENT_SAMPLE_BYTES", 1)
+    monkeypatch.setattr("lgvi_warp.engine.launches.SEGMENT_SAMPLE_BYTES", 1)
     assert same(lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none").statistics, whole.statistics)
 
 
@@ -653,12 +653,12 @@ def test_what_a_moved_origin_needs_is_written_too():
     fleet = lw.Ensemble(lw.Scene.named("remus_100"))
     plan = make_plan(fleet, "psi_x", 0.01, 0.1, lw.SaveAt(fields=("position",)))
     assert plan.fields == ("position",)
-    assert plan.sample_fields == {"position": 3, "attitude": 9}
+    assert plan.layout.sizes == {"position": 3, "attitude": 9}
     plan = make_plan(fleet, "psi_x", 0.01, 0.1, lw.SaveAt(fields=("velocity", "position")))
     assert plan.fields == ("position", "velocity")
-    assert tuple(plan.sample_fields) == FIELDS
+    assert tuple(plan.layout.sizes) == FIELDS
     plan = make_plan(one(scene_of(net=1.0)), "psi_s", 0.01, 0.1, lw.SaveAt(fields=("position",)))
-    assert plan.fields == tuple(plan.sample_fields) == ("position",)
+    assert plan.fields == tuple(plan.layout.sizes) == ("position",)
 
 
 @pytest.mark.slow  # for its kernel
@@ -777,7 +777,7 @@ def test_no_statistics_cost_nothing(fleet):
     assert settings.watch(np.zeros(1)) == ((), None)
     plain = make_plan(fleet, **SETTINGS)
     asked = make_plan(fleet, **SETTINGS, fields=settings.fields)
-    assert plain.advance is asked.advance
+    assert plain.kernel.advance is asked.kernel.advance
     assert "observed" not in lw.solve(fleet, **SETTINGS).provenance
 
 

@@ -12,8 +12,7 @@ from lgvi_warp.engine.step_warnings import COARSE, PRECISION
 from lgvi_warp.engine.survey import frame_of
 from lgvi_warp.methods import limits
 from lgvi_warp.methods.method import Method
-from lgvi_warp.physics import terms
-from lgvi_warp.physics.terms import hydrostatics
+from lgvi_warp.physics import hydrostatics, terms
 from lgvi_warp.runs.settle import make_plan
 from tests.support.tools import one, random_states, scene_of
 

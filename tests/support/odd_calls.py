@@ -53,7 +53,6 @@ UNCALLED = {
     "Status",
     "Warnings",
     "Looks",
-    "Plan",
     "Allocation",
     "ControlLaw",
     "Guidance",

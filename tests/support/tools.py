@@ -109,6 +109,6 @@ def expected(entry):
 def generated(plan, folder):
     """The C++ that Warp generates for a plan's kernel, which nothing compiles."""
     with mock.patch("warp._src.build.build_cpu", lambda path, *_, **__: Path(path).touch()):
-        wp.compile_aot_module(plan.advance.kernel.module, device="cpu", module_dir=str(folder))
+        wp.compile_aot_module(plan.kernel.advance.kernel.module, device="cpu", module_dir=str(folder))
     (path,) = Path(folder).glob("*.cpp")
     return path.read_text()

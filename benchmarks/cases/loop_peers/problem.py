@@ -122,7 +122,7 @@ def make_lanes(problem: Problem) -> Way:
 
     def end() -> End:
         raw = samples[0][:, -1].transpose(0, 2, 1).reshape(1, -1, samples[0].shape[2])[:, : problem.members]
-        fields = unpacked(plan.sample_fields, raw.astype(np.float64), packets.frame)
+        fields = unpacked(plan.layout.sizes, raw.astype(np.float64), packets.frame)
         return fields["position"][-1], fields["attitude"][-1]
 
     return Way(lambda: packets.refill(packets.members), advance, end)

@@ -106,7 +106,7 @@ class Samples:
 def _empty(plan: Plan, names: Sequence[str], members: int) -> dict[str, np.ndarray]:
     """Uninitialised arrays for all samples of so many members, by field."""
     k, real = len(plan.grid.times), machine.DTYPES[plan.dtype]
-    fields = {name: np.empty((k, members, *plan.table[name].shape), real) for name in names}
+    fields = {name: np.empty((k, members, *plan.layout.table[name].shape), real) for name in names}
     if plan.spec.compensated and "position" in fields:
         fields["position"] = np.empty((k, members, 3))
     return fields

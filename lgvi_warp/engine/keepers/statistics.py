@@ -120,8 +120,8 @@ class _BlockStatistics:
         self._plan, self._replicates, self._times = plan, run.replicates, len(run.time)
         # For statistics of members' ends: the quantity at the last sample.
         self._last: dict[Statistic, np.ndarray] = {}
-        self._looking = plan.gathered is not None
-        of_looks = plan.gathered.times if plan.gathered else run.time
+        self._looking = plan.launches.gathered is not None
+        of_looks = plan.launches.gathered.times if plan.launches.gathered else run.time
         times = (of_looks if statistic.looks else run.times_of(statistic) for statistic in run.statistics)
         self._open = [
             statistic.open(time, members.count) for statistic, time in zip(run.statistics, times, strict=True)

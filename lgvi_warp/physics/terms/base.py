@@ -57,7 +57,7 @@ class PackingContext:
         Returns:
             Its numbers by field, each of shape (1, ...) or (n, ...).
         """
-        return {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
+        return own(term, self.parameters)
 
 
 class Packed(NamedTuple):
@@ -140,7 +140,9 @@ class Term:
     Class attributes: `type` is the name in a scene file, which knows the class as soon as it is made; `device` is the module
     of lgvi_kernels.laws by name (by default the type), or any object with the same functions; `timed` says whether the law
     depends on time; `dissipative`, whether its damping never creates energy; `strengths` names the numbers without which it
-    does nothing. docs/develop/add_a_force.md shows how to write one.
+    does nothing; `carries` says whether it is a current that is the same everywhere and at all times, which exerts no force;
+    `anchored`, whether it holds the vehicle to a place, so that a current does work. docs/develop/add_a_force.md shows how to
+    write one.
 
     Args:
         name: Name of the term in parameters ("name.field"), which tells two terms of one type apart; by default the type.
@@ -159,6 +161,11 @@ class Term:
     dissipative: ClassVar[bool] = True
     # Numbers without which it does nothing: it is absent where all of them are zero. None named: it always acts.
     strengths: ClassVar[tuple[str, ...]] = ()
+    carries: ClassVar[bool] = False
+    anchored: ClassVar[bool] = False
+    # Device code of its exact flow, a sub-map of its own: for axes that are principal ones, and for any, one after the other.
+    # None named: it has none. `Drag` has the methods that go with it.
+    exact_flow: ClassVar[tuple[str, ...]] = ()
     # The bus of a controller that drives it (see lgvi_warp/control), and the numbers that then do not act.
     driver: ClassVar[Any] = None
     driven_fields: ClassVar[tuple[str, ...]] = ()
@@ -459,6 +466,11 @@ class Term:
             if item.name != "name" and value is not None:
                 content[word_of(item)] = value.tolist() if isinstance(value, np.ndarray) else value
         return content
+
+
+def own(term: Term, parameters: Numbers) -> dict[str, np.ndarray]:
+    """The numbers of one term by field, out of those of a scene by name."""
+    return {name: parameters[f"{term.key}.{name}"] for name in term.parameters()}
 
 
 def _checked(

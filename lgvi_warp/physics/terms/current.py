@@ -21,6 +21,7 @@ class Current(Term):
 
     type: ClassVar[str] = "current"
     strengths: ClassVar[tuple[str, ...]] = ("velocity",)
+    carries: ClassVar[bool] = True
 
     velocity: Any = number((3,), "m/s")
 

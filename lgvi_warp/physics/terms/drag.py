@@ -14,8 +14,6 @@ from lgvi_warp.physics.inertia import Frame
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
 
 ZEROS = (0.0,) * 6
-# Off-diagonal elements below this fraction of the largest are round-off of the turned axes.
-DIAGONAL = 1e-12
 # Part of the exact flow -> its coefficients: their kind, and force or torque.
 PARTS = {
     "linear_force": ("linear", slice(0, 3)),
@@ -46,6 +44,7 @@ class Drag(Term):
     type: ClassVar[str] = "drag"
     device: ClassVar[str] = "drag_matrix"
     strengths: ClassVar[tuple[str, ...]] = ("linear", "quadratic")
+    exact_flow: ClassVar[tuple[str, ...]] = ("drag", "drag_directions")
 
     linear: Any = number((6,), "N s/m, N m s", ZEROS, least=0.0)
     quadratic: Any = number((6,), "N s2/m2, N m s2", ZEROS, least=0.0)
@@ -66,7 +65,7 @@ class Drag(Term):
 
         Args:
             numbers: The term's numbers by field, each of shape (n, 6).
-            frame: The kernel's frame, whose axes are the user's up to their order (`has_exact_flow`).
+            frame: The kernel's frame, whose axes are the user's up to their order (`Frame.principal`).
             scale: The factor by which the kernel divides momenta, (1,) or (n,).
 
         Returns:
@@ -109,6 +108,18 @@ class Drag(Term):
         matrices = {kind: numbers[kind][:, :, None] * np.eye(6) for kind in ("linear", "quadratic")}
         return packed_matrix(matrices["linear"], matrices["quadratic"], context)
 
+    def per_speed(self, numbers: Numbers, speeds: np.ndarray) -> np.ndarray:
+        """Drag over speed along and about each axis.
+
+        Args:
+            numbers: The term's numbers by field, each of shape (n, 6).
+            speeds: Sizes of velocity and angular velocity, (n, 6) [m/s, rad/s].
+
+        Returns:
+            (n, 6) [N s/m, N m s].
+        """
+        return np.asarray(numbers["linear"] + numbers["quadratic"] * speeds)
+
     def braking(self, numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
         """The derivatives on the diagonal.
 
@@ -133,14 +144,6 @@ def _turned(Q: np.ndarray, diagonal: np.ndarray) -> np.ndarray:
     return np.einsum(
         "nji,nj->ni", np.broadcast_to(Q, (max(len(Q), len(diagonal)), 3, 3)) ** 2, diagonal + 0.0 * Q[:, 0]
     )
-
-
-def has_exact_flow(frame: Frame) -> bool:
-    """Whether the user's axes are principal axes of M and J, in any order, about the same origin."""
-    M = frame.M
-    off = np.abs(M[:, ~np.eye(3, dtype=bool)]).max(axis=1)
-    diagonal = off <= DIAGONAL * np.abs(np.einsum("nii->ni", M)).max(axis=1)
-    return bool(np.all(diagonal) and frame.aligned and not frame.coupled)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from lgvi_warp.physics import vehicle
+from lgvi_warp.physics.hydrostatics import moment, net
 from lgvi_warp.physics.terms.base import CONSERVED, Array, Numbers, Packed, PackingContext, Term
 
 
@@ -52,24 +52,3 @@ class Restoring(Term):
     def potential(self, numbers: Numbers, position: Array, attitude: Array, parameters: Numbers) -> Array:
         # Energy U = (B r_b - W r_g).R^T e3, (k, n) [J].
         return np.sum(moment(parameters) * attitude[..., 2, :], axis=-1)
-
-
-def net(p: Numbers) -> np.ndarray:
-    """Weight less buoyancy, the net force downward.
-
-    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-    Returns: Force (n,) [N], negative where buoyancy is the larger.
-    """
-    return vehicle.weight(p) - p["vehicle.buoyancy"]
-
-
-def moment(p: Numbers) -> np.ndarray:
-    """The vector B r_b - W r_g about the user's origin, from which the restoring moment follows.
-
-    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-    Returns: Vectors (n, 3) [N m] in body axes.
-    """
-    lift = p["vehicle.buoyancy"][:, None] * p["vehicle.center_of_buoyancy"]
-    if "vehicle.center_of_gravity" not in p:
-        return lift
-    return lift - vehicle.weight(p)[:, None] * p["vehicle.center_of_gravity"]

@@ -23,6 +23,7 @@ class Tether(Term):
     """
 
     type: ClassVar[str] = "tether"
+    anchored: ClassVar[bool] = True
 
     anchor: Any = number((3,), "m")
     stiffness: Any = number((), "N/m", least=0.0)

@@ -121,7 +121,7 @@ class Bench:
     ):
         settings = dict(method=method, h=h, t1=t1, save=SaveAt(every=spacing, fields=tuple(fields)), dtype="float64")
         plan = make_plan(fleet, **settings)  # type: ignore[arg-type]
-        if plan.asks:
+        if plan.launches.asks:
             key = plan.kernel_choice.controller.callback.key  # type: ignore[union-attr]
             raise refusal("laws", key, "is a Python function, of which no lane knows", "give a law with device code")
         if plan.kernel_choice.lead is not None:
@@ -179,9 +179,9 @@ class Bench:
         for first in range(k0, k1, most):
             stop = min(first + most, k1)
             raw = packets.advance(first, stop)[:, :m]
-            values = unpacked(plan.sample_fields, raw, packets.frame, plan.table)
+            values = unpacked(plan.layout.sizes, raw, packets.frame, plan.layout.table)
             if watch:
-                watch(plan.due(first, stop)[0], values)
+                watch(plan.launches.due(first, stop)[0], values)
         failed = packets.ended()[0] != 0
         last = {name: values[name][-1] for name in FIELDS}
         states: Any = {name: np.where(failed.reshape(-1, *(1,) * (v.ndim - 1)), np.nan, v) for name, v in last.items()}

@@ -15,9 +15,9 @@ import numpy as np
 from lgvi_warp.common import machine
 from lgvi_warp.common.arguments import listed, whole
 from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import Status, failed, stopped
-from lgvi_warp.engine import plan
 from lgvi_warp.engine.executors import check_threads
 from lgvi_warp.results.provenance import provenance
 from lgvi_warp.scene.scene import Scene
@@ -337,7 +337,7 @@ def stability_map(
                               *((name, value, "s") for name, value in (("t1", t1), ("error_time", error_time))
                                 if value is not None)):  # fmt: skip
         faults.positive(name, value, unit)
-    faults.choice("dtype", dtype, plan.DTYPES)
+    faults.choice("dtype", dtype, DTYPES)
     check_threads(faults, threads)
     grid = None
     with faults.including():

@@ -14,7 +14,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.status import Status, failed, stop_time
-from lgvi_warp.engine.plan import Plan
+from lgvi_warp.engine.plan import Plan, choose_plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics import energy as invariants
@@ -106,7 +106,7 @@ def plan_of(
     grid: StabilityGrid, members: np.ndarray, method: str, times: TimeGrid, dtype: str, checks: str = "safe"
 ) -> Plan:
     """Make the plan of a run of some members."""
-    return Plan(grid.fleet(members), Method(method), times, FIELDS, dtype, checks=checks)
+    return choose_plan(grid.fleet(members), Method(method), times, FIELDS, dtype, checks=checks)
 
 
 def refusals(grid: StabilityGrid, names: Sequence[str], dtype: str) -> dict[str, str]:

@@ -17,7 +17,6 @@ from lgvi_warp.common.errors import MissingExtra, NothingToDraw, NotReal
 from lgvi_warp.common.identity import UNKNOWN, identity
 from lgvi_warp.common.reading import UnreadableError
 from lgvi_warp.control.base import SECTIONS
-from lgvi_warp.runs.settle import make_plan
 from tests.conftest import ROOT
 from tests.support.odd_calls import goods
 
@@ -99,7 +98,6 @@ OTHERS = {
     "ScipyDistribution": lambda: lw.ScipyDistribution(stats.norm()),
     "Looks": lambda: lw.Looks(np.ones((1, 3)), np.eye(3)[None], np.ones((1, 3)), np.ones((1, 3)), np.ones(1)),
     "Status": lambda: lw.Status.OK, "Warnings": lambda: lw.Warnings(3), "Store": lambda: lw.Store("run.zarr"),
-    "Plan": lambda: make_plan(lw.Ensemble(SPHERE, 4), method="psi_s", h=0.1, t1=0.5),
     "PackingContext": lambda: lw.PackingContext({"a.b": np.ones(2)}, None, np.arange(2), 1, 0.1),
 }  # fmt: skip
 

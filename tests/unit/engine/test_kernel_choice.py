@@ -70,3 +70,19 @@ def test_without_forces_nothing_is_kicked(method):
         letters[net] = {letter for letter, _ in (*choice.program, *([choice.lead] if choice.lead else []))}
     assert "K" in letters[2.0]
     assert letters[0.0] == letters[2.0] - {"K"}
+
+
+class Mooring(lw.Tether):
+    """A tether by another name, whose device code is that of one."""
+
+    type = "mooring"
+    device = "tether"
+
+
+@pytest.mark.parametrize("kind", [lw.Tether, Mooring])
+@pytest.mark.parametrize("velocity", [(0.1, 0.0, 0.0), None])
+def test_a_current_works_against_what_says_that_it_is_anchored(kind, velocity):
+    terms = [kind(anchor=(0.0, 0.0, 0.0), stiffness=1.0)]
+    terms += [] if velocity is None else [lw.Current(velocity=velocity)]
+    choice = make_plan(one(lw.Scene(vehicle(), terms=terms)), "psi_s", h=0.01, t1=0.1).kernel_choice
+    assert choice.conservative is (velocity is None)

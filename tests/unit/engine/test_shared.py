@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lgvi_warp.engine.shared import FRAME, MEMBERS, SEED, Reads, Shared, context
-from lgvi_warp.scene.ensemble import KEPT
+from lgvi_warp.scene.draws import KEPT
 
 NUMBERS = {"a.x": np.ones((1, 3)), "b.y": np.zeros(5)}
 WAYS = {

@@ -12,7 +12,7 @@ from lgvi_warp.common import machine
 from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, survey
 from lgvi_warp.methods.method import Method
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.scene import ensemble as ensembles
+from lgvi_warp.scene import slices
 from tests.support.tools import scene_of
 
 PLAIN = {"start.position": np.zeros((9, 3)), "start.attitude": np.broadcast_to(np.eye(3), (9, 3, 3))}
@@ -38,7 +38,7 @@ def seen(members, method="psi_s"):
 @pytest.fixture(params=(1, 4, 100))
 def at_once(request, monkeypatch):
     """So many members are looked at together."""
-    monkeypatch.setattr(ensembles, "AT_ONCE", request.param)
+    monkeypatch.setattr(slices, "AT_ONCE", request.param)
 
 
 def test_one_odd_member_decides(at_once):
@@ -109,7 +109,7 @@ def test_parts_join_to_the_whole(monkeypatch):
     members = lw.Ensemble(scene, 500, 3, vary)
     found = []
     for size in (7, 64, 1000):
-        monkeypatch.setattr(ensembles, "AT_ONCE", size)
+        monkeypatch.setattr(slices, "AT_ONCE", size)
         found.append(seen(members, "psi_x"))
     assert found[0] == found[1] == found[2]
 
@@ -123,7 +123,7 @@ def test_the_first_unphysical_member_is_named_whatever_the_parts(at_once):
 
 
 def test_memory_of_a_plan_does_not_grow_with_members(monkeypatch):
-    monkeypatch.setattr(ensembles, "AT_ONCE", 512)
+    monkeypatch.setattr(slices, "AT_ONCE", 512)
     members = lw.Ensemble(scene_of((1.0, 2.0, 3.0)), 60_000, 1, {"vehicle.inertia": lw.Normal(relative=0.01)})
     make_plan(members.subset([0]), h=0.01, t1=0.1)  # the kernel's own
     tracemalloc.start()

@@ -52,7 +52,7 @@ def test_it_is_no_part_of_the_dynamics():
         make_plan(lw.Ensemble(lw.Scene(lw.Vehicle(30.0, inertia=(0.2, 3.0, 3.0), shape=shape)), 2), h=0.1, t1=1.0)
         for shape in (None, {"length": 2.0, "diameter": 0.3})
     )
-    assert plain.kernel_hash == shaped.kernel_hash
+    assert plain.kernel.hash == shaped.kernel.hash
     assert plain.spec == shaped.spec
     tables = [provenance(plan) for plan in (plain, shaped)]
     assert tables[0] != tables[1]

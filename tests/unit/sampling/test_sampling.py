@@ -15,7 +15,7 @@ import lgvi_warp as lw
 from lgvi_warp.sampling import designs as sampling
 from lgvi_warp.sampling.designs.sequences import sobol_points
 from lgvi_warp.sampling.designs.space import Space
-from lgvi_warp.scene import ensemble
+from lgvi_warp.scene import draws
 from lgvi_warp.scene.settings import MOST_MEMBERS
 from lgvi_warp.scene.variations import targets
 from tests.unit.scene.test_ensemble import assert_same, faults
@@ -58,7 +58,7 @@ def cube(content, members, space=SPACE):
 
 @pytest.mark.parametrize("content", [*SEQUENCES, *DESIGNS, *REPLICATED], ids=str)
 def test_blocks_subsets_and_longer_ensembles_have_the_same_members(scene, content, monkeypatch):
-    monkeypatch.setattr(ensemble, "KEPT", 0)
+    monkeypatch.setattr(draws, "KEPT", 0)
     n = members_of(content)
     fleet = lw.Ensemble(scene, n, 3, VARY, content)
     whole = fleet.select(0, n)

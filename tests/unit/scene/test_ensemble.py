@@ -9,7 +9,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.physics import notation
 from lgvi_warp.results.result import Drawn
-from lgvi_warp.scene import ensemble as ensembles
+from lgvi_warp.scene import draws
 from tests.support.refusals import faults
 
 FULL = np.array([[5.0, 0.3, 0.1], [0.3, 6.0, -0.2], [0.1, -0.2, 7.0]])
@@ -112,7 +112,7 @@ def test_the_scene_file_describes_the_ensemble(scene):
 def _either_way(request, monkeypatch):
     """Numbers of few members are drawn once and kept, those of many are drawn each time."""
     if request.param == "drawn anew":
-        monkeypatch.setattr(ensembles, "KEPT", 0)
+        monkeypatch.setattr(draws, "KEPT", 0)
 
 
 @pytest.mark.usefixtures("_either_way")

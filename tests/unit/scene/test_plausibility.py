@@ -10,8 +10,7 @@ import pytest
 import lgvi_warp as lw
 from benchmarks import problems
 from lgvi_warp.cli import main
-from lgvi_warp.scene import ensemble as ensembles
-from lgvi_warp.scene import plausibility
+from lgvi_warp.scene import plausibility, slices
 from lgvi_warp.scene.plausibility import LIMITS
 from tests.conftest import ROOT
 
@@ -166,7 +165,7 @@ def test_members_are_counted_and_the_first_is_named(monkeypatch):
     assert "291.2 N" in expected[0]
     assert "(1 of 1,000 members; first: member 999)" in expected[1]
     for at_once in (7, 111, 1000):  # the last of them alone, too
-        monkeypatch.setattr(ensembles, "AT_ONCE", at_once)
+        monkeypatch.setattr(slices, "AT_ONCE", at_once)
         assert said(fleet) == expected
 
 

@@ -7,7 +7,7 @@ import tomllib
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.cli.lists import SCENE
+from lgvi_warp.cli.lists import NEW_SCENE
 from lgvi_warp.importers.fossen import vehicle_file, vehicles
 from lgvi_warp.scene.schema import schema
 from tests.conftest import ROOT
@@ -101,7 +101,7 @@ def test_a_registered_term_is_in_it():
 def test_the_scene_of_new_has_comments_on_every_key():
     lines = [
         line
-        for line in SCENE.splitlines()
+        for line in NEW_SCENE.splitlines()
         if "=" in line and not line.startswith(("#", "[", '"', "type", "of", "members"))
     ]
     assert lines

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The launches of a run: which steps each makes, and which samples and looks fall due in it."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from lgvi_kernels.advance.spec import CHUNK
+from lgvi_warp.methods.saveat import TimeGrid
+
+# Limits of one launch: they keep progress current, interrupts prompt and the sample buffer small in long runs.
+SEGMENT_VEHICLE_STEPS = 20_000_000
+SEGMENT_SAMPLE_BYTES = 16_000_000
+# What is gathered at looks before it is reduced: it should stay in the caches.
+GATHERED_BYTES = 8_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Launches:
+    """How the steps of a run are divided into launches.
+
+    lengths: of the stages and of the leads, in units of the step h [1].
+    real: Warp's type of the kernel's numbers.
+    sample_bytes, bytes_at_look: memory of what the kernel writes of one member, of a sample and at a look [bytes].
+    every: steps between two looks of the controller; None without one.
+    asks: whether a function of the host answers each look.
+    looks: whether samples are gathered at all looks.
+    """
+
+    grid: TimeGrid
+    lengths: tuple[tuple[float, ...], tuple[float, ...]]
+    real: Any
+    sample_bytes: int
+    bytes_at_look: int
+    every: int | None
+    asks: bool
+    looks: bool
+
+    @functools.cached_property
+    def gathered(self) -> TimeGrid | None:
+        """The controller's looks, where samples are taken at all of them; None without a controller or without `looks`."""
+        return self.grid.looks(self.every) if self.looks and self.every is not None else None
+
+    @functools.cached_property
+    def times(self) -> tuple[Any, Any, Any]:
+        """Kernel arguments that all blocks share.
+
+        Returns: (stage_h, lead_h, sample_step): lengths of stages and leads [s], and the numbers of steps after which samples
+            are due.
+        """
+        stages, leads = (np.array(fractions) * self.grid.h for fractions in self.lengths)
+        due = np.append(self.grid.sample_steps, 2**31 - 1).astype(np.int32)
+        return (
+            wp.array(stages, dtype=self.real, device="cpu"),
+            wp.array(leads, dtype=self.real, device="cpu"),
+            wp.array(due, dtype=wp.int32, device="cpu"),
+        )
+
+    def due(self, k0: int, k1: int) -> tuple[int, int]:
+        """Which samples fall due in the launch of steps k0 to k1.
+
+        Returns: (s0, s1): samples s0 to s1 - 1 are due after step k0 and no later than step k1.
+        """
+        steps = self.grid.sample_steps
+        return int(steps.searchsorted(k0, side="right")), int(steps.searchsorted(k1, side="right"))
+
+    def look_bytes(self, count: int) -> int:
+        """Memory of what is gathered at a look of a block of so many members [bytes]."""
+        return self.bytes_at_look * count
+
+    def slots(self, count: int) -> int:
+        """How many looks of a block of so many members are gathered at once; 0 where none are."""
+        if self.gathered is None:
+            return 0
+        return max(2, min(GATHERED_BYTES // max(1, self.look_bytes(count)), len(self.gathered.times)))
+
+    def looks_of(self, k0: int, k1: int) -> slice:
+        """Which looks are gathered once the launch of steps k0 to k1 has ended.
+
+        Returns: Those after step k0, with that of the start, and no later than step k1. Where a function of the host answers,
+            a look ends in the next launch: those from step k0 on and before step k1, with that of the end.
+        """
+        assert self.gathered is not None
+        bounds = np.array([k0 + 1 if k0 else 0, k1 + 1])
+        if self.asks:
+            bounds = np.array([k0, k1 if k1 < self.grid.steps else k1 + 1])
+        first, stop = np.searchsorted(self.gathered.sample_steps, bounds)
+        return slice(int(first), int(stop))
+
+    def segments(self, count: int) -> Iterator[tuple[int, int]]:
+        """The launches of a block of so many members, each short enough to be interrupted, with samples in a small buffer.
+
+        Yields: (k0, k1): a launch makes the steps from k0 to k1.
+        """
+        if self.asks:
+            yield from self._periods()
+            return
+        due, slots = self.grid.sample_steps, self.slots(count)
+        every = int(self.gathered.sample_steps[1]) if self.gathered and len(self.gathered.times) > 1 else 0
+        most_samples = max(1, SEGMENT_SAMPLE_BYTES // max(self.sample_bytes * count, 1))
+        most_steps = max(CHUNK, SEGMENT_VEHICLE_STEPS // count // CHUNK * CHUNK)
+        k = 0
+        while k < self.grid.steps:
+            last = self.due(k, k)[1] + most_samples
+            k1 = min(k + most_steps, int(due[min(last, len(due)) - 1]))
+            if every:
+                # Up to the last look for which there is a slot before those of earlier ones are taken again.
+                k1 = min(k1, ((k // every + 1) // slots * slots + slots - 1) * every)
+            yield k, k1
+            k = k1
+
+    def _periods(self) -> Iterator[tuple[int, int]]:
+        """The launches where a function of the host answers each look: one a period."""
+        assert self.every is not None
+        for k in range(0, self.grid.steps, self.every):
+            yield k, min(k + self.every, self.grid.steps)

@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a run refuses before it begins: settings that do not go together, and steps that do not suit what acts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lgvi_kernels.lanes.arithmetic import WIDTHS
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.common.machine import DTYPES
+from lgvi_warp.common.status import CHECKS, ON_FAILURE
+from lgvi_warp.engine.kernel_choice import KernelChoice
+from lgvi_warp.methods.method import Method
+from lgvi_warp.methods.saveat import TimeGrid, divisors
+from lgvi_warp.physics.terms.noisy import NoisyTerm
+from lgvi_warp.scene.like import SceneLike
+
+# Sub-maps whose equation may have no solution.
+SOLVING = {"D", "W", "A", "Phi", "Phi*"}
+
+# A step and the draws that fill it differ by less than this part, the round-off of their quotient and of their texts.
+STEP_ROUND_OFF = 1e-12
+
+
+def check_settings(
+    faults: Faults, scene: SceneLike, method: Method, dtype: str, width: int | None, checks: str, on_failure: str
+) -> None:
+    """Refuse values that are not known, or that the scene, the method or another setting does not allow."""
+    faults.choice("dtype", dtype, DTYPES)
+    faults.choice("checks", checks, CHECKS)
+    faults.choice("on_failure", on_failure, ON_FAILURE)
+    faults.raise_if_any()
+    if width is not None:
+        faults.choice("width", width, WIDTHS)
+    if checks == "none" and scene.events:
+        faults.add("checks", checks, "does not see events", 'use checks="safe", or drop the events')
+    if dtype == "float32_compensated" and (method.tableau or method.gauss or method.two_part):
+        problem = f"compensates sums of a method of sub-maps, which {method.name} is not"
+        faults.add("dtype", dtype, problem, "use float64, or psi_s, psi_x and their compositions")
+    if checks == "none" and on_failure in ON_FAILURE[1:]:
+        problem = f"does not see failures, which on_failure={on_failure!r} waits for"
+        faults.add("checks", checks, problem, 'use checks="safe", or on_failure="freeze"')
+
+
+def check_substep(choice: KernelChoice, method: Method) -> None:
+    """Refuse to divide the steps of a method or of laws that cannot be divided, with the reason."""
+    faults, name = Faults(), method.name
+    if choice.controller is not None:
+        why = "remembers what a step that is made again would change"
+        faults.add("on_failure", "substep", f"the controller {why}", 'use on_failure="freeze", or a shorter step')
+    letters = {letter for letter, _ in (*choice.program, *([choice.lead] if choice.lead else []))}
+    if method.gauss:
+        why = "starts each step from the stages of the last one, which a divided step would have lost"
+        faults.add("on_failure", "substep", f"{name} {why}", 'shorten the step, or use on_failure="freeze"')
+    elif not letters & SOLVING:
+        why = "solves nothing that could fail"
+        faults.add("on_failure", "substep", f"{name} {why}", 'use on_failure="freeze"; psi_s and psi solve (24)')
+    for term, module in choice.laws:
+        noisy = getattr(module, "NOISE", False)
+        if term.memory or noisy:
+            why = "draws its noise once a step" if noisy else "remembers what a step that is made again would change"
+            faults.add("on_failure", "substep", f"{term.key} {why}", 'use on_failure="freeze", or a shorter step')
+    faults.raise_if_any()
+
+
+def check_noise_steps(choice: KernelChoice, grid: TimeGrid) -> None:
+    """Refuse a step that is no whole multiple of a term's noise_step, and name the nearest one that is."""
+    faults, h = Faults(), grid.h
+    # All samples are whole multiples of this one.
+    spacing = h * float(np.gcd.reduce(grid.sample_steps))
+    for term, _ in choice.laws:
+        if not isinstance(term, NoisyTerm) or term.noise_step is None:
+            continue
+        noise_step, draws = float(term.noise_step), term.draws(h)
+        if abs(h - draws * noise_step) > STEP_ROUND_OFF * h:
+            multiple = round(spacing / noise_step)
+            problem = f"is no whole multiple of {term.key}.noise_step = {noise_step:.9g} s"
+            if multiple < 1 or abs(spacing - multiple * noise_step) > STEP_ROUND_OFF * spacing:
+                remedy = f"give a noise_step that divides the {spacing:.9g} s between samples"
+            else:
+                count = min(divisors(multiple), key=lambda count: abs(multiple / count * noise_step - h))
+                remedy = f"use a step of {multiple // count * noise_step:.9g} s"
+            faults.add("step", h, problem, remedy)
+        elif grid.steps * draws >= 2**31:
+            problem = f"makes {grid.steps * draws:,} draws in this run"
+            faults.add(f"{term.key}.noise_step", noise_step, problem, "there are 2,147,483,647: use a longer one")
+    faults.raise_if_any()
+
+
+def check_looks(choice: KernelChoice, h: float) -> None:
+    """Refuse a period or a delay of the controller that is no whole number of steps [s]."""
+    faults = Faults()
+    if choice.controller is not None:
+        choice.controller.check_step(faults, h)
+    faults.raise_if_any()

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the kernel writes of a sample, and gathers at a look: fields of the motion, then signals of the controller."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import accumulate
+
+from lgvi_kernels.advance.feeding import ALL_NOTES, NOTED, bit
+from lgvi_kernels.advance.rows import SAMPLE_FIELDS
+from lgvi_warp.control.signals import SIGNALS, row_of, saved_fields
+from lgvi_warp.engine.kernel_choice import KernelChoice
+from lgvi_warp.physics.fields import Field
+
+
+@dataclass(frozen=True, eq=False)
+class SampleLayout:
+    """Where each number of a sample is.
+
+    fields: names of the samples to keep, in the order in which they are saved.
+    compensated: whether a position is two sums.
+    read_at_looks: field of the motion -> which of its numbers statistics read at looks, () for all; None for all numbers of
+        all fields.
+    """
+
+    choice: KernelChoice
+    fields: tuple[str, ...]
+    compensated: bool
+    read_at_looks: Mapping[str, tuple[int, ...]] | None
+
+    @functools.cached_property
+    def table(self) -> dict[str, Field]:
+        """The fields that the run may save, by name."""
+        return saved_fields(self.choice.controller)
+
+    @property
+    def signals(self) -> tuple[str, ...]:
+        """Names of the controller's signals among the fields."""
+        return tuple(name for name in self.fields if name in SIGNALS)
+
+    @functools.cached_property
+    def sizes(self) -> dict[str, int]:
+        """What the kernel writes of a sample: the fields kept, and those needed to move them back to the user's origin.
+
+        Returns: Field -> numbers per sample, in the order in which they are written; a compensated position is b, then b_low.
+            Signals of the controller come last.
+        """
+        needed = set(self.fields)
+        if self.choice.moved:
+            needed |= {"attitude"} if "position" in needed else set()
+            needed |= {"angular_velocity"} if "velocity" in needed else set()
+        numbers = {name: size for name, size in SAMPLE_FIELDS.items() if name in needed}
+        if self.compensated and "position" in numbers:
+            numbers["position"] = 6
+        return numbers | {name: math.prod(self.table[name].shape) for name in self.signals}
+
+    @functools.cached_property
+    def look_fields(self) -> dict[str, int]:
+        """How many numbers of each field the kernel gathers at a look, in the user's axes; of signals all, as in samples."""
+        sizes = {name: size for name, size in self.sizes.items() if name in self.fields}
+        entries = self.look_entries
+        return {name: len(entries.get(name, ())) or size for name, size in sizes.items() if self._reads(name)}
+
+    @functools.cached_property
+    def look_entries(self) -> dict[str, tuple[int, ...]]:
+        """Fields of the motion of which some numbers alone are gathered at looks: field -> these, counted from 0."""
+        entries = {name: numbers for name, numbers in (self.read_at_looks or {}).items() if numbers}
+        if self.compensated:  # a place is a pair of sums
+            entries.pop("position", None)
+        return entries
+
+    def _reads(self, name: str) -> bool:
+        """Whether a field is gathered at looks: a signal always, the motion where a statistic reads it."""
+        return name in SIGNALS or self.read_at_looks is None or name in self.read_at_looks
+
+    @property
+    def notes(self) -> int:
+        """What looks note, as bits (see feeding.py): that of which something is saved, and all where the host is asked."""
+        noted = [signal for name in self.signals if (signal := SIGNALS[name]).group in NOTED]
+        return ALL_NOTES if self.choice.asks else sum({bit(signal.group, signal.row) for signal in noted})
+
+    @functools.cached_property
+    def noted_rows(self) -> dict[str, range]:
+        """Rows of the memory in which looks note something, by its name in NOTED."""
+        controller = self.choice.controller
+        if controller is None:
+            return {}
+        firsts = accumulate(NOTED.values(), initial=controller.bus.rows)
+        return {name: range(first, first + size) for (name, size), first in zip(NOTED.items(), firsts, strict=False)}
+
+    @functools.cached_property
+    def signal_rows(self) -> tuple[int, ...]:
+        """Rows of the memory that are saved with each sample: those of each signal in turn."""
+        controller = self.choice.controller
+        if controller is None or controller.bus is None:
+            return ()
+        noted = {name: rows.start for name, rows in self.noted_rows.items()}
+        begins = ((row_of(name, controller.bus, noted), self.sizes[name]) for name in self.signals)
+        return tuple(row + i for row, size in begins for i in range(size))

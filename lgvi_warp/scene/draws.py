@@ -1,0 +1,237 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where the numbers of an ensemble's members come from, and these numbers, drawn block by block."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, cut
+from lgvi_warp.physics import notation
+from lgvi_warp.sampling.designs.base import Sampling
+from lgvi_warp.sampling.designs.space import Space
+from lgvi_warp.sampling.members import Members
+from lgvi_warp.scene import variations
+from lgvi_warp.scene.given_members import explicit_parameter
+from lgvi_warp.scene.like import SceneLike
+from lgvi_warp.scene.settings import MOST_MEMBERS, EnsembleSettings
+from lgvi_warp.scene.start import ATTITUDES, resolve_attitude
+from lgvi_warp.scene.variations import Target, Variation
+
+# Most members whose numbers an ensemble keeps once they are drawn.
+KEPT = 1024
+Columns = Sequence[tuple[Target, np.ndarray]]
+
+
+@dataclass(frozen=True, eq=False)
+class SceneNumbers:
+    """The numbers of a scene by name: its parameters, and those of the start, unless these are given for each member."""
+
+    parameters: Mapping[str, np.ndarray]
+    start: Mapping[str, Any]
+
+    @functools.cached_property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """All of them as arrays (1, ...)."""
+        return {name: np.asarray(value)[None] for name, value in {**self.parameters, **self.start}.items()}
+
+    @functools.cached_property
+    def attitude(self) -> np.ndarray:
+        """Rotation matrix (1, 3, 3) of the start."""
+        return resolve_attitude({way: self.arrays[f"start.{way}"] for way in ATTITUDES if f"start.{way}" in self.start})
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """The numbers of members: of the scene, given as arrays, by columns of a table, or drawn, each in place of those before.
+
+    A member's numbers follow from its position in the whole ensemble alone.
+
+    explicit: arrays (whole, ...) by name; those of the start begin with "start.".
+    columns: what a table sets, with its values (whole, ...).
+    variations: what distributions draw.
+    space: the cube that the sampling fills.
+    whole: number of members of the whole ensemble.
+    places: (members,), positions of these members in it; None for all, in order.
+    """
+
+    scene: SceneNumbers
+    explicit: Mapping[str, np.ndarray]
+    columns: Columns
+    variations: Sequence[Variation]
+    sampling: Sampling
+    space: Space
+    whole: int
+    places: np.ndarray | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        # Another process draws the numbers itself: they are not sent.
+        return {item.name: getattr(self, item.name) for item in fields(self)}
+
+    @property
+    def members(self) -> int:
+        """Number of these members."""
+        return self.whole if self.places is None else len(self.places)
+
+    @functools.cached_property
+    def drawn_names(self) -> set[str]:
+        """Names of what distributions draw."""
+        return {target.name for variation in self.variations for target in variation.targets}
+
+    @functools.cached_property
+    def varied_names(self) -> set[str]:
+        """Names of what members have of their own: drawn, from columns or explicit."""
+        return self.drawn_names | {target.name for target, _ in self.columns} | self.explicit.keys()
+
+    def values(self, first: int, stop: int, start: bool = True) -> dict[str, np.ndarray]:
+        """The numbers of the members first to stop - 1 by name, with those of the start or without.
+
+        Values that all members share have a leading dimension of 1. Those of few members are drawn once and kept: a run
+        reads them several times.
+        """
+        if self.members > KEPT:
+            return self._drawn(first, stop, start)
+        every = self._few.items() if start else ((name, self._few[name]) for name in self.scene.parameters)
+        if (first, stop) == (0, self.members):
+            return dict(every)
+        return {name: values[first:stop] if len(values) > 1 else values for name, values in every}
+
+    @functools.cached_property
+    def _few(self) -> dict[str, np.ndarray]:
+        few = self._drawn(0, self.members, True)
+        for name in self.varied_names & few.keys():
+            few[name].flags.writeable = False
+        return few
+
+    def _drawn(self, first: int, stop: int, start: bool) -> dict[str, np.ndarray]:
+        """Draw what `values` returns."""
+        base, of_scene = self.scene.parameters, self.scene.arrays
+        values = of_scene.copy() if start else {name: of_scene[name] for name in base}
+        if self.explicit:
+            rows = slice(first, stop) if self.places is None else self.places[first:stop]
+            values |= {name: column[rows] for name, column in self.explicit.items() if start or name in base}
+        wanted = [v for v in self.variations if start or any(target.name in base for target in v.targets)]
+        if not (wanted or self.columns):
+            return values
+        members = np.arange(first, stop) if self.places is None else self.places[first:stop]
+        space = self.space.of([variation.key for variation in wanted]) if self.sampling.kind == "random" else self.space
+        levels = self.sampling.draw(space, members) if wanted else {}
+        drawn = [(target, column[members]) for target, column in self.columns]
+        for variation in wanted:
+            drawn += variation.values(levels[variation.key])
+        for target, column in drawn:
+            if target.name in values:
+                variations.put(values, target, column)
+        return values
+
+    def members_of(self, values: dict[str, np.ndarray], indices: np.ndarray, seed: int) -> Members:
+        """Members from all their numbers by name, which loses those of the start."""
+        m = len(indices)
+        start = {key.removeprefix("start."): values.pop(key) for key in tuple(values) if key.startswith("start.")}
+        # In one memory layout, on which the order of the sums of a matrix product depends.
+        R = _of_each(np.ascontiguousarray(self._attitude(start)), m)
+        if "velocity_inertial" in start:
+            # Written out: the order of the sum, and so its bits, must not depend on the number of members.
+            v = start["velocity_inertial"]
+            nu = R[:, 0] * v[:, :1] + R[:, 1] * v[:, 1:2] + R[:, 2] * v[:, 2:]
+        else:
+            nu = start["velocity"]
+        position, nu, Om = (_of_each(x, m) for x in (start["position"], nu, start["angular_velocity"]))
+        return Members(values, position, R, nu, Om, indices, seed)
+
+    def _attitude(self, start: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Rotation matrices (1 or m, 3, 3) of some members; one that members share is computed once."""
+        shared = self.varied_names.isdisjoint(f"start.{way}" for way in ATTITUDES)
+        return self.scene.attitude if shared else resolve_attitude(start)
+
+
+def _of_each(values: np.ndarray, members: int) -> np.ndarray:
+    """Return values (1 or n, ...) as those of n members, which nobody writes into."""
+    if len(values) == members and not values.flags.writeable:
+        return values
+    return np.broadcast_to(values, (members, *values.shape[1:]))
+
+
+def draws_of(scene: SceneLike, settings: EnsembleSettings, explicit: Mapping[str, np.ndarray]) -> Draws:
+    """The draws that settings describe, or of members whose states are given; refuse what does not fit the scene.
+
+    explicit: arrays by name; empty where no states are given.
+    """
+    faults = Faults("ensemble.vary.")
+    base, sampling = scene.parameters(), settings.sampling
+    columns, designed = sampling.own_values(), sampling.distributions()
+    start = {} if explicit else {f"start.{key}": value for key, value in scene.start.given().items()}
+    if not explicit:
+        start = _turned_by_matrix(faults, start, [*settings.vary, *designed, *columns])
+    known = {**base, **start}
+    for key in designed.keys() & settings.vary.keys():
+        fault = f"varies what the {sampling.kind} gives values"
+        faults.add(f'"{key}"', settings.vary[key], fault, "drop one of them")
+    distributions = {**designed, **settings.vary}
+    described = [variations.variation(faults, *item, known) for item in sorted(distributions.items())]
+    found = [variation for variation in described if variation]
+    tables = Faults("ensemble.sampling.table.")
+    in_table = {key: _column(tables, key, column, known) for key, column in columns.items()}
+    named = [(variation.key, variation.targets) for variation in found]
+    variations.clashes(faults, [*named, *((key, (pair[0],)) for key, pair in in_table.items() if pair)])
+    with faults.including():
+        tables.raise_if_any()
+    faults.raise_if_any()
+    seed = int(settings.seed)
+    space = variations.space(seed, found)
+    whole = counted(sampling, space, settings.members)
+    numbers = SceneNumbers(base, start)
+    return Draws(numbers, explicit, [pair for pair in in_table.values() if pair], found, sampling, space, whole)
+
+
+def _turned_by_matrix(faults: Faults, start: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
+    """The start with its attitude as a matrix, whatever form it has, if the attitude itself varies.
+
+    keys: names of all that varies.
+    """
+    names = {target.name for key in keys for target in variations.targets(key)}
+    if variations.ATTITUDE not in names:
+        return start
+    ways = [f"start.{way}" for way in ATTITUDES]
+    for way in sorted((set(ways) - {variations.ATTITUDE}) & names):
+        faults.add(f'"{way}"', "...", f'varies beside "{variations.ATTITUDE}"', "keep one of them")
+    faults.raise_if_any()
+    R = resolve_attitude({way.removeprefix("start."): np.asarray(start[way])[None] for way in ways if way in start})
+    return {name: value for name, value in start.items() if name not in ways} | {variations.ATTITUDE: R[0]}
+
+
+def _column(tables: Faults, key: str, column: Any, known: Mapping[str, np.ndarray]) -> tuple[Target, np.ndarray] | None:
+    """What a column of a table sets, and its values; None after a fault in the name."""
+    (target, *more), also = variations.targets(key), f'; or leave it out: ignore = ["{cut(key)}"]'
+    if more:
+        tables.add(f'"{key}"', "...", "names several numbers", "give each a column of its own")
+    if more or not variations.known_target(tables, key, "...", target, known, also):
+        return None
+    shape = (len(column), *target.of(known[target.name]).shape)
+    name = target.name if target.index is None else key
+    values = explicit_parameter(tables, name, column, shape)
+    attitudes = target.name == variations.ATTITUDE and values.shape == shape
+    if attitudes and not notation.rotations(values).all():
+        tables.add(f'"{key}"', "...", "holds a matrix that is no rotation to 1e-9", "give R^T R = I, det R = 1")
+    return target, values
+
+
+def counted(sampling: Sampling, space: Space, members: int | None) -> int:
+    """The number of members; raise SceneError for a number that the sampling cannot have.
+
+    members: as asked for; None for what the sampling has.
+    """
+    faults = Faults("ensemble.")
+    designed, group = sampling.own_members(space), sampling.group_size(space)
+    whole = int(members or designed or group)
+    if whole > MOST_MEMBERS:
+        problem = f"are more members than the {MOST_MEMBERS} that there can be"
+        faults.add(f"sampling.{sampling.kind}", whole, problem, "give fewer values, of fewer names")
+    else:
+        sampling.check(faults, space, whole)
+    faults.raise_if_any()
+    return whole

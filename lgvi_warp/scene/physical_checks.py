@@ -1,0 +1,163 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether the numbers of an ensemble's members are physical, as far as they vary."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.physics import vehicle as vehicles
+from lgvi_warp.physics.terms.base import own
+from lgvi_warp.scene.like import SceneLike
+from lgvi_warp.scene.slices import over_members
+
+
+@dataclass
+class Unphysical:
+    """Unphysical values of one quantity: the first such member, its value, and how many; shared: one value for all."""
+
+    first: int
+    value: Any
+    shared: bool
+    of: int
+    count: int
+
+
+def _odd_entry(value: Any) -> tuple[str, Any]:
+    """Return the place of the first entry that is not finite, as in "[1,2]", and the entry; or "" and the value itself."""
+    numbers = np.asarray(value)
+    if not numbers.ndim or np.isfinite(numbers).all():
+        return "", value
+    place = tuple(np.argwhere(~np.isfinite(numbers))[0].tolist())
+    return f"[{','.join(map(str, place))}]", numbers[place]
+
+
+@dataclass(frozen=True)
+class PhysicalChecks:
+    """The checks of an ensemble, which raise SceneError where a member is unphysical, and name the first such member.
+
+    varied: names of the parameters that vary, which alone are looked at.
+    drawn: names of what distributions draw.
+    members: number of all members.
+    """
+
+    scene: SceneLike
+    varied: AbstractSet[str]
+    drawn: AbstractSet[str]
+    members: int
+
+    def of_members(self, parameters: Callable[[int, int], Mapping[str, np.ndarray]], count: int) -> None:
+        """Look at the first members, at so few at a time that memory stays small.
+
+        parameters: of the members from first to stop - 1.
+        """
+
+        def look(first: int, stop: int) -> dict[str, Unphysical]:
+            with np.errstate(over="ignore", invalid="ignore"):
+                return self._look_at(first, stop, parameters(first, stop))
+
+        findings: dict[str, Unphysical] = {}
+        for block_findings in over_members(look, count if self.varied else 0):
+            for key, finding in block_findings.items():
+                if key not in findings:
+                    findings[key] = finding
+                elif not finding.shared:
+                    findings[key].count += finding.count
+        self._refuse(findings, count)
+
+    def of_block(self, first: int, stop: int, parameters: Mapping[str, np.ndarray]) -> None:
+        """Look at the members from first to stop - 1."""
+        self._refuse(self._look_at(first, stop, parameters), stop - first)
+
+    def _refuse(self, findings: Mapping[str, Unphysical], looked_at: int) -> None:
+        faults = Faults()
+        all_seen = looked_at == self.members
+        for key, finding in findings.items():
+            is_drawn = not self.drawn.isdisjoint(key.split(" + "))
+            remedy = (
+                "use a smaller spread, TruncatedNormal or LogNormal" if is_drawn else "give finite, physical values"
+            )
+            of = f"{looked_at} members" if all_seen else f"the {looked_at:,} members that were looked at"
+            of = f"{finding.of} members" if finding.shared else of
+            entry, value = _odd_entry(finding.value)
+            problem = f"is unphysical ({finding.count} of {of})"
+            faults.add(f"{key}{entry} of member {finding.first}", value, problem, remedy)
+        faults.raise_if_any()
+
+    def _look_at(self, first: int, stop: int, p: Mapping[str, np.ndarray]) -> dict[str, Unphysical]:
+        keys = {name.rpartition(".")[0] for name in self.varied}
+        with np.errstate(over="ignore", invalid="ignore"):
+            checks = _vehicle_checks(p, self.varied, self.scene.vehicle.inertia_tolerance)
+            for term in self.scene.parts:
+                if term.key in keys:
+                    checks |= {f"{term.key}.{name}": bad for name, bad in term.unphysical(own(term, p)).items()}
+        unphysical = {}
+        for key, bad in checks.items():
+            bad = np.atleast_1d(bad)
+            if np.any(bad):
+                names = key.split(" + ")
+                i = int(np.argmax(bad))
+                value = sum(p[name][i % len(p[name])] for name in names if p[name].ndim == p[names[-1]].ndim)
+                shared = len(bad) == 1 and stop - first > 1
+                unphysical[key] = Unphysical(first + i, value, shared, len(bad), int(bad.sum()))
+        return unphysical
+
+
+def _vehicle_checks(p: Mapping[str, np.ndarray], varied: AbstractSet[str], tolerance: float) -> dict[str, np.ndarray]:
+    """Return masks (n,) by name: which members' varied numbers of vehicle and environment are unphysical."""
+
+    def heavy() -> np.ndarray:
+        return np.isfinite(p["vehicle.mass"]) & (p["vehicle.mass"] >= vehicles.LEAST)
+
+    def light_with_water() -> np.ndarray:
+        total = p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"]
+        return heavy() & ~_positive_definite(total)
+
+    def impossible_body() -> np.ndarray:
+        good = _positive_definite(p[rigid])
+        possible = np.where(good[:, None, None], p[rigid], np.eye(6))
+        return np.asarray(~good | vehicles.impossible(possible, tolerance))
+
+    def negative(key: str) -> np.ndarray:
+        return np.asarray(~(np.isfinite(p[key]) & (p[key] >= 0.0)))
+
+    def not_finite(key: str) -> np.ndarray:
+        return np.asarray(~np.isfinite(p[key]).all(axis=1))
+
+    rigid, added = "vehicle.rigid_body_mass_matrix", "vehicle.added_mass_matrix"
+    checks: dict[str, Callable[[], np.ndarray]] = {}
+    if "vehicle.mass" in p:
+        checks["vehicle.mass"] = lambda: ~heavy()
+        checks["vehicle.inertia"] = lambda: ~_positive_definite(p["vehicle.inertia"])
+        checks["vehicle.mass + vehicle.added_mass"] = light_with_water
+    else:
+        checks[rigid] = impossible_body
+        checks[f"{rigid} + {added}"] = lambda: ~_positive_definite(p[rigid] + p[added])
+    for keys, check in ((("center_of_buoyancy", "center_of_gravity"), not_finite), (("buoyancy", "weight"), negative)):
+        checks |= {key: functools.partial(check, key) for key in map("vehicle.{}".format, keys) if key in p}
+    if "environment.gravity" in p:
+        checks["environment.gravity"] = functools.partial(negative, "environment.gravity")
+    density = p["environment.water_density"]
+    checks["environment.water_density"] = lambda: ~(np.isfinite(density) & (density > 0))
+    return {key: check() for key, check in checks.items() if any(name in varied for name in key.split(" + "))}
+
+
+def _positive_definite(matrices: np.ndarray) -> np.ndarray:
+    """Return which symmetric matrices (n, d, d) are positive definite, by elimination; False where not finite."""
+    d, diagonals = matrices.shape[-1], np.einsum("nii->ni", matrices)
+    if np.count_nonzero(matrices) == np.count_nonzero(diagonals):  # diagonal matrices
+        return np.asarray(((diagonals >= vehicles.LEAST) & np.isfinite(diagonals)).all(axis=1))
+    remainder = matrices.copy()
+    good = np.isfinite(matrices).all(axis=(1, 2))
+    for k in range(d):
+        pivot = remainder[:, k, k]
+        good &= pivot >= vehicles.LEAST
+        row = remainder[:, k, k + 1 :] / np.where(good, pivot, 1.0)[:, None]
+        remainder[:, k + 1 :, k + 1 :] -= remainder[:, k + 1 :, k, None] * row[:, None, :]
+    return np.asarray(good)

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: Apache-2.0
+"""All members of an ensemble, some at a time so that memory stays small, on all cores."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+from lgvi_warp.common import machine
+
+# Members that are checked together: some tens of megabytes per thread.
+AT_ONCE = 16_384
+Found = TypeVar("Found")
+
+
+def over_members(look: Callable[[int, int], Found], members: int) -> list[Found]:
+    """Apply a function to all members, some at a time so that memory stays small, on all cores."""
+    firsts = range(0, members, AT_ONCE)
+    if len(firsts) < 2:
+        return [look(0, members)] if members else []
+    with ThreadPoolExecutor(min(machine.thread_count(), max(1, len(firsts)))) as pool:
+        return list(pool.map(lambda first: look(first, min(first + AT_ONCE, members)), firsts))

@@ -6,12 +6,12 @@ from __future__ import annotations
 import argparse
 import time
 
-from lgvi_warp.cli.output import say, tell
+from lgvi_warp.cli.output import Part, say, tell
 from lgvi_warp.cli.settings import load_scene
 from lgvi_warp.common import machine
 
 
-def warm(chosen: argparse.Namespace) -> int:
+def warm(chosen: argparse.Namespace, *, compile_plans: Part = None) -> int:
     """Run the verb warm: compile what runs of a scene need, and print how long each phase took."""
     from lgvi_warp.calls import warm as kernels
 
@@ -19,7 +19,7 @@ def warm(chosen: argparse.Namespace) -> int:
     scene = load_scene(chosen)
     plans = kernels.plans_of(scene, chosen.methods or (), chosen.dtypes or ())
     compiled, total = [], 0.0
-    for plan, phases in kernels.warm(plans, chosen.threads or machine.thread_count()):
+    for plan, phases in (compile_plans or kernels.warm)(plans, chosen.threads or machine.thread_count()):
         total += sum(phases)
         compiled.append({"method": plan.method.name, "dtype": plan.dtype, "seconds": phases._asdict()})
         say(chosen, f"{plan.method.name} {plan.dtype}: {phases}{'' if phases.clang else ' (was in the cache)'}")

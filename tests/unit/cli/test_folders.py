@@ -12,8 +12,8 @@ from lgvi_warp.cli import folders, plot, stores, view
 from lgvi_warp.cli.arguments import parsed
 from lgvi_warp.cli.folders import Content, contents
 from lgvi_warp.cli.writing import Written
+from tests.support.verbs import Study
 from tests.unit.cli.test_run_summary import MACHINE, told
-from tests.unit.cli.test_study_verbs import Study
 from tests.unit.cli.test_terminal import region, sobol
 from tests.unit.studies.test_cost import found as tradeoff_of
 

@@ -17,7 +17,7 @@ from lgvi_warp.common.errors import MissingExtra, NothingToDraw
 from lgvi_warp.common.phases import Phases
 from lgvi_warp.common.status import Status, WarningArray, Warnings
 from tests.support.made import made
-from tests.unit.cli.test_study_verbs import Study
+from tests.support.verbs import Study
 
 MACHINE = {
     "checks": "safe",

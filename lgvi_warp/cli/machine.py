@@ -15,10 +15,10 @@ from lgvi_warp.engine import widths
 from lgvi_warp.engine.peak import fma_peak
 
 
-def info(chosen: argparse.Namespace, *, peak_of: Callable[[str], float] = fma_peak) -> int:
+def info(chosen: argparse.Namespace, *, peak_of: Callable[[str], float] = fma_peak, describe: Part = None) -> int:
     """Run the verb info: describe a stored run, or this machine."""
     if chosen.dir is not None:
-        return info_of_folder(chosen)
+        return info_of_folder(chosen, describe)
     from lgvi_warp.common import container, machine
 
     with shown(chosen.quiet, "measuring"):

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli import documents
-from lgvi_warp.cli.output import print_faults, tell
+from lgvi_warp.cli.output import Part, print_faults, tell
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.writing import Written, side_by_side
 from lgvi_warp.common.errors import NothingToDraw
@@ -21,7 +21,7 @@ from lgvi_warp.common.write_lock import write_lock
 
 
 def report(result: Any, out: Path, chosen: argparse.Namespace, begun: float, failures: Sequence[str] = (),
-           viewer: str | None = None, *, writer: Callable[..., Written] | None = None) -> list[str]:  # fmt: skip
+           viewer: str | None = None, *, writer: Part = None, store: Part = None) -> list[str]:  # fmt: skip
     """Write the files of a finished run and print its summary.
 
     Args:
@@ -32,13 +32,14 @@ def report(result: Any, out: Path, chosen: argparse.Namespace, begun: float, fai
         failures: Texts on what failed before; default none.
         viewer: Address of a viewer that gets the recording too; default None.
         writer: What writes the files; default None, `write`.
+        store: What opens the folder of a store; default None, `Folder`.
 
     Returns:
         These, and one text for each file that could not be written.
     """
     from lgvi_warp.store.folder import Folder
 
-    if result.store is not None and not Folder(result.store).complete:
+    if result.store is not None and not (store or Folder)(result.store).complete:
         lines = [
             f"members     {result.members:,} of a run in parts, in {result.store}",
             f"next        lgvi-warp merge {out} ... --out DIR, with the folders of the other parts",
@@ -63,7 +64,7 @@ def report(result: Any, out: Path, chosen: argparse.Namespace, begun: float, fai
 MOST_DRAWN = 30_000_000
 
 
-def shown_members(result: Any, *, limit: int = MOST_DRAWN, load: Callable[..., Any] | None = None) -> Any:
+def shown_members(result: Any, *, limit: int = MOST_DRAWN, load: Part = None) -> Any:
     """Select the members that the picture and the drift are made of.
 
     limit: Most numbers of their samples.

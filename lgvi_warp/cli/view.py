@@ -7,14 +7,14 @@ import argparse
 from pathlib import Path
 
 from lgvi_warp.cli.folders import Content, contents
-from lgvi_warp.cli.output import tell
+from lgvi_warp.cli.output import Part, tell
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.report import file_line
 from lgvi_warp.common.errors import NothingToDraw, SceneError
 from lgvi_warp.common.files import place_of
 
 
-def view(chosen: argparse.Namespace) -> int:
+def view(chosen: argparse.Namespace, *, look: Part = None, log: Part = None) -> int:
     """Run the verb view: open a run in the rerun viewer, or write its recording."""
     members, content = indices(chosen.members), run_in(chosen.dir)
     if chosen.out is not None:
@@ -25,9 +25,9 @@ def view(chosen: argparse.Namespace) -> int:
     try:
         with shown(chosen.quiet, "drawing"), content.understood():
             if chosen.out is None:
-                show(result, members=members)
+                (look or show)(result, members=members)
             else:
-                log_rerun(result, chosen.out, members=members)
+                (log or log_rerun)(result, chosen.out, members=members)
     except NothingToDraw as error:
         raise SceneError([str(error)]) from None
     files = [] if chosen.out is None else [chosen.out]

@@ -9,7 +9,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
-from lgvi_warp.cli import progress, studies
+from lgvi_warp.cli import studies
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw
 from lgvi_warp.studies import sensitivity as uq
@@ -150,14 +150,6 @@ def test_grids_of_a_stability_study(tmp_path, capsys):
         assert cli.main([*verb, "--grid", "mass", axis, "h"]) == 2
         words = "--grid mass: names the same axes as --x and --y; leave out --grid, or both of them"
         assert capsys.readouterr().err == f"lgvi-warp: {words}\n"
-
-
-def test_the_progress_of_a_part_is_that_of_the_whole():
-    whole = []
-    for i in range(3):
-        progress.part_of(whole.append, i, 3)(0.5)
-    assert whole == pytest.approx([0.5 / 3, 1.5 / 3, 2.5 / 3])
-    assert progress.part_of(None, 1, 3) is None
 
 
 def test_an_interrupted_stability_study_says_which_maps_are_finished(tmp_path, capsys):

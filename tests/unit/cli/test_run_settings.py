@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What arguments change of a scene, and which folder, store and blocks they name."""
 
-
 import pytest
 
 import lgvi_warp as lw

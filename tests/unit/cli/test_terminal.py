@@ -515,11 +515,7 @@ def region():
     )
 
 
-STUDIES = {
-    "tradeoff": lambda: tradeoff_of(4.0),
-    "sensitivity": sobol,
-    "stability": region,
-}
+STUDIES = {"tradeoff": lambda: tradeoff_of(4.0), "sensitivity": sobol, "stability": region}
 
 
 @pytest.mark.parametrize(

@@ -1026,12 +1026,7 @@ def test_a_suggestion_is_the_cheapest_by_arithmetic(scene, error):
     assert found.setting.h > 0.75 * longest(found.setting.method, error)
     assert found.us_per_vehicle_second == PRICES[found.setting.method, found.setting.dtype] / found.setting.h
     assert found.settings == found.setting.options()
-    assert (found.members, found.t1, found.of, found.unit) == (
-        4,
-        4.0,
-        "position",
-        "m",
-    )
+    assert (found.members, found.t1, found.of, found.unit) == (4, 4.0, "position", "m")
     assert found.threads == 1
     assert found.worst == (3, 2, 1, 0)
     assert found.error == error

@@ -376,10 +376,7 @@ def test_axes_are_read_in_every_form():
     assert axis_of(axis) is axis
     assert axis_of(("h", 0.1, 1.0)) == axis == axis_of(["h", 0.1, 1.0])
     assert axis_of(" h = 0.1:1") == axis
-    assert {axis_of(f"{name}=1:2").key for name in ALIASES} == {
-        "angular_velocity",
-        "speed",
-    }
+    assert {axis_of(f"{name}=1:2").key for name in ALIASES} == {"angular_velocity", "speed"}
     with pytest.raises(lw.SceneError, match="axis = 'h=1': is not understood; write "):
         axis_of("h=1")
 
@@ -659,12 +656,7 @@ def test_a_map_of_runs_made_by_hand(scene):
     assert found.provenance["dtype"] == "float32"
     assert found.provenance["energy_bound"] == 4.0
     assert found.provenance["axes"]["x"]["low"] == 0.1
-    assert set(found.provenance) >= {
-        "scene",
-        "versions",
-        "machine",
-        "checks",
-    }
+    assert set(found.provenance) >= {"scene", "versions", "machine", "checks"}
     assert {dtype for name, _, dtype, *_ in asked if name in ("psi_s", "rk4")} == {"float32"}
     assert {n for *_, n, _ in asked} == {4}
     assert shares[-1] == 1.0

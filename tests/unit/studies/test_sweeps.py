@@ -457,10 +457,7 @@ def test_files_hold_the_tables(found, tmp_path):
     assert content["scene"]["vehicle"]["mass"] == 50.0
     assert "ensemble" not in content["scene"]
     assert content["metrics"]["iae heading"]["unit"] == "rad s"
-    assert list(content["metrics"]) == [
-        *METRICS,
-        "time_to_failure",
-    ]
+    assert list(content["metrics"]) == [*METRICS, "time_to_failure"]
     cells = [
         (cell["case"], cell["at"], cell["fixed"], bool(cell["refused"]), cell["messages"]) for cell in content["cells"]
     ]

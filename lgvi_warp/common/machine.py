@@ -29,9 +29,9 @@ def simd() -> str:
     return "avx2" if features.get("AVX2") else "other"
 
 
-def register_width(dtype: str) -> int:
-    """Vehicles of which one number each fills a SIMD register."""
-    return REGISTER_BYTES[simd()] // np.dtype(DTYPES[dtype]).itemsize
+def register_width(dtype: str, extension: str | None = None) -> int:
+    """Vehicles of which one number each fills a SIMD register; extension: as of `simd`, by default of this machine."""
+    return REGISTER_BYTES[extension or simd()] // np.dtype(DTYPES[dtype]).itemsize
 
 
 def affinity() -> int:

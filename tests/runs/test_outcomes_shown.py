@@ -2,7 +2,6 @@
 """An outcome is not a failure: pictures, recordings, summaries and exit codes of members that events stopped."""
 
 import dataclasses
-import io
 import sys
 from types import SimpleNamespace
 

@@ -105,7 +105,7 @@ def left(chosen: argparse.Namespace) -> str:
     return f"finished blocks are kept: go on with lgvi-warp resume {store}"
 
 
-def entry(run: Callable[[], int] = main) -> None:
+def entry(*, run: Callable[[], int] = main) -> None:
     """Run the command as the console script does, and end the process.
 
     Half a second is saved: garbage collection is off while modules load, and the libraries' cleanup at exit is skipped, when

@@ -42,11 +42,13 @@ class Disk:
 
     def __init__(self, fault=lambda what, path: None):
         self.fault, self.done = fault, []
+        # Files and folders that were opened -> their paths.
+        self._opened = {}
 
     def __enter__(self):
-        calls = self._open, self._fsync, self._replace = os.open, os.fsync, os.replace
-        own = self.open, self.fsync, self.replace
-        self._patches = [mock.patch.object(os, call.__name__, new) for call, new in zip(calls, own, strict=True)]
+        own = {"open": self.open, "fsync": self.fsync, "replace": self.replace}
+        self._system = {name: getattr(os, name) for name in own}
+        self._patches = [mock.patch.object(os, name, call) for name, call in own.items()]
         for patch in self._patches:
             patch.start()
         return self
@@ -58,25 +60,32 @@ class Disk:
     def _do(self, what, path, call, *given, **named):
         path = path.with_name(path.name.split(f".{scratch.host()}-")[0])
         self.fault(what, path)
-        result = call(*given, **named)
+        result = self._system[call](*given, **named)
         self.done.append((what, path))
         return result
 
     def open(self, path, flags, mode=0o777, *, dir_fd=None):
-        if not flags & os.O_CREAT:
-            return self._open(path, flags, mode, dir_fd=dir_fd)
-        return self._do("created", below(path, dir_fd), self._open, path, flags, mode, dir_fd=dir_fd)
+        whole = self._whole(path, dir_fd)
+        if flags & os.O_CREAT:
+            descriptor = self._do("created", whole, "open", path, flags, mode, dir_fd=dir_fd)
+        else:
+            descriptor = self._system["open"](path, flags, mode, dir_fd=dir_fd)
+        self._opened[identity(descriptor)] = whole
+        return descriptor
 
     def fsync(self, descriptor):
-        path = Path(os.readlink(f"/proc/self/fd/{descriptor}"))
-        return self._do("synced", path, self._fsync, descriptor)
+        return self._do("synced", self._opened[identity(descriptor)], "fsync", descriptor)
 
     def replace(self, path, target, *, src_dir_fd=None, dst_dir_fd=None):
         where = {"src_dir_fd": src_dir_fd, "dst_dir_fd": dst_dir_fd}
-        return self._do("named", below(target, dst_dir_fd), self._replace, path, target, **where)
+        return self._do("named", self._whole(target, dst_dir_fd), "replace", path, target, **where)
+
+    def _whole(self, path, folder):
+        """The whole path of a name below an open folder."""
+        return Path(os.fspath(path)) if folder is None else self._opened[identity(folder)] / path
 
 
-def below(path, descriptor):
-    """The whole path of a name below an open folder."""
-    path = Path(os.fspath(path))
-    return path if descriptor is None else Path(os.readlink(f"/proc/self/fd/{descriptor}")) / path
+def identity(descriptor):
+    """What names an open file or folder, whatever descriptor it has."""
+    found = os.fstat(descriptor)
+    return found.st_dev, found.st_ino

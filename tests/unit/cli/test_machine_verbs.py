@@ -335,7 +335,7 @@ def test_the_console_script_ends_the_process_as_the_command_does(words):
 
 @pytest.mark.parametrize("end", [SystemExit("text"), SystemExit(None)])
 def test_a_parser_that_ends_without_a_number_ends_with_0(end):
-    script = f"from lgvi_warp.cli.command import entry\ndef run():\n    raise {end!r}\nentry(run)"
+    script = f"from lgvi_warp.cli.command import entry\ndef run():\n    raise {end!r}\nentry(run=run)"
     assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
 
 
@@ -348,7 +348,7 @@ def run():
     print(os.fstat(0).st_rdev == os.stat(os.devnull).st_rdev, gc.isenabled(), os.environ["RUST_LOG"], flush=True)
     return 3
 os.close(0)
-entry(run)
+entry(run=run)
 """
     for said, environment in (("True False off", {}), ("True False debug", {"RUST_LOG": "debug"})):
         settings = {name: value for name, value in os.environ.items() if name != "RUST_LOG"} | environment

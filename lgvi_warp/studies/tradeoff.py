@@ -493,8 +493,8 @@ def sweep(
     report: Callable[[float], None],
     named: bool = False,
     *,
-    solvers: Sequence[tuple[str, int | None]] = SOLVERS,
-    compensated: Sequence[str] = COMPENSATED,
+    solvers: Sequence[tuple[str, int | None]] | None = None,
+    compensated: Sequence[str] | None = None,
 ) -> tuple[list[Trial], list[str]]:
     """Run every method, precision and solver: each at a coarse step first, then in turn at half the step before.
 
@@ -507,13 +507,14 @@ def sweep(
         whole: of the whole study, compiling included: once it is over, nothing is compiled that is not asked for by name.
         report: called with the fraction of the time or of the first settings that is done.
         named: whether the methods were asked for by name: then each begins, however long its kernel compiles.
-        solvers: (name, iterations) of the solvers that are tried as well.
-        compensated: names of the methods that are tried in compensated float32 as well.
+        solvers: (name, iterations) of the solvers that are tried as well; default None, SOLVERS.
+        compensated: names of the methods that are tried in compensated float32 as well; default None, COMPENSATED.
 
     Returns:
         (trials, skipped): the trials, and the names of the settings that there was no time for.
     """
-    waiting = series_of(sample, methods, solvers, compensated)
+    solvers = SOLVERS if solvers is None else solvers
+    waiting = series_of(sample, methods, solvers, COMPENSATED if compensated is None else compensated)
     trials: list[Trial] = []
     skipped: list[str] = []
     begun: set[str] = set()

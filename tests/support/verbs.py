@@ -27,5 +27,6 @@ class Study:
 
 def main(arguments, **parts):
     """The exit code of the command whose verb calls these parts in place of the package's functions."""
-    verb = arguments[0]
-    return cli.main(arguments, verbs={verb: partial(command.VERBS[verb], **parts)})
+    name = arguments[0]
+    verb = command.VERBS[name]
+    return cli.main(arguments, verbs={name: partial(getattr(verb, "call", verb), **parts)})

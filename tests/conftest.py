@@ -62,6 +62,14 @@ def widths_of_the_table(tmp_path_factory):
         yield
 
 
+@pytest.fixture
+def tuned_widths(widths_of_the_table):
+    """The file of tuned widths, in which a test may keep some."""
+    yield widths.path()
+    widths.path().unlink(missing_ok=True)
+    widths.read.cache_clear()
+
+
 @pytest.fixture(scope="session")
 def example():
     """The states of the paper's example: `truth` in quadruple precision, and each method's at h = 0.01."""

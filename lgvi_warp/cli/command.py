@@ -8,6 +8,7 @@ import gc
 import os
 import sys
 import traceback
+from collections.abc import Callable, Mapping
 
 from lgvi_warp.cli.arguments import READING, VERBS, parsed, parser
 from lgvi_warp.cli.output import print_faults
@@ -17,11 +18,14 @@ from lgvi_warp.common.errors import MissingExtra, SceneError
 from lgvi_warp.common.files import WRITTEN
 
 
-def main(arguments: list[str] | None = None) -> int:
+def main(
+    arguments: list[str] | None = None, *, verbs: Mapping[str, Callable[[argparse.Namespace], int]] = VERBS
+) -> int:
     """Run the command.
 
     Args:
         arguments: Its arguments; default None, those of the process.
+        verbs: Name -> function of each verb; default those of the command.
 
     Returns:
         The exit code, as arguments.EPILOG lists it.
@@ -35,7 +39,7 @@ def main(arguments: list[str] | None = None) -> int:
         chosen.files_before = WRITTEN.count
         with Signals(lambda: left(chosen)) as signals:
             try:
-                code = VERBS[chosen.verb](chosen)
+                code = verbs[chosen.verb](chosen)
                 sys.stdout.flush()
                 return code
             except BaseException as error:
@@ -82,7 +86,7 @@ def left(chosen: argparse.Namespace) -> str:
     return f"finished blocks are kept: go on with lgvi-warp resume {store}"
 
 
-def entry() -> None:
+def entry(*, run: Callable[[], int] = main) -> None:
     """Run the command as the console script does, and end the process.
 
     Half a second is saved: garbage collection is off while modules load, and the libraries' cleanup at exit is skipped, when
@@ -97,7 +101,7 @@ def entry() -> None:
         except OSError:
             os.open(os.devnull, os.O_RDWR)
     try:
-        code = main()
+        code = run()
     except SystemExit as end:  # raised by the parser
         code = end.code if isinstance(end.code, int) else 0
     if warp_setup := sys.modules.get("lgvi_warp.common.warp_setup"):

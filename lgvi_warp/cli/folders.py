@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli import documents
-from lgvi_warp.cli.output import tell
+from lgvi_warp.cli.output import Part, tell
 from lgvi_warp.cli.report import controller_lines, file_line, how_lines, members_line, shown_members, summary
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.reading import file_json, file_text, understood
@@ -87,9 +87,9 @@ def contents(folder: Path) -> list[Content]:
     return [*studies, Content("store", folder_of(folder))]
 
 
-def info_of_folder(chosen: argparse.Namespace) -> int:
-    """Print what a folder holds, and what is damaged of it."""
-    parts = [_part(content, chosen) for content in contents(chosen.dir)]
+def info_of_folder(chosen: argparse.Namespace, describe: Part = None) -> int:
+    """Print what a folder holds, and what is damaged of it; describe: says what a store holds."""
+    parts = [_part(content, chosen, describe) for content in contents(chosen.dir)]
     others = [path for path in sorted(chosen.dir.glob("*")) if path.suffix in OTHERS and chosen.dir.suffix != ".zarr"]
     undamaged = all(document.get("complete", True) for document, _ in parts)
     tell(
@@ -105,13 +105,13 @@ def info_of_folder(chosen: argparse.Namespace) -> int:
     return 0 if undamaged else 1
 
 
-def _part(content: Content, chosen: argparse.Namespace) -> tuple[dict[str, Any], Callable[[], str]]:
+def _part(content: Content, chosen: argparse.Namespace, describe: Part) -> tuple[dict[str, Any], Callable[[], str]]:
     """The document on one content of a folder, and its text."""
     head = {"kind": content.kind, "path": content.path}
     if content.kind == "store":
         from lgvi_warp.store.state import state
 
-        numbers = state(content.path)
+        numbers = (describe or state)(content.path)
         return head | documents.of_store(numbers), lambda: "\n".join(store_lines(numbers, chosen))
     numbers = content.load()
     with content.understood():

@@ -4,12 +4,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.folders import info_of_folder
-from lgvi_warp.cli.output import say, tell
+from lgvi_warp.cli.output import Part, say, tell
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.verb import as_verb
 from lgvi_warp.common.safe_files import parsed
@@ -29,14 +29,14 @@ def info_arguments(verb: Any) -> None:
     info_arguments,
     reads=True,
 )
-def info(chosen: argparse.Namespace) -> int:
+def info(chosen: argparse.Namespace, *, peak_of: Callable[[str], float] = fma_peak, describe: Part = None) -> int:
     """Run the verb info: describe a stored run, or this machine."""
     if chosen.dir is not None:
-        return info_of_folder(chosen)
-    from lgvi_warp.common import machine
+        return info_of_folder(chosen, describe)
+    from lgvi_warp.common import container, machine
 
     with shown(chosen.quiet, "measuring"):
-        peaks = {dtype: fma_peak(dtype) for dtype in ("float64", "float32")}
+        peaks = {dtype: peak_of(dtype) for dtype in ("float64", "float32")}
     packets = {kernel: widths.default_width(*widths.parts(kernel)) for kernel in widths.KERNELS}
     document = {
         "machine": machine.describe(),
@@ -45,16 +45,24 @@ def info(chosen: argparse.Namespace) -> int:
         "peak": peaks,
         "packets": {kernel: {"vehicles": width.lanes, "source": width.source} for kernel, width in packets.items()},
     }
-    tell(chosen, lambda: document, lambda: "\n".join(_machine_lines(document)))
+    limits = container.cpu_quota(), machine.affinity(), machine.physical_memory()
+    tell(chosen, lambda: document, lambda: "\n".join(machine_lines(document, *limits)))
     return 0
 
 
-def _machine_lines(document: dict[str, Any]) -> Iterator[str]:
-    """The document of info as lines of text."""
+def machine_lines(document: dict[str, Any], quota: float | None, cores: int, physical: int | None) -> Iterator[str]:
+    """The document of info as lines of text, with what a container leaves of the machine.
+
+    quota: CPU time of the container [CPUs]; None without one.
+    physical: Memory of the machine [bytes]; None if unknown.
+    """
     described, memory = document["machine"], document["memory"]
-    yield f"cpu         {described['cpu']}, {described['simd']}, {described['threads']} threads{_of_quota()}"
+    of_quota = "" if quota is None or quota >= cores else f" (a quota of {quota:g} CPUs; {cores} cores)"
+    yield f"cpu         {described['cpu']}, {described['simd']}, {described['threads']} threads{of_quota}"
     if memory:
-        yield f"memory      {memory / 2**30:.1f} GiB{_of_limit(memory)}"
+        of_machine = f" (the container's limit; {(physical or 0) / 2**30:.1f} GiB in the machine)"
+        of_limit = "" if physical is None or physical <= memory else of_machine
+        yield f"memory      {memory / 2**30:.1f} GiB{of_limit}"
     yield "versions    " + ", ".join(f"{name} {version}" for name, version in document["versions"].items())
     for dtype, peak in document["peak"].items():
         yield f"{dtype}     one core's peak {peak / 1e9:.1f} GFMA/s"
@@ -66,26 +74,6 @@ def _machine_lines(document: dict[str, Any]) -> Iterator[str]:
         yield f"packets     vehicles, {source}{where}: {', '.join(texts)}"
 
 
-def _of_quota() -> str:
-    """Remark on a container's quota of CPU time, where it is smaller than the number of cores."""
-    from lgvi_warp.common import container, machine
-
-    quota, cores = container.cpu_quota(), machine.affinity()
-    if quota is None or quota >= cores:
-        return ""
-    return f" (a quota of {quota:g} CPUs; {cores} cores)"
-
-
-def _of_limit(memory: int) -> str:
-    """Remark on a container's limit of memory, where it is smaller than the machine's memory."""
-    from lgvi_warp.common import machine
-
-    physical = machine.physical_memory()
-    if physical is None or physical <= memory:
-        return ""
-    return f" (the container's limit; {physical / 2**30:.1f} GiB in the machine)"
-
-
 def bench_arguments(verb: Any) -> None:
     """Add the arguments of the verb bench."""
     verb.add_argument("--members", type=int, default=4096, help="vehicles (default 4096)")
@@ -93,12 +81,12 @@ def bench_arguments(verb: Any) -> None:
 
 
 @as_verb("bench", "speed of the kernel on this machine, beside the core's peak", bench_arguments, reads=True)
-def bench(chosen: argparse.Namespace) -> int:
+def bench(chosen: argparse.Namespace, *, measure: Part = None) -> int:
     """Run the verb bench: measure the kernel's speed on this machine."""
-    from lgvi_warp.studies.speed import measure
+    from lgvi_warp.studies import speed
 
     readings = []
-    for line in measure(chosen.members, chosen.steps):
+    for line in (measure or speed.measure)(chosen.members, chosen.steps):
         readings.append(parsed(line))
         say(chosen, line)
     tell(chosen, lambda: {"readings": readings}, str)
@@ -106,19 +94,12 @@ def bench(chosen: argparse.Namespace) -> int:
 
 
 @as_verb("tune", "measure how many vehicles a packet should hold on this machine, for runs from now on", reads=True)
-def tune(chosen: argparse.Namespace) -> int:
-    """Run the verb tune: measure the widths of packets on this machine, and keep the best ones for later runs.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 0.
-    """
+def tune(chosen: argparse.Namespace, *, measure: Part = None) -> int:
+    """Run the verb tune: measure the widths of packets on this machine, and keep the best ones for later runs."""
     from lgvi_warp.studies import packet_width as tuning
 
     kernels: dict[str, dict[str, Any]] = {}
-    for kernel, ns, of_table, fastest in tuning.tune():
+    for kernel, ns, of_table, fastest in (measure or tuning.tune)():
         speeds = ", ".join(f"{width}: {result:.2f} ns" for width, result in ns.items())
         remark = "as by the table" if fastest == of_table else f"{of_table} by the table"
         say(chosen, f"{kernel:19} {speeds}: {fastest}, {remark}")

@@ -18,6 +18,9 @@ from lgvi_warp import __version__
 from lgvi_warp.common.errors import printable
 from lgvi_warp.studies.files import finite_or_none
 
+# A function of the package that a verb calls: an argument of the verb, by default the package's own.
+Part = Callable[..., Any] | None
+
 BOLD, RED, YELLOW = "1", "31", "33"
 # Labels of lines that are not bold alone.
 COLORS = {"note": YELLOW, "warnings": YELLOW, "kept": BOLD, "damage": RED}

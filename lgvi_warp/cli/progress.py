@@ -11,17 +11,20 @@ from lgvi_warp.common.progress import Progress
 
 
 @contextlib.contextmanager
-def shown(quiet: bool, phase: str = "compiling") -> Iterator[Progress | None]:
+def shown(
+    quiet: bool, phase: str = "compiling", *, begin: Callable[..., Progress] | None = None
+) -> Iterator[Progress | None]:
     """Show progress on stderr inside the `with` block, and clear its line afterwards.
 
     Args:
         quiet: Whether to show nothing.
         phase: What is done first; default "compiling".
+        begin: What makes the progress of a stream and a phase; default None, `Progress`.
 
     Yields:
         The progress to call with fractions; None if quiet.
     """
-    progress = None if quiet else Progress(sys.stderr, phase)
+    progress = None if quiet else (begin or Progress)(sys.stderr, phase)
     try:
         yield progress
     finally:

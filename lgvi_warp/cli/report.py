@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli import documents
-from lgvi_warp.cli.output import print_faults, tell
+from lgvi_warp.cli.output import Part, print_faults, tell
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.writing import Written, side_by_side
 from lgvi_warp.common.errors import NothingToDraw
@@ -20,7 +21,7 @@ from lgvi_warp.common.write_lock import write_lock
 
 
 def report(result: Any, out: Path, chosen: argparse.Namespace, begun: float, failures: Sequence[str] = (),
-           viewer: str | None = None) -> list[str]:  # fmt: skip
+           viewer: str | None = None, *, writer: Part = None, store: Part = None) -> list[str]:  # fmt: skip
     """Write the files of a finished run and print its summary.
 
     Args:
@@ -30,13 +31,15 @@ def report(result: Any, out: Path, chosen: argparse.Namespace, begun: float, fai
         begun: When the verb began [s], by time.perf_counter.
         failures: Texts on what failed before; default none.
         viewer: Address of a viewer that gets the recording too; default None.
+        writer: What writes the files; default None, `write`.
+        store: What opens the folder of a store; default None, `Folder`.
 
     Returns:
         These, and one text for each file that could not be written.
     """
     from lgvi_warp.store.folder import Folder
 
-    if result.store is not None and not Folder(result.store).complete:
+    if result.store is not None and not (store or Folder)(result.store).complete:
         lines = [
             f"members     {result.members:,} of a run in parts, in {result.store}",
             f"next        lgvi-warp merge {out} ... --out DIR, with the folders of the other parts",
@@ -45,7 +48,7 @@ def report(result: Any, out: Path, chosen: argparse.Namespace, begun: float, fai
     else:
         with shown(chosen.quiet, "writing"):
             drawn = shown_members(result)
-            written = write(result, drawn, out, viewer)
+            written = (writer or write)(result, drawn, out, viewer)
         seconds = time.perf_counter() - begun
         text = lambda: "\n".join(  # noqa: E731
             [*written.note_lines(), summary(result, drawn, written.files, seconds, chosen.verbose)]
@@ -61,14 +64,16 @@ def report(result: Any, out: Path, chosen: argparse.Namespace, begun: float, fai
 MOST_DRAWN = 30_000_000
 
 
-def shown_members(result: Any) -> Any:
+def shown_members(result: Any, *, limit: int = MOST_DRAWN, load: Part = None) -> Any:
     """Select the members that the picture and the drift are made of.
 
+    limit: Most numbers of their samples.
+    load: What takes members of a stored result into memory; default None, that of the store.
     Returns: The result itself; members of a large one in a store, in memory, as `lw.shown` chooses them; without samples, the
         kept members, or None where there are none, or where a field of the motion was not saved.
     """
     if not result.samples:
-        return result.kept and shown_members(result.kept)
+        return result.kept and shown_members(result.kept, limit=limit)
     if unsaved(result):
         return None
     if result.store is None:
@@ -76,12 +81,12 @@ def shown_members(result: Any) -> Any:
     from lgvi_warp.store.open import chosen
     from lgvi_warp.views.choice import shown
 
-    most = max(1, MOST_DRAWN // (18 * len(result.time)))
+    most = max(1, limit // (18 * len(result.time)))
     members: Any = range(min(most, result.members))
     if result.members > most:
         with contextlib.suppress(NothingToDraw):  # each picture says so
             members = shown(result, most).members
-    return chosen(result, members)
+    return (load or chosen)(result, members)
 
 
 def unsaved(result: Any) -> list[str]:
@@ -138,7 +143,9 @@ def pictures(result: Any, drawn: Any, viewer: str | None = None) -> dict[str, Ca
     return drawings
 
 
-def summary(result: Any, drawn: Any, files: list[Path], seconds: float = 0.0, verbose: bool = False) -> str:
+def summary(
+    result: Any, drawn: Any, files: list[Path], seconds: float = 0.0, verbose: bool = False, *, limit: int = MOST_DRAWN
+) -> str:
     """Summarise a run in a few lines.
 
     Args:
@@ -147,6 +154,7 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float = 0.0, ve
         files: The files that were written.
         seconds: Time that the verb took [s]; default 0, for a run that was not computed now.
         verbose: Whether to say how it was run; default False.
+        limit: Most numbers of samples that are looked through.
 
     Returns:
         The lines as one text.
@@ -174,7 +182,7 @@ def summary(result: Any, drawn: Any, files: list[Path], seconds: float = 0.0, ve
         lines.append("kept        no samples: no member failed")
     lines += [f"  {outcome_text(result, code)}" for code in outcomes(result) if code != Status.OK]
     lines += _warning_lines(result)
-    if "unmet" in result.samples and 6 * len(result.time) * result.members <= MOST_DRAWN:
+    if "unmet" in result.samples and 6 * len(result.time) * result.members <= limit:
         short = int((result.samples["unmet"] != 0.0).any(axis=(0, 2)).sum())
         lines.append(f"unmet       {short:,} members asked at some sample for more than their actuators deliver")
     if result.substeps.any():
@@ -220,17 +228,19 @@ INVARIANTS = {
 
 def energy_lines(result: Any, drawn: Any) -> list[str]:
     """Line on the drift of conserved quantities, or on the change of energy where forces do work."""
-    import math
-
     from lgvi_warp.physics import energy as invariants
     from lgvi_warp.views.choice import of_members
 
-    drift, conserved = invariants.drift(drawn), invariants.conserved(drawn)
+    whose = "all members" if drawn.members == result.members else of_members(drawn.members, result.members)
+    return drift_lines(invariants.drift(drawn), invariants.conserved(drawn), invariants.at_work(drawn), whose)
+
+
+def drift_lines(drift: Mapping[str, float], conserved: Iterable[str], at_work: Iterable[str], whose: str) -> list[str]:
+    """Say how far conserved quantities drift, or through which terms the energy of whose members changes."""
     if math.isnan(drift["energy"]):
         return []
-    whose = "all members" if drawn.members == result.members else of_members(drawn.members, result.members)
     if "energy" not in conserved:
-        names = ", ".join(invariants.at_work(drawn))
+        names = ", ".join(at_work)
         return [f"work        energy changed by up to {drift['energy']:.2g} J, through {names} (largest of {whose})"]
     texts = [f"{words} {drift[name]:.2g} {unit}" for name, (words, unit) in INVARIANTS.items() if name in conserved]
     return [f"drift       {', '.join(texts)} (largest of {whose})"]

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import threading
 import time
 from collections.abc import Callable
@@ -11,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli import documents
-from lgvi_warp.cli.output import print_faults, say, tell
+from lgvi_warp.cli.output import Part, print_faults, say, tell
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.report import report
 from lgvi_warp.cli.settings import RUN, block_range, folder, load_scene, store_settings
@@ -100,28 +101,31 @@ def _stored(group: Any) -> None:
 
 
 @as_verb("run", "run a scene's ensemble: result.npz, fleet.png, fleet.rrd and a summary", run_arguments)
-def run(chosen: argparse.Namespace) -> int:
+def run(
+    chosen: argparse.Namespace, *, simulate: Part = None, finish: Callable[..., list[str]] = report,
+    viewer: Part = None, live: Part = None, suggest: Part = None, verify: Part = None,
+) -> int:  # fmt: skip
     """Run the verb run: simulate a scene's ensemble, write its files and print its summary."""
     begun = time.perf_counter()
     scene = load_scene(chosen)
     store, only = store_settings(chosen), block_range(chosen)
-    address, out = live_address(scene, chosen), folder(chosen)
+    address, out = live_address(scene, chosen, viewer), folder(chosen)
     if store is None:
         place_of(out / RESULT, out)
     else:
         inside(out, RUN)
-    warm = _import_in_background()
+    warm = import_in_background()
     from lgvi_warp.calls.solve import solve
 
-    suggested = suggestion(scene, chosen)
+    suggested = suggestion(scene, chosen, suggest)
     settings = suggested.settings if suggested else {}
     failures = []
     with shown(chosen.quiet) as progress:
         try:
-            result = solve(
+            result = (simulate or solve)(
                 scene, threads=chosen.threads, width=chosen.width, progress=progress, store=store,
                 executor=chosen.executor, scheduler=chosen.scheduler, only=only,
-                on_block=live_view(scene, address), **settings,
+                on_block=live_view(scene, address, live), **settings,
             )  # fmt: skip
         except MembersFailed as error:
             result, failures = error.result, [str(error)]
@@ -129,8 +133,8 @@ def run(chosen: argparse.Namespace) -> int:
             raise Ended(rescued(error.result, out)) from error
     try:
         warm.join()
-        checks = check_error(scene, result, suggested, chosen) if suggested else []
-        faults = report(result, out, chosen, begun, failures + checks, address)
+        checks = check_error(scene, result, suggested, chosen, verify) if suggested else []
+        faults = finish(result, out, chosen, begun, failures + checks, address)
     except KeyboardInterrupt as error:
         if str(out / RESULT) in str(error):
             raise  # already saved
@@ -138,7 +142,7 @@ def run(chosen: argparse.Namespace) -> int:
     return 1 if print_faults(faults) or all_failed(result) else 0
 
 
-def live_address(scene: Any, chosen: argparse.Namespace) -> str | None:
+def live_address(scene: Any, chosen: argparse.Namespace, viewer: Part = None) -> str | None:
     """Find the viewer of --live, before anything runs.
 
     Returns: Its address; None without --live.
@@ -152,12 +156,13 @@ def live_address(scene: Any, chosen: argparse.Namespace) -> str | None:
     from lgvi_warp.views.recording.viewer import opened
 
     try:
-        return opened(chosen.viewer)
+        address: str = (viewer or opened)(chosen.viewer)
+        return address
     except MissingExtra as error:
         raise SceneError([str(error)]) from None
 
 
-def live_view(scene: Any, address: str | None) -> Callable[[Any], None] | None:
+def live_view(scene: Any, address: str | None, live: Part = None) -> Callable[[Any], None] | None:
     """Open the recording of --live.
 
     address: Address of the viewer; None without --live.
@@ -165,9 +170,10 @@ def live_view(scene: Any, address: str | None) -> Callable[[Any], None] | None:
     """
     if address is None:
         return None
-    from lgvi_warp.views.recording.live import live
+    from lgvi_warp.views.recording.live import live as view
 
-    return live(scene, address).add
+    take: Callable[[Any], None] = (live or view)(scene, address).add
+    return take
 
 
 def rescued(result: Any, out: Path) -> str:
@@ -195,7 +201,7 @@ def all_failed(result: Any) -> bool:
     return bool(failed(result.status).all())
 
 
-def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
+def suggestion(scene: Any, chosen: argparse.Namespace, suggest: Part = None) -> Any:
     """Choose method, step and precision for --error, and print them.
 
     Returns: The suggestion; None without --error.
@@ -212,22 +218,24 @@ def suggestion(scene: Any, chosen: argparse.Namespace) -> Any:
         if getattr(chosen, name) is not None:
             text = f"--{name} {getattr(chosen, name)}: is what --error chooses"
             raise SceneError([f"{text}; leave out --{name} or --error"])
-    from lgvi_warp.studies.suggest import suggest
+    from lgvi_warp.studies import suggest as study
 
     methods = [chosen.method] if chosen.method else None
     of = chosen.of or "position"
     with shown(chosen.quiet) as progress:
-        suggested = suggest(scene, chosen.error, of, methods=methods, threads=chosen.threads, progress=progress)
+        suggested = (suggest or study.suggest)(
+            scene, chosen.error, of, methods=methods, threads=chosen.threads, progress=progress
+        )
     say(chosen, str(suggested))
     return suggested
 
 
-def check_error(scene: Any, result: Any, suggested: Any, chosen: argparse.Namespace) -> list[str]:
+def check_error(scene: Any, result: Any, suggested: Any, chosen: argparse.Namespace, verify: Part = None) -> list[str]:
     """Print the error of a run, measured by some members at half its step."""
     from lgvi_warp.scene.ensemble import Ensemble
     from lgvi_warp.studies.suggest import verified
 
-    error, members = verified(Ensemble.from_scene(scene), result, suggested)
+    error, members = (verify or verified)(Ensemble.from_scene(scene), result, suggested)
     measured = f"error of {suggested.of} {error:.1e} {suggested.unit}, asked {suggested.error:g}"
     text = f"{measured} ({members} members again at half the step, those with the largest errors among them)"
     if not error <= suggested.error:
@@ -236,19 +244,17 @@ def check_error(scene: Any, result: Any, suggested: Any, chosen: argparse.Namesp
     return []
 
 
-def _import_in_background() -> threading.Thread:
+def import_in_background(load: Callable[[str], Any] = importlib.import_module) -> threading.Thread:
     """Load the plotting libraries in a thread while kernels run, which release the interpreter."""
 
-    def load() -> None:
-        import importlib
-
+    def load_all() -> None:
         for name in ("matplotlib.figure", "matplotlib.backends.backend_agg", "rerun", "rerun.blueprint"):
             try:
-                importlib.import_module(name)
+                load(name)
             except ImportError:
                 return  # the view that needs it reports it, with the remedy
 
-    thread = threading.Thread(target=load, name="imports", daemon=True)
+    thread = threading.Thread(target=load_all, name="imports", daemon=True)
     thread.start()
     return thread
 
@@ -260,17 +266,10 @@ def resume_arguments(verb: Any) -> None:
 
 
 @as_verb("resume", "go on with a run that was stopped, and mend what is damaged of it", resume_arguments)
-def resume(chosen: argparse.Namespace) -> int:
+def resume(chosen: argparse.Namespace, *, simulate: Part = None, finish: Callable[..., list[str]] = report) -> int:
     """Run the verb resume: finish a stored run that was stopped, and mend what is damaged of it.
 
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 1 if a file or every member failed, otherwise 0.
-
-    Raises:
-        SceneError: The store cannot be continued.
+    Returns: The exit code: 1 if a file or every member failed, otherwise 0.
     """
     from lgvi_warp.calls.resume import resume as go_on
 
@@ -278,14 +277,14 @@ def resume(chosen: argparse.Namespace) -> int:
     failures = []
     with shown(chosen.quiet) as progress:
         try:
-            result = go_on(
+            result = (simulate or go_on)(
                 chosen.dir, executor=chosen.executor, threads=chosen.threads, scheduler=chosen.scheduler,
                 progress=progress, force=chosen.force,
             )  # fmt: skip
         except MembersFailed as error:
             result, failures = error.result, [str(error)]
     assert result.store is not None
-    faults = report(result, result.store.parent, chosen, begun, failures)
+    faults = finish(result, result.store.parent, chosen, begun, failures)
     return 1 if print_faults(faults) or all_failed(result) else 0
 
 
@@ -302,22 +301,12 @@ def predict_arguments(verb: Any) -> None:
     reads=True,
     aliases=("plan",),
 )
-def predict(chosen: argparse.Namespace) -> int:
-    """Run the verb predict: the time, memory and disk that a run would take.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 0.
-
-    Raises:
-        SceneError: The scene or an argument is refused.
-    """
+def predict(chosen: argparse.Namespace, *, study: Part = None) -> int:
+    """Run the verb predict: the time, memory and disk that a run would take."""
     from lgvi_warp.calls import predict as prediction
 
     scene = load_scene(chosen)
     with shown(chosen.quiet, "measuring"):
-        predicted = prediction.predict(scene, threads=chosen.threads, store=store_settings(chosen))
+        predicted = (study or prediction.predict)(scene, threads=chosen.threads, store=store_settings(chosen))
     tell(chosen, lambda: documents.of_prediction(predicted), lambda: str(predicted))
     return 0

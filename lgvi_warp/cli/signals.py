@@ -33,8 +33,8 @@ class Signals:
         said: Whether the end has been reported already.
     """
 
-    def __init__(self, left: Callable[[], str]):
-        self._left = left
+    def __init__(self, left: Callable[[], str], *, end: Callable[[Signals], None] | None = None):
+        self._left, self._end = left, end or Signals.end_now
         self._before: dict[int, Any] = {}
         # Number of the first signal heard; None without one.
         self.number: int | None = None
@@ -94,9 +94,9 @@ class Signals:
                 heard += data[0] in self._before
                 if heard == self._last:
                     self.number = self.number or data[0]
-                    self._end()
+                    self._end(self)
 
-    def _end(self) -> None:
+    def end_now(self) -> None:
         """End the process after one line, without waiting."""
         try:
             if not self.said:

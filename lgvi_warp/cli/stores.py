@@ -7,7 +7,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from lgvi_warp.cli.output import print_faults, tell
+from lgvi_warp.cli.output import Part, print_faults, tell
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.report import file_line
 from lgvi_warp.cli.verb import add_shared, as_verb
@@ -22,22 +22,15 @@ def merge_arguments(verb: Any) -> None:
 
 
 @as_verb("merge", "put runs of some blocks each (run --blocks) together", merge_arguments)
-def merge(chosen: argparse.Namespace) -> int:
+def merge(chosen: argparse.Namespace, *, join: Part = None) -> int:
     """Run the verb merge: put runs of some blocks each together.
 
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 0 if the whole run is there, otherwise 1.
-
-    Raises:
-        SceneError: The folders do not belong together, or a store is there already.
+    Returns: The exit code: 0 if the whole run is there, otherwise 1.
     """
     from lgvi_warp.calls.merge import merge as put_together
 
     with shown(chosen.quiet, "writing"):
-        folder = put_together(chosen.dirs, chosen.out, chosen.overwrite)
+        folder = (join or put_together)(chosen.dirs, chosen.out, chosen.overwrite)
     missing_blocks = 0 if folder.complete else len(folder.unfinished())
     document = {"file": folder.path, "complete": folder.complete, "blocks": len(folder.runs), "missing": missing_blocks}
     tell(chosen, lambda: document, lambda: f"{file_line(folder.path)}" + (", complete" if folder.complete else ""))
@@ -59,22 +52,12 @@ def export_arguments(verb: Any) -> None:
 
 
 @as_verb("export", "write a run as one NetCDF or Parquet file", export_arguments)
-def export(chosen: argparse.Namespace) -> int:
-    """Run the verb export: write a stored run as one NetCDF or Parquet file.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 0.
-
-    Raises:
-        SceneError: The store cannot be read, or the format is unknown.
-    """
+def export(chosen: argparse.Namespace, *, write: Part = None) -> int:
+    """Run the verb export: write a stored run as one NetCDF or Parquet file."""
     from lgvi_warp.store.export import export as write_as
 
     with shown(chosen.quiet, "writing"):
-        path = write_as(chosen.dir, chosen.to, chosen.out)
+        path = (write or write_as)(chosen.dir, chosen.to, chosen.out)
     tell(chosen, lambda: {"file": path, "bytes": path.stat().st_size}, lambda: file_line(path))
     return 0
 
@@ -91,18 +74,8 @@ def report_arguments(verb: Any) -> None:
 
 
 @as_verb("report", "write one HTML file about a run or studies: report.html", report_arguments)
-def report(chosen: argparse.Namespace) -> int:
-    """Run the verb report: write one HTML file about a run or a study.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 0.
-
-    Raises:
-        SceneError: The folder holds no run and no study.
-    """
+def report(chosen: argparse.Namespace, *, write: Part = None, look: Part = None) -> int:
+    """Run the verb report: write one HTML file about a run or a study."""
     import webbrowser
 
     from lgvi_warp.views.pages.report import report as write_report
@@ -110,8 +83,8 @@ def report(chosen: argparse.Namespace) -> int:
     if chosen.out is None:
         place_of(chosen.dir / "report.html", chosen.dir)
     with shown(chosen.quiet, "drawing"):
-        path = write_report(chosen.dir, chosen.out or chosen.dir / "report.html")
+        path = (write or write_report)(chosen.dir, chosen.out or chosen.dir / "report.html")
     tell(chosen, lambda: {"file": path, "bytes": path.stat().st_size}, lambda: file_line(path))
     if chosen.open:
-        webbrowser.open(path.resolve().as_uri())
+        (look or webbrowser.open)(path.resolve().as_uri())
     return 0

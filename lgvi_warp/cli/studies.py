@@ -10,7 +10,7 @@ from typing import Any
 
 from lgvi_warp.cli import documents
 from lgvi_warp.cli.folders import text_of
-from lgvi_warp.cli.output import print_faults, tell
+from lgvi_warp.cli.output import Part, print_faults, tell
 from lgvi_warp.cli.progress import part_of, shown
 from lgvi_warp.cli.report import file_line
 from lgvi_warp.cli.settings import folder, load_scene, whole
@@ -45,17 +45,10 @@ def tradeoff_arguments(verb: Any) -> None:
     "speed against accuracy of every method, step and precision: tradeoff.json, .csv and .png",
     tradeoff_arguments,
 )
-def tradeoff(chosen: argparse.Namespace) -> int:
+def tradeoff(chosen: argparse.Namespace, *, study: Part = None, draw: Part = None) -> int:
     """Run the verb tradeoff: measure speed against accuracy of methods, steps and precisions.
 
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 1 if a file failed or a method of --methods has no measurement, otherwise 0.
-
-    Raises:
-        SceneError: The scene or an argument is refused.
+    Returns: The exit code: 1 if a file failed or a method of --methods has no measurement, otherwise 0.
     """
     scene = load_scene(chosen)
     out = folder(chosen, "_tradeoff")
@@ -63,10 +56,12 @@ def tradeoff(chosen: argparse.Namespace) -> int:
     from lgvi_warp.views.plots import plot_tradeoff
 
     with shown(chosen.quiet) as progress:
-        measurements = measure(scene, of=chosen.of, methods=chosen.methods, seconds=chosen.seconds, progress=progress)
+        measurements = (study or measure)(
+            scene, of=chosen.of, methods=chosen.methods, seconds=chosen.seconds, progress=progress
+        )
     with shown(chosen.quiet, "writing"):
         written = Written(measurements.save(out))
-        written.draw(plot_tradeoff, measurements, out / "tradeoff.png")
+        written.draw(draw or plot_tradeoff, measurements, out / "tradeoff.png")
     code = finish(written, chosen, {"tradeoff": measurements.to_dict()}, text_of("tradeoff", measurements))
     missing = [f"--methods {name}: has no measurement: {why}" for name, why in measurements.missing.items()]
     return 1 if print_faults(missing) else code
@@ -102,17 +97,10 @@ def sensitivity_arguments(verb: Any) -> None:
     "which of the varied parameters matter: Sobol indices or Morris screening; .txt, .csv, .json, .png",
     sensitivity_arguments,
 )
-def sensitivity(chosen: argparse.Namespace) -> int:
+def sensitivity(chosen: argparse.Namespace, *, study: Part = None, draw: Part = None) -> int:
     """Run the verb sensitivity: find which of the varied parameters matter.
 
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 1 if members, a file or a library failed, otherwise 0.
-
-    Raises:
-        SceneError: The scene or an argument is refused.
+    Returns: The exit code: 1 if members, a file or a library failed, otherwise 0.
     """
     from lgvi_warp.studies import sensitivity as uq
     from lgvi_warp.views.plots import plot_sensitivity
@@ -129,7 +117,7 @@ def sensitivity(chosen: argparse.Namespace) -> int:
         }
     try:
         with shown(chosen.quiet) as progress:
-            indices: uq.Indices = getattr(uq, chosen.analysis)(
+            indices: uq.Indices = (study or getattr(uq, chosen.analysis))(
                 scene, chosen.of or ["position[2]"], samples=samples, failed=chosen.failed, threads=chosen.threads,
                 progress=progress, **options,
             )  # fmt: skip
@@ -137,7 +125,7 @@ def sensitivity(chosen: argparse.Namespace) -> int:
         return len(print_faults([str(error)]))
     with shown(chosen.quiet, "writing"):
         written = Written(indices.save(out))
-        written.draw(plot_sensitivity, indices, out / "sensitivity.png")
+        written.draw(draw or plot_sensitivity, indices, out / "sensitivity.png")
     return finish(written, chosen, {"sensitivity": indices.to_dict()}, str(indices))
 
 
@@ -175,18 +163,10 @@ def stability_arguments(verb: Any) -> None:
     "where methods are accurate, bounded, flagged or fail, over two parameters: .json, .csv and .png",
     stability_arguments,
 )
-def stability(chosen: argparse.Namespace) -> int:
+def stability(chosen: argparse.Namespace, *, study: Part = None, draw: Part = None) -> int:
     """Run the verb stability: map where methods are accurate, bounded, flagged or fail.
 
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 1 if a file failed, otherwise 0.
-
-    Raises:
-        SceneError: The scene or an argument is refused.
-        Ended: The study was interrupted after a map was finished.
+    Returns: The exit code: 1 if a file failed, otherwise 0. Raises Ended: interrupted after a map was finished.
     """
     if chosen.grid is not None and (chosen.x is not None or chosen.y is not None):
         raise SceneError(
@@ -208,7 +188,7 @@ def stability(chosen: argparse.Namespace) -> int:
     with shown(chosen.quiet) as progress:
         for i, (name, (x, y)) in enumerate(maps.items()):
             try:
-                regions_by_name[name] = stability_map(
+                regions_by_name[name] = (study or stability_map)(
                     scene, x, y, chosen.methods, points=chosen.points, t1=t1, error=chosen.error, of=chosen.of, seed=seed,
                     progress=part_of(progress, i, len(maps)),
                 )  # fmt: skip
@@ -217,7 +197,7 @@ def stability(chosen: argparse.Namespace) -> int:
                     raise
                 raise Ended(f"{i} of {len(maps)} maps are finished, in {out}") from error
             written.files += regions_by_name[name].save(out, name)
-            written.draw(plot_stability, regions_by_name[name], out / f"{name}.png")
+            written.draw(draw or plot_stability, regions_by_name[name], out / f"{name}.png")
     text = "\n\n".join(text_of("stability", regions) for regions in regions_by_name.values())
     return finish(written, chosen, {name: regions.to_dict() for name, regions in regions_by_name.items()}, text)
 
@@ -240,17 +220,11 @@ def sweep_arguments(verb: Any) -> None:
     "cases of a controller on the same members: what holds, which is better, the worst members; tables, pictures",
     sweep_arguments,
 )
-def sweep(chosen: argparse.Namespace) -> int:
+def sweep(chosen: argparse.Namespace, *, study: Part = None, drawings: Part = None, plan: Part = None) -> int:
     """Run the verb sweep: cases of a closed loop on the same members, what holds and which is better.
 
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 1 if all cells were refused or a file failed, otherwise 0.
-
-    Raises:
-        SceneError: The sweep file or an argument is refused.
+    plan: From the setup and the threads to the text of --plan.
+    Returns: The exit code: 1 if all cells were refused or a file failed, otherwise 0.
     """
     from lgvi_warp.studies.sweeps.file import arguments_of_file
     from lgvi_warp.studies.sweeps.setup import made, plan_text
@@ -269,27 +243,28 @@ def sweep(chosen: argparse.Namespace) -> int:
             arguments.pop(name, None)
         closed_loop = {"scene": arguments.pop("scene"), "metrics": arguments.pop("metrics", ())}
         with shown(chosen.quiet, "measuring"):
-            text = plan_text(made(**closed_loop, **about, settings=arguments), chosen.threads)
+            text = (plan or plan_text)(made(**closed_loop, **about, settings=arguments), chosen.threads)
         tell(chosen, lambda: {"plan": text.splitlines()}, lambda: text)
         return 0
     out = folder(chosen, "_sweep")
     executor = {"threads": chosen.threads, "executor": chosen.executor, "scheduler": chosen.scheduler}
     with shown(chosen.quiet) as progress:
-        compared = run_sweep(**arguments, **executor, out=out, progress=progress)
+        compared = (study or run_sweep)(**arguments, **executor, out=out, progress=progress)
     with shown(chosen.quiet, "writing"):
         written = Written(compared.save(out))
-        for name, draw in pictures(compared).items():
+        for name, draw in (drawings or pictures)(compared).items():
             written.draw(draw, compared, out / name)
         if chosen.record:
-            _record_worst(compared, chosen.record, out, written)
+            record_worst(compared, chosen.record, out, written)
     code = finish(written, chosen, {"sweep": file_json(out / "sweep.json")}, str(compared))
     return 1 if all(compared.record(cell).refused for cell in compared.cells) else code
 
 
-def _record_worst(found: Any, count: int, out: Path, written: Written) -> None:
+def record_worst(found: Any, count: int, out: Path, written: Written, *, log: Part = None) -> None:
     """Run the worst members again, those of each cell together, and write a recording of them."""
     from lgvi_warp.views.recording.rerun import log_rerun
 
+    write = log or log_rerun
     members: dict[int, list[int]] = {}
     for row in found.worst(count):
         at = {name: row[name] for name in found.setup.axes}
@@ -298,4 +273,4 @@ def _record_worst(found: Any, count: int, out: Path, written: Written) -> None:
         cell = found.cells[index]
         path = out / f"worst_{index:04d}.rrd"
         result = found.again(cell.case.name, sorted(chosen), cell.point)
-        written.draw(lambda result, path: log_rerun(result, path) or path, result, path)
+        written.draw(lambda result, path: write(result, path) or path, result, path)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.folders import Content, contents
-from lgvi_warp.cli.output import tell
+from lgvi_warp.cli.output import Part, tell
 from lgvi_warp.cli.progress import shown
 from lgvi_warp.cli.report import file_line
 from lgvi_warp.cli.verb import as_verb
@@ -24,7 +24,7 @@ def view_arguments(verb: Any) -> None:
 
 
 @as_verb("view", "look at a run in the rerun viewer", view_arguments)
-def view(chosen: argparse.Namespace) -> int:
+def view(chosen: argparse.Namespace, *, look: Part = None, log: Part = None) -> int:
     """Run the verb view: open a run in the rerun viewer, or write its recording."""
     members, content = indices(chosen.members), run_in(chosen.dir)
     if chosen.out is not None:
@@ -35,9 +35,9 @@ def view(chosen: argparse.Namespace) -> int:
     try:
         with shown(chosen.quiet, "drawing"), content.understood():
             if chosen.out is None:
-                show(result, members=members)
+                (look or show)(result, members=members)
             else:
-                log_rerun(result, chosen.out, members=members)
+                (log or log_rerun)(result, chosen.out, members=members)
     except NothingToDraw as error:
         raise SceneError([str(error)]) from None
     files = [] if chosen.out is None else [chosen.out]

@@ -7,7 +7,7 @@ import argparse
 import time
 from typing import Any
 
-from lgvi_warp.cli.output import say, tell
+from lgvi_warp.cli.output import Part, say, tell
 from lgvi_warp.cli.settings import load_scene
 from lgvi_warp.cli.verb import SHARED, add_shared, as_verb
 from lgvi_warp.common import machine
@@ -22,7 +22,7 @@ def warm_arguments(verb: Any) -> None:
 
 
 @as_verb("warm", "compile the kernels of a scene ahead of its runs, several at a time", warm_arguments, reads=True)
-def warm(chosen: argparse.Namespace) -> int:
+def warm(chosen: argparse.Namespace, *, compile_plans: Part = None) -> int:
     """Run the verb warm: compile what runs of a scene need, and print how long each phase took."""
     from lgvi_warp.calls import warm as kernels
 
@@ -30,7 +30,7 @@ def warm(chosen: argparse.Namespace) -> int:
     scene = load_scene(chosen)
     plans = kernels.plans_of(scene, chosen.methods or (), chosen.dtypes or ())
     compiled, total = [], 0.0
-    for plan, phases in kernels.warm(plans, chosen.threads or machine.thread_count()):
+    for plan, phases in (compile_plans or kernels.warm)(plans, chosen.threads or machine.thread_count()):
         total += sum(phases)
         compiled.append({"method": plan.method.name, "dtype": plan.dtype, "seconds": phases._asdict()})
         say(chosen, f"{plan.method.name} {plan.dtype}: {phases}{'' if phases.clang else ' (was in the cache)'}")

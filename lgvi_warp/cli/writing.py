@@ -60,7 +60,9 @@ class Written:
         ]
 
 
-def side_by_side(writers: Mapping[Path, Callable[[Path], Path]]) -> dict[Path, Future[Path]]:
+def side_by_side(
+    writers: Mapping[Path, Callable[[Path], Path]], *, wait: Callable[..., Any] = wait
+) -> dict[Path, Future[Path]]:
     """Write files, each in a thread of its own."""
     if not writers:
         return {}

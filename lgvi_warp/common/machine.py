@@ -29,9 +29,9 @@ def simd() -> str:
     return "avx2" if features.get("AVX2") else "other"
 
 
-def register_width(dtype: str) -> int:
-    """Vehicles of which one number each fills a SIMD register."""
-    return REGISTER_BYTES[simd()] // np.dtype(DTYPES[dtype]).itemsize
+def register_width(dtype: str, extension: str | None = None) -> int:
+    """Vehicles of which one number each fills a SIMD register; extension: as of `simd`, by default of this machine."""
+    return REGISTER_BYTES[extension or simd()] // np.dtype(DTYPES[dtype]).itemsize
 
 
 def affinity() -> int:
@@ -43,8 +43,12 @@ def affinity() -> int:
 
 def thread_count() -> int:
     """Default number of threads of a run."""
-    quota = container.cpu_quota()
-    return affinity() if quota is None else max(1, min(affinity(), math.ceil(quota)))
+    return threads_of(affinity(), container.cpu_quota())
+
+
+def threads_of(cores: int, quota: float | None) -> int:
+    """Threads that a quota of CPU time keeps busy; quota: [CPUs], None without one."""
+    return cores if quota is None else max(1, min(cores, math.ceil(quota)))
 
 
 @functools.cache
@@ -74,8 +78,12 @@ def memory_bytes() -> int | None:
 
     Returns: Its size [bytes]; None if neither is known.
     """
-    known = [size for size in (physical_memory(), container.memory_limit()) if size is not None]
-    return min(known, default=None)
+    return least_known(physical_memory(), container.memory_limit())
+
+
+def least_known(*sizes: int | None) -> int | None:
+    """The least of the sizes that are known; None if none is."""
+    return min((size for size in sizes if size is not None), default=None)
 
 
 def resident() -> int:

@@ -8,7 +8,8 @@ import functools
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from importlib import import_module
 from typing import Any, ParamSpec, TextIO, TypeVar
 
 from lgvi_warp.common.errors import refusal
@@ -29,13 +30,18 @@ class Progress:
         stream: Where to write.
         phase: What is done until the first fraction above 0; default "compiling".
         in_place: Whether to write over the line before; default None: on a terminal.
+        clock: The time now [s].
+        interval: Least time between two lines [s]; default None, 0.1 in place and 10 otherwise.
     """
 
-    def __init__(self, stream: TextIO, phase: str = "compiling", in_place: bool | None = None):
+    def __init__(
+        self, stream: TextIO, phase: str = "compiling", in_place: bool | None = None, *,
+        clock: Callable[[], float] = time.perf_counter, interval: float | None = None,
+    ):  # fmt: skip
         self._stream, self._phase = stream, phase
         self._in_place = stream.isatty() if in_place is None else in_place
-        self._interval = 0.1 if self._in_place else 10.0
-        self._start = self._last = time.perf_counter()
+        self._clock, self._interval = clock, (0.1 if self._in_place else 10.0) if interval is None else interval
+        self._start = self._last = clock()
         # The first fraction above 0, from which on the time left is reckoned.
         self._first = self._fraction = 0.0
         self._length = 0
@@ -46,7 +52,7 @@ class Progress:
 
     def __call__(self, fraction: float) -> None:
         """Show the fraction done, at most once per interval."""
-        now = time.perf_counter()
+        now = self._clock()
         with self._lock:
             if self._first == 0.0 < fraction:
                 self._phase, self._start, self._first = "running", now, fraction
@@ -74,7 +80,7 @@ class Progress:
         """Show what takes long without a fraction."""
         while not self._closed.wait(TICK):
             with self._lock, contextlib.suppress(OSError, ValueError):
-                now = time.perf_counter()
+                now = self._clock()
                 if not self._closed.is_set() and now - self._last >= self._interval:
                     self._show(now)
 
@@ -106,14 +112,14 @@ class NotebookBar:
         self._bar.close()
 
 
-def bar() -> Progress | NotebookBar:
+def bar(
+    *, modules: Mapping[str, Any] = sys.modules, load: Callable[[str], Any] = import_module
+) -> Progress | NotebookBar:
     """Begin to show the progress of a call: a bar of tqdm in a notebook that has it, otherwise `Progress` on stderr."""
-    notebook = "ipykernel" in sys.modules
+    notebook = "ipykernel" in modules
     if notebook:
         with contextlib.suppress(ImportError):
-            from tqdm.auto import tqdm
-
-            return NotebookBar(tqdm)
+            return NotebookBar(load("tqdm.auto").tqdm)
     return Progress(sys.stderr, in_place=notebook or None)
 
 

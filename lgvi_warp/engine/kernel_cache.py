@@ -25,7 +25,7 @@ import tempfile
 import threading
 import time
 import weakref
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -50,7 +50,7 @@ TORN, OURS, OLD = re.compile(r"(\w+)_p\d+_t\d+"), "wp_make_", 86_400.0
 loaded: weakref.WeakSet[Any] = weakref.WeakSet()
 
 
-def load(module: Any) -> Phases:
+def load(module: Any, *, compiled_by: Callable[..., tuple[float, float]] | None = None) -> Phases:
     """Load a kernel's code, compiling it where the cache has none that is whole."""
     warp_setup.start()
     with build_lock:
@@ -66,7 +66,7 @@ def load(module: Any) -> Phases:
                 wp.load_module(module, device="cpu")
                 written = compiled = hashed
             else:
-                written, compiled = compile_module(module, cache, code)
+                written, compiled = (compiled_by or compile_module)(module, cache, code)
         loaded.add(module)
         return Phases(written - begun, compiled - written, time.time() - compiled)
 
@@ -233,23 +233,26 @@ def temporary_room() -> bool:
     return True
 
 
-def seek_room(folder: Path, wanted: int = ROOM_BYTES) -> None:
+def seek_room(
+    folder: Path, wanted: int = ROOM_BYTES, *, system: Any = os, write: Callable[..., None] = durable.write_all
+) -> None:
     """Check by trial that a folder has room for some bytes and files: nothing else reveals quotas and limits.
 
     wanted: room needed [bytes].
+    system: what tells of files, as the module os does.
     """
-    if hasattr(os, "statvfs"):
-        system = os.statvfs(folder)
+    if hasattr(system, "statvfs"):
+        left = system.statvfs(folder)
         # A system that has no fixed number of files says 0.
-        if system.f_files and system.f_favail < ROOM_FILES:
+        if left.f_files and left.f_favail < ROOM_FILES:
             raise OSError(errno.ENOSPC, "No files left on device")
     with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
         try:
-            os.posix_fallocate(file.fileno(), 0, wanted)
+            system.posix_fallocate(file.fileno(), 0, wanted)
         except (AttributeError, OSError) as error:
             if getattr(error, "errno", None) not in (None, errno.EINVAL, errno.EOPNOTSUPP, errno.ENOSYS):
                 raise
-            durable.write_all(file, memoryview(bytes(wanted)))
+            write(file, memoryview(bytes(wanted)))
 
 
 def sweep(cache: Path, folder: Path) -> None:

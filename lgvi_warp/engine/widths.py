@@ -68,13 +68,13 @@ def default_width(kind: str, dtype: str) -> Width:
     return Width(lanes, "tuned") if lanes else of_table(kind, dtype)
 
 
-def of_table(kind: str, dtype: str) -> Width:
-    """Look up the width of a kernel for this kind of processor."""
-    simd = machine.simd()
-    processor = f"Intel, {simd}" if "Intel" in machine.cpu_name() else simd
+def of_table(kind: str, dtype: str, *, cpu: str | None = None, simd: str | None = None) -> Width:
+    """Look up the width of a kernel for this kind of processor, or another one's name and SIMD extension."""
+    simd = simd or machine.simd()
+    processor = f"Intel, {simd}" if "Intel" in (cpu or machine.cpu_name()) else simd
     processor = processor if processor in REGISTERS else simd
     registers = 1 if dtype == "float32_compensated" else REGISTERS.get(processor, {}).get(kind, 1)
-    return Width(registers * machine.register_width(dtype), f"table: {processor}")
+    return Width(registers * machine.register_width(dtype, simd), f"table: {processor}")
 
 
 def path() -> Path:
@@ -102,12 +102,12 @@ def read(file: Path) -> dict[str, int]:
     return {name: known[name] for name in KERNELS if type(known.get(name)) is int and known[name] in WIDTHS}
 
 
-def keep(widths: Mapping[str, int]) -> Path:
-    """Keep widths for this machine and these versions, beside those of others."""
+def keep(widths: Mapping[str, int], *, of: str | None = None) -> Path:
+    """Keep widths for this machine and these versions, or others that `of` names, beside those of the rest."""
     file = path()
     file.parent.mkdir(parents=True, exist_ok=True)
     with files.locked(file.parent, wait=True):
-        content = _content(file) | {this_machine(): dict(widths)}
+        content = _content(file) | {of or this_machine(): dict(widths)}
         files.write_whole(file, json.dumps(content, indent=1).encode())
     read.cache_clear()
     return file

@@ -42,10 +42,12 @@ class Commits:
 
     waits: Whether `add` returns only when its block is durable. Copies in other processes wait, because nothing waits for the
         end of these processes. Default False.
+    period, most: How long a block waits for others [s], and the most blocks in the queue.
     """
 
-    def __init__(self, waits: bool = False):
+    def __init__(self, waits: bool = False, *, period: float = PERIOD, most: int = MOST):
         self._waits, self._changed = waits, threading.Condition()
+        self._period, self._most = period, most
         self._waiting: list[Commit] = []
         self._at_work = self._ending = False
         self._error: BaseException | None = None
@@ -57,7 +59,7 @@ class Commits:
         """Add a block; waits where too many blocks are in the queue."""
         commit = Commit(files, path, marker)
         with self._changed:
-            self._changed.wait_for(lambda: len(self._waiting) < MOST)
+            self._changed.wait_for(lambda: len(self._waiting) < self._most)
             self._waiting.append(commit)
             self._changed.notify_all()
             if not self._at_work:
@@ -94,7 +96,9 @@ class Commits:
     def _group(self) -> list[Commit]:
         """Take the blocks that wait, after some time in which more may come."""
         with self._changed:
-            self._changed.wait_for(lambda: self._waits or self._ending or len(self._waiting) == MOST, PERIOD)
+            self._changed.wait_for(
+                lambda: self._waits or self._ending or len(self._waiting) == self._most, self._period
+            )
             group, self._waiting = self._waiting, []
             self._at_work = bool(group)
             self._changed.notify_all()

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import itertools
 import json
@@ -67,16 +68,22 @@ def export(path: str | os.PathLike[str], to: str, out: str | os.PathLike[str] | 
     durable.place_of(target, root)
     check_whole(folder)
     target.parent.mkdir(parents=True, exist_ok=True)
+    with fault_of_library(to, target), durable.placed(target, root) as beside:
+        {"netcdf": _netcdf, "parquet": _parquet}[to](folder, beside)
+    return target
+
+
+@contextlib.contextmanager
+def fault_of_library(to: str, target: Path) -> Iterator[None]:
+    """Say of what a library of the format raises which file it is about, and what helps."""
     try:
-        with durable.placed(target, root) as beside:
-            {"netcdf": _netcdf, "parquet": _parquet}[to](folder, beside)
+        yield
     except ImportError as error:
         raise SceneError([f"to = {to!r}: {error}; install it: pip install 'lgvi-warp[export]'"]) from error
     except (OSError, RuntimeError) as error:
         # Neither library names the file, and netCDF4 hides the system's error.
         reason = getattr(error, "strerror", None) or f"was not written ({error}); is the disk full?"
         raise OSError(getattr(error, "errno", None) or errno.EIO, reason, str(target)) from error
-    return target
 
 
 def check_whole(folder: Folder) -> None:

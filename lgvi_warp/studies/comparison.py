@@ -15,7 +15,6 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import failed as failed_members
 from lgvi_warp.common.status import stop_time
-from lgvi_warp.engine.executors.threads import ThisThread
 from lgvi_warp.engine.plan import Plan, choose_plan
 from lgvi_warp.methods import saveat
 from lgvi_warp.methods.method import Method
@@ -25,11 +24,11 @@ from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.results.result import Result
-from lgvi_warp.runs.run import run_plan
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.budget import Budget, rounded_up
 from lgvi_warp.studies.distance import QUANTITIES, Compared, compared_in
+from lgvi_warp.studies.kernels import KERNELS, Kernels
 
 # Error at which a trajectory is no longer meaningful [m or rad].
 LOST = 1e-2
@@ -98,6 +97,7 @@ class Sample:
     Where noise acts on a grid, m divides the number of its draws in the spacing, so that all runs see one path.
 
     t1: end time [s]. Default: run.duration of the scene.
+    kernels: what compiles, runs and prices its plans.
 
     Attributes:
         whole: the whole ensemble.
@@ -113,7 +113,10 @@ class Sample:
         fixed_draws: the most that the noise_steps of the scene allow; 0 where no term has one.
     """
 
-    def __init__(self, fleet: Ensemble | Scene, t1: float | None = None, members: int = 128, samples: int = SAMPLES):
+    def __init__(
+        self, fleet: Ensemble | Scene, t1: float | None = None, members: int = 128, samples: int = SAMPLES, *,
+        kernels: Kernels = KERNELS,
+    ):  # fmt: skip
         ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
         settings = ensemble.scene.run
         t1 = settings.duration if t1 is None else t1
@@ -124,7 +127,7 @@ class Sample:
             faults.positive("t1", t1)
         faults.raise_if_any()
         assert t1 is not None
-        self.whole, self.t1, self.samples = ensemble, float(t1), samples
+        self.whole, self.t1, self.samples, self.kernels = ensemble, float(t1), samples, kernels
         self.ensemble = ensemble if ensemble.members <= members else ensemble.subset(range(members))
         self._drawn_once_a_step = self.ensemble
         self.members = self.ensemble.members
@@ -141,7 +144,7 @@ class Sample:
 
     def more(self, members: int, times: int = 1) -> Sample:
         """Make the same sample with more members, and so many times as many times."""
-        return Sample(self.whole, self.t1, members, self.samples * times)
+        return Sample(self.whole, self.t1, members, self.samples * times, kernels=self.kernels)
 
     def on_grid(self, draws: int) -> Sample:
         """Make the same sample with noise on a grid that all its runs share."""
@@ -204,8 +207,8 @@ class Sample:
         return sample.plan(candidate)
 
     def run(self, candidate: Candidate, ensemble: Ensemble | None = None) -> Result:
-        """Run a setting in this thread, whose processor time is then the run's."""
-        return run_plan(self.plan(candidate, ensemble), 1, executor=ThisThread())
+        """Run a setting."""
+        return self.kernels.run(self.plan(candidate, ensemble))
 
     def accepted(
         self, methods: Sequence[str], dtype: str = "float64", most: int | None = None
@@ -426,7 +429,7 @@ def make_reference(
             sample = sample.on_grid(finer)
         for name, steps in ((first, m), (second, finer)):
             with budget.free():
-                sample.plan(sample.candidate(name, steps)).compile()
+                sample.kernels.compile(sample.plan(sample.candidate(name, steps)))
         before = budget.spent
         with np.errstate(all="ignore"):
             runs = extrapolated(sample, first, m), extrapolated(sample, second, finer)

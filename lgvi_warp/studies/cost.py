@@ -52,23 +52,37 @@ class Cost:
     spread: float
 
 
-def costs(plans: Sequence[Plan], rounds: int = 5) -> list[Cost]:
+def costs(
+    plans: Sequence[Plan], rounds: int = 5, *, make: Callable[..., Packets] = Packets,
+    clock: Callable[[], float] = thread_seconds, grows: Callable[[Plan], bool] | None = None,
+) -> list[Cost]:  # fmt: skip
     """Measure the cost of plans, with one number for all plans that run the same kernel.
 
     The readings are taken in interleaved rounds: what slows the machine for a while slows all plans alike.
     """
-    calls, steps = launches(plans)
-    kinds = [Kind(plan.spec, plan.grid.h, work_grows(plan)) for plan in plans]
-    seconds = timed(calls, rounds)
-    for _ in range(MORE):
-        unsure = ~np.array(confirmed(kinds, seconds / steps), dtype=bool)
-        if not unsure.any():
-            break
-        again = np.full((len(plans), rounds), np.nan)
-        again[unsure] = timed([calls[i] for i in np.flatnonzero(unsure)], rounds)
-        seconds = np.concatenate([seconds, again], axis=1)
+    calls, steps = launches(plans, make=make, clock=clock)
+    kinds = [Kind(plan.spec, plan.grid.h, (grows or work_grows)(plan)) for plan in plans]
+    per_step = readings(kinds, lambda which: timed([calls[i] for i in which], rounds, clock=clock) / steps[which])
     return [Cost(1e6 * least / plan.grid.h, spread)
-            for plan, (least, spread) in zip(plans, of_steps(kinds, seconds / steps), strict=True)]  # fmt: skip
+            for plan, (least, spread) in zip(plans, of_steps(kinds, per_step), strict=True)]  # fmt: skip
+
+
+def readings(kinds: Sequence[Kind], read: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Read the cost of a step of each kind, and of those again whose least reading no other is near.
+
+    read: from indices of kinds to readings of one step (indices, rounds) [s].
+    Returns: All readings (kinds, rounds) [s]; NaN where there is none.
+    """
+    seconds = read(np.arange(len(kinds)))
+    rounds = seconds.shape[1]
+    for _ in range(MORE):
+        unsure = np.flatnonzero(~np.array(confirmed(kinds, seconds), dtype=bool))
+        if not len(unsure):
+            break
+        again = np.full((len(kinds), rounds), np.nan)
+        again[unsure] = read(unsure)
+        seconds = np.concatenate([seconds, again], axis=1)
+    return seconds
 
 
 @dataclass(frozen=True)
@@ -126,7 +140,9 @@ def _bounding(kind: Kind, kinds: Sequence[Kind], seconds: np.ndarray) -> np.ndar
     return np.asarray(seconds[np.array(bounds_it)])
 
 
-def launches(plans: Sequence[Plan]) -> tuple[list[Callable[[], object]], np.ndarray]:
+def launches(
+    plans: Sequence[Plan], *, make: Callable[..., Packets] = Packets, clock: Callable[[], float] = thread_seconds
+) -> tuple[list[Callable[[], object]], np.ndarray]:
     """Prepare one launch of each plan that is long enough to time.
 
     Returns: (calls, steps): a call of each plan, and the steps times vehicles that it makes (plans, 1).
@@ -134,33 +150,35 @@ def launches(plans: Sequence[Plan]) -> tuple[list[Callable[[], object]], np.ndar
     calls: list[Callable[[], object]] = []
     steps = np.empty((len(plans), 1))
     for i, plan in enumerate(plans):
-        packets = Packets(plan, plan.ensemble.select(0, plan.ensemble.members))
+        packets = make(plan, plan.ensemble.select(0, plan.ensemble.members))
         # The cheapest step takes 10 ns: a launch of a tenth of these steps tells how long one takes.
         guess = 10e-9 * len(plan.method.stages) * max(plan.ensemble.members, plan.spec.width)
         few = int(min(max(0.1 * TIMED / guess, 1), 10_000))
-        begun = thread_seconds()
+        begun = clock()
         packets.advance(0, few)
-        n = int(min(max(TIMED * few / max(thread_seconds() - begun, 1e-9), 10), 100_000))
+        n = int(min(max(TIMED * few / max(clock() - begun, 1e-9), 10), 100_000))
         calls.append(functools.partial(packets.advance, 0, n))
         steps[i] = n * plan.ensemble.members
     return calls, steps
 
 
-def timed(calls: Sequence[Callable[[], object]], rounds: int) -> np.ndarray:
+def timed(
+    calls: Sequence[Callable[[], object]], rounds: int, *, clock: Callable[[], float] = thread_seconds
+) -> np.ndarray:
     """Time calls in interleaved rounds, after one call of each to warm up.
 
     Returns: CPU time of each call in each round (calls, rounds) [s], at least the clock's resolution.
     """
     for call in calls:
         call()
-    readings = np.empty((len(calls), rounds))
+    seconds = np.empty((len(calls), rounds))
     for j in range(rounds):
         for i, call in enumerate(calls):
-            begun = thread_seconds()
+            begun = clock()
             call()
-            readings[i, j] = thread_seconds() - begun
+            seconds[i, j] = clock() - begun
     # Nothing shorter than the clock's resolution can be measured.
-    return np.maximum(readings, time.get_clock_info("thread_time").resolution)
+    return np.maximum(seconds, time.get_clock_info("thread_time").resolution)
 
 
 def work_grows(plan: Plan) -> bool:

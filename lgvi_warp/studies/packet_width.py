@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from lgvi_warp.common import machine
 from lgvi_warp.engine import widths
+from lgvi_warp.engine.plan import Plan
 from lgvi_warp.physics.terms.drag import DragMatrix
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.studies import speed
@@ -42,25 +44,31 @@ class Reading(NamedTuple):
     best: int
 
 
-def tune(rounds: int = ROUNDS) -> Iterator[Reading]:
+def tune(
+    rounds: int = ROUNDS, *, prepare: Callable[[Plan], Callable[[], None]] = speed.stepper,
+    clock: Callable[[], float] = time.perf_counter, register_width: Callable[[str], int] = machine.register_width,
+) -> Iterator[Reading]:  # fmt: skip
     """Measure every kind of kernel at every width that may suit this machine.
 
     Args:
         rounds: Number of readings of each, of which the least counts. Default 20, about a tenth of a second.
+        prepare: From a plan to a call that makes all its steps.
+        clock: The time now [s].
+        register_width: From a precision to the vehicles in a register.
 
     Yields:
         The speeds of one kind.
     """
     for kernel in widths.KERNELS:
         kind, dtype = widths.parts(kernel)
-        lanes = [n * machine.register_width(dtype) for n in REGISTERS]
+        lanes = [n * register_width(dtype) for n in REGISTERS]
         fleet = speed.fleet(MEMBERS, *TERMS.get(kind, ()))
         plans = {
             width: make_plan(fleet, METHODS[kind], h=H, t1=H * STEPS, dtype=dtype, width=width)
             for width in lanes
             if width in widths.WIDTHS
         }
-        seconds = speed.least([speed.stepper(plan) for plan in plans.values()], rounds)
+        seconds = speed.least([prepare(plan) for plan in plans.values()], rounds, clock=clock)
         ns = {width: 1e9 * spent / (MEMBERS * STEPS) for width, spent in zip(plans, seconds, strict=True)}
         before = widths.of_table(kind, dtype).lanes
         fastest = min(ns, key=lambda width: ns[width])

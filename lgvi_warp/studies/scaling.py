@@ -5,7 +5,8 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.studies.cost import costs
+from lgvi_warp.studies.cost import Cost, costs
 from lgvi_warp.studies.members import ensemble_of, scene_of
 from lgvi_warp.studies.speed import least
 
@@ -59,6 +60,17 @@ def scaling(
         SceneError: An argument is at fault.
     """
     fleet = ensemble_of(fleet)
+    sizes, counts = members_and_threads(fleet, members, threads)
+    plans = [make_plan(fleet.subset(np.arange(n)), method, h=h, t1=t1) for n in sizes]
+    for plan in plans:
+        plan.compile()
+    return timed_runs(plans, counts, rounds)
+
+
+def members_and_threads(
+    fleet: Ensemble, members: Sequence[int] | None, threads: Sequence[int] | None
+) -> tuple[list[int], list[int]]:
+    """Numbers of members and of threads that are asked for; None: of both some up to all. Raises SceneError."""
     sizes = rising(10, fleet.members) if members is None else _numbers("members", members)
     counts = rising(2, machine.thread_count()) if threads is None else _numbers("threads", threads)
     faults = Faults()
@@ -67,11 +79,16 @@ def scaling(
     if not counts or counts[0] < 1:
         faults.add("threads", threads, "holds no number of threads", "name numbers from 1 on")
     faults.raise_if_any()
-    plans = [make_plan(fleet.subset(np.arange(n)), method, h=h, t1=t1) for n in sizes]
+    return sizes, counts
+
+
+def timed_runs(
+    plans: Sequence[Plan], counts: Sequence[int], rounds: int, *, run: Callable[[Plan, int], Any] = run_plan,
+    clock: Callable[[], float] = time.perf_counter,
+) -> list[dict[str, Any]]:  # fmt: skip
+    """Time whole runs of plans by so many threads, in turn; the rows of `scaling`."""
     runs = [(plan, count) for plan in plans for count in counts]
-    for plan in plans:
-        plan.compile()
-    readings = least([functools.partial(_run, *pair) for pair in runs], rounds)
+    readings = least([functools.partial(run, *pair) for pair in runs], rounds, clock=clock)
     return [
         {
             "members": plan.ensemble.members,
@@ -81,11 +98,6 @@ def scaling(
         }
         for (plan, count), seconds in zip(runs, readings, strict=True)
     ]
-
-
-def _run(plan: Plan, threads: int) -> None:
-    """Run a plan whole, by so many threads."""
-    run_plan(plan, threads)
 
 
 def rising(base: int, most: int) -> list[int]:
@@ -133,13 +145,27 @@ def term_cost(
     if not scene.terms:
         raise SceneError(["scene.terms: is empty; give the scene terms whose cost is to be measured"])
     step = scene.run.step if h is None else h
-    cast = [(NONE, ())] + [(term.key, (term,)) for term in scene.terms]
+    plans = plans_of_terms(scene, members, method, step, dtype)
+    for plan in plans.values():
+        plan.compile()
+    return priced(plans, costs(list(plans.values()), rounds))
+
+
+def plans_of_terms(
+    scene: Scene, members: int, method: str | Method | None, h: float | None, dtype: str | None
+) -> dict[str, Plan]:
+    """Plan a scene without terms, with each alone and with all, by the method that the whole scene runs by."""
+    casts: dict[str, tuple[Term, ...]] = {NONE: ()} | {term.key: (term,) for term in scene.terms}
     if len(scene.terms) > 1:
-        cast.append((ALL, tuple(scene.terms)))
-    chosen = plan_of(scene, tuple(scene.terms), members, method, step, dtype).method
-    plans = [plan_of(scene, terms, members, chosen, step, dtype) for _, terms in cast]
+        casts[ALL] = tuple(scene.terms)
+    chosen = plan_of(scene, tuple(scene.terms), members, method, h, dtype).method
+    return {name: plan_of(scene, terms, members, chosen, h, dtype) for name, terms in casts.items()}
+
+
+def priced(plans: Mapping[str, Plan], prices: Sequence[Cost]) -> list[dict[str, Any]]:
+    """The rows of `term_cost` of plans by name, of which the first is the scene without terms."""
     nanoseconds = [
-        1e3 * cost.us_per_vehicle_second * plan.grid.h for cost, plan in zip(costs(plans, rounds), plans, strict=True)
+        1e3 * price.us_per_vehicle_second * plan.grid.h for price, plan in zip(prices, plans.values(), strict=True)
     ]
     return [
         {
@@ -149,7 +175,7 @@ def term_cost(
             "ns_per_vehicle_step": round(price, 3),
             "more_than_none": round(price - nanoseconds[0], 3),
         }
-        for (name, _), plan, price in zip(cast, plans, nanoseconds, strict=True)
+        for (name, plan), price in zip(plans.items(), nanoseconds, strict=True)
     ]
 
 
@@ -168,9 +194,7 @@ def plan_of(
     dtype: The precision; None: that of the scene.
     """
     bare = dataclasses.replace(scene, terms=terms, controller=None, events=(), ensemble_settings=None)
-    plan = make_plan(Ensemble(bare, members, 1), method, h=h, t1=None if h is None else 10.0 * h, dtype=dtype)
-    plan.compile()
-    return plan
+    return make_plan(Ensemble(bare, members, 1), method, h=h, t1=None if h is None else 10.0 * h, dtype=dtype)
 
 
 def _numbers(key: str, values: Any) -> list[int]:

@@ -64,10 +64,10 @@ def fleet(members: int, *terms: Term) -> Ensemble:
     )
 
 
-def stepper(plan: Plan) -> Callable[[], None]:
+def stepper(plan: Plan, *, make: Callable[..., Packets] = Packets) -> Callable[[], None]:
     """Prepare a call that makes all steps of a plan on one thread, without samples and set-up."""
     plan.compile()
-    packets = Packets(plan, plan.ensemble.select(0, plan.ensemble.members))
+    packets = make(plan, plan.ensemble.select(0, plan.ensemble.members))
     return lambda: void(packets.advance(0, plan.grid.steps))
 
 
@@ -75,7 +75,9 @@ def void(_: Any) -> None:
     """Accept any value and return nothing."""
 
 
-def interleaved(calls: Sequence[Callable[[], None]], rounds: int = 5) -> list[float]:
+def interleaved(
+    calls: Sequence[Callable[[], None]], rounds: int = 5, *, clock: Callable[[], float] = time.perf_counter
+) -> list[float]:
     """Time calls in turn, so that a slow period of the machine slows all of them.
 
     Returns: Median wall time of each call [s].
@@ -85,13 +87,15 @@ def interleaved(calls: Sequence[Callable[[], None]], rounds: int = 5) -> list[fl
         call()
     for _ in range(rounds):
         for call, seconds in zip(calls, times, strict=True):
-            start = time.perf_counter()
+            start = clock()
             call()
-            seconds.append(time.perf_counter() - start)
+            seconds.append(clock() - start)
     return [median(seconds) for seconds in times]
 
 
-def least(calls: Sequence[Callable[[], None]], rounds: int = 15) -> list[float]:
+def least(
+    calls: Sequence[Callable[[], None]], rounds: int = 15, *, clock: Callable[[], float] = time.perf_counter
+) -> list[float]:
     """Time calls in turn; other work on the machine can only lengthen a reading, so the least of each counts.
 
     Returns: Least wall time of each call [s].
@@ -99,18 +103,21 @@ def least(calls: Sequence[Callable[[], None]], rounds: int = 15) -> list[float]:
     best = [np.inf] * len(calls)
     for _ in range(rounds):
         for i, call in enumerate(calls):
-            start = time.perf_counter()
+            start = clock()
             call()
-            best[i] = min(best[i], time.perf_counter() - start)
+            best[i] = min(best[i], clock() - start)
     return best
 
 
-def measure(members: int = 4096, steps: int = 1000) -> Iterator[str]:
+def measure(
+    members: int = 4096, steps: int = 1000, *, prepare: Callable[[Plan], Callable[[], None]] = stepper,
+    timed: Callable[[Sequence[Callable[[], None]]], list[float]] = interleaved, peak_of: Callable[[str], float] = fma_peak,
+) -> Iterator[str]:  # fmt: skip
     """Measure psi_s in both precisions next to the peak of the core."""
     for dtype in ("float64", "float32"):
         plan = make_plan(fleet(members), "psi_s", h=0.01, t1=0.01 * steps, dtype=dtype)
-        seconds = interleaved([stepper(plan)])[0] / (members * steps)
-        peak = fma_peak(dtype)
+        seconds = timed([prepare(plan)])[0] / (members * steps)
+        peak = peak_of(dtype)
         yield json.dumps(record(plan.method, dtype, plan.spec.width, seconds, peak))
 
 

@@ -15,7 +15,6 @@ from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.executors import check_threads
-from lgvi_warp.engine.executors.threads import ThisThread
 from lgvi_warp.engine.plan import Plan, choose_plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
@@ -30,14 +29,14 @@ from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies import comparison, cost
 from lgvi_warp.studies import tradeoff as tradeoffs
 from lgvi_warp.studies.budget import Budget, rounded_up
-from lgvi_warp.studies.comparison import Candidate, Reference, Sample
+from lgvi_warp.studies.comparison import Candidate, Growth, Reference, Sample
 from lgvi_warp.studies.distance import Compared, compared_in
+from lgvi_warp.studies.kernels import KERNELS, Kernels
 from lgvi_warp.studies.speed import void
 from lgvi_warp.studies.tradeoff import (
     PRECISIONS,
     Trial,
     chosen_methods,
-    costs,
     growth_of,
     growth_text,
     noise_text,
@@ -202,20 +201,29 @@ def suggest(
     names = chosen_methods(methods, CANDIDATES)
     report = callback(progress) or void
     sample = Sample(fleet, t1, members, TIMES)
+    return suggestion_on(sample, compared, error, names, seconds, report, methods is not None, threads=threads)
+
+
+def suggestion_on(
+    sample: Sample, compared: Compared, error: float, names: Sequence[str], seconds: float,
+    report: Callable[[float], None], named: bool, *, threads: int | None = None,
+    make_reference: Callable[..., Reference] = comparison.make_reference,
+) -> Suggestion:  # fmt: skip
+    """Search a sample for the cheapest setting, as `suggest` says; named: whether the methods were asked for by name."""
     taken, refused = sample.accepted(names)
     if not taken:
         raise SceneError([f"method {name}: {why}" for name, why in refused.items()])
     if sample.noise(taken[0]) == "free":
         problem = f"error = {error:g}: noise acts, whose path differs from step to step, so members have no error"
         raise SceneError([f"{problem}; use lgvi-warp tradeoff, which compares statistics"])
-    reference = checked_reference(sample, compared, error, seconds, taken)
+    reference = checked_reference(sample, compared, error, seconds, taken, make_reference=make_reference)
     sample = reference.sample
     report(0.3)
     budget = Budget((1.0 - SHARE) * seconds)
-    ladders = Ladders(sample, reference, compared, error / SAFETY, budget, methods is not None)
-    few = taken if methods else short_list(sample, taken)
+    ladders = Ladders(sample, reference, compared, error / SAFETY, budget, named)
+    few = taken if named else short_list(sample, taken)
     ladders.climb(few, lambda part: report(0.3 + 0.4 * part))
-    if not methods:
+    if not named:
         stiff = [name for name in STIFFLY_DAMPED if name in taken and name not in few and ladders.limited_by_damping]
         ladders.climb(stiff)
         others = [name for name in taken if name not in (*few, *stiff)]
@@ -230,7 +238,7 @@ def suggest(
     times = times_to_check(sample, [trial.candidate for trial in trials[:FINALISTS]])
     more = sample.more(CHECKED, times) if times > 1 or sample.whole.members > sample.members else sample
     if more is not sample:
-        reference = checked_reference(more, compared, error, seconds, taken)
+        reference = checked_reference(more, compared, error, seconds, taken, make_reference=make_reference)
         more = reference.sample
     goal = error / SAFETY**0.5
     size = sample.whole.members
@@ -243,13 +251,13 @@ def suggest(
     missed = [trial.candidate for trial, (_, apart) in zip(trials, final, strict=False) if apart > error]
     final += [checked(replace(candidate, dtype="float64")) for candidate in missed if candidate.dtype == "float32"]
     final = [(trial, apart) for trial, apart in final if apart <= error] or final[:1]
-    priced = list(zip(final, cost.costs([trial.plan for trial, _ in final], rounds=ROUNDS), strict=True))
+    priced = list(zip(final, more.kernels.costs([trial.plan for trial, _ in final], ROUNDS), strict=True))
     text = cost.disagreement([(trial.candidate.text, price.spread) for (trial, _), price in priced])
     priced.sort(key=lambda pair: pair[1].us_per_vehicle_second)
     (best, expected), price = priced[0]
     notes = [text] if text else []
     notes += [noise_text(more)] if more.draws else []
-    notes += [f"{name} is left out: {why}" for name, why in refused.items() if methods]
+    notes += [f"{name} is left out: {why}" for name, why in refused.items() if named]
     if expected > error:
         notes.append(f"no step was found that keeps {error:g} {compared.unit}: {expected:.1e} is expected of the best")
     ensemble = sample.whole
@@ -263,7 +271,7 @@ def suggest(
         unit=compared.unit,
         expected=expected,
         us_per_vehicle_second=price.us_per_vehicle_second,
-        run_seconds=seconds_of(ensemble, best.candidate, sample.t1) / used,
+        run_seconds=seconds_of(ensemble, best.candidate, sample.t1, kernels=sample.kernels) / used,
         threads=used,
         memory_bytes=memory_of(ensemble, best.candidate, sample.t1),
         members=more.members,
@@ -310,13 +318,16 @@ def largest_in_fleet(errors: np.ndarray, members: int) -> float:
     return float(max(falling[0], falling[k] * (k * max(members, n) / (n * CHANCE)) ** exponent))
 
 
-def checked_reference(sample: Sample, of: Compared, error: float, seconds: float, taken: Sequence[str]) -> Reference:
+def checked_reference(
+    sample: Sample, of: Compared, error: float, seconds: float, taken: Sequence[str], *,
+    make_reference: Callable[..., Reference] = comparison.make_reference, grown: Callable[..., Growth] = growth_of,
+) -> Reference:  # fmt: skip
     """Make a reference that is ten times better than the error up to the end.
 
     error: error asked for [unit of `of`].
     seconds: processor time of the whole search, of which the reference gets a part [s].
     """
-    reference = comparison.make_reference(sample, of, goal=error / 30.0, seconds=SHARE * seconds)
+    reference = make_reference(sample, of, goal=error / 30.0, seconds=SHARE * seconds)
     apart = reference.error(of.name)
     if apart <= 0.1 * error:
         return reference
@@ -327,7 +338,7 @@ def checked_reference(sample: Sample, of: Compared, error: float, seconds: float
         raise SceneError([f"{cause}; {remedy}. {problem} yet: {differ}; or ask for a larger error or a shorter t1"])
     until = sample.times[reference.reaches(of.name, 0.1 * error)]
     remedy = f"ask for t1 (--duration) up to {until:g} s" if until > 0.0 else "ask for a shorter t1 (--duration)"
-    grows = growth_text(growth_of(reference.sample, taken, reference))
+    grows = growth_text(grown(reference.sample, taken, reference))
     raise SceneError(
         [f"{problem}: {differ}, and agree no better with shorter steps; {grows}; {remedy}, or for a larger error"]
     )
@@ -423,15 +434,15 @@ class Ladders:
         m, before, worse = sample.coarsest(2.0), math.inf, 0
         plan = sample.plan_to_price(sample.candidate(method, m, dtype))
         with self.budget.free():
-            plan.compile()
-        per_step = step_cost(plan)
+            sample.kernels.compile(plan)
+        per_step = step_cost(plan, sample.kernels)
         while per_step / sample.h(m) < 2.0 * min((price for price, _ in self.priced), default=math.inf):
             trial = tried(sample, sample.candidate(method, m, dtype), reference, budget=self.budget)
             size = trial.error(of)
             if size <= target:
                 best = lengthened(sample, trial, m, before, reference, of, target)
                 # Price the step that was found: where a step iterates, its work depends on its length.
-                self.priced.append((step_cost(best.plan) / best.candidate.h, best))
+                self.priced.append((step_cost(best.plan, sample.kernels) / best.candidate.h, best))
                 return self.priced[-1][0]
             worse = worse + 1 if size > 0.8 * before and before < 0.1 else 0
             if worse >= 2 or m > 10**7 or self.budget.over or m == sample.allowed(2 * m):
@@ -440,7 +451,7 @@ class Ladders:
             m = sample.allowed(2 * m)
             if cost.work_grows(plan):
                 plan = sample.plan_to_price(sample.candidate(method, m, dtype))
-                per_step = step_cost(plan)
+                per_step = step_cost(plan, sample.kernels)
             yield trial
         return math.inf
 
@@ -456,9 +467,9 @@ class Ladders:
         return [trial for price, trial in sorted(self.priced, key=lambda pair: pair[0]) if price < 1.5 * least]
 
 
-def step_cost(plan: Plan) -> float:
+def step_cost(plan: Plan, kernels: Kernels) -> float:
     """Measure what one step of a plan costs."""
-    return costs([plan], ROUNDS)[0] * plan.grid.h
+    return kernels.costs([plan], ROUNDS)[0].us_per_vehicle_second * plan.grid.h
 
 
 def lengthened(
@@ -517,7 +528,10 @@ def refined(
     return trial, size
 
 
-def seconds_of(fleet: Ensemble, candidate: Candidate, t1: float, members: int = 256) -> float:
+def seconds_of(
+    fleet: Ensemble, candidate: Candidate, t1: float, members: int = 256, *, kernels: Kernels = KERNELS,
+    timed: Callable[..., np.ndarray] = cost.timed,
+) -> float:  # fmt: skip
     """Predict the CPU time of a whole run from that of a few members.
 
     t1: end time [s].
@@ -525,8 +539,8 @@ def seconds_of(fleet: Ensemble, candidate: Candidate, t1: float, members: int = 
     """
     n = min(members, fleet.members)
     plan = make_plan(fleet.subset(range(n)), candidate.resolved(), candidate.h, t1, dtype=candidate.dtype)
-    plan.compile()
-    return float(cost.timed([lambda: run_plan(plan, 1, executor=ThisThread())], 2).min()) * fleet.members / n
+    kernels.compile(plan)
+    return float(timed([lambda: kernels.run(plan)], 2).min()) * fleet.members / n
 
 
 def memory_of(fleet: Ensemble, candidate: Candidate, t1: float) -> int:
@@ -540,7 +554,9 @@ def memory_of(fleet: Ensemble, candidate: Candidate, t1: float) -> int:
     return fleet.members * (len(grid.times) * a_sample + BYTES_OF_A_MEMBER)
 
 
-def verified(fleet: Ensemble, result: Result, found: Suggestion) -> tuple[float, int]:
+def verified(
+    fleet: Ensemble, result: Result, found: Suggestion, *, run: Callable[[Plan, int], Result] = run_plan
+) -> tuple[float, int]:
     """Measure the error of a finished run by running some of its members again with half the step.
 
     The members are those with the largest errors in the search, then the first ones. A method of order p is 2^p times
@@ -561,9 +577,9 @@ def verified(fleet: Ensemble, result: Result, found: Suggestion) -> tuple[float,
     if any(isinstance(term, NoisyTerm) for term, _ in plan.kernel_choice.laws):
         checked_fleet, share = comparison.drawn_every(checked_fleet, h / 2.0, own=False), math.sqrt(1.0 - 2.0**-2)
         grid_of_run = TimeGrid(h, steps, result.time)
-        done = run_plan(choose_plan(checked_fleet, plan.method, grid_of_run, plan.fields, candidate.dtype), 1)
+        done = run(choose_plan(checked_fleet, plan.method, grid_of_run, plan.fields, candidate.dtype), 1)
     half = choose_plan(checked_fleet, plan.method, TimeGrid(h / 2.0, 2 * steps, result.time), plan.fields, "float64")
     with np.errstate(all="ignore"):
-        apart = comparison.distances(done, run_plan(half, 1), found.asked)
+        apart = comparison.distances(done, run(half, 1), found.asked)
         size = comparison.errors(apart, len(result.time) - 1)[found.of]["path_max"]
     return size / share, len(chosen)

@@ -16,7 +16,6 @@ from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.progress import callback, shows_progress
-from lgvi_warp.engine.executors.threads import ThisThread
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import COMPOSITIONS, PROGRAMS, Method
 from lgvi_warp.physics import energy as invariants
@@ -257,11 +256,11 @@ def tried(
     """
     plan = sample.plan(candidate)
     with budget.free() if budget else contextlib.nullcontext():
-        compile_seconds = plan.compile()
+        compile_seconds = sample.kernels.compile(plan)
     with np.errstate(all="ignore"):
-        begun = cost.thread_seconds()
-        result = replace(comparison.run_plan(plan, 1, executor=ThisThread()), compile_seconds=compile_seconds)
-        cpu_seconds = cost.thread_seconds() - begun
+        begun = sample.kernels.clock()
+        result = replace(sample.kernels.run(plan), compile_seconds=compile_seconds)
+        cpu_seconds = sample.kernels.clock() - begun
         errors: dict[str, dict[str, float]] = {}
         if reference is not None and not comparison.failed(result):
             until = until % len(sample.times)
@@ -269,11 +268,6 @@ def tried(
             if not all(np.isfinite(norms["path_max"]) for norms in errors.values()):
                 errors = {}
     return Trial(candidate, sample.plan_to_price(candidate), result, errors, cpu_seconds)
-
-
-def costs(plans: Sequence[Plan], rounds: int = 5) -> list[float]:
-    """Measure the cost of plans (see cost.py)."""
-    return [price.us_per_vehicle_second for price in cost.costs(plans, rounds)]
 
 
 def chosen_methods(methods: Sequence[str] | None, default: Sequence[str] = CANDIDATES) -> tuple[str, ...]:
@@ -348,9 +342,17 @@ def tradeoff(
     faults.positive("seconds", seconds)
     faults.raise_if_any()
     names = chosen_methods(methods)
-    begun, whole = time.perf_counter(), Budget(seconds)
-    report = callback(progress) or void
     sample = Sample(fleet, t1, members)
+    return tradeoff_on(sample, compared, names, seconds, callback(progress) or void, methods is not None)
+
+
+def tradeoff_on(
+    sample: Sample, compared: Compared, names: Sequence[str], seconds: float, report: Callable[[float], None],
+    named: bool, *, make_reference: Callable[..., Reference] = comparison.make_reference,
+    grown: Callable[..., Growth] | None = None,
+) -> Tradeoff:  # fmt: skip
+    """Measure methods on a sample, as `tradeoff` says; named: whether they were asked for by name."""
+    begun, whole = time.perf_counter(), Budget(seconds)
     taken, refused = sample.accepted(names)
     if not taken:
         raise SceneError([f"method {name}: {why}" for name, why in refused.items()])
@@ -361,7 +363,7 @@ def tradeoff(
         messages.append("noise acts, whose path differs from step to step: only statistics are compared")
         finest = tried(sample, sample.candidate(taken[0], 32 * sample.coarsest(0.5)), None).result
     else:
-        reference = comparison.make_reference(
+        reference = make_reference(
             sample, compared, seconds=SHARE * seconds, report=lambda fraction: report(0.2 * fraction)
         )
         sample, finest = reference.sample, reference.result
@@ -374,13 +376,13 @@ def tradeoff(
         reference = None
     if reference:
         until = trusted_until(reference, compared, seconds)
-        growth = growth_of(sample, taken, reference)
+        growth = (grown or growth_of)(sample, taken, reference)
         if until < len(sample.times) - 1:
             text = f"errors of single members are up to {sample.times[until]:g} s, where the reference still agrees"
             messages.append(f"{text} with itself; beyond it only statistics are meaningful")
     budget = Budget(0.6 * seconds)
     trials, skipped = sweep(
-        sample, taken, reference, until, budget, whole, lambda part: report(0.2 + 0.6 * part), methods is not None
+        sample, taken, reference, until, budget, whole, lambda part: report(0.2 + 0.6 * part), named
     )
     if skipped:
         messages.append(
@@ -403,7 +405,7 @@ def tradeoff(
         messages=tuple(messages),
         seconds=time.perf_counter() - begun,
         units=QUANTITIES | {compared.name: compared.unit},
-        missing=without_reading(names, trials, measured, refused, seconds) if methods else {},
+        missing=without_reading(names, trials, measured, refused, seconds) if named else {},
     )
 
 
@@ -429,12 +431,14 @@ def without_reading(
     return {name: refused.get(name) or why(name) for name in dict.fromkeys(names) if name not in there}
 
 
-def growth_of(sample: Sample, taken: Sequence[str], reference: Reference) -> Growth:
+def growth_of(
+    sample: Sample, taken: Sequence[str], reference: Reference, *, measure: Callable[..., Growth] = comparison.growth
+) -> Growth:
     """Measure how errors grow, by the method of highest order at about the reference's step."""
     method = max(taken, key=lambda name: Method(name).order)
-    often = sample if sample.draws else Sample(sample.whole, sample.t1, sample.members)
+    often = sample if sample.draws else Sample(sample.whole, sample.t1, sample.members, kernels=sample.kernels)
     m = max(1, round(float(often.spacing) / reference.result.provenance["step"]))
-    return comparison.growth(often, often.candidate(method, m))
+    return measure(often, often.candidate(method, m))
 
 
 def noise_text(sample: Sample) -> str:
@@ -497,6 +501,9 @@ def sweep(
     whole: Budget,
     report: Callable[[float], None],
     named: bool = False,
+    *,
+    solvers: Sequence[tuple[str, int | None]] | None = None,
+    compensated: Sequence[str] | None = None,
 ) -> tuple[list[Trial], list[str]]:
     """Run every method, precision and solver: each at a coarse step first, then in turn at half the step before.
 
@@ -509,11 +516,14 @@ def sweep(
         whole: of the whole study, compiling included: once it is over, nothing is compiled that is not asked for by name.
         report: called with the fraction of the time or of the first settings that is done.
         named: whether the methods were asked for by name: then each begins, however long its kernel compiles.
+        solvers: (name, iterations) of the solvers that are tried as well; default None, SOLVERS.
+        compensated: names of the methods that are tried in compensated float32 as well; default None, COMPENSATED.
 
     Returns:
         (trials, skipped): the trials, and the names of the settings that there was no time for.
     """
-    waiting = series_of(sample, methods)
+    solvers = SOLVERS if solvers is None else solvers
+    waiting = series_of(sample, methods, solvers, COMPENSATED if compensated is None else compensated)
     trials: list[Trial] = []
     skipped: list[str] = []
     begun: set[str] = set()
@@ -541,12 +551,14 @@ def sweep(
     return trials, skipped
 
 
-def series_of(sample: Sample, methods: Sequence[str]) -> list[Series]:
+def series_of(
+    sample: Sample, methods: Sequence[str], solvers: Sequence[tuple[str, int | None]], compensated: Sequence[str]
+) -> list[Series]:
     """List the series of settings, the default precision of every method first."""
     plain: tuple[str, int | None] = ("quartic", None)
     settings = [(name, dtype, plain) for dtype in PRECISIONS for name in methods]
-    settings += [(SOLVED_BY, "float64", solved) for solved in SOLVERS if SOLVED_BY in methods]
-    summed, _ = sample.accepted([name for name in COMPENSATED if name in methods], "float32_compensated")
+    settings += [(SOLVED_BY, "float64", solved) for solved in solvers if SOLVED_BY in methods]
+    summed, _ = sample.accepted([name for name in compensated if name in methods], "float32_compensated")
     settings += [(name, "float32_compensated", plain) for name in summed]
     return [Series(*setting, sample.coarsest(1.0)) for setting in settings]
 
@@ -582,7 +594,10 @@ def hopeless(one: Trial, trials: Sequence[Trial]) -> bool:
     return math.isfinite(error) and any(max(rival.error(of) for of in DECIDING) < error for rival in rivals)
 
 
-def between(sample: Sample, trials: list[Trial], reference: Reference, until: int, budget: Budget) -> None:
+def between(
+    sample: Sample, trials: list[Trial], reference: Reference, until: int, budget: Budget, *,
+    run: Callable[..., Trial] = tried,
+) -> None:  # fmt: skip
     """Add trials near the Pareto front, at steps between those already tried."""
     ranked = sorted((trial.cpu_seconds, trial.error(DECIDING[0]), i) for i, trial in enumerate(trials))
     best, near = math.inf, list[Trial]()
@@ -597,7 +612,7 @@ def between(sample: Sample, trials: list[Trial], reference: Reference, until: in
             candidate = replace(trial.candidate, h=sample.h(sample.allowed(step)))
             if candidate not in tried_already and not budget.over:
                 tried_already.add(candidate)
-                trials.append(tried(sample, candidate, reference, until, budget))
+                trials.append(run(sample, candidate, reference, until, budget))
 
 
 def measurements(
@@ -618,7 +633,7 @@ def measurements(
         key = trial.candidate.name, trial.candidate.dtype
         compiled[key] = max(compiled.get(key, 0.0), trial.result.compile_seconds)
     measured = []
-    for trial, price in zip(good, cost.costs([trial.plan for trial in good]), strict=True):
+    for trial, price in zip(good, sample.kernels.costs([trial.plan for trial in good]), strict=True):
         limits = {of: reference.error(of, until) for of in trial.errors} if reference else {}
         with np.errstate(all="ignore"):
             biases = comparison.biases(trial.result, finest, asked)

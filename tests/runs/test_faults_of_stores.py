@@ -10,7 +10,6 @@ import sys
 import threading
 import time
 
-import numpy as np
 import pytest
 
 import lgvi_warp as lw
@@ -21,6 +20,7 @@ from lgvi_warp.common import safe_files, scratch, write_lock
 from lgvi_warp.store import folder as store
 from tests.conftest import ROOT
 from tests.support import hostile
+from tests.support.disks import Disk, full, refused
 from tests.support.stores import MEMBERS, SETTINGS, differing, fleet, forked, tree
 
 
@@ -262,36 +262,27 @@ def test_a_file_of_another_machine_is_left_alone(results, tmp_path):
     assert [one.exists() for one in (others, dead, alive)] == [True, False, True]
 
 
-def test_two_runs_that_end_together_leave_the_files_of_one(results, tmp_path, monkeypatch):
+def test_two_runs_that_end_together_leave_the_files_of_one(results, tmp_path):
     """Their files are written one after another."""
-    loaded, order = [lw.Result.load(one) for one in results], []
-    save = lw.Result.save
-
-    def slowly(self, path):
-        order.append(self.members)
-        time.sleep(0.05)
-        found = save(self, path)
-        order.append(self.members)
-        return found
-
-    monkeypatch.setattr(lw.Result, "save", slowly)
+    loaded = [lw.Result.load(one) for one in results]
     threads = [threading.Thread(target=report.write, args=(one, None, tmp_path)) for one in loaded]
-    for one in threads:
-        one.start()
-    for one in threads:
-        one.join()
-    assert order in ([20, 20, 30, 30], [30, 30, 20, 20])
+    with Disk(lambda what, path: time.sleep(0.05)) as disk:
+        for one in threads:
+            one.start()
+        for one in threads:
+            one.join()
+    order = [what for what, path in disk.done if path == tmp_path / "result.npz"]
+    assert order == ["synced", "named"] * 2
     assert [one.name for one in tmp_path.iterdir()] == ["result.npz"]
-    assert lw.Result.load(tmp_path / "result.npz").members == order[-1]
+    assert lw.Result.load(tmp_path / "result.npz").members in (20, 30)
 
 
-def test_a_saved_result_is_on_the_disk_before_it_has_its_name(results, tmp_path, monkeypatch):
-    order, fsync, replace = [], os.fsync, durable.Path.replace
-    monkeypatch.setattr(os, "fsync", lambda fd: (order.append(os.readlink(f"/proc/self/fd/{fd}")), fsync(fd)))
-    monkeypatch.setattr(durable.Path, "replace", lambda self, to: (order.append("name"), replace(self, to))[1])
-    lw.Result.load(results[0]).save(tmp_path / "result.npz")
-    assert order[0].endswith(".part")
-    assert order[1:] == ["name", str(tmp_path)]
+def test_a_saved_result_is_on_the_disk_before_it_has_its_name(results, tmp_path):
+    target = tmp_path / "result.npz"
+    with Disk() as disk:
+        lw.Result.load(results[0]).save(target)
+    order = [one for one in disk.done if one[0] != "created"]
+    assert order == [("synced", target), ("named", target), ("synced", tmp_path)]
 
 
 # What a folder called run.zarr may hold that no run wrote, and whether there is a run beside it.
@@ -412,19 +403,11 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("number", "file", "said"), FAULTS)
-def test_a_disk_that_takes_no_more(whole, tmp_path, monkeypatch, number, file, said):
+def test_a_disk_that_takes_no_more(whole, tmp_path, number, file, said):
     """A line says so, what was finished is kept, and the run goes on when there is room."""
-    path, created = tmp_path / "run.zarr", safe_files.created
-
-    def refused(root, beside):
-        if beside.name.startswith(f"{file}."):
-            raise OSError(number, os.strerror(number))
-        return created(root, beside)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(safe_files, "created", refused)
-        with pytest.raises(OSError, match=said) as told:
-            lw.solve(fleet(), **SETTINGS, store=path)
+    path = tmp_path / "run.zarr"
+    with Disk(refused(number, ("created", f"/{file}"))), pytest.raises(OSError, match=said) as told:
+        lw.solve(fleet(), **SETTINGS, store=path)
     assert "\n" not in str(told.value)
     assert file in str(told.value)
     assert not list(tmp_path.rglob("*.part"))
@@ -434,42 +417,28 @@ def test_a_disk_that_takes_no_more(whole, tmp_path, monkeypatch, number, file, s
 
 
 @pytest.mark.parametrize(("number", "said"), [(errno.EACCES, WRITE), (errno.EROFS, WRITE), (errno.ENOSPC, ROOM)])
-def test_a_folder_that_takes_no_lock(tmp_path, monkeypatch, number, said):
-    def refused(path):
-        raise OSError(number, os.strerror(number), str(path))
-
-    monkeypatch.setattr(write_lock, "_opened", refused)
-    with pytest.raises(OSError, match=said):
+def test_a_folder_that_takes_no_lock(tmp_path, number, said):
+    name = write_lock.lock_file(tmp_path / "run.zarr").name
+    with Disk(refused(number, ("created", name))), pytest.raises(OSError, match=said):
         lw.solve(fleet(10), **SETTINGS, store=tmp_path / "run.zarr")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_full_disk_does_not_undo_a_saved_result(results, tmp_path, monkeypatch):
+def test_a_full_disk_does_not_undo_a_saved_result(results, tmp_path):
     target = shutil.copy(results[0], tmp_path / "result.npz")
-
-    def full(*_, **__):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-    monkeypatch.setattr(np, "savez", full)
-    with pytest.raises(OSError, match="No space left"):
+    with Disk(full(("synced", "result.npz"))), pytest.raises(OSError, match="No space left"):
         lw.Result.load(results[1]).save(target)
     assert lw.Result.load(target).members == 20
     assert [one.name for one in tmp_path.iterdir()] == ["result.npz"]
 
 
-def test_a_full_disk_does_not_undo_what_is_overwritten(whole, tmp_path, monkeypatch):
-    path, created = shutil.copytree(whole, tmp_path / "run.zarr"), safe_files.created
-
-    def full(root, beside):
-        if beside.name.startswith("created.json."):
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        return created(root, beside)
-
-    monkeypatch.setattr(safe_files, "created", full)
-    with pytest.raises(OSError, match="No space left"):
-        lw.solve(fleet(300), **SETTINGS, store=lw.Store(path, existing="overwrite"))
-    with pytest.raises(OSError, match="No space left"):
-        lw.merge([path], tmp_path, overwrite=True)
+def test_a_full_disk_does_not_undo_what_is_overwritten(whole, tmp_path):
+    path = shutil.copytree(whole, tmp_path / "run.zarr")
+    with Disk(full(("created", "created.json"))):
+        with pytest.raises(OSError, match="No space left"):
+            lw.solve(fleet(300), **SETTINGS, store=lw.Store(path, existing="overwrite"))
+        with pytest.raises(OSError, match="No space left"):
+            lw.merge([path], tmp_path, overwrite=True)
     assert differing(whole, path) == []
     assert [one.name for one in tmp_path.iterdir()] == ["run.zarr"]
 

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A kernel cache that is damaged, full, unwritable or left torn: compiled anew, or told; never loaded."""
 
+import contextlib
 import errno
+import functools
 import hashlib
 import json
 import os
@@ -11,12 +13,12 @@ import sys
 import tempfile
 import threading
 import time
+from types import SimpleNamespace
 from unittest import mock
 
 import pytest
 import warp as wp
 
-from lgvi_warp.common import files as durable
 from lgvi_warp.common import warp_setup
 from lgvi_warp.engine import kernel_cache
 from tests.conftest import ROOT
@@ -233,31 +235,24 @@ def test_a_full_disk_is_told_before_llvm_ends_the_process(cache):
     assert works()
 
 
-def test_no_files_left_is_no_room(tmp_path, monkeypatch):
-    system = os.statvfs(tmp_path)
-    for files, left, full in ((1000, 3, True), (1000, 900, False), (0, 0, False)):
-        fields = list(system)[:10]
-        fields[5], fields[7] = files, left
-        monkeypatch.setattr(os, "statvfs", lambda path, found=os.statvfs_result(fields): found)
-        if full:
-            with pytest.raises(OSError, match="No files left"):
-                kernel_cache.seek_room(tmp_path)
-        else:
-            kernel_cache.seek_room(tmp_path)
+@pytest.mark.parametrize(("files", "left", "full"), [(1000, 3, True), (1000, 900, False), (0, 0, False)])
+def test_no_files_left_is_no_room(tmp_path, files, left, full):
+    fields = list(os.statvfs(tmp_path))[:10]
+    fields[5], fields[7] = files, left
+    system = SimpleNamespace(statvfs=lambda path: os.statvfs_result(fields), posix_fallocate=os.posix_fallocate)
+    with pytest.raises(OSError, match="No files left") if full else contextlib.nullcontext():
+        kernel_cache.seek_room(tmp_path, system=system)
 
 
-def test_room_is_looked_for_by_writing_where_nothing_else_tells(tmp_path, monkeypatch):
+def test_room_is_looked_for_by_writing_where_nothing_else_tells(tmp_path):
     def unknown(*arguments):
         raise OSError(errno.EOPNOTSUPP, "not supported")
 
-    monkeypatch.setattr(os, "posix_fallocate", unknown)
-    kernel_cache.seek_room(tmp_path, 1000)
-    monkeypatch.setattr(durable, "write_all", lambda file, view: unknown())
-    with pytest.raises(OSError, match="not supported"):
-        kernel_cache.seek_room(tmp_path, 1000)
-    monkeypatch.delattr(os, "posix_fallocate")
-    with pytest.raises(OSError, match="not supported"):
-        kernel_cache.seek_room(tmp_path, 1000)
+    system = SimpleNamespace(posix_fallocate=unknown)
+    kernel_cache.seek_room(tmp_path, 1000, system=system)
+    for one in (system, SimpleNamespace()):
+        with pytest.raises(OSError, match="not supported"):
+            kernel_cache.seek_room(tmp_path, 1000, system=one, write=unknown)
 
 
 def test_an_unwritable_cache_is_named(cache, monkeypatch):
@@ -321,10 +316,10 @@ def test_what_killed_processes_left_is_swept(cache):
     assert not alive.exists()
 
 
-def test_threads_compile_once(cache, monkeypatch):
+def test_threads_compile_once(cache):
     compiled = mock.Mock(side_effect=kernel_cache.compile_module)
-    monkeypatch.setattr(kernel_cache, "compile_module", compiled)
-    threads = [threading.Thread(target=kernel_cache.load, args=(MODULE,)) for _ in range(4)]
+    load = functools.partial(kernel_cache.load, MODULE, compiled_by=compiled)
+    threads = [threading.Thread(target=load) for _ in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:

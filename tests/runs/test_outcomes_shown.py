@@ -2,7 +2,6 @@
 """An outcome is not a failure: pictures, recordings, summaries and exit codes of members that events stopped."""
 
 import dataclasses
-import io
 import sys
 from types import SimpleNamespace
 
@@ -493,45 +492,6 @@ def test_a_plain_installation_runs(scene_file, capsys, monkeypatch, absent, file
     assert "not written" not in errors
     assert f"note        {words}to have pictures: pip install 'lgvi-warp[viz]'\n" in said
     assert sorted(path.name for path in (scene_file.parent / "out").iterdir()) == files
-
-
-def test_a_library_that_is_broken_is_a_fault(mixed, tmp_path, monkeypatch):
-    def broken(result, path):
-        raise ImportError("libpng16.so: wrong version")
-
-    monkeypatch.setattr("lgvi_warp.views.plots.plot", broken)
-    assert "libpng16.so" in report.write(mixed, mixed, tmp_path).faults[0]
-
-
-def test_an_interrupt_while_drawing_leaves_whole_files(mixed, tmp_path, monkeypatch):
-    def interrupted(jobs, timeout):
-        next(iter(jobs)).result()
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("lgvi_warp.cli.writing.wait", interrupted)
-    with pytest.raises(KeyboardInterrupt) as caught:
-        report.write(mixed, mixed, tmp_path)
-    names = {path.name for path in tmp_path.iterdir()}
-    assert "result.npz" in names <= {"result.npz", "fleet.png", "fleet.rrd"}
-    said = str(caught.value)
-    assert said.startswith("written: ")
-    assert all(str(path) in said for path in tmp_path.iterdir())
-    assert lw.Result.load(tmp_path / "result.npz").status.counts() == mixed.status.counts()
-
-
-def test_the_command_says_in_a_line_what_an_interrupt_left(scene_file, monkeypatch, capsys):
-    from lgvi_warp.cli import runs
-    from lgvi_warp.cli.signals import Ended
-
-    out = scene_file.parent / "out"
-
-    def interrupted(*arguments):
-        raise Ended(f"written: {out / 'result.npz'}")
-
-    monkeypatch.setattr(runs, "report", interrupted)
-    monkeypatch.setattr(sys, "stderr", io.StringIO())
-    assert cli.main(["run", str(scene_file), "--out", str(out), "--quiet"]) == 130
-    assert sys.stderr.getvalue() == f"lgvi-warp: interrupted; written: {out / 'result.npz'}\n"
 
 
 def test_keep_failed_keeps_no_outcome(mixed):

@@ -15,13 +15,13 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
-from lgvi_warp.cli import command, progress, runs
+from lgvi_warp.cli import progress
 from lgvi_warp.cli.signals import Lasting, Signals
 from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.executors.threads import Threads
-from lgvi_warp.engine.plan import Plan
 from tests.conftest import ROOT
 from tests.support.stores import SETTINGS, bits, differing, fleet
+from tests.support.verbs import Study, main
 
 PAPER = str(ROOT / "examples" / "paper.toml")
 # 16 blocks of 256 members, half a second each or less.
@@ -258,7 +258,7 @@ def test_a_full_disk_below_stdout_is_told(tmp_path):
 
 
 @pytest.mark.parametrize("name", CODES)
-def test_a_signal_is_an_exit_code_and_handlers_are_as_before(name, monkeypatch, capsys):
+def test_a_signal_is_an_exit_code_and_handlers_are_as_before(name, capsys):
     number = getattr(signal, name)
     before = [signal.getsignal(getattr(signal, one)) for one in CODES]
 
@@ -266,24 +266,23 @@ def test_a_signal_is_an_exit_code_and_handlers_are_as_before(name, monkeypatch, 
         signal.raise_signal(number)
         time.sleep(10.0)
 
-    monkeypatch.setitem(command.VERBS, "info", verb)
-    assert cli.main(["info"]) == CODES[name]
+    assert cli.main(["info"], verbs={"info": verb}) == CODES[name]
     assert [signal.getsignal(getattr(signal, one)) for one in CODES] == before
     text = "" if name == "SIGINT" else f" by {name}"
     assert capsys.readouterr().err == f"lgvi-warp: interrupted{text}; nothing was to be written\n"
 
 
-def test_ignored_signals_stay_ignored_within(monkeypatch):
+def test_ignored_signals_stay_ignored_within():
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
-        monkeypatch.setitem(command.VERBS, "info", lambda chosen: signal.raise_signal(signal.SIGHUP) or 0)
-        assert cli.main(["info"]) == 0
+        verbs = {"info": lambda chosen: signal.raise_signal(signal.SIGHUP) or 0}
+        assert cli.main(["info"], verbs=verbs) == 0
         assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGHUP, before)
 
 
-def test_an_interrupt_that_a_library_turns_into_another_error(monkeypatch, capsys):
+def test_an_interrupt_that_a_library_turns_into_another_error(capsys):
     def verb(chosen):
         try:
             signal.raise_signal(signal.SIGTERM)
@@ -291,12 +290,11 @@ def test_an_interrupt_that_a_library_turns_into_another_error(monkeypatch, capsy
         except KeyboardInterrupt:
             raise ImportError("half of it is there") from None
 
-    monkeypatch.setitem(command.VERBS, "info", verb)
-    assert cli.main(["info"]) == 143
+    assert cli.main(["info"], verbs={"info": verb}) == 143
     assert capsys.readouterr().err == "lgvi-warp: interrupted by SIGTERM; nothing was to be written\n"
 
 
-def test_an_interrupt_where_none_can_be_raised_comes_again(monkeypatch, capsys):
+def test_an_interrupt_where_none_can_be_raised_comes_again(capsys):
     class Deaf:
         def __del__(self):
             signal.raise_signal(signal.SIGTERM)
@@ -306,26 +304,25 @@ def test_an_interrupt_where_none_can_be_raised_comes_again(monkeypatch, capsys):
         Deaf()
         time.sleep(10.0)
 
-    monkeypatch.setitem(command.VERBS, "info", verb)
-    assert cli.main(["info"]) == 143
+    assert cli.main(["info"], verbs={"info": verb}) == 143
     assert capsys.readouterr().err == "lgvi-warp: interrupted by SIGTERM; nothing was to be written\n"
 
 
-def test_other_threads_leave_signals_alone(monkeypatch):
-    monkeypatch.setitem(command.VERBS, "info", lambda chosen: 7)
+def test_other_threads_leave_signals_alone():
+    verbs = {"info": lambda chosen: 7}
     before, codes = signal.getsignal(signal.SIGTERM), []
-    thread = threading.Thread(target=lambda: codes.append(cli.main(["info"])))
+    thread = threading.Thread(target=lambda: codes.append(cli.main(["info"], verbs=verbs)))
     thread.start()
     thread.join(SECONDS)
     assert codes == [7]
     assert signal.getsignal(signal.SIGTERM) is before
 
 
-def test_the_second_signal_ends_the_process(monkeypatch):
+def test_the_second_signal_ends_the_process():
     """The listener alone: the main thread need not come back."""
     ends = threading.Event()
-    monkeypatch.setattr(Signals, "_end", lambda signals: ends.set())
-    with contextlib.suppress(KeyboardInterrupt), Signals(lambda: "") as signals:
+    listened = Signals(lambda: "", end=lambda signals: ends.set())
+    with contextlib.suppress(KeyboardInterrupt), listened as signals:
         with contextlib.suppress(KeyboardInterrupt):
             signal.raise_signal(signal.SIGHUP)
         assert not ends.wait(0.1)
@@ -397,23 +394,19 @@ def test_blocks_at_work_come_to_their_end(threads):
 
 
 @pytest.mark.parametrize("there", [False, True])
-def test_an_interrupt_among_the_pictures_saves_the_result(there, tmp_path, monkeypatch, capsys):
-    def report(*given):
-        raise KeyboardInterrupt
-
+def test_an_interrupt_among_the_pictures_saves_the_result(there, tmp_path, capsys):
     if there:
         (tmp_path / "result.npz").write_bytes(b"of a week")
-    monkeypatch.setattr(runs, "report", report)
-    assert cli.main([*SHORT, "--out", str(tmp_path), "--quiet"]) == 130
+    assert main([*SHORT, "--out", str(tmp_path), "--quiet"], finish=Study(KeyboardInterrupt())) == 130
     path = tmp_path / ("result_part.npz" if there else "result.npz")
     assert lw.Result.load(path).members == 20
     text = f"lgvi-warp: interrupted; the run is finished: its 20 members are saved in {path}\n"
     assert capsys.readouterr().err == text
 
 
-def test_an_interrupt_while_a_kernel_is_compiled_leaves_nothing(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(Plan, "compile", lambda plan: signal.raise_signal(signal.SIGINT))
-    assert cli.main([*SHORT, "--out", str(tmp_path), "--quiet"]) == 130
+def test_an_interrupt_before_a_block_is_done_leaves_nothing(tmp_path, capsys):
+    compiling = lambda *given, **settings: signal.raise_signal(signal.SIGINT)  # noqa: E731
+    assert main([*SHORT, "--out", str(tmp_path), "--quiet"], simulate=compiling) == 130
     assert capsys.readouterr().err == "lgvi-warp: interrupted; nothing was written\n"
     assert list(tmp_path.iterdir()) == []
 
@@ -491,16 +484,6 @@ def test_an_interrupt_while_files_are_written_leaves_them_whole(tmp_path, monkey
     assert all(str(tmp_path / name) in said for name in there)
 
 
-def test_a_part_that_cannot_be_saved_is_told(tmp_path, monkeypatch):
-    result = lw.solve(fleet(20), **SETTINGS)
-
-    def full(*given):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(lw.Result, "save", full)
-    assert "members are lost: " in runs.rescued(result, tmp_path)
-
-
 def test_lasting_streams():
     class Gone:
         def __init__(self, number):
@@ -515,8 +498,7 @@ def test_lasting_streams():
     for number in (32, 5):
         gone = Gone(number)
         stream = Lasting(gone)
-        shown = progress.Progress(stream)
-        shown._interval = 0.0
+        shown = progress.Progress(stream, interval=0.0)
         shown(0.5)
         shown(0.6)
         shown.close()

@@ -181,16 +181,7 @@ def test_the_command_restores_the_statistics_of_the_scene(tmp_path, capsys):
     scene += '\n[[run.statistics]]\ntype = "mean"\nof = "position"\n'
     scene += '[run.until]\nstatistic = "mean position[2]"\nhalf_width = 10.0\nmembers = 256\n'
     (tmp_path / "scene.toml").write_text(scene.replace("[run]", '[run]\nkeep = "none"'))
-    options = [
-        "--members",
-        "1003",
-        "--duration",
-        "1",
-        "--store",
-        "zarr",
-        "--out",
-        str(tmp_path),
-    ]
+    options = ["--members", "1003", "--duration", "1", "--store", "zarr", "--out", str(tmp_path)]
     assert cli.main(["run", str(tmp_path / "scene.toml"), *options]) == 0
     before, said = tree(tmp_path / "run.zarr"), capsys.readouterr().out
     assert "mean position" in said

@@ -18,7 +18,6 @@ import lgvi_warp as lw
 from benchmarks.problems import DepthSum
 from lgvi_warp import cli
 from lgvi_warp.common import files as durable
-from lgvi_warp.common import machine, safe_files
 from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.results import member_fields
@@ -27,9 +26,11 @@ from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.store import folder as store
 from lgvi_warp.store import layout as store_layout
 from lgvi_warp.store.block_files import packed, unpacked
+from lgvi_warp.store.export import fault_of_library
 from lgvi_warp.store.run import StoredRun
 from lgvi_warp.store.state import state
 from tests.conftest import ROOT
+from tests.support.disks import Disk, full, refused
 from tests.support.stores import MEMBERS, SETTINGS, differing, fleet, markers, tree
 
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")
@@ -393,13 +394,9 @@ def test_a_full_disk_is_told_by_an_export(whole, tmp_path, to, capsys):
     ],
     ids=["the system's", "the library's"],
 )
-def test_an_export_that_fails_says_what_the_library_says(error, number, text, whole, tmp_path, monkeypatch):
-    def fail(folder, path):
+def test_an_export_that_fails_says_what_the_library_says(error, number, text, tmp_path):
+    with pytest.raises(OSError) as caught, fault_of_library("netcdf", tmp_path / "run.nc"):
         raise error
-
-    monkeypatch.setattr("lgvi_warp.store.export._netcdf", fail)
-    with pytest.raises(OSError) as caught:
-        lw.export(whole, "netcdf", tmp_path / "run.nc")
     assert (caught.value.errno, caught.value.strerror, caught.value.filename) == (
         number,
         text,
@@ -582,63 +579,55 @@ def test_a_law_of_your_own_goes_on_with_its_ensemble(tmp_path, monkeypatch):
     assert state(tmp_path / "b.zarr")["complete"]
 
 
-def test_another_version_or_machine_is_refused_unless_forced(copy, monkeypatch):
-    versions = machine.versions() | {"numpy": "0.1"}
-    monkeypatch.setattr(machine, "versions", lambda: versions)
-    with pytest.raises(lw.SceneError, match=r"versions.numpy is '.*' in the store and '0.1' here: the same bits"):
+def of_run(path, **changes):
+    """Write into a store that another machine, or another version, made the run."""
+    content = json.loads((path / "zarr.json").read_text())
+    attributes = content["attributes"]
+    made_by = json.loads(attributes["provenance"])
+    for name, values in changes.items():
+        made_by[name] |= values
+    attributes["provenance"] = json.dumps(made_by)
+    texts = [attributes[name] for name in ("provenance", "recipe", "messages", "shared")]
+    attributes["crc32c"] = store.checksum_of(texts)
+    (path / "zarr.json").write_text(json.dumps(content))
+
+
+def test_another_version_or_machine_is_refused_unless_forced(copy):
+    of_run(copy, versions={"numpy": "0.1"})
+    with pytest.raises(lw.SceneError, match=r"versions.numpy is '0.1' in the store and '.*' here: the same bits"):
         lw.resume(copy)
     assert any("continued although versions.numpy" in text for text in lw.resume(copy, force=True).messages)
-    monkeypatch.setattr(machine, "cpu_name", lambda: "abacus")
+    of_run(copy, versions={"numpy": "0.1"}, machine={"cpu": "abacus"})
     with pytest.raises(lw.SceneError, match="2 faults"):
         lw.resume(copy)
 
 
-def test_more_threads_or_another_python_are_no_difference(copy, monkeypatch):
-    monkeypatch.setattr(machine, "thread_count", lambda: 17)
-    monkeypatch.setattr(machine, "versions", lambda versions=machine.versions(): versions | {"python": "9"})
+def test_more_threads_or_another_python_are_no_difference(copy):
+    of_run(copy, machine={"threads": 17}, versions={"python": "9"})
     assert lw.resume(copy, threads=2).members == MEMBERS
 
 
-def test_a_full_disk_keeps_what_is_finished(tmp_path, whole, monkeypatch, capsys):
-    left = 400_000
-
-    def limited(file, view, write=durable.write_all):
-        nonlocal left
-        left -= len(view)
-        if left < 0:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        write(file, view)
-
-    monkeypatch.setattr(durable, "write_all", limited)
+def test_a_full_disk_keeps_what_is_finished(tmp_path, whole):
     path = tmp_path / "run.zarr"
-    with pytest.raises(
-        OSError, match=r"No space left on device: the blocks that were finished are kept.*lgvi-warp resume"
-    ):
+    kept = r"No space left on device: the blocks that were finished are kept.*lgvi-warp resume"
+    with pytest.raises(OSError, match=kept), Disk(full(("created", "position/c.0.2.0"))):
         lw.solve(fleet(), **SETTINGS, store=path, threads=1)
     assert not list(path.rglob(f"*{durable.UNFINISHED}"))
     assert state(path)["damage"] == []
-    monkeypatch.undo()
     lw.resume(path)
     assert differing(whole, path) == []
 
 
-def test_a_disk_that_is_full_when_a_block_was_written_already(tmp_path, whole, monkeypatch):
+def test_a_disk_that_is_full_when_a_block_was_written_already(tmp_path, whole):
     """Some systems find out when they sync: the run ends, and all other blocks that were written are there."""
-
-    def limited(beside, target, sync=durable.sync_file):
-        if target.name == "000000256.json":
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        sync(beside, target)
-
-    monkeypatch.setattr(durable, "sync_file", limited)
     path = tmp_path / "run.zarr"
-    with pytest.raises(OSError, match=r"No space left on device: the blocks that were finished are kept"):
+    kept = r"No space left on device: the blocks that were finished are kept"
+    with pytest.raises(OSError, match=kept), Disk(full(("synced", "000000256.json"))):
         lw.solve(fleet(), **SETTINGS, store=path, threads=1)
     assert state(path)["damage"] == []
     assert 1 <= state(path)["finished"] <= 3
     assert not list(path.rglob(f"*{durable.UNFINISHED}"))
     assert not state(path)["complete"]
-    monkeypatch.undo()
     lw.resume(path)
     assert differing(whole, path) == []
 
@@ -685,11 +674,7 @@ def test_a_folder_that_is_read_only(tmp_path):
         lw.solve(fleet(), **SETTINGS, store=tmp_path / "run.zarr")
 
 
-def test_a_file_system_that_is_read_only(tmp_path, monkeypatch, capsys):
-    def refused(*_, **__):
-        raise OSError(errno.EROFS, os.strerror(errno.EROFS), str(tmp_path))
-
-    monkeypatch.setattr("lgvi_warp.store.create.skeleton", refused)
+def test_a_file_system_that_is_read_only(tmp_path, capsys):
     arguments = [
         "run",
         str(ROOT / "examples" / "paper.toml"),
@@ -700,30 +685,27 @@ def test_a_file_system_that_is_read_only(tmp_path, monkeypatch, capsys):
         "--store",
         "zarr",
     ]
-    assert cli.main([*arguments, "--quiet"]) == 1
+    with Disk(refused(errno.EROFS, ("created", ".json"))):
+        assert cli.main([*arguments, "--quiet"]) == 1
     assert "Read-only file system: choose a folder that can be written" in capsys.readouterr().err
 
 
-def test_chunks_are_synced_before_their_block_is_marked(tmp_path, monkeypatch):
-    order = []
-    sync, rename = os.fsync, safe_files.rename
-    monkeypatch.setattr(os, "fsync", lambda fd: (order.append(("sync", os.readlink(f"/proc/self/fd/{fd}"))), sync(fd)))
-    monkeypatch.setattr(
-        safe_files, "rename", lambda root, path, to: (order.append(("name", str(to))), rename(root, path, to))[1]
-    )
-    lw.solve(fleet(200), **SETTINGS, store=tmp_path / "run.zarr", threads=1)
+def test_chunks_are_synced_before_their_block_is_marked(tmp_path):
+    with Disk() as disk:
+        lw.solve(fleet(200), **SETTINGS, store=tmp_path / "run.zarr", threads=1)
+    order = [(what, str(path)) for what, path in disk.done if what != "created"]
     root = str(tmp_path / "run.zarr")
-    marked = order.index(("name", f"{root}/blocks/000000000.json"))
+    marked = order.index(("named", f"{root}/blocks/000000000.json"))
     written = [
-        i for i, (what, name) in enumerate(order) if what == "name" and name.startswith(f"{root}/") and "/c." in name
+        i for i, (what, name) in enumerate(order) if what == "named" and name.startswith(f"{root}/") and "/c." in name
     ]
     assert len(written) == 13
     assert max(written) < marked
     for i in written:
         name = order[i][1]
-        assert any(what == "sync" and one.startswith(f"{name}.") for what, one in order[:i])
-    assert any(one == ("sync", f"{root}/position") for one in order[max(written) : marked])
-    assert order.index(("name", f"{root}/zarr.json")) > marked
+        assert ("synced", name) in order[:i]
+    assert ("synced", f"{root}/position") in order[max(written) : marked]
+    assert order.index(("named", f"{root}/zarr.json")) > marked
 
 
 def test_parts_of_keepers_lie_in_the_store(tmp_path, memory):

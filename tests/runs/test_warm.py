@@ -10,9 +10,7 @@ from unittest import mock
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import cli
 from lgvi_warp.calls import warm
-from lgvi_warp.common.phases import Phases
 from lgvi_warp.runs import run as runs
 from tests.conftest import ROOT
 
@@ -45,18 +43,6 @@ def test_statistics_and_kept_members_take_the_kernel_of_the_scene():
     run = dataclasses.replace(scene.run, keep="failed", statistics=(lw.Mean("position"),))
     watched = dataclasses.replace(scene, run=run)
     assert kernels_of(watched) == kernels_of(scene) == [("psi_s", "float64", kernel_of_solve(watched))]
-
-
-def test_what_it_says(monkeypatch, capsys):
-    monkeypatch.setattr(warm, "warm", lambda plans, workers: zip(plans, [Phases(1, 2, 0.5), Phases(0.5)], strict=True))
-    assert cli.main(["warm", str(PAPER), "--dtypes", "float64,float32", "--threads", "2"]) == 0
-    first, second, last = capsys.readouterr().out.splitlines()
-    assert first == "psi_s float64: source 1.00 s, Clang 2.00 s, load 0.50 s"
-    assert second == "psi_s float32: source 0.50 s, Clang 0.00 s, load 0.00 s (was in the cache)"
-    assert last.startswith("kernels: 2, in ")
-    assert last.endswith("take 4.00 s")
-    assert cli.main(["warm", str(PAPER), "--dtypes", "float64,float32", "--quiet"]) == 0
-    assert not capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -419,8 +419,7 @@ def test_a_quantity_of_the_users_sees_what_members_start_from(sinking):
 
 
 @pytest.mark.parametrize(
-    "of",
-    ["deph", "position[3]", "attitude[0]", "energy[0]", "median(energy)", "max(min(energy))", 3, [], "max(energy"],
+    "of", ["deph", "position[3]", "attitude[0]", "energy[0]", "median(energy)", "max(min(energy))", 3, [], "max(energy"]
 )
 def test_bad_quantities(scene, of):
     assert "of = " in fault(uq.sobol, scene, of, vary=BOX, **RUN)

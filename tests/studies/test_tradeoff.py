@@ -24,6 +24,8 @@ from lgvi_warp.studies import suggest as suggestion
 from lgvi_warp.studies import tradeoff as tradeoffs
 from lgvi_warp.studies.budget import Budget
 from lgvi_warp.studies.comparison import Sample
+from lgvi_warp.studies.distance import compared_in
+from lgvi_warp.studies.speed import void
 from tests.conftest import ROOT
 from tests.support.random_scenes import judged, random_scene
 
@@ -88,16 +90,15 @@ def test_the_reference_is_the_truth(found, scene):
     assert reference.error("position") < 1e-11
 
 
-def test_a_bad_reference_is_refused(scene, monkeypatch):
+def test_a_bad_reference_is_refused(scene):
     def bad(sample, of="position", **_):
-        return good(sample, of, goal=1e9, methods=("psi_s", "su4(psi_x)"))
+        return comparison.make_reference(sample, of, goal=1e9, methods=("psi_s", "su4(psi_x)"))
 
-    good = comparison.make_reference
-    monkeypatch.setattr(comparison, "make_reference", bad)
+    sample, position = Sample(scene, 40.0), compared_in("position")
     with pytest.raises(lw.SceneError, match=r"no reference: su4\(psi_x\) at h = .* differ by .*shorter t1"):
-        lw.tradeoff(scene, 40.0, methods=["psi_s"])
+        tradeoffs.tradeoff_on(sample, position, ["psi_s"], 45.0, void, True, make_reference=bad)
     with pytest.raises(lw.SceneError, match=r"cannot be checked: su4\(psi_x\) at h = .* differ by .*larger error"):
-        lw.suggest(scene, 1e-6, t1=40.0, methods=["psi_s"])
+        suggestion.suggestion_on(sample, position, 1e-6, ["psi_s"], 30.0, void, True, make_reference=bad)
 
 
 def test_a_reference_that_agrees_with_itself_less_hides_more(scene):
@@ -179,18 +180,18 @@ def test_a_search_compiles_only_what_may_be_cheaper(scene, monkeypatch):
     asked = suggestion.compared_in("position")
 
     def climbed(prices, methods, **settings):
-        ladders = suggestion.Ladders(sample, reference, asked, 0.1, Budget(ENOUGH))
         climbs = []
 
-        def longest(method, dtype):
-            climbs.append((method, dtype[5:]))
-            price = prices[climbs[-1]]
-            if price is not None and price < math.inf:
-                ladders.priced.append((price, None))
-            yield from ()
-            return price
+        class Priced(suggestion.Ladders):
+            def longest(self, method, dtype):
+                climbs.append((method, dtype[5:]))
+                price = prices[climbs[-1]]
+                if price is not None and price < math.inf:
+                    self.priced.append((price, None))
+                yield from ()
+                return price
 
-        monkeypatch.setattr(ladders, "longest", longest)
+        ladders = Priced(sample, reference, asked, 0.1, Budget(ENOUGH))
         ladders.climb(methods, **settings)
         return climbs
 

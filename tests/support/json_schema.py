@@ -1,14 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """As much of JSON schema as the schema of scene files uses."""
 
-KINDS = {
-    "object": dict,
-    "array": list,
-    "string": str,
-    "boolean": bool,
-    "number": (int, float),
-    "integer": int,
-}
+KINDS = {"object": dict, "array": list, "string": str, "boolean": bool, "number": (int, float), "integer": int}
 
 KNOWN = {"type", "properties", "required", "additionalProperties", "items", "anyOf", "enum", "const", "minItems", "maxItems",
          "minimum", "maximum", "exclusiveMinimum", "minProperties", "maxProperties", "description", "title",

@@ -7,6 +7,7 @@ import lgvi_warp as lw
 from lgvi_warp.studies import comparison
 from lgvi_warp.studies import suggest as suggestion
 from lgvi_warp.studies import tradeoff as tradeoffs
+from lgvi_warp.studies.cost import costs
 
 
 def random_scene(seed):
@@ -65,6 +66,6 @@ def judged(fleet, found, asked, rounds=5):
                 m = max(m + 1, round(1.2 * m))
             if last:
                 good.append(last)
-    prices = tradeoffs.costs([one.plan for one in good], rounds)
+    prices = [price.us_per_vehicle_second for price in costs([one.plan for one in good], rounds)]
     best = min(range(len(good)), key=prices.__getitem__)
     return own.error(asked["of"]) / asked["error"], prices[0] / prices[best], good[best].candidate

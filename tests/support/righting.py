@@ -146,10 +146,7 @@ def of_yaml(path, gravity):
 def of_tables(tables):
     """The same two forces from what an importer returned (axes z down), told in axes z up."""
     v = tables["vehicle"]
-    return [
-        (DOWN @ v["center_of_gravity"], -v["weight"]),
-        (DOWN @ v["center_of_buoyancy"], v["buoyancy"]),
-    ]
+    return [(DOWN @ v["center_of_gravity"], -v["weight"]), (DOWN @ v["center_of_buoyancy"], v["buoyancy"])]
 
 
 def tilts():

@@ -19,9 +19,12 @@ from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import Status, failed, stopped
 from lgvi_warp.engine.executors import check_threads
+from lgvi_warp.engine.plan import Plan
 from lgvi_warp.results.provenance import provenance
+from lgvi_warp.results.result import Result
+from lgvi_warp.runs.run import run_plan
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.studies.distance import QUANTITIES, compared_in
+from lgvi_warp.studies.distance import QUANTITIES, Compared, compared_in
 from lgvi_warp.studies.files import Saved, finite_or_none
 from lgvi_warp.studies.members import scene_of
 from lgvi_warp.studies.speed import void
@@ -324,7 +327,7 @@ def stability_map(
                [0, 0, 1, 2],
                [0, 1, 2, 2]])
     """
-    begun, report = time.perf_counter(), callback(progress) or void
+    report = callback(progress) or void
     scene = scene_of(scene)
     dtype = scene.run.dtype if dtype is None else dtype
     names = chosen_methods(methods, METHODS)
@@ -347,6 +350,18 @@ def stability_map(
     assert grid is not None
     assert compared is not None
     error_time, t1 = (None if value is None else float(value) for value in (error_time, t1))
+    return map_of(grid, names, compared, dtype, error=error, error_time=error_time, t1=t1, energy_bound=energy_bound,
+                  directions=directions, seed=seed, threads=threads, report=report)  # fmt: skip
+
+
+def map_of(
+    grid: StabilityGrid, names: Sequence[str], compared: Compared, dtype: str, *, error: float, error_time: float | None,
+    t1: float | None, energy_bound: float, directions: int, seed: int, threads: int | None = None,
+    report: Callable[[float], None] = void, run: Callable[..., Result] = run_plan,
+    prepare: Callable[[Plan], Any] = Plan.compile,
+) -> StabilityMap:  # fmt: skip
+    """Run methods over the cells of a grid, as `stability_map` says."""
+    begun = time.perf_counter()
     refused = refusals(grid, names, dtype)
     if len(refused) == len(names):
         raise SceneError([f"method {name}: {why}" for name, why in refused.items()])
@@ -358,10 +373,10 @@ def stability_map(
     least = LEAST_DRIVEN if kind == "driven" else 1
     columns = [column(step, members, error_time, t1, least) for step, members in grid.columns()]
     threads = threads or machine.thread_count()
-    text = make_references(grid, columns, compared, error, threads, lambda fraction: report(0.4 * fraction))
+    text = make_references(grid, columns, compared, error, threads, lambda fraction: report(0.4 * fraction), run=run)
     outcomes, messages = {}, []
     for i, name in enumerate(names):
-        outcome, why = run_method(grid, columns, name, dtype, compared, kind, threads)
+        outcome, why = run_method(grid, columns, name, dtype, compared, kind, threads, run=run, prepare=prepare)
         report(0.4 + 0.6 * (i + 1) / len(names))
         outcomes[name] = outcome
         if why:

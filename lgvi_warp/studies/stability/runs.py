@@ -154,8 +154,9 @@ def _carried(term: Any, module: Any) -> bool:
 
 
 def make_references(
-    grid: StabilityGrid, columns: Sequence[Column], of: Any, error: float, threads: int, report: Callable[[float], None]
-) -> str:
+    grid: StabilityGrid, columns: Sequence[Column], of: Any, error: float, threads: int, report: Callable[[float], None],
+    *, run: Callable[..., Result] = run_plan,
+) -> str:  # fmt: skip
     """Give every column its reference at the error times.
 
     error: largest error of an accurate cell [unit of `of`]; references agree to a tenth of it.
@@ -166,7 +167,7 @@ def make_references(
     done = 0
     with ThreadPoolExecutor(threads) as pool:
         jobs = [
-            pool.submit(_reference, grid, step_column, (first, second), rates, compared, error / TRUST)
+            pool.submit(_reference, grid, step_column, (first, second), rates, compared, error / TRUST, run)
             for step_column in columns
         ]
         for job in as_completed(jobs):
@@ -176,17 +177,18 @@ def make_references(
     return f"{second} against {first}, steps that turn by {FINE:g} rad or less, halved until they agree"
 
 
-def precise_pair(grid: StabilityGrid) -> tuple[str, str]:
+def precise_pair(grid: StabilityGrid, *, refused: Callable[..., dict[str, str]] = refusals) -> tuple[str, str]:
     """Choose the two best methods that the scene takes."""
-    names = list(itertools.islice((name for name in PRECISE if not refusals(grid, [name], "float64")), 2))
+    names = list(itertools.islice((name for name in PRECISE if not refused(grid, [name], "float64")), 2))
     if not names:
         raise SceneError([f"method: the scene takes none of {', '.join(PRECISE)} for a reference"])
     return paired(names)
 
 
 def _reference(
-    grid: StabilityGrid, column: Column, names: tuple[str, str], rates: np.ndarray, of: Compared, goal: float
-) -> None:
+    grid: StabilityGrid, column: Column, names: tuple[str, str], rates: np.ndarray, of: Compared, goal: float,
+    run: Callable[..., Result],
+) -> None:  # fmt: skip
     """Fill in a column's reference by two methods, halving the steps of members that do not agree yet."""
     n = len(column.members)
     column.verified = np.zeros(n, bool)
@@ -196,7 +198,7 @@ def _reference(
         members = column.members[open_]
         try:
             with np.errstate(all="ignore"):
-                a, b = (run_plan(plan_of(grid, members, name, column.grid(k, whole=False), "float64"), 1)
+                a, b = (run(plan_of(grid, members, name, column.grid(k, whole=False), "float64"), 1)
                         for name, k in zip(names, (finer, math.ceil(1.5 * finer)), strict=True))  # fmt: skip
                 apart = comparison.distances(a, b, of)[of.name]
                 good = ~failed(a.status) & ~failed(b.status) & np.isfinite(b.attitude).all(axis=(0, 2, 3))
@@ -229,7 +231,9 @@ def joined(whole: Result | None, part: Result, at: np.ndarray) -> Result:
 
 
 def run_method(
-    grid: StabilityGrid, columns: Sequence[Column], method: str, dtype: str, of: Compared, judged: str, threads: int
+    grid: StabilityGrid, columns: Sequence[Column], method: str, dtype: str, of: Compared, judged: str, threads: int,
+    *, plan_of: Callable[..., Plan] = plan_of, run: Callable[..., Result] = run_plan,
+    prepare: Callable[[Plan], Any] = Plan.compile,
 ) -> tuple[Found, str]:  # fmt: skip
     """Run a method over all columns.
 
@@ -239,12 +243,12 @@ def run_method(
     findings = Found(np.full(n, np.inf), np.zeros(n), np.full(n, REFUSED), np.zeros(n, bool))
     why: list[str] = []
     rows = grid.shape[2]
-    plan_of(grid, np.arange(n), method, SHORTEST, dtype, "all").compile()
+    prepare(plan_of(grid, np.arange(n), method, SHORTEST, dtype, "all"))
 
     def column_of(column: Column, at: np.ndarray) -> None:
         members = column.members[at]
         try:
-            run = plan_of(grid, members, method, column.grid(), dtype, "all")
+            plan = plan_of(grid, members, method, column.grid(), dtype, "all")
         except SceneError as error:
             why.append(str(error))
             if len(at) > rows:
@@ -254,7 +258,7 @@ def run_method(
                 column_of(column, at[half:])
             return
         with np.errstate(all="ignore"):
-            judge(run_plan(run, 1), column, at, findings, of, judged)
+            judge(run(plan, 1), column, at, findings, of, judged)
 
     with ThreadPoolExecutor(threads) as pool:
         jobs = [pool.submit(column_of, step_column, np.arange(len(step_column.members))) for step_column in columns]

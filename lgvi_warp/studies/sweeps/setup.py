@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -100,12 +100,12 @@ class Setup:
         save = SaveAt(every=float(controller.period) if by_samples else None, fields=())
         return {"save": save, "statistics": metrics, "keep": "none"}
 
-    def run(self, fleet: Ensemble, **more: Any) -> Record:
+    def run(self, fleet: Ensemble, *, simulate: Callable[..., Any] = solve, **more: Any) -> Record:
         """Run a cell."""
         faults = Faults()
         check_wanted(faults, "metrics", self.metrics, fleet.scene.controller)
         faults.raise_if_any()
-        result = solve(fleet, until=False, **self.kept(fleet), **self.settings, **more)
+        result = simulate(fleet, until=False, **self.kept(fleet), **self.settings, **more)
         numbers = {name: result.statistics[f"each {name}"].value[0, 0] for name in self.metrics}
         return Record(np.asarray(result.status), numbers, tuple(result.messages))
 
@@ -141,8 +141,10 @@ def made(
     sampling: Any,
     metrics: Any,
     settings: Mapping[str, Any],
+    *,
+    predict: Callable[..., Prediction] = predict,
 ) -> Setup:
-    """Return what a sweep would run; every argument but the last is as of `sweep`."""
+    """Return what a sweep would run; `settings` are those of solve, all before them as of `sweep`."""
     faults = Faults()
     base, together = _given(scene, vary)
     parts: dict[str, Any] = {"cases": (), "axes": {}, "metrics": {}}
@@ -161,23 +163,23 @@ def made(
         raise refusal(
             "grid",
             f"{count:,} cells",
-            too_many_text(setup, count),
+            too_many_text(setup, count, predict=predict),
             f"give at most {MOST_CELLS:,} cells, or vary a number",
         )
     return setup
 
 
-def too_many_text(setup: Setup, count: int) -> str:
+def too_many_text(setup: Setup, count: int, *, predict: Callable[..., Prediction] = predict) -> str:
     """Say what is wrong with so many cells: the time that they would take."""
     try:
-        prediction = _prediction(setup, None)
+        prediction = _prediction(setup, None, predict)
     except SceneError:
         return f"are {setup.members.members:,} members each"
     duration = duration_text(prediction.advance * count)
     return f"are {setup.members.members:,} members each and would take {duration} on this machine"
 
 
-def _prediction(setup: Setup, threads: int | None) -> Prediction:
+def _prediction(setup: Setup, threads: int | None, predict: Callable[..., Prediction]) -> Prediction:
     """What the first cell would take."""
     fleet, _ = setup.fleet(setup.cases[0], {name: values[0] for name, values in setup.axes.items()})
     return predict(fleet, threads=threads, **setup.kept(fleet), **setup.settings)
@@ -194,12 +196,12 @@ def duration_text(seconds: float) -> str:
     return f"{seconds:.2g} s"
 
 
-def plan_text(setup: Setup, threads: int | None = None) -> str:
+def plan_text(setup: Setup, threads: int | None = None, *, predict: Callable[..., Prediction] = predict) -> str:
     """Return what a sweep would take, as lines of text, from a trial of its first cell.
 
     threads: number of threads; None (default) for all cores.
     """
-    prediction, count = _prediction(setup, threads), len(setup.cells)
+    prediction, count = _prediction(setup, threads, predict), len(setup.cells)
     points, duration = count // len(setup.cases), duration_text((prediction.advance + prediction.set_up) * count)
     lines = [f"cells       {count:,}: {len(setup.cases)} cases at {points:,} points of the grid",
              f"members     {setup.members.members:,} of each, the same in all",

@@ -105,6 +105,15 @@ def sweep(
         (('slow', 'quick'), 16)
     """
     setup = made(scene, cases, grid, vary, members, seed, sampling, metrics, settings)
+    report = callback(progress)
+    return swept(setup, success, baseline, confidence, interval, out, threads, executor, scheduler, report)
+
+
+def swept(
+    setup: Setup, success: Any, baseline: str | None, confidence: float, interval: str,
+    out: str | os.PathLike[str] | None, threads: int | None, executor: Any, scheduler: str | None, progress: Any,
+) -> Sweep:  # fmt: skip
+    """Run the cells of a setup, as `sweep` says."""
     faults = Faults()
     level = faults.number("confidence", confidence, "1")
     if level is not None and not 0.0 < level < 1.0:
@@ -119,7 +128,7 @@ def sweep(
     assert conditions is not None
     records = Records(None if out is None else path_of("out", out), list(setup.metrics), setup.members.members)
     records.check()
-    cells = list(_run(setup, records, threads, executor, scheduler, callback(progress)))
+    cells = list(_run(setup, records, threads, executor, scheduler, progress))
     return Sweep(setup, cells, records, conditions, baseline, float(confidence), interval)
 
 

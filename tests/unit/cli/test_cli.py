@@ -2,6 +2,7 @@
 """The command: what it writes, what it says, and how it refuses."""
 
 import json
+import os
 import subprocess
 import sys
 from types import SimpleNamespace
@@ -11,11 +12,11 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
-from lgvi_warp.cli import command, machine, settings
 from lgvi_warp.cli.runs import all_failed
 from lgvi_warp.engine import widths
 from lgvi_warp.studies import packet_width as tuning
 from tests.conftest import ROOT
+from tests.support.verbs import Study, main
 
 PAPER = str(ROOT / "examples" / "paper.toml")
 SMALL = ["--members", "20", "--duration", "2", "--set", "run.save_every=0.5"]
@@ -202,8 +203,7 @@ def test_a_file_where_a_folder_should_be_is_named(tmp_path, capsys):
 
 
 def test_a_folder_that_cannot_be_written_is_refused_before_the_run(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(settings.os, "access", lambda path, mode: False)
-    monkeypatch.setattr(lw.Scene, "load", lambda *_: None)
+    monkeypatch.setattr(os, "access", lambda path, mode: (path, mode) != (tmp_path, os.W_OK | os.X_OK))
     for verb in ("run", "tradeoff"):
         assert cli.main([verb, PAPER, "--out", str(tmp_path)]) == 1
         text = f"lgvi-warp: {tmp_path}: Permission denied: choose a folder that can be written\n"
@@ -217,29 +217,16 @@ def test_a_recording_that_cannot_be_begun_is_told(finished, tmp_path):
         lw.log_rerun(result, tmp_path / "none" / "fleet.rrd")
 
 
-def test_what_an_interrupt_leaves_is_said(tmp_path, monkeypatch, capsys):
-    def interrupted(chosen):
-        raise KeyboardInterrupt
-
-    for verb in ("run", "resume", "info"):
-        monkeypatch.setitem(command.VERBS, verb, interrupted)
+def test_what_an_interrupt_leaves_is_said(tmp_path, capsys):
+    verbs = dict.fromkeys(("run", "resume", "info"), Study(KeyboardInterrupt()))
     run = ["run", PAPER, "--store", "zarr", "--out", str(tmp_path)]
     cases = [(run, "nothing was written"), (["info"], "nothing was to be written")]
     (tmp_path / "there" / "run.zarr").mkdir(parents=True)
     kept = f"finished blocks are kept: go on with lgvi-warp resume {tmp_path / 'there'}"
     cases += [([*run[:-1], str(tmp_path / "there")], kept), (["resume", str(tmp_path / "there")], kept)]
     for arguments, text in cases:
-        assert cli.main(arguments) == 130
+        assert cli.main(arguments, verbs=verbs) == 130
         assert capsys.readouterr().err == f"lgvi-warp: interrupted; {text}\n"
-
-
-def test_an_error_of_the_system_without_a_file_is_said(monkeypatch, capsys):
-    def full(chosen):
-        raise OSError("no room")
-
-    monkeypatch.setitem(command.VERBS, "info", full)
-    assert cli.main(["info"]) == 1
-    assert capsys.readouterr().err == "lgvi-warp: no room\n"
 
 
 def test_exit_codes_are_told(capsys):
@@ -255,20 +242,17 @@ def test_info(capsys):
     assert all(word in out for word in ("cpu", "threads", "warp-lang 1.19", "chained float32 ", "GFMA/s"))
 
 
-def test_tune_keeps_what_it_measured(tmp_path, monkeypatch, capsys):
+def test_tune_keeps_what_it_measured(tuned_widths, capsys):
     readings = [
         tuning.Reading("plain float64", {8: 2.0, 16: 1.5}, 8, 16),
         tuning.Reading("plain float32", {16: 1.0}, 16, 16),
     ]
-    monkeypatch.setattr(tuning, "tune", lambda: readings)
-    monkeypatch.setattr(widths, "path", lambda: tmp_path / widths.FILE)
-    assert cli.main(["tune"]) == 0
+    assert main(["tune"], measure=lambda: readings) == 0
     out = capsys.readouterr().out
     assert "8: 2.00 ns, 16: 1.50 ns: 16, 8 by the table" in out
-    assert str(tmp_path) in out
+    assert str(tuned_widths) in out
     assert widths.tuned() == {"plain float64": 16, "plain float32": 16}
-    monkeypatch.setattr(machine, "fma_peak", lambda dtype: 1e9)
-    assert cli.main(["info"]) == 0
+    assert main(["info"], peak_of=lambda dtype: 1e9) == 0
     tuned, table = (line for line in capsys.readouterr().out.splitlines() if line.startswith("packets"))
     assert "tuned" in tuned
     assert "plain float64 16" in tuned

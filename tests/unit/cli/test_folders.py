@@ -8,12 +8,12 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
-from lgvi_warp.cli import folders, plot, stores, view
+from lgvi_warp.cli import folders, view
 from lgvi_warp.cli.arguments import parsed
 from lgvi_warp.cli.folders import Content, contents
 from lgvi_warp.cli.writing import Written
+from tests.support.verbs import Study, main
 from tests.unit.cli.test_run_summary import MACHINE, told
-from tests.unit.cli.test_study_verbs import Study
 from tests.unit.cli.test_terminal import region, sobol
 from tests.unit.studies.test_cost import found as tradeoff_of
 
@@ -59,7 +59,7 @@ def test_damage_is_listed_to_a_limit(store, options, count, shown, more):
     assert said == expected + ([f"damage      and {more:,} more files"] if more else [])
 
 
-def test_contents_of_a_folder(tmp_path, monkeypatch):
+def test_contents_of_a_folder(tmp_path):
     names = {"result": ["result.npz", "result_part.npz"], "tradeoff": ["tradeoff.json"],
              "sensitivity": ["sensitivity.json"], "stability": ["stability.json", "stability_mass.json"],
              "sweep": ["sweep.json"]}  # fmt: skip
@@ -68,14 +68,12 @@ def test_contents_of_a_folder(tmp_path, monkeypatch):
         content.path.write_text("{}")
     (tmp_path / "other.json").write_text("{}")
     assert contents(tmp_path) == expected
-    monkeypatch.setattr("lgvi_warp.store.open.folder_of", lambda path: path / "a.zarr")
     (tmp_path / "a.zarr").mkdir()
-    assert contents(tmp_path) == [*expected, Content("store", tmp_path / "a.zarr / ".strip(" /"))]
+    assert contents(tmp_path) == [*expected, Content("store", tmp_path / "a.zarr")]
     alone = tmp_path / "b"
     (alone / "c.zarr").mkdir(parents=True)
-    assert contents(alone) == [Content("store", alone / "a.zarr")]
-    assert contents(tmp_path / "none.zarr") == [Content("store", tmp_path / "none.zarr" / "a.zarr")]
-    assert contents(tmp_path / "result.npz") == [Content("store", tmp_path / "result.npz" / "a.zarr")]
+    assert contents(alone) == [Content("store", alone / "c.zarr")]
+    assert contents(tmp_path / "none.zarr") == [Content("store", tmp_path / "none.zarr")]
     for name, words in (("none", "is not there"), ("c.zarr/..", "holds nothing that a verb wrote")):
         (tmp_path / "empty").mkdir(exist_ok=True)
         place = tmp_path / ("empty" if "nothing" in words else name)
@@ -84,7 +82,7 @@ def test_contents_of_a_folder(tmp_path, monkeypatch):
         assert str(caught.value) == f"{place}: {words}; give the folder of a run or of a study"
 
 
-def test_info_of_a_folder_with_everything(store, tmp_path, monkeypatch, capsys):
+def test_info_of_a_folder_with_everything(store, tmp_path, capsys):
     result = told()
     result.save(tmp_path / "result.npz")
     tradeoff_of(4.0).save(tmp_path)
@@ -93,10 +91,8 @@ def test_info_of_a_folder_with_everything(store, tmp_path, monkeypatch, capsys):
     for name in ("b.rrd", "a.png", "c.nc", "d.parquet", "e.html", "f.csv", "g.txt", "h.dat"):
         (tmp_path / name).write_text("x")
     (tmp_path / "run.zarr").mkdir()
-    monkeypatch.setattr("lgvi_warp.store.open.folder_of", lambda path: tmp_path / "run.zarr")
     states = Study([store, store | {"complete": True}, store])
-    monkeypatch.setattr("lgvi_warp.store.state.state", states)
-    assert cli.main(["info", str(tmp_path)]) == 1
+    assert main(["info", str(tmp_path)], describe=states) == 1
     text = capsys.readouterr().out
     said = [line.partition(" (")[0] for line in text.split("\n")]
     others = ["a.png", "b.rrd", "c.nc", "d.parquet", "e.html", "f.csv", "g.txt", "tradeoff.csv"]
@@ -106,7 +102,7 @@ def test_info_of_a_folder_with_everything(store, tmp_path, monkeypatch, capsys):
     places = [text.index(words) for words in ("tradeoff.json (", "# A sweep\nrun         ", "2 of 3 finished")]
     assert places == sorted(places)
     assert "how  " not in text
-    assert cli.main(["info", str(tmp_path), "--json"]) == 0
+    assert main(["info", str(tmp_path), "--json"], describe=states) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["path"] == str(tmp_path)
     assert document["complete"] is True
@@ -118,8 +114,7 @@ def test_info_of_a_folder_with_everything(store, tmp_path, monkeypatch, capsys):
     assert document["files"] == [f"{tmp_path}/{name}" for name in others]
     assert states.calls[0] == ((tmp_path / "run.zarr",), {})
     (tmp_path / "run.zarr" / "a.png").write_text("x")
-    monkeypatch.setattr(folders, "contents", lambda _: [Content("store", tmp_path / "run.zarr")])
-    assert cli.main(["info", str(tmp_path / "run.zarr"), "--json"]) == 1
+    assert main(["info", str(tmp_path / "run.zarr"), "--json"], describe=states) == 1
     assert json.loads(capsys.readouterr().out)["files"] == []
 
 
@@ -138,59 +133,32 @@ def test_studies_have_their_reports():
     assert folders.text_of("sensitivity", sobol()) == str(sobol())
 
 
-def test_pictures_are_drawn_again(tmp_path, monkeypatch, capsys):
-    drawn = []
-    numbers = {"result": "a result", "store": "a store", "sweep": {}, "tradeoff": 1, "stability": 2, "sensitivity": 3}
-    monkeypatch.setattr(Content, "load", lambda self: numbers[self.kind])
-    monkeypatch.setattr(plot, "shown_members", lambda result: f"some of {result}")
-
-    def pictures(result, few):
-        def draw(path):
-            drawn.append((result, few, path.name))
-            path.write_text("x")
-            return path
-
-        return {f"{result[-5:]}.png": draw}
-
-    monkeypatch.setattr(plot, "pictures", pictures)
-    for name in ("tradeoff", "stability", "sensitivity"):
-        monkeypatch.setattr(f"lgvi_warp.views.plots.plot_{name}",
-                            lambda found, path, name=name: (drawn.append((name, found, path.name)), path.touch()))  # fmt: skip
-    names = {"result": "r.npz", "tradeoff": "t.json", "stability": "s_mass.json", "sensitivity": "u.json",
-             "sweep": "sweep.json", "store": "run.zarr"}  # fmt: skip
-    held = [Content(kind, tmp_path / name) for kind, name in names.items()]
-    monkeypatch.setattr(plot, "contents", lambda _: held)
-    for where, words, out in ((tmp_path / "run.zarr", [], tmp_path), (tmp_path, [], tmp_path),
-                              (tmp_path, ["--out", str(tmp_path / "o")], tmp_path / "o")):  # fmt: skip
-        drawn.clear()
-        assert cli.main(["plot", str(where), *words, "--json"]) == 0
-        assert drawn == [("a result", "some of a result", "esult.png"), ("tradeoff", 1, "t.png"),
-                         ("stability", 2, "s_mass.png"), ("sensitivity", 3, "u.png"),
-                         ("a store", "some of a store", "store.png")]  # fmt: skip
-        said = capsys.readouterr()
-        document = json.loads(said.out)
-        assert document["files"] == [f"{out}/{name}" for *_, name in drawn]
-        again = "its pictures are drawn again by the same lgvi-warp sweep, which runs nothing twice"
-        assert document["notes"] == [f"{tmp_path}/sweep.json: {again}"]
-        assert said.err == f"lgvi-warp: {tmp_path}/sweep.json: {again}\n"
-    drawn.clear()
-    assert cli.main(["plot", str(tmp_path)]) == 0
-    files = [line.partition(" (")[0] for line in capsys.readouterr().out.split("\n")]
-    assert files == [*(f"file        {tmp_path}/{name}" for *_, name in drawn), ""]
-    monkeypatch.setattr("lgvi_warp.views.plots.plot_tradeoff", Study(OSError("no room")))
-    assert cli.main(["plot", str(tmp_path), "-q"]) == 1
-    assert f"lgvi-warp: {tmp_path}/t.png was not written: no room\n" in capsys.readouterr().err
+def test_pictures_are_drawn_again(tmp_path, capsys):
+    told().save(tmp_path / "result.npz")
+    (tmp_path / "sweep.json").write_text("{}")
+    assert cli.main(["plot", str(tmp_path), "--out", str(tmp_path / "o"), "--json"]) == 0
+    said = capsys.readouterr()
+    document = json.loads(said.out)
+    assert document["files"] == [f"{tmp_path}/o/{name}" for name in ("fleet.png", "fleet.rrd")]
+    again = "its pictures are drawn again by the same lgvi-warp sweep, which runs nothing twice"
+    assert document["notes"] == [f"{tmp_path}/sweep.json: {again}"]
+    assert said.err == f"lgvi-warp: {tmp_path}/sweep.json: {again}\n"
+    (tmp_path / "fleet.png").mkdir()
+    assert cli.main(["plot", str(tmp_path)]) == 1
+    said = capsys.readouterr()
+    assert [line.partition(" (")[0] for line in said.out.split("\n")] == [f"file        {tmp_path}/fleet.rrd", ""]
+    assert f"lgvi-warp: {tmp_path}/fleet.png was not written: " in said.err
 
 
-def test_the_last_run_of_a_folder_is_viewed(monkeypatch):
-    monkeypatch.setattr(Content, "load", lambda self: self)
-    held = [Content("result", Path("a")), Content("store", Path("b")), Content("sweep", Path("c"))]
-    monkeypatch.setattr(view, "contents", lambda _: held)
-    assert view.run_in(Path("x")) == held[1]
+def test_the_last_run_of_a_folder_is_viewed(tmp_path):
+    (tmp_path / "sweep.json").write_text("{}")
+    with pytest.raises(lw.SceneError, match=rf"^{tmp_path}: holds a study, and no run; give the folder of a run$"):
+        view.run_in(tmp_path)
+    (tmp_path / "result.npz").touch()
+    assert view.run_in(tmp_path) == Content("result", tmp_path / "result.npz")
+    (tmp_path / "run.zarr").mkdir()
+    assert view.run_in(tmp_path) == Content("store", tmp_path / "run.zarr")
     assert view.run_in(Path("x.npz")) == Content("result", Path("x.npz"))
-    held[:2] = []
-    with pytest.raises(lw.SceneError, match=r"^x: holds a study, and no run; give the folder of a run$"):
-        view.run_in(Path("x"))
 
 
 def test_members_to_view_are_a_list():
@@ -201,21 +169,19 @@ def test_members_to_view_are_a_list():
             view.indices(text)
 
 
-def test_a_viewed_run_says_its_file(tmp_path, monkeypatch, capsys):
+def test_a_viewed_run_says_its_file(tmp_path, capsys):
     told().save(tmp_path / "result.npz")
-    logged, shown = [], []
+    look, logged = Study(None), []
     log = lambda result, out, members: (logged.append((result.members, members)), out.write_bytes(b"x" * 200_000))  # noqa: E731
-    monkeypatch.setattr("lgvi_warp.views.recording.rerun.log_rerun", log)
-    monkeypatch.setattr("lgvi_warp.views.recording.rerun.show", lambda result, members: shown.append(members))
-    assert cli.main(["view", str(tmp_path), "--out", str(tmp_path / "a.rrd"), "--members", "1,2"]) == 0
+    assert main(["view", str(tmp_path), "--out", str(tmp_path / "a.rrd"), "--members", "1,2"], log=log) == 0
     assert capsys.readouterr().out == f"file        {tmp_path}/a.rrd (0.2 MB)\n"
     assert logged == [(4, [1, 2])]
-    assert cli.main(["view", str(tmp_path), "--json"]) == 0
-    assert shown == [None]
+    assert main(["view", str(tmp_path), "--json"], look=look) == 0
+    assert main(["view", str(tmp_path), "-q", "--members", "0"], look=look) == 0
+    assert [(result.members, shown["members"]) for (result,), shown in look.calls] == [(4, None), (4, [0])]
     assert json.loads(capsys.readouterr().out)["files"] == []
     for error in (lw_error("no member"), OSError("no display")):
-        monkeypatch.setattr("lgvi_warp.views.recording.rerun.show", Study(error))
-        assert cli.main(["view", str(tmp_path), "-q"]) == (2 if "member" in str(error) else 1)
+        assert main(["view", str(tmp_path), "-q"], look=Study(error)) == (2 if "member" in str(error) else 1)
         assert capsys.readouterr().err == f"lgvi-warp: {error}\n"
 
 
@@ -238,21 +204,20 @@ class Merged:
         return range(self.missing)
 
 
-def test_merging_says_what_is_missing(tmp_path, monkeypatch, capsys):
+def test_merging_says_what_is_missing(tmp_path, capsys):
     path = tmp_path / "run.zarr"
     path.mkdir()
     (path / "a").write_bytes(b"x" * 100_000)
     study = Study([Merged(path, 2), Merged(path, 0), Merged(path, 0, True), Merged(path, 1, True)])
-    monkeypatch.setattr("lgvi_warp.calls.merge.merge", study)
     verb, line = ["merge", "a", "b", "--out", "c"], f"file        {path} (0.1 MB)"
     resume = f"lgvi-warp resume {path} runs them"
     for text in (f"2 of 3 blocks are in none of the folders; {resume}",
                  f"the members that it keeps are missing; {resume}, or says why not"):  # fmt: skip
-        assert cli.main(verb) == 1
+        assert main(verb, join=study) == 1
         assert capsys.readouterr() == (f"{line}\n", f"lgvi-warp: {path}: {text}\n")
-    assert cli.main([*verb, "--overwrite"]) == 0
+    assert main([*verb, "--overwrite"], join=study) == 0
     assert capsys.readouterr() == (f"{line}, complete\n", "")
-    assert cli.main([*verb, "--json"]) == 0
+    assert main([*verb, "--json"], join=study) == 0
     document = json.loads(capsys.readouterr().out)
     assert {name: document[name] for name in ("file", "complete", "blocks", "missing")} == {
         "file": str(path), "complete": True, "blocks": 3, "missing": 0}  # fmt: skip
@@ -261,25 +226,22 @@ def test_merging_says_what_is_missing(tmp_path, monkeypatch, capsys):
         (*folders_given, True), (*folders_given, False)]  # fmt: skip
 
 
-def test_a_run_is_exported_and_reported(tmp_path, monkeypatch, capsys):
+def test_a_run_is_exported_and_reported(tmp_path, capsys):
     for name in ("a.nc", "report.html", "b.html"):
         (tmp_path / name).write_bytes(b"x" * 100_000)
     write, page, opened = Study(tmp_path / "a.nc"), Study([tmp_path / "report.html", tmp_path / "b.html"]), []
-    monkeypatch.setattr("lgvi_warp.store.export.export", write)
-    monkeypatch.setattr("lgvi_warp.views.pages.report.report", page)
-    monkeypatch.setattr("webbrowser.open", opened.append)
-    assert cli.main(["export", "a", "--to", "netcdf", "--out", "b"]) == 0
+    assert main(["export", "a", "--to", "netcdf", "--out", "b"], write=write) == 0
     assert capsys.readouterr().out == f"file        {tmp_path}/a.nc (0.1 MB)\n"
     assert write.calls == [((Path("a"), "netcdf", Path("b")), {})]
-    assert cli.main(["report", "a"]) == 0
+    assert main(["report", "a"], write=page, look=opened.append) == 0
     assert opened == []
     assert capsys.readouterr().out == f"file        {tmp_path}/report.html (0.1 MB)\n"
-    assert cli.main(["report", "a", "--out", "b", "--open", "--json"]) == 0
+    assert main(["report", "a", "--out", "b", "--open", "--json"], write=page, look=opened.append) == 0
     document = json.loads(capsys.readouterr().out)
     assert (document["file"], document["bytes"]) == (f"{tmp_path}/b.html", 100_000)
     assert opened == [f"file://{tmp_path}/b.html"]
     assert [values for values, _ in page.calls] == [(Path("a"), Path("a/report.html")), (Path("a"), Path("b"))]
-    assert stores.export(parsed(["export", "a", "--to", "x", "-q"])) == 0
+    assert main(["export", "a", "--to", "x", "-q"], write=write) == 0
     assert capsys.readouterr().out == ""
 
 

@@ -2,122 +2,120 @@
 """The verbs about the machine and about names, what they print in full; how the command ends; scripts for shells."""
 
 import argparse
+import contextlib
 import errno
-import gc
 import inspect
 import io
 import json
 import os
+import subprocess
 import sys
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
-from lgvi_warp.cli import command, completion, lists, machine, output, writing
+from lgvi_warp.cli import command, completion, lists, output, writing
+from lgvi_warp.cli.machine import machine_lines
 from lgvi_warp.cli.signals import Lasting, Signals
-from lgvi_warp.common import container
-from lgvi_warp.common import machine as common
+from lgvi_warp.common import container, machine
 from lgvi_warp.common.phases import Phases
 from lgvi_warp.engine import widths
 from tests.conftest import ROOT
-from tests.unit.cli.test_study_verbs import Study
+from tests.support.verbs import Study, main
 
 PAPER = str(ROOT / "examples" / "paper.toml")
 
 
-@pytest.fixture
-def known(monkeypatch, tmp_path):
-    """A machine of known numbers."""
-    monkeypatch.setattr(common, "describe", lambda: {"cpu": "a cpu", "simd": "avx2", "threads": 4})
-    monkeypatch.setattr(common, "memory_bytes", lambda: 3 * 2**30)
-    monkeypatch.setattr(common, "physical_memory", lambda: 8 * 2**30)
-    monkeypatch.setattr(common, "affinity", lambda: 4)
-    monkeypatch.setattr(common, "versions", lambda: {"numpy": "2", "warp": "1"})
-    monkeypatch.setattr(container, "cpu_quota", lambda: 1.5)
-    monkeypatch.setattr(machine, "fma_peak", lambda dtype: {"float64": 1.25e10, "float32": 2.5e10}[dtype])
-    monkeypatch.setattr(widths, "path", lambda: tmp_path / widths.FILE)
-    monkeypatch.setattr(widths, "KERNELS", ("plain float64", "plain float32", "dense float64"))
-    sources = {"plain": "tuned", "dense": "table"}
-    monkeypatch.setattr(widths, "parts", lambda kernel: tuple(kernel.split()))
-    width = lambda kind, dtype: SimpleNamespace(lanes=8 if dtype == "float64" else 16, source=sources[kind])  # noqa: E731
-    monkeypatch.setattr(widths, "default_width", width)
-
-
-def test_info_of_the_machine(known, tmp_path, monkeypatch, capsys):
-    assert cli.main(["info"]) == 0
-    assert (
-        capsys.readouterr().out
-        == f"""cpu         a cpu, avx2, 4 threads (a quota of 1.5 CPUs; 4 cores)
-memory      3.0 GiB (the container's limit; 8.0 GiB in the machine)
-versions    numpy 2, warp 1
-float64     one core's peak 12.5 GFMA/s
-float32     one core's peak 25.0 GFMA/s
-packets     vehicles, tuned ({tmp_path}/{widths.FILE}): plain float64 8, plain float32 16
-packets     vehicles, table: dense float64 8
-"""
-    )
-    assert cli.main(["info", "--json"]) == 0
+def test_info_of_the_machine(tuned_widths, capsys):
+    widths.keep({"plain float64": 8, "plain float32": 16})
+    peak = {"float64": 1.25e10, "float32": 2.5e10}
+    assert main(["info", "--json"], peak_of=peak.get) == 0
     document = json.loads(capsys.readouterr().out)
-    assert document["memory"] == 3 * 2**30
-    assert document["peak"] == {"float64": 1.25e10, "float32": 2.5e10}
+    assert document["machine"] == machine.describe()
+    assert document["memory"] == machine.memory_bytes()
+    assert document["versions"] == machine.versions()
+    assert document["peak"] == peak
     assert document["packets"]["plain float32"] == {"vehicles": 16, "source": "tuned"}
+    assert main(["info"], peak_of=peak.get) == 0
+    said = capsys.readouterr().out
+    limits = container.cpu_quota(), machine.affinity(), machine.physical_memory()
+    assert said.split("\n")[:-1] == list(machine_lines(document, *limits))
+    assert f"packets     vehicles, tuned ({tuned_widths}): plain float64 8, plain float32 16\n" in said
+
+
+def test_a_machine_in_words():
+    sources = {"plain": "tuned", "dense": "table"}
+    document = {
+        "machine": {"cpu": "a cpu", "simd": "avx2", "threads": 4}, "memory": 3 * 2**30,
+        "versions": {"numpy": "2", "warp": "1"}, "peak": {"float64": 1.25e10, "float32": 2.5e10},
+        "packets": {kernel: {"vehicles": 8, "source": sources[kernel.split()[0]]}
+                    for kernel in ("plain float64", "plain float32", "dense float64")},
+    }  # fmt: skip
+    assert list(machine_lines(document, 1.5, 4, 8 * 2**30)) == [
+        "cpu         a cpu, avx2, 4 threads (a quota of 1.5 CPUs; 4 cores)",
+        "memory      3.0 GiB (the container's limit; 8.0 GiB in the machine)",
+        "versions    numpy 2, warp 1",
+        "float64     one core's peak 12.5 GFMA/s",
+        "float32     one core's peak 25.0 GFMA/s",
+        f"packets     vehicles, tuned ({widths.path()}): plain float64 8, plain float32 8",
+        "packets     vehicles, table: dense float64 8",
+    ]
     for memory, physical in ((0, 1), (2**30, 2**30), (2**30, None)):
-        monkeypatch.setattr(common, "memory_bytes", lambda memory=memory: memory)
-        monkeypatch.setattr(common, "physical_memory", lambda physical=physical: physical)
-        cli.main(["info"])
-        said = capsys.readouterr().out
-        assert ("memory      1.0 GiB\n" in said) == bool(memory)
-        assert ("memory  " in said) == bool(memory)
+        said = list(machine_lines(document | {"memory": memory}, None, 4, physical))
+        assert said[0] == "cpu         a cpu, avx2, 4 threads"
+        assert ("memory      1.0 GiB" in said) == bool(memory)
+        assert any(line.startswith("memory") for line in said) == bool(memory)
     for quota in (4.0, None, 5.0):
-        monkeypatch.setattr(container, "cpu_quota", lambda quota=quota: quota)
-        cli.main(["info"])
-        assert capsys.readouterr().out.startswith("cpu         a cpu, avx2, 4 threads\n")
+        assert next(machine_lines(document, quota, 4, None)) == "cpu         a cpu, avx2, 4 threads"
 
 
-def test_bench_and_tune_in_full(known, tmp_path, monkeypatch, capsys):
-    study = Study(['{"a": 1}', '{"a": 2}'])
-    monkeypatch.setattr(
-        "lgvi_warp.studies.speed.measure", lambda *given: study.calls.append(given) or iter(study.result)
-    )
-    assert cli.main(["bench"]) == 0
+def test_bench_and_tune_in_full(tuned_widths, capsys):
+    lines = ['{"a": 1}', '{"a": 2}']
+    measure = Study([lines, lines])
+    assert main(["bench"], measure=measure) == 0
     assert capsys.readouterr().out == '{"a": 1}\n{"a": 2}\n'
-    assert cli.main(["bench", "--members", "5", "--steps", "7", "--json"]) == 0
+    assert main(["bench", "--members", "5", "--steps", "7", "--json"], measure=measure) == 0
     assert json.loads(capsys.readouterr().out)["readings"] == [{"a": 1}, {"a": 2}]
-    assert study.calls == [(4096, 1000), (5, 7)]
+    assert [values for values, _ in measure.calls] == [(4096, 1000), (5, 7)]
     readings = [("plain float64", {8: 2.0, 16: 1.525}, 8, 16), ("dense float64", {8: 1.0}, 8, 8)]
-    monkeypatch.setattr("lgvi_warp.studies.packet_width.tune", lambda: readings)
-    kept = []
-    monkeypatch.setattr(widths, "keep", lambda best: kept.append(best) or "a file")
-    assert cli.main(["tune"]) == 0
-    assert kept == [{"plain float64": 16, "dense float64": 8}]
+    assert main(["tune"], measure=lambda: readings) == 0
+    assert widths.tuned() == {"plain float64": 16, "dense float64": 8}
     assert capsys.readouterr().out == (
         "plain float64       8: 2.00 ns, 16: 1.52 ns: 16, 8 by the table\n"
         "dense float64       8: 1.00 ns: 8, as by the table\n"
-        "kept in a file, for runs from now on; without that file the table counts\n"
+        f"kept in {tuned_widths}, for runs from now on; without that file the table counts\n"
     )
+    assert main(["tune", "--json"], measure=lambda: readings) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["kernels"]["plain float64"] == {"ns": {"8": 2.0, "16": 1.525}, "table": 8, "best": 16}
+    assert document["file"] == str(tuned_widths)
 
 
-def test_warm_in_full(monkeypatch, capsys):
-    plans = [SimpleNamespace(method=SimpleNamespace(name=name), dtype="float64") for name in ("psi_s", "rk4")]
-    asked, phases = [], [Phases(0.5, 2.0, 0.25), Phases(0.25, 0.0, 0.5)]
-    monkeypatch.setattr("lgvi_warp.calls.warm.plans_of", lambda *given: asked.append(given[1:]) or plans)
-    monkeypatch.setattr("lgvi_warp.calls.warm.warm",
-                        lambda given, workers: asked.append((given, workers)) or zip(given, phases, strict=True))  # fmt: skip
-    monkeypatch.setattr(common, "thread_count", lambda: 7)
-    assert cli.main(["warm", PAPER]) == 0
+def test_warm_in_full(capsys):
+    phases, asked = [Phases(0.5, 2.0, 0.25), Phases(0.25, 0.0, 0.5)], []
+
+    def compile_plans(plans, workers):
+        asked.append(([(plan.method.name, plan.dtype) for plan in plans], workers))
+        return zip(plans, [*phases, *phases], strict=False)
+
+    two = ["--methods", "psi_s, rk4"]
+    assert main(["warm", PAPER, *two], compile_plans=compile_plans) == 0
     lines = capsys.readouterr().out.split("\n")
     assert lines[:2] == [f"psi_s float64: {phases[0]}", f"rk4 float64: {phases[1]} (was in the cache)"]
     assert lines[2].startswith("kernels: 2, in ")
     assert lines[2].endswith(" s; one after another their phases take 3.50 s")
     assert 0.0 <= float(lines[2].split(" s;")[0].split()[-1]) < 60.0
-    more = ["--methods", "psi_s, rk4", "--dtypes", "float32,float64", "--threads", "3", "--json"]
-    assert cli.main(["warm", PAPER, *more]) == 0
-    assert asked == [((), ()), (plans, 7), (["psi_s", "rk4"], ["float32", "float64"]), (plans, 3)]
+    more = [*two, "--dtypes", "float32,float64", "--threads", "3", "--json"]
+    assert main(["warm", PAPER, *more], compile_plans=compile_plans) == 0
+    plain, both = [("psi_s", "float64"), ("rk4", "float64")], {(a, b) for a in ("psi_s", "rk4") for b in machine.DTYPES}
+    assert asked[0] == (plain, machine.thread_count())
+    assert set(asked[1][0]) == {pair for pair in both if "compensated" not in pair[1]}
+    assert asked[1][1] == 3
     kernels = json.loads(capsys.readouterr().out)["kernels"]
-    assert kernels[0] == {"method": "psi_s", "dtype": "float64", "seconds": {"source": 0.5, "clang": 2.0, "load": 0.25}}
+    assert [kernel["seconds"] for kernel in kernels[:1]] == [{"source": 0.5, "clang": 2.0, "load": 0.25}]
+    assert len(kernels) == 4
 
 
 def test_check_in_full(capsys):
@@ -266,14 +264,13 @@ def test_what_is_said(capsys, quiet, json_wanted, text, said):
     assert capsys.readouterr().out == said
 
 
-def test_labels_have_their_colors(monkeypatch):
+def test_labels_have_their_colors():
     stream = Lasting(io.StringIO())
     stream.color = "always"
-    monkeypatch.setattr(sys, "stdout", stream)
-    monkeypatch.setattr(sys, "stderr", stream)
     text = "note        a\ndamage      b\nkept  c\nstatus      d\n  note  e\nno label\nwarnings    f"
-    output.say(argparse.Namespace(quiet=False, json=False), text)
-    assert output.print_faults(iter(["one", "two"])) == ["one", "two"]
+    with contextlib.redirect_stdout(stream), contextlib.redirect_stderr(stream):
+        output.say(argparse.Namespace(quiet=False, json=False), text)
+        assert output.print_faults(iter(["one", "two"])) == ["one", "two"]
     painted = [f"\x1b[{color}m{label}\x1b[0m" for color, label in
                (("33", "note"), ("31", "damage"), ("1", "kept"), ("1", "status"), ("33", "warnings"))]  # fmt: skip
     assert stream.getvalue() == (
@@ -293,21 +290,20 @@ def test_labels_have_their_colors(monkeypatch):
         (KeyboardInterrupt(), 130, "interrupted; nothing was to be written"),
     ],
 )
-def test_how_the_command_ends(monkeypatch, capsys, error, code, text):
-    monkeypatch.setitem(command.VERBS, "info", Study(error))
-    assert cli.main(["info"]) == code
+def test_how_the_command_ends(capsys, error, code, text):
+    verbs = {"info": Study(error)}
+    assert cli.main(["info"], verbs=verbs) == code
     assert capsys.readouterr() == ("", f"lgvi-warp: {text}\n")
-    assert cli.main(["info", "-v"]) == code
+    assert cli.main(["info", "-v"], verbs=verbs) == code
     assert "Traceback" in capsys.readouterr().err
     signals = Signals(str)
     command.code_of(error, cli.parser().parse_args(["info"]), signals)
     assert signals.said
 
 
-def test_a_bug_is_raised(monkeypatch):
-    monkeypatch.setitem(command.VERBS, "info", Study(KeyError("a bug")))
+def test_a_bug_is_raised():
     with pytest.raises(KeyError, match="a bug"):
-        cli.main(["info"])
+        cli.main(["info"], verbs={"info": Study(KeyError("a bug"))})
 
 
 def test_what_verbs_leave(tmp_path):
@@ -325,40 +321,39 @@ def test_what_verbs_leave(tmp_path):
     assert left("run", "a", "--out", out) == "nothing was written"
 
 
-@pytest.mark.parametrize(
-    ("end", "code"),
-    [(0, 0), (3, 3), (SystemExit(2), 2), (SystemExit("text"), 0), (SystemExit(None), 0)],
-)
-def test_the_console_script_ends_the_process(monkeypatch, end, code):
-    codes, ended = [], []
-    monkeypatch.setattr(command, "main", Study(end))
-    monkeypatch.setattr("os._exit", codes.append)
-    monkeypatch.setitem(sys.modules, "lgvi_warp.common.warp_setup", SimpleNamespace(end=lambda: ended.append(True)))
-    closed, opened = [], []
+@pytest.mark.parametrize("words", [["list", "methods"], ["list", "odd"], ["--help"], ["info", "none"]])
+def test_the_console_script_ends_the_process_as_the_command_does(words):
+    """In a process of its own, two of whose descriptors are closed: nothing that is written ends in a file opened later."""
+    script = "import sys; from lgvi_warp.cli import entry; import os; os.close(0); entry()"
+    one = subprocess.run([sys.executable, "-c", script, *words], capture_output=True, text=True, check=False)
+    try:
+        code = cli.main(words)
+    except SystemExit as end:
+        code = end.code
+    assert one.returncode == code
 
-    def fstat(descriptor):
-        closed.append(descriptor)
-        if descriptor == 1:
-            raise OSError
 
-    monkeypatch.setenv("RUST_LOG", "x")
-    monkeypatch.delenv("RUST_LOG")
-    monkeypatch.setattr(gc, "disable", lambda: ended.append("gc"))
-    with monkeypatch.context() as patched:
-        patched.setattr(os, "fstat", fstat)
-        patched.setattr(os, "open", lambda *given: opened.append(given))
-        command.entry()
-    assert codes == [code]
-    assert ended == ["gc", True]
-    assert os.environ["RUST_LOG"] == "off"
-    assert closed == [0, 1, 2]
-    assert opened == [(os.devnull, os.O_RDWR)]
-    monkeypatch.setenv("RUST_LOG", "debug")
-    monkeypatch.delitem(sys.modules, "lgvi_warp.common.warp_setup")
-    command.entry()
-    assert codes == [code, code]
-    assert os.environ["RUST_LOG"] == "debug"
-    assert len(ended) == 3
+@pytest.mark.parametrize("end", [SystemExit("text"), SystemExit(None)])
+def test_a_parser_that_ends_without_a_number_ends_with_0(end):
+    script = f"from lgvi_warp.cli.command import entry\ndef run():\n    raise {end!r}\nentry(run=run)"
+    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
+
+
+def test_the_console_script_opens_what_is_closed_and_silences_the_recorder():
+    script = """
+import os, sys
+from lgvi_warp.cli.command import entry
+def run():
+    import gc
+    print(os.fstat(0).st_rdev == os.stat(os.devnull).st_rdev, gc.isenabled(), os.environ["RUST_LOG"], flush=True)
+    return 3
+os.close(0)
+entry(run=run)
+"""
+    for said, environment in (("True False off", {}), ("True False debug", {"RUST_LOG": "debug"})):
+        settings = {name: value for name, value in os.environ.items() if name != "RUST_LOG"} | environment
+        one = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=settings, check=False)
+        assert (one.returncode, one.stdout.strip()) == (3, said), one.stderr
 
 
 def test_a_stream_that_is_gone_is_silent():
@@ -399,7 +394,7 @@ def test_files_are_written_side_by_side(tmp_path):
         jobs[names[1]].result()
 
 
-def test_an_interrupt_names_the_files_that_are_finished(tmp_path, monkeypatch):
+def test_an_interrupt_names_the_files_that_are_finished(tmp_path):
     waited = []
 
     def wait(jobs, timeout):
@@ -408,11 +403,10 @@ def test_an_interrupt_names_the_files_that_are_finished(tmp_path, monkeypatch):
             job.exception()
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(writing, "wait", wait)
     names = [tmp_path / name for name in "ab"]
     with pytest.raises(writing.Ended, match=f"^written: {names[0]}$"):
-        writing.side_by_side({names[0]: lambda path: path, names[1]: Study(OSError("full"))})
+        writing.side_by_side({names[0]: lambda path: path, names[1]: Study(OSError("full"))}, wait=wait)
     with pytest.raises(KeyboardInterrupt) as caught:
-        writing.side_by_side({names[1]: Study(OSError("full"))})
+        writing.side_by_side({names[1]: Study(OSError("full"))}, wait=wait)
     assert not isinstance(caught.value, writing.Ended)
     assert waited == [0.2, 0.2]

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What arguments change of a scene, and which folder, store and blocks they name."""
 
-import errno
-
 import pytest
 
 import lgvi_warp as lw
@@ -66,15 +64,6 @@ def test_the_folder_is_named_after_the_scene(tmp_path, monkeypatch):
     assert settings.folder(given, "_y") == tmp_path / "a" / "b"
     assert (tmp_path / "a" / "b").is_dir()
     assert settings.folder(given) == tmp_path / "a" / "b"  # a second time
-
-
-def test_a_folder_has_to_be_written_and_entered(tmp_path, monkeypatch):
-    asked = []
-    monkeypatch.setattr(settings.os, "access", lambda path, mode: asked.append((path, mode)))
-    with pytest.raises(PermissionError, match="Permission denied: choose a folder that can be written") as caught:
-        settings.writable(tmp_path)
-    assert (caught.value.errno, caught.value.filename) == (errno.EACCES, str(tmp_path))
-    assert asked == [(tmp_path, settings.os.W_OK | settings.os.X_OK)]
 
 
 def test_the_store_and_its_options(tmp_path):

@@ -13,11 +13,11 @@ import lgvi_warp as lw
 from lgvi_warp.cli import documents, progress, report
 from lgvi_warp.cli.arguments import parsed
 from lgvi_warp.cli.writing import Written
-from lgvi_warp.common.errors import MissingExtra, NothingToDraw
+from lgvi_warp.common.errors import MissingExtra
 from lgvi_warp.common.phases import Phases
 from lgvi_warp.common.status import Status, WarningArray, Warnings
 from tests.support.made import made
-from tests.unit.cli.test_study_verbs import Study
+from tests.support.verbs import Study
 
 MACHINE = {
     "checks": "safe",
@@ -88,23 +88,17 @@ def test_what_was_not_kept_is_said():
     assert report.unsaved(whole) == report.unsaved(failed) == []
 
 
-def test_the_energy_is_that_of_the_members_drawn(monkeypatch):
+def test_the_energy_is_that_of_the_members_drawn():
     result, few = told(), told(3)
     (line,) = report.energy_lines(result, few)
     assert line.endswith(" (largest of 3 of 4 members)")
-    from lgvi_warp.physics import energy
-
     numbers = {"energy": 0.123456, "horizontal_momentum": 2.0, "vertical_angular_momentum": 3e-9}
-    monkeypatch.setattr(energy, "drift", lambda _: numbers)
-    monkeypatch.setattr(energy, "at_work", lambda _: ["drag", "current"])
     every = "drift       energy 0.12 J, horizontal momentum 2 N s, vertical angular momentum 3e-09 N m s"
     of_energy = "work        energy changed by up to 0.12 J, through drag, current (largest of all members)"
     for conserved, text in (({*numbers}, f"{every} (largest of all members)"), ({"horizontal_momentum"}, of_energy),
                             ({"energy"}, "drift       energy 0.12 J (largest of all members)")):  # fmt: skip
-        monkeypatch.setattr(energy, "conserved", lambda _, conserved=conserved: conserved)
-        assert report.energy_lines(result, result) == [text]
-    monkeypatch.setattr(energy, "drift", lambda _: numbers | {"energy": np.nan})
-    assert report.energy_lines(result, result) == []
+        assert report.drift_lines(numbers, conserved, ["drag", "current"], "all members") == [text]
+    assert report.drift_lines(numbers | {"energy": np.nan}, {*numbers}, [], "all members") == []
 
 
 def test_the_first_member_with_a_warning_is_named():
@@ -125,15 +119,14 @@ def test_divided_steps_are_counted():
     assert not any("substeps" in line for line in summary(told()))
 
 
-def test_members_that_ask_for_too_much_are_counted(monkeypatch):
+def test_members_that_ask_for_too_much_are_counted():
     unmet = np.zeros((3, 4, 2))
     unmet[1, 2, 0], unmet[2, 3, 1] = 0.5, -0.5
     result = told()
     result = dataclasses.replace(result, samples=dict(result.samples) | {"unmet": unmet})
     text = "unmet       2 members asked at some sample for more than their actuators deliver"
     for most, shown in ((72, True), (71, False)):
-        monkeypatch.setattr(report, "MOST_DRAWN", most)
-        assert (text in summary(result)) == shown
+        assert (text in summary(result, limit=most)) == shown
 
 
 def test_a_controller_is_one_line():
@@ -186,48 +179,36 @@ def test_members_that_are_drawn():
     assert report.shown_members(few) is None
 
 
-def test_of_a_large_store_some_members_are_drawn(monkeypatch):
-    result = dataclasses.replace(told(6), store=Path("run.zarr"))
-    chosen = []
-    monkeypatch.setattr("lgvi_warp.store.open.chosen", lambda whole, members: chosen.append(list(members)))
-    monkeypatch.setattr("lgvi_warp.views.choice.shown", lambda _, most: SimpleNamespace(members=[most, most + 1]))
-    for drawn, expected in ((18 * 3 * 6, list(range(6))), (18 * 3 * 6 - 1, [5, 6]), (18 * 3 * 2, [2, 3]), (1, [1, 2])):
-        monkeypatch.setattr(report, "MOST_DRAWN", drawn)
-        report.shown_members(result)
-        assert chosen[-1] == expected
+class Stored(dict):
+    """Samples as a store has them: those of some members are read at once."""
 
-    def nothing(*_):
-        raise NothingToDraw("no member")
-
-    monkeypatch.setattr("lgvi_warp.views.choice.shown", nothing)
-    report.shown_members(result)
-    assert chosen[-1] == [0]
+    def part(self, members):
+        return {name: values[:, members] for name, values in self.items()}
 
 
-def test_files_that_a_run_has(tmp_path, monkeypatch):
-    result, calls = told(), []
-    plots = "lgvi_warp.views.plots"
-    monkeypatch.setattr(f"{plots}.plot", lambda *given: calls.append(("plot", *given)) or given[1])
-    monkeypatch.setattr(f"{plots}.plot_statistics", lambda *given: calls.append(("statistics", *given)) or given[1])
-    monkeypatch.setattr(
-        "lgvi_warp.views.recording.rerun.log_rerun", lambda *given, to: calls.append(("record", *given, to))
-    )
-    monkeypatch.setattr(f"{plots}.drawable", lambda _: True)
-    few = told(2)
-    for viewer, answers, to in ((None, True, None), ("a", True, "a"), ("a", False, None)):
-        monkeypatch.setattr("lgvi_warp.views.recording.viewer.answers", lambda _, answers=answers: answers)
-        drawings = report.pictures(result, few, viewer)
-        calls.clear()
-        assert [draw(Path(name)) for name, draw in drawings.items()] == [
-            Path("fleet.png"), Path("fleet.rrd"), Path("statistics.png")]  # fmt: skip
-        kinds = [("plot", few, Path("fleet.png")), ("record", result, Path("fleet.rrd"), to),
-                 ("statistics", result, Path("statistics.png"))]  # fmt: skip
-        assert all(
-            a is b or a == b for call, kind in zip(calls, kinds, strict=True) for a, b in zip(call, kind, strict=True)
-        )
-    assert list(report.pictures(result, None)) == ["statistics.png"]
-    monkeypatch.setattr(f"{plots}.drawable", lambda _: False)
+def test_of_a_large_store_some_members_are_drawn():
+    whole = told(6)
+    result = dataclasses.replace(whole, store=Path("run.zarr"), samples=Stored(whole.samples))
+
+    def drawn(result, limit):
+        return list(report.shown_members(result, limit=limit, load=lambda whole, members: members))
+
+    assert drawn(result, 18 * 3 * 6) == list(range(6))
+    for limit, most in ((18 * 3 * 6 - 1, 5), (18 * 3 * 2, 2), (1, 1)):
+        assert drawn(result, limit) == list(lw.shown(whole, most).members)
+        assert len(drawn(result, limit)) == most
+    lost = Stored({name: values * np.nan for name, values in whole.samples.items()})
+    assert drawn(dataclasses.replace(result, samples=lost), 1) == [0]  # each picture says why it is none
+
+
+def test_files_that_a_run_has(tmp_path):
+    result, few = told(), told(2)
+    assert list(report.pictures(result, few)) == ["fleet.png", "fleet.rrd"]
     assert report.pictures(result, None) == {}
+    # A viewer that does not answer gets nothing, and the file is written.
+    record = report.pictures(result, few, "rerun+http://127.0.0.1:9/proxy")["fleet.rrd"]
+    assert record(tmp_path / "a.rrd") == tmp_path / "a.rrd"
+    assert (tmp_path / "a.rrd").stat().st_size > 1000
     written = report.write(result, None, tmp_path)
     assert written.files == [tmp_path / "result.npz"]
     assert lw.Result.load(tmp_path / "result.npz").members == 4
@@ -238,20 +219,16 @@ def test_files_that_a_run_has(tmp_path, monkeypatch):
     assert fault.startswith(f"{tmp_path}/file/c/result.npz was not written: ")
 
 
-def test_the_end_of_a_run_is_told(tmp_path, monkeypatch, capsys):
+def test_the_end_of_a_run_is_told(tmp_path, capsys):
     result, written = told(), Written([tmp_path / "fleet.png"], ["a fault"], ["a is empty"])
     written.missing["a.rrd"] = MissingExtra("recordings", "rerun-sdk", "viz")
     (tmp_path / "fleet.png").write_bytes(b"x")
     writing = Study(written)
-    monkeypatch.setattr(report, "write", writing)
-    shown = []
-    monkeypatch.setattr(report, "shown", lambda *given: shown.append(given) or progress.shown(True))
     chosen = parsed(["run", "scene.toml", "-v"])
     begun = time.perf_counter() - 5.0
     result = dataclasses.replace(result, run_seconds=1.0)
-    assert report.report(result, tmp_path, chosen, begun, ["b"], "a viewer") == ["a fault", "b"]
+    assert report.report(result, tmp_path, chosen, begun, ["b"], "a viewer", writer=writing) == ["a fault", "b"]
     assert writing.calls == [((result, result, tmp_path, "a viewer"), {})]
-    assert shown == [(False, "writing")]
     out, err = capsys.readouterr()
     lines = out.split("\n")
     assert lines[0].startswith("note        a.rrd: not made without rerun-sdk")
@@ -263,12 +240,10 @@ def test_the_end_of_a_run_is_told(tmp_path, monkeypatch, capsys):
     assert lines[-2] == f"look        open {tmp_path}/fleet.png"
 
 
-def test_a_part_of_a_run_is_to_be_merged(tmp_path, monkeypatch, capsys):
-    from lgvi_warp.store import folder
-
-    monkeypatch.setattr(folder, "Folder", lambda path: SimpleNamespace(complete=False))
+def test_a_part_of_a_run_is_to_be_merged(tmp_path, capsys):
+    part = lambda path: SimpleNamespace(complete=False)  # noqa: E731
     stored = dataclasses.replace(told(1200), store=tmp_path / "run.zarr")
-    assert report.report(stored, tmp_path, parsed(["run", "scene.toml"]), 0.0, ["b"]) == ["b"]
+    assert report.report(stored, tmp_path, parsed(["run", "scene.toml"]), 0.0, ["b"], store=part) == ["b"]
     merge = f"next        lgvi-warp merge {tmp_path} ... --out DIR, with the folders of the other parts"
     assert capsys.readouterr() == (f"members     1,200 of a run in parts, in {tmp_path}/run.zarr\n{merge}\n", "")
 
@@ -309,11 +284,16 @@ def test_documents_of_a_run_by_hand(tmp_path):
 
 
 @pytest.mark.parametrize(("quiet", "kind"), [(True, type(None)), (False, progress.Progress)])
-def test_progress_is_shown_and_closed(monkeypatch, quiet, kind):
-    ended, close = [], progress.Progress.close
-    monkeypatch.setattr(progress.Progress, "close", lambda self: (ended.append(self), close(self)))
-    with pytest.raises(ZeroDivisionError), progress.shown(quiet) as shown:
-        assert type(shown) is kind
+def test_progress_is_shown_and_closed(quiet, kind):
+    ended = []
+
+    class Closing(progress.Progress):
+        def close(self):
+            ended.append(self)
+            super().close()
+
+    with pytest.raises(ZeroDivisionError), progress.shown(quiet, begin=Closing) as shown:
+        assert isinstance(shown, kind)
         assert not ended
         raise ZeroDivisionError
     assert ended == ([] if quiet else [shown])

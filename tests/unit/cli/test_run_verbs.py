@@ -2,7 +2,6 @@
 """The verbs run, resume and predict: what their arguments reach, and how they end. No kernel runs."""
 
 import dataclasses
-import importlib
 import threading
 from pathlib import Path
 from types import SimpleNamespace
@@ -17,7 +16,7 @@ from lgvi_warp.common.errors import Interrupted, MembersFailed, MissingExtra
 from lgvi_warp.common.status import Status
 from tests.conftest import ROOT
 from tests.support.made import made
-from tests.unit.cli.test_study_verbs import Study
+from tests.support.verbs import Study, main
 
 PAPER = str(ROOT / "examples" / "paper.toml")
 
@@ -28,35 +27,27 @@ def result_of(members=6, planned=6, status=Status.OK):
     return dataclasses.replace(result, provenance=result.provenance | {"ensemble": {"members": planned, "seed": 1}})
 
 
-@pytest.fixture
-def solved(monkeypatch):
-    """A function that sets what a run ends with; it returns calls of solve, and of the report."""
+class Report:
+    """Stands for what writes a run's files and its summary: keeps what it is given, and returns its failures."""
 
-    def ends_with(outcome):
-        study, reports = Study(outcome), []
+    def __init__(self, faults=()):
+        self.calls, self.faults = [], list(faults)
 
-        def report(result, out, chosen, begun, failures, address=None):
-            reports.append((result, out, list(failures), address))
-            return failures
-
-        monkeypatch.setattr("lgvi_warp.calls.solve.solve", study)
-        monkeypatch.setattr(runs, "report", report)
-        monkeypatch.setattr(runs, "_import_in_background", lambda: SimpleNamespace(join=lambda: None))
-        return study.calls, reports
-
-    return ends_with
+    def __call__(self, result, out, chosen, begun, failures, address=None):
+        # The libraries of pictures are loaded before they are drawn.
+        assert not any(thread.name == "imports" for thread in threading.enumerate())
+        self.calls.append((result, out, list(failures), address))
+        return [*self.faults, *failures]
 
 
-def test_arguments_of_a_run(solved, tmp_path, monkeypatch):
+def test_arguments_of_a_run(tmp_path):
     result = result_of()
-    calls, reports = solved(result)
-    out, joined = str(tmp_path), []
-    thread = SimpleNamespace(join=lambda: joined.append(len(reports)))
-    monkeypatch.setattr(runs, "_import_in_background", lambda: thread)
-    assert cli.main(["run", PAPER, "--out", out, "-q"]) == 0
+    solve, report = Study(result), Report()
+    verb = ["run", PAPER, "--out", str(tmp_path)]
+    assert main([*verb, "-q"], simulate=solve, finish=report) == 0
     more = ["--threads", "3", "--width", "4", "--executor", "dask", "--scheduler", "tcp://x", "--store", "zarr"]
-    assert cli.main(["run", PAPER, "--out", out, "--members", "9", *more, "--blocks", "1:2"]) == 0
-    ((scene,), plain), ((other,), named) = calls
+    assert main([*verb, "--members", "9", *more, "--blocks", "1:2"], simulate=solve, finish=report) == 0
+    ((scene,), plain), ((other,), named) = solve.calls
     assert scene.run.step == 0.01
     assert other.ensemble_settings.members == 9
     assert plain == {"threads": None, "width": None, "progress": None, "store": None, "executor": "threads",
@@ -65,121 +56,105 @@ def test_arguments_of_a_run(solved, tmp_path, monkeypatch):
     assert named.pop("store").path == tmp_path / "run.zarr"
     assert named == {"threads": 3, "width": 4, "executor": "dask", "scheduler": "tcp://x", "only": range(1, 2),
                      "on_block": None}  # fmt: skip
-    assert reports == [(result, tmp_path, [], None)] * 2
-    assert joined == [0, 1]  # before the files are written
+    assert report.calls == [(result, tmp_path, [], None)] * 2
 
 
-def test_libraries_are_imported_until_one_is_missing(monkeypatch):
+def test_libraries_are_imported_until_one_is_missing():
     libraries = ["matplotlib.figure", "matplotlib.backends.backend_agg", "rerun", "rerun.blueprint"]
     for absent, tried in (("", libraries), ("rerun", libraries[:3])):
         names = []
 
-        def import_module(name, absent=absent, names=names):
+        def load(name, absent=absent, names=names):
             names.append(name)
             if name == absent:
                 raise ImportError(name)
 
-        monkeypatch.setattr(importlib, "import_module", import_module)
-        thread = runs._import_in_background()
+        thread = runs.import_in_background(load)
         thread.join()
         assert names == tried
-        assert isinstance(thread, threading.Thread)
         assert thread.daemon
 
 
 @pytest.mark.parametrize(
-    ("faults", "status", "code"), [(["a"], Status.OK, 1), ([], Status.NON_FINITE, 1), ([], Status.FLOOR, 0)]
+    ("outcome", "faults", "code", "said"),
+    [
+        (result_of(), ["a"], 1, ["a"]),
+        (result_of(status=Status.NON_FINITE), [], 1, []),
+        (result_of(status=Status.FLOOR), [], 0, []),
+        (MembersFailed("2 members failed", result_of()), [], 1, ["2 members failed"]),
+    ],
 )
-def test_exit_codes_of_a_run(solved, monkeypatch, tmp_path, capsys, faults, status, code):
-    solved(result_of(status=status))
-    monkeypatch.setattr(runs, "report", lambda *_: faults)
-    assert cli.main(["run", PAPER, "--out", str(tmp_path), "-q"]) == code
-    assert capsys.readouterr() == ("", "".join(f"lgvi-warp: {fault}\n" for fault in faults))
+def test_exit_codes_of_a_run(tmp_path, capsys, outcome, faults, code, said):
+    report = Report(faults)
+    assert main(["run", PAPER, "--out", str(tmp_path), "-q"], simulate=Study(outcome), finish=report) == code
+    assert capsys.readouterr() == ("", "".join(f"lgvi-warp: {fault}\n" for fault in said))
+    ((result, _, failures, _),) = report.calls
+    assert result is getattr(outcome, "result", outcome)
+    assert failures == (said if isinstance(outcome, MembersFailed) else [])
 
 
-def test_members_that_fail_are_reported_with_the_files(solved, tmp_path, capsys):
-    result = result_of()
-    _, reports = solved(MembersFailed("2 members failed", result))
-    assert cli.main(["run", PAPER, "--out", str(tmp_path), "-q"]) == 1
-    assert reports == [(result, tmp_path, ["2 members failed"], None)]
-    assert capsys.readouterr().err == "lgvi-warp: 2 members failed\n"
-
-
-def test_an_interrupted_run_says_what_is_saved(solved, tmp_path, capsys):
-    solved(Interrupted("stopped", result_of(2)))
-    path = tmp_path / "result.npz"
+def test_an_interrupted_run_says_what_is_saved(tmp_path, capsys):
+    solve = Study(Interrupted("stopped", result_of(2)))
     go_on = "a run with --store zarr can go on where it stopped"
     for name in ("result.npz", "result_part.npz", "result_part.npz"):
         path = tmp_path / name
-        assert cli.main(["run", PAPER, "--out", str(tmp_path), "-q"]) == 130
+        assert main(["run", PAPER, "--out", str(tmp_path), "-q"], simulate=solve) == 130
         words = f"interrupted; the first 2 of 6 members are saved in {path}; {go_on}"
         assert capsys.readouterr().err == f"lgvi-warp: {words}\n"
         assert lw.Result.load(path).members == 2
     assert sorted(path.name for path in tmp_path.iterdir()) == ["result.npz", "result_part.npz"]
 
 
-def test_what_an_interrupt_leaves_of_a_run_that_ended(tmp_path, monkeypatch):
+def test_what_an_interrupt_leaves_of_a_run_that_ended(tmp_path):
     whole = result_of(1000, 1000)
     assert runs.rescued(whole, tmp_path) == f"the run is finished: its 1,000 members are saved in {tmp_path}/result.npz"
     stored = dataclasses.replace(whole, store=tmp_path / "a" / "run.zarr")
     text = f"the run is finished: its pictures are made by lgvi-warp resume {tmp_path}/a"
     assert runs.rescued(stored, tmp_path) == text
+    provenance = {"ensemble": {"members": 1000}}
     for error, words in ((OSError(28, "No space"), "No space"), (OSError("full"), "full")):
-
-        def save(self, path, error=error):
-            raise error
-
-        monkeypatch.setattr(lw.Result, "save", save)
         lost = f"the first 6 of 1,000 members are lost: {tmp_path}/result_part.npz: {words}"
-        assert runs.rescued(result_of(6, 1000), tmp_path) == lost
+        result = SimpleNamespace(store=None, members=6, provenance=provenance, save=Study(error))
+        assert runs.rescued(result, tmp_path) == lost
 
 
-def test_an_interrupt_among_the_files_says_what_is_saved(solved, tmp_path, monkeypatch, capsys):
-    solved(result_of())
+def test_an_interrupt_among_the_files_says_what_is_saved(tmp_path, capsys):
     saved = tmp_path / "result.npz"
     for said, text in ((f"written: {saved}", f"written: {saved}"),
                        ("", f"the run is finished: its 6 members are saved in {saved}")):  # fmt: skip
-
-        def report(*_, said=said):
-            raise runs.Ended(said)
-
-        monkeypatch.setattr(runs, "report", report)
-        assert cli.main(["run", PAPER, "--out", str(tmp_path), "-q"]) == 130
+        parts = {"simulate": Study(result_of()), "finish": Study(runs.Ended(said))}
+        assert main(["run", PAPER, "--out", str(tmp_path), "-q"], **parts) == 130
         assert capsys.readouterr().err == f"lgvi-warp: interrupted; {text}\n"
 
 
-def test_a_live_run_hands_over_its_blocks(solved, tmp_path, monkeypatch):
-    result = result_of()
-    calls, reports = solved(result)
-    asked, views = [], []
-    monkeypatch.setattr(
-        "lgvi_warp.views.recording.viewer.opened", lambda address: asked.append(address) or "rerun+http://a"
-    )
-    monkeypatch.setattr(
-        "lgvi_warp.views.recording.live.live", lambda *given: views.append(given) or SimpleNamespace(add="takes")
-    )
-    for options, address in (([], None), (["--viewer", "rerun+http://b"], "rerun+http://b")):
-        assert cli.main(["run", PAPER, "--out", str(tmp_path), "-q", "--live", *options]) == 0
-        assert asked.pop() == address
-    assert [settings["on_block"] for _, settings in calls] == ["takes", "takes"]
-    assert [given[1] for given in views] == ["rerun+http://a"] * 2
-    assert views[0][0] is calls[0][0][0]
-    assert [address for *_, address in reports] == ["rerun+http://a"] * 2
+def test_a_live_run_hands_over_its_blocks(tmp_path):
+    solve, report = Study(result_of()), Report()
+    viewer, live = Study("rerun+http://a"), Study(SimpleNamespace(add="takes"))
+    verb = ["run", PAPER, "--out", str(tmp_path), "-q", "--live"]
+    for options in ([], ["--viewer", "rerun+http://b"]):
+        assert main([*verb, *options], simulate=solve, finish=report, viewer=viewer, live=live) == 0
+    assert [given for given, _ in viewer.calls] == [(None,), ("rerun+http://b",)]
+    assert [settings["on_block"] for _, settings in solve.calls] == ["takes", "takes"]
+    assert [given[1] for given, _ in live.calls] == ["rerun+http://a"] * 2
+    assert live.calls[0][0][0] is solve.calls[0][0][0]
+    assert [address for *_, address in report.calls] == ["rerun+http://a"] * 2
 
 
-def test_a_live_run_needs_its_library_and_what_it_shows(solved, tmp_path, monkeypatch, capsys):
-    calls, _ = solved(result_of())
-    monkeypatch.setattr(
-        "lgvi_warp.views.recording.viewer.opened", Study(MissingExtra("recordings", "rerun-sdk", "viz"))
-    )
-    verb = ["run", PAPER, "--out", str(tmp_path / "out"), "-q"]
-    cases = {("--live",): "pip install 'lgvi-warp[viz]'", ("--viewer", "x"): "has no effect without --live; add --live"}
-    none = "--live: shows members as they are done, and the run keeps none; add --keep all"
-    cases |= {("--live", "--keep", "none"): none, ("--live", "--keep", "1,2"): none}
-    for options, words in cases.items():
-        assert cli.main([*verb, *options]) == 2
-        assert words in capsys.readouterr().err
-    assert calls == []
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--live"], "pip install 'lgvi-warp[viz]'"),
+        (["--viewer", "x"], "has no effect without --live; add --live"),
+        (["--live", "--keep", "none"], "--live: shows members as they are done, and the run keeps none; add --keep all"),
+        (["--live", "--keep", "1,2"], "--live: shows members as they are done, and the run keeps none; add --keep all"),
+    ],
+)  # fmt: skip
+def test_a_live_run_needs_its_library_and_what_it_shows(tmp_path, capsys, options, words):
+    solve, viewer = Study(result_of()), Study(MissingExtra("recordings", "rerun-sdk", "viz"))
+    verb = ["run", PAPER, "--out", str(tmp_path / "out"), "-q", *options]
+    assert main(verb, simulate=solve, viewer=viewer) == 2
+    assert words in capsys.readouterr().err
+    assert solve.calls == []
     assert not (tmp_path / "out").exists()
 
 
@@ -193,29 +168,28 @@ class Suggestion:
         return "suggested   a step"
 
 
-def test_a_run_with_an_error_takes_what_is_suggested_and_checks_it(solved, tmp_path, monkeypatch, capsys):
+def test_a_run_with_an_error_takes_what_is_suggested_and_checks_it(tmp_path, capsys):
     result = result_of()
-    calls, reports = solved(result)
+    solve, report = Study(result), Report()
     suggest, verified = Study(Suggestion()), Study([(0.5, 7), (0.51, 7), (np.nan, 7)])
-    monkeypatch.setattr("lgvi_warp.studies.suggest.suggest", suggest)
-    monkeypatch.setattr("lgvi_warp.studies.suggest.verified", verified)
+    parts = {"simulate": solve, "finish": report, "suggest": suggest, "verify": verified}
     verb = ["run", PAPER, "--out", str(tmp_path), "--error", "0.5"]
     again = "asked 0.5 (7 members again at half the step, those with the largest errors among them)"
-    assert cli.main(verb) == 0
+    assert main(verb, **parts) == 0
     said = capsys.readouterr()
     assert said.out == f"suggested   a step\nchecked     error of speed 5.0e-01 m/s, {again}\n"
     for options, number in ((["-q", "--method", "rk4", "--of", "depth", "--threads", "2"], "5.1e-01"), (["-q"], "nan")):
-        assert cli.main([*verb, *options]) == 1
+        assert main([*verb, *options], **parts) == 1
         text = f"error of speed {number} m/s, {again}: missed; ask for a smaller one"
         assert capsys.readouterr() == ("", f"lgvi-warp: {text}\n")
-        assert reports[-1][2] == [text]
+        assert report.calls[-1][2] == [text]
     (first, settings), (_, named), _ = suggest.calls
     assert settings.pop("progress") is not None
     assert first[1:] == (0.5, "position")
     assert settings == {"methods": None, "threads": None}
     assert suggest.calls[1][0][1:] == (0.5, "depth")
     assert named == {"methods": ["rk4"], "threads": 2, "progress": None}
-    assert all(settings["h"] == 0.25 and settings["dtype"] == "float32" for _, settings in calls)
+    assert all(settings["h"] == 0.25 and settings["dtype"] == "float32" for _, settings in solve.calls)
     (ensemble, checked, suggested), _ = verified.calls[0]
     assert isinstance(ensemble, lw.Ensemble)
     assert checked is result
@@ -234,22 +208,21 @@ def test_a_run_with_an_error_takes_what_is_suggested_and_checks_it(solved, tmp_p
          '--error 0.01: is checked on samples of all members; give run.keep="all", no run.until'),
     ],
 )  # fmt: skip
-def test_what_contradicts_an_error_is_refused(solved, tmp_path, capsys, options, text):
-    solved(result_of())
+def test_what_contradicts_an_error_is_refused(tmp_path, capsys, options, text):
     assert cli.main(["run", PAPER, "--out", str(tmp_path), "-q", *options]) == 2
     assert capsys.readouterr().err == f"lgvi-warp: {text}\n"
 
 
-def test_arguments_of_resume(solved, tmp_path, monkeypatch, capsys):
+def test_arguments_of_resume(tmp_path, capsys):
     result = dataclasses.replace(result_of(), store=tmp_path / "there" / "run.zarr")
-    _, reports = solved(result)
     failed = dataclasses.replace(result_of(status=Status.NON_FINITE), store=result.store)
     study = Study([result, result, MembersFailed("all failed", result), failed])
-    monkeypatch.setattr("lgvi_warp.calls.resume.resume", study)
-    assert cli.main(["resume", str(tmp_path), "-q"]) == 0
+    report = Report()
+    assert main(["resume", str(tmp_path), "-q"], simulate=study, finish=report) == 0
     options = ["--threads", "2", "--executor", "processes", "--scheduler", "tcp://x", "--force"]
-    assert cli.main(["resume", str(tmp_path), *options]) == 0
-    assert [cli.main(["resume", str(tmp_path), "-q"]) for _ in range(2)] == [1, 1]
+    assert main(["resume", str(tmp_path), *options], simulate=study, finish=report) == 0
+    ends = [main(["resume", str(tmp_path), "-q"], simulate=study, finish=report) for _ in range(2)]
+    assert ends == [1, 1]
     assert capsys.readouterr().err.endswith("lgvi-warp: all failed\n")
     (place, plain), (_, named), *_ = study.calls
     common = {"executor": "threads", "threads": None, "scheduler": None, "progress": None, "force": False}
@@ -257,27 +230,15 @@ def test_arguments_of_resume(solved, tmp_path, monkeypatch, capsys):
     assert plain == common
     assert named.pop("progress") is not None
     assert named == {"executor": "processes", "threads": 2, "scheduler": "tcp://x", "force": True}
-    assert [given[:3] for given in reports] == [(result, tmp_path / "there", [])] * 2 + [
+    assert [given[:3] for given in report.calls] == [(result, tmp_path / "there", [])] * 2 + [
         (result, tmp_path / "there", ["all failed"]), (failed, tmp_path / "there", [])]  # fmt: skip
 
 
-def test_arguments_of_predict(tmp_path, monkeypatch, capsys):
+def test_arguments_of_predict(tmp_path, capsys):
     study = Study(SimpleNamespace(seconds=3.0, members=4))
-    monkeypatch.setattr("lgvi_warp.calls.predict.predict", study)
-    options = [
-        "--threads",
-        "2",
-        "--store",
-        "zarr",
-        "--store-dtype",
-        "float32",
-        "--out",
-        str(tmp_path),
-        "--members",
-        "3",
-    ]
-    assert cli.main(["predict", PAPER, "-q"]) == 0
-    assert cli.main(["predict", PAPER, *options]) == 0
+    options = f"--threads 2 --store zarr --store-dtype float32 --out {tmp_path} --members 3"
+    assert main(["predict", PAPER, "-q"], study=study) == 0
+    assert main(["predict", PAPER, *options.split()], study=study) == 0
     (_, plain), ((scene,), named) = study.calls
     assert plain == {"threads": None, "store": None}
     assert scene.ensemble_settings.members == 3

@@ -9,73 +9,47 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
+from lgvi_warp.cli import studies
+from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw
 from lgvi_warp.studies import sensitivity as uq
 from lgvi_warp.studies.stability.map import GRIDS
 from tests.conftest import ROOT
+from tests.support.verbs import Study, main
 from tests.unit.cli.test_terminal import region, sobol
 from tests.unit.studies.test_cost import found as tradeoff_of
 
 PAPER = str(ROOT / "examples" / "paper.toml")
 
 
-class Study:
-    """Stands for the function of a study: keeps what it is called with.
-
-    Args:
-        result: What it returns; an error is raised.
-    """
-
-    def __init__(self, result):
-        self.result, self.calls = result, []
-
-    def __call__(self, *values, **settings):
-        self.calls.append((values, settings))
-        result = self.result[len(self.calls) - 1] if isinstance(self.result, list) else self.result
-        if isinstance(result, BaseException):
-            raise result
-        return result
+def draw(found, path):
+    """Stands for what draws a picture."""
+    path.write_text("a picture")
 
 
-@pytest.fixture
-def drawn(monkeypatch):
-    """The pictures that are drawn: (name of the function, file)."""
-    names = []
-
-    def plot(name):
-        return lambda found, path: (names.append((name, path.name)), path.write_text("a picture"))
-
-    for name in ("tradeoff", "stability", "sensitivity"):
-        monkeypatch.setattr(f"lgvi_warp.views.plots.plot_{name}", plot(name))
-    return names
-
-
-def test_a_method_that_was_asked_for_and_has_no_measurement_ends_with_1(tmp_path, monkeypatch, drawn, capsys):
+def test_a_method_that_was_asked_for_and_has_no_measurement_ends_with_1(tmp_path, capsys):
     found = dataclasses.replace(tradeoff_of(4.0), missing={"rk8": "members failed at every step that was tried"})
-    monkeypatch.setattr("lgvi_warp.studies.tradeoff.tradeoff", Study(found))
-    monkeypatch.chdir(tmp_path)
-    assert cli.main(["tradeoff", PAPER, "--methods", "rk4,rk8", "--out", "b"]) == 1
+    verb = ["tradeoff", PAPER, "--methods", "rk4,rk8", "--out", str(tmp_path / "b")]
+    assert main(verb, study=Study(found), draw=draw) == 1
     out, err = capsys.readouterr()
     assert "lgvi-warp: --methods rk8: has no measurement: members failed at every step" in err
     assert out.startswith("missing     rk8: members failed")
-    assert drawn == [("tradeoff", "tradeoff.png")]
+    assert (tmp_path / "b" / "tradeoff.png").exists()
     assert json.loads((tmp_path / "b" / "tradeoff.json").read_text())["missing"] == found.missing
 
 
-def test_arguments_of_a_tradeoff(tmp_path, monkeypatch, drawn, capsys):
+def test_arguments_of_a_tradeoff(tmp_path, monkeypatch, capsys):
     measure = Study(tradeoff_of(4.0))
-    monkeypatch.setattr("lgvi_warp.studies.tradeoff.tradeoff", measure)
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["tradeoff", PAPER, "--members", "7", "-q"]) == 0
+    assert main(["tradeoff", PAPER, "--members", "7", "-q"], study=measure, draw=draw) == 0
     assert capsys.readouterr() == ("", "")
     more = ["--of", "depth", "--methods", "rk4, psi_s", "--seconds", "3", "--out", "b"]
-    assert cli.main(["tradeoff", PAPER, *more]) == 0
+    assert main(["tradeoff", PAPER, *more], study=measure, draw=draw) == 0
     ((scene,), settings), (_, others) = measure.calls
     assert scene.ensemble_settings.members == 7
     assert settings == {"of": "position", "methods": None, "seconds": 45.0, "progress": None}
     assert others.pop("progress") is not None
     assert others == {"of": "depth", "methods": ["rk4", "psi_s"], "seconds": 3.0}
-    assert drawn == [("tradeoff", "tradeoff.png")] * 2
     for folder in ("runs/paper_tradeoff", "b"):
         assert sorted(path.name for path in (tmp_path / folder).iterdir()) == [
             "tradeoff.csv", "tradeoff.json", "tradeoff.png"]  # fmt: skip
@@ -85,42 +59,39 @@ def test_arguments_of_a_tradeoff(tmp_path, monkeypatch, drawn, capsys):
     assert files == [f"file        b/tradeoff.{end}" for end in ("json", "csv", "png")]
 
 
-def test_a_picture_that_fails_is_an_exit_code(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("lgvi_warp.studies.tradeoff.tradeoff", Study(tradeoff_of(4.0)))
+def test_a_picture_that_fails_is_an_exit_code(tmp_path, capsys):
     for error, code, text in ((OSError("no room"), 1, "no room"), (NothingToDraw("no rows"), 0, "no rows")):
-        monkeypatch.setattr("lgvi_warp.views.plots.plot_tradeoff", Study(error))
-        assert cli.main(["tradeoff", PAPER, "--out", str(tmp_path), "-q"]) == code
+        parts = {"study": Study(tradeoff_of(4.0)), "draw": Study(error)}
+        assert main(["tradeoff", PAPER, "--out", str(tmp_path), "-q"], **parts) == code
         picture = tmp_path / "tradeoff.png"
         assert capsys.readouterr().err == f"lgvi-warp: {picture} was not written: {text}\n"
 
 
-def test_arguments_of_a_sensitivity_study(tmp_path, monkeypatch, drawn, capsys):
-    analyses = {"sobol": Study(sobol()), "morris": Study(sobol())}
-    for name, study in analyses.items():
-        monkeypatch.setattr(uq, name, study)
+def test_arguments_of_a_sensitivity_study(tmp_path, capsys):
+    study = Study(sobol())
     verb = ["sensitivity", PAPER, "--out", str(tmp_path)]
-    assert cli.main([*verb, "-q"]) == 0
-    assert cli.main([*verb, "--first-order", "--samples", "0", "-q"]) == 0
-    assert cli.main([*verb, "--analysis", "morris", "-q"]) == 0
-    grouped = ["--replicates", "4", "--group", "start=start.position,start.velocity"]
-    assert cli.main([*verb, *grouped, "-q"]) == 0
-    assert cli.main([*verb, "--group", "start", "-q"]) == 2
-    assert "--group = 'start': names no factors" in capsys.readouterr().err
-    more = ["--of", "depth", "--of", "speed", "--samples", "5", "--failed", "drop", "--threads", "3", "--seed", "4"]
-    assert cli.main([*verb, "--analysis", "morris", *more]) == 0
-    (plain, first, together), (coarse, named) = (study.calls for study in analyses.values())
+
+    def reached(*options, code=0):
+        assert main([*verb, *options], study=study, draw=draw) == code
+        return study.calls[-1]
+
     common = {"failed": "refuse", "threads": None, "progress": None}
     plainly = common | {"samples": 256, "second_order": True, "replicates": 8, "groups": {}}
-    assert plain[0][1] == ["position[2]"]
-    assert plain[1] == plainly
-    assert first[1] == plainly | {"samples": 0, "second_order": False}
-    assert together[1] == plainly | {"replicates": 4, "groups": {"start": ["start.position", "start.velocity"]}}
-    assert coarse[1] == common | {"samples": 64}
-    assert named[0][0].ensemble_settings.seed == 4
-    assert named[0][1] == ["depth", "speed"]
-    assert named[1].pop("progress") is not None
-    assert named[1] == {"failed": "drop", "threads": 3, "samples": 5}
-    assert drawn == [("sensitivity", "sensitivity.png")] * 5
+    (_, of), settings = reached("-q")
+    assert (of, settings) == (["position[2]"], plainly)
+    assert reached("--first-order", "--samples", "0", "-q")[1] == plainly | {"samples": 0, "second_order": False}
+    grouped = ["--replicates", "4", "--group", "start=start.position,start.velocity"]
+    groups = {"start": ["start.position", "start.velocity"]}
+    assert reached(*grouped, "-q")[1] == plainly | {"replicates": 4, "groups": groups}
+    reached("--group", "start", "-q", code=2)
+    assert "--group = 'start': names no factors" in capsys.readouterr().err
+    assert reached("--analysis", "morris", "-q")[1] == common | {"samples": 64}
+    more = ["--of", "depth", "--of", "speed", "--samples", "5", "--failed", "drop", "--threads", "3", "--seed", "4"]
+    (scene, of), settings = reached("--analysis", "morris", *more)
+    assert scene.ensemble_settings.seed == 4
+    assert of == ["depth", "speed"]
+    assert settings.pop("progress") is not None
+    assert settings == {"failed": "drop", "threads": 3, "samples": 5}
     said = capsys.readouterr().out
     assert said.startswith(f"{sobol()}\n\nfile        {tmp_path}/sensitivity.")
     assert said.count("file  ") == 4
@@ -130,72 +101,46 @@ def test_arguments_of_a_sensitivity_study(tmp_path, monkeypatch, drawn, capsys):
 @pytest.mark.parametrize(
     ("error", "code"), [(uq.FailedMembers("3 members failed"), 1), (MissingExtra("studies", "SALib", "uq"), 2)]
 )
-def test_a_sensitivity_study_that_fails_is_one_line(tmp_path, monkeypatch, capsys, error, code):
-    monkeypatch.setattr(uq, "sobol", Study(error))
-    assert cli.main(["sensitivity", PAPER, "--out", str(tmp_path), "-q"]) == code
+def test_a_sensitivity_study_that_fails_is_one_line(tmp_path, capsys, error, code):
+    assert main(["sensitivity", PAPER, "--out", str(tmp_path), "-q"], study=Study(error)) == code
     assert capsys.readouterr() == ("", f"lgvi-warp: {error}\n")
     assert not list(tmp_path.iterdir())
 
 
-def test_arguments_of_a_stability_map(tmp_path, monkeypatch, drawn):
+def test_arguments_of_a_stability_map(tmp_path):
     study = Study(region())
-    monkeypatch.setattr("lgvi_warp.studies.stability.map.stability_map", study)
     verb = ["stability", PAPER, "-q", "--out", str(tmp_path)]
-    more = [
-        "--x",
-        "h=0.1:1",
-        "--y",
-        "vehicle.mass",
-        "--methods",
-        "psi",
-        "--points",
-        "5",
-        "--error",
-        "0.5",
-        "--of",
-        "depth",
-    ]
-    assert cli.main(verb) == 0
-    assert cli.main([*verb, *more, "--duration", "9", "--seed", "11"]) == 0
+    more = "--x h=0.1:1 --y vehicle.mass --methods psi --points 5 --error 0.5 --of depth --duration 9 --seed 11"
+    assert main(verb, study=study, draw=draw) == 0
+    assert main([*verb, *more.split()], study=study, draw=draw) == 0
     (plain, named) = study.calls
     assert plain[0][1:] == ("h", "angular_velocity", None)
     seed = lw.Scene.load(PAPER).ensemble_settings.seed
     assert plain[1] == {"points": 24, "t1": None, "error": 0.01, "of": "attitude", "seed": seed, "progress": None}
     assert named[0][1:] == ("h=0.1:1", "vehicle.mass", ["psi"])
     assert named[1] == {"points": 5, "t1": 9.0, "error": 0.5, "of": "depth", "seed": 11, "progress": None}
-    assert drawn == [("stability", "stability.png")] * 2
+    assert (tmp_path / "stability.png").exists()
 
 
-def test_a_scene_without_an_ensemble_has_the_seed_0(tmp_path, monkeypatch, drawn):
+def test_a_scene_without_an_ensemble_has_the_seed_0(tmp_path):
     study = Study(region())
-    monkeypatch.setattr("lgvi_warp.studies.stability.map.stability_map", study)
     scene = tmp_path / "bare.toml"
     scene.write_text('[vehicle]\nname = "sphere"\n')
-    assert cli.main(["stability", str(scene), "-q", "--x", "speed", "--out", str(tmp_path / "out")]) == 0
+    verb = ["stability", str(scene), "-q", "--x", "speed", "--out", str(tmp_path / "out")]
+    assert main(verb, study=study, draw=draw) == 0
     ((values, settings),) = study.calls
     assert settings["seed"] == 0
     assert values[1:3] == ("speed", "angular_velocity")
 
 
-def test_grids_of_a_stability_study(tmp_path, monkeypatch, drawn, capsys):
-    fractions, whole = [], []
-
-    def study(scene, x, y, methods, progress, **settings):
-        progress(0.5)
-        fractions.append((x, y))
-        return region()
-
-    monkeypatch.setattr("lgvi_warp.studies.stability.map.stability_map", study)
-    closing = SimpleNamespace(close=lambda: None)
-    monkeypatch.setattr("lgvi_warp.cli.progress.Progress", lambda *_: Calling(whole, closing))
+def test_grids_of_a_stability_study(tmp_path, capsys):
+    study = Study(region())
     verb = ["stability", PAPER, "--out", str(tmp_path)]
-    assert cli.main([*verb, "--grid", "mass"]) == 0
-    assert fractions == [GRIDS["mass"]]
-    assert whole == [0.5]
-    assert drawn == [("stability", "stability_mass.png")]
-    assert cli.main([*verb, "--grid", "all"]) == 0
-    assert fractions[1:] == list(GRIDS.values())
-    assert whole[1:] == pytest.approx([0.5 / 3, 1.5 / 3, 2.5 / 3])
+    assert main([*verb, "--grid", "mass"], study=study, draw=draw) == 0
+    assert (tmp_path / "stability_mass.png").exists()
+    assert main([*verb, "--grid", "all"], study=study, draw=draw) == 0
+    assert [values[1:3] for values, _ in study.calls] == [GRIDS["mass"], *GRIDS.values()]
+    assert all(settings["progress"] is not None for _, settings in study.calls)
     assert {path.name for path in tmp_path.glob("*.json")} == {f"stability_{name}.json" for name in GRIDS}
     # One report for each, and a blank line between them.
     said = capsys.readouterr().out
@@ -207,22 +152,12 @@ def test_grids_of_a_stability_study(tmp_path, monkeypatch, drawn, capsys):
         assert capsys.readouterr().err == f"lgvi-warp: {words}\n"
 
 
-class Calling:
-    """A progress that keeps its fractions."""
-
-    def __init__(self, fractions, closing):
-        self.fractions, self.close = fractions, closing.close
-
-    def __call__(self, fraction):
-        self.fractions.append(fraction)
-
-
-def test_an_interrupted_stability_study_says_which_maps_are_finished(tmp_path, monkeypatch, drawn, capsys):
+def test_an_interrupted_stability_study_says_which_maps_are_finished(tmp_path, capsys):
     interrupted = KeyboardInterrupt()
     for results, text in (([interrupted], "nothing was written"),
                           ([region(), region(), interrupted], f"2 of 3 maps are finished, in {tmp_path}")):  # fmt: skip
-        monkeypatch.setattr("lgvi_warp.studies.stability.map.stability_map", Study(results))
-        assert cli.main(["stability", PAPER, "--grid", "all", "--out", str(tmp_path), "-q"]) == 130
+        verb = ["stability", PAPER, "--grid", "all", "--out", str(tmp_path), "-q"]
+        assert main(verb, study=Study(results), draw=draw) == 130
         assert capsys.readouterr().err == f"lgvi-warp: interrupted; {text}\n"
 
 
@@ -258,27 +193,17 @@ class Swept:
 
 
 @pytest.fixture
-def sweep(tmp_path, monkeypatch):
+def sweep(tmp_path):
     """A function of what was refused and of options: exit code, what the sweep was called with, what it found."""
-    file = {
-        "scene": "a scene",
-        "cases": "cases",
-        "members": 40,
-        "seed": 1,
-        "baseline": "a",
-        "metrics": ("m",),
-        "step": 0.1,
-    }
-    monkeypatch.setattr("lgvi_warp.studies.sweeps.file.arguments_of_file", lambda path: dict(file, file=path))
-    monkeypatch.setattr(
-        "lgvi_warp.views.plots.sweep_pictures.pictures", lambda _: {"a.png": lambda found, path: path.write_text("a")}
+    (tmp_path / "laws.toml").write_text(
+        f'scene = "{PAPER}"\nmembers = 40\nseed = 1\nmetrics = ["max(depth)"]\n[compare]\nbaseline = "a"\n[run]\nstep = 0.1\n'
     )
 
-    def run(*options, refused=("", "", "")):
+    def run(*options, refused=("", "", ""), **parts):
         found = Swept(refused)
         study = Study(found)
-        monkeypatch.setattr("lgvi_warp.studies.sweeps.sweep.sweep", study)
-        code = cli.main(["sweep", "laws.toml", "--out", str(tmp_path / "out"), *options])
+        parts = {"study": study, "drawings": lambda _: {"a.png": draw}} | parts
+        code = main(["sweep", str(tmp_path / "laws.toml"), "--out", str(tmp_path / "out"), *options], **parts)
         return code, study.calls, found
 
     return run
@@ -288,23 +213,13 @@ def test_arguments_of_a_sweep(sweep, tmp_path, capsys):
     code, (((), settings),), _ = sweep("-q", "--members", "1e3", "--seed", "-2", "--threads", "3", "--executor", "dask",
                                        "--scheduler", "tcp://x")  # fmt: skip
     assert code == 0
+    assert settings.pop("scene").to_dict() == lw.Scene.load(PAPER).to_dict()
     assert settings == {
-        "file": "laws.toml",
-        "scene": "a scene",
-        "cases": "cases",
-        "members": 1000,
-        "seed": -2,
-        "baseline": "a",
-        "metrics": ("m",),
-        "step": 0.1,
-        "threads": 3,
-        "executor": "dask",
-        "scheduler": "tcp://x",
-        "out": tmp_path / "out",
-        "progress": None,
-    }
+        "members": 1000, "seed": -2, "baseline": "a", "metrics": ["max(depth)"], "h": 0.1, "threads": 3, "executor": "dask",
+        "scheduler": "tcp://x", "out": tmp_path / "out", "progress": None,
+    }  # fmt: skip
     assert capsys.readouterr() == ("", "")
-    assert (tmp_path / "out" / "a.png").read_text() == "a"
+    assert (tmp_path / "out" / "a.png").read_text() == "a picture"
     _, (((), settings),), found = sweep("--members", "many")
     assert (settings["members"], settings["seed"]) == ("many", 1)
     assert settings["progress"] is not None
@@ -322,36 +237,27 @@ def test_a_sweep_of_refused_cells_alone_failed(sweep):
     assert sweep("-q", refused=("no",) * 3)[0] == 1
 
 
-def test_the_worst_members_are_recorded_by_cell(sweep, tmp_path, monkeypatch, capsys):
-    recorded = []
+def test_the_worst_members_are_recorded_by_cell(tmp_path):
+    recorded, written, found = [], Written(), Swept(("", "", ""))
 
     def log(result, path):
         recorded.append((result, path.name))
         path.write_text("a recording")
 
-    monkeypatch.setattr("lgvi_warp.views.recording.rerun.log_rerun", log)
-    code, _, found = sweep("--record", "3", "--json")
-    assert code == 0
+    studies.record_worst(found, 3, tmp_path, written, log=log)
     assert found.runs == [("a", [5, 9], {"delay": 2}), ("b", [4], {"delay": 1})]
     assert recorded == [("members [5, 9] of a", "worst_0001.rrd"), ("members [4] of b", "worst_0002.rrd")]
-    names = [path.rpartition("/")[2] for path in json.loads(capsys.readouterr().out)["files"]]
-    assert names == ["sweep.json", "a.png", "worst_0001.rrd", "worst_0002.rrd"]
+    assert [path.name for path in written.files] == ["worst_0001.rrd", "worst_0002.rrd"]
 
 
-def test_the_plan_of_a_sweep_runs_nothing(sweep, tmp_path, monkeypatch, capsys):
-    calls = []
-    monkeypatch.setattr("lgvi_warp.studies.sweeps.setup.made", lambda **settings: settings)
-    monkeypatch.setattr(
-        "lgvi_warp.studies.sweeps.setup.plan_text", lambda *given: calls.append(given) or "cells 4\ntime 2"
-    )
-    code, runs, _ = sweep("--plan", "--threads", "2", "--members", "5")
+def test_the_plan_of_a_sweep_runs_nothing(sweep, tmp_path, capsys):
+    plan = Study("cells 4\ntime 2")
+    code, runs, _ = sweep("--plan", "--threads", "2", "--members", "5", plan=plan)
     assert code == 0
     assert runs == []
     assert capsys.readouterr().out == "cells 4\ntime 2\n"
     assert not (tmp_path / "out").exists()
-    assert calls == [({
-        "scene": "a scene", "metrics": ("m",), "cases": "cases", "grid": None, "vary": None, "members": 5, "seed": 1,
-        "sampling": None, "settings": {"file": "laws.toml", "step": 0.1},
-    }, 2)]  # fmt: skip
-    assert sweep("--plan", "--json")[0] == 0
+    (((setup, threads), _),) = plan.calls
+    assert (setup.members.members, threads) == (5, 2)
+    assert sweep("--plan", "--json", plan=plan)[0] == 0
     assert json.loads(capsys.readouterr().out)["plan"] == ["cells 4", "time 2"]

@@ -9,7 +9,6 @@ import re
 import shutil
 import subprocess
 import sys
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,18 +16,16 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp import cli
 from lgvi_warp.calls import predict as prediction
-from lgvi_warp.calls import warm as kernels
-from lgvi_warp.cli import arguments, command, machine, output, progress, signals
+from lgvi_warp.cli import arguments, command, output, signals
 from lgvi_warp.common.phases import Phases
-from lgvi_warp.engine import widths
 from lgvi_warp.studies import packet_width as tuning
-from lgvi_warp.studies import speed
 from lgvi_warp.studies.sensitivity import Indices, MorrisEffects, SobolIndices
 from lgvi_warp.studies.stability.grid import Line
 from lgvi_warp.studies.stability.map import StabilityMap
 from lgvi_warp.studies.tradeoff import Tradeoff
 from tests.conftest import ROOT
 from tests.support.json_page import TABLES, differing
+from tests.support.verbs import Study, main
 from tests.unit.studies.test_cost import found as tradeoff_of
 
 PAPER = str(ROOT / "examples" / "paper.toml")
@@ -330,9 +327,9 @@ def test_completion_has_every_verb_and_option(shell, capsys, tmp_path):
 # One JSON document for each verb ------------------------------------------------------------------------------------------
 
 
-def document(given, capsys, code=0, name=""):
+def document(given, capsys, code=0, name="", **parts):
     """The document that a verb prints, which is as the page states."""
-    assert cli.main([*given, "--json", "--quiet"]) == code
+    assert main([*given, "--json", "--quiet"], **parts) == code
     content = json.loads(capsys.readouterr().out)
     assert differing(content, name or given[0]) == []
     assert (content["verb"], content["version"]) == (given[0], lw.__version__)
@@ -374,41 +371,23 @@ def test_a_refused_verb_prints_no_document(capsys):
     assert capsys.readouterr().out == ""
 
 
-def test_documents_of_the_machine(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(machine, "fma_peak", lambda dtype: 1e9)
-    monkeypatch.setattr(widths, "path", lambda: tmp_path / widths.FILE)
+def test_documents_of_the_machine(tuned_widths, capsys):
+    assert document(["info"], capsys, peak_of=lambda dtype: 1e9)["peak"] == {"float64": 1e9, "float32": 1e9}
     readings = [tuning.Reading("plain float64", {8: 2.0, 16: 1.5}, 8, 16)]
-    monkeypatch.setattr(tuning, "tune", lambda: readings)
+    kept = document(["tune"], capsys, measure=lambda: readings)["kernels"]["plain float64"]
+    assert kept == {"ns": {"8": 2.0, "16": 1.5}, "table": 8, "best": 16}
     record = json.dumps({"method": "psi_s", "ns_per_vehicle_step": 9.0})
-    monkeypatch.setattr(speed, "measure", lambda members, steps: iter([record, record]))
-    assert document(["info"], capsys)["peak"] == {"float64": 1e9, "float32": 1e9}
-    assert document(["tune"], capsys)["kernels"]["plain float64"] == {
-        "ns": {"8": 2.0, "16": 1.5},
-        "table": 8,
-        "best": 16,
-    }
-    assert len(document(["bench"], capsys)["readings"]) == 2
+    assert len(document(["bench"], capsys, measure=lambda members, steps: [record, record])["readings"]) == 2
 
 
-def test_documents_of_kernels_and_predictions(monkeypatch, capsys):
-    monkeypatch.setattr(kernels, "warm", lambda plans, workers: ((plan, Phases(0.1, 0.0, 0.2)) for plan in plans))
-    content = document(["warm", PAPER, "--methods", "psi_s,rk4"], capsys)
+def test_documents_of_kernels_and_predictions(capsys):
+    compiled = lambda plans, workers: ((plan, Phases(0.1, 0.0, 0.2)) for plan in plans)  # noqa: E731
+    content = document(["warm", PAPER, "--methods", "psi_s,rk4"], capsys, compile_plans=compiled)
     assert [kernel["method"] for kernel in content["kernels"]] == ["psi_s", "rk4"]
-    numbers = prediction.Prediction(5, 4, 3, 2, 0.1, 0.2, 0.3, 0.4, 5, 6, None, 7)
-    monkeypatch.setattr(prediction, "predict", lambda *given, **settings: numbers)
-    assert document(["plan", PAPER], capsys)["seconds"] == 0.2 + 0.4
-    phases = []
-
-    def began(stream, phase):
-        phases.append(phase)
-        return SimpleNamespace(close=lambda: phases.append("closed"))
-
-    monkeypatch.setattr(progress, "Progress", began)
-    assert cli.main(["predict", PAPER, "-q"]) == 0
-    assert capsys.readouterr().out == ""
-    assert not phases
-    assert cli.main(["predict", PAPER]) == 0
-    assert phases == ["measuring", "closed"]
+    study = Study(prediction.Prediction(5, 4, 3, 2, 0.1, 0.2, 0.3, 0.4, 5, 6, None, 7))
+    assert document(["plan", PAPER], capsys, study=study)["seconds"] == 0.2 + 0.4
+    assert main(["predict", PAPER, "-q"], study=study) == 0
+    assert capsys.readouterr() == ("", "")
 
 
 @pytest.mark.kernel
@@ -459,6 +438,8 @@ def test_documents_of_stores(tmp_path, capsys):
     assert document(["info", str(tmp_path / "all")], capsys, name="info of a folder")["complete"]
     assert document(["resume", str(tmp_path / "all")], capsys)["vehicle_steps_per_second"] is None
     assert document(["export", str(tmp_path / "all"), "--to", "parquet"], capsys)["bytes"] > 0
+    drawn = document(["plot", str(tmp_path / "all" / "run.zarr")], capsys)["files"]
+    assert drawn == [f"{tmp_path}/all/{name}" for name in ("fleet.png", "fleet.rrd")]
     assert any(
         path.endswith(".parquet")
         for path in document(["info", str(tmp_path / "all")], capsys, name="info of a folder")["files"]
@@ -534,11 +515,7 @@ def region():
     )
 
 
-STUDIES = {
-    "tradeoff": (lambda: tradeoff_of(4.0), Tradeoff, "lgvi_warp.studies.tradeoff.tradeoff"),
-    "sensitivity": (sobol, Indices, "lgvi_warp.studies.sensitivity.sobol"),
-    "stability": (region, StabilityMap, "lgvi_warp.studies.stability.map.stability_map"),
-}
+STUDIES = {"tradeoff": lambda: tradeoff_of(4.0), "sensitivity": sobol, "stability": region}
 
 
 @pytest.mark.parametrize(
@@ -557,15 +534,15 @@ def test_a_study_is_read_back_from_its_file(make, tmp_path):
 
 
 @pytest.mark.parametrize("verb", STUDIES)
-def test_studies_print_a_document_and_info_and_plot_know_their_folders(verb, tmp_path, monkeypatch, capsys):
-    make, _, function = STUDIES[verb]
-    monkeypatch.setattr(function, lambda *given, **settings: make())
+def test_studies_print_a_document_and_info_and_plot_know_their_folders(verb, tmp_path, capsys):
+    make = STUDIES[verb]
+    study = Study(make())
     out = str(tmp_path)
-    content = document([verb, PAPER, "--out", out], capsys)
+    content = document([verb, PAPER, "--out", out], capsys, study=study)
     assert content["content"] == {verb: make().to_dict()}
     assert content["faults"] == []
     assert f"{out}/{verb}.png" in content["files"]
-    assert cli.main([verb, PAPER, "--out", out]) == 0
+    assert main([verb, PAPER, "--out", out], study=study) == 0
     said = capsys.readouterr().out
     (held,) = document(["info", out], capsys, name="info of a folder")["holds"]
     assert (held["kind"], held["content"]) == (verb, make().to_dict())

@@ -26,16 +26,6 @@ def test_a_recording_of_some_members(folder, tmp_path, capsys, name):
     assert str(path) in capsys.readouterr().out
 
 
-def test_the_viewer_is_started(folder, monkeypatch):
-    seen = []
-    monkeypatch.setattr(
-        "lgvi_warp.views.recording.rerun.show", lambda result, members: seen.append((result.members, members))
-    )
-    assert main(["view", str(folder)]) == 0
-    assert main(["view", str(folder), "--members", "0"]) == 0
-    assert seen == [(6, None), (6, [0])]
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -89,6 +79,6 @@ def test_a_disk_that_is_full_while_recording_is_one_line_and_leaves_no_file(tmp_
 
 
 def test_no_rerun_is_one_line_with_the_remedy(folder, tmp_path, capsys, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "rerun", None)
+    monkeypatch.setitem(sys.modules, "rerun", None)
     assert main(["view", str(folder), "--out", str(tmp_path / "a.rrd")]) == 2
     assert "pip install 'lgvi-warp[viz]'" in capsys.readouterr().err

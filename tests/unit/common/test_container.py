@@ -5,7 +5,7 @@ import os
 
 import pytest
 
-from lgvi_warp import cli
+from lgvi_warp.calls.predict import Prediction
 from lgvi_warp.common import container, machine
 
 NONE_V1 = 9223372036854771712
@@ -77,15 +77,18 @@ def test_files_that_cannot_be_read_say_nothing(tmp_path):
 @pytest.mark.parametrize(
     ("quota", "cores", "threads"), [(None, 8, 8), (1.5, 8, 2), (0.2, 8, 1), (16.0, 8, 8), (3.0, 8, 3)]
 )
-def test_threads_by_default(quota, cores, threads, monkeypatch):
-    monkeypatch.setattr(machine, "affinity", lambda: cores)
-    monkeypatch.setattr(container, "cpu_quota", lambda: quota)
-    assert machine.thread_count() == threads
-    assert machine.describe()["threads"] == threads
+def test_threads_by_default(quota, cores, threads):
+    assert machine.threads_of(cores, quota) == threads
 
 
-def test_cores_are_those_that_the_process_may_use(monkeypatch):
+def test_what_this_process_may_use():
     assert 1 <= machine.affinity() <= (os.cpu_count() or 1)
+    assert machine.thread_count() == machine.threads_of(machine.affinity(), container.cpu_quota())
+    assert machine.describe()["threads"] == machine.thread_count()
+    assert machine.memory_bytes() == machine.least_known(machine.physical_memory(), container.memory_limit())
+
+
+def test_cores_are_those_that_the_system_names(monkeypatch):
     monkeypatch.setattr(os, "process_cpu_count", lambda: 5, raising=False)
     assert machine.affinity() == 5
 
@@ -94,38 +97,13 @@ def test_cores_are_those_that_the_process_may_use(monkeypatch):
     ("physical", "limit", "memory"),
     [(100, None, 100), (100, 40, 40), (100, NONE_V1, 100), (None, 40, 40), (None, None, None)],
 )
-def test_memory(physical, limit, memory, monkeypatch):
-    monkeypatch.setattr(machine, "physical_memory", lambda: physical)
-    monkeypatch.setattr(container, "memory_limit", lambda: limit)
-    assert machine.memory_bytes() == memory
+def test_memory(physical, limit, memory):
+    assert machine.least_known(physical, limit) == memory
 
 
-def test_info_tells_what_a_container_leaves(monkeypatch, capsys):
-    monkeypatch.setattr("lgvi_warp.cli.machine.fma_peak", lambda dtype: 1e9)
-    monkeypatch.setattr(machine, "affinity", lambda: 64)
-    monkeypatch.setattr(machine, "physical_memory", lambda: 256 * 2**30)
-    for quota, limit, words in (
-        (None, None, ("64 threads\n", "256.0 GiB\n")),
-        (
-            7.5,
-            4 * 2**30,
-            ("8 threads (a quota of 7.5 CPUs; 64 cores)\n", "4.0 GiB (the container's limit; 256.0 GiB in the"),
-        ),
-    ):
-        monkeypatch.setattr(container, "cpu_quota", lambda quota=quota: quota)
-        monkeypatch.setattr(container, "memory_limit", lambda limit=limit: limit)
-        assert cli.main(["info"]) == 0
-        told = capsys.readouterr().out
-        assert all(word in told for word in words)
-
-
-@pytest.mark.kernel
-def test_plan_counts_by_what_a_container_leaves(monkeypatch, capsys):
-    from tests.conftest import ROOT
-
-    monkeypatch.setattr(container, "cpu_quota", lambda: 0.5)
-    monkeypatch.setattr(container, "memory_limit", lambda: 10**7)
-    assert cli.main(["predict", str(ROOT / "examples" / "paper.toml"), "--members", "20", "--duration", "2"]) == 0
-    told = capsys.readouterr().out
+def test_a_prediction_tells_what_a_container_does_not_hold():
+    told = str(
+        Prediction(20, 200, 1, 1, 0.0, 0.0, 0.0, 0.0, memory=9 * 10**6, disk=0, free_memory=10**7, free_disk=None)
+    )
     assert "1 threads" in told
     assert "more than the memory holds" in told

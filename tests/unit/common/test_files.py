@@ -2,7 +2,6 @@
 """Whatever is done with files, and however it ends, no descriptor stays open and no unfinished file lies about."""
 
 import contextlib
-import errno
 import gc
 import os
 
@@ -10,6 +9,8 @@ import pytest
 
 from lgvi_warp.common import files, reading, safe_files, write_lock
 from lgvi_warp.common.errors import SceneError
+from tests.support import disks
+from tests.support.disks import Disk
 
 DESCRIPTORS = "/proc/self/fd"
 
@@ -104,19 +105,14 @@ def open_files():
 @pytest.mark.skipif(not os.path.isdir(DESCRIPTORS), reason="the system does not list open files")
 @pytest.mark.parametrize("full", [False, True], ids=["", "full disk"])
 @pytest.mark.parametrize("name", ACTIONS)
-def test_no_descriptor_stays_open(name, full, root, monkeypatch):
+def test_no_descriptor_stays_open(name, full, root):
     write_files(root)  # threads and locks that are made once
     for beside in (root / "inner" / "a", root / "inner" / "b"):
         beside.unlink()
-    if full:
-
-        def no_room(descriptor):
-            raise OSError(errno.ENOSPC, "No space left on device")
-
-        monkeypatch.setattr(os, "fsync", no_room)
     gc.collect()  # files of tests before this one, which nothing refers to any more
     before = open_files()
-    act(ACTIONS[name], root)
+    with Disk(disks.full(("synced", ""))) if full else contextlib.nullcontext():
+        act(ACTIONS[name], root)
     files.syncs().submit(int).result()
     assert not open_files() - before
     assert not list(root.rglob(f"*{files.UNFINISHED}"))

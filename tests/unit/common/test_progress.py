@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Progress on terminals, in pipes and in notebooks, and `progress=True` of functions."""
 
+import functools
 import io
-import sys
+import time
 import types
+from contextlib import redirect_stderr
 from typing import ClassVar
 
 import pytest
@@ -19,15 +21,9 @@ class Terminal(io.StringIO):
         return True
 
 
-def at_once(progress):
-    """The same progress, which shows every call."""
-    progress._interval = 0.0
-    return progress
-
-
 def test_lines_name_the_phase_and_the_time_left():
     stream = io.StringIO()
-    progress = at_once(Progress(stream))
+    progress = Progress(stream, interval=0.0)
     progress(0.0)
     progress(0.25)
     progress(0.5)
@@ -38,43 +34,43 @@ def test_lines_name_the_phase_and_the_time_left():
     assert third == "running 50.0%, 0 s left"
 
 
-def test_the_time_left_follows_from_the_share_since_the_first(monkeypatch):
-    now = [100.0]
-    monkeypatch.setattr(module.time, "perf_counter", lambda: now[0])
+@pytest.mark.parametrize(
+    ("interval", "begun", "shares", "lines"),
+    [
+        # 20 % in 10 s, so 70 % in 35 s; the minute of the compiler does not count.
+        (0.0, 100.0, ((160.0, 0.1), (170.0, 0.3)), ["running 10.0%", "running 30.0%, 35 s left"]),
+        # A pipe gets a line at most every ten seconds.
+        (None, 0.0, ((1.0, 0.1), (9.0, 0.2), (10.0, 0.3), (15.0, 0.4), (20.5, 0.5)),
+         ["running 30.0%, 32 s left", "running 50.0%, 24 s left"]),
+    ],
+)  # fmt: skip
+def test_lines_of_a_pipe_and_the_time_left(interval, begun, shares, lines):
+    now = [begun]
     stream = io.StringIO()
-    progress = at_once(Progress(stream))
-    for now[0], share in ((160.0, 0.1), (170.0, 0.3)):
+    progress = Progress(stream, clock=lambda: now[0], interval=interval)
+    for now[0], share in shares:
         progress(share)
     progress.close()
-    # 20 % in 10 s, so 70 % in 35 s; the minute of the compiler does not count.
-    assert stream.getvalue().splitlines()[-1] == "running 30.0%, 35 s left"
-
-
-def test_a_pipe_gets_a_line_at_most_every_ten_seconds(monkeypatch):
-    now = [0.0]
-    monkeypatch.setattr(module.time, "perf_counter", lambda: now[0])
-    stream = io.StringIO()
-    progress = Progress(stream)
-    for now[0], share in ((1.0, 0.1), (9.0, 0.2), (10.0, 0.3), (15.0, 0.4), (20.5, 0.5)):
-        progress(share)
-    progress.close()
-    assert [line.split(",")[0] for line in stream.getvalue().splitlines()] == ["running 30.0%", "running 50.0%"]
+    assert stream.getvalue().splitlines() == lines
 
 
 def test_what_takes_long_without_a_fraction_is_shown_too():
-    stream, told = Terminal(), module.threading.Event()
-    progress = Progress(stream, "writing")
-    progress._show = lambda now: told.set()
+    now = [0.0]
+    stream = Terminal()
+    progress = Progress(stream, "writing", clock=lambda: now[0])
     assert stream.getvalue() == "\rwriting, 0 s"
-    assert told.wait(10.0)
+    now[0] = 7.0
+    until = time.monotonic() + 10.0
+    while "writing, 7 s" not in stream.getvalue():
+        assert time.monotonic() < until
+        time.sleep(0.05)
     progress.close()
 
 
-def test_the_progress_line_is_clean_whatever_happens(monkeypatch):
+def test_the_progress_line_is_clean_whatever_happens():
     stream = Terminal()
-    monkeypatch.setattr(sys, "stderr", stream)
-    with pytest.raises(KeyboardInterrupt), shown(False) as progress:
-        at_once(progress)
+    at_once = functools.partial(Progress, interval=0.0)
+    with pytest.raises(KeyboardInterrupt), redirect_stderr(stream), shown(False, begin=at_once) as progress:
         progress(0.5)
         progress(0.75)
         raise KeyboardInterrupt
@@ -91,7 +87,7 @@ def test_the_progress_line_is_clean_whatever_happens(monkeypatch):
 
 def test_a_long_line_is_blanked_by_a_short_one():
     stream = Terminal()
-    progress = at_once(Progress(stream, "a long phase to begin with, and more than a bar of any width"))
+    progress = Progress(stream, "a long phase to begin with, and more than a bar of any width", interval=0.0)
     progress(1.0)
     progress.close()
     first, second, _, _ = stream.getvalue().removeprefix("\r").split("\r")
@@ -116,20 +112,19 @@ def test_a_function_is_called_as_before():
     assert work.__name__ == "work"
 
 
-def test_true_shows_and_false_is_silent(monkeypatch):
+def test_true_shows_and_false_is_silent():
     stream = Terminal()
-    monkeypatch.setattr(sys, "stderr", stream)
-    assert work([0.5], progress=False) is False
-    assert stream.getvalue() == ""
-    work([0.5], progress=True)
+    with redirect_stderr(stream):
+        assert work([0.5], progress=False) is False
+        assert stream.getvalue() == ""
+        work([0.5], progress=True)
     assert stream.getvalue().startswith("\rcompiling")
     assert stream.getvalue().endswith("\r")
 
 
-def test_true_is_cleaned_up_after_an_error(monkeypatch):
+def test_true_is_cleaned_up_after_an_error():
     stream = Terminal()
-    monkeypatch.setattr(sys, "stderr", stream)
-    with pytest.raises(TypeError):
+    with redirect_stderr(stream), pytest.raises(TypeError):
         work(None, progress=True)
     assert stream.getvalue().endswith("\r")
 
@@ -159,21 +154,22 @@ class FakeBar:
         self.closed = True
 
 
-def test_a_notebook_has_a_bar_of_tqdm(monkeypatch):
-    monkeypatch.setitem(sys.modules, "ipykernel", types.ModuleType("ipykernel"))
-    monkeypatch.setitem(sys.modules, "tqdm", types.ModuleType("tqdm"))
-    monkeypatch.setitem(sys.modules, "tqdm.auto", types.SimpleNamespace(tqdm=FakeBar))
-    work([0.0, 0.25, 0.75], progress=True)
+def test_a_notebook_has_a_bar_of_tqdm():
+    shown = module.bar(modules={"ipykernel": None}, load=lambda name: types.SimpleNamespace(tqdm=FakeBar))
+    for share in (0.0, 0.25, 0.75):
+        shown(share)
+    shown.close()
     (bar,) = FakeBar.bars
     assert (bar.n, bar.words, bar.closed) == (0.75, ["compiling", "running"], True)
 
 
-def test_a_notebook_without_tqdm_writes_in_place(monkeypatch):
+def test_a_notebook_without_tqdm_writes_in_place():
+    def absent(name):
+        raise ImportError(name)
+
     stream = io.StringIO()
-    monkeypatch.setattr(sys, "stderr", stream)
-    monkeypatch.setitem(sys.modules, "ipykernel", types.ModuleType("ipykernel"))
-    monkeypatch.setitem(sys.modules, "tqdm.auto", None)
-    work([0.5], progress=True)
+    with redirect_stderr(stream):
+        module.bar(modules={"ipykernel": None}, load=absent).close()
     assert stream.getvalue().startswith("\rcompiling")
 
 

@@ -7,7 +7,6 @@ import os
 import pytest
 
 from lgvi_kernels.lanes.arithmetic import WIDTHS
-from lgvi_warp.common import machine
 from lgvi_warp.engine import widths
 from lgvi_warp.engine.widths import path as path_of_users
 from lgvi_warp.results.provenance import provenance
@@ -20,11 +19,9 @@ DTYPES = ("float64", "float32", "float32_compensated")
 
 
 @pytest.fixture
-def file(tmp_path, monkeypatch):
-    """A file of tuned widths that does not exist yet, in a folder that does not either."""
-    place = tmp_path / "cache" / widths.FILE
-    monkeypatch.setattr(widths, "path", lambda: place)
-    return place
+def file(tuned_widths):
+    """A file of tuned widths that does not exist yet."""
+    return tuned_widths
 
 
 @pytest.mark.parametrize(
@@ -33,10 +30,8 @@ def file(tmp_path, monkeypatch):
      (XEON, "avx512", "plain", (16, 32, 16)), (XEON, "avx512", "chained", (16, 32, 16)),
      (XEON, "avx512", "explicit", (8, 16, 16)), (XEON, "avx2", "chained", (4, 8, 8)), ("Cortex", "other", "plain", (2, 4, 4))],
 )  # fmt: skip
-def test_the_table(file, monkeypatch, cpu, simd, kind, lanes):
-    monkeypatch.setattr(machine, "cpu_name", lambda: cpu)
-    monkeypatch.setattr(machine, "simd", lambda: simd)
-    chosen = [widths.default_width(kind, dtype) for dtype in DTYPES]
+def test_the_table(cpu, simd, kind, lanes):
+    chosen = [widths.of_table(kind, dtype, cpu=cpu, simd=simd) for dtype in DTYPES]
     assert tuple(width.lanes for width in chosen) == lanes
     assert all(width.source.startswith("table: ") and width.source.endswith(simd) for width in chosen)
     assert all("Intel" not in width.source or cpu == XEON for width in chosen)
@@ -46,20 +41,16 @@ def test_kernels_have_these_widths():
     assert widths.WIDTHS == WIDTHS
 
 
-def test_kept_widths_count_on_this_machine_alone(file, monkeypatch):
+def test_kept_widths_count_on_this_machine_alone(file):
     assert widths.tuned() == {}
     assert widths.keep({"plain float64": 4}) == file
     assert widths.default_width("plain", "float64") == (4, "tuned")
     assert widths.default_width("plain", "float32").source.startswith("table")
-    monkeypatch.setattr(machine, "cpu_name", lambda: XEON)
-    widths.read.cache_clear()
-    assert widths.tuned() == {}
-    widths.keep({"float32_compensated": 32})
-    assert widths.default_width("chained", "float32_compensated") == (32, "tuned")
-    monkeypatch.undo()
-    monkeypatch.setattr(widths, "path", lambda: file)
-    widths.read.cache_clear()
+    widths.keep({"plain float64": 8, "float32_compensated": 32}, of=f"another {widths.this_machine()}")
     assert widths.tuned() == {"plain float64": 4}
+    widths.keep({"float32_compensated": 32})
+    assert widths.tuned() == {"float32_compensated": 32}
+    assert widths.default_width("chained", "float32_compensated") == (32, "tuned")
     assert len(json.loads(file.read_bytes())) == 2
 
 
@@ -82,7 +73,6 @@ def contents():
 
 
 def test_foreign_files_are_ignored(file):
-    file.parent.mkdir()
     for content in contents():
         file.write_bytes(content)
         widths.read.cache_clear()
@@ -94,7 +84,8 @@ def test_foreign_files_are_ignored(file):
 
 
 def test_what_is_no_file_is_ignored(file):
-    file.mkdir(parents=True)
+    file.mkdir()
+    widths.read.cache_clear()
     assert widths.tuned() == {}
     file.rmdir()
     os.mkfifo(file)

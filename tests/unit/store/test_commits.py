@@ -2,16 +2,14 @@
 """Blocks become durable in groups: files before markers, each folder synced once, and what fails is told of its block."""
 
 import errno
-import os
 import pickle
 import threading
 
 import pytest
 
 from lgvi_warp.common import files as durable
-from lgvi_warp.common import safe_files
-from lgvi_warp.store import commits
 from lgvi_warp.store.commits import Commits
+from tests.support.disks import Disk, full, refused
 
 
 @pytest.fixture
@@ -21,10 +19,9 @@ def root(tmp_path):
     return tmp_path
 
 
-@pytest.fixture
-def slowly(monkeypatch):
-    """A group waits until the end of the context."""
-    monkeypatch.setattr(commits, "PERIOD", 60.0)
+def grouped():
+    """Commits whose group waits until the end of the context."""
+    return Commits(period=60.0)
 
 
 def add(to, root, i, size=10):
@@ -37,36 +34,19 @@ def there(root, folder):
     return sorted(path.name for path in (root / folder).iterdir())
 
 
-def full(of, before):
-    """`before`, for a disk that is full when it comes to the file called so."""
-
-    def limited(beside, target):
-        if str(target).endswith(of):
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        before(beside, target)
-
-    return limited
+def marked(root):
+    """Names of the markers that are in their places."""
+    return [name for name in there(root, "blocks") if durable.UNFINISHED not in name]
 
 
-def test_a_group_is_synced_named_and_then_marked(root, slowly, monkeypatch):
-    order = []
-    file, folder, rename = durable.sync_file, durable.sync_folder, safe_files.rename
-
-    def told(what, call):
-        def telling(*paths):
-            call(*paths)
-            order.append((what, paths[-1].relative_to(root).as_posix()))
-
-        return telling
-
-    monkeypatch.setattr(durable, "sync_file", told("synced", file))
-    monkeypatch.setattr(durable, "sync_folder", told("synced", folder))
-    monkeypatch.setattr(safe_files, "rename", told("named", rename))
-    with Commits() as own:
+def test_a_group_is_synced_named_and_then_marked(root):
+    with grouped() as own, Disk() as disk:
         for i in range(3):
             add(own, root, i)
-        assert order == []
+        assert all(what == "created" for what, _ in disk.done)
+        own.__exit__(None)
     assert there(root, "chunks") == there(root, "blocks") == list("012")
+    order = [(what, path.relative_to(root).as_posix()) for what, path in disk.done if what != "created"]
     for start, name in ((0, "chunks"), (7, "blocks")):
         part = order[start : start + 7]
         assert part[-1] == ("synced", name)
@@ -74,77 +54,58 @@ def test_a_group_is_synced_named_and_then_marked(root, slowly, monkeypatch):
     assert len(order) == 14
 
 
-def test_large_files_are_on_their_way_before_their_block_is_handed_over(root, monkeypatch):
+def test_large_files_are_on_their_way_before_their_block_is_handed_over(root):
     synced = threading.Event()
-    sync = os.fsync
-    monkeypatch.setattr(os, "fsync", lambda descriptor: (sync(descriptor), synced.set())[0])
-    files = durable.Files(root)
-    files.write("chunks/small", bytes(durable.EARLY_BYTES - 1))
-    assert not synced.wait(0.05)
-    files.write("chunks/large", bytes(durable.EARLY_BYTES))
-    assert synced.wait(10.0)
-    files.finish()
+    with Disk(lambda what, path: synced.set() if what == "synced" else None):
+        files = durable.Files(root)
+        files.write("chunks/small", bytes(durable.EARLY_BYTES - 1))
+        assert not synced.wait(0.05)
+        files.write("chunks/large", bytes(durable.EARLY_BYTES))
+        assert synced.wait(10.0)
+        files.finish()
     assert there(root, "chunks") == ["large", "small"]
 
 
-@pytest.mark.parametrize("at", ["chunks/2", "blocks/2"])
-def test_a_block_that_fails_is_not_marked_and_the_others_are(root, slowly, monkeypatch, at):
-    monkeypatch.setattr(durable, "sync_file", full(at, durable.sync_file))
-    with pytest.raises(OSError, match="No space left"), Commits() as own:
+@pytest.mark.parametrize(
+    ("fault", "said", "others"),
+    [
+        (full(("synced", "chunks/2")), "No space left", ["0", "1", "3"]),
+        (full(("synced", "blocks/2")), "No space left", ["0", "1", "3"]),
+        (full(("created", "blocks/1")), r"No space left.*blocks/1'", ["0", "2", "3"]),
+        (refused(errno.EIO, ("synced", "chunks")), "Input/output error", []),
+    ],
+    ids=["a file", "a marker", "no room for a marker", "a folder"],
+)
+def test_a_block_that_fails_is_not_marked_and_the_others_are(root, fault, said, others):
+    with pytest.raises(OSError, match=said), Disk(fault), grouped() as own:
         for i in range(4):
             add(own, root, i)
-    assert [name for name in there(root, "blocks") if durable.UNFINISHED not in name] == ["0", "1", "3"]
+    assert marked(root) == others
 
 
-def test_no_room_for_a_marker(root, slowly, monkeypatch):
-    def limited(file, view, write=durable.write_all):
-        if "/blocks/1" in file.name:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        write(file, view)
-
-    monkeypatch.setattr(durable, "write_all", limited)
-    with pytest.raises(OSError, match=r"No space left.*blocks/1'"), Commits() as own:
-        for i in range(3):
-            add(own, root, i)
-    assert [name for name in there(root, "blocks") if durable.UNFINISHED not in name] == ["0", "2"]
-
-
-def test_a_folder_that_cannot_be_synced_marks_nothing(root, slowly, monkeypatch):
-    def refused(path):
-        raise OSError(errno.EIO, os.strerror(errno.EIO), str(path))
-
-    monkeypatch.setattr(durable, "sync_folder", refused)
-    with pytest.raises(OSError, match="Input/output error"), Commits() as own:
+def test_the_next_block_is_told_that_the_disk_is_full(root):
+    own = Commits(period=0.0)
+    with Disk(full(("synced", "chunks/0"))):
         add(own, root, 0)
-    assert there(root, "blocks") == []
-
-
-def test_the_next_block_is_told_that_the_disk_is_full(root, monkeypatch):
-    monkeypatch.setattr(commits, "PERIOD", 0.0)
-    monkeypatch.setattr(durable, "sync_file", full("chunks/0", durable.sync_file))
-    own = Commits()
-    add(own, root, 0)
-    with pytest.raises(OSError, match="No space left"), own:
-        for i in range(1, 10_000):
-            add(own, root, i)
+        with pytest.raises(OSError, match="No space left"), own:
+            for i in range(1, 10_000):
+                add(own, root, i)
     assert 0 < len(there(root, "blocks")) < 9_999
 
 
-def test_an_interrupt_waits_for_the_blocks_that_are_written(root, slowly):
-    with pytest.raises(KeyboardInterrupt), Commits() as own:
+def test_an_interrupt_waits_for_the_blocks_that_are_written(root):
+    with pytest.raises(KeyboardInterrupt), grouped() as own:
         add(own, root, 0)
         raise KeyboardInterrupt
     assert there(root, "blocks") == ["0"]
 
 
-def test_a_copy_in_another_process_waits_for_each_block(root, slowly, monkeypatch):
-    own = pickle.loads(pickle.dumps(Commits()))
+def test_a_copy_in_another_process_waits_for_each_block(root):
+    own = pickle.loads(pickle.dumps(grouped()))
     add(own, root, 0)
     assert there(root, "blocks") == ["0"]
-    with monkeypatch.context() as patch:
-        patch.setattr(durable, "sync_file", full("chunks/1", durable.sync_file))
-        with pytest.raises(OSError, match="No space left"):
-            add(own, root, 1)
+    with Disk(full(("synced", "chunks/1"))), pytest.raises(OSError, match="No space left"):
+        add(own, root, 1)
     add(own, root, 2)
     assert there(root, "blocks") == ["0", "2"]
 
@@ -160,24 +121,26 @@ def waits(call, gate):
     return waited and not thread.is_alive()
 
 
-def test_blocks_wait_for_a_disk_that_is_behind(root, monkeypatch):
-    gate, sync = threading.Event(), durable.sync_file
-    monkeypatch.setattr(commits, "MOST", 2)
-    monkeypatch.setattr(durable, "sync_file", lambda beside, target: (gate.wait(10.0), sync(beside, target)))
-    with Commits() as own:
+def behind(gate):
+    """A disk that syncs nothing until the gate is opened."""
+    return Disk(lambda what, path: gate.wait(10.0) if what == "synced" else None)
+
+
+def test_blocks_wait_for_a_disk_that_is_behind(root):
+    gate = threading.Event()
+    with behind(gate), Commits(most=2) as own:
         for i in range(3):
             add(own, root, i)  # two are at the disk or on the way to it
         assert waits(lambda: [add(own, root, i) for i in range(3, 6)], gate)
     assert len(there(root, "blocks")) == 6
 
 
-def test_large_files_wait_for_a_disk_that_is_behind(root, monkeypatch):
-    gate, sync = threading.Event(), os.fsync
-    monkeypatch.setattr(durable, "_room", threading.BoundedSemaphore(2))
-    monkeypatch.setattr(os, "fsync", lambda descriptor: (gate.wait(10.0), sync(descriptor)))
+def test_large_files_wait_for_a_disk_that_is_behind(root):
+    gate, most = threading.Event(), durable.MOST_WAITING
     files = durable.Files(root)
-    for i in range(2):
-        files.write(f"chunks/{i}", bytes(durable.EARLY_BYTES))
-    assert waits(lambda: files.write("chunks/2", bytes(durable.EARLY_BYTES)), gate)
-    files.finish()
-    assert there(root, "chunks") == ["0", "1", "2"]
+    with behind(gate):
+        for i in range(most):
+            files.write(f"chunks/{i}", bytes(durable.EARLY_BYTES))
+        assert waits(lambda: files.write(f"chunks/{most}", bytes(durable.EARLY_BYTES)), gate)
+        files.finish()
+    assert len(there(root, "chunks")) == most + 1

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Comparisons of settings whose runs are made by hand: errors of known size, references, fronts, suggestions, reports."""
 
+import copy
 import dataclasses
 import json
 import math
@@ -13,15 +14,17 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
-from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics import notation
+from lgvi_warp.runs.default_method import h_rates
+from lgvi_warp.runs.step_error import rates
 from lgvi_warp.studies import comparison, cost, suggest
 from lgvi_warp.studies import distance as compared
 from lgvi_warp.studies import tradeoff as tradeoffs
 from lgvi_warp.studies.budget import Budget
 from lgvi_warp.studies.comparison import Candidate, Growth, Reference, Sample
+from lgvi_warp.studies.speed import void
 from lgvi_warp.studies.tradeoff import Measurement, Tradeoff, Trial
 from tests.conftest import ROOT
 from tests.support.made import made
@@ -56,9 +59,15 @@ class Runs:
     def __init__(self, sizes, prices=None, round_off=1e-5):
         self.sizes, self.prices, self.round_off, self.settings = sizes, prices or {}, round_off, []
 
-    def run(self, plan, threads, executor=None):
+    def compile(self, plan):
+        return 0.0
+
+    def clock(self):
+        return 0.0
+
+    def run(self, plan):
         name, h, n = plan.method.name, plan.grid.h, plan.ensemble.members
-        self.settings.append((name, plan.dtype, h, threads))
+        self.settings.append((name, plan.dtype, h))
         t = plan.grid.times
         path, single, size = exact(t, n), plan.dtype != "float64", self.sizes.get(name, 0.0)
         fails = {"status": np.full(n, Status.NON_FINITE), "end": np.full(n, t[1])} if size == math.inf else {}
@@ -72,21 +81,26 @@ class Runs:
     def costs(self, plans, rounds=5):
         return [cost.Cost(self.prices.get((p.method.name, p.dtype), 1.0) / p.grid.h, 1.0) for p in plans]
 
-    def __enter__(self):
-        self.patches = [
-            mock.patch.object(comparison, "run_plan", self.run),
-            mock.patch.object(suggest, "run_plan", self.run),
-            mock.patch.object(Plan, "compile", lambda plan: 0.0),
-            mock.patch.object(cost, "costs", self.costs),
-            mock.patch.object(cost, "thread_seconds", lambda: 0.0),
-        ]
-        for patch in self.patches:
-            patch.start()
-        return self
 
-    def __exit__(self, *_):
-        for patch in self.patches:
-            patch.stop()
+def on(sample, kernels):
+    """The same sample, whose runs are made by others: by sizes of errors, or by what stands for the kernels."""
+    sample = copy.copy(sample)
+    sample.kernels = Runs(kernels) if isinstance(kernels, dict) else kernels
+    return sample
+
+
+def tradeoff_by(runs, fleet, of="position", methods=None, members=128, seconds=ENOUGH, **parts):
+    """A trade-off up to 4 s whose runs are made by `runs`."""
+    sample, names = Sample(fleet, 4.0, members, kernels=runs), tradeoffs.chosen_methods(methods)
+    parts = {"grown": lambda *_: GROWN} | parts
+    return tradeoffs.tradeoff_on(sample, compared.compared_in(of), names, seconds, void, methods is not None, **parts)
+
+
+def suggestion_by(runs, fleet, error, methods=suggest.CANDIDATES, seconds=ENOUGH, named=False, **settings):
+    """A suggestion for an error of position up to 4 s whose runs are made by `runs`."""
+    sample = Sample(fleet, 4.0, 128, suggest.TIMES, kernels=runs)
+    of = compared.compared_in("position")
+    return suggest.suggestion_on(sample, of, error, methods, seconds, void, named, **settings)
 
 
 def fleet_of(scene, n=4):
@@ -280,29 +294,30 @@ def test_two_methods_of_a_reference_are_of_like_order():
 def test_extrapolation_takes_out_two_orders(scene):
     sample = Sample(fleet_of(scene), 4.0, samples=5)
 
-    def cubic(plan, threads, executor=None):
+    def cubic(plan):
         h, t = plan.grid.h, plan.grid.times
         path = exact(t, 4)
         path[..., 0] += (2.0 * h**2 + 5.0 * h**3) * t[:, None]
         return dataclasses.replace(made(path, t), compile_seconds=h)
 
-    with mock.patch.object(comparison, "run_plan", cubic):
-        found = comparison.extrapolated(sample, "psi_s", 2)
-        np.testing.assert_allclose(found.position, exact(sample.times, 4), atol=1e-13)
-        assert found.compile_seconds == pytest.approx(0.4 + 0.2 + 0.1)
-        plain = comparison.extrapolated(sample, "rk4", 2)
-        assert plain.compile_seconds == 0.4
-        assert np.abs(plain.position - exact(sample.times, 4)).max() > 1.0
-        noisy = comparison.extrapolated(sample.on_grid(8), "psi_s", 2)
-        assert noisy.compile_seconds == 0.4
+    sample = on(sample, SimpleNamespace(run=cubic))
+    found = comparison.extrapolated(sample, "psi_s", 2)
+    np.testing.assert_allclose(found.position, exact(sample.times, 4), atol=1e-13)
+    assert found.compile_seconds == pytest.approx(0.4 + 0.2 + 0.1)
+    plain = comparison.extrapolated(sample, "rk4", 2)
+    assert plain.compile_seconds == 0.4
+    assert np.abs(plain.position - exact(sample.times, 4)).max() > 1.0
+    noisy = comparison.extrapolated(sample.on_grid(8), "psi_s", 2)
+    assert noisy.compile_seconds == 0.4
 
 
 def test_a_reference_is_refined_until_it_agrees(scene):
     sample = Sample(fleet_of(scene), 4.0, samples=5)
     sizes = {"rk8": 1.0, "kl8(psi_x)": 3.0}
     shares = []
-    with Runs(sizes) as runs:
-        coarse = comparison.make_reference(sample, goal=1e-3, seconds=ENOUGH, report=shares.append)
+    runs = Runs(sizes)
+    sample = on(sample, runs)
+    coarse = comparison.make_reference(sample, goal=1e-3, seconds=ENOUGH, report=shares.append)
     m = sample.coarsest(0.5)
     while True:
         finer = max(m + 1, round(1.5 * m))
@@ -315,45 +330,47 @@ def test_a_reference_is_refined_until_it_agrees(scene):
     assert coarse.methods == ("kl8(psi_x)", "rk8")
     assert coarse.text == f"rk8 at h = {h:.4g} s against kl8(psi_x) at h = {H:.4g} s"
     assert coarse.asked.name == "position"
-    assert runs.settings[-2:] == [("kl8(psi_x)", "float64", H, 1), ("rk8", "float64", h, 1)]
+    assert runs.settings[-2:] == [("kl8(psi_x)", "float64", H), ("rk8", "float64", h)]
     assert len(shares) >= 1
     assert coarse.result.provenance["step"] == h
     assert coarse.sample is sample
-    with Runs(sizes) as runs:
-        best = comparison.make_reference(sample, "position[0]", seconds=ENOUGH, methods=["rk8", "rk4", "psi_s"])
+    best = comparison.make_reference(sample, "position[0]", seconds=ENOUGH, methods=["rk8", "rk4", "psi_s"])
     assert best.methods == ("rk8", "psi_s")
     assert best.asked.name == "position[0]"
     assert best.error("position") < 1e-12
     # No better twice, and it ends.
-    with Runs({}) as runs:
-        comparison.make_reference(sample, seconds=ENOUGH, methods=["rk8", "rk5"], goal=-1.0)
+    runs = Runs({})
+    comparison.make_reference(on(sample, runs), seconds=ENOUGH, methods=["rk8", "rk5"], goal=-1.0)
     assert len(runs.settings) == 2 * 3
-    with Runs(sizes) as runs:
-        comparison.make_reference(sample, seconds=0.0)
+    runs = Runs(sizes)
+    comparison.make_reference(on(sample, runs), seconds=0.0)
     assert len(runs.settings) == 2
 
 
 def test_a_reference_in_noise_shares_its_draws(scene):
     noisy = lw.Ensemble(dataclasses.replace(scene, terms=[CURRENT]), 2)
     sample = Sample(noisy, 4.0, samples=5)
-    with Runs({}) as runs:
-        reference = comparison.make_reference(sample, seconds=0.0)
+    runs = Runs({})
+    reference = comparison.make_reference(on(sample, runs), seconds=0.0)
     m = 3 * 2 ** math.ceil(math.log2(8.0 * sample.coarsest(0.5) / 3.0))
     assert reference.methods == ("psi_x", "psi_s")
     assert reference.sample.draws == 2 * m
-    assert [h for _, _, h, _ in runs.settings] == [sample.h(m), sample.h(2 * m)]
+    assert [h for _, _, h in runs.settings] == [sample.h(m), sample.h(2 * m)]
     fixed = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[dataclasses.replace(CURRENT, noise_step=0.1)]), 2), 4.0,
                    samples=5)  # fmt: skip
-    with Runs({}) as runs:
-        reference = comparison.make_reference(fixed, seconds=ENOUGH)
-    assert [h for _, _, h, _ in runs.settings] == [fixed.h(4), fixed.h(8)]
+    runs = Runs({})
+    reference = comparison.make_reference(on(fixed, runs), seconds=ENOUGH)
+    assert [h for _, _, h in runs.settings] == [fixed.h(4), fixed.h(8)]
     assert reference.sample.draws == 8
 
 
 def test_a_scene_without_a_precise_method_has_no_reference(scene):
-    sample = Sample(fleet_of(scene), 4.0)
-    with mock.patch.object(Sample, "accepted", lambda *_, **__: ([], {})), pytest.raises(lw.SceneError) as caught:
-        comparison.make_reference(sample)
+    class Refusing(Sample):
+        def accepted(self, *_, **__):
+            return [], {}
+
+    with pytest.raises(lw.SceneError) as caught:
+        comparison.make_reference(Refusing(fleet_of(scene), 4.0))
     assert "method: the scene takes none of kl8(psi_x), rk8, " in str(caught.value)
     assert "name one that it takes: methods=[...]" in str(caught.value)
 
@@ -391,7 +408,7 @@ def test_growth_is_of_two_runs_whose_attitudes_differ(scene):
     sample = Sample(fleet, 4.0, samples=5)
     starts = []
 
-    def run(plan, threads, executor=None):
+    def run(plan):
         state = plan.ensemble.select(0, 3)
         starts.append((plan.ensemble, state))
         t = plan.grid.times
@@ -400,8 +417,7 @@ def test_growth_is_of_two_runs_whose_attitudes_differ(scene):
             path[..., 0] += 1e-8 * np.exp(0.5 * t)[:, None]
         return made(path, t, attitude=np.broadcast_to(state.attitude, (len(t), 3, 3, 3)))
 
-    with mock.patch.object(comparison, "run_plan", run):
-        grown = comparison.growth(sample, sample.candidate("rk4", 2))
+    grown = comparison.growth(on(sample, SimpleNamespace(run=run)), sample.candidate("rk4", 2))
     assert np.hypot(np.exp(0.5 * grown.times), 1.0) == pytest.approx(grown.curve, rel=1e-6)
     turn = np.swapaxes(starts[0][1].attitude, 1, 2) @ starts[1][1].attitude
     angle = np.linalg.norm(turn - np.eye(3), axis=(1, 2)) / math.sqrt(2.0)
@@ -480,12 +496,11 @@ def test_a_quantitys_distance_and_size():
 
 
 def test_angles_differ_the_short_way_round():
-    angles = {1: 3.1, 2: -3.1}
-    heading = compared.Compared("heading", "rad", lambda samples, members: np.full((1, 1, 1), angles[samples]))
-    with mock.patch.object(compared, "samples_of", lambda result: (result, None)):
-        assert heading.distance(1, 2) == pytest.approx(np.array([[2.0 * np.pi - 6.2]]))
-        plain = dataclasses.replace(heading, unit="m")
-        assert plain.distance(1, 2) == pytest.approx(np.array([[6.2]]))
+    one, other = (made(np.full((2, 1, 3), angle)) for angle in (3.1, -3.1))
+    heading = compared.Compared("heading", "rad", lambda samples, members: samples["position"][..., :1])
+    assert heading.distance(one, other) == pytest.approx(np.full((2, 1), 2.0 * np.pi - 6.2))
+    plain = dataclasses.replace(heading, unit="m")
+    assert plain.distance(one, other) == pytest.approx(np.full((2, 1), 6.2))
 
 
 def test_a_mean_is_compared_by_the_end_of_its_interval():
@@ -663,17 +678,16 @@ def test_biases_in_words():
 
 
 def reference_of(sample, sizes, goal=0.0):
-    with Runs(sizes):
-        return comparison.make_reference(sample, goal=goal, seconds=ENOUGH)
+    return comparison.make_reference(on(sample, sizes), goal=goal, seconds=ENOUGH)
 
 
 def test_a_trial_has_the_errors_of_its_run(scene):
     sample = Sample(fleet_of(scene), 4.0, samples=5)
     reference = reference_of(sample, {})
-    with Runs({"psi_s": 2.0}):
-        trial = tradeoffs.tried(sample, sample.candidate("psi_s", 4), reference)
-        early = tradeoffs.tried(sample, sample.candidate("psi_s", 4), reference, 2)
-        blind = tradeoffs.tried(sample, sample.candidate("psi_s", 4), None)
+    sample = on(sample, {"psi_s": 2.0})
+    trial = tradeoffs.tried(sample, sample.candidate("psi_s", 4), reference)
+    early = tradeoffs.tried(sample, sample.candidate("psi_s", 4), reference, 2)
+    blind = tradeoffs.tried(sample, sample.candidate("psi_s", 4), None)
     size = 2.0 * sample.h(4) ** 2
     assert trial.error("position") == pytest.approx(4 * 4.0 * size)
     assert early.error("position") == pytest.approx(4 * 1.6 * size)
@@ -682,11 +696,9 @@ def test_a_trial_has_the_errors_of_its_run(scene):
     assert trial.candidate == sample.candidate("psi_s", 4)
     assert trial.plan.grid.h == sample.h(4)
     assert trial.plan.method.name == "psi_s"
-    with Runs({"psi_s": math.inf}):
-        assert tradeoffs.tried(sample, sample.candidate("psi_s", 4), reference).errors == {}
+    assert tradeoffs.tried(on(sample, {"psi_s": math.inf}), sample.candidate("psi_s", 4), reference).errors == {}
     noisy = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[CURRENT]), 2), 4.0, samples=5).on_grid(12)
-    with Runs({}):
-        plan = tradeoffs.tried(noisy, noisy.candidate("psi_s", 4), None).plan
+    plan = tradeoffs.tried(on(noisy, {}), noisy.candidate("psi_s", 4), None).plan
     assert plan.ensemble.scene.terms[0].noise_step == pytest.approx(noisy.h(4))
 
 
@@ -694,10 +706,10 @@ def test_a_sweep_halves_steps_until_round_off(scene):
     sample = Sample(fleet_of(scene), 4.0, samples=5)
     reference = dataclasses.replace(reference_of(sample, {}), own={name: np.full(6, 1e-9) for name in NAMES})
     shares = []
-    with Runs({"psi_s": 1e-2, "psi_x": 1e-2}) as runs, mock.patch.multiple(tradeoffs, SOLVERS=(("newton", None),)):
-        trials, skipped = tradeoffs.sweep(
-            sample, ["psi_s"], reference, 5, Budget(ENOUGH), Budget(ENOUGH), shares.append
-        )
+    runs, budgets = Runs({"psi_s": 1e-2, "psi_x": 1e-2}), (Budget(ENOUGH), Budget(ENOUGH))
+    trials, skipped = tradeoffs.sweep(
+        on(sample, runs), ["psi_s"], reference, 5, *budgets, shares.append, solvers=[("newton", None)]
+    )
     assert skipped == []
     assert shares[:4] == pytest.approx([0.0, 0.125, 0.25, 0.375])
     assert min(shares[4:]) >= 0.5
@@ -726,14 +738,14 @@ def test_every_method_has_a_coarse_setting_before_any_step_is_halved(scene):
     sample = Sample(fleet_of(scene), 4.0, samples=5)
     reference = dataclasses.replace(reference_of(sample, {}), own={name: np.full(6, 1e-9) for name in NAMES})
     methods = ["psi_x", "psi_s", "rk4", "rk8"]
-    with Runs(dict.fromkeys(methods, 1e-2)) as runs:
-        tradeoffs.sweep(sample, methods, reference, 5, Budget(ENOUGH), Budget(ENOUGH), lambda part: None)
+    runs = Runs(dict.fromkeys(methods, 1e-2))
+    tradeoffs.sweep(on(sample, runs), methods, reference, 5, Budget(ENOUGH), Budget(ENOUGH), lambda part: None)
     coarsest = sample.h(sample.coarsest(1.0))
-    firsts = [name for name, dtype, h, _ in runs.settings[:4] if (dtype, h) == ("float64", coarsest)]
+    firsts = [name for name, dtype, h in runs.settings[:4] if (dtype, h) == ("float64", coarsest)]
     assert firsts == methods
     # Then in turn: no series is more than one halving ahead of another that still goes on.
-    halved = [h for _, _, h, _ in runs.settings if h < coarsest]
-    assert {name for name, _, h, _ in runs.settings if h == 0.5 * coarsest} == set(methods)
+    halved = [h for _, _, h in runs.settings if h < coarsest]
+    assert {name for name, _, h in runs.settings if h == 0.5 * coarsest} == set(methods)
     assert halved[: len(methods)] == [0.5 * coarsest] * len(methods)
 
 
@@ -749,23 +761,25 @@ def test_a_sweep_without_time_tries_what_was_asked_for_by_name(scene):
 
     def swept(runs, whole, **more):
         trials, skipped = tradeoffs.sweep(
-            sample, ["psi_x", "rk4"], reference, 5, runs, whole, lambda part: None, **more
+            sample, ["psi_x", "rk4"], reference, 5, runs, whole, lambda part: None, compensated=(), **more
         )
         return [trial.candidate.text for trial in trials], skipped
 
-    with Runs({"psi_x": 1.0, "rk4": 1.0}), mock.patch.multiple(tradeoffs, COMPENSATED=()):
-        rest = ["psi_x float32", "rk4 float32"]
-        # Nobody named them: the first begins always.
-        assert swept(spent(2.0, 1.0), Budget(ENOUGH)) == (
-            ["psi_x float64"],
-            ["rk4 float64", *rest, "psi_x float64 at fine steps"],
-        )
-        assert swept(Budget(ENOUGH), spent(2.0, 1.0))[0][:2] == ["psi_x float64"] * 2
-        assert swept(spent(2.0, 1.0), spent(2.0, 1.0), named=True) == (
-            ["psi_x float64", "rk4 float64"],
-            [*rest, "psi_x float64 at fine steps", "rk4 float64 at fine steps"],
-        )
-        statistics, _ = tradeoffs.sweep(sample, ["psi_x"], None, 5, Budget(ENOUGH), Budget(ENOUGH), lambda part: None)
+    sample = on(sample, {"psi_x": 1.0, "rk4": 1.0})
+    rest = ["psi_x float32", "rk4 float32"]
+    # Nobody named them: the first begins always.
+    assert swept(spent(2.0, 1.0), Budget(ENOUGH)) == (
+        ["psi_x float64"],
+        ["rk4 float64", *rest, "psi_x float64 at fine steps"],
+    )
+    assert swept(Budget(ENOUGH), spent(2.0, 1.0))[0][:2] == ["psi_x float64"] * 2
+    assert swept(spent(2.0, 1.0), spent(2.0, 1.0), named=True) == (
+        ["psi_x float64", "rk4 float64"],
+        [*rest, "psi_x float64 at fine steps", "rk4 float64 at fine steps"],
+    )
+    statistics, _ = tradeoffs.sweep(
+        sample, ["psi_x"], None, 5, Budget(ENOUGH), Budget(ENOUGH), lambda part: None, compensated=()
+    )
     assert len(statistics) == 2 * 5
     assert all(trial.errors == {} for trial in statistics)
 
@@ -775,30 +789,30 @@ def test_time_that_other_programs_take_does_not_end_a_search(scene, study):
     """Every run waits as on a busy machine, longer than the search may last."""
 
     class Waiting(Runs):
-        def run(self, plan, threads, executor=None):
+        def run(self, plan):
             time.sleep(0.1)
-            return super().run(plan, threads, executor)
+            return super().run(plan)
 
     sizes = dict.fromkeys(("rk8", "rk4", "psi_x", "psi_s"), 1e-2)
     methods = ["psi_x", "psi_s", "rk4", "rk8"]
     found = []
     for kind in (Runs, Waiting):
-        with kind(BAD | sizes), mock.patch.object(comparison, "growth", return_value=GROWN):
-            if study == "suggest":
-                # Enough processor time for the arithmetic of a search, and less than its runs wait.
-                one = lw.suggest(fleet_of(scene), 1e-4, t1=4.0, methods=methods, seconds=1.0)
-                found.append((one.settings, one.expected))
-            else:
-                one = lw.tradeoff(fleet_of(scene), 4.0, methods=methods, seconds=1.0)
-                found.append({m.setting.method for m in one.measurements})
+        runs = kind(BAD | sizes)
+        if study == "suggest":
+            # Enough processor time for the arithmetic of a search, and less than its runs wait.
+            one = suggestion_by(runs, fleet_of(scene), 1e-4, methods, seconds=1.0, named=True)
+            found.append((one.settings, one.expected))
+        else:
+            one = tradeoff_by(runs, fleet_of(scene), methods=methods, seconds=1.0)
+            found.append({m.setting.method for m in one.measurements})
     assert found[0] == found[1]
 
 
 def test_what_was_asked_for_and_has_no_reading_is_named(scene):
-    with Runs({"psi_s": 1e-2, "rk4": math.inf}), mock.patch.object(comparison, "growth", return_value=GROWN):
-        found = lw.tradeoff(fleet_of(scene), 4.0, methods=["psi_s", "rk4", "gauss4"], seconds=ENOUGH)
-        unasked = lw.tradeoff(fleet_of(scene), 4.0, seconds=ENOUGH)
-        brief = lw.tradeoff(fleet_of(scene), 4.0, methods=["psi_s", "rk4"], seconds=1e-6)
+    runs = Runs({"psi_s": 1e-2, "rk4": math.inf})
+    found = tradeoff_by(runs, fleet_of(scene), methods=["psi_s", "rk4", "gauss4"])
+    unasked = tradeoff_by(runs, fleet_of(scene))
+    brief = tradeoff_by(runs, fleet_of(scene), methods=["psi_s", "rk4"], seconds=1e-6)
     # With no time for more than the coarse step, that is what is told.
     assert brief.missing == {
         "rk4": "members failed at every step down to 0.2 s; for shorter ones give more seconds than 1e-06"
@@ -831,8 +845,8 @@ def test_a_reference_says_how_much_time_would_do(scene):
     assert comparison.time_over(20.0, 20.0, 0.4) == ("20 s were over", "seconds=50 would do")
     assert comparison.time_over(20.0, math.inf, 0.4) == ("20 s were over", "give more seconds")
     rough = dataclasses.replace(reference_of(sample, {}), own={"position": np.full(6, 1.0)}, text="a and b", more=20.0)
-    with mock.patch.object(comparison, "make_reference", return_value=rough), pytest.raises(lw.SceneError) as caught:
-        suggest.checked_reference(sample, of, 1e-2, 20.0, ["rk4"])
+    with pytest.raises(lw.SceneError) as caught:
+        suggest.checked_reference(sample, of, 1e-2, 20.0, ["rk4"], make_reference=lambda *_, **__: rough)
     assert str(caught.value).startswith("20 s were over; seconds=50 would do. error = 0.01 m of position")
     with pytest.raises(lw.SceneError, match=r"^20 s were over; seconds=\d+ would do\. There is no reference: a and b"):
         tradeoffs.trusted_until(rough, of, 20.0)
@@ -892,24 +906,23 @@ def test_steps_between_are_tried_near_the_front(scene):
         more.append(candidate)
         return trial(1.0, 1.0, h=candidate.h)
 
-    with mock.patch.object(tradeoffs, "tried", tried):
-        tradeoffs.between(sample, trials, reference, 4, Budget(ENOUGH))
-        assert sorted(one.h for one in more) == sorted(sample.h(m) for m in (7, 14))
-        assert len(trials) == 5
-        more.clear()
-        tradeoffs.between(sample, trials[:2], reference, 4, Budget(-1.0))
+    tradeoffs.between(sample, trials, reference, 4, Budget(ENOUGH), run=tried)
+    assert sorted(one.h for one in more) == sorted(sample.h(m) for m in (7, 14))
+    assert len(trials) == 5
+    more.clear()
+    tradeoffs.between(sample, trials[:2], reference, 4, Budget(-1.0), run=tried)
     assert more == []
 
 
 def test_measurements_are_of_trials_that_did_not_fail(scene):
     sample = Sample(fleet_of(scene), 4.0, samples=5)
     reference = dataclasses.replace(reference_of(sample, {}), own={name: np.full(6, 1e-3) for name in NAMES})
-    with Runs({"psi_s": 1.0}, {("psi_s", "float64"): 3.0}):
-        trials = [tradeoffs.tried(sample, sample.candidate("psi_s", m), reference) for m in (4, 40)]
-        lost = dataclasses.replace(trials[0], errors={})
-        slow = dataclasses.replace(trials[1], result=dataclasses.replace(trials[1].result, compile_seconds=7.0))
-        both = tradeoffs.measurements(sample, [trials[0], slow, lost], reference, reference.result, 5)
-        blind = tradeoffs.measurements(sample, [lost], None, reference.result, 5)
+    sample = on(sample, Runs({"psi_s": 1.0}, {("psi_s", "float64"): 3.0}))
+    trials = [tradeoffs.tried(sample, sample.candidate("psi_s", m), reference) for m in (4, 40)]
+    lost = dataclasses.replace(trials[0], errors={})
+    slow = dataclasses.replace(trials[1], result=dataclasses.replace(trials[1].result, compile_seconds=7.0))
+    both = tradeoffs.measurements(sample, [trials[0], slow, lost], reference, reference.result, 5)
+    blind = tradeoffs.measurements(sample, [lost], None, reference.result, 5)
     assert [one.setting for one in both] == [trials[0].candidate, trials[1].candidate]
     assert [one.us_per_vehicle_second for one in both] == pytest.approx([3.0 / sample.h(4), 3.0 / sample.h(40)])
     assert all(one.compile_seconds == 7.0 and one.order == 2 and one.cost_spread == 1.0 for one in both)
@@ -923,23 +936,17 @@ def test_measurements_are_of_trials_that_did_not_fail(scene):
 
 
 def test_a_tradeoff_says_how_far_its_reference_reaches(scene):
-    with (
-        Runs({"psi_s": 1e-2, "rk8": 1.0, "kl8(psi_x)": 1.0}) as runs,
-        mock.patch.object(comparison, "growth") as growth,
-    ):
-        growth.return_value = GROWN
-        found = lw.tradeoff(fleet_of(scene), 4.0, methods=["psi_s", "gauss4"], seconds=ENOUGH, members=3)
-        late = {name: np.array([0.0, *[1e-9] * 10, *[1.0] * 10]) for name in (*NAMES, "depth")}
-        part = comparison.make_reference(Sample(fleet_of(scene), 4.0), seconds=ENOUGH)
-        with mock.patch.object(comparison, "make_reference", return_value=dataclasses.replace(part, own=late)):
-            short = lw.tradeoff(fleet_of(scene), 4.0, "depth", methods=["psi_s"], seconds=ENOUGH)
+    runs = Runs({"psi_s": 1e-2, "rk8": 1.0, "kl8(psi_x)": 1.0})
+    found = tradeoff_by(runs, fleet_of(scene), methods=["psi_s", "gauss4"], members=3)
+    late = {name: np.array([0.0, *[1e-9] * 10, *[1.0] * 10]) for name in (*NAMES, "depth")}
+    part = dataclasses.replace(reference_of(Sample(fleet_of(scene), 4.0), runs), own=late)
+    short = tradeoff_by(runs, fleet_of(scene), "depth", ["psi_s"], make_reference=lambda *_, **__: part)
     assert (found.members, found.t1, found.until, found.of) == (3, 4.0, 4.0, "position")
     assert found.messages == ()
     assert found.units == compared.QUANTITIES
     assert found.growth is GROWN
     assert list(found.reference_error) == NAMES
     assert found.front()
-    assert {threads for *_, threads in runs.settings} == {1}
     assert short.until == 2.0
     assert short.units["depth"] == "m"
     assert short.messages[0] == ("errors of single members are up to 2 s, where the reference still agrees with itself; "
@@ -983,9 +990,9 @@ def test_growth_is_measured_at_the_references_step(scene):
     sample = Sample(fleet_of(scene), 4.0, samples=5)
     result = SimpleNamespace(provenance={"step": 0.1})
     for one, often in ((sample, 20), (sample.on_grid(16), 5)):
-        with mock.patch.object(comparison, "growth") as growth:
-            tradeoffs.growth_of(one, ["psi_s", "rk8", "rk4"], Reference(result, "", {}, one))
-        (seen, candidate), _ = growth.call_args
+        seen, candidate = tradeoffs.growth_of(
+            one, ["psi_s", "rk8", "rk4"], Reference(result, "", {}, one), measure=lambda *given: given
+        )
         assert candidate.method == "rk8"
         assert len(seen.times) == often + 1
         assert seen.members == 4
@@ -1007,8 +1014,8 @@ def longest(name, error, n=4, t1=4.0):
 @pytest.mark.parametrize("error", [1e-1, 1e-3, 1e-7])
 def test_a_suggestion_is_the_cheapest_by_arithmetic(scene, error):
     fleet = fleet_of(scene)
-    with Runs(BAD | SIZES, PRICES, round_off=1e-5) as runs:
-        found = lw.suggest(fleet, error, t1=4.0, seconds=ENOUGH, threads=2)
+    runs = Runs(BAD | SIZES, PRICES, round_off=1e-5)
+    found = suggestion_by(runs, fleet, error, threads=2)
     exact_price = {name: PRICES[name, "float64"] / longest(name, error / suggest.SAFETY) for name in SIZES}
     # float32 has an error of 1.6e-4 of its own.
     least = min(exact_price, key=exact_price.get)
@@ -1019,12 +1026,7 @@ def test_a_suggestion_is_the_cheapest_by_arithmetic(scene, error):
     assert found.setting.h > 0.75 * longest(found.setting.method, error)
     assert found.us_per_vehicle_second == PRICES[found.setting.method, found.setting.dtype] / found.setting.h
     assert found.settings == found.setting.options()
-    assert (found.members, found.t1, found.of, found.unit) == (
-        4,
-        4.0,
-        "position",
-        "m",
-    )
+    assert (found.members, found.t1, found.of, found.unit) == (4, 4.0, "position", "m")
     assert found.threads == 1
     assert found.worst == (3, 2, 1, 0)
     assert found.error == error
@@ -1036,8 +1038,8 @@ def test_a_suggestion_is_the_cheapest_by_arithmetic(scene, error):
 
 
 def test_a_suggestion_that_no_step_keeps_is_refused(scene):
-    with Runs({"psi_x": 1e12, "rk8": 0.0}), pytest.raises(lw.SceneError) as caught:
-        lw.suggest(fleet_of(scene), 1e-3, t1=4.0, methods=["psi_x"], seconds=ENOUGH)
+    with pytest.raises(lw.SceneError) as caught:
+        suggestion_by(Runs({"psi_x": 1e12, "rk8": 0.0}), fleet_of(scene), 1e-3, ["psi_x"], named=True)
     assert str(caught.value) == ("error = 0.001 m of position: no step of psi_x kept it; ask for a larger error or a shorter "
                                  "t1")  # fmt: skip
 
@@ -1048,10 +1050,9 @@ def test_others_are_tried_where_the_short_list_fails(scene):
     bad = {"psi_x": 1e12, "psi_1": 1e12}
     reference = reference_of(Sample(fleet_of(scene), 4.0, 128, suggest.TIMES), {})
     names = [name for name in suggest.CANDIDATES if name in ("psi_x", "psi_1", "psi_s")]
-    with Runs(sizes | bad), mock.patch.object(suggest, "CANDIDATES", names), mock.patch.object(
-        comparison, "make_reference", return_value=reference
-    ):  # fmt: skip
-        found = lw.suggest(fleet_of(scene), 1e-3, t1=4.0, seconds=ENOUGH)
+    runs = Runs(sizes | bad)
+    known = dataclasses.replace(reference, sample=on(reference.sample, runs))
+    found = suggestion_by(runs, fleet_of(scene), 1e-3, names, make_reference=lambda *_, **__: known)
     assert found.setting.method == "psi_s"
 
 
@@ -1061,13 +1062,10 @@ def test_a_reference_that_is_too_rough_names_what_to_ask(scene):
 
     def refusal(own):
         rough = dataclasses.replace(reference_of(sample, {}), own={"position": np.array(own)}, text="a and b")
-        with (
-            mock.patch.object(comparison, "make_reference", return_value=rough) as made_reference,
-            mock.patch.object(comparison, "growth", return_value=dataclasses.replace(GROWN, power=2.0)),
-            pytest.raises(lw.SceneError) as caught,
-        ):
-            suggest.checked_reference(sample, of, 1e-2, 3.0, ["rk4"])
-        assert made_reference.call_args.kwargs == {"goal": 1e-2 / 30.0, "seconds": 0.4 * 3.0}
+        make, grown = mock.Mock(return_value=rough), dataclasses.replace(GROWN, power=2.0)
+        with pytest.raises(lw.SceneError) as caught:
+            suggest.checked_reference(sample, of, 1e-2, 3.0, ["rk4"], make_reference=make, grown=lambda *_: grown)
+        assert make.call_args.kwargs == {"goal": 1e-2 / 30.0, "seconds": 0.4 * 3.0}
         return str(caught.value)
 
     head = "error = 0.01 m of position up to 4 s cannot be checked: a and b differ by 1.0e+00 m, and agree no better"
@@ -1076,46 +1074,44 @@ def test_a_reference_that_is_too_rough_names_what_to_ask(scene):
         "; ask for t1 (--duration) up to 0.8 s, or for a larger error")  # fmt: skip
     assert "; ask for a shorter t1 (--duration), or for a larger error" in refusal([0.0, 1e-2, 1.0, 1.0, 1.0, 1.0])
     good = dataclasses.replace(reference_of(sample, {}), own={"position": np.full(6, 1e-3)})
-    with mock.patch.object(comparison, "make_reference", return_value=good):
-        assert suggest.checked_reference(sample, of, 1e-2, 3.0, ["rk4"]) is good
+    make = lambda *_, **__: good  # noqa: E731
+    assert suggest.checked_reference(sample, of, 1e-2, 3.0, ["rk4"], make_reference=make) is good
 
 
 def test_a_step_is_lengthened_as_far_as_the_target_allows(scene):
     sample = Sample(fleet_of(scene), 4.0, samples=5)
     reference = reference_of(sample, {})
-    size = {"psi_s": 0.1}
-    with Runs(size):
+    sample = on(sample, {"psi_s": 0.1})
 
-        def at(m):
-            return tradeoffs.tried(sample, sample.candidate("psi_s", m), reference)
+    def at(m):
+        return tradeoffs.tried(sample, sample.candidate("psi_s", m), reference)
 
-        target = 4.0 * 4.0 * 0.1 * sample.h(45) ** 2 * 1.0001
-        low = at(32).error("position")
-        best = suggest.lengthened(sample, at(64), 64, low, reference, "position", target)
-        assert best.candidate.h == sample.h(45)
-        good = at(64)
-        for before in (math.inf, 0.5 * target, math.nan):
-            assert suggest.lengthened(sample, good, 64, before, reference, "position", target) is good
-        one = at(1)
-        assert suggest.lengthened(sample, one, 1, 1e9, reference, "position", 1e8) is one
-        # A step that misses the target is shortened by its order, at most twice each time.
-        short, size = suggest.refined(sample, sample.candidate("psi_s", 32), reference, "position", target, 4)
-        assert size == short.error("position") <= target
-        assert short.candidate.h == sample.h(46)
-        same, _ = suggest.refined(sample, sample.candidate("psi_s", 45), reference, "position", target, 4)
-        assert same.candidate.h == sample.h(45)
-        far, _ = suggest.refined(sample, sample.candidate("psi_s", 1), reference, "position", target, 4)
-        assert far.candidate.h == sample.h(46) or far.error("position") <= target
-    with Runs({"psi_s": math.inf}) as runs:
-        suggest.refined(sample, sample.candidate("psi_s", 10), reference, "position", target, 4)
-    assert [round(float(sample.spacing) / h) for _, _, h, _ in runs.settings] == [10, 15, 23, 35, 53, 80, 120]
+    target = 4.0 * 4.0 * 0.1 * sample.h(45) ** 2 * 1.0001
+    low = at(32).error("position")
+    best = suggest.lengthened(sample, at(64), 64, low, reference, "position", target)
+    assert best.candidate.h == sample.h(45)
+    good = at(64)
+    for before in (math.inf, 0.5 * target, math.nan):
+        assert suggest.lengthened(sample, good, 64, before, reference, "position", target) is good
+    one = at(1)
+    assert suggest.lengthened(sample, one, 1, 1e9, reference, "position", 1e8) is one
+    # A step that misses the target is shortened by its order, at most twice each time.
+    short, size = suggest.refined(sample, sample.candidate("psi_s", 32), reference, "position", target, 4)
+    assert size == short.error("position") <= target
+    assert short.candidate.h == sample.h(46)
+    same, _ = suggest.refined(sample, sample.candidate("psi_s", 45), reference, "position", target, 4)
+    assert same.candidate.h == sample.h(45)
+    far, _ = suggest.refined(sample, sample.candidate("psi_s", 1), reference, "position", target, 4)
+    assert far.candidate.h == sample.h(46) or far.error("position") <= target
+    runs = Runs({"psi_s": math.inf})
+    suggest.refined(on(sample, runs), sample.candidate("psi_s", 10), reference, "position", target, 4)
+    assert [round(float(sample.spacing) / h) for _, _, h in runs.settings] == [10, 15, 23, 35, 53, 80, 120]
 
 
 def test_the_worst_members_are_named_first(scene):
     sample = Sample(fleet_of(scene), 4.0, samples=5)
     reference = reference_of(sample, {})
-    with Runs({"psi_s": 1.0}):
-        one = tradeoffs.tried(sample, sample.candidate("psi_s", 4), reference)
+    one = tradeoffs.tried(on(sample, {"psi_s": 1.0}), sample.candidate("psi_s", 4), reference)
     assert suggest.worst_of(one, reference, "position") == (3, 2, 1, 0)
     assert suggest.worst_of(one, reference, "position", 2) == (3, 2)
 
@@ -1149,14 +1145,14 @@ def test_memory_and_time_are_those_of_all_members(scene):
     for dtype, size in (("float64", 8), ("float32", 4)):
         candidate = Candidate("psi_s", 0.1, dtype)
         assert suggest.memory_of(fleet, candidate, 4.0) == 1000 * (9 * 18 * size + suggest.BYTES_OF_A_MEMBER)
-    with Runs({}) as runs, mock.patch.object(cost, "timed") as timed:
-        timed.side_effect = lambda calls, rounds: (calls[0](), np.array([[3.0, 2.0]]))[1]
-        seconds = suggest.seconds_of(fleet, Candidate("psi_s", 0.1), 4.0)
-        few = suggest.seconds_of(fleet.subset(range(10)), Candidate("psi_s", 0.1), 4.0)
+    runs = Runs({})
+    timed = mock.Mock(side_effect=lambda calls, rounds: (calls[0](), np.array([[3.0, 2.0]]))[1])
+    seconds = suggest.seconds_of(fleet, Candidate("psi_s", 0.1), 4.0, kernels=runs, timed=timed)
+    few = suggest.seconds_of(fleet.subset(range(10)), Candidate("psi_s", 0.1), 4.0, kernels=runs, timed=timed)
     assert seconds == pytest.approx(2.0 * 1000 / 256)
     assert few == 2.0
     assert timed.call_args.args[1] == 2
-    assert {setting[:3] for setting in runs.settings} == {("psi_s", "float64", 0.1)}
+    assert set(runs.settings) == {("psi_s", "float64", 0.1)}
 
 
 def test_a_finished_run_is_checked_with_half_the_step(scene):
@@ -1165,19 +1161,14 @@ def test_a_finished_run_is_checked_with_half_the_step(scene):
         setting=Candidate("psi_s", 0.1), worst=(99, 7), asked=compared.compared_in("position"), of="position"
     )
     plan = Sample(fleet, 4.0, 100, 5).plan(Candidate("psi_s", 0.1))
-    with Runs({"psi_s": 1.0}) as runs:
-        result = runs.run(plan, 1)
-        half = runs.run(dataclasses.replace(plan, grid=plan.grid, method=Method("rk8")), 1)
-        assert half is not None
-        checks = []
+    checks = []
 
-        def run(one, threads, executor=None):
-            checks.append(one)
-            path = exact(one.grid.times, 100)[:, one.ensemble.indices]
-            return made(path, one.grid.times)
+    def run(one, threads):
+        checks.append(one)
+        path = exact(one.grid.times, 100)[:, one.ensemble.indices]
+        return made(path, one.grid.times)
 
-        with mock.patch.object(suggest, "run_plan", run):
-            error, members = suggest.verified(fleet, result, found)
+    error, members = suggest.verified(fleet, Runs({"psi_s": 1.0}).run(plan), found, run=run)
     (one,) = checks
     assert members == 64
     assert list(one.ensemble.indices) == [99, 7, *range(7), *range(8, 63)]
@@ -1212,23 +1203,23 @@ def test_ladders_give_up_what_is_dear_or_stalls(scene):
     assert ladders(4.1 * 2.0**-24 * size).dtypes != ["float64"]
     assert ladders(1e-30).dtypes == ["float64"]
     prices = {("psi_s", "float64"): 3.0, ("psi_x", "float64"): 100.0}
-    with Runs({"psi_s": 1e-2, "psi_x": 1e-2, "rk4": 1e12}, prices, round_off=1e-3):
-        one = ladders(1e-3)
-        h = (1e-3 / (1e-2 * 16.0)) ** 0.5
-        price = longest(one, "psi_s", "float64")
-        assert price == one.priced[0][0] == 3.0 / sample.h(math.ceil(0.8 / h))
-        assert longest(one, "psi_x", "float64") == math.inf
-        assert longest(one, "psi_s", "float32") is None
-        assert one.cheapest() == [one.priced[0][1]]
-        assert len(one.priced) == 1
-        assert longest(ladders(1e-3, -1.0), "rk4", "float64") is None
-        one.priced += [(1.49 * price, "near"), (1.5 * price, "far"), (1.2 * price, "nearer")]
-        assert one.cheapest()[1:] == ["nearer", "near"]
+    sample = on(sample, Runs({"psi_s": 1e-2, "psi_x": 1e-2, "rk4": 1e12}, prices, round_off=1e-3))
+    one = ladders(1e-3)
+    h = (1e-3 / (1e-2 * 16.0)) ** 0.5
+    price = longest(one, "psi_s", "float64")
+    assert price == one.priced[0][0] == 3.0 / sample.h(math.ceil(0.8 / h))
+    assert longest(one, "psi_x", "float64") == math.inf
+    assert longest(one, "psi_s", "float32") is None
+    assert one.cheapest() == [one.priced[0][1]]
+    assert len(one.priced) == 1
+    assert longest(ladders(1e-3, -1.0), "rk4", "float64") is None
+    one.priced += [(1.49 * price, "near"), (1.5 * price, "far"), (1.2 * price, "nearer")]
+    assert one.cheapest()[1:] == ["nearer", "near"]
     assert ladders(1e-3).limited_by_damping
     assert ladders(1e-3).cheapest() == []
-    for rate, limited in ((2.0, False), (2.1, True)):
-        with mock.patch.object(suggest, "h_rates", return_value={"drag": rate}) as h_rates:
-            one = ladders(1e-3)
-            one.priced = [(1.0, SimpleNamespace(candidate=Candidate("psi_s", 0.25)))]
-            assert one.limited_by_damping is limited
-            assert h_rates.call_args.args[1] == 0.25
+    damped = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[lw.Drag(linear=[1.0] * 6)]), 2), 4.0, samples=5)
+    rate = h_rates(rates(damped.ensemble), 1.0)["drag"]
+    for ratio, limited in ((1.99, False), (2.01, True)):
+        one = suggest.Ladders(damped, reference, of, 1e-3, Budget(ENOUGH))
+        one.priced = [(1.0, SimpleNamespace(candidate=Candidate("psi_s", ratio / rate)))]
+        assert one.limited_by_damping is limited

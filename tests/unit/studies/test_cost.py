@@ -90,26 +90,20 @@ def test_many_are_told_few_by_name():
     assert "m0" not in text
 
 
-def clock(monkeypatch, seconds):
-    """A clock that each call of `take` moves on."""
-    now = SimpleNamespace(time=0.0, left=list(seconds))
-    monkeypatch.setattr(cost, "thread_seconds", lambda: now.time)
+def test_calls_are_timed_in_turn_after_one_that_is_not_counted():
+    now = SimpleNamespace(time=0.0, left=[100.0, 100.0, 1.0, 2.0, 3.0, 4.0])
 
     def take(factor):
         def call():
-            now.time += factor * (now.left.pop(0) if now.left else 1.0)
+            now.time += factor * now.left.pop(0)
 
         return call
 
-    return take
+    readings = cost.timed([take(1.0), take(10.0)], 2, clock=lambda: now.time)
+    np.testing.assert_array_equal(readings, [[1.0, 3.0], [20.0, 40.0]])
 
 
-def test_calls_are_timed_in_turn_after_one_that_is_not_counted(monkeypatch):
-    take = clock(monkeypatch, [100.0, 100.0, 1.0, 2.0, 3.0, 4.0])
-    np.testing.assert_array_equal(cost.timed([take(1.0), take(10.0)], 2), [[1.0, 3.0], [20.0, 40.0]])
-
-
-def test_settings_are_priced_by_the_clock_of_the_thread(scene, monkeypatch):
+def test_settings_are_priced_by_the_clock_of_the_thread():
     """Through the machinery that trade-offs and suggestions use, with kernels that are not run."""
     slow = iter([30.0, 1.0, 7.0, 2.0] * 100)
     now = SimpleNamespace(time=0.0)
@@ -121,10 +115,6 @@ def test_settings_are_priced_by_the_clock_of_the_thread(scene, monkeypatch):
         def advance(self, first, stop):
             now.time += TRUE[self.plan.spec.name] * (stop - first) * self.plan.ensemble.members * next(slow)
 
-    monkeypatch.setattr(cost, "thread_seconds", lambda: now.time)
-    monkeypatch.setattr(cost, "Packets", Packets)
-    monkeypatch.setattr(cost, "work_grows", lambda plan: False)
-
     def plan(name, h):
         spec = SimpleNamespace(name=name, width=8)
         ensemble = SimpleNamespace(members=128, select=lambda first, stop: None)
@@ -132,11 +122,10 @@ def test_settings_are_priced_by_the_clock_of_the_thread(scene, monkeypatch):
         return SimpleNamespace(spec=spec, grid=SimpleNamespace(h=h), ensemble=ensemble, method=method)
 
     plans = [plan(name, h) for name in TRUE for h in STEPS]
-    prices = cost.costs(plans)
+    prices = cost.costs(plans, make=Packets, clock=lambda: now.time, grows=lambda plan: False)
     for one, price in zip(plans, prices, strict=True):
         assert price.us_per_vehicle_second * one.grid.h == pytest.approx(1e6 * TRUE[one.spec.name], rel=1e-9)
         assert price.spread > cost.DISAGREE
-    assert tradeoffs.costs(plans)[0] == pytest.approx(prices[0].us_per_vehicle_second)
 
 
 def found(spread):

@@ -13,41 +13,44 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.common import machine
 from lgvi_warp.engine import widths
-from lgvi_warp.engine.plan import Plan
+from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.studies import cost, files, members, scaling, speed
 from lgvi_warp.studies import packet_width as tuning
 from lgvi_warp.studies.cost import Cost, Kind
 
 
-@pytest.fixture
-def clock(monkeypatch):
-    """Time that only the test moves on, read by `least`."""
-    now = SimpleNamespace(time=0.0)
-    monkeypatch.setattr(speed, "time", SimpleNamespace(perf_counter=lambda: now.time))
-    monkeypatch.setattr(Plan, "compile", lambda plan: 0.0)
-    return now
+class Clock:
+    """Time that only the test moves on."""
+
+    def __init__(self):
+        self.time = 0.0
+
+    def __call__(self):
+        return self.time
 
 
-def test_costs_by_members_and_threads(clock, monkeypatch):
-    runs = []
+def test_costs_by_members_and_threads():
+    runs, clock = [], Clock()
 
-    def run_plan(plan, threads):
+    def run(plan, threads):
         runs.append((plan.ensemble.members, threads))
         clock.time += (1e-6 + 1e-9 * plan.ensemble.members * plan.grid.steps) / threads + 1e-5 * (len(runs) <= 4)
 
-    monkeypatch.setattr(scaling, "run_plan", run_plan)
-    rows = lw.scaling(speed.fleet(64), [64, 8, 8], [2, 1, 2], method="psi_s", h=0.01, t1=1.0, rounds=2)
+    fleet = speed.fleet(64)
+    sizes, counts = scaling.members_and_threads(fleet, [64, 8, 8], [2, 1, 2])
+    plans = [make_plan(fleet.subset(range(n)), "psi_s", h=0.01, t1=1.0) for n in sizes]
+    rows = scaling.timed_runs(plans, counts, 2, run=run, clock=clock)
     pairs = [(n, k) for n in (8, 64) for k in (1, 2)]
     assert rows == [{"members": n, "threads": k, "steps": 100,
                      "ns_per_vehicle_step": round((1e3 + n * 100) / k / (n * 100), 3)} for n, k in pairs]  # fmt: skip
     assert runs == [(8, 1), (8, 2), (64, 1), (64, 2)] * 2
 
 
-def test_members_and_threads_by_default(clock, monkeypatch):
-    monkeypatch.setattr(scaling, "run_plan", lambda plan, threads: None)
-    monkeypatch.setattr(machine, "thread_count", lambda: 6)
-    rows = lw.scaling(speed.fleet(64), method="psi_s", h=0.01, t1=1.0)
-    assert [(row["members"], row["threads"]) for row in rows] == [(n, k) for n in (1, 10, 64) for k in (1, 2, 4, 6)]
+def test_members_and_threads_by_default():
+    sizes, counts = scaling.members_and_threads(speed.fleet(64), None, None)
+    assert sizes == [1, 10, 64]
+    assert counts == scaling.rising(2, machine.thread_count())
+    assert scaling.rising(2, 6) == [1, 2, 4, 6]
     assert scaling.rising(10, 1) == [1]
     assert scaling.rising(10, 10) == [1, 10]
     assert scaling.rising(10, 100) == [1, 10, 100]
@@ -66,34 +69,23 @@ def test_numbers_of_members_and_threads_that_are_none(arguments, words):
     assert words in str(caught.value)
 
 
-def test_what_each_term_costs(clock, monkeypatch):
+def test_what_each_term_costs():
     """Ten nanoseconds without terms, seven more for each of a scene's."""
-    asked = []
-
-    def costs(plans, rounds):
-        asked.append((plans, rounds))
-        return [Cost(1e-3 * (10.0 + 7.0 * len(plan.ensemble.scene.terms)) / plan.grid.h, 1.0) for plan in plans]
-
-    monkeypatch.setattr(scaling, "costs", costs)
     drag, wrench = lw.Drag(linear=[1.0] * 6), lw.Wrench(force=[1.0, 0.0, 0.0])
     scene = dataclasses.replace(speed.example(), terms=[drag, wrench])
-    rows = lw.term_cost(scene, method="psi_x", h=0.02, dtype="float32", members=16, rounds=3)
+    plans = scaling.plans_of_terms(scene, 16, "psi_x", 0.02, "float32")
+    prices = [Cost(1e-3 * (10.0 + 7.0 * len(plan.ensemble.scene.terms)) / plan.grid.h, 1.0) for plan in plans.values()]
     names = [("none", 10.0), ("drag", 17.0), ("wrench", 17.0), ("all terms", 24.0)]
-    assert rows == [{"term": name, "method": "psi_x", "dtype": "float32", "ns_per_vehicle_step": ns,
-                     "more_than_none": ns - 10.0} for name, ns in names]  # fmt: skip
-    ((plans, rounds),) = asked
-    assert rounds == 3
-    assert all(plan.ensemble.members == 16 and plan.grid.h == 0.02 and plan.grid.steps == 10 for plan in plans)
-    assert [row["term"] for row in lw.term_cost(dataclasses.replace(scene, terms=[drag]), method="psi_x", h=0.02)] == [
+    assert scaling.priced(plans, prices) == [
+        {"term": name, "method": "psi_x", "dtype": "float32", "ns_per_vehicle_step": ns, "more_than_none": ns - 10.0}
+        for name, ns in names]  # fmt: skip
+    assert all(plan.ensemble.members == 16 and plan.grid.h == 0.02 and plan.grid.steps == 10 for plan in plans.values())
+    assert list(scaling.plans_of_terms(dataclasses.replace(scene, terms=[drag]), 4, "psi_x", 0.02, None)) == [
         "none", "drag"]  # fmt: skip
     run = dataclasses.replace(scene.run, method="rk4", step=0.05)
-    rows = lw.term_cost(dataclasses.replace(scene, run=run, events=[{"type": "floor", "depth": 20.0}]))
-    assert {row["method"] for row in rows} == {"rk4"}
-    assert asked[-1][1] == 5
-    for plan in asked[-1][0]:
-        assert plan.grid.h == 0.05
-        assert plan.ensemble.members == 64
-        assert plan.dtype == "float64"
+    ending = dataclasses.replace(scene, run=run, events=[{"type": "floor", "depth": 20.0}])
+    for plan in scaling.plans_of_terms(ending, 64, None, 0.05, None).values():
+        assert (plan.method.name, plan.dtype, plan.grid.h, plan.ensemble.members) == ("rk4", "float64", 0.05, 64)
         assert not plan.ensemble.scene.events
     with pytest.raises(
         lw.SceneError, match=r"scene\.terms: is empty; give the scene terms whose cost is to be measured"
@@ -102,24 +94,22 @@ def test_what_each_term_costs(clock, monkeypatch):
 
 
 @pytest.mark.parametrize(("faster", "better"), [(0.96, True), (0.98, False)])
-def test_the_width_of_each_kernel_is_the_fastest(clock, monkeypatch, faster, better):
+def test_the_width_of_each_kernel_is_the_fastest(faster, better):
     """One width of each kernel is faster than that of the table, by enough or not."""
-    plans, seen = [], []
+    plans, seen, clock = [], [], Clock()
+    lanes_of = {"float64": 4, "float32": 8, "float32_compensated": 8}.get
 
-    def stepper(plan):
+    def prepare(plan):
         plans.append(plan)
         place = (plan.dtype, plan.spec.width)
 
         def call():
             seen.append(place)
-            lanes = machine.register_width(plan.dtype)
-            clock.time += 1e-3 * (faster if plan.spec.width == lanes else 1.0)
+            clock.time += 1e-3 * (faster if plan.spec.width == lanes_of(plan.dtype) else 1.0)
 
         return call
 
-    monkeypatch.setattr(speed, "stepper", stepper)
-    monkeypatch.setattr(machine, "register_width", lambda dtype: 4 if dtype == "float64" else 8)
-    found = list(tuning.tune(2))
+    found = list(tuning.tune(2, prepare=prepare, clock=clock, register_width=lanes_of))
     assert [one.kernel for one in found] == list(widths.KERNELS)
     for one in found:
         kind, dtype = widths.parts(one.kernel)
@@ -143,7 +133,8 @@ def test_the_width_of_each_kernel_is_the_fastest(clock, monkeypatch, faster, bet
     assert len(seen) == 2 * len(plans)
 
 
-def test_the_least_reading_counts_without_a_first_call(clock):
+def test_the_least_reading_counts_without_a_first_call():
+    clock = Clock()
     lengths = {"a": iter([3.0, 1.0, 2.0]), "b": iter([5.0, 6.0, 4.0])}
     calls = []
 
@@ -151,34 +142,28 @@ def test_the_least_reading_counts_without_a_first_call(clock):
         calls.append(name)
         clock.time += next(lengths[name])
 
-    assert speed.least([lambda: call("a"), lambda: call("b")], 3) == [1.0, 4.0]
+    assert speed.least([lambda: call("a"), lambda: call("b")], 3, clock=clock) == [1.0, 4.0]
     assert calls == ["a", "b"] * 3
 
 
 # Costs
 
 
-def test_costs_that_are_unsure_are_read_again(monkeypatch):
+def test_costs_that_are_unsure_are_read_again():
     """Of two kernels one is disturbed: it alone is read again, at most three times, until two readings are near."""
-    left = {"quiet": iter([1.0] * 9), "busy": iter([1.0, 9.0, 5.0, 3.0, 2.0, 2.05] + [1.0] * 9)}
-    plans = [SimpleNamespace(spec=name, grid=SimpleNamespace(h=0.5)) for name in left]
-    timed = []
+    left = [iter([1.0] * 9), iter([1.0, 9.0, 5.0, 3.0, 2.0, 2.05] + [1.0] * 9)]
+    read = []
 
-    def timed_calls(calls, rounds):
-        timed.append([call() for call in calls])
-        return np.array([[next(left[name]) for _ in range(rounds)] for name in timed[-1]])
+    def of_kinds(which):
+        read.append(list(which))
+        return np.array([[next(left[i]) for _ in range(2)] for i in which])
 
-    monkeypatch.setattr(
-        cost, "launches", lambda plans: ([lambda n=plan.spec: n for plan in plans], np.full((2, 1), 4.0))
-    )
-    monkeypatch.setattr(cost, "work_grows", lambda plan: False)
-    monkeypatch.setattr(cost, "timed", timed_calls)
-    # Readings of a step are a quarter of a launch's: 1, 9 | 5, 3 | 2, 2.05 | 1, 1.
-    quiet, busy = cost.costs(plans, 2)
-    assert timed == [["quiet", "busy"], ["busy"], ["busy"], ["busy"]]
-    assert quiet == Cost(1e6 * 0.25 / 0.5, 1.0)
-    assert busy.us_per_vehicle_second == 1e6 * 0.25 / 0.5
-    assert busy.spread == np.median([1, 9, 5, 3, 2, 2.05, 1, 1])
+    kinds = [Kind("quiet", 0.5), Kind("busy", 0.5)]
+    seconds = cost.readings(kinds, of_kinds)
+    assert read == [[0, 1], [1], [1], [1]]
+    nan = np.nan
+    np.testing.assert_array_equal(seconds, [[1, 1, *[nan] * 6], [1, 9, 5, 3, 2, 2.05, 1, 1]])
+    assert cost.of_steps(kinds, seconds) == [(1.0, 1.0), (1.0, np.median([1, 9, 5, 3, 2, 2.05, 1, 1]))]
 
 
 def test_disagreement_is_above_its_bound():
@@ -208,7 +193,7 @@ def test_readings_near_the_least():
     assert (short, long) == (3.0, 1.0)
 
 
-def test_launches_are_long_enough_to_time(monkeypatch):
+def test_launches_are_long_enough_to_time():
     """A step that costs `price` for each vehicle is launched so often that it takes two milliseconds."""
     now, asked = SimpleNamespace(time=0.0), []
 
@@ -221,14 +206,15 @@ def test_launches_are_long_enough_to_time(monkeypatch):
             asked.append((first, stop))
             now.time += self.plan.price * (stop - first) * self.plan.ensemble.members
 
-    monkeypatch.setattr(cost, "Packets", Packets)
-    monkeypatch.setattr(cost, "thread_seconds", lambda: now.time)
-
     def plan(price, n=100, stages=1):
         return SimpleNamespace(price=price, spec=SimpleNamespace(width=8), method=SimpleNamespace(stages=(1.0,) * stages),
                                ensemble=SimpleNamespace(members=n, select=lambda a, b: ("members", a, b)))  # fmt: skip
 
-    calls, steps = cost.launches([plan(20e-9), plan(1.0), plan(1e-15), plan(20e-9, 100, 10), plan(20e-9, 2)])
+    calls, steps = cost.launches(
+        [plan(20e-9), plan(1.0), plan(1e-15), plan(20e-9, 100, 10), plan(20e-9, 2)],
+        make=Packets,
+        clock=lambda: now.time,
+    )
     assert [stop for _, stop in asked] == [200, 200, 200, 20, 2500]
     assert all(first == 0 for first, _ in asked)
     assert steps[:, 0] == pytest.approx([1000 * 100, 10 * 100, 100_000 * 100, 1000 * 100, 50_000 * 2], rel=1e-2)
@@ -326,10 +312,10 @@ def test_speeds_beside_the_peak_of_the_core():
     assert [term.key for term in example.scene.terms] == ["drag"]
     assert example.vary["start.angular_velocity"].relative == 0.1
     assert example.scene.vehicle.mass == 123.8
-    with mock.patch.object(speed, "Packets") as packets, mock.patch.object(Plan, "compile") as compiled:
-        plan = scaling.make_plan(example, "psi_s", h=0.01, t1=1.0)
-        call = speed.stepper(plan)
-        assert compiled.called
-        assert packets.call_args.args[0] is plan
-        call()
+    packets, plan = mock.Mock(), mock.Mock()
+    plan.grid.steps = 100
+    call = speed.stepper(plan, make=packets)
+    plan.compile.assert_called_once_with()
+    assert packets.call_args.args[0] is plan
+    call()
     packets.return_value.advance.assert_called_once_with(0, 100)

@@ -140,10 +140,7 @@ def test_numbers_of_quantities_and_of_metrics(monkeypatch):
     told = Told(monkeypatch, lambda X: np.array([1.0, np.inf]))
     plain = numbers.Numbers(SCENE, ["a"], "of", "max(depth)", {"h": 0.1})
     assert (plain.label, plain.of_metric) == ("max(depth)", False)
-    assert plain(lambda run: run(None)).tolist() == [
-        1.0,
-        np.inf,
-    ]
+    assert plain(lambda run: run(None)).tolist() == [1.0, np.inf]
     assert told.asked == [((SCENE, ["a"], "max(depth)"), {"failed": "nan", "h": 0.1})]
     assert numbers.Numbers(SCENE, None, "of", test_risks_at_their_ends, {}).label == "test_risks_at_their_ends"
     with pytest.raises(lw.SceneError, match="of = '3 numbers': is not a single number; name one of its entries"):
@@ -170,17 +167,10 @@ def test_the_worst_case_of_a_sum(monkeypatch):
     assert found.parameters == {"vehicle.mass": 4.0, "drag.linear[0]": 1.0}
     assert found.value == 4.0
     assert found.at_bounds == {"vehicle.mass": "high", "drag.linear[0]": "low"}
-    assert (found.of, found.worst) == (
-        "depth",
-        "largest",
-    )
+    assert (found.of, found.worst) == ("depth", "largest")
     ((scene, names, of), settings) = told.asked[0]
     assert (scene, names, of) == (SCENE, list(OVER), "depth")
-    assert settings == {
-        "failed": "nan",
-        "h": 0.1,
-        "common_noise": True,
-    }
+    assert settings == {"failed": "nan", "h": 0.1, "common_noise": True}
     assert shares == sorted(shares)
     assert shares[-1] == found.runs / 400
     assert len(found.restarts) == 3
@@ -228,10 +218,7 @@ def test_tuning_meets_the_same_members_and_then_fresh_ones(monkeypatch):
     depth = fleet.select(0, 5).position[:, 2]
     assert list(found.parameters.values()) == pytest.approx([2.5, 10.0], rel=1e-3)
     assert found.cost == pytest.approx((depth**2).mean(), rel=1e-5)
-    assert found.before == {
-        "vehicle.mass": 2.0,
-        "drag.linear[0]": 1.0,
-    }
+    assert found.before == {"vehicle.mass": 2.0, "drag.linear[0]": 1.0}
     others = lw.Ensemble(SCENE, 20, 8, STARTS).select(0, 20).position[:, 2]
     assert found.fresh_cost == pytest.approx((others**2).mean(), rel=1e-5)
     assert (found.members, found.fresh) == (5, 20)
@@ -306,20 +293,11 @@ def test_margins_in_words_and_by_member():
     assert found.reasons == {"at its limit: fins[1]": 1}
     plain = found.to_dict()
     assert plain["why"] == ["", "", "at its limit: fins[1]", ""]
-    assert plain["eigenvalues"]["gain_upper"] == [
-        2.0,
-        8.0,
-        None,
-        4.0,
-    ]
+    assert plain["eigenvalues"]["gain_upper"] == [2.0, 8.0, None, 4.0]
     assert json.loads(json.dumps(plain, allow_nan=False))["runs"]["delay"] == [3.0, 1.0, None, 2.0]
     assert lines[2].split() == ["0", "%", "5", "%", "25", "%", "50", "%", "75", "%", "95", "%", "100", "%"]
     assert lines[4].split() == ["gain_upper", "2", "2", "2", "4", "8", "8", "8"]
-    assert lines[5].split()[:3] == [
-        "delay",
-        "s",
-        "0.1",
-    ]
+    assert lines[5].split()[:3] == ["delay", "s", "0.1"]
     assert found.percentiles([50.0])["delay"].tolist() == [0.2]
     assert found.members == 4
     x, share = found.curve("gain_upper")

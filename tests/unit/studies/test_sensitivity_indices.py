@@ -61,14 +61,7 @@ def test_a_table_in_words():
     lines = str(effects()).splitlines()
     assert lines[0] == "Morris screening: 8 samples, 48 members, 1 failed"
     assert lines[4].split() == ["factor", "mu_star", "mu", "sigma"]
-    assert lines[5].split() == [
-        "a",
-        "0.5",
-        "+-",
-        "0.05",
-        "-0.5",
-        "1.5",
-    ]
+    assert lines[5].split() == ["a", "0.5", "+-", "0.05", "-0.5", "1.5"]
     assert not any("with" in line for line in str(sobol_indices(second=False)).splitlines())
 
 
@@ -165,10 +158,7 @@ def test_indices_are_saltellis_of_a_sum_and_a_product():
     fleet, made = of_design(Saltelli(True, 8), 1024, lambda x, y, m: (x + y, (x - 0.5) * (m - 2.0)))
     found = analyses.sobol_of(fleet, made, confidence=0.9)
     assert found.factors == ("start.position[0]", "start.position[1]", "vehicle.mass")
-    assert found.quantities == (
-        "q",
-        "r",
-    )
+    assert found.quantities == ("q", "r")
     assert found.first[0] == pytest.approx([0.2, 0.8, 0.0], abs=0.03)
     assert found.total[0] == pytest.approx([0.2, 0.8, 0.0], abs=0.03)
     assert found.first[1] == pytest.approx([0.0, 0.0, 0.0], abs=0.1)

@@ -17,22 +17,20 @@ def test_a_record_tells_nanoseconds_and_the_part_of_the_peak():
     assert (found["method"], found["dtype"], found["width"]) == ("psi_s", "float64", 8)
 
 
-def test_times_are_by_vehicle_and_step(monkeypatch):
+def test_times_are_by_vehicle_and_step():
     """400 vehicles of 50 steps in 0.4 ms are 20 ns a vehicle and step, next to the peak of the same precision."""
     asked = []
-    monkeypatch.setattr(
-        speed, "stepper", lambda plan: asked.append((plan.ensemble.members, plan.grid.steps, plan.dtype))
-    )
-    monkeypatch.setattr(speed, "interleaved", lambda calls: [4e-4 for _ in calls])
-    monkeypatch.setattr(speed, "fma_peak", {"float64": 50e9, "float32": 100e9}.get)
-    found = [json.loads(line) for line in speed.measure(400, 50)]
+    prepare = lambda plan: asked.append((plan.ensemble.members, plan.grid.steps, plan.dtype))  # noqa: E731
+    peak = {"float64": 50e9, "float32": 100e9}.get
+    lines = speed.measure(400, 50, prepare=prepare, timed=lambda calls: [4e-4 for _ in calls], peak_of=peak)
+    found = [json.loads(line) for line in lines]
     assert asked == [(400, 50, "float64"), (400, 50, "float32")]
     assert [(one["dtype"], one["ns_per_vehicle_step"], one["peak_gfma"]) for one in found] == [
         ("float64", 20.0, 50.0), ("float32", 20.0, 100.0)
     ]  # fmt: skip
 
 
-def test_readings_are_medians_in_turn(monkeypatch):
+def test_readings_are_medians_in_turn():
     """Each call is made once before it counts; then all take turns, and of each the median time is told."""
     calls = []
     now, lengths = 0.0, {"a": iter([9.0, 1.0, 5.0, 2.0]), "b": iter([9.0, 30.0, 10.0, 20.0])}
@@ -42,6 +40,6 @@ def test_readings_are_medians_in_turn(monkeypatch):
         calls.append(name)
         now += next(lengths[name])
 
-    monkeypatch.setattr(speed.time, "perf_counter", lambda: now)
-    assert speed.interleaved([lambda: call("a"), lambda: call("b")], rounds=3) == [2.0, 20.0]
+    readings = speed.interleaved([lambda: call("a"), lambda: call("b")], rounds=3, clock=lambda: now)
+    assert readings == [2.0, 20.0]
     assert calls == ["a", "b"] * 4

@@ -5,7 +5,6 @@ import dataclasses
 import json
 import math
 from types import SimpleNamespace
-from unittest import mock
 
 import numpy as np
 import pytest
@@ -22,7 +21,7 @@ from lgvi_warp.studies.distance import compared_in
 from lgvi_warp.studies.stability import runs
 from lgvi_warp.studies.stability.grid import ALIASES, Axis, Line, StabilityGrid, axis_of, rotation_vectors
 from lgvi_warp.studies.stability.limits import oscillation_limit, rotation_limit
-from lgvi_warp.studies.stability.map import Cell, StabilityMap, cells_of, report_text
+from lgvi_warp.studies.stability.map import Cell, StabilityMap, cells_of, map_of, report_text
 from lgvi_warp.studies.stability.runs import REFUSED, Found, column
 from tests.support.made import made
 
@@ -376,10 +375,7 @@ def test_axes_are_read_in_every_form():
     assert axis_of(axis) is axis
     assert axis_of(("h", 0.1, 1.0)) == axis == axis_of(["h", 0.1, 1.0])
     assert axis_of(" h = 0.1:1") == axis
-    assert {axis_of(f"{name}=1:2").key for name in ALIASES} == {
-        "angular_velocity",
-        "speed",
-    }
+    assert {axis_of(f"{name}=1:2").key for name in ALIASES} == {"angular_velocity", "speed"}
     with pytest.raises(lw.SceneError, match="axis = 'h=1': is not understood; write "):
         axis_of("h=1")
 
@@ -514,9 +510,8 @@ def test_references_are_refined_where_they_do_not_agree(scene):
         asked.append((plan.method.name, plan.grid.h, len(plan.ensemble.indices), threads))
         return ran(plan, 1e-3 * (len(asked) <= 4) * (len(asked) % 2) * (np.arange(plan.ensemble.members) % 2 == 1))
 
-    with mock.patch.object(runs, "run_plan", run_plan):
-        shares = []
-        text = runs.make_references(grid, [one], "position", 1e-3, 1, shares.append)
+    shares = []
+    text = runs.make_references(grid, [one], "position", 1e-3, 1, shares.append, run=run_plan)
     rate = max(values.max() for values in grid.rates().values())
     finer = math.ceil(h * rate / 0.2)
     first, second = runs.precise_pair(grid)
@@ -534,10 +529,9 @@ def test_references_are_refined_where_they_do_not_agree(scene):
 
 def test_a_scene_without_a_precise_method_has_no_map(scene):
     grid = grid_of(scene)
-    with mock.patch.object(runs, "refusals", lambda grid, names, dtype: dict.fromkeys(names, "no")), pytest.raises(
-        lw.SceneError, match=r"method: the scene takes none of kl8\(psi_x\), .* for a reference"
-    ):  # fmt: skip
-        runs.precise_pair(grid)
+    refusing = lambda grid, names, dtype: dict.fromkeys(names, "no")  # noqa: E731
+    with pytest.raises(lw.SceneError, match=r"method: the scene takes none of kl8\(psi_x\), .* for a reference"):
+        runs.precise_pair(grid, refused=refusing)
     assert runs.precise_pair(grid) == ("kl8(psi_x)", "rk8")
 
 
@@ -617,8 +611,8 @@ def test_a_column_that_is_refused_is_tried_in_halves(scene):
     def run_plan(plan, threads):
         return made(np.zeros((len(plan.grid.times), plan.n, 3)), plan.grid.times)
 
-    with mock.patch.multiple(runs, plan_of=plan_of, run_plan=run_plan):
-        found, why = runs.run_method(grid, [one], "psi_s", "float32", compared_in("position"), "conservative", 1)
+    of, parts = compared_in("position"), {"plan_of": plan_of, "run": run_plan, "prepare": lambda plan: 0.0}
+    found, why = runs.run_method(grid, [one], "psi_s", "float32", of, "conservative", 1, **parts)
     assert why == "too heavy"
     assert asked[0] == (10, "psi_s", "float32", "all")
     assert found.status.tolist() == [0] * 6 + [REFUSED] * 4
@@ -642,10 +636,10 @@ def test_a_map_of_runs_made_by_hand(scene):
             return dataclasses.replace(result, warnings=np.ones(n, np.uint16))
         return result
 
-    with mock.patch.object(runs, "run_plan", run_plan), mock.patch.object(runs.Plan, "compile", lambda plan: 0.0):
-        found = lw.stability_map(damped, ("h", 0.1, 0.4), ("angular_velocity", 0.5, 2.0), ["psi_s", "gauss4", "rk4"],
-                                 points=(3, 2), directions=2, t1=3.0, error_time=1.0, error=0.1, of="position",
-                                 energy_bound=4.0, seed=5, dtype="float32", threads=1, progress=shares.append)  # fmt: skip
+    grid = StabilityGrid(damped, ("h", 0.1, 0.4), ("angular_velocity", 0.5, 2.0), (3, 2), 2, 5, None)
+    found = map_of(grid, ["psi_s", "gauss4", "rk4"], compared_in("position"), "float32", t1=3.0, error_time=1.0, error=0.1,
+                   energy_bound=4.0, directions=2, seed=5, threads=1, report=shares.append, run=run_plan,
+                   prepare=lambda plan: 0.0)  # fmt: skip
     assert found.classes["psi_s"].tolist() == [[0, 1, 2]] * 2
     assert found.classes["rk4"].tolist() == [[0, 0, 3]] * 2
     assert found.statuses["rk4"].tolist() == [[0, 0, 3]] * 2
@@ -659,12 +653,7 @@ def test_a_map_of_runs_made_by_hand(scene):
     assert found.provenance["dtype"] == "float32"
     assert found.provenance["energy_bound"] == 4.0
     assert found.provenance["axes"]["x"]["low"] == 0.1
-    assert set(found.provenance) >= {
-        "scene",
-        "versions",
-        "machine",
-        "checks",
-    }
+    assert set(found.provenance) >= {"scene", "versions", "machine", "checks"}
     assert {dtype for name, _, dtype, *_ in asked if name in ("psi_s", "rk4")} == {"float32"}
     assert {n for *_, n, _ in asked} == {4}
     assert shares[-1] == 1.0
@@ -682,24 +671,21 @@ def test_a_map_of_runs_made_by_hand(scene):
 
 
 def test_times_of_a_map_follow_the_fastest_motion(scene):
-    with mock.patch.object(runs, "run_plan", lambda plan, threads: ran(plan)), mock.patch.object(
-        runs.Plan, "compile", lambda plan: 0.0
-    ):  # fmt: skip
+    def of(one=scene, t1=None, error_time=None):
+        grid = StabilityGrid(one, ("h", 0.1, 0.4), "angular_velocity", (1, 1), 1, 0, None)
+        return map_of(grid, ["psi_s"], compared_in("attitude"), "float64", t1=t1, error_time=error_time, error=0.01,
+                      energy_bound=2.0, directions=1, seed=0, threads=1, run=lambda plan, threads: ran(plan),
+                      prepare=lambda plan: 0.0)  # fmt: skip
 
-        def of(one=scene, **more):
-            return lw.stability_map(
-                one, ("h", 0.1, 0.4), "angular_velocity", ["psi_s"], points=1, directions=1, threads=1, **more
-            )
-
-        period = 2.0 * math.pi / grid_of(scene).rate
-        assert (of().error_time, of().t1) == pytest.approx((period, 10.0 * period))
-        assert (of(t1=1.0).error_time, of(t1=1.0).t1) == (1.0, 1.0)
-        assert of(t1=1.0, error_time=2.0).t1 == 2.0
-        pushed = dataclasses.replace(scene, terms=[lw.Wrench(force=[500.0, 0.0, 0.0])])
-        driven = of(pushed, error_time=0.5, t1=9.0)
-        assert (driven.judged, driven.t1, driven.error_time) == ("driven", 0.5, 0.5)
-        assert of().reference.startswith("rk8 against kl8(psi_x), steps")
-        assert of().directions == 1
+    period = 2.0 * math.pi / grid_of(scene).rate
+    assert (of().error_time, of().t1) == pytest.approx((period, 10.0 * period))
+    assert (of(t1=1.0).error_time, of(t1=1.0).t1) == (1.0, 1.0)
+    assert of(t1=1.0, error_time=2.0).t1 == 2.0
+    pushed = dataclasses.replace(scene, terms=[lw.Wrench(force=[500.0, 0.0, 0.0])])
+    driven = of(pushed, error_time=0.5, t1=9.0)
+    assert (driven.judged, driven.t1, driven.error_time) == ("driven", 0.5, 0.5)
+    assert of().reference.startswith("rk8 against kl8(psi_x), steps")
+    assert of().directions == 1
 
 
 def test_what_drives_a_scene_by_kind(scene):

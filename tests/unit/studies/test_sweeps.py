@@ -3,7 +3,7 @@
 
 import csv
 import json
-from dataclasses import replace
+from dataclasses import fields, replace
 from unittest import mock
 
 import numpy as np
@@ -14,7 +14,7 @@ import lgvi_warp as lw
 from lgvi_warp.common.status import Status
 from lgvi_warp.statistics.estimates import paired
 from lgvi_warp.statistics.estimates.given_data import explained
-from lgvi_warp.studies.sweeps import cases, output, setup, success
+from lgvi_warp.studies.sweeps import cases, output, setup, success, sweep
 from lgvi_warp.studies.sweeps.file import arguments_of_file
 from lgvi_warp.studies.sweeps.record import Record, Records, key_of
 from lgvi_warp.studies.sweeps.sweep_table import coordinates
@@ -66,10 +66,23 @@ def half_of_them():
 def swept(records, names=CASES, **more):
     """A sweep whose cells show these records, in order."""
     shown = iter(records)
-    arguments = {"vary": VARY, "members": N, "seed": 3, "metrics": METRICS} | more
-    arguments.setdefault("success", {"overshoot heading": {"below": 1.5}})
-    with mock.patch.object(setup.Setup, "run", lambda self, fleet, **_: next(shown)):
-        return lw.sweep(SCENE, names, **arguments)
+    arguments = {"success": {"overshoot heading": {"below": 1.5}}} | more
+    return swept_by(lambda fleet, **_: next(shown), names, **arguments)
+
+
+def swept_by(run, names=CASES, *, success=None, baseline=None, confidence=0.95, interval="wilson", out=None, threads=None,
+             progress=None, **more):  # fmt: skip
+    """A sweep whose cells are run by `run`, from members and what solve is told to a record."""
+
+    class Made(setup.Setup):
+        def run(self, fleet, **more):
+            return run(fleet, **more)
+
+    asked = {"grid": None, "vary": VARY, "members": N, "seed": 3, "sampling": None, "metrics": METRICS}
+    asked |= {name: more.pop(name) for name in asked.keys() & more.keys()}
+    one = setup.made(SCENE, names, settings=more, **asked)
+    one = Made(**{field.name: getattr(one, field.name) for field in fields(one)})
+    return sweep.swept(one, success, baseline, confidence, interval, out, threads, "threads", None, progress)
 
 
 @pytest.fixture(scope="module")
@@ -457,10 +470,7 @@ def test_files_hold_the_tables(found, tmp_path):
     assert content["scene"]["vehicle"]["mass"] == 50.0
     assert "ensemble" not in content["scene"]
     assert content["metrics"]["iae heading"]["unit"] == "rad s"
-    assert list(content["metrics"]) == [
-        *METRICS,
-        "time_to_failure",
-    ]
+    assert list(content["metrics"]) == [*METRICS, "time_to_failure"]
     cells = [
         (cell["case"], cell["at"], cell["fixed"], bool(cell["refused"]), cell["messages"]) for cell in content["cells"]
     ]
@@ -676,10 +686,9 @@ def test_a_sweep_asks_solve_for_its_metrics_alone():
         return mock.Mock(status=np.zeros(N, np.uint8), messages=("slow",),
                          statistics={f"each {name}": one for name, one in each.items()})  # fmt: skip
 
-    with mock.patch.object(setup, "solve", solve):
-        found = lw.sweep(SCENE, vary=VARY, members=N, seed=3, metrics=METRICS, threads=2, executor="processes",
-                         scheduler="steal", h=0.01)  # fmt: skip
-    record = found.record(found.cells[0])
+    one = setup.made(SCENE, None, None, VARY, N, 3, None, METRICS, {"h": 0.01})
+    fleet, _ = one.fleet(one.cases[0], {})
+    record = one.run(fleet, simulate=solve, threads=2, executor="processes", scheduler="steal")
     assert [values.tolist() for values in record.numbers.values()] == [[i] * N for i in range(3)]
     assert list(record.numbers) == [*METRICS, "time_to_failure"]
     assert record.messages == ("slow",)
@@ -690,11 +699,9 @@ def test_a_sweep_asks_solve_for_its_metrics_alone():
     assert [one.key for one in asked["statistics"]] == list(record.numbers)
     # Of an expression over the path there is a sample at each look; without a controller, as the scene says.
     by_samples = setup.metrics_of(["max(depth)"])
-    assert replace(found.setup, metrics=by_samples).kept(found.cells[0].fleet)["save"] == lw.SaveAt(
-        every=0.1, fields=()
-    )
+    assert replace(one, metrics=by_samples).kept(fleet)["save"] == lw.SaveAt(every=0.1, fields=())
     bare = lw.Ensemble(BARE, N, 3)
-    assert replace(found.setup, metrics=by_samples).kept(bare)["save"] == lw.SaveAt(fields=())
+    assert replace(one, metrics=by_samples).kept(bare)["save"] == lw.SaveAt(fields=())
 
 
 def test_keys_are_of_all_that_decides_the_numbers(found):
@@ -750,13 +757,12 @@ def test_records_are_kept_in_files_and_refusals_in_memory(tmp_path):
 def test_progress_is_that_of_all_cells():
     shares, runs = [], []
 
-    def run(self, fleet, progress, **more):
+    def run(fleet, progress, **more):
         runs.append(more)
         progress(0.5)
         return record()
 
-    with mock.patch.object(setup.Setup, "run", run):
-        lw.sweep(SCENE, CASES, vary=VARY, members=N, metrics=METRICS, progress=shares.append, threads=2)
+    swept_by(run, progress=shares.append, threads=2)
     assert shares == pytest.approx([1 / 6, 1 / 3, 1 / 2, 2 / 3, 1.0])
     assert runs == [{"threads": 2, "executor": "threads", "scheduler": None}] * 2
 
@@ -785,22 +791,21 @@ def test_the_sweep_keeps_what_the_ensemble_says_unless_it_is_asked():
     ({"metrics": ["iae heading", lw.IAE("heading")]}, "metrics[1] = 'iae heading': is the name of another metric"),
     ({"confidence": 0.0}, "confidence = 0.0: is not between 0 and 1; give 0.95"),
     ({"confidence": 1.0}, "confidence = 1.0: is not between 0 and 1"),
-    ({"grid": {"run.step": [0.01 * i for i in range(1, 101)], "run.duration": list(range(1, 103))}}, "10,200 cells"),
 ])  # fmt: skip
 def test_what_a_sweep_is_asked_wrongly_is_refused(arguments, words):
     arguments = {"scene": SCENE, "members": N, "metrics": METRICS} | arguments
-    with (
-        mock.patch.object(setup, "_prediction", side_effect=lw.SceneError(["no"])),
-        pytest.raises(lw.SceneError) as caught,
-    ):
+    with pytest.raises(lw.SceneError) as caught:
         lw.sweep(arguments.pop("scene"), **arguments)
     assert words in str(caught.value)
-    if "10,200" in words:
-        assert "are 40 members each; give at most 10,000 cells, or vary a number" in str(caught.value)
 
 
 def test_ten_thousand_cells_are_not_too_many():
-    grid = {"run.step": [0.01 * i for i in range(1, 101)], "run.duration": list(range(1, 101))}
+    grid = {"run.step": [0.01 * i for i in range(1, 101)], "run.duration": list(range(1, 103))}
+    refused = mock.Mock(side_effect=lw.SceneError(["no"]))
+    told = r"10,200 cells': are 40 members each; give at most 10,000 cells, or vary a number"
+    with pytest.raises(lw.SceneError, match=told):
+        setup.made(SCENE, None, grid, None, N, None, None, [], {}, predict=refused)
+    grid["run.duration"] = list(range(1, 101))
     assert len(setup.made(SCENE, None, grid, None, 1, None, None, [], {}).cells) == 10_000
 
 
@@ -809,8 +814,8 @@ def test_a_plan_in_words():
         SCENE, CASES[:2], {"controller.delay": [0.02, 0.04, 0.06]}, VARY, 2000, 3, None, METRICS, {"h": 0.01}
     )
     prediction = mock.Mock(advance=4.0, set_up=1.0, compile=2.5, memory=3e6)
-    with mock.patch.object(setup, "predict", return_value=prediction) as predict:
-        text = setup.plan_text(one, 2)
+    predict = mock.Mock(return_value=prediction)
+    text = setup.plan_text(one, 2, predict=predict)
     lines = text.splitlines()
     assert lines == ["cells       6: 2 cases at 3 points of the grid", "members     2,000 of each, the same in all",
                      "time        about 30 s, and 2.5 s for each kernel", "memory      3 MB",
@@ -823,8 +828,10 @@ def test_a_plan_in_words():
     assert fleet.members == 2000
     durations = [setup.duration_text(seconds) for seconds in (119.0, 120.0, 7200.0, 3 * 86400.0, 6.3e7, 6.2e7)]
     assert durations == ["1.2e+02 s", "2 minutes", "2 hours", "3 days", "2 years", "7.2e+02 days"]
-    with mock.patch.object(setup, "_prediction", return_value=prediction):
-        assert setup.too_many_text(one, 45) == "are 2,000 members each and would take 3 minutes on this machine"
+    assert (
+        setup.too_many_text(one, 45, predict=predict)
+        == "are 2,000 members each and would take 3 minutes on this machine"
+    )
 
 
 # Files of sweeps

@@ -10,15 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common import machine
 from lgvi_warp.common.arguments import flag
-from lgvi_warp.common.errors import Faults, SceneError, refusal, shown
+from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.labelled import columns_by_name, is_labelled
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.common.status import Status, failed
 from lgvi_warp.control.signals import ordered
-from lgvi_warp.engine.executors import executor_of
-from lgvi_warp.engine.keepers.observation import observe
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.engine.shared import Shared
 from lgvi_warp.engine.survey import survey
@@ -27,8 +24,7 @@ from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.provenance import provenance
 from lgvi_warp.results.quantities import OfEnds, OfInterest, OfResult, quantities
 from lgvi_warp.results.result import Result
-from lgvi_warp.runs.run import completed
-from lgvi_warp.runs.settle import enough_iterations, make_plan
+from lgvi_warp.runs.request import Request, enough_iterations, ensemble_of, scene_of
 from lgvi_warp.sampling.designs.designs import salib_problem
 from lgvi_warp.sampling.designs.levels import UnitCubePoints
 from lgvi_warp.sampling.designs.table import Table
@@ -57,28 +53,22 @@ class _Kind:
 
 
 class Runner:
-    """Settings of a run, and the plans that they lead to: what `solve` settles once for a call, and `prepare` once for many.
+    """Plans of a request for many members, settled once: what `solve` does for a call."""
 
-    threads: number of threads; None (default) for all cores.
-    """
-
-    def __init__(
-        self,
-        scene: SceneLike,
-        settings: Mapping[str, Any],
-        statistics: Sequence[Any] = (),
-        threads: int | None = None,
-        executor: Any = "threads",
-        scheduler: str | None = None,
-    ):
-        self.scene, self.settings = scene, dict(settings)
-        self.observed = observe(1, scene.run, statistics, "all", False, scene.events, scene.controller)
-        self.executor = executor_of(executor, threads, scheduler)
-        self.threads = threads or machine.thread_count()
-        chosen = self.settings.get("method")
+    def __init__(self, request: Request):
+        self.request = request
+        scene, chosen = request.fleet.scene, request.method
         self._auto = (chosen if isinstance(chosen, Method) else scene.run.method_of(chosen)).iterations == "auto"
         self._kinds: dict[frozenset[str], _Kind] = {}
         self._last: Plan | None = None
+
+    @classmethod
+    def of(cls, fleet: Ensemble, statistics: Sequence[Any], **settings: Any) -> Runner:
+        """The runs of all members of an ensemble, whatever the scene says of statistics, keep and until."""
+        faults = Faults()
+        request = Request.of(faults, fleet, statistics=statistics, keep="all", until=False, **settings)
+        faults.raise_if_any()
+        return cls(request)
 
     def plan(self, fleet: Ensemble) -> Plan:
         """The plan of a run of some members; a kernel is chosen for what these members are, as `solve` does."""
@@ -91,17 +81,10 @@ class Runner:
             plan = kind.plans.get((method, survey(fleet, method, h, kind.shared, odd=False, most=SURVEYED).decisive))
             if plan is not None:
                 return plan.of(fleet)
-        plan = make_plan(
-            fleet,
-            **self.settings,
-            fields=self.observed.fields,
-            survey_all=False,
-            read_at_looks=self.observed.read_at_looks(),
-            looks=self.observed.looks,
-        )
+        plan = replace(self.request, fleet=fleet).plan(survey_all=False)
         plan.compile()
         if plan.method.reason:  # chosen once, by the members of the first plan
-            self.settings["method"] = plan.method
+            self.request = replace(self.request, method=plan.method)
         kind = self._kinds.setdefault(names, _Kind(plan.shared))
         facts = survey(fleet, plan.method, plan.grid.h, kind.shared, odd=False, most=SURVEYED)
         kind.plans[plan.method, facts.decisive] = self._last = plan
@@ -116,12 +99,11 @@ class Runner:
         few = {"members": fleet.members, "seed": fleet.seed, "varied": sorted(fleet.varied_names)}
 
         def known(plan: Plan) -> tuple[dict[str, Any], tuple[str, ...]]:
-            content = plan.shared("provenance", {}, lambda numbers: provenance(plan, self.observed))
+            content = plan.shared("provenance", {}, lambda numbers: provenance(plan, self.request.observed))
             return {**content, "ensemble": few}, plan.grid.messages
 
         plan = self.plan(fleet)
-        settings = dict(progress=progress, executor=self.executor, known=known, warned=warned)
-        return completed(plan, self.threads, self.observed, plan.fields, **settings)
+        return self.request.run(plan, fields=plan.fields, progress=progress, known=known, warned=warned)
 
 
 class Prepared:
@@ -454,10 +436,7 @@ def prepare(
         SceneError: For faulty arguments, all in one message.
     """
     faults = Faults()
-    if not isinstance(fleet, Ensemble | Scene):
-        problem = "is neither an Ensemble nor a Scene"
-        raise SceneError([f"fleet = {shown(fleet)}: {problem}; give lw.Scene(...) or lw.Ensemble(...)"])
-    scene = fleet.scene if isinstance(fleet, Ensemble) else fleet
+    scene = scene_of(fleet)
     interests: tuple[OfResult, ...] = ()
     if of is not None:
         with faults.including():
@@ -470,7 +449,7 @@ def prepare(
         faults.add("vary", vary, "has no distributions, which levels=True needs", "map names to distributions")
     faults.raise_if_any()
     if vary is None:
-        whole = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(scene)
+        whole = ensemble_of(fleet)
     elif distributions:
         whole = Ensemble(scene, 1, 0, vary)  # type: ignore[arg-type]
     else:
@@ -481,12 +460,11 @@ def prepare(
     settings = dict(
         method=method, h=h, t1=t1, save=save, dtype=dtype, width=width, checks=checks, on_failure=on_failure
     )
-    runner = Runner(scene, settings, [*statistics, *gathered] if gathered else statistics, threads, executor, scheduler)
-    known = settings | dict(
-        statistics=statistics, levels=levels, failed=failed, common_noise=common_noise, threads=threads, executor=executor,
-        scheduler=scheduler)  # fmt: skip
-    made_of = (fleet, vary, of), known
     first = whole if isinstance(table, str) else table
+    how = dict(threads=threads, executor=executor, scheduler=scheduler)
+    runner = Runner.of(first, [*statistics, *gathered] if gathered else statistics, **settings, **how)
+    known = settings | how | dict(statistics=statistics, levels=levels, failed=failed, common_noise=common_noise)
+    made_of = (fleet, vary, of), known
     runner.plan(first)
     first.select(0, 1)  # which keeps what all members share
     return Prepared(whole, table, names, interests, runner, columns, failed == "refuse", common_noise, made_of)

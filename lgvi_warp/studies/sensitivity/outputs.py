@@ -110,10 +110,9 @@ def evaluate(
     """
     interests, report = quantities(of), callback(progress)
     ensemble_of(fleet), flag("common_noise", common_noise)
-    how = {name: settings.pop(name) for name in ("threads", "executor", "scheduler") if name in settings}
     # The scene's own statistics, keep and until do not apply: every member of the design must run.
     gathered = statistics_for(fleet.scene, interests)
-    runner = Runner(fleet.scene, {"save": samples_for(fleet.scene, interests, save), **settings}, gathered, **how)
+    runner = Runner.of(fleet, gathered, save=samples_for(fleet.scene, interests, save), **settings)
     if common_noise:
         fleet = fleet.subset(np.arange(fleet.members))
         fleet.indices = np.zeros(fleet.members, dtype=np.int64)

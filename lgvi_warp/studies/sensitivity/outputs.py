@@ -11,12 +11,11 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from lgvi_warp.calls.prepared import PATHS_AT_ONCE, Runner, counted, lost_text, part, samples_for, statistics_for
 from lgvi_warp.calls.prepared import FailedMembers as FailedMembers
+from lgvi_warp.calls.runner import PATHS_AT_ONCE, Runner, lost_text, samples_for, statistics_for
 from lgvi_warp.common.arguments import ensemble_of, flag
 from lgvi_warp.common.errors import closest
 from lgvi_warp.common.progress import callback, shows_progress
-from lgvi_warp.common.status import failed
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.quantities import OfInterest, quantities
 from lgvi_warp.scene.ensemble import Ensemble
@@ -116,22 +115,7 @@ def evaluate(
     if common_noise:
         fleet = fleet.subset(np.arange(fleet.members))
         fleet.indices = np.zeros(fleet.members, dtype=np.int64)
-    looks_at_members = any(interest.looks_at_members for interest in interests)
-    values, status, provenance = [], [], {}
-    for first in range(0, fleet.members, PATHS_AT_ONCE):
-        chosen = np.arange(first, min(first + PATHS_AT_ONCE, fleet.members))
-        group_progress = report and part(report, first / fleet.members, (first + len(chosen)) / fleet.members)
-        group = fleet.subset(chosen)
-        result = runner.run(group, group_progress)
-        members = group.select(0, len(chosen)) if looks_at_members else None
-        values.append([interest.values(result, members) for interest in interests])
-        status.append(np.asarray(result.status))
-        provenance = result.provenance
-    numbers = np.concatenate([np.concatenate(group_values, axis=1) for group_values in values])
-    labels: list[str] = []
-    for interest, columns in zip(interests, values[0], strict=True):
-        labels += interest.labels(columns.shape[1])
-    ended = np.concatenate(status)
-    failures = failed(ended) | ~np.isfinite(numbers).all(axis=1)
-    counts = counted(ended, numbers)
-    return Outputs(numbers, tuple(labels), failures, counts, provenance | {"ensemble": fleet.to_dict()})
+    found = runner.evaluate(fleet, interests, PATHS_AT_ONCE, report)
+    labels = [label for each, width in zip(interests, found.widths, strict=True) for label in each.labels(width)]
+    content = found.provenance | {"ensemble": fleet.to_dict()}
+    return Outputs(found.values, tuple(labels), found.lost, found.counts, content)

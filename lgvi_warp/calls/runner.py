@@ -88,10 +88,11 @@ class Runner:
         names = frozenset(fleet.varied_names)
         kind = self._kinds.get(names)
         if kind is not None and self._last is not None:
-            method, h, dtype = self._last.method, self._last.grid.h, self._last.dtype
+            last = self._last
+            method = last.method
             if self._auto:
-                method = replace(method, iterations=enough_iterations(fleet, method, h, dtype))
-            plan = kind.plans.get((method, survey(fleet, method, h, kind.shared, odd=False, most=SURVEYED).decisive))
+                method = replace(method, iterations=enough_iterations(fleet, method, last.grid.h, last.dtype))
+            plan = kind.plans.get((method, survey(fleet, method, kind.shared, odd=False, most=SURVEYED).decisive))
             if plan is not None:
                 return plan.of(fleet)
         plan = replace(self.request, fleet=fleet).plan(survey_all=False)
@@ -99,7 +100,7 @@ class Runner:
         if plan.method.reason:  # chosen once, by the members of the first plan
             self.request = replace(self.request, method=plan.method)
         kind = self._kinds.setdefault(names, _Kind(plan.shared))
-        facts = survey(fleet, plan.method, plan.grid.h, kind.shared, odd=False, most=SURVEYED)
+        facts = survey(fleet, plan.method, kind.shared, odd=False, most=SURVEYED)
         kind.plans[plan.method, facts.decisive] = self._last = plan
         return plan
 

@@ -135,7 +135,7 @@ class Plan:
         faults.raise_if_any()
         checked = self.checks != "none"
         most = None if self.survey_all else SURVEYED
-        facts = survey(self.ensemble, self.method, self.grid.h, self.shared, most=most)
+        facts = survey(self.ensemble, self.method, self.shared, most=most)
         object.__setattr__(self, "_facts", facts)
         choice = choose_kernel(self.ensemble, self.method, self.grid.h, facts, built_in, checked)
         object.__setattr__(self, "kernel_choice", choice)
@@ -338,7 +338,7 @@ class Plan:
         Returns:
             False where they need more.
         """
-        facts = survey_of(members.parameters, ensemble, self.method, self.grid.h, self.shared, block)
+        facts = survey_of(members.parameters, ensemble, self.method, self.shared, block)
         return self._facts.covers(facts)
 
     def with_neighbours(self, indices: np.ndarray) -> np.ndarray:

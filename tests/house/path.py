@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How an argument travels from `lw.solve` to the kernel: `python -m tests.house.path h` prints its stays, files and climbs.
+"""How an argument travels from `lw.solve` to the kernel: `python -m tests.house.path h [scene.toml]` prints its walk.
 
-A real run is watched. A stay is a function that has the value in a name, in a container or in an attribute that it reads, or
+A real run is watched, of a scene's first members. A stay is a function that has the value in a name, in a container or in an attribute that it reads, or
 a class whose object holds it. A climb is a step of this walk, in the order of first visits, from a room to a higher one.
 """
 
@@ -17,7 +17,7 @@ from tests.house.graph import ROOMS, ROOT, SOURCE_ROOTS
 # Values that no other number of the run has.
 ARGUMENTS = {"h": 0.0123456789, "t1": 0.123456789}
 FLOORS = {room: floor for floor, rooms in enumerate(ROOMS) for room in rooms}
-MOST_ENTRIES = 32
+MOST_ENTRIES, MEMBERS = 32, 16
 # Where the kernel takes over: of what is called later nothing is looked at.
 LAUNCH = "Packets.advance"
 
@@ -85,9 +85,9 @@ class Walk:
         return list(dict.fromkeys(found[1:] for found in sorted(self.found)))
 
 
-def walked(argument):
-    """The stays of an argument of a small run."""
-    fleet = lw.Ensemble(lw.Scene.load(ROOT / "examples" / "paper.toml"), 16)
+def walked(argument, scene=ROOT / "examples" / "paper.toml"):
+    """The stays of an argument in a small run of a scene."""
+    fleet = lw.Ensemble(lw.Scene.load(scene), MEMBERS)
     walk = Walk(ARGUMENTS[argument])
     before = sys.getprofile()
     threading.setprofile(walk.watch)
@@ -106,8 +106,8 @@ def climbs(stays):
     return sum(after > before for before, after in zip(floors, floors[1:], strict=False))
 
 
-def main(argument):
-    stays = walked(argument)
+def main(argument, *scene):
+    stays = walked(argument, *scene)
     for name, _, file in stays:
         print(f"{file:45s} {name}")
     print(f"{argument}: {len(stays)} stays, {len({file for *_, file in stays})} files, {climbs(stays)} climbs")
@@ -116,4 +116,4 @@ def main(argument):
 if __name__ == "__main__":
     if sys.argv[1:2] == [] or sys.argv[1] not in ARGUMENTS:
         sys.exit(f"give one of {', '.join(ARGUMENTS)}")
-    main(sys.argv[1])
+    main(*sys.argv[1:3])

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.calls.runner import PATHS_AT_ONCE, Runner, lost_text, samples_for, statistics_for
+from lgvi_warp.calls.runner import PATHS_AT_ONCE, Runner, samples_for, statistics_for
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.labelled import columns_by_name, is_labelled
@@ -217,11 +217,10 @@ class Prepared:
             fleet, self._of, PATHS_AT_ONCE if large else fleet.members, progress, warned=False
         )
         values = found.values
-        if found.lost.any():
+        if found.failed.any():
             if self._refuse:
-                remedy = 'mend what fails, or take NaN for them: failed="nan"'
-                raise FailedMembers([lost_text(found.lost, found.counts, remedy)])
-            values = np.where(found.lost[:, None], np.nan, values)
+                raise FailedMembers([found.text('mend what fails, or take NaN for them: failed="nan"')])
+            values = np.where(found.failed[:, None], np.nan, values)
         return values[:, 0] if values.shape[1] == 1 else values
 
 
@@ -329,7 +328,7 @@ def prepare(
     )
     first = whole if isinstance(table, str) else table
     how = dict(threads=threads, executor=executor, scheduler=scheduler)
-    runner = Runner.of(first, [*statistics, *gathered] if gathered else statistics, **settings, **how)
+    runner = Runner(first, [*statistics, *gathered] if gathered else statistics, **settings, **how)
     known = settings | how | dict(statistics=statistics, levels=levels, failed=failed, common_noise=common_noise)
     made_of = (fleet, vary, of), known
     runner.plan(first)

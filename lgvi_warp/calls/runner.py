@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -38,50 +38,49 @@ class _Kind:
 
 
 @dataclass(frozen=True)
-class Evaluated:
-    """Quantities of some members.
+class Outputs:
+    """Quantities of interest of an ensemble.
 
-    values: (n, m).
-    status: (n,).
-    widths: how many of the columns are those of each quantity of interest.
-    provenance: that of the last run.
+    Attributes:
+        values: the quantities (n, m) [their units].
+        labels: names of the quantities (m,).
+        failed: whether each member failed (n,).
+        counts: name of a status -> number of members.
+        provenance: scene, settings, versions and machine of the runs.
     """
 
     values: np.ndarray
-    status: np.ndarray
-    widths: list[int]
+    labels: tuple[str, ...]
+    failed: np.ndarray
+    counts: dict[str, int]
     provenance: dict[str, Any]
 
-    @property
-    def lost(self) -> np.ndarray:
-        """Whether each member failed, or a quantity of it is not finite (n,)."""
-        return failed(self.status) | ~np.isfinite(self.values).all(axis=1)
+    def text(self, remedy: str) -> str:
+        """Describe how many members failed, and of what.
 
-    @property
-    def counts(self) -> dict[str, int]:
-        """Number of members by what became of them."""
-        names = {Status(int(code)).name.lower(): int((self.status == code).sum()) for code in np.unique(self.status)}
-        odd = int((~np.isfinite(self.values).all(axis=1)).sum())
-        return names | ({"quantity not finite": odd} if odd else {})
+        Args:
+            remedy: what the user can do, which ends the text.
+
+        Returns:
+            One line of text.
+        """
+        causes = ", ".join(f"{name} {number}" for name, number in self.counts.items() if name != "ok")
+        first, count = int(np.argmax(self.failed)), f"{int(self.failed.sum())} of {len(self.failed)}"
+        return f"{count} members failed ({causes}; the first: member {first}); {remedy}"
 
 
 class Runner:
-    """Plans of a request for many members, settled once: what `solve` does for a call."""
+    """Runs of many ensembles, with the settings of `solve`; what they share is settled once."""
 
-    def __init__(self, request: Request):
-        self.request = request
-        scene, chosen = request.fleet.scene, request.method
+    def __init__(self, fleet: Ensemble, statistics: Sequence[Any], **settings: Any):
+        faults = Faults()
+        # Every member runs, whatever the scene says of statistics, keep and until.
+        self.request = Request.of(faults, fleet, statistics=statistics, keep="all", until=False, **settings)
+        faults.raise_if_any()
+        scene, chosen = fleet.scene, self.request.method
         self._auto = (chosen if isinstance(chosen, Method) else scene.run.method_of(chosen)).iterations == "auto"
         self._kinds: dict[frozenset[str], _Kind] = {}
         self._last: Plan | None = None
-
-    @classmethod
-    def of(cls, fleet: Ensemble, statistics: Sequence[Any], **settings: Any) -> Runner:
-        """The runs of all members of an ensemble, whatever the scene says of statistics, keep and until."""
-        faults = Faults()
-        request = Request.of(faults, fleet, statistics=statistics, keep="all", until=False, **settings)
-        faults.raise_if_any()
-        return cls(request)
 
     def plan(self, fleet: Ensemble) -> Plan:
         """The plan of a run of some members; a kernel is chosen for what these members are, as `solve` does."""
@@ -126,35 +125,30 @@ class Runner:
         at_once: int,
         progress: Callable[[float], None] | None = None,
         warned: bool = True,
-    ) -> Evaluated:
+    ) -> Outputs:
         """Run members, so many at a time, and keep their quantities alone."""
         looks_at_members = any(each.looks_at_members for each in of)
-        values, status, content, n = [], [], dict[str, Any](), fleet.members
+        groups, ends, content, n = [], [], dict[str, Any](), fleet.members
         for first in range(0, n, at_once):
             stop = min(first + at_once, n)
             group = fleet if stop - first == n else fleet.subset(np.arange(first, stop))
             result = self.run(group, progress and part(progress, first / n, stop / n), warned)
             members = group.select(0, group.members) if looks_at_members else None
-            values.append([each.values(result, members) for each in of])
-            status.append(np.asarray(result.status))
+            groups.append([each.values(result, members) for each in of])
+            ends.append(np.asarray(result.status))
             content = result.provenance
-        numbers = np.concatenate([np.concatenate(of_group, axis=1) for of_group in values])
-        return Evaluated(numbers, np.concatenate(status), [columns.shape[1] for columns in values[0]], content)
+        labels = [label for each, columns in zip(of, groups[0], strict=True) for label in each.labels(columns.shape[1])]
+        values, status = np.concatenate([np.concatenate(group, axis=1) for group in groups]), np.concatenate(ends)
+        odd = ~np.isfinite(values).all(axis=1)
+        codes = np.unique(status) if status.any() else [Status.OK]
+        counts = {Status(int(code)).name.lower(): int((status == code).sum()) for code in codes}
+        counts |= {"quantity not finite": int(odd.sum())} if odd.any() else {}
+        return Outputs(values, tuple(labels), failed(status) | odd, counts, content)
 
 
 def part(progress: Callable[[float], None], begin: float, end: float) -> Callable[[float], None]:
     """Tell of a part of the work as a part of the whole."""
     return lambda fraction: progress(begin + (end - begin) * fraction)
-
-
-def lost_text(lost: np.ndarray, counts: Mapping[str, int], remedy: str) -> str:
-    """Describe how many members failed, and of what.
-
-    lost: (n,), whether each failed, or a quantity of it is not finite.
-    """
-    causes = ", ".join(f"{name} {number}" for name, number in counts.items() if name != "ok")
-    first = int(np.argmax(lost))
-    return f"{int(lost.sum())} of {len(lost)} members failed ({causes}; the first: member {first}); {remedy}"
 
 
 def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -> SaveAt | None:

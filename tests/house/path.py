@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """How an argument travels from `lw.solve` to the kernel: `python -m tests.house.path h [scene.toml]` prints its walk.
 
-A real run is watched, of a scene's first members. A stay is a function that has the value in a name, in a container or in an attribute that it reads, or
-a class whose object holds it. A climb is a step of this walk, in the order of first visits, from a room to a higher one.
+A real run of a scene's first members is watched. A stay is a function that has the value in a name, in a container or in an
+attribute that it reads, or a class whose object holds it. A climb is a step of this walk, in the order of first visits, from a
+room to a higher one.
 """
 
 import os

@@ -6,13 +6,14 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
 from lgvi_warp.calls.prepared import FailedMembers as FailedMembers
-from lgvi_warp.calls.runner import PATHS_AT_ONCE, Runner, lost_text, samples_for, statistics_for
+from lgvi_warp.calls.runner import PATHS_AT_ONCE, Runner, samples_for, statistics_for
+from lgvi_warp.calls.runner import Outputs as Outputs
 from lgvi_warp.common.arguments import ensemble_of, flag
 from lgvi_warp.common.errors import closest
 from lgvi_warp.common.progress import callback, shows_progress
@@ -45,36 +46,6 @@ def known_arguments(**gone: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
         return checked
 
     return decorated
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Quantities of interest of an ensemble.
-
-    Attributes:
-        values: the quantities (n, m) [their units].
-        labels: names of the quantities (m,).
-        failed: whether each member failed (n,).
-        counts: name of a status -> number of members.
-        provenance: scene, settings, versions and machine of the runs.
-    """
-
-    values: np.ndarray
-    labels: tuple[str, ...]
-    failed: np.ndarray
-    counts: dict[str, int]
-    provenance: dict[str, Any]
-
-    def text(self, remedy: str) -> str:
-        """Describe how many members failed, and of what.
-
-        Args:
-            remedy: what the user can do, which ends the text.
-
-        Returns:
-            One line of text.
-        """
-        return lost_text(self.failed, self.counts, remedy)
 
 
 @known_arguments()
@@ -111,11 +82,9 @@ def evaluate(
     ensemble_of(fleet), flag("common_noise", common_noise)
     # The scene's own statistics, keep and until do not apply: every member of the design must run.
     gathered = statistics_for(fleet.scene, interests)
-    runner = Runner.of(fleet, gathered, save=samples_for(fleet.scene, interests, save), **settings)
+    runner = Runner(fleet, gathered, save=samples_for(fleet.scene, interests, save), **settings)
     if common_noise:
         fleet = fleet.subset(np.arange(fleet.members))
         fleet.indices = np.zeros(fleet.members, dtype=np.int64)
     found = runner.evaluate(fleet, interests, PATHS_AT_ONCE, report)
-    labels = [label for each, width in zip(interests, found.widths, strict=True) for label in each.labels(width)]
-    content = found.provenance | {"ensemble": fleet.to_dict()}
-    return Outputs(found.values, tuple(labels), found.lost, found.counts, content)
+    return replace(found, provenance=found.provenance | {"ensemble": fleet.to_dict()})

@@ -137,7 +137,7 @@ class Plan:
         most = None if self.survey_all else SURVEYED
         facts = survey(self.ensemble, self.method, self.shared, most=most)
         object.__setattr__(self, "_facts", facts)
-        choice = choose_kernel(self.ensemble, self.method, self.grid.h, facts, built_in, checked)
+        choice = choose_kernel(self.ensemble, self.method, facts, built_in, checked)
         object.__setattr__(self, "kernel_choice", choice)
         check_backward_drag(self.ensemble, choice, self.method, self.grid.h)
         self._check_substep()

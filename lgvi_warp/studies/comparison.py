@@ -25,7 +25,6 @@ from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.results.result import Result
-from lgvi_warp.runs.request import Request
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
@@ -90,13 +89,6 @@ class Candidate:
     def resolved(self) -> Method:
         """Build the method with its solver."""
         return Method(self.method, self.solver, self.iterations)
-
-    def request(self, fleet: Ensemble, t1: float) -> Request:
-        """A run of some members with this setting, and the scene's samples.
-
-        t1: end time [s].
-        """
-        return Request(fleet, self.resolved(), self.h, t1, dtype=self.dtype)
 
 
 class Sample:

@@ -23,6 +23,7 @@ from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.results.result import Result
 from lgvi_warp.runs.default_method import h_rates, is_damped
 from lgvi_warp.runs.run import run_plan
+from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.runs.step_error import rates
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
@@ -498,7 +499,7 @@ def seconds_of(fleet: Ensemble, candidate: Candidate, t1: float, members: int = 
     Returns: Time of all members on one core, the scene's samples included and compiling not [s].
     """
     n = min(members, fleet.members)
-    plan = candidate.request(fleet.subset(range(n)), t1).plan()
+    plan = make_plan(fleet.subset(range(n)), candidate.resolved(), candidate.h, t1, dtype=candidate.dtype)
     plan.compile()
     return float(cost.timed([lambda: run_plan(plan, 1, executor=ThisThread())], 2).min()) * fleet.members / n
 
@@ -509,8 +510,9 @@ def memory_of(fleet: Ensemble, candidate: Candidate, t1: float) -> int:
     t1: end time [s].
     Returns: Memory of the run and its result [bytes].
     """
+    grid = make_plan(fleet.subset([0]), candidate.resolved(), candidate.h, t1, dtype=candidate.dtype).grid
     a_sample = 18 * np.dtype(machine.DTYPES[candidate.dtype]).itemsize
-    return fleet.members * (len(candidate.request(fleet, t1).grid().times) * a_sample + BYTES_OF_A_MEMBER)
+    return fleet.members * (len(grid.times) * a_sample + BYTES_OF_A_MEMBER)
 
 
 def verified(fleet: Ensemble, result: Result, found: Suggestion) -> tuple[float, int]:
@@ -526,7 +528,7 @@ def verified(fleet: Ensemble, result: Result, found: Suggestion) -> tuple[float,
     candidate = found.setting
     chosen = list(dict.fromkeys((*found.worst, *range(fleet.members))))[:CONFIRMED]
     checked_fleet = fleet.subset(chosen)
-    plan = candidate.request(checked_fleet, float(result.time[-1])).plan()
+    plan = make_plan(checked_fleet, candidate.resolved(), candidate.h, float(result.time[-1]), dtype=candidate.dtype)
     h = result.provenance["step"]
     steps = np.rint(result.time / h).astype(np.int64)
     # In double precision, so that the error contains the run's round-off too.

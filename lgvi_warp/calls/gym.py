@@ -24,7 +24,7 @@ from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt, exact
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS
 from lgvi_warp.physics.terms.noisy import NoisyTerm
-from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.runs.request import Request, ensemble_of
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
@@ -95,10 +95,7 @@ class Vehicles:
         width: int | None = None,
     ):
         gymnasium = needed()
-        if not isinstance(fleet, Ensemble | Scene):
-            problem = "is neither an Ensemble nor a Scene"
-            raise refusal("fleet", fleet, problem, "give lw.Scene(...) or lw.Ensemble(...)")
-        ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
+        ensemble = ensemble_of(fleet)
         faults, names = Faults(), (instead_of,) if isinstance(instead_of, str) else tuple(instead_of)
         controller = ensemble.scene.controller
         if controller is None:
@@ -154,7 +151,8 @@ class Vehicles:
         members = max(self.num_envs, self._fleet.members) if self._random else self._fleet.members
         planned = self._fleet.with_seed(self._fleet.seed, members) if self._random else self._fleet
         save = SaveAt(fields=("position",))
-        plan = make_plan(planned, method, h, t1, save, dtype, width=width, checks="safe", on_failure="freeze")
+        asked = Request(planned, method, h, t1, save, dtype, width=width, checks="safe", on_failure="freeze")
+        plan = asked.plan()
         plan.compile()
         return plan
 

@@ -30,6 +30,7 @@ from lgvi_warp.engine.plan import NotSurveyed, Plan
 from lgvi_warp.engine.work import Work
 from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.results import member_fields
+from lgvi_warp.runs.request import Request
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.store.block_files import BlockFiles, marker
@@ -39,6 +40,7 @@ from lgvi_warp.store.kept import group_of
 from lgvi_warp.store.layout import columns, size
 from lgvi_warp.store.recipe import of_store
 from lgvi_warp.store.settings import Store
+from lgvi_warp.store.solve import settled
 
 # Least time of a trial [s]; bytes, and number of small files, written to measure the speed of a disk.
 TRIAL_SECONDS = 0.3
@@ -143,28 +145,14 @@ def predict(
         >>> prediction.members, prediction.steps, prediction.seconds > 0.0
         (8, 20, True)
     """
-    from lgvi_warp.runs.settle import fields_of, make_plan
-    from lgvi_warp.store.solve import settled
-
     faults = Faults()
     check_threads(faults, threads)
     faults.raise_if_any()
     ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
-    statistics, keep, until = (settings.pop(name, None) for name in ("statistics", "keep", "until"))
-    scene = ensemble.scene
-    observed = observe(ensemble.members, scene.run, statistics, keep, until, scene.events, scene.controller)
-    fields = fields_of(settings.get("save"), scene.run)
-    plan = make_plan(
-        ensemble,
-        **settings,
-        fields=observed.fields,
-        survey_all=False,
-        read_at_looks=observed.read_at_looks(),
-        looks=observed.looks,
-    )
-    count = threads or machine.thread_count()
-    asked_store = store if isinstance(store, Store) or store is None else Store(store)
-    into = settled(asked_store, plan, observed, fields) if asked_store else None
+    observed = observe(ensemble, *(settings.pop(name, None) for name in ("statistics", "keep", "until")))
+    request = Request(ensemble, **settings, observed=observed, threads=threads)
+    plan, count = request.plan(survey_all=False), request.count
+    into, fields = (None, request.saved) if store is None else settled(store, request)
     joined = into is not None or bool(observed.watch(plan.grid.times)[0])
     blocks_of_run = parts(ensemble.members, plan.grid.steps, count, joined)
     compile_seconds = plan.compile()
@@ -176,7 +164,7 @@ def predict(
         set_up, step = costs(plan, blocks_of_run, count, observed)
     place = nearest_folder(into.folder) if into else Path.cwd()
     runs = [Sized(plan, into, fields if observed.samples else (), sizes(plan, observed.watch(plan.grid.times)[0]))]
-    runs += again(plan, observed, asked_store, fields)
+    runs += again(plan, observed, into, fields)
     write, metadata = writing(runs, place, count) if into else (0.0, 0)
     n, steps = ensemble.members, plan.grid.steps
     more = sum(sized.plan.ensemble.members for sized in runs) / n
@@ -343,8 +331,7 @@ def again(plan: Plan, observed: Observation, store: Store | None, fields: Sequen
     if store is None:
         return [Sized(plan.subplan(plan.with_neighbours(wanted).tolist(), fields))]
     group = group_of(store, plan, wanted)
-    stored_fields = tuple(name for name in fields if store.fields is None or name in store.fields)
-    return [Sized(plan.subplan(group.members.tolist(), stored_fields), group)]
+    return [Sized(plan.subplan(group.members.tolist(), fields), group)]
 
 
 def writing(runs: Sequence[Sized], folder: Path, threads: int) -> tuple[float, int]:

@@ -5,123 +5,31 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common import machine
+from lgvi_warp.calls.runner import PATHS_AT_ONCE, Runner, samples_for, statistics_for
 from lgvi_warp.common.arguments import flag
-from lgvi_warp.common.errors import Faults, SceneError, refusal, shown
+from lgvi_warp.common.errors import Faults, SceneError, refusal
 from lgvi_warp.common.labelled import columns_by_name, is_labelled
 from lgvi_warp.common.progress import callback, shows_progress
-from lgvi_warp.common.status import Status, failed
-from lgvi_warp.control.signals import ordered
-from lgvi_warp.engine.executors import executor_of
-from lgvi_warp.engine.keepers.observation import observe
-from lgvi_warp.engine.plan import Plan
-from lgvi_warp.engine.shared import Shared
-from lgvi_warp.engine.survey import survey
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
-from lgvi_warp.results.provenance import provenance
-from lgvi_warp.results.quantities import OfEnds, OfInterest, OfResult, quantities
-from lgvi_warp.results.result import Result
-from lgvi_warp.runs.run import completed
-from lgvi_warp.runs.settle import enough_iterations, make_plan
+from lgvi_warp.results.quantities import OfInterest, OfResult, quantities
+from lgvi_warp.runs.request import ensemble_of, scene_of
 from lgvi_warp.sampling.designs.designs import salib_problem
 from lgvi_warp.sampling.designs.levels import UnitCubePoints
 from lgvi_warp.sampling.designs.table import Table
 from lgvi_warp.scene import variations
 from lgvi_warp.scene.columns import as_given, columns_of, names_of, stacked, whole_columns
-from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
-from lgvi_warp.scene.like import SceneLike
+from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.settings import MOST_MEMBERS, EnsembleSettings
-from lgvi_warp.statistics.base import Statistic
-
-# Members that are run together where quantities look over their paths, which are kept as long as they run.
-PATHS_AT_ONCE = 16_384
 
 
 class FailedMembers(SceneError):  # noqa: N818  (what happened, and no fault of the scene)
     """Raised when members failed and the answer cannot be computed from the remaining ones."""
-
-
-@dataclass
-class _Kind:
-    """Plans of ensembles in which the same names vary, by what their survey found."""
-
-    shared: Shared
-    plans: dict[Any, Plan] = field(default_factory=dict)
-
-
-class Runner:
-    """Settings of a run, and the plans that they lead to: what `solve` settles once for a call, and `prepare` once for many.
-
-    threads: number of threads; None (default) for all cores.
-    """
-
-    def __init__(
-        self,
-        scene: SceneLike,
-        settings: Mapping[str, Any],
-        statistics: Sequence[Any] = (),
-        threads: int | None = None,
-        executor: Any = "threads",
-        scheduler: str | None = None,
-    ):
-        self.scene, self.settings = scene, dict(settings)
-        self.observed = observe(1, scene.run, statistics, "all", False, scene.events, scene.controller)
-        self.executor = executor_of(executor, threads, scheduler)
-        self.threads = threads or machine.thread_count()
-        chosen = self.settings.get("method")
-        self._auto = (chosen if isinstance(chosen, Method) else scene.run.method_of(chosen)).iterations == "auto"
-        self._kinds: dict[frozenset[str], _Kind] = {}
-        self._last: Plan | None = None
-
-    def plan(self, fleet: Ensemble) -> Plan:
-        """The plan of a run of some members; a kernel is chosen for what these members are, as `solve` does."""
-        names = frozenset(fleet.varied_names)
-        kind = self._kinds.get(names)
-        if kind is not None and self._last is not None:
-            method, h, dtype = self._last.method, self._last.grid.h, self._last.dtype
-            if self._auto:
-                method = replace(method, iterations=enough_iterations(fleet, method, h, dtype))
-            plan = kind.plans.get((method, survey(fleet, method, h, kind.shared, odd=False, most=SURVEYED).decisive))
-            if plan is not None:
-                return plan.of(fleet)
-        plan = make_plan(
-            fleet,
-            **self.settings,
-            fields=self.observed.fields,
-            survey_all=False,
-            read_at_looks=self.observed.read_at_looks(),
-            looks=self.observed.looks,
-        )
-        plan.compile()
-        if plan.method.reason:  # chosen once, by the members of the first plan
-            self.settings["method"] = plan.method
-        kind = self._kinds.setdefault(names, _Kind(plan.shared))
-        facts = survey(fleet, plan.method, plan.grid.h, kind.shared, odd=False, most=SURVEYED)
-        kind.plans[plan.method, facts.decisive] = self._last = plan
-        return plan
-
-    def run(self, fleet: Ensemble, progress: Callable[[float], None] | None = None, warned: bool = True) -> Result:
-        """Run some members.
-
-        Returns: Their result, whose provenance names the members' number but not their values, and whose messages leave out
-            what is odd about their values.
-        """
-        few = {"members": fleet.members, "seed": fleet.seed, "varied": sorted(fleet.varied_names)}
-
-        def known(plan: Plan) -> tuple[dict[str, Any], tuple[str, ...]]:
-            content = plan.shared("provenance", {}, lambda numbers: provenance(plan, self.observed))
-            return {**content, "ensemble": few}, plan.grid.messages
-
-        plan = self.plan(fleet)
-        settings = dict(progress=progress, executor=self.executor, known=known, warned=warned)
-        return completed(plan, self.threads, self.observed, plan.fields, **settings)
 
 
 class Prepared:
@@ -305,51 +213,15 @@ class Prepared:
         if not self._of:
             return self._runner.run(fleet, progress)
         large = any(each.over_path or each.is_function for each in self._of)
-        at_once, groups = PATHS_AT_ONCE if large else fleet.members, []
-        for first in range(0, fleet.members, at_once):
-            stop = min(first + at_once, fleet.members)
-            group = fleet if stop - first == fleet.members else fleet.subset(np.arange(first, stop))
-            groups.append(self._values(group, progress and part(progress, first / fleet.members, stop / fleet.members)))
-        values, status = (np.concatenate(each) for each in zip(*groups, strict=True))
-        lost = failed(status) | ~np.isfinite(values).all(axis=1)
-        if lost.any():
+        found = self._runner.evaluate(
+            fleet, self._of, PATHS_AT_ONCE if large else fleet.members, progress, warned=False
+        )
+        values = found.values
+        if found.failed.any():
             if self._refuse:
-                remedy = 'mend what fails, or take NaN for them: failed="nan"'
-                raise FailedMembers([lost_text(lost, counted(status, values), remedy)])
-            values = np.where(lost[:, None], np.nan, values)
+                raise FailedMembers([found.text('mend what fails, or take NaN for them: failed="nan"')])
+            values = np.where(found.failed[:, None], np.nan, values)
         return values[:, 0] if values.shape[1] == 1 else values
-
-    def _values(self, fleet: Ensemble, progress: Callable[[float], None] | None) -> tuple[np.ndarray, np.ndarray]:
-        """The quantities (n, m) of some members, and their status (n,)."""
-        result = self._runner.run(fleet, progress, warned=False)
-        members = fleet.select(0, fleet.members) if any(each.looks_at_members for each in self._of) else None
-        return np.concatenate([each.values(result, members) for each in self._of], axis=1), np.asarray(result.status)
-
-
-def part(progress: Callable[[float], None], begin: float, end: float) -> Callable[[float], None]:
-    """Tell of a part of the work as a part of the whole."""
-    return lambda fraction: progress(begin + (end - begin) * fraction)
-
-
-def lost_text(lost: np.ndarray, counts: Mapping[str, int], remedy: str) -> str:
-    """Describe how many members failed, and of what.
-
-    lost: (n,), whether each failed, or a quantity of it is not finite.
-    """
-    causes = ", ".join(f"{name} {number}" for name, number in counts.items() if name != "ok")
-    first = int(np.argmax(lost))
-    return f"{int(lost.sum())} of {len(lost)} members failed ({causes}; the first: member {first}); {remedy}"
-
-
-def counted(status: np.ndarray, values: np.ndarray) -> dict[str, int]:
-    """Count members by what became of them.
-
-    status: (n,), their status.
-    values: (n, m), their quantities.
-    """
-    names = {Status(int(code)).name.lower(): int((status == code).sum()) for code in np.unique(status)}
-    odd = int((~np.isfinite(values).all(axis=1)).sum())
-    return names | ({"quantity not finite": odd} if odd else {})
 
 
 def scene_numbers(scene: Any) -> dict[str, np.ndarray]:
@@ -366,30 +238,6 @@ def scene_value(scene: Any, name: str) -> np.ndarray:
         faults.add(f'"{name}"', "...", "is not a single number", f'name its entries, such as "{entry}"')
     faults.raise_if_any()
     return target.of(known[target.name])
-
-
-def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -> SaveAt | None:
-    """The samples that quantities need, where the user does not say which to keep."""
-    if save is not None or not of:
-        return save
-    fields = ordered(name for each in of for name in each.fields)
-    paths = [each.label for each in of if each.over_path]
-    if paths and scene.run.save_every is None:
-        problem = f"save = None: is missing, and {paths[0]} looks over the path"
-        raise SceneError([f"{problem}; give save=lw.SaveAt(every=...) or [run] save_every"])
-    if paths or any(each.is_function for each in of):
-        return SaveAt(every=scene.run.save_every, fields=fields)
-    times = sorted({each.when for each in of if isinstance(each, OfEnds) and each.when is not None})
-    return SaveAt(at=times or None, fields=fields)
-
-
-def statistics_for(scene: SceneLike, of: Sequence[OfResult]) -> list[Statistic]:
-    """The statistics that quantities need, beside samples."""
-    found = dict[str, Statistic]()
-    for each in of:
-        if isinstance(each, OfEnds):
-            found |= each.gathered(scene.events)
-    return list(found.values())
 
 
 def prepare(
@@ -461,10 +309,7 @@ def prepare(
         (2,)
     """
     faults = Faults()
-    if not isinstance(fleet, Ensemble | Scene):
-        problem = "is neither an Ensemble nor a Scene"
-        raise SceneError([f"fleet = {shown(fleet)}: {problem}; give lw.Scene(...) or lw.Ensemble(...)"])
-    scene = fleet.scene if isinstance(fleet, Ensemble) else fleet
+    scene = scene_of(fleet)
     interests: tuple[OfResult, ...] = ()
     if of is not None:
         with faults.including():
@@ -477,7 +322,7 @@ def prepare(
         faults.add("vary", vary, "has no distributions, which levels=True needs", "map names to distributions")
     faults.raise_if_any()
     if vary is None:
-        whole = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(scene)
+        whole = ensemble_of(fleet)
     elif distributions:
         whole = Ensemble(scene, 1, 0, vary)  # type: ignore[arg-type]
     else:
@@ -488,12 +333,11 @@ def prepare(
     settings = dict(
         method=method, h=h, t1=t1, save=save, dtype=dtype, width=width, checks=checks, on_failure=on_failure
     )
-    runner = Runner(scene, settings, [*statistics, *gathered] if gathered else statistics, threads, executor, scheduler)
-    known = settings | dict(
-        statistics=statistics, levels=levels, failed=failed, common_noise=common_noise, threads=threads, executor=executor,
-        scheduler=scheduler)  # fmt: skip
-    made_of = (fleet, vary, of), known
     first = whole if isinstance(table, str) else table
+    how = dict(threads=threads, executor=executor, scheduler=scheduler)
+    runner = Runner(first, [*statistics, *gathered] if gathered else statistics, **settings, **how)
+    known = settings | how | dict(statistics=statistics, levels=levels, failed=failed, common_noise=common_noise)
+    made_of = (fleet, vary, of), known
     runner.plan(first)
     first.select(0, 1)  # which keeps what all members share
     return Prepared(whole, table, names, interests, runner, columns, failed == "refuse", common_noise, made_of)

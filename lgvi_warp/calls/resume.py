@@ -14,7 +14,7 @@ from lgvi_warp.engine.keepers.observation import Observing, observation_of
 from lgvi_warp.engine.keepers.protocol import Keeper
 from lgvi_warp.results.provenance import provenance
 from lgvi_warp.results.result import Result
-from lgvi_warp.runs.run import finished
+from lgvi_warp.runs.run import refuse_failed
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.store.folder import ROOT, Folder
@@ -81,13 +81,14 @@ def resume(
     now = of_store(provenance(plan, observed), plan.ensemble)
     now |= {} if observed_content is None else {"observed": observed_content}
     messages = refuse_another(folder.path, folder.provenance, now, force)
+    last = KeptRun(observed, tuple((observed_content or {}).get("fields", ())))
     runner = executor_of(executor, threads, scheduler)
     # Provenance and messages stay those of the start of the run, on whatever machine it goes on.
     run = StoredRun(
         plan, store_of(folder, force), folder.provenance, folder.messages, (*keepers, *observing.keepers), None,
-        observing.enough, KeptRun(observed, tuple((observed_content or {}).get("fields", ()))),
+        observing.enough, last,
     )  # fmt: skip
     finished_folder = run.run(runner, callback(progress))
     remarks = messages + went_on(finished_folder)
     result = result_of(finished_folder, None, folder.messages + remarks, plan.ensemble.scene.terms, observing)
-    return finished(result, plan, observed, (observed_content or {}).get("fields", ()), threads)
+    return refuse_failed(result, plan)

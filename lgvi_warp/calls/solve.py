@@ -7,18 +7,15 @@ import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from lgvi_warp.common import machine
 from lgvi_warp.common.arguments import function_of
-from lgvi_warp.common.errors import Faults, SceneError, shown
+from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.progress import callback, shows_progress
-from lgvi_warp.engine.executors import executor_of
 from lgvi_warp.engine.executors.base import Executor
-from lgvi_warp.engine.keepers.observation import Observation, observe
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.result import Result
-from lgvi_warp.runs.run import completed, finished
-from lgvi_warp.runs.settle import blocks_there, fields_of, make_plan
+from lgvi_warp.runs.request import Request, ensemble_of
+from lgvi_warp.runs.run import refuse_failed
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.store.settings import Store
@@ -105,38 +102,25 @@ def solve(
         >>> print(f"{result.statistics['mean depth'].value[-1, 0]:.2f} m")
         -0.02 m
     """
-    if not isinstance(fleet, Ensemble | Scene):
-        problem = "is neither an Ensemble nor a Scene"
-        raise SceneError([f"fleet = {shown(fleet)}: {problem}; give lw.Scene(...) or lw.Ensemble(...)"])
-    ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
     faults = Faults()
-    observed, runner = Observation(), None
-    with faults.including():
-        scene = ensemble.scene
-        observed = observe(ensemble.members, scene.run, statistics, keep, until, scene.events, scene.controller)
-    with faults.including():
-        runner = executor_of(executor, threads, scheduler)
+    request = Request.of(
+        faults, ensemble_of(fleet), statistics=statistics, keep=keep, until=until, executor=executor, threads=threads,
+        scheduler=scheduler, method=method, h=h, t1=t1, save=save, dtype=dtype, width=width, checks=checks,
+        on_failure=on_failure,
+    )  # fmt: skip
     with faults.including():
         function_of("on_block", on_block)
     if only is not None and store is None:
         faults.add("only", only, "is for a run into a store", "give store=..., or leave it out")
-    if only is not None and observed.until is not None:
+    if only is not None and request.observed.until is not None:
         faults.add("only", only, "runs in parts, where until looks at the whole", "leave out one of them")
     faults.raise_if_any()
-    assert runner is not None
-    plan = make_plan(
-        ensemble, method, h, t1, save, dtype, width=width, checks=checks, on_failure=on_failure, fields=observed.fields,
-        survey_all=store is not None, looks=observed.looks,
-        read_at_looks=observed.read_at_looks())  # fmt: skip
-    fields, count = fields_of(save, ensemble.scene.run), threads or machine.thread_count()
+    plan = request.plan(survey_all=store is not None)
     try:
         if store is None:
-            return completed(plan, count, observed, fields, progress=callback(progress), executor=runner, partial=True,
-                             on_block=on_block)  # fmt: skip
-        only = blocks_there(only, plan)
-        into = store if isinstance(store, Store) else Store(store)
-        result = run_stored(plan, into, runner, callback(progress), only, observed, fields, on_block)
-        return result if only is not None else finished(result, plan, observed, fields, count)
+            return request.run(plan, progress=callback(progress), partial=True, on_block=on_block)
+        result = run_stored(request, plan, store, callback(progress), only, on_block)
+        return result if only is not None else refuse_failed(result, plan)
     finally:
         # Packets and their plan refer to each other: their arrays would stay until Python looks for such circles.
         plan.idle.clear()

@@ -11,7 +11,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from lgvi_warp.common.phases import Phases
 from lgvi_warp.engine.executors.base import deaf
 from lgvi_warp.engine.plan import Plan
-from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.runs.request import Request
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 
@@ -22,7 +22,7 @@ def plans_of(scene: Scene, methods: Sequence[str], dtypes: Sequence[str]) -> lis
     plans: dict[tuple[str, str], Plan] = {}
     for method in methods or (None,):
         for dtype in dtypes or (None,):
-            plan = make_plan(ensemble, method, dtype=dtype)
+            plan = Request(ensemble, method, dtype=dtype).plan()
             plans[plan.method.name, plan.dtype] = plan
     return list(plans.values())
 

@@ -43,7 +43,7 @@ def check(chosen: argparse.Namespace) -> int:
 
 def _settings(ensemble: Any) -> tuple[str, tuple[str, ...]]:
     """The run in a few words, and remarks on its settings. Raises SceneError for what a run would refuse."""
-    from lgvi_warp.runs.settle import make_plan
+    from lgvi_warp.runs.request import Request
 
     run = ensemble.scene.run
     members = f"members {ensemble.members:,}"
@@ -52,5 +52,5 @@ def _settings(ensemble: Any) -> tuple[str, tuple[str, ...]]:
         return members, (f"{' and '.join(missing)}: not given, so the method was not looked at; a run wants it",)
     # Automatic iterations are found only by a run.
     method = replace(run.method_of(), iterations=None) if run.iterations == "auto" else None
-    plan = make_plan(ensemble, method)
+    plan = Request(ensemble, method).plan()
     return f"{members}, {plan.method.name}, step {plan.grid.h:g} s, {plan.grid.steps:,} steps", plan.grid.messages

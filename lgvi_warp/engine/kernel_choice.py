@@ -80,14 +80,12 @@ class KernelChoice:
 def choose_kernel(
     ensemble: Ensemble,
     method: Method,
-    h: float,
     facts: Survey,
     built_in: Callable[[str, str], Any],
     checked: bool = True,
 ) -> KernelChoice:
     """Choose what the kernel of a run must contain.
 
-    h: step [s].
     built_in: (folder, name) -> module of built-in device code in the folder "laws" or "stops", None where there is none.
     """
     explicit = method.tableau is not None

@@ -144,7 +144,7 @@ class Plan:
 
     def serves(self, ensemble: Ensemble, block: Block, members: Members) -> bool:
         """Whether the kernel has all that some members of the same scene need."""
-        return self.facts.covers(survey_of(members.parameters, ensemble, self.method, self.grid.h, self.shared, block))
+        return self.facts.covers(survey_of(members.parameters, ensemble, self.method, self.shared, block))
 
 
 def choose_plan(
@@ -173,8 +173,8 @@ def choose_plan(
     check(faults, "statistics", fields, scene.controller)
     faults.raise_if_any()
     shared = _shared(ensemble)
-    facts = survey(ensemble, method, grid.h, shared, most=None if survey_all else SURVEYED)
-    choice = choose_kernel(ensemble, method, grid.h, facts, built_in, checks != "none")
+    facts = survey(ensemble, method, shared, most=None if survey_all else SURVEYED)
+    choice = choose_kernel(ensemble, method, facts, built_in, checks != "none")
     check_backward_drag(ensemble, choice, method, grid.h)
     if on_failure == "substep":
         check_substep(choice, method)

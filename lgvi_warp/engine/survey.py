@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -140,14 +141,12 @@ class Survey:
 def survey(
     ensemble: Ensemble,
     method: Method,
-    h: float,
     shared: Shared | None = None,
     odd: bool = True,
     most: int | None = None,
 ) -> Survey:
     """Look at members, or at one alone where no number of the vehicle, the water or the laws varies.
 
-    h: step [s].
     most: number of the first members to look at; None (default) for all.
     """
     known = Shared({*ensemble.varied_names, MEMBERS}) if shared is None else shared
@@ -155,20 +154,15 @@ def survey(
     def look(first: int, stop: int) -> Survey:
         # Members that overflow get their status, or their fault, elsewhere: no warning from NumPy.
         with np.errstate(over="ignore", invalid="ignore"):
-            return _look(ensemble, method, h, known, odd, first, stop)
+            return _seen(ensemble.parameters(first, stop), ensemble, method, known, odd, first, stop)
 
     count = min(ensemble.members, most or ensemble.members) if ensemble.varied() else 1
     return functools.reduce(Survey.joined, over_members(look, count))
 
 
-def survey_of(
-    parameters: Parameters, ensemble: Ensemble, method: Method, h: float, shared: Shared, block: Block
-) -> Survey:
-    """Look at the members of one block, whose parameters are drawn already.
-
-    h: step [s].
-    """
-    return _seen(parameters, ensemble, method, h, shared, False, block.first, block.stop)
+def survey_of(parameters: Parameters, ensemble: Ensemble, method: Method, shared: Shared, block: Block) -> Survey:
+    """Look at the members of one block, whose parameters are drawn already."""
+    return _seen(parameters, ensemble, method, shared, False, block.first, block.stop)
 
 
 def framed(method: Method, parameters: Parameters, shared: Shared) -> dict[str, Any]:
@@ -198,15 +192,10 @@ def framed(method: Method, parameters: Parameters, shared: Shared) -> dict[str, 
     return p
 
 
-def _look(ensemble: Ensemble, method: Method, h: float, shared: Shared, odd: bool, first: int, stop: int) -> Survey:
-    return _seen(ensemble.parameters(first, stop), ensemble, method, h, shared, odd, first, stop)
-
-
 def _seen(
     parameters: Parameters,
     ensemble: Ensemble,
     method: Method,
-    h: float,
     shared: Shared,
     odd: bool,
     first: int,
@@ -215,7 +204,8 @@ def _seen(
     p = framed(method, parameters, shared)
     frame, scene, numbers_of = p[FRAME][0], ensemble.scene, ensemble.own
     aligned = shared("aligned", p, lambda numbers: numbers[AXES][0].aligned)
-    run = frame, ensemble.indices_of(first, stop), ensemble.seed, h, aligned
+    # Weight and buoyancy do not depend on the step.
+    run = frame, ensemble.indices_of(first, stop), ensemble.seed, math.nan, aligned
 
     def is_felt(term: Term, numbers: Any) -> bool:
         if term not in terms.IMPLIED:

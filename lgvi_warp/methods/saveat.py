@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -86,6 +86,10 @@ class TimeGrid:
         step, steps = exact(self.h), np.arange(0, self.steps + 1, every)
         times = np.array([k * step.numerator / step.denominator for k in steps.tolist()])
         return TimeGrid(self.h, steps, times, self.messages)
+
+    def telling(self, *messages: str) -> TimeGrid:
+        """The same steps and samples with more messages."""
+        return replace(self, messages=(*self.messages, *messages))
 
 
 def exact(x: float) -> Fraction:

@@ -8,10 +8,11 @@ advance damped scenes: the cheapest whose step is stable and whose error is smal
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection, Iterator
+from typing import Any
 
 from lgvi_warp.common.errors import SceneError
-from lgvi_warp.engine.plan import Plan, damping_terms
+from lgvi_warp.engine.plan import Plan, choose_plan, damping_terms
 from lgvi_warp.methods.limits import drag_limit, rotation_limit
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
@@ -36,12 +37,16 @@ DAMPED = {
 OTHERWISE = ("psi_x", "psi_s")
 
 
-def planned(ensemble: Ensemble, grid: TimeGrid, plan_of: Callable[[Method, tuple[str, ...]], Plan]) -> Plan:
-    """Plan a run with the first method that takes it."""
+def planned(ensemble: Ensemble, grid: TimeGrid, others: tuple[Any, ...]) -> Plan:
+    """Plan a run with the first method that takes it.
+
+    others: the arguments of `choose_plan` after the grid.
+    """
     found = rates(ensemble)
     for method in choices(ensemble, grid.h, found):
+        told = messages(method, found, grid.h, max(AHEAD, grid.h * grid.steps))
         try:
-            return plan_of(method, messages(method, found, grid.h, max(AHEAD, grid.h * grid.steps)))
+            return choose_plan(ensemble, method, grid.telling(*told), *others)
         except SceneError as error:
             fault = error
     raise fault

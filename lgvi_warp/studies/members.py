@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whose members a study is about: of an Ensemble, or of a Scene and its section [ensemble]."""
+"""The scene that a study is about."""
 
 from __future__ import annotations
 
@@ -8,18 +8,6 @@ from typing import Any
 from lgvi_warp.common.errors import refusal
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
-
-
-def ensemble_of(fleet: Any) -> Ensemble:
-    """The members that are meant.
-
-    fleet: An Ensemble, or a Scene, whose [ensemble] is meant.
-    """
-    if isinstance(fleet, Ensemble):
-        return fleet
-    if not isinstance(fleet, Scene):
-        raise refusal("fleet", fleet, "is neither an Ensemble nor a Scene", "give lw.Scene(...) or lw.Ensemble(...)")
-    return Ensemble.from_scene(fleet)
 
 
 def scene_of(scene: Any) -> Scene:

@@ -17,12 +17,13 @@ from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.physics.terms.base import Term
+from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.cost import Cost, costs
-from lgvi_warp.studies.members import ensemble_of, scene_of
+from lgvi_warp.studies.members import scene_of
 from lgvi_warp.studies.speed import least
 
 # Row of a scene without terms, and row of all its terms together.

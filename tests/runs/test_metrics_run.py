@@ -243,8 +243,7 @@ def test_numbers_do_not_depend_on_what_else_is_read_at_looks(dtype, fleet, coars
 def test_a_look_gathers_only_the_numbers_that_are_read(fleet):
     def gathered(*statistics):
         observed = Observation(statistics, keep="none")
-        plan = make_plan(fleet, t1=1.0, fields=observed.fields, looks=True, read_at_looks=observed.read_at_looks())
-        return plan.layout.look_fields
+        return make_plan(fleet, t1=1.0, observed=observed).layout.look_fields
 
     assert gathered(lw.IAE("depth"), lw.RMSError("depth")) == {"position": 1, "reference_depth": 1}
     assert gathered(lw.IAE("depth"), lw.IAE("heading")) == {

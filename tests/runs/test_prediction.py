@@ -127,7 +127,7 @@ def test_statistics_and_kept_members_are_counted(tmp_path):
     assert with_all.disk == pytest.approx(disk, rel=0.02)
     assert without.disk < 0.2 * disk
     # The trees of all parts are at least what is joined at the end, the estimates what was read from them.
-    statistics = observe(1003, fleet().scene.run, STATISTICS, None, None).statistics
+    statistics = observe(fleet(), STATISTICS).statistics
     found = sizes(make_plan(fleet(), **SETTINGS), statistics)
     gathered = gathered_of(Folder(path), statistics)
     assert gathered <= found.joined <= 3 * gathered

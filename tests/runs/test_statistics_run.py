@@ -640,7 +640,7 @@ def test_float32_is_summed_up_in_float64(fleet):
 
 
 def test_only_the_fields_that_statistics_need_are_written(fleet):
-    settings = observation.observe(1003, fleet.scene.run, [lw.Mean("depth")], "none", None)
+    settings = observation.observe(fleet, [lw.Mean("depth")], "none")
     assert settings.fields(FIELDS) == ("position",)
     assert observation.Observation(keep="none").fields(FIELDS) == ()
     assert observation.Observation((lw.Mean("speed"),)).fields(("position",)) == ("position", "velocity")
@@ -772,11 +772,11 @@ def test_the_command_prints_and_draws_them(path, tmp_path, capsys):
 
 
 def test_no_statistics_cost_nothing(fleet):
-    settings = observation.observe(1003, fleet.scene.run, None, None, None)
+    settings = observation.observe(fleet)
     assert settings == observation.Observation()
     assert settings.watch(np.zeros(1)) == ((), None)
     plain = make_plan(fleet, **SETTINGS)
-    asked = make_plan(fleet, **SETTINGS, fields=settings.fields)
+    asked = make_plan(fleet, **SETTINGS, observed=settings)
     assert plain.kernel.advance is asked.kernel.advance
     assert "observed" not in lw.solve(fleet, **SETTINGS).provenance
 

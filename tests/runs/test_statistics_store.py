@@ -254,7 +254,7 @@ def test_parts_of_a_run_are_merged_with_their_statistics(whole, memory, tmp_path
 
 @pytest.mark.parametrize("given", [[], STATISTICS])
 def test_an_observation_is_told_and_read(given):
-    observed = observe(1003, lw.Scene.load(ROOT / "examples/paper.toml").run, given, "failed", UNTIL)
+    observed = observe(lw.Ensemble.from_scene(lw.Scene.load(ROOT / "examples/paper.toml")), given, "failed", UNTIL)
     assert observation_of(observed.to_dict() | {"fields": ["position"]}).to_dict() == observed.to_dict()
 
 

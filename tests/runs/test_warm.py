@@ -11,7 +11,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.calls import warm
-from lgvi_warp.runs import run as runs
+from lgvi_warp.runs import request
 from tests.conftest import ROOT
 
 PAPER = ROOT / "examples" / "paper.toml"
@@ -23,7 +23,7 @@ def kernels_of(scene, methods=(), dtypes=()):
 
 def kernel_of_solve(scene, *arguments, **named):
     """The kernel of a run, which does not begin."""
-    with mock.patch.object(runs, "run_plan", side_effect=InterruptedError) as begun, pytest.raises(InterruptedError):
+    with mock.patch.object(request, "run_plan", side_effect=InterruptedError) as begun, pytest.raises(InterruptedError):
         lw.solve(scene, *arguments, **named)
     return begun.call_args.args[0].spec
 

@@ -122,7 +122,7 @@ def test_members_are_the_same_in_all_cells_bit_by_bit(found, scene):
 def test_cells_that_differ_in_numbers_share_a_kernel(found):
     soft, late, stiff = (found.cells[i].fleet for i in (0, 1, 2))
     signals = ("attitude", "position", "reference_heading", "reference_position")
-    kernels = [make_plan(fleet, fields=lambda asked: signals).kernel.advance for fleet in (soft, stiff)]
+    kernels = [make_plan(fleet, save=lw.SaveAt(fields=signals)).kernel.advance for fleet in (soft, stiff)]
     assert kernels[0] is kernels[1]
     assert late is not None
 

@@ -30,11 +30,11 @@ def statistics():
 def runs(members, steps):
     """Name -> a call that makes the run and returns its seconds, and those of all cores together."""
     fleet, t1 = speed.fleet(members), 0.01 * steps
-    every = lw.SaveAt(every=t1 / 10)
+    every = lw.SaveAt(every=t1 / 10, fields=("position",))
     threads = machine.thread_count()
 
-    def of(save, fields, observed):
-        plan = make_plan(fleet, "psi_s", 0.01, t1, save, fields=lambda asked: fields)
+    def of(save, observed):
+        plan = make_plan(fleet, "psi_s", 0.01, t1, save)
 
         def call():
             start = time.process_time()
@@ -44,11 +44,11 @@ def runs(members, steps):
         return call
 
     nothing = Observation(keep="none")
-    one_by_one = {one.type: of(every, ("position",), Observation((one,), "none")) for one in statistics()}
+    one_by_one = {one.type: of(every, Observation((one,), "none")) for one in statistics()}
     return {
-        "no samples": of(lw.SaveAt(), (), nothing),
-        "samples dropped": of(every, ("position",), nothing),
-        "statistics": of(every, ("position",), Observation(statistics(), "none")),
+        "no samples": of(lw.SaveAt(fields=()), nothing),
+        "samples dropped": of(every, nothing),
+        "statistics": of(every, Observation(statistics(), "none")),
     } | one_by_one
 
 

@@ -184,7 +184,7 @@ def statistics_record(folder, quick, what, observed, keepers):
     """
     members, threads = (8192, machine.thread_count()) if quick else (262_144, machine.thread_count())
     save = SaveAt(every=1.0)
-    plan = make_plan(speed.fleet(members), "psi_s", h=0.01, t1=10.0, save=save, fields=observed.fields)
+    plan = make_plan(speed.fleet(members), "psi_s", h=0.01, t1=10.0, save=save, observed=observed)
     plan.compile()
 
     def without():

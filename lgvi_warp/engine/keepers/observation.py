@@ -11,11 +11,10 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import failed, stopped
-from lgvi_warp.control.controller import Controller
 from lgvi_warp.control.signals import SIGNALS, ordered
 from lgvi_warp.engine.keepers.statistics import Gathered
 from lgvi_warp.physics.fields import FIELDS
-from lgvi_warp.physics.terms.events import Event
+from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.settings import check_keep
 from lgvi_warp.statistics.base import Statistic, from_list
 from lgvi_warp.statistics.ends import check_outcomes, outcomes
@@ -187,21 +186,10 @@ def watch_fields(until: Until, statistics: Sequence[Statistic]) -> tuple[str, ..
     return watch(Until(until.statistic, until.half_width), statistics, np.zeros(1)).statistic.quantity.fields
 
 
-def observe(
-    plan_members: int,
-    settings: Any,
-    given: Any,
-    keep: Any,
-    until: Any,
-    events: Sequence[Event] = (),
-    controller: Controller | None = None,
-) -> Observation:
-    """The observation that the arguments of solve describe; those that are None come from the scene's [run].
-
-    settings: the scene's [run] settings.
-    controller: controller of the scene; None (default) for none.
-    """
-    faults = Faults()
+def observe(fleet: Ensemble, given: Any = None, keep: Any = None, until: Any = None) -> Observation:
+    """The observation that the arguments of solve describe; those that are None come from the scene's [run]."""
+    faults, scene = Faults(), fleet.scene
+    settings, events = scene.run, scene.events
     gathered: tuple[Statistic, ...] = ()
     stop: Until | None = None
     keep = settings.keep if keep is None else keep
@@ -211,11 +199,11 @@ def observe(
     for statistic in gathered:
         with faults.including():
             check_outcomes(f"{statistic.type}.{'at' if statistic.at else 'of'}", statistic.outcomes, known)
-    check_wanted(faults, "statistics", {statistic.key: statistic for statistic in gathered}, controller)
+    check_wanted(faults, "statistics", {statistic.key: statistic for statistic in gathered}, scene.controller)
     with faults.including():
         condition = settings.until if until is None else until
         stop = None if condition is None or condition is False else from_dict(condition)
-    check_keep(faults, "keep", keep, plan_members)
+    check_keep(faults, "keep", keep, fleet.members)
     if stop is not None and not faults:
         with faults.including():
             watch_fields(stop, gathered)

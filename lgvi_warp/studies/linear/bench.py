@@ -23,7 +23,7 @@ from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.events import StopTime
 from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.physics.terms.waves import Waves
-from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.runs.request import Request
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 
@@ -119,8 +119,8 @@ class Bench:
         spacing: float,
         fields: Sequence[str] = FIELDS,
     ):
-        settings = dict(method=method, h=h, t1=t1, save=SaveAt(every=spacing, fields=tuple(fields)), dtype="float64")
-        plan = make_plan(fleet, **settings)  # type: ignore[arg-type]
+        request = Request(fleet, method, h, t1, SaveAt(every=spacing, fields=tuple(fields)), "float64")
+        plan = request.plan()
         if plan.launches.asks:
             key = plan.kernel_choice.controller.callback.key  # type: ignore[union-attr]
             raise refusal("laws", key, "is a Python function, of which no lane knows", "give a law with device code")
@@ -128,7 +128,7 @@ class Bench:
             scene: Any = fleet.scene
             # Kernels that look for events have no lead, and else the same method.
             fleet = fleet.in_scene(replace(scene, events=[StopTime(at=NEVER)]))
-            plan = make_plan(fleet, **{**settings, "method": plan.method})  # type: ignore[arg-type]
+            plan = replace(request, fleet=fleet, method=plan.method).plan()
         plan.compile()
         self.fleet, self.plan = fleet, plan
         controller = plan.kernel_choice.controller

@@ -14,6 +14,7 @@ from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.control.delay import MOST_PERIODS
 from lgvi_warp.methods.method import Method
+from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.linear.bench import calm
@@ -22,7 +23,6 @@ from lgvi_warp.studies.linear.linearize import RANDOM, check_parts
 from lgvi_warp.studies.linear.loops import IDLE, LEAST_LOOKS, UNSETTLED, Loops, Study
 from lgvi_warp.studies.linear.sampled_loop import SampledLoop
 from lgvi_warp.studies.linear.trim import step_of
-from lgvi_warp.studies.members import ensemble_of
 
 OF, WAYS = ("gain", "delay"), ("eigenvalues", "runs")
 # Members whose margins are sought together.

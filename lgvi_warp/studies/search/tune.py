@@ -14,10 +14,10 @@ from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.results.quantities import OfInterest
+from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics.base import Statistic
-from lgvi_warp.studies.members import ensemble_of
 from lgvi_warp.studies.search.box import LEAST, POPULATION, Box, search
 from lgvi_warp.studies.search.numbers import Numbers
 from lgvi_warp.studies.search.risk import risk_of

@@ -6,17 +6,17 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from lgvi_warp.calls.prepared import PATHS_AT_ONCE, Runner, counted, lost_text, part, samples_for, statistics_for
 from lgvi_warp.calls.prepared import FailedMembers as FailedMembers
+from lgvi_warp.calls.runner import PATHS_AT_ONCE, Runner, samples_for, statistics_for
+from lgvi_warp.calls.runner import Outputs as Outputs
 from lgvi_warp.common.arguments import ensemble_of, flag
 from lgvi_warp.common.errors import closest
 from lgvi_warp.common.progress import callback, shows_progress
-from lgvi_warp.common.status import failed
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.quantities import OfInterest, quantities
 from lgvi_warp.scene.ensemble import Ensemble
@@ -46,36 +46,6 @@ def known_arguments(**gone: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
         return checked
 
     return decorated
-
-
-@dataclass(frozen=True)
-class Outputs:
-    """Quantities of interest of an ensemble.
-
-    Attributes:
-        values: the quantities (n, m) [their units].
-        labels: names of the quantities (m,).
-        failed: whether each member failed (n,).
-        counts: name of a status -> number of members.
-        provenance: scene, settings, versions and machine of the runs.
-    """
-
-    values: np.ndarray
-    labels: tuple[str, ...]
-    failed: np.ndarray
-    counts: dict[str, int]
-    provenance: dict[str, Any]
-
-    def text(self, remedy: str) -> str:
-        """Describe how many members failed, and of what.
-
-        Args:
-            remedy: what the user can do, which ends the text.
-
-        Returns:
-            One line of text.
-        """
-        return lost_text(self.failed, self.counts, remedy)
 
 
 @known_arguments()
@@ -110,29 +80,11 @@ def evaluate(
     """
     interests, report = quantities(of), callback(progress)
     ensemble_of(fleet), flag("common_noise", common_noise)
-    how = {name: settings.pop(name) for name in ("threads", "executor", "scheduler") if name in settings}
     # The scene's own statistics, keep and until do not apply: every member of the design must run.
     gathered = statistics_for(fleet.scene, interests)
-    runner = Runner(fleet.scene, {"save": samples_for(fleet.scene, interests, save), **settings}, gathered, **how)
+    runner = Runner(fleet, gathered, save=samples_for(fleet.scene, interests, save), **settings)
     if common_noise:
         fleet = fleet.subset(np.arange(fleet.members))
         fleet.indices = np.zeros(fleet.members, dtype=np.int64)
-    looks_at_members = any(interest.looks_at_members for interest in interests)
-    values, status, provenance = [], [], {}
-    for first in range(0, fleet.members, PATHS_AT_ONCE):
-        chosen = np.arange(first, min(first + PATHS_AT_ONCE, fleet.members))
-        group_progress = report and part(report, first / fleet.members, (first + len(chosen)) / fleet.members)
-        group = fleet.subset(chosen)
-        result = runner.run(group, group_progress)
-        members = group.select(0, len(chosen)) if looks_at_members else None
-        values.append([interest.values(result, members) for interest in interests])
-        status.append(np.asarray(result.status))
-        provenance = result.provenance
-    numbers = np.concatenate([np.concatenate(group_values, axis=1) for group_values in values])
-    labels: list[str] = []
-    for interest, columns in zip(interests, values[0], strict=True):
-        labels += interest.labels(columns.shape[1])
-    ended = np.concatenate(status)
-    failures = failed(ended) | ~np.isfinite(numbers).all(axis=1)
-    counts = counted(ended, numbers)
-    return Outputs(numbers, tuple(labels), failures, counts, provenance | {"ensemble": fleet.to_dict()})
+    found = runner.evaluate(fleet, interests, PATHS_AT_ONCE, report)
+    return replace(found, provenance=found.provenance | {"ensemble": fleet.to_dict()})

@@ -296,16 +296,14 @@ def again(setup: Setup, cell: Cell, indices: Sequence[int], save: SaveAt | None,
     threads: number of threads; None for all cores.
     """
     from lgvi_warp.engine.keepers.observation import Observation
-    from lgvi_warp.runs.run import again as run_again
-    from lgvi_warp.runs.settle import fields_of, make_plan
+    from lgvi_warp.runs.request import Request
 
     if cell.fleet is None:
         raise refusal("case", cell.name, "was refused", "run a member of another one")
-    fields = fields_of(save, cell.fleet.scene.run)
-    settings = {name: value for name, value in setup.settings.items() if name != "checks"}
-    observed = Observation((*setup.metrics.values(),), tuple(int(i) for i in indices))
-    plan = make_plan(cell.fleet, save=save, **settings, checks=setup.settings.get("checks"), fields=lambda asked: tuple(
-        dict.fromkeys((*observed.fields(asked), *asked))))  # fmt: skip
-    _, result = run_again(plan, observed, np.zeros(cell.fleet.members, np.uint8), fields, threads)
+    # The plan of a run that keeps all samples, of which these members alone are run.
+    observed = Observation(tuple(setup.metrics.values()))
+    whole = Request(cell.fleet, save=save, **setup.settings, observed=observed, threads=threads)
+    some = replace(whole, observed=replace(observed, keep=tuple(int(i) for i in indices)))
+    _, result = some.again(whole.plan(), np.zeros(cell.fleet.members, np.uint8))
     assert result is not None
     return result

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import lgvi_warp as lw
-from lgvi_warp.calls.prepared import Runner
+from lgvi_warp.calls.runner import Runner
 from lgvi_warp.studies import sensitivity as uq
 from tests.support.refusals import refused
 

@@ -32,7 +32,7 @@ def fleet(scene, odd=4, **parameters):
 
 
 def seen(members, method="psi_s"):
-    return survey(members, Method(method), 0.01)
+    return survey(members, Method(method))
 
 
 @pytest.fixture(params=(1, 4, 100))

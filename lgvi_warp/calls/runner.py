@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Many runs of one scene, whose settings, plan and kernel are settled once, and quantities of their members."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, SceneError
+from lgvi_warp.common.status import Status, failed
+from lgvi_warp.control.signals import ordered
+from lgvi_warp.engine.plan import Plan
+from lgvi_warp.engine.shared import Shared
+from lgvi_warp.engine.survey import survey
+from lgvi_warp.methods.method import Method
+from lgvi_warp.methods.saveat import SaveAt
+from lgvi_warp.results.provenance import provenance
+from lgvi_warp.results.quantities import OfEnds, OfResult
+from lgvi_warp.results.result import Result
+from lgvi_warp.runs.request import Request, enough_iterations
+from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
+from lgvi_warp.scene.like import SceneLike
+from lgvi_warp.statistics.base import Statistic
+
+# Members that are run together where quantities look over their paths, which are kept as long as they run.
+PATHS_AT_ONCE = 16_384
+
+
+@dataclass
+class _Kind:
+    """Plans of ensembles in which the same names vary, by what their survey found."""
+
+    shared: Shared
+    plans: dict[Any, Plan] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Quantities of interest of an ensemble.
+
+    Attributes:
+        values: the quantities (n, m) [their units].
+        labels: names of the quantities (m,).
+        failed: whether each member failed (n,).
+        counts: name of a status -> number of members.
+        provenance: scene, settings, versions and machine of the runs.
+    """
+
+    values: np.ndarray
+    labels: tuple[str, ...]
+    failed: np.ndarray
+    counts: dict[str, int]
+    provenance: dict[str, Any]
+
+    def text(self, remedy: str) -> str:
+        """Describe how many members failed, and of what.
+
+        Args:
+            remedy: what the user can do, which ends the text.
+
+        Returns:
+            One line of text.
+        """
+        causes = ", ".join(f"{name} {number}" for name, number in self.counts.items() if name != "ok")
+        first, count = int(np.argmax(self.failed)), f"{int(self.failed.sum())} of {len(self.failed)}"
+        return f"{count} members failed ({causes}; the first: member {first}); {remedy}"
+
+
+class Runner:
+    """Runs of many ensembles, with the settings of `solve`; what they share is settled once."""
+
+    def __init__(self, fleet: Ensemble, statistics: Sequence[Any], **settings: Any):
+        faults = Faults()
+        # Every member runs, whatever the scene says of statistics, keep and until.
+        self.request = Request.of(faults, fleet, statistics=statistics, keep="all", until=False, **settings)
+        faults.raise_if_any()
+        scene, chosen = fleet.scene, self.request.method
+        self._auto = (chosen if isinstance(chosen, Method) else scene.run.method_of(chosen)).iterations == "auto"
+        self._kinds: dict[frozenset[str], _Kind] = {}
+        self._last: Plan | None = None
+
+    def plan(self, fleet: Ensemble) -> Plan:
+        """The plan of a run of some members; a kernel is chosen for what these members are, as `solve` does."""
+        names = frozenset(fleet.varied_names)
+        kind = self._kinds.get(names)
+        if kind is not None and self._last is not None:
+            last = self._last
+            method = last.method
+            if self._auto:
+                method = replace(method, iterations=enough_iterations(fleet, method, last.grid.h, last.dtype))
+            plan = kind.plans.get((method, survey(fleet, method, kind.shared, odd=False, most=SURVEYED).decisive))
+            if plan is not None:
+                return plan.of(fleet)
+        plan = replace(self.request, fleet=fleet).plan(survey_all=False)
+        plan.compile()
+        if plan.method.reason:  # chosen once, by the members of the first plan
+            self.request = replace(self.request, method=plan.method)
+        kind = self._kinds.setdefault(names, _Kind(plan.shared))
+        facts = survey(fleet, plan.method, kind.shared, odd=False, most=SURVEYED)
+        kind.plans[plan.method, facts.decisive] = self._last = plan
+        return plan
+
+    def run(self, fleet: Ensemble, progress: Callable[[float], None] | None = None, warned: bool = True) -> Result:
+        """Run some members.
+
+        Returns: Their result, whose provenance names the members' number but not their values, and whose messages leave out
+            what is odd about their values.
+        """
+        few = {"members": fleet.members, "seed": fleet.seed, "varied": sorted(fleet.varied_names)}
+
+        def known(plan: Plan) -> tuple[dict[str, Any], tuple[str, ...]]:
+            content = plan.shared("provenance", {}, lambda numbers: provenance(plan, self.request.observed))
+            return {**content, "ensemble": few}, plan.grid.messages
+
+        plan = self.plan(fleet)
+        return self.request.run(plan, fields=plan.fields, progress=progress, known=known, warned=warned)
+
+    def evaluate(
+        self,
+        fleet: Ensemble,
+        of: Sequence[OfResult],
+        at_once: int,
+        progress: Callable[[float], None] | None = None,
+        warned: bool = True,
+    ) -> Outputs:
+        """Run members, so many at a time, and keep their quantities alone."""
+        looks_at_members = any(each.looks_at_members for each in of)
+        groups, ends, content, n = [], [], dict[str, Any](), fleet.members
+        for first in range(0, n, at_once):
+            stop = min(first + at_once, n)
+            group = fleet if stop - first == n else fleet.subset(np.arange(first, stop))
+            result = self.run(group, progress and part(progress, first / n, stop / n), warned)
+            members = group.select(0, group.members) if looks_at_members else None
+            groups.append([each.values(result, members) for each in of])
+            ends.append(np.asarray(result.status))
+            content = result.provenance
+        labels = [label for each, columns in zip(of, groups[0], strict=True) for label in each.labels(columns.shape[1])]
+        values, status = np.concatenate([np.concatenate(group, axis=1) for group in groups]), np.concatenate(ends)
+        odd = ~np.isfinite(values).all(axis=1)
+        codes = np.unique(status) if status.any() else [Status.OK]
+        counts = {Status(int(code)).name.lower(): int((status == code).sum()) for code in codes}
+        counts |= {"quantity not finite": int(odd.sum())} if odd.any() else {}
+        return Outputs(values, tuple(labels), failed(status) | odd, counts, content)
+
+
+def part(progress: Callable[[float], None], begin: float, end: float) -> Callable[[float], None]:
+    """Tell of a part of the work as a part of the whole."""
+    return lambda fraction: progress(begin + (end - begin) * fraction)
+
+
+def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -> SaveAt | None:
+    """The samples that quantities need, where the user does not say which to keep."""
+    if save is not None or not of:
+        return save
+    fields = ordered(name for each in of for name in each.fields)
+    paths = [each.label for each in of if each.over_path]
+    if paths and scene.run.save_every is None:
+        problem = f"save = None: is missing, and {paths[0]} looks over the path"
+        raise SceneError([f"{problem}; give save=lw.SaveAt(every=...) or [run] save_every"])
+    if paths or any(each.is_function for each in of):
+        return SaveAt(every=scene.run.save_every, fields=fields)
+    times = sorted({each.when for each in of if isinstance(each, OfEnds) and each.when is not None})
+    return SaveAt(at=times or None, fields=fields)
+
+
+def statistics_for(scene: SceneLike, of: Sequence[OfResult]) -> list[Statistic]:
+    """The statistics that quantities need, beside samples."""
+    found = dict[str, Statistic]()
+    for each in of:
+        if isinstance(each, OfEnds):
+            found |= each.gathered(scene.events)
+    return list(found.values())

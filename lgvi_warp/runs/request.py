@@ -1,0 +1,204 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A run as it is asked for: its members, its settings, what is kept of it and who runs it, settled once for every call."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from lgvi_warp.common import machine
+from lgvi_warp.common.errors import Faults, refusal
+from lgvi_warp.common.status import Status
+from lgvi_warp.control.signals import check
+from lgvi_warp.engine.executors import executor_of
+from lgvi_warp.engine.executors.base import Executor
+from lgvi_warp.engine.keepers.observation import Observation, observe
+from lgvi_warp.engine.plan import NotSurveyed, Plan, choose_plan
+from lgvi_warp.methods.method import Method
+from lgvi_warp.methods.saveat import SaveAt, TimeGrid, time_grid
+from lgvi_warp.physics.fields import FIELDS
+from lgvi_warp.results.result import Result
+from lgvi_warp.runs.default_method import planned
+from lgvi_warp.runs.run import refuse_failed, run_plan
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+
+# With more Newton steps than this, a fixed number gains nothing over iterating to the tolerance.
+MOST_FIXED = 4
+# What a run keeps that says nothing of it.
+ALL_SAMPLES = Observation()
+
+
+@dataclass(frozen=True)
+class Request:
+    """A run as it is asked for; settings that are None come from the [run] of the scene, and are explained at `lw.solve`.
+
+    h: step [s].
+    t1: end of the run [s].
+    observed: statistics, members whose samples are kept, and when the run stops.
+    threads: None for all cores.
+    executor: None for threads.
+    """
+
+    fleet: Ensemble
+    method: str | Method | None = None
+    h: float | None = None
+    t1: float | None = None
+    save: SaveAt | None = None
+    dtype: str | None = None
+    _: KW_ONLY
+    width: int | None = None
+    checks: str | None = None
+    on_failure: str | None = None
+    observed: Observation = ALL_SAMPLES
+    threads: int | None = None
+    executor: Executor | None = None
+
+    @classmethod
+    def of(
+        cls,
+        faults: Faults,
+        fleet: Ensemble,
+        *,
+        statistics: Any = None,
+        keep: Any = None,
+        until: Any = None,
+        executor: Any = "threads",
+        threads: int | None = None,
+        scheduler: str | None = None,
+        **settings: Any,
+    ) -> Request:
+        """The run that the arguments of `solve` ask for; what is wrong with those named here is added to the faults."""
+        observed, runner = ALL_SAMPLES, None
+        with faults.including():
+            observed = observe(fleet, statistics, keep, until)
+        with faults.including():
+            runner = executor_of(executor, threads, scheduler)
+        return cls(fleet, **settings, observed=observed, threads=threads, executor=runner)
+
+    @property
+    def saved(self) -> tuple[str, ...]:
+        """Names of the samples that are kept."""
+        if self.save is not None:
+            return self.save.fields
+        named = self.fleet.scene.run.save_fields
+        return FIELDS if named is None else tuple(named)
+
+    @property
+    def count(self) -> int:
+        """The number of threads."""
+        return self.threads or machine.thread_count()
+
+    def grid(self) -> TimeGrid:
+        """Choose the steps and the sample times."""
+        run, faults = self.fleet.scene.run, Faults()
+        h = _seconds(faults, "h", self.h, run.step, "give the step in seconds: solve(..., h=0.01) or [run] step")
+        end = "give the end in seconds: solve(..., t1=150.0) or [run] duration"
+        t1 = _seconds(faults, "t1", self.t1, run.duration, end)
+        if self.save is not None and not isinstance(self.save, SaveAt):
+            faults.add("save", self.save, "is no SaveAt", "give lw.SaveAt(every=1.0) or lw.SaveAt(at=[...])")
+        faults.raise_if_any()
+        check(
+            faults, "run.save_fields" if self.save is None else "save.fields", self.saved, self.fleet.scene.controller
+        )
+        faults.raise_if_any()
+        if self.save is not None:
+            return time_grid(h, t1, self.save)
+        if run.save_every is None or run.save_every <= t1:
+            return time_grid(h, t1, SaveAt(every=run.save_every))
+        # The scene's save_every is meant for its own duration; a shorter run ignores it.
+        told = (
+            f"run.save_every = {run.save_every} s is longer than the run, {t1} s: only the start and the end are kept"
+        )
+        return time_grid(h, t1, SaveAt()).telling(told)
+
+    def plan(self, survey_all: bool = True) -> Plan:
+        """Settle the run: its steps, its method and its kernel.
+
+        survey_all: as of `choose_plan`.
+        """
+        grid, run = self.grid(), self.fleet.scene.run
+        dtype = run.dtype if self.dtype is None else self.dtype
+        checks = run.checks if self.checks is None else self.checks
+        on_failure = run.on_failure if self.on_failure is None else self.on_failure
+        observed, fields = self.observed, self.observed.fields(self.saved)
+        others = (fields, dtype, self.width, checks, on_failure, survey_all, observed.looks, observed.read_at_looks())
+        if self.method is None and run.method is None and not run.method_options:
+            return planned(self.fleet, grid, others)
+        method = self.method if isinstance(self.method, Method) else run.method_of(self.method)
+        if method.iterations == "auto":
+            method = replace(method, iterations=enough_iterations(self.fleet, method, grid.h, dtype))
+            n = method.iterations
+            number = f"{n} a solve, enough for" if n is not None else f"to the tolerance: {MOST_FIXED} are too few for"
+            grid = grid.telling(f"Newton steps {number} every member's start at twice the step")
+        return choose_plan(self.fleet, method, grid, *others)
+
+    def run(self, plan: Plan, **settings: Any) -> Result:
+        """Run in memory, and the members again whose samples alone are kept.
+
+        plan: the plan of this request. Where a member beyond those that were looked at needs another kernel, the run begins
+            anew with a kernel for all members, so that they have the bits of one kernel.
+        settings: as of `run_plan`.
+        """
+        settings = {"observed": self.observed, "fields": self.saved, "executor": self.executor, **settings}
+        try:
+            result = run_plan(plan, self.count, **settings)
+        except NotSurveyed:
+            plan = plan.replanned(survey_all=True)
+            result = run_plan(plan, self.count, **settings)
+        indices, kept = self.again(plan, result.status)
+        if kept is not None:
+            result = replace(result, kept=kept, kept_members=indices)
+        return refuse_failed(result, plan)
+
+    def again(self, plan: Plan, status: np.ndarray) -> tuple[np.ndarray, Result | None]:
+        """Run the members again whose samples are wanted after the run; they have the same bits as in the run.
+
+        status: (n,), of each member.
+        Returns: Their indices, (m,), and their result, None if there are none.
+        """
+        indices = self.observed.again(status)
+        if not len(indices):
+            return indices, None
+        chosen = plan.with_neighbours(indices)
+        result = run_plan(plan.subplan([int(i) for i in chosen], self.saved), self.count)
+        return indices, result if len(chosen) == len(indices) else result.part(np.searchsorted(chosen, indices))
+
+
+def scene_of(fleet: Any) -> Any:
+    """The scene of an Ensemble, or a Scene itself."""
+    if not isinstance(fleet, Ensemble | Scene):
+        raise refusal("fleet", fleet, "is neither an Ensemble nor a Scene", "give lw.Scene(...) or lw.Ensemble(...)")
+    return fleet.scene if isinstance(fleet, Ensemble) else fleet
+
+
+def ensemble_of(fleet: Any) -> Ensemble:
+    """The members that are meant: those of an Ensemble, or of a Scene with its [ensemble]."""
+    scene = scene_of(fleet)
+    return fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(scene)
+
+
+def enough_iterations(fleet: Ensemble, method: Method, h: float, dtype: str) -> int | None:
+    """Find the least number of Newton steps that leaves every member's residual below the tolerance at twice the step.
+
+    The residual after a fixed number grows with h |Omega|: twice the step leaves room for members that spin up.
+
+    h: Step of the run [s].
+    Returns: The number of Newton steps, or None if more than MOST_FIXED would be needed.
+    """
+    for n in range(MOST_FIXED + 1):
+        trial = Request(fleet, replace(method, iterations=n), 2.0 * h, 2.0 * h, SaveAt(), dtype)
+        if not np.any(run_plan(trial.plan(), trial.count).status == Status.NOT_CONVERGED):
+            return n
+    return None
+
+
+def _seconds(faults: Faults, key: str, given: Any, of_scene: float | None, remedy: str) -> float:
+    """A time of the run [s], as given or of the scene."""
+    seconds = of_scene if given is None else given
+    if seconds is None:
+        faults.add(key, seconds, "is missing", remedy)
+        return 0.0
+    return float(faults.positive(key, seconds) or 0.0)

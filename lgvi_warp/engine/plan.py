@@ -17,8 +17,8 @@ import numpy as np
 import warp as wp
 
 from lgvi_kernels import built_in
-from lgvi_kernels.advance.feeding import ALL_NOTES, NOTED, bit
 from lgvi_kernels.advance.kernel import Advance, make_advance
+from lgvi_kernels.advance.noting import ALL_NOTES, NOTED, bit
 from lgvi_kernels.advance.rows import SAMPLE_FIELDS
 from lgvi_kernels.advance.spec import CHUNK, Control, Spec
 from lgvi_kernels.lanes.arithmetic import WIDTHS
@@ -458,7 +458,7 @@ class Plan:
 
     @property
     def notes(self) -> int:
-        """What looks note, as bits (see feeding.py): that of which something is saved, and all where the host is asked."""
+        """What looks note, as bits (see noting.py): that of which something is saved, and all where the host is asked."""
         noted = [signal for name in self.signals if (signal := SIGNALS[name]).group in NOTED]
         return ALL_NOTES if self.asks else sum({bit(signal.group, signal.row) for signal in noted})
 

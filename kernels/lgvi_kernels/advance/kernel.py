@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import warp as wp
 
 from lgvi_kernels.advance.events import FIRST
-from lgvi_kernels.advance.feeding import make_note_actuators, make_signals
+from lgvi_kernels.advance.gathering import make_note_actuators, make_signals
 from lgvi_kernels.advance.retry import make_retry
 from lgvi_kernels.advance.rows import make_rows, make_sample
 from lgvi_kernels.advance.spec import CHUNK, Types, make_types

@@ -14,7 +14,7 @@ Equations of Nordkvist & Sanyal (2010): (12), (23) are in `Ab`, the rotation in 
 maps/submaps.py; (15), (16), and with them (10)-(16) and (19)-(23) as printed, in maps/paper.py; (24) in maps/rotation.py.
 
 To read any file: a module that writes + - * / between lanes imports `add`, `sub`, `mul`, `div`, although no line names
-them (`noqa: F401`), since Warp looks operators up among the module's names. A function `make_...` runs on the host, once for
+them (`noqa: F401`), since Warp looks operators up among the module's names. Laws and stops import all of law.py. A function `make_...` runs on the host, once for
 each kernel. Inside it, `if wp.static(...)` is decided then: what a scene does not have is not compiled, and costs nothing.
 """
 

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is gathered at a controller's looks, and the signals that samples write."""
 
+import functools
 from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, positive, sub  # noqa: F401
+from lgvi_kernels.lanes.arithmetic import add, mul, positive, sub  # noqa: F401
 from lgvi_kernels.maps.compose import superpose
 from lgvi_kernels.maps.submaps import look, rotate
 
@@ -67,6 +68,7 @@ def make_gather(spec, View, at_step):
     return gather
 
 
+@functools.cache
 def make_note_actuators(spec, View, at_step):
     """(x, c, h, k): the actuators write where they are into the bus (role `report` of their laws); nothing where none does."""
     report = superpose(spec.laws, "report")
@@ -84,6 +86,7 @@ def make_note_actuators(spec, View, at_step):
     return note_actuators
 
 
+@functools.cache
 def make_signals(Lane):
     """(keep_signals, sample_signals): of lanes that freeze the signals are kept, and samples write them."""
 

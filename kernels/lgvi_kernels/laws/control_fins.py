@@ -6,27 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    absolute,
-    add,
-    clamp,
-    command,
-    cosine,
-    div,
-    least,
-    make_pursuit,
-    middle_of_half,
-    mul,
-    neg,
-    ones,
-    positive,
-    remember,
-    remembered,
-    row1,
-    sine,
-    struct,
-    sub,
-)
+from lgvi_kernels.law import *
 from lgvi_kernels.laws import fins
 from lgvi_kernels.laws.fins import add_fins, note_lift_and_drag, speed_along
 

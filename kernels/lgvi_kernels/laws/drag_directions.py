@@ -15,7 +15,7 @@ from lgvi_kernels.lanes.arithmetic import component_x, component_y, component_z
 from lgvi_kernels.lanes.matrix3 import apply, transpose_times
 from lgvi_kernels.lanes.state import matrix3_struct
 from lgvi_kernels.lanes.sums import pushed, twisted
-from lgvi_kernels.law import absolute, add, cross, div, lane3, mul, ones, struct, sub, vec3  # noqa: F401
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.drag import PARTS
 from lgvi_kernels.laws.drag import make_E as make_exact
 

@@ -5,30 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    absolute,
-    add,
-    clamp,
-    command,
-    decay,
-    div,
-    exponential,
-    greatest,
-    least,
-    logarithm,
-    make_pursuit,
-    middle_of_half,
-    mul,
-    neg,
-    ones,
-    positive,
-    remember,
-    remembered,
-    row1,
-    struct,
-    sub,
-    vec3,
-)
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.driven import Driven, approached
 
 

@@ -6,28 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    absolute,
-    add,
-    command,
-    decay,
-    div,
-    exponential,
-    greatest,
-    make_pursuit,
-    middle_of_half,
-    mul,
-    neg,
-    ones,
-    positive,
-    remember,
-    remembered,
-    row1,
-    row3,
-    struct,
-    sub,
-    vec3,
-)
+from lgvi_kernels.law import *
 
 # Rows of one thruster: force and torque per newton (6), coefficient forward and backward, dead band, limit, 1 / lag.
 ROWS = 11

@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, greatest, mul, neg, ones, remembered, row1, row3, struct, sub, vec3  # noqa: F401
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.thrusters import ROWS, commanded, evolve, follow  # noqa: F401
 
 

@@ -8,26 +8,7 @@ import warp as wp
 
 from lgvi_kernels import device
 from lgvi_kernels.lanes.noise import noise_key
-from lgvi_kernels.law import (  # noqa: F401
-    absolute,
-    add,
-    div,
-    lane,
-    lane3,
-    least,
-    mul,
-    normals,
-    ones,
-    positive,
-    quarter,
-    remember,
-    remembered,
-    root,
-    rounded,
-    struct,
-    sub,
-    vec3,
-)
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.readings import make_reading, remember3, remembered3
 
 # Features that draw random numbers, and those by which a reading is not that of its own look.

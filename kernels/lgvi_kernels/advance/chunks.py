@@ -19,13 +19,13 @@ from lgvi_kernels.lanes.sums import at_rest, choose
 from lgvi_kernels.maps.compose import superpose
 
 
-def make_looked_at(spec):
-    """(x, c, monitor, k, last, h, opening, frozen): x after k steps, looked at and made a rotation again now and then."""
+def make_inspected(spec):
+    """(x, c, monitor, k, last, h, opening, frozen): x after k steps; now and then it is noted, and made a rotation again."""
     types, note, real = make_types(spec), make_watching(spec).note, spec.real
     State, Constants, Monitor, Lane = types.State, types.Constants, types.Monitor, types.Lane
 
     @wp.func(inline=True)
-    def looked_at(
+    def inspected(
         x: State, c: Constants, monitor: Monitor, k: int, last: int, h: wp.float64, opening: real, frozen: Lane
     ):
         """last: the step of the last sample."""
@@ -37,7 +37,7 @@ def make_looked_at(spec):
                 x = renormalise(x, c.tolerance)
         return x
 
-    return looked_at
+    return inspected
 
 
 def make_sampled(spec):
@@ -75,7 +75,7 @@ def make_chunks(spec):
     State, Constants, Monitor, Lane, Ints = types.State, types.Constants, types.Monitor, types.Lane, types.Ints
     Alarm, one_step, stepped, held = types.Alarm, stepping.one_step, stepping.stepped, stepping.held
     examined, stopped, controlled = make_examined(spec), make_stopped(spec), spec.control is not None
-    looked_at, sampled = make_looked_at(spec), make_sampled(spec)
+    inspected, sampled = make_inspected(spec), make_sampled(spec)
     note_actuators = make_note_actuators(spec, types.View, stepping.at_step)
     _, _, back_up = make_rows(Lane, State, spec.paced, spec.compensated)
 
@@ -140,7 +140,7 @@ def make_chunks(spec):
             else:
                 k += n
                 singles = wp.max(singles - 1, 0)
-                x = looked_at(x, c, monitor, k, last, h, opening, frozen)
+                x = inspected(x, c, monitor, k, last, h, opening, frozen)
                 if k == sample_step[s]:
                     sampled(x, kept, any_frozen, c, monitor, k, h, opening, frozen, s - s0, numbers, columns, out)
                     s += 1

@@ -7,15 +7,17 @@ The rooms; each may import from the earlier ones only:
 - law.py: what the author of a force or of an event imports;
 - laws, stops: one file for each force, one file for each event;
 - maps: the maps that a step is made of, and the solvers of equation (24);
-- advance: the kernel. method.py makes a step from maps and laws, stepping.py loops over steps, kernel.py is launched.
+- advance: the kernel. method.py makes a step from maps and laws, stepping.py loops over steps, chunks.py looks at the alarms
+  between them, kernel.py is launched; feeding.py is the look of a controller.
 
 Equations of Nordkvist & Sanyal (2010): (12), (23) are in `Ab`, the rotation in (10), (11), (13), (14) and its adjoint
 (19)-(22) in `D`, the potential's force and moment in (13), (14), (19), (20) in `K`, their Munk moment in `Ap`, all in
 maps/submaps.py; (15), (16), and with them (10)-(16) and (19)-(23) as printed, in maps/paper.py; (24) in maps/rotation.py.
 
 To read any file: a module that writes + - * / between lanes imports `add`, `sub`, `mul`, `div`, although no line names
-them (`noqa: F401`), since Warp looks operators up among the module's names. A function `make_...` runs on the host, once for
-each kernel. Inside it, `if wp.static(...)` is decided then: what a scene does not have is not compiled, and costs nothing.
+them (`noqa: F401`), since Warp looks operators up among the module's names; laws and stops import all of law.py.
+A function `make_...` runs on the host, once for each kernel. Inside it, `if wp.static(...)` is decided then: what a scene
+does not have is not compiled, and costs nothing.
 """
 
 import functools

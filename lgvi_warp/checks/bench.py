@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A law evaluated alone, its numbers packed as for a run, at random views: the means of check_law."""
+"""A term evaluated alone, its numbers packed as for a run: the means of the checks; and random views, those of check_law."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -37,12 +37,8 @@ ORIGIN = np.array([0.1, -0.2, 0.15])
 class Views:
     """States and times at which a law is evaluated.
 
-    Attributes:
-        attitude: (k, 3, 3), rotation matrices from body to inertial axes.
-        position: (k, 3) [m], in inertial axes.
-        velocity: (k, 3) [m/s], in body axes.
-        rate: (k, 3) [rad/s], angular velocity in body axes.
-        time: (k,) [s], the same for all lanes of a packet.
+    attitude: (k, 3, 3), body to inertial; position: (k, 3) [m], inertial; velocity: (k, 3) [m/s] and rate: (k, 3) [rad/s],
+    body axes; time: (k,) [s], the same for all lanes of a packet.
     """
 
     attitude: np.ndarray
@@ -52,17 +48,11 @@ class Views:
     time: np.ndarray
 
     def moved(self, axis: int, by: float) -> Views:
-        """The views with every position displaced along an inertial axis.
-
-        by: displacement [m].
-        """
+        """The views with every position displaced by a length [m] along an inertial axis."""
         return replace(self, position=self.position + by * np.eye(3)[axis])
 
     def turned(self, axis: int, by: float) -> Views:
-        """The views with every attitude turned about one of its body axes.
-
-        by: angle [rad].
-        """
+        """The views with every attitude turned by an angle [rad] about one of its body axes."""
         return replace(self, attitude=self.attitude @ notation.matrix_from_rotation_vector(by * np.eye(3)[axis]))
 
     def elsewhere(self) -> Views:
@@ -87,10 +77,7 @@ MOST_SAMPLES = 1_000_000
 
 
 def of_scene(scene: Any) -> Scene:
-    """The scene in which a law is checked.
-
-    scene: What the user gave: a Scene, or None for a simple one.
-    """
+    """The scene in which a law is checked: what the user gave, or a simple one for None."""
     if scene is None:
         return simple_scene()
     if not isinstance(scene, Scene):
@@ -113,56 +100,85 @@ def simple_scene() -> Scene:
     return Scene(body, Environment())
 
 
-class Bench:
-    """A term with its numbers packed as for a run, ready to be evaluated at views.
+REMEDY = (
+    "return what the role adds to (w, D, f, state); name fields as the View and params() do; import the operators of "
+    "lanes that are used; no `if` on a lane, no plain number times a lane: docs/develop/add_a_force.md"
+)
 
-    Attributes:
-        views: random views, `count` of them.
-        corners: views at rest and along single axes.
-        packets: the term's numbers on the device; set once packed() has been checked.
+
+class TermBench:
+    """A term, or a part of a controller, with its numbers and the kernels that evaluate it alone, one for each width.
+
+    roles: those that its device code has; count: of views, or of members; width: the first, which is used.
+    parameters: of the scene, with the term's own; own: those of the term, by name.
+    """
+
+    def __init__(self, term: Term, module: Any, scene: Scene, count: int, seed: int, roles: Iterable[str],
+                 widths: Sequence[int], make: Callable[..., Any] = make_examine, remedy: str = REMEDY):  # fmt: skip
+        self.term, self.module, self.count, self.seed, self.width = term, module, count, seed, widths[0]
+        self.roles = tuple(role for role in roles if hasattr(module, role))
+        numbers = scene.parameters() | {f"{term.key}.{name}": value for name, value in term.parameters().items()}
+        self.parameters = {name: np.asarray(value)[None] for name, value in numbers.items()}
+        self.own = {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
+        warp_setup.start()
+        self.kernels = {width: built(term, module, width, make, remedy) for width in widths}
+        self.Params = np.dtype(self.kernels[self.width].Params.numpy_dtype())
+
+
+class Device:
+    """The arrays of a kernel: a term's numbers, table and memory packed as for a run, and what the kernel writes."""
+
+    def __init__(self, bench: TermBench, packed: Any, width: int, fields: int, scratch: int = 0, bus: int = 0):
+        self.kernel, self.packets, self.fields = bench.kernels[width], bench.count // width, fields
+        Params = self.kernel.Params
+        self.laws = LawArrays(self.packets, [(Params, np.dtype(Params.numpy_dtype()))], self.kernel.Lane)
+        self.laws.write([Group([packed], [False])], scratch, bus)
+        self.out = wp.zeros((self.packets, fields), dtype=self.kernel.Lane, device="cpu")
+
+    def launch(self, *given: Any, repeats: int = 1) -> None:
+        """Launch the kernel for all packets, some times over."""
+        inputs = [self.laws.structs[0].array, self.laws.table.array, *given, self.laws.memory.array, self.out]
+        with build_lock:
+            wp.launch(self.kernel.kernel, self.packets * repeats, inputs, device="cpu")
+
+    def written(self) -> np.ndarray:
+        """What the last launch wrote: (count, fields), a copy."""
+        out = self.out.numpy().reshape(self.packets, self.fields, -1).transpose(0, 2, 1)
+        return np.array(out.reshape(-1, self.fields))
+
+
+class Bench(TermBench):
+    """A term that is evaluated at random views, and at corners: at rest and along single axes.
+
+    packets: the term's numbers on the device; set once packed() has been checked.
     """
 
     packets: Bank
 
     def __init__(self, term: Term, module: Any, scene: Scene, packets: int, seed: int):
-        self.term, self.module, self.width = term, module, register_width("float64")
+        width = register_width("float64")
+        super().__init__(term, module, scene, packets * width, seed, COLUMNS, (width,))
         self.noisy = bool(getattr(module, "NOISE", False))
-        self.roles = tuple(role for role in COLUMNS if hasattr(module, role))
-        numbers = scene.parameters() | {f"{term.key}.{name}": value for name, value in term.parameters().items()}
-        self.parameters = {name: np.asarray(value)[None] for name, value in numbers.items()}
-        self.own = {name: self.parameters[f"{term.key}.{name}"] for name in term.parameters()}
-        self.count = packets * self.width
-        self.seed = seed
         around = scene.start.given()["position"]
-        self.views = random_views(packets, self.width, seed, around)
-        self.corners = tuple(corner_views(packets, self.width, around))
-        warp_setup.start()
-        self.examine = built(term, module, self.width)
-        self.Params = np.dtype(self.examine.Params.numpy_dtype())
+        self.views = random_views(packets, width, seed, around)
+        self.corners = tuple(corner_views(packets, width, around))
 
     def context(self, parameters: Mapping[str, np.ndarray], elsewhere: bool = False) -> PackingContext:
-        """The context that packed() receives.
-
-        parameters: parameters of the scene by name, each (1, ...) or (n, ...).
-        """
+        """The context that packed() receives; parameters: of the scene by name, each (1, ...) or (n, ...)."""
         return packing_context(parameters, self.count, self.seed, KICK, elsewhere)
 
     def at(self, views: Views) -> dict[str, np.ndarray]:
-        """Evaluate every role of the law.
-
-        Returns: By role: (count, numbers of the role).
-        """
+        """Evaluate every role of the law: by role, (count, numbers of the role)."""
         return self.packets.evaluate(views)
 
 
-class Bank:
-    """A term's numbers, table and memory, packed as for a run."""
+class Bank(Device):
+    """A law's numbers in some context, after the law has remembered at some views."""
 
     def __init__(self, bench: Bench, context: PackingContext, views: Views):
-        self.bench, self.count = bench, bench.count // bench.width
         packed = bench.term.packed(Ensemble.own(bench.term, context.parameters), context)
-        self.laws = LawArrays(self.count, [(bench.examine.Params, bench.Params)], bench.examine.Lane)
-        self.laws.write([Group([packed], [False])])
+        super().__init__(bench, packed, bench.width, OUT_FIELDS)
+        self.bench = bench
         self.run_device(views, 0)
 
     @property
@@ -171,32 +187,20 @@ class Bank:
         return self.laws.memory.array
 
     def evaluate(self, views: Views) -> dict[str, np.ndarray]:
-        """Evaluate every role of the law, and its energy where it has one.
-
-        Returns: By role: (count, numbers of the role).
-        """
+        """Evaluate every role of the law, and its energy where it has one: by role, (count, numbers of the role)."""
         out = self.run_device(views, -1)
         roles = (*self.bench.roles, *["energy"] * hasattr(self.bench.module, "energy"))
         return {role: out[:, COLUMNS[role][0] : sum(COLUMNS[role])] for role in roles}
 
     def run_device(self, views: Views, second: int, h: float = KICK) -> np.ndarray:
-        """Evaluate the law once at each view.
-
-        h: length of the kick, or of the time before the views (default KICK) [s].
-        Returns: (k, OUT_FIELDS), the columns of `lgvi_kernels.advance.examine.COLUMNS`.
-        """
-        width, Lane = self.bench.width, self.bench.examine.Lane
+        """Evaluate the law once at each view: (k, OUT_FIELDS); h: length of the kick, or of the time before the views [s]."""
         flat = [views.attitude.reshape(-1, 9), views.position, views.velocity, views.rate]
         rows = np.concatenate(flat, axis=1)
-        lanes = Lanes(self.count, rows.shape[1], Lane)
+        lanes = Lanes(self.packets, rows.shape[1], self.kernel.Lane)
         put_rows(lanes.view, rows)
-        times = wp.array(views.time[::width], dtype=wp.float64, device="cpu")
-        out = wp.zeros((self.count, OUT_FIELDS), dtype=Lane, device="cpu")
-        inputs = [self.laws.structs[0].array, self.laws.table.array, lanes.array, times, wp.float64(h), STEP, second]
-        inputs += [self.laws.memory.array, out]
-        with build_lock:
-            wp.launch(self.bench.examine.kernel, dim=self.count, inputs=inputs, device="cpu")
-        return np.asarray(out.numpy().transpose(0, 2, 1).reshape(-1, OUT_FIELDS))
+        times = wp.array(views.time[:: self.bench.width], dtype=wp.float64, device="cpu")
+        self.launch(lanes.array, times, wp.float64(h), STEP, second)
+        return self.written()
 
 
 def packing_context(
@@ -216,16 +220,10 @@ def packing_context(
     return PackingContext(parameters, frame, np.arange(count), seed, h)
 
 
-REMEDY = (
-    "return what the role adds to (w, D, f, state); name fields as the View and params() do; import the operators of "
-    "lanes that are used; no `if` on a lane, no plain number times a lane: docs/develop/add_a_force.md"
-)
-
-
-def built(term: Term, module: Any, width: int, make: Callable[..., Any] = make_examine, remedy: str = REMEDY) -> Any:
+def built(term: Term, module: Any, width: int, make: Callable[..., Any], remedy: str) -> Any:
     """The compiled kernel that evaluates a law, or a part of a controller.
 
-    make: (module, numbers, width, real) -> kernel and types; by default `make_examine`.
+    make: (module, numbers, width, real) -> kernel and types.
     """
     try:
         hash(module)
@@ -246,10 +244,7 @@ def built(term: Term, module: Any, width: int, make: Callable[..., Any] = make_e
 
 
 def random_views(packets: int, width: int, seed: int, around: np.ndarray) -> Views:
-    """Random views around a position.
-
-    around: (3,) [m], mean of the positions, whose standard deviation is 4 m.
-    """
+    """Random views; around: (3,) [m], mean of the positions, whose standard deviation is 4 m."""
     rng = np.random.default_rng(seed)
     k = packets * width
     quaternion, position, velocity, rate = rng.normal(size=(k, 4)), *rng.normal(size=(3, k, 3))
@@ -278,16 +273,10 @@ def corner_views(packets: int, width: int, around: np.ndarray) -> Iterator[Views
 
 
 def short(values: np.ndarray) -> str:
-    """Numbers for a message, rounded to three decimals.
-
-    values: numbers of any shape.
-    """
+    """Numbers for a message, rounded to three decimals."""
     return str(np.round(np.asarray(values), 3).tolist())
 
 
 def sizes(values: np.ndarray) -> str:
-    """Numbers for a message with three significant digits, for those that may be very small.
-
-    values: (n,), numbers.
-    """
+    """Numbers (n,) for a message with three significant digits, for those that may be very small."""
     return "[" + ", ".join(f"{value:.3g}" for value in values) + "]"

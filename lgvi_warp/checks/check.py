@@ -11,7 +11,19 @@ import numpy as np
 
 from lgvi_kernels import built_in
 from lgvi_warp.checks.bench import MOST_SAMPLES, ORIGIN, TURN, Bank, Bench, Views, of_scene, short, sizes
-from lgvi_warp.checks.report import EPS, ROUNDINGS, Check, LawReport, attempt, judged, packed_numbers, unpacked
+from lgvi_warp.checks.report import (
+    LANES_APART,
+    ROUND_OFF,
+    VARIED_NUMBERS,
+    Check,
+    LawReport,
+    attempt,
+    finite,
+    first_wrong,
+    judged,
+    packed_numbers,
+    unpacked,
+)
 from lgvi_warp.common.arguments import whole
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import register_width
@@ -99,20 +111,14 @@ def _finite(bench: Bench, step: float) -> Iterator[Check]:
     """Whether numbers are finite at all views, at rest and along single axes; notes a law that is zero everywhere."""
     here = bench.at(bench.views)
     at_random = _all_finite("finite", here, bench.views)
-    for views in bench.corners:
-        at_corners = _all_finite("finite at rest, along axes", bench.at(views), views)
-        if not at_corners.ok:
-            break
-    yield at_corners
+    yield first_wrong(_all_finite("finite at rest, along axes", bench.at(views), views) for views in bench.corners)
     asleep = not any(np.any(value) for value in here.values())
     note = "note: zero at every view, so little was checked; give a scene that starts where the law acts"
     yield at_random._replace(text=note) if asleep else at_random
 
 
 def _all_finite(name: str, values: dict[str, np.ndarray], views: Views) -> Check:
-    """Whether every role gives numbers at every view."""
-    finite = np.all([np.isfinite(value).all(axis=1) for value in values.values()], axis=0)
-    return judged(name, (~finite).astype(float), 0.0, views, "guard divisions and roots")
+    return finite(name, np.concatenate([*values.values()], axis=1), views)
 
 
 def _whole(bench: Bench, step: float) -> Iterator[Check]:
@@ -139,13 +145,10 @@ def _packing(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
     each = {name: np.repeat(value, bench.count, axis=0) for name, value in bench.parameters.items()}
     varied = _tried(bench, bench.context(each), views, "where numbers have one entry a member")
     for role, value in here.items():
-        yield judged(f"{role}: lanes apart", mixed[role][back] - value, 0.0, views, "a lane must not look at others")
-        if isinstance(varied, str):
-            yield Check(f"{role}: varied numbers", np.inf, 0.0, False, varied)
-        else:
-            limit = ROUNDINGS * EPS * np.abs(value).max()
-            remedy = "packed() must give n entries where its numbers have n"
-            yield judged(f"{role}: varied numbers", varied[role] - value, limit, views, remedy)
+        yield judged(f"{role}: lanes apart", mixed[role][back] - value, 0.0, views, LANES_APART)
+        difference = varied if isinstance(varied, str) else varied[role] - value
+        limit = ROUND_OFF * np.abs(value).max()
+        yield judged(f"{role}: varied numbers", difference, limit, views, VARIED_NUMBERS)
     # Weight and restoring moment keep their promise together, not each.
     if not any(isinstance(bench.term, type(implied)) for implied in terms.IMPLIED):
         yield from _axes(bench, here)
@@ -158,12 +161,10 @@ def _event_axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
         return
     turned_views = replace(bench.views, attitude=bench.views.attitude @ TURN)
     turned = _tried(bench, bench.context(bench.parameters, True), turned_views, "in other axes of the body")
-    if isinstance(turned, str):
-        yield Check("distance: any axes", np.inf, 0.0, False, turned)
-        return
-    limit = ROUNDINGS * EPS * np.abs(here["distance"]).max() * 100.0
+    difference = turned if isinstance(turned, str) else turned["distance"] - here["distance"]
+    limit = ROUND_OFF * np.abs(here["distance"]).max() * 100.0
     remedy = "turn vectors and points of the body by context.frame.vector() in packed()"
-    yield judged("distance: any axes", turned["distance"] - here["distance"], limit, bench.views, remedy)
+    yield judged("distance: any axes", difference, limit, bench.views, remedy)
 
 
 def _tried(bench: Bench, context: PackingContext, views: Views, where: str) -> dict[str, np.ndarray] | str:
@@ -175,9 +176,9 @@ def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
     """The same wrench from a frame with other axes and origin."""
     views, turned_views = bench.views, bench.views.elsewhere()
     turned = _tried(bench, bench.context(bench.parameters, True), turned_views, "in other axes of the body")
-    for role in set(here) & {"law", "damping"}:
+    for role in [role for role in ("law", "damping") if role in here]:
         if isinstance(turned, str):
-            yield Check(f"{role}: any axes", np.inf, 0.0, False, turned)
+            yield judged(f"{role}: any axes", turned, 0.0, views, "")
             continue
         wrench, turned_wrench = _wrench(role, here[role], views), _wrench(role, turned[role], turned_views)
         force = turned_wrench[:, :3] @ TURN.T
@@ -185,7 +186,7 @@ def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
         difference = np.concatenate([force, torque], axis=1) - wrench
         # Moving the origin and turning add up numbers as large as these.
         largest = max(np.abs(values).max() for values in (here[role], turned[role], wrench))
-        limit = ROUNDINGS * EPS * largest * 100.0
+        limit = ROUND_OFF * largest * 100.0
         remedy = "turn vectors by context.frame.vector(), points by .point(), torques by .torque() in packed()"
         yield judged(f"{role}: any axes", difference, limit, views, remedy)
 
@@ -199,12 +200,7 @@ def _wrench(role: str, value: np.ndarray, views: Views) -> np.ndarray:
 
 
 class Slope(NamedTuple):
-    """A central difference and a bound of its error.
-
-    Attributes:
-        value: (k, ...), the difference quotient.
-        allowed: (k, ...), its error: that of the step, estimated with twice the step, and that of rounding.
-    """
+    """A central difference, `value` (k, ...), and a bound of its error: of the step, by twice the step, and of rounding."""
 
     value: np.ndarray
     allowed: np.ndarray
@@ -215,7 +211,7 @@ def _slope(values: Any, step: float, reach: np.ndarray) -> Slope:
     near, far = [(np.asarray(values(by)), np.asarray(values(-by))) for by in (step, 2.0 * step)]
     first, second = (near[0] - near[1]) / (2.0 * step), (far[0] - far[1]) / (4.0 * step)
     size = np.maximum.reduce([np.abs(value) for value in (*near, *far)])
-    rounded = ROUNDINGS * EPS * (size + reach.reshape(-1, *(1,) * (size.ndim - 1)) * np.abs(first)) / step
+    rounded = ROUND_OFF * (size + reach.reshape(-1, *(1,) * (size.ndim - 1)) * np.abs(first)) / step
     # The error of the step is a third of the difference; where the slope jumps nearby, as much as that.
     return Slope(first, 2.0 * np.abs(second - first) + rounded)
 
@@ -247,7 +243,7 @@ def _potential(bench: Bench, step: float) -> Iterator[Check]:
     yield judged("law: torque = -dU/dR", wrench[:, 3:] - torque, limits, views, remedy)
     if hasattr(bench.module, "energy"):
         known, energy = U(views), bench.at(views)["energy"][:, 0]
-        round_off = 100.0 * ROUNDINGS * EPS * max(np.abs(known).max(), np.abs(energy).max())
+        round_off = 100.0 * ROUND_OFF * max(np.abs(known).max(), np.abs(energy).max())
         difference = (energy - energy[0]) - (known - known[0])
         yield judged("energy: as potential()", difference, round_off, views, "is it u + U, with u as given?")
 
@@ -283,7 +279,7 @@ def _power(bench: Bench, views: Views) -> tuple[np.ndarray, np.ndarray, np.ndarr
     D = bench.at(views)["damping"].reshape(-1, 6, 6)
     twist = np.concatenate([views.velocity, views.rate], axis=1)
     power = np.einsum("ki,kij,kj->k", twist, D, twist)
-    return power, ROUNDINGS * EPS * np.einsum("ki,kij,kj->k", np.abs(twist), np.abs(D), np.abs(twist)), twist
+    return power, ROUND_OFF * np.einsum("ki,kij,kj->k", np.abs(twist), np.abs(D), np.abs(twist)), twist
 
 
 def _flow(bench: Bench, step: float) -> Iterator[Check]:
@@ -320,7 +316,7 @@ def _water(bench: Bench, u: Callable[[Views], np.ndarray], rounded: np.ndarray) 
         host = term.water_at_start(bench.own, views.position, bench.context(bench.parameters))
     else:
         host = velocity[:, 0]
-    limit = ROUNDINGS * EPS * (max(np.abs(host).max(), 1e-300) + rounded)
+    limit = ROUND_OFF * (max(np.abs(host).max(), 1e-300) + rounded)
     return judged("flow: water()", u(views) - host, limit, views, "the host's water() must be what flow() gives")
 
 
@@ -353,6 +349,6 @@ def _follow(bench: Bench, step: float) -> Iterator[Check]:
     yield judged("follow: blind to the state", remembered((elsewhere, FOLLOWED)) - at_once, 0.0, views, remedy)
     earlier = replace(views, time=views.time - 0.25 * FOLLOWED)
     apart = remembered((earlier, 0.75 * FOLLOWED), (views, 0.25 * FOLLOWED)) - at_once
-    limit = ROUNDINGS * EPS * (np.abs(at_once).max() + 1e-300)
+    limit = ROUND_OFF * (np.abs(at_once).max() + 1e-300)
     remedy = "advance by the exact solution over view.h, which ends at view.t"
     yield judged("follow: exact", apart, limit, views, remedy)

@@ -23,7 +23,19 @@ from lgvi_warp.checks.part_bench import (
     RandomLooks,
     corner_looks,
 )
-from lgvi_warp.checks.report import EPS, ROUNDINGS, Check, LawReport, attempt, judged, packed_numbers, unpacked
+from lgvi_warp.checks.report import (
+    LANES_APART,
+    ROUND_OFF,
+    VARIED_NUMBERS,
+    Check,
+    LawReport,
+    attempt,
+    finite,
+    first_wrong,
+    judged,
+    packed_numbers,
+    unpacked,
+)
 from lgvi_warp.common.arguments import whole
 from lgvi_warp.common.errors import SceneError, refusal
 from lgvi_warp.control.base import SECTIONS, Allocation, Part
@@ -49,18 +61,8 @@ PERIOD = 0.1
 class Measurement:
     """What a twin takes for the motion at a look, as lgvi_warp.reference.control has it.
 
-    Attributes:
-        position: (3,) [m], inertial axes.
-        R: (3, 3), body to inertial axes.
-        velocity: (3,) [m/s], over ground, body axes.
-        water_velocity: (3,) [m/s], through the water, body axes.
-        angular_velocity: (3,) [rad/s], body axes.
-        t: time [s].
-        period: time between two looks [s].
-        h: step [s].
-        step: number of the step that begins.
-        look: number of the look.
-        member: index of the member.
+    position (3,) [m] inertial; R (3, 3) body to inertial; velocity over ground, water_velocity through water (3,) [m/s] and
+    angular_velocity (3,) [rad/s], body axes; t, period, h [s]; step and look, numbers of the step that begins and of the look.
     """
 
     position: np.ndarray
@@ -78,15 +80,9 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Reference:
-    """The wanted motion of a twin, as lgvi_warp.reference.control has it.
+    """The wanted motion of a twin: position (3,) [m] and velocity (3,) [m/s], inertial; R (3, 3); speed ahead [m/s].
 
-    Attributes:
-        position: (3,) [m], inertial axes.
-        velocity: (3,) [m/s], inertial axes.
-        R: (3, 3), body to inertial axes.
-        angular_velocity: (3,) [rad/s], axes of R.
-        angular_acceleration: (3,) [rad/s^2], axes of R.
-        speed: [m/s], through the water ahead.
+    angular_velocity (3,) [rad/s] and angular_acceleration (3,) [rad/s^2] in the axes of R.
     """
 
     position: np.ndarray
@@ -196,25 +192,20 @@ def _name(bench: PartBench) -> str:
 def _finite(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
     """Whether all numbers are finite; notes a part that does nothing."""
     name = f"{_name(bench)}: finite"
-    at_random = _all_finite(name, here, bench.looks)
+    at_random = finite(name, here.all(), bench.looks)
     asleep = not _does(bench, here)
     note = "note: changes nothing at any look, so little was checked; give a scene in which it acts"
     yield at_random._replace(text=note) if asleep and at_random.ok else at_random
-    for looks in corner_looks(bench.looks):
-        at_corners = _all_finite(
-            f"{name} without error, half a turn away, at rest", bench.answers(packed, looks), looks
-        )
-        if not at_corners.ok:
-            break
-    yield at_corners
+    corners = f"{name} without error, half a turn away, at rest"
+    yield first_wrong(finite(corners, bench.answers(packed, looks).all(), looks) for looks in corner_looks(bench.looks))
     bounds = _numbers_at_bounds(bench)
     if bounds:
-        answers = attempt(lambda: bench.answers(bench.packed(bounds), bench.looks), "with numbers at their bounds")
-        if isinstance(answers, str):
-            yield Check(f"{name} at bounds of numbers", np.inf, 0.0, False, answers)
-        else:
-            remedy = "guard divisions and roots, or declare lw.number(..., above=0.0)"
-            yield _all_finite(f"{name} at bounds of numbers", answers, bench.looks, remedy)
+        name = f"{name} at bounds of numbers"
+        answers = attempt(
+            lambda: bench.answers(bench.packed(bounds), bench.looks).all(), "with numbers at their bounds"
+        )
+        remedy = "guard divisions and roots, or declare lw.number(..., above=0.0)"
+        yield finite(name, answers, bench.looks, remedy)
 
 
 def _does(bench: PartBench, here: Answers) -> bool:
@@ -223,12 +214,6 @@ def _does(bench: PartBench, here: Answers) -> bool:
     return not np.array_equal(here.looks, before) or not np.array_equal(
         here.memory[:, : bench.bus.rows], bench.looks.bus
     )
-
-
-def _all_finite(name: str, answers: Answers, looks: RandomLooks, remedy: str = "guard divisions and roots") -> Check:
-    """Whether the part gives numbers at every look."""
-    finite = np.isfinite(answers.all()).all(axis=1)
-    return judged(name, (~finite).astype(float), 0.0, looks, remedy)
 
 
 def _numbers_at_bounds(bench: PartBench) -> dict[str, np.ndarray]:
@@ -251,17 +236,17 @@ def _numbers_at_bounds(bench: PartBench) -> dict[str, np.ndarray]:
 
 def _lanes(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
     """A lane answers the same whatever the others are, and alone; nothing follows from the true position."""
-    name, width = _name(bench), bench.widths[0]
+    name, width = _name(bench), bench.width
     mixed = np.zeros_like(here.all())
     for stays in (0, width - 1):
         lane_that_stays = np.arange(bench.count) % width == stays
         mixed[lane_that_stays] += (bench.answers(packed, bench.looks.but_lane(stays, width)).all() - here.all())[
             lane_that_stays
         ]
-    yield judged(f"{name}: lanes apart", mixed, 0.0, bench.looks, "a lane must not look at others")
+    yield judged(f"{name}: lanes apart", mixed, 0.0, bench.looks, LANES_APART)
     alone = bench.answers(packed, bench.looks, 1).all() - here.all()
-    limit = ROUNDINGS * EPS * np.abs(here.all()).max()
-    yield judged(f"{name}: packets of one", alone, limit, bench.looks, "a lane must not look at others")
+    limit = ROUND_OFF * np.abs(here.all()).max()
+    yield judged(f"{name}: packets of one", alone, limit, bench.looks, LANES_APART)
     blind = bench.answers(packed, bench.looks.elsewhere()).all() - here.all()
     yield judged(f"{name}: blind to the truth", blind, 0.0, bench.looks, "read y.position, which is measured, not y.b")
 
@@ -285,15 +270,12 @@ def _packing(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
 
     for words, compare, where, remedy in (
         ("varied numbers", by_member, "where numbers have one entry a member",
-         "packed() must give n entries where its numbers have n"),
+         VARIED_NUMBERS),
         ("any axes", in_other_axes, "in other axes of the body",
          "leave numbers as they are: a controller works in the user's axes"),
     ):  # fmt: skip
         name, difference = f"{_name(bench)}: {words}", attempt(compare, where)
-        if isinstance(difference, str):
-            yield Check(name, np.inf, 0.0, False, difference)
-        else:
-            yield judged(name, difference, ROUNDINGS * EPS * np.abs(here.looks).max(), bench.looks, remedy)
+        yield judged(name, difference, ROUND_OFF * np.abs(here.looks).max(), bench.looks, remedy)
 
 
 def _memory(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
@@ -325,7 +307,7 @@ def _twin(bench: PartBench, packed: Any, here: Answers, twin: Any) -> Iterator[C
     row, count = bench.bus.commands[bench.part.to] if isinstance(bench.part, Allocation) else (0, 0)
     pairs = [("as the twin", here.looks, wanted), ("commands of the twin", here.memory[:, row : row + count], commands)]
     for words, got, right in pairs[: 1 + bool(count)]:
-        limit = TWIN * ROUNDINGS * EPS * max(np.abs(right).max(), np.abs(got).max())
+        limit = TWIN * ROUND_OFF * max(np.abs(right).max(), np.abs(got).max())
         yield judged(f"{_name(bench)}: {words}", got - right, limit, bench.looks, "the twin says otherwise")
 
 

@@ -9,20 +9,16 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import warp as wp
 
 from lgvi_kernels import built_in
 from lgvi_kernels.advance import examine_part
 from lgvi_kernels.advance.examine_part import LOOK_FIELDS, OUT_FIELDS, make_examine_part
 from lgvi_kernels.maps.in_turn import ROLES
-from lgvi_warp.checks import bench
-from lgvi_warp.checks.bench import packing_context, short, sizes
-from lgvi_warp.common import warp_setup
+from lgvi_warp.checks.bench import Device, TermBench, packing_context, short, sizes
 from lgvi_warp.common.machine import register_width
-from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.control.base import Part
 from lgvi_warp.engine import kernel_choice
-from lgvi_warp.engine.arrays import Group, Lanes, LawArrays, memory_rows, put_rows
+from lgvi_warp.engine.arrays import Lanes, memory_rows, put_rows
 from lgvi_warp.physics import notation
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
@@ -56,27 +52,20 @@ COLUMNS = {
 class RandomLooks:
     """What is measured, wanted and demanded before a part acts, at looks that follow one another.
 
-    Attributes:
-        rows: (LOOKS, k, LOOK_FIELDS), the columns of `lgvi_kernels.advance.examine_part` for k members.
-        bus: (k, rows), what others left in the first rows of the memory.
+    rows: (LOOKS, k, LOOK_FIELDS), the columns of `lgvi_kernels.advance.examine_part` for k members.
+    bus: (k, rows), what others left in the first rows of the memory.
     """
 
     rows: np.ndarray
     bus: np.ndarray
 
     def vector(self, group: str, name: str) -> np.ndarray:
-        """A vector of all looks.
-
-        Returns: (LOOKS, k, 3), a view of the rows.
-        """
+        """A vector of all looks (LOOKS, k, 3), a view of the rows."""
         first = COLUMNS[group, name]
         return self.rows[..., first : first + 3]
 
     def attitude(self, group: str) -> np.ndarray:
-        """The attitude that is measured or wanted.
-
-        Returns: (LOOKS, k, 3, 3), body to inertial axes.
-        """
+        """The attitude that is measured or wanted (LOOKS, k, 3, 3), body to inertial axes."""
         return np.stack([self.vector(group, name) for name in ("north", "east", "down")], axis=-2)
 
     def elsewhere(self) -> RandomLooks:
@@ -107,10 +96,9 @@ class RandomLooks:
 class Answers(NamedTuple):
     """What a part made of looks.
 
-    Attributes:
-        looks: (k, LOOKS * OUT_FIELDS), what is measured, wanted and demanded after it.
-        memory: (k, rows), the bus, the part's rows and the guard behind them, after the last look.
-        own: first and last but one of the part's rows.
+    looks: (k, LOOKS * OUT_FIELDS), what is measured, wanted and demanded after it.
+    memory: (k, rows), the bus, the part's rows and the guard behind them, after the last look.
+    own: first and last but one of the part's rows.
     """
 
     looks: np.ndarray
@@ -122,95 +110,63 @@ class Answers(NamedTuple):
         return np.concatenate([self.looks, self.memory[:, : self.own[1]]], axis=1)
 
 
-class PartBench:
-    """A part with its numbers packed as for a run, ready to be evaluated at looks.
-
-    Attributes:
-        roles: the roles that its device code has.
-        widths: lanes of a packet, of each kernel: those of a register, and one.
-        count: number of members.
-        period: time between two looks [s].
-        looks: random looks.
-    """
+class PartBench(TermBench):
+    """A part that is evaluated at random looks, one `period` [s] apart, in packets of a register and of one."""
 
     def __init__(self, part: Part, scene: Scene, samples: int, seed: int):
-        self.part, self.seed = part, seed
-        module = kernel_choice.device_module(part, part.device_in(False), built_in)
+        module, width = kernel_choice.device_module(part, part.device_in(False), built_in), register_width("float64")
         assert part.bus is not None
-        self.bus = part.bus
-        self.roles = tuple(role for role in ROLES if hasattr(module, role))
-        self.widths = (register_width("float64"), 1)
-        self.count = -(-samples // self.widths[0]) * self.widths[0]
-        self.period = float(scene.controller.period)
-        self.parameters = {name: np.asarray(value)[None] for name, value in scene.parameters().items()}
-        self.looks = random_looks(self.count, self.bus.rows, seed, scene.start.given()["position"])
-        warp_setup.start()
-        self.kernels = {width: bench.built(part, module, width, make_examine_part, REMEDY) for width in self.widths}
-        self.Params = np.dtype(self.kernels[1].Params.numpy_dtype())
+        self.part, self.bus, self.period = part, part.bus, float(scene.controller.period)
+        count = -(-samples // width) * width
+        self.looks = random_looks(count, self.bus.rows, seed, scene.start.given()["position"])
+        super().__init__(part, module, scene, count, seed, ROLES, (width, 1), make_examine_part, REMEDY)
 
     def packed(self, parameters: Mapping[str, np.ndarray] | None = None, elsewhere: bool = False) -> Any:
-        """What the part packs.
-
-        parameters: parameters of the scene by name, each (1, ...) or (n, ...); by default those of the scene.
-        """
+        """What the part packs; parameters: of the scene by name, each (1, ...) or (n, ...), by default its own."""
         numbers = self.parameters if parameters is None else parameters
         context = packing_context(numbers, self.count, self.seed, self.period / EVERY, elsewhere)
         return self.part.packed(Ensemble.own(self.part, numbers), context)
 
     def answers(self, packed: Any, looks: RandomLooks, width: int | None = None) -> Answers:
         """Let the part act at each look, from its memory at the start."""
-        launch = _Launch(self, packed, looks, width or self.widths[0])
-        out = np.stack([launch.look(k) for k in range(LOOKS)], axis=1)
-        first = self.bus.rows
-        return Answers(out.reshape(self.count, -1), launch.memory(), (first, first + memory_rows(packed)))
+        device = _PartDevice(self, packed, looks, width or self.width)
+        out = np.stack([device.look(k) for k in range(LOOKS)], axis=1)
+        return Answers(out.reshape(self.count, -1), device.memory(), (self.bus.rows, device.end))
 
     def nanoseconds(self, packed: Any) -> float:
-        """Processor time of the part for a member and a look, less that of a kernel that only copies.
-
-        Returns: The time [ns], at least 0; the least of some rounds.
-        """
-        bench_launch, spent = _Launch(self, packed, self.looks, self.widths[0]), []
+        """Processor time [ns] of the part for a member and a look, less that of a kernel that only copies; the least seen."""
+        device, spent = _PartDevice(self, packed, self.looks, self.width), []
         for acts in (1, 0):
             rounds = []
             for _ in range(ROUNDS):
                 begin = time.process_time_ns()
-                bench_launch.launch(0, acts, REPEATS)
+                device.act(0, acts, REPEATS)
                 rounds.append(time.process_time_ns() - begin)
             spent.append(min(rounds) / (REPEATS * self.count))
         return max(0.0, spent[0] - spent[1])
 
 
-class _Launch:
+class _PartDevice(Device):
     """The arrays of a kernel for a part and its looks."""
 
-    def __init__(self, part: PartBench, packed: Any, looks: RandomLooks, width: int):
-        self.examine, self.looks, self.bench = part.kernels[width], looks, part
-        Lane, self.packets = self.examine.Lane, part.count // width
-        kind = self.examine.Params, np.dtype(self.examine.Params.numpy_dtype())
-        self.laws = LawArrays(self.packets, [kind], Lane)
-        self.laws.write([Group([packed], [False])], GUARD, part.bus.rows)
-        self.end = part.bus.rows + memory_rows(packed)
+    def __init__(self, bench: PartBench, packed: Any, looks: RandomLooks, width: int):
+        super().__init__(bench, packed, width, OUT_FIELDS, GUARD, bench.bus.rows)
+        self.looks, self.period, self.end = looks, bench.period, bench.bus.rows + memory_rows(packed)
         # Behind the part's rows are no numbers, so that what it reads or writes there shows.
         rows = self.laws.memory.view
         rows[:, self.end :] = np.nan
-        put_rows(rows[:, : part.bus.rows], looks.bus)
-        self.rows = Lanes(self.packets, LOOK_FIELDS, Lane)
-        self.out = wp.zeros((self.packets, OUT_FIELDS), dtype=Lane, device="cpu")
+        put_rows(rows[:, : bench.bus.rows], looks.bus)
+        self.rows = Lanes(self.packets, LOOK_FIELDS, self.kernel.Lane)
 
     def look(self, k: int) -> np.ndarray:
         """Let the part act once: (count, OUT_FIELDS)."""
         put_rows(self.rows.view, self.looks.rows[k])
-        self.launch(k, 1, 1)
-        out = self.out.numpy().reshape(self.packets, OUT_FIELDS, -1).transpose(0, 2, 1)
-        # A copy: a packet of one is not laid out anew, and the next look writes here.
-        return np.array(out.reshape(-1, OUT_FIELDS))
+        self.act(k, 1, 1)
+        return self.written()
 
-    def launch(self, k: int, acts: int, repeats: int) -> None:
-        """Launch the kernel for all packets, some times over."""
-        period, laws = self.bench.period, self.laws
-        inputs = [laws.structs[0].array, laws.table.array, self.rows.array, k, k * EVERY, period / EVERY, period, acts]
-        with build_lock:
-            wp.launch(self.examine.kernel, self.packets * repeats, [*inputs, laws.memory.array, self.out], device="cpu")
+    def act(self, k: int, acts: int, repeats: int) -> None:
+        """Let the part act at look k, some times over, or nothing."""
+        self.launch(self.rows.array, k, k * EVERY, self.period / EVERY, self.period, acts, repeats=repeats)
 
     def memory(self) -> np.ndarray:
         """The memory without its backup: (count, rows)."""
@@ -236,10 +192,7 @@ def random_looks(count: int, bus: int, seed: int, around: np.ndarray) -> RandomL
 
 
 def turn(looks: RandomLooks, group: str, attitude: np.ndarray) -> None:
-    """Write an attitude into looks.
-
-    attitude: (..., 3, 3), body to inertial axes.
-    """
+    """Write an attitude (..., 3, 3), body to inertial axes, into looks."""
     for i, name in enumerate(("north", "east", "down")):
         looks.vector(group, name)[...] = attitude[..., i, :]
 

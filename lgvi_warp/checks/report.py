@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
@@ -12,9 +12,11 @@ import numpy as np
 from lgvi_warp.engine.arrays import FIELDS
 from lgvi_warp.physics.terms.base import Packed, Term
 
-EPS = float(np.finfo(np.float64).eps)
-# How many roundings of a law's largest number may add up in it.
-ROUNDINGS = 64.0
+# How much of a law's largest number its roundings may add up to: 64 of them.
+ROUND_OFF = 64.0 * float(np.finfo(np.float64).eps)
+# What to do where lanes mix, or where numbers that vary give something else.
+LANES_APART = "a lane must not look at others"
+VARIED_NUMBERS = "packed() must give n entries where its numbers have n"
 
 
 class Check(NamedTuple):
@@ -69,12 +71,16 @@ class Described(Protocol):
         """One of them in words."""
 
 
-def judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, views: Described, remedy: str) -> Check:
+def judged(
+    name: str, difference: np.ndarray | str, allowed: np.ndarray | float, views: Described, remedy: str
+) -> Check:
     """A check of deviations: the one that exceeds its limit by most, and the view where it occurs.
 
-    difference: (k,) or (k, d), deviations at k views.
+    difference: (k,) or (k, d), deviations at k views; or what kept them from being found.
     allowed: largest deviation that is allowed; for each view (k,) where it is an array.
     """
+    if isinstance(difference, str):
+        return Check(name, np.inf, 0.0, False, difference)
     k = len(difference)
     worst = np.abs(difference).reshape(k, -1)
     limit = np.broadcast_to(np.reshape(allowed, (-1, 1)) if np.ndim(allowed) == 1 else allowed, worst.shape)
@@ -85,6 +91,20 @@ def judged(name: str, difference: np.ndarray, allowed: np.ndarray | float, views
     good = bool(np.all(worst <= limit) and np.isfinite(limit).all())
     text = "" if good else f"{views.description(int(i))}; {remedy}"
     return Check(name, float(worst[i, j]), float(limit[i, j]), good, text)
+
+
+def finite(name: str, values: np.ndarray | str, views: Described, remedy: str = "guard divisions and roots") -> Check:
+    """Whether the values (k, n) at k views are numbers."""
+    wrong = values if isinstance(values, str) else (~np.isfinite(values).all(axis=1)).astype(float)
+    return judged(name, wrong, 0.0, views, remedy)
+
+
+def first_wrong(checks: Iterable[Check]) -> Check:
+    """The first check that fails, or else the last; those behind it are not made."""
+    for check in checks:
+        if not check.ok:
+            break
+    return check
 
 
 def attempt(make: Callable[[], Any], where: str) -> Any:

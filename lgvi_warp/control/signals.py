@@ -34,7 +34,7 @@ _OF_ACTUATORS = (
     Signal(Field("demand", (6,), "N, N m", "demanded wrench X Y Z K M N in body axes"), "demand"),
     Signal(Field("unmet", (6,), "N, N m", "demand that the actuators do not deliver, X Y Z K M N"), ""),
 )
-# Rows of a measurement and of a reference, as lgvi_kernels/advance/feeding.py writes them.
+# Rows of a measurement and of a reference, as lgvi_kernels/advance/noting.py writes them.
 _VECTORS = {"position": 0, "attitude": 3}
 _MEASURED = _VECTORS | {"velocity": 12, "water_velocity": 15, "angular_velocity": 18, "depth": 2, "heading": 21}
 _WANTED = _VECTORS | {"velocity": 12, "angular_velocity": 15, "depth": 2}

@@ -12,8 +12,8 @@ import numpy as np
 import warp as wp
 
 from lgvi_kernels.advance.events import FIRST
-from lgvi_kernels.advance.feeding import NOTED
 from lgvi_kernels.advance.monitor import ENERGY_FIELDS
+from lgvi_kernels.advance.noting import NOTED
 from lgvi_kernels.advance.rows import PACE_FIELDS, SAMPLE_FIELDS, STATE_FIELDS, WASTE
 from lgvi_kernels.lanes.arithmetic import int_lane
 from lgvi_warp.common.status import Warnings

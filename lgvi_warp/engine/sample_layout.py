@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import accumulate
 
-from lgvi_kernels.advance.feeding import ALL_NOTES, NOTED, bit
+from lgvi_kernels.advance.noting import ALL_NOTES, NOTED, bit
 from lgvi_kernels.advance.rows import SAMPLE_FIELDS
 from lgvi_warp.control.signals import SIGNALS, row_of, saved_fields
 from lgvi_warp.engine.kernel_choice import KernelChoice
@@ -78,7 +78,7 @@ class SampleLayout:
 
     @property
     def notes(self) -> int:
-        """What looks note, as bits (see feeding.py): that of which something is saved, and all where the host is asked."""
+        """What looks note, as bits (see noting.py): that of which something is saved, and all where the host is asked."""
         noted = [signal for name in self.signals if (signal := SIGNALS[name]).group in NOTED]
         return ALL_NOTES if self.choice.asks else sum({bit(signal.group, signal.row) for signal in noted})
 

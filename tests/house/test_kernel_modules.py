@@ -6,6 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from lgvi_kernels import law
+from lgvi_kernels.maps.bounded import ROLES
+from lgvi_kernels.maps.in_turn import ROLES as ROLES_OF_PARTS
+
 KERNELS = Path(__file__).parents[2] / "kernels" / "lgvi_kernels"
 OPERATORS = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div", ast.USub: "neg"}
 FORMULAS = sorted({*KERNELS.rglob("*.py")} - {KERNELS / "lanes" / "arithmetic.py"})
@@ -27,12 +31,18 @@ def test_operators_are_imported(path):
         if isinstance(node, ast.ImportFrom) and node.module in ("lgvi_kernels.lanes.arithmetic", "lgvi_kernels.law")
         for alias in node.names
     }
+    if "*" in imported:
+        imported |= set(law.__all__)
     used = set()
     for function in device_functions(tree):
         for node in ast.walk(function):
             if isinstance(node, (ast.BinOp, ast.UnaryOp)) and type(node.op) in OPERATORS and not whole_numbers(node):
                 used.add(OPERATORS[type(node.op)])
     assert used <= imported, f"{path.name}: import {sorted(used - imported)} from lgvi_kernels.lanes.arithmetic"
+
+
+def test_what_laws_import_is_no_role():
+    assert not set(law.__all__) & {*ROLES, *ROLES_OF_PARTS, "distance", "force", "potential", "params"}
 
 
 def whole_numbers(node):

@@ -23,6 +23,8 @@ NON_FINITE = 3
 SECANTS = 16
 MOST_EVALUATIONS = 80
 EPSILON = {wp.float64: 2.0**-52, wp.float32: 2.0**-23}
+# Parts of a step that are no further from each other than so many EPSILONs are one.
+SPACINGS = 4.0
 
 
 class Watch(NamedTuple):
@@ -124,6 +126,43 @@ def _chain(events, number):
     return reached, least_of
 
 
+def make_trial(real):
+    """The function that says which part of a step to try: the first beyond a whole step is `high`, all others lie between."""
+    spacing = SPACINGS * EPSILON[real]
+
+    @wp.func(inline=True)
+    def trial_between(low: real, high: real, low_distance: real, high_distance: real, evaluations: int):
+        trial = high
+        if high <= real(1.0) or evaluations > 1:
+            trial = real(0.5) * (low + high)
+            if evaluations < wp.static(SECANTS):
+                trial = low + (high - low) * low_distance / (low_distance - high_distance)
+                trial = wp.clamp(trial, low + real(wp.static(spacing)), high - real(wp.static(spacing)))
+        return trial
+
+    return trial_between
+
+
+def make_water_around(water_velocity, part_step, real):
+    """(good, x, c, k, h, stage_h, lead_h, opening) -> R^T u at the start and at the end of a step, zero for water at rest."""
+    moving = water_velocity is not None
+
+    @wp.func(inline=True)
+    def water_around(
+        good: Any, x: Any, c: Any, k: int, h: wp.float64, stage_h: Any, lead_h: Any, opening: real, zero: Any
+    ):
+        still = vec3(zero, zero, zero)
+        end_still = still
+        if wp.static(moving):
+            # Before the first part: the laws' memory is here that of the step's end, and every part sets it back.
+            end_still = water_velocity(x, c, real(h))
+            begun = part_step(good, c, k, h, real(0.0), 0, stage_h, lead_h, opening, ones(zero))
+            still = water_velocity(begun, c, real(h))
+        return still, end_still
+
+    return water_around
+
+
 def make_arrival(watch, part_step, choose, water_velocity, real, width, most_parts):
     """The function that makes the last step of members that reach an event: the part of it that ends there.
 
@@ -131,9 +170,9 @@ def make_arrival(watch, part_step, choose, water_velocity, real, width, most_par
     k on; choose: see sums; water_velocity: (x, c, h) -> R^T u, or None where a sample can compute it later; most_parts: into
     how many parts one without a solution may be divided.
     """
-    # Parts of a step nearer to each other than this are one.
-    spacing = 4.0 * EPSILON[real]
-    moving, spacing_of, nearest = water_velocity is not None, watch.spacing, watch.nearest
+    spacing, moving = SPACINGS * EPSILON[real], water_velocity is not None
+    spacing_of, nearest = watch.spacing, watch.nearest
+    trial_between, water_around = make_trial(real), make_water_around(water_velocity, part_step, real)
 
     @wp.func(inline=False)
     def arrival(good: Any, x: Any, code: Any, c: Any, k: int, h: wp.float64, stage_h: Any, lead_h: Any, opening: real):
@@ -149,13 +188,7 @@ def make_arrival(watch, part_step, choose, water_velocity, real, width, most_par
         begin, begin_margin, begin_code = nearest(good, c, real(h), between)
         end, end_margin, end_code = nearest(x, c, real(h), between)
         part_of_step = begin - begin
-        still = vec3(part_of_step, part_of_step, part_of_step)
-        end_still = still
-        if wp.static(moving):
-            # Before the first part: the laws' memory is here that of the step's end, and every part sets it back.
-            end_still = water_velocity(x, c, real(h))
-            begun = part_step(good, c, k, h, real(0.0), 0, stage_h, lead_h, opening, ones(begin))
-            still = water_velocity(begun, c, real(h))
+        still, end_still = water_around(good, x, c, k, h, stage_h, lead_h, opening, part_of_step)
         for j in range(wp.static(width)):
             if code[j] >= real(wp.static(float(FIRST))):
                 lane = ones(begin) - ones(begin)
@@ -184,13 +217,7 @@ def make_arrival(watch, part_step, choose, water_velocity, real, width, most_par
                     side = int(0)
                     while high - low > real(wp.static(spacing)) and evaluations < wp.static(MOST_EVALUATIONS):
                         evaluations += 1
-                        # The first try beyond a whole step is at `high`, all others between the two.
-                        trial = high
-                        if high <= real(1.0) or evaluations > 1:
-                            trial = real(0.5) * (low + high)
-                            if evaluations < wp.static(SECANTS):
-                                trial = low + (high - low) * low_distance / (low_distance - high_distance)
-                                trial = wp.clamp(trial, low + real(wp.static(spacing)), high - real(wp.static(spacing)))
+                        trial = trial_between(low, high, low_distance, high_distance, evaluations)
                         y = part_step(good, c, k, h, trial / real(parts), parts, stage_h, lead_h, opening, lane)
                         distance, margin, status = nearest(y, c, real(h), between)
                         failed = y.alarm.code[j] > real(0.0)

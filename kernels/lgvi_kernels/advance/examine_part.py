@@ -2,6 +2,7 @@
 """A kernel that evaluates one part of a controller alone, at looks that are given."""
 
 import functools
+from typing import Any
 
 import warp as wp
 
@@ -24,6 +25,61 @@ LOOK_FIELDS = TRUE_POSITION + 3
 OUT_FIELDS = TRUE_POSITION
 
 
+@wp.func
+def three(rows: Any, i: int, at: int):
+    return vec3(rows[i, at], rows[i, at + 1], rows[i, at + 2])
+
+
+@wp.func
+def measured_of(y: Any, looks: Any, i: int):
+    """y with what is measured."""
+    y.position = three(looks, i, 0)
+    y.north = three(looks, i, 3)
+    y.east = three(looks, i, 6)
+    y.down = three(looks, i, 9)
+    y.velocity = three(looks, i, 12)
+    y.water_velocity = three(looks, i, 15)
+    y.angular_velocity = three(looks, i, 18)
+    y.b = three(looks, i, wp.static(TRUE_POSITION))
+    return y
+
+
+@wp.func
+def wanted_of(r: Any, looks: Any, i: int):
+    """r with what is wanted."""
+    r.position = three(looks, i, 21)
+    r.velocity = three(looks, i, 24)
+    r.north = three(looks, i, 27)
+    r.east = three(looks, i, 30)
+    r.down = three(looks, i, 33)
+    r.angular_velocity = three(looks, i, 36)
+    r.angular_acceleration = three(looks, i, 39)
+    r.speed = looks[i, wp.static(SPEED)]
+    return r
+
+
+@wp.func
+def put_look(out: Any, i: int, y: Any, r: Any, w: Any):
+    """Write what is measured, wanted and demanded after the part."""
+    put(out, i, 0, y.position)
+    put(out, i, 3, y.north)
+    put(out, i, 6, y.east)
+    put(out, i, 9, y.down)
+    put(out, i, 12, y.velocity)
+    put(out, i, 15, y.water_velocity)
+    put(out, i, 18, y.angular_velocity)
+    put(out, i, 21, r.position)
+    put(out, i, 24, r.velocity)
+    put(out, i, 27, r.north)
+    put(out, i, 30, r.east)
+    put(out, i, 33, r.down)
+    put(out, i, 36, r.angular_velocity)
+    put(out, i, 39, r.angular_acceleration)
+    put(out, i, 42, w.force)
+    put(out, i, 45, w.torque)
+    out[i, wp.static(SPEED)] = r.speed
+
+
 @functools.cache
 def make_examine_part(module, numbers, width, real):
     """Build (without compiling) the kernel that calls this module's functions of all roles, one after another."""
@@ -34,10 +90,6 @@ def make_examine_part(module, numbers, width, real):
         wrench_struct(width, real),
     )
     measure, guide, act, allocate, send = (in_turn((module,), role) for role in ROLES)
-
-    @wp.func
-    def three(rows: wp.array2d(dtype=Lane), i: int, at: int):
-        return vec3(rows[i, at], rows[i, at + 1], rows[i, at + 2])
 
     @wp.kernel(module="unique", enable_backward=False)
     def examine_part(
@@ -59,15 +111,7 @@ def make_examine_part(module, numbers, width, real):
     ):
         i = wp.tid() % looks.shape[0]
         p = params[i % params.shape[0]]
-        y = Measurement()
-        y.position = three(looks, i, 0)
-        y.north = three(looks, i, 3)
-        y.east = three(looks, i, 6)
-        y.down = three(looks, i, 9)
-        y.velocity = three(looks, i, 12)
-        y.water_velocity = three(looks, i, 15)
-        y.angular_velocity = three(looks, i, 18)
-        y.b = three(looks, i, wp.static(TRUE_POSITION))
+        y = measured_of(Measurement(), looks, i)
         y.t = real(step) * h
         y.h = h
         y.period = period
@@ -77,15 +121,7 @@ def make_examine_part(module, numbers, width, real):
         y.memory = memory
         y.packet = i
         y.entry = i % table.shape[0]
-        r = Reference()
-        r.position = three(looks, i, 21)
-        r.velocity = three(looks, i, 24)
-        r.north = three(looks, i, 27)
-        r.east = three(looks, i, 30)
-        r.down = three(looks, i, 33)
-        r.angular_velocity = three(looks, i, 36)
-        r.angular_acceleration = three(looks, i, 39)
-        r.speed = looks[i, wp.static(SPEED)]
+        r = wanted_of(Reference(), looks, i)
         w = Wrench()
         w.force = three(looks, i, 42)
         w.torque = three(looks, i, 45)
@@ -100,22 +136,6 @@ def make_examine_part(module, numbers, width, real):
                 w = allocate(w, r, y, p)
             if wp.static(send is not None):
                 y = send(y, r, y, p)
-        put(out, i, 0, y.position)
-        put(out, i, 3, y.north)
-        put(out, i, 6, y.east)
-        put(out, i, 9, y.down)
-        put(out, i, 12, y.velocity)
-        put(out, i, 15, y.water_velocity)
-        put(out, i, 18, y.angular_velocity)
-        put(out, i, 21, r.position)
-        put(out, i, 24, r.velocity)
-        put(out, i, 27, r.north)
-        put(out, i, 30, r.east)
-        put(out, i, 33, r.down)
-        put(out, i, 36, r.angular_velocity)
-        put(out, i, 39, r.angular_acceleration)
-        put(out, i, 42, w.force)
-        put(out, i, 45, w.torque)
-        out[i, wp.static(SPEED)] = r.speed
+        put_look(out, i, y, r, w)
 
     return Examine(examine_part, Lane, Params)

@@ -119,6 +119,44 @@ def make_damping(damping, shear):
     return total
 
 
+def make_exact_drag(spec, velocities_of_forces):
+    """(prepare, E) of drag by its exact flow; None for both where the Spec has none."""
+    if not spec.dragged:
+        return None, None
+    if spec.laws[0] is drag:
+        prepare, exact = drag.make_E(spec.drag, spec.compensated)
+    else:
+        prepare, exact = drag_directions.make_E(spec.drag, velocities_of_forces)
+
+    @wp.func
+    def E(x: Any, c: Any, h: Any):
+        """Drag by its exact flow. c.drag has the constants for the whole step h; for another length they are made here."""
+        if h == c.drag.h:
+            x = exact(x, c.drag, c)
+        else:
+            x = exact(x, prepare(c.drag, c.params.own, h), c)
+        return x
+
+    return prepare, E
+
+
+def maps_of(spec, letters):
+    """The maps of a step after its lead, with their coefficients."""
+    pitched = spec.coupling[3:]
+    maps = []
+    for i, (letter, coefficient) in enumerate(spec.maps):
+        if letter[0] == "R":
+            # The axes of the turns from here on, over the end of the step into the next one.
+            axes = [int(name[1]) - 1 for name, _ in (*spec.maps[i:], *spec.maps[:i]) if name[0] == "R"]
+            following = next((axis for axis in axes if axis != axes[0]), axes[0])
+            watched = spec.checked and not any(name[0] == "R" for name, _ in spec.maps[i + 1 :])
+            turn = turns.make_turn(axes[0], pitched[axes[0]], following, spec.compensated, watched)
+            maps.append((turn, coefficient))
+        else:
+            maps.append((letters[letter], coefficient))
+    return tuple(maps)
+
+
 def make_method(spec):
     """The functions of a method for this Spec."""
     width, real = spec.width, spec.real
@@ -137,23 +175,7 @@ def make_method(spec):
     if "shear" in spec.parts:
         shear, water_wrench = make_shear(matrix3_struct(width, real), lever, shifted), make_water_wrench(lever, shifted)
     damping = make_damping(laws_damping, shear)
-    prepare, exact = None, None
-    if spec.drag and spec.explicit is None:
-        by_axes = laws[0] is drag
-        prepare, exact = (
-            drag.make_E(spec.drag, spec.compensated)
-            if by_axes
-            else drag_directions.make_E(spec.drag, velocities_of_forces)
-        )
-
-    @wp.func
-    def E(x: Any, c: Any, h: Any):
-        """Drag by its exact flow. c.drag has the constants for the whole step h; for another length they are made here."""
-        if h == c.drag.h:
-            x = exact(x, c.drag, c)
-        else:
-            x = exact(x, prepare(c.drag, c.params.own, h), c)
-        return x
+    prepare, E = make_exact_drag(spec, velocities_of_forces)
 
     @wp.func
     def water_velocity(x: Any, c: Any, h: Any):
@@ -181,7 +203,7 @@ def make_method(spec):
         "D": make_D(rotation_struct(width, real), solve, spec.compensated),
     }
     if "K" in used:
-        letters["K"] = make_K(View, Wrench, Flow, law, evolve, flow, varies, shifted, E if spec.drag else None, V)
+        letters["K"] = make_K(View, Wrench, Flow, law, evolve, flow, varies, shifted, E, V)
     if "W" in used:
         letters["W"] = make_W(rotation_struct(width, real), rotate, spec.iterations, spec.adaptive, spec.checked)
     if "modified" in spec.parts:
@@ -191,7 +213,7 @@ def make_method(spec):
     if spec.gauss:
         functions = (View, Wrench, law, velocities)
         letters["G"] = make_G(spec.gauss, *functions, spec.iterations, spec.adaptive, spec.checked, spec.timed)
-    U12, U13, U23, *pitched = spec.coupling
+    U12, U13, U23 = spec.coupling[:3]
     for letter in used:
         if letter[0] == "h":
             letters[letter] = turns.make_hop(int(letter[1]) - 1, int(letter[2]) - 1, U12, U13, U23, spec.compensated)
@@ -202,18 +224,8 @@ def make_method(spec):
         maps = (letters["Ab"], None if spec.mass == "isotropic" else Ap, letters["D"])
         functions = (View, Wrench, potential, forces, current, evolve, velocities)
         letters["Phi"], letters["Phi*"] = make_phi(maps, functions, *spec.averages)
-    maps = []
-    for i, (letter, coefficient) in enumerate(spec.maps):
-        if letter[0] == "R":
-            # The axes of the turns from here on, over the end of the step into the next one.
-            axes = [int(name[1]) - 1 for name, _ in (*spec.maps[i:], *spec.maps[:i]) if name[0] == "R"]
-            following = next((axis for axis in axes if axis != axes[0]), axes[0])
-            watched = spec.checked and not any(name[0] == "R" for name, _ in spec.maps[i + 1 :])
-            turn = turns.make_turn(axes[0], pitched[axes[0]], following, spec.compensated, watched)
-            maps.append((turn, coefficient))
-        else:
-            maps.append((letters[letter], coefficient))
-    step = fold_pair(tuple(maps)) if spec.paired else fold(tuple(maps))
+    maps = maps_of(spec, letters)
+    step = fold_pair(maps) if spec.paired else fold(maps)
     # Without a lead, step stands in its place, and is called nowhere.
     lead = letters[spec.lead[0]] if spec.lead else step
     return Step(step, lead, velocities, prepare, water_velocity, velocities_of_forces)

@@ -28,16 +28,14 @@ class Retry(NamedTuple):
     arrival: Any
 
 
-@functools.cache
-def make_retry(spec):
-    """The functions that make a step again; those that this Spec does not ask for are called nowhere."""
-    types, stepping, real, width = make_types(spec), make_stepping(spec), spec.real, spec.width
+def make_in_parts(spec):
+    """The function that makes a step in equal parts of any length."""
+    types, stepping, real = make_types(spec), make_stepping(spec), spec.real
     Lane, State, Alarm, Constants = types.Lane, types.State, types.Alarm, types.Constants
-    method, watch, at_step, opened = stepping.method, stepping.watch, stepping.at_step, stepping.opened
-    step, lead, has_lead = method.step, method.lead, spec.lead is not None
+    step, lead, has_lead = stepping.method.step, stepping.method.lead, spec.lead is not None
+    at_step, opened = stepping.at_step, stepping.opened
     composed, paired, compensated, remembers = spec.composed, spec.paired, spec.compensated, spec.memory
-    paced, turned, watched = spec.paced, spec.turned, spec.watched
-    to_event = watch.alarm if watched else step
+    paced, turned = spec.paced, spec.turned
     _, _, back_up = make_rows(Lane, State, paced, compensated)
 
     @wp.func(inline=False)
@@ -75,6 +73,17 @@ def make_retry(spec):
             x.alarm = turned_too_far(x.alarm)
         return opened(opened(x, c, -(part * opening)), c, opening)
 
+    return in_parts
+
+
+@functools.cache
+def make_retry(spec):
+    """The functions that make a step again; those that this Spec does not ask for are called nowhere."""
+    types, stepping, real, width = make_types(spec), make_stepping(spec), spec.real, spec.width
+    Lane, State, Constants = types.Lane, types.State, types.Constants
+    method, watch, watched, in_parts = stepping.method, stepping.watch, spec.watched, make_in_parts(spec)
+    to_event = watch.alarm if watched else method.step
+
     @wp.func(inline=False)
     def retried(good: State, x: State, code: Lane, c: Constants, k: int, h: wp.float64, stage_h: wp.array(dtype=real),
                 lead_h: wp.array(dtype=real), opening: real):  # fmt: skip
@@ -109,7 +118,7 @@ def make_retry(spec):
             x = choose(solved, y, x)
         return x, codes
 
-    arrival = step
+    arrival = method.step
     if watched:
         water = method.water_velocity if spec.still else None
         arrival = make_arrival(watch, in_parts, choose, water, real, width, MOST_PARTS if spec.substep else 1)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A packet's state and its samples as rows of lanes in arrays."""
 
+import functools
 from typing import Any
 
 import warp as wp
@@ -19,6 +20,7 @@ SAMPLE_FIELDS = {"position": 3, "attitude": 9, "velocity": 3, "angular_velocity"
 WASTE = 9
 
 
+@functools.cache
 def make_rows(Lane, State, paced, compensated):
     """(read, write, back_up) of the state and of the laws' memory. paced: a packet chooses its steps."""
 

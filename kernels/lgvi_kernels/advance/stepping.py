@@ -105,6 +105,14 @@ def make_stepping(spec):
 
     feed, respond = make_feed(spec, types, method, at_step, opened) if spec.control else (step, step)
 
+    held = make_held(types, real, one_step, feed) if spec.control else step
+    return Stepping(method, watch, at_step, opened, one_step, stepped, feed, respond, held)
+
+
+def make_held(types, real, one_step, feed):
+    """The function that makes a number of steps, and the looks of a controller between them."""
+    State, Constants, Monitor = types.State, types.Constants, types.Monitor
+
     @wp.func(inline=False)
     def held(x: State, c: Constants, monitor: Monitor, k: int, n: int, h: wp.float64, stage_h: wp.array(dtype=real),
              lead_h: wp.array(dtype=real), first_h: real, opening: real):  # fmt: skip
@@ -122,4 +130,4 @@ def make_stepping(spec):
                 x.alarm = feed(x, c, monitor, at, h, opening)
         return x
 
-    return Stepping(method, watch, at_step, opened, one_step, stepped, feed, respond, held if spec.control else step)
+    return held

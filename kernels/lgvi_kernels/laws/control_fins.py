@@ -6,29 +6,10 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    absolute,
-    add,
-    clamp,
-    command,
-    cosine,
-    div,
-    least,
-    make_pursuit,
-    middle_of_half,
-    mul,
-    neg,
-    ones,
-    positive,
-    remember,
-    remembered,
-    row1,
-    sine,
-    struct,
-    sub,
-)
+from lgvi_kernels.law import *
 from lgvi_kernels.laws import fins
 from lgvi_kernels.laws.fins import add_fins, note_lift_and_drag, speed_along
+from lgvi_kernels.laws.scheduled import make_commanded
 
 # Rows of one fin: those of fins.ROWS, limit, and limit of the rate.
 LIMIT = fins.ROWS
@@ -47,11 +28,7 @@ def params(width, real):
     return struct("ControlFins", **places, count=wp.int32, knots=wp.int32, limited=wp.int32)
 
 
-@wp.func
-def commanded(view: Any, p: Any, i: int, t: Any):
-    """The command of fin i at time t, within its limit."""
-    first = p.first + wp.static(ROWS) * p.count + i * (1 + 3 * p.knots)
-    return command(view, first, p.knots, row1(view, p.first + wp.static(ROWS) * i + wp.static(LIMIT)), t)
+schedule, commanded = make_commanded(ROWS, LIMIT)
 
 
 @wp.func
@@ -91,11 +68,10 @@ def turn_to_command(state: Any, view: Any, p: Any):
     if p.limited > 0:
         for i in range(p.count):
             at = p.first + wp.static(ROWS) * i
-            first = p.first + wp.static(ROWS) * p.count + i * (1 + 3 * p.knots)
             limit = row1(view, at + wp.static(LIMIT))
             rate = row1(view, at + wp.static(RATE))
             angle = remembered(view, p.memory + i)
-            remember(view, p.memory + i, turning(view, angle, first, p.knots, limit, rate))
+            remember(view, p.memory + i, turning(view, angle, schedule(p, i), p.knots, limit, rate))
     return state
 
 

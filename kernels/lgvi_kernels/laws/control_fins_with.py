@@ -7,24 +7,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels import device
-from lgvi_kernels.law import (  # noqa: F401
-    absolute,
-    add,
-    add_outer,
-    arctangent2,
-    cosine,
-    mul,
-    neg,
-    ones,
-    positive,
-    remember,
-    root,
-    row1,
-    row3,
-    sine,
-    sub,
-    table1,
-)
+from lgvi_kernels.law import *
 from lgvi_kernels.laws import fins
 from lgvi_kernels.laws.driven import make_driven
 from lgvi_kernels.laws.fins import add_fins, note_lift_and_drag, speed_along

@@ -7,7 +7,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels import device
-from lgvi_kernels.law import add, mul, row3  # noqa: F401
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.driven import make_driven
 
 CHANNELS = 6

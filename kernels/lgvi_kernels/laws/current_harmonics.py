@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, cosine, fused, mul, neg, ones, row1, row3, sine, struct  # noqa: F401
+from lgvi_kernels.law import *
 
 FLOW = "uniform"
 

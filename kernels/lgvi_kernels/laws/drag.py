@@ -11,7 +11,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes.sums import pushed, twisted
-from lgvi_kernels.law import absolute, add, decay, div, lane3, mul, ones, positive, struct, sub, vec3  # noqa: F401
+from lgvi_kernels.law import *
 
 PARTS = ("linear_force", "linear_torque", "quadratic_force", "quadratic_torque")
 

@@ -15,7 +15,7 @@ from lgvi_kernels.lanes.arithmetic import component_x, component_y, component_z
 from lgvi_kernels.lanes.matrix3 import apply, transpose_times
 from lgvi_kernels.lanes.state import matrix3_struct
 from lgvi_kernels.lanes.sums import pushed, twisted
-from lgvi_kernels.law import absolute, add, cross, div, lane3, mul, ones, struct, sub, vec3  # noqa: F401
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.drag import PARTS
 from lgvi_kernels.laws.drag import make_E as make_exact
 
@@ -36,19 +36,23 @@ def params(width, real):
 
 
 def make_axis(component, linear, quadratic):
-    """Drag along one axis alone: the change of its velocity."""
+    """Drag along one axis alone: (nu, Om, total, w, decay, gain, velocity, rate) -> nu, Om, total.
+
+    w: the velocity along the axis; velocity, rate: what a change of 1 in it changes of nu and Om; total: its changes so far.
+    """
 
     @wp.func
-    def changed(w: Any, decay: Any, gain: Any):
+    def slowed(nu: Any, Om: Any, total: Any, w: Any, decay: Any, gain: Any, velocity: Any, rate: Any):
         unity = ones(w)
-        slowed = w
+        left = w
         if wp.static(quadratic):
-            slowed = slowed / (unity + component(gain) * absolute(w))
+            left = left / (unity + component(gain) * absolute(w))
         if wp.static(linear):
-            slowed = component(decay) * slowed
-        return slowed - w
+            left = component(decay) * left
+        d = left - w
+        return nu + d * velocity, Om + d * rate, total + d
 
-    return changed
+    return slowed
 
 
 COMPONENTS = (component_x, component_y, component_z)
@@ -88,57 +92,20 @@ def make_E(parts, velocities):
         dq = zero
         dr = zero
         if wp.static(along):
-            d = fx(nu.x, e.decay_force, e.gain_force)
-            nu = nu + d * p.velocity_u
-            Om = Om + d * p.rate_u
-            du = du + d
-            d = fy(nu.y, e.decay_force, e.gain_force)
-            nu = nu + d * p.velocity_v
-            Om = Om + d * p.rate_v
-            dv = dv + d
-            d = fz(nu.z, e.decay_force, e.gain_force)
-            nu = nu + d * p.velocity_w
-            Om = Om + d * p.rate_w
-            dw = dw + d
+            nu, Om, du = fx(nu, Om, du, nu.x, e.decay_force, e.gain_force, p.velocity_u, p.rate_u)
+            nu, Om, dv = fy(nu, Om, dv, nu.y, e.decay_force, e.gain_force, p.velocity_v, p.rate_v)
+            nu, Om, dw = fz(nu, Om, dw, nu.z, e.decay_force, e.gain_force, p.velocity_w, p.rate_w)
         if wp.static(about):
-            d = tx(Om.x, e.decay_torque, e.gain_torque)
-            nu = nu + d * p.velocity_p
-            Om = Om + d * p.rate_p
-            dp = dp + d
-            d = ty(Om.y, e.decay_torque, e.gain_torque)
-            nu = nu + d * p.velocity_q
-            Om = Om + d * p.rate_q
-            dq = dq + d
-            d = tz(Om.z, e.decay_torque, e.gain_torque)
-            nu = nu + d * p.velocity_r
-            Om = Om + d * p.rate_r
-            dr = dr + d
-        if wp.static(about):
-            d = tz(Om.z, e.decay_torque, e.gain_torque)
-            nu = nu + d * p.velocity_r
-            Om = Om + d * p.rate_r
-            dr = dr + d
-            d = ty(Om.y, e.decay_torque, e.gain_torque)
-            nu = nu + d * p.velocity_q
-            Om = Om + d * p.rate_q
-            dq = dq + d
-            d = tx(Om.x, e.decay_torque, e.gain_torque)
-            nu = nu + d * p.velocity_p
-            Om = Om + d * p.rate_p
-            dp = dp + d
+            nu, Om, dp = tx(nu, Om, dp, Om.x, e.decay_torque, e.gain_torque, p.velocity_p, p.rate_p)
+            nu, Om, dq = ty(nu, Om, dq, Om.y, e.decay_torque, e.gain_torque, p.velocity_q, p.rate_q)
+            nu, Om, dr = tz(nu, Om, dr, Om.z, e.decay_torque, e.gain_torque, p.velocity_r, p.rate_r)
+            nu, Om, dr = tz(nu, Om, dr, Om.z, e.decay_torque, e.gain_torque, p.velocity_r, p.rate_r)
+            nu, Om, dq = ty(nu, Om, dq, Om.y, e.decay_torque, e.gain_torque, p.velocity_q, p.rate_q)
+            nu, Om, dp = tx(nu, Om, dp, Om.x, e.decay_torque, e.gain_torque, p.velocity_p, p.rate_p)
         if wp.static(along):
-            d = fz(nu.z, e.decay_force, e.gain_force)
-            nu = nu + d * p.velocity_w
-            Om = Om + d * p.rate_w
-            dw = dw + d
-            d = fy(nu.y, e.decay_force, e.gain_force)
-            nu = nu + d * p.velocity_v
-            Om = Om + d * p.rate_v
-            dv = dv + d
-            d = fx(nu.x, e.decay_force, e.gain_force)
-            nu = nu + d * p.velocity_u
-            Om = Om + d * p.rate_u
-            du = du + d
+            nu, Om, dw = fz(nu, Om, dw, nu.z, e.decay_force, e.gain_force, p.velocity_w, p.rate_w)
+            nu, Om, dv = fy(nu, Om, dv, nu.y, e.decay_force, e.gain_force, p.velocity_v, p.rate_v)
+            nu, Om, du = fx(nu, Om, du, nu.x, e.decay_force, e.gain_force, p.velocity_u, p.rate_u)
         impulse = p.mass_force * vec3(du, dv, dw)
         moment = p.mass_torque * vec3(dp, dq, dr)
         x = pushed(x, transpose_times(p.turn, impulse))

@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import absolute, add, mul, row3, struct, vec3  # noqa: F401
+from lgvi_kernels.law import *
 
 
 @functools.cache

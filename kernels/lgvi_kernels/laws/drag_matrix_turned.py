@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import absolute, add, add_outer, dot, mul, row3, struct  # noqa: F401
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.drag_matrix import add_three
 
 

@@ -6,24 +6,7 @@ from typing import Any, NamedTuple
 import warp as wp
 
 from lgvi_kernels.lanes.held import held_command
-from lgvi_kernels.law import (  # noqa: F401
-    absolute,
-    add,
-    clamp,
-    div,
-    exponential,
-    greatest,
-    least,
-    mul,
-    neg,
-    ones,
-    positive,
-    remember,
-    remembered,
-    row1,
-    struct,
-    sub,
-)
+from lgvi_kernels.law import *
 
 
 class Driven(NamedTuple):

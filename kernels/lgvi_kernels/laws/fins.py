@@ -6,22 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    add,
-    div,
-    dot,
-    greatest,
-    mul,
-    ones,
-    remember,
-    remembered,
-    root,
-    row1,
-    row3,
-    struct,
-    sub,
-    vec3,
-)
+from lgvi_kernels.law import *
 
 # Rows of one fin: the twists that measure the speed along its chord c and normal n (6 and 6, each also the wrench of a unit
 # force), then rho A / 2 times lift slope, drag coefficient and added drag coefficient; and as MATRICES say.

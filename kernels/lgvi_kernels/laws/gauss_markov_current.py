@@ -6,20 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    add,
-    div,
-    lane,
-    lane3,
-    mul,
-    ones,
-    remember,
-    remembered,
-    struct,
-    sub,
-    vec3,
-    wandered,
-)
+from lgvi_kernels.law import *
 
 FLOW = "uniform"
 NOISE = True

@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, dot, mul, row3, struct  # noqa: F401
+from lgvi_kernels.law import *
 
 
 @functools.cache

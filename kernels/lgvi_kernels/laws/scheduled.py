@@ -5,30 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    absolute,
-    add,
-    clamp,
-    command,
-    decay,
-    div,
-    exponential,
-    greatest,
-    least,
-    logarithm,
-    make_pursuit,
-    middle_of_half,
-    mul,
-    neg,
-    ones,
-    positive,
-    remember,
-    remembered,
-    row1,
-    struct,
-    sub,
-    vec3,
-)
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.driven import Driven, approached
 
 
@@ -68,8 +45,27 @@ def chased(n: Any, start: Any, end: Any, length: Any, pace: Any):
 chasing = make_pursuit(chased)
 
 
+def make_commanded(rows, limit):
+    """(schedule, commanded) of an actuator with `rows` rows a channel, its limit among them, with tables of commands behind.
+
+    schedule: (p, i) -> the first row of the table of channel i; commanded: (view, p, i, t) -> its command within its limit.
+    """
+
+    @wp.func
+    def schedule(p: Any, i: int):
+        return p.first + wp.static(rows) * p.count + i * (1 + 3 * p.knots)
+
+    @wp.func
+    def commanded(view: Any, p: Any, i: int, t: Any):
+        most = row1(view, p.first + wp.static(rows) * i + wp.static(limit))
+        return command(view, schedule(p, i), p.knots, most, t)
+
+    return schedule, commanded
+
+
 def make_scheduled(name, rows, limit, lag, rate):
     """As make_driven, for an actuator with a table of commands over time for each channel, behind the rows of all channels."""
+    schedule, commanded = make_commanded(rows, limit)
 
     def params(width, real):
         """Params: first row of the table, of the memory if `moving`; count of channels and of knots of their commands."""
@@ -77,23 +73,12 @@ def make_scheduled(name, rows, limit, lag, rate):
         return struct(name, **dict.fromkeys(words, wp.int32))
 
     @wp.func
-    def schedule(p: Any, i: int):
-        """First row of the table of channel i."""
-        return p.first + wp.static(rows) * p.count + i * (1 + 3 * p.knots)
-
-    @wp.func
-    def scheduled(view: Any, p: Any, i: int, t: Any):
-        """The command of channel i at time t, within its limit."""
-        most = row1(view, p.first + wp.static(rows) * i + wp.static(limit))
-        return command(view, schedule(p, i), p.knots, most, t)
-
-    @wp.func
     def place(view: Any, p: Any, i: int):
         n = ones(view.b.x)
         if p.moving > 0:
             n = remembered(view, p.memory + i)
         else:
-            n = scheduled(view, p, i, view.t)
+            n = commanded(view, p, i, view.t)
         return n
 
     @wp.func
@@ -106,7 +91,7 @@ def make_scheduled(name, rows, limit, lag, rate):
                 n = remembered(view, p.memory + i)
                 half = view.h.dtype(0.5) * view.h * ones(n)
                 lag_here = row1(view, at + wp.static(lag))
-                n = approached(n, scheduled(view, p, i, t), half, lag_here, row1(view, at + wp.static(rate)))
+                n = approached(n, commanded(view, p, i, t), half, lag_here, row1(view, at + wp.static(rate)))
                 remember(view, p.memory + i, n)
         return state
 

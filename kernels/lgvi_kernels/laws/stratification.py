@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, cross, dot, lane, lane3, mul, neg, struct, sub  # noqa: F401
+from lgvi_kernels.law import *
 
 POTENTIAL = True
 

@@ -5,20 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    add,
-    cross,
-    div,
-    dot,
-    greatest,
-    mul,
-    ones,
-    root,
-    sub,
-    to_body,
-    to_inertial,
-    vec3,
-)
+from lgvi_kernels.law import *
 
 POTENTIAL = True
 

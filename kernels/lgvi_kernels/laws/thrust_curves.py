@@ -9,22 +9,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    absolute,
-    add,
-    clamp,
-    div,
-    greatest,
-    least,
-    mul,
-    neg,
-    ones,
-    positive,
-    root,
-    row1,
-    sub,
-    table1,
-)
+from lgvi_kernels.law import *
 
 # Coefficients of the start of a polynomial's inverse, and rows of one side of it: 1 / its largest value, that value, its
 # place, the least slope, and the coefficients from the lowest power up.

@@ -6,31 +6,12 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    absolute,
-    add,
-    command,
-    decay,
-    div,
-    exponential,
-    greatest,
-    make_pursuit,
-    middle_of_half,
-    mul,
-    neg,
-    ones,
-    positive,
-    remember,
-    remembered,
-    row1,
-    row3,
-    struct,
-    sub,
-    vec3,
-)
+from lgvi_kernels.law import *
+from lgvi_kernels.laws.scheduled import make_commanded
 
 # Rows of one thruster: force and torque per newton (6), coefficient forward and backward, dead band, limit, 1 / lag.
 ROWS = 11
+LIMIT = 9
 
 
 @functools.cache
@@ -43,11 +24,7 @@ def params(width, real):
     return struct("Thrusters", first=wp.int32, memory=wp.int32, count=wp.int32, knots=wp.int32, lagged=wp.int32)
 
 
-@wp.func
-def commanded(view: Any, p: Any, i: int, t: Any):
-    """The command of thruster i at time t, within its limit."""
-    first = p.first + wp.static(ROWS) * p.count + i * (1 + 3 * p.knots)
-    return command(view, first, p.knots, row1(view, p.first + wp.static(ROWS) * i + 9), t)
+schedule, commanded = make_commanded(ROWS, LIMIT)
 
 
 @wp.func
@@ -80,13 +57,24 @@ def lag_behind_command(state: Any, view: Any, p: Any):
     if p.lagged > 0:
         for i in range(p.count):
             at = p.first + wp.static(ROWS) * i
-            first = p.first + wp.static(ROWS) * p.count + i * (1 + 3 * p.knots)
             n = remembered(view, p.memory + i)
-            remember(view, p.memory + i, lagging(view, n, first, p.knots, row1(view, at + 9), row1(view, at + 10)))
+            n = lagging(view, n, schedule(p, i), p.knots, row1(view, at + 9), row1(view, at + 10))
+            remember(view, p.memory + i, n)
     return state
 
 
 follow = lag_behind_command
+
+
+@wp.func
+def place_of(view: Any, p: Any, i: int):
+    """Where thruster i is."""
+    n = ones(view.b.x) - ones(view.b.x)
+    if p.lagged > 0:
+        n = remembered(view, p.memory + i)
+    else:
+        n = commanded(view, p, i, view.t)
+    return n
 
 
 @wp.func
@@ -95,11 +83,7 @@ def law(w: Any, view: Any, p: Any):
     zero = ones(view.b.x) - ones(view.b.x)
     for i in range(p.count):
         at = p.first + wp.static(ROWS) * i
-        n = zero
-        if p.lagged > 0:
-            n = remembered(view, p.memory + i)
-        else:
-            n = commanded(view, p, i, view.t)
+        n = place_of(view, p, i)
         band = row1(view, at + 8)
         ahead = greatest(n - band, zero)
         astern = greatest(-n - band, zero)

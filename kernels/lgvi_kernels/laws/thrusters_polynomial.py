@@ -6,8 +6,9 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, greatest, mul, neg, ones, remembered, row1, row3, struct, sub, vec3  # noqa: F401
-from lgvi_kernels.laws.thrusters import ROWS, commanded, evolve, follow  # noqa: F401
+from lgvi_kernels.law import *
+from lgvi_kernels.laws.thrust_curves import powers_of
+from lgvi_kernels.laws.thrusters import ROWS, evolve, follow, place_of  # noqa: F401
 
 
 @functools.cache
@@ -28,29 +29,16 @@ def params(width, real):
 
 
 @wp.func
-def polynomial_at(view: Any, first: int, powers: int, w: Any):
-    """p1 w + p2 w^2 + ..., by Horner's rule."""
-    value = w - w
-    for i in range(powers):
-        value = (value + row1(view, first + powers - 1 - i)) * w
-    return value
-
-
-@wp.func
 def polynomial_law(w: Any, view: Any, p: Any):
     """Thrust = c+ f+(max(n - band, 0)) - c- f-(max(-n - band, 0)) along each thruster."""
     zero = ones(view.b.x) - ones(view.b.x)
     curve = p.first + p.count * (wp.static(ROWS) + 1 + 3 * p.knots)
     for i in range(p.count):
         at = p.first + wp.static(ROWS) * i
-        n = zero
-        if p.lagged > 0:
-            n = remembered(view, p.memory + i)
-        else:
-            n = commanded(view, p, i, view.t)
+        n = place_of(view, p, i)
         band = row1(view, at + 8)
-        ahead = polynomial_at(view, curve, p.powers, greatest(n - band, zero))
-        astern = polynomial_at(view, curve + p.powers, p.powers, greatest(-n - band, zero))
+        ahead = powers_of(view, curve, p.powers, greatest(n - band, zero))
+        astern = powers_of(view, curve + p.powers, p.powers, greatest(-n - band, zero))
         thrust = row1(view, at + 6) * ahead - row1(view, at + 7) * astern
         w.force = w.force + thrust * row3(view, at)
         w.torque = w.torque + thrust * row3(view, at + 3)

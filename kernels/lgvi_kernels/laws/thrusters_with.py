@@ -7,7 +7,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels import device
-from lgvi_kernels.law import absolute, add, add_outer, dot, mul, positive, row1, row3, sub  # noqa: F401
+from lgvi_kernels.law import *
 from lgvi_kernels.laws import thrust_curves
 from lgvi_kernels.laws.driven import make_driven
 from lgvi_kernels.laws.scheduled import make_scheduled

@@ -6,23 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    add,
-    cosine,
-    exponential,
-    fused,
-    greatest,
-    mul,
-    neg,
-    ones,
-    positive,
-    row1,
-    row3,
-    sine,
-    struct,
-    sub,
-    vec3,
-)
+from lgvi_kernels.law import *
 
 FLOW = "varying"
 

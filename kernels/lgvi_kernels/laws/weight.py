@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import absolute, add, lane, mul, sub  # noqa: F401
+from lgvi_kernels.law import *
 
 POTENTIAL = True
 SEPARABLE = True

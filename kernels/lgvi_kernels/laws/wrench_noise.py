@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, div, lane3, mul, normals_over, ones, root, struct  # noqa: F401
+from lgvi_kernels.law import *
 
 NOISE = True
 

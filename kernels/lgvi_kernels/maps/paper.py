@@ -42,11 +42,16 @@ def sum_of(a: Any, b: Any):
     return a
 
 
-def make_phi(maps, laws, alpha, beta):
-    """(Phi, Phi*). maps: Ab, Ap, D; laws: View, Wrench, potential, forces, current, evolve, velocities."""
-    Ab, Ap, D = maps
-    View, Wrench, potential, forces, current, evolve, velocities = laws
-    equation_15 = make_equation_15(alpha, beta)
+@wp.func
+def change(a: Any, b: Any):
+    """Sum of the squares of the differences of two wrenches' components."""
+    f = a.force - b.force
+    m = a.torque - b.torque
+    return dot(f, f) + dot(m, m)
+
+
+def make_conservative(View, Wrench, potential):
+    """(x, c, h) -> the wrench of the conservative laws."""
 
     @wp.func
     def conservative(x: Any, c: Any, h: Any):
@@ -54,6 +59,12 @@ def make_phi(maps, laws, alpha, beta):
         if wp.static(potential is not None):
             w = potential(w, look(View(), x, c, h), c.params)
         return w
+
+    return conservative
+
+
+def make_remember(View, evolve):
+    """(x, c, h, to_middle): laws that remember, over all of h."""
 
     @wp.func
     def remember(x: Any, c: Any, h: Any, to_middle: Any):
@@ -65,6 +76,16 @@ def make_phi(maps, laws, alpha, beta):
             view.second = 1
             view = evolve(view, view, c.params)
         return x
+
+    return remember
+
+
+def make_phi(maps, laws, alpha, beta):
+    """(Phi, Phi*). maps: Ab, Ap, D; laws: View, Wrench, potential, forces, current, evolve, velocities."""
+    Ab, Ap, D = maps
+    View, Wrench, potential, forces, current, evolve, velocities = laws
+    equation_15 = make_equation_15(alpha, beta)
+    conservative, remember = make_conservative(View, Wrench, potential), make_remember(View, evolve)
 
     @wp.func
     def munk(x: Any, c: Any, h: Any):
@@ -95,13 +116,6 @@ def make_phi(maps, laws, alpha, beta):
         x = Ab(x, c, h)
         x = moved(x, h * u)
         return x
-
-    @wp.func
-    def change(a: Any, b: Any):
-        """Sum of the squares of the differences of two wrenches' components."""
-        f = a.force - b.force
-        m = a.torque - b.torque
-        return dot(f, f) + dot(m, m)
 
     @wp.func
     def Phi_adjoint(x: Any, c: Any, h: Any):

@@ -76,13 +76,8 @@ def make_errors(Rates, moves):
     return errors
 
 
-def make_adaptive(stages, finish, errors, estimate, width, real, timed, copy_memory):
-    """From one step of the grid to the next, by steps that the packet's worst lane decides.
-
-    copy_memory: (constants, source, target), where a law remembers (see maps/explicit.py); else None.
-    """
-    # Of PI control: this exponent is that of the step's own error, BETA that of the error before.
-    power = 0.75 * BETA - 1.0 / estimate
+def make_verdicts(width, real):
+    """(worst_of, given_up): the error by which a packet chooses its step, and the lanes that it goes on without."""
 
     @wp.func
     def worst_of(error: Any, code: Any):
@@ -111,6 +106,18 @@ def make_adaptive(stages, finish, errors, estimate, width, real, timed, copy_mem
         alarm.code = code
         alarm.size = size
         return alarm
+
+    return worst_of, given_up
+
+
+def make_adaptive(stages, finish, errors, estimate, width, real, timed, copy_memory):
+    """From one step of the grid to the next, by steps that the packet's worst lane decides.
+
+    copy_memory: (constants, source, target), where a law remembers (see maps/explicit.py); else None.
+    """
+    # Of PI control: this exponent is that of the step's own error, BETA that of the error before.
+    power = 0.75 * BETA - 1.0 / estimate
+    worst_of, given_up = make_verdicts(width, real)
 
     @wp.func
     def step(x: Any, c: Any, h: Any):

@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import sub  # noqa: F401
+from lgvi_kernels.law import *
 
 
 @wp.func

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lgvi_kernels.advance.feeding import ALL_NOTES, BITS_OF_ROWS, NOTED, bit
+from lgvi_kernels.advance.noting import ALL_NOTES, BITS_OF_ROWS, NOTED, bit
 from lgvi_warp.control.base import Bus
 from lgvi_warp.control.signals import CHANNELS, SAVED, SIGNALS, has_shape, ordered, row_of
 from lgvi_warp.physics.fields import FIELDS

@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, clamp, neg, remember, remembered, row1, struct  # noqa: F401
+from lgvi_kernels.law import *
 
 
 @functools.cache

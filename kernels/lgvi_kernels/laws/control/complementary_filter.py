@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, cross, div, dot, lane, mul, ones, root, struct, sub, vec3  # noqa: F401
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.low_pass import share
 from lgvi_kernels.laws.control.readings import (
     put_attitude,

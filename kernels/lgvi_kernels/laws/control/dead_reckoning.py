@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, lane3, mul, struct, to_inertial, vec3  # noqa: F401
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.readings import remember3, remembered3
 
 

@@ -6,20 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    add,
-    arctangent2,
-    clamp,
-    lane,
-    mul,
-    neg,
-    remember,
-    remembered,
-    root,
-    struct,
-    sub,
-    vec3,
-)
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.integral import integral, keep_error
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, lane, mul, positive, remember, remembered, struct  # noqa: F401
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.lost import since
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, heading_error, lane, mul, ones, remembered, struct, sub, vec3  # noqa: F401
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.integral import integral, keep_error
 
 

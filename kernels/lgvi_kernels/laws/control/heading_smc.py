@@ -6,20 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    add,
-    clamp,
-    div,
-    heading_error,
-    lane,
-    mul,
-    neg,
-    ones,
-    remembered,
-    struct,
-    sub,
-    vec3,
-)
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.integral import integral, keep_error
 
 

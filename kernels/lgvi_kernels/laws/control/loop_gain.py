@@ -7,7 +7,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels import device
-from lgvi_kernels.law import add, lane, mul, remember, remembered, struct, sub, vec3  # noqa: F401
+from lgvi_kernels.law import *
 
 
 @functools.cache

@@ -7,7 +7,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels import device
-from lgvi_kernels.law import add, decay, div, lane, least, mul, ones, rounded, struct, sub, vec3  # noqa: F401
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.readings import make_reading, turn_to, turned
 
 TURN = 6.283185307179586

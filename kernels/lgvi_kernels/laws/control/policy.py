@@ -6,23 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    add,
-    clamp,
-    greatest,
-    heading_error,
-    hyperbolic_tangent,
-    lane3,
-    mul,
-    ones,
-    remember,
-    remembered,
-    row1,
-    struct,
-    sub,
-    to_body,
-    vec3,
-)
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.integral import remember3, remembered3
 from lgvi_kernels.laws.control.pose_error import attitude_error
 

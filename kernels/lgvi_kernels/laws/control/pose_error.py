@@ -6,19 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    add,
-    cross,
-    lane,
-    lane3,
-    mul,
-    neg,
-    struct,
-    sub,
-    to_body,
-    to_inertial,
-    vec3,
-)
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.integral import integral3, remember3, remembered3, unhindered
 
 

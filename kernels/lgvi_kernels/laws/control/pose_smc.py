@@ -6,7 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, clamp, div, mul, neg, ones, sub, to_body, vec3  # noqa: F401
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.pose_error import (
     attitude_error,
     attitude_integral,

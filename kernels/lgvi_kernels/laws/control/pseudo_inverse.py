@@ -7,25 +7,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels import device
-from lgvi_kernels.law import (  # noqa: F401
-    absolute,
-    add,
-    div,
-    dot,
-    least,
-    mul,
-    neg,
-    ones,
-    positive,
-    remember,
-    root,
-    row1,
-    row3,
-    struct,
-    sub,
-    table1,
-    vec3,
-)
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.lost import since
 from lgvi_kernels.laws.control.rest import ROWS as rest_rows
 from lgvi_kernels.laws.control.rest import rest

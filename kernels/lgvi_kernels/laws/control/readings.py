@@ -6,25 +6,7 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    add,
-    arctangent2,
-    cosine,
-    cross,
-    div,
-    dot,
-    greatest,
-    mul,
-    neg,
-    ones,
-    positive,
-    remember,
-    remembered,
-    root,
-    sine,
-    sub,
-    vec3,
-)
+from lgvi_kernels.law import *
 
 # Numbers of what can be read.
 COUNTS = {

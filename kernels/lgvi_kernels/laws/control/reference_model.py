@@ -6,26 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    absolute,
-    add,
-    arctangent2,
-    clamp,
-    cosine,
-    mul,
-    neg,
-    ones,
-    positive,
-    remember,
-    remembered,
-    row1,
-    row3,
-    sine,
-    struct,
-    sub,
-    to_inertial,
-    vec3,
-)
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.integral import remember3, remembered3
 
 # Rows of a number that is filtered: its map over a period, line by line, and the limit of its rate.

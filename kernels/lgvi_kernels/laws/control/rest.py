@@ -5,7 +5,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import add, dot, mul, row3, vec3  # noqa: F401
+from lgvi_kernels.law import *
 
 # Rows of a symmetric projector (6, 6), line by line: it maps a demand to what the actuators cannot make.
 ROWS = 36

@@ -8,26 +8,7 @@ import warp as wp
 
 from lgvi_kernels import device
 from lgvi_kernels.lanes.noise import noise_key
-from lgvi_kernels.law import (  # noqa: F401
-    absolute,
-    add,
-    div,
-    lane,
-    lane3,
-    least,
-    mul,
-    normals,
-    ones,
-    positive,
-    quarter,
-    remember,
-    remembered,
-    root,
-    rounded,
-    struct,
-    sub,
-    vec3,
-)
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.readings import make_reading, remember3, remembered3
 
 # Features that draw random numbers, and those by which a reading is not that of its own look.
@@ -42,29 +23,21 @@ def drawn(like: Any, key: Any, look: int, stream: int):
     return normals(like, key.member, look, key.channel + stream, key.seed0, key.seed1)
 
 
-@functools.cache
-def made(features):
-    """The device code of a sensor: features: what it reads (see readings.py), and its numbers that are not idle."""
-    of, *others = features
-    reading = make_reading(of)
-    count, rows = reading.count, reading.rows
-    values, with_values, shifted, put, taken = reading[2:]
-    biased, noisy, drifting, quantised, rare, late, lossy = (
-        name in others for name in ("bias", "noise", "drift", "quantum", "every", "latency", "dropout")
+@wp.func
+def on_grid(v: Any, q: Any):
+    """v rounded to whole numbers of quanta; as it is where a quantum is 0."""
+    unity = ones(v.x)
+    size = vec3(positive(q.x, q.x, unity), positive(q.y, q.y, unity), positive(q.z, q.z, unity))
+    return vec3(
+        positive(q.x, size.x * rounded(v.x / size.x), v.x),
+        positive(q.y, size.y * rounded(v.y / size.y), v.y),
+        positive(q.z, size.z * rounded(v.z / size.z), v.z),
     )
-    draws = any(name in others for name in DRAWING)
-    keeps = any(name in others for name in KEEPING)
 
-    def params(width, real):
-        """Params: the numbers by member; key of the random numbers; first of its rows of the memory; readings that it keeps.
 
-        Its rows: the walk; `sets` readings as they arrive; that of this look; how many looks the last one is old.
-        """
-        Lane, Lane3 = lane(width, real), lane3(width, real)
-        vectors = {name: Lane3 for name in others if name in ("bias", "noise", "drift", "quantum")}
-        lanes = {name: Lane for name in others if name in KEEPING}
-        key = {"key": noise_key(width)} if draws else {}
-        return struct("Sensor", **vectors, **lanes, **key, memory=wp.int32, sets=wp.int32)
+def make_kept(reading, drifting, rare, late):
+    """(y, p, lost) -> y with the reading that has arrived by now."""
+    count, rows, put, taken = reading.count, reading.rows, reading.put, reading.taken
 
     @wp.func
     def kept(y: Any, p: Any, lost: Any):
@@ -101,6 +74,33 @@ def made(features):
             remember(y, fresh + j, value)
         return taken(y, fresh)
 
+    return kept
+
+
+@functools.cache
+def made(features):
+    """The device code of a sensor: features: what it reads (see readings.py), and its numbers that are not idle."""
+    of, *others = features
+    reading = make_reading(of)
+    count, values, with_values, shifted = reading.count, reading.values, reading.with_values, reading.shifted
+    biased, noisy, drifting, quantised, rare, late, lossy = (
+        name in others for name in ("bias", "noise", "drift", "quantum", "every", "latency", "dropout")
+    )
+    draws = any(name in others for name in DRAWING)
+    keeps = any(name in others for name in KEEPING)
+    kept = make_kept(reading, drifting, rare, late)
+
+    def params(width, real):
+        """Params: the numbers by member; key of the random numbers; first of its rows of the memory; readings that it keeps.
+
+        Its rows: the walk; `sets` readings as they arrive; that of this look; how many looks the last one is old.
+        """
+        Lane, Lane3 = lane(width, real), lane3(width, real)
+        vectors = {name: Lane3 for name in others if name in ("bias", "noise", "drift", "quantum")}
+        lanes = {name: Lane for name in others if name in KEEPING}
+        key = {"key": noise_key(width)} if draws else {}
+        return struct("Sensor", **vectors, **lanes, **key, memory=wp.int32, sets=wp.int32)
+
     @wp.func
     def measure(y: Any, p: Any):
         """The truth, plus bias, walk and noise, rounded to the quantum; then what has arrived of it."""
@@ -131,15 +131,7 @@ def made(features):
         if wp.static(biased or noisy or drifting):
             y = shifted(y, e)
         if wp.static(quantised):
-            q = p.quantum
-            size = vec3(positive(q.x, q.x, unity), positive(q.y, q.y, unity), positive(q.z, q.z, unity))
-            v = values(y)
-            w = vec3(
-                positive(q.x, size.x * rounded(v.x / size.x), v.x),
-                positive(q.y, size.y * rounded(v.y / size.y), v.y),
-                positive(q.z, size.z * rounded(v.z / size.z), v.z),
-            )
-            y = with_values(y, w)
+            y = with_values(y, on_grid(values(y), p.quantum))
         if wp.static(keeps):
             y = kept(y, p, lost)
         return y

@@ -7,7 +7,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels import device
-from lgvi_kernels.law import add, lane, mul, ones, positive, struct, sub  # noqa: F401
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.lost import since
 from lgvi_kernels.laws.control.readings import make_reading
 

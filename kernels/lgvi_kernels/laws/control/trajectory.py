@@ -6,22 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    add,
-    cosine,
-    dot,
-    mul,
-    neg,
-    ones,
-    positive,
-    root,
-    row1,
-    row3,
-    sine,
-    struct,
-    sub,
-    vec3,
-)
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.set_point import headed
 
 # Rows of a piece: its time, then for each power of the time since position (3), heading and speed.

@@ -6,27 +6,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.law import (  # noqa: F401
-    add,
-    clamp,
-    cosine,
-    div,
-    greatest,
-    lane,
-    least,
-    mul,
-    neg,
-    ones,
-    positive,
-    remember,
-    remembered,
-    root,
-    row3,
-    sine,
-    struct,
-    sub,
-    vec3,
-)
+from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.set_point import headed
 
 ILOS = 1

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is gathered at a controller's looks, and the signals that samples write."""
+
+import functools
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.lanes.arithmetic import add, mul, positive, sub  # noqa: F401
+from lgvi_kernels.maps.compose import superpose
+from lgvi_kernels.maps.submaps import look, rotate
+
+
+@wp.func
+def put_look(monitor: Any, start: int, j: int, i: int, v: Any):
+    """Write those of numbers j to j + 2 of the motion that are gathered."""
+    if monitor.columns[j] >= 0:
+        monitor.looks[start + monitor.columns[j], i] = v.x
+    if monitor.columns[j + 1] >= 0:
+        monitor.looks[start + monitor.columns[j + 1], i] = v.y
+    if monitor.columns[j + 2] >= 0:
+        monitor.looks[start + monitor.columns[j + 2], i] = v.z
+
+
+@wp.func(inline=False)
+def gather_signals(memory: Any, i: int, monitor: Any, look: int):
+    """Write the signals at a look behind its motion."""
+    count = monitor.signals.shape[0]
+    start = (look % monitor.slots + 1) * monitor.numbers - count
+    for j in range(count):
+        monitor.looks[start + j, i] = memory[i, monitor.signals[j]]
+
+
+def make_gather_motion(compensated, moved):
+    """(y, x, c, monitor): write the motion at a look into the look's rows; moved: see make_truth."""
+
+    @wp.func
+    def gather_motion(y: Any, x: Any, c: Any, monitor: Any):
+        start = (y.look % monitor.slots) * monitor.numbers
+        put_look(monitor, start, 0, c.packet, y.position)
+        if wp.static(compensated):
+            low = (x.b - y.position) + x.b_low
+            if wp.static(moved):
+                low = low + rotate(x, c.inertia.user_origin)
+            # A pair of sums is gathered whole, three numbers and three more.
+            put_look(monitor, start + 3, 0, c.packet, low)
+        put_look(monitor, start, 3, c.packet, y.north)
+        put_look(monitor, start, 6, c.packet, y.east)
+        put_look(monitor, start, 9, c.packet, y.down)
+        put_look(monitor, start, 12, c.packet, y.velocity)
+        put_look(monitor, start, 15, c.packet, y.angular_velocity)
+
+    return gather_motion
+
+
+def make_gather(spec, View, at_step):
+    """(x, c, monitor, k, h): write the signals after a look, where something is gathered at all of them."""
+    reports = spec.control.reports
+    note_actuators = make_note_actuators(spec, View, at_step)
+
+    @wp.func
+    def gather(x: Any, c: Any, monitor: Any, k: int, h: wp.float64):
+        if monitor.slots > 0:
+            if wp.static(reports):
+                note_actuators(x, c, h, k)
+            gather_signals(c.memory, c.packet, monitor, k // monitor.every)
+
+    return gather
+
+
+@functools.cache
+def make_note_actuators(spec, View, at_step):
+    """(x, c, h, k): the actuators write where they are into the bus (role `report` of their laws); nothing where none does."""
+    report = superpose(spec.laws, "report")
+
+    # It takes a view and the laws' numbers alone: all constants of a packet would take longer to pass than to use.
+    @wp.func(inline=False)
+    def write_report(view: View, params: Any):
+        if wp.static(report is not None):
+            view = report(view, view, params)
+
+    @wp.func
+    def note_actuators(x: Any, c: Any, h: wp.float64, k: int):
+        write_report(look(View(), at_step(x, k, h), c, x.b.x.dtype(h)), c.params)
+
+    return note_actuators
+
+
+@functools.cache
+def make_signals(Lane):
+    """(keep_signals, sample_signals): of lanes that freeze the signals are kept, and samples write them."""
+
+    @wp.func(inline=False)
+    def keep_signals(memory: wp.array2d(dtype=Lane), i: int, monitor: Any, half: int, code: Lane):
+        """half: where the memory's half begins that holds the signals of lanes with a code."""
+        for j in range(monitor.signals.shape[0]):
+            held = memory[i, half + monitor.signals[j]]
+            memory[i, monitor.kept + j] = positive(code, held, memory[i, monitor.kept + j])
+
+    @wp.func(inline=False)
+    def sample_signals(
+        out: wp.array2d(dtype=Lane), i: int, end: int, memory: wp.array2d(dtype=Lane), monitor: Any, frozen: Lane
+    ):
+        """Write the signals as the last numbers of a sample, which ends before the column `end`."""
+        count = monitor.signals.shape[0]
+        for j in range(count):
+            live = memory[i, monitor.signals[j]]
+            out[i, end - count + j] = positive(frozen, memory[i, monitor.kept + j], live)
+
+    return keep_signals, sample_signals

@@ -12,9 +12,8 @@ from typing import Any
 
 import warp as wp
 
+from lgvi_kernels.lanes import overloads
 from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
-    REALS,
-    WIDTHS,
     absolute,
     add,
     div,
@@ -299,86 +298,149 @@ def _normals(width, real):
     return f"{_types(width, real, '')} {_philox(width)} wp::vec_t<{4 * width}, S> r; {pairs} return r;"
 
 
-# Definitions of one name at module level become overloads of one Warp function; inside a factory they would not.
-for _real in REALS:
-    for _width in WIDTHS:
-        _L, _I, _4L = lane(_width, _real), int_lane(_width), lane(4 * _width, _real)
-        _native_here = functools.partial(native_code, _width, _real)
-        _body_here = functools.partial(_body, _width, _real)
+@overloads.family
+def greatest():
+    """The larger of a and b; b where one is no number."""
+    ...
 
-        @wp.func_native(_native_here("AB", "A > B ? A : B"))
-        def greatest(a: _L, b: _L) -> _L: ...
 
-        @wp.func_native(_native_here("ABC", "A < B ? B : (A > C ? C : A)"))
-        def clamp(a: _L, b: _L, c: _L) -> _L:
-            """a kept between b and c; NaN stays NaN."""
-            ...
+@overloads.family
+def clamp():
+    """a kept between b and c; NaN stays NaN."""
+    ...
 
-        @wp.func_native(_native_here("ABC", "A * B + C" if _width == 1 else "__builtin_elementwise_fma(A, B, C)"))
-        def fused(a: _L, b: _L, c: _L) -> _L:
-            """a b + c, rounded once (with one lane, where the compiler joins them)."""
-            ...
 
-        @wp.func_native(_native_here("A", _root(_width).format("A")))
-        def root(a: _L) -> _L:
-            """Square root."""
-            ...
+@overloads.family
+def fused():
+    """a b + c, rounded once (with one lane, where the compiler joins them)."""
+    ...
 
-        @wp.func_native(_body_here("A", _nearest(_real)))
-        def rounded(a: _L) -> _L:
-            """The nearest whole number; of two the even one."""
-            ...
 
-        @wp.func_native(_body_here("A", _exponential(_real)))
-        def exponential(a: _L) -> _L:
-            """e^a, to 2 eps; 0 and inf beyond the format's range."""
-            ...
+@overloads.family
+def root():
+    """Square root."""
+    ...
 
-        @wp.func_native(_body_here("A", _sine(_real, "N"), "Y"))
-        def sine(a: _L) -> _L:
-            """sin a, to 2 eps for |a| <= 1e5 rad."""
-            ...
 
-        @wp.func_native(_body_here("A", _sine(_real, "N + 1"), "Y"))
-        def cosine(a: _L) -> _L:
-            """cos a, to 2 eps for |a| <= 1e5 rad. With sine of the same a it costs next to nothing."""
-            ...
+@overloads.family
+def rounded():
+    """The nearest whole number; of two the even one."""
+    ...
 
-        @wp.func_native(_body_here("A", _positive_logarithm(_real)))
-        def logarithm(a: _L) -> _L:
-            """ln a of a normal number a, to 2 eps; not a number where a <= 0."""
-            ...
 
-        @wp.func_native(_body_here("AB", _arctangent2(_real)))
-        def arctangent2(a: _L, b: _L) -> _L:
-            """The angle of the point (b, a), in [-pi, pi], to 2 eps; 0 for the origin. Of (0, b < 0) it is pi."""
-            ...
+@overloads.family
+def exponential():
+    """e^a, to 2 eps; 0 and inf beyond the format's range."""
+    ...
 
-        @wp.func_native(_body_here("A", _decay(_real)))
-        def decay(a: _L) -> _L:
-            """(1 - e^-a) / a, 1 at a = 0, to 3 eps for every a > -700 (float32: -87)."""
-            ...
 
-        @wp.func_native(_normals(_width, _real))
-        def normals(like: _L, member: _I, step: int, channel: int, seed0: int, seed1: int) -> _4L:
-            """Four independent standard normals in each lane, side by side: a function of the arguments alone.
+@overloads.family
+def sine():
+    """sin a, to 2 eps for |a| <= 1e5 rad."""
+    ...
 
-            Philox4x32-10 with counter (member, step, channel, 0) and key (seed0, seed1), then Box & Muller's map.
-            """
-            ...
 
-        @wp.func_native(
-            f"wp::vec_t<{_width}, wp::{_real.__name__}> r; memcpy(&r, &a[k * {_width}], sizeof(r)); return r;"
-        )
-        def quarter(a: _4L, k: int) -> _L:
-            """Lane k, 0 to 3, of the four lanes side by side in a."""
-            ...
+@overloads.family
+def cosine():
+    """cos a, to 2 eps for |a| <= 1e5 rad. With sine of the same a it costs next to nothing."""
+    ...
 
-        @wp.func
-        def normals3(like: _L, member: _I, step: int, channel: int, seed0: int, seed1: int):
-            """A 3-vector of the first three of `normals`."""
-            four = normals(like, member, step, channel, seed0, seed1)
-            return vec3(quarter(four, 0), quarter(four, 1), quarter(four, 2))
+
+@overloads.family
+def logarithm():
+    """ln a of a normal number a, to 2 eps; not a number where a <= 0."""
+    ...
+
+
+@overloads.family
+def arctangent2():
+    """The angle of the point (b, a), in [-pi, pi], to 2 eps; 0 for the origin. Of (0, b < 0) it is pi."""
+    ...
+
+
+@overloads.family
+def decay():
+    """(1 - e^-a) / a, 1 at a = 0, to 3 eps for every a > -700 (float32: -87)."""
+    ...
+
+
+@overloads.family
+def normals():
+    """Four independent standard normals in each lane, side by side: a function of the arguments alone.
+
+    Philox4x32-10 with counter (member, step, channel, 0) and key (seed0, seed1), then Box & Muller's map.
+    """
+    ...
+
+
+@overloads.family
+def quarter():
+    """Lane k, 0 to 3, of the four lanes side by side in a."""
+    ...
+
+
+@overloads.family
+def normals3():
+    """A 3-vector of the first three of `normals`."""
+    ...
+
+
+@overloads.for_each_type
+def _declare_functions(width, real):
+    L = lane(width, real)
+    native, body = functools.partial(native_code, width, real), functools.partial(_body, width, real)
+
+    @overloads.func_native(native("AB", "A > B ? A : B"))
+    def greatest(a: L, b: L) -> L: ...
+
+    @overloads.func_native(native("ABC", "A < B ? B : (A > C ? C : A)"))
+    def clamp(a: L, b: L, c: L) -> L: ...
+
+    @overloads.func_native(native("ABC", "A * B + C" if width == 1 else "__builtin_elementwise_fma(A, B, C)"))
+    def fused(a: L, b: L, c: L) -> L: ...
+
+    @overloads.func_native(native("A", _root(width).format("A")))
+    def root(a: L) -> L: ...
+
+    @overloads.func_native(body("A", _nearest(real)))
+    def rounded(a: L) -> L: ...
+
+    @overloads.func_native(body("A", _exponential(real)))
+    def exponential(a: L) -> L: ...
+
+    @overloads.func_native(body("A", _sine(real, "N"), "Y"))
+    def sine(a: L) -> L: ...
+
+    @overloads.func_native(body("A", _sine(real, "N + 1"), "Y"))
+    def cosine(a: L) -> L: ...
+
+    @overloads.func_native(body("A", _positive_logarithm(real)))
+    def logarithm(a: L) -> L: ...
+
+    @overloads.func_native(body("AB", _arctangent2(real)))
+    def arctangent2(a: L, b: L) -> L: ...
+
+    @overloads.func_native(body("A", _decay(real)))
+    def decay(a: L) -> L: ...
+
+
+@overloads.for_each_type
+def _declare_normals(width, real):
+    # Four lanes side by side are kept together, not calculated with: no function of lanes knows their type.
+    L, I, L4 = lane(width, real), int_lane(width), wp.types.vector(4 * width, real)  # noqa: E741
+
+    @overloads.func_native(_normals(width, real))
+    def normals(like: L, member: I, step: int, channel: int, seed0: int, seed1: int) -> L4: ...
+
+    @overloads.func_native(
+        f"wp::vec_t<{width}, wp::{real.__name__}> r; memcpy(&r, &a[k * {width}], sizeof(r)); return r;"
+    )
+    def quarter(a: L4, k: int) -> L: ...
+
+    @overloads.func
+    def normals3(like: L, member: I, step: int, channel: int, seed0: int, seed1: int):
+        four = normals(like, member, step, channel, seed0, seed1)
+        return vec3(quarter(four, 0), quarter(four, 1), quarter(four, 2))
 
 
 @wp.func

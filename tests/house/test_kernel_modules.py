@@ -8,13 +8,14 @@ import pytest
 
 KERNELS = Path(__file__).parents[2] / "kernels" / "lgvi_kernels"
 OPERATORS = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div", ast.USub: "neg"}
+WARP = ("wp.", "overloads.")
 FORMULAS = sorted({*KERNELS.rglob("*.py")} - {KERNELS / "lanes" / "arithmetic.py"})
 
 
 def device_functions(tree):
     """Functions that Warp compiles."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef) and any("wp." in ast.unparse(d) for d in node.decorator_list):
+        if isinstance(node, ast.FunctionDef) and any(ast.unparse(d).startswith(WARP) for d in node.decorator_list):
             yield node
 
 

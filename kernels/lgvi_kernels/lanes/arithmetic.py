@@ -17,7 +17,7 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes import overloads
+from lgvi_kernels.lanes import native, overloads
 
 WIDTHS = (1, 2, 4, 8, 16, 32)
 REALS = (wp.float32, wp.float64)
@@ -56,93 +56,6 @@ def lane3(width, real):
 def symmetric3(width, real):
     """Type of one symmetric 3x3 matrix of `width` vehicles: diagonal 11, 22, 33 and off-diagonal 23, 31, 12."""
     return struct("Symmetric3", **dict.fromkeys(("diagonal", "off_diagonal"), lane3(width, real)))
-
-
-def native_head(width, real, arguments):
-    """C++ that declares the vector type V and copies the lanes a, b, c into vectors A, B, C."""
-    name = "wp::float32" if real == wp.float32 else "wp::float64"
-    size = width * (4 if real == wp.float32 else 8)
-    vector = "S V" if width == 1 else f"S V __attribute__((vector_size({size})))"
-    loads = "".join(f" V {v}; memcpy(&{v}, &{v.lower()}, sizeof(V));" for v in arguments)
-    return f"typedef {name} S; typedef {vector};{loads}"
-
-
-def native_code(width, real, arguments, expression):
-    """C++ of a function of the lanes a, b, c: the expression is written in their vectors A, B, C (and a number s)."""
-    # Warp's vec_t is a struct around an array. memcpy is the legal way to read its bytes as a vector; compiled, it is no copy.
-    result = f"V R = {expression}; wp::vec_t<{width}, S> r; memcpy(&r, &R, sizeof(V)); return r;"
-    return f"{native_head(width, real, arguments)} {result}"
-
-
-def _native_any_positive(width, real):
-    """C++ of: some lane of `a` is positive. The maximum would not do: it may drop a lane beside one that is NaN."""
-    if width == 1:
-        return "return a[0] > 0;"
-    return f"{native_head(width, real, 'A')} return __builtin_reduce_or(A > (S)0) != 0;"
-
-
-def _native_element(width, real, statement):
-    """C++ that reads or writes a lane r at its place in a two-dimensional array."""
-    kind = f"wp::vec_t<{width}, wp::{real.__name__}>"
-    place = f"{kind}* place = ({kind}*)rows.data + ((wp::int64)(entry * rows.shape[1] + row) + offset);"
-    return f"{kind} r; {place} {statement}"
-
-
-def _native_shared(width, real):
-    """C++ that reads one number of a two-dimensional array into all lanes."""
-    place = "((S*)rows.data)[(wp::int64)(entry * rows.shape[1] + row) + offset]"
-    return f"{native_head(width, real, '')} V R = V() + {place}; wp::vec_t<{width}, S> r; memcpy(&r, &R, sizeof(V)); return r;"
-
-
-def _native_own(width, real, statement):
-    """C++ that reads or writes a lane r at its place among the rows that a law may see; where there is none, nothing."""
-    kind = f"wp::vec_t<{width}, wp::{real.__name__}>"
-    place = f"{kind}* place = ({kind}*)rows.rows.data + ((wp::int64)entry * rows.rows.shape[1] + at);"
-    return f"{kind} r = {kind}(); {_OWN_ROW} if (at <= last) {{ {place} {statement} }}"
-
-
-def _native_own_shared(width, real):
-    """C++ that reads one number, of a row that a law may see, into all lanes."""
-    kind = f"wp::vec_t<{width}, wp::{real.__name__}>"
-    number = f"((wp::{real.__name__}*)rows.rows.data)[(wp::int64)entry * rows.rows.shape[1] + at]"
-    return f"{_OWN_ROW} return at <= last ? {kind}({number}) : {kind}();"
-
-
-def _native_gather(width, real, shared):
-    """C++ that reads, for each lane, the row of its own index among those that a law may see."""
-    kind, number = f"wp::vec_t<{width}, wp::{real.__name__}>", f"wp::{real.__name__}"
-    value = f"(({number}*)rows.rows.data)[begin + at]" if shared else f"(({kind}*)rows.rows.data)[begin + at][j]"
-    each = f"const int step = index[j]; {_OWN_ROW.replace('offset', 'offset + step')} if (at <= last) r[j] = {value};"
-    begin = "const wp::int64 begin = (wp::int64)entry * rows.rows.shape[1];"
-    return f"{kind} r = {kind}(); {begin} for (int j = 0; j < {width}; ++j) {{ {each} }} return r;"
-
-
-# C++: the row `at` that a law sees for the one it asks for, and the last one that it may see; there is none if at > last.
-_OWN_ROW = (
-    "wp::int64 at = (wp::int64)row + offset, last = rows.last; if (at >= 0 && at < rows.common) last = at;"
-    " else at = at < rows.first ? rows.first : at > last && last >= rows.first ? last : at;"
-)
-
-
-def _native_whole(width, real):
-    """C++ of the whole numbers at or below those of a lane; what is no number, or beyond int32, becomes an end of int32."""
-    floor = "__builtin_floorf" if real == wp.float32 else "__builtin_floor"
-    value = f"v >= (S)-2147483648.0 ? (v < (S)2147483648.0 ? (int){floor}(v) : 2147483647) : -2147483647 - 1"
-    each = f"for (int j = 0; j < {width}; ++j) {{ const S v = a[j]; r[j] = {value}; }}"
-    return f"typedef wp::{real.__name__} S; wp::vec_t<{width}, wp::int32> r; {each} return r;"
-
-
-def _native_below(width, real):
-    """C++ of floor, lane by lane."""
-    floor = "__builtin_floorf" if real == wp.float32 else "__builtin_floor"
-    kind = f"wp::vec_t<{width}, wp::{real.__name__}>"
-    return f"{kind} r; for (int j = 0; j < {width}; ++j) r[j] = {floor}(a[j]); return r;"
-
-
-def _native_integers(width, expression):
-    """C++ of a sum or product of whole numbers, lane by lane, which wraps around."""
-    each = f"const unsigned x = {expression[0]}, y = b[j]; r[j] = (int)(x {expression[1]} y);"
-    return f"wp::vec_t<{width}, wp::int32> r; for (int j = 0; j < {width}; ++j) {{ {each} }} return r;"
 
 
 @functools.cache
@@ -276,16 +189,16 @@ def vec3():
 def _declare_integers(width):
     I = int_lane(width)  # noqa: E741
 
-    @overloads.func_native(_native_integers(width, ("a[j]", "+")))
+    @overloads.func_native(native.integers(width, ("a[j]", "+")))
     def add(a: I, b: I) -> I: ...
 
-    @overloads.func_native(_native_integers(width, ("a[j]", "-")))
+    @overloads.func_native(native.integers(width, ("a[j]", "-")))
     def sub(a: I, b: I) -> I: ...
 
-    @overloads.func_native(_native_integers(width, ("a[j]", "*")))
+    @overloads.func_native(native.integers(width, ("a[j]", "*")))
     def mul(a: I, b: I) -> I: ...
 
-    @overloads.func_native(_native_integers(width, ("s", "*")))
+    @overloads.func_native(native.integers(width, ("s", "*")))
     def mul(s: wp.int32, b: I) -> I: ...
 
 
@@ -293,48 +206,48 @@ def _declare_integers(width):
 def _declare_numbers(width, real):
     _declare_integers(width)
     R, L, I = real, lane(width, real), int_lane(width)  # noqa: E741
-    native = functools.partial(native_code, width, real)
+    code = functools.partial(native.code, width, real)
 
-    @overloads.func_native(native("AB", "A + B"))
+    @overloads.func_native(code("AB", "A + B"))
     def add(a: L, b: L) -> L: ...
 
-    @overloads.func_native(native("AB", "A - B"))
+    @overloads.func_native(code("AB", "A - B"))
     def sub(a: L, b: L) -> L: ...
 
-    @overloads.func_native(native("A", "-A"))
+    @overloads.func_native(code("A", "-A"))
     def neg(a: L) -> L: ...
 
-    @overloads.func_native(native("AB", "A * B"))
+    @overloads.func_native(code("AB", "A * B"))
     def mul(a: L, b: L) -> L: ...
 
-    @overloads.func_native(native("A", "s * A"))
+    @overloads.func_native(code("A", "s * A"))
     def mul(s: R, a: L) -> L: ...
 
-    @overloads.func_native(native("AB", "A / B"))
+    @overloads.func_native(code("AB", "A / B"))
     def div(a: L, b: L) -> L: ...
 
-    @overloads.func_native(native("A", "A < (S)0 ? -A : A"))
+    @overloads.func_native(code("A", "A < (S)0 ? -A : A"))
     def absolute(a: L) -> L: ...
 
-    @overloads.func_native(native("AB", "A < B ? A : B"))
+    @overloads.func_native(code("AB", "A < B ? A : B"))
     def least(a: L, b: L) -> L: ...
 
-    @overloads.func_native(native("AB", "A < B ? B : A"))
+    @overloads.func_native(code("AB", "A < B ? B : A"))
     def largest(a: L, b: L) -> L: ...
 
-    @overloads.func_native(native("", "V() + (S)1"))
+    @overloads.func_native(code("", "V() + (S)1"))
     def ones(like: L) -> L: ...
 
-    @overloads.func_native(native("ABC", "A > (S)0 ? B : C"))
+    @overloads.func_native(code("ABC", "A > (S)0 ? B : C"))
     def positive(a: L, b: L, c: L) -> L: ...
 
-    @overloads.func_native(_native_any_positive(width, real))
+    @overloads.func_native(native.any_positive(width, real))
     def any_positive(a: L) -> bool: ...
 
-    @overloads.func_native(_native_whole(width, real))
+    @overloads.func_native(native.whole(width, real))
     def whole(a: L) -> I: ...
 
-    @overloads.func_native(_native_below(width, real))
+    @overloads.func_native(native.below(width, real))
     def below(a: L) -> L: ...
 
 
@@ -345,18 +258,18 @@ def _declare_rows(width, real):
     OwnLanes, OwnNumbers = own_rows(L), own_rows(real)
     read = "memcpy(&r, place, sizeof(r)); return r;"
     write = "memcpy(place, &value, sizeof(r));"
-    read_own = _native_own(width, real, "memcpy(&r, place, sizeof(r));") + " return r;"
+    read_own = native.own(width, real, "memcpy(&r, place, sizeof(r));") + " return r;"
 
-    @overloads.func_native(_native_element(width, real, read))
+    @overloads.func_native(native.element(width, real, read))
     def element(rows: Rows, entry: int, row: int, offset: int) -> L: ...
 
-    @overloads.func_native(_native_element(width, real, read))
+    @overloads.func_native(native.element(width, real, read))
     def entry_of(like: L, rows: Rows, entry: int, row: int, offset: int) -> L: ...
 
-    @overloads.func_native(_native_shared(width, real))
+    @overloads.func_native(native.shared(width, real))
     def entry_of(like: L, rows: Numbers, entry: int, row: int, offset: int) -> L: ...
 
-    @overloads.func_native(_native_element(width, real, write))
+    @overloads.func_native(native.element(width, real, write))
     def set_element(rows: Rows, entry: int, row: int, offset: int, value: L): ...
 
     @overloads.func_native(read_own)
@@ -365,16 +278,16 @@ def _declare_rows(width, real):
     @overloads.func_native(read_own)
     def entry_of(like: L, rows: OwnLanes, entry: int, row: int, offset: int) -> L: ...
 
-    @overloads.func_native(_native_own_shared(width, real))
+    @overloads.func_native(native.own_shared(width, real))
     def entry_of(like: L, rows: OwnNumbers, entry: int, row: int, offset: int) -> L: ...
 
-    @overloads.func_native(_native_own(width, real, write))
+    @overloads.func_native(native.own(width, real, write))
     def set_element(rows: OwnLanes, entry: int, row: int, offset: int, value: L): ...
 
-    @overloads.func_native(_native_gather(width, real, False))
+    @overloads.func_native(native.gather(width, real, False))
     def gathered(like: L, rows: OwnLanes, entry: int, row: int, offset: int, index: I) -> L: ...
 
-    @overloads.func_native(_native_gather(width, real, True))
+    @overloads.func_native(native.gather(width, real, True))
     def gathered(like: L, rows: OwnNumbers, entry: int, row: int, offset: int, index: I) -> L: ...
 
     _declare_pieces(L)

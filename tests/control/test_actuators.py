@@ -212,7 +212,7 @@ def solved(name, method, h, steps, every):
 ROUND_OFF = {"rov": 1e-8, "auv": 1e-9}
 
 
-@pytest.mark.slow_but("rov-psi_s-100")
+@pytest.mark.slow_but("*-psi_s-100")
 @pytest.mark.parametrize("steps", [100, 1000])
 @pytest.mark.parametrize("method", ["psi_s", "rk4"])
 @pytest.mark.parametrize("name", SCENES)

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from lgvi_warp.common.status import Status
+
 KERNELS = Path(__file__).parents[2] / "kernels" / "lgvi_kernels"
 OPERATORS = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div", ast.USub: "neg"}
 WARP = ("wp.", "overloads.")
@@ -45,3 +47,14 @@ def whole_numbers(node):
         any(isinstance(sub, ast.Constant) and isinstance(sub.value, int) for sub in ast.walk(node))
         or text[1:].replace(".", "").isdigit()
     )
+
+
+def test_statuses_have_the_numbers_that_the_host_reads():
+    numbers = [
+        (path.name, node.targets[0].id, node.value.value)
+        for path in KERNELS.rglob("*.py")
+        for node in ast.parse(path.read_text()).body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) in Status.__members__
+    ]
+    assert {name for _, name, _ in numbers} >= {"STEP_TOO_LARGE", "NOT_CONVERGED", "NON_FINITE", "BACKWARD_DRAG"}
+    assert [(name, number) for _, name, number in numbers] == [(name, Status[name].value) for _, name, _ in numbers]

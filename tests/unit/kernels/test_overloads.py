@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lanes are declared for the types that are asked for. Warp's hash of a kernel knows their code, and not what else is declared."""
+"""Lanes are declared for the types that are asked for; the hash of a kernel knows their code, not what else is declared."""
 
 import json
 import os

@@ -68,121 +68,40 @@ def own_rows(kind):
     return struct("OwnRows", rows=wp.array2d(dtype=kind), **dict.fromkeys(("first", "last", "common"), wp.int32))
 
 
-@overloads.family
-def add():
-    """a + b, lane by lane; of whole numbers, and below, it wraps around."""
-    ...
-
-
-@overloads.family
-def sub():
-    """a - b."""
-    ...
-
-
-@overloads.family
-def neg():
-    """-a."""
-    ...
-
-
-@overloads.family
-def mul():
-    """a b, where a may be a number, or a symmetric matrix before a vector."""
-    ...
-
-
-@overloads.family
-def div():
-    """a / b."""
-    ...
-
-
-@overloads.family
-def absolute():
-    """|a|."""
-    ...
-
-
-@overloads.family
-def least():
-    """The lesser of a and b; b where one is no number."""
-    ...
-
-
-@overloads.family
-def largest():
-    """The larger of a and b; a where one is no number."""
-    ...
-
-
-@overloads.family
-def ones():
-    """1 in every lane; `like` only says which type. The zero is ones(x) - ones(x): x - x would keep a NaN."""
-    ...
-
-
-@overloads.family
-def positive():
-    """`b` in the lanes where a > 0, `c` in the others (and where a is not a number)."""
-    ...
-
-
-@overloads.family
-def any_positive():
-    """Whether some lane is positive."""
-    ...
-
-
-@overloads.family
-def whole():
-    """The whole number at or below each, as an index; what is no number, or beyond int32, becomes an end of int32."""
-    ...
-
-
-@overloads.family
-def below():
-    """The whole number at or below each."""
-    ...
-
-
-@overloads.family
-def element():
-    """rows[entry, row + offset] of an array without gaps: one address serves all (constant) offsets."""
-    ...
-
-
-@overloads.family
-def entry_of():
-    """`element`; `like` says which type, since the overload whose lanes share a number cannot know it."""
-    ...
-
-
-@overloads.family
-def set_element():
-    """rows[entry, row + offset] = value."""
-    ...
-
-
-@overloads.family
-def gathered():
-    """The row + offset + index of each lane."""
-    ...
-
-
-@overloads.family
-def pieces_of():
-    """How many pieces of a table to read: as many as are asked for.
-
-    Of own rows no more than they hold behind `first` and the `head` rows of the first value, of `each` rows.
-    """
-    ...
-
-
-@overloads.family
-def vec3():
-    """A 3-vector of three lanes."""
-    ...
+add = overloads.family("add", "a + b, lane by lane; of whole numbers, it wraps around.")
+sub = overloads.family("sub", "a - b.")
+neg = overloads.family("neg", "-a.")
+mul = overloads.family("mul", "a b, where a may be a number, or a symmetric matrix before a vector.")
+div = overloads.family("div", "a / b.")
+absolute = overloads.family("absolute", "|a|.")
+least = overloads.family("least", "The lesser of a and b; b where one is no number.")
+largest = overloads.family("largest", "The larger of a and b; a where one is no number.")
+ones = overloads.family(
+    "ones", "1 in every lane; `like` only says which type. The zero is ones(x) - ones(x): x - x would keep a NaN."
+)
+positive = overloads.family(
+    "positive", "`b` in the lanes where a > 0, `c` in the others (and where a is not a number)."
+)
+any_positive = overloads.family("any_positive", "Whether some lane is positive.")
+whole = overloads.family(
+    "whole",
+    "The whole number at or below each, as an index; what is no number, or beyond int32, becomes an end of int32.",
+)
+below = overloads.family("below", "The whole number at or below each.")
+element = overloads.family(
+    "element", "rows[entry, row + offset] of an array without gaps: one address serves all (constant) offsets."
+)
+entry_of = overloads.family(
+    "entry_of", "`element`; `like` says which type, since the overload whose lanes share a number cannot know it."
+)
+set_element = overloads.family("set_element", "rows[entry, row + offset] = value.")
+gathered = overloads.family("gathered", "The row + offset + index of each lane.")
+pieces_of = overloads.family(
+    "pieces_of",
+    "How many pieces of a table, each of `each` rows, to read behind `first` and the `head` rows of the first value: as many "
+    "as are asked for; of own rows no more than they hold.",
+)
+vec3 = overloads.family("vec3", "A 3-vector of three lanes.")
 
 
 @functools.cache
@@ -251,6 +170,19 @@ def _declare_numbers(width, real):
     def below(a: L) -> L: ...
 
 
+@functools.cache
+def _declare_pieces(kind):
+    Rows, OwnRows = wp.array2d(dtype=kind), own_rows(kind)
+
+    @overloads.func
+    def pieces_of(rows: Rows, first: int, count: int, head: int, each: int):
+        return count
+
+    @overloads.func
+    def pieces_of(rows: OwnRows, first: int, count: int, head: int, each: int):
+        return wp.min(count, (rows.last - wp.clamp(first, rows.first, rows.last) + 1 - head) // each)
+
+
 @overloads.for_each_type
 def _declare_rows(width, real):
     L, I = lane(width, real), int_lane(width)  # noqa: E741
@@ -292,19 +224,6 @@ def _declare_rows(width, real):
 
     _declare_pieces(L)
     _declare_pieces(real)
-
-
-@functools.cache
-def _declare_pieces(kind):
-    Rows, OwnRows = wp.array2d(dtype=kind), own_rows(kind)
-
-    @overloads.func
-    def pieces_of(rows: Rows, first: int, count: int, head: int, each: int):
-        return count
-
-    @overloads.func
-    def pieces_of(rows: OwnRows, first: int, count: int, head: int, each: int):
-        return wp.min(count, (rows.last - wp.clamp(first, rows.first, rows.last) + 1 - head) // each)
 
 
 @overloads.for_each_type

@@ -21,92 +21,28 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
     vec3,
 )
 
-
-@overloads.family
-def greatest():
-    """The larger of a and b; b where one is no number."""
-    ...
-
-
-@overloads.family
-def clamp():
-    """a kept between b and c; NaN stays NaN."""
-    ...
-
-
-@overloads.family
-def fused():
-    """a b + c, rounded once (with one lane, where the compiler joins them)."""
-    ...
-
-
-@overloads.family
-def root():
-    """Square root."""
-    ...
-
-
-@overloads.family
-def rounded():
-    """The nearest whole number; of two the even one."""
-    ...
-
-
-@overloads.family
-def exponential():
-    """e^a, to 2 eps; 0 and inf beyond the format's range."""
-    ...
-
-
-@overloads.family
-def sine():
-    """sin a, to 2 eps for |a| <= 1e5 rad."""
-    ...
-
-
-@overloads.family
-def cosine():
-    """cos a, to 2 eps for |a| <= 1e5 rad. With sine of the same a it costs next to nothing."""
-    ...
-
-
-@overloads.family
-def logarithm():
-    """ln a of a normal number a, to 2 eps; not a number where a <= 0."""
-    ...
-
-
-@overloads.family
-def arctangent2():
-    """The angle of the point (b, a), in [-pi, pi], to 2 eps; 0 for the origin. Of (0, b < 0) it is pi."""
-    ...
-
-
-@overloads.family
-def decay():
-    """(1 - e^-a) / a, 1 at a = 0, to 3 eps for every a > -700 (float32: -87)."""
-    ...
-
-
-@overloads.family
-def normals():
-    """Four independent standard normals in each lane, side by side: a function of the arguments alone.
-
-    Philox4x32-10 with counter (member, step, channel, 0) and key (seed0, seed1), then Box & Muller's map.
-    """
-    ...
-
-
-@overloads.family
-def quarter():
-    """Lane k, 0 to 3, of the four lanes side by side in a."""
-    ...
-
-
-@overloads.family
-def normals3():
-    """A 3-vector of the first three of `normals`."""
-    ...
+greatest = overloads.family("greatest", "The larger of a and b; b where one is no number.")
+clamp = overloads.family("clamp", "a kept between b and c; NaN stays NaN.")
+fused = overloads.family("fused", "a b + c, rounded once (with one lane, where the compiler joins them).")
+root = overloads.family("root", "Square root.")
+rounded = overloads.family("rounded", "The nearest whole number; of two the even one.")
+exponential = overloads.family("exponential", "e^a, to 2 eps; 0 and inf beyond the format's range.")
+sine = overloads.family("sine", "sin a, to 2 eps for |a| <= 1e5 rad.")
+cosine = overloads.family(
+    "cosine", "cos a, to 2 eps for |a| <= 1e5 rad. With sine of the same a it costs next to nothing."
+)
+logarithm = overloads.family("logarithm", "ln a of a normal number a, to 2 eps; not a number where a <= 0.")
+arctangent2 = overloads.family(
+    "arctangent2", "The angle of the point (b, a), in [-pi, pi], to 2 eps; 0 for the origin. Of (0, b < 0) it is pi."
+)
+decay = overloads.family("decay", "(1 - e^-a) / a, 1 at a = 0, to 3 eps for every a > -700 (float32: -87).")
+normals = overloads.family(
+    "normals",
+    "Four independent standard normals in each lane, side by side: a function of the arguments alone. Philox4x32-10 "
+    "with counter (member, step, channel, 0) and key (seed0, seed1), then Box & Muller's map.",
+)
+quarter = overloads.family("quarter", "Lane k, 0 to 3, of the four lanes side by side in a.")
+normals3 = overloads.family("normals3", "A 3-vector of the first three of `normals`.")
 
 
 @overloads.for_each_type

@@ -32,21 +32,14 @@ def normals_of(view: Any, key: Any, stream: int, draw: int):
     return normals3(view.b.x, key.member, draw, key.channel + stream, key.seed0, key.seed1)
 
 
-@overloads.family
-def normals_over():
-    """Three standard normals for this step of the run: with a grid, the sum of its draws over the root of their number."""
-    ...
-
-
-@overloads.family
-def wandered():
-    """The vector u after this step of the run: at each draw u <- decay u + spread xi, both over the time of one draw."""
-    ...
-
-
-@overloads.for_each_type
-def _declare(width, real):
-    _declare_keys(width)
+normals_over = overloads.family(
+    "normals_over",
+    "Three standard normals for this step of the run: with a grid, the sum of its draws over the root of their number.",
+)
+wandered = overloads.family(
+    "wandered",
+    "The vector u after this step of the run: at each draw u <- decay u + spread xi, both over the time of one draw.",
+)
 
 
 # The key's type chooses.
@@ -77,3 +70,8 @@ def _declare_keys(width):
         for j in range(key.draws):
             u = decay * u + spread * normals_of(view, key, stream, first + j)
         return u
+
+
+@overloads.for_each_type
+def _declare(width, real):
+    _declare_keys(width)

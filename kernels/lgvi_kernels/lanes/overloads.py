@@ -23,8 +23,13 @@ _lock = threading.RLock()
 _types, _declarers = [], []
 
 
-def family(stub):
-    """A Warp function without overloads, but one that no call with arguments means; a decorator."""
+def family(name, meaning):
+    """A Warp function without overloads, but one that no call with arguments means; meaning: what its overloads do."""
+
+    def stub(): ...
+
+    stub.__name__ = stub.__qualname__ = name
+    stub.__doc__ = meaning
     return wp.func_native(f"// {_DIGEST}")(stub)
 
 

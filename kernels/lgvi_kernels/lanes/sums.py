@@ -63,58 +63,17 @@ def with_turned(
     return x
 
 
-@overloads.family
-def place():
-    """The position that laws see: b, or b + b_low."""
-    ...
-
-
-@overloads.family
-def moved():
-    """b <- b + d."""
-    ...
-
-
-@overloads.family
-def moved_from():
-    """b <- b of `start` + d: two halves of a move are so rounded as one."""
-    ...
-
-
-@overloads.family
-def settled():
-    """b takes the digits of b_low that it can hold."""
-    ...
-
-
-@overloads.family
-def pushed():
-    """p <- p + d."""
-    ...
-
-
-@overloads.family
-def twisted():
-    """pi <- pi + d."""
-    ...
-
-
-@overloads.family
-def turned():
-    """p <- F^T p, pi <- F^T pi, R <- R F."""
-    ...
-
-
-@overloads.family
-def choose():
-    """The state `yes` in the lanes where test > 0, `no` in the others; the alarm is that of `no`."""
-    ...
-
-
-@overloads.family
-def at_rest():
-    """The same vehicles at rest at the origin."""
-    ...
+place = overloads.family("place", "The position that laws see: b, or b + b_low.")
+moved = overloads.family("moved", "b <- b + d.")
+moved_from = overloads.family("moved_from", "b <- b of `start` + d: two halves of a move are so rounded as one.")
+settled = overloads.family("settled", "b takes the digits of b_low that it can hold.")
+pushed = overloads.family("pushed", "p <- p + d.")
+twisted = overloads.family("twisted", "pi <- pi + d.")
+turned = overloads.family("turned", "p <- F^T p, pi <- F^T pi, R <- R F.")
+choose = overloads.family(
+    "choose", "The state `yes` in the lanes where test > 0, `no` in the others; the alarm is that of `no`."
+)
+at_rest = overloads.family("at_rest", "The same vehicles at rest at the origin.")
 
 
 @overloads.for_each_type

@@ -27,11 +27,14 @@ def kernel_hash():
 
 
 def hashes():
-    """Print the hash before and after other lanes are declared, and how many functions `sine` has then."""
+    """Print the hash before and after other lanes are declared, how many functions `sine` has then, and a later one."""
     found = [kernel_hash(), len(sine.user_overloads)]
+    from lgvi_kernels.lanes.noise import wandered
+
+    found.append(len(wandered.user_templates))
     for width in WIDTHS:
         lane(width, wp.float32)
-    print(json.dumps([*found, kernel_hash(), len(sine.user_overloads)]))
+    print(json.dumps([*found, kernel_hash(), len(sine.user_overloads), len(wandered.user_templates)]))
 
 
 def in_a_new_process(kernels):
@@ -48,13 +51,19 @@ def as_it_is():
 
 
 def test_a_type_is_declared_when_it_is_asked_for(as_it_is):
-    _, first, _, then = as_it_is
+    _, first, _, _, then, _ = as_it_is
     assert then - first == len(WIDTHS)
     assert first == 2  # that of the type, and the family's own
 
 
+def test_a_function_that_is_imported_later_knows_the_types(as_it_is):
+    _, _, first, _, _, then = as_it_is
+    assert first == 2  # a key for each step of the run, and one for steps of a grid
+    assert then == 2 * len(WIDTHS)
+
+
 def test_a_hash_does_not_depend_on_other_types(as_it_is):
-    before, _, after, _ = as_it_is
+    before, _, _, after, _, _ = as_it_is
     assert before == after
 
 

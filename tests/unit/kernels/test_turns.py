@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Turns about the axes by shears, of vectors and of sums of two: what the turn's sine and tangent, as rounded, make of them."""
+"""Turns about the axes by shears, of vectors and of sums of two: what a sine and a tangent, as rounded, make of them."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Functions of lanes, declared for a width and a type when a kernel asks for these first.
 
-A run takes one width and one type of twelve, and to declare the functions of one takes Warp as long as it takes to import it.
+A run takes one width and one type of twelve; Warp would need longer to declare the functions of all than to be imported.
 A function is a `family` at first, which other modules import. What `for_each_type` decorates is called with each width and
 type that is asked for, and adds to each family an overload, with `func` or `func_native` in place of those of Warp.
 

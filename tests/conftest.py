@@ -27,13 +27,21 @@ def matches(case, mark):
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
+def pytest_collection_modifyitems(config, items):
     """Mark as slow the cases that `slow_for` names, and all but those that `slow_but` names."""
+    unlike = {}
     for item in items:
         case = item.callspec.id if hasattr(item, "callspec") else ""
         slow_for, slow_but = item.get_closest_marker("slow_for"), item.get_closest_marker("slow_but")
         if (slow_for and matches(case, slow_for)) or (slow_but and not matches(case, slow_but)):
             item.add_marker(pytest.mark.slow)
+        for mark in filter(None, (slow_for, slow_but)):
+            left = unlike.setdefault((item.nodeid.partition("[")[0], mark.name), set(mark.args))
+            left -= {pattern for pattern in left if fnmatch.fnmatchcase(case, pattern)}
+    wrong = [f"{test}: {name} names no case by {sorted(left)}" for (test, name), left in unlike.items() if left]
+    # A case that is asked for by its name comes alone.
+    if wrong and not any("[" in argument for argument in config.args):
+        raise pytest.UsageError(*wrong)
 
 
 def pytest_collection_finish():

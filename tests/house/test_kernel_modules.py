@@ -9,16 +9,18 @@ import pytest
 from lgvi_kernels import law
 from lgvi_kernels.maps.bounded import ROLES
 from lgvi_kernels.maps.in_turn import ROLES as ROLES_OF_PARTS
+from lgvi_warp.common.status import Status
 
 KERNELS = Path(__file__).parents[2] / "kernels" / "lgvi_kernels"
 OPERATORS = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "div", ast.USub: "neg"}
+WARP = ("wp.", "overloads.")
 FORMULAS = sorted({*KERNELS.rglob("*.py")} - {KERNELS / "lanes" / "arithmetic.py"})
 
 
 def device_functions(tree):
     """Functions that Warp compiles."""
     for node in ast.walk(tree):
-        if isinstance(node, ast.FunctionDef) and any("wp." in ast.unparse(d) for d in node.decorator_list):
+        if isinstance(node, ast.FunctionDef) and any(ast.unparse(d).startswith(WARP) for d in node.decorator_list):
             yield node
 
 
@@ -54,3 +56,14 @@ def whole_numbers(node):
         any(isinstance(sub, ast.Constant) and isinstance(sub.value, int) for sub in ast.walk(node))
         or text[1:].replace(".", "").isdigit()
     )
+
+
+def test_statuses_have_the_numbers_that_the_host_reads():
+    numbers = [
+        (path.name, node.targets[0].id, node.value.value)
+        for path in KERNELS.rglob("*.py")
+        for node in ast.parse(path.read_text()).body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) in Status.__members__
+    ]
+    assert {name for _, name, _ in numbers} >= {"STEP_TOO_LARGE", "NOT_CONVERGED", "NON_FINITE", "BACKWARD_DRAG"}
+    assert [(name, number) for _, name, number in numbers] == [(name, Status[name].value) for _, name, _ in numbers]

@@ -30,6 +30,10 @@ IMPLIED = {
     "restoring": Case((lw.Restoring(),), (Restoring(moment=VEHICLE.buoyancy * np.array(VEHICLE.center_of_buoyancy)),)),
 }
 ALONE = IMPLIED | {name: case for name, case in CASES.items() if len(case.terms) == 1}
+(LAGGING,), (LAGGING_TWIN,), _ = CASES["thrusters"]
+ALONE["prompt thrusters"] = Case(
+    (replace(LAGGING, time_constant=0.0),), (type(LAGGING_TWIN)(**vars(LAGGING_TWIN) | {"time_constant": np.zeros(3)}),)
+)
 
 
 def bench_of(term, folder, aligned=False):

@@ -16,9 +16,9 @@ from lgvi_warp.reference.submaps import Body, look, start, water
 from lgvi_warp.reference.terms.current import Current
 from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.weight import Weight
-from tests.laws.case import Case
+from tests.laws.case import Case, case, matrix
 from tests.laws.cases import CASES, together
-from tests.support.tools import difference, from_state, last, one, slope
+from tests.support.tools import TURN, difference, from_state, last, one, slope
 
 GRAVITY = 9.8
 VEHICLE = lw.Vehicle(
@@ -32,25 +32,30 @@ STATE = {"b": (0.4, -0.3, 8.0), "R": lw.notation.matrix_from_rotation_vector(np.
          "nu": (1.2, 0.3, -0.2), "Om": (0.3, -0.4, 0.5)}  # fmt: skip
 
 
-def scene_of(case):
+# Masses and moments of inertia about axes of their own, which are not those of drag.
+BENT = replace(
+    VEHICLE, inertia=TURN @ np.diag((1.5, 4.0, 4.5)) @ TURN.T, added_mass=TURN.T @ np.diag((5.0, 22.0, 25.0)) @ TURN
+)
+
+
+def scene_of(case, vehicle=VEHICLE):
     """The vehicle with the terms of a case."""
-    return lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), terms=list(case.terms))
+    return lw.Scene(vehicle, lw.Environment(gravity=GRAVITY), terms=list(case.terms))
 
 
-def body_of(case):
+def body_of(case, v=VEHICLE):
     """The same for the twin."""
-    v = VEHICLE
     laws = (Weight(net=v.mass * GRAVITY - v.buoyancy), Restoring(moment=v.buoyancy * v.center_of_buoyancy), *case.laws)
     excess = v.buoyancy / GRAVITY - v.mass
     lever = v.buoyancy / GRAVITY * v.center_of_buoyancy
     return Body(v.mass_matrix, v.inertia, laws, excess, lever, v.mass)
 
 
-def both(case, method, h, steps, dtype="float64", **named):
+def both(case, method, h, steps, dtype="float64", vehicle=VEHICLE, state=STATE):
     """The state after so many steps by the kernel and by the twin."""
-    result = lw.solve(one(scene_of(case), **STATE), method, h=h, t1=steps * h, dtype=dtype, **named)
-    body = body_of(case)
-    b, R, nu, Om = (np.array(value) for value in STATE.values())
+    result = lw.solve(one(scene_of(case, vehicle), **state), method, h=h, t1=steps * h, dtype=dtype)
+    body = body_of(case, vehicle)
+    b, R, nu, Om = (np.array(value) for value in state.values())
     x = start(body, b, R, np.zeros(3), np.zeros(3))
     nu = nu - R.T @ water(look(x, body, h), body).velocity
     x = start(body, b, R, body.M @ nu, body.J @ Om)
@@ -80,6 +85,13 @@ def test_a_hundred_steps(name):
     # 100 steps of round-off 1e-15 and little growth.
     kernel, twin = both(CASES[name], "psi_s", 0.02, 100)
     assert difference(kernel, twin) < 2e-12
+
+
+def test_drag_along_axes_that_are_not_principal():
+    # Strong in yaw and sway: each axis changes the velocities along all others.
+    strong = case(lw.Drag, linear=(8.0, 60.0, 5.0, 0.7, 0.4, 9.0), quadratic=(10.0, 30.0, 90.0, 1.0, 6.0, 3.0))
+    kernel, twin = both(strong, "psi_s", 0.05, 10, vehicle=BENT)
+    assert difference(kernel, twin) < 2e-13
 
 
 def scaled(term, by):
@@ -131,6 +143,20 @@ def test_the_papers_forces(name, method):
     # Phi* is iterated to 1e-14 of the momenta; a contraction by 1/10 or better leaves about 1e-15 of that, each step.
     kernel, twin = both(FORCED_CASES[name], method, 0.01, 5)
     assert difference(kernel, twin) < 2e-13
+
+
+def test_forces_that_turn_the_momenta():
+    # From -3/4 to 1/4 of the impulse of a step: in both halves the impulse is more than the momenta that are left.
+    force, h = np.array((1000.0, -300.0, 200.0)), 0.01
+    calm = {
+        "drag_matrix": {"linear": 0.01 * matrix(1), "quadratic": 0.01 * matrix(2)},
+        "current_profile": {"velocities": ((-1e-3, 2e-3, -1e-3), (1e-3, -2e-3, 1e-3))},
+        "wrench_schedule": {"force": (tuple(force),) * 4, "torque": ((0.02, -0.02, 0.01),) * 4},
+    }
+    terms = tuple(replace(term, **calm.get(term.type, {})) for term in FORCED_CASES["several"].terms)
+    velocity = -0.75 * h * np.linalg.solve(VEHICLE.mass_matrix, force)
+    fleet = one(scene_of(Case(terms, ())), **STATE | {"nu": velocity, "Om": (0.003, -0.004, 0.005)})
+    assert lw.solve(fleet, "psi", h=h, t1=h).status.counts() == {"ok": 1}
 
 
 # Numbers for which nothing of "all together" jumps: schedules that stay, noise too small to be seen.

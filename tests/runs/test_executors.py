@@ -35,6 +35,8 @@ FIELDS = ("position", "attitude", "velocity", "angular_velocity")
 # Long enough that a worker can be killed before the end: 16 blocks of 256 members.
 LONG = {"method": "psi_s", "h": 0.01, "t1": 60.0, "save": lw.SaveAt(every=1.0)}
 MANY = 4096
+# Of a scheduler's own pages: where tests run side by side, its usual port is taken.
+ANY_PORT = {"dashboard_address": "127.0.0.1:0"}
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +61,7 @@ def client():
 
     with (
         LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None, memory_limit=None,
-                     silence_logs=logging.CRITICAL) as cluster,
+                     scheduler_kwargs=ANY_PORT, silence_logs=logging.CRITICAL) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):  # fmt: skip
         yield client
@@ -192,7 +194,9 @@ def test_threads_of_one_dask_worker_share_it(memory):
     from lgvi_warp.engine.executors import dask
 
     with (
-        LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster,
+        LocalCluster(
+            n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None, scheduler_kwargs=ANY_PORT
+        ) as cluster,
         Client(cluster, set_as_default=False) as client,
     ):
         assert same(lw.solve(fleet(), **SETTINGS, executor=dask.Dask(client)), memory)

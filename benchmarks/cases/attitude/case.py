@@ -7,6 +7,7 @@ Also the drift from orthogonality after all steps, neither renormalised.
 import numpy as np
 import warp as wp
 
+from lgvi_kernels.lanes import native
 from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
     add,
     cross,
@@ -15,7 +16,6 @@ from lgvi_kernels.lanes.arithmetic import (  # noqa: F401
     lane,
     lane3,
     mul,
-    native_code,
     neg,
     ones,
     sub,
@@ -31,7 +31,7 @@ WIDTH, REAL = 8, wp.float64
 Lane, Lane3, Rotation = lane(WIDTH, REAL), lane3(WIDTH, REAL), rotation_struct(WIDTH, REAL)
 
 
-@wp.func_native(native_code(WIDTH, REAL, "A", "__builtin_elementwise_sqrt(A)"))
+@wp.func_native(native.code(WIDTH, REAL, "A", "__builtin_elementwise_sqrt(A)"))
 def root(a: Lane) -> Lane: ...
 
 

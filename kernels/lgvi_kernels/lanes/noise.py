@@ -10,7 +10,8 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import WIDTHS, add, div, int_lane, mul, ones  # noqa: F401
+from lgvi_kernels.lanes import overloads
+from lgvi_kernels.lanes.arithmetic import add, div, int_lane, mul, ones  # noqa: F401
 from lgvi_kernels.lanes.functions import normals3, root
 from lgvi_kernels.lanes.state import struct
 
@@ -31,17 +32,27 @@ def normals_of(view: Any, key: Any, stream: int, draw: int):
     return normals3(view.b.x, key.member, draw, key.channel + stream, key.seed0, key.seed1)
 
 
-# Definitions of one name at module level become overloads: the key's type chooses.
-for _width in WIDTHS:
-    _StepKey, _GridKey = noise_key(_width), noise_key(_width, True)
+normals_over = overloads.family(
+    "normals_over",
+    "Three standard normals for this step of the run: with a grid, the sum of its draws over the root of their number.",
+)
+wandered = overloads.family(
+    "wandered",
+    "The vector u after this step of the run: at each draw u <- decay u + spread xi, both over the time of one draw.",
+)
 
-    @wp.func
-    def normals_over(view: Any, key: _StepKey, stream: int):
-        """Three standard normals for this step of the run: with a grid, the sum of its draws over the root of their number."""
+
+# The key's type chooses.
+@functools.cache
+def _declare_keys(width):
+    StepKey, GridKey = noise_key(width), noise_key(width, True)
+
+    @overloads.func
+    def normals_over(view: Any, key: StepKey, stream: int):
         return normals_of(view, key, stream, view.step)
 
-    @wp.func
-    def normals_over(view: Any, key: _GridKey, stream: int):
+    @overloads.func
+    def normals_over(view: Any, key: GridKey, stream: int):
         first = view.step * key.draws
         total = normals_of(view, key, stream, first)
         for j in range(1, key.draws):
@@ -49,14 +60,18 @@ for _width in WIDTHS:
         unity = ones(view.b.x)
         return (unity / root(view.h.dtype(key.draws) * unity)) * total
 
-    @wp.func
-    def wandered(view: Any, key: _StepKey, stream: int, u: Any, decay: Any, spread: Any):
-        """The vector u after this step of the run: at each draw u <- decay u + spread xi, both over the time of one draw."""
+    @overloads.func
+    def wandered(view: Any, key: StepKey, stream: int, u: Any, decay: Any, spread: Any):
         return decay * u + spread * normals_of(view, key, stream, view.step)
 
-    @wp.func
-    def wandered(view: Any, key: _GridKey, stream: int, u: Any, decay: Any, spread: Any):
+    @overloads.func
+    def wandered(view: Any, key: GridKey, stream: int, u: Any, decay: Any, spread: Any):
         first = view.step * key.draws
         for j in range(key.draws):
             u = decay * u + spread * normals_of(view, key, stream, first + j)
         return u
+
+
+@overloads.for_each_type
+def _declare(width, real):
+    _declare_keys(width)

@@ -9,17 +9,7 @@ import functools
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import lane, lane3, own_rows, symmetric3
-
-
-@functools.cache
-def struct(name, **fields):
-    """A Warp struct from names and types: for structs whose fields depend on what a scene has.
-
-    The same names and types give the same struct, so that a law defined anew (a notebook's cell run twice) fits the kernel
-    that Warp keeps for its source.
-    """
-    return wp.struct(type(name, (), {"__annotations__": fields, "__module__": __name__}))
+from lgvi_kernels.lanes.arithmetic import lane, lane3, own_rows, struct, symmetric3
 
 
 @functools.cache

@@ -13,7 +13,8 @@ from typing import Any
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import REALS, WIDTHS, add, lane, lane3, mul, ones, positive, sub, vec3  # noqa: F401
+from lgvi_kernels.lanes import overloads
+from lgvi_kernels.lanes.arithmetic import add, lane, lane3, mul, ones, positive, sub, vec3  # noqa: F401
 from lgvi_kernels.lanes.packet import choose_vectors, vectors_at_rest
 from lgvi_kernels.lanes.rotations import transpose_apply
 from lgvi_kernels.lanes.state import state_struct
@@ -62,99 +63,108 @@ def with_turned(
     return x
 
 
-for _width in WIDTHS:
-    for _real in REALS:
-        _State, _L, _L3 = state_struct(_width, _real), lane(_width, _real), lane3(_width, _real)
+place = overloads.family("place", "The position that laws see: b, or b + b_low.")
+moved = overloads.family("moved", "b <- b + d.")
+moved_from = overloads.family("moved_from", "b <- b of `start` + d: two halves of a move are so rounded as one.")
+settled = overloads.family("settled", "b takes the digits of b_low that it can hold.")
+pushed = overloads.family("pushed", "p <- p + d.")
+twisted = overloads.family("twisted", "pi <- pi + d.")
+turned = overloads.family("turned", "p <- F^T p, pi <- F^T pi, R <- R F.")
+choose = overloads.family(
+    "choose", "The state `yes` in the lanes where test > 0, `no` in the others; the alarm is that of `no`."
+)
+at_rest = overloads.family("at_rest", "The same vehicles at rest at the origin.")
 
-        @wp.func
-        def place(x: _State):
-            """The position that laws see: b, or b + b_low."""
-            return x.b
 
-        @wp.func
-        def moved(x: _State, d: _L3):
-            """b <- b + d."""
-            x.b = x.b + d
-            return x
+@overloads.for_each_type
+def _declare_plain(width, real):
+    State, L, L3 = state_struct(width, real), lane(width, real), lane3(width, real)
 
-        @wp.func
-        def moved_from(x: _State, start: _State, d: _L3):
-            """b <- b of `start` + d: two halves of a move are so rounded as one."""
-            x.b = start.b + d
-            return x
+    @overloads.func
+    def place(x: State):
+        return x.b
 
-        @wp.func
-        def pushed(x: _State, d: _L3):
-            """p <- p + d."""
-            x.p = x.p + d
-            return x
+    @overloads.func
+    def moved(x: State, d: L3):
+        x.b = x.b + d
+        return x
 
-        @wp.func
-        def twisted(x: _State, d: _L3):
-            """pi <- pi + d."""
-            x.pi = x.pi + d
-            return x
+    @overloads.func
+    def moved_from(x: State, start: State, d: L3):
+        x.b = start.b + d
+        return x
 
-        @wp.func
-        def turned(x: _State, F: Any):
-            """p <- F^T p, pi <- F^T pi, R <- R F."""
-            x.p = transpose_apply(F, x.p)
-            x.pi = transpose_apply(F, x.pi)
-            x.R0 = transpose_apply(F, x.R0)
-            x.R1 = transpose_apply(F, x.R1)
-            x.R2 = transpose_apply(F, x.R2)
-            return x
+    @overloads.func
+    def pushed(x: State, d: L3):
+        x.p = x.p + d
+        return x
 
-        @wp.func
-        def choose(test: _L, yes: _State, no: _State):
-            """The state `yes` in the lanes where test > 0, `no` in the others; the alarm is that of `no`."""
-            return choose_vectors(test, yes, no)
+    @overloads.func
+    def twisted(x: State, d: L3):
+        x.pi = x.pi + d
+        return x
 
-        @wp.func
-        def at_rest(x: _State):
-            """The same vehicles at rest at the origin."""
-            return vectors_at_rest(x)
+    @overloads.func
+    def turned(x: State, F: Any):
+        x.p = transpose_apply(F, x.p)
+        x.pi = transpose_apply(F, x.pi)
+        x.R0 = transpose_apply(F, x.R0)
+        x.R1 = transpose_apply(F, x.R1)
+        x.R2 = transpose_apply(F, x.R2)
+        return x
 
-    _State, _L, _L3 = state_struct(_width, wp.float32, True), lane(_width, wp.float32), lane3(_width, wp.float32)
+    @overloads.func
+    def choose(test: L, yes: State, no: State):
+        return choose_vectors(test, yes, no)
 
-    @wp.func
-    def place(x: _State):
+    @overloads.func
+    def at_rest(x: State):
+        return vectors_at_rest(x)
+
+
+@overloads.for_each_type
+def _declare_compensated(width, real):
+    if real != wp.float32:
+        return
+    State, L, L3 = state_struct(width, real, True), lane(width, real), lane3(width, real)
+
+    @overloads.func
+    def place(x: State):
         return x.b + x.b_low
 
-    @wp.func
-    def moved(x: _State, d: _L3):
+    @overloads.func
+    def moved(x: State, d: L3):
         x.b_low = x.b_low + d
         return x
 
-    @wp.func
-    def moved_from(x: _State, start: _State, d: _L3):
+    @overloads.func
+    def moved_from(x: State, start: State, d: L3):
         x.b_low = start.b_low + d
         return x
 
-    @wp.func
-    def settled(x: _State):
-        """b takes the digits of b_low that it can hold."""
+    @overloads.func
+    def settled(x: State):
         b = x.b + x.b_low
         x.b_low = x.b_low - (b - x.b)
         x.b = b
         return x
 
-    @wp.func
-    def pushed(x: _State, d: _L3):
+    @overloads.func
+    def pushed(x: State, d: L3):
         p, low = carried(x.p, x.p_low, d)
         x.p = p
         x.p_low = low
         return x
 
-    @wp.func
-    def twisted(x: _State, d: _L3):
+    @overloads.func
+    def twisted(x: State, d: L3):
         pi, low = carried(x.pi, x.pi_low, d)
         x.pi = pi
         x.pi_low = low
         return x
 
-    @wp.func
-    def turned(x: _State, F: Any):
+    @overloads.func
+    def turned(x: State, F: Any):
         p, p_low = carried_turn(x.p, x.p_low, F)
         pi, pi_low = carried_turn(x.pi, x.pi_low, F)
         R0, R0_low = carried_turn(x.R0, x.R0_low, F)
@@ -162,8 +172,8 @@ for _width in WIDTHS:
         R2, R2_low = carried_turn(x.R2, x.R2_low, F)
         return with_turned(x, p, p_low, pi, pi_low, R0, R0_low, R1, R1_low, R2, R2_low)
 
-    @wp.func
-    def choose(test: _L, yes: _State, no: _State):
+    @overloads.func
+    def choose(test: L, yes: State, no: State):
         no = choose_vectors(test, yes, no)
         no.R0_low = positive(test, yes.R0_low, no.R0_low)
         no.R1_low = positive(test, yes.R1_low, no.R1_low)
@@ -173,8 +183,8 @@ for _width in WIDTHS:
         no.pi_low = positive(test, yes.pi_low, no.pi_low)
         return no
 
-    @wp.func
-    def at_rest(x: _State):
+    @overloads.func
+    def at_rest(x: State):
         x = vectors_at_rest(x)
         zero = x.b
         x.R0_low = zero

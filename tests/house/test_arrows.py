@@ -69,19 +69,16 @@ def test_the_reader_finds_both_packages():
     assert all(part(package) for package in ("lgvi_warp.reference", "lgvi_warp.views", "lgvi_kernels.laws"))
 
 
-@pytest.mark.parametrize(
-    ("source", "expected"),
-    [
-        ("import rerun as rr", [("rerun", "top")]),
-        ("def f():\n    import rerun", [("rerun", "lazy")]),
-        ("class A:\n    import rerun", [("rerun", "top")]),
-        ("try:\n    from rerun import Mesh3D\nexcept ImportError:\n    pass", [("rerun.Mesh3D", "top")]),
-        ("if TYPE_CHECKING:\n    import rerun\nelse:\n    import xarray", [("rerun", "typing"), ("xarray", "top")]),
-        ("from lgvi_warp import views", [("lgvi_warp.views", "top")]),
-        ("from . import plots", [("lgvi_warp.views.plots", "top")]),
-        ("from ..results.result import Result", [("lgvi_warp.results.result.Result", "top")]),
-    ],
-)
+@pytest.mark.parametrize(("source", "expected"), [
+    ("import rerun as rr", [("rerun", "top")]),
+    ("def f():\n    import rerun", [("rerun", "lazy")]),
+    ("class A:\n    import rerun", [("rerun", "top")]),
+    ("try:\n    from rerun import Mesh3D\nexcept ImportError:\n    pass", [("rerun.Mesh3D", "top")]),
+    ("if TYPE_CHECKING:\n    import rerun\nelse:\n    import xarray", [("rerun", "typing"), ("xarray", "top")]),
+    ("from lgvi_warp import views", [("lgvi_warp.views", "top")]),
+    ("from . import plots", [("lgvi_warp.views.plots", "top")]),
+    ("from ..results.result import Result", [("lgvi_warp.results.result.Result", "top")]),
+])  # fmt: skip
 def test_the_reader_sees_an_import(source, expected):
     assert imports(ast.parse(source), "lgvi_warp.views") == expected
 

@@ -182,19 +182,16 @@ def strips(velocity, hull, count=20001):
     return total
 
 
-@pytest.mark.parametrize(
-    ("velocity", "bound"),
-    [
-        # The force per length is a polynomial of degree 3 where the flow keeps its direction: exact; its moment, of degree
-        # 4, is not, unless the flow is the same everywhere.
-        ((1.0, 0.0, 1.0, 0.3, 0.5, 0.0), 1e-3),
-        ((1.0, 0.7, -0.2, 0.3, 0.0, 0.0), 1e-11),
-        ((0.0, 0.3, 1.0, 0.0, 0.5, -0.4), 2e-3),
-        # The flow turns round within the hull.
-        ((0.0, 0.0, 0.1, 0.0, 1.0, 0.0), 1e-2),
-        ((0.0, 0.2, 0.1, 0.0, 1.0, 0.7), 1e-2),
-    ],
-)
+@pytest.mark.parametrize(("velocity", "bound"), [
+    # The force per length is a polynomial of degree 3 where the flow keeps its direction: exact; its moment, of degree
+    # 4, is not, unless the flow is the same everywhere.
+    ((1.0, 0.0, 1.0, 0.3, 0.5, 0.0), 1e-3),
+    ((1.0, 0.7, -0.2, 0.3, 0.0, 0.0), 1e-11),
+    ((0.0, 0.3, 1.0, 0.0, 0.5, -0.4), 2e-3),
+    # The flow turns round within the hull.
+    ((0.0, 0.0, 0.1, 0.0, 1.0, 0.0), 1e-2),
+    ((0.0, 0.2, 0.1, 0.0, 1.0, 0.7), 1e-2),
+])  # fmt: skip
 def test_two_points_a_segment_are_enough(velocity, bound):
     hull, velocity = arrays(HULL), np.array(velocity)
     law = CrossFlow(**hull, density=DENSITY)
@@ -316,15 +313,12 @@ def test_what_is_refused(kind, numbers, message):
     assert any(message in fault for fault in caught.value.faults), caught.value.faults
 
 
-@pytest.mark.parametrize(
-    ("term", "name", "values"),
-    [
-        (terms.Fins(**WING, drag=0.1), "fins.normal", [[[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]]]),
-        (terms.Fins(**WING, drag=0.1), "fins.chord", [[[1.0, 0.0, 0.0]], [[0.0, 0.0, 0.0]]]),
-        (terms.ControlFins(**WING, drag=0.1), "control_fins.rate_limit", [[1e6], [0.5]]),
-        (terms.CrossFlow(**HULL), "cross_flow.stations", [HULL["stations"], [0.0] * 5]),
-    ],
-)
+@pytest.mark.parametrize(("term", "name", "values"), [
+    (terms.Fins(**WING, drag=0.1), "fins.normal", [[[0.0, 0.0, 1.0]], [[1.0, 0.0, 0.0]]]),
+    (terms.Fins(**WING, drag=0.1), "fins.chord", [[[1.0, 0.0, 0.0]], [[0.0, 0.0, 0.0]]]),
+    (terms.ControlFins(**WING, drag=0.1), "control_fins.rate_limit", [[1e6], [0.5]]),
+    (terms.CrossFlow(**HULL), "cross_flow.stations", [HULL["stations"], [0.0] * 5]),
+])  # fmt: skip
 def test_members_that_are_refused(term, name, values):
     state = [np.broadcast_to(value, (2, *np.shape(value))) for value in STATE.values()]
     with pytest.raises(lw.SceneError, match=f"{name} of member 1"):

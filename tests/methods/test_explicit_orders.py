@@ -173,17 +173,14 @@ def test_steps_are_not_chosen_where_noise_is_drawn_once_a_step():
         lw.solve(one(test_terms.scene_of(CASES["wrench noise"]), **test_terms.STATE), method, h=0.02, t1=0.1)
 
 
-@pytest.mark.parametrize(
-    ("named", "text"),
-    [
-        ({"name": "kl8(rk8)"}, "not symmetric"),
-        ({"name": "rk6"}, "rk"),
-        ({"name": "rk4", "rtol": 1e-8, "atol": 1e-8}, "estimates no error; use rk5 or rk8"),
-        ({"name": "psi_s", "rtol": 1e-8, "atol": 1e-8}, "estimates no error"),
-        ({"name": "rk8", "rtol": 1e-8}, "is given alone"),
-        ({"name": "rk8", "rtol": -1.0, "atol": 1e-8}, "is not between 0 and 1"),
-    ],
-)
+@pytest.mark.parametrize(("named", "text"), [
+    ({"name": "kl8(rk8)"}, "not symmetric"),
+    ({"name": "rk6"}, "rk"),
+    ({"name": "rk4", "rtol": 1e-8, "atol": 1e-8}, "estimates no error; use rk5 or rk8"),
+    ({"name": "psi_s", "rtol": 1e-8, "atol": 1e-8}, "estimates no error"),
+    ({"name": "rk8", "rtol": 1e-8}, "is given alone"),
+    ({"name": "rk8", "rtol": -1.0, "atol": 1e-8}, "is not between 0 and 1"),
+])  # fmt: skip
 def test_methods_are_refused(named, text):
     with pytest.raises(lw.SceneError, match=text):
         lw.Method(**named)

@@ -227,13 +227,10 @@ def test_rk4_diverges_there(falling):
 # What it refuses -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"name": "su4(rkw3)"}, "not symmetric"),
-        ({"name": METHOD, "rtol": 1e-6, "atol": 1e-6}, "estimates no error; use rk5 or rk8"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "words"), [
+    ({"name": "su4(rkw3)"}, "not symmetric"),
+    ({"name": METHOD, "rtol": 1e-6, "atol": 1e-6}, "estimates no error; use rk5 or rk8"),
+])  # fmt: skip
 def test_methods_that_do_not_exist(arguments, words):
     with pytest.raises(SceneError, match=words):
         lw.Method(**arguments)

@@ -222,14 +222,11 @@ def test_clamp_and_greatest(width, name):
     assert np.isnan(evaluate(width, name, [np.nan], [-1.0], [1.0])["clamp"]).all()
 
 
-@pytest.mark.parametrize(
-    ("name", "widths"),
-    [
-        ("float64", (1, 8)),
-        ("float32", (1, 16)),
-        *(pytest.param(name, WIDTHS, marks=pytest.mark.slow) for name in FORMATS),
-    ],
-)
+@pytest.mark.parametrize(("name", "widths"), [
+    ("float64", (1, 8)),
+    ("float32", (1, 16)),
+    *(pytest.param(name, WIDTHS, marks=pytest.mark.slow) for name in FORMATS),
+])  # fmt: skip
 def test_every_width_gives_the_same_bits(name, widths):
     x = np.concatenate([np.random.default_rng(3).uniform(0.01, 80.0, 4096), [0.0, np.inf, np.nan]])
     first, *others = (evaluate(width, name, x, 1.0, 2.0) for width in widths)

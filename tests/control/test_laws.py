@@ -57,14 +57,8 @@ def scene(tmp_path_factory):
         file, **{f"{kind}_{i}": a for i, layer in enumerate(LAYERS) for kind, a in zip(("weights", "biases"), layer)}
     )
     inputs = [
-        "depth_error",
-        "position_error[1]",
-        "heading_error",
-        "velocity",
-        "attitude_error",
-        "down[0]",
-        "speed_error",
-    ]
+        "depth_error", "position_error[1]", "heading_error", "velocity", "attitude_error", "down[0]", "speed_error",
+    ]  # fmt: skip
     three = dict(
         lambda_=(0.3, 0.4, 0.5), boundary=(0.1, 0.2, 0.3), lambda_r=(0.5, 0.6, 0.7), boundary_r=(0.1, 0.2, 0.3)
     )

@@ -77,13 +77,9 @@ def ensemble(group):
     terms = [lw.Drag(linear=(1.0,) * 6, quadratic=(1.0,) * 6)] if group.dragged else []
     scene = lw.Scene(lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0)), lw.Environment(gravity=9.8), terms=terms)
     parameters = {
-        "vehicle.mass": mass,
-        "vehicle.added_mass": M - mass[:, None],
-        "vehicle.inertia": array(cases, "J"),
-        "vehicle.buoyancy": buoyancy,
-        "vehicle.center_of_buoyancy": arm,
-        "environment.gravity": g,
-    }
+        "vehicle.mass": mass, "vehicle.added_mass": M - mass[:, None], "vehicle.inertia": array(cases, "J"),
+        "vehicle.buoyancy": buoyancy, "vehicle.center_of_buoyancy": arm, "environment.gravity": g,
+    }  # fmt: skip
     if group.dragged:
         parameters |= {f"drag.{name}": array(cases, name) for name in ("linear", "quadratic")}
     return lw.Ensemble.from_states(scene, *states(cases), parameters)

@@ -10,21 +10,9 @@ from tests.house.graph import arrows_up, circle, closure, imports, modules
 
 # What pyproject.toml declares, by import name; the optional ones take long to import, or may be absent.
 OPTIONAL = {
-    "SALib",
-    "matplotlib",
-    "rerun",
-    "rerun_cli",
-    "xarray",
-    "zarr",
-    "google_crc32c",
-    "distributed",
-    "netCDF4",
-    "pyarrow",
-    "gymnasium",
-    "tqdm",
-    "control",
-    "tomlkit",
-}
+    "SALib", "matplotlib", "rerun", "rerun_cli", "xarray", "zarr", "google_crc32c", "distributed", "netCDF4", "pyarrow",
+    "gymnasium", "tqdm", "control", "tomlkit",
+}  # fmt: skip
 DEPENDENCIES = {"numpy", "scipy", "warp"} | OPTIONAL
 
 
@@ -102,19 +90,11 @@ def test_the_product_imports_what_it_declares():
 
 def test_only_these_files_of_the_engine_know_the_kernels():
     those = {
-        "lgvi_warp.engine.kernel",
-        "lgvi_warp.engine.kernel_spec",
-        "lgvi_warp.engine.launches",
-        "lgvi_warp.engine.packing",
-        "lgvi_warp.engine.plan",
-        "lgvi_warp.engine.plan_checks",
-        "lgvi_warp.engine.sample_layout",
-        "lgvi_warp.engine.packets",
-        "lgvi_warp.engine.peak",
-        "lgvi_warp.checks.bench",
-        "lgvi_warp.checks.check",
-        "lgvi_warp.checks.part_bench",
-    }
+        "lgvi_warp.engine.kernel", "lgvi_warp.engine.kernel_spec", "lgvi_warp.engine.launches",
+        "lgvi_warp.engine.packing", "lgvi_warp.engine.plan", "lgvi_warp.engine.plan_checks",
+        "lgvi_warp.engine.sample_layout", "lgvi_warp.engine.packets", "lgvi_warp.engine.peak", "lgvi_warp.checks.bench",
+        "lgvi_warp.checks.check", "lgvi_warp.checks.part_bench",
+    }  # fmt: skip
     assert importers("lgvi_kernels") == those
 
 

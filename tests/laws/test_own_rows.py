@@ -85,12 +85,9 @@ class Reading(lw.Term):
 
 
 NUMBERS = dict(
-    values=lw.number(("k",), "1"),
-    row=lw.number((), "1"),
-    count=lw.number((), "1"),
-    place=lw.number((), "1"),
+    values=lw.number(("k",), "1"), row=lw.number((), "1"), count=lw.number((), "1"), place=lw.number((), "1"),
     spread=lw.number((), "1"),
-)
+)  # fmt: skip
 WILD = dict(values=np.linspace(-1.0, 1.0, 11), row=0, count=1, place=0, spread=0.0)
 
 

@@ -5,20 +5,18 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.methods.method import PROGRAMS, Method
-from lgvi_warp.reference import advance, explicit
 from lgvi_warp.reference.control.depth_pid import DepthPID
 from lgvi_warp.reference.control.heading_pid import HeadingPID
-from lgvi_warp.reference.control.loop import Fault, Loop, closed_loop
+from lgvi_warp.reference.control.loop import Fault, Loop
 from lgvi_warp.reference.control.matrix import AllocationMatrix
 from lgvi_warp.reference.control.set_point import SetPoint
-from lgvi_warp.reference.submaps import Body, start
 from lgvi_warp.reference.terms.drag import Drag
 from lgvi_warp.reference.terms.driven import ControlWrench
-from lgvi_warp.reference.terms.restoring import Restoring
-from lgvi_warp.reference.terms.weight import Weight
+from lgvi_warp.reference.terms.wrench import Wrench
+from tests.support.loops import torpedo, twin_body, twin_run
 
-GRAVITY, MASS, BUOYANCY, CENTER = 9.8, 20.0, 20.0 * 9.8, (0.01, 0.005, -0.02)
+GRAVITY = 9.8
+VEHICLE = torpedo(20.0 * GRAVITY, (0.01, 0.005, -0.02))
 LINEAR, QUADRATIC = (3.0, 4.0, 5.0, 0.3, 0.4, 0.5), (10.0, 30.0, 40.0, 1.0, 2.0, 3.0)
 WANTED = dict(depth=6.0, heading=2.5)
 HEADING = dict(kp=12.0, ki=0.5, kd=25.0, integral_limit=0.8)
@@ -40,46 +38,24 @@ def scene(lag, delay=0.0, faults=(), **more):
         allocation=[lw.AllocationMatrix(to="control_wrench", matrix=MATRIX)],
         faults=faults,
     )
-    vehicle = lw.Vehicle(
-        MASS, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=BUOYANCY, center_of_buoyancy=CENTER
-    )
     terms = [lw.Drag(linear=LINEAR, quadratic=QUADRATIC), lw.ControlWrench(limit=LIMIT, time_constant=lag),
              lw.Wrench(force=(15.0, 0.0, 0.0))]  # fmt: skip
-    return lw.Scene(vehicle, lw.Environment(gravity=GRAVITY), terms, lw.Start(**STATE), controller, **more)
+    return lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), terms, lw.Start(**STATE), controller, **more)
 
 
 def twin(method, lag, steps, delay=0, faults=()):
     """Positions (steps + 1, 3) and attitudes of the twin's loop."""
-    from lgvi_warp.reference.terms.wrench import Wrench
-
-    vehicle = lw.Vehicle(
-        MASS, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=BUOYANCY, center_of_buoyancy=CENTER
-    )
     actuator = ControlWrench(limit=np.array(LIMIT), time_constant=np.array(lag))
     laws = (
-        Weight(net=MASS * GRAVITY - BUOYANCY),
-        Restoring(moment=BUOYANCY * np.array(CENTER)),
         Drag(linear=np.array(LINEAR), quadratic=np.array(QUADRATIC)),
         actuator,
         Wrench(force=np.array((15.0, 0.0, 0.0)), torque=np.zeros(3)),
     )
-    body = Body(vehicle.mass_matrix, vehicle.inertia, laws)
-    parts = [
-        SetPoint(**WANTED),
-        DepthPID(**DEPTH),
-        HeadingPID(**HEADING),
-        AllocationMatrix(to="control_wrench", matrix=MATRIX),
-    ]
+    allocation = AllocationMatrix(to="control_wrench", matrix=MATRIX)
+    parts = [SetPoint(**WANTED), DepthPID(**DEPTH), HeadingPID(**HEADING), allocation]
     loop = Loop(parts, {"control_wrench": actuator}, EVERY, delay, faults)
-    b, nu, Om = (np.array(STATE[key]) for key in ("position", "velocity", "angular_velocity"))
-    loop.begin()
-    x = start(body, b, np.eye(3), body.M @ nu, body.J @ Om)
-    if method in PROGRAMS:
-        step = lambda x, body, h: advance.step(x, body, PROGRAMS[method], h)  # noqa: E731
-    else:
-        step = explicit.stepper(Method(method).tableau)
-    states = closed_loop(x, body, loop, step, H, steps)
-    return np.array([s.b for s in states]), np.array([s.R for s in states])
+    state = dict(b=STATE["position"], nu=STATE["velocity"], Om=STATE["angular_velocity"])
+    return twin_run(twin_body(VEHICLE, GRAVITY, laws), loop, method, H, steps, **state)
 
 
 @pytest.mark.slow_but("rk4-0.3-3")

@@ -74,12 +74,12 @@ def body_of(scene):
     return Body(v.mass_matrix, v.inertia, terms)
 
 
-def one(scene, b=(0.0, 0.0, 0.0), R=None, nu=(0.0, 0.0, 0.0), Om=(0.0, 0.0, 0.0)):
-    """An ensemble of one member, or of as many as the arrays hold."""
+def one(scene, b=(0.0, 0.0, 0.0), R=None, nu=(0.0, 0.0, 0.0), Om=(0.0, 0.0, 0.0), parameters=None):
+    """An ensemble of one member, or of as many as the arrays, and those of varied parameters, hold."""
     R = np.eye(3) if R is None else R
     states = [np.reshape(np.asarray(x, dtype=float), (-1, *shape)) for x, shape in zip((b, R, nu, Om), SHAPES)]
-    n = max(len(x) for x in states)
-    return lw.Ensemble.from_states(scene, *(np.broadcast_to(x, (n, *x.shape[1:])) for x in states))
+    n = max(len(x) for x in (*states, *(parameters or {}).values()))
+    return lw.Ensemble.from_states(scene, *(np.broadcast_to(x, (n, *x.shape[1:])) for x in states), parameters)
 
 
 SHAPES = ((3,), (3, 3), (3,), (3,))

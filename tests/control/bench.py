@@ -26,16 +26,7 @@ def scene(sensors, faults=(), period=0.1, **law):
 
 
 def measured(ensemble, truth, h=0.02, dtype="float64", width=4):
-    """What members measure at each look.
-
-    Args:
-        ensemble: the members.
-        truth: (looks, members or 1, FIELDS), motions at the looks.
-        h, dtype, width: step [s]; precision; lanes of a packet.
-
-    Returns:
-        (looks, members, FIELDS).
-    """
+    """What members measure at each look, (looks, members, FIELDS), of motions truth (looks, members or 1, FIELDS)."""
     controller = ensemble.scene.controller
     plan = make_plan(ensemble, "psi_s", h, 1.0, dtype=dtype, width=width)
     n, looks = ensemble.members, len(truth)

@@ -82,12 +82,9 @@ def test_axes_do_not_matter():
     # The same vehicle in turned body axes: the kernel works in its principal axes, and packed() must turn the nose.
     v = own_law.vehicle
     turned = lw.Vehicle(
-        v.mass,
-        inertia=TURN.T @ v.inertia @ TURN,
-        added_mass=TURN.T @ v.added_mass @ TURN,
-        buoyancy=v.buoyancy,
+        v.mass, inertia=TURN.T @ v.inertia @ TURN, added_mass=TURN.T @ v.added_mass @ TURN, buoyancy=v.buoyancy,
         center_of_buoyancy=v.center_of_buoyancy @ TURN,
-    )
+    )  # fmt: skip
     laws = [own_law.Dock(**DOCK), own_law.Mud(**MUD, center=(0.3, 0.0, -0.1))]
     other = [own_law.Dock(**DOCK | {"nose": DOCK["nose"] @ TURN}), own_law.Mud(**MUD, center=(0.3, 0.0, -0.1) @ TURN)]
     start = {"b": START["b"], "R": TURN, "nu": START["nu"] @ TURN, "Om": START["Om"] @ TURN}

@@ -58,12 +58,9 @@ def free_scene(M=(1.0, 2.0, 3.0), J=(1.0, 2.0, 2.5)):
     """A scene with forces far below round-off: the body moves freely, by the same kernel as that of `scene_of`."""
     heavy = vehicle(M, J)
     free = lw.Vehicle(
-        heavy.mass,
-        inertia=J,
-        added_mass=heavy.added_mass,
-        buoyancy=3e-30 * heavy.mass,
+        heavy.mass, inertia=J, added_mass=heavy.added_mass, buoyancy=3e-30 * heavy.mass,
         center_of_buoyancy=(0.0, 0.0, -1e-3),
-    )
+    )  # fmt: skip
     return lw.Scene(free, lw.Environment(gravity=1e-30))
 
 

@@ -15,6 +15,7 @@ from lgvi_kernels.lanes.arithmetic import add, cross, div, dot, lane, mul, ones,
 from lgvi_kernels.lanes.state import struct
 from lgvi_kernels.lanes.view import remember, remembered, to_body
 from lgvi_kernels.laws import restoring, tether
+from lgvi_warp.physics import terms
 from tests.laws.cases import CASES
 
 BUILT_IN = [(f"{name} {i}", term) for name, case in CASES.items() for i, term in enumerate(case.terms)]
@@ -27,11 +28,23 @@ def names_of_failed(report):
     return [one.name for one in report.checks if not one.ok]
 
 
-@pytest.mark.parametrize("term", [term for _, term in BUILT_IN], ids=[name for name, _ in BUILT_IN])
+EACH = pytest.mark.parametrize("term", [term for _, term in BUILT_IN], ids=[name for name, _ in BUILT_IN])
+
+
+@EACH
 def test_a_built_in_law_is_right(term):
     report = lw.check_law(term)
     assert report.ok, str(report)
     assert len(report.checks) >= 4
+
+
+@EACH
+def test_a_scene_file_holds_it(term):
+    (again,) = terms.from_list([term.to_dict()])
+    assert type(again) is type(term)
+    assert again.to_dict() == term.to_dict()
+    for key, value in term.parameters().items():
+        np.testing.assert_array_equal(getattr(again, key), value, err_msg=key)
 
 
 @pytest.mark.parametrize("term", [lw.Weight(), lw.Restoring(), lw.Surface(), lw.StopTime(at=3.0)], ids=lambda t: t.type)

@@ -16,7 +16,7 @@ from lgvi_warp.reference.terms.cross_flow import CrossFlow
 from lgvi_warp.reference.terms.fins import Fins
 from lgvi_warp.runs.settle import make_plan
 from tests.laws.cases_lift import CASES, DENSITY, FINS, HULL, LIFT, arrays
-from tests.laws.test_parity import STATE, VEHICLE, both
+from tests.laws.test_parity import STATE, VEHICLE
 from tests.support.tools import difference, last, one, random_states, slope
 
 WING = dict(position=[[0.0, 0.0, 0.0]], chord=[[1.0, 0.0, 0.0]], normal=[[0.0, 0.0, -1.0]], area=0.01, lift_slope=3.0)
@@ -193,15 +193,7 @@ def test_two_points_a_segment_are_enough(velocity, bound):
         assert error[2] < 1e-11
 
 
-# All of them ---------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", CASES)
-def test_float32(name):
-    # 100 steps of round-off 6e-8 and growth by a few.
-    kernel, twin = both(CASES[name], "psi_s", 0.02, 100, dtype="float32")
-    assert difference(kernel, twin) < 1e-4
+# Members that differ --------------------------------------------------------------------------------------------------
 
 
 MEMBERS = {
@@ -237,15 +229,6 @@ def test_members_that_differ(key, varied):
         here = scene(dataclasses.replace(term, **own), vehicle=dataclasses.replace(VEHICLE, inertia=inertia[i]))
         alone = lw.solve(one(here, **STATE), "psi_s", h=0.01, t1=0.2)
         assert difference(last(result, i), last(alone)) < 1e-14
-
-
-@pytest.mark.parametrize("name", CASES)
-def test_a_term_can_be_written_and_read(name):
-    term = CASES[name].terms[0]
-    (again,) = terms.from_list([term.to_dict()])
-    assert type(again) is type(term)
-    for key, value in term.parameters().items():
-        np.testing.assert_array_equal(getattr(again, key), value, err_msg=key)
 
 
 def test_the_remus_lift_is_prestero_s():

@@ -10,7 +10,6 @@ from lgvi_warp.reference import random
 from lgvi_warp.reference.terms import View
 from lgvi_warp.reference.terms.current_harmonics import CurrentHarmonics
 from lgvi_warp.reference.terms.waves import Waves
-from tests.laws.cases import CASES
 from tests.laws.cases_water import HARMONICS, STRATIFICATION, WAVES, WRENCH_NOISE, arrays
 from tests.support.tools import GRAVITY, TURN, one, random_states, slope, vehicle
 
@@ -282,13 +281,6 @@ def test_noise_does_not_see_the_kernels_axes():
     np.testing.assert_allclose(result.velocity[-1], term.force * xi[0] @ np.linalg.inv(M), rtol=0.0, atol=2e-3)
 
 
-@pytest.mark.parametrize("method", ["psi", "psi_1", "tj4(psi_s)"])
-@pytest.mark.parametrize("name", NOISES)
-def test_methods_that_cannot_draw_noise_say_so(name, method):
-    with pytest.raises(lw.SceneError, match=r"noise more than once|undoes one of h"):
-        lw.solve(ensemble(NOISES[name], members=1), method, h=0.1, t1=0.1)
-
-
 # Stratification -----------------------------------------------------------------------------------------------------
 
 
@@ -316,19 +308,6 @@ def test_energy_in_stratified_water():
         energy = lw.solve(fleet, "psi_s", h=h, t1=4.0, save=lw.SaveAt(every=0.2)).energy
         changes.append(np.abs(energy - energy[0]).max())
     assert slope(np.array([0.02, 0.01, 0.005]), changes) == pytest.approx(2.0, abs=0.1)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("term", ["waves", "current harmonics", "stratification"])
-def test_order(term):
-    # The scheme is of order 2 where time and place enter: against itself with a small step.
-    case = CASES[term]
-    fleet = one(lw.Scene(vehicle(net=0.5, moment=(0.2, 0.1, 0.4)), lw.Environment(GRAVITY), terms=list(case.terms)),
-                (0.4, -0.3, 8.0), TURN, (0.5, 0.2, -0.1), (0.3, -0.4, 0.5))  # fmt: skip
-    steps = np.array([0.04, 0.02, 0.01])
-    truth = lw.solve(fleet, "psi_s", h=0.0005, t1=2.0).position[-1]
-    errors = [np.abs(lw.solve(fleet, "psi_s", h=h, t1=2.0).position[-1] - truth).max() for h in steps]
-    assert slope(steps, errors) == pytest.approx(2.0, abs=0.1)
 
 
 # What is refused ----------------------------------------------------------------------------------------------------
@@ -368,12 +347,3 @@ def test_members_with_unphysical_periods_are_counted():
     fleet = {"waves.periods": np.array([[5.0, 4.0, 3.0], [5.0, -4.0, 3.0]])}
     with pytest.raises(lw.SceneError, match=r"waves.periods of member 1 .*is unphysical \(1 of 2 members\)"):
         lw.Ensemble.from_states(scene(terms.Waves(**WAVES)), *random_states(1, 2), parameters=fleet)
-
-
-@pytest.mark.parametrize(
-    "name", ["current harmonics", "waves", "Gauss-Markov current", "wrench noise", "stratification"]
-)
-def test_a_scene_file_holds_it(name):
-    (term,) = CASES[name].terms
-    (again,) = terms.from_list([term.to_dict()])
-    assert again.to_dict() == term.to_dict()

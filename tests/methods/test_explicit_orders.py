@@ -159,33 +159,6 @@ def test_water_is_taken_at_the_users_origin():
     assert difference(last(lw.solve(one(scene, **start), "psi", h=0.001, t1=1.0)), truth) < 1e-5
 
 
-@pytest.mark.parametrize("method", ["rk4", "rkmk4", "rkw3"])
-def test_laws_that_do_not_fit_are_refused(method):
-    with pytest.raises(
-        lw.SceneError, match=r"gauss_markov_current, a term that remembers what is not known.*use psi_s"
-    ):
-        lw.solve(one(test_terms.scene_of(CASES["Gauss-Markov current"]), **test_terms.STATE), method, h=0.02, t1=0.1)
-
-
-def test_steps_are_not_chosen_where_noise_is_drawn_once_a_step():
-    method = lw.Method("rk5", rtol=1e-6, atol=1e-6)
-    with pytest.raises(lw.SceneError, match=r"cannot choose its steps where noise is drawn.*leave out rtol and atol"):
-        lw.solve(one(test_terms.scene_of(CASES["wrench noise"]), **test_terms.STATE), method, h=0.02, t1=0.1)
-
-
-@pytest.mark.parametrize(("named", "text"), [
-    ({"name": "kl8(rk8)"}, "not symmetric"),
-    ({"name": "rk6"}, "rk"),
-    ({"name": "rk4", "rtol": 1e-8, "atol": 1e-8}, "estimates no error; use rk5 or rk8"),
-    ({"name": "psi_s", "rtol": 1e-8, "atol": 1e-8}, "estimates no error"),
-    ({"name": "rk8", "rtol": 1e-8}, "is given alone"),
-    ({"name": "rk8", "rtol": -1.0, "atol": 1e-8}, "is not between 0 and 1"),
-])  # fmt: skip
-def test_methods_are_refused(named, text):
-    with pytest.raises(lw.SceneError, match=text):
-        lw.Method(**named)
-
-
 def test_momentum_without_forces():
     free, method = free_scene((25.0, 42.0, 45.0), (1.5, 4.0, 4.5)), lw.Method("rk8", rtol=1e-9, atol=1e-9)
     end = lw.solve(one(free, **test_terms.STATE), method, h=0.02, t1=2.0)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.common.errors import SceneError
 from lgvi_warp.engine.survey import frame_of
 from lgvi_warp.methods.tableaux import DOP853, RK4, RKW3
 from lgvi_warp.reference import explicit, linearly_implicit
@@ -222,24 +221,6 @@ def test_quadratic_drag_where_rk4_diverges(falling):
 def test_rk4_diverges_there(falling):
     with np.errstate(all="ignore"):
         assert not np.abs(falling(0.0, QUADRATIC, 0.2, 20, "rk4", 2.0)).max() < 1e3
-
-
-# What it refuses -----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(("arguments", "words"), [
-    ({"name": "su4(rkw3)"}, "not symmetric"),
-    ({"name": METHOD, "rtol": 1e-6, "atol": 1e-6}, "estimates no error; use rk5 or rk8"),
-])  # fmt: skip
-def test_methods_that_do_not_exist(arguments, words):
-    with pytest.raises(SceneError, match=words):
-        lw.Method(**arguments)
-
-
-def test_compensated_sums_are_refused():
-    fleet = lw.Ensemble.from_scene(test_parity.scene_of(CASES["drag"]))
-    with pytest.raises(SceneError, match="which rkw3 is not"):
-        make_plan(fleet, METHOD, h=0.1, t1=1.0, dtype="float32_compensated")
 
 
 def test_studies_try_it_where_something_is_damped():

@@ -50,30 +50,17 @@ WEAK = dict(channel=0, time=1.1, gain=0.5, offset=0.0)
 
 # A rudder and stern planes that stall, then two thrusters that help where these are at their limits.
 FINS = dict(
-    position=((-0.6, 0.0, 0.0), (-0.6, 0.0, 0.0)),
-    chord=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-    normal=((0.0, 1.0, 0.0), (0.0, 0.0, -1.0)),
-    area=(0.013, 0.013),
-    lift_slope=(1.4, 1.6),
-    drag=(0.01, 0.01),
-    drag_normal=(0.5, 0.5),
-    limit=(0.35, 0.3),
-    rate_limit=(1.0, 1e6),
-    time_constant=(0.1, 0.2),
-    lift_angles=(0.0, 0.25, 0.4, 1.6),
-    lift_coefficients=(0.0, 0.25, 0.2, 0.0),
-)
+    position=((-0.6, 0.0, 0.0), (-0.6, 0.0, 0.0)), chord=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+    normal=((0.0, 1.0, 0.0), (0.0, 0.0, -1.0)), area=(0.013, 0.013), lift_slope=(1.4, 1.6), drag=(0.01, 0.01),
+    drag_normal=(0.5, 0.5), limit=(0.35, 0.3), rate_limit=(1.0, 1e6), time_constant=(0.1, 0.2),
+    lift_angles=(0.0, 0.25, 0.4, 1.6), lift_coefficients=(0.0, 0.25, 0.2, 0.0),
+)  # fmt: skip
 PAIR = dict(
-    position=((-0.5, 0.3, 0.0), (-0.5, -0.3, 0.0)),
-    direction=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-    dead_band=(0.0, 0.02),
-    limit=(1.0, 1.0),
-    rate_limit=(4.0, 5.0),
-    time_constant=(0.0, 0.1),
-    table_commands=(-1.0, -0.5, -0.1, 0.1, 0.4, 1.0),
+    position=((-0.5, 0.3, 0.0), (-0.5, -0.3, 0.0)), direction=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)), dead_band=(0.0, 0.02),
+    limit=(1.0, 1.0), rate_limit=(4.0, 5.0), time_constant=(0.0, 0.1), table_commands=(-1.0, -0.5, -0.1, 0.1, 0.4, 1.0),
     table_thrusts=((-9.0, -8.0), (-2.0, -3.0), (0.0, 0.0), (0.0, 0.0), (5.0, 3.0), (20.0, 12.0)),
     advance_loss=(2.0, 1.0),
-)
+)  # fmt: skip
 
 
 def arrays(numbers):

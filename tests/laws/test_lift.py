@@ -47,9 +47,6 @@ UNFELT = (
 )
 
 
-# Fins ----------------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("angle", "incidence"), [(0.0, 1e-3), (1e-3, 0.0), (2e-3, -1e-3)])
 def test_a_small_angle_is_a_thin_wing(angle, incidence):
     # Lift rho/2 A V^2 slope (deflection + incidence) along the normal, here up: to 2/3 angle^2 = 1e-6, and the step's
@@ -134,9 +131,6 @@ def test_without_a_rate_limit_nothing_is_kept():
     assert terms.ControlFins(**WING, drag=0.0, rate_limit=2.0).memory
 
 
-# Cross-flow ----------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 def test_a_cylinder_falls_at_its_terminal_speed():
     # sqrt(2 W / (rho Cd D L)); kick and drag in turn settle a little off it, of order 2 in the step.
@@ -193,9 +187,6 @@ def test_two_points_a_segment_are_enough(velocity, bound):
         assert error[2] < 1e-11
 
 
-# Members that differ --------------------------------------------------------------------------------------------------
-
-
 MEMBERS = {
     "fins": (terms.Fins(**FINS), {"area": 0.01, "drag": 0.1, "chord": 0.1, "position": 0.1}),
     "control_fins": (terms.ControlFins(**FINS, command=[0.1, -0.2, 0.3]), {"command": 0.05, "limit": 0.1}),
@@ -239,8 +230,6 @@ def test_the_remus_lift_is_prestero_s():
         assert -lift.matrix[i, j] == printed
     assert np.count_nonzero(lift.matrix) == 4
 
-
-# What is refused -----------------------------------------------------------------------------------------------------
 
 FIN = WING | {"drag": 0.1}
 UNSORTED = {"times": [0.0, 0.0], "command_schedule": [[0.1], [0.2]]}

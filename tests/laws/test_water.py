@@ -46,9 +46,6 @@ def flow_at(twin, b, t):
     return twin.flow(View(np.eye(3), np.asarray(b), np.zeros(3), np.zeros(3), t))
 
 
-# A current of harmonics ---------------------------------------------------------------------------------------------
-
-
 def test_a_vehicle_at_rest_in_accelerating_water_stays_with_it():
     # The push (rho V + A) a moves (m + A), and rho V = m: nothing is left of it but round-off, whatever M is.
     twin, h, steps = CurrentHarmonics(**arrays(HARMONICS)), 0.05, 200
@@ -72,9 +69,6 @@ def test_a_heavy_vehicle_is_pushed_by_accelerating_water():
     result = lw.solve(one(lw.Scene(heavy, lw.Environment(GRAVITY), terms=[term])), "psi_s", h=0.01, t1=4.5)
     # The force of each step's middle: an error of (omega h)^2 / 24.
     assert result.velocity[-1, 0, 0] == pytest.approx(-0.4 * 3.0 / 4.0, rel=1e-5)
-
-
-# Waves --------------------------------------------------------------------------------------------------------------
 
 
 def test_waves_are_a_potential_flow():
@@ -148,8 +142,6 @@ def test_frequency_of_encounter(course_deg):
     assert np.hypot(*fit[1:]) == pytest.approx(size, rel=1e-3)
     assert np.abs(swing - columns @ fit).max() < 1e-3 * size
 
-
-# A current that wanders ---------------------------------------------------------------------------------------------
 
 WANDER = dict(standard_deviation=(0.3, 0.2, 0.0), time_constant=2.0)
 
@@ -240,9 +232,6 @@ def test_two_terms_of_a_type_draw_their_own_numbers():
     assert np.abs(variance - 2.0).max() < ERRORS * 2.0 * np.sqrt(2.0 / MEMBERS)
 
 
-# Noise of force and torque ------------------------------------------------------------------------------------------
-
-
 # A full inertia makes the kernel turn the axes: noise must not see it.
 FULL = TURN @ np.diag([1.0, 2.0, 3.0]) @ TURN.T
 
@@ -281,9 +270,6 @@ def test_noise_does_not_see_the_kernels_axes():
     np.testing.assert_allclose(result.velocity[-1], term.force * xi[0] @ np.linalg.inv(M), rtol=0.0, atol=2e-3)
 
 
-# Stratification -----------------------------------------------------------------------------------------------------
-
-
 def test_oscillation_in_stratified_water():
     # Upright, the centre of buoyancy is at d0 + A cos(omega t), omega^2 = B gradient / M33.
     term, M33 = terms.Stratification(**STRATIFICATION), 3.0
@@ -309,8 +295,6 @@ def test_energy_in_stratified_water():
         changes.append(np.abs(energy - energy[0]).max())
     assert slope(np.array([0.02, 0.01, 0.005]), changes) == pytest.approx(2.0, abs=0.1)
 
-
-# What is refused ----------------------------------------------------------------------------------------------------
 
 BAD = {
     "current_harmonics.periods = .*-7.0.*is not positive; give numbers above 0": (

@@ -37,9 +37,6 @@ from lgvi_warp.reference.rotation import cross
 from lgvi_warp.reference.terms import Law
 from tests.support.tools import TURN, difference, slope
 
-EXPLICIT = ("x6", "x8", "x10")
-IMPLICIT = ("psi_w", "psi_1_w")
-
 
 def free(b, R):
     return np.zeros(3), np.zeros(3)

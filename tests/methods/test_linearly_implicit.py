@@ -37,9 +37,6 @@ def amplification(z, w):
     return 1.0 + z * (stages[..., 0] @ b)
 
 
-# Coefficients --------------------------------------------------------------------------------------------------------
-
-
 def test_order_3_whatever_the_matrix():
     # Conditions of W-methods, Hairer & Wanner II, IV.7: those of the explicit method, and zero for each tree with an edge g.
     a, g, b = matrices()
@@ -61,8 +58,6 @@ def test_stability():
         assert np.abs(amplification(rates, ratio * rates)).max() < 1.0
         assert np.abs(amplification(rates, rates / ratio)).max() < 1.0
 
-
-# The twin ------------------------------------------------------------------------------------------------------------
 
 SPEEDS = np.array([1.0, 0.6, 0.5, 0.8, 0.9, 0.7])
 LIGHT = Drag(linear=0.1 * SPEEDS, quadratic=np.zeros(6))
@@ -99,9 +94,6 @@ def test_without_damping_it_is_the_classical_method():
     assert make_plan(fleet, METHOD, h=0.1, t1=1.0).spec == make_plan(fleet, "rk4", h=0.1, t1=1.0).spec
 
 
-# The kernel ----------------------------------------------------------------------------------------------------------
-
-
 def both(scene, body, at, h, steps, **named):
     """The state after so many steps by the kernel and by the twin."""
     fleet = one(scene, **at)
@@ -136,8 +128,6 @@ def test_kernel_with_laws(names, dtype, bound):
     assert difference(*both(scene, body, test_parity.STATE, 0.02, 25, dtype=dtype)) < bound
 
 
-# Steady motion -------------------------------------------------------------------------------------------------------
-
 RUDDER = test_remus_100.RUDDERS[0]
 
 
@@ -165,9 +155,6 @@ def test_a_turn_with_roll_is_a_fixed_point():
     _, turned, nu, Om = last(result)
     assert np.abs(np.concatenate([nu, Om]) - velocity).max() < 1e-10
     assert np.abs(turned[2] - R[2]).max() < 1e-10
-
-
-# Strong damping ------------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")

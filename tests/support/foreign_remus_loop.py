@@ -41,29 +41,14 @@ from tests.support import foreign_remus as remus
 
 # Numbers of the law, in the order of its struct; they are those of the NumPy loop.
 NUMBERS = {
-    **{f"linear{i}": remus.LINEAR[i] for i in range(6)},
-    "fading": remus.FADING,
-    "pressure": 0.5 * remus.DENSITY * remus.AREA,
-    "drag": remus.DRAG,
-    "slope": remus.SLOPE,
-    "induced": remus.INDUCED,
-    "cross": remus.CROSS,
-    "half": -remus.STRIPS[0],
-    "strip": remus.STRIPS[1] - remus.STRIPS[0],
-    "added_ahead": remus.ADDED[0, 0],
-    "added_across": remus.ADDED[1, 1],
-    "rudder": remus.RUDDER,
-    "planes": remus.PLANES,
-    "place": remus.FIN_PLACE,
-    "limit": remus.FIN_LIMIT,
-    "fin_rate": 1.0 / remus.FIN_LAG,
-    "thrust": remus.THRUST,
-    "thrust_loss": remus.THRUST_LOSS,
-    "torque": remus.TORQUE,
-    "torque_loss": remus.TORQUE_LOSS,
-    "revolutions": remus.REVOLUTIONS,
-    "revolutions_rate": 1.0 / remus.PROPELLER_LAG,
-}
+    **{f"linear{i}": remus.LINEAR[i] for i in range(6)}, "fading": remus.FADING,
+    "pressure": 0.5 * remus.DENSITY * remus.AREA, "drag": remus.DRAG, "slope": remus.SLOPE, "induced": remus.INDUCED,
+    "cross": remus.CROSS, "half": -remus.STRIPS[0], "strip": remus.STRIPS[1] - remus.STRIPS[0],
+    "added_ahead": remus.ADDED[0, 0], "added_across": remus.ADDED[1, 1], "rudder": remus.RUDDER, "planes": remus.PLANES,
+    "place": remus.FIN_PLACE, "limit": remus.FIN_LIMIT, "fin_rate": 1.0 / remus.FIN_LAG, "thrust": remus.THRUST,
+    "thrust_loss": remus.THRUST_LOSS, "torque": remus.TORQUE, "torque_loss": remus.TORQUE_LOSS,
+    "revolutions": remus.REVOLUTIONS, "revolutions_rate": 1.0 / remus.PROPELLER_LAG,
+}  # fmt: skip
 STRIPS = len(remus.STRIPS)
 
 

@@ -94,6 +94,7 @@ def test_parts_of_controllers_fit_a_vehicle(page, tmp_path, monkeypatch):
         scene = lw.Scene.from_dict({"vehicle": {"name": "bluerov2_heavy"}, "controller": controller})
         for section, tables in parts.items():
             assert [part.type for part in getattr(scene.controller, section)] == [table["type"] for table in tables]
+        assert lw.Scene.from_dict(scene.to_dict()).to_dict() == scene.to_dict()
 
 
 @pytest.mark.slow

@@ -15,11 +15,23 @@ from lgvi_warp.reference.terms.drag import Drag
 from lgvi_warp.reference.terms.driven import DrivenThrusters
 from lgvi_warp.reference.terms.driven_fins import DrivenFins
 from lgvi_warp.reference.terms.wrench import Wrench
-from tests.control.test_loop import DEPTH, GRAVITY, HEADING, LINEAR, QUADRATIC, STATE, VEHICLE, WANTED
+from tests.control.test_loop import (
+    DEPTH,
+    EVERY,
+    GRAVITY,
+    HEADING,
+    LINEAR,
+    QUADRATIC,
+    STATE,
+    VEHICLE,
+    WANTED,
+    H,
+    controller,
+)
 from tests.support.loops import twin_body, twin_run
 from tests.support.tools import one
 
-H, EVERY, SPEED, DENSITY = 0.02, 5, 1.5, 1025.0
+SPEED, DENSITY = 1.5, 1025.0
 AHEAD = (15.0, 0.0, 0.0)
 # The laws ask for M and N.
 ASKED = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 1.0])[:, None]
@@ -154,16 +166,9 @@ def twin(name, method, i, steps):
 def solved(name, method, h, steps, every):
     """The result of members that differ in a gain and in the time of the fault that the loop knows."""
     _, terms, allocation, faults = SCENES[name]
-    controller = lw.Controller(
-        period=EVERY * H,
-        guidance=[lw.SetPoint(**WANTED)],
-        laws=[lw.DepthPID(**DEPTH), lw.HeadingPID(**HEADING)],
-        allocation=allocation,
-        faults=faults,
-    )
     water = lw.Environment(gravity=GRAVITY, water_density=DENSITY)
     terms = [lw.Drag(linear=LINEAR, quadratic=QUADRATIC), *terms, lw.Wrench(force=AHEAD)]
-    scene = lw.Scene(VEHICLE, water, terms, lw.Start(**STATE), controller)
+    scene = lw.Scene(VEHICLE, water, terms, lw.Start(**STATE), controller(allocation, faults))
     varied = {"heading_pid.kp": STIFF} | ({"dead.time": LOST} if faults else {})
     fleet = one(scene, STATE["position"], None, STATE["velocity"], STATE["angular_velocity"], varied)
     result = lw.solve(fleet, method, h=h, t1=steps * h, save=lw.SaveAt(every=every * h))

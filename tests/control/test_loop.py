@@ -28,19 +28,18 @@ STATE = {"position": (0.4, -0.3, 3.0), "velocity": (1.2, 0.3, -0.2), "angular_ve
 H, EVERY = 0.02, 5
 
 
+def controller(allocation, faults, **more):
+    """Depth and heading loops."""
+    laws, guidance = [lw.DepthPID(**DEPTH), lw.HeadingPID(**HEADING)], [lw.SetPoint(**WANTED)]
+    return lw.Controller(period=EVERY * H, guidance=guidance, laws=laws, allocation=allocation, faults=faults, **more)
+
+
 def scene(lag, delay=0.0, faults=(), **more):
-    """A torpedo-like body with depth and heading loops and an ideal actuator."""
-    controller = lw.Controller(
-        period=EVERY * H,
-        delay=delay,
-        guidance=[lw.SetPoint(**WANTED)],
-        laws=[lw.DepthPID(**DEPTH), lw.HeadingPID(**HEADING)],
-        allocation=[lw.AllocationMatrix(to="control_wrench", matrix=MATRIX)],
-        faults=faults,
-    )
+    """A torpedo-like body with these loops and an ideal actuator."""
+    loops = controller([lw.AllocationMatrix(to="control_wrench", matrix=MATRIX)], faults, delay=delay)
     terms = [lw.Drag(linear=LINEAR, quadratic=QUADRATIC), lw.ControlWrench(limit=LIMIT, time_constant=lag),
              lw.Wrench(force=(15.0, 0.0, 0.0))]  # fmt: skip
-    return lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), terms, lw.Start(**STATE), controller, **more)
+    return lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), terms, lw.Start(**STATE), loops, **more)
 
 
 def twin(method, lag, steps, delay=0, faults=()):

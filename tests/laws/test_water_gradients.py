@@ -210,14 +210,8 @@ def left_over(dv, dOm):
     """(6,) What Hamel's equations leave: dP/dt - dL/db, and dK/dt + Om x K less the derivative by turns."""
 
     def momenta(s):
-        path = (
-            POSE["b"] + s * TWIST["v"],
-            POSE["R"] @ turn(s * TWIST["Om"]),
-            TWIST["v"] + s * dv,
-            TWIST["Om"] + s * dOm,
-            s,
-        )
-        return np.concatenate(slopes(*path)[2:])
+        place = POSE["b"] + s * TWIST["v"], POSE["R"] @ turn(s * TWIST["Om"])
+        return np.concatenate(slopes(*place, TWIST["v"] + s * dv, TWIST["Om"] + s * dOm, s)[2:])
 
     # The derivative along the way to the fourth power of 1e-3.
     d = 1e-3

@@ -14,12 +14,9 @@ from tests.support.tools import difference, expected, free_scene, last, one, slo
 
 # Steps with errors above round-off and small enough for the leading term.
 STEPS = {
-    "rk4": (0.05, 0.025, 0.0125),
-    "rk5": (0.1, 0.05, 0.025),
-    "rk8": (0.2, 0.125, 0.1, 0.0625),
-    "cg3": (0.02, 0.01, 0.005),
-    "rkmk4": (0.05, 0.025, 0.0125),
-}
+    "rk4": (0.05, 0.025, 0.0125), "rk5": (0.1, 0.05, 0.025), "rk8": (0.2, 0.125, 0.1, 0.0625),
+    "cg3": (0.02, 0.01, 0.005), "rkmk4": (0.05, 0.025, 0.0125),
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")

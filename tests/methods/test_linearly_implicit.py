@@ -157,34 +157,25 @@ def test_a_turn_with_roll_is_a_fixed_point():
     assert np.abs(turned[2] - R[2]).max() < 1e-10
 
 
-@pytest.fixture(scope="module")
-def falling():
+def falling(linear, quadratic, h, steps, method=METHOD, speed=0.0):
     """Velocity of a heavy body that falls with linear or quadratic drag, at each step."""
-
-    def run(linear, quadratic, h, steps, method=METHOD, speed=0.0):
-        drag = {"type": "drag_matrix", "linear": linear * np.eye(6), "quadratic": quadratic * np.eye(6)}
-        scene = lw.Scene(
-            lw.Vehicle(20.0, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=150.0),
-            lw.Environment(gravity=9.8),
-            [drag],
-        )
-        fleet = one(scene, nu=(0.0, 0.0, speed))
-        return lw.solve(fleet, method, h=h, t1=steps * h, save=lw.SaveAt(every=h)).velocity[:, 0]
-
-    return run
+    drag = {"type": "drag_matrix", "linear": linear * np.eye(6), "quadratic": quadratic * np.eye(6)}
+    body = lw.Vehicle(20.0, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=150.0)
+    fleet = one(lw.Scene(body, lw.Environment(gravity=9.8), [drag]), nu=(0.0, 0.0, speed))
+    return lw.solve(fleet, method, h=h, t1=steps * h, save=lw.SaveAt(every=h)).velocity[:, 0]
 
 
 NET = 20.0 * 9.8 - 150.0
 
 
-def test_terminal_fall(falling):
+def test_terminal_fall():
     # v' = (net - q v^2) / 45 kg: rate 2 q v / 45 = 6.4 1/s, so nothing is left of the start after 30 s.
     end = falling(0.0, 450.0, 0.2, 150)[-1]
     assert end[2] == pytest.approx(np.sqrt(NET / 450.0), rel=1e-13)
 
 
 @pytest.mark.parametrize("number", [1e2, 1e4, 1e6])
-def test_linear_drag_of_any_strength(falling, number):
+def test_linear_drag_of_any_strength(number):
     # h rate = `number`: the first step leaves R(z) of the start, which falls as 12 / |z| with the true matrix.
     h, mass = 0.1, 45.0
     linear = number * mass / h
@@ -197,7 +188,7 @@ def test_linear_drag_of_any_strength(falling, number):
 QUADRATIC = 20.0 * 45.0 / (0.2 * 2.0)
 
 
-def test_quadratic_drag_where_rk4_diverges(falling):
+def test_quadratic_drag_where_rk4_diverges():
     h, speed = 0.2, 2.0
     v = falling(0.0, QUADRATIC, h, 60, speed=speed)[:, 2]
     assert np.abs(v).max() == speed
@@ -205,7 +196,7 @@ def test_quadratic_drag_where_rk4_diverges(falling):
 
 
 @pytest.mark.slow
-def test_rk4_diverges_there(falling):
+def test_rk4_diverges_there():
     with np.errstate(all="ignore"):
         assert not np.abs(falling(0.0, QUADRATIC, 0.2, 20, "rk4", 2.0)).max() < 1e3
 

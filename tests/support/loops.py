@@ -11,7 +11,7 @@ from lgvi_warp.control.pose_pid import PosePID
 from lgvi_warp.control.pose_smc import PoseSMC
 from lgvi_warp.methods.method import PROGRAMS, Method
 from lgvi_warp.reference import advance, explicit
-from lgvi_warp.reference.control.loop import Loop, closed_loop
+from lgvi_warp.reference.control.loop import Fault, Loop, closed_loop
 from lgvi_warp.reference.control.policy import Policy
 from lgvi_warp.reference.control.pseudo_inverse import PseudoInverse
 from lgvi_warp.reference.submaps import Body, start
@@ -19,6 +19,7 @@ from lgvi_warp.reference.terms.drag import Drag
 from lgvi_warp.reference.terms.driven import ControlWrench
 from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.weight import Weight
+from lgvi_warp.reference.terms.wrench import Wrench
 
 
 def torpedo(buoyancy, center_of_buoyancy, inertia=(1.5, 4.0, 4.5)):
@@ -66,23 +67,32 @@ def twin_of(part, numbers, scene):
     return twin
 
 
-def twin_loop(scene, numbers, every):
-    """(body, loop) of a vehicle in the simple form with drag and an ideal actuator, whose allocation is the pseudo-inverse."""
-    vehicle, terms = scene.vehicle, {term.type: term for term in scene.terms}
-    actuator = ControlWrench(limit=np.array(terms["control_wrench"].limit), time_constant=np.zeros(6))
-    laws = [actuator]
-    if "drag" in terms:
-        laws.append(Drag(linear=np.array(terms["drag"].linear), quadratic=np.array(terms["drag"].quadratic)))
-    parts = [twin_of(part, numbers, scene) for part in (*scene.controller.guidance, *scene.controller.laws)]
-    allocation = PseudoInverse(to="control_wrench", effect=np.eye(6))
-    loop = Loop([*parts, allocation], {"control_wrench": actuator}, every)
-    return twin_body(vehicle, scene.environment.gravity, laws), loop
+def twin_loop(scene, numbers, every, h):
+    """(body, loop) of a vehicle in the simple form with drag, a held wrench and an ideal actuator, with its delay and faults.
+
+    Its allocation is the scene's matrix, or the pseudo-inverse.
+    """
+    loops, terms = scene.controller, {term.type: term for term in scene.terms}
+    ideal = terms["control_wrench"]
+    lag = np.broadcast_to(np.array(ideal.time_constant, float), 6)
+    actuator, laws = ControlWrench(limit=np.array(ideal.limit), time_constant=lag), []
+    for name, kind in (("drag", Drag), ("wrench", Wrench)):
+        if name in terms:
+            laws.append(kind(**{key: np.array(value) for key, value in terms[name].parameters().items()}))
+    parts = [twin_of(part, numbers, scene) for part in (*loops.guidance, *loops.laws)]
+    given = [twin_of(part, numbers, scene) for part in loops.allocation if part.type == "matrix"]
+    parts += given or [PseudoInverse(to="control_wrench", effect=np.eye(6))]
+    faults = [
+        Fault(one.of, int(one.channel), float(one.time), float(one.gain), float(one.offset)) for one in loops.faults
+    ]
+    loop = Loop(parts, {"control_wrench": actuator}, every, round(float(loops.delay) / h), faults)
+    return twin_body(scene.vehicle, scene.environment.gravity, [actuator, *laws]), loop
 
 
-def twin_states(scene, numbers, state, every, h, steps):
-    """Positions (k, 3) and attitudes (k, 3, 3) of one member at its looks, by psi_s.
+def twin_states(scene, numbers, state, every, h, steps, method="psi_s"):
+    """Positions (k, 3) and attitudes (k, 3, 3) of one member at its looks.
 
     state: position, attitude, velocity, angular velocity at the start.
     """
-    body, loop = twin_loop(scene, numbers, every)
-    return tuple(x[::every] for x in twin_run(body, loop, "psi_s", h, steps, *state))
+    body, loop = twin_loop(scene, numbers, every, h)
+    return tuple(x[::every] for x in twin_run(body, loop, method, h, steps, *state))

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Closed loops with sensors: against the twin, against the discrete Lyapunov equation, and with a sensor that dies."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_lyapunov
@@ -8,17 +10,10 @@ from scipy.linalg import solve_discrete_lyapunov
 import lgvi_warp as lw
 from lgvi_warp.physics.terms.noisy import channel
 from lgvi_warp.reference.control.dead_reckoning import DeadReckoning
-from lgvi_warp.reference.control.depth_pid import DepthPID
 from lgvi_warp.reference.control.fault import SensorFault
-from lgvi_warp.reference.control.heading_pid import HeadingPID
-from lgvi_warp.reference.control.loop import Loop
-from lgvi_warp.reference.control.matrix import AllocationMatrix
 from lgvi_warp.reference.control.sensor import Sensor
-from lgvi_warp.reference.control.set_point import SetPoint
-from lgvi_warp.reference.terms.drag import Drag
-from lgvi_warp.reference.terms.driven import ControlWrench
 from tests.control.test_loop import GRAVITY, VEHICLE, WANTED
-from tests.support.loops import torpedo, twin_body, twin_run
+from tests.support.loops import torpedo, twin_loop, twin_run
 from tests.support.tools import one
 
 LINEAR, QUADRATIC = np.array((3.0, 4.0, 5.0, 0.3, 0.4, 0.5)), np.array((10.0, 30.0, 40.0, 1.0, 2.0, 3.0))
@@ -51,8 +46,7 @@ def steered(sensors, faults=()):
 
 def twin(m):
     """Positions of the twin's loop with the sensors of member m."""
-    actuator = ControlWrench(limit=LIMIT)
-    laws = Drag(linear=LINEAR, quadratic=QUADRATIC), actuator
+    body, loop = twin_loop(steered([]), {}, EVERY, H)
     parts = []
     for numbers in SENSORS:
         varied = {name.split(".")[1]: v[m] for name, v in VARIED.items() if name.startswith(numbers["name"])}
@@ -60,10 +54,8 @@ def twin(m):
         parts[-1].latency = int(parts[-1].latency)
         parts[-1].bias = np.array(parts[-1].bias)
     parts += [SensorFault(**(FAULT | {"of": "angular_velocity"})), DeadReckoning(depth="measured")]
-    parts += [SetPoint(**WANTED), DepthPID(**DEPTH), HeadingPID(**HEADING)]
-    parts.append(AllocationMatrix(to="control_wrench", matrix=np.diag((0.0, 0.0, 0.0, 0.0, 1.0, 1.0))))
-    loop = Loop(parts, {"control_wrench": actuator}, EVERY)
-    return twin_run(twin_body(VEHICLE, GRAVITY, laws, m), loop, "psi_s", H, STEPS)[0]
+    loop.parts = [*parts, *loop.parts]
+    return twin_run(replace(body, member=m), loop, "psi_s", H, STEPS)[0]
 
 
 @pytest.mark.slow_for("float32")

@@ -28,11 +28,11 @@ def torpedo(buoyancy, center_of_buoyancy, inertia=(1.5, 4.0, 4.5)):
                       center_of_buoyancy=center_of_buoyancy)  # fmt: skip
 
 
-def twin_body(vehicle, gravity, laws, member=0):
+def twin_body(vehicle, gravity, laws):
     """The twin's body of a vehicle in the simple form: its weight and buoyancy, and these laws."""
     moment = vehicle.buoyancy * np.array(vehicle.center_of_buoyancy, float)
     own = Weight(net=vehicle.mass * gravity - vehicle.buoyancy), Restoring(moment=moment)
-    return Body(vehicle.mass_matrix, vehicle.inertia, (*own, *laws), member=member)
+    return Body(vehicle.mass_matrix, vehicle.inertia, (*own, *laws))
 
 
 def twin_run(body, loop, method, h, steps, b=(0.0, 0.0, 0.0), R=None, nu=(0.0, 0.0, 0.0), Om=(0.0, 0.0, 0.0)):

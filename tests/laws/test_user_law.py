@@ -112,30 +112,18 @@ def test_a_second_solve_builds_no_kernel():
 
 
 SCENE = """
+environment = { gravity = 9.8 }
+terms = [
+  { type = "dock", position = [2.0, 1.0, 3.0], nose = [0.6, 0.1, 0.0], energy = 40.0, reach = 2.0 },
+  { type = "mud", name = "silt", floor = 5.0, height = 2.0, linear = 30.0 },
+]
+ensemble = { members = 3, vary = { "silt.linear" = { lognormal = { sigma = 0.1 } } } }
 [vehicle]
 mass = 31.0
 added_mass = [1.0, 30.0, 30.0]
 inertia = [0.2, 8.0, 8.0]
 buoyancy = 303.8
 center_of_buoyancy = [0.0, 0.0, -0.02]
-[environment]
-gravity = 9.8
-[[terms]]
-type = "dock"
-position = [2.0, 1.0, 3.0]
-nose = [0.6, 0.1, 0.0]
-energy = 40.0
-reach = 2.0
-[[terms]]
-type = "mud"
-name = "silt"
-floor = 5.0
-height = 2.0
-linear = 30.0
-[ensemble]
-members = 3
-[ensemble.vary]
-"silt.linear" = { lognormal = { sigma = 0.1 } }
 """
 
 

@@ -51,26 +51,16 @@ def goods(scene, fleet, result, folder):
         "over": {}, "within": {}, "of": "depth", "minimise": "depth", "found": None, "matrix": np.eye(6),
     }  # fmt: skip
     own = {
-        "CurrentHarmonics": {"amplitudes": AHEAD, "periods": [10.0]},
-        "Fins": fins,
+        "CurrentHarmonics": {"amplitudes": AHEAD, "periods": [10.0]}, "Fins": fins,
         "ControlFins": {**fins, "command": [0.1]},
-        "Thrusters": {"position": POINT, "direction": AHEAD, "coefficient": [1.0], "command": [1.0]},
-        "Vehicle": BODY,
-        "BodyLift": {"matrix": np.zeros((6, 6))},
-        "Normal": {"std": 1.0},
-        "Uniform": {"half_width": 1.0},
-        "LogNormal": {"sigma": 0.1},
-        "TruncatedNormal": {"std": 1.0},
-        "Choice": {"values": [1.0, 2.0]},
-        "Quantity": {"name": "depth2"},
-        "solve": {"h": 0.1, "t1": 0.2},
-        "predict": {"h": 0.1, "t1": 0.2},
-        "prepare": {"h": 0.1, "t1": 0.2},
-        "Ensemble": {"members": 4},
-        "Case": {"name": "a"},
+        "Thrusters": {"position": POINT, "direction": AHEAD, "coefficient": [1.0], "command": [1.0]}, "Vehicle": BODY,
+        "BodyLift": {"matrix": np.zeros((6, 6))}, "Normal": {"std": 1.0}, "Uniform": {"half_width": 1.0},
+        "LogNormal": {"sigma": 0.1}, "TruncatedNormal": {"std": 1.0}, "Choice": {"values": [1.0, 2.0]},
+        "Quantity": {"name": "depth2"}, "solve": {"h": 0.1, "t1": 0.2}, "predict": {"h": 0.1, "t1": 0.2},
+        "prepare": {"h": 0.1, "t1": 0.2}, "Ensemble": {"members": 4}, "Case": {"name": "a"},
         "Tether": {"anchor": [0.0] * 3, "stiffness": 1.0},
         "vehicle_tables_from_fossen": {"mass": 20.0, "inertia": [1.5, 4.0, 4.5]},
-    }
+    }  # fmt: skip
     return by_name, own
 
 

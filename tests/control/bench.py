@@ -12,6 +12,7 @@ from lgvi_kernels.lanes.look import measurement_struct
 from lgvi_kernels.maps.in_turn import in_turn
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.runs.settle import make_plan
+from tests.support.loops import torpedo
 
 # Position, attitude row by row, velocity, velocity through the water, angular velocity.
 FIELDS = 21
@@ -19,29 +20,13 @@ FIELDS = 21
 
 def scene(sensors, faults=(), period=0.1, **law):
     """A vehicle with these sensors and a law that needs nothing of them."""
-    vehicle = lw.Vehicle(
-        20.0,
-        inertia=(1.5, 4.0, 4.5),
-        added_mass=(5.0, 22.0, 25.0),
-        buoyancy=196.0,
-        center_of_buoyancy=(0.0, 0.0, -0.02),
-    )
     laws, guidance = [lw.HeadingPID(**{"kp": 1.0} | law)], [lw.SetPoint(heading=0.0)]
     controller = lw.Controller(period=period, sensors=sensors, guidance=guidance, laws=laws, faults=faults)
-    return lw.Scene(vehicle, lw.Environment(9.8), [lw.ControlWrench()], controller=controller)
+    return lw.Scene(torpedo(196.0, (0.0, 0.0, -0.02)), lw.Environment(9.8), [lw.ControlWrench()], controller=controller)
 
 
 def measured(ensemble, truth, h=0.02, dtype="float64", width=4):
-    """What members measure at each look.
-
-    Args:
-        ensemble: the members.
-        truth: (looks, members or 1, FIELDS), motions at the looks.
-        h, dtype, width: step [s]; precision; lanes of a packet.
-
-    Returns:
-        (looks, members, FIELDS).
-    """
+    """What members measure at each look, (looks, members, FIELDS), of motions truth (looks, members or 1, FIELDS)."""
     controller = ensemble.scene.controller
     plan = make_plan(ensemble, "psi_s", h, 1.0, dtype=dtype, width=width)
     n, looks = ensemble.members, len(truth)

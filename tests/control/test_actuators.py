@@ -5,27 +5,33 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.methods.method import PROGRAMS, Method
-from lgvi_warp.reference import advance, explicit
 from lgvi_warp.reference.control.depth_pid import DepthPID
 from lgvi_warp.reference.control.heading_pid import HeadingPID
-from lgvi_warp.reference.control.loop import Fault, Loop, closed_loop
+from lgvi_warp.reference.control.loop import Fault, Loop
 from lgvi_warp.reference.control.pseudo_inverse import PseudoInverse
 from lgvi_warp.reference.control.set_point import SetPoint
-from lgvi_warp.reference.submaps import Body, start
 from lgvi_warp.reference.terms import View
 from lgvi_warp.reference.terms.drag import Drag
 from lgvi_warp.reference.terms.driven import DrivenThrusters
 from lgvi_warp.reference.terms.driven_fins import DrivenFins
-from lgvi_warp.reference.terms.restoring import Restoring
-from lgvi_warp.reference.terms.weight import Weight
 from lgvi_warp.reference.terms.wrench import Wrench
-from tests.control.test_loop import BUOYANCY, CENTER, GRAVITY, LINEAR, MASS, QUADRATIC, STATE
+from tests.control.test_loop import (
+    DEPTH,
+    EVERY,
+    GRAVITY,
+    HEADING,
+    LINEAR,
+    QUADRATIC,
+    STATE,
+    VEHICLE,
+    WANTED,
+    H,
+    controller,
+)
+from tests.support.loops import twin_body, twin_run
+from tests.support.tools import one
 
-H, EVERY, SPEED, DENSITY = 0.02, 5, 1.5, 1025.0
-WANTED = dict(depth=6.0, heading=2.5)
-HEADING = dict(kp=12.0, ki=0.5, kd=25.0, integral_limit=0.8)
-DEPTH = dict(kp=0.3, ki=0.01, pitch_limit=0.3, kp_pitch=20.0, ki_pitch=1.0, kd_pitch=30.0, integral_limit=(2.0, 1.0))
+SPEED, DENSITY = 1.5, 1025.0
 AHEAD = (15.0, 0.0, 0.0)
 # The laws ask for M and N.
 ASKED = np.array([0.0, 0.0, 0.0, 0.0, 1.0, 1.0])[:, None]
@@ -56,30 +62,17 @@ WEAK = dict(channel=0, time=1.1, gain=0.5, offset=0.05)
 
 # A rudder and stern planes that stall, then two thrusters that help where these are at their limits.
 FINS = dict(
-    position=((-0.6, 0.0, 0.0), (-0.6, 0.0, 0.0)),
-    chord=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-    normal=((0.0, 1.0, 0.0), (0.0, 0.0, -1.0)),
-    area=(0.013, 0.013),
-    lift_slope=(1.4, 1.6),
-    drag=(0.01, 0.01),
-    drag_normal=(0.5, 0.5),
-    limit=(0.35, 0.3),
-    rate_limit=(1.0, 1e6),
-    time_constant=(0.1, 0.2),
-    lift_angles=(0.0, 0.25, 0.4, 1.6),
-    lift_coefficients=(0.0, 0.25, 0.2, 0.0),
-)
+    position=((-0.6, 0.0, 0.0), (-0.6, 0.0, 0.0)), chord=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+    normal=((0.0, 1.0, 0.0), (0.0, 0.0, -1.0)), area=(0.013, 0.013), lift_slope=(1.4, 1.6), drag=(0.01, 0.01),
+    drag_normal=(0.5, 0.5), limit=(0.35, 0.3), rate_limit=(1.0, 1e6), time_constant=(0.1, 0.2),
+    lift_angles=(0.0, 0.25, 0.4, 1.6), lift_coefficients=(0.0, 0.25, 0.2, 0.0),
+)  # fmt: skip
 PAIR = dict(
-    position=((-0.5, 0.3, 0.0), (-0.5, -0.3, 0.0)),
-    direction=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-    dead_band=(0.0, 0.02),
-    limit=(1.0, 1.0),
-    rate_limit=(4.0, 5.0),
-    time_constant=(0.0, 0.1),
-    table_commands=(-1.0, -0.5, -0.1, 0.1, 0.4, 1.0),
+    position=((-0.5, 0.3, 0.0), (-0.5, -0.3, 0.0)), direction=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)), dead_band=(0.0, 0.02),
+    limit=(1.0, 1.0), rate_limit=(4.0, 5.0), time_constant=(0.0, 0.1), table_commands=(-1.0, -0.5, -0.1, 0.1, 0.4, 1.0),
     table_thrusts=((-9.0, -8.0), (-2.0, -3.0), (0.0, 0.0), (0.0, 0.0), (5.0, 3.0), (20.0, 12.0)),
     advance_loss=(2.0, 1.0),
-)
+)  # fmt: skip
 
 
 def arrays(numbers):
@@ -158,50 +151,26 @@ class Recorder(Loop):
 def twin(name, method, i, steps):
     """Positions at the looks, and what these did not deliver, of the twin's loop of member i."""
     actuators, allocation, faults = SCENES[name][0](LOST[i])
-    vehicle = lw.Vehicle(
-        MASS, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=BUOYANCY, center_of_buoyancy=CENTER
-    )
     laws = (
-        Weight(net=MASS * GRAVITY - BUOYANCY),
-        Restoring(moment=BUOYANCY * np.array(CENTER)),
         Drag(linear=np.array(LINEAR), quadratic=np.array(QUADRATIC)),
         *actuators.values(),
         Wrench(force=np.array(AHEAD), torque=np.zeros(3)),
     )
-    body = Body(vehicle.mass_matrix, vehicle.inertia, laws)
     parts = [SetPoint(**WANTED), DepthPID(**DEPTH), HeadingPID(**HEADING | {"kp": STIFF[i]}), *allocation]
     loop = Recorder(parts, actuators, EVERY, 0, faults)
-    loop.begin()
-    b, nu, Om = (np.array(STATE[key]) for key in ("position", "velocity", "angular_velocity"))
-    x = start(body, b, np.eye(3), body.M @ nu, body.J @ Om)
-    if method in PROGRAMS:
-        step = lambda x, body, h: advance.step(x, body, PROGRAMS[method], h)  # noqa: E731
-    else:
-        step = explicit.stepper(Method(method).tableau)
-    states = closed_loop(x, body, loop, step, H, steps)
-    return np.array([s.b for s in states])[::EVERY], np.array(loop.rests)
+    state = dict(b=STATE["position"], nu=STATE["velocity"], Om=STATE["angular_velocity"])
+    positions, _ = twin_run(twin_body(VEHICLE, GRAVITY, laws), loop, method, H, steps, **state)
+    return positions[::EVERY], np.array(loop.rests)
 
 
 def solved(name, method, h, steps, every):
     """The result of members that differ in a gain and in the time of the fault that the loop knows."""
     _, terms, allocation, faults = SCENES[name]
-    controller = lw.Controller(
-        period=EVERY * H,
-        guidance=[lw.SetPoint(**WANTED)],
-        laws=[lw.DepthPID(**DEPTH), lw.HeadingPID(**HEADING)],
-        allocation=allocation,
-        faults=faults,
-    )
-    vehicle = lw.Vehicle(
-        MASS, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=BUOYANCY, center_of_buoyancy=CENTER
-    )
     water = lw.Environment(gravity=GRAVITY, water_density=DENSITY)
     terms = [lw.Drag(linear=LINEAR, quadratic=QUADRATIC), *terms, lw.Wrench(force=AHEAD)]
-    scene = lw.Scene(vehicle, water, terms, lw.Start(**STATE), controller)
-    states = [np.broadcast_to(np.array(value), (len(STIFF), *np.shape(value))) for value in
-              (STATE["position"], np.eye(3), STATE["velocity"], STATE["angular_velocity"])]  # fmt: skip
+    scene = lw.Scene(VEHICLE, water, terms, lw.Start(**STATE), controller(allocation, faults))
     varied = {"heading_pid.kp": STIFF} | ({"dead.time": LOST} if faults else {})
-    fleet = lw.Ensemble.from_states(scene, *states, parameters=varied)
+    fleet = one(scene, STATE["position"], None, STATE["velocity"], STATE["angular_velocity"], varied)
     result = lw.solve(fleet, method, h=h, t1=steps * h, save=lw.SaveAt(every=every * h))
     assert result.status.counts() == {"ok": len(STIFF)}
     return result.position

@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import lgvi_warp as lw
+from tests.support.tools import one
 
 MASS, INERTIA, GRAVITY = 20.0, (5.0, 8.0, 11.0), 10.0
 PERIOD = 0.1
@@ -32,31 +33,19 @@ OTHERS = {
 
 def scene(period=PERIOD, position=NONE, heading=0.0, **words):
     """A neutral body, set-point, PID of pose and of heading with gains of 0."""
-    laws = [
-        lw.PosePID(**dict.fromkeys(("kp", "ki", "kd", "kr", "kw"), NONE), **words),
-        lw.HeadingPID(kp=0.0),
-    ]
+    laws = [lw.PosePID(**dict.fromkeys(("kp", "ki", "kd", "kr", "kw"), NONE), **words), lw.HeadingPID(kp=0.0)]
     controller = lw.Controller(period=period, guidance=[lw.SetPoint(position=position, heading=heading)], laws=laws)
     vehicle = lw.Vehicle(MASS, inertia=INERTIA, added_mass=NONE, buoyancy=MASS * GRAVITY, center_of_buoyancy=NONE)
-    return lw.Scene(
-        vehicle, lw.Environment(gravity=GRAVITY), [lw.ControlWrench(limit=FAR), lw.Wrench()], controller=controller
-    )
+    terms = [lw.ControlWrench(limit=FAR), lw.Wrench()]
+    return lw.Scene(vehicle, lw.Environment(gravity=GRAVITY), terms, controller=controller)
 
 
 def run(scene, members, h, t1, every, states=None):
     """The result of members with these numbers, {name: value}; what is not named is that of OTHERS."""
     rows = [OTHERS | member for member in (*members, LAST)]
     parameters = {name: np.array([row[name] for row in rows], float) for name in OTHERS}
-    n = len(rows)
-    given = states or (
-        np.zeros((n - 1, 3)),
-        np.tile(np.eye(3), (n - 1, 1, 1)),
-        np.zeros((n - 1, 3)),
-        np.zeros((n - 1, 3)),
-    )
-    given = [np.concatenate([x, np.eye(3)[None] if x.ndim == 3 else np.zeros((1, 3))]) for x in given]
-    ensemble = lw.Ensemble.from_states(scene, *given, parameters)
-    return lw.solve(ensemble, "psi_s", h=h, t1=t1, save=lw.SaveAt(every=every))
+    given = [np.concatenate([x, np.eye(3)[None] if x.ndim == 3 else np.zeros((1, 3))]) for x in states or ()]
+    return lw.solve(one(scene, *given, parameters=parameters), "psi_s", h=h, t1=t1, save=lw.SaveAt(every=every))
 
 
 def sampled(kp, kd, F, x, v, looks, inertia=MASS):

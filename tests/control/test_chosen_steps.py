@@ -42,16 +42,6 @@ def test_the_loop_is_that_of_fixed_steps(h, lag, delay):
 
 
 def test_what_is_refused():
-    for method in ("psi_x", "psi_s", "rk4"):
-        with pytest.raises(lw.SceneError, match="estimates no error; use rk5 or rk8, or leave them out"):
-            lw.Method(method, rtol=1e-6, atol=1e-9)
-    noisy = scene(NONE)
-    noise = lw.WrenchNoise(force=(0.1, 0.1, 0.1))
-    noisy = lw.Scene(noisy.vehicle, noisy.environment, [*noisy.terms, noise], noisy.start, noisy.controller)
-    with pytest.raises(
-        lw.SceneError, match="cannot choose its steps where noise is drawn once a step; leave out rtol and atol"
-    ):
-        lw.solve(noisy, chosen(1e-6), h=PERIOD, t1=1.0)
     # Looks are at whole steps of the run, whatever steps are chosen within.
     sentence = "controller.period = 0.1: is no whole number of steps of 0.04 s; give 0.08 or 0.12 s, or another step"
     with pytest.raises(lw.SceneError, match=re.escape(sentence)):

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from tests.control.test_sensors import of_members
+from tests.support.loops import torpedo
+from tests.support.tools import one
 
 # A yaw without drag: a double integrator under the moment that the loop commands.
 J, KP, KD, H, EVERY, STEPS = 4.5, 2.0, 3.0, 0.02, 5, 120
@@ -14,15 +15,13 @@ DELAYS = np.array([0, 1, 4, 5, 7, 10, 22, 48])
 
 def members(delays, times=np.inf):
     """Members with these delays in steps, and with a fault from these times on: one kernel for all."""
-    vehicle = lw.Vehicle(
-        20.0, inertia=(1.5, 4.0, J), added_mass=(5.0, 22.0, 25.0), buoyancy=196.0, center_of_buoyancy=(0.0, 0.0, -0.02)
-    )
+    vehicle = torpedo(196.0, (0.0, 0.0, -0.02), (1.5, 4.0, J))
     guidance = [lw.SetPoint(heading=0.3)]
     faults = [lw.Fault(of="control_wrench", channel=5, gain=0.5, offset=0.05)]
     controller = lw.Controller(period=EVERY * H, guidance=guidance, laws=[lw.HeadingPID(kp=KP, kd=KD)], faults=faults)
     scene = lw.Scene(vehicle, lw.Environment(9.8), [lw.ControlWrench()], controller=controller)
     times = np.broadcast_to(times, len(delays))
-    return of_members(scene, len(delays), {"controller.delay": np.asarray(delays) * H, "fault.time": times})
+    return one(scene, parameters={"controller.delay": np.asarray(delays) * H, "fault.time": times})
 
 
 def wanted(delay, fault=(np.inf, 1.0, 0.0)):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from tests.support.loops import twin_states
+from tests.support.loops import torpedo, twin_states
 
 H, EVERY = 0.05, 2
 POINTS = [(0.0, 0.0, 2.0), (4.0, 0.0, 3.0), (4.0, 3.0, 3.0), (1.0, 5.0, 2.5)]
@@ -18,13 +18,7 @@ def scene(current=(0.0, 0.0, 0.0), **words):
     words = dict(points=POINTS, speed=1.0, look_ahead=1.5, radius=0.8) | words
     laws = [lw.SpeedPID(kp=40.0, ki=4.0, drag=20.0), lw.HeavePID(kp=30.0, kd=40.0), lw.HeadingPID(kp=30.0, kd=40.0)]
     controller = lw.Controller(period=EVERY * H, guidance=[lw.Waypoints(**words)], laws=laws)
-    vehicle = lw.Vehicle(
-        20.0,
-        inertia=(1.5, 4.0, 4.5),
-        added_mass=(5.0, 22.0, 25.0),
-        buoyancy=20.0 * 9.8,
-        center_of_buoyancy=(0.0, 0.0, -0.1),
-    )
+    vehicle = torpedo(20.0 * 9.8, (0.0, 0.0, -0.1))
     terms = [lw.Drag(linear=(3.0, 40.0, 40.0, 3.0, 4.0, 5.0), quadratic=(20.0, 90.0, 90.0, 1.0, 2.0, 3.0)),
              lw.ControlWrench(limit=(60.0, 60.0, 60.0, 20.0, 20.0, 20.0))]  # fmt: skip
     terms += [lw.Current(velocity=current)] if np.any(current) else []

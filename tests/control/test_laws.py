@@ -11,9 +11,10 @@ import lgvi_warp as lw
 from lgvi_kernels.advance import kernel
 from lgvi_kernels.lanes.flags import CPU_FLAGS
 from lgvi_warp.engine import kernel as kernels
-from tests.support.loops import twin_states
+from tests.support.loops import torpedo, twin_states
 
 H, EVERY, STEPS = 0.05, 2, 400
+VEHICLE = torpedo(20.5 * 9.8, (0.01, 0.005, -0.02))
 LIMIT = (25.0, 20.0, 15.0, 2.0, 2.5, 3.0)
 rng = np.random.default_rng(7)
 # A policy that damps, and pushes toward what is wanted: untrained layers of different widths.
@@ -57,14 +58,8 @@ def scene(tmp_path_factory):
         file, **{f"{kind}_{i}": a for i, layer in enumerate(LAYERS) for kind, a in zip(("weights", "biases"), layer)}
     )
     inputs = [
-        "depth_error",
-        "position_error[1]",
-        "heading_error",
-        "velocity",
-        "attitude_error",
-        "down[0]",
-        "speed_error",
-    ]
+        "depth_error", "position_error[1]", "heading_error", "velocity", "attitude_error", "down[0]", "speed_error",
+    ]  # fmt: skip
     three = dict(
         lambda_=(0.3, 0.4, 0.5), boundary=(0.1, 0.2, 0.3), lambda_r=(0.5, 0.6, 0.7), boundary_r=(0.1, 0.2, 0.3)
     )
@@ -85,19 +80,12 @@ def scene(tmp_path_factory):
         lw.ReferenceModel(natural_frequency=(1.0, 1.2, 0.8, 1.5), damping_ratio=(1.0, 0.8, 1.2, 1.0),
                           rate_limit=(0.6, 0.5, 0.4, 0.5)),
     ]  # fmt: skip
-    vehicle = lw.Vehicle(
-        20.0,
-        inertia=(1.5, 4.0, 4.5),
-        added_mass=(5.0, 22.0, 25.0),
-        buoyancy=20.5 * 9.8,
-        center_of_buoyancy=(0.01, 0.005, -0.02),
-    )
     terms = [
         lw.Drag(linear=(3.0, 4.0, 5.0, 0.3, 0.4, 0.5), quadratic=(10.0, 30.0, 40.0, 1.0, 2.0, 3.0)),
         lw.ControlWrench(limit=LIMIT),
     ]
     controller = lw.Controller(period=EVERY * H, guidance=guidance, laws=laws)
-    return lw.Scene(vehicle, lw.Environment(gravity=9.8), terms, controller=controller)
+    return lw.Scene(VEHICLE, lw.Environment(gravity=9.8), terms, controller=controller)
 
 
 def states(n):
@@ -199,15 +187,8 @@ def test_guidance_keeps_what_others_want():
     places = lw.Trajectory(times=(0.0, 3.0), positions=[(0, 0, 3), (2, 1, 4)])
     for guidance in ([point, places], [places, point]):
         gains = {**dict.fromkeys(("kp", "kd"), (20.0, 25.0, 30.0)), **dict.fromkeys(("kr", "kw"), (6.0, 7.0, 8.0))}
-        vehicle = lw.Vehicle(
-            20.0,
-            inertia=(1.5, 4.0, 4.5),
-            added_mass=(5.0, 22.0, 25.0),
-            buoyancy=20.5 * 9.8,
-            center_of_buoyancy=(0.01, 0.005, -0.02),
-        )
         controller = lw.Controller(period=EVERY * H, guidance=guidance, laws=[lw.PosePID(**gains)])
-        way = lw.Scene(vehicle, lw.Environment(gravity=9.8), [lw.ControlWrench(limit=LIMIT)], controller=controller)
+        way = lw.Scene(VEHICLE, lw.Environment(gravity=9.8), [lw.ControlWrench(limit=LIMIT)], controller=controller)
         given = states(1)
         result = lw.solve(lw.Ensemble.from_states(way, *given), "psi_s", h=H, t1=6.0, save=lw.SaveAt(every=EVERY * H))
         b, R = twin_states(way, {}, [x[0] for x in given], EVERY, H, 120)

@@ -1,33 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """Closed loops with sensors: against the twin, against the discrete Lyapunov equation, and with a sensor that dies."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_lyapunov
 
 import lgvi_warp as lw
-from lgvi_warp.methods.method import PROGRAMS
 from lgvi_warp.physics.terms.noisy import channel
-from lgvi_warp.reference import advance
 from lgvi_warp.reference.control.dead_reckoning import DeadReckoning
-from lgvi_warp.reference.control.depth_pid import DepthPID
 from lgvi_warp.reference.control.fault import SensorFault
-from lgvi_warp.reference.control.heading_pid import HeadingPID
-from lgvi_warp.reference.control.loop import Loop, closed_loop
-from lgvi_warp.reference.control.matrix import AllocationMatrix
 from lgvi_warp.reference.control.sensor import Sensor
-from lgvi_warp.reference.control.set_point import SetPoint
-from lgvi_warp.reference.submaps import Body, start
-from lgvi_warp.reference.terms.drag import Drag
-from lgvi_warp.reference.terms.driven import ControlWrench
-from lgvi_warp.reference.terms.restoring import Restoring
-from lgvi_warp.reference.terms.weight import Weight
-from tests.control.test_sensors import of_members
+from tests.control.test_loop import GRAVITY, VEHICLE, WANTED
+from tests.support.loops import torpedo, twin_loop, twin_run
+from tests.support.tools import one
 
-GRAVITY, MASS, BUOYANCY, CENTER = 9.8, 20.0, 20.0 * 9.8, np.array((0.01, 0.005, -0.02))
 LINEAR, QUADRATIC = np.array((3.0, 4.0, 5.0, 0.3, 0.4, 0.5)), np.array((10.0, 30.0, 40.0, 1.0, 2.0, 3.0))
 LIMIT = np.array((1e6, 1e6, 1e6, 1e6, 3.0, 4.0))
-WANTED = dict(depth=6.0, heading=2.5)
 HEADING = dict(kp=6.0, ki=0.5, kd=4.0, integral_limit=0.8)
 DEPTH = dict(kp=0.3, ki=0.02, pitch_limit=0.3, kp_pitch=12.0, ki_pitch=1.0, kd_pitch=6.0, integral_limit=(2.0, 1.0))
 H, EVERY, STEPS, MEMBERS = 0.02, 5, 300, 3
@@ -38,12 +28,6 @@ SENSORS = [
 ]
 FAULT = dict(name="weak_gyro", of="gyro", channel=2, time=3.0, gain=0.5, offset=0.02)
 VARIED = {"cell.noise": np.array([0.0, 0.02, 0.1]), "compass.latency": np.array([0.0, 1.0, 3.0])}
-
-
-def body():
-    return lw.Vehicle(
-        MASS, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=BUOYANCY, center_of_buoyancy=CENTER
-    )
 
 
 def steered(sensors, faults=()):
@@ -57,18 +41,12 @@ def steered(sensors, faults=()):
         faults=faults,
     )
     terms = [lw.Drag(linear=LINEAR, quadratic=QUADRATIC), lw.ControlWrench(limit=LIMIT)]
-    return lw.Scene(body(), lw.Environment(gravity=GRAVITY), terms, controller=controller)
+    return lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), terms, controller=controller)
 
 
 def twin(m):
     """Positions of the twin's loop with the sensors of member m."""
-    actuator = ControlWrench(limit=LIMIT)
-    laws = (
-        Weight(net=MASS * GRAVITY - BUOYANCY),
-        Restoring(moment=BUOYANCY * CENTER),
-        Drag(linear=LINEAR, quadratic=QUADRATIC),
-        actuator,
-    )
+    body, loop = twin_loop(steered([]), {}, EVERY, H)
     parts = []
     for numbers in SENSORS:
         varied = {name.split(".")[1]: v[m] for name, v in VARIED.items() if name.startswith(numbers["name"])}
@@ -76,22 +54,15 @@ def twin(m):
         parts[-1].latency = int(parts[-1].latency)
         parts[-1].bias = np.array(parts[-1].bias)
     parts += [SensorFault(**(FAULT | {"of": "angular_velocity"})), DeadReckoning(depth="measured")]
-    parts += [SetPoint(**WANTED), DepthPID(**DEPTH), HeadingPID(**HEADING)]
-    parts.append(AllocationMatrix(to="control_wrench", matrix=np.diag((0.0, 0.0, 0.0, 0.0, 1.0, 1.0))))
-    loop = Loop(parts, {"control_wrench": actuator}, EVERY)
-    loop.begin()
-    vehicle = body()
-    rigid = Body(vehicle.mass_matrix, vehicle.inertia, laws, member=m)
-    step = lambda x, body, h: advance.step(x, body, PROGRAMS["psi_s"], h)  # noqa: E731
-    begin = start(rigid, np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
-    return np.array([x.b for x in closed_loop(begin, rigid, loop, step, H, STEPS)])
+    loop.parts = [*parts, *loop.parts]
+    return twin_run(replace(body, member=m), loop, "psi_s", H, STEPS)[0]
 
 
 @pytest.mark.slow_for("float32")
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 def test_the_loop_is_the_twins(dtype):
     sensors = [*(lw.Sensor(**numbers) for numbers in SENSORS), lw.DeadReckoning(depth="measured")]
-    members = of_members(steered(sensors, [lw.Fault(**FAULT)]), MEMBERS, VARIED)
+    members = one(steered(sensors, [lw.Fault(**FAULT)]), parameters=VARIED)
     result = lw.solve(members, "psi_s", h=H, t1=STEPS * H, save=lw.SaveAt(every=50 * H), dtype=dtype)
     assert result.status.counts() == {"ok": MEMBERS}
     for m in range(MEMBERS):
@@ -107,7 +78,7 @@ def test_a_dead_sensor_of_the_depth_makes_the_vehicle_dive():
     still = steered(sensors, dead)
     pushed = lw.Wrench(force=(15.0, 0.0, 0.0))
     scene = lw.Scene(still.vehicle, still.environment, [*still.terms, pushed], controller=still.controller)
-    members = of_members(scene, 2, {"fault.time": np.array([np.inf, 50.0])})
+    members = one(scene, parameters={"fault.time": np.array([np.inf, 50.0])})
     depth = lw.solve(members, "psi_s", h=H, t1=120.0, save=lw.SaveAt(every=40.0)).position[..., 2]
     assert np.array_equal(depth[:2, 0], depth[:2, 1])
     # One settles; the other takes itself for afloat, and dives for the rest of the time.
@@ -127,13 +98,7 @@ def test_the_variance_under_white_noise_is_that_of_the_lyapunov_equation():
     controller = lw.Controller(
         period=PERIOD, sensors=sensors, guidance=[lw.SetPoint(heading=0.0)], laws=[lw.HeadingPID(kp=KP, kd=KD)]
     )
-    vehicle = lw.Vehicle(
-        MASS,
-        inertia=(1.5, 4.0, J),
-        added_mass=(5.0, 22.0, 25.0),
-        buoyancy=BUOYANCY,
-        center_of_buoyancy=(0.0, 0.0, -0.02),
-    )
+    vehicle = torpedo(20.0 * GRAVITY, (0.0, 0.0, -0.02), (1.5, 4.0, J))
     scene = lw.Scene(vehicle, lw.Environment(GRAVITY), [lw.ControlWrench()], controller=controller)
     members = 4096
     result = lw.solve(lw.Ensemble(scene, members, 3), "psi_s", h=0.05, t1=60.0, save=lw.SaveAt(every=10.0))

@@ -16,6 +16,7 @@ from lgvi_warp.reference.control.low_pass import LowPass
 from lgvi_warp.reference.control.sensor import Sensor
 from lgvi_warp.reference.rotation import exp
 from tests.control.bench import measured, scene
+from tests.support.tools import one
 
 MEMBERS, LOOKS, PERIOD, H = 6, 60, 0.1, 0.02
 EPS = {"float64": 2.0**-52, "float32": 2.0**-23}
@@ -98,12 +99,6 @@ def motion(looks=LOOKS, members=MEMBERS, period=PERIOD):
     return rows
 
 
-def of_members(scene, n, parameters):
-    """An ensemble of members with numbers of their own, whose seed is 0."""
-    rest, upright = np.zeros((n, 3)), np.tile(np.eye(3), (n, 1, 1))
-    return lw.Ensemble.from_states(scene, rest, upright, rest, rest, parameters)
-
-
 def chain(case):
     parts = [lw.Sensor(**numbers) for numbers in SENSORS[case]]
     parts += [getattr(lw, kind)(**numbers) for kind, numbers in ESTIMATORS[case]]
@@ -149,7 +144,7 @@ def of_twin(case, truth):
 
 
 def members_of(case):
-    return of_members(chain(case), MEMBERS, VARIED[case])
+    return one(chain(case), parameters=VARIED[case])
 
 
 @pytest.mark.slow_for("all-float32", "plain-float32", "reckoned-float32")
@@ -181,7 +176,7 @@ def readings():
     }
     truth = np.zeros((LOOKS, 1, 21))
     truth[..., 3:12] = np.eye(3).reshape(-1)
-    return measured(of_members(chain("all"), MANY, varied), truth, H)
+    return measured(one(chain("all"), parameters=varied), truth, H)
 
 
 def test_the_variance_of_a_walk_grows_with_time(readings):
@@ -219,13 +214,13 @@ def test_numbers_that_are_the_same_for_all_designs():
     truth = motion()
     base = measured(members_of("all"), truth, H)
     gains = scene(chain("all").controller.sensors, chain("all").controller.faults, PERIOD, kp=9.0)
-    other_gains = of_members(gains, MEMBERS, VARIED["all"])
+    other_gains = one(gains, parameters=VARIED["all"])
     assert np.array_equal(measured(other_gains, truth, H), base)
     # Another step, with the same looks: the faults begin at the first look at or after their times.
     assert np.array_equal(measured(members_of("all"), truth, 0.1), base)
     # Fewer members, and only some.
     some = {name: values[:3] for name, values in VARIED["all"].items()}
-    few = measured(of_members(chain("all"), 3, some), truth[:, :3], H)
+    few = measured(one(chain("all"), parameters=some), truth[:, :3], H)
     assert np.array_equal(few, base[:, :3])
 
 
@@ -254,7 +249,7 @@ def test_one_members_extreme_changes_no_other_bit(extreme):
     assert np.array_equal(seen[:, others], base[:, others])
     assert not np.array_equal(seen[:, 2], base[:, 2])
     bias = VARIED["all"] | {"cell.bias": np.where(others, 0.01, 1e200), "gyro.bias": np.full((MEMBERS, 3), 0.02)}
-    seen = measured(of_members(chain("all"), MEMBERS, bias), truth, H)
+    seen = measured(one(chain("all"), parameters=bias), truth, H)
     assert np.array_equal(seen[:, others], base[:, others])
 
 
@@ -280,7 +275,7 @@ def test_a_filters_step_response():
     truth[1:, :, 12] = 1.0
     numbers = {"slow.time_constant": np.full(MEMBERS, 0.7), "log.bias": np.zeros((MEMBERS, 3))} | VARIED["plain"]
     numbers["log.bias"][1:] = 0.3
-    seen = measured(of_members(chain("plain"), MEMBERS, numbers), truth, H)[:, 0, 12]
+    seen = measured(one(chain("plain"), parameters=numbers), truth, H)[:, 0, 12]
     assert np.abs(seen - (1.0 - np.exp(-np.arange(LOOKS) * PERIOD / 0.7))).max() < LOOKS * EPS["float64"]
 
 

@@ -30,32 +30,21 @@ def wrong_checks(report):
 
 
 SCENE = """
+terms = [{ type = "control_wrench" }, { type = "drag", linear = [20.0, 20.0, 20.0, 5.0, 5.0, 5.0] }]
+run = { step = 0.05, duration = 20.0 }
 [vehicle]
 mass = 20.0
 added_mass = [5.0, 22.0, 25.0]
 inertia = [1.5, 4.0, 4.5]
 buoyancy = 196.2
 center_of_buoyancy = [0.0, 0.0, -0.02]
-[[terms]]
-type = "control_wrench"
-[[terms]]
-type = "drag"
-linear = [20.0, 20.0, 20.0, 5.0, 5.0, 5.0]
 [controller]
 period = 0.1
-[[controller.guidance]]
-type = "set_point"
-depth = 1.0
-[[controller.laws]]
-type = "bang"
-level = 3.0
+guidance = [{ type = "set_point", depth = 1.0 }]
+laws = [{ type = "bang", level = 3.0 }]
 [ensemble]
 members = 3
-[ensemble.vary]
-"bang.level" = { uniform = { low = 2.0, high = 4.0 } }
-[run]
-step = 0.05
-duration = 20.0
+vary = { "bang.level" = { uniform = { low = 2.0, high = 4.0 } } }
 """
 
 

@@ -50,6 +50,13 @@ class Case:
         return self.status[method] if isinstance(self.status, dict) else self.status
 
 
+class Cases(list):
+    """Cases, one after another."""
+
+    def add(self, *numbers, **named):
+        self.append(Case(*numbers, **named))
+
+
 @dataclass(frozen=True)
 class Group:
     """Cases that one kernel advances together, with this step [s] and so many steps."""
@@ -77,13 +84,9 @@ def ensemble(group):
     terms = [lw.Drag(linear=(1.0,) * 6, quadratic=(1.0,) * 6)] if group.dragged else []
     scene = lw.Scene(lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0)), lw.Environment(gravity=9.8), terms=terms)
     parameters = {
-        "vehicle.mass": mass,
-        "vehicle.added_mass": M - mass[:, None],
-        "vehicle.inertia": array(cases, "J"),
-        "vehicle.buoyancy": buoyancy,
-        "vehicle.center_of_buoyancy": arm,
-        "environment.gravity": g,
-    }
+        "vehicle.mass": mass, "vehicle.added_mass": M - mass[:, None], "vehicle.inertia": array(cases, "J"),
+        "vehicle.buoyancy": buoyancy, "vehicle.center_of_buoyancy": arm, "environment.gravity": g,
+    }  # fmt: skip
     if group.dragged:
         parameters |= {f"drag.{name}": array(cases, name) for name in ("linear", "quadratic")}
     return lw.Ensemble.from_states(scene, *states(cases), parameters)
@@ -130,109 +133,80 @@ FLAGGED = {"psi_s": (NOT_CONVERGED, TOO_LARGE), "psi_x": (TOO_LARGE, NON_FINITE)
 def turning():
     """Free bodies: spins, tumbles, shapes, masses, the Munk oscillation, places far away."""
     h, axes = 0.1, np.eye(3)
-    cases = []
+    cases = Cases()
     for x in (1e-12, 1e-9, 1e-6, 1e-3, 0.1, 0.5, 1.0, 1.5, 1.9, 1.9999, 2.001, np.pi, 3.99, 4.01, 100.0, 1e6, 1e12):
         status = (OK,) if x < 2.0 else BEYOND if x < 4.0 else (TOO_LARGE,)
         for i in range(3):
-            cases.append(
-                Case(f"spin about axis {i + 1}, h Om = {x:.5g}", Om=x / h * axes[i], status=status, aligned=True)
-            )
+            cases.add(f"spin about axis {i + 1}, h Om = {x:.5g}", Om=x / h * axes[i], status=status, aligned=True)
     for x in (1e-12, 1e-6, 1e-3, 0.1, 0.5, 1.0):
-        cases.append(Case(f"tumbling, h Om = {x:g}", Om=oblique(x / h), nu=oblique(0.1)))
+        cases.add(f"tumbling, h Om = {x:g}", Om=oblique(x / h), nu=oblique(0.1))
     for x in (5.0, 1e3, 1e9):
-        cases.append(Case(f"tumbling, h Om = {x:g}", Om=oblique(x / h), status=(TOO_LARGE, NON_FINITE)))
+        cases.add(f"tumbling, h Om = {x:g}", Om=oblique(x / h), status=(TOO_LARGE, NON_FINITE))
     for e in (0.0, 1e-12, 1e-8, 1e-4):
         text = f"intermediate axis, h Om = 0.5, tilted by {e:g}"
-        cases.append(Case(text, Om=(5.0 * e, 5.0, 5.0 * e), aligned=e == 0.0))
+        cases.add(text, Om=(5.0 * e, 5.0, 5.0 * e), aligned=e == 0.0)
     # The separatrix: 2 T J2 = |pi|^2.
     a, c = np.sqrt(J0[2] * (J0[2] - J0[1])), np.sqrt(J0[0] * (J0[1] - J0[0]))
-    cases.append(Case("on the separatrix, h Om = 0.3", Om=3.0 * np.array([a, 0.0, c]) / np.hypot(a, c)))
+    cases.add("on the separatrix, h Om = 0.3", Om=3.0 * np.array([a, 0.0, c]) / np.hypot(a, c))
     for r in (1e2, 1e4, 1e6):
         for x in (1e-3, 0.1, 0.5, 1.5):
-            mild = x * x * r <= 1.0
-            status = (OK,) if mild else SLENDER
-            cases.append(
-                Case(f"rod, J = (1/{r:g}, 1, 1), h Om = {x:g}", J=(1.0 / r, 1.0, 1.0), Om=oblique(x / h), status=status)
-            )
-        rod = Case(f"rod, J = (1/{r:g}, 1, 1), spun about its length", J=(1.0 / r, 1.0, 1.0), Om=(10.0, 1e-3, 1e-3))
-        cases += [rod, Case(f"J = (1/{r:g}, 1/{r:g}, 1): no body, h Om = 0.5", J=(1.0 / r, 1.0 / r, 1.0), Om=oblique(5.0),
-                            status=FLAGGED | ({"psi_s": (OK, NOT_CONVERGED)} if r < 1e3 else {}))]  # fmt: skip
+            status = (OK,) if x * x * r <= 1.0 else SLENDER
+            cases.add(f"rod, J = (1/{r:g}, 1, 1), h Om = {x:g}", J=(1 / r, 1.0, 1.0), Om=oblique(x / h), status=status)
+        cases.add(f"rod, J = (1/{r:g}, 1, 1), spun about its length", J=(1.0 / r, 1.0, 1.0), Om=(10.0, 1e-3, 1e-3))
+        status = FLAGGED | ({"psi_s": (OK, NOT_CONVERGED)} if r < 1e3 else {})
+        text = f"J = (1/{r:g}, 1/{r:g}, 1): no body, h Om = 0.5"
+        cases.add(text, J=(1.0 / r, 1.0 / r, 1.0), Om=oblique(5.0), status=status)
     for e in (0.0, 1e-12, 1e-9, 1e-6):
-        cases.append(
-            Case(f"sphere, inertias {e:g} apart, h Om = 0.5", J=(1.0, 1.0 + e, 1.0 + 2.0 * e), Om=oblique(5.0))
-        )
+        cases.add(f"sphere, inertias {e:g} apart, h Om = 0.5", J=(1.0, 1.0 + e, 1.0 + 2.0 * e), Om=oblique(5.0))
     for e in (0.0, 1e-12, 1e-6):
-        cases.append(
-            Case(f"plate, J1 + J2 = (1 + {e:g}) J3, h Om = 0.5", J=(1.0, 1.5, 2.5 / (1.0 + e)), Om=oblique(5.0))
-        )
+        cases.add(f"plate, J1 + J2 = (1 + {e:g}) J3, h Om = 0.5", J=(1.0, 1.5, 2.5 / (1.0 + e)), Om=oblique(5.0))
     for m in (1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9):
         size = (m / 1000.0) ** (1.0 / 3.0)
         J, M = m * size**2 * np.array([0.2, 0.3, 0.4]), m * np.array([1.0, 1.2, 1.5])
-        cases.append(Case(f"mass {m:g} kg", M, J, nu=oblique(0.5 * size), Om=oblique(1.0), b=(size, 0.0, -size)))
+        cases.add(f"mass {m:g} kg", M, J, nu=oblique(0.5 * size), Om=oblique(1.0), b=(size, 0.0, -size))
     for a in (0.0, 1.0, 10.0, 100.0):
-        cases.append(
-            Case(
-                f"added mass {a:g} times the mass, along one axis",
-                (10.0, 10.0, 10.0 + 10.0 * a),
-                nu=oblique(0.1),
-                Om=oblique(0.5),
-            )
-        )
+        M = (10.0, 10.0, 10.0 + 10.0 * a)
+        cases.add(f"added mass {a:g} times the mass, along one axis", M, nu=oblique(0.1), Om=oblique(0.5))
     for a in (1.0, 100.0):
-        cases.append(
-            Case(f"added mass {a:g} times the mass, all axes", (10.0 + 10.0 * a,) * 3, nu=oblique(0.1), Om=oblique(0.5))
-        )
+        M = (10.0 + 10.0 * a,) * 3
+        cases.add(f"added mass {a:g} times the mass, all axes", M, nu=oblique(0.1), Om=oblique(0.5))
     for hw in (0.1, 0.5, 1.0, 1.5, 2.0, 2.2, 2.5, 3.0, 5.0):
         # Broadside motion is stable: w^2 = |p|^2 (1/M_min - 1/M_max) / J_min, here 0.3 rad from it.
         p = hw / h / np.sqrt(1.0 - 1.0 / 100.0)
         nu = p * np.array([np.sin(0.3), 0.01 * np.cos(0.3), 0.0])
         status = (OK,) if hw <= 2.0 else (TOO_LARGE,)
-        cases.append(
-            Case(
-                f"Munk oscillation of 0.3 rad, M = (1, 100, 100), h w = {hw:g}",
-                (1.0, 100.0, 100.0),
-                (1.0,) * 3,
-                nu=nu,
-                status=status,
-            )
-        )
+        text = f"Munk oscillation of 0.3 rad, M = (1, 100, 100), h w = {hw:g}"
+        cases.add(text, (1.0, 100.0, 100.0), (1.0,) * 3, nu=nu, status=status)
     for r in (1e3, 1e7, 1e12):
-        cases.append(Case(f"{r:g} m from the origin", b=(r, -r, r), nu=oblique(0.5), Om=oblique(0.5)))
+        cases.add(f"{r:g} m from the origin", b=(r, -r, r), nu=oblique(0.5), Om=oblique(0.5))
     return Group("Free bodies", h, 60, tuple(cases))
 
 
 def forced():
     """Weight, restoring moment and drag, from none to far beyond what the step resolves."""
     h = 0.1
-    cases = []
+    cases = Cases()
     J6 = np.concatenate([M0, J0])
     nu, Om = oblique(1.0), oblique(0.5)
     for k in (1e-6, 1e-3, 1.0, 1e3, 1e6):
-        cases.append(Case(f"linear drag, h l / I = {k:g}", nu=nu, Om=Om, linear=k / h * J6))
+        cases.add(f"linear drag, h l / I = {k:g}", nu=nu, Om=Om, linear=k / h * J6)
         speed = np.abs(np.concatenate([nu, Om]))
-        cases.append(Case(f"quadratic drag, h q |v| / I = {k:g}", nu=nu, Om=Om, quadratic=k / h * J6 / speed))
+        cases.add(f"quadratic drag, h q |v| / I = {k:g}", nu=nu, Om=Om, quadratic=k / h * J6 / speed)
         one = np.where(np.arange(6) == 1, k / h * J6, 0.0)
-        cases.append(Case(f"linear drag on one axis, h l / I = {k:g}", nu=nu, Om=Om, linear=one))
-        net = Case(
-            f"sinking, linear and quadratic drag, h l / I = {k:g}",
-            nu=nu,
-            Om=Om,
-            net=3.0,
-            linear=k / h * J6,
-            quadratic=k / h * J6,
-        )
-        cases.append(net)
+        cases.add(f"linear drag on one axis, h l / I = {k:g}", nu=nu, Om=Om, linear=one)
+        text = f"sinking, linear and quadratic drag, h l / I = {k:g}"
+        cases.add(text, nu=nu, Om=Om, net=3.0, linear=k / h * J6, quadratic=k / h * J6)
     for net in (0.0, 1e-9, -1e-9, 5.0, -5.0):
         word = "neutral" if net == 0.0 else "sinking" if net > 0.0 else "rising"
-        cases.append(Case(f"{word}, net weight {net:g} N", net=net, nu=nu, Om=Om, Br=(0.0, 0.0, -1.0)))
+        cases.add(f"{word}, net weight {net:g} N", net=net, nu=nu, Om=Om, Br=(0.0, 0.0, -1.0))
     for hw in (0.0, 1e-6, 0.1, 1.0, 1.9):
         # A pendulum about axis 1: w^2 = B r / J1, 0.3 rad from upright.
         R = lw.notation.matrix_from_rotation_vector(np.array([0.3, 0.0, 0.0]))
         arm = (0.0, 0.0, -((hw / h) ** 2) * J0[0])
-        cases.append(Case(f"upright pendulum, h w = {hw:g}", R=R, Br=arm))
+        cases.add(f"upright pendulum, h w = {hw:g}", R=R, Br=arm)
     for hw in (3.0, 10.0, 1e3, 1e6):
         arm = (0.0, 0.0, -((hw / h) ** 2) * J0[0])
-        cases.append(Case(f"pendulum, h w = {hw:g}", R=TILT, Br=arm, status=(TOO_LARGE, NON_FINITE)))
+        cases.add(f"pendulum, h w = {hw:g}", R=TILT, Br=arm, status=(TOO_LARGE, NON_FINITE))
     for m in (1e-6, 1e9):
         size = (m / 1000.0) ** (1.0 / 3.0)
         J, M = m * size**2 * np.array([0.2, 0.3, 0.4]), m * np.array([1.0, 1.2, 1.5])
@@ -240,9 +214,9 @@ def forced():
         drag = {"linear": 0.1 * scale, "quadratic": 0.1 * scale}
         arm, net = (0.0, 0.0, -0.1 * m * size**2), 0.1 * m * min(size, 1.0)
         text = f"mass {m:g} kg with weight, arm and drag"
-        cases.append(Case(text, M, J, net=net, Br=arm, nu=oblique(0.5 * size), Om=oblique(0.5), **drag))
-    cases.append(Case("no gravity", gravity=0.0, nu=nu, Om=Om, linear=0.1 * J6))
-    cases.append(Case("no gravity, buoyancy of 5 N", gravity=0.0, net=-5.0, Br=(0.0, 0.0, -0.5), nu=nu, Om=Om))
+        cases.add(text, M, J, net=net, Br=arm, nu=oblique(0.5 * size), Om=oblique(0.5), **drag)
+    cases.add("no gravity", gravity=0.0, nu=nu, Om=Om, linear=0.1 * J6)
+    cases.add("no gravity, buoyancy of 5 N", gravity=0.0, net=-5.0, Br=(0.0, 0.0, -0.5), nu=nu, Om=Om)
     return Group("Weight, restoring moment and drag", h, 60, tuple(cases), dragged=True)
 
 

@@ -96,198 +96,80 @@ def sources():
     return [*texts, named, matrices + "weight = 299.0\nbuoyancy = 300.0\n" + start + run]
 
 
+def toml(text):
+    """A text whose lines end at "; " as well."""
+    return text.replace("; ", "\n")
+
+
 # A vehicle, its actuators, and its controller: all parts that a scene file may name stand in one of these.
 CONTROLLED = [
     (
-        """
-[vehicle]
-name = "remus_100"
-buoyancy = 299.0
-[start]
-velocity = [1.54, 0.0, 0.0]
-[run]
-step = 0.01
-duration = 0.5
-[ensemble]
-members = 8
-[ensemble.vary]
-"vehicle.buoyancy" = { uniform = { low = 297.0, high = 302.0 } }
-""",
-        """
-[controller]
-period = 0.1
-delay = 0.02
-[[controller.sensors]]
-type = "sensor"
-name = "depth_cell"
-of = "depth"
-noise = 0.02
-quantum = 0.005
-[[controller.sensors]]
-type = "sensor"
-name = "compass"
-of = "heading"
-noise = 0.01
-drift = 0.002
-latency = 2
-every = 3
-dropout = 0.1
-[[controller.guidance]]
-type = "set_point"
-depth = 10.0
-heading = 0.5
-speed = 1.5
-[[controller.guidance]]
-type = "reference_model"
-natural_frequency = [0.2, 0.3, 0.2, 0.3]
+        toml("""
+[vehicle]; name = "remus_100"; buoyancy = 299.0
+[start]; velocity = [1.54, 0.0, 0.0]
+[run]; step = 0.01; duration = 0.5
+[ensemble]; members = 8
+[ensemble.vary]; "vehicle.buoyancy" = { uniform = { low = 297.0, high = 302.0 } }
+"""),
+        toml("""
+[controller]; period = 0.1; delay = 0.02
+[[controller.sensors]]; type = "sensor"; name = "depth_cell"; of = "depth"; noise = 0.02; quantum = 0.005
+[[controller.sensors]]; type = "sensor"; name = "compass"; of = "heading"; noise = 0.01; drift = 0.002; latency = 2
+every = 3; dropout = 0.1
+[[controller.guidance]]; type = "set_point"; depth = 10.0; heading = 0.5; speed = 1.5
+[[controller.guidance]]; type = "reference_model"; natural_frequency = [0.2, 0.3, 0.2, 0.3]
 damping_ratio = [1.0, 1.0, 1.0, 1.0]
-[[controller.laws]]
-type = "depth_pid"
-kp = 0.1
-ki = 0.001
-pitch_limit = 0.5
-kp_pitch = 5.0
-ki_pitch = 0.3
-kd_pitch = 2.0
-integral_limit = [20.0, 20.0]
-[[controller.laws]]
-type = "heading_pid"
-kp = 1.0
-ki = 0.02
-kd = 2.0
-anti_windup = "none"
-[[controller.allocation]]
-type = "matrix"
-to = "control_fins"
-matrix = [[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]]
-[[controller.faults]]
-name = "stuck_rudder"
-of = "control_fins"
-channel = 0
-time = 40.0
-gain = 0.0
-offset = 0.1
-""",
+[[controller.laws]]; type = "depth_pid"; kp = 0.1; ki = 0.001; pitch_limit = 0.5; kp_pitch = 5.0; ki_pitch = 0.3
+kd_pitch = 2.0; integral_limit = [20.0, 20.0]
+[[controller.laws]]; type = "heading_pid"; kp = 1.0; ki = 0.02; kd = 2.0; anti_windup = "none"
+[[controller.allocation]]; type = "matrix"; to = "control_fins"; matrix = [[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]]
+[[controller.faults]]; name = "stuck_rudder"; of = "control_fins"; channel = 0; time = 40.0; gain = 0.0; offset = 0.1
+"""),
     ),
     (
-        """
-[vehicle]
-name = "bluerov2_heavy"
-[run]
-step = 0.01
-duration = 0.5
-""",
-        """
-[controller]
-period = 0.05
-[[controller.sensors]]
-type = "sensor"
-of = "velocity"
-bias = [0.01, 0.0, 0.0]
-[[controller.sensors]]
-type = "dead_reckoning"
-[[controller.guidance]]
-type = "waypoints"
-points = [[0.0, 0.0, 5.0], [10.0, 0.0, 5.0], [10.0, 10.0, 6.0]]
-speed = 1.0
-look_ahead = 3.0
-radius = 1.0
-[[controller.guidance]]
-type = "set_point"
-position = [0.0, 0.0, 5.0]
-heading = 0.0
-[[controller.laws]]
-type = "pose_pid"
-kp = [40.0, 40.0, 60.0]
-ki = [4.0, 4.0, 6.0]
-kd = [60.0, 60.0, 80.0]
-kr = [10.0, 10.0, 10.0]
-kw = [4.0, 4.0, 4.0]
-feedforward = "restoring"
-[[controller.allocation]]
-type = "pseudo_inverse"
-to = "thrusters"
-weights = [1, 1, 1, 1, 2, 2, 2, 2]
-[[controller.faults]]
-of = "thrusters"
-channel = 4
-time = 20.0
-gain = 0.0
-known = true
-""",
+        toml("""
+[vehicle]; name = "bluerov2_heavy"
+[run]; step = 0.01; duration = 0.5
+"""),
+        toml("""
+[controller]; period = 0.05
+[[controller.sensors]]; type = "sensor"; of = "velocity"; bias = [0.01, 0.0, 0.0]
+[[controller.sensors]]; type = "dead_reckoning"
+[[controller.guidance]]; type = "waypoints"; points = [[0.0, 0.0, 5.0], [10.0, 0.0, 5.0], [10.0, 10.0, 6.0]]
+speed = 1.0; look_ahead = 3.0; radius = 1.0
+[[controller.guidance]]; type = "set_point"; position = [0.0, 0.0, 5.0]; heading = 0.0
+[[controller.laws]]; type = "pose_pid"; kp = [40.0, 40.0, 60.0]; ki = [4.0, 4.0, 6.0]; kd = [60.0, 60.0, 80.0]
+kr = [10.0, 10.0, 10.0]; kw = [4.0, 4.0, 4.0]; feedforward = "restoring"
+[[controller.allocation]]; type = "pseudo_inverse"; to = "thrusters"; weights = [1, 1, 1, 1, 2, 2, 2, 2]
+[[controller.faults]]; of = "thrusters"; channel = 4; time = 20.0; gain = 0.0; known = true
+"""),
     ),
     (
-        """
-[vehicle]
-mass = 30.0
-added_mass = [1.0, 30.0, 30.0]
-inertia = [0.2, 3.5, 3.5]
-buoyancy = 296.0
-[[terms]]
-type = "control_wrench"
-limit = [25.0, 20.0, 15.0, 2.0, 2.5, 3.0]
-[run]
-step = 0.05
-duration = 0.5
-""",
-        """
-[controller]
-period = 0.1
-[[controller.sensors]]
-type = "low_pass"
-of = "velocity"
-time_constant = 0.5
-[[controller.sensors]]
-type = "complementary_filter"
-time_constant = 5.0
-[[controller.sensors]]
-type = "sensor"
-name = "gyroscope"
-of = "angular_velocity"
-noise = [0.001, 0.001, 0.002]
-[[controller.guidance]]
-type = "trajectory"
-times = [0.5, 3.0, 8.0]
-positions = [[0, 0, 3], [2, 1, 4], [5, -2, 6]]
-headings = [0.3, 2.0, -2.5]
-interpolation = "cubic"
-[[controller.guidance]]
-type = "set_point"
-speed = 1.0
-[[controller.laws]]
-type = "heave_pid"
-kp = 20.0
-[[controller.laws]]
-type = "speed_pid"
-kp = 30.0
-drag = 4.0
-[[controller.laws]]
-type = "heading_smc"
-lambda = 0.4
-boundary = 0.1
-k_sigma = 0.2
-k_d = 0.8
-nomoto_gain = 0.25
+        toml("""
+[vehicle]; mass = 30.0; added_mass = [1.0, 30.0, 30.0]; inertia = [0.2, 3.5, 3.5]; buoyancy = 296.0
+[[terms]]; type = "control_wrench"; limit = [25.0, 20.0, 15.0, 2.0, 2.5, 3.0]
+[run]; step = 0.05; duration = 0.5
+"""),
+        toml("""
+[controller]; period = 0.1
+[[controller.sensors]]; type = "low_pass"; of = "velocity"; time_constant = 0.5
+[[controller.sensors]]; type = "complementary_filter"; time_constant = 5.0
+[[controller.sensors]]; type = "sensor"; name = "gyroscope"; of = "angular_velocity"; noise = [0.001, 0.001, 0.002]
+[[controller.guidance]]; type = "trajectory"; times = [0.5, 3.0, 8.0]; positions = [[0, 0, 3], [2, 1, 4], [5, -2, 6]]
+headings = [0.3, 2.0, -2.5]; interpolation = "cubic"
+[[controller.guidance]]; type = "set_point"; speed = 1.0
+[[controller.laws]]; type = "heave_pid"; kp = 20.0
+[[controller.laws]]; type = "speed_pid"; kp = 30.0; drag = 4.0
+[[controller.laws]]; type = "heading_smc"; lambda = 0.4; boundary = 0.1; k_sigma = 0.2; k_d = 0.8; nomoto_gain = 0.25
 nomoto_time = 1.5
-[[controller.laws]]
-type = "pose_smc"
-lambda = [0.3, 0.4, 0.5]
-boundary = [0.1, 0.2, 0.3]
-lambda_r = [0.5, 0.6, 0.7]
-boundary_r = [0.1, 0.2, 0.3]
-k_sigma = [3.0, 4.0, 5.0]
-k_d = [30.0, 40.0, 50.0]
-k_sigma_r = [0.5, 0.6, 0.7]
-k_d_r = [3.0, 4.0, 5.0]
-[[controller.laws]]
-type = "state_feedback"
+[[controller.laws]]; type = "pose_smc"; lambda = [0.3, 0.4, 0.5]; boundary = [0.1, 0.2, 0.3]
+lambda_r = [0.5, 0.6, 0.7]; boundary_r = [0.1, 0.2, 0.3]; k_sigma = [3.0, 4.0, 5.0]; k_d = [30.0, 40.0, 50.0]
+k_sigma_r = [0.5, 0.6, 0.7]; k_d_r = [3.0, 4.0, 5.0]
+[[controller.laws]]; type = "state_feedback"
 K = [[1,0,0,0,0,0,1,0,0,0,0,0],[0,1,0,0,0,0,0,1,0,0,0,0],[0,0,1,0,0,0,0,0,1,0,0,0],[0,0,0,1,0,0,0,0,0,1,0,0],
      [0,0,0,0,1,0,0,0,0,0,1,0],[0,0,0,0,0,1,0,0,0,0,0,1]]
-[[controller.faults]]
-of = "gyroscope"
-channel = 1
-offset = 0.1
-""",
+[[controller.faults]]; of = "gyroscope"; channel = 1; offset = 0.1
+"""),
     ),
 ]
 CONTROLLED_WORDS = [

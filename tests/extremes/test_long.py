@@ -10,11 +10,13 @@ from lgvi_warp.common.status import Status
 from lgvi_warp.physics import energy as invariants
 from tests.extremes import extended
 from tests.extremes.cases import DTYPES, UNIT, Case, Group, ensemble, oblique, twin
-from tests.support.tools import random_states
+from tests.support.tools import one, random_states
 
 SLOW = pytest.mark.slow
 KAPPAS = tuple(10.0**k for k in range(-6, 7))
 SPHERE = {"M": (10.0, 10.0, 10.0), "J": (1.0, 1.0, 1.0)}
+BRAKED = lw.Scene(lw.Vehicle(10.0, inertia=(1.0,) * 3, buoyancy=98.0), lw.Environment(9.8),
+                  [lw.DragMatrix(linear=np.eye(6), quadratic=np.eye(6))])  # fmt: skip
 
 
 def rising(values, unit):
@@ -56,23 +58,17 @@ def test_energy_never_grows_by_a_drag_matrix(dtype):
     I6 = np.diag([10.0] * 3 + [1.0] * 3)
     D = np.sqrt(I6) @ D @ np.sqrt(I6)
     m = len(D)
-    scene = lw.Scene(
-        lw.Vehicle(10.0, inertia=(1.0,) * 3, buoyancy=98.0),
-        lw.Environment(9.8),
-        [lw.DragMatrix(linear=np.eye(6), quadratic=np.eye(6))],
-    )
     b, R, nu, Om = random_states(3, 2 * m, 1.0, 0.5)
     quadratic = np.zeros((2 * m, 6, 6))
     quadratic[m:] = np.concatenate([k / h * I6 for k in KAPPAS]).reshape(-1, 6, 6).repeat(n, axis=0)
     linear = np.concatenate([D, np.zeros((m, 6, 6))])
     fleet = lw.Ensemble.from_states(
-        scene, b, R, nu, Om, {"drag_matrix.linear": linear, "drag_matrix.quadratic": quadratic}
+        BRAKED, b, R, nu, Om, {"drag_matrix.linear": linear, "drag_matrix.quadratic": quadratic}
     )
     result = lw.solve(fleet, "psi_s", h=h, t1=20.0, save=lw.SaveAt(every=h), dtype=dtype)
     assert (np.asarray(result.status) == Status.OK).all()
-    energy = 5.0 * (result.velocity.astype(float) ** 2).sum(-1) + 0.5 * (
-        result.angular_velocity.astype(float) ** 2
-    ).sum(-1)
+    v, Om = result.velocity.astype(float), result.angular_velocity.astype(float)
+    energy = 5.0 * (v**2).sum(-1) + 0.5 * (Om**2).sum(-1)
     # What a solve of 6 equations rounds grows with the size of its right side, the energy of the step before.
     assert rising(np.maximum(energy, 1e-30 * energy[0]), UNIT[dtype]) < 400.0
 
@@ -81,14 +77,8 @@ def test_energy_never_grows_by_a_drag_matrix(dtype):
 def test_a_linear_drag_matrix_step(kappa):
     # Two stages with gamma = 1 - 1/sqrt(2) on v' = -z v / h: v <- v (1 + (2 gamma - 1) z) / (1 + gamma z)^2.
     h, M = 0.1, 10.0
-    scene = lw.Scene(
-        lw.Vehicle(M, inertia=(1.0,) * 3, buoyancy=98.0),
-        lw.Environment(9.8),
-        [lw.DragMatrix(linear=np.eye(6), quadratic=np.eye(6))],
-    )
-    fleet = lw.Ensemble.from_states(scene, [[0.0] * 3], [np.eye(3)], [[2.0, 0.0, 0.0]], [[0.0] * 3],
-                                    {"drag_matrix.linear": [kappa * M / h * np.eye(6)],
-                                     "drag_matrix.quadratic": np.zeros((1, 6, 6))})  # fmt: skip
+    drag = {"drag_matrix.linear": [kappa * M / h * np.eye(6)], "drag_matrix.quadratic": np.zeros((1, 6, 6))}
+    fleet = one(BRAKED, nu=(2.0, 0.0, 0.0), parameters=drag)
     u = lw.solve(fleet, "psi_s", h=h, t1=h).velocity[-1, 0, 0]
     factor = (1.0 + (2.0 * GAMMA - 1.0) * kappa) / (1.0 + GAMMA * kappa) ** 2
     # The difference 1 - ... loses digits where little is left: absolute, in units of what there was.

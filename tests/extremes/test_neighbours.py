@@ -23,18 +23,10 @@ def healthy(n, dragged=False, laws=()):
     """n different members, in many packets of any width."""
     states = random_states(7, n, 0.5, 0.5)
     if dragged:
-        group = cases.Group(
-            "",
-            H,
-            STEPS,
-            (cases.Case("", net=0.3, Br=(0.0, 0.0, -0.5), linear=(1e-3,) * 6, quadratic=(1e-4,) * 6),),
-            True,
-        )
-        one = cases.ensemble(group)
-        shared = {
-            name: np.repeat(value, n, axis=0) for name, value in one.parameters(0, 1).items() if np.ndim(value) != 0
-        }
-        shared = {name: shared[name] for name in one.explicit() if name in shared}
+        case = cases.Case("", net=0.3, Br=(0.0, 0.0, -0.5), linear=(1e-3,) * 6, quadratic=(1e-4,) * 6)
+        one = cases.ensemble(cases.Group("", H, STEPS, (case,), dragged=True))
+        known = {name: value for name, value in one.parameters(0, 1).items() if np.ndim(value) != 0}
+        shared = {name: np.repeat(known[name], n, axis=0) for name in one.explicit() if name in known}
         return lw.Ensemble.from_states(one.scene, *states, shared), shared
     scene = lw.Scene(GENERAL.vehicle, GENERAL.environment, terms=laws)
     return lw.Ensemble.from_states(scene, *states), {}

@@ -10,21 +10,9 @@ from tests.house.graph import arrows_up, circle, closure, imports, modules
 
 # What pyproject.toml declares, by import name; the optional ones take long to import, or may be absent.
 OPTIONAL = {
-    "SALib",
-    "matplotlib",
-    "rerun",
-    "rerun_cli",
-    "xarray",
-    "zarr",
-    "google_crc32c",
-    "distributed",
-    "netCDF4",
-    "pyarrow",
-    "gymnasium",
-    "tqdm",
-    "control",
-    "tomlkit",
-}
+    "SALib", "matplotlib", "rerun", "rerun_cli", "xarray", "zarr", "google_crc32c", "distributed", "netCDF4", "pyarrow",
+    "gymnasium", "tqdm", "control", "tomlkit",
+}  # fmt: skip
 DEPENDENCIES = {"numpy", "scipy", "warp"} | OPTIONAL
 
 
@@ -60,28 +48,21 @@ def importers(package, lazy=True):
 
 
 def test_the_reader_finds_both_packages():
-    assert {
-        "lgvi_warp",
-        "lgvi_warp.engine.plan",
-        "lgvi_warp.reference.rotation",
-        "lgvi_kernels.advance.kernel",
-    } <= modules().keys()
+    some = {"lgvi_warp", "lgvi_warp.engine.plan", "lgvi_warp.reference.rotation", "lgvi_kernels.advance.kernel"}
+    assert some <= modules().keys()
     assert all(part(package) for package in ("lgvi_warp.reference", "lgvi_warp.views", "lgvi_kernels.laws"))
 
 
-@pytest.mark.parametrize(
-    ("source", "expected"),
-    [
-        ("import rerun as rr", [("rerun", "top")]),
-        ("def f():\n    import rerun", [("rerun", "lazy")]),
-        ("class A:\n    import rerun", [("rerun", "top")]),
-        ("try:\n    from rerun import Mesh3D\nexcept ImportError:\n    pass", [("rerun.Mesh3D", "top")]),
-        ("if TYPE_CHECKING:\n    import rerun\nelse:\n    import xarray", [("rerun", "typing"), ("xarray", "top")]),
-        ("from lgvi_warp import views", [("lgvi_warp.views", "top")]),
-        ("from . import plots", [("lgvi_warp.views.plots", "top")]),
-        ("from ..results.result import Result", [("lgvi_warp.results.result.Result", "top")]),
-    ],
-)
+@pytest.mark.parametrize(("source", "expected"), [
+    ("import rerun as rr", [("rerun", "top")]),
+    ("def f():\n    import rerun", [("rerun", "lazy")]),
+    ("class A:\n    import rerun", [("rerun", "top")]),
+    ("try:\n    from rerun import Mesh3D\nexcept ImportError:\n    pass", [("rerun.Mesh3D", "top")]),
+    ("if TYPE_CHECKING:\n    import rerun\nelse:\n    import xarray", [("rerun", "typing"), ("xarray", "top")]),
+    ("from lgvi_warp import views", [("lgvi_warp.views", "top")]),
+    ("from . import plots", [("lgvi_warp.views.plots", "top")]),
+    ("from ..results.result import Result", [("lgvi_warp.results.result.Result", "top")]),
+])  # fmt: skip
 def test_the_reader_sees_an_import(source, expected):
     assert imports(ast.parse(source), "lgvi_warp.views") == expected
 
@@ -95,29 +76,17 @@ def test_the_reference_imports_numpy_only():
 
 
 def test_the_product_imports_what_it_declares():
-    assert (
-        strangers(
-            "lgvi_warp", {"lgvi_warp", "lgvi_warp_command", "lgvi_kernels"} | DEPENDENCIES | sys.stdlib_module_names
-        )
-        == []
-    )
+    ours = {"lgvi_warp", "lgvi_warp_command", "lgvi_kernels"}
+    assert strangers("lgvi_warp", ours | DEPENDENCIES | sys.stdlib_module_names) == []
 
 
 def test_only_these_files_of_the_engine_know_the_kernels():
     those = {
-        "lgvi_warp.engine.kernel",
-        "lgvi_warp.engine.kernel_spec",
-        "lgvi_warp.engine.launches",
-        "lgvi_warp.engine.packing",
-        "lgvi_warp.engine.plan",
-        "lgvi_warp.engine.plan_checks",
-        "lgvi_warp.engine.sample_layout",
-        "lgvi_warp.engine.packets",
-        "lgvi_warp.engine.peak",
-        "lgvi_warp.checks.bench",
-        "lgvi_warp.checks.check",
-        "lgvi_warp.checks.part_bench",
-    }
+        "lgvi_warp.engine.kernel", "lgvi_warp.engine.kernel_spec", "lgvi_warp.engine.launches",
+        "lgvi_warp.engine.packing", "lgvi_warp.engine.plan", "lgvi_warp.engine.plan_checks",
+        "lgvi_warp.engine.sample_layout", "lgvi_warp.engine.packets", "lgvi_warp.engine.peak", "lgvi_warp.checks.bench",
+        "lgvi_warp.checks.check", "lgvi_warp.checks.part_bench",
+    }  # fmt: skip
     assert importers("lgvi_kernels") == those
 
 

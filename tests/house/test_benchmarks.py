@@ -70,15 +70,12 @@ def test_a_text_goes_between_its_marks(tmp_path):
     assert page.read_text() == TEXT.replace("old", "new")
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (None, "is missing"),
-        (TEXT.replace("method", "drift"), "needs the lines"),
-        (TEXT + TEXT, "needs the lines"),
-        (TEXT.replace("begin", "x").replace("end", "begin").replace("x", "end"), "needs the lines"),
-    ],
-)
+@pytest.mark.parametrize(("text", "message"), [
+    (None, "is missing"),
+    (TEXT.replace("method", "drift"), "needs the lines"),
+    (TEXT + TEXT, "needs the lines"),
+    (TEXT.replace("begin", "x").replace("end", "begin").replace("x", "end"), "needs the lines"),
+])  # fmt: skip
 def test_a_page_without_its_marks_is_refused(tmp_path, text, message):
     page = tmp_path / "page.md"
     if text is not None:

@@ -13,22 +13,28 @@ import SALib.sample.sobol
 import scipy.stats
 
 import lgvi_warp as lw
+from lgvi_warp.statistics import TYPES as STATISTICS
 from tests.conftest import ROOT
 
 matplotlib.use("Agg")
 
 
-def snippets(language):
-    """(page and line, text) of every fenced snippet of a language."""
+def snippets(language, *names):
+    """(page and line, text) of every fenced snippet of a language; those with events, kernels of their own, are slow."""
     found = []
-    for name in ("sampling.md", "sensitivity.md"):
+    for name in names:
         text = (ROOT / "docs" / "guide" / name).read_text()
         for match in re.finditer(rf"```{language}\n(.*?)```", text, re.DOTALL):
-            found.append(pytest.param(match[1], id=f"{name}:{text[: match.start()].count(chr(10)) + 1}"))
+            marks = [pytest.mark.slow] if "events=" in match[1] else []
+            found.append(pytest.param(match[1], id=f"{name}:{text[: match.start()].count(chr(10)) + 1}", marks=marks))
     return found
 
 
-@pytest.mark.parametrize("text", snippets("toml"))
+TOML = snippets("toml", "sampling.md", "sensitivity.md")
+PYTHON = snippets("python", "sampling.md", "sensitivity.md", "statistics.md")
+
+
+@pytest.mark.parametrize("text", TOML)
 def test_toml(text, tmp_path):
     paper = (ROOT / "examples" / "paper.toml").read_text()
     whole = re.sub(r"\[ensemble\].*?(?=\[run\])", "", paper, flags=re.DOTALL) + text
@@ -37,7 +43,7 @@ def test_toml(text, tmp_path):
     assert lw.Ensemble.from_scene(scene).members > 1
 
 
-@pytest.mark.parametrize("text", snippets("python"))
+@pytest.mark.parametrize("text", PYTHON)
 def test_python(text, scene, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     before = {"lw": lw, "np": np, "scipy": scipy, "SALib": SALib, "scene": scene}
@@ -46,19 +52,18 @@ def test_python(text, scene, tmp_path, monkeypatch, capsys):
 
 
 def test_there_are_snippets():
-    assert len(snippets("toml")) >= 6
-    assert len(snippets("python")) >= 6
+    assert len(TOML) >= 6
+    assert len(PYTHON) >= 12
+    assert len(blocks("guide/statistics.md", "python")) == 6
 
 
 REMUS = '[vehicle]\nname = "remus_100"\n'
 ROV = '[vehicle]\nname = "bluerov2_heavy"\n'
-LAW = "[controller]\nperiod = 0.1\n" + "".join(
-    f"[[controller.{section}]]\n{keys}\n"
-    for section, keys in {
-        "guidance": 'type = "set_point"\nheading = 0.5',
-        "laws": 'type = "heading_pid"\nkp = 1.0',
-    }.items()
-)
+LAW = """[controller]
+period = 0.1
+guidance = [{ type = "set_point", heading = 0.5 }]
+laws = [{ type = "heading_pid", kp = 1.0 }]
+"""
 # Page -> what stands before each of its snippets in a scene file.
 BEFORE = {
     "controllers/README.md": [REMUS],
@@ -125,3 +130,26 @@ def test_a_controller_in_python_and_its_signals():
     exec(text, names := {"lw": lw, "scene": scene})
     assert names["result"].command.shape == (21, 1, 6)
     assert names["result"].status.counts() == {"ok": 1}
+
+
+def test_statistics_in_a_scene_file(tmp_path):
+    (text,) = blocks("guide/statistics.md", "toml")
+    (tmp_path / "scene.toml").write_text((ROOT / "examples" / "paper.toml").read_text() + text)
+    assert len(lw.Scene.load(tmp_path / "scene.toml").run.statistics) == 4
+
+
+def test_shapes_of_statistics_are_those_of_the_page(scene):
+    exec(blocks("guide/statistics.md", "python")[0], names := {"lw": lw, "np": np, "scene": scene})
+    depth = names["depth"]
+    assert depth.time.shape == depth.count.shape == (6,)
+    assert depth.value.shape == depth.lower.shape == (6, 3, 1)
+    assert names["result"].statistics["mean position"].half_width.shape == (6, 3)
+
+
+@pytest.mark.parametrize("looks", [True, False])
+def test_every_type_of_statistic_is_on_its_page(looks):
+    page = (ROOT / "docs" / ("controllers/metrics.md" if looks else "guide/statistics.md")).read_text()
+    for name, kind in STATISTICS.items():
+        if bool(kind.looks) is looks:
+            assert f"`{name}`" in page
+            assert f"`lw.{kind.__name__}`" in page

@@ -18,12 +18,10 @@ from lgvi_warp.views.pages import again
 from lgvi_warp.views.recording import rerun
 
 ESTIMATE = Estimate("mean x", {}, "m", 0.95, "", {"value": ("time",)}, {"value": np.zeros(2)}, {"time": np.arange(2.0)})
+TWO = Space(0, ("a", "b"), (1, 1), (("a", (0,)), ("b", (1,))))
+MODEL = lw.LinearModel(*np.zeros((4, 12, 12)), 0.1, (), (), {})
 DOORS = {
-    "screening": (
-        lambda: lw.Morris(4).draw(Space(0, ("a", "b"), (1, 1), (("a", (0,)), ("b", (1,)))), np.arange(3)),
-        "SALib.sample",
-        "uq",
-    ),
+    "screening": (lambda: lw.Morris(4).draw(TWO, np.arange(3)), "SALib.sample", "uq"),
     "sensitivity": (lambda: analyses.salib(), "SALib.analyze.morris", "uq"),
     "datasets of statistics": (lambda: ESTIMATE.dataset, "xarray", "store"),
     "stores: checksums": (needed, "google_crc32c", "store"),
@@ -31,11 +29,7 @@ DOORS = {
     "stores: zarr": (needed, "zarr", "store"),
     "clusters": (lambda: executor_of("dask", 1, "tcp://127.0.0.1:1"), "distributed", "cluster"),
     "environments": (lambda: lw.gym.VectorEnv(None, observe=[]), "gymnasium", "gym"),
-    "state spaces": (
-        lambda: lw.LinearModel(*np.zeros((4, 12, 12)), 0.1, (), (), {}).state_space(),
-        "control",
-        "control",
-    ),
+    "state spaces": (lambda: MODEL.state_space(), "control", "control"),
     "YAML": (lambda: yaml_text.parsed("a: 1"), "yaml", "yaml"),
     "plots": (plots.figure_class, "matplotlib.figure", "viz"),
     "reports": (lambda: again.toml_of({}), "tomlkit", "viz"),

@@ -15,49 +15,29 @@ from tests.conftest import ROOT
 matplotlib.use("Agg")
 DOCS = ROOT / "docs"
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```\n(?:\n((?:    [^\n]*\n)+))?", re.DOTALL | re.MULTILINE)
-# Page -> the test that runs its snippets. The pages of terms and those below are run here.
-ELSEWHERE = {
-    "README.md": "house/test_readme.py",
-    "docs/controllers/README.md": "house/test_docs.py",
-    "docs/controllers/actuators.md": "house/test_docs.py",
-    "docs/controllers/allocation.md": "house/test_docs.py",
-    "docs/controllers/callback.md": "house/test_docs.py",
-    "docs/controllers/faults.md": "control/test_bad_sensors.py",
-    "docs/controllers/gym.md": "control/test_gym.py",
-    "docs/controllers/margins.md": "studies/test_margins.py",
-    "docs/controllers/metrics.md": "house/test_statistics_page.py",
-    "docs/controllers/sensors.md": "control/test_bad_sensors.py",
-    "docs/controllers/signals.md": "house/test_docs.py",
-    "docs/develop/add_a_method.md": "house/test_develop_pages.py",
-    "docs/develop/add_a_sampling.md": "house/test_develop_pages.py",
-    "docs/develop/add_a_statistic.md": "house/test_develop_pages.py",
-    "docs/gallery.md": "house/test_gallery.py",
-    "docs/guide/events.md": "house/test_docs.py",
-    "docs/guide/failed_members.md": "house/test_docs.py",
-    "docs/guide/is_my_controller_robust.md": "studies/test_sweep_pages.py",
-    "docs/guide/many_calls.md": "house/test_docs.py",
-    "docs/guide/methods.md": "house/test_readme.py",
-    "docs/guide/sampling.md": "house/test_docs.py",
-    "docs/guide/sensitivity.md": "house/test_docs.py",
-    "docs/guide/statistics.md": "house/test_statistics_page.py",
-    "docs/guide/vehicles.md": "house/test_docs.py",
-    "docs/guide/worst_case.md": "studies/test_margins.py",
-    "docs/start/tutorial.md": "house/test_wheel.py",
-}
+# A test -> the pages whose snippets it runs. The pages of terms and those below are run here.
+OF_TESTS = {
+    "house/test_readme.py": "README.md docs/guide/methods.md",
+    "house/test_docs.py":
+        "docs/controllers/README.md docs/controllers/actuators.md docs/controllers/allocation.md "
+        "docs/controllers/callback.md docs/controllers/metrics.md docs/controllers/signals.md "
+        "docs/guide/events.md docs/guide/failed_members.md docs/guide/many_calls.md docs/guide/sampling.md "
+        "docs/guide/sensitivity.md docs/guide/statistics.md docs/guide/vehicles.md",
+    "control/test_bad_sensors.py": "docs/controllers/faults.md docs/controllers/sensors.md",
+    "control/test_gym.py": "docs/controllers/gym.md",
+    "studies/test_margins.py": "docs/controllers/margins.md docs/guide/worst_case.md",
+    "house/test_develop_pages.py":
+        "docs/develop/add_a_method.md docs/develop/add_a_sampling.md docs/develop/add_a_statistic.md",
+    "house/test_gallery.py": "docs/gallery.md",
+    "studies/test_sweep_pages.py": "docs/guide/is_my_controller_robust.md",
+    "house/test_wheel.py": "docs/start/tutorial.md",
+}  # fmt: skip
+ELSEWHERE = {page: test for test, pages in OF_TESTS.items() for page in pages.split()}
 TERMS = [f"docs/guide/terms/{path.name}" for path in sorted((DOCS / "guide" / "terms").glob("[a-z]*.md"))]
 PARTS = ["docs/controllers/guidance.md", "docs/controllers/laws.md"]
 OF_A_RESULT = ["docs/guide/pictures.md", "docs/guide/recordings.md"]
-SCRIPTS = [
-    f"docs/guide/{name}.md"
-    for name in (
-        "choose_method_and_step",
-        "compare_with_your_simulator",
-        "current",
-        "notebooks",
-        "resume",
-        "your_vehicle",
-    )
-]
+SCRIPT_NAMES = "choose_method_and_step compare_with_your_simulator current notebooks resume your_vehicle"
+SCRIPTS = [f"docs/guide/{name}.md" for name in SCRIPT_NAMES.split()]
 
 
 def snippets(page, language):
@@ -75,9 +55,8 @@ def test_each_page_with_code_has_its_test():
     run_here = {*TERMS, *PARTS, *OF_A_RESULT, *SCRIPTS}
     assert with_code - {"docs/guide/terms/README.md"} == ELSEWHERE.keys() | run_here
     for page, test in ELSEWHERE.items():
-        assert page.rpartition("/")[2].partition(".")[0] in (ROOT / "tests" / test).read_text().replace("glob", ""), (
-            page
-        )
+        text = (ROOT / "tests" / test).read_text().replace("glob", "")
+        assert page.rpartition("/")[2].partition(".")[0] in text, page
 
 
 @pytest.mark.parametrize("page", TERMS)
@@ -104,6 +83,7 @@ def test_parts_of_controllers_fit_a_vehicle(page, tmp_path, monkeypatch):
         scene = lw.Scene.from_dict({"vehicle": {"name": "bluerov2_heavy"}, "controller": controller})
         for section, tables in parts.items():
             assert [part.type for part in getattr(scene.controller, section)] == [table["type"] for table in tables]
+        assert lw.Scene.from_dict(scene.to_dict()).to_dict() == scene.to_dict()
 
 
 @pytest.mark.slow

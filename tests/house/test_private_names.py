@@ -76,14 +76,8 @@ def read() -> dict[Path, tuple[set[str], list[ast.AST]]]:
     files = {}
     for path in FILES:
         nodes = list(ast.walk(ast.parse(path.read_text())))
-        files[path] = (
-            own_names(nodes),
-            [
-                node
-                for node in nodes
-                if is_private_attribute(node) or isinstance(node, ast.ImportFrom) or sets_an_attribute(node)
-            ],
-        )
+        uses = (is_private_attribute, sets_an_attribute, lambda node: isinstance(node, ast.ImportFrom))
+        files[path] = own_names(nodes), [node for node in nodes if any(use(node) for use in uses)]
     return files
 
 

@@ -48,11 +48,6 @@ def test_an_old_name_pickles_as_the_new_class():
     assert loaded.points.tolist() == [[0.25, 0.5]]
 
 
-def test_an_unknown_name_is_still_unknown():
-    with pytest.raises(AttributeError, match="no attribute 'Setings'"):
-        lw.Setings
-
-
 def test_the_verb_plan_is_the_verb_predict():
     chosen = [vars(parser().parse_args([verb, "scene.toml", "--members", "3"])) for verb in ("plan", "predict")]
     assert chosen[0].pop("verb") == "plan"

@@ -31,15 +31,9 @@ def test_the_readme_is_short_and_shows_what_comes_of_it():
     text = (ROOT / "README.md").read_text()
     assert len(text.split()) < 1200
     order = [
-        "fleet.webp",
-        "pip install",
-        "lgvi-warp run",
-        "```python",
-        "accuracy_paper.png",
-        "## What is modelled",
-        "**No:**",
-        "## Citation",
-    ]
+        "fleet.webp", "pip install", "lgvi-warp run", "```python", "accuracy_paper.png", "## What is modelled",
+        "**No:**", "## Citation",
+    ]  # fmt: skip
     assert sorted(order, key=text.index) == order
 
 

@@ -180,17 +180,8 @@ def test_the_site_is_built_without_warnings_and_its_links_lead_somewhere(tmp_pat
     # No network: a name that is looked up has no server.
     offline = os.environ | {name: "http://127.0.0.1:9" for name in ("http_proxy", "https_proxy")}
     command = [
-        sys.executable,
-        "-m",
-        "sphinx",
-        "-W",
-        "--keep-going",
-        "-q",
-        "-d",
-        str(tmp_path / "trees"),
-        "docs",
-        str(site),
-    ]
+        sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-d", str(tmp_path / "trees"), "docs", str(site),
+    ]  # fmt: skip
     done = subprocess.run(command, cwd=ROOT, env=offline, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert broken_links(site) == []

@@ -12,22 +12,9 @@ import lgvi_warp as lw
 from tests.conftest import ROOT
 
 HEAVY = {
-    "scipy",
-    "warp",
-    "matplotlib",
-    "rerun",
-    "xarray",
-    "pandas",
-    "zarr",
-    "distributed",
-    "dask",
-    "netCDF4",
-    "pyarrow",
-    "SALib",
-    "gymnasium",
-    "tqdm",
-    "control",
-}
+    "scipy", "warp", "matplotlib", "rerun", "xarray", "pandas", "zarr", "distributed", "dask", "netCDF4", "pyarrow",
+    "SALib", "gymnasium", "tqdm", "control",
+}  # fmt: skip
 PRINT = "; import sys, json; print(json.dumps(sorted(sys.modules)))"
 
 

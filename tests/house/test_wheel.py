@@ -53,14 +53,8 @@ def installed(built, tmp_path_factory):
     (wheel,) = built.glob("*.whl")
 
     def run(command, *arguments):
-        return subprocess.run(
-            [scripts / command, *map(str, arguments)],
-            check=True,
-            cwd=folder,
-            env=variables,
-            capture_output=True,
-            text=True,
-        ).stdout
+        command = [scripts / command, *map(str, arguments)]
+        return subprocess.run(command, check=True, cwd=folder, env=variables, capture_output=True, text=True).stdout
 
     subprocess.run([sys.executable, "-m", "venv", environment], check=True)
     run("python", "-m", "pip", "install", "--no-index", "--no-deps", wheel)

@@ -35,10 +35,7 @@ WEAK = {"standard_deviation": (1e-30,) * 3, "time_constant": 1.0}
 
 def fleet(wander=WEAK, force=S, members=MEMBERS, seed=7, grid=GRID):
     """Members of one start under linear drag, white noise and a current that wanders, both drawn on a grid."""
-    noise = [
-        terms.WrenchNoise(force=force, noise_step=grid),
-        terms.GaussMarkovCurrent(**wander, noise_step=grid),
-    ]
+    noise = [terms.WrenchNoise(force=force, noise_step=grid), terms.GaussMarkovCurrent(**wander, noise_step=grid)]
     drag = terms.DragMatrix(linear=np.diag([DRAG] * 3 + [1e-30] * 3))
     body = vehicle(M=(MASS,) * 3, J=(1e9, 2e9, 3e9))
     scene = lw.Scene(body, lw.Environment(GRAVITY), terms=[drag, *noise], start=lw.Start(velocity=SPEED))
@@ -47,9 +44,6 @@ def fleet(wander=WEAK, force=S, members=MEMBERS, seed=7, grid=GRID):
 
 def run(h, t1=END, method="psi_x", every=None, **named):
     return lw.solve(fleet(**named), method, h=h, t1=t1, save=every and lw.SaveAt(every=every))
-
-
-# One path ---------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("repeat", REPEATS)
@@ -81,9 +75,6 @@ def test_the_current_that_wanders_is_the_same_for_every_step():
         np.testing.assert_allclose(path, paths[0], rtol=0.0, atol=1e-13)
 
 
-# What it adds up to ------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("repeat", REPEATS)
 def test_mean_and_variance_are_those_of_the_exact_solution(repeat):
     # E v = v0 e^(-g t), Var v = S^2 / m^2 (1 - e^(-2 g t)) / (2 g); of the step: (g h)^2 / 6 of them, less than 2e-3.
@@ -104,9 +95,6 @@ def test_halving_the_step_changes_paths_with_the_strong_order():
         assert slope(np.array(REPEATS[:-1]), changes) == pytest.approx(1.0, abs=ERRORS * 0.0064 / np.log(4.0) + 0.01), (
             name
         )
-
-
-# The same bits -----------------------------------------------------------------------------------------------------
 
 
 def test_members_keep_their_path_in_a_subset_and_in_a_store(tmp_path):
@@ -138,9 +126,6 @@ def test_a_grid_of_the_run_is_no_grid(dtype):
     np.testing.assert_allclose(ends[1], ends[0], rtol=0.0, atol=1e-14 if dtype == "float64" else 1e-5)
 
 
-# The setting -------------------------------------------------------------------------------------------------------
-
-
 def test_a_scene_file_keeps_it_and_nothing_varies_it():
     scene = fleet(members=1).scene
     again = lw.Scene.from_dict(scene.to_dict())
@@ -159,15 +144,12 @@ def test_what_is_no_time_is_refused(kind, value):
         kind(**numbers, noise_step=value)
 
 
-@pytest.mark.parametrize(
-    ("h", "every", "text"),
-    [
-        # 0.075 is nearer, but does not divide a second.
-        (0.08, 1.0, r"step = 0.0769.*no whole multiple of wrench_noise.noise_step = 0.025 s; use a step of 0.1 s"),
-        (0.01, 1.0, r"step = 0.01: .*use a step of 0.025 s"),
-        (0.05, 0.11, r"give a noise_step that divides the 0.11 s between samples"),
-    ],
-)
+@pytest.mark.parametrize(("h", "every", "text"), [
+    # 0.075 is nearer, but does not divide a second.
+    (0.08, 1.0, r"step = 0.0769.*no whole multiple of wrench_noise.noise_step = 0.025 s; use a step of 0.1 s"),
+    (0.01, 1.0, r"step = 0.01: .*use a step of 0.025 s"),
+    (0.05, 0.11, r"give a noise_step that divides the 0.11 s between samples"),
+])  # fmt: skip
 def test_a_step_that_is_no_multiple_is_refused_with_the_nearest(h, every, text):
     with pytest.raises(lw.SceneError, match=text):
         make_plan(fleet(members=1), "psi_x", h, 11.0 * every, lw.SaveAt(every=every))
@@ -193,9 +175,6 @@ def test_steps_of_a_comparison_divide_the_draws():
         lw.SceneError, match=r"wrench_noise.noise_step = 0.03: does not divide the 0.1 s.*run.save_every"
     ):
         Sample(fleet(members=2, grid=0.03), 2.0)
-
-
-# A law of a user ---------------------------------------------------------------------------------------------------
 
 
 @wp.func
@@ -245,13 +224,8 @@ def test_check_law_takes_it_and_a_device_that_hides_its_noise_is_refused():
         lw.check_law(Quiet(strength=S))
 
 
-# Orders ------------------------------------------------------------------------------------------------------------
-
-
-SPLIT, EXPLICIT = (
-    ("psi_s", "psi_x", "psi_x8", "psi_w", "phi", "phi_adjoint"),
-    ("rk4", "rk5", "rk8", "rkw3", "cg3", "rkmk4"),
-)
+SPLIT = ("psi_s", "psi_x", "psi_x8", "psi_w", "phi", "phi_adjoint")
+EXPLICIT = ("rk4", "rk5", "rk8", "rkw3", "cg3", "rkmk4")
 ORDERS = [*(("white", method) for method in (*SPLIT, *EXPLICIT)), *(("Gauss-Markov", method) for method in SPLIT)]
 
 

@@ -74,8 +74,15 @@ def wild_distance(view: Any, p: Any):
     return seen(view, p) + view.h.dtype(1e3) * ones(view.b.x)
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Reading(lw.Term):
     """The numbers of both."""
+
+    values: Any = lw.number(("k",), "1")
+    row: Any = lw.number((), "1")
+    count: Any = lw.number((), "1")
+    place: Any = lw.number((), "1")
+    spread: Any = lw.number((), "1")
 
     def packed(self, numbers, context):
         words = {name: int(numbers[name].flat[0]) for name in ("row", "count", "place")}
@@ -84,13 +91,6 @@ class Reading(lw.Term):
         return lw.Packed({**words, "spread": numbers["spread"]}, rows, memory)
 
 
-NUMBERS = dict(
-    values=lw.number(("k",), "1"),
-    row=lw.number((), "1"),
-    count=lw.number((), "1"),
-    place=lw.number((), "1"),
-    spread=lw.number((), "1"),
-)
 WILD = dict(values=np.linspace(-1.0, 1.0, 11), row=0, count=1, place=0, spread=0.0)
 
 
@@ -103,11 +103,6 @@ class WildTerm(Reading):
     type: ClassVar[str] = "wild_term"
     device: ClassVar[Any] = TermDevice
     memory: ClassVar[bool] = True
-    values: Any = NUMBERS["values"]
-    row: Any = NUMBERS["row"]
-    count: Any = NUMBERS["count"]
-    place: Any = NUMBERS["place"]
-    spread: Any = NUMBERS["spread"]
 
 
 @functools.cache
@@ -124,11 +119,6 @@ class EventDevice:
 class WildEvent(lw.Event, Reading):
     type: ClassVar[str] = "wild_event"
     device: ClassVar[Any] = EventDevice
-    values: Any = NUMBERS["values"]
-    row: Any = NUMBERS["row"]
-    count: Any = NUMBERS["count"]
-    place: Any = NUMBERS["place"]
-    spread: Any = NUMBERS["spread"]
 
 
 def foreign(shared):

@@ -111,9 +111,6 @@ def test_the_vehicle_s_inertia_is_the_one_here():
     np.testing.assert_allclose(given, mass_matrix(LEVER), rtol=0.0, atol=1e-12)
 
 
-# Straight ahead ------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 def test_speed_from_rest():
     # (m + added mass) u' = T - k u^2: u = CRUISE tanh(t / tau), tau = 12.56 s, at t = tau. The step's error is of order 2
@@ -139,9 +136,6 @@ def test_steady_speed():
         errors.append(abs(velocity[0] / CRUISE - 1.0))
     assert errors[-1] < (0.16 * 0.1) ** 2 / 12.0
     assert slope(steps, errors) == pytest.approx(2.0, abs=0.1)
-
-
-# Turns in the plane --------------------------------------------------------------------------------------------------
 
 
 def steady_turn(rudder):
@@ -196,9 +190,6 @@ def test_the_straight_course_is_unstable():
     yaw = [run(plane_scene(0.0), 0.01, t1, start)[1][5] for t1 in (6.0, 8.0)]
     # (h rate)^2 and what is left of the other root, exp(-3.4 t) of it, are below 1e-4.
     assert np.log(yaw[1] / yaw[0]) / 2.0 == pytest.approx(fastest, rel=1e-4)
-
-
-# Six degrees of freedom ----------------------------------------------------------------------------------------------
 
 
 def turn_with_roll(rudder):

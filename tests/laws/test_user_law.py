@@ -82,12 +82,9 @@ def test_axes_do_not_matter():
     # The same vehicle in turned body axes: the kernel works in its principal axes, and packed() must turn the nose.
     v = own_law.vehicle
     turned = lw.Vehicle(
-        v.mass,
-        inertia=TURN.T @ v.inertia @ TURN,
-        added_mass=TURN.T @ v.added_mass @ TURN,
-        buoyancy=v.buoyancy,
+        v.mass, inertia=TURN.T @ v.inertia @ TURN, added_mass=TURN.T @ v.added_mass @ TURN, buoyancy=v.buoyancy,
         center_of_buoyancy=v.center_of_buoyancy @ TURN,
-    )
+    )  # fmt: skip
     laws = [own_law.Dock(**DOCK), own_law.Mud(**MUD, center=(0.3, 0.0, -0.1))]
     other = [own_law.Dock(**DOCK | {"nose": DOCK["nose"] @ TURN}), own_law.Mud(**MUD, center=(0.3, 0.0, -0.1) @ TURN)]
     start = {"b": START["b"], "R": TURN, "nu": START["nu"] @ TURN, "Om": START["Om"] @ TURN}
@@ -115,30 +112,18 @@ def test_a_second_solve_builds_no_kernel():
 
 
 SCENE = """
+environment = { gravity = 9.8 }
+terms = [
+  { type = "dock", position = [2.0, 1.0, 3.0], nose = [0.6, 0.1, 0.0], energy = 40.0, reach = 2.0 },
+  { type = "mud", name = "silt", floor = 5.0, height = 2.0, linear = 30.0 },
+]
+ensemble = { members = 3, vary = { "silt.linear" = { lognormal = { sigma = 0.1 } } } }
 [vehicle]
 mass = 31.0
 added_mass = [1.0, 30.0, 30.0]
 inertia = [0.2, 8.0, 8.0]
 buoyancy = 303.8
 center_of_buoyancy = [0.0, 0.0, -0.02]
-[environment]
-gravity = 9.8
-[[terms]]
-type = "dock"
-position = [2.0, 1.0, 3.0]
-nose = [0.6, 0.1, 0.0]
-energy = 40.0
-reach = 2.0
-[[terms]]
-type = "mud"
-name = "silt"
-floor = 5.0
-height = 2.0
-linear = 30.0
-[ensemble]
-members = 3
-[ensemble.vary]
-"silt.linear" = { lognormal = { sigma = 0.1 } }
 """
 
 

@@ -10,7 +10,6 @@ from lgvi_warp.reference import random
 from lgvi_warp.reference.terms import View
 from lgvi_warp.reference.terms.current_harmonics import CurrentHarmonics
 from lgvi_warp.reference.terms.waves import Waves
-from tests.laws.cases import CASES
 from tests.laws.cases_water import HARMONICS, STRATIFICATION, WAVES, WRENCH_NOISE, arrays
 from tests.support.tools import GRAVITY, TURN, one, random_states, slope, vehicle
 
@@ -47,9 +46,6 @@ def flow_at(twin, b, t):
     return twin.flow(View(np.eye(3), np.asarray(b), np.zeros(3), np.zeros(3), t))
 
 
-# A current of harmonics ---------------------------------------------------------------------------------------------
-
-
 def test_a_vehicle_at_rest_in_accelerating_water_stays_with_it():
     # The push (rho V + A) a moves (m + A), and rho V = m: nothing is left of it but round-off, whatever M is.
     twin, h, steps = CurrentHarmonics(**arrays(HARMONICS)), 0.05, 200
@@ -73,9 +69,6 @@ def test_a_heavy_vehicle_is_pushed_by_accelerating_water():
     result = lw.solve(one(lw.Scene(heavy, lw.Environment(GRAVITY), terms=[term])), "psi_s", h=0.01, t1=4.5)
     # The force of each step's middle: an error of (omega h)^2 / 24.
     assert result.velocity[-1, 0, 0] == pytest.approx(-0.4 * 3.0 / 4.0, rel=1e-5)
-
-
-# Waves --------------------------------------------------------------------------------------------------------------
 
 
 def test_waves_are_a_potential_flow():
@@ -149,8 +142,6 @@ def test_frequency_of_encounter(course_deg):
     assert np.hypot(*fit[1:]) == pytest.approx(size, rel=1e-3)
     assert np.abs(swing - columns @ fit).max() < 1e-3 * size
 
-
-# A current that wanders ---------------------------------------------------------------------------------------------
 
 WANDER = dict(standard_deviation=(0.3, 0.2, 0.0), time_constant=2.0)
 
@@ -241,9 +232,6 @@ def test_two_terms_of_a_type_draw_their_own_numbers():
     assert np.abs(variance - 2.0).max() < ERRORS * 2.0 * np.sqrt(2.0 / MEMBERS)
 
 
-# Noise of force and torque ------------------------------------------------------------------------------------------
-
-
 # A full inertia makes the kernel turn the axes: noise must not see it.
 FULL = TURN @ np.diag([1.0, 2.0, 3.0]) @ TURN.T
 
@@ -282,16 +270,6 @@ def test_noise_does_not_see_the_kernels_axes():
     np.testing.assert_allclose(result.velocity[-1], term.force * xi[0] @ np.linalg.inv(M), rtol=0.0, atol=2e-3)
 
 
-@pytest.mark.parametrize("method", ["psi", "psi_1", "tj4(psi_s)"])
-@pytest.mark.parametrize("name", NOISES)
-def test_methods_that_cannot_draw_noise_say_so(name, method):
-    with pytest.raises(lw.SceneError, match=r"noise more than once|undoes one of h"):
-        lw.solve(ensemble(NOISES[name], members=1), method, h=0.1, t1=0.1)
-
-
-# Stratification -----------------------------------------------------------------------------------------------------
-
-
 def test_oscillation_in_stratified_water():
     # Upright, the centre of buoyancy is at d0 + A cos(omega t), omega^2 = B gradient / M33.
     term, M33 = terms.Stratification(**STRATIFICATION), 3.0
@@ -317,21 +295,6 @@ def test_energy_in_stratified_water():
         changes.append(np.abs(energy - energy[0]).max())
     assert slope(np.array([0.02, 0.01, 0.005]), changes) == pytest.approx(2.0, abs=0.1)
 
-
-@pytest.mark.slow
-@pytest.mark.parametrize("term", ["waves", "current harmonics", "stratification"])
-def test_order(term):
-    # The scheme is of order 2 where time and place enter: against itself with a small step.
-    case = CASES[term]
-    fleet = one(lw.Scene(vehicle(net=0.5, moment=(0.2, 0.1, 0.4)), lw.Environment(GRAVITY), terms=list(case.terms)),
-                (0.4, -0.3, 8.0), TURN, (0.5, 0.2, -0.1), (0.3, -0.4, 0.5))  # fmt: skip
-    steps = np.array([0.04, 0.02, 0.01])
-    truth = lw.solve(fleet, "psi_s", h=0.0005, t1=2.0).position[-1]
-    errors = [np.abs(lw.solve(fleet, "psi_s", h=h, t1=2.0).position[-1] - truth).max() for h in steps]
-    assert slope(steps, errors) == pytest.approx(2.0, abs=0.1)
-
-
-# What is refused ----------------------------------------------------------------------------------------------------
 
 BAD = {
     "current_harmonics.periods = .*-7.0.*is not positive; give numbers above 0": (
@@ -368,12 +331,3 @@ def test_members_with_unphysical_periods_are_counted():
     fleet = {"waves.periods": np.array([[5.0, 4.0, 3.0], [5.0, -4.0, 3.0]])}
     with pytest.raises(lw.SceneError, match=r"waves.periods of member 1 .*is unphysical \(1 of 2 members\)"):
         lw.Ensemble.from_states(scene(terms.Waves(**WAVES)), *random_states(1, 2), parameters=fleet)
-
-
-@pytest.mark.parametrize(
-    "name", ["current harmonics", "waves", "Gauss-Markov current", "wrench noise", "stratification"]
-)
-def test_a_scene_file_holds_it(name):
-    (term,) = CASES[name].terms
-    (again,) = terms.from_list([term.to_dict()])
-    assert again.to_dict() == term.to_dict()

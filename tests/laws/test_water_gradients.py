@@ -40,9 +40,6 @@ def accelerations(fleet, method, h):
     return tuple(np.einsum("k,kni->ni", FIRST / h, x) for x in (v, result.angular_velocity))
 
 
-# The pressure on a spheroid --------------------------------------------------------------------------------------------
-
-
 class Cases(NamedTuple):
     """Bodies, states and waters of n members."""
 
@@ -165,8 +162,6 @@ def test_a_sphere_in_shear_has_autons_lift():
     np.testing.assert_allclose(got, force / (mass + 0.5 * displaced), rtol=0.0, atol=1e-9)
 
 
-# A Lagrangian ----------------------------------------------------------------------------------------------------------
-
 # A body whose centre of mass is not its origin, with added mass that couples everything.
 MASS, CENTER, DISPLACED = 20.0, np.array([0.03, -0.02, 0.06]), 22.0
 RIGID = np.block([[MASS * np.eye(3), -MASS * hat(CENTER)], [MASS * hat(CENTER), np.diag([0.5, 2.5, 2.5])]])
@@ -215,14 +210,8 @@ def left_over(dv, dOm):
     """(6,) What Hamel's equations leave: dP/dt - dL/db, and dK/dt + Om x K less the derivative by turns."""
 
     def momenta(s):
-        path = (
-            POSE["b"] + s * TWIST["v"],
-            POSE["R"] @ turn(s * TWIST["Om"]),
-            TWIST["v"] + s * dv,
-            TWIST["Om"] + s * dOm,
-            s,
-        )
-        return np.concatenate(slopes(*path)[2:])
+        place = POSE["b"] + s * TWIST["v"], POSE["R"] @ turn(s * TWIST["Om"])
+        return np.concatenate(slopes(*place, TWIST["v"] + s * dv, TWIST["Om"] + s * dOm, s)[2:])
 
     # The derivative along the way to the fourth power of 1e-3.
     d = 1e-3
@@ -288,9 +277,6 @@ def test_the_twin_of_a_lopsided_body_moves_as_its_lagrangian_says():
         R @ (dnu + np.cross(TWIST["Om"], nu)) + FLOW["acceleration"] + FLOW["growth"] * STRAIN @ b + STRAIN @ TWIST["v"]
     )
     np.testing.assert_allclose(np.concatenate([dv, dOm]), np.concatenate(by_lagrangian()), rtol=0.0, atol=1e-9)
-
-
-# Waves against SciPy ----------------------------------------------------------------------------------------------------
 
 
 class Wave(NamedTuple):

@@ -9,7 +9,6 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
 from lgvi_warp.methods.method import COMPOSITIONS, HALVES, TWO_PART
-from tests.methods.test_coupled import scene_of as coupled_scene_of
 from tests.support.tools import difference, expected, free_scene, last, one, slope
 
 ORDERS = {
@@ -95,38 +94,6 @@ def test_float32_reaches_its_round_off(method, scene, example):
     truth = expected(example["truth"]["5"])
     result = run(scene, method, 0.125, dtype="float32")
     assert difference(last(result), truth) < 1e-5
-
-
-TETHER = lw.terms.Tether(anchor=[0.0, 0.0, 0.0], stiffness=2.0, rest_length=8.0)
-DRAG = lw.terms.Drag(quadratic=[20.0, 80.0, 80.0, 3.0, 5.0, 5.0])
-MATRIX = lw.terms.DragMatrix(linear=np.eye(6))
-WRENCH = lw.terms.Wrench(force=[1.0, 0.0, 0.0], torque=[0.0, 0.0, 0.0])
-REFUSED = [
-    ("rkn6_14", TETHER, "needs potentials of position plus those of attitude; tether has none such"),
-    ("rkn6_11", DRAG, "drag has none such"),
-    ("rkn4_6", WRENCH, "wrench has none such"),
-    ("bm4(psi_x)", MATRIX, "keeps its order only if a step of -h undoes one of h"),
-]
-
-
-@pytest.mark.parametrize(("method", "term", "words"), REFUSED)
-def test_laws_that_do_not_fit(method, term, words, scene):
-    scene = lw.Scene(scene.vehicle, scene.environment, terms=[term], start=scene.start)
-    with pytest.raises(lw.SceneError, match=words):
-        run(scene, method, 0.1)
-
-
-@pytest.mark.parametrize(("name", "words"), [("bm4(psi_1)", "divide D"), ("bm6(phi)", "not symmetric"),
-                                             ("kl6(rkn4_6)", "not of order 2"),
-                                             ("bm5(psi_x)", "did you mean 'bm")])  # fmt: skip
-def test_names_that_do_not_fit(name, words):
-    with pytest.raises(lw.SceneError, match=words):
-        lw.Method(name)
-
-
-def test_coupled_inertia_does_not_fit():
-    with pytest.raises(lw.SceneError, match="cannot advance an inertia that couples velocities and rates"):
-        lw.solve(one(coupled_scene_of(())), "rkn6_11", h=0.1, t1=0.1)
 
 
 def test_a_quarter_turn_is_too_large():

@@ -6,6 +6,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.physics import terms
+from tests.support.loops import torpedo
 from tests.support.tools import one, slope
 
 GRAVITY = 10.0
@@ -17,12 +18,9 @@ WRENCH, CURRENT = terms.Wrench(force=(1e-30, 0.0, 0.0), torque=ARM), terms.Curre
 def sphere(net=NET, center=ARM):
     """A body of 20 kg whose added mass is the same on every axis, to round-off."""
     return lw.Vehicle(
-        20.0,
-        inertia=(0.4, 0.4, 0.4),
-        added_mass=(10.0, 10.0, 10.0 + 2.0**-48),
-        buoyancy=20.0 * GRAVITY - net,
+        20.0, inertia=(0.4, 0.4, 0.4), added_mass=(10.0, 10.0, 10.0 + 2.0**-48), buoyancy=20.0 * GRAVITY - net,
         center_of_buoyancy=center,
-    )
+    )  # fmt: skip
 
 
 def drag_of(linear=DRAG, quadratic=DRAG):
@@ -109,13 +107,7 @@ def test_equilibrium_pitch_of_a_trim_moment(method):
 def test_a_steady_current_only_carries(method):
     # In the frame of the water everything is as in still water: positions differ by u t, velocities by R^T u.
     u = np.array([0.3, -0.2, 0.05])
-    vehicle = lw.Vehicle(
-        20.0,
-        inertia=(1.5, 4.0, 4.5),
-        added_mass=(5.0, 22.0, 25.0),
-        buoyancy=19.9 * GRAVITY,
-        center_of_buoyancy=(0.01, 0.005, -0.02),
-    )
+    vehicle = torpedo(19.9 * GRAVITY, (0.01, 0.005, -0.02))
     drag = terms.Drag(linear=(3.0, 4.0, 5.0, 0.3, 0.4, 0.5), quadratic=(10.0, 30.0, 40.0, 1.0, 2.0, 3.0))
     R = lw.notation.matrix_from_rotation_vector(np.array([0.3, -0.4, 0.8]))
     nu, Om = np.array([1.2, 0.3, -0.2]), (0.3, -0.4, 0.5)
@@ -132,14 +124,8 @@ def test_a_steady_current_only_carries(method):
 def test_a_neutral_body_at_rest_goes_with_accelerating_water():
     # rho V = m: the water's acceleration pushes the body as it pushes the water. R = I, M anisotropic: no relative motion.
     schedule = terms.CurrentProfile(depths=(0.0, 100.0), velocities=((0.5, 0.0, 0.0), (0.5, 0.0, 0.0)))
-    vehicle = lw.Vehicle(
-        20.0,
-        inertia=(1.5, 4.0, 4.5),
-        added_mass=(5.0, 22.0, 25.0),
-        buoyancy=20.0 * GRAVITY - NET,
-        center_of_buoyancy=ARM,
-    )
-    r = run(vehicle, [schedule], {"b": (0.0, 0.0, 10.0), "nu": (0.5, 0.0, 0.0)}, 0.05, 10.0, width=1)
+    vehicle, state = torpedo(20.0 * GRAVITY - NET, ARM), {"b": (0.0, 0.0, 10.0), "nu": (0.5, 0.0, 0.0)}
+    r = run(vehicle, [schedule], state, 0.05, 10.0, width=1)
     assert np.abs(r.position[-1, 0] - (5.0, 0.0, 10.0)).max() < 1e-12
 
 

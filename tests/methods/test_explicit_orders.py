@@ -14,12 +14,9 @@ from tests.support.tools import difference, expected, free_scene, last, one, slo
 
 # Steps with errors above round-off and small enough for the leading term.
 STEPS = {
-    "rk4": (0.05, 0.025, 0.0125),
-    "rk5": (0.1, 0.05, 0.025),
-    "rk8": (0.2, 0.125, 0.1, 0.0625),
-    "cg3": (0.02, 0.01, 0.005),
-    "rkmk4": (0.05, 0.025, 0.0125),
-}
+    "rk4": (0.05, 0.025, 0.0125), "rk5": (0.1, 0.05, 0.025), "rk8": (0.2, 0.125, 0.1, 0.0625),
+    "cg3": (0.02, 0.01, 0.005), "rkmk4": (0.05, 0.025, 0.0125),
+}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -157,36 +154,6 @@ def test_water_is_taken_at_the_users_origin():
     start = {"b": (0.4, -0.3, 8.0), "nu": (1.2, 0.3, -0.2), "Om": (0.3, -0.4, 0.5)}
     truth = last(lw.solve(one(scene, **start), "rk4", h=0.01, t1=1.0))
     assert difference(last(lw.solve(one(scene, **start), "psi", h=0.001, t1=1.0)), truth) < 1e-5
-
-
-@pytest.mark.parametrize("method", ["rk4", "rkmk4", "rkw3"])
-def test_laws_that_do_not_fit_are_refused(method):
-    with pytest.raises(
-        lw.SceneError, match=r"gauss_markov_current, a term that remembers what is not known.*use psi_s"
-    ):
-        lw.solve(one(test_terms.scene_of(CASES["Gauss-Markov current"]), **test_terms.STATE), method, h=0.02, t1=0.1)
-
-
-def test_steps_are_not_chosen_where_noise_is_drawn_once_a_step():
-    method = lw.Method("rk5", rtol=1e-6, atol=1e-6)
-    with pytest.raises(lw.SceneError, match=r"cannot choose its steps where noise is drawn.*leave out rtol and atol"):
-        lw.solve(one(test_terms.scene_of(CASES["wrench noise"]), **test_terms.STATE), method, h=0.02, t1=0.1)
-
-
-@pytest.mark.parametrize(
-    ("named", "text"),
-    [
-        ({"name": "kl8(rk8)"}, "not symmetric"),
-        ({"name": "rk6"}, "rk"),
-        ({"name": "rk4", "rtol": 1e-8, "atol": 1e-8}, "estimates no error; use rk5 or rk8"),
-        ({"name": "psi_s", "rtol": 1e-8, "atol": 1e-8}, "estimates no error"),
-        ({"name": "rk8", "rtol": 1e-8}, "is given alone"),
-        ({"name": "rk8", "rtol": -1.0, "atol": 1e-8}, "is not between 0 and 1"),
-    ],
-)
-def test_methods_are_refused(named, text):
-    with pytest.raises(lw.SceneError, match=text):
-        lw.Method(**named)
 
 
 def test_momentum_without_forces():

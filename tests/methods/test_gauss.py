@@ -106,12 +106,3 @@ def test_any_number_of_segments_gives_the_same_bits(scene):
     whole = lw.solve(lw.Ensemble(scene, members=3), "gauss6", h=0.1, t1=5.0, save=lw.SaveAt(every=5.0))
     sampled = lw.solve(lw.Ensemble(scene, members=3), "gauss6", h=0.1, t1=5.0, save=lw.SaveAt(every=0.1))
     assert np.array_equal(whole.attitude[-1], sampled.attitude[-1])
-
-
-@pytest.mark.parametrize("term", [lw.terms.Drag(quadratic=np.ones(6)), lw.terms.DragMatrix(linear=np.eye(6)),
-                                  lw.terms.Current(velocity=[0.1, 0.0, 0.0]),
-                                  lw.terms.WrenchNoise(force=[1.0] * 3, torque=[0.0] * 3)])  # fmt: skip
-def test_laws_that_do_not_fit(term, scene):
-    scene = lw.Scene(scene.vehicle, scene.environment, terms=[term], start=scene.start)
-    with pytest.raises(lw.SceneError, match="takes forces of position and time only"):
-        run(scene, "gauss6", 0.1)

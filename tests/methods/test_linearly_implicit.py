@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.common.errors import SceneError
 from lgvi_warp.engine.survey import frame_of
 from lgvi_warp.methods.tableaux import DOP853, RK4, RKW3
 from lgvi_warp.reference import explicit, linearly_implicit
@@ -38,9 +37,6 @@ def amplification(z, w):
     return 1.0 + z * (stages[..., 0] @ b)
 
 
-# Coefficients --------------------------------------------------------------------------------------------------------
-
-
 def test_order_3_whatever_the_matrix():
     # Conditions of W-methods, Hairer & Wanner II, IV.7: those of the explicit method, and zero for each tree with an edge g.
     a, g, b = matrices()
@@ -62,8 +58,6 @@ def test_stability():
         assert np.abs(amplification(rates, ratio * rates)).max() < 1.0
         assert np.abs(amplification(rates, rates / ratio)).max() < 1.0
 
-
-# The twin ------------------------------------------------------------------------------------------------------------
 
 SPEEDS = np.array([1.0, 0.6, 0.5, 0.8, 0.9, 0.7])
 LIGHT = Drag(linear=0.1 * SPEEDS, quadratic=np.zeros(6))
@@ -100,9 +94,6 @@ def test_without_damping_it_is_the_classical_method():
     assert make_plan(fleet, METHOD, h=0.1, t1=1.0).spec == make_plan(fleet, "rk4", h=0.1, t1=1.0).spec
 
 
-# The kernel ----------------------------------------------------------------------------------------------------------
-
-
 def both(scene, body, at, h, steps, **named):
     """The state after so many steps by the kernel and by the twin."""
     fleet = one(scene, **at)
@@ -137,8 +128,6 @@ def test_kernel_with_laws(names, dtype, bound):
     assert difference(*both(scene, body, test_parity.STATE, 0.02, 25, dtype=dtype)) < bound
 
 
-# Steady motion -------------------------------------------------------------------------------------------------------
-
 RUDDER = test_remus_100.RUDDERS[0]
 
 
@@ -168,37 +157,25 @@ def test_a_turn_with_roll_is_a_fixed_point():
     assert np.abs(turned[2] - R[2]).max() < 1e-10
 
 
-# Strong damping ------------------------------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def falling():
+def falling(linear, quadratic, h, steps, method=METHOD, speed=0.0):
     """Velocity of a heavy body that falls with linear or quadratic drag, at each step."""
-
-    def run(linear, quadratic, h, steps, method=METHOD, speed=0.0):
-        drag = {"type": "drag_matrix", "linear": linear * np.eye(6), "quadratic": quadratic * np.eye(6)}
-        scene = lw.Scene(
-            lw.Vehicle(20.0, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=150.0),
-            lw.Environment(gravity=9.8),
-            [drag],
-        )
-        fleet = one(scene, nu=(0.0, 0.0, speed))
-        return lw.solve(fleet, method, h=h, t1=steps * h, save=lw.SaveAt(every=h)).velocity[:, 0]
-
-    return run
+    drag = {"type": "drag_matrix", "linear": linear * np.eye(6), "quadratic": quadratic * np.eye(6)}
+    body = lw.Vehicle(20.0, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=150.0)
+    fleet = one(lw.Scene(body, lw.Environment(gravity=9.8), [drag]), nu=(0.0, 0.0, speed))
+    return lw.solve(fleet, method, h=h, t1=steps * h, save=lw.SaveAt(every=h)).velocity[:, 0]
 
 
 NET = 20.0 * 9.8 - 150.0
 
 
-def test_terminal_fall(falling):
+def test_terminal_fall():
     # v' = (net - q v^2) / 45 kg: rate 2 q v / 45 = 6.4 1/s, so nothing is left of the start after 30 s.
     end = falling(0.0, 450.0, 0.2, 150)[-1]
     assert end[2] == pytest.approx(np.sqrt(NET / 450.0), rel=1e-13)
 
 
 @pytest.mark.parametrize("number", [1e2, 1e4, 1e6])
-def test_linear_drag_of_any_strength(falling, number):
+def test_linear_drag_of_any_strength(number):
     # h rate = `number`: the first step leaves R(z) of the start, which falls as 12 / |z| with the true matrix.
     h, mass = 0.1, 45.0
     linear = number * mass / h
@@ -211,7 +188,7 @@ def test_linear_drag_of_any_strength(falling, number):
 QUADRATIC = 20.0 * 45.0 / (0.2 * 2.0)
 
 
-def test_quadratic_drag_where_rk4_diverges(falling):
+def test_quadratic_drag_where_rk4_diverges():
     h, speed = 0.2, 2.0
     v = falling(0.0, QUADRATIC, h, 60, speed=speed)[:, 2]
     assert np.abs(v).max() == speed
@@ -219,30 +196,9 @@ def test_quadratic_drag_where_rk4_diverges(falling):
 
 
 @pytest.mark.slow
-def test_rk4_diverges_there(falling):
+def test_rk4_diverges_there():
     with np.errstate(all="ignore"):
         assert not np.abs(falling(0.0, QUADRATIC, 0.2, 20, "rk4", 2.0)).max() < 1e3
-
-
-# What it refuses -----------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"name": "su4(rkw3)"}, "not symmetric"),
-        ({"name": METHOD, "rtol": 1e-6, "atol": 1e-6}, "estimates no error; use rk5 or rk8"),
-    ],
-)
-def test_methods_that_do_not_exist(arguments, words):
-    with pytest.raises(SceneError, match=words):
-        lw.Method(**arguments)
-
-
-def test_compensated_sums_are_refused():
-    fleet = lw.Ensemble.from_scene(test_parity.scene_of(CASES["drag"]))
-    with pytest.raises(SceneError, match="which rkw3 is not"):
-        make_plan(fleet, METHOD, h=0.1, t1=1.0, dtype="float32_compensated")
 
 
 def test_studies_try_it_where_something_is_damped():

@@ -14,7 +14,6 @@ from lgvi_warp.physics import terms
 from lgvi_warp.reference import explicit, linearly_implicit, munthe_kaas
 from lgvi_warp.reference.terms.control_fins import ControlFins
 from lgvi_warp.reference.terms.thrusters import Thrusters
-from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.studies.comparison import Sample
 from tests.laws import test_parity as test_terms
 from tests.laws.case import Case
@@ -180,10 +179,6 @@ def test_a_thruster_that_is_switched_on(method, steps):
 
 def test_what_is_refused_and_what_studies_try():
     fleet = one(test_terms.scene_of(ROUGH), **test_terms.STATE)
-    for method, words in (("cg3", "before the step's start, where it is not known what thrusters remembers; use rkmk4"),
-                          ("kl6(psi_x)", "use psi_x")):  # fmt: skip
-        with pytest.raises(lw.SceneError, match=words):
-            make_plan(fleet, method, h=0.1, t1=1.0)
     laws = test_terms.body_of(ROUGH)
     with pytest.raises(ValueError, match="not known before a step"):
         munthe_kaas.cg3(begun(laws), laws, 0.1)

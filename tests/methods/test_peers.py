@@ -15,16 +15,9 @@ from lgvi_warp.reference.terms.weight import Weight
 # 2 s, 9 members: one more than fill a packet of 8 lanes.
 MEMBERS, T1 = 9, 2.0
 NEEDS = {
-    "lgvi_warp": (),
-    "warp_ordinary": (),
-    "heyoka": ("heyoka",),
-    "numba": ("numba",),
-    "numba_simd": ("numba",),
-    "jax": ("jax",),
-    "diffrax": ("jax", "diffrax"),
-    "mujoco": ("mujoco",),
-    "newton": ("newton",),
-}
+    "lgvi_warp": (), "warp_ordinary": (), "heyoka": ("heyoka",), "numba": ("numba",), "numba_simd": ("numba",),
+    "jax": ("jax",), "diffrax": ("jax", "diffrax"), "mujoco": ("mujoco",), "newton": ("newton",),
+}  # fmt: skip
 # Largest error of the best setting over 2 s: round-off for high orders, else the truncation of the finest step: of order 4
 # and of order 2 at 1/256 s, of order 1 at 1/128 s.
 LIMITS = {"numba": 1e-10, "warp_ordinary": 1e-5, "newton": 1e-3}

@@ -19,7 +19,7 @@ from lgvi_warp.reference.terms.gauss_markov_current import GaussMarkovCurrent
 from lgvi_warp.reference.terms.restoring import Restoring
 from lgvi_warp.reference.terms.weight import Weight
 from lgvi_warp.reference.terms.wrench import Wrench
-from tests.methods.test_reference_structure import coordinates, moved, two_form
+from tests.methods.test_reference_structure import change, coordinates, moved, two_form
 from tests.support.tools import TURN, difference, expected, from_state, slope
 
 M = TURN @ np.diag([1.0, 2.0, 3.0]) @ TURN.T
@@ -48,11 +48,6 @@ def begin(body, speed=1.0):
 
 def errors(x, body, truth):
     return np.array([np.linalg.norm(u - v) for u, v in zip(from_state(body, x), truth, strict=True)])
-
-
-def change(values):
-    values = np.array(values)
-    return np.abs(values - values[0]).max()
 
 
 # Order conditions of Runge-Kutta methods: b.phi = 1 / gamma for each rooted tree (Hairer, Norsett & Wanner, II.2).

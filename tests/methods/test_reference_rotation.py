@@ -13,13 +13,9 @@ ITERATIVE = ("newton", "cayley", "quartic")
 # Principal inertias: the paper's, a general one, a sphere, a plate (J1 + J2 = J3), a thin rod, and one that no rigid
 # body has, but that added inertia can make (J1 + J2 < J3).
 SHAPES = {
-    "paper": (5.46, 5.29, 5.72),
-    "general": (1.0, 2.0, 2.5),
-    "sphere": (2.0, 2.0, 2.0),
-    "plate": (1.0, 2.0, 3.0),
-    "rod": (1e-6, 1.0, 1.0),
-    "added": (1.0, 2.0, 3.5),
-}
+    "paper": (5.46, 5.29, 5.72), "general": (1.0, 2.0, 2.5), "sphere": (2.0, 2.0, 2.0), "plate": (1.0, 2.0, 3.0),
+    "rod": (1e-6, 1.0, 1.0), "added": (1.0, 2.0, 3.5),
+}  # fmt: skip
 ROUND_OFF = 2.3e-16
 
 

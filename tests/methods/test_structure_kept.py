@@ -6,6 +6,8 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.physics import energy as invariants
+from tests.methods.test_reference_structure import coordinates, moved, two_form
+from tests.support import tools
 from tests.support.tools import EQUAL, METHODS, difference, free_scene, last, one, random_states, scene_of, slope
 
 # One kernel for each method: masses that differ, weight and a restoring moment.
@@ -95,45 +97,15 @@ def test_phi_adjoint_undoes_phi(steps):
 def symplectic_defect(method, h, M, eps=2e-4):
     """|DPsi^T S DPsi - S| of one kernel step by central differences of order 4, in left-trivialised coordinates."""
     scene = scene_of(M, (1.0, 2.0, 2.5), net=-0.7, moment=(0.1, -0.2, -0.5))
-    b, R, nu, Om = (x[0] for x in random_states(4, 1, 0.6, 0.6))
-    M, J = np.diag(M), np.diag((1.0, 2.0, 2.5))
-    moves = np.concatenate([k * eps * np.eye(12) for k in (-2, -1, 1, 2)])
-    shifted = R @ lw.notation.matrix_from_rotation_vector(moves[:, 3:6])
-    p, pi = M @ nu + moves[:, 6:9], J @ Om + moves[:, 9:]
-    fleet = one(scene, b + moves[:, :3] @ R.T, shifted, np.linalg.solve(M, p.T).T, np.linalg.solve(J, pi.T).T)
-    result = lw.solve(fleet, method, h=h, t1=h)
-    centre = last(lw.solve(one(scene, b, R, nu, Om), method, h=h, t1=h))
-    out = _coordinates(result, centre, M, J).reshape(4, 12, 12)
+    body = tools.body_of(scene)
+    x = tools.to_state(body, *(value[0] for value in random_states(4, 1, 0.6, 0.6)))
+    moves = np.concatenate([*(k * eps * np.eye(12) for k in (-2, -1, 1, 2)), np.zeros((1, 12))])
+    states = zip(*(tools.from_state(body, moved(x, d)) for d in moves), strict=True)
+    result = lw.solve(one(scene, *map(np.array, states)), method, h=h, t1=h)
+    *around, centre = (tools.to_state(body, *last(result, i)) for i in range(len(moves)))
+    out = np.array([coordinates(y, centre) for y in around]).reshape(4, 12, 12)
     derivative = ((out[0] - out[3]) + 8.0 * (out[2] - out[1])).T / (12.0 * eps)
-    before, after = _form(M @ nu, J @ Om), _form(M @ centre[2], J @ centre[3])
-    return np.abs(derivative.T @ after @ derivative - before).max()
-
-
-def _coordinates(result, centre, M, J):
-    """(R^T db, log(R^T R'), p, pi) of each member about the centre, (n, 12)."""
-    b, R, _, _ = centre
-    relative = R.T @ result.attitude[-1]
-    q = lw.notation.quaternion_from_matrix(relative)
-    half = np.arcsin(np.linalg.norm(q[:, 1:], axis=1, keepdims=True))
-    rotation = 2.0 * q[:, 1:] / np.sinc(half / np.pi)
-    return np.hstack(
-        [(result.position[-1] - b) @ R, rotation, result.velocity[-1] @ M, result.angular_velocity[-1] @ J]
-    )
-
-
-def _form(p, pi):
-    """S of the canonical two-form on T*SE(3), left-trivialised: <dm1, x2> - <dm2, x1> - <m, [x1, x2]>, x = (v, w)."""
-
-    def hat(a):
-        return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
-
-    S = np.zeros((12, 12))
-    S[6:, :6], S[:6, 6:] = np.eye(6), -np.eye(6)
-    # [x1, x2] = (w1 x v2 - w2 x v1, w1 x w2): p.(w1 x v2) = v2.(p x w1) = x1w . (v2 x p)
-    S[3:6, :3] -= -hat(p)
-    S[:3, 3:6] -= -hat(p)
-    S[3:6, 3:6] -= -hat(pi)
-    return S
+    return np.abs(derivative.T @ two_form(centre) @ derivative - two_form(x)).max()
 
 
 slow = pytest.mark.slow

@@ -5,34 +5,9 @@ import math
 
 # What a file, or a caller from Python, may write in the place of anything.
 ODD = (
-    None,
-    True,
-    "",
-    "a",
-    "drag",
-    [],
-    [[1]],
-    [["a"]],
-    {},
-    {"a": 1},
-    [{}],
-    0,
-    -1,
-    2**63,
-    2**70,
-    -(2**63),
-    1e308,
-    5e-324,
-    math.nan,
-    math.inf,
-    [1.0, [2.0]],
-    [None],
-    [1e308] * 3,
-    "1.0",
-    [[[]]],
-    {"type": {"a": 1}},
-    10**400,
-)
+    None, True, "", "a", "drag", [], [[1]], [["a"]], {}, {"a": 1}, [{}], 0, -1, 2**63, 2**70, -(2**63), 1e308, 5e-324,
+    math.nan, math.inf, [1.0, [2.0]], [None], [1e308] * 3, "1.0", [[[]]], {"type": {"a": 1}}, 10**400,
+)  # fmt: skip
 NUMBERS = (0.0, 1.0, -1.0, 0.5, 2.0, 10.0, 1e-3, 1e3, 1e-300, 1e300)
 SCALES = (0.01, 0.1, 1.0, 10.0, 100.0)
 

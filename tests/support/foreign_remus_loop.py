@@ -41,29 +41,14 @@ from tests.support import foreign_remus as remus
 
 # Numbers of the law, in the order of its struct; they are those of the NumPy loop.
 NUMBERS = {
-    **{f"linear{i}": remus.LINEAR[i] for i in range(6)},
-    "fading": remus.FADING,
-    "pressure": 0.5 * remus.DENSITY * remus.AREA,
-    "drag": remus.DRAG,
-    "slope": remus.SLOPE,
-    "induced": remus.INDUCED,
-    "cross": remus.CROSS,
-    "half": -remus.STRIPS[0],
-    "strip": remus.STRIPS[1] - remus.STRIPS[0],
-    "added_ahead": remus.ADDED[0, 0],
-    "added_across": remus.ADDED[1, 1],
-    "rudder": remus.RUDDER,
-    "planes": remus.PLANES,
-    "place": remus.FIN_PLACE,
-    "limit": remus.FIN_LIMIT,
-    "fin_rate": 1.0 / remus.FIN_LAG,
-    "thrust": remus.THRUST,
-    "thrust_loss": remus.THRUST_LOSS,
-    "torque": remus.TORQUE,
-    "torque_loss": remus.TORQUE_LOSS,
-    "revolutions": remus.REVOLUTIONS,
-    "revolutions_rate": 1.0 / remus.PROPELLER_LAG,
-}
+    **{f"linear{i}": remus.LINEAR[i] for i in range(6)}, "fading": remus.FADING,
+    "pressure": 0.5 * remus.DENSITY * remus.AREA, "drag": remus.DRAG, "slope": remus.SLOPE, "induced": remus.INDUCED,
+    "cross": remus.CROSS, "half": -remus.STRIPS[0], "strip": remus.STRIPS[1] - remus.STRIPS[0],
+    "added_ahead": remus.ADDED[0, 0], "added_across": remus.ADDED[1, 1], "rudder": remus.RUDDER, "planes": remus.PLANES,
+    "place": remus.FIN_PLACE, "limit": remus.FIN_LIMIT, "fin_rate": 1.0 / remus.FIN_LAG, "thrust": remus.THRUST,
+    "thrust_loss": remus.THRUST_LOSS, "torque": remus.TORQUE, "torque_loss": remus.TORQUE_LOSS,
+    "revolutions": remus.REVOLUTIONS, "revolutions_rate": 1.0 / remus.PROPELLER_LAG,
+}  # fmt: skip
 STRIPS = len(remus.STRIPS)
 
 
@@ -307,12 +292,7 @@ class DepthFilter(lw.Guidance):
 
 
 def scene(depth: float, heading: float, sea: remus.Sea) -> lw.Scene:
-    """The loop of the package: its depth law, sliding mode and reference model with the other simulator's numbers.
-
-    Args:
-        depth, heading: what is wanted [m], [rad].
-        sea: the current.
-    """
+    """The loop of the package: its depth law, sliding mode and reference model with the other simulator's numbers."""
     guidance = [
         lw.SetPoint(depth=depth, heading=heading),
         lw.ReferenceModel(natural_frequency=(1.0, 0.1), rate_limit=(1e3, np.radians(5.0))),
@@ -338,17 +318,7 @@ CALM, CURRENT = remus.Sea(), remus.Sea(0.5, np.radians(170.0))
 
 
 def ours(sea: remus.Sea, method: str = "rk8", parts: int = 1, time: float = TIME) -> tuple[np.ndarray, np.ndarray]:
-    """The loop of the package.
-
-    Args:
-        sea: the current.
-        method: how time advances; "rk8" by default.
-        parts: steps in a period; 1 by default.
-        time: how long [s].
-
-    Returns:
-        Positions (k, 3) [m] and headings (k,) [rad] at the looks and at the end.
-    """
+    """Positions (k, 3) [m] and headings (k,) [rad] of the package's loop at the looks and at the end; parts: of a period."""
     save = lw.SaveAt(every=remus.SAMPLE)
     result = lw.solve(scene(**WANTED, sea=sea), method, h=remus.SAMPLE / parts, t1=time, save=save)
     assert result.status.counts() == {"ok": 1}
@@ -357,14 +327,7 @@ def ours(sea: remus.Sea, method: str = "rk8", parts: int = 1, time: float = TIME
 
 
 def theirs(sea: remus.Sea, choices: remus.Choices, time: float = TIME) -> tuple[np.ndarray, np.ndarray]:
-    """The loop of the other simulator, as `ours`.
-
-    Args:
-        sea, choices, time: the current; how it is run; how long [s].
-
-    Returns:
-        Positions (k, 3) [m] and headings (k,) [rad] at the looks and at the end.
-    """
+    """The same of the other simulator's loop."""
     position, angles = remus.simulate(**WANTED, time=time, sea=sea, choices=choices)
     return position, angles[:, 2]
 

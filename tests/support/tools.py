@@ -58,12 +58,9 @@ def free_scene(M=(1.0, 2.0, 3.0), J=(1.0, 2.0, 2.5)):
     """A scene with forces far below round-off: the body moves freely, by the same kernel as that of `scene_of`."""
     heavy = vehicle(M, J)
     free = lw.Vehicle(
-        heavy.mass,
-        inertia=J,
-        added_mass=heavy.added_mass,
-        buoyancy=3e-30 * heavy.mass,
+        heavy.mass, inertia=J, added_mass=heavy.added_mass, buoyancy=3e-30 * heavy.mass,
         center_of_buoyancy=(0.0, 0.0, -1e-3),
-    )
+    )  # fmt: skip
     return lw.Scene(free, lw.Environment(gravity=1e-30))
 
 
@@ -74,12 +71,12 @@ def body_of(scene):
     return Body(v.mass_matrix, v.inertia, terms)
 
 
-def one(scene, b=(0.0, 0.0, 0.0), R=None, nu=(0.0, 0.0, 0.0), Om=(0.0, 0.0, 0.0)):
-    """An ensemble of one member, or of as many as the arrays hold."""
+def one(scene, b=(0.0, 0.0, 0.0), R=None, nu=(0.0, 0.0, 0.0), Om=(0.0, 0.0, 0.0), parameters=None):
+    """An ensemble of one member, or of as many as the arrays, and those of varied parameters, hold."""
     R = np.eye(3) if R is None else R
     states = [np.reshape(np.asarray(x, dtype=float), (-1, *shape)) for x, shape in zip((b, R, nu, Om), SHAPES)]
-    n = max(len(x) for x in states)
-    return lw.Ensemble.from_states(scene, *(np.broadcast_to(x, (n, *x.shape[1:])) for x in states))
+    n = max(len(x) for x in (*states, *(parameters or {}).values()))
+    return lw.Ensemble.from_states(scene, *(np.broadcast_to(x, (n, *x.shape[1:])) for x in states), parameters)
 
 
 SHAPES = ((3,), (3, 3), (3,), (3,))

@@ -63,25 +63,22 @@ def policy(tmp_path, arrays=ONE, **words):
     return lw.Policy(**dict(file=tmp_path / "policy.npz", inputs=["depth_error"], outputs=["Z"]) | words)
 
 
-@pytest.mark.parametrize(
-    ("arrays", "words", "said"),
-    [
-        (ONE, {"inputs": ["dept_error"]}, r"policy.inputs\[0\] = 'dept_error'.*depth_error"),
-        (ONE, {"inputs": "depth"}, "policy.inputs.*no list of names"),
-        (ONE, {"inputs": ["velocity"]}, "policy.inputs.*are 3 numbers.*name the 1 of"),
-        (ONE, {"outputs": ["Z", "Z"]}, r"policy.outputs\[1\].*named twice"),
-        (ONE, {"outputs": ["Z", "N"]}, "policy.outputs.*are 2 numbers"),
-        (ONE, {"scale": (1.0, 2.0)}, "policy.scale.*give 1"),
-        (ONE, {"activation": "gelu"}, "policy.activation.*relu"),
-        (ONE, {"checksum": 1}, "policy.checksum.*is not that of"),
-        ({"weights_0": np.ones((1, 1))}, {}, "policy.file.*has weights_0; save it by np.savez"),
-        ({}, {}, "policy.file.*has no arrays"),
-        (ONE | {"biases_0": np.zeros(2)}, {}, r"policy.file.*weights_0 of shape \(1, 1\)"),
-        (ONE | dict(weights_1=np.ones((1, 2)), biases_1=np.zeros(1)), {}, r"policy.file.*weights_1.*give \(n, 1\)"),
-        (ONE | {"biases_0": np.array([np.nan])}, {}, "policy.file.*other than finite numbers"),
-        (ONE | {"biases_0": np.array(["a"])}, {}, "policy.file.*other than finite numbers"),
-    ],
-)
+@pytest.mark.parametrize(("arrays", "words", "said"), [
+    (ONE, {"inputs": ["dept_error"]}, r"policy.inputs\[0\] = 'dept_error'.*depth_error"),
+    (ONE, {"inputs": "depth"}, "policy.inputs.*no list of names"),
+    (ONE, {"inputs": ["velocity"]}, "policy.inputs.*are 3 numbers.*name the 1 of"),
+    (ONE, {"outputs": ["Z", "Z"]}, r"policy.outputs\[1\].*named twice"),
+    (ONE, {"outputs": ["Z", "N"]}, "policy.outputs.*are 2 numbers"),
+    (ONE, {"scale": (1.0, 2.0)}, "policy.scale.*give 1"),
+    (ONE, {"activation": "gelu"}, "policy.activation.*relu"),
+    (ONE, {"checksum": 1}, "policy.checksum.*is not that of"),
+    ({"weights_0": np.ones((1, 1))}, {}, "policy.file.*has weights_0; save it by np.savez"),
+    ({}, {}, "policy.file.*has no arrays"),
+    (ONE | {"biases_0": np.zeros(2)}, {}, r"policy.file.*weights_0 of shape \(1, 1\)"),
+    (ONE | dict(weights_1=np.ones((1, 2)), biases_1=np.zeros(1)), {}, r"policy.file.*weights_1.*give \(n, 1\)"),
+    (ONE | {"biases_0": np.array([np.nan])}, {}, "policy.file.*other than finite numbers"),
+    (ONE | {"biases_0": np.array(["a"])}, {}, "policy.file.*other than finite numbers"),
+])  # fmt: skip
 def test_a_policy_that_does_not_fit(arrays, words, said, tmp_path):
     with pytest.raises(lw.SceneError, match=re.compile(said, re.S)):
         policy(tmp_path, arrays, **words)

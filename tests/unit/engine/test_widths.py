@@ -61,15 +61,8 @@ def contents():
     odd += [{"other float64": 8}, [8], 8, None, "plain float64"]
     texts = [json.dumps({key: one}) for one in odd] + [json.dumps({"another": {"plain float64": 4}})]
     return [
-        *map(str.encode, texts),
-        b"",
-        b"[]",
-        b"8",
-        b"{",
-        b"\xff\xfe",
-        b"[" * 100_000,
-        b" " * (widths.MOST_BYTES + 1),
-    ]
+        *map(str.encode, texts), b"", b"[]", b"8", b"{", b"\xff\xfe", b"[" * 100_000, b" " * (widths.MOST_BYTES + 1),
+    ]  # fmt: skip
 
 
 def test_foreign_files_are_ignored(file):

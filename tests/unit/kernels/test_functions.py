@@ -24,14 +24,9 @@ FORMATS = {"float64": (wp.float64, np.float64), "float32": (wp.float32, np.float
 THOROUGH = [(1, "float64"), (8, "float64"), (1, "float32"), (16, "float32")]
 LARGEST = {"float64": 700.0, "float32": 87.0}
 ERRORS = {
-    "root": 1.0,
-    "exponential": 2.0,
-    "sine": 2.0,
-    "cosine": 2.0,
-    "logarithm": 3.0,
-    "decay": 4.0,
+    "root": 1.0, "exponential": 2.0, "sine": 2.0, "cosine": 2.0, "logarithm": 3.0, "decay": 4.0,
     "hyperbolic_tangent": 5.0,
-}
+}  # fmt: skip
 ARCTANGENT_ERROR = 3.0
 
 
@@ -84,14 +79,9 @@ def exact_decay(x):
 
 
 EXACT = {
-    "root": np.sqrt,
-    "exponential": np.exp,
-    "sine": np.sin,
-    "cosine": np.cos,
-    "logarithm": np.log,
-    "decay": exact_decay,
+    "root": np.sqrt, "exponential": np.exp, "sine": np.sin, "cosine": np.cos, "logarithm": np.log, "decay": exact_decay,
     "hyperbolic_tangent": np.tanh,
-}
+}  # fmt: skip
 
 
 def arguments(function, name):
@@ -222,14 +212,11 @@ def test_clamp_and_greatest(width, name):
     assert np.isnan(evaluate(width, name, [np.nan], [-1.0], [1.0])["clamp"]).all()
 
 
-@pytest.mark.parametrize(
-    ("name", "widths"),
-    [
-        ("float64", (1, 8)),
-        ("float32", (1, 16)),
-        *(pytest.param(name, WIDTHS, marks=pytest.mark.slow) for name in FORMATS),
-    ],
-)
+@pytest.mark.parametrize(("name", "widths"), [
+    ("float64", (1, 8)),
+    ("float32", (1, 16)),
+    *(pytest.param(name, WIDTHS, marks=pytest.mark.slow) for name in FORMATS),
+])  # fmt: skip
 def test_every_width_gives_the_same_bits(name, widths):
     x = np.concatenate([np.random.default_rng(3).uniform(0.01, 80.0, 4096), [0.0, np.inf, np.nan]])
     first, *others = (evaluate(width, name, x, 1.0, 2.0) for width in widths)

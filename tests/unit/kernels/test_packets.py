@@ -13,7 +13,6 @@ from lgvi_kernels.lanes.state import state_struct, struct
 
 pytestmark = pytest.mark.kernel
 
-VECTORS = ("R0", "R1", "R2", "b", "p", "pi")
 ENTRIES = 18
 LIMIT, TINY = 1e-3, 1e-4
 TURN = np.linalg.qr(np.random.default_rng(0).normal(size=(3, 3)))[0]

@@ -7,7 +7,6 @@ Each row of a table below is a file, or an argument, that somebody may meet. doc
 import io
 import os
 import resource
-import socket
 import subprocess
 import sys
 import time
@@ -25,6 +24,7 @@ from lgvi_warp.cli.settings import out_of
 from lgvi_warp.common import errors, reading
 from lgvi_warp.scene.scene import from_dict
 from tests.conftest import ROOT
+from tests.support import hostile
 
 BODY = "[vehicle]\nmass = 30.0\ninertia = [0.2, 3.0, 3.0]\nbuoyancy = 290.0\n"
 TABLED = BODY + "[ensemble.sampling.table]\nfile = 'table.csv'\n"
@@ -134,15 +134,6 @@ SCENES = {
 }
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_a_scene_is_refused(name, tmp_path):
-    content, words = SCENES[name]
-    path = tmp_path / "scene.toml"
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    refused(lw.Scene.load, path, words=words)
-    assert tree(tmp_path) == [str(path)]
-
-
 def test_a_scene_with_windows_lines_and_a_mark_before_it_is_read(tmp_path):
     path = tmp_path / "scene.toml"
     path.write_bytes(b"\xef\xbb\xbf" + BODY.replace("\n", "\r\n").encode())
@@ -186,16 +177,6 @@ TABLES = {
 }
 
 
-@pytest.mark.parametrize("name", TABLES)
-def test_a_table_is_refused(name, tmp_path):
-    content, words = TABLES[name]
-    (tmp_path / "table.csv").write_bytes(content)
-    (tmp_path / "scene.toml").write_text(TABLED)
-    before = tree(tmp_path)
-    refused(lw.Scene.load, tmp_path / "scene.toml", words=words)
-    assert tree(tmp_path) == before
-
-
 # Coefficients in YAML.
 GOOD = "mass: 30\ninertia: [1, 2, 2]\n"
 BOMB = "a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1]\n" + "".join(
@@ -235,12 +216,25 @@ YAML = {
 }
 
 
-@pytest.mark.parametrize("name", YAML)
-def test_yaml_is_refused(name, tmp_path, monkeypatch):
+FILES = (
+    {f"scene: {name}": row for name, row in SCENES.items()}
+    | {f"table: {name}": row for name, row in TABLES.items()}
+    | {f"YAML: {name}": row for name, row in YAML.items()}
+)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_file_is_refused(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    text, words = YAML[name]
-    refused(from_yaml, text, words=words)
-    assert tree(tmp_path) == []
+    kind, (content, words) = name.partition(":")[0], FILES[name]
+    Path("scene.toml").write_text(TABLED)
+    if kind != "YAML":
+        data = content.encode() if isinstance(content, str) else content
+        Path({"scene": "scene.toml", "table": "table.csv"}[kind]).write_bytes(data)
+    before = tree(tmp_path)
+    load, given = (from_yaml, content) if kind == "YAML" else (lw.Scene.load, "scene.toml")
+    refused(load, given, words=words)
+    assert tree(tmp_path) == before
 
 
 def test_yaml_that_two_versions_read_alike_is_read():
@@ -254,61 +248,33 @@ def test_yaml_that_two_versions_read_alike_is_read():
 # Files that are none. What opens them waits, or never ends.
 
 
-def doors(tmp_path):
-    """Every way to give the path of a file."""
-    (tmp_path / "scene.toml").write_text(TABLED)
-    return {
-        "scene": lw.Scene.load,
-        "table": lambda path: lw.Table(str(path)),
-        "YAML": from_yaml,
-        "SDF": from_sdf,
-    }
-
-
-def made(kind, tmp_path):
-    """The path of what is no file."""
-    path = tmp_path / "odd"
-    if kind == "folder":
-        path.mkdir()
-    elif kind == "pipe":
-        os.mkfifo(path)
-    elif kind == "socket":
-        with socket.socket(socket.AF_UNIX) as server:
-            server.bind(os.path.relpath(path))
-    elif kind == "link to a device":
-        path.symlink_to("/dev/zero")
-    elif kind == "link to itself":
-        path.symlink_to(path)
-    elif kind == "huge":
-        with path.open("wb") as file:
-            file.truncate(20_000_000_000)
-    elif kind == "terminal":
-        return "/dev/tty"
-    elif kind == "device":
-        return "/dev/zero"
-    elif kind == "name with a zero byte":
-        return "odd\0name"
-    elif kind == "long name":
-        return "x" * 100_000
-    elif kind == "no name":
-        return ""
-    return path
-
-
+DOORS = {"scene": lw.Scene.load, "table": lambda path: lw.Table(str(path)), "YAML": from_yaml, "SDF": from_sdf}
+# A harm to a path, or a whole path, and words of the refusal.
 KINDS = {
-    "folder": "is a folder", "pipe": "is a named pipe", "socket": "is a socket", "device": "is a device",
-    "terminal": "is a device", "link to a device": "is a device", "link to itself": "symbolic links", "huge": "20,000.0 MB",
-    "name with a zero byte": "null", "long name": "File name too long", "no name": "No such file", "missing": "No such file",
-}  # fmt: skip
+    "folder": (hostile.folder, "is a folder"),
+    "pipe": (hostile.pipe, "is a named pipe"),
+    "socket": (hostile.bound, "is a socket"),
+    "device": ("/dev/zero", "is a device"),
+    "terminal": ("/dev/tty", "is a device"),
+    "link to a device": (hostile.link("/dev/zero"), "is a device"),
+    "link to itself": (hostile.to_itself, "symbolic links"),
+    "huge": (hostile.sized(20_000_000_000), "20,000.0 MB"),
+    "name with a zero byte": ("odd\0name", "null"),
+    "long name": ("x" * 100_000, "File name too long"),
+    "no name": ("", "No such file"),
+    "missing": (Path("odd"), "No such file"),
+}
 
 
-@pytest.mark.parametrize("door", ["scene", "table", "YAML", "SDF"])
+@pytest.mark.parametrize("door", DOORS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_no_file_is_refused(kind, door, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    load, path = doors(tmp_path)[door], made(kind, tmp_path)
+    made, words = KINDS[kind]
+    if callable(made):
+        made(tmp_path / "odd", tmp_path)
     before = tree(tmp_path)
-    error = refused(load, path, words=(KINDS[kind],))
+    error = refused(DOORS[door], tmp_path / "odd" if callable(made) else made, words=(words,))
     assert "give" in str(error) or "leave out" in str(error)
     assert tree(tmp_path) == before
 
@@ -323,54 +289,46 @@ def test_a_file_that_grows_while_it_is_read_ends(tmp_path, monkeypatch):
 
 # Arguments of the command: exit code 2 and a line.
 PAPER = str(ROOT / "examples" / "paper.toml")
-ARGUMENTS = [
-    (["run", PAPER, "--members", "nan"], "ensemble.members = nan"),
-    (["run", PAPER, "--members", "-1"], "ensemble.members = -1"),
-    (["run", PAPER, "--members", "1e300"], "ensemble.members"),
-    (["run", PAPER, "--members", "1e999"], "ensemble.members = inf"),
-    (["run", PAPER, "--members", ""], "ensemble.members = ''"),
-    (["run", PAPER, "--members", "2.5"], "ensemble.members"),
-    (["run", PAPER, "--members", "true"], "ensemble.members = True"),
-    (["run", PAPER, "--seed", "-1"], "ensemble.seed = -1"),
-    (["run", PAPER, "--seed", "99999999999999999999999999"], "ensemble.seed = 99999999999999999999999999: is beyond"),
-    (["run", PAPER, "--step", "nan"], "run.step = nan"),
-    (["run", PAPER, "--step", "-1"], "run.step = -1"),
-    (["run", PAPER, "--step", "0"], "run.step = 0"),
-    (["run", PAPER, "--step", ""], "run.step = ''"),
-    (["check", PAPER, "--step", "1e-300"], "step = 1e-300: needs"),
-    (["check", PAPER, "--duration", "1e300"], "save.every = 1.0: asks for more"),
-    (["run", PAPER, "--duration", "inf"], "run.duration = inf"),
-    (["run", PAPER, "--tolerance", "nan"], "run.tolerance = nan"),
-    (["run", PAPER, "--iterations", "1e9"], "run.iterations"),
-    (["run", PAPER, "--iterations", "-1"], "run.iterations = -1"),
-    (["run", PAPER, "--keep", "99999999999999999999"], "run.keep"),
-    (["run", PAPER, "--keep", "-1"], "run.keep"),
-    (["run", PAPER, "--threads", "-1", "--members", "8"], "threads = -1"),
-    (["run", PAPER, "--threads", "1000000000", "--members", "8"], "threads = 1000000000: is more than 100,000"),
-    (["predict", PAPER, "--threads", "0"], "threads = 0"),
-    (["run", PAPER, "--error", "nan", "--members", "8"], "error = nan"),
-    (["run", PAPER, "--error", "inf", "--members", "8"], "error = inf"),
-    (["run", PAPER, "--error", "-1", "--members", "8"], "error = -1"),
-    (["tradeoff", PAPER, "--seconds", "nan"], "seconds = nan"),
-    (["tradeoff", PAPER, "--seconds", "inf"], "seconds = inf"),
-    (["tradeoff", PAPER, "--seconds", "-1"], "seconds = -1"),
-    (["tradeoff", PAPER, "--seconds", "0"], "seconds = 0"),
-    (["stability", PAPER, "--points", "0"], "points = (0, 0)"),
-    (["stability", PAPER, "--points", "1000000"], "points = (1000000, 1000000): make"),
-    (["stability", PAPER, "--error", "nan"], "error = nan"),
-    (["sensitivity", PAPER, "--samples", "0"], "samples = 0"),
-    (["sensitivity", PAPER, "--samples", "-4"], "samples = -4"),
-    (["bench", "--members", "0"], "ensemble.members = 0"),
-    (["run", PAPER, "--set", "vehicle.mass=120\n[start]"], "vehicle.mass = '120\\n[start]': is not one value"),
-    (["run", PAPER, "--set", "vehicle.mass=120\nvehicle.buoyancy=3"], "is not one value"),
-    (["run", PAPER, "--set", "run.method=psi_s\npsi"], "is not one value"),
-    (["run", PAPER, "--set", "vehicle.mass=" + "9" * 5000], "vehicle.mass"),
-    (["run", PAPER, "--set", "vehicle.mass=" + "[" * 5000 + "]" * 5000], "nested"),
-    (["run", PAPER, "--set", "=3"], "is not a dotted key"),
-]
+# Verb and option, the key that is told, and of each value how it is told.
+OPTIONS = [
+    ("run --members", "ensemble.members",
+     {"nan": "nan", "-1": "-1", "1e300": str(int(1e300))[:60], "1e999": "inf", "": "''", "2.5": "2.5", "true": "True"}),
+    ("run --seed", "ensemble.seed", {"-1": "-1", "9" * 26: "9" * 26 + ": is beyond"}),
+    ("run --step", "run.step", {"nan": "nan", "-1": "-1", "0": "0", "": "''"}),
+    ("check --step", "step", {"1e-300": "1e-300: needs"}),
+    ("check --duration", "save.every", {"1e300": "1.0: asks for more"}),
+    ("run --duration", "run.duration", {"inf": "inf"}),
+    ("run --tolerance", "run.tolerance", {"nan": "nan"}),
+    ("run --iterations", "run.iterations", {"1e9": "1000000000.0", "-1": "-1"}),
+    ("run --keep", "run.keep", {"9" * 20: "9" * 20, "-1": "-1"}),
+    ("run --members 8 --threads", "threads", {"-1": "-1", "1000000000": "1000000000: is more than 100,000"}),
+    ("predict --threads", "threads", {"0": "0"}),
+    ("run --members 8 --error", "error", {"nan": "nan", "inf": "inf", "-1": "-1"}),
+    ("tradeoff --seconds", "seconds", {"nan": "nan", "inf": "inf", "-1": "-1", "0": "0"}),
+    ("stability --points", "points", {"0": "(0, 0)", "1000000": "(1000000, 1000000): make"}),
+    ("stability --error", "error", {"nan": "nan"}),
+    ("sensitivity --samples", "samples", {"0": "0", "-4": "-4"}),
+]  # fmt: skip
+SET = {
+    "vehicle.mass=120\n[start]": "vehicle.mass = '120\\n[start]': is not one value",
+    "vehicle.mass=120\nvehicle.buoyancy=3": "is not one value",
+    "run.method=psi_s\npsi": "is not one value",
+    "vehicle.mass=" + "9" * 5000: "vehicle.mass",
+    "vehicle.mass=" + "[" * 5000 + "]" * 5000: "nested",
+    "=3": "is not a dotted key",
+}
+ARGUMENTS = (
+    [([*option.split(), value, PAPER], f"{key} = {told}") for option, key, values in OPTIONS for value, told in values.items()]
+    + [(["run", PAPER, "--set", value], words) for value, words in SET.items()]
+    + [(["bench", "--members", "0"], "ensemble.members = 0")]
+)  # fmt: skip
 
 
-@pytest.mark.parametrize(("arguments", "words"), ARGUMENTS, ids=[" ".join(one)[-30:] for one, _ in ARGUMENTS])
+def short(arguments):
+    return " ".join(word for word in arguments if word != PAPER)[:40]
+
+
+@pytest.mark.parametrize(("arguments", "words"), ARGUMENTS, ids=[short(arguments) for arguments, _ in ARGUMENTS])
 def test_an_argument_is_refused(arguments, words, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     begun = time.thread_time()

@@ -200,12 +200,13 @@ def special(folder):
 
 # A few of each kind in the quick tests: the doors are the same for all.
 @pytest.mark.slow_but(
-    "store: created names an*", "store: created names a N*", "store: marker names an*", "store: marker names a d*", "store: a chunk is a*", "store: an array is a link*",
-    "store: kept is a link*", "store: the root is a*", "store: the root has 50*", "store: codec p*", "store: parts*",
-    "store: a shape*", "store: other members*", "store: a term of a module*", "store: a table*", "store: an array a*",
-    "store: a distribution of*", "store: statistics of*", "store: the store is a link*", "store: a marker is a*",
-    "store: messages that write*", "tradeoff: a link to a*", "tradeoff: the table is*", "tradeoff: a picture is*",
-    "sweep: *", "result: a link*", "result: a part*", "result: a pipe", "result: a folder", "result: a s*", "result: a term*",
+    "store: created names an*", "store: created names a N*", "store: marker names an*", "store: marker names a d*",
+    "store: a chunk is a*", "store: an array is a link*", "store: kept is a link*", "store: the root is a*",
+    "store: the root has 50*", "store: codec p*", "store: parts*", "store: a shape*", "store: other members*",
+    "store: a term of a module*", "store: a table*", "store: an array a*", "store: a distribution of*",
+    "store: statistics of*", "store: the store is a link*", "store: a marker is a*", "store: messages that write*",
+    "tradeoff: a link to a*", "tradeoff: the table is*", "tradeoff: a picture is*", "sweep: *", "result: a link*",
+    "result: a part*", "result: a pipe", "result: a folder", "result: a s*", "result: a term*",
     "result: provenance that*", "sensitivity: 10*", "stability: a pipe", "stability: nested*",
 )  # fmt: skip
 @pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")

@@ -27,6 +27,7 @@ from tests.conftest import ROOT
 from tests.support import hostile
 
 BODY = "[vehicle]\nmass = 30.0\ninertia = [0.2, 3.0, 3.0]\nbuoyancy = 290.0\n"
+START, VARY = BODY + "[start]\nposition = ", BODY + "[ensemble.vary]\n"
 TABLED = BODY + "[ensemble.sampling.table]\nfile = 'table.csv'\n"
 # Of this process's own time, however busy the machine is [s], and of its memory [kB].
 MOST_SECONDS, MOST_KB = 2.0, 300_000
@@ -56,6 +57,10 @@ def terms(count, kind="drag"):
     return BODY + f'[[terms]]\ntype = "{kind}"\n' * count
 
 
+def numbered(line, count):
+    return "".join(line.format(i) for i in range(count))
+
+
 # Scenes: what the file holds, and words of the refusal.
 SCENES = {
     "empty": (b"", ("vehicle", "is missing")),
@@ -74,20 +79,17 @@ SCENES = {
     "lists in lists": ("a = " + "[" * 10_000 + "]" * 10_000, ("nested",)),
     "open lists": ("a = " + "[" * 100_000, ("nested",)),
     "tables in tables": ("a = " + "{a=" * 10_000 + "1" + "}" * 10_000, ("nested",)),
-    "lists, less deep": (BODY + "[start]\nposition = " + "[" * 30 + "]" * 30, ("nested more than 24 deep",)),
+    "lists, less deep": (START + "[" * 30 + "]" * 30, ("nested more than 24 deep",)),
     "a key of a million points": ("a." * 500_000 + "a = 1", ("more than 8 parts",)),
     "quoted keys with points": ("'x y' . " * 100_000 + "a = 1", ("more than 8 parts",)),
     "a header of a million points": ("[" + "a." * 500_000 + "a]", ("more than 8 parts",)),
-    "tables without end": ("".join(f"[a{i}.b.c.d]\n" for i in range(60_000)), ("60,000 tables",)),
+    "tables without end": (numbered("[a{}.b.c.d]\n", 60_000), ("60,000 tables",)),
     "terms without end": (terms(1500), ("terms: are 1,500", "at most 1,000")),
     "events without end": ("events = [" + '{type="floor"},' * 40_000 + "]\n" + BODY, ("events: are 40,000",)),
     "unknown terms": (terms(900, "drug"), ("900 faults", "and 880 more", "did you mean 'drag'?")),
-    "unknown keys": (BODY + "".join(f"key{i} = 1\n" for i in range(30_000)), ("30,000 faults", "and 29,980 more")),
-    "unknown names that vary": (
-        BODY + "[ensemble.vary]\n" + "".join(f'"a{i}.b" = {{normal={{std=1.0}}}}\n' for i in range(6000)),
-        ("and 5,980 more",),
-    ),
-    "unknown laws": (BODY + "[ensemble.vary]\n" + "".join(f"a{i} = {{ norml = 1 }}\n" for i in range(6000)), ("more",)),
+    "unknown keys": (BODY + numbered("key{} = 1\n", 30_000), ("30,000 faults", "and 29,980 more")),
+    "unknown names that vary": (VARY + numbered("'a{}.b' = {{normal={{std=1.0}}}}\n", 6000), ("and 5,980 more",)),
+    "unknown laws": (VARY + numbered("a{} = {{ norml = 1 }}\n", 6000), ("more",)),
     "a whole number of 5,000 digits": (BODY.replace("30.0", "9" * 5000), ("thousands of digits", "1.0e20")),
     "a whole number of 30 digits": (BODY.replace("30.0", "9" * 30), ("vehicle.mass", "64 bits")),
     "a hexadecimal of 100,000 digits": (BODY.replace("30.0", "0x" + "f" * 100_000), ("vehicle.mass", "120412 digits")),
@@ -102,11 +104,8 @@ SCENES = {
     "a text for a number": (BODY.replace("30.0", "'30.0'"), ("vehicle.mass = '30.0'", "not numeric")),
     "a long text": (BODY.replace("30.0", "'" + "x" * 900_000 + "'"), ("vehicle.mass", "900,000 characters")),
     "a long name": (BODY + "'" + "x" * 900_000 + "' = 1", ("900,000 characters",)),
-    "a text among 200,000 numbers": (
-        BODY + "[start]\nposition = ['" + "x" * 4000 + "', " + "1," * 200_000 + "]",
-        ("start.position", "not numeric"),
-    ),
-    "200,000 numbers": (BODY + "[start]\nposition = [" + "1," * 200_000 + "]", ("start.position", "(200000,)")),
+    "a text among 200,000 numbers": (START + f"['{'x' * 4000}', {'1,' * 200_000}]", ("start.position", "not numeric")),
+    "200,000 numbers": (START + "[" + "1," * 200_000 + "]", ("start.position", "(200000,)")),
     "doubled keys": (BODY + "mass = 31.0\n", ("is not TOML", "line 5")),
     "doubled tables": (BODY + BODY, ("is not TOML",)),
     "codes for the terminal": (BODY + '"\\u001b]0;gone\\u0007\\n2 faults" = 1\n', (r"\x1b]0;gone\x07\n2 faults",)),
@@ -114,24 +113,16 @@ SCENES = {
     "a vehicle of another folder": ("[vehicle]\nname = '../../secret'\n", ("../../secret", "is not known")),
     "members without end": (BODY + "[ensemble]\nmembers = 9000000000000000000\n", ("members", "2147483648")),
     "a grid without end": (
-        BODY + "[ensemble.vary]\n'start.position' = {normal={std=1.0}}\n"
-        "[ensemble.sampling.grid]\n'start.position' = 1000000000\n",
-        ("more members than",),
-    ),
+        VARY + "'start.position' = {normal={std=1.0}}\n[ensemble.sampling.grid]\n'start.position' = 1000000000\n",
+        ("more members than",)),
     "a hypercube without end": (
         BODY + "[ensemble]\nmembers = 2147483648\nsampling = {latin_hypercube = {group = 2147483648}}\n",
-        ("group", "1048576"),
-    ),
+        ("group", "1048576")),
     "a law of scipy's that is none": (
-        BODY + "[ensemble.vary]\n'vehicle.mass' = {scipy = {name = '__import__'}}\n",
-        ("__import__", "is no distribution"),
-    ),
-    "a law of the user's": (
-        BODY + "[ensemble.vary]\n'vehicle.mass' = {own = {law = 'eval'}}\n",
-        ("a file does not hold",),
-    ),
+        VARY + "'vehicle.mass' = {scipy = {name = '__import__'}}\n", ("__import__", "is no distribution")),
+    "a law of the user's": (VARY + "'vehicle.mass' = {own = {law = 'eval'}}\n", ("a file does not hold",)),
     "a table that is a device": (TABLED.replace("table.csv", "/dev/zero"), ("is a device",)),
-}
+}  # fmt: skip
 
 
 def test_a_scene_with_windows_lines_and_a_mark_before_it_is_read(tmp_path):
@@ -142,13 +133,15 @@ def test_a_scene_with_windows_lines_and_a_mark_before_it_is_read(tmp_path):
 
 # Tables of members.
 WIDE = ",".join(f"column {i}" for i in range(16_000))
-BOXES = io.BytesIO()
-np.savez(BOXES, a=np.zeros(3))
-OBJECTS = io.BytesIO()
-np.save(OBJECTS, np.array([{}], dtype=object), allow_pickle=True)
-ZIPPED = io.BytesIO()
-with zipfile.ZipFile(ZIPPED, "w") as archive:
-    archive.writestr("../../escaped.csv", "vehicle.mass\n30\n")
+OBJECTS = hostile.npy(hostile.of_type("'|O'", (1,)))
+
+
+def zipped(name, data):
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.writestr(name, data)
+    return buffer.getvalue()
+
 
 TABLES = {
     "empty": (b"", ("is empty",)),
@@ -169,9 +162,9 @@ TABLES = {
     "a zero byte": (b"vehicle.mass\n3\x000\n", ("no number",)),
     "UTF-16": ("vehicle.mass\n30\n".encode("utf-16"), ("UTF-8",)),
     "invalid UTF-8": (b"vehicle.mass\n\xc3\x28\n", ("UTF-8",)),
-    "NumPy's array of objects": (OBJECTS.getvalue(), ("a file of NumPy",)),
-    "NumPy's archive": (BOXES.getvalue(), ("an archive",)),
-    "an archive that means another folder": (ZIPPED.getvalue(), ("an archive",)),
+    "NumPy's array of objects": (OBJECTS, ("a file of NumPy",)),
+    "NumPy's archive": (zipped("a.npy", OBJECTS), ("an archive",)),
+    "an archive that means another folder": (zipped("../../escaped.csv", "vehicle.mass\n30\n"), ("an archive",)),
     "a compressed file": (b"\x1f\x8b\x08\x00", ("an archive",)),
     "codes for the terminal": (b"\x1b[2J\n1\n", (r"\x1b[2J",)),
 }
@@ -210,7 +203,7 @@ YAML = {
     "two documents": (GOOD + "---\n" + GOOD, ("another document",)),
     "a key that is a list": ("[1, 2]: 3\n", ("is a key that is no text",)),
     "a zero byte": (GOOD + "a: \0\n", ("not allowed",)),
-    "unknown keys": (GOOD + "".join(f"k{i}: 1\n" for i in range(2000)), ("2,000 faults", "and 1,980 more")),
+    "unknown keys": (GOOD + numbered("k{}: 1\n", 2000), ("2,000 faults", "and 1,980 more")),
     "a long text": (GOOD + "a: '" + "x" * 200_000 + "'\n", ("131,072",)),
     "a million dashes": (GOOD + "a:\n" + "- " * 60_000, ("YAML",)),
 }

@@ -180,12 +180,13 @@ def call(verb, path, out):
 
 
 def read(path):
-    """All bytes of the plain files of a folder that are not huge."""
-    found = b""
-    for name, entry in safe_files.entries(path):
-        if entry.is_file(follow_symlinks=False) and entry.stat().st_size < 10**8:
-            found += (path / name).read_bytes()
-    return found
+    """All bytes of the plain files of a folder that are not huge, nor below folders without an end."""
+    found = []
+    with contextlib.suppress(lw.SceneError):
+        for name, entry in safe_files.entries(path):
+            if entry.is_file(follow_symlinks=False) and entry.stat().st_size < 10**8:
+                found.append((path / name).read_bytes())
+    return b"".join(found)
 
 
 def special(folder):

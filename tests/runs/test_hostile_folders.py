@@ -44,8 +44,6 @@ READERS = {
     "sensitivity": ("sensitivity.json", Indices.load),
     "stability": ("stability.json", StabilityMap.load),
 }
-# What is drawn into a folder.
-DRAWN = {"tradeoff": "tradeoff.png", "result": "fleet.png"}
 SCENE = ROOT / "examples" / "paper.toml"
 SWEEP = f"""
 scene = "{SCENE}"
@@ -415,41 +413,37 @@ def remove(path):
     shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink(missing_ok=True)
 
 
-@pytest.mark.parametrize("kind", hostile.PLACES)
-@pytest.mark.parametrize("base", DRAWN)
-def test_verbs_replace_nothing_but_plain_files_of_the_folder(base, kind, theirs, home, capsys):
-    """plot, report and run write names of their own."""
-    path = theirs(base)
-    (path / "x.png").unlink(missing_ok=True)
-    verbs = {"plot": DRAWN[base], "report": "report.html"} | ({"run": "result.npz"} if base == "result" else {})
-    for verb, name in verbs.items():
-        remove(path / name)
-        text = left_alone(lambda: call(verb, path, path), path / name, kind, home, capsys)
-        assert "not replaced" in text or hostile.OUT in text
-        assert list(special(path)) == [name]
-        remove(path / name)
-
-
 STUDIES = {
     "tradeoff": ["--members", 4, "--duration", 0.1, "--methods", "psi_s"],
     "sensitivity": ["--samples", 8, "--duration", 0.1],
     "stability": ["--points", 2, "--duration", 0.1, "--methods", "psi_s"],
 }
+# What writes a file under a name of its own into a folder: the command before its name, a good folder or "", and the file.
+WRITES = {
+    "plot of a study": (["plot"], "tradeoff", "tradeoff.png"),
+    "plot of a result": (["plot"], "result", "fleet.png"),
+    "report on a study": (["report"], "tradeoff", "report.html"),
+    "report on a result": (["report"], "result", "report.html"),
+    "run": (["run", SCENE, "--members", 4, "--duration", 0.5, "--out"], "result", "result.npz"),
+} | {
+    f"{verb}.{ending}": ([verb, SCENE, *settings, "--quiet", "--out"], "", f"{verb}.{ending}")
+    for verb, settings in STUDIES.items()
+    for ending in ("json", "csv", "png")
+}
 
 
-@pytest.mark.slow
-@pytest.mark.kernel
+@pytest.mark.slow_for("tradeoff.*", "sensitivity.*", "stability.*")
 @pytest.mark.parametrize("kind", hostile.PLACES)
-@pytest.mark.parametrize("verb", STUDIES)
-def test_a_study_that_is_run_replaces_nothing_but_plain_files_of_its_folder(verb, kind, home, capsys):
-    out = home.parent / "study"
-    for ending in ("json", "csv", "png"):
-        out.mkdir()
-        asked = [verb, SCENE, *STUDIES[verb], "--quiet", "--out", out]
-        text = left_alone(lambda: cli.main([*map(str, asked)]), out / f"{verb}.{ending}", kind, home, capsys)
-        assert "not replaced" in text or hostile.OUT in text
-        assert list(special(out)) == [f"{verb}.{ending}"]
-        shutil.rmtree(out)
+@pytest.mark.parametrize("name", WRITES)
+def test_verbs_replace_nothing_but_plain_files_of_the_folder(name, kind, theirs, home, capsys):
+    command, base, file = WRITES[name]
+    path = theirs(base) if base else home.parent / "study"
+    path.mkdir(exist_ok=True)
+    (path / "x.png").unlink(missing_ok=True)
+    (path / file).unlink(missing_ok=True)
+    text = left_alone(lambda: cli.main([*map(str, command), str(path)]), path / file, kind, home, capsys)
+    assert "not replaced" in text or hostile.OUT in text
+    assert list(special(path)) == [file]
 
 
 @pytest.mark.parametrize("verb", ["view", "merge"])

@@ -191,12 +191,12 @@ def read(path):
 
 
 def special(folder):
-    """Names and kinds of what is no plain file in a folder, and where links lead."""
+    """What is no plain file in a folder: name -> its number on the disk, and where it leads or of which kind it is."""
     found = {}
     for name in os.listdir(folder):
         path = folder / name
         if path.is_symlink() or not path.is_file():
-            found[name] = os.readlink(path) if path.is_symlink() else path.lstat().st_mode
+            found[name] = (path.lstat().st_ino, os.readlink(path) if path.is_symlink() else path.lstat().st_mode)
     return found
 
 

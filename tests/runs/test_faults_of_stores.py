@@ -68,6 +68,15 @@ def holding(path, sign):
         time.sleep(60)
 
 
+def at_once(*calls):
+    """Threads that begin together, until all have ended."""
+    threads = [threading.Thread(target=call) for call in calls]
+    for one in threads:
+        one.start()
+    for one in threads:
+        one.join()
+
+
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     """A complete store, which no test changes."""
@@ -113,11 +122,7 @@ def test_threads_of_one_process_are_kept_apart_as_well(whole, tmp_path):
         except lw.SceneError as error:
             said.append(str(error))
 
-    threads = [threading.Thread(target=run) for _ in range(3)]
-    for one in threads:
-        one.start()
-    for one in threads:
-        one.join()
+    at_once(run, run, run)
     assert len(said) == 2
     assert differing(whole, path) == []
 
@@ -224,11 +229,7 @@ def test_two_who_save_into_one_file(results, tmp_path):
 
 def test_two_threads_who_save_into_one_file(results, tmp_path):
     loaded, target = [lw.Result.load(one) for one in results], tmp_path / "result.npz"
-    threads = [threading.Thread(target=lambda one=one: [one.save(target) for _ in range(20)]) for one in loaded]
-    for one in threads:
-        one.start()
-    for one in threads:
-        one.join()
+    at_once(*[lambda one=one: [one.save(target) for _ in range(20)] for one in loaded])
     assert lw.Result.load(target).members in (20, 30)
     assert [one.name for one in tmp_path.iterdir()] == ["result.npz"]
 
@@ -265,12 +266,8 @@ def test_a_file_of_another_machine_is_left_alone(results, tmp_path):
 def test_two_runs_that_end_together_leave_the_files_of_one(results, tmp_path):
     """Their files are written one after another."""
     loaded = [lw.Result.load(one) for one in results]
-    threads = [threading.Thread(target=report.write, args=(one, None, tmp_path)) for one in loaded]
     with Disk(lambda what, path: time.sleep(0.05)) as disk:
-        for one in threads:
-            one.start()
-        for one in threads:
-            one.join()
+        at_once(*[lambda one=one: report.write(one, None, tmp_path) for one in loaded])
     order = [what for what, path in disk.done if path == tmp_path / "result.npz"]
     assert order == ["synced", "named"] * 2
     assert [one.name for one in tmp_path.iterdir()] == ["result.npz"]
@@ -445,19 +442,14 @@ def test_a_full_disk_does_not_undo_what_is_overwritten(whole, tmp_path):
 
 def test_the_page_names_tests_that_there_are():
     """Each test and each store or result that docs/guide/what_files_can_do.md names for its sentences."""
-    text = (
-        (ROOT / "docs" / "guide" / "what_files_can_do.md")
-        .read_text()
-        .partition("## Stores and results")[2]
-        .partition("\n## ")[0]
-    )
-    source = "".join(
-        (ROOT / "tests" / "runs" / f"test_{name}_stores.py").read_text() for name in ("hostile", "faults_of")
-    )
+    page = (ROOT / "docs" / "guide" / "what_files_can_do.md").read_text()
+    text = page.partition("## Studies and sweeps")[2]
+    files = ("test_hostile_folders.py", "test_faults_of_stores.py")
+    source = "".join((ROOT / "tests" / "runs" / file).read_text() for file in files)
     tests = re.findall(r"`(test_\w+)`", text)
     named = re.findall(r'"([^"]+)"', " ".join(re.findall(r"\(`stores`:([^)]*)\)", text.replace("\n", " "))))
-    assert len(tests) > 10
-    assert all(f"def {name}(" in source for name in tests)
+    assert len(tests) > 14
+    assert [name for name in tests if f"def {name}(" not in source] == []
     rows = [*hostile.STORES, *hostile.RESULTS]
     assert len(named) > 25
     assert all(any(row.startswith(name.removesuffix(" ...")) for row in rows) for name in named)

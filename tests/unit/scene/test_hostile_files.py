@@ -7,7 +7,6 @@ Each row of a table below is a file, or an argument, that somebody may meet. doc
 import io
 import os
 import resource
-import socket
 import subprocess
 import sys
 import time
@@ -25,8 +24,10 @@ from lgvi_warp.cli.settings import out_of
 from lgvi_warp.common import errors, reading
 from lgvi_warp.scene.scene import from_dict
 from tests.conftest import ROOT
+from tests.support import hostile
 
 BODY = "[vehicle]\nmass = 30.0\ninertia = [0.2, 3.0, 3.0]\nbuoyancy = 290.0\n"
+START, VARY = BODY + "[start]\nposition = ", BODY + "[ensemble.vary]\n"
 TABLED = BODY + "[ensemble.sampling.table]\nfile = 'table.csv'\n"
 # Of this process's own time, however busy the machine is [s], and of its memory [kB].
 MOST_SECONDS, MOST_KB = 2.0, 300_000
@@ -56,6 +57,10 @@ def terms(count, kind="drag"):
     return BODY + f'[[terms]]\ntype = "{kind}"\n' * count
 
 
+def numbered(line, count):
+    return "".join(line.format(i) for i in range(count))
+
+
 # Scenes: what the file holds, and words of the refusal.
 SCENES = {
     "empty": (b"", ("vehicle", "is missing")),
@@ -74,20 +79,17 @@ SCENES = {
     "lists in lists": ("a = " + "[" * 10_000 + "]" * 10_000, ("nested",)),
     "open lists": ("a = " + "[" * 100_000, ("nested",)),
     "tables in tables": ("a = " + "{a=" * 10_000 + "1" + "}" * 10_000, ("nested",)),
-    "lists, less deep": (BODY + "[start]\nposition = " + "[" * 30 + "]" * 30, ("nested more than 24 deep",)),
+    "lists, less deep": (START + "[" * 30 + "]" * 30, ("nested more than 24 deep",)),
     "a key of a million points": ("a." * 500_000 + "a = 1", ("more than 8 parts",)),
     "quoted keys with points": ("'x y' . " * 100_000 + "a = 1", ("more than 8 parts",)),
     "a header of a million points": ("[" + "a." * 500_000 + "a]", ("more than 8 parts",)),
-    "tables without end": ("".join(f"[a{i}.b.c.d]\n" for i in range(60_000)), ("60,000 tables",)),
+    "tables without end": (numbered("[a{}.b.c.d]\n", 60_000), ("60,000 tables",)),
     "terms without end": (terms(1500), ("terms: are 1,500", "at most 1,000")),
     "events without end": ("events = [" + '{type="floor"},' * 40_000 + "]\n" + BODY, ("events: are 40,000",)),
     "unknown terms": (terms(900, "drug"), ("900 faults", "and 880 more", "did you mean 'drag'?")),
-    "unknown keys": (BODY + "".join(f"key{i} = 1\n" for i in range(30_000)), ("30,000 faults", "and 29,980 more")),
-    "unknown names that vary": (
-        BODY + "[ensemble.vary]\n" + "".join(f'"a{i}.b" = {{normal={{std=1.0}}}}\n' for i in range(6000)),
-        ("and 5,980 more",),
-    ),
-    "unknown laws": (BODY + "[ensemble.vary]\n" + "".join(f"a{i} = {{ norml = 1 }}\n" for i in range(6000)), ("more",)),
+    "unknown keys": (BODY + numbered("key{} = 1\n", 30_000), ("30,000 faults", "and 29,980 more")),
+    "unknown names that vary": (VARY + numbered("'a{}.b' = {{normal={{std=1.0}}}}\n", 6000), ("and 5,980 more",)),
+    "unknown laws": (VARY + numbered("a{} = {{ norml = 1 }}\n", 6000), ("more",)),
     "a whole number of 5,000 digits": (BODY.replace("30.0", "9" * 5000), ("thousands of digits", "1.0e20")),
     "a whole number of 30 digits": (BODY.replace("30.0", "9" * 30), ("vehicle.mass", "64 bits")),
     "a hexadecimal of 100,000 digits": (BODY.replace("30.0", "0x" + "f" * 100_000), ("vehicle.mass", "120412 digits")),
@@ -102,11 +104,8 @@ SCENES = {
     "a text for a number": (BODY.replace("30.0", "'30.0'"), ("vehicle.mass = '30.0'", "not numeric")),
     "a long text": (BODY.replace("30.0", "'" + "x" * 900_000 + "'"), ("vehicle.mass", "900,000 characters")),
     "a long name": (BODY + "'" + "x" * 900_000 + "' = 1", ("900,000 characters",)),
-    "a text among 200,000 numbers": (
-        BODY + "[start]\nposition = ['" + "x" * 4000 + "', " + "1," * 200_000 + "]",
-        ("start.position", "not numeric"),
-    ),
-    "200,000 numbers": (BODY + "[start]\nposition = [" + "1," * 200_000 + "]", ("start.position", "(200000,)")),
+    "a text among 200,000 numbers": (START + f"['{'x' * 4000}', {'1,' * 200_000}]", ("start.position", "not numeric")),
+    "200,000 numbers": (START + "[" + "1," * 200_000 + "]", ("start.position", "(200000,)")),
     "doubled keys": (BODY + "mass = 31.0\n", ("is not TOML", "line 5")),
     "doubled tables": (BODY + BODY, ("is not TOML",)),
     "codes for the terminal": (BODY + '"\\u001b]0;gone\\u0007\\n2 faults" = 1\n', (r"\x1b]0;gone\x07\n2 faults",)),
@@ -114,33 +113,16 @@ SCENES = {
     "a vehicle of another folder": ("[vehicle]\nname = '../../secret'\n", ("../../secret", "is not known")),
     "members without end": (BODY + "[ensemble]\nmembers = 9000000000000000000\n", ("members", "2147483648")),
     "a grid without end": (
-        BODY + "[ensemble.vary]\n'start.position' = {normal={std=1.0}}\n"
-        "[ensemble.sampling.grid]\n'start.position' = 1000000000\n",
-        ("more members than",),
-    ),
+        VARY + "'start.position' = {normal={std=1.0}}\n[ensemble.sampling.grid]\n'start.position' = 1000000000\n",
+        ("more members than",)),
     "a hypercube without end": (
         BODY + "[ensemble]\nmembers = 2147483648\nsampling = {latin_hypercube = {group = 2147483648}}\n",
-        ("group", "1048576"),
-    ),
+        ("group", "1048576")),
     "a law of scipy's that is none": (
-        BODY + "[ensemble.vary]\n'vehicle.mass' = {scipy = {name = '__import__'}}\n",
-        ("__import__", "is no distribution"),
-    ),
-    "a law of the user's": (
-        BODY + "[ensemble.vary]\n'vehicle.mass' = {own = {law = 'eval'}}\n",
-        ("a file does not hold",),
-    ),
+        VARY + "'vehicle.mass' = {scipy = {name = '__import__'}}\n", ("__import__", "is no distribution")),
+    "a law of the user's": (VARY + "'vehicle.mass' = {own = {law = 'eval'}}\n", ("a file does not hold",)),
     "a table that is a device": (TABLED.replace("table.csv", "/dev/zero"), ("is a device",)),
-}
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_a_scene_is_refused(name, tmp_path):
-    content, words = SCENES[name]
-    path = tmp_path / "scene.toml"
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    refused(lw.Scene.load, path, words=words)
-    assert tree(tmp_path) == [str(path)]
+}  # fmt: skip
 
 
 def test_a_scene_with_windows_lines_and_a_mark_before_it_is_read(tmp_path):
@@ -151,13 +133,15 @@ def test_a_scene_with_windows_lines_and_a_mark_before_it_is_read(tmp_path):
 
 # Tables of members.
 WIDE = ",".join(f"column {i}" for i in range(16_000))
-BOXES = io.BytesIO()
-np.savez(BOXES, a=np.zeros(3))
-OBJECTS = io.BytesIO()
-np.save(OBJECTS, np.array([{}], dtype=object), allow_pickle=True)
-ZIPPED = io.BytesIO()
-with zipfile.ZipFile(ZIPPED, "w") as archive:
-    archive.writestr("../../escaped.csv", "vehicle.mass\n30\n")
+OBJECTS = hostile.npy(hostile.of_type("'|O'", (1,)))
+
+
+def zipped(name, data):
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.writestr(name, data)
+    return buffer.getvalue()
+
 
 TABLES = {
     "empty": (b"", ("is empty",)),
@@ -178,22 +162,12 @@ TABLES = {
     "a zero byte": (b"vehicle.mass\n3\x000\n", ("no number",)),
     "UTF-16": ("vehicle.mass\n30\n".encode("utf-16"), ("UTF-8",)),
     "invalid UTF-8": (b"vehicle.mass\n\xc3\x28\n", ("UTF-8",)),
-    "NumPy's array of objects": (OBJECTS.getvalue(), ("a file of NumPy",)),
-    "NumPy's archive": (BOXES.getvalue(), ("an archive",)),
-    "an archive that means another folder": (ZIPPED.getvalue(), ("an archive",)),
+    "NumPy's array of objects": (OBJECTS, ("a file of NumPy",)),
+    "NumPy's archive": (zipped("a.npy", OBJECTS), ("an archive",)),
+    "an archive that means another folder": (zipped("../../escaped.csv", "vehicle.mass\n30\n"), ("an archive",)),
     "a compressed file": (b"\x1f\x8b\x08\x00", ("an archive",)),
     "codes for the terminal": (b"\x1b[2J\n1\n", (r"\x1b[2J",)),
 }
-
-
-@pytest.mark.parametrize("name", TABLES)
-def test_a_table_is_refused(name, tmp_path):
-    content, words = TABLES[name]
-    (tmp_path / "table.csv").write_bytes(content)
-    (tmp_path / "scene.toml").write_text(TABLED)
-    before = tree(tmp_path)
-    refused(lw.Scene.load, tmp_path / "scene.toml", words=words)
-    assert tree(tmp_path) == before
 
 
 # Coefficients in YAML.
@@ -229,18 +203,31 @@ YAML = {
     "two documents": (GOOD + "---\n" + GOOD, ("another document",)),
     "a key that is a list": ("[1, 2]: 3\n", ("is a key that is no text",)),
     "a zero byte": (GOOD + "a: \0\n", ("not allowed",)),
-    "unknown keys": (GOOD + "".join(f"k{i}: 1\n" for i in range(2000)), ("2,000 faults", "and 1,980 more")),
+    "unknown keys": (GOOD + numbered("k{}: 1\n", 2000), ("2,000 faults", "and 1,980 more")),
     "a long text": (GOOD + "a: '" + "x" * 200_000 + "'\n", ("131,072",)),
     "a million dashes": (GOOD + "a:\n" + "- " * 60_000, ("YAML",)),
 }
 
 
-@pytest.mark.parametrize("name", YAML)
-def test_yaml_is_refused(name, tmp_path, monkeypatch):
+FILES = (
+    {f"scene: {name}": row for name, row in SCENES.items()}
+    | {f"table: {name}": row for name, row in TABLES.items()}
+    | {f"YAML: {name}": row for name, row in YAML.items()}
+)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_a_file_is_refused(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    text, words = YAML[name]
-    refused(from_yaml, text, words=words)
-    assert tree(tmp_path) == []
+    kind, (content, words) = name.partition(":")[0], FILES[name]
+    Path("scene.toml").write_text(TABLED)
+    if kind != "YAML":
+        data = content.encode() if isinstance(content, str) else content
+        Path({"scene": "scene.toml", "table": "table.csv"}[kind]).write_bytes(data)
+    before = tree(tmp_path)
+    load, given = (from_yaml, content) if kind == "YAML" else (lw.Scene.load, "scene.toml")
+    refused(load, given, words=words)
+    assert tree(tmp_path) == before
 
 
 def test_yaml_that_two_versions_read_alike_is_read():
@@ -254,61 +241,33 @@ def test_yaml_that_two_versions_read_alike_is_read():
 # Files that are none. What opens them waits, or never ends.
 
 
-def doors(tmp_path):
-    """Every way to give the path of a file."""
-    (tmp_path / "scene.toml").write_text(TABLED)
-    return {
-        "scene": lw.Scene.load,
-        "table": lambda path: lw.Table(str(path)),
-        "YAML": from_yaml,
-        "SDF": from_sdf,
-    }
-
-
-def made(kind, tmp_path):
-    """The path of what is no file."""
-    path = tmp_path / "odd"
-    if kind == "folder":
-        path.mkdir()
-    elif kind == "pipe":
-        os.mkfifo(path)
-    elif kind == "socket":
-        with socket.socket(socket.AF_UNIX) as server:
-            server.bind(os.path.relpath(path))
-    elif kind == "link to a device":
-        path.symlink_to("/dev/zero")
-    elif kind == "link to itself":
-        path.symlink_to(path)
-    elif kind == "huge":
-        with path.open("wb") as file:
-            file.truncate(20_000_000_000)
-    elif kind == "terminal":
-        return "/dev/tty"
-    elif kind == "device":
-        return "/dev/zero"
-    elif kind == "name with a zero byte":
-        return "odd\0name"
-    elif kind == "long name":
-        return "x" * 100_000
-    elif kind == "no name":
-        return ""
-    return path
-
-
+DOORS = {"scene": lw.Scene.load, "table": lambda path: lw.Table(str(path)), "YAML": from_yaml, "SDF": from_sdf}
+# A harm to a path, or a whole path, and words of the refusal.
 KINDS = {
-    "folder": "is a folder", "pipe": "is a named pipe", "socket": "is a socket", "device": "is a device",
-    "terminal": "is a device", "link to a device": "is a device", "link to itself": "symbolic links", "huge": "20,000.0 MB",
-    "name with a zero byte": "null", "long name": "File name too long", "no name": "No such file", "missing": "No such file",
-}  # fmt: skip
+    "folder": (hostile.folder, "is a folder"),
+    "pipe": (hostile.pipe, "is a named pipe"),
+    "socket": (hostile.bound, "is a socket"),
+    "device": ("/dev/zero", "is a device"),
+    "terminal": ("/dev/tty", "is a device"),
+    "link to a device": (hostile.link("/dev/zero"), "is a device"),
+    "link to itself": (hostile.to_itself, "symbolic links"),
+    "huge": (hostile.sized(20_000_000_000), "20,000.0 MB"),
+    "name with a zero byte": ("odd\0name", "null"),
+    "long name": ("x" * 100_000, "File name too long"),
+    "no name": ("", "No such file"),
+    "missing": (Path("odd"), "No such file"),
+}
 
 
-@pytest.mark.parametrize("door", ["scene", "table", "YAML", "SDF"])
+@pytest.mark.parametrize("door", DOORS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_no_file_is_refused(kind, door, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    load, path = doors(tmp_path)[door], made(kind, tmp_path)
+    made, words = KINDS[kind]
+    if callable(made):
+        made(tmp_path / "odd", tmp_path)
     before = tree(tmp_path)
-    error = refused(load, path, words=(KINDS[kind],))
+    error = refused(DOORS[door], tmp_path / "odd" if callable(made) else made, words=(words,))
     assert "give" in str(error) or "leave out" in str(error)
     assert tree(tmp_path) == before
 
@@ -323,54 +282,46 @@ def test_a_file_that_grows_while_it_is_read_ends(tmp_path, monkeypatch):
 
 # Arguments of the command: exit code 2 and a line.
 PAPER = str(ROOT / "examples" / "paper.toml")
-ARGUMENTS = [
-    (["run", PAPER, "--members", "nan"], "ensemble.members = nan"),
-    (["run", PAPER, "--members", "-1"], "ensemble.members = -1"),
-    (["run", PAPER, "--members", "1e300"], "ensemble.members"),
-    (["run", PAPER, "--members", "1e999"], "ensemble.members = inf"),
-    (["run", PAPER, "--members", ""], "ensemble.members = ''"),
-    (["run", PAPER, "--members", "2.5"], "ensemble.members"),
-    (["run", PAPER, "--members", "true"], "ensemble.members = True"),
-    (["run", PAPER, "--seed", "-1"], "ensemble.seed = -1"),
-    (["run", PAPER, "--seed", "99999999999999999999999999"], "ensemble.seed = 99999999999999999999999999: is beyond"),
-    (["run", PAPER, "--step", "nan"], "run.step = nan"),
-    (["run", PAPER, "--step", "-1"], "run.step = -1"),
-    (["run", PAPER, "--step", "0"], "run.step = 0"),
-    (["run", PAPER, "--step", ""], "run.step = ''"),
-    (["check", PAPER, "--step", "1e-300"], "step = 1e-300: needs"),
-    (["check", PAPER, "--duration", "1e300"], "save.every = 1.0: asks for more"),
-    (["run", PAPER, "--duration", "inf"], "run.duration = inf"),
-    (["run", PAPER, "--tolerance", "nan"], "run.tolerance = nan"),
-    (["run", PAPER, "--iterations", "1e9"], "run.iterations"),
-    (["run", PAPER, "--iterations", "-1"], "run.iterations = -1"),
-    (["run", PAPER, "--keep", "99999999999999999999"], "run.keep"),
-    (["run", PAPER, "--keep", "-1"], "run.keep"),
-    (["run", PAPER, "--threads", "-1", "--members", "8"], "threads = -1"),
-    (["run", PAPER, "--threads", "1000000000", "--members", "8"], "threads = 1000000000: is more than 100,000"),
-    (["predict", PAPER, "--threads", "0"], "threads = 0"),
-    (["run", PAPER, "--error", "nan", "--members", "8"], "error = nan"),
-    (["run", PAPER, "--error", "inf", "--members", "8"], "error = inf"),
-    (["run", PAPER, "--error", "-1", "--members", "8"], "error = -1"),
-    (["tradeoff", PAPER, "--seconds", "nan"], "seconds = nan"),
-    (["tradeoff", PAPER, "--seconds", "inf"], "seconds = inf"),
-    (["tradeoff", PAPER, "--seconds", "-1"], "seconds = -1"),
-    (["tradeoff", PAPER, "--seconds", "0"], "seconds = 0"),
-    (["stability", PAPER, "--points", "0"], "points = (0, 0)"),
-    (["stability", PAPER, "--points", "1000000"], "points = (1000000, 1000000): make"),
-    (["stability", PAPER, "--error", "nan"], "error = nan"),
-    (["sensitivity", PAPER, "--samples", "0"], "samples = 0"),
-    (["sensitivity", PAPER, "--samples", "-4"], "samples = -4"),
-    (["bench", "--members", "0"], "ensemble.members = 0"),
-    (["run", PAPER, "--set", "vehicle.mass=120\n[start]"], "vehicle.mass = '120\\n[start]': is not one value"),
-    (["run", PAPER, "--set", "vehicle.mass=120\nvehicle.buoyancy=3"], "is not one value"),
-    (["run", PAPER, "--set", "run.method=psi_s\npsi"], "is not one value"),
-    (["run", PAPER, "--set", "vehicle.mass=" + "9" * 5000], "vehicle.mass"),
-    (["run", PAPER, "--set", "vehicle.mass=" + "[" * 5000 + "]" * 5000], "nested"),
-    (["run", PAPER, "--set", "=3"], "is not a dotted key"),
-]
+# Verb and option, the key that is told, and of each value how it is told.
+OPTIONS = [
+    ("run --members", "ensemble.members",
+     {"nan": "nan", "-1": "-1", "1e300": str(int(1e300))[:60], "1e999": "inf", "": "''", "2.5": "2.5", "true": "True"}),
+    ("run --seed", "ensemble.seed", {"-1": "-1", "9" * 26: "9" * 26 + ": is beyond"}),
+    ("run --step", "run.step", {"nan": "nan", "-1": "-1", "0": "0", "": "''"}),
+    ("check --step", "step", {"1e-300": "1e-300: needs"}),
+    ("check --duration", "save.every", {"1e300": "1.0: asks for more"}),
+    ("run --duration", "run.duration", {"inf": "inf"}),
+    ("run --tolerance", "run.tolerance", {"nan": "nan"}),
+    ("run --iterations", "run.iterations", {"1e9": "1000000000.0", "-1": "-1"}),
+    ("run --keep", "run.keep", {"9" * 20: "9" * 20, "-1": "-1"}),
+    ("run --members 8 --threads", "threads", {"-1": "-1", "1000000000": "1000000000: is more than 100,000"}),
+    ("predict --threads", "threads", {"0": "0"}),
+    ("run --members 8 --error", "error", {"nan": "nan", "inf": "inf", "-1": "-1"}),
+    ("tradeoff --seconds", "seconds", {"nan": "nan", "inf": "inf", "-1": "-1", "0": "0"}),
+    ("stability --points", "points", {"0": "(0, 0)", "1000000": "(1000000, 1000000): make"}),
+    ("stability --error", "error", {"nan": "nan"}),
+    ("sensitivity --samples", "samples", {"0": "0", "-4": "-4"}),
+]  # fmt: skip
+SET = {
+    "vehicle.mass=120\n[start]": "vehicle.mass = '120\\n[start]': is not one value",
+    "vehicle.mass=120\nvehicle.buoyancy=3": "is not one value",
+    "run.method=psi_s\npsi": "is not one value",
+    "vehicle.mass=" + "9" * 5000: "vehicle.mass",
+    "vehicle.mass=" + "[" * 5000 + "]" * 5000: "nested",
+    "=3": "is not a dotted key",
+}
+ARGUMENTS = (
+    [([*option.split(), value, PAPER], f"{key} = {told}") for option, key, values in OPTIONS for value, told in values.items()]
+    + [(["run", PAPER, "--set", value], words) for value, words in SET.items()]
+    + [(["bench", "--members", "0"], "ensemble.members = 0")]
+)  # fmt: skip
 
 
-@pytest.mark.parametrize(("arguments", "words"), ARGUMENTS, ids=[" ".join(one)[-30:] for one, _ in ARGUMENTS])
+def short(arguments):
+    return " ".join(word for word in arguments if word != PAPER)[:40]
+
+
+@pytest.mark.parametrize(("arguments", "words"), ARGUMENTS, ids=[short(arguments) for arguments, _ in ARGUMENTS])
 def test_an_argument_is_refused(arguments, words, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     begun = time.thread_time()

@@ -22,18 +22,8 @@ MARKS = {
     "wrench": r"numbers_wrench", "thrusters": r"commanded", "waves": r"Waves", "fins": r"Fins",
 }  # fmt: skip
 # Functions that some scenes need, and a bare one does not.
-NOT_THERE = (
-    "kicked",
-    "look",
-    "factorise",
-    "exponential",
-    r"(?<!sub)normals",
-    "passage",
-    "R_i",
-    "back_up",
-    "decay3",
-    "to_body",
-)
+NOT_THERE = ("kicked", "look", "factorise", "exponential", r"(?<!sub)normals", "passage", "R_i", "back_up", "decay3",
+             "to_body")  # fmt: skip
 BARE = lw.Vehicle(20.0, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=20.0 * 9.8)
 
 
@@ -161,19 +151,12 @@ def test_a_polynomial_is_there_only_if_asked_for(tmp_path):
     assert "polynomial" not in plain.to_dict()
 
 
-VARIED = {
-    "vehicle.mass": lw.Normal(relative=0.01),
-    "vehicle.inertia": lw.Normal(relative=0.01),
-    "drag_matrix.linear": lw.Normal(relative=0.01),
-    "drag_matrix.quadratic": lw.Normal(relative=0.01),
-    "current.velocity": lw.Normal(std=0.1),
-    "tether.anchor": lw.Normal(std=0.1),
-    "tether.stiffness": lw.LogNormal(sigma=0.1),
-    "wrench.force": lw.Normal(std=(0.1, 0.0, 0.0)),
-    "thrusters.coefficient": lw.Uniform(relative=0.1),
-    "thrusters.position": lw.Normal(std=0.01),
-    "environment.gravity": lw.Uniform(low=9.78, high=9.83),
-}
+VARIED = {"vehicle.mass": lw.Normal(relative=0.01), "vehicle.inertia": lw.Normal(relative=0.01),
+          "drag_matrix.linear": lw.Normal(relative=0.01), "drag_matrix.quadratic": lw.Normal(relative=0.01),
+          "current.velocity": lw.Normal(std=0.1), "tether.anchor": lw.Normal(std=0.1),
+          "tether.stiffness": lw.LogNormal(sigma=0.1), "wrench.force": lw.Normal(std=(0.1, 0.0, 0.0)),
+          "thrusters.coefficient": lw.Uniform(relative=0.1), "thrusters.position": lw.Normal(std=0.01),
+          "environment.gravity": lw.Uniform(low=9.78, high=9.83)}  # fmt: skip
 
 
 def scene():

@@ -355,13 +355,10 @@ def test_statistics_and_quantities_of_interest(whole):
     np.testing.assert_allclose(run(), np.stack([size, whole.command[-1, :, 5]], axis=1), rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("asked", "text"),
-    [
-        ({"save": lw.SaveAt(fields=("position", "demand"))}, "save.fields = 'demand'"),
-        ({"statistics": [lw.Mean("command[0]")]}, "statistics = 'command'"),
-    ],
-)
+@pytest.mark.parametrize(("asked", "text"), [
+    ({"save": lw.SaveAt(fields=("position", "demand"))}, "save.fields = 'demand'"),
+    ({"statistics": [lw.Mean("command[0]")]}, "statistics = 'command'"),
+])  # fmt: skip
 def test_a_scene_without_a_controller_has_none(asked, text):
     why = r": is a signal of a controller, which this scene has not; give \[controller\]"
     with pytest.raises(lw.SceneError, match=text + why):

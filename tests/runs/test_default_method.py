@@ -232,12 +232,8 @@ def torpedo_in_a_turn():
     return lw.Ensemble(torpedo(drag, push), 4, 1, vary), 20.0
 
 
-FLEETS = {
-    "REMUS": turning_remus,
-    "REMUS that rolls": lambda: turning_remus((0.1, 0.2, 0.3)),
-    "BlueROV2": driven_bluerov,
-    "torpedo": torpedo_in_a_turn,
-}
+FLEETS = {"REMUS": turning_remus, "REMUS that rolls": lambda: turning_remus((0.1, 0.2, 0.3)),
+          "BlueROV2": driven_bluerov, "torpedo": torpedo_in_a_turn}  # fmt: skip
 
 
 def measured(fleet, t1, method, steps):

@@ -99,12 +99,8 @@ def test_events_look_at_the_users_origin(method):
     d = np.array([0.0, 0.0, 2.0])
     shifted = moved(rigid[None], -d[None], np.eye(3)[None])[0]
     vehicle = lw.Vehicle(rigid_body_mass_matrix=shifted, buoyancy=200.0, weight=200.0, center_of_buoyancy=d)
-    scene = lw.Scene(
-        vehicle,
-        lw.Environment(gravity=GRAVITY),
-        events=[lw.Surface()],
-        start=lw.Start(position=(0, 0, 1.0), velocity=(0, 0, -1.0)),
-    )
+    scene = lw.Scene(vehicle, lw.Environment(gravity=GRAVITY), events=[lw.Surface()],
+                     start=lw.Start(position=(0, 0, 1.0), velocity=(0, 0, -1.0)))  # fmt: skip
     r = lw.solve(scene, method, h=0.03, t1=3.0)
     assert r.status[0] == lw.Status.SURFACE
     assert r.failure_time[0] == pytest.approx(1.0, abs=1e-9)
@@ -279,12 +275,9 @@ def test_single_precision_stands_at_the_event(dtype):
 def test_the_first_of_two_events_in_a_step():
     # Straight paths: the floor is 1 mm nearer in time than the end of the box, or the other way round.
     for depth, east, status in ((6.0, 1.001, "floor"), (6.001, 1.0, "box")):
-        scene = lw.Scene(
-            VEHICLE,
-            lw.Environment(gravity=GRAVITY),
-            events=stops(lower=(-9, -9, -9), upper=(9, east, 9), floor=depth),
-            start=lw.Start(position=(0, 0, 5.0), velocity=(0, 1.0, 1.0)),
-        )
+        scene = lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY),
+                         events=stops(lower=(-9, -9, -9), upper=(9, east, 9), floor=depth),
+                         start=lw.Start(position=(0, 0, 5.0), velocity=(0, 1.0, 1.0)))  # fmt: skip
         r = lw.solve(scene, h=0.3, t1=3.0)
         assert r.status.counts() == {status: 1}
         assert r.end_time[0] == pytest.approx(1.0, abs=1e-12)
@@ -299,11 +292,9 @@ def test_what_is_no_number_is_no_event():
 
 
 # A tidal current, one that wanders, and noise: water that changes, and laws that remember.
-TERMS = {
-    "water": [{"type": "current_harmonics", "amplitudes": [[0.3, 0.1, 0.0]], "periods": [8.0]}],
-    "wandering": [{"type": "gauss_markov_current", "standard_deviation": [0.2, 0.2, 0.0], "time_constant": 5.0}],
-    "noise": [{"type": "wrench_noise", "force": [2.0, 2.0, 2.0], "torque": [0.1, 0.1, 0.1]}],
-}
+TERMS = {"water": [{"type": "current_harmonics", "amplitudes": [[0.3, 0.1, 0.0]], "periods": [8.0]}],
+         "wandering": [{"type": "gauss_markov_current", "standard_deviation": [0.2, 0.2, 0.0], "time_constant": 5.0}],
+         "noise": [{"type": "wrench_noise", "force": [2.0, 2.0, 2.0], "torque": [0.1, 0.1, 0.1]}]}  # fmt: skip
 TERMS["all"] = [table for tables in TERMS.values() for table in tables]
 
 
@@ -345,11 +336,8 @@ def test_an_event_in_a_step_that_was_divided():
     # Too fast a turn for the step: divided steps get on, and arrive.
     b, R, nu, Om = random_states(2, 8, spin=0.1)
     Om[:4] *= 400.0
-    scene = lw.Scene(
-        lw.Vehicle(20.0, inertia=(1.0, 1.2, 1.4), added_mass=(0.0, 0.0, 0.0), buoyancy=20.0 * GRAVITY),
-        lw.Environment(gravity=GRAVITY),
-        events=[lw.Floor(depth=2.0), lw.Surface(depth=-2.0)],
-    )
+    scene = lw.Scene(lw.Vehicle(20.0, inertia=(1.0, 1.2, 1.4), added_mass=(0.0, 0.0, 0.0), buoyancy=20.0 * GRAVITY),
+                     lw.Environment(gravity=GRAVITY), events=[lw.Floor(depth=2.0), lw.Surface(depth=-2.0)])  # fmt: skip
     r = lw.solve(lw.Ensemble.from_states(scene, b, R, nu, Om), h=0.1, t1=20.0, on_failure="substep")
     hit = np.asarray(r.status) >= lw.Status.SURFACE
     inside = np.abs(b[:, 2]) < 2.0
@@ -364,16 +352,11 @@ def test_events_need_checks():
         lw.solve(fleet(4, [lw.Surface()]), h=0.05, t1=1.0, checks="none")
 
 
-@pytest.mark.parametrize(
-    ("event", "words"),
-    [
-        ({"type": "box", "lower": [0, 0, 0], "upper": [1, -1, 1]}, ("upper", "lower")),
-        ({"type": "flor", "depth": 3}, ("flor", "floor")),
-        ({"type": "floor"}, ("depth", "missing")),
-        ({"type": "time", "at": -1.0}, ("at", "-1.0", "from 0")),
-        ("surface", ("surface",)),
-    ],
-)
+@pytest.mark.parametrize(("event", "words"), [
+    ({"type": "box", "lower": [0, 0, 0], "upper": [1, -1, 1]}, ("upper", "lower")),
+    ({"type": "flor", "depth": 3}, ("flor", "floor")), ({"type": "floor"}, ("depth", "missing")),
+    ({"type": "time", "at": -1.0}, ("at", "-1.0", "from 0")), ("surface", ("surface",)),
+])  # fmt: skip
 def test_a_bad_event_is_refused(event, words):
     with pytest.raises(lw.SceneError) as error:
         lw.Scene(VEHICLE, events=[event])

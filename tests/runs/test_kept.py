@@ -114,18 +114,11 @@ def test_no_failures_leave_no_group(tmp_path):
     assert state(tmp_path)["complete"]
 
 
-DAMAGED = (
-    ("kept/position/c.0.1.0", flip, "has changed"),
-    ("kept/attitude/c.0.0.0.0", tear, "is torn"),
-    ("kept/vehicle.mass/c.1", remove, "is missing"),
-    ("kept/position/zarr.json", flip, "has changed"),
-    ("kept/member/c.0", flip, "has changed"),
-    ("kept/blocks/000000256.json", remove, "is missing or damaged"),
-    ("kept/blocks/000000000.json", flip, "is missing or damaged"),
-    ("kept/created.json", flip, "is damaged"),
-    ("kept/zarr.json", tear, "is damaged"),
-    ("kept", shutil.rmtree, "is missing"),
-)
+DAMAGED = (("kept/position/c.0.1.0", flip, "has changed"), ("kept/attitude/c.0.0.0.0", tear, "is torn"),
+           ("kept/vehicle.mass/c.1", remove, "is missing"), ("kept/position/zarr.json", flip, "has changed"),
+           ("kept/member/c.0", flip, "has changed"), ("kept/blocks/000000256.json", remove, "is missing or damaged"),
+           ("kept/blocks/000000000.json", flip, "is missing or damaged"), ("kept/created.json", flip, "is damaged"),
+           ("kept/zarr.json", tear, "is damaged"), ("kept", shutil.rmtree, "is missing"))  # fmt: skip
 
 
 @pytest.mark.parametrize(("name", "harm", "word"), DAMAGED, ids=[f"{h.__name__} {n}" for n, h, _ in DAMAGED])

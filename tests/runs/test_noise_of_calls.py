@@ -19,12 +19,8 @@ NAMES = ["start.position[2]", "start.velocity[2]"]
 @pytest.fixture(scope="module")
 def noisy():
     """A neutral body with linear drag under white force and torque, in a random current, which holds a heading."""
-    controller = lw.Controller(
-        period=H,
-        sensors=[lw.Sensor(of="heading", noise=0.1, name="compass")],
-        guidance=[lw.SetPoint(heading=0.5)],
-        laws=[lw.HeadingPID(kp=1.0, kd=1.0)],
-    )
+    controller = lw.Controller(period=H, sensors=[lw.Sensor(of="heading", noise=0.1, name="compass")],
+                               guidance=[lw.SetPoint(heading=0.5)], laws=[lw.HeadingPID(kp=1.0, kd=1.0)])  # fmt: skip
     terms = [lw.Drag(linear=(DRAG,) * 6), lw.WrenchNoise(force=(0.0, 0.0, STRENGTH), torque=(0.1, 0.1, 0.1)),
              lw.GaussMarkovCurrent(standard_deviation=(0.1,) * 3, time_constant=5.0), lw.ControlWrench(limit=2.0)]  # fmt: skip
     return lw.Scene(BODY, terms=terms, controller=controller)

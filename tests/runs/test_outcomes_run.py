@@ -276,13 +276,8 @@ def test_quantities_of_two_events_of_one_status():
 
 def test_an_outcome_that_no_member_can_have_is_refused():
     with pytest.raises(lw.SceneError) as error:
-        lw.solve(
-            fleet(10, [lw.Floor(depth=26.0)]),
-            "psi_s",
-            h=0.04,
-            t1=1.0,
-            statistics=[lw.Outcome("surface"), lw.Mean("depth", at="flor")],
-        )
+        lw.solve(fleet(10, [lw.Floor(depth=26.0)]), "psi_s", h=0.04, t1=1.0,
+                 statistics=[lw.Outcome("surface"), lw.Mean("depth", at="flor")])  # fmt: skip
     text = str(error.value)
     assert "outcome.of = 'surface': is no outcome of this scene" in text
     assert "did you mean 'floor'" in text

@@ -202,15 +202,12 @@ def test_drift_is_of_the_times_under_way(mixed, sunk):
 
 # What acts beside weight and buoyancy, and what is conserved then.
 ALL = {"energy", "horizontal_momentum", "vertical_angular_momentum"}
-ACTING = {
-    "still drag": (lw.Drag(linear=np.zeros(6), quadratic=np.zeros(6)), ALL),
-    "drag": (lw.Drag(linear=np.ones(6), quadratic=np.zeros(6)), set()),
-    "thrust": (lw.Wrench(force=[1.0, 0.0, 0.0]), set()),
-    "noise": (lw.WrenchNoise(force=[0.1, 0.0, 0.0]), set()),
-    "moving water": (lw.Current(velocity=[0.2, 0.0, 0.0]), set()),
-    "layers": (lw.Stratification(gradient=0.01), ALL),
-    "an anchor": (lw.Tether(anchor=[0.0, 0.0, 8.0], stiffness=2.0), {"energy"}),
-}
+ACTING = {"still drag": (lw.Drag(linear=np.zeros(6), quadratic=np.zeros(6)), ALL),
+          "drag": (lw.Drag(linear=np.ones(6), quadratic=np.zeros(6)), set()),
+          "thrust": (lw.Wrench(force=[1.0, 0.0, 0.0]), set()), "noise": (lw.WrenchNoise(force=[0.1, 0.0, 0.0]), set()),
+          "moving water": (lw.Current(velocity=[0.2, 0.0, 0.0]), set()),
+          "layers": (lw.Stratification(gradient=0.01), ALL),
+          "an anchor": (lw.Tether(anchor=[0.0, 0.0, 8.0], stiffness=2.0), {"energy"})}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ACTING)
@@ -475,14 +472,11 @@ def test_the_summary_says_work_where_forces_do_some(mixed):
     assert report.energy_lines(lost, lost) == []
 
 
-@pytest.mark.parametrize(
-    ("absent", "files", "words"),
-    [
-        (["matplotlib"], ["fleet.rrd", "result.npz"], "fleet.png: not made without matplotlib; "),
-        (["rerun"], ["fleet.png", "result.npz"], "fleet.rrd: not made without rerun-sdk; "),
-        (["matplotlib", "rerun"], ["result.npz"], "fleet.png, fleet.rrd: not made without matplotlib and rerun-sdk; "),
-    ],
-)
+@pytest.mark.parametrize(("absent", "files", "words"), [
+    (["matplotlib"], ["fleet.rrd", "result.npz"], "fleet.png: not made without matplotlib; "),
+    (["rerun"], ["fleet.png", "result.npz"], "fleet.rrd: not made without rerun-sdk; "),
+    (["matplotlib", "rerun"], ["result.npz"], "fleet.png, fleet.rrd: not made without matplotlib and rerun-sdk; "),
+])  # fmt: skip
 def test_a_plain_installation_runs(scene_file, capsys, monkeypatch, absent, files, words):
     for name in absent:
         for module in [name, *(one for one in sys.modules if one.startswith(f"{name}."))]:

@@ -191,11 +191,9 @@ def test_whole_numbers_are_refused_with_the_name_of_an_entry(paper):
 
 def test_other_members_may_need_another_kernel():
     """A term that no member feels is in no kernel, and an isotropic mass matrix has code of its own."""
-    scene = lw.Scene(
-        lw.Vehicle(mass=10.0, added_mass=[0.0, 0.0, 0.0], inertia=[1.0, 2.0, 3.0]),
-        start=lw.Start(velocity=[1.0, 0.2, 0.1], angular_velocity=[0.1, 0.2, 0.3]),
-        terms=[lw.Current(velocity=[0.0, 0.0, 0.0])],
-    )
+    scene = lw.Scene(lw.Vehicle(mass=10.0, added_mass=[0.0, 0.0, 0.0], inertia=[1.0, 2.0, 3.0]),
+                     start=lw.Start(velocity=[1.0, 0.2, 0.1], angular_velocity=[0.1, 0.2, 0.3]),
+                     terms=[lw.Current(velocity=[0.0, 0.0, 0.0])])  # fmt: skip
     names = ["current.velocity[0]", "vehicle.added_mass[1,1]"]
     run = lw.prepare(scene, names, of="position", **SHORT)
     for X in ([[0.0, 0.0]], [[0.5, 0.0]], [[0.0, 3.0]], [[0.0, 0.0], [0.5, 3.0]], [[0.0, 0.0]]):
@@ -356,11 +354,8 @@ def surveyed(monkeypatch):
 @pytest.fixture
 def drifting():
     """Members of which one alone, the 500th, has a current."""
-    scene = lw.Scene(
-        lw.Vehicle(mass=10.0, added_mass=[0.0, 1.0, 2.0], inertia=[1.0, 2.0, 3.0]),
-        start=lw.Start(velocity=[1.0, 0.2, 0.1]),
-        terms=[lw.Current(velocity=[0.0, 0.0, 0.0])],
-    )
+    scene = lw.Scene(lw.Vehicle(mass=10.0, added_mass=[0.0, 1.0, 2.0], inertia=[1.0, 2.0, 3.0]),
+                     start=lw.Start(velocity=[1.0, 0.2, 0.1]), terms=[lw.Current(velocity=[0.0, 0.0, 0.0])])  # fmt: skip
     return late(scene, 600, 500, {"current.velocity": [0.5, 0.0, 0.0]})
 
 

@@ -24,10 +24,8 @@ def fleet():
     scene = scene_of((10.0, 12.0, 15.0), (1.0, 2.0, 2.5), net=-0.3, moment=(0.0, 0.1, -0.5))
     n = 1003
     rng = np.random.default_rng(5)
-    parameters = {
-        "vehicle.mass": 5.0 + rng.random(n),
-        "vehicle.inertia": np.array([1.0, 2.0, 2.5]) + rng.random((n, 3)),
-    }
+    parameters = {"vehicle.mass": 5.0 + rng.random(n),
+                  "vehicle.inertia": np.array([1.0, 2.0, 2.5]) + rng.random((n, 3))}  # fmt: skip
     return lw.Ensemble.from_states(scene, *random_states(3, n), parameters)
 
 

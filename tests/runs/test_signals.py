@@ -201,10 +201,8 @@ entry()
         code, out, lines = ended(process)
     assert (code, out) == (130, "")
     assert time.monotonic() - began < 10.0
-    assert lines in (
-        ["lgvi-warp: interrupted twice, ended at once; nothing was to be written"],
-        ["lgvi-warp: interrupted; nothing was to be written"],
-    )
+    assert lines in (["lgvi-warp: interrupted twice, ended at once; nothing was to be written"],
+                     ["lgvi-warp: interrupted; nothing was to be written"])  # fmt: skip
 
 
 @pytest.mark.slow

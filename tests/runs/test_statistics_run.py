@@ -108,12 +108,8 @@ def test_statistics_of_paths_are_those_of_the_samples(whole):
 def test_quantities_are_those_of_the_result(fleet, whole):
     inertial = np.einsum("knij,knj->kni", whole.attitude, whole.velocity)
     names = ("velocity_inertial", "attitude", "angular_velocity", "speed")
-    truths = (
-        inertial,
-        whole.attitude.reshape(4, -1, 9),
-        whole.angular_velocity,
-        np.linalg.norm(whole.velocity, axis=-1)[..., None],
-    )
+    truths = (inertial, whole.attitude.reshape(4, -1, 9), whole.angular_velocity,
+              np.linalg.norm(whole.velocity, axis=-1)[..., None])  # fmt: skip
     found = lw.solve(fleet, **SETTINGS, statistics=[lw.Mean(name) for name in names]).statistics
     for name, truth in zip(names, truths, strict=True):
         np.testing.assert_allclose(found[f"mean {name}"].value, truth.mean(axis=1), rtol=0, atol=1e-14)
@@ -184,10 +180,8 @@ def test_parts_pass_through_files(fleet, whole, tmp_path):
     plan = make_plan(fleet, **SETTINGS)
     statistics = tuple(EVERY)
     # What gathers blocks elsewhere was pickled.
-    gathered, again = (
-        pickle.loads(pickle.dumps(Gathered(plan.grid.times, plan.ensemble.members, statistics))),
-        Gathered(plan.grid.times, plan.ensemble.members, statistics),
-    )
+    gathered, again = (pickle.loads(pickle.dumps(Gathered(plan.grid.times, plan.ensemble.members, statistics))),
+                       Gathered(plan.grid.times, plan.ensemble.members, statistics))  # fmt: skip
     from lgvi_warp.engine.work import run_block
 
     plan.compile()
@@ -203,17 +197,11 @@ def test_parts_pass_through_files(fleet, whole, tmp_path):
     assert same(again.result(), whole.statistics)
 
 
-@pytest.mark.parametrize(
-    ("sampling", "words"),
-    [
-        ("sobol", "wider than need be"),
-        ("halton", "{ halton = { replicates = 16 } }"),
-        (lw.Sobol(replicates=2), "balanced at powers of two: 512 or 1024 members"),
-        (lw.Halton(replicates=2), ""),
-        (lw.Grid({"start.position[0]": 4, "vehicle.mass": 4}), "do not rely"),
-        ("random", ""),
-    ],
-)
+@pytest.mark.parametrize(("sampling", "words"), [
+    ("sobol", "wider than need be"), ("halton", "{ halton = { replicates = 16 } }"),
+    (lw.Sobol(replicates=2), "balanced at powers of two: 512 or 1024 members"), (lw.Halton(replicates=2), ""),
+    (lw.Grid({"start.position[0]": 4, "vehicle.mass": 4}), "do not rely"), ("random", ""),
+])  # fmt: skip
 def test_intervals_of_dependent_members_are_said_to_be(scene, whole, sampling, words):
     sampled = lw.Ensemble(
         scene, 16, 1, {"start.position[0]": lw.Normal(std=1.0), "vehicle.mass": lw.Normal(std=1.0)}, sampling
@@ -273,11 +261,8 @@ def spinning():
     states[0][:, 2] = np.arange(n)
     states[2] = states[2].copy()
     states[2][7, 0] = np.nan
-    scene = lw.Scene(
-        lw.Vehicle(20.0, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=0.0),
-        lw.Environment(gravity=0.0),
-        [lw.Wrench(torque=(1.0, 0.0, 0.0))],
-    )
+    scene = lw.Scene(lw.Vehicle(20.0, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=0.0),
+                     lw.Environment(gravity=0.0), [lw.Wrench(torque=(1.0, 0.0, 0.0))])  # fmt: skip
     return lw.Ensemble.from_states(scene, *states, {"wrench.torque": torque})
 
 
@@ -395,17 +380,12 @@ def test_a_linear_gaussian_case_has_its_exact_moments():
     levels = (0.05, 0.5, 0.95)
     names = ["position", "velocity"]
     ask = [lw.Mean(names, confidence=share), lw.Covariance(names, confidence=share)]
-    ask += [
-        lw.Quantiles("position", levels, confidence=share),
-        lw.Exceedance("position", above=(2.0, -2.5, 9.0), confidence=share),
-    ]
+    ask += [lw.Quantiles("position", levels, confidence=share),
+            lw.Exceedance("position", above=(2.0, -2.5, 9.0), confidence=share)]  # fmt: skip
     found = lw.solve(fleet, h=h, t1=t, statistics=ask, keep="none").statistics
-    truths = {
-        "mean position, velocity": mean,
-        "covariance position, velocity": exact,
-        "quantiles position": mean[:3] + np.sqrt(bb) * ndtri(np.array(levels))[:, None],
-        "exceedance position above (2, -2.5, 9)": ndtr((mean[:3] - [2.0, -2.5, 9.0]) / np.sqrt(bb)),
-    }
+    truths = {"mean position, velocity": mean, "covariance position, velocity": exact,
+              "quantiles position": mean[:3] + np.sqrt(bb) * ndtri(np.array(levels))[:, None],
+              "exceedance position above (2, -2.5, 9)": ndtr((mean[:3] - [2.0, -2.5, 9.0]) / np.sqrt(bb))}  # fmt: skip
     for name, truth in truths.items():
         assert np.all((found[name].lower[-1] <= truth) & (truth <= found[name].upper[-1])), name
     # And the intervals are no wider than they have to be: 4.2 standard errors of the estimate, of 20,000 members.
@@ -505,11 +485,8 @@ REPLICATED = [
     lw.PathMaximum("speed", then=[lw.Mean(), lw.Quantiles(levels=(0.5,), size=64)]), lw.PathMean("depth"),
     lw.Mean("angular_velocity"),
 ]  # fmt: skip
-STARTS = {
-    "start.position": lw.Normal(std=0.1),
-    "start.velocity_inertial": lw.Normal(std=0.02),
-    "start.angular_velocity": lw.Normal(std=0.03),
-}
+STARTS = {"start.position": lw.Normal(std=0.1), "start.velocity_inertial": lw.Normal(std=0.02),
+          "start.angular_velocity": lw.Normal(std=0.03)}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -619,12 +596,8 @@ def test_a_function_of_ones_own(fleet, whole):
 
 
 def test_float32_is_summed_up_in_float64(fleet):
-    ask = [
-        lw.Mean("position"),
-        lw.Covariance("position"),
-        lw.Quantiles("position", (0.1, 0.9)),
-        lw.Quantiles("speed", (0.5,)),
-    ]
+    ask = [lw.Mean("position"), lw.Covariance("position"), lw.Quantiles("position", (0.1, 0.9)),
+           lw.Quantiles("speed", (0.5,))]  # fmt: skip
     found = lw.solve(
         fleet, **SETTINGS, dtype="float32", statistics=[*ask, lw.PathMaximum("depth", lw.Quantiles(levels=(0.5,)))]
     )
@@ -799,13 +772,8 @@ def test_memory_grows_with_neither_members_nor_steps():
 
 
 def test_a_run_stops_at_the_same_block_in_whatever_order_they_finish():
-    settings = {
-        "h": 0.1,
-        "t1": 1.0,
-        "statistics": [lw.Mean("position")],
-        "keep": "none",
-        "until": lw.Until("mean position[2]", 0.05),
-    }
+    settings = {"h": 0.1, "t1": 1.0, "statistics": [lw.Mean("position")], "keep": "none",
+                "until": lw.Until("mean position[2]", 0.05)}  # fmt: skip
     one, other = (
         lw.solve(falling(), **settings, **how) for how in ({"threads": 1}, {"executor": Ordered(range(39, -1, -1))})
     )

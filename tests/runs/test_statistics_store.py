@@ -269,18 +269,12 @@ def known(plan):
     return content | {"machine": machine}
 
 
-@pytest.mark.parametrize(
-    ("vary", "sampling"),
-    [
-        (MASS | RATES, "sobol"),
-        (MASS | RATES, lw.Sobol(replicates=4)),
-        (MASS, lw.Halton(replicates=8)),
-        (MASS, lw.LatinHypercube(8)),
-        ({}, lw.Grid({"start.position[0]": [0.0, 1.0], "vehicle.mass": [123.0, 124.0, 125.0, 126.0]})),
-        ({}, lw.Table(values={"vehicle.mass": np.linspace(123.0, 124.0, 8)})),
-        (RATES, "random"),
-    ],
-)
+@pytest.mark.parametrize(("vary", "sampling"), [
+    (MASS | RATES, "sobol"), (MASS | RATES, lw.Sobol(replicates=4)), (MASS, lw.Halton(replicates=8)),
+    (MASS, lw.LatinHypercube(8)),
+    ({}, lw.Grid({"start.position[0]": [0.0, 1.0], "vehicle.mass": [123.0, 124.0, 125.0, 126.0]})),
+    ({}, lw.Table(values={"vehicle.mass": np.linspace(123.0, 124.0, 8)})), (RATES, "random"),
+])  # fmt: skip
 @pytest.mark.parametrize("chosen", [None, [5, 2, 3]])
 def test_the_plan_of_a_store_is_the_plan_of_the_run(vary, sampling, chosen, tmp_path):
     members = lw.Ensemble(fleet(2).scene, 8, 3, vary, sampling)

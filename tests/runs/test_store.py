@@ -168,19 +168,8 @@ def test_long_runs_are_cut_in_equal_chunks_of_about_10_mb():
 def test_a_column_for_each_number_of_a_member():
     plan = make_plan(fleet(20), lw.Method("rk5", rtol=1e-6, atol=1e-9), h=0.1, t1=1.0)
     names = [one.name for one in store_layout.columns(plan, lw.Store("run.zarr")) if not one.times]
-    assert names == [
-        "realization",
-        "status",
-        "failure_time",
-        "failure_value",
-        "warnings",
-        "warning_time",
-        "warning_value",
-        "substeps",
-        "steps_made",
-        "steps_tried",
-        "vehicle.mass",
-    ]
+    assert names == ["realization", "status", "failure_time", "failure_value", "warnings", "warning_time",
+                     "warning_value", "substeps", "steps_made", "steps_tried", "vehicle.mass"]  # fmt: skip
 
 
 def test_time_chunks_come_together(tmp_path, memory):
@@ -276,12 +265,8 @@ def flip(path):
 
 WORDS = {flip: "has changed", tear: "is torn", remove: "is missing"}
 # Samples, numbers of members (each in all three ways) and what describes them.
-DAMAGED = (
-    *((name, harm) for name in ("position/c.0.2.0", "status/c.1", "vehicle.mass/c.3") for harm in WORDS),
-    ("attitude/c.0.0.0.0", tear),
-    ("position/zarr.json", flip),
-    ("created.json", flip),
-)
+DAMAGED = (*((name, harm) for name in ("position/c.0.2.0", "status/c.1", "vehicle.mass/c.3") for harm in WORDS),
+           ("attitude/c.0.0.0.0", tear), ("position/zarr.json", flip), ("created.json", flip))  # fmt: skip
 BLOCK_OF = {"position/c.0.2.0": 512, "status/c.1": 256, "vehicle.mass/c.3": 768, "attitude/c.0.0.0.0": 0}
 
 
@@ -513,10 +498,8 @@ def test_explicit_states_and_subsets_go_on_from_the_store_alone(tmp_path):
 
 RANDOM = np.random.default_rng(5).uniform(0.1, 0.9, (700, 4))
 # 600 members of each: given as arrays, of 700 rows.
-ARRAYS = {
-    "table": lambda u: lw.Table({"vehicle.mass": 123.0 + u[:, 0], "start.angular_velocity": u[:, 1:]}),
-    "levels": lambda u: lw.UnitCubePoints(u),
-}
+ARRAYS = {"table": lambda u: lw.Table({"vehicle.mass": 123.0 + u[:, 0], "start.angular_velocity": u[:, 1:]}),
+          "levels": lambda u: lw.UnitCubePoints(u)}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", ARRAYS)
@@ -675,16 +658,8 @@ def test_a_folder_that_is_read_only(tmp_path):
 
 
 def test_a_file_system_that_is_read_only(tmp_path, capsys):
-    arguments = [
-        "run",
-        str(ROOT / "examples" / "paper.toml"),
-        "--members",
-        "5",
-        "--out",
-        str(tmp_path),
-        "--store",
-        "zarr",
-    ]
+    arguments = ["run", str(ROOT / "examples" / "paper.toml"), "--members", "5", "--out", str(tmp_path), "--store",
+                 "zarr"]  # fmt: skip
     with Disk(refused(errno.EROFS, ("created", ".json"))):
         assert cli.main([*arguments, "--quiet"]) == 1
     assert "Read-only file system: choose a folder that can be written" in capsys.readouterr().err

@@ -117,14 +117,8 @@ def test_a_scene_is_begun_and_checked(tmp_path, capsys):
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="the imitation is one of Linux")
 def test_all_of_them_without_what_windows_has_not():
-    words = [
-        "-q",
-        "-p",
-        "no:cacheprovider",
-        "-p",
-        "tests.support.windows",
-        str(ROOT / "tests" / "runs" / "test_systems.py"),
-    ]
+    words = ["-q", "-p", "no:cacheprovider", "-p", "tests.support.windows",
+             str(ROOT / "tests" / "runs" / "test_systems.py")]  # fmt: skip
     paths = os.pathsep.join(map(str, (ROOT, ROOT / "kernels")))
     environment = os.environ | {"PYTHONPATH": paths, "LGVI_WARP_IMITATED": "1"}
     if os.environ.get("LGVI_WARP_IMITATED"):

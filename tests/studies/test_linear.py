@@ -73,15 +73,12 @@ def test_a_run_from_a_trim_stays_there():
     np.testing.assert_allclose(after.position[0], 10.0 * found.start.attitude @ found.start.velocity, atol=100.0 * most)
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ({"speed": 1.0, "free": ("pitch",)}, "has no steady motion with pitch free"),
-        ({"speed": 1.0, "free": ("pich",)}, "did you mean 'pitch'"),
-        ({"speed": 1.0, "fixed": {"speed": 2.0}}, "is given twice"),
-        ({"free": ("pitch",), "fixed": {"pitch": 0.1}}, "has a value too"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), [
+    ({"speed": 1.0, "free": ("pitch",)}, "has no steady motion with pitch free"),
+    ({"speed": 1.0, "free": ("pich",)}, "did you mean 'pitch'"),
+    ({"speed": 1.0, "fixed": {"speed": 2.0}}, "is given twice"),
+    ({"free": ("pitch",), "fixed": {"pitch": 0.1}}, "has a value too"),
+])  # fmt: skip
 def test_what_has_no_trim(words, message):
     with pytest.raises(lw.SceneError, match=message):
         lw.trim(hover(), **words, method="psi_s", h=0.02)
@@ -263,15 +260,10 @@ def test_what_has_no_regulator(regulator):
         lw.lqr(lagging, np.ones(18), np.ones(6)).law()
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ({"inputs": "thrust"}, "did you mean|known: commands"),
-        ({"closed": True, "period": 0.2}, "is that of a plant"),
-        ({"about": 3.0}, "is no motion"),
-        ({"step": 0.0}, "step"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), [
+    ({"inputs": "thrust"}, "did you mean|known: commands"), ({"closed": True, "period": 0.2}, "is that of a plant"),
+    ({"about": 3.0}, "is no motion"), ({"step": 0.0}, "step"),
+])  # fmt: skip
 def test_what_cannot_be_linearised(words, message):
     with pytest.raises(lw.SceneError, match=message):
         lw.linearize(regulated(), **words, method="psi_s", h=0.02)

@@ -183,16 +183,10 @@ def test_edges_beside_known_ones():
     assert np.array_equal(np.isinf(inside[:, 1]), counts >= 60.0)
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ({"loop": "heding_pid"}, "did you mean 'heading_pid'"),
-        ({"of": "phase"}, "of = 'phase'"),
-        ({"by": "guess"}, "by = 'guess'"),
-        ({"seconds": 0.0}, "seconds"),
-        ({"seconds": 1.0}, "is less than 30 looks"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), [
+    ({"loop": "heding_pid"}, "did you mean 'heading_pid'"), ({"of": "phase"}, "of = 'phase'"),
+    ({"by": "guess"}, "by = 'guess'"), ({"seconds": 0.0}, "seconds"), ({"seconds": 1.0}, "is less than 30 looks"),
+])  # fmt: skip
 def test_bad_arguments(words, message):
     with pytest.raises(lw.SceneError, match=message):
         lw.margins(scene(), **words, h=H)
@@ -367,10 +361,8 @@ def test_saturated_members_whose_sampled_loop_grows_are_never_steady():
     """Random gains: the loop by hand grows or not, whatever a torque at its limit shows at the time that is looked at."""
     rng = np.random.default_rng(4)
     n = 64
-    gains = {
-        name: rng.uniform(low, high, n)
-        for name, low, high in (("kp", -6.0, 8.0), ("kd", -4.0, 400.0), ("ki", 0.0, 3.0))
-    }
+    gains = {name: rng.uniform(low, high, n) for name, low, high in (("kp", -6.0, 8.0), ("kd", -4.0, 400.0),
+                                                                     ("ki", 0.0, 3.0))}  # fmt: skip
     radii = np.array([radius(*each, 1.0, 0) for each in zip(gains["kp"], gains["ki"], gains["kd"], strict=True)])
     spins, eye, zero = rng.normal(0.0, 0.1, (n, 3)), np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
     numbers = {f"heading_pid.{name}": values for name, values in gains.items()}

@@ -118,14 +118,10 @@ def test_a_failure_is_the_worst_case():
     assert found.runs < 100
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ({"worst": "best"}, "worst = 'best'"),
-        ({"budget": 3}, "is less than a generation"),
-        ({"of": "position"}, "is not a single number"),
-    ],
-)
+@pytest.mark.parametrize(("words", "message"), [
+    ({"worst": "best"}, "worst = 'best'"), ({"budget": 3}, "is less than a generation"),
+    ({"of": "position"}, "is not a single number"),
+])  # fmt: skip
 def test_bad_worst_cases(words, message):
     with pytest.raises(lw.SceneError, match=message):
         lw.worst_case(regulated(), {"start.velocity[2]": (1.0, 2.0)}, **{"of": "depth", **words}, **RUN)

@@ -89,10 +89,8 @@ def test_indices_of_ishigamis_function(found):
 
 # Of Sobol's g, by factor; the vehicle's start has a factor for each.
 WEIGHTS = np.array([0.0, 1.0, 4.5, 9.0, 99.0])
-UNIT = {
-    name: lw.Uniform(low=0.0, high=1.0)
-    for name in (*(f"start.angular_velocity[{i}]" for i in range(2)), *(f"start.position[{i}]" for i in range(3)))
-}
+UNIT = {name: lw.Uniform(low=0.0, high=1.0) for name in (*(f"start.angular_velocity[{i}]" for i in range(2)),
+                                                         *(f"start.position[{i}]" for i in range(3)))}  # fmt: skip
 
 
 def sobols_g(result):
@@ -315,13 +313,8 @@ def test_members_that_fail_are_counted_and_refused(scene):
     assert "of 384 members failed (step_too_large" in message
     assert 'failed="drop"' in message
     with pytest.raises(uq.FailedMembers):
-        uq.morris(
-            scene,
-            "position[2]",
-            samples=20,
-            vary=FAST | {"start.angular_velocity[2]": lw.Uniform(low=100.0, high=300.0)},
-            **RUN,
-        )
+        uq.morris(scene, "position[2]", samples=20,
+                  vary=FAST | {"start.angular_velocity[2]": lw.Uniform(low=100.0, high=300.0)}, **RUN)  # fmt: skip
 
 
 def test_whole_groups_are_used_alone(scene):

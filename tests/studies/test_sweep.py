@@ -21,17 +21,10 @@ from tests.support.json_page import differing
 pytestmark = pytest.mark.kernel
 
 MEMBERS = 300
-METRICS = [
-    "overshoot heading",
-    lw.MaxError("north", name="way"),
-    lw.RMSError("heading"),
-    lw.SteadyStateError("heading"),
-]
-CASES = [
-    {"name": "soft"},
-    {"name": "stiff", "set": {"heading_pid.kp": 8.0}},
-    {"name": "unknown", "set": {"heading_pid.kq": 1.0}},
-]
+METRICS = ["overshoot heading", lw.MaxError("north", name="way"), lw.RMSError("heading"),
+           lw.SteadyStateError("heading")]  # fmt: skip
+CASES = [{"name": "soft"}, {"name": "stiff", "set": {"heading_pid.kp": 8.0}},
+         {"name": "unknown", "set": {"heading_pid.kq": 1.0}}]  # fmt: skip
 GRID = {"controller.delay": [0.02, 0.04]}
 # The same in all sweeps of this file, so that they share one kernel.
 SUCCESS = {"way": {"below": 1.0}}
@@ -74,15 +67,8 @@ VARY = {"start.position[0]": lw.Normal(std=0.8), "vehicle.mass": lw.Uniform(low=
 
 
 def swept(scene, out=None, **more):
-    arguments = {
-        "cases": CASES,
-        "grid": GRID,
-        "vary": VARY,
-        "members": MEMBERS,
-        "seed": 3,
-        "metrics": METRICS,
-        "success": SUCCESS,
-    }
+    arguments = {"cases": CASES, "grid": GRID, "vary": VARY, "members": MEMBERS, "seed": 3, "metrics": METRICS,
+                 "success": SUCCESS}  # fmt: skip
     return lw.sweep(scene, out=out, **{**arguments, **more})
 
 
@@ -384,11 +370,8 @@ def test_what_is_asked_wrongly_gets_one_sentence(scene, more, text):
 
 
 def test_a_grid_of_a_million_cells_is_refused_with_its_time(scene):
-    grid = {
-        "controller.delay": [0.02 * i for i in range(1, 101)],
-        "vehicle.mass": list(range(40, 140)),
-        "heading_pid.ki": list(range(100)),
-    }
+    grid = {"controller.delay": [0.02 * i for i in range(1, 101)], "vehicle.mass": list(range(40, 140)),
+            "heading_pid.ki": list(range(100))}  # fmt: skip
     with pytest.raises(lw.SceneError, match=r"3,000,000 cells.*300 members each and would take .* on this machine"):
         swept(scene, grid=grid)
 

@@ -16,10 +16,8 @@ from tests.conftest import ROOT
 pytestmark = pytest.mark.kernel
 
 SCENE = ROOT / "examples" / "scenes" / "remus_100_autopilot.toml"
-PAGES = {
-    "metrics": ROOT / "docs" / "controllers" / "metrics.md",
-    "guide": ROOT / "docs" / "guide" / "is_my_controller_robust.md",
-}
+PAGES = {"metrics": ROOT / "docs" / "controllers" / "metrics.md",
+         "guide": ROOT / "docs" / "guide" / "is_my_controller_robust.md"}  # fmt: skip
 
 
 def snippets(page, language):

@@ -156,15 +156,11 @@ def test_errors_of_whatever_statistics_know(scene, tmp_path):
     assert suggestion.verified(fleet, result, suggested)[0] <= 1.05e-4
 
 
-@pytest.mark.parametrize(
-    ("vehicle", "terms", "names"),
-    [
-        ("torpedo", [], ["rk8", "kl8(psi_x)", "psi_x", "psi_1"]),
-        ("remus_100", [], ["rk4", "rk8"]),
-        ("torpedo", [lw.Drag(linear=[5.0] * 6)], ["rk4", "rk8", "psi_x"]),
-        ("torpedo", [lw.GaussMarkovCurrent(standard_deviation=[0.1] * 3, time_constant=9.0)], ["psi_x", "psi_s"]),
-    ],
-)
+@pytest.mark.parametrize(("vehicle", "terms", "names"), [
+    ("torpedo", [], ["rk8", "kl8(psi_x)", "psi_x", "psi_1"]), ("remus_100", [], ["rk4", "rk8"]),
+    ("torpedo", [lw.Drag(linear=[5.0] * 6)], ["rk4", "rk8", "psi_x"]),
+    ("torpedo", [lw.GaussMarkovCurrent(standard_deviation=[0.1] * 3, time_constant=9.0)], ["psi_x", "psi_s"]),
+])  # fmt: skip
 def test_few_methods_are_tried_first_by_what_acts(vehicle, terms, names):
     sample = Sample(lw.Ensemble(lw.Scene.named(vehicle, terms=terms)), 4.0)
     taken = sample.accepted(suggestion.CANDIDATES)[0]
@@ -288,13 +284,8 @@ CURRENT = lw.GaussMarkovCurrent(standard_deviation=[0.2, 0.2, 0.05], time_consta
 
 def noisy_fleet(term):
     """A vehicle that this noise alone drives."""
-    vehicle = lw.Vehicle(
-        100.0,
-        inertia=[50.0, 60.0, 70.0],
-        added_mass=[5.0, 6.0, 7.0],
-        buoyancy=981.0,
-        center_of_buoyancy=[0.0, 0.0, -0.01],
-    )
+    vehicle = lw.Vehicle(100.0, inertia=[50.0, 60.0, 70.0], added_mass=[5.0, 6.0, 7.0], buoyancy=981.0,
+                         center_of_buoyancy=[0.0, 0.0, -0.01])  # fmt: skip
     return lw.Ensemble(lw.Scene(vehicle, lw.Environment(gravity=9.81), [term]), 32, 1)
 
 
@@ -436,18 +427,13 @@ def test_suggestions_for_twenty_scenes():
     assert cheap >= 19
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"error": -1.0}, ["error = -1.0", "above 0 [m]"]),
-        ({"of": "spead"}, ["of = 'spead'", "did you mean 'speed'"]),
-        ({"of": "max(depth)"}, ["of = 'max(depth)'", "give 'depth'"]),
-        ({"of": ["depth", "speed"]}, ["of = ['depth', 'speed']", "one of them"]),
-        ({"methods": ["psi_z"]}, ["methods = 'psi_z'", "psi_x"]),
-        ({"methods": []}, ["methods = []", "name one"]),
-        ({"t1": 0.0}, ["t1 = 0.0"]),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "words"), [
+    ({"error": -1.0}, ["error = -1.0", "above 0 [m]"]), ({"of": "spead"}, ["of = 'spead'", "did you mean 'speed'"]),
+    ({"of": "max(depth)"}, ["of = 'max(depth)'", "give 'depth'"]),
+    ({"of": ["depth", "speed"]}, ["of = ['depth', 'speed']", "one of them"]),
+    ({"methods": ["psi_z"]}, ["methods = 'psi_z'", "psi_x"]), ({"methods": []}, ["methods = []", "name one"]),
+    ({"t1": 0.0}, ["t1 = 0.0"]),
+])  # fmt: skip
 def test_bad_arguments_are_refused_with_the_remedy(scene, arguments, words):
     with pytest.raises(lw.SceneError) as caught:
         lw.suggest(scene, **({"t1": 1.0} | arguments))

@@ -28,13 +28,8 @@ from tests.support.made import made, turned
 from tests.unit.views.test_cost_pictures import RUNS, TERMS
 
 N, FLOOR = 40, 20.0
-STATISTICS = [
-    lw.Quantiles("depth"),
-    lw.Mean("velocity"),
-    lw.Histogram("depth", bins=10, limits=(0.0, 25.0)),
-    lw.Covariance("position"),
-    lw.PathMaximum("speed"),
-]
+STATISTICS = [lw.Quantiles("depth"), lw.Mean("velocity"), lw.Histogram("depth", bins=10, limits=(0.0, 25.0)),
+              lw.Covariance("position"), lw.PathMaximum("speed")]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -89,25 +84,8 @@ def of_cells():
         for name in names
     }
     zeros = dict.fromkeys(names, np.zeros((5, 6)))
-    return StabilityMap(
-        x,
-        y,
-        classes,
-        zeros,
-        zeros,
-        zeros,
-        ratios,
-        "position",
-        0.01,
-        3.0,
-        10.0,
-        4,
-        "conservative",
-        "rk8",
-        0,
-        {},
-        unit="m",
-    )
+    return StabilityMap(x, y, classes, zeros, zeros, zeros, ratios, "position", 0.01, 3.0, 10.0, 4, "conservative",
+                        "rk8", 0, {}, unit="m")  # fmt: skip
 
 
 def of_factors():
@@ -392,10 +370,8 @@ def test_pieces_give_what_the_whole_gives(solved):
 
 def margins_of(steady):
     upper = np.array([2.0, 4.0, np.inf, 3.0, np.nan])
-    values = {
-        "gain_upper": np.where(steady, upper, np.nan),
-        "delay": np.where(steady, [0.1, 0.3, 0.2, 0.4, 0.0], np.nan),
-    }
+    values = {"gain_upper": np.where(steady, upper, np.nan),
+              "delay": np.where(steady, [0.1, 0.3, 0.2, 0.4, 0.0], np.nan)}  # fmt: skip
     why = np.where(steady, "", "does not settle").astype(object)
     return Margins("heading_pid", values, {"gain_upper": 1.1 * upper, "delay": values["delay"]}, why, 0.02)
 

@@ -94,25 +94,18 @@ def test_options_reach_the_run(tmp_path, capsys):
     assert p["scene"]["vehicle"]["mass"] == 124
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--set", "vehicle.mas=1"], ["vehicle.mas", "did you mean 'mass'"]),
-        (["--step", "-1", "--members", "0", "--set", "vehicle.mass=-2"], ["3 faults", "step", "members", "mass"]),
-        (["--method", "psy"], ["psy", "did you mean"]),
-        (["--set", "nonsense"], ["--set nonsense", "vehicle.mass=120"]),
-        (["--dtype", "float16"], ["float16"]),
-        (["--width", "5"], ["width = 5"]),
-        (["--threads", "0"], ["threads = 0"]),
-        (["--resume"], ["--resume", "--store zarr"]),
-        (["--blocks", "0:2", "--overwrite"], ["--blocks and --overwrite", "--store zarr"]),
-        (["--store", "zarr", "--blocks", "3"], ["--blocks 3", "--blocks 0:100"]),
-        (["--store", "zarr", "--blocks", "5:9"], ["blocks 5:9", "within the 1"]),
-        (["--store", "zarr", "--store-dtype", "float16"], ["float16"]),
-        (["--executor", "thread"], ["did you mean 'threads'"]),
-        (["--scheduler", "tcp://x"], ["dask alone"]),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["--set", "vehicle.mas=1"], ["vehicle.mas", "did you mean 'mass'"]),
+    (["--step", "-1", "--members", "0", "--set", "vehicle.mass=-2"], ["3 faults", "step", "members", "mass"]),
+    (["--method", "psy"], ["psy", "did you mean"]), (["--set", "nonsense"], ["--set nonsense", "vehicle.mass=120"]),
+    (["--dtype", "float16"], ["float16"]), (["--width", "5"], ["width = 5"]), (["--threads", "0"], ["threads = 0"]),
+    (["--resume"], ["--resume", "--store zarr"]),
+    (["--blocks", "0:2", "--overwrite"], ["--blocks and --overwrite", "--store zarr"]),
+    (["--store", "zarr", "--blocks", "3"], ["--blocks 3", "--blocks 0:100"]),
+    (["--store", "zarr", "--blocks", "5:9"], ["blocks 5:9", "within the 1"]),
+    (["--store", "zarr", "--store-dtype", "float16"], ["float16"]),
+    (["--executor", "thread"], ["did you mean 'threads'"]), (["--scheduler", "tcp://x"], ["dask alone"]),
+])  # fmt: skip
 def test_a_bad_argument_is_refused_with_the_remedy(arguments, words, tmp_path, capsys):
     assert cli.main(["run", PAPER, "--out", str(tmp_path / "out"), *SMALL, *arguments]) == 2
     text = capsys.readouterr().err
@@ -243,10 +236,8 @@ def test_info(capsys):
 
 
 def test_tune_keeps_what_it_measured(tuned_widths, capsys):
-    readings = [
-        tuning.Reading("plain float64", {8: 2.0, 16: 1.5}, 8, 16),
-        tuning.Reading("plain float32", {16: 1.0}, 16, 16),
-    ]
+    readings = [tuning.Reading("plain float64", {8: 2.0, 16: 1.5}, 8, 16),
+                tuning.Reading("plain float32", {16: 1.0}, 16, 16)]  # fmt: skip
     assert main(["tune"], measure=lambda: readings) == 0
     out = capsys.readouterr().out
     assert "8: 2.00 ns, 16: 1.50 ns: 16, 8 by the table" in out

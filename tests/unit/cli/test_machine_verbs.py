@@ -196,11 +196,8 @@ def test_scripts_for_shells_in_full():
     )
     assert "if" not in values
     assert '[[ " go see " == *" $each "* ]]' in values
-    cases = (
-        'go) words="up down -q --to --out" ;;',
-        'see) words="--all" files=1 ;;',
-        '*) words="go see --help --version -q --quiet -v --verbose --json --color" ;;',
-    )
+    cases = ('go) words="up down -q --to --out" ;;', 'see) words="--all" files=1 ;;',
+             '*) words="go see --help --version -q --quiet -v --verbose --json --color" ;;')  # fmt: skip
     assert rest.startswith(' "$verb" in\n' + "".join(f"            {case}\n" for case in cases))
     assert completion.zsh(VERBS) == completion.ZSH.format(
         names="        'go:Go: it'\\''s on.'\n        'see:See.'",
@@ -237,28 +234,18 @@ def test_verbs_are_read_from_the_parser():
 
 
 def test_values_become_plain():
-    value = {
-        1: np.float32(0.5),
-        "a": np.array([[1, 2]]),
-        "b": (ROOT, float("nan")),
-        "c": np.bool_(True),
-        "d": [np.inf, None],
-    }
+    value = {1: np.float32(0.5), "a": np.array([[1, 2]]), "b": (ROOT, float("nan")), "c": np.bool_(True),
+             "d": [np.inf, None]}  # fmt: skip
     plain = output.plain(value)
     assert plain == {"1": 0.5, "a": [[1, 2]], "b": [str(ROOT), None], "c": True, "d": [None, None]}
     assert type(plain["1"]) is float
     assert plain["c"] is True
 
 
-@pytest.mark.parametrize(
-    ("quiet", "json_wanted", "text", "said"),
-    [
-        (False, False, "note        a", "note        a\n"),
-        (True, False, "a", ""),
-        (False, True, "a", ""),
-        (False, False, "", ""),
-    ],
-)
+@pytest.mark.parametrize(("quiet", "json_wanted", "text", "said"), [
+    (False, False, "note        a", "note        a\n"), (True, False, "a", ""), (False, True, "a", ""),
+    (False, False, "", ""),
+])  # fmt: skip
 def test_what_is_said(capsys, quiet, json_wanted, text, said):
     output.say(argparse.Namespace(quiet=quiet, json=json_wanted), text)
     assert capsys.readouterr().out == said
@@ -279,17 +266,13 @@ def test_labels_have_their_colors():
     )
 
 
-@pytest.mark.parametrize(
-    ("error", "code", "text"),
-    [
-        (MemoryError(), 1, "out of memory; run fewer members or keep fewer samples"),
-        (MemoryError("3 GB"), 1, "3 GB; run fewer members or keep fewer samples"),
-        (OSError(errno.ENOSPC, "No space", "a file"), 1, "a file: No space"),
-        (OSError("odd"), 1, "odd"),
-        (lw.SceneError(["a", "b"]), 2, str(lw.SceneError(["a", "b"]))),
-        (KeyboardInterrupt(), 130, "interrupted; nothing was to be written"),
-    ],
-)
+@pytest.mark.parametrize(("error", "code", "text"), [
+    (MemoryError(), 1, "out of memory; run fewer members or keep fewer samples"),
+    (MemoryError("3 GB"), 1, "3 GB; run fewer members or keep fewer samples"),
+    (OSError(errno.ENOSPC, "No space", "a file"), 1, "a file: No space"), (OSError("odd"), 1, "odd"),
+    (lw.SceneError(["a", "b"]), 2, str(lw.SceneError(["a", "b"]))),
+    (KeyboardInterrupt(), 130, "interrupted; nothing was to be written"),
+])  # fmt: skip
 def test_how_the_command_ends(capsys, error, code, text):
     verbs = {"info": Study(error)}
     assert cli.main(["info"], verbs=verbs) == code

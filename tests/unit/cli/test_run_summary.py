@@ -19,11 +19,8 @@ from lgvi_warp.common.status import Status, WarningArray, Warnings
 from tests.support.made import made
 from tests.support.verbs import Study
 
-MACHINE = {
-    "checks": "safe",
-    "machine": {"threads": 2, "cpu": "a cpu", "simd": "avx2"},
-    "versions": {"numpy": "2", "warp": "1"},
-}
+MACHINE = {"checks": "safe", "machine": {"threads": 2, "cpu": "a cpu", "simd": "avx2"},
+           "versions": {"numpy": "2", "warp": "1"}}  # fmt: skip
 
 
 def told(members=4, k=3, provenance=None, **values):
@@ -58,10 +55,8 @@ def test_notes_come_first_and_the_speed_before_the_outcomes():
     assert lines[3] == "speed       800 vehicle-steps per second (0.50 s; kernel loaded in 0.25 s; 1.50 s in all)"
     assert lines[4] == "status      ok 4"
     compiled = dataclasses.replace(result, compile_phases=Phases(0.1, 2.0, 0.2))
-    assert summary(compiled)[3:5] == [
-        lines[3].replace("1.50", "0.00"),
-        f"kernel      compiled: {Phases(0.1, 2.0, 0.2)}",
-    ]
+    assert summary(compiled)[3:5] == [lines[3].replace("1.50", "0.00"),
+                                      f"kernel      compiled: {Phases(0.1, 2.0, 0.2)}"]  # fmt: skip
 
 
 def test_outcomes_but_ok_have_a_line_each():
@@ -144,12 +139,8 @@ def test_a_controller_is_one_line():
 
 
 def test_a_chosen_method_has_its_reason():
-    settings = {
-        "method": {"name": "psi_x", "chosen": "since drag acts"},
-        "dtype": "float32",
-        "step": 0.25,
-        "steps": 4000,
-    }
+    settings = {"method": {"name": "psi_x", "chosen": "since drag acts"}, "dtype": "float32", "step": 0.25,
+                "steps": 4000}  # fmt: skip
     text = "members     1,200, psi_x, float32, step 0.25 s, 4,000 steps\nmethod      psi_x, chosen since drag acts"
     assert report.members_line(1200, settings) == text
 

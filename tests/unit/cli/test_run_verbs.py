@@ -75,15 +75,11 @@ def test_libraries_are_imported_until_one_is_missing():
         assert thread.daemon
 
 
-@pytest.mark.parametrize(
-    ("outcome", "faults", "code", "said"),
-    [
-        (result_of(), ["a"], 1, ["a"]),
-        (result_of(status=Status.NON_FINITE), [], 1, []),
-        (result_of(status=Status.FLOOR), [], 0, []),
-        (MembersFailed("2 members failed", result_of()), [], 1, ["2 members failed"]),
-    ],
-)
+@pytest.mark.parametrize(("outcome", "faults", "code", "said"), [
+    (result_of(), ["a"], 1, ["a"]), (result_of(status=Status.NON_FINITE), [], 1, []),
+    (result_of(status=Status.FLOOR), [], 0, []),
+    (MembersFailed("2 members failed", result_of()), [], 1, ["2 members failed"]),
+])  # fmt: skip
 def test_exit_codes_of_a_run(tmp_path, capsys, outcome, faults, code, said):
     report = Report(faults)
     assert main(["run", PAPER, "--out", str(tmp_path), "-q"], simulate=Study(outcome), finish=report) == code

@@ -60,23 +60,15 @@ def test_alone_it_helps(capsys):
     assert out.err == ""
 
 
-@pytest.mark.parametrize(
-    ("given", "usage", "words"),
-    [
-        (["rnu"], "lgvi-warp", "'rnu' is not known; did you mean 'run'?"),
-        (
-            ["run", PAPER, "--sed", "1", "--stepp", "2"],
-            "lgvi-warp run",
-            "'--stepp' is not known; did you mean '--step'?",
-        ),
-        (["run", PAPER, "--store", "zar"], "lgvi-warp run", "'zar' is not known; did you mean 'zarr'?"),
-        (["list", "vehicle"], "lgvi-warp list", "'vehicle' is not known; did you mean 'vehicles'?"),
-        (["check", PAPER, "more"], "lgvi-warp check", "'more' is not known"),
-        (["check", "--color", "allways", PAPER], "lgvi-warp check", "did you mean 'always'?"),
-        (["merge", "a"], "lgvi-warp merge", "--out"),
-        (["--json"], "lgvi-warp", "VERB"),
-    ],
-)
+@pytest.mark.parametrize(("given", "usage", "words"), [
+    (["rnu"], "lgvi-warp", "'rnu' is not known; did you mean 'run'?"),
+    (["run", PAPER, "--sed", "1", "--stepp", "2"], "lgvi-warp run", "'--stepp' is not known; did you mean '--step'?"),
+    (["run", PAPER, "--store", "zar"], "lgvi-warp run", "'zar' is not known; did you mean 'zarr'?"),
+    (["list", "vehicle"], "lgvi-warp list", "'vehicle' is not known; did you mean 'vehicles'?"),
+    (["check", PAPER, "more"], "lgvi-warp check", "'more' is not known"),
+    (["check", "--color", "allways", PAPER], "lgvi-warp check", "did you mean 'always'?"),
+    (["merge", "a"], "lgvi-warp merge", "--out"), (["--json"], "lgvi-warp", "VERB"),
+])  # fmt: skip
 def test_a_fault_has_the_verbs_usage_and_the_nearest_name(given, usage, words, capsys):
     assert ended(given) == 2
     text = capsys.readouterr().err
@@ -114,20 +106,8 @@ def test_verbose_says_where_an_error_came_from(capsys):
 
 
 def test_every_verb_is_of_those_that_write_or_of_those_that_do_not():
-    writing = {
-        "run",
-        "resume",
-        "merge",
-        "export",
-        "tradeoff",
-        "sensitivity",
-        "stability",
-        "sweep",
-        "new",
-        "plot",
-        "report",
-        "view",
-    }
+    writing = {"run", "resume", "merge", "export", "tradeoff", "sensitivity", "stability", "sweep", "new", "plot",
+               "report", "view"}  # fmt: skip
     assert writing | set(command.READING) == set(command.VERBS) == set(cli.parser().verbs)
     assert not writing & set(command.READING)
 
@@ -140,18 +120,11 @@ class Terminal(io.StringIO):
         return True
 
 
-@pytest.mark.parametrize(
-    ("terminal", "choice", "environment", "expected"),
-    [
-        (True, "auto", {}, True),
-        (False, "auto", {}, False),
-        (True, "auto", {"NO_COLOR": "1"}, False),
-        (True, "auto", {"NO_COLOR": ""}, True),
-        (True, "auto", {"TERM": "dumb"}, False),
-        (True, "never", {}, False),
-        (False, "always", {"NO_COLOR": "1"}, True),
-    ],
-)
+@pytest.mark.parametrize(("terminal", "choice", "environment", "expected"), [
+    (True, "auto", {}, True), (False, "auto", {}, False), (True, "auto", {"NO_COLOR": "1"}, False),
+    (True, "auto", {"NO_COLOR": ""}, True), (True, "auto", {"TERM": "dumb"}, False), (True, "never", {}, False),
+    (False, "always", {"NO_COLOR": "1"}, True),
+])  # fmt: skip
 def test_when_there_are_colors(terminal, choice, environment, expected, monkeypatch):
     monkeypatch.delenv("NO_COLOR", raising=False)
     monkeypatch.setenv("TERM", "xterm")
@@ -399,12 +372,8 @@ def test_documents_of_a_run_and_its_folder(tmp_path, capsys):
     assert ran["outcomes"] == {"ok": 20}
     assert ran["energy"]["all"]
     assert ran["samples"]["times"] == 5
-    assert [path.rpartition("/")[2] for path in ran["files"]] == [
-        "result.npz",
-        "fleet.png",
-        "fleet.rrd",
-        "statistics.png",
-    ]
+    assert [path.rpartition("/")[2] for path in ran["files"]] == ["result.npz", "fleet.png", "fleet.rrd",
+                                                                  "statistics.png"]  # fmt: skip
     depth = next(entry for entry in ran["statistics"] if entry["label"] == "mean depth")
     result = lw.Result.load(tmp_path / "paper" / "result.npz")
     assert depth["value"] == result.statistics["mean depth"].value[-1, 0]
@@ -483,18 +452,8 @@ def sobol():
     first = np.array([[0.5, 0.25], [np.nan, np.nan]])
     second = np.full((2, 2, 2), np.nan)
     second[0, 0, 1] = second[0, 1, 0] = 0.125
-    common = (
-        ("a", "b"),
-        ("depth", "speed"),
-        np.array([1.0, 2.0]),
-        np.array([0.5, 0.0]),
-        8,
-        48,
-        1,
-        0.95,
-        ("a note",),
-        {"x": 1},
-    )
+    common = (("a", "b"), ("depth", "speed"), np.array([1.0, 2.0]), np.array([0.5, 0.0]), 8, 48, 1, 0.95, ("a note",),
+              {"x": 1})  # fmt: skip
     return SobolIndices(*common, first, first / 8.0, first / 2.0, first / 16.0, second, second / 2.0)
 
 

@@ -14,41 +14,15 @@ BODY = {"mass": 10.0, "inertia": [1.0, 2.0, 2.5], "buoyancy": 98.0}
 DRAG = {"type": "drag", "linear": [1.0] * 6}
 
 # Names, and words of the refusal.
-BAD = [
-    ("a/b", "has '/'"),
-    ("/abs", "has '/'"),
-    ("/", "has '/'"),
-    ("..", "begins with a point"),
-    (".", "begins with a point"),
-    ("../../escaped", "has '/'"),
-    (".hidden", "begins with a point"),
-    ("a\\b", "has '\\\\'"),
-    ("C:", "has ':'"),
-    ("a\0b", "'\\x00'"),
-    ("a\nb", "'\\n'"),
-    ("\u202egnp", "'\\u202e'"),
-    ("a" * 300, "has 300 bytes"),
-    ("ü" * 60, "has 120 bytes"),
-    ("con", "device on Windows"),
-    ("NUL", "device on Windows"),
-    ("com1", "device on Windows"),
-    ("COM\u00b9", "device on Windows"),
-    ("lpt9.x", "device on Windows"),
-    ("aux .x", "device on Windows"),
-    ("drag.", "ends with a point"),
-    ("drag ", "ends with a space"),
-    (" drag", "begins with a space"),
-    ("-drag", "begins with '-'"),
-    ("drag*", "has '*'"),
-    ("drag?", "has '?'"),
-    ('"drag"', "has '\"'"),
-    ("a,b", "has ','"),
-    ("drag[0]", "has '['"),
-    ("$(touch x)", "has '$'"),
-    ("a|b", "has '|'"),
-    ("e\u0301", "has '\u0301'"),
-    ("\ud800", "'\\ud800'"),
-]
+BAD = [("a/b", "has '/'"), ("/abs", "has '/'"), ("/", "has '/'"), ("..", "begins with a point"),
+       (".", "begins with a point"), ("../../escaped", "has '/'"), (".hidden", "begins with a point"),
+       ("a\\b", "has '\\\\'"), ("C:", "has ':'"), ("a\0b", "'\\x00'"), ("a\nb", "'\\n'"), ("\u202egnp", "'\\u202e'"),
+       ("a" * 300, "has 300 bytes"), ("ü" * 60, "has 120 bytes"), ("con", "device on Windows"),
+       ("NUL", "device on Windows"), ("com1", "device on Windows"), ("COM\u00b9", "device on Windows"),
+       ("lpt9.x", "device on Windows"), ("aux .x", "device on Windows"), ("drag.", "ends with a point"),
+       ("drag ", "ends with a space"), (" drag", "begins with a space"), ("-drag", "begins with '-'"),
+       ("drag*", "has '*'"), ("drag?", "has '?'"), ('"drag"', "has '\"'"), ("a,b", "has ','"), ("drag[0]", "has '['"),
+       ("$(touch x)", "has '$'"), ("a|b", "has '|'"), ("e\u0301", "has '\u0301'"), ("\ud800", "'\\ud800'")]  # fmt: skip
 
 
 @pytest.mark.parametrize(("name", "words"), BAD, ids=[ascii(name)[:20] for name, _ in BAD])

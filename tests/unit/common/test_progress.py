@@ -201,9 +201,5 @@ def test_the_real_bar_of_tqdm_takes_the_same_calls():
 )
 def test_every_long_call_takes_true(call):
     with pytest.raises(lw.SceneError, match="progress = 7: is no function"):
-        call(
-            None,
-            *[None] * (2 if call in (lw.tune, lw.worst_case) else call is lw.uq.evaluate),
-            *[1.0] * (call is lw.suggest),
-            progress=7,
-        )
+        call(None, *[None] * (2 if call in (lw.tune, lw.worst_case) else call is lw.uq.evaluate),
+             *[1.0] * (call is lw.suggest), progress=7)  # fmt: skip

@@ -22,12 +22,8 @@ from tests.conftest import ROOT
 def estimate(name, unit="m"):
     """An estimate of one number at three times."""
     values = np.arange(3.0)[:, None]
-    dims = {
-        "value": ("time", "component"),
-        "lower": ("time", "component"),
-        "upper": ("time", "component"),
-        "count": ("time",),
-    }
+    dims = {"value": ("time", "component"), "lower": ("time", "component"), "upper": ("time", "component"),
+            "count": ("time",)}  # fmt: skip
     arrays = {"value": values, "lower": values - 1.0, "upper": values + 1.0, "count": np.full(3, 7)}
     return Estimate(
         name, {"type": "mean"}, unit, 0.95, "", dims, arrays, {"time": np.arange(3.0), "component": np.array(["x"])}
@@ -40,12 +36,9 @@ def result(members=5, times=4, statuses=(0,), samples=True):
     position = rng.normal(size=(*shape, 3))
     position[..., 2] = 10.0 + np.arange(times)[:, None]
     roll = np.array([[1.0, 0.0, 0.0], [0.0, np.cos(0.5), -np.sin(0.5)], [0.0, np.sin(0.5), np.cos(0.5)]])
-    fields = {
-        "position": position,
-        "attitude": np.broadcast_to(roll, (*shape, 3, 3)),
-        "velocity": np.broadcast_to([3.0, 0.0, 4.0], (*shape, 3)),
-        "angular_velocity": np.zeros((*shape, 3)),
-    }
+    fields = {"position": position, "attitude": np.broadcast_to(roll, (*shape, 3, 3)),
+              "velocity": np.broadcast_to([3.0, 0.0, 4.0], (*shape, 3)),
+              "angular_velocity": np.zeros((*shape, 3))}  # fmt: skip
     nothing = np.full(members, np.nan)
     how = {"method": {"name": "psi_s"}, "dtype": "float64", "step": 0.1, "steps": 10}
     return lw.Result(
@@ -59,20 +52,13 @@ SCENE = lw.Scene.load(ROOT / "examples" / "scenes" / "remus_100_autopilot.toml")
 MANY = {
     f"start.{name}[{i}]": lw.Normal(std=0.1) for name in ("position", "velocity", "angular_velocity") for i in range(3)
 }
-OBJECTS = {
-    "vehicle": SCENE.vehicle,
-    "scene": SCENE,
-    "remarks": lw.Vehicle(mass=1.0, inertia=(1.0, 1.0, 1.0), warnings=["x" * 500] * 50),
-    "ensemble": lw.Ensemble.from_scene(SCENE),
-    "ensemble of much": lw.Ensemble(SCENE, 7, 1, MANY),
-    "method": lw.Method("kl8(psi_x)", iterations=3),
-    "result": result(),
-    "result of many": result(100_000, 2, (0, 1, 16, 17)),
-    "result without samples": result(samples=False),
-    "estimates": Estimates([estimate(f"mean {i}") for i in range(300)]),
-    "no estimates": Estimates(),
-    "status": np.resize(np.array([0, 16, 3], np.uint8), 10_000).view(StatusArray),
-}
+OBJECTS = {"vehicle": SCENE.vehicle, "scene": SCENE,
+           "remarks": lw.Vehicle(mass=1.0, inertia=(1.0, 1.0, 1.0), warnings=["x" * 500] * 50),
+           "ensemble": lw.Ensemble.from_scene(SCENE), "ensemble of much": lw.Ensemble(SCENE, 7, 1, MANY),
+           "method": lw.Method("kl8(psi_x)", iterations=3), "result": result(),
+           "result of many": result(100_000, 2, (0, 1, 16, 17)), "result without samples": result(samples=False),
+           "estimates": Estimates([estimate(f"mean {i}") for i in range(300)]), "no estimates": Estimates(),
+           "status": np.resize(np.array([0, 16, 3], np.uint8), 10_000).view(StatusArray)}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", OBJECTS)
@@ -133,16 +119,10 @@ def test_texts_are_escaped_and_cut():
     assert all(len(line) <= summaries.WIDTH for line in lines)
 
 
-@pytest.mark.parametrize(
-    ("value", "unit", "text"),
-    [
-        (1.0 / 3.0, "m", "0.333333 m"),
-        ([1, 2.5, 3], "", "[1, 2.5, 3]"),
-        (np.diag([1.0, 2.0]), "kg", "diagonal [1, 2] kg"),
-        (np.ones((2, 2)), "kg", "2 x 2 numbers kg"),
-        (np.zeros(9), "1", "9 numbers"),
-    ],
-)
+@pytest.mark.parametrize(("value", "unit", "text"), [
+    (1.0 / 3.0, "m", "0.333333 m"), ([1, 2.5, 3], "", "[1, 2.5, 3]"), (np.diag([1.0, 2.0]), "kg", "diagonal [1, 2] kg"),
+    (np.ones((2, 2)), "kg", "2 x 2 numbers kg"), (np.zeros(9), "1", "9 numbers"),
+])  # fmt: skip
 def test_numbers(value, unit, text):
     assert summaries.numbers(value, unit) == text
 

@@ -179,14 +179,10 @@ def test_sdf_axes_are_turned_by_half_a_turn_about_x():
     assert vehicle["weight"] == vehicle["buoyancy"] == 20.0 * 9.80665
 
 
-@pytest.mark.parametrize(
-    "pose,attributes",
-    [
-        ("0 0 0 0 0 1.5707963267948966", ""),
-        ("0 0 0 0 0 90", ' degrees="true"'),
-        ("0 0 0 0 0 0.7071067811865476 0.7071067811865476", ' rotation_format="quat_xyzw"'),
-    ],
-)
+@pytest.mark.parametrize("pose,attributes", [
+    ("0 0 0 0 0 1.5707963267948966", ""), ("0 0 0 0 0 90", ' degrees="true"'),
+    ("0 0 0 0 0 0.7071067811865476 0.7071067811865476", ' rotation_format="quat_xyzw"'),
+])  # fmt: skip
 def test_sdf_pose_turns_the_inertia(pose, attributes):
     """A quarter of a turn about z: the axis x of the inertia's frame lies along y of the link."""
     M = np.array(from_sdf(sdf(pose, attributes=attributes))["vehicle"]["rigid_body_mass_matrix"])
@@ -322,15 +318,9 @@ def test_the_three_forms_agree(yaml):
     for key, value in tables_fossen["vehicle"].items():
         np.testing.assert_allclose(tables_sdf["vehicle"][key], value, atol=1e-15, err_msg=key)
     content = {key: np.asarray(value).tolist() for key, value in tables_fossen["vehicle"].items()}
-    text = yaml.safe_dump(
-        {
-            "mass": 20.0,
-            "inertia": INERTIA.tolist(),
-            "cog": [0.0, 0.0, -0.0196],
-            "added_mass": content["added_mass_matrix"],
-            "quadratic_damping": [-1.62, 0.0, 0.0, 0.0, 0.0, 0.0],
-        }
-    )
+    text = yaml.safe_dump({"mass": 20.0, "inertia": INERTIA.tolist(), "cog": [0.0, 0.0, -0.0196],
+                           "added_mass": content["added_mass_matrix"],
+                           "quadratic_damping": [-1.62, 0.0, 0.0, 0.0, 0.0, 0.0]})  # fmt: skip
     tables_yaml = from_yaml(text)
     assert tables_yaml["terms"] == tables_fossen["terms"]
     for key, value in tables_fossen["vehicle"].items():

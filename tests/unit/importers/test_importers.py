@@ -237,15 +237,11 @@ def test_a_controllers_gain_is_no_drag():
 
 # Shapes
 
-VOLUMES = {
-    "<box><size>1 2 3</size></box>": 6.0,
-    "<box/>": 1.0,
-    "<sphere><radius>0.5</radius></sphere>": np.pi / 6.0,
-    "<cylinder><radius>0.5</radius><length>2</length></cylinder>": np.pi / 2.0,
-    "<capsule><radius>0.5</radius><length>2</length></capsule>": np.pi / 2.0 + np.pi / 6.0,
-    "<ellipsoid><radii>1 2 3</radii></ellipsoid>": 8.0 * np.pi,
-    "<cone><radius>0.5</radius><length>3</length></cone>": np.pi / 4.0,
-}
+VOLUMES = {"<box><size>1 2 3</size></box>": 6.0, "<box/>": 1.0, "<sphere><radius>0.5</radius></sphere>": np.pi / 6.0,
+           "<cylinder><radius>0.5</radius><length>2</length></cylinder>": np.pi / 2.0,
+           "<capsule><radius>0.5</radius><length>2</length></capsule>": np.pi / 2.0 + np.pi / 6.0,
+           "<ellipsoid><radii>1 2 3</radii></ellipsoid>": 8.0 * np.pi,
+           "<cone><radius>0.5</radius><length>3</length></cone>": np.pi / 4.0}  # fmt: skip
 LINK = """<sdf version="1.9"><model name="m"><link name="hull">
   <inertial><mass>{mass}</mass><inertia><ixx>1</ixx><iyy>1</iyy><izz>1</izz></inertia></inertial>
   <collision name="shape"><pose>0.1 0.2 0.3 0.4 0.5 0.6</pose><geometry>{shape}</geometry></collision>{more}

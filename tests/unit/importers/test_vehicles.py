@@ -70,14 +70,8 @@ def test_the_remus_matrices_follow_from_the_printed_derivatives():
     printed |= {"Y_rdot": 1.93, "N_vdot": 1.93, "Z_qdot": -1.93, "M_wdot": -1.93}
     printed |= {"X_uu": -1.62, "Y_vv": -1310.0, "Y_rr": 0.632, "Z_ww": -131.0, "Z_qq": -0.632, "K_pp": -0.13}
     printed |= {"M_ww": 3.18, "M_qq": -188.0, "N_vv": -3.18, "N_rr": -94.0}
-    made = co.vehicle_tables_from_fossen(
-        printed,
-        mass=30.48,
-        inertia=(0.177, 3.45, 3.45),
-        center_of_gravity=(0.0, 0.0, 0.0196),
-        weight=299.0,
-        buoyancy=308.0,
-    )
+    made = co.vehicle_tables_from_fossen(printed, mass=30.48, inertia=(0.177, 3.45, 3.45),
+                                         center_of_gravity=(0.0, 0.0, 0.0196), weight=299.0, buoyancy=308.0)  # fmt: skip
     for key, value in made["vehicle"].items():
         np.testing.assert_allclose(v[key], value, rtol=1e-14, atol=1e-15, err_msg=key)
     assert made["terms"] == [t for t in content("remus_100")["terms"] if t["type"] == "drag_matrix"]
@@ -95,16 +89,8 @@ def test_the_remus_added_mass_implies_the_printed_cross_terms():
     def product(i, a, b):
         return forces(**{a: 1.0, b: 1.0})[i] - forces(**{a: 1.0})[i] - forces(**{b: 1.0})[i]
 
-    printed = {
-        "Xwq": -35.5,
-        "Xvr": 35.5,
-        "Yur": -0.93,
-        "Ywp": 35.5,
-        "Ypq": 1.93,
-        "Zuq": 0.93,
-        "Zvp": -35.5,
-        "Zrp": 1.93,
-    }
+    printed = {"Xwq": -35.5, "Xvr": 35.5, "Yur": -0.93, "Ywp": 35.5, "Ypq": 1.93, "Zuq": 0.93, "Zvp": -35.5,
+               "Zrp": 1.93}  # fmt: skip
     printed |= {"Muw": 34.6, "Muq": 1.93, "Mvp": -1.93, "Nuv": -34.6, "Nur": 1.93, "Nwp": -1.93}
     for name, value in printed.items():
         assert product("XYZKMN".index(name[0]), *name[1:]) == pytest.approx(value, abs=0.05), name
@@ -184,12 +170,8 @@ def test_bluerov2_thrust_is_the_published_curve():
 
 def test_commands_for_thrusts():
     """The inverse of a curve with a dead band, of another shape astern; the least command; 0 for 0; the limit beyond reach."""
-    numbers = {
-        "position": [[0.0, 0.0, 0.0]] * 3,
-        "direction": [[1.0, 0.0, 0.0]] * 3,
-        "dead_band": [0.0, 0.1, 0.1],
-        "limit": 0.9,
-    }
+    numbers = {"position": [[0.0, 0.0, 0.0]] * 3, "direction": [[1.0, 0.0, 0.0]] * 3, "dead_band": [0.0, 0.1, 0.1],
+               "limit": 0.9}  # fmt: skip
     square = lw.Thrusters(coefficient=[10.0, 20.0, 0.0], coefficient_astern=[5.0, 10.0, 1.0], **numbers)
     np.testing.assert_allclose(square.command_for([2.5, -2.5, 1.0]), [0.5, -0.6, 0.0], rtol=1e-12)
     curved = lw.Thrusters(polynomial=[2.0, 0.0, 40.0], polynomial_astern=[3.0], **numbers)

@@ -29,15 +29,12 @@ class Row(Buoys):
     places: Any = lw.number(("k",), "m", rising=True)
 
 
-@pytest.mark.parametrize(
-    ("numbers", "words"),
-    [
-        ({"pull": 0.0}, "buoys.pull = 0.0: is not positive; give numbers above 0 to 5 [N]"),
-        ({"pull": 6.0}, "buoys.pull = 6.0: is out of bounds; give numbers above 0 to 5 [N]"),
-        ({"least_pull": 1.0}, "buoys.least_pull = 1.0: is out of bounds; give numbers above 1 [N]"),
-        ({"places": [0.0, 0.0]}, "buoys.places = [0.0, 0.0]: is not rising; sort the table and drop repetitions"),
-    ],
-)
+@pytest.mark.parametrize(("numbers", "words"), [
+    ({"pull": 0.0}, "buoys.pull = 0.0: is not positive; give numbers above 0 to 5 [N]"),
+    ({"pull": 6.0}, "buoys.pull = 6.0: is out of bounds; give numbers above 0 to 5 [N]"),
+    ({"least_pull": 1.0}, "buoys.least_pull = 1.0: is out of bounds; give numbers above 1 [N]"),
+    ({"places": [0.0, 0.0]}, "buoys.places = [0.0, 0.0]: is not rising; sort the table and drop repetitions"),
+])  # fmt: skip
 def test_a_number_out_of_its_bounds(numbers, words):
     with pytest.raises(lw.SceneError) as error:
         Row(**{"pull": 1.0, "places": [0.0, 1.0]} | numbers)

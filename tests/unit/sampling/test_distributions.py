@@ -45,12 +45,10 @@ def test_uniforms_are_these_numbers():
 
 def test_uniforms_depend_on_seed_name_and_member():
     reference = uniforms(1, "vehicle.mass", 0, N, 1)[:, 0]
-    others = {
-        "seed": uniforms(2, "vehicle.mass", 0, N, 1)[:, 0],
-        "large seed": uniforms(1 + 2**32, "vehicle.mass", 0, N, 1)[:, 0],
-        "name": uniforms(1, "vehicle.buoyancy", 0, N, 1)[:, 0],
-        "next member": uniforms(1, "vehicle.mass", 1, N, 1)[:, 0],
-    }
+    others = {"seed": uniforms(2, "vehicle.mass", 0, N, 1)[:, 0],
+              "large seed": uniforms(1 + 2**32, "vehicle.mass", 0, N, 1)[:, 0],
+              "name": uniforms(1, "vehicle.buoyancy", 0, N, 1)[:, 0],
+              "next member": uniforms(1, "vehicle.mass", 1, N, 1)[:, 0]}  # fmt: skip
     for what, other in others.items():
         # The correlation of independent samples has a standard error of 1/sqrt(N).
         assert abs(np.corrcoef(reference, other)[0, 1]) < ERRORS / np.sqrt(N), what
@@ -72,26 +70,20 @@ def test_uniforms_are_uniform_and_their_components_independent():
 # Quantiles ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "law, exact",
-    [
-        (lw.Normal(std=0.5), stats.norm(10.0, 0.5)),
-        (lw.Normal(relative=0.02), stats.norm(10.0, 0.2)),
-        (lw.Normal(mean=-1.0, std=2.0), stats.norm(-1.0, 2.0)),
-        (lw.Uniform(low=-1.0, high=3.0), stats.uniform(-1.0, 4.0)),
-        (lw.Uniform(half_width=2.0), stats.uniform(8.0, 4.0)),
-        (lw.Uniform(relative=0.1), stats.uniform(9.0, 2.0)),
-        (lw.LogNormal(sigma=0.3), stats.lognorm(0.3, scale=10.0)),
-        (lw.LogNormal(sigma=0.3, median=2.0), stats.lognorm(0.3, scale=2.0)),
-        (lw.TruncatedNormal(std=2.0), stats.truncnorm(-3.0, 3.0, 10.0, 2.0)),
-        (lw.TruncatedNormal(relative=0.2, width=1.5), stats.truncnorm(-1.5, 1.5, 10.0, 2.0)),
-        (lw.TruncatedNormal(std=2.0, low=9.0, high=13.0), stats.truncnorm(-0.5, 1.5, 10.0, 2.0)),
-        (lw.TruncatedNormal(std=2.0, low=9.0), stats.truncnorm(-0.5, np.inf, 10.0, 2.0)),
-        (lw.TruncatedNormal(std=2.0, high=9.0), stats.truncnorm(-np.inf, -0.5, 10.0, 2.0)),
-        (lw.TruncatedNormal(std=1.0, mean=0.0, low=12.0), stats.truncnorm(12.0, np.inf, 0.0, 1.0)),
-        (lw.TruncatedNormal(std=1.0, mean=0.0, high=-12.0), stats.truncnorm(-np.inf, -12.0, 0.0, 1.0)),
-    ],
-)
+@pytest.mark.parametrize("law, exact", [
+    (lw.Normal(std=0.5), stats.norm(10.0, 0.5)), (lw.Normal(relative=0.02), stats.norm(10.0, 0.2)),
+    (lw.Normal(mean=-1.0, std=2.0), stats.norm(-1.0, 2.0)), (lw.Uniform(low=-1.0, high=3.0), stats.uniform(-1.0, 4.0)),
+    (lw.Uniform(half_width=2.0), stats.uniform(8.0, 4.0)), (lw.Uniform(relative=0.1), stats.uniform(9.0, 2.0)),
+    (lw.LogNormal(sigma=0.3), stats.lognorm(0.3, scale=10.0)),
+    (lw.LogNormal(sigma=0.3, median=2.0), stats.lognorm(0.3, scale=2.0)),
+    (lw.TruncatedNormal(std=2.0), stats.truncnorm(-3.0, 3.0, 10.0, 2.0)),
+    (lw.TruncatedNormal(relative=0.2, width=1.5), stats.truncnorm(-1.5, 1.5, 10.0, 2.0)),
+    (lw.TruncatedNormal(std=2.0, low=9.0, high=13.0), stats.truncnorm(-0.5, 1.5, 10.0, 2.0)),
+    (lw.TruncatedNormal(std=2.0, low=9.0), stats.truncnorm(-0.5, np.inf, 10.0, 2.0)),
+    (lw.TruncatedNormal(std=2.0, high=9.0), stats.truncnorm(-np.inf, -0.5, 10.0, 2.0)),
+    (lw.TruncatedNormal(std=1.0, mean=0.0, low=12.0), stats.truncnorm(12.0, np.inf, 0.0, 1.0)),
+    (lw.TruncatedNormal(std=1.0, mean=0.0, high=-12.0), stats.truncnorm(-np.inf, -12.0, 0.0, 1.0)),
+])  # fmt: skip
 def test_quantiles(law, exact):
     # ndtri is good to some 1e-15 of its argument; its own condition at 1 - 1e-9 is 1e9 * 1e-16 * 0.2 = 2e-8.
     got = law.quantile(LEVELS, np.array(10.0))
@@ -101,15 +93,11 @@ def test_quantiles(law, exact):
     assert (np.diff(got) > 0.0).all()
 
 
-@pytest.mark.parametrize(
-    "law, exact",
-    [
-        (lw.Normal(std=0.5), stats.norm(10.0, 0.5)),
-        (lw.Uniform(half_width=2.0), stats.uniform(8.0, 4.0)),
-        (lw.LogNormal(sigma=0.3), stats.lognorm(0.3, scale=10.0)),
-        (lw.TruncatedNormal(std=2.0, low=9.0, high=13.0), stats.truncnorm(-0.5, 1.5, 10.0, 2.0)),
-    ],
-)
+@pytest.mark.parametrize("law, exact", [
+    (lw.Normal(std=0.5), stats.norm(10.0, 0.5)), (lw.Uniform(half_width=2.0), stats.uniform(8.0, 4.0)),
+    (lw.LogNormal(sigma=0.3), stats.lognorm(0.3, scale=10.0)),
+    (lw.TruncatedNormal(std=2.0, low=9.0, high=13.0), stats.truncnorm(-0.5, 1.5, 10.0, 2.0)),
+])  # fmt: skip
 def test_sampled_moments(law, exact):
     x = law.quantile(uniforms(5, law.kind, 0, N, 1)[:, 0], np.array(10.0))
     mean, variance, excess = (float(moment) for moment in exact.stats(moments="mvk"))
@@ -246,43 +234,29 @@ def test_all_faults_of_a_law_come_at_once():
         assert key in message
 
 
-@pytest.mark.parametrize(
-    "law",
-    [
-        lw.Normal(std=[0.03, 0.02, 0.01]),
-        lw.Uniform(low=0.0, high=1.0),
-        lw.LogNormal(sigma=0.1),
-        lw.TruncatedNormal(relative=0.1, width=2.0),
-    ],
-)
+@pytest.mark.parametrize("law", [
+    lw.Normal(std=[0.03, 0.02, 0.01]), lw.Uniform(low=0.0, high=1.0), lw.LogNormal(sigma=0.1),
+    lw.TruncatedNormal(relative=0.1, width=2.0),
+])  # fmt: skip
 def test_there_and_back(law):
     assert from_dict("key", law.to_dict()) == law
     assert list(law.to_dict()) == [law.kind]
 
 
-@pytest.mark.parametrize(
-    "content, text",
-    [
-        (3.0, "is not a distribution"),
-        ({}, "is not a distribution"),
-        ({"normal": {"std": 1.0}, "uniform": {}}, "is not a distribution"),
-        ({"gaussian": {"std": 1.0}}, "known: normal, uniform"),
-        ({"normal": 1.0}, "is not a table"),
-        ({"normal": {"sd": 1.0}}, "did you mean 'std'?"),
-        ({"normal": {"std": -1.0}}, "negative"),
-        ({"gamma": {"scale": 3.0}}, "key.gamma.a = None: is missing"),
-        ({"gamma": {"a": 1.0, "sale": 3.0}}, "did you mean 'scale'"),
-        ({"gamma": {"a": -1.0}}, "scipy.stats refuses"),
-        ({"gamma": {"a": "x"}}, "not numeric"),
-        ({"scipy": {"name": "gama"}}, "no distribution of scipy.stats"),
-        ({"scipy": {}}, "no distribution of scipy.stats"),
-        ({"scipy": 3}, "is not a table"),
-        ({"gammma": {"a": 1.0}}, "did you mean 'gamma'"),
-        ({"histogram": {"counts": [0.0], "edges": [0.0, 1.0]}}, "weigh no bin"),
-        ({"histogram": {"counts": [1.0], "edges": [0.0]}}, "bound 1"),
-        ({"histogram": {"counts": [1.0, 1.0], "edges": [0.0, 1.0, 1.0]}}, "rising"),
-    ],
-)
+@pytest.mark.parametrize("content, text", [
+    (3.0, "is not a distribution"), ({}, "is not a distribution"),
+    ({"normal": {"std": 1.0}, "uniform": {}}, "is not a distribution"),
+    ({"gaussian": {"std": 1.0}}, "known: normal, uniform"), ({"normal": 1.0}, "is not a table"),
+    ({"normal": {"sd": 1.0}}, "did you mean 'std'?"), ({"normal": {"std": -1.0}}, "negative"),
+    ({"gamma": {"scale": 3.0}}, "key.gamma.a = None: is missing"),
+    ({"gamma": {"a": 1.0, "sale": 3.0}}, "did you mean 'scale'"), ({"gamma": {"a": -1.0}}, "scipy.stats refuses"),
+    ({"gamma": {"a": "x"}}, "not numeric"), ({"scipy": {"name": "gama"}}, "no distribution of scipy.stats"),
+    ({"scipy": {}}, "no distribution of scipy.stats"), ({"scipy": 3}, "is not a table"),
+    ({"gammma": {"a": 1.0}}, "did you mean 'gamma'"),
+    ({"histogram": {"counts": [0.0], "edges": [0.0, 1.0]}}, "weigh no bin"),
+    ({"histogram": {"counts": [1.0], "edges": [0.0]}}, "bound 1"),
+    ({"histogram": {"counts": [1.0, 1.0], "edges": [0.0, 1.0, 1.0]}}, "rising"),
+])  # fmt: skip
 def test_bad_tables_name_the_key(content, text):
     with pytest.raises(lw.SceneError, match="the key") as caught:
         from_dict("the key", content)

@@ -336,17 +336,12 @@ def test_choices_come_as_often_as_they_weigh():
     assert set(map(tuple, whole.draw(uniforms(1, "x", 0, 100, 1), [np.zeros(2)])[0])) == {(1.0, 2.0), (3.0, 4.0)}
 
 
-@pytest.mark.parametrize(
-    "law",
-    [
-        lw.Choice(values=[1.0, 2.0], weights=[1.0, 3.0]),
-        lw.CorrelatedNormal(std=[1.0, 2.0], correlation=[[1.0, 0.5], [0.5, 1.0]]),
-        lw.RotationNormal(std=[0.1, 0.2, 0.3]),
-        lw.UniformRotation(),
-        lw.PositiveDefinite(sigma=0.1, off_diagonal=0.2),
-        lw.PhysicalInertia(sigma=0.1, mass_sigma=0.01),
-    ],
-)
+@pytest.mark.parametrize("law", [
+    lw.Choice(values=[1.0, 2.0], weights=[1.0, 3.0]),
+    lw.CorrelatedNormal(std=[1.0, 2.0], correlation=[[1.0, 0.5], [0.5, 1.0]]), lw.RotationNormal(std=[0.1, 0.2, 0.3]),
+    lw.UniformRotation(), lw.PositiveDefinite(sigma=0.1, off_diagonal=0.2),
+    lw.PhysicalInertia(sigma=0.1, mass_sigma=0.01),
+])  # fmt: skip
 def test_there_and_back(law):
     assert from_dict("key", law.to_dict()) == law
     assert list(law.to_dict()) == [law.kind]

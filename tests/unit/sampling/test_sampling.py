@@ -33,11 +33,8 @@ VARY = {
 }
 SPACE = Space(3, ("a", "b"), (2, 1), (("a[0]", (0,)), ("a[1]", (1,)), ("b", (2,))))
 SEQUENCES = ("random", "sobol", "halton", {"latin_hypercube": {"group": 40}})
-REPLICATED = (
-    {"sobol": {"replicates": 8}},
-    {"halton": {"replicates": 4}},
-    {"latin_hypercube": {"group": 10, "replicates": 4}},
-)
+REPLICATED = ({"sobol": {"replicates": 8}}, {"halton": {"replicates": 4}},
+              {"latin_hypercube": {"group": 10, "replicates": 4}})  # fmt: skip
 # 6 factors vary, three of them joint laws: groups of 14 or 8 members, and paths of 7.
 DESIGNS = ({"saltelli": {"second_order": True}}, {"saltelli": {"second_order": False}}, "morris")
 
@@ -145,18 +142,12 @@ def test_sequences_are_these_numbers():
     np.testing.assert_array_equal(cube({"latin_hypercube": {"group": 8}}, [0, 9]), LATIN)
 
 
-SOBOL = [
-    [0.029180726618506014, 0.21242503903340548, 0.31510313984472305],
-    [0.8223508863011375, 0.9412634876789525, 0.41237329703290015],
-]
-HALTON = [
-    [0.6569170426508356, 0.42754819126216037, 0.5106789685181907],
-    [0.031917042650835614, 0.9831037468177162, 0.5506789685181908],
-]
-LATIN = [
-    [0.24267010446711515, 0.7606552021171017, 0.9640351063422453],
-    [0.394352329870452, 0.1927249966504648, 0.8978476365967205],
-]
+SOBOL = [[0.029180726618506014, 0.21242503903340548, 0.31510313984472305],
+         [0.8223508863011375, 0.9412634876789525, 0.41237329703290015]]  # fmt: skip
+HALTON = [[0.6569170426508356, 0.42754819126216037, 0.5106789685181907],
+          [0.031917042650835614, 0.9831037468177162, 0.5506789685181908]]  # fmt: skip
+LATIN = [[0.24267010446711515, 0.7606552021171017, 0.9640351063422453],
+         [0.394352329870452, 0.1927249966504648, 0.8978476365967205]]  # fmt: skip
 
 
 @pytest.mark.parametrize("content", ["random", {"latin_hypercube": {"group": 40}}], ids=str)
@@ -249,13 +240,10 @@ def test_whole_numbers_of_numpy(scene):
     """They are as good as Python's, in provenance as well."""
     import json
 
-    pairs = [
-        (lw.LatinHypercube(np.int64(10), replicates=np.int32(2)), lw.LatinHypercube(10, replicates=2)),
-        (lw.Sobol(replicates=np.uint8(4)), lw.Sobol(replicates=4)),
-        (lw.Halton(replicates=np.int16(4)), lw.Halton(replicates=4)),
-        (lw.Morris(np.int64(6)), lw.Morris(6)),
-        (lw.Grid({"vehicle.buoyancy": np.int64(4)}), lw.Grid({"vehicle.buoyancy": 4})),
-    ]
+    pairs = [(lw.LatinHypercube(np.int64(10), replicates=np.int32(2)), lw.LatinHypercube(10, replicates=2)),
+             (lw.Sobol(replicates=np.uint8(4)), lw.Sobol(replicates=4)),
+             (lw.Halton(replicates=np.int16(4)), lw.Halton(replicates=4)), (lw.Morris(np.int64(6)), lw.Morris(6)),
+             (lw.Grid({"vehicle.buoyancy": np.int64(4)}), lw.Grid({"vehicle.buoyancy": 4}))]  # fmt: skip
     vary = {"vehicle.buoyancy": lw.Uniform(half_width=1.0), "start.position[2]": lw.Normal(std=1.0)}
     for ours, theirs in pairs:
         n = {"grid": 4, "morris": 60}.get(ours.kind, 80)
@@ -403,12 +391,9 @@ def test_columns_that_no_scene_has_are_left_out(scene, tmp_path):
     found = faults(lw.Table, path, columns=["vehicle.mass", "id"])
     assert len(found) == 2
     assert all('leave the column out: ignore = ["id"]' in fault for fault in found)
-    tables = [
-        lw.Table(path, ignore=["", "id"]),
-        lw.Table(path, columns=("start.position[2]", "vehicle.mass")),
-        lw.Table(frame, ignore=["id"]),
-        lw.Table(values=frame, columns=["vehicle.mass", "start.position[2]"]),
-    ]
+    tables = [lw.Table(path, ignore=["", "id"]), lw.Table(path, columns=("start.position[2]", "vehicle.mass")),
+              lw.Table(frame, ignore=["id"]),
+              lw.Table(values=frame, columns=["vehicle.mass", "start.position[2]"])]  # fmt: skip
     for table in tables:
         assert sorted(table.own_values()) == ["start.position[2]", "vehicle.mass"]
         fleet = lw.Ensemble(scene, sampling=table)
@@ -607,18 +592,12 @@ def test_files_that_are_none(scene, tmp_path):
 
 
 def test_bad_names_and_laws_come_in_one_message(scene):
-    vary = {
-        "vehicle.mass, vehicle.buoyancy": lw.Normal(std=1.0),
-        "vehicle.inertia[0,5]": lw.Normal(std=1.0),
-        "vehicle.mass[0]": lw.Normal(std=1.0),
-        "start.position": lw.Normal(std=1.0),
-        "start.position[1]": lw.Normal(std=1.0),
-        "vehicle.added_mass": lw.RotationNormal(std=0.1),
-        "vehicle.center_of_buoyancy": lw.PositiveDefinite(sigma=0.1),
-        "environment.gravity, environment.water_density": lw.CorrelatedNormal(covariance=np.eye(3)),
-        "vehicle.inertia": lw.PositiveDefinite(sigma=(0.1, 0.2)),
-        "vehicle.nothing": stats.gamma(2.0),
-    }
+    vary = {"vehicle.mass, vehicle.buoyancy": lw.Normal(std=1.0), "vehicle.inertia[0,5]": lw.Normal(std=1.0),
+            "vehicle.mass[0]": lw.Normal(std=1.0), "start.position": lw.Normal(std=1.0),
+            "start.position[1]": lw.Normal(std=1.0), "vehicle.added_mass": lw.RotationNormal(std=0.1),
+            "vehicle.center_of_buoyancy": lw.PositiveDefinite(sigma=0.1),
+            "environment.gravity, environment.water_density": lw.CorrelatedNormal(covariance=np.eye(3)),
+            "vehicle.inertia": lw.PositiveDefinite(sigma=(0.1, 0.2)), "vehicle.nothing": stats.gamma(2.0)}  # fmt: skip
     found = faults(lw.Ensemble, scene, 4, 0, vary)
     assert len(found) == 9
     for key in vary:

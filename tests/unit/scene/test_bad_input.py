@@ -213,10 +213,8 @@ def test_a_setting_of_a_section(key, value, words):
     assert all(word in fault for word in words), fault
 
 
-PAIRS = [
-    ({"velocity": (1, 0, 0), "velocity_inertial": (1, 0, 0)}, "start.velocity and velocity_inertial = "),
-    ({"rotation_vector": (1, 0, 0), "euler_deg": (1, 0, 0)}, "start.rotation_vector and euler_deg = "),
-]
+PAIRS = [({"velocity": (1, 0, 0), "velocity_inertial": (1, 0, 0)}, "start.velocity and velocity_inertial = "),
+         ({"rotation_vector": (1, 0, 0), "euler_deg": (1, 0, 0)}, "start.rotation_vector and euler_deg = ")]  # fmt: skip
 
 
 @pytest.mark.parametrize(("values", "start"), PAIRS)
@@ -361,15 +359,11 @@ def test_a_scene_file_that_is_not_there(path):
 
 
 FAR = lw.Normal(std=100.0)
-VARIED = [
-    (PROFILE, "current_profile.depths", FAR),
-    (SCHEDULE, "wrench_schedule.times", FAR),
-    (THRUSTER | {"times": [0.0, 1.0], "command_schedule": [[0.0], [1.0]]}, "thrusters.times", FAR),
-    (HULL, "cross_flow.stations", FAR),
-    (THRUSTER, "thrusters.coefficient", FAR),
-    ({"type": "drag_matrix", "linear": np.eye(6).tolist()}, "drag_matrix.linear", FAR),
-    (WAVES, "waves.periods", FAR),
-]
+VARIED = [(PROFILE, "current_profile.depths", FAR), (SCHEDULE, "wrench_schedule.times", FAR),
+          (THRUSTER | {"times": [0.0, 1.0], "command_schedule": [[0.0], [1.0]]}, "thrusters.times", FAR),
+          (HULL, "cross_flow.stations", FAR), (THRUSTER, "thrusters.coefficient", FAR),
+          ({"type": "drag_matrix", "linear": np.eye(6).tolist()}, "drag_matrix.linear", FAR),
+          (WAVES, "waves.periods", FAR)]  # fmt: skip
 
 
 @pytest.mark.parametrize(("table", "name", "law"), VARIED)
@@ -381,10 +375,8 @@ def test_members_that_would_be_unphysical(table, name, law):
     assert "smaller spread" in fault
 
 
-NAMES = [
-    ({"type": "drag"}, "drag.quadrtic", "did you mean 'drag.quadratic'?"),
-    ({"type": "drag", "name": "hull"}, "drag.quadratic", "did you mean 'hull.quadratic'?"),
-]
+NAMES = [({"type": "drag"}, "drag.quadrtic", "did you mean 'drag.quadratic'?"),
+         ({"type": "drag", "name": "hull"}, "drag.quadratic", "did you mean 'hull.quadratic'?")]  # fmt: skip
 
 
 @pytest.mark.parametrize(("table", "name", "remedy"), NAMES)

@@ -13,19 +13,13 @@ from lgvi_warp.scene import draws
 from tests.support.refusals import faults
 
 FULL = np.array([[5.0, 0.3, 0.1], [0.3, 6.0, -0.2], [0.1, -0.2, 7.0]])
-EVERYTHING = {
-    "vehicle.mass": lw.Normal(relative=0.01),
-    "vehicle.added_mass": lw.Uniform(relative=0.1),
-    "vehicle.inertia": lw.LogNormal(sigma=0.05),
-    "vehicle.buoyancy": lw.TruncatedNormal(std=1.0),
-    "vehicle.center_of_buoyancy": lw.Normal(std=(0.001, 0.001, 0.002)),
-    "environment.gravity": lw.Uniform(low=9.78, high=9.83),
-    "environment.water_density": lw.Uniform(low=1020.0, high=1030.0),
-    "start.position": lw.Normal(std=0.5),
-    "start.rotation_vector": lw.Normal(std=0.1),
-    "start.velocity_inertial": lw.Normal(std=0.05),
-    "start.angular_velocity": lw.Normal(std=(0.03, 0.02, 0.01)),
-}
+EVERYTHING = {"vehicle.mass": lw.Normal(relative=0.01), "vehicle.added_mass": lw.Uniform(relative=0.1),
+              "vehicle.inertia": lw.LogNormal(sigma=0.05), "vehicle.buoyancy": lw.TruncatedNormal(std=1.0),
+              "vehicle.center_of_buoyancy": lw.Normal(std=(0.001, 0.001, 0.002)),
+              "environment.gravity": lw.Uniform(low=9.78, high=9.83),
+              "environment.water_density": lw.Uniform(low=1020.0, high=1030.0), "start.position": lw.Normal(std=0.5),
+              "start.rotation_vector": lw.Normal(std=0.1), "start.velocity_inertial": lw.Normal(std=0.05),
+              "start.angular_velocity": lw.Normal(std=(0.03, 0.02, 0.01))}  # fmt: skip
 
 
 def numbers(m):
@@ -53,15 +47,9 @@ def test_nothing_varied_is_shared(scene):
     m = lw.Ensemble(scene, members=5).select(1, 4)
     assert m.count == 3
     shapes = {name: value.shape for name, value in m.parameters.items()}
-    assert shapes == {
-        "vehicle.mass": (1,),
-        "vehicle.added_mass": (1, 3, 3),
-        "vehicle.inertia": (1, 3, 3),
-        "vehicle.buoyancy": (1,),
-        "vehicle.center_of_buoyancy": (1, 3),
-        "environment.gravity": (1,),
-        "environment.water_density": (1,),
-    }
+    assert shapes == {"vehicle.mass": (1,), "vehicle.added_mass": (1, 3, 3), "vehicle.inertia": (1, 3, 3),
+                      "vehicle.buoyancy": (1,), "vehicle.center_of_buoyancy": (1, 3), "environment.gravity": (1,),
+                      "environment.water_density": (1,)}  # fmt: skip
     assert (m.position.shape, m.attitude.shape) == ((3, 3), (3, 3, 3))
     np.testing.assert_array_equal(m.position, np.tile([0.0, 0.0, 10.0], (3, 1)))
 
@@ -273,15 +261,11 @@ def test_one_member(scene):
 # Refused laws ------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "name, text",
-    [
-        ("vehicle.mas", "did you mean 'vehicle.mass'?"),
-        ("mass", "did you mean 'vehicle.mass'?"),
-        ("start.velocity", "the scene gives start.position, start.rotation_vector, start.velocity_inertial"),
-        ("start.euler_deg", "the scene gives start.position, start.rotation_vector"),
-    ],
-)
+@pytest.mark.parametrize("name, text", [
+    ("vehicle.mas", "did you mean 'vehicle.mass'?"), ("mass", "did you mean 'vehicle.mass'?"),
+    ("start.velocity", "the scene gives start.position, start.rotation_vector, start.velocity_inertial"),
+    ("start.euler_deg", "the scene gives start.position, start.rotation_vector"),
+])  # fmt: skip
 def test_names_that_the_scene_does_not_have(scene, name, text):
     (fault,) = faults(lw.Ensemble, scene, 4, 0, {name: lw.Normal(std=0.1)})
     assert f'ensemble.vary."{name}"' in fault
@@ -301,15 +285,10 @@ def test_a_full_matrix_varies_and_stays_symmetric(scene):
     np.testing.assert_allclose(J, np.broadcast_to(FULL, J.shape), rtol=0.05)
 
 
-@pytest.mark.parametrize(
-    "name, law",
-    [
-        ("vehicle.mass", lw.Normal(std=(1.0, 2.0, 3.0))),
-        ("start.position", lw.Normal(std=(1.0, 2.0))),
-        ("start.position", lw.Normal(std=np.ones((3, 3)))),
-        ("vehicle.inertia", lw.Uniform(low=np.ones((3, 3)), high=2.0)),
-    ],
-)
+@pytest.mark.parametrize("name, law", [
+    ("vehicle.mass", lw.Normal(std=(1.0, 2.0, 3.0))), ("start.position", lw.Normal(std=(1.0, 2.0))),
+    ("start.position", lw.Normal(std=np.ones((3, 3)))), ("vehicle.inertia", lw.Uniform(low=np.ones((3, 3)), high=2.0)),
+])  # fmt: skip
 def test_laws_of_the_wrong_shape(scene, name, law):
     assert "does not fit a quantity of shape" in faults(lw.Ensemble, scene, 4, 0, {name: law})[0]
 

@@ -16,32 +16,19 @@ N = 3
 R = np.array([np.eye(3)] * N)
 ZERO = np.zeros((N, 3))
 MASKED = np.ma.array(np.arange(9.0).reshape(N, 3), mask=np.eye(3))
-ODD = {
-    "texts": [["1.5", "2", "3"]] * N,
-    "array of texts": np.array([["1.5", "2", "3"]] * N),
-    "bytes": np.array([[b"1", b"2", b"3"]] * N),
-    "objects that are texts": np.array([["1.5", 2.0, 3.0]] * N, dtype=object),
-    "truth values": np.ones((N, 3), dtype=bool),
-    "a truth value": [[True, 0.0, 0.0]] * N,
-    "a truth value of NumPy's": [[np.True_, 0.0, 0.0]] * N,
-    "an array of truth values": [np.array([True, False, True])] * N,
-    "complex": ZERO + 0j,
-    "a complex number": [[0j, 0.0, 0.0]] * N,
-    "dates": np.zeros((N, 3), dtype="datetime64[s]"),
-    "nothing": [[None, 0.0, 0.0]] * N,
-    "ragged": [[1.0, 2.0, 3.0], [1.0], [2.0]],
-    "masked": MASKED,
-    "masked within a list": [MASKED[0], MASKED[1], MASKED[2]],
-    "the masked number": [[np.ma.masked, 0.0, 0.0]] * N,
-}
-GOOD = {
-    "lists": ZERO.tolist(),
-    "whole numbers": np.zeros((N, 3), dtype=np.int8),
-    "objects that are numbers": np.array(ZERO, dtype=object),
-    "fractions": [[Fraction(0), 0, 0.0]] * N,
-    "half precision": ZERO.astype(np.float16),
-    "a mask that hides nothing": np.ma.masked_greater(ZERO, 1.0),
-}
+ODD = {"texts": [["1.5", "2", "3"]] * N, "array of texts": np.array([["1.5", "2", "3"]] * N),
+       "bytes": np.array([[b"1", b"2", b"3"]] * N),
+       "objects that are texts": np.array([["1.5", 2.0, 3.0]] * N, dtype=object),
+       "truth values": np.ones((N, 3), dtype=bool), "a truth value": [[True, 0.0, 0.0]] * N,
+       "a truth value of NumPy's": [[np.True_, 0.0, 0.0]] * N,
+       "an array of truth values": [np.array([True, False, True])] * N, "complex": ZERO + 0j,
+       "a complex number": [[0j, 0.0, 0.0]] * N, "dates": np.zeros((N, 3), dtype="datetime64[s]"),
+       "nothing": [[None, 0.0, 0.0]] * N, "ragged": [[1.0, 2.0, 3.0], [1.0], [2.0]], "masked": MASKED,
+       "masked within a list": [MASKED[0], MASKED[1], MASKED[2]],
+       "the masked number": [[np.ma.masked, 0.0, 0.0]] * N}  # fmt: skip
+GOOD = {"lists": ZERO.tolist(), "whole numbers": np.zeros((N, 3), dtype=np.int8),
+        "objects that are numbers": np.array(ZERO, dtype=object), "fractions": [[Fraction(0), 0, 0.0]] * N,
+        "half precision": ZERO.astype(np.float16), "a mask that hides nothing": np.ma.masked_greater(ZERO, 1.0)}  # fmt: skip
 
 
 @pytest.mark.parametrize("form", ODD)

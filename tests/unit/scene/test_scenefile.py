@@ -91,16 +91,10 @@ def test_a_small_scene_needs_a_vehicle_only():
 
 
 def test_overrides():
-    changes = {
-        "vehicle.mass": "120.5",
-        "run.method": "psi",
-        "run.dtype": '"float32_compensated"',
-        "run.duration": 2,
-        "start.position": "[0, 0, 5]",
-        "ensemble.members": "7",
-        "ensemble.vary.vehicle.mass": "{ uniform = { half_width = 0.5 } }",
-        'ensemble.vary."vehicle.buoyancy"': "{ normal = { std = 0.1 } }",
-    }
+    changes = {"vehicle.mass": "120.5", "run.method": "psi", "run.dtype": '"float32_compensated"', "run.duration": 2,
+               "start.position": "[0, 0, 5]", "ensemble.members": "7",
+               "ensemble.vary.vehicle.mass": "{ uniform = { half_width = 0.5 } }",
+               'ensemble.vary."vehicle.buoyancy"': "{ normal = { std = 0.1 } }"}  # fmt: skip
     scene = lw.Scene.load(PAPER, changes)
     assert (scene.vehicle.mass, scene.run.method, scene.run.duration) == (120.5, "psi", 2)
     assert scene.run.dtype == "float32_compensated"

@@ -14,11 +14,8 @@ from tests.conftest import ROOT
 from tests.support.json_schema import faults
 
 SCHEMA = schema()
-FILES = [
-    *sorted((ROOT / "examples").glob("*.toml")),
-    *sorted((ROOT / "examples" / "scenes").glob("*.toml")),
-    *map(vehicle_file, vehicles()),
-]
+FILES = [*sorted((ROOT / "examples").glob("*.toml")), *sorted((ROOT / "examples" / "scenes").glob("*.toml")),
+         *map(vehicle_file, vehicles())]  # fmt: skip
 PAPER = tomllib.loads((ROOT / "examples" / "paper.toml").read_text())
 
 

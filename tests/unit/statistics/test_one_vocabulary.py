@@ -15,23 +15,10 @@ from lgvi_warp.studies.distance import QUANTITIES, compared_in
 from tests.support.refusals import refused
 
 K, N = 4, 3
-AT_EACH_TIME = [
-    *KNOWN,
-    "position[2]",
-    "attitude[0,1]",
-    "attitude[0, 1]",
-    "norm(velocity)",
-    "norm(position)",
-    "euler[2]",
-]
-OVER_PATH = [
-    "max(depth)",
-    "range(position)",
-    "norm(max(velocity))",
-    "max(norm(velocity))",
-    "max(position)[2]",
-    "mean(energy)",
-]
+AT_EACH_TIME = [*KNOWN, "position[2]", "attitude[0,1]", "attitude[0, 1]", "norm(velocity)", "norm(position)",
+                "euler[2]"]  # fmt: skip
+OVER_PATH = ["max(depth)", "range(position)", "norm(max(velocity))", "max(norm(velocity))", "max(position)[2]",
+             "mean(energy)"]  # fmt: skip
 UNKNOWN = ["deph", "position[3]", "attitude[0]", "median(speed)", "speed[0]", "max(speed", "norm()", "", "a b"]
 
 
@@ -169,17 +156,12 @@ def test_a_quantity_of_the_users_may_be_asked_for_everywhere(result):
     assert lw.Mean(own).quantity is own
 
 
-@pytest.mark.parametrize(
-    ("of", "labels"),
-    [
-        ("position", ("position[0]", "position[1]", "position[2]")),
-        ("max(position)", ("max(position)[0]", "max(position)[1]", "max(position)[2]")),
-        ("max(position)[1]", ("max(position)[1]",)),
-        ("max(position[1])", ("max(position[1])",)),
-        ("norm(velocity)", ("norm(velocity)",)),
-        ("range(norm(velocity))", ("range(norm(velocity))",)),
-    ],
-)
+@pytest.mark.parametrize(("of", "labels"), [
+    ("position", ("position[0]", "position[1]", "position[2]")),
+    ("max(position)", ("max(position)[0]", "max(position)[1]", "max(position)[2]")),
+    ("max(position)[1]", ("max(position)[1]",)), ("max(position[1])", ("max(position[1])",)),
+    ("norm(velocity)", ("norm(velocity)",)), ("range(norm(velocity))", ("range(norm(velocity))",)),
+])  # fmt: skip
 def test_each_component_is_named_by_an_expression_for_it(of, labels):
     assert functional("of", of).labels == labels
     for label in labels:

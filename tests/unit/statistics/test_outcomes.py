@@ -290,12 +290,8 @@ def test_parts_and_estimates_of_an_earlier_version_are_refused():
     with pytest.raises(ValueError, match="'outcome floor' is of an earlier version"):
         Estimates.from_arrays(arrays, text)
     gather = Gathered(TIMES, 100, [lw.Outcome("floor")])
-    old = {
-        "members": np.array([1]),
-        "time": np.array([1.0]),
-        "so": np.array([True]),
-        "replicate": np.zeros(1, np.int32),
-    }
+    old = {"members": np.array([1]), "time": np.array([1.0]), "so": np.array([True]),
+           "replicate": np.zeros(1, np.int32)}  # fmt: skip
     with pytest.raises(ValueError, match="'outcome floor' is of an earlier version"):
         gather.merge(blocks(100)[0], [old])
 

@@ -452,10 +452,8 @@ def test_coverage_of_the_spread_of_few_members(repeated, n):
 
     x = repeated[:, :n]
     circle = of(lw.CircularMean, np.random.default_rng(36).vonmises(0.0, 2.0, size=(REPETITIONS, n, 1)))
-    held = np.append(
-        np.diag(coverage(of(lw.Covariance, x), np.eye(2))),
-        coverage(circle, ive(1, 2.0) / ive(0, 2.0), "resultant_length"),
-    )
+    held = np.append(np.diag(coverage(of(lw.Covariance, x), np.eye(2))),
+                     coverage(circle, ive(1, 2.0) / ive(0, 2.0), "resultant_length"))  # fmt: skip
     # Fourth moments as they are hold 80, 87, 91 %, and 72, 82, 90 % of resultant lengths.
     assert np.all((held >= 0.915) & (held <= 0.99)), held
 
@@ -707,15 +705,10 @@ def test_intervals_are_those_of_the_definitions():
         assert (low, high) == pytest.approx((exact.low, exact.high), abs=1e-12)
 
 
-ORDERS = {
-    "rising": np.sort,
-    "falling": lambda x: np.sort(x)[::-1],
-    "from both ends": lambda x: np.stack([np.sort(x)[: len(x) // 2], np.sort(x)[::-1][: len(x) // 2]], 1).ravel(),
-    "random": lambda x: x,
-    "blocks of equals": lambda x: np.repeat(x[: len(x) // 256], 256),
-    "heavy ties": lambda x: np.round(x),
-    "strided": lambda x: np.sort(x).reshape(256, -1).T.ravel(),
-}
+ORDERS = {"rising": np.sort, "falling": lambda x: np.sort(x)[::-1],
+          "from both ends": lambda x: np.stack([np.sort(x)[: len(x) // 2], np.sort(x)[::-1][: len(x) // 2]], 1).ravel(),
+          "random": lambda x: x, "blocks of equals": lambda x: np.repeat(x[: len(x) // 256], 256),
+          "heavy ties": lambda x: np.round(x), "strided": lambda x: np.sort(x).reshape(256, -1).T.ravel()}  # fmt: skip
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -753,24 +746,18 @@ def test_the_sketchs_error_is_as_often_up_as_down():
     assert abs(error.mean()) < 5.0 * proven / np.sqrt(streams)
 
 
-OF_EVERY_KIND = {
-    "mean": lambda x: lw.Mean(x),
-    "covariance": lambda x: lw.Covariance(x),
-    "extremes": lambda x: lw.Extremes(x),
-    "quantiles": lambda x: lw.Quantiles(x, size=64),
-    "histogram": lambda x: lw.Histogram(x, bins=30, limits=(-10.0, 1010.0)),
-    "exceedance": lambda x: lw.Exceedance(x, above=(1000.0, 0.0, -5.0)),
-    "first_passage": lambda x: lw.FirstPassage(scalar(), above=1002.0),
-    "circular_mean": lambda x: lw.CircularMean(x),
-    "mean_attitude": lambda x: lw.MeanAttitude(),
-    "path_maximum": lambda x: lw.PathMaximum(x, [lw.Mean(), lw.Quantiles(size=64)]),
-    "path_minimum": lambda x: lw.PathMinimum(x, [lw.Covariance(), lw.Extremes()]),
-    "path_range": lambda x: lw.PathRange(x),
-    "path_mean": lambda x: lw.PathMean(x, [lw.Mean(), lw.Quantiles(size=64)]),
-    "path_rms": lambda x: lw.PathRms(x),
-    "each": lambda x: lw.Each(x),
-    "path_time": lambda x: lw.PathTime(x, above=(999.0, -1.0, -6.0), below=(1001.0, 1.0, -4.0)),
-}
+OF_EVERY_KIND = {"mean": lambda x: lw.Mean(x), "covariance": lambda x: lw.Covariance(x),
+                 "extremes": lambda x: lw.Extremes(x), "quantiles": lambda x: lw.Quantiles(x, size=64),
+                 "histogram": lambda x: lw.Histogram(x, bins=30, limits=(-10.0, 1010.0)),
+                 "exceedance": lambda x: lw.Exceedance(x, above=(1000.0, 0.0, -5.0)),
+                 "first_passage": lambda x: lw.FirstPassage(scalar(), above=1002.0),
+                 "circular_mean": lambda x: lw.CircularMean(x), "mean_attitude": lambda x: lw.MeanAttitude(),
+                 "path_maximum": lambda x: lw.PathMaximum(x, [lw.Mean(), lw.Quantiles(size=64)]),
+                 "path_minimum": lambda x: lw.PathMinimum(x, [lw.Covariance(), lw.Extremes()]),
+                 "path_range": lambda x: lw.PathRange(x),
+                 "path_mean": lambda x: lw.PathMean(x, [lw.Mean(), lw.Quantiles(size=64)]),
+                 "path_rms": lambda x: lw.PathRms(x), "each": lambda x: lw.Each(x),
+                 "path_time": lambda x: lw.PathTime(x, above=(999.0, -1.0, -6.0), below=(1001.0, 1.0, -4.0))}  # fmt: skip
 
 
 # Those of ends have no samples: tests/unit/statistics/test_outcomes.py. Those of looks: test_metrics.py.

@@ -768,10 +768,8 @@ def test_a_sweep_without_time_tries_what_was_asked_for_by_name(scene):
     sample = on(sample, {"psi_x": 1.0, "rk4": 1.0})
     rest = ["psi_x float32", "rk4 float32"]
     # Nobody named them: the first begins always.
-    assert swept(spent(2.0, 1.0), Budget(ENOUGH)) == (
-        ["psi_x float64"],
-        ["rk4 float64", *rest, "psi_x float64 at fine steps"],
-    )
+    assert swept(spent(2.0, 1.0), Budget(ENOUGH)) == (["psi_x float64"],
+                                                      ["rk4 float64", *rest, "psi_x float64 at fine steps"])  # fmt: skip
     assert swept(Budget(ENOUGH), spent(2.0, 1.0))[0][:2] == ["psi_x float64"] * 2
     assert swept(spent(2.0, 1.0), spent(2.0, 1.0), named=True) == (
         ["psi_x float64", "rk4 float64"],

@@ -211,11 +211,8 @@ def test_launches_are_long_enough_to_time():
         return SimpleNamespace(price=price, spec=SimpleNamespace(width=8), method=SimpleNamespace(stages=(1.0,) * stages),
                                ensemble=SimpleNamespace(members=n, select=lambda a, b: ("members", a, b)))  # fmt: skip
 
-    calls, steps = cost.launches(
-        [plan(20e-9), plan(1.0), plan(1e-15), plan(20e-9, 100, 10), plan(20e-9, 2)],
-        make=Packets,
-        clock=lambda: now.time,
-    )
+    calls, steps = cost.launches([plan(20e-9), plan(1.0), plan(1e-15), plan(20e-9, 100, 10), plan(20e-9, 2)],
+                                 make=Packets, clock=lambda: now.time)  # fmt: skip
     assert [stop for _, stop in asked] == [200, 200, 200, 20, 2500]
     assert all(first == 0 for first, _ in asked)
     assert steps[:, 0] == pytest.approx([1000 * 100, 10 * 100, 100_000 * 100, 1000 * 100, 50_000 * 2], rel=1e-2)
@@ -228,13 +225,8 @@ def test_launches_are_long_enough_to_time():
 
 
 def test_numbers_that_json_cannot_hold_are_none():
-    content = {
-        "a": math.inf,
-        "b": [1.0, math.nan, (2, np.float32(3.0))],
-        "c": np.array([[1.0, -math.inf]]),
-        "d": "x",
-        "e": None,
-    }
+    content = {"a": math.inf, "b": [1.0, math.nan, (2, np.float32(3.0))], "c": np.array([[1.0, -math.inf]]), "d": "x",
+               "e": None}  # fmt: skip
     plain = files.finite_or_none(content)
     assert plain == {"a": None, "b": [1.0, None, [2, 3.0]], "c": [[1.0, None]], "d": "x", "e": None}
     assert type(plain["b"][2][1]) is float

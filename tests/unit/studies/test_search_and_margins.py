@@ -285,10 +285,8 @@ def test_margins_in_words_and_by_member():
     by_runs = {name: 10.0 * column for name, column in values.items()}
     found = Margins("heading_pid", values, by_runs, np.array(["", "", "at its limit: fins[1]", ""], dtype=object), 0.01)
     lines = str(found).splitlines()
-    assert lines[:2] == [
-        "heading_pid: margins of 4 members",
-        "1 of them have none (1: at its limit: fins[1]); the others:",
-    ]
+    assert lines[:2] == ["heading_pid: margins of 4 members",
+                         "1 of them have none (1: at its limit: fins[1]); the others:"]  # fmt: skip
     assert found.steady.tolist() == [True, True, False, True]
     assert found.reasons == {"at its limit: fins[1]": 1}
     plain = found.to_dict()

@@ -68,30 +68,12 @@ def test_a_table_in_words():
 def test_records_of_every_index():
     rows = list(sobol_indices().rows())
     assert len(rows) == 2 * 2 * 2 + 2
-    assert rows[0] == {
-        "quantity": "depth",
-        "factor": "a",
-        "other": "",
-        "index": "first",
-        "value": 0.5,
-        "confidence": 0.05,
-    }
-    assert rows[3] == {
-        "quantity": "depth",
-        "factor": "bc",
-        "other": "",
-        "index": "total",
-        "value": 0.5,
-        "confidence": 0.05,
-    }
-    assert rows[8] == {
-        "quantity": "depth",
-        "factor": "a",
-        "other": "bc",
-        "index": "second",
-        "value": 0.3,
-        "confidence": 0.2,
-    }
+    assert rows[0] == {"quantity": "depth", "factor": "a", "other": "", "index": "first", "value": 0.5,
+                       "confidence": 0.05}  # fmt: skip
+    assert rows[3] == {"quantity": "depth", "factor": "bc", "other": "", "index": "total", "value": 0.5,
+                       "confidence": 0.05}  # fmt: skip
+    assert rows[8] == {"quantity": "depth", "factor": "a", "other": "bc", "index": "second", "value": 0.3,
+                       "confidence": 0.2}  # fmt: skip
     assert [row["quantity"] for row in rows[8:]] == ["depth", "energy"]
     rows = list(effects().rows())
     assert [row["index"] for row in rows[:3]] == ["mu_star", "mu", "sigma"]
@@ -474,12 +456,9 @@ def test_a_model_describes_its_columns(monkeypatch):
     model = adaptor.model(BARE, vary, "depth", **settings)
     names = ["vehicle.mass", "start.position[0]", "start.position[1]", "start.position[2]"]
     assert list(model.names) == names
-    assert model.problem == {
-        "num_vars": 4,
-        "names": names,
-        "bounds": [[1.0, 0.1], [-1.0, 1.0], [-2.0, 2.0], [-3.0, 3.0]],
-        "dists": ["norm", "unif", "unif", "unif"],
-    }
+    assert model.problem == {"num_vars": 4, "names": names,
+                             "bounds": [[1.0, 0.1], [-1.0, 1.0], [-2.0, 2.0], [-3.0, 3.0]],
+                             "dists": ["norm", "unif", "unif", "unif"]}  # fmt: skip
     u = np.array([[0.25, 0.5], [0.75, 1.0]])
     ends = [distribution.ppf(u) for distribution in model.distributions]
     assert ends[0].shape == (2, 2)

@@ -39,16 +39,12 @@ def drag_scene(scene):
     return dataclasses.replace(scene, terms=[lw.Drag(linear=[1.0] * 6, quadratic=[0, 0, 40.0, 0, 0, 0])])
 
 
-@pytest.mark.parametrize(
-    ("text", "axis"),
-    [
-        ("h", Axis("h")),
-        ("h=0.01:3", Axis("h", 0.01, 3.0)),
-        ("vehicle.mass=50:500:linear", Axis("vehicle.mass", 50.0, 500.0, log=False)),
-        ("vehicle.inertia=0.1:10:log:scale", Axis("vehicle.inertia", 0.1, 10.0, scaled=True)),
-        ("vehicle.mass=1:2:set", Axis("vehicle.mass", 1.0, 2.0, scaled=False)),
-    ],
-)
+@pytest.mark.parametrize(("text", "axis"), [
+    ("h", Axis("h")), ("h=0.01:3", Axis("h", 0.01, 3.0)),
+    ("vehicle.mass=50:500:linear", Axis("vehicle.mass", 50.0, 500.0, log=False)),
+    ("vehicle.inertia=0.1:10:log:scale", Axis("vehicle.inertia", 0.1, 10.0, scaled=True)),
+    ("vehicle.mass=1:2:set", Axis("vehicle.mass", 1.0, 2.0, scaled=False)),
+])  # fmt: skip
 def test_an_axis_is_read(text, axis):
     assert Axis.parse(text) == axis
 
@@ -157,17 +153,11 @@ def test_all_faults_at_once(scene):
         lw.stability_map(scene, points=0, directions=0)
 
 
-@pytest.mark.parametrize(
-    ("x", "y", "words"),
-    [
-        ("h", "h", "both axes"),
-        ("speed", "angular_velocity", "missing, and is on no axis"),
-        ("h=a:b", "speed", "NAME=LOW:HIGH"),
-        ("h=1:2:cubic", "speed", "NAME=LOW:HIGH"),
-        ("h=-1:2", "speed", "above 0"),
-        ("h", "vehicle.inertia=1:2:log:set", "multiplied"),
-    ],
-)
+@pytest.mark.parametrize(("x", "y", "words"), [
+    ("h", "h", "both axes"), ("speed", "angular_velocity", "missing, and is on no axis"),
+    ("h=a:b", "speed", "NAME=LOW:HIGH"), ("h=1:2:cubic", "speed", "NAME=LOW:HIGH"), ("h=-1:2", "speed", "above 0"),
+    ("h", "vehicle.inertia=1:2:log:set", "multiplied"),
+])  # fmt: skip
 def test_bad_axes_are_refused(scene, x, y, words):
     with pytest.raises(lw.SceneError, match=words):
         grid_of(dataclasses.replace(scene, run=RunSettings()), x, y)
@@ -537,10 +527,8 @@ def test_a_scene_without_a_precise_method_has_no_map(scene):
 
 def test_parts_of_a_reference_are_put_in_their_places():
     path = np.zeros((2, 3, 3))
-    whole, part = (
-        made(path, attitude=np.tile(np.eye(3), (2, 3, 1, 1))),
-        made(path[:, :2] + 1.0, status=[0, Status.NON_FINITE], end=[np.nan, 0.5]),
-    )
+    whole, part = (made(path, attitude=np.tile(np.eye(3), (2, 3, 1, 1))),
+                   made(path[:, :2] + 1.0, status=[0, Status.NON_FINITE], end=[np.nan, 0.5]))  # fmt: skip
     assert runs.joined(None, part, np.array([0, 1])) is part
     before = whole.energy
     joined = runs.joined(whole, part, np.array([2, 0]))

@@ -38,11 +38,8 @@ SCENE = lw.Scene.from_dict(TABLES)
 BARE = replace(SCENE, controller=None)
 VARY = {"start.position": lw.Normal(std=0.8), "vehicle.mass": lw.Uniform(low=45.0, high=55.0)}
 METRICS = ["overshoot heading", "iae heading"]
-CASES = [
-    {"name": "soft"},
-    {"name": "stiff", "set": {"heading_pid.kp": 8.0}},
-    {"name": "unknown", "set": {"heading_pid.kq": 1.0}},
-]
+CASES = [{"name": "soft"}, {"name": "stiff", "set": {"heading_pid.kp": 8.0}},
+         {"name": "unknown", "set": {"heading_pid.kq": 1.0}}]  # fmt: skip
 MASS = lw.Ensemble(SCENE, N, 3, VARY).parameters(0, N)["vehicle.mass"]
 RISING = np.linspace(0.1, 2.05, N)
 
@@ -150,24 +147,10 @@ def test_rows_of_a_comparison(found):
     d = paired.proportions(*only, N, 0.95)
     head = {"first": "soft", "second": "stiff"}
     assert only == (3, 6)
-    assert rows[0] == pytest.approx(
-        head
-        | {
-            "of": "success",
-            "value_first": 0.7,
-            "value_second": 31 / 40,
-            "difference": 3 / 40,
-            "lower": d.lower,
-            "upper": d.upper,
-            "p": d.p,
-            "p_holm": d.p,
-            "real": False,
-            "pairs": N,
-            "test": "McNemar, exact",
-            "only_first": 3,
-            "only_second": 6,
-        }
-    )
+    assert rows[0] == pytest.approx(head | {"of": "success", "value_first": 0.7, "value_second": 31 / 40,
+                                            "difference": 3 / 40, "lower": d.lower, "upper": d.upper, "p": d.p,
+                                            "p_holm": d.p, "real": False, "pairs": N, "test": "McNemar, exact",
+                                            "only_first": 3, "only_second": 6})  # fmt: skip
     good = [i for i in range(N) if i not in (3, 7)]
     x, y = RISING[good], half_of_them().numbers["overshoot heading"][good]
     test = stats.ttest_rel(y, x)
@@ -248,11 +231,8 @@ def test_shares_of_all_or_none_stay_probabilities():
 
 def test_all_pairs_of_three_cases_are_tested_together():
     records = [record(np.where(np.arange(N) < few, 0.1, 2.0)) for few in (10, 22, 16)]
-    names = [
-        {"name": "a"},
-        {"name": "b", "set": {"heading_pid.kp": 8.0}},
-        {"name": "c", "set": {"heading_pid.kp": 9.0}},
-    ]
+    names = [{"name": "a"}, {"name": "b", "set": {"heading_pid.kp": 8.0}},
+             {"name": "c", "set": {"heading_pid.kp": 9.0}}]  # fmt: skip
     ranks = swept(records, names).ranking()
     # 12, 6 and 6 members differ: of McNemar's p, 0.0005 and twice 0.031, the latter are corrected to 0.0625.
     assert [(row["case"], row["better_than"]) for row in ranks] == [("b", "a"), ("c", ""), ("a", "")]
@@ -611,10 +591,8 @@ def test_what_a_case_sets_does_not_vary_in_it():
 
 def test_numbers_that_only_a_case_has_vary_in_it():
     law = {"type": "heave_pid", "kp": 2.0}
-    names = [
-        {"name": "plain"},
-        {"name": "deep", "replace": {"laws": [law], "guidance": [{"type": "set_point", "depth": 1.0}]}},
-    ]
+    names = [{"name": "plain"},
+             {"name": "deep", "replace": {"laws": [law], "guidance": [{"type": "set_point", "depth": 1.0}]}}]  # fmt: skip
     found = swept([record(), record()], names, vary=VARY | {"heave_pid.kp": lw.Uniform(low=1.0, high=3.0)},
                   metrics=METRICS)  # fmt: skip
     assert [cell.fixed for cell in found.cells] == [("heave_pid.kp",), ()]

@@ -158,16 +158,8 @@ def test_a_viewer_that_ends_before_it_has_a_recording_leaves_the_file(tmp_path):
 
 @pytest.mark.kernel
 def test_run_shows_members_as_they_are_done_then_the_whole_run(tmp_path, capsys):
-    command = [
-        "run",
-        str(ROOT / "examples" / "paper.toml"),
-        "--out",
-        str(tmp_path),
-        "--members",
-        "20",
-        "--duration",
-        "2",
-    ]
+    command = ["run", str(ROOT / "examples" / "paper.toml"), "--out", str(tmp_path), "--members", "20", "--duration",
+               "2"]  # fmt: skip
     with receiver(tmp_path / "sent.rrd") as address:
         assert cli.main([*command, "--set", "run.save_every=0.5", "--live", "--viewer", address]) == 0
     assert "fleet.rrd" in capsys.readouterr().out
@@ -259,16 +251,10 @@ def test_an_address_without_a_port_has_that_of_viewers():
     assert not viewer.answers("rerun+http://127.0.0.1/proxy") or viewer.is_open()
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        (["--viewer", "x"], "--viewer x: has no effect without --live"),
-        (
-            ["--live", "--keep", "none"],
-            "--live: shows members as they are done, and the run keeps none; add --keep all",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("options", "words"), [
+    (["--viewer", "x"], "--viewer x: has no effect without --live"),
+    (["--live", "--keep", "none"], "--live: shows members as they are done, and the run keeps none; add --keep all"),
+])  # fmt: skip
 def test_live_is_refused_where_it_shows_nothing(options, words, tmp_path, capsys):
     assert cli.main(["run", str(ROOT / "examples" / "paper.toml"), "--out", str(tmp_path / "run"), *options]) == 2
     said = capsys.readouterr().err
@@ -277,13 +263,10 @@ def test_live_is_refused_where_it_shows_nothing(options, words, tmp_path, capsys
     assert not (tmp_path / "run").exists()
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("echo no display >&2; exit 1", r"did not start \(no display\); run where there is a display"),
-        ("exit 0", "no viewer answers"),
-    ],
-)
+@pytest.mark.parametrize(("text", "words"), [
+    ("echo no display >&2; exit 1", r"did not start \(no display\); run where there is a display"),
+    ("exit 0", "no viewer answers"),
+])  # fmt: skip
 def test_a_viewer_that_does_not_start_is_told_of(tmp_path, monkeypatch, text, words):
     started_by(monkeypatch, tmp_path, text)
     with pytest.raises(OSError, match=words):

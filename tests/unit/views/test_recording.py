@@ -48,11 +48,8 @@ def fleet(n=40, k=31, seed=1, **named):
     return made(position, time, status=status, end=end, attitude=attitude, seed=seed, **named)
 
 
-SCENE = lw.Scene.named(
-    "remus_100",
-    events=[{"type": "floor", "depth": 16.0}, {"type": "surface", "depth": 4.0}],
-    terms=[{"type": "current", "velocity": [0.1, -0.2, 0.0]}],
-)
+SCENE = lw.Scene.named("remus_100", events=[{"type": "floor", "depth": 16.0}, {"type": "surface", "depth": 4.0}],
+                       terms=[{"type": "current", "velocity": [0.1, -0.2, 0.0]}])  # fmt: skip
 
 
 def rows(path, entity, ending, recording=None):
@@ -418,18 +415,14 @@ def test_a_disk_that_is_full(tmp_path, mixed, monkeypatch):
     assert old.read_bytes() == b"before"
 
 
-@pytest.mark.parametrize(
-    ("arguments", "kind", "words"),
-    [
-        ({"members": [40]}, lw.SceneError, "members = 40: is none of the 40 members; give indices from 0 to 39"),
-        ({"members": [-1]}, lw.SceneError, "members = -1: is none of the 40 members"),
-        ({"members": []}, lw.SceneError, "is no list of members"),
-        ({"members": "3"}, lw.SceneError, "is no list of members"),
-        ({"path": None}, ValueError, "give path="),
-        ({"to": "rerun+http://127.0.0.1:9/proxy"}, OSError, 'no viewer answers .*start a viewer with "rerun"'),
-        ({"to": "nowhere"}, OSError, "no viewer answers"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "kind", "words"), [
+    ({"members": [40]}, lw.SceneError, "members = 40: is none of the 40 members; give indices from 0 to 39"),
+    ({"members": [-1]}, lw.SceneError, "members = -1: is none of the 40 members"),
+    ({"members": []}, lw.SceneError, "is no list of members"),
+    ({"members": "3"}, lw.SceneError, "is no list of members"), ({"path": None}, ValueError, "give path="),
+    ({"to": "rerun+http://127.0.0.1:9/proxy"}, OSError, 'no viewer answers .*start a viewer with "rerun"'),
+    ({"to": "nowhere"}, OSError, "no viewer answers"),
+])  # fmt: skip
 def test_bad_input_is_one_line_with_the_remedy(mixed, tmp_path, arguments, kind, words):
     given = {"path": tmp_path / "a.rrd"} | arguments
     with pytest.raises(kind, match=words) as caught:
@@ -448,14 +441,11 @@ def test_nothing_to_draw_is_said(mixed, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("exec sleep 0.5", None),
-        ("echo no display >&2; exit 1", r"did not start \(no display\); the recording is .*fleet.rrd: open it"),
-        (None, "cannot be started .* the recording is"),
-    ],
-)
+@pytest.mark.parametrize(("text", "words"), [
+    ("exec sleep 0.5", None),
+    ("echo no display >&2; exit 1", r"did not start \(no display\); the recording is .*fleet.rrd: open it"),
+    (None, "cannot be started .* the recording is"),
+])  # fmt: skip
 def test_show_starts_a_viewer(mixed, tmp_path, monkeypatch, text, words):
     started_by(monkeypatch, tmp_path, text and f'echo "$1" > "{tmp_path}/opened"\n{text}')
     if words is None:

@@ -169,10 +169,8 @@ def test_pictures_suit_the_run(tmp_path):
     ends = fleet(400)
     rng = np.random.default_rng(7)
     buoyancy = np.where(np.asarray(ends.status) == lw.Status.SURFACE, 280.0, 300.0) + rng.normal(size=ends.members)
-    drawn = dict(ends.parameters) | {
-        "vehicle.buoyancy": buoyancy,
-        "vehicle.weight": 299.0 + rng.normal(size=ends.members),
-    }
+    drawn = dict(ends.parameters) | {"vehicle.buoyancy": buoyancy,
+                                     "vehicle.weight": 299.0 + rng.normal(size=ends.members)}  # fmt: skip
     varies = dataclasses.replace(ends, parameters=drawn)
     assert page_of(varies, tmp_path).count("<svg") == 2  # their speeds at the start vary too
     assert page_of(dataclasses.replace(varies, samples={}), tmp_path).count("<svg") == 2
@@ -217,13 +215,8 @@ def test_pictures_of_a_sweep_come_after_its_date_in_their_order(tmp_path):
     for name in ("a", "causes", "metrics", "success"):
         Image.new("RGB", (4, 4)).save(tmp_path / f"{name}.png")
     text = lw.report(tmp_path, tmp_path / "report.html").read_text(encoding="utf-8")
-    words = [
-        f"Sweep of {time.strftime('%Y-%m-%d')}",
-        "<h2>Success</h2>",
-        "<h2>Metrics</h2>",
-        "<h2>Causes</h2>",
-        "<h2>A</h2>",
-    ]
+    words = [f"Sweep of {time.strftime('%Y-%m-%d')}", "<h2>Success</h2>", "<h2>Metrics</h2>", "<h2>Causes</h2>",
+             "<h2>A</h2>"]  # fmt: skip
     places = [text.index(word) for word in words]
     assert places == sorted(places)
 

@@ -121,20 +121,12 @@ def of_paper(members, h, t1, every):
     return lw.solve(lw.Ensemble(scene, members, 1, vary), h=h, t1=t1, save=lw.SaveAt(every=every))
 
 
-RUNS = {
-    "paper": lambda: of_paper(100, 0.01, 60.0, 0.5),
-    "README": lambda: of_paper(4096, 0.01, 10.0, 1.0),
-    "first dive": first_dive,
-    "some of each outcome": lambda: fleet(200),
-    "REMUS 100 that sink to the floor": sinking,
-    "some reach the surface": rising,
-    "173 of 400 failed": failing,
-    "one vehicle, two samples": lambda: made(np.array([[[0.0, 0.0, 5.0]], [[6.0, 2.0, 8.0]]])),
-    "one vehicle, 600 samples": lambda: fleet(1, 600),
-    "a grid of 1,000": many,
-    "100,000 members": lambda: fleet(100_000, 5),
-    "waves with a tether": tethered,
-}
+RUNS = {"paper": lambda: of_paper(100, 0.01, 60.0, 0.5), "README": lambda: of_paper(4096, 0.01, 10.0, 1.0),
+        "first dive": first_dive, "some of each outcome": lambda: fleet(200),
+        "REMUS 100 that sink to the floor": sinking, "some reach the surface": rising, "173 of 400 failed": failing,
+        "one vehicle, two samples": lambda: made(np.array([[[0.0, 0.0, 5.0]], [[6.0, 2.0, 8.0]]])),
+        "one vehicle, 600 samples": lambda: fleet(1, 600), "a grid of 1,000": many,
+        "100,000 members": lambda: fleet(100_000, 5), "waves with a tether": tethered}  # fmt: skip
 
 
 @pytest.mark.slow

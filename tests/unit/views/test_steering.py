@@ -28,16 +28,13 @@ def all_well(result):
     return dataclasses.replace(result, status=0 * result.status, failure_time=np.nan * result.failure_time)
 
 
-@pytest.mark.parametrize(
-    ("result", "titles"),
-    [
-        (fleet(), ["12 of 40 members from above", "Depth", "Attitude: medians, bands of 90 %", "Outcomes"]),
-        (all_well(fleet()), ["12 of 40 members from above", "Depth", "Attitude: medians, bands of 90 %", "Energy"]),
-        (steered(), ["12 of 40 members from above", "Depth", "Commands: medians, bands of 90 %", "Outcomes"]),
-        (fleet(1, 12), ["1 member from above", "Depth", "Attitude", "Outcomes"]),
-        (steered(1), ["1 member from above", "Depth", "Commands", "Outcomes"]),
-    ],
-)
+@pytest.mark.parametrize(("result", "titles"), [
+    (fleet(), ["12 of 40 members from above", "Depth", "Attitude: medians, bands of 90 %", "Outcomes"]),
+    (all_well(fleet()), ["12 of 40 members from above", "Depth", "Attitude: medians, bands of 90 %", "Energy"]),
+    (steered(), ["12 of 40 members from above", "Depth", "Commands: medians, bands of 90 %", "Outcomes"]),
+    (fleet(1, 12), ["1 member from above", "Depth", "Attitude", "Outcomes"]),
+    (steered(1), ["1 member from above", "Depth", "Commands", "Outcomes"]),
+])  # fmt: skip
 def test_panels_suit_the_run(result, titles):
     assert [axes.get_title() for axes in lw.plots.summary(result)] == titles
 
@@ -75,19 +72,15 @@ def test_faults_are_those_that_begin_during_the_run():
     assert fault.time == 40.0
     assert faults(dataclasses.replace(result, time=result.time / 2.0)) == []
     parts = AUTOPILOT.to_dict()
-    parts["controller"]["faults"] += [
-        {"name": "late", "type": "fault", "of": "compass", "time": float("inf")},
-        {"type": "fault", "of": "depth_cell", "time": 10.0, "gain": 0.5},
-    ]
+    parts["controller"]["faults"] += [{"name": "late", "type": "fault", "of": "compass", "time": float("inf")},
+                                      {"type": "fault", "of": "depth_cell", "time": 10.0, "gain": 0.5}]  # fmt: skip
     result = steered(scene=lw.Scene.from_dict(parts))
     assert [fault.text for fault in faults(result)] == [
         "fault: depth_cell[0] times 0.5 plus 0, from 10 s",
         "fault stuck_rudder: control_fins[0] times 0 plus 0.1, from 40 s",
     ]
-    varied = dict(result.parameters) | {
-        "stuck_rudder.time": np.linspace(30.0, 50.0, 40),
-        "stuck_rudder.offset": np.linspace(0, 0.1, 40),
-    }
+    varied = dict(result.parameters) | {"stuck_rudder.time": np.linspace(30.0, 50.0, 40),
+                                        "stuck_rudder.offset": np.linspace(0, 0.1, 40)}  # fmt: skip
     said = faults(dataclasses.replace(result, parameters=varied))[1]
     assert said.time == 30.0
     assert (

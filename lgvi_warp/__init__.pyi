@@ -42,10 +42,10 @@ from lgvi_warp.control.state_feedback import StateFeedback as StateFeedback
 from lgvi_warp.control.trajectory import Trajectory as Trajectory
 from lgvi_warp.control.waypoints import Waypoints as Waypoints
 from lgvi_warp.engine.host_callback import Looks as Looks
-from lgvi_warp.importers.fossen import vehicle_tables_from_fossen as vehicle_tables_from_fossen
-from lgvi_warp.importers.fossen import vehicles as vehicles
-from lgvi_warp.importers.sdf import vehicle_tables_from_sdf as vehicle_tables_from_sdf
-from lgvi_warp.importers.yaml import vehicle_tables_from_yaml as vehicle_tables_from_yaml
+from lgvi_warp.vehicles.fossen import vehicle_tables_from_fossen as vehicle_tables_from_fossen
+from lgvi_warp.vehicles.fossen import vehicles as vehicles
+from lgvi_warp.vehicles.sdf import vehicle_tables_from_sdf as vehicle_tables_from_sdf
+from lgvi_warp.vehicles.yaml import vehicle_tables_from_yaml as vehicle_tables_from_yaml
 from lgvi_warp.methods.method import Method as Method
 from lgvi_warp.methods.saveat import SaveAt as SaveAt
 from lgvi_warp.physics import notation as notation

@@ -80,7 +80,7 @@ def new_arguments(verb: Any) -> None:
 @as_verb("new", "write a scene file to begin with, with comments", new_arguments)
 def new(chosen: argparse.Namespace) -> int:
     """Run the verb new: write a scene file with comments."""
-    from lgvi_warp.importers.fossen import vehicle_tables
+    from lgvi_warp.vehicles.fossen import vehicle_tables
 
     content = vehicle_tables(chosen.vehicle)
     if os.path.lexists(place_of(chosen.scene)):
@@ -134,7 +134,7 @@ def _methods() -> dict[str, str]:
 
 def _vehicles() -> dict[str, str]:
     """Vehicle -> its title, and what its numbers lead to that few would expect."""
-    from lgvi_warp.importers.fossen import vehicle_tables, vehicles
+    from lgvi_warp.vehicles.fossen import vehicle_tables, vehicles
 
     sources = {name: vehicle_tables(name)["source"] for name in vehicles()}
     return {name: "; ".join(of[key] for key in ("title", "remark") if key in of) for name, of in sources.items()}

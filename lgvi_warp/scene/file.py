@@ -132,7 +132,7 @@ def with_named_vehicle(content: Mapping[str, Any]) -> Mapping[str, Any]:
     table = content.get("vehicle")
     if not isinstance(table, Mapping) or "name" not in table:
         return content
-    from lgvi_warp.importers.fossen import vehicle_tables
+    from lgvi_warp.vehicles.fossen import vehicle_tables
 
     known = vehicle_tables(str(table["name"]))
     merged = dict(content)

@@ -11,7 +11,7 @@ from typing import Any
 
 from lgvi_warp.control.base import SECTIONS as LISTS
 from lgvi_warp.control.controller import Controller
-from lgvi_warp.importers.fossen import vehicles
+from lgvi_warp.vehicles.fossen import vehicles
 from lgvi_warp.physics import terms
 from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.physics.terms import events

@@ -67,7 +67,7 @@ WORDS = [
 @functools.cache
 def sources():
     """The texts that are broken: the examples, the vehicles, and one scene for each term, all terms and all events."""
-    files = sorted([*(ROOT / "examples").glob("*.toml"), *(ROOT / "lgvi_warp" / "importers").glob("*.toml")])
+    files = sorted([*(ROOT / "examples").glob("*.toml"), *(ROOT / "lgvi_warp" / "vehicles").glob("*.toml")])
     texts = [path.read_text(encoding="utf-8") for path in files]
     start = "[start]\nposition = [0.0, 0.0, 10.0]\neuler_deg = [1.0, 2.0, 3.0]\nvelocity = [0.5, 0.1, 0.0]\n"
     small = (

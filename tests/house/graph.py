@@ -17,7 +17,7 @@ SOURCE_ROOTS = {"lgvi_warp": ROOT, "lgvi_kernels": ROOT / "kernels"}
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 # The lowest first; those of one floor side by side.
 ROOMS = (
-    ("common",), ("physics",), ("control",), ("methods",), ("sampling",), ("statistics",), ("importers",), ("scene",),
+    ("common",), ("physics",), ("control",), ("methods",), ("sampling",), ("statistics",), ("vehicles",), ("scene",),
     ("engine",), ("checks", "results"), ("runs",), ("store",), ("calls",), ("studies",), ("views",), ("cli",),
 )  # fmt: skip
 

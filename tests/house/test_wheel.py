@@ -72,7 +72,7 @@ def test_the_wheel_holds_the_packages_and_their_data(built):
     expected = {name.removeprefix("kernels/") for name in tracked}
     expected = {name for name in expected if name.partition("/")[0] in packages}
     assert {name for name in names if ".dist-info/" not in name} == expected
-    assert {"lgvi_warp/py.typed", "lgvi_warp/__init__.pyi", "lgvi_warp/importers/remus_100.toml"} <= names
+    assert {"lgvi_warp/py.typed", "lgvi_warp/__init__.pyi", "lgvi_warp/vehicles/remus_100.toml"} <= names
 
 
 def test_the_source_archive_holds_what_the_tests_need(built):

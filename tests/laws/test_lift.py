@@ -9,7 +9,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.engine.packets import Packets
-from lgvi_warp.importers import fossen as coefficients
+from lgvi_warp.vehicles import fossen as coefficients
 from lgvi_warp.physics import terms
 from lgvi_warp.reference.terms import View
 from lgvi_warp.reference.terms.cross_flow import CrossFlow

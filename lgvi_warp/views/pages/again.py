@@ -100,7 +100,7 @@ def _same(setting: Any, value: Any) -> bool:
 
 def shortened(scene: Mapping[str, Any]) -> Mapping[str, Any]:
     """Name a vehicle of the package in place of its numbers, where that is the same scene."""
-    from lgvi_warp.importers.fossen import vehicles
+    from lgvi_warp.vehicles.fossen import vehicles
     from lgvi_warp.scene.scene import Scene
 
     name = scene.get("vehicle", {}).get("title")

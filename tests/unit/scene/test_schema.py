@@ -8,7 +8,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.cli.lists import NEW_SCENE
-from lgvi_warp.importers.fossen import vehicle_file, vehicles
+from lgvi_warp.vehicles.fossen import vehicle_file, vehicles
 from lgvi_warp.scene.schema import schema
 from tests.conftest import ROOT
 from tests.support.json_schema import faults

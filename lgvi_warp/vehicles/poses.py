@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest
-from lgvi_warp.importers.robot_xml import child_of, is_true, numbers_in, text_of
+from lgvi_warp.vehicles.robot_xml import child_of, is_true, numbers_in, text_of
 from lgvi_warp.physics.notation import hat
 
 # Most frames of which each is given relative to the next.

@@ -43,7 +43,7 @@ def vehicles() -> list[str]:
     Returns:
         Names in alphabetical order.
     """
-    folder = resources.files("lgvi_warp.importers")
+    folder = resources.files("lgvi_warp.vehicles")
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
@@ -54,7 +54,7 @@ def vehicle_file(name: str) -> Path:
     """
     if name not in (known := vehicles()):
         raise SceneError([f"vehicle file {name!r}: is not known; {closest(name, known)}"])
-    return Path(str(resources.files("lgvi_warp.importers") / f"{name}.toml"))
+    return Path(str(resources.files("lgvi_warp.vehicles") / f"{name}.toml"))
 
 
 def vehicle_tables(name: str) -> dict[str, Any]:

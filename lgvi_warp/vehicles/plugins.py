@@ -11,10 +11,10 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.importers.fossen import HALF_TURN_6, Coefficients, as_positive, symmetric
-from lgvi_warp.importers.links import carried
-from lgvi_warp.importers.poses import Pose
-from lgvi_warp.importers.robot_xml import floats, is_true, number, numbers_in, plugin_name, text_of
+from lgvi_warp.vehicles.fossen import HALF_TURN_6, Coefficients, as_positive, symmetric
+from lgvi_warp.vehicles.links import carried
+from lgvi_warp.vehicles.poses import Pose
+from lgvi_warp.vehicles.robot_xml import floats, is_true, number, numbers_in, plugin_name, text_of
 
 _TERM = re.compile(r"^([xyzkmn])(Dot)?([UVWPQR])(abs)?([UVWPQR])?$")
 # Plugins that push a vehicle and are not read: parts of their names, and what to give here in their place.

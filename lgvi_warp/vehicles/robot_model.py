@@ -11,8 +11,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, closest
-from lgvi_warp.importers.links import MOST_LINKS, Joint, Link, add_volumes, link_named, read_inertia, volume_of
-from lgvi_warp.importers.plugins import (
+from lgvi_warp.vehicles.links import MOST_LINKS, Joint, Link, add_volumes, link_named, read_inertia, volume_of
+from lgvi_warp.vehicles.plugins import (
     Hydrodynamics,
     is_hydrodynamics,
     is_read,
@@ -21,9 +21,9 @@ from lgvi_warp.importers.plugins import (
     read_underwater_object,
     unread,
 )
-from lgvi_warp.importers.poses import Poses, Scope, read_pose
-from lgvi_warp.importers.robot_xml import child_of, is_true, number, numbers, plugin_name, plugins_of, text_of
-from lgvi_warp.importers.urdf import read_urdf
+from lgvi_warp.vehicles.poses import Poses, Scope, read_pose
+from lgvi_warp.vehicles.robot_xml import child_of, is_true, number, numbers, plugin_name, plugins_of, text_of
+from lgvi_warp.vehicles.urdf import read_urdf
 
 GAZEBO_GRAVITY = 9.8  # m/s2: of a <world> that gives none
 GAZEBO_DENSITY = 1000.0  # kg/m3: of Gazebo's Buoyancy system, if none is given

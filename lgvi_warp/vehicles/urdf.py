@@ -6,9 +6,9 @@ from __future__ import annotations
 from xml.etree.ElementTree import Element
 
 from lgvi_warp.common.errors import Faults, SceneError
-from lgvi_warp.importers.links import Joint, Link, add_volumes, read_inertia, volume_of
-from lgvi_warp.importers.poses import Pose, read_origin
-from lgvi_warp.importers.robot_xml import TEMPLATES, numbers_in
+from lgvi_warp.vehicles.links import Joint, Link, add_volumes, read_inertia, volume_of
+from lgvi_warp.vehicles.poses import Pose, read_origin
+from lgvi_warp.vehicles.robot_xml import TEMPLATES, numbers_in
 
 
 def refuse_xacro(root: Element) -> None:

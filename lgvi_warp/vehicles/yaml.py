@@ -12,8 +12,8 @@ import numpy as np
 from lgvi_warp.common import yaml_text
 from lgvi_warp.common.arguments import names_of
 from lgvi_warp.common.errors import Faults, SceneError, closest
-from lgvi_warp.importers import fossen
-from lgvi_warp.importers.plugins import by_diagonal
+from lgvi_warp.vehicles import fossen
+from lgvi_warp.vehicles.plugins import by_diagonal
 
 # YAML ---------------------------------------------------------------------------------------------------------------
 

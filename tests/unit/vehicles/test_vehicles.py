@@ -9,7 +9,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp import cli
-from lgvi_warp.importers import fossen as co
+from lgvi_warp.vehicles import fossen as co
 from tests.conftest import ROOT
 
 NAMES = co.vehicles()

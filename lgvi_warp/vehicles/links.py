@@ -10,9 +10,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, closest
-from lgvi_warp.importers.fossen import PAIRS, inertia_from_names
-from lgvi_warp.importers.poses import HERE, Pose
-from lgvi_warp.importers.robot_xml import number, numbers, numbers_in, text_of
+from lgvi_warp.vehicles.fossen import PAIRS, inertia_from_names
+from lgvi_warp.vehicles.poses import HERE, Pose
+from lgvi_warp.vehicles.robot_xml import number, numbers, numbers_in, text_of
 from lgvi_warp.physics.notation import hat
 
 

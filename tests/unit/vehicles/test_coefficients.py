@@ -10,8 +10,8 @@ import lgvi_warp as lw
 from lgvi_warp import vehicle_tables_from_fossen as from_fossen
 from lgvi_warp import vehicle_tables_from_sdf as from_sdf
 from lgvi_warp import vehicle_tables_from_yaml as from_yaml
-from lgvi_warp.importers import fossen as co
-from lgvi_warp.importers import poses as coefficients_poses
+from lgvi_warp.vehicles import fossen as co
+from lgvi_warp.vehicles import poses as coefficients_poses
 
 DIAGONAL = {"X_udot": -0.93, "Y_vdot": -35.5, "Z_wdot": -35.5, "K_pdot": -0.0704, "M_qdot": -4.88, "N_rdot": -4.88}
 PAIRS = {"Y_rdot": 1.93, "N_vdot": 1.93, "Z_qdot": -1.93, "M_wdot": -1.93}

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError
-from lgvi_warp.importers.fossen import HALF_TURN, HALF_TURN_6, STANDARD_GRAVITY, Coefficients, rigid_body, turned
-from lgvi_warp.importers.links import Link, Lump, beside, joined, link_named, lumped, main_link
-from lgvi_warp.importers.plugins import Hydrodynamics, add_to
-from lgvi_warp.importers.robot_model import GAZEBO_DENSITY, RobotModel, listed, read_model, read_water, world_of
-from lgvi_warp.importers.robot_xml import parse_xml
+from lgvi_warp.vehicles.fossen import HALF_TURN, HALF_TURN_6, STANDARD_GRAVITY, Coefficients, rigid_body, turned
+from lgvi_warp.vehicles.links import Link, Lump, beside, joined, link_named, lumped, main_link
+from lgvi_warp.vehicles.plugins import Hydrodynamics, add_to
+from lgvi_warp.vehicles.robot_model import GAZEBO_DENSITY, RobotModel, listed, read_model, read_water, world_of
+from lgvi_warp.vehicles.robot_xml import parse_xml
 
 
 def vehicle_tables_from_sdf(

@@ -12,7 +12,7 @@ import lgvi_warp as lw
 POINTS = np.array([[0.0, 0.0, 5.0], [200.0, 0.0, 5.0], [200.0, 60.0, 15.0], [0.0, 60.0, 15.0]])  # m: north, east, down
 
 controller = lw.Controller(
-    period=0.1,  # s between looks
+    period=0.1,  # s between ticks
     guidance=[lw.Waypoints(points=POINTS, speed=1.54, look_ahead=20.0, radius=12.0, method="ilos", kappa=0.8)],
     laws=[
         lw.DepthPID(kp=0.15, ki=0.002, pitch_limit=0.35, kp_pitch=2.0, ki_pitch=0.2, kd_pitch=1.5),

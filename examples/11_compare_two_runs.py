@@ -17,7 +17,7 @@ vary = {"vehicle.buoyancy": lw.Uniform(low=299.0, high=308.0), "waves.phases": l
 def fleet(ki):
     """Vehicles whose law of depth has this gain of its integral."""
     controller = lw.Controller(
-        period=0.1,  # s between looks
+        period=0.1,  # s between ticks
         guidance=[lw.SetPoint(depth=WANTED, heading=0.0)],
         laws=[
             lw.DepthPID(kp=0.05, ki=ki, pitch_limit=0.35, kp_pitch=2.0, ki_pitch=0.0, kd_pitch=1.5),

@@ -16,18 +16,11 @@ _PLACES = {
     if isinstance(_line, _ast.ImportFrom)
     for _alias in _line.names
 }
-# {old public name: the name that replaces it}
-_RENAMED = {_line.targets[0].id: _line.value.id for _line in _STUB if isinstance(_line, _ast.Assign)}
 
 __all__ = sorted(_PLACES)
 
 
 def __getattr__(name: str) -> object:
-    if name in _RENAMED:
-        import warnings
-
-        warnings.warn(f"lw.{name} is now lw.{_RENAMED[name]}; write that", DeprecationWarning, stacklevel=2)
-        return globals().get(_RENAMED[name]) or __getattr__(_RENAMED[name])
     if name not in _PLACES:
         raise AttributeError(f"module 'lgvi_warp' has no attribute {name!r}")
     module, name_there = _PLACES[name]

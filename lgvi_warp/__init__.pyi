@@ -41,16 +41,16 @@ from lgvi_warp.control.speed_pid import SpeedPID as SpeedPID
 from lgvi_warp.control.state_feedback import StateFeedback as StateFeedback
 from lgvi_warp.control.trajectory import Trajectory as Trajectory
 from lgvi_warp.control.waypoints import Waypoints as Waypoints
-from lgvi_warp.engine.host_callback import Looks as Looks
-from lgvi_warp.vehicles.fossen import vehicle_tables_from_fossen as vehicle_tables_from_fossen
-from lgvi_warp.vehicles.fossen import vehicles as vehicles
-from lgvi_warp.vehicles.sdf import vehicle_tables_from_sdf as vehicle_tables_from_sdf
-from lgvi_warp.vehicles.yaml import vehicle_tables_from_yaml as vehicle_tables_from_yaml
+from lgvi_warp.engine.host_callback import CallbackInput as CallbackInput
+from lgvi_warp.vehicles.fossen import from_fossen as from_fossen
+from lgvi_warp.vehicles.fossen import vehicle_names as vehicle_names
+from lgvi_warp.vehicles.sdf import from_sdf as from_sdf
+from lgvi_warp.vehicles.yaml import from_yaml as from_yaml
 from lgvi_warp.methods.method import Method as Method
 from lgvi_warp.methods.saveat import SaveAt as SaveAt
 from lgvi_warp.physics import notation as notation
 from lgvi_warp.physics import terms as terms
-from lgvi_warp.physics.terms import register_term as register_term
+from lgvi_warp.physics.terms import register as register
 from lgvi_warp.physics.terms.base import Packed as Packed
 from lgvi_warp.physics.terms.base import PackingContext as PackingContext
 from lgvi_warp.physics.terms.base import Term as Term
@@ -113,8 +113,8 @@ from lgvi_warp.statistics.counts import Exceedance as Exceedance
 from lgvi_warp.statistics.counts import FirstPassage as FirstPassage
 from lgvi_warp.statistics.counts import Histogram as Histogram
 from lgvi_warp.statistics.metrics.actuator_metrics import Effort as Effort
-from lgvi_warp.statistics.metrics.actuator_metrics import Energy as Energy
-from lgvi_warp.statistics.metrics.actuator_metrics import OwnMetric as OwnMetric
+from lgvi_warp.statistics.metrics.actuator_metrics import ActuatorEnergy as ActuatorEnergy
+from lgvi_warp.statistics.metrics.actuator_metrics import CustomMetric as CustomMetric
 from lgvi_warp.statistics.metrics.actuator_metrics import SaturationShare as SaturationShare
 from lgvi_warp.statistics.metrics.actuator_metrics import TimeToFailure as TimeToFailure
 from lgvi_warp.statistics.metrics.actuator_metrics import Travel as Travel
@@ -137,7 +137,7 @@ from lgvi_warp.statistics.order import Extremes as Extremes
 from lgvi_warp.statistics.order import Quantiles as Quantiles
 from lgvi_warp.statistics.outcomes import EndTime as EndTime
 from lgvi_warp.statistics.outcomes import Outcome as Outcome
-from lgvi_warp.statistics.paths.each import Each as Each
+from lgvi_warp.statistics.paths.member_values import MemberValues as MemberValues
 from lgvi_warp.statistics.paths.path import PathMaximum as PathMaximum
 from lgvi_warp.statistics.paths.path import PathMean as PathMean
 from lgvi_warp.statistics.paths.path import PathMinimum as PathMinimum
@@ -162,7 +162,7 @@ from lgvi_warp.studies.scaling import scaling as scaling
 from lgvi_warp.studies.scaling import term_cost as term_cost
 from lgvi_warp.studies.search.risk import CVaR as CVaR
 from lgvi_warp.studies.search.tune import Tuned as Tuned
-from lgvi_warp.studies.search.tune import tune as tune
+from lgvi_warp.studies.search.tune import tune_gains as tune_gains
 from lgvi_warp.studies.search.worst_case import WorstCase as WorstCase
 from lgvi_warp.studies.search.worst_case import worst_case as worst_case
 from lgvi_warp.studies.stability.map import StabilityMap as StabilityMap
@@ -173,24 +173,14 @@ from lgvi_warp.studies.sweeps.output import Sweep as Sweep
 from lgvi_warp.studies.sweeps.sweep import sweep as sweep
 from lgvi_warp.studies.tradeoff import tradeoff as tradeoff
 from lgvi_warp.views import plots as plots
-from lgvi_warp.views.choice import shown as shown
+from lgvi_warp.views.choice import select_members as select_members
 from lgvi_warp.views.pages.report import report as report
 from lgvi_warp.views.plots import plot as plot
 from lgvi_warp.views.plots import plot_sensitivity as plot_sensitivity
 from lgvi_warp.views.plots import plot_stability as plot_stability
 from lgvi_warp.views.plots import plot_statistics as plot_statistics
 from lgvi_warp.views.plots import plot_tradeoff as plot_tradeoff
-from lgvi_warp.views.recording.rerun import log_rerun as log_rerun
+from lgvi_warp.views.recording.rerun import record as record
 from lgvi_warp.views.recording.rerun import show as show
 
 __version__: str
-
-# Old public names.
-Frozen = ScipyDistribution
-Levels = UnitCubePoints
-Setting = PackingContext
-from_fossen = vehicle_tables_from_fossen
-from_sdf = vehicle_tables_from_sdf
-from_yaml = vehicle_tables_from_yaml
-quantity = number
-register = register_term

@@ -1,7 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Run the command as `python -m lgvi_warp`."""
+"""Start the command, as `lgvi-warp` or `python -m lgvi_warp`: signals are heard while its libraries are imported."""
 
-from lgvi_warp_command import entry
+import os
+import signal
+from types import FrameType
+
+
+def entry() -> None:
+    """Run the command as the console script does: install signal handlers, then import the rest."""
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        # An ignored signal, as under nohup, stays ignored.
+        if number is not None and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
+            signal.signal(number, _end)
+    from lgvi_warp.cli import entry as command
+
+    command()
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    """End at once: nothing has begun, so nothing is lost."""
+    os.write(2, b"lgvi-warp: interrupted; nothing was written\n")
+    os._exit(128 + number)
+
 
 if __name__ == "__main__":
     entry()

@@ -65,7 +65,7 @@ def refuse(module, *_, **__):
 
 @pytest.fixture(scope="session", autouse=True)
 def widths_of_the_table(tmp_path_factory):
-    """Packets as on a machine where `lgvi-warp tune` never ran."""
+    """Packets as on a machine where `lgvi-warp calibrate` never ran."""
     with mock.patch.object(widths, "path", lambda: tmp_path_factory.getbasetemp() / widths.FILE):
         yield
 

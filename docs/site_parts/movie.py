@@ -47,7 +47,7 @@ def record(path: Path) -> np.ndarray:
     )
     vary = {"vehicle.buoyancy": lw.Normal(std=1.0), "current.velocity": lw.Normal(std=[0.05, 0.05, 0.0])}
     result = lw.solve(lw.Ensemble(scene, 300, seed=1, vary=vary), h=0.02, t1=110.0, save=lw.SaveAt(every=1.0))
-    lw.log_rerun(result, path)
+    lw.record(result, path)
     return np.asarray(result.time)
 
 

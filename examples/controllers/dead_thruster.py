@@ -22,7 +22,7 @@ def scene(known):
     # N/m, N/(m s), N s/m; N m, N m s
     gains = {"kp": [80.0] * 3, "ki": [15.0] * 3, "kd": [80.0, 80.0, 100.0], "kr": [10.0] * 3, "kw": [4.0] * 3}
     controller = lw.Controller(
-        period=0.05,  # s between looks
+        period=0.05,  # s between ticks
         guidance=[lw.SetPoint(position=PLACE, heading=0.0)],
         laws=[lw.PosePID(**gains, feedforward="restoring")],
         allocation=[lw.PseudoInverse(to="thrusters")],

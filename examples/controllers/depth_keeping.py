@@ -13,7 +13,7 @@ GROUPS = {"the least buoyant fifth": ("#0072B2", "-"), "the most buoyant fifth":
 
 waves = lw.Waves(amplitudes=[0.75, 0.45, 0.3], periods=[9.0, 7.0, 5.5], headings_deg=[180.0, 150.0, 200.0])
 controller = lw.Controller(
-    period=0.1,  # s between looks
+    period=0.1,  # s between ticks
     sensors=[lw.Sensor(name="depth_cell", of="depth", noise=0.02)],  # m
     guidance=[lw.SetPoint(depth=WANTED, heading=0.0), lw.ReferenceModel(natural_frequency=[0.2, 0.3])],
     laws=[

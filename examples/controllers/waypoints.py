@@ -17,7 +17,7 @@ def scene(method):
     """The vehicle at its first waypoint, in a current towards the east."""
     way = lw.Waypoints(points=POINTS, speed=1.54, look_ahead=20.0, radius=12.0, method=method, kappa=0.8)
     controller = lw.Controller(
-        period=0.1,  # s between looks
+        period=0.1,  # s between ticks
         guidance=[way],
         laws=[
             lw.DepthPID(kp=0.15, ki=0.002, pitch_limit=0.35, kp_pitch=2.0, ki_pitch=0.2, kd_pitch=1.5),

@@ -34,7 +34,7 @@ vary = {
 def tuned(members, budget):
     """The best gains for each risk, by the integral of time times the depth's error."""
     fleet = lw.Ensemble(scene, members, seed=1, vary=vary)
-    return {name: lw.tune(fleet, OVER, "itae depth", risk=risk, budget=budget, **RUN) for name, risk in RISKS.items()}
+    return {name: lw.tune_gains(fleet, OVER, "itae depth", risk=risk, budget=budget, **RUN) for name, risk in RISKS.items()}
 
 
 def fresh_costs(gains, members):

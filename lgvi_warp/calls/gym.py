@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.calls.observations import observer
-from lgvi_warp.common.errors import Faults, MissingExtra, closest, ragged, refusal, shown
+from lgvi_warp.common.errors import Faults, MissingExtra, closest, ragged, refusal, brief
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.real_numbers import answered
 from lgvi_warp.control.callback import Callback
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.episodes import Episodes
-from lgvi_warp.engine.host_callback import Looks
+from lgvi_warp.engine.host_callback import CallbackInput
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt, exact
@@ -34,19 +34,19 @@ from lgvi_warp.scene.settings import MOST_MEMBERS
 MOST_STEPS = 2**31 - 2
 
 # Of (t, y, r), or (t, y, r, actions): see `Vehicles`.
-OfLooks = Callable[..., Any]
+OfTicks = Callable[..., Any]
 
 
 class Vehicles:
     """Vehicles as a vector environment of Gymnasium; one step is one period of the scene's controller.
 
-    An action is what a law demands, or what an actuator is commanded, until the next look. An observation is what the
+    An action is what a law demands, or what an actuator is commanded, until the next tick. An observation is what the
     controller measures, with its sensors' errors, beside what its guidance wants. Vehicles that fail, or that an event of the
     scene stops, are terminated. Each episode of each environment is another member of the ensemble: with other draws of all
     that varies. Laws of the scene go on, and the actions are added to their demands.
 
     `observe`, `reward` and `terminated` may be functions of (t, y, r): the time since all began [s], what is measured and what
-    is wanted (`lw.Looks`) of m vehicles at once.
+    is wanted (`lw.CallbackInput`) of m vehicles at once.
 
     Args:
         fleet: The ensemble, or a scene with its own; with a controller.
@@ -79,10 +79,10 @@ class Vehicles:
         self,
         fleet: Ensemble | Scene,
         *,
-        observe: Sequence[str] | OfLooks,
+        observe: Sequence[str] | OfTicks,
         act: str = "demand",
-        reward: OfLooks | None = None,
-        terminated: OfLooks | None = None,
+        reward: OfTicks | None = None,
+        terminated: OfTicks | None = None,
         duration: float | None = None,
         num_envs: int | None = None,
         outputs: Sequence[str] = COMPONENTS,
@@ -238,7 +238,7 @@ class Vehicles:
             ValueError: Where the mask has another shape, or is False throughout.
         """
         if seed is not None and not isinstance(seed, int | np.integer):
-            raise TypeError(f"seed = {shown(seed)}: is no whole number; give one for all environments")
+            raise TypeError(f"seed = {brief(seed)}: is no whole number; give one for all environments")
         super().reset(seed=seed)  # type: ignore[misc]  # of gymnasium.vector.VectorEnv
         mask = _mask(options, self.num_envs)
         whole = mask.all() or not self._begun
@@ -297,7 +297,7 @@ class Vehicles:
         status = episodes.status()
         ended = status != 0
         if np.any(ended & ~last):
-            self._look_at_ends(np.flatnonzero(ended & ~last), y, r)
+            self._tick_at_ends(np.flatnonzero(ended & ~last), y, r)
         observed = self._seen(y, r)
         rewards = self._rewarded(y, r, actions)
         terminations = ended if self._terminated is None else ended | self._truth(self._terminated(self.time, y, r))
@@ -344,21 +344,21 @@ class Vehicles:
             self._prepared[stale] = wanted[stale]
         return self._seen(*self._episodes.restart(envs))
 
-    def _look_at_ends(self, envs: np.ndarray, y: Looks, r: Looks) -> None:
+    def _tick_at_ends(self, envs: np.ndarray, y: CallbackInput, r: CallbackInput) -> None:
         """Put what is seen in the states in which vehicles ended in place of what is seen of them at rest."""
         for whole, part in zip((y, r), self._episodes.look_at(envs), strict=True):
             for name, value in vars(part).items():
                 if value is not None:
                     getattr(whole, name)[envs] = value
 
-    def _seen(self, y: Looks, r: Looks) -> np.ndarray:
+    def _seen(self, y: CallbackInput, r: CallbackInput) -> np.ndarray:
         """Observations of some environments."""
         observed = answered("observe", self._observe(self.time, y, r)).astype(self._kind)
         if observed.ndim != 2 or len(observed) != len(y.heading):
             raise ValueError(f"observe: returned shape {observed.shape}; return ({len(y.heading)}, k), a row for each")
         return observed
 
-    def _rewarded(self, y: Looks, r: Looks, actions: Any) -> np.ndarray:
+    def _rewarded(self, y: CallbackInput, r: CallbackInput, actions: Any) -> np.ndarray:
         if self._reward is None:
             return np.zeros(self.num_envs)
         more = (np.asarray(actions),) if self._with_actions else ()
@@ -409,7 +409,7 @@ def _whole_periods(duration: float | None, period: float) -> float:
     return count
 
 
-def _nothing(size: int, t: float, y: Looks, r: Looks, members: np.ndarray) -> np.ndarray:
+def _nothing(size: int, t: float, y: CallbackInput, r: CallbackInput, members: np.ndarray) -> np.ndarray:
     """The answer of a callback where no environment gives one."""
     return np.zeros((len(members), size))
 
@@ -459,7 +459,7 @@ def _mask(options: Mapping[str, Any] | None, count: int) -> np.ndarray:
     if mask is None:
         return np.ones(count, bool)
     if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_:
-        raise TypeError(f"options['reset_mask'] = {shown(mask)}: is no NumPy array of truth values; give one")
+        raise TypeError(f"options['reset_mask'] = {brief(mask)}: is no NumPy array of truth values; give one")
     if mask.shape != (count,) or not mask.any():
         problem = f"has shape {mask.shape} and {int(mask.sum())} True"
         raise ValueError(f"options['reset_mask']: {problem}; give shape ({count},) with one True at least")

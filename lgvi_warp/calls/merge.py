@@ -20,7 +20,7 @@ from lgvi_warp.store.folder import CREATED, ROOT, Folder, held, refuse_foreign
 from lgvi_warp.store.kept import keep_of, members_kept
 from lgvi_warp.store.open import folder_of
 from lgvi_warp.store.recipe import same_run
-from lgvi_warp.store.run import explained
+from lgvi_warp.store.run import disk_error_with_remedy
 
 
 def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], overwrite: bool = False) -> Folder:
@@ -67,7 +67,7 @@ def merge(paths: Sequence[str | os.PathLike[str]], out: str | os.PathLike[str], 
             raise SceneError([f"{target}: is a file; give a folder"])
         safe_files.inside(target, first.path.name)
         target /= first.path.name
-    with explained(target), held(target):
+    with disk_error_with_remedy(target), held(target):
         if os.path.lexists(target) and not overwrite:
             raise SceneError([f"{target}: holds a run already; give --overwrite, or another folder"])
         refuse_foreign(target)

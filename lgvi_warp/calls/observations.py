@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest
-from lgvi_warp.engine.host_callback import Looks
+from lgvi_warp.engine.host_callback import CallbackInput
 
 
-def heading_error(y: Looks, r: Looks) -> np.ndarray:
+def heading_error(y: CallbackInput, r: CallbackInput) -> np.ndarray:
     """The wanted heading less the measured one.
 
     Returns: (m,) [rad], in (-pi, pi], from the forward axes, without Euler angles.
@@ -21,7 +21,7 @@ def heading_error(y: Looks, r: Looks) -> np.ndarray:
     return np.arctan2(s[:, 1] * c[:, 0] - s[:, 0] * c[:, 1], s[:, 0] * c[:, 0] + s[:, 1] * c[:, 1])
 
 
-def attitude_error(y: Looks, r: Looks) -> np.ndarray:
+def attitude_error(y: CallbackInput, r: CallbackInput) -> np.ndarray:
     """e_R = vee(R_d^T R - R^T R_d) / 2, as of `lw.PosePID`.
 
     Returns: (m, 3) [1], body axes.
@@ -29,7 +29,7 @@ def attitude_error(y: Looks, r: Looks) -> np.ndarray:
     return 0.5 * np.cross(y.attitude, r.attitude).sum(axis=1)
 
 
-def position_error(y: Looks, r: Looks) -> np.ndarray:
+def position_error(y: CallbackInput, r: CallbackInput) -> np.ndarray:
     """The wanted position less the measured one.
 
     Returns: (m, 3) [m], body axes.
@@ -37,7 +37,7 @@ def position_error(y: Looks, r: Looks) -> np.ndarray:
     return np.einsum("nji,nj->ni", y.attitude, r.position - y.position)
 
 
-def water_velocity(y: Looks) -> np.ndarray:
+def water_velocity(y: CallbackInput) -> np.ndarray:
     """The measured velocity through the water.
 
     Returns: (m, 3) [m/s], body axes.
@@ -46,7 +46,7 @@ def water_velocity(y: Looks) -> np.ndarray:
     return y.water_velocity
 
 
-class Observation(NamedTuple):
+class ObservedNumber(NamedTuple):
     """A number, or several, that a learner may see.
 
     wish: What guidance must give for it; None for nothing.
@@ -55,30 +55,30 @@ class Observation(NamedTuple):
 
     length: int
     wish: str | None
-    of: Callable[[Looks, Looks], Any]
+    of: Callable[[CallbackInput, CallbackInput], Any]
 
 
 OBSERVATIONS = {
-    "depth_error": Observation(1, "depth", lambda y, r: r.depth - y.depth),
-    "heading_error": Observation(1, "heading", heading_error),
-    "speed_error": Observation(1, "speed", lambda y, r: r.speed - water_velocity(y)[:, 0]),
-    "depth": Observation(1, None, lambda y, r: y.depth),
-    "position_error": Observation(3, "position", position_error),
-    "attitude_error": Observation(3, "attitude", attitude_error),
-    "velocity": Observation(3, None, lambda y, r: y.velocity),
-    "water_velocity": Observation(3, None, lambda y, r: water_velocity(y)),
-    "angular_velocity": Observation(3, None, lambda y, r: y.angular_velocity),
-    "down": Observation(3, None, lambda y, r: y.attitude[:, 2]),
-    "measured_position": Observation(3, None, lambda y, r: y.position),
-    "measured_attitude": Observation(9, None, lambda y, r: y.attitude),
-    "measured_heading": Observation(1, None, lambda y, r: y.heading),
-    "reference_position": Observation(3, None, lambda y, r: r.position),
-    "reference_attitude": Observation(9, None, lambda y, r: r.attitude),
-    "reference_velocity": Observation(3, None, lambda y, r: r.velocity),
-    "reference_angular_velocity": Observation(3, None, lambda y, r: r.angular_velocity),
-    "reference_heading": Observation(1, None, lambda y, r: r.heading),
-    "reference_depth": Observation(1, None, lambda y, r: r.depth),
-    "reference_speed": Observation(1, None, lambda y, r: r.speed),
+    "depth_error": ObservedNumber(1, "depth", lambda y, r: r.depth - y.depth),
+    "heading_error": ObservedNumber(1, "heading", heading_error),
+    "speed_error": ObservedNumber(1, "speed", lambda y, r: r.speed - water_velocity(y)[:, 0]),
+    "depth": ObservedNumber(1, None, lambda y, r: y.depth),
+    "position_error": ObservedNumber(3, "position", position_error),
+    "attitude_error": ObservedNumber(3, "attitude", attitude_error),
+    "velocity": ObservedNumber(3, None, lambda y, r: y.velocity),
+    "water_velocity": ObservedNumber(3, None, lambda y, r: water_velocity(y)),
+    "angular_velocity": ObservedNumber(3, None, lambda y, r: y.angular_velocity),
+    "down": ObservedNumber(3, None, lambda y, r: y.attitude[:, 2]),
+    "measured_position": ObservedNumber(3, None, lambda y, r: y.position),
+    "measured_attitude": ObservedNumber(9, None, lambda y, r: y.attitude),
+    "measured_heading": ObservedNumber(1, None, lambda y, r: y.heading),
+    "reference_position": ObservedNumber(3, None, lambda y, r: r.position),
+    "reference_attitude": ObservedNumber(9, None, lambda y, r: r.attitude),
+    "reference_velocity": ObservedNumber(3, None, lambda y, r: r.velocity),
+    "reference_angular_velocity": ObservedNumber(3, None, lambda y, r: r.angular_velocity),
+    "reference_heading": ObservedNumber(1, None, lambda y, r: r.heading),
+    "reference_depth": ObservedNumber(1, None, lambda y, r: r.depth),
+    "reference_speed": ObservedNumber(1, None, lambda y, r: r.speed),
 }  # fmt: skip
 # Signals of a controller that are the same as one above.
 OBSERVATIONS |= {
@@ -86,12 +86,12 @@ OBSERVATIONS |= {
 }
 
 
-def observer(faults: Faults, names: Any, wishes: Sequence[str]) -> Callable[[float, Looks, Looks], np.ndarray]:
+def observer(faults: Faults, names: Any, wishes: Sequence[str]) -> Callable[[float, CallbackInput, CallbackInput], np.ndarray]:
     """The function that gathers named numbers.
 
     Returns: Function of the time and of the measured and wanted motion of m members that returns (m, k).
     """
-    chosen: list[tuple[Observation, int | None]] = []
+    chosen: list[tuple[ObservedNumber, int | None]] = []
     known: Mapping[str, tuple[str, int | None]] = {
         (name if i is None else f"{name}[{i}]"): (name, i)
         for name, each in OBSERVATIONS.items()
@@ -111,7 +111,7 @@ def observer(faults: Faults, names: Any, wishes: Sequence[str]) -> Callable[[flo
             faults.add(f"observe[{i}]", entry, f"needs a wanted {wish}, which no guidance gives", remedy)
         chosen.append((OBSERVATIONS[name], index))
 
-    def observe(t: float, y: Looks, r: Looks) -> np.ndarray:
+    def observe(t: float, y: CallbackInput, r: CallbackInput) -> np.ndarray:
         columns = [np.reshape(each.of(y, r), (len(y.heading), each.length)) for each, _ in chosen]
         return np.concatenate(
             [c if i is None else c[:, i : i + 1] for c, (_, i) in zip(columns, chosen, strict=True)], axis=1

@@ -40,7 +40,7 @@ from lgvi_warp.store.kept import group_of
 from lgvi_warp.store.layout import columns, size
 from lgvi_warp.store.recipe import of_store
 from lgvi_warp.store.settings import Store
-from lgvi_warp.store.solve import settled
+from lgvi_warp.store.solve import with_saved_fields
 
 # Least time of a trial [s]; bytes, and number of small files, written to measure the speed of a disk.
 TRIAL_SECONDS = 0.3
@@ -152,7 +152,7 @@ def predict(
     observed = observe(ensemble, *(settings.pop(name, None) for name in ("statistics", "keep", "until")))
     request = Request(ensemble, **settings, observed=observed, threads=threads)
     plan, count = request.plan(survey_all=False), request.count
-    into, fields = (None, request.saved) if store is None else settled(store, request)
+    into, fields = (None, request.saved) if store is None else with_saved_fields(store, request)
     joined = into is not None or bool(observed.watch(plan.grid.times)[0])
     blocks_of_run = parts(ensemble.members, plan.grid.steps, count, joined)
     compile_seconds = plan.compile()
@@ -164,7 +164,7 @@ def predict(
         set_up, step = costs(plan, blocks_of_run, count, observed)
     place = nearest_folder(into.folder) if into else Path.cwd()
     runs = [Sized(plan, into, fields if observed.samples else (), sizes(plan, observed.watch(plan.grid.times)[0]))]
-    runs += again(plan, observed, into, fields)
+    runs += size_of_rerun(plan, observed, into, fields)
     write, metadata = writing(runs, place, count) if into else (0.0, 0)
     n, steps = ensemble.members, plan.grid.steps
     more = sum(sized.plan.ensemble.members for sized in runs) / n
@@ -298,11 +298,11 @@ class Sized:
         count = min(len(runs), threads)
         row = sum(plan.layout.sizes.values()) * np.dtype(machine.DTYPES[plan.dtype]).itemsize
         segment = min(SEGMENT_SAMPLE_BYTES, row * runs[0].count * len(plan.grid.times))
-        # Those gathered at looks are held once, as the kernel wrote them.
-        looks = plan.launches.slots(runs[0].count) * plan.launches.look_bytes(runs[0].count)
+        # Those gathered at ticks are held once, as the kernel wrote them.
+        ticks = plan.launches.slots(runs[0].count) * plan.launches.tick_bytes(runs[0].count)
         # A segment's samples are held three times: as the kernel wrote them, in order of members, and as rotated or moved
         # copies. Parts are held twice: their rows, and all joined.
-        each = 3 * segment + looks + 2 * self.statistics.part + self.statistics.taking
+        each = 3 * segment + ticks + 2 * self.statistics.part + self.statistics.taking
         if self.store:
             each += self.statistics.file + sum(column.bytes for column in columns(plan, self.store))
         return count * each
@@ -320,7 +320,7 @@ def memory(runs: Sequence[Sized], threads: int) -> int:
     return max(peaks)
 
 
-def again(plan: Plan, observed: Observation, store: Store | None, fields: Sequence[str]) -> list[Sized]:
+def size_of_rerun(plan: Plan, observed: Observation, store: Store | None, fields: Sequence[str]) -> list[Sized]:
     """Find the run of the members that are run again for their samples.
 
     store: Where the run is written; None: in memory.

@@ -19,11 +19,11 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.store.folder import ROOT, Folder
 from lgvi_warp.store.kept import KeptRun
-from lgvi_warp.store.layout_check import understood
+from lgvi_warp.store.layout_check import corrupt_store_as_scene_error
 from lgvi_warp.store.open import folder_of, result_of
 from lgvi_warp.store.recipe import of_store, refuse_another
 from lgvi_warp.store.run import StoredRun
-from lgvi_warp.store.solve import went_on
+from lgvi_warp.store.solve import resume_message
 from lgvi_warp.store.state import store_of
 
 
@@ -75,7 +75,7 @@ def resume(
     ensemble = Ensemble.from_scene(fleet) if isinstance(fleet, Scene) else fleet
     plan = folder.plan(ensemble)
     observed_content = folder.provenance.get("observed")
-    with understood(folder.path / ROOT):
+    with corrupt_store_as_scene_error(folder.path / ROOT):
         observed = observation_of(observed_content, statistics)
     observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
     now = of_store(provenance(plan, observed), plan.ensemble)
@@ -89,6 +89,6 @@ def resume(
         observing.enough, last,
     )  # fmt: skip
     finished_folder = run.run(runner, callback(progress))
-    remarks = messages + went_on(finished_folder)
+    remarks = messages + resume_message(finished_folder)
     result = result_of(finished_folder, None, folder.messages + remarks, plan.ensemble.scene.terms, observing)
     return refuse_failed(result, plan)

@@ -13,12 +13,12 @@ from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.status import Status, failed
 from lgvi_warp.control.signals import ordered
 from lgvi_warp.engine.plan import Plan
-from lgvi_warp.engine.shared import Shared
+from lgvi_warp.engine.shared import SharedResultsCache
 from lgvi_warp.engine.survey import survey
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.provenance import provenance
-from lgvi_warp.results.quantities import OfEnds, OfResult
+from lgvi_warp.results.quantities import EndQuantity, OfResult
 from lgvi_warp.results.result import Result
 from lgvi_warp.runs.request import Request, enough_iterations
 from lgvi_warp.scene.ensemble import SURVEYED, Ensemble
@@ -33,7 +33,7 @@ PATHS_AT_ONCE = 16_384
 class _Kind:
     """Plans of ensembles in which the same names vary, by what their survey found."""
 
-    shared: Shared
+    shared: SharedResultsCache
     plans: dict[Any, Plan] = field(default_factory=dict)
 
 
@@ -93,7 +93,7 @@ class Runner:
                 method = replace(method, iterations=enough_iterations(fleet, method, last.grid.h, last.dtype))
             plan = kind.plans.get((method, survey(fleet, method, kind.shared, odd=False, most=SURVEYED).decisive))
             if plan is not None:
-                return plan.of(fleet)
+                return plan.for_members(fleet)
         plan = replace(self.request, fleet=fleet).plan(survey_all=False)
         plan.compile()
         if plan.method.reason:  # chosen once, by the members of the first plan
@@ -162,7 +162,7 @@ def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -
         raise SceneError([f"{problem}; give save=lw.SaveAt(every=...) or [run] save_every"])
     if paths or any(each.is_function for each in of):
         return SaveAt(every=scene.run.save_every, fields=fields)
-    times = sorted({each.when for each in of if isinstance(each, OfEnds) and each.when is not None})
+    times = sorted({each.when for each in of if isinstance(each, EndQuantity) and each.when is not None})
     return SaveAt(at=times or None, fields=fields)
 
 
@@ -170,6 +170,6 @@ def statistics_for(scene: SceneLike, of: Sequence[OfResult]) -> list[Statistic]:
     """The statistics that quantities need, beside samples."""
     found = dict[str, Statistic]()
     for each in of:
-        if isinstance(each, OfEnds):
+        if isinstance(each, EndQuantity):
             found |= each.gathered(scene.events)
     return list(found.values())

@@ -79,8 +79,8 @@ def _of_times(plan: Plan, statistics: Sequence[Statistic], count: int) -> Sizes:
 
     def take() -> None:
         samples = samples_of(plan, plan.grid, when, start, packets.ended)
-        for looks_or_not in (gathers.look, gathers.take) if plan.launches.gathered else (gathers.take,):
-            looks_or_not(when, samples)
+        for take in (gathers.take_ticks, gathers.take) if plan.launches.gathered else (gathers.take,):
+            take(when, samples)
 
     _, taking = _peak(take)
     part = gathers.close(packets.outcome())

@@ -123,4 +123,4 @@ def solve(
         return result if only is not None else refuse_failed(result, plan)
     finally:
         # Packets and their plan refer to each other: their arrays would stay until Python looks for such circles.
-        plan.idle.clear()
+        plan.free_packets.clear()

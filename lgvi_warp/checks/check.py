@@ -24,7 +24,7 @@ from lgvi_warp.checks.report import (
     packed_numbers,
     unpacked,
 )
-from lgvi_warp.common.arguments import whole
+from lgvi_warp.common.arguments import whole_number
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.machine import register_width
 from lgvi_warp.engine import kernel_choice
@@ -77,8 +77,8 @@ def check_law(
     if not isinstance(term, Term):
         raise SceneError([f"term = {term!r}: is no term; give an object such as lw.Drag(...), not its class"])
     module = kernel_choice.device_module(term, term.device_in(False), built_in)
-    packets = -(-whole("samples", samples, 1, MOST_SAMPLES) // register_width("float64"))
-    bench = Bench(term, module, of_scene(scene), packets, whole("seed", seed, 0))
+    packets = -(-whole_number("samples", samples, 1, MOST_SAMPLES) // register_width("float64"))
+    bench = Bench(term, module, of_scene(scene), packets, whole_number("seed", seed, 0))
     checks: list[Check] = []
     for examine in (_numbers, _finite, _whole, _potential, _damping, _flow, _follow):
         with np.errstate(all="ignore"):  # what is not finite is found by its check

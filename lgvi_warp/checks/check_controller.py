@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a part of a controller is right: its device code at random looks, alone and in packets, and against a twin."""
+"""Whether a part of a controller is right: its device code at random ticks, alone and in packets, and against a twin."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from lgvi_warp.checks.bench import MOST_SAMPLES, of_scene
 from lgvi_warp.checks.part_bench import (
     COLUMNS,
     EVERY,
-    LOOKS,
+    TICKS,
     OUT_FIELDS,
     SPEED,
     Answers,
     PartBench,
-    RandomLooks,
-    corner_looks,
+    RandomTicks,
+    corner_ticks,
 )
 from lgvi_warp.checks.report import (
     LANES_APART,
@@ -36,7 +36,7 @@ from lgvi_warp.checks.report import (
     packed_numbers,
     unpacked,
 )
-from lgvi_warp.common.arguments import whole
+from lgvi_warp.common.arguments import whole_number
 from lgvi_warp.common.errors import SceneError, refusal
 from lgvi_warp.control.base import SECTIONS, Allocation, Part
 from lgvi_warp.control.controller import Controller
@@ -53,16 +53,16 @@ OTHER = 1.125
 TWIN_ROLES = ("measure", "guide", "control", "allocate")
 # A twin computes in another order: so many times the roundings of a sum.
 TWIN = 100.0
-# Time between two looks of a part that is checked without a controller [s].
+# Time between two ticks of a part that is checked without a controller [s].
 PERIOD = 0.1
 
 
 @dataclass(frozen=True)
-class Measurement:
-    """What a twin takes for the motion at a look, as lgvi_warp.reference.control has it.
+class TwinMeasurement:
+    """What a twin takes for the motion at a tick, as lgvi_warp.reference.control has it.
 
     position (3,) [m] inertial; R (3, 3) body to inertial; velocity over ground, water_velocity through water (3,) [m/s] and
-    angular_velocity (3,) [rad/s], body axes; t, period, h [s]; step and look, numbers of the step that begins and of the look.
+    angular_velocity (3,) [rad/s], body axes; t, period, h [s]; step and tick, numbers of the step that begins and of the tick.
     """
 
     position: np.ndarray
@@ -74,12 +74,12 @@ class Measurement:
     period: float
     h: float
     step: int
-    look: int
+    tick: int
     member: int
 
 
 @dataclass(frozen=True)
-class Reference:
+class TwinReference:
     """The wanted motion of a twin: position (3,) [m] and velocity (3,) [m/s], inertial; R (3, 3); speed ahead [m/s].
 
     angular_velocity (3,) [rad/s] and angular_acceleration (3,) [rad/s^2] in the axes of R.
@@ -96,20 +96,20 @@ class Reference:
 def check_controller(
     part: Part, *, scene: Scene | None = None, twin: Any = None, samples: int = 64, seed: int = 0
 ) -> LawReport:
-    """Check the device code of a part of a controller at random looks, which follow one another.
+    """Check the device code of a part of a controller at random ticks, which follow one another.
 
     Each new part costs the compilation of two small kernels. The checks:
 
     * `packed` fills the fields that `params` names, and gives the same in all axes that a method may choose.
-    * Numbers are finite: at random looks, where nothing is left to do, half a turn away and at rest, and with each number of
+    * Numbers are finite: at random ticks, where nothing is left to do, half a turn away and at rest, and with each number of
       the part at its bounds.
     * Lanes do not mix: a lane answers the same whatever the others are, and the same as a packet of one.
     * Numbers that vary by member give what shared ones give.
     * Memory stays in its rows. Only allocation and faults write commands.
     * The truth is not reached: nothing depends on the true position behind the measurement.
-    * A twin, where given, agrees at every look.
+    * A twin, where given, agrees at every tick.
 
-    The last line tells the processor time for a vehicle and a look.
+    The last line tells the processor time for a vehicle and a tick.
 
     Args:
         part: a sensor, a guidance, a law, an allocation or a fault, built-in or the user's own.
@@ -117,9 +117,9 @@ def check_controller(
             replaces the one of its name. None (default) for a simple vehicle with a `lw.ControlWrench`.
         twin: an object with the same role for one vehicle in NumPy, as the parts in `lgvi_warp/reference/control`: some of
             `begin()`, `measure(y)`, `guide(r, y)`, `control(w, r, y, unmet)`, `allocate(w, actuators)`. None (default): none.
-        samples: number of members (default 64), of four looks each: any attitudes, positions some metres around the scene's
+        samples: number of members (default 64), of four ticks each: any attitudes, positions some metres around the scene's
             start, velocities, angular velocities and demands of order 1.
-        seed: seed of the random looks (default 0).
+        seed: seed of the random ticks (default 0).
 
     Returns:
         A report of all checks; `ok` says whether all passed.
@@ -139,17 +139,17 @@ def check_controller(
     (wired,) = (candidate for candidate in completed.controller.parts if candidate.key == part.key)
     numbers = {name: np.asarray(value)[None] for name, value in wired.parameters().items()}
     wired = wired.with_features(frozenset(f"{part.key}.{word}" for word in wired.features(numbers)))
-    bench = PartBench(wired, completed, whole("samples", samples, 1, MOST_SAMPLES), whole("seed", seed, 0))
+    bench = PartBench(wired, completed, whole_number("samples", samples, 1, MOST_SAMPLES), whole_number("seed", seed, 0))
     with np.errstate(all="ignore"):  # what is not finite is found by its check
         packed, checks = packed_numbers(wired, bench.Params, bench.packed)
         if packed is None or not all(check.ok for check in checks):
             return LawReport(part, tuple(checks))
-        here = attempt(lambda: bench.answers(packed, bench.looks), "with shared numbers")
+        here = attempt(lambda: bench.answers(packed, bench.ticks), "with shared numbers")
         if isinstance(here, str):
             return LawReport(part, (*checks, unpacked(here)))
         for examine in (_finite, _lanes, _packing, _memory, functools.partial(_twin, twin=twin)):
             checks += examine(bench, packed, here)
-    text = "note: nanoseconds for a vehicle and a look"
+    text = "note: nanoseconds for a vehicle and a tick"
     checks.append(Check(f"{_name(bench)}: time", bench.nanoseconds(packed), np.inf, True, text))
     return LawReport(part, tuple(checks))
 
@@ -192,27 +192,27 @@ def _name(bench: PartBench) -> str:
 def _finite(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
     """Whether all numbers are finite; notes a part that does nothing."""
     name = f"{_name(bench)}: finite"
-    at_random = finite(name, here.all(), bench.looks)
+    at_random = finite(name, here.all(), bench.ticks)
     asleep = not _does(bench, here)
-    note = "note: changes nothing at any look, so little was checked; give a scene in which it acts"
+    note = "note: changes nothing at any tick, so little was checked; give a scene in which it acts"
     yield at_random._replace(text=note) if asleep and at_random.ok else at_random
     corners = f"{name} without error, half a turn away, at rest"
-    yield first_wrong(finite(corners, bench.answers(packed, looks).all(), looks) for looks in corner_looks(bench.looks))
+    yield first_wrong(finite(corners, bench.answers(packed, ticks).all(), ticks) for ticks in corner_ticks(bench.ticks))
     bounds = _numbers_at_bounds(bench)
     if bounds:
         name = f"{name} at bounds of numbers"
         answers = attempt(
-            lambda: bench.answers(bench.packed(bounds), bench.looks).all(), "with numbers at their bounds"
+            lambda: bench.answers(bench.packed(bounds), bench.ticks).all(), "with numbers at their bounds"
         )
         remedy = "guard divisions and roots, or declare lw.number(..., above=0.0)"
-        yield finite(name, answers, bench.looks, remedy)
+        yield finite(name, answers, bench.ticks, remedy)
 
 
 def _does(bench: PartBench, here: Answers) -> bool:
     """Whether the part changes anything."""
-    before = bench.looks.rows[..., :OUT_FIELDS].transpose(1, 0, 2).reshape(bench.count, -1)
-    return not np.array_equal(here.looks, before) or not np.array_equal(
-        here.memory[:, : bench.bus.rows], bench.looks.bus
+    before = bench.ticks.rows[..., :OUT_FIELDS].transpose(1, 0, 2).reshape(bench.count, -1)
+    return not np.array_equal(here.ticks, before) or not np.array_equal(
+        here.memory[:, : bench.bus.rows], bench.ticks.bus
     )
 
 
@@ -240,15 +240,15 @@ def _lanes(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
     mixed = np.zeros_like(here.all())
     for stays in (0, width - 1):
         lane_that_stays = np.arange(bench.count) % width == stays
-        mixed[lane_that_stays] += (bench.answers(packed, bench.looks.but_lane(stays, width)).all() - here.all())[
+        mixed[lane_that_stays] += (bench.answers(packed, bench.ticks.but_lane(stays, width)).all() - here.all())[
             lane_that_stays
         ]
-    yield judged(f"{name}: lanes apart", mixed, 0.0, bench.looks, LANES_APART)
-    alone = bench.answers(packed, bench.looks, 1).all() - here.all()
+    yield judged(f"{name}: lanes apart", mixed, 0.0, bench.ticks, LANES_APART)
+    alone = bench.answers(packed, bench.ticks, 1).all() - here.all()
     limit = ROUND_OFF * np.abs(here.all()).max()
-    yield judged(f"{name}: packets of one", alone, limit, bench.looks, LANES_APART)
-    blind = bench.answers(packed, bench.looks.elsewhere()).all() - here.all()
-    yield judged(f"{name}: blind to the truth", blind, 0.0, bench.looks, "read y.position, which is measured, not y.b")
+    yield judged(f"{name}: packets of one", alone, limit, bench.ticks, LANES_APART)
+    blind = bench.answers(packed, bench.ticks.elsewhere()).all() - here.all()
+    yield judged(f"{name}: blind to the truth", blind, 0.0, bench.ticks, "read y.position, which is measured, not y.b")
 
 
 def _packing(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
@@ -262,11 +262,11 @@ def _packing(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
         varied[name] = np.where(odd.reshape(-1, *(1,) * (value.ndim - 1)), changed, value)
 
     def by_member() -> np.ndarray:
-        shared = np.where(odd[:, None], bench.answers(bench.packed(others), bench.looks).looks, here.looks)
-        return bench.answers(bench.packed(varied), bench.looks).looks - shared
+        shared = np.where(odd[:, None], bench.answers(bench.packed(others), bench.ticks).ticks, here.ticks)
+        return bench.answers(bench.packed(varied), bench.ticks).ticks - shared
 
     def in_other_axes() -> np.ndarray:
-        return bench.answers(bench.packed(elsewhere=True), bench.looks).looks - here.looks
+        return bench.answers(bench.packed(elsewhere=True), bench.ticks).ticks - here.ticks
 
     for words, compare, where, remedy in (
         ("varied numbers", by_member, "where numbers have one entry a member",
@@ -275,14 +275,14 @@ def _packing(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
          "leave numbers as they are: a controller works in the user's axes"),
     ):  # fmt: skip
         name, difference = f"{_name(bench)}: {words}", attempt(compare, where)
-        yield judged(name, difference, ROUND_OFF * np.abs(here.looks).max(), bench.looks, remedy)
+        yield judged(name, difference, ROUND_OFF * np.abs(here.ticks).max(), bench.ticks, remedy)
 
 
 def _memory(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
     """Nothing changes outside the part's rows but the commands, and those by allocation and faults alone."""
     bus, first, last = bench.bus, *here.own
     before = here.memory.copy()
-    before[:, : bus.rows], before[:, last:] = bench.looks.bus, np.nan
+    before[:, : bus.rows], before[:, last:] = bench.ticks.bus, np.nan
     may = np.zeros(before.shape[1], bool)
     may[first:last] = True
     if isinstance(bench.part, Allocation):
@@ -294,39 +294,39 @@ def _memory(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
     rows = sorted(set(np.flatnonzero(changed.any(axis=0)).tolist()))
     written = ", ".join(f"p.memory + {row - first}" for row in rows[:3])
     remedy = f"its rows are the {last - first} from p.memory on; it writes {written}"
-    yield judged(f"{_name(bench)}: memory in its rows", changed.any(axis=1).astype(float), 0.0, bench.looks, remedy)
+    yield judged(f"{_name(bench)}: memory in its rows", changed.any(axis=1).astype(float), 0.0, bench.ticks, remedy)
 
 
 def _twin(bench: PartBench, packed: Any, here: Answers, twin: Any) -> Iterator[Check]:
-    """The twin's numbers at every look of every member."""
+    """The twin's numbers at every tick of every member."""
     if twin is None:
         return
     wanted, commands = (
         np.stack(each) for each in zip(*(_of_twin(bench, twin, i) for i in range(bench.count)), strict=True)
     )
     row, count = bench.bus.commands[bench.part.to] if isinstance(bench.part, Allocation) else (0, 0)
-    pairs = [("as the twin", here.looks, wanted), ("commands of the twin", here.memory[:, row : row + count], commands)]
+    pairs = [("as the twin", here.ticks, wanted), ("commands of the twin", here.memory[:, row : row + count], commands)]
     for words, got, right in pairs[: 1 + bool(count)]:
         limit = TWIN * ROUND_OFF * max(np.abs(right).max(), np.abs(got).max())
-        yield judged(f"{_name(bench)}: {words}", got - right, limit, bench.looks, "the twin says otherwise")
+        yield judged(f"{_name(bench)}: {words}", got - right, limit, bench.ticks, "the twin says otherwise")
 
 
 def _of_twin(bench: PartBench, twin: Any, i: int) -> tuple[np.ndarray, np.ndarray]:
-    """What the twin makes of the looks of a member (LOOKS * OUT_FIELDS,), and its last commands."""
-    looks, unmet, to = bench.looks, bench.looks.bus[i, bench.bus.unmet :][:6], getattr(bench.part, "to", "")
-    actuator, out = SimpleNamespace(command=np.zeros(0)), looks.rows[:, i, :OUT_FIELDS].copy()
+    """What the twin makes of the ticks of a member (TICKS * OUT_FIELDS,), and its last commands."""
+    ticks, unmet, to = bench.ticks, bench.ticks.bus[i, bench.bus.unmet :][:6], getattr(bench.part, "to", "")
+    actuator, out = SimpleNamespace(command=np.zeros(0)), ticks.rows[:, i, :OUT_FIELDS].copy()
     if isinstance(bench.part, Allocation):
         actuator.limit = bench.parameters[f"{to}.limit"][0]
     if hasattr(twin, "begin"):
         twin.begin()
-    for k in range(LOOKS):
+    for k in range(TICKS):
         step = k * EVERY
         h = bench.period / EVERY
-        y = Measurement(
-            **_motion(looks, "measured", k, i), t=step * h, period=bench.period, h=h, step=step, look=k, member=i
+        y = TwinMeasurement(
+            **_motion(ticks, "measured", k, i), t=step * h, period=bench.period, h=h, step=step, tick=k, member=i
         )
-        r = Reference(**_motion(looks, "wanted", k, i), speed=float(looks.rows[k, i, SPEED]))
-        w = np.concatenate([looks.vector("demanded", name)[k, i] for name in ("force", "torque")])
+        r = TwinReference(**_motion(ticks, "wanted", k, i), speed=float(ticks.rows[k, i, SPEED]))
+        w = np.concatenate([ticks.vector("demanded", name)[k, i] for name in ("force", "torque")])
         if "measure" in bench.roles:
             y = twin.measure(y)
         if "guide" in bench.roles:
@@ -346,7 +346,7 @@ def _of_twin(bench: PartBench, twin: Any, i: int) -> tuple[np.ndarray, np.ndarra
     return out.reshape(-1), np.asarray(actuator.command)
 
 
-def _motion(looks: RandomLooks, group: str, k: int, i: int) -> dict[str, np.ndarray]:
-    """The vectors of a look of a member by name, the attitude as R."""
+def _motion(ticks: RandomTicks, group: str, k: int, i: int) -> dict[str, np.ndarray]:
+    """The vectors of a tick of a member by name, the attitude as R."""
     names = [name for of, name in COLUMNS if of == group and name not in AXES]
-    return {name: looks.vector(group, name)[k, i].copy() for name in names} | {"R": looks.attitude(group)[k, i].copy()}
+    return {name: ticks.vector(group, name)[k, i].copy() for name in names} | {"R": ticks.attitude(group)[k, i].copy()}

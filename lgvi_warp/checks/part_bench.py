@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A part of a controller evaluated alone, its numbers packed as for a run, at random looks: the means of check_controller."""
+"""A part of a controller evaluated alone, its numbers packed as for a run, at random ticks: the means of check_controller."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from lgvi_kernels import built_in
 from lgvi_kernels.advance import examine_part
-from lgvi_kernels.advance.examine_part import LOOK_FIELDS, OUT_FIELDS, make_examine_part
+from lgvi_kernels.advance.examine_part import TICK_FIELDS, OUT_FIELDS, make_examine_part
 from lgvi_kernels.maps.in_turn import ROLES
 from lgvi_warp.checks.bench import Device, TermBench, packing_context, short, sizes
 from lgvi_warp.common.machine import register_width
@@ -23,8 +23,8 @@ from lgvi_warp.physics import notation
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 
-# Steps between two looks, and how many looks follow one another.
-EVERY, LOOKS = 10, 4
+# Steps between two ticks, and how many ticks follow one another.
+EVERY, TICKS = 10, 4
 # Rows behind those of the part, which it must not touch.
 GUARD = 16
 # Times that all packets are evaluated for a timing, and timings of which the least counts.
@@ -35,7 +35,7 @@ REMEDY = (
 )
 # Column of the wanted speed.
 SPEED = examine_part.SPEED
-# First columns of the vectors of a look, by group and name.
+# First columns of the vectors of a tick, by group and name.
 COLUMNS = {
     (group, name): 3 * i
     for i, (group, name) in enumerate(
@@ -49,10 +49,10 @@ COLUMNS = {
 
 
 @dataclass(frozen=True)
-class RandomLooks:
-    """What is measured, wanted and demanded before a part acts, at looks that follow one another.
+class RandomTicks:
+    """What is measured, wanted and demanded before a part acts, at ticks that follow one another.
 
-    rows: (LOOKS, k, LOOK_FIELDS), the columns of `lgvi_kernels.advance.examine_part` for k members.
+    rows: (TICKS, k, TICK_FIELDS), the columns of `lgvi_kernels.advance.examine_part` for k members.
     bus: (k, rows), what others left in the first rows of the memory.
     """
 
@@ -60,29 +60,29 @@ class RandomLooks:
     bus: np.ndarray
 
     def vector(self, group: str, name: str) -> np.ndarray:
-        """A vector of all looks (LOOKS, k, 3), a view of the rows."""
+        """A vector of all ticks (TICKS, k, 3), a view of the rows."""
         first = COLUMNS[group, name]
         return self.rows[..., first : first + 3]
 
     def attitude(self, group: str) -> np.ndarray:
-        """The attitude that is measured or wanted (LOOKS, k, 3, 3), body to inertial axes."""
+        """The attitude that is measured or wanted (TICKS, k, 3, 3), body to inertial axes."""
         return np.stack([self.vector(group, name) for name in ("north", "east", "down")], axis=-2)
 
-    def elsewhere(self) -> RandomLooks:
+    def elsewhere(self) -> RandomTicks:
         """The same looks at another true position, which only sensors before the part may know."""
         rows = self.rows.copy()
         rows[..., examine_part.TRUE_POSITION :] += 17.0
         return replace(self, rows=rows)
 
-    def but_lane(self, lane: int, width: int) -> RandomLooks:
-        """Looks in which all lanes of a packet differ but one."""
+    def but_lane(self, lane: int, width: int) -> RandomTicks:
+        """Ticks in which all lanes of a packet differ but one."""
         others = np.arange(self.rows.shape[1]) % width != lane
         rows, bus = self.rows.copy(), self.bus.copy()
         rows[:, others], bus[others] = np.roll(rows, 1, axis=1)[:, others] + 0.5, bus[others] + 0.5
         return replace(self, rows=rows, bus=bus)
 
     def description(self, i: int) -> str:
-        """The first look of a member in words, for a message."""
+        """The first tick of a member in words, for a message."""
         place, wanted, velocity, rate = (
             self.vector(*name)[0, i]
             for name in (("measured", "position"), ("wanted", "position"), ("measured", "velocity"),
@@ -94,31 +94,31 @@ class RandomLooks:
 
 
 class Answers(NamedTuple):
-    """What a part made of looks.
+    """What a part made of ticks.
 
-    looks: (k, LOOKS * OUT_FIELDS), what is measured, wanted and demanded after it.
-    memory: (k, rows), the bus, the part's rows and the guard behind them, after the last look.
+    ticks: (k, TICKS * OUT_FIELDS), what is measured, wanted and demanded after it.
+    memory: (k, rows), the bus, the part's rows and the guard behind them, after the last tick.
     own: first and last but one of the part's rows.
     """
 
-    looks: np.ndarray
+    ticks: np.ndarray
     memory: np.ndarray
     own: tuple[int, int]
 
     def all(self) -> np.ndarray:
         """The numbers that must be the same where the part is: (k, numbers)."""
-        return np.concatenate([self.looks, self.memory[:, : self.own[1]]], axis=1)
+        return np.concatenate([self.ticks, self.memory[:, : self.own[1]]], axis=1)
 
 
 class PartBench(TermBench):
-    """A part that is evaluated at random looks, one `period` [s] apart, in packets of a register and of one."""
+    """A part that is evaluated at random ticks, one `period` [s] apart, in packets of a register and of one."""
 
     def __init__(self, part: Part, scene: Scene, samples: int, seed: int):
         module, width = kernel_choice.device_module(part, part.device_in(False), built_in), register_width("float64")
         assert part.bus is not None
         self.part, self.bus, self.period = part, part.bus, float(scene.controller.period)
         count = -(-samples // width) * width
-        self.looks = random_looks(count, self.bus.rows, seed, scene.start.given()["position"])
+        self.ticks = random_ticks(count, self.bus.rows, seed, scene.start.given()["position"])
         super().__init__(part, module, scene, count, seed, ROLES, (width, 1), make_examine_part, REMEDY)
 
     def packed(self, parameters: Mapping[str, np.ndarray] | None = None, elsewhere: bool = False) -> Any:
@@ -127,15 +127,15 @@ class PartBench(TermBench):
         context = packing_context(numbers, self.count, self.seed, self.period / EVERY, elsewhere)
         return self.part.packed(Ensemble.own(self.part, numbers), context)
 
-    def answers(self, packed: Any, looks: RandomLooks, width: int | None = None) -> Answers:
-        """Let the part act at each look, from its memory at the start."""
-        device = _PartDevice(self, packed, looks, width or self.width)
-        out = np.stack([device.look(k) for k in range(LOOKS)], axis=1)
+    def answers(self, packed: Any, ticks: RandomTicks, width: int | None = None) -> Answers:
+        """Let the part act at each tick, from its memory at the start."""
+        device = _PartDevice(self, packed, ticks, width or self.width)
+        out = np.stack([device.look(k) for k in range(TICKS)], axis=1)
         return Answers(out.reshape(self.count, -1), device.memory(), (self.bus.rows, device.end))
 
     def nanoseconds(self, packed: Any) -> float:
-        """Processor time [ns] of the part for a member and a look, less that of a kernel that only copies; the least seen."""
-        device, spent = _PartDevice(self, packed, self.looks, self.width), []
+        """Processor time [ns] of the part for a member and a tick, less that of a kernel that only copies; the least seen."""
+        device, spent = _PartDevice(self, packed, self.ticks, self.width), []
         for acts in (1, 0):
             rounds = []
             for _ in range(ROUNDS):
@@ -147,25 +147,25 @@ class PartBench(TermBench):
 
 
 class _PartDevice(Device):
-    """The arrays of a kernel for a part and its looks."""
+    """The arrays of a kernel for a part and its ticks."""
 
-    def __init__(self, bench: PartBench, packed: Any, looks: RandomLooks, width: int):
+    def __init__(self, bench: PartBench, packed: Any, ticks: RandomTicks, width: int):
         super().__init__(bench, packed, width, OUT_FIELDS, GUARD, bench.bus.rows)
-        self.looks, self.period, self.end = looks, bench.period, bench.bus.rows + memory_rows(packed)
+        self.ticks, self.period, self.end = ticks, bench.period, bench.bus.rows + memory_rows(packed)
         # Behind the part's rows are no numbers, so that what it reads or writes there shows.
         rows = self.laws.memory.view
         rows[:, self.end :] = np.nan
-        put_rows(rows[:, : bench.bus.rows], looks.bus)
-        self.rows = Lanes(self.packets, LOOK_FIELDS, self.kernel.Lane)
+        put_rows(rows[:, : bench.bus.rows], ticks.bus)
+        self.rows = Lanes(self.packets, TICK_FIELDS, self.kernel.Lane)
 
     def look(self, k: int) -> np.ndarray:
         """Let the part act once: (count, OUT_FIELDS)."""
-        put_rows(self.rows.view, self.looks.rows[k])
+        put_rows(self.rows.view, self.ticks.rows[k])
         self.act(k, 1, 1)
         return self.written()
 
     def act(self, k: int, acts: int, repeats: int) -> None:
-        """Let the part act at look k, some times over, or nothing."""
+        """Let the part act at tick k, some times over, or nothing."""
         self.launch(self.rows.array, k, k * EVERY, self.period / EVERY, self.period, acts, repeats=repeats)
 
     def memory(self) -> np.ndarray:
@@ -174,36 +174,36 @@ class _PartDevice(Device):
         return np.array(rows.transpose(0, 2, 1).reshape(-1, rows.shape[1]))
 
 
-def random_looks(count: int, bus: int, seed: int, around: np.ndarray) -> RandomLooks:
-    """Random looks around a position.
+def random_ticks(count: int, bus: int, seed: int, around: np.ndarray) -> RandomTicks:
+    """Random ticks around a position.
 
     around: (3,) [m], mean of the positions, whose standard deviation is 4 m.
     Returns: Any attitude; velocities [m/s], angular velocities [rad/s], demands [N, N m] and what others left in the memory of
         order 1.
     """
     rng = np.random.default_rng(seed)
-    looks = RandomLooks(rng.normal(size=(LOOKS, count, LOOK_FIELDS)), rng.normal(size=(count, bus)))
+    ticks = RandomTicks(rng.normal(size=(TICKS, count, TICK_FIELDS)), rng.normal(size=(count, bus)))
     for group in ("measured", "wanted"):
-        place = looks.vector(group, "position")
+        place = ticks.vector(group, "position")
         place[...] = around + 4.0 * place
-        turn(looks, group, notation.matrix_from_quaternion(rng.normal(size=(LOOKS, count, 4))))
-    looks.rows[..., examine_part.TRUE_POSITION :] = looks.vector("measured", "position")
-    return looks
+        turn(ticks, group, notation.matrix_from_quaternion(rng.normal(size=(TICKS, count, 4))))
+    ticks.rows[..., examine_part.TRUE_POSITION :] = ticks.vector("measured", "position")
+    return ticks
 
 
-def turn(looks: RandomLooks, group: str, attitude: np.ndarray) -> None:
-    """Write an attitude (..., 3, 3), body to inertial axes, into looks."""
+def turn(ticks: RandomTicks, group: str, attitude: np.ndarray) -> None:
+    """Write an attitude (..., 3, 3), body to inertial axes, into ticks."""
     for i, name in enumerate(("north", "east", "down")):
-        looks.vector(group, name)[...] = attitude[..., i, :]
+        ticks.vector(group, name)[...] = attitude[..., i, :]
 
 
-def corner_looks(looks: RandomLooks) -> list[RandomLooks]:
-    """Looks at which a careless part divides by zero.
+def corner_ticks(ticks: RandomTicks) -> list[RandomTicks]:
+    """Ticks at which a careless part divides by zero.
 
     Returns: What is wanted is what is measured; the wanted attitude is turned by half a turn; everything is at rest, level, at
         the origin, and nothing is demanded.
     """
-    same, turned, rest = (replace(looks, rows=looks.rows.copy(), bus=np.zeros_like(looks.bus)) for _ in range(3))
+    same, turned, rest = (replace(ticks, rows=ticks.rows.copy(), bus=np.zeros_like(ticks.bus)) for _ in range(3))
     for name in ("position", "velocity", "angular_velocity"):
         same.vector("wanted", name)[...] = same.vector("measured", name)
     turn(same, "wanted", same.attitude("measured"))

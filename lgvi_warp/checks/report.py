@@ -65,7 +65,7 @@ class LawReport:
 
 
 class Described(Protocol):
-    """Views, or looks, that a message can describe."""
+    """Views, or ticks, that a message can describe."""
 
     def description(self, i: int) -> str:
         """One of them in words."""

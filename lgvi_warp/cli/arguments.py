@@ -12,7 +12,7 @@ from lgvi_warp import __version__
 from lgvi_warp.cli.check import check
 from lgvi_warp.cli.completion import completion
 from lgvi_warp.cli.lists import list_names, new, schema, show_help
-from lgvi_warp.cli.machine import bench, info, tune
+from lgvi_warp.cli.machine import bench, info, calibrate
 from lgvi_warp.cli.plot import plot
 from lgvi_warp.cli.runs import predict, resume, run
 from lgvi_warp.cli.stores import export, merge, report
@@ -24,7 +24,7 @@ from lgvi_warp.common.errors import closest
 
 # In the order of the help.
 _VERBS = (run, check, predict, resume, merge, export, report, tradeoff, sensitivity, stability, sweep, view, info, bench,
-          warm, tune, new, list_names, schema, plot, completion, show_help)  # fmt: skip
+          warm, calibrate, new, list_names, schema, plot, completion, show_help)  # fmt: skip
 VERBS: dict[str, Callable[[argparse.Namespace], int]] = {
     name: verb for verb in _VERBS for name in (verb.name, *verb.aliases)
 }

@@ -28,7 +28,7 @@ def values() -> dict[str, tuple[str, ...]]:
     """List the values of options that are checked with the scene and not by the parser."""
     from lgvi_warp.common.machine import DTYPES
     from lgvi_warp.engine.executors import NAMES
-    from lgvi_warp.vehicles.fossen import vehicles
+    from lgvi_warp.vehicles.fossen import vehicle_names
     from lgvi_warp.methods import method
     from lgvi_warp.physics.fields import TABLE
     from lgvi_warp.scene.settings import KEEP
@@ -47,7 +47,7 @@ def values() -> dict[str, tuple[str, ...]]:
         "--method": methods, "--methods": methods, "--dtype": tuple(DTYPES), "--dtypes": tuple(DTYPES),
         "--store-dtype": ("float32", "float64"), "--solver": method.SOLVERS, "--iterations": ("auto",), "--checks": CHECKS,
         "--on-failure": ON_FAILURE, "--keep": KEEP, "--executor": NAMES, "--of": tuple(TABLE), "--to": tuple(FORMATS),
-        "--vehicle": tuple(vehicles()),
+        "--vehicle": tuple(vehicle_names()),
     }  # fmt: skip
 
 

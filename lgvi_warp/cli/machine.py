@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verbs info, without a folder about this machine, bench and tune."""
+"""The verbs info, without a folder about this machine, bench and calibrate."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 from lgvi_warp.cli.folders import info_of_folder
 from lgvi_warp.cli.output import Part, say, tell
-from lgvi_warp.cli.progress import shown
+from lgvi_warp.cli.progress import progress_bar
 from lgvi_warp.cli.verb import as_verb
 from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.engine import widths
@@ -35,7 +35,7 @@ def info(chosen: argparse.Namespace, *, peak_of: Callable[[str], float] = fma_pe
         return info_of_folder(chosen, describe)
     from lgvi_warp.common import container, machine
 
-    with shown(chosen.quiet, "measuring"):
+    with progress_bar(chosen.quiet, "measuring"):
         peaks = {dtype: peak_of(dtype) for dtype in ("float64", "float32")}
     packets = {kernel: widths.default_width(*widths.parts(kernel)) for kernel in widths.KERNELS}
     document = {
@@ -93,13 +93,13 @@ def bench(chosen: argparse.Namespace, *, measure: Part = None) -> int:
     return 0
 
 
-@as_verb("tune", "measure how many vehicles a packet should hold on this machine, for runs from now on", reads=True)
-def tune(chosen: argparse.Namespace, *, measure: Part = None) -> int:
-    """Run the verb tune: measure the widths of packets on this machine, and keep the best ones for later runs."""
+@as_verb("calibrate", "measure how many vehicles a packet should hold on this machine, for runs from now on", reads=True)
+def calibrate(chosen: argparse.Namespace, *, measure: Part = None) -> int:
+    """Run the verb calibrate: measure the widths of packets on this machine, and keep the best ones for later runs."""
     from lgvi_warp.studies import packet_width as tuning
 
     kernels: dict[str, dict[str, Any]] = {}
-    for kernel, ns, of_table, fastest in (measure or tuning.tune)():
+    for kernel, ns, of_table, fastest in (measure or tuning.calibrate)():
         speeds = ", ".join(f"{width}: {result:.2f} ns" for width, result in ns.items())
         remark = "as by the table" if fastest == of_table else f"{of_table} by the table"
         say(chosen, f"{kernel:19} {speeds}: {fastest}, {remark}")

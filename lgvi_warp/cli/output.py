@@ -54,24 +54,24 @@ def tell(chosen: argparse.Namespace, document: Callable[[], dict[str, Any]], tex
     """Print the results of a verb: a text, or one JSON document."""
     if chosen.json:
         head = {"verb": chosen.verb, "version": __version__}
-        print(json.dumps(plain(head | document()), indent=1, allow_nan=False), flush=True)
+        print(json.dumps(as_json(head | document()), indent=1, allow_nan=False), flush=True)
     elif not chosen.quiet:
         say(chosen, text())
 
 
-def plain(value: Any) -> Any:
+def as_json(value: Any) -> Any:
     """Turn a value into what JSON holds.
 
     Returns: The same in plain types; numbers that are not finite are None.
     """
     if isinstance(value, dict):
-        return {str(key): plain(item) for key, item in value.items()}
+        return {str(key): as_json(item) for key, item in value.items()}
     if isinstance(value, Path):
         return str(value)
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
+        return [as_json(item) for item in value]
     return finite_or_none(value)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from lgvi_warp.cli import documents
 from lgvi_warp.cli.folders import Content, contents
 from lgvi_warp.cli.output import print_faults, tell
-from lgvi_warp.cli.progress import shown
+from lgvi_warp.cli.progress import progress_bar
 from lgvi_warp.cli.report import file_line, pictures, shown_members
 from lgvi_warp.cli.settings import writable
 from lgvi_warp.cli.verb import add_shared, as_verb
@@ -44,7 +44,7 @@ def plot(chosen: argparse.Namespace) -> int:
     home = chosen.dir.parent if chosen.dir.suffix == ".zarr" else chosen.dir
     out = writable(chosen.out or home)
     written = Written()
-    with shown(chosen.quiet, "drawing"):
+    with progress_bar(chosen.quiet, "drawing"):
         for content in held:
             _draw(content, written, out)
     for missing in written.missing.values():  # pictures are all that the verb is for

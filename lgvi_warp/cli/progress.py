@@ -11,7 +11,7 @@ from lgvi_warp.common.progress import Progress
 
 
 @contextlib.contextmanager
-def shown(
+def progress_bar(
     quiet: bool, phase: str = "compiling", *, begin: Callable[..., Progress] | None = None
 ) -> Iterator[Progress | None]:
     """Show progress on stderr inside the `with` block, and clear its line afterwards.

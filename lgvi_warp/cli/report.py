@@ -13,7 +13,7 @@ from typing import Any
 
 from lgvi_warp.cli import documents
 from lgvi_warp.cli.output import Part, print_faults, tell
-from lgvi_warp.cli.progress import shown
+from lgvi_warp.cli.progress import progress_bar
 from lgvi_warp.cli.writing import Written, side_by_side
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.safe_files import size_below
@@ -46,7 +46,7 @@ def report(result: Any, out: Path, chosen: argparse.Namespace, begun: float, fai
         ]
         drawn, written, text = None, Written([result.store]), lambda: "\n".join(lines)
     else:
-        with shown(chosen.quiet, "writing"):
+        with progress_bar(chosen.quiet, "writing"):
             drawn = shown_members(result)
             written = (writer or write)(result, drawn, out, viewer)
         seconds = time.perf_counter() - begun
@@ -69,7 +69,7 @@ def shown_members(result: Any, *, limit: int = MOST_DRAWN, load: Part = None) ->
 
     limit: Most numbers of their samples.
     load: What takes members of a stored result into memory; default None, that of the store.
-    Returns: The result itself; members of a large one in a store, in memory, as `lw.shown` chooses them; without samples, the
+    Returns: The result itself; members of a large one in a store, in memory, as `lw.select_members` chooses them; without samples, the
         kept members, or None where there are none, or where a field of the motion was not saved.
     """
     if not result.samples:
@@ -79,13 +79,13 @@ def shown_members(result: Any, *, limit: int = MOST_DRAWN, load: Part = None) ->
     if result.store is None:
         return result
     from lgvi_warp.store.open import chosen
-    from lgvi_warp.views.choice import shown
+    from lgvi_warp.views.choice import select_members
 
     most = max(1, limit // (18 * len(result.time)))
     members: Any = range(min(most, result.members))
     if result.members > most:
         with contextlib.suppress(NothingToDraw):  # each picture says so
-            members = shown(result, most).members
+            members = select_members(result, most).members
     return (load or chosen)(result, members)
 
 
@@ -117,10 +117,10 @@ def write(result: Any, drawn: Any, out: Path, viewer: str | None = None) -> Writ
 
 def _record(result: Any, path: Path, viewer: str | None) -> Path:
     """Write the recording of a result, and send it to a viewer where there is one."""
-    from lgvi_warp.views.recording.rerun import log_rerun
+    from lgvi_warp.views.recording.rerun import record
     from lgvi_warp.views.recording.viewer import answers
 
-    log_rerun(result, path, to=viewer if viewer and answers(viewer) else None)
+    record(result, path, to=viewer if viewer and answers(viewer) else None)
     return path
 
 

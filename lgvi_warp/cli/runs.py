@@ -13,7 +13,7 @@ from typing import Any
 
 from lgvi_warp.cli import documents
 from lgvi_warp.cli.output import Part, print_faults, say, tell
-from lgvi_warp.cli.progress import shown
+from lgvi_warp.cli.progress import progress_bar
 from lgvi_warp.cli.report import report
 from lgvi_warp.cli.settings import RUN, block_range, folder, load_scene, store_settings
 from lgvi_warp.cli.signals import Ended
@@ -120,7 +120,7 @@ def run(
     suggested = suggestion(scene, chosen, suggest)
     settings = suggested.settings if suggested else {}
     failures = []
-    with shown(chosen.quiet) as progress:
+    with progress_bar(chosen.quiet) as progress:
         try:
             result = (simulate or solve)(
                 scene, threads=chosen.threads, width=chosen.width, progress=progress, store=store,
@@ -222,7 +222,7 @@ def suggestion(scene: Any, chosen: argparse.Namespace, suggest: Part = None) -> 
 
     methods = [chosen.method] if chosen.method else None
     of = chosen.of or "position"
-    with shown(chosen.quiet) as progress:
+    with progress_bar(chosen.quiet) as progress:
         suggested = (suggest or study.suggest)(
             scene, chosen.error, of, methods=methods, threads=chosen.threads, progress=progress
         )
@@ -275,7 +275,7 @@ def resume(chosen: argparse.Namespace, *, simulate: Part = None, finish: Callabl
 
     begun = time.perf_counter()
     failures = []
-    with shown(chosen.quiet) as progress:
+    with progress_bar(chosen.quiet) as progress:
         try:
             result = (simulate or go_on)(
                 chosen.dir, executor=chosen.executor, threads=chosen.threads, scheduler=chosen.scheduler,
@@ -306,7 +306,7 @@ def predict(chosen: argparse.Namespace, *, study: Part = None) -> int:
     from lgvi_warp.calls import predict as prediction
 
     scene = load_scene(chosen)
-    with shown(chosen.quiet, "measuring"):
+    with progress_bar(chosen.quiet, "measuring"):
         predicted = (study or prediction.predict)(scene, threads=chosen.threads, store=store_settings(chosen))
     tell(chosen, lambda: documents.of_prediction(predicted), lambda: str(predicted))
     return 0

@@ -56,7 +56,7 @@ def load_scene(chosen: argparse.Namespace) -> Scene:
     return Scene.load(chosen.scene, overrides(chosen))
 
 
-def whole(text: str) -> str:
+def whole_number_text(text: str) -> str:
     """Write a whole number as TOML does: 1e6 becomes 1000000."""
     if text.strip("+-").isdigit():
         return text
@@ -72,7 +72,7 @@ def listed(text: str) -> str:
     return f"[{text}]" if text.replace(",", "").replace(" ", "").isdigit() else text
 
 
-PLAIN = {"members": whole, "seed": whole, "keep": listed}
+PLAIN = {"members": whole_number_text, "seed": whole_number_text, "keep": listed}
 
 
 def out_of(chosen: argparse.Namespace, suffix: str = "") -> Path:

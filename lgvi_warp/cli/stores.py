@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.output import Part, print_faults, tell
-from lgvi_warp.cli.progress import shown
+from lgvi_warp.cli.progress import progress_bar
 from lgvi_warp.cli.report import file_line
 from lgvi_warp.cli.verb import add_shared, as_verb
 from lgvi_warp.common.files import place_of
@@ -29,7 +29,7 @@ def merge(chosen: argparse.Namespace, *, join: Part = None) -> int:
     """
     from lgvi_warp.calls.merge import merge as put_together
 
-    with shown(chosen.quiet, "writing"):
+    with progress_bar(chosen.quiet, "writing"):
         folder = (join or put_together)(chosen.dirs, chosen.out, chosen.overwrite)
     missing_blocks = 0 if folder.complete else len(folder.unfinished())
     document = {"file": folder.path, "complete": folder.complete, "blocks": len(folder.runs), "missing": missing_blocks}
@@ -56,7 +56,7 @@ def export(chosen: argparse.Namespace, *, write: Part = None) -> int:
     """Run the verb export: write a stored run as one NetCDF or Parquet file."""
     from lgvi_warp.store.export import export as write_as
 
-    with shown(chosen.quiet, "writing"):
+    with progress_bar(chosen.quiet, "writing"):
         path = (write or write_as)(chosen.dir, chosen.to, chosen.out)
     tell(chosen, lambda: {"file": path, "bytes": path.stat().st_size}, lambda: file_line(path))
     return 0
@@ -82,7 +82,7 @@ def report(chosen: argparse.Namespace, *, write: Part = None, look: Part = None)
 
     if chosen.out is None:
         place_of(chosen.dir / "report.html", chosen.dir)
-    with shown(chosen.quiet, "drawing"):
+    with progress_bar(chosen.quiet, "drawing"):
         path = (write or write_report)(chosen.dir, chosen.out or chosen.dir / "report.html")
     tell(chosen, lambda: {"file": path, "bytes": path.stat().st_size}, lambda: file_line(path))
     if chosen.open:

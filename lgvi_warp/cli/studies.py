@@ -11,9 +11,9 @@ from typing import Any
 from lgvi_warp.cli import documents
 from lgvi_warp.cli.folders import text_of
 from lgvi_warp.cli.output import Part, print_faults, tell
-from lgvi_warp.cli.progress import part_of, shown
+from lgvi_warp.cli.progress import part_of, progress_bar
 from lgvi_warp.cli.report import file_line
-from lgvi_warp.cli.settings import folder, load_scene, whole
+from lgvi_warp.cli.settings import folder, load_scene, whole_number_text
 from lgvi_warp.cli.signals import Ended
 from lgvi_warp.cli.verb import EXECUTOR, FOLDER, OF, SCENE, WORKERS, add_shared, as_verb
 from lgvi_warp.cli.writing import Written
@@ -55,11 +55,11 @@ def tradeoff(chosen: argparse.Namespace, *, study: Part = None, draw: Part = Non
     from lgvi_warp.studies.tradeoff import tradeoff as measure
     from lgvi_warp.views.plots import plot_tradeoff
 
-    with shown(chosen.quiet) as progress:
+    with progress_bar(chosen.quiet) as progress:
         measurements = (study or measure)(
             scene, of=chosen.of, methods=chosen.methods, seconds=chosen.seconds, progress=progress
         )
-    with shown(chosen.quiet, "writing"):
+    with progress_bar(chosen.quiet, "writing"):
         written = Written(measurements.save(out))
         written.draw(draw or plot_tradeoff, measurements, out / "tradeoff.png")
     code = finish(written, chosen, {"tradeoff": measurements.to_dict()}, text_of("tradeoff", measurements))
@@ -116,14 +116,14 @@ def sensitivity(chosen: argparse.Namespace, *, study: Part = None, draw: Part = 
             "groups": _groups(chosen.group),
         }
     try:
-        with shown(chosen.quiet) as progress:
+        with progress_bar(chosen.quiet) as progress:
             indices: uq.Indices = (study or getattr(uq, chosen.analysis))(
                 scene, chosen.of or ["position[2]"], samples=samples, failed=chosen.failed, threads=chosen.threads,
                 progress=progress, **options,
             )  # fmt: skip
     except uq.FailedMembers as error:
         return len(print_faults([str(error)]))
-    with shown(chosen.quiet, "writing"):
+    with progress_bar(chosen.quiet, "writing"):
         written = Written(indices.save(out))
         written.draw(draw or plot_sensitivity, indices, out / "sensitivity.png")
     return finish(written, chosen, {"sensitivity": indices.to_dict()}, str(indices))
@@ -185,7 +185,7 @@ def stability(chosen: argparse.Namespace, *, study: Part = None, draw: Part = No
         maps = {f"stability_{name}": GRIDS[name] for name in names}
     t1 = scene.run.duration if chosen.duration is not None else None
     written, regions_by_name = Written(), {}
-    with shown(chosen.quiet) as progress:
+    with progress_bar(chosen.quiet) as progress:
         for i, (name, (x, y)) in enumerate(maps.items()):
             try:
                 regions_by_name[name] = (study or stability_map)(
@@ -235,22 +235,22 @@ def sweep(chosen: argparse.Namespace, *, study: Part = None, drawings: Part = No
     for name in ("members", "seed"):
         text = getattr(chosen, name)
         if text is not None:
-            digits = whole(text)
+            digits = whole_number_text(text)
             arguments[name] = int(digits) if digits.lstrip("+-").isdigit() else text
     if chosen.plan:
         about = {name: arguments.pop(name, None) for name in ("cases", "grid", "vary", "members", "seed", "sampling")}
         for name in ("success", "baseline", "confidence", "interval"):
             arguments.pop(name, None)
         closed_loop = {"scene": arguments.pop("scene"), "metrics": arguments.pop("metrics", ())}
-        with shown(chosen.quiet, "measuring"):
+        with progress_bar(chosen.quiet, "measuring"):
             text = (plan or plan_text)(made(**closed_loop, **about, settings=arguments), chosen.threads)
         tell(chosen, lambda: {"plan": text.splitlines()}, lambda: text)
         return 0
     out = folder(chosen, "_sweep")
     executor = {"threads": chosen.threads, "executor": chosen.executor, "scheduler": chosen.scheduler}
-    with shown(chosen.quiet) as progress:
+    with progress_bar(chosen.quiet) as progress:
         compared = (study or run_sweep)(**arguments, **executor, out=out, progress=progress)
-    with shown(chosen.quiet, "writing"):
+    with progress_bar(chosen.quiet, "writing"):
         written = Written(compared.save(out))
         for name, draw in (drawings or pictures)(compared).items():
             written.draw(draw, compared, out / name)
@@ -262,9 +262,9 @@ def sweep(chosen: argparse.Namespace, *, study: Part = None, drawings: Part = No
 
 def record_worst(found: Any, count: int, out: Path, written: Written, *, log: Part = None) -> None:
     """Run the worst members again, those of each cell together, and write a recording of them."""
-    from lgvi_warp.views.recording.rerun import log_rerun
+    from lgvi_warp.views.recording.rerun import record
 
-    write = log or log_rerun
+    write = log or record
     members: dict[int, list[int]] = {}
     for row in found.worst(count):
         at = {name: row[name] for name in found.setup.axes}

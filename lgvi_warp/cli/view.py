@@ -9,7 +9,7 @@ from typing import Any
 
 from lgvi_warp.cli.folders import Content, contents
 from lgvi_warp.cli.output import Part, tell
-from lgvi_warp.cli.progress import shown
+from lgvi_warp.cli.progress import progress_bar
 from lgvi_warp.cli.report import file_line
 from lgvi_warp.cli.verb import as_verb
 from lgvi_warp.common.errors import NothingToDraw, SceneError
@@ -30,14 +30,14 @@ def view(chosen: argparse.Namespace, *, look: Part = None, log: Part = None) -> 
     if chosen.out is not None:
         place_of(chosen.out)  # before the run is read: a fault of the recording is none of the run
     result = content.load()
-    from lgvi_warp.views.recording.rerun import log_rerun, show
+    from lgvi_warp.views.recording.rerun import record, show
 
     try:
-        with shown(chosen.quiet, "drawing"), content.understood():
+        with progress_bar(chosen.quiet, "drawing"), content.understood():
             if chosen.out is None:
                 (look or show)(result, members=members)
             else:
-                (log or log_rerun)(result, chosen.out, members=members)
+                (log or record)(result, chosen.out, members=members)
     except NothingToDraw as error:
         raise SceneError([str(error)]) from None
     files = [] if chosen.out is None else [chosen.out]

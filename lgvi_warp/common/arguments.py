@@ -47,7 +47,7 @@ def file_path(key: str, value: Any) -> Path:
     return path
 
 
-def whole(key: str, value: Any, least: int, most: int = 2**31 - 1) -> int:
+def whole_number(key: str, value: Any, least: int, most: int = 2**31 - 1) -> int:
     """Read a whole number."""
     if not is_whole(value, least, most):
         raise refusal(key, value, f"is no whole number from {least} to {most:,}", f"give one from {least}")

@@ -69,7 +69,7 @@ class SceneError(ValueError):
 
 def refusal(key: str, value: Any, what: str, remedy: str) -> SceneError:
     """Make the error of a single fault."""
-    return SceneError([f"{cut(key)} = {shown(value)}: {what}; {remedy}"])
+    return SceneError([f"{cut(key)} = {brief(value)}: {what}; {remedy}"])
 
 
 class MembersFailed(RuntimeError):  # noqa: N818
@@ -140,7 +140,7 @@ MOST_KNOWN = 60
 def closest(word: Any, known: Iterable[str]) -> str:
     """Suggest the known name nearest to a word."""
     names = [str(name) for name in known]
-    text = word[:LONGEST_VALUE] if isinstance(word, str) else shown(word)
+    text = word[:LONGEST_VALUE] if isinstance(word, str) else brief(word)
     near = [name for name in names if name.endswith(f".{text}")]
     near = near or difflib.get_close_matches(text, names, n=1, cutoff=0.6)
     more = f" and {len(names) - MOST_KNOWN:,} more" if len(names) > MOST_KNOWN else ""
@@ -181,7 +181,7 @@ class _Brief(reprlib.Repr):
 _brief = _Brief()
 
 
-def shown(value: Any) -> str:
+def brief(value: Any) -> str:
     """Show a value on one line of a message.
 
     Args:
@@ -200,7 +200,7 @@ def shown(value: Any) -> str:
 
 def cut(name: Any) -> str:
     """Shorten a name for a message: a file may hold one of any length."""
-    text = name if isinstance(name, str) else shown(name)
+    text = name if isinstance(name, str) else brief(name)
     return text if len(text) <= LONGEST_NAME else f"{text[:LONGEST_NAME]}..."
 
 
@@ -238,7 +238,7 @@ class Faults:
             self._more += 1
             return
         words = remedy if isinstance(remedy, str) else remedy()
-        self._found.append(f"{self._prefix}{cut(key)} = {shown(value)}: {what}; {words}")
+        self._found.append(f"{self._prefix}{cut(key)} = {brief(value)}: {what}; {words}")
 
     @contextlib.contextmanager
     def including(self) -> Iterator[None]:

@@ -269,7 +269,7 @@ def write_text(path: str | os.PathLike[str], text: str, root: str | os.PathLike[
     return Path(path)
 
 
-class Written:
+class PlacedFiles:
     """How many files this process has put in their places, and the last of them, for a process that is ended.
 
     Attributes:
@@ -288,7 +288,7 @@ class Written:
             self.count, self.last = self.count + 1, path
 
 
-WRITTEN = Written()
+WRITTEN = PlacedFiles()
 
 
 def put_folder(beside: Path, target: Path) -> None:

@@ -115,7 +115,7 @@ def file_json(path: str | os.PathLike[str]) -> Any:
 
 
 @contextlib.contextmanager
-def understood(path: str | os.PathLike[str], what: str, remedy: str) -> Iterator[None]:
+def corrupt_file_as_scene_error(path: str | os.PathLike[str], what: str, remedy: str) -> Iterator[None]:
     """Turn what the content of a file raises in the `with` block into a fault of the file."""
     name = str(path_of("path", path))
     try:

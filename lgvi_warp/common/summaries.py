@@ -75,7 +75,7 @@ def counted(counts: dict[str, int]) -> str:
     return ", ".join(f"{name} {number:,}" for name, number in counts.items())
 
 
-def numbers(value: Any, unit: str = "") -> str:
+def few_digits(value: Any, unit: str = "") -> str:
     """Write a number or an array.
 
     value: A number, or an array of any shape.
@@ -84,7 +84,7 @@ def numbers(value: Any, unit: str = "") -> str:
     array = np.asarray(value, dtype=np.float64)
     after = f" {unit}" if unit not in ("", "1") else ""
     if array.ndim == 2 and array.shape[0] == array.shape[1] and not np.any(array - np.diag(np.diag(array))):
-        return f"diagonal {numbers(np.diag(array), unit)}"
+        return f"diagonal {few_digits(np.diag(array), unit)}"
     if array.ndim == 0:
         return f"{array:.6g}{after}"
     if array.ndim > 1 or array.size > ENTRIES:

@@ -27,7 +27,7 @@ KEYS = {"pid", "host", "since"}
 _held: set[int] = set()
 
 
-def _let_go() -> None:
+def _close_inherited() -> None:
     """Close inherited descriptors in a child after a fork: they must not outlive the holder's."""
     for descriptor in _held:
         with contextlib.suppress(OSError):
@@ -36,7 +36,7 @@ def _let_go() -> None:
 
 
 if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_let_go)
+    os.register_at_fork(after_in_child=_close_inherited)
 
 
 def lock_file(target: Path) -> Path:
@@ -74,7 +74,7 @@ def writer_of(target: Path) -> str | None:
         holder = _holder(descriptor) if stat.S_ISREG(os.fstat(descriptor).st_mode) else None
         if not holder or (holder["host"] == scratch.host() and not scratch.is_alive(int(holder["pid"]))):
             return None
-        return _told(descriptor).strip(" ()")
+        return _holder_text(descriptor).strip(" ()")
     except (OSError, ValueError, TypeError):
         return None
     finally:
@@ -87,11 +87,11 @@ def _taken(path: Path, target: Path, wait: bool) -> int:
         descriptor = _opened(path)
         try:
             if not _locked(descriptor, wait):
-                text = f"{target}: another run is writing into it{_told(descriptor)}; wait for it, or end it"
+                text = f"{target}: another run is writing into it{_holder_text(descriptor)}; wait for it, or end it"
                 raise SceneError([text])
             # The previous holder may have removed the file that was opened here.
             if _is_still(path, descriptor):
-                _sign(descriptor)
+                _write_holder(descriptor)
                 return descriptor
         except BaseException:
             os.close(descriptor)
@@ -155,7 +155,7 @@ def _holder(descriptor: int) -> dict[str, Any] | None:
     return content if isinstance(content, dict) and content.keys() in (KEYS, set()) else None
 
 
-def _told(descriptor: int) -> str:
+def _holder_text(descriptor: int) -> str:
     """Name the holder in words."""
     for _ in range(10):
         holder = _holder(descriptor)
@@ -165,7 +165,7 @@ def _told(descriptor: int) -> str:
     return ""
 
 
-def _sign(descriptor: int) -> None:
+def _write_holder(descriptor: int) -> None:
     """Write the holder into the file. On a full disk the lock holds without it."""
     holder = {"pid": os.getpid(), "host": scratch.host(), "since": time.strftime("%Y-%m-%d %H:%M:%S")}
     with contextlib.suppress(OSError):

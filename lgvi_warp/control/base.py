@@ -37,7 +37,7 @@ class Bus(NamedTuple):
 
     acting: First row of the commands that act, where commands are delayed. As many rows of the commands before follow, and the
         row of the step from which the former act.
-    period: Time between two looks [s].
+    period: Time between two ticks [s].
     """
 
     commands: Mapping[str, tuple[int, int]]
@@ -58,7 +58,7 @@ class Bus(NamedTuple):
     def of(cls, channels: Mapping[str, int], period: float = 1.0, answers: int = 0) -> Bus:
         """The bus of some actuators.
 
-        period: Time between two looks [s]; 1 by default.
+        period: Time between two ticks [s]; 1 by default.
         """
         commands, row = {}, 0
         for key, count in channels.items():
@@ -104,7 +104,7 @@ class Part(Term):
 
     @property
     def looks_before(self) -> int:
-        """Number of looks that it must have had before a time at which a member starts anew beside others; by default 0."""
+        """Number of ticks that it must have had before a time at which a member starts anew beside others; by default 0."""
         return 0
 
     def features(self, numbers: Numbers) -> tuple[str, ...]:
@@ -185,7 +185,7 @@ class ControlLaw(Part):
     section: ClassVar[str] = "laws"
     kinds: ClassVar[dict[str, Any]] = {}
     demands: ClassVar[tuple[str, ...]] = ()
-    # Rows of the memory, from `Bus.answer` on, by which laws hand numbers on within a look.
+    # Rows of the memory, from `Bus.answer` on, by which laws hand numbers on within a tick.
     shared_rows: ClassVar[int] = 0
     # Numbers of the vehicle by name, as the scene has them, whatever a member's are; set for a law of a scene.
     nominal: ClassVar[Numbers] = {}

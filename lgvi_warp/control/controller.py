@@ -32,13 +32,13 @@ SPANNED = 1e-8
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Controller:
-    """A controller that looks once a period, and whose commands are held until the next look.
+    """A controller that acts at control ticks, once a period; its commands are held until the next one.
 
     Each list holds parts such as lw.HeadingPID(...), or tables as in a scene file.
 
     Args:
-        period: Time between two looks [s], a whole number of steps.
-        delay: From a look until its commands act [s], a whole number of steps; may vary by member. 0 by default.
+        period: Time between two ticks [s], a whole number of steps.
+        delay: From a tick until its commands act [s], a whole number of steps; may vary by member. 0 by default.
         sensors: What changes the truth into what is measured, in this order; by default the truth is measured.
         guidance: What says which motion is wanted, in this order.
         laws: What demands a wrench; their demands are added.
@@ -269,7 +269,7 @@ class Controller:
                 faults.add(key, part.channel, f"is beyond the {count} of {part.of}", remedy)
 
     def every(self, h: float) -> int:
-        """Steps between two looks.
+        """Steps between two ticks.
 
         Args:
             h: Step of the run [s].
@@ -319,7 +319,7 @@ def from_table(given: Any) -> Controller | None:
     if given is None:
         return None
     example = "write [controller] and its keys below, or give lw.Controller(...)"
-    return declared.from_table(Controller, "controller", given, example, period="give the time between two looks [s]")
+    return declared.from_table(Controller, "controller", given, example, period="give the time between two ticks [s]")
 
 
 def terms_of(scene: Mapping[str, Any]) -> tuple[Term, ...]:

@@ -12,7 +12,7 @@ from lgvi_warp.common.declared import word
 from lgvi_warp.control.base import MeasuringPart
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 
-# Weights of the velocities of the last look and of this one.
+# Weights of the velocities of the last tick and of this one.
 RULES = {"trapezoid": (0.5, 0.5), "euler": (1.0, 0.0)}
 VELOCITIES = ("velocity", "water_velocity")
 DEPTHS = ("reckoned", "measured")
@@ -20,16 +20,16 @@ DEPTHS = ("reckoned", "measured")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DeadReckoning(MeasuringPart):
-    """The position from measured attitude and velocity, from the position that is measured at the first look.
+    """The position from measured attitude and velocity, from the position that is measured at the first tick.
 
     It stands after the sensors that it uses. Without a sensor of the position it starts at the true one.
 
     Args:
-        rule: "trapezoid", the default, takes the mean of the velocities at both looks; "euler" that of the last look.
+        rule: "trapezoid", the default, takes the mean of the velocities at both ticks; "euler" that of the last tick.
         velocity: "velocity", the default, over ground; or "water_velocity", through the water: then a current carries the
             estimate away.
         depth: "reckoned", the default, as the rest of the position; or "measured", left as it is.
-        start_error: Added to the position of the first look, (3,) [m], inertial axes; 0 by default.
+        start_error: Added to the position of the first tick, (3,) [m], inertial axes; 0 by default.
 
     Raises:
         SceneError: Where a word is not known; and as `Term`.

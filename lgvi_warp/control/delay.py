@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The delay from a controller's look to its actuators."""
+"""The delay from a controller's tick to its actuators."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ MOST_PERIODS = 1000
 class Delay(Part):
     """The delay of a controller, a part that `Controller` makes of its numbers. Its key is that of the section.
 
-    period: Time between two looks [s].
-    delay: From a look until its commands act [s].
+    period: Time between two ticks [s].
+    delay: From a tick until its commands act [s].
     """
 
     device: ClassVar[str] = "delay"

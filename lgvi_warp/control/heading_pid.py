@@ -14,7 +14,7 @@ from lgvi_warp.physics.terms.base import number
 class HeadingPID(IntegralLaw):
     """PID of the heading: N = kp e + ki I + kd (wanted rate - r), with e the wanted heading less the measured one.
 
-    e is in [-pi, pi]. The integral I gains e times the period at each look.
+    e is in [-pi, pi]. The integral I gains e times the period at each tick.
 
     Args:
         kp: Proportional gain [N m/rad].

@@ -14,7 +14,7 @@ from lgvi_warp.physics.terms.base import number
 class HeavePID(IntegralLaw):
     """PID of the depth by a force: Z = kp e + ki I + kd (wanted - measured depth rate), e the wanted less the measured depth.
 
-    For vehicles that can push up and down. The integral I gains e times the period at each look.
+    For vehicles that can push up and down. The integral I gains e times the period at each tick.
 
     Args:
         kp: Proportional gain [N/m].

@@ -15,7 +15,7 @@ class PosePID(PoseLaw):
     """Geometric PID of the pose, without Euler angles, stable from almost every attitude (Bullo & Murray 1995).
 
     f = R^T (kp e_b + ki I) + kd (R^T v_d - nu), tau = -kr e_R - kw (Omega - R^T R_d Omega_d) - ki_r I_R, with
-    e_b = b_d - b and e_R = vee(R_d^T R - R^T R_d) / 2. The integrals I and I_R gain e_b and e_R times the period at each look.
+    e_b = b_d - b and e_R = vee(R_d^T R - R^T R_d) / 2. The integrals I and I_R gain e_b and e_R times the period at each tick.
 
     Args:
         kp: Gains of the position (3,) [N/m], inertial axes.

@@ -25,7 +25,7 @@ class ReferenceModel(Guidance):
     """What the guidance before it wants, led smoothly from the measured state (Fossen 2021, 12.1.1).
 
     Each number x follows its target s by x''' + (2 zeta + 1) omega x'' + (2 zeta + 1) omega^2 x' + omega^3 (x - s) = 0. It
-    starts at the measured position, heading and rates. Between looks the target is held and the equation solved exactly;
+    starts at the measured position, heading and rates. Between ticks the target is held and the equation solved exactly;
     where x' is then beyond its limit, x went at the limit all the time, and x'' is 0. A heading goes the short way to its
     target, and may pass pi. Roll and pitch that are wanted are kept.
 

@@ -13,21 +13,21 @@ from lgvi_warp.control.base import READINGS, MeasuringPart
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
 from lgvi_warp.physics.terms.noisy import key_of
 
-# Numbers of a sensor, in the order of its device code, with the value that has no effect; those of each axis, those of looks.
+# Numbers of a sensor, in the order of its device code, with the value that has no effect; those of each axis, those of ticks.
 VECTORS = ("bias", "noise", "drift", "quantum")
 IDLE = dict.fromkeys(VECTORS, 0.0) | {"every": 1.0, "latency": 0.0, "dropout": 0.0}
 DRAWING = frozenset({"noise", "drift", "dropout"})
 KEEPING = frozenset({"every", "latency", "dropout"})
-MOST_LOOKS = 1000.0
+MOST_TICKS = 1000.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Sensor(MeasuringPart):
-    """A sensor of one thing: truth + bias + walk + noise, rounded to the quantum; new at some looks, late, and lost at times.
+    """A sensor of one thing: truth + bias + walk + noise, rounded to the quantum; new at some ticks, late, and lost at times.
 
     The numbers are in the unit of what is measured: m, rad, m/s or rad/s; of a 3-vector each is one number, which stands for
     all axes, or three. An attitude is turned by the errors as a rotation vector of the body's axes, and the quantum is that of
-    roll, pitch and yaw; a heading is turned about the vertical. The random numbers follow from the seed, the member, the look
+    roll, pitch and yaw; a heading is turned about the vertical. The random numbers follow from the seed, the member, the tick
     and the sensor's name: they are the same for all gains, methods and steps.
 
     Args:
@@ -37,8 +37,8 @@ class Sensor(MeasuringPart):
         bias: Added to each reading; 0 by default.
         drift: Random walk: its standard deviation after 1 s, in the unit of the reading / s^1/2; 0 by default.
         quantum: Readings are rounded to whole multiples of this; 0 by default, not at all.
-        every: Looks from one new reading to the next, a whole number; 1 by default. In between the last one is kept.
-        latency: Looks until a reading arrives, a whole number; 0 by default. Until then the first one is there.
+        every: Ticks from one new reading to the next, a whole number; 1 by default. In between the last one is kept.
+        latency: Ticks until a reading arrives, a whole number; 0 by default. Until then the first one is there.
         dropout: Probability with which a reading is lost, so that the last one is kept; 0 by default. The first is never lost.
 
     Raises:
@@ -53,8 +53,8 @@ class Sensor(MeasuringPart):
     bias: Any = number((3,), "unit", 0.0)
     drift: Any = number((3,), "unit/s^1/2", 0.0, least=0.0)
     quantum: Any = number((3,), "unit", 0.0, least=0.0)
-    every: Any = number((), "looks", IDLE["every"], least=1.0, most=MOST_LOOKS)
-    latency: Any = number((), "looks", IDLE["latency"], least=0.0, most=MOST_LOOKS)
+    every: Any = number((), "looks", IDLE["every"], least=1.0, most=MOST_TICKS)
+    latency: Any = number((), "looks", IDLE["latency"], least=0.0, most=MOST_TICKS)
     dropout: Any = number((), "1", IDLE["dropout"], least=0.0, most=1.0)
 
     def __post_init__(self) -> None:
@@ -70,12 +70,12 @@ class Sensor(MeasuringPart):
         return () if READINGS[self.of] == 1 else super().shape_of(item)
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault for each number of looks that is not whole."""
+        """Adds a fault for each number of ticks that is not whole."""
         for name in ("every", "latency"):
             value = float(getattr(self, name))
             if value != round(value):
                 near = f"{np.floor(value):g} or {np.ceil(value):g}"
-                faults.add(name, value, "is no whole number of looks", f"give {near}")
+                faults.add(name, value, "is no whole number of ticks", f"give {near}")
 
     @property
     def looks_before(self) -> int:
@@ -116,5 +116,5 @@ def _vector(values: np.ndarray) -> np.ndarray:
 
 
 def _whole(name: str, values: np.ndarray) -> np.ndarray:
-    """Numbers of looks rounded, as they may vary by member; others as they are."""
+    """Numbers of ticks rounded, as they may vary by member; others as they are."""
     return np.rint(values) if name in ("every", "latency") else values

@@ -118,7 +118,7 @@ def check_names(faults: Faults, key: str, names: Any) -> None:
         faults.choice(key, name, SAVED)
 
 
-def check(faults: Faults, key: str, names: Iterable[str], controller: Controller | None) -> None:
+def check_signals(faults: Faults, key: str, names: Iterable[str], controller: Controller | None) -> None:
     """Add a fault for each signal that a scene does not have.
 
     controller: The controller of the scene; None for none.

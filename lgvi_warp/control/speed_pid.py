@@ -14,7 +14,7 @@ from lgvi_warp.physics.terms.base import number
 class SpeedPID(IntegralLaw):
     """Control of the speed ahead u through the water: X = kp e + ki I + drag u_d |u_d|, e the wanted speed u_d less u.
 
-    It has no derivative: no acceleration is measured. The integral I gains e times the period at each look.
+    It has no derivative: no acceleration is measured. The integral I gains e times the period at each tick.
 
     Args:
         kp: Proportional gain [N s/m].

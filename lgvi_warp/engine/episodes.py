@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Members that start anew in some lanes while the others go on, between two looks of a controller that asks the host."""
+"""Members that start anew in some lanes while the others go on, between two ticks of a controller that asks the host."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import refusal
-from lgvi_warp.engine.host_callback import Looks, answer, last_look
+from lgvi_warp.engine.host_callback import CallbackInput, write_answer, last_tick
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.sampling.members import Members
 
 
 class Episodes:
-    """One block of members, of which any may be replaced after a look.
+    """One block of members, of which any may be replaced after a tick.
 
     Those that come next are packed and looked at ahead, many at once, in packets of their own. When one starts, its lane is
     copied. So a start costs little, and no bit of the others changes.
@@ -49,20 +49,20 @@ class Episodes:
         self._next_lanes: list[np.ndarray] = []
 
     def advance(self, values: np.ndarray) -> None:
-        """Answer the last look, and go on to the next one.
+        """Answer the last tick, and go on to the next one.
 
         values: demands (m, 6), or commands (m, channels).
         """
-        answer(self.packets, values)
+        write_answer(self.packets, values)
         self.packets.launch(self.steps, self.steps + self.every)
         self.steps += self.every
 
-    def look(self) -> tuple[Looks, Looks]:
+    def look(self) -> tuple[CallbackInput, CallbackInput]:
         """What is measured and what is wanted now.
 
         Returns: (measured, wanted).
         """
-        return last_look(self.packets)
+        return last_tick(self.packets)
 
     def status(self) -> np.ndarray:
         """The status of each member.
@@ -87,14 +87,14 @@ class Episodes:
         aside.refill(members)
         if aside.laws.places != self.packets.laws.places:
             problem = "has members that remember more or fewer numbers than others, such as a delay that varies"
-            raise refusal("fleet", "", problem, "let the same number of periods or looks serve all members")
+            raise refusal("fleet", "", problem, "let the same number of periods or ticks serve all members")
         aside.launch(0, 0)
         if self._next is None:
             self._next = Packets(self.plan, self.packets.members)
             self._next_lanes = _lanes_of(self._next)
         self._copy(_lanes_of(aside), np.arange(len(lanes)), self._next_lanes, lanes)
 
-    def restart(self, lanes: np.ndarray) -> tuple[Looks, Looks]:
+    def restart(self, lanes: np.ndarray) -> tuple[CallbackInput, CallbackInput]:
         """Start the prepared members.
 
         lanes: (r,), which of the m lanes.
@@ -104,16 +104,16 @@ class Episodes:
         rehearsals = self._rehearsals()
         if not rehearsals:
             self._copy(self._next_lanes, lanes, self._lanes, lanes)
-            return last_look(self._next, lanes)
+            return last_tick(self._next, lanes)
         places = np.arange(len(lanes))
         aside = self._aside_for(self.room_for(len(lanes)), self._any)
         self._copy(self._next_lanes, lanes, _lanes_of(aside), places)
         for k in rehearsals:
             aside.launch(k, k)
         self._copy(_lanes_of(aside), places, self._lanes, lanes)
-        return last_look(aside, places)
+        return last_tick(aside, places)
 
-    def look_at(self, lanes: np.ndarray) -> tuple[Looks, Looks]:
+    def look_at(self, lanes: np.ndarray) -> tuple[CallbackInput, CallbackInput]:
         """Look at members that have ended, in the state in which they did; in the block itself they rest meanwhile.
 
         lanes: (r,), which of the m lanes.
@@ -124,7 +124,7 @@ class Episodes:
         self._copy(self._lanes, lanes, _lanes_of(aside), places)
         aside.status.zero_()
         aside.launch(self.steps, self.steps)
-        return last_look(aside, places)
+        return last_tick(aside, places)
 
     def _aside_for(self, count: int, members: Callable[[int], Members]) -> Packets:
         """Packets of so many members."""
@@ -140,9 +140,9 @@ class Episodes:
     def _rehearsals(self) -> range:
         """Steps after which those that start are looked at besides: late readings, and what is wanted at times, need it."""
         parts = (*self._controller.sensors, *self._controller.guidance)
-        looks = max((part.looks_before for part in parts), default=0)
+        ticks = max((part.ticks_before for part in parts), default=0)
         last = self.steps // self.every
-        return range(max(1, last + 1 - looks) * self.every, self.steps + 1, self.every)
+        return range(max(1, last + 1 - ticks) * self.every, self.steps + 1, self.every)
 
     def _copy(self, source: list[np.ndarray], of: np.ndarray, target: list[np.ndarray], to: np.ndarray) -> None:
         """Copy lanes with all that belongs to them."""

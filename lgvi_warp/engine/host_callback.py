@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The exchange with a function of the host at a controller's looks: what it is told, and its answer."""
+"""The exchange with a function of the host at a controller's ticks: what it is told, and its answer."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from lgvi_warp.engine.packets import Packets
 
 
 @dataclass(frozen=True)
-class Looks:
-    """What a controller measures, or wants, of m members at a look.
+class CallbackInput:
+    """What a controller measures, or wants, of m members at a tick.
 
     Args:
         position: Positions (m, 3) [m], inertial axes.
@@ -43,8 +43,8 @@ class Looks:
         return self.position[:, 2]
 
 
-def last_look(packets: Packets, members: np.ndarray | None = None) -> tuple[Looks, Looks]:
-    """What was measured and what was wanted at the last look.
+def last_tick(packets: Packets, members: np.ndarray | None = None) -> tuple[CallbackInput, CallbackInput]:
+    """What was measured and what was wanted at the last tick.
 
     members: which of their members (m,); default None for all.
     Returns: (measured, wanted), copies.
@@ -52,9 +52,9 @@ def last_look(packets: Packets, members: np.ndarray | None = None) -> tuple[Look
     y, r = (_numbers(packets, packets.plan.layout.noted_rows[name], members) for name in ("measured", "reference"))
     measured_attitude, wanted_attitude = (rows[:, 3:12].reshape(-1, 3, 3) for rows in (y, r))
     headings = [np.arctan2(R[:, 1, 0], R[:, 0, 0]) for R in (measured_attitude, wanted_attitude)]
-    measured = Looks(y[:, :3], measured_attitude, y[:, 12:15], y[:, 18:21], headings[0], water_velocity=y[:, 15:18])
+    measured = CallbackInput(y[:, :3], measured_attitude, y[:, 12:15], y[:, 18:21], headings[0], water_velocity=y[:, 15:18])
     rates = {"speed": r[:, 19], "angular_acceleration": r[:, 20:23]}
-    return measured, Looks(r[:, :3], wanted_attitude, r[:, 12:15], r[:, 15:18], headings[1], **rates)
+    return measured, CallbackInput(r[:, :3], wanted_attitude, r[:, 12:15], r[:, 15:18], headings[1], **rates)
 
 
 def _numbers(packets: Packets, places: range, members: np.ndarray | None) -> np.ndarray:
@@ -67,8 +67,8 @@ def _numbers(packets: Packets, places: range, members: np.ndarray | None) -> np.
     return copied.reshape(-1, len(places))[: packets.members.count]
 
 
-def answer(packets: Packets, values: np.ndarray) -> None:
-    """Write the host's answer to the last look.
+def write_answer(packets: Packets, values: np.ndarray) -> None:
+    """Write the host's answer to the last tick.
 
     values: demands (m, 6), or commands (m, channels).
     """
@@ -81,15 +81,15 @@ def answer(packets: Packets, values: np.ndarray) -> None:
     view[:, first : first + count] = padded.reshape(-1, width, count).transpose(0, 2, 1)
 
 
-def ask(packets: Packets, t: float) -> None:
-    """Call the function of a plan's controller with the last look, and write its answer.
+def call_host(packets: Packets, t: float) -> None:
+    """Call the function of a plan's controller with the last tick, and write its answer.
 
-    t: time of the look [s].
+    t: time of the tick [s].
     """
     controller = packets.plan.kernel_choice.controller
     assert controller is not None
     callback: Any = controller.callback
-    measured, wanted = last_look(packets)
+    measured, wanted = last_tick(packets)
     members = packets.members.indices
     where = f"callback {callback.key!r} at t = {t:.9g} s, members {members[0]} to {members[-1]}"
     try:
@@ -100,4 +100,4 @@ def ask(packets: Packets, t: float) -> None:
     values, shape = answered(where, given), (packets.members.count, controller.bus.rows - controller.bus.answer)
     if values.shape != shape:
         raise ValueError(f"{where}: returned shape {values.shape}; return {shape}, a row for each member")
-    answer(packets, values)
+    write_answer(packets, values)

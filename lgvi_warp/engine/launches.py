@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The launches of a run: which steps each makes, and which samples and looks fall due in it."""
+"""The launches of a run: which steps each makes, and which samples and ticks fall due in it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from lgvi_warp.methods.saveat import TimeGrid
 # Limits of one launch: they keep progress current, interrupts prompt and the sample buffer small in long runs.
 SEGMENT_VEHICLE_STEPS = 20_000_000
 SEGMENT_SAMPLE_BYTES = 16_000_000
-# What is gathered at looks before it is reduced: it should stay in the caches.
+# What is gathered at ticks before it is reduced: it should stay in the caches.
 GATHERED_BYTES = 8_000_000
 
 
@@ -27,25 +27,25 @@ class Launches:
 
     lengths: of the stages and of the leads, in units of the step h [1].
     real: Warp's type of the kernel's numbers.
-    sample_bytes, bytes_at_look: memory of what the kernel writes of one member, of a sample and at a look [bytes].
-    every: steps between two looks of the controller; None without one.
-    asks: whether a function of the host answers each look.
-    looks: whether samples are gathered at all looks.
+    sample_bytes, bytes_at_tick: memory of what the kernel writes of one member, of a sample and at a tick [bytes].
+    every: steps between two ticks of the controller; None without one.
+    asks: whether a function of the host answers each tick.
+    ticks: whether samples are gathered at all ticks.
     """
 
     grid: TimeGrid
     lengths: tuple[tuple[float, ...], tuple[float, ...]]
     real: Any
     sample_bytes: int
-    bytes_at_look: int
+    bytes_at_tick: int
     every: int | None
     asks: bool
-    looks: bool
+    ticks: bool
 
     @functools.cached_property
     def gathered(self) -> TimeGrid | None:
-        """The controller's looks, where samples are taken at all of them; None without a controller or without `looks`."""
-        return self.grid.looks(self.every) if self.looks and self.every is not None else None
+        """The controller's ticks, where samples are taken at all of them; None without a controller or without `ticks`."""
+        return self.grid.ticks(self.every) if self.ticks and self.every is not None else None
 
     @functools.cached_property
     def times(self) -> tuple[Any, Any, Any]:
@@ -70,21 +70,21 @@ class Launches:
         steps = self.grid.sample_steps
         return int(steps.searchsorted(k0, side="right")), int(steps.searchsorted(k1, side="right"))
 
-    def look_bytes(self, count: int) -> int:
-        """Memory of what is gathered at a look of a block of so many members [bytes]."""
-        return self.bytes_at_look * count
+    def tick_bytes(self, count: int) -> int:
+        """Memory of what is gathered at a tick of a block of so many members [bytes]."""
+        return self.bytes_at_tick * count
 
     def slots(self, count: int) -> int:
-        """How many looks of a block of so many members are gathered at once; 0 where none are."""
+        """How many ticks of a block of so many members are gathered at once; 0 where none are."""
         if self.gathered is None:
             return 0
-        return max(2, min(GATHERED_BYTES // max(1, self.look_bytes(count)), len(self.gathered.times)))
+        return max(2, min(GATHERED_BYTES // max(1, self.tick_bytes(count)), len(self.gathered.times)))
 
-    def looks_of(self, k0: int, k1: int) -> slice:
-        """Which looks are gathered once the launch of steps k0 to k1 has ended.
+    def ticks_of(self, k0: int, k1: int) -> slice:
+        """Which ticks are gathered once the launch of steps k0 to k1 has ended.
 
         Returns: Those after step k0, with that of the start, and no later than step k1. Where a function of the host answers,
-            a look ends in the next launch: those from step k0 on and before step k1, with that of the end.
+            a tick ends in the next launch: those from step k0 on and before step k1, with that of the end.
         """
         assert self.gathered is not None
         bounds = np.array([k0 + 1 if k0 else 0, k1 + 1])
@@ -116,7 +116,7 @@ class Launches:
             k = k1
 
     def _periods(self) -> Iterator[tuple[int, int]]:
-        """The launches where a function of the host answers each look: one a period."""
+        """The launches where a function of the host answers each tick: one a period."""
         assert self.every is not None
         for k in range(0, self.grid.steps, self.every):
             yield k, min(k + self.every, self.grid.steps)

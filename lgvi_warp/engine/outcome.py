@@ -12,7 +12,7 @@ from lgvi_warp.statistics.ends import Ends
 
 
 @dataclass
-class Outcome:
+class MemberStatus:
     """The outcome of m members, arrays with one entry each.
 
     Attributes:
@@ -37,7 +37,7 @@ class Outcome:
     substeps: np.ndarray
     event: np.ndarray
 
-    def at(self, members: slice) -> Outcome:
+    def at(self, members: slice) -> MemberStatus:
         """The outcome of some members.
 
         Args:
@@ -46,10 +46,10 @@ class Outcome:
         Returns:
             Views of their entries.
         """
-        return Outcome(*(getattr(self, field.name)[members] for field in fields(self)))
+        return MemberStatus(*(getattr(self, field.name)[members] for field in fields(self)))
 
     @classmethod
-    def clear(cls, members: int, paces: int) -> Outcome:
+    def clear(cls, members: int, paces: int) -> MemberStatus:
         """The outcome of members that reached the end without a fault.
 
         Args:

@@ -19,7 +19,7 @@ from lgvi_kernels.lanes.arithmetic import int_lane
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.common.warp_setup import build_lock
 from lgvi_warp.engine.arrays import Group, Lanes, LawArrays, Structs
-from lgvi_warp.engine.outcome import Outcome
+from lgvi_warp.engine.outcome import MemberStatus
 from lgvi_warp.engine.packing import Packing
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.engine.step_warnings import (
@@ -70,9 +70,9 @@ class Packets:
     @classmethod
     def of(cls, plan: Plan, members: Members) -> Packets:
         """Packets of these members: those of a finished block, if there are any of this size, or new ones."""
-        for _ in range(len(plan.idle)):
+        for _ in range(len(plan.free_packets)):
             try:
-                packets = plan.idle.pop()
+                packets = plan.free_packets.pop()
             except IndexError:  # another thread took the last
                 break
             if packets.count == -(-members.count // plan.spec.width):
@@ -82,7 +82,7 @@ class Packets:
 
     def leave(self) -> None:
         """Leave these packets to the next block; nothing of them may be used any more."""
-        self.plan.idle.append(self)
+        self.plan.free_packets.append(self)
 
     def refill(self, members: Members) -> None:
         """Take other members in place of these, from their starts on."""
@@ -166,12 +166,12 @@ class Packets:
             monitor.signals = wp.array(np.array(rows, np.int32), dtype=wp.int32, device="cpu")
             monitor.first_signals = wp.zeros((self.count, max(1, len(rows))), dtype=Lane, device="cpu")
             monitor.slots = plan.launches.slots(self.count * plan.spec.width)
-            monitor.numbers, columns = sum(plan.layout.look_fields.values()), columns_at_looks(plan)
+            monitor.numbers, columns = sum(plan.layout.tick_fields.values()), columns_at_ticks(plan)
             monitor.columns = wp.array(columns, dtype=wp.int32, device="cpu")
             if monitor.slots:
-                # An odd number of lanes from row to row: else the rows of a look crowd into a few lines of the cache.
+                # An odd number of lanes from row to row: else the rows of a tick crowd into a few lines of the cache.
                 shape = (max(1, monitor.slots * monitor.numbers), self.count | 1)
-                monitor.looks = wp.zeros(shape, dtype=Lane, device="cpu")
+                monitor.ticks = wp.zeros(shape, dtype=Lane, device="cpu")
         if plan.spec.still:
             monitor.still = wp.zeros((self.count, 3), dtype=Lane, device="cpu")
         return monitor
@@ -234,15 +234,15 @@ class Packets:
             return wp.launch(plan.kernel.advance.kernel, dim=self.count, inputs=inputs, device="cpu", record_cmd=True)
 
     def gathered(self, when: slice) -> np.ndarray:
-        """What the last launch gathered at looks.
+        """What the last launch gathered at ticks.
 
-        Returns: (looks, members, numbers of a sample), in memory that the next launch overwrites, in the user's axes.
+        Returns: (ticks, members, numbers of a sample), in memory that the next launch overwrites, in the user's axes.
         """
         slots, numbers = self.monitor.slots, self.monitor.numbers
         first = when.start % slots
-        rows = self.monitor.looks.numpy()[first * numbers : (first + when.stop - when.start) * numbers]
-        by_look = rows.reshape(when.stop - when.start, numbers, math.prod(rows.shape[1:]))[..., : self.members.count]
-        return by_look.transpose(0, 2, 1)
+        rows = self.monitor.ticks.numpy()[first * numbers : (first + when.stop - when.start) * numbers]
+        by_tick = rows.reshape(when.stop - when.start, numbers, math.prod(rows.shape[1:]))[..., : self.members.count]
+        return by_tick.transpose(0, 2, 1)
 
     def first_signals(self) -> np.ndarray:
         """The signals at t = 0, once the first launch has made them.
@@ -253,7 +253,7 @@ class Packets:
         packets, numbers, width = rows.shape
         return rows.transpose(0, 2, 1).reshape(1, packets * width, numbers).copy()
 
-    def outcome(self, warned: bool = True) -> Outcome:
+    def outcome(self, warned: bool = True) -> MemberStatus:
         """The outcome of each member so far."""
         m = self.members.count
         none = np.zeros(m, np.uint16), np.zeros(m, np.int64), np.full(m, np.nan)
@@ -265,7 +265,7 @@ class Packets:
         for number, (event, _) in enumerate(self.plan.kernel_choice.events):
             stopped = code == FIRST + number
             status[stopped], stopped_by[stopped] = event.status, 1 + number
-        return Outcome(
+        return MemberStatus(
             status,
             self._failed_step[:m].astype(np.int64),
             np.sqrt(self._failed_size[:m].astype(np.float64)),
@@ -316,7 +316,7 @@ class Packets:
     def _with_departed(
         self, bits: np.ndarray, step: np.ndarray, value: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same with a warning of the members whose last attitude is no rotation: some end between two looks."""
+        """The same with a warning of the members whose last attitude is no rotation: some end between two ticks."""
         size = departure(self.state_lanes.view[:, :9])[: len(bits)]
         warning = np.uint16(Warnings.ORTHOGONALITY)
         over = size > orthogonality_limit(self.plan)
@@ -331,15 +331,15 @@ def columns_of(sizes: Mapping[str, int]) -> Any:
     return wp.vec4i(*(firsts.get(name, -1) for name in SAMPLE_FIELDS))
 
 
-def columns_at_looks(plan: Plan) -> np.ndarray:
-    """Where in a look's rows the kernel writes the motion."""
+def columns_at_ticks(plan: Plan) -> np.ndarray:
+    """Where in a tick's rows the kernel writes the motion."""
     columns, row, firsts = [], 0, {}
-    for name, size in plan.layout.look_fields.items():
+    for name, size in plan.layout.tick_fields.items():
         firsts[name], row = row, row + size
     for name, size in SAMPLE_FIELDS.items():
         rows = np.full(size, -1)
         if name in firsts:
-            entries = plan.layout.look_entries.get(name, range(size))
+            entries = plan.layout.tick_entries.get(name, range(size))
             rows[list(entries)] = firsts[name] + np.arange(len(entries))
         columns.append(rows)
     return np.concatenate(columns).astype(np.int32)

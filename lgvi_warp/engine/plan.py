@@ -16,16 +16,16 @@ from lgvi_kernels import built_in
 from lgvi_kernels.advance.spec import Spec
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.phases import Phases
-from lgvi_warp.control.signals import check, ordered
+from lgvi_warp.control.signals import check_signals, ordered
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.kernel import Kernel
 from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, choose_kernel
 from lgvi_warp.engine.kernel_spec import COMPENSATED, kind_of, lengths_of, spec_of
 from lgvi_warp.engine.launches import Launches
 from lgvi_warp.engine.packing import rows_shared
-from lgvi_warp.engine.plan_checks import check_looks, check_noise_steps, check_settings, check_substep
+from lgvi_warp.engine.plan_checks import check_ticks, check_noise_steps, check_settings, check_substep
 from lgvi_warp.engine.sample_layout import SampleLayout
-from lgvi_warp.engine.shared import MEMBERS, SEED, Shared
+from lgvi_warp.engine.shared import MEMBERS, SEED, SharedResultsCache
 from lgvi_warp.engine.survey import Survey, survey, survey_of
 from lgvi_warp.engine.widths import default_width
 from lgvi_warp.methods.method import Method
@@ -66,8 +66,8 @@ class Plan:
     layout: SampleLayout = field(compare=False, repr=False)
     launches: Launches = field(compare=False, repr=False)
     facts: Survey = field(compare=False, repr=False)
-    shared: Shared = field(compare=False, repr=False)
-    idle: list[Any] = field(default_factory=list, compare=False, repr=False)
+    shared: SharedResultsCache = field(compare=False, repr=False)
+    free_packets: list[Any] = field(default_factory=list, compare=False, repr=False)
     whole: tuple[Plan, Sequence[int], Sequence[str]] | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -91,8 +91,8 @@ class Plan:
 
     def _settings(self) -> dict[str, Any]:
         named = ("ensemble", "method", "grid", "fields", "dtype", "checks", "on_failure")
-        of_looks = {"looks": self.launches.looks, "read_at_looks": self.layout.read_at_looks}
-        own = {name: getattr(self, name) for name in named} | of_looks
+        of_ticks = {"ticks": self.launches.ticks, "read_at_ticks": self.layout.read_at_ticks}
+        own = {name: getattr(self, name) for name in named} | of_ticks
         return own | {"width": self.spec.width, "survey_all": self.surveyed_all}
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -102,7 +102,7 @@ class Plan:
             return Plan.subplan, self.whole
         return functools.partial(choose_plan, **self._settings(), width_source=self.width_source), ()
 
-    def of(self, ensemble: Ensemble) -> Plan:
+    def for_members(self, ensemble: Ensemble) -> Plan:
         """The same plan, with the same kernel, for other members of the scene, of which the survey of this one holds."""
         check_backward_drag(ensemble, self.kernel_choice, self.method, self.grid.h)
         return replace(self, ensemble=ensemble)
@@ -157,8 +157,8 @@ def choose_plan(
     checks: str = "safe",
     on_failure: str = "freeze",
     survey_all: bool = True,
-    looks: bool = False,
-    read_at_looks: Mapping[str, tuple[int, ...]] | None = None,
+    ticks: bool = False,
+    read_at_ticks: Mapping[str, tuple[int, ...]] | None = None,
     width_source: str = "asked for",
 ) -> Plan:
     """Decide all that is decided before a run; raise SceneError where the settings, the method and the scene disagree.
@@ -170,7 +170,7 @@ def choose_plan(
     faults, scene = Faults(), ensemble.scene
     check_settings(faults, scene, method, dtype, width, checks, on_failure)
     # Those of `save` are checked before: these are of statistics.
-    check(faults, "statistics", fields, scene.controller)
+    check_signals(faults, "statistics", fields, scene.controller)
     faults.raise_if_any()
     shared = _shared(ensemble)
     facts = survey(ensemble, method, shared, most=None if survey_all else SURVEYED)
@@ -179,10 +179,10 @@ def choose_plan(
     if on_failure == "substep":
         check_substep(choice, method)
     check_noise_steps(choice, grid)
-    check_looks(choice, grid.h)
+    check_ticks(choice, grid.h)
     if width is None:
         width, width_source = default_width(kind_of(method, choice), dtype)
-    layout = SampleLayout(choice, ordered(fields), dtype == COMPENSATED, read_at_looks)
+    layout = SampleLayout(choice, ordered(fields), dtype == COMPENSATED, read_at_ticks)
     spec = spec_of(choice, method, layout, width, dtype, checks, on_failure)
     plan = Plan(
         ensemble=ensemble,
@@ -198,7 +198,7 @@ def choose_plan(
         width_source=width_source,
         kernel=Kernel(spec, choice),
         layout=layout,
-        launches=_launches(grid, method, spec, layout, looks),
+        launches=_launches(grid, method, spec, layout, ticks),
         facts=facts,
         shared=shared,
     )
@@ -208,21 +208,21 @@ def choose_plan(
     return replace(plan, spec=spec, kernel=Kernel(spec, choice))
 
 
-def _shared(ensemble: Ensemble) -> Shared:
-    return Shared({*ensemble.varied_names, MEMBERS, SEED})
+def _shared(ensemble: Ensemble) -> SharedResultsCache:
+    return SharedResultsCache({*ensemble.varied_names, MEMBERS, SEED})
 
 
-def _launches(grid: TimeGrid, method: Method, spec: Spec, layout: SampleLayout, looks: bool) -> Launches:
+def _launches(grid: TimeGrid, method: Method, spec: Spec, layout: SampleLayout, ticks: bool) -> Launches:
     controller, size = layout.choice.controller, 8 if spec.real == wp.float64 else 4
     return Launches(
         grid,
         lengths_of(method, layout.choice),
         spec.real,
         sample_bytes=sum(layout.sizes.values()) * size,
-        bytes_at_look=sum(layout.look_fields.values()) * size,
+        bytes_at_tick=sum(layout.tick_fields.values()) * size,
         every=None if controller is None else controller.every(grid.h),
         asks=layout.choice.asks,
-        looks=looks,
+        ticks=ticks,
     )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the kernel writes of a sample, and gathers at a look: fields of the motion, then signals of the controller."""
+"""What the kernel writes of a sample, and gathers at a tick: fields of the motion, then signals of the controller."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ class SampleLayout:
 
     fields: names of the samples to keep, in the order in which they are saved.
     compensated: whether a position is two sums.
-    read_at_looks: field of the motion -> which of its numbers statistics read at looks, () for all; None for all numbers of
+    read_at_ticks: field of the motion -> which of its numbers statistics read at ticks, () for all; None for all numbers of
         all fields.
     """
 
     choice: KernelChoice
     fields: tuple[str, ...]
     compensated: bool
-    read_at_looks: Mapping[str, tuple[int, ...]] | None
+    read_at_ticks: Mapping[str, tuple[int, ...]] | None
 
     @functools.cached_property
     def table(self) -> dict[str, Field]:
@@ -58,33 +58,33 @@ class SampleLayout:
         return numbers | {name: math.prod(self.table[name].shape) for name in self.signals}
 
     @functools.cached_property
-    def look_fields(self) -> dict[str, int]:
-        """How many numbers of each field the kernel gathers at a look, in the user's axes; of signals all, as in samples."""
+    def tick_fields(self) -> dict[str, int]:
+        """How many numbers of each field the kernel gathers at a tick, in the user's axes; of signals all, as in samples."""
         sizes = {name: size for name, size in self.sizes.items() if name in self.fields}
-        entries = self.look_entries
+        entries = self.tick_entries
         return {name: len(entries.get(name, ())) or size for name, size in sizes.items() if self._reads(name)}
 
     @functools.cached_property
-    def look_entries(self) -> dict[str, tuple[int, ...]]:
-        """Fields of the motion of which some numbers alone are gathered at looks: field -> these, counted from 0."""
-        entries = {name: numbers for name, numbers in (self.read_at_looks or {}).items() if numbers}
+    def tick_entries(self) -> dict[str, tuple[int, ...]]:
+        """Fields of the motion of which some numbers alone are gathered at ticks: field -> these, counted from 0."""
+        entries = {name: numbers for name, numbers in (self.read_at_ticks or {}).items() if numbers}
         if self.compensated:  # a place is a pair of sums
             entries.pop("position", None)
         return entries
 
     def _reads(self, name: str) -> bool:
-        """Whether a field is gathered at looks: a signal always, the motion where a statistic reads it."""
-        return name in SIGNALS or self.read_at_looks is None or name in self.read_at_looks
+        """Whether a field is gathered at ticks: a signal always, the motion where a statistic reads it."""
+        return name in SIGNALS or self.read_at_ticks is None or name in self.read_at_ticks
 
     @property
     def notes(self) -> int:
-        """What looks note, as bits (see noting.py): that of which something is saved, and all where the host is asked."""
+        """What ticks note, as bits (see noting.py): that of which something is saved, and all where the host is asked."""
         noted = [signal for name in self.signals if (signal := SIGNALS[name]).group in NOTED]
         return ALL_NOTES if self.choice.asks else sum({bit(signal.group, signal.row) for signal in noted})
 
     @functools.cached_property
     def noted_rows(self) -> dict[str, range]:
-        """Rows of the memory in which looks note something, by its name in NOTED."""
+        """Rows of the memory in which ticks note something, by its name in NOTED."""
         controller = self.choice.controller
         if controller is None:
             return {}

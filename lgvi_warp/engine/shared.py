@@ -19,7 +19,7 @@ Value = TypeVar("Value")
 FRAME, AXES, MEMBERS, SEED = "frame", "axes", "members", "seed"
 
 
-class Reads(dict[str, np.ndarray]):
+class TrackedParameters(dict[str, np.ndarray]):
     """Numbers by name, which note the names that were read.
 
     Attributes:
@@ -72,8 +72,8 @@ class Reads(dict[str, np.ndarray]):
         return super().items()
 
 
-class WatchedContext(PackingContext):
-    """A packing context that notes when the frame, the members' indices or the seed are read. Its parameters are `Reads`."""
+class TrackedContext(PackingContext):
+    """A packing context that notes when the frame, the members' indices or the seed are read. Its parameters are `TrackedParameters`."""
 
     def __getattribute__(self, name: str) -> Any:
         value = super().__getattribute__(name)
@@ -84,8 +84,8 @@ class WatchedContext(PackingContext):
 
 
 def context(numbers: Mapping[str, np.ndarray], *run: Any) -> PackingContext:
-    """A packing context for a computation that `Shared` may watch."""
-    return (WatchedContext if isinstance(numbers, Reads) else PackingContext)(numbers, *run)
+    """A packing context for a computation that `SharedResultsCache` may watch."""
+    return (TrackedContext if isinstance(numbers, TrackedParameters) else PackingContext)(numbers, *run)
 
 
 class _Few(NamedTuple):
@@ -97,7 +97,7 @@ class _Few(NamedTuple):
 
 
 @dataclass
-class Shared:
+class SharedResultsCache:
     """Results computed once, as far as they follow from numbers that vary from no member to another.
 
     What a computation reads is seen when it runs first, so nothing has to list it. Which numbers it reads must depend on
@@ -120,7 +120,7 @@ class Shared:
         if key in self._varying:
             value = compute(numbers)
         else:
-            reads = Reads(numbers)
+            reads = TrackedParameters(numbers)
             value = compute(reads)
             if reads.names.isdisjoint(self.varied):
                 self._kept[key] = value

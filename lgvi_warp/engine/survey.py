@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.engine.block import Block
-from lgvi_warp.engine.shared import AXES, FRAME, MEMBERS, Shared, context
+from lgvi_warp.engine.shared import AXES, FRAME, MEMBERS, SharedResultsCache, context
 from lgvi_warp.methods.method import Method, middle_axis
 from lgvi_warp.physics import inertia, notation, terms, vehicle
 from lgvi_warp.physics.inertia import Frame
@@ -141,7 +141,7 @@ class Survey:
 def survey(
     ensemble: Ensemble,
     method: Method,
-    shared: Shared | None = None,
+    shared: SharedResultsCache | None = None,
     odd: bool = True,
     most: int | None = None,
 ) -> Survey:
@@ -149,7 +149,7 @@ def survey(
 
     most: number of the first members to look at; None (default) for all.
     """
-    known = Shared({*ensemble.varied_names, MEMBERS}) if shared is None else shared
+    known = SharedResultsCache({*ensemble.varied_names, MEMBERS}) if shared is None else shared
 
     def look(first: int, stop: int) -> Survey:
         # Members that overflow get their status, or their fault, elsewhere: no warning from NumPy.
@@ -160,12 +160,12 @@ def survey(
     return functools.reduce(Survey.joined, over_members(look, count))
 
 
-def survey_of(parameters: Parameters, ensemble: Ensemble, method: Method, shared: Shared, block: Block) -> Survey:
+def survey_of(parameters: Parameters, ensemble: Ensemble, method: Method, shared: SharedResultsCache, block: Block) -> Survey:
     """Look at the members of one block, whose parameters are drawn already."""
     return _seen(parameters, ensemble, method, shared, False, block.first, block.stop)
 
 
-def framed(method: Method, parameters: Parameters, shared: Shared) -> dict[str, Any]:
+def framed(method: Method, parameters: Parameters, shared: SharedResultsCache) -> dict[str, Any]:
     """Parameters with the frame that follows from them, under the name FRAME.
 
     Returns: The parameters and, under FRAME, what `frame_of` returns; under AXES the same, but any mass matrix in it.
@@ -196,7 +196,7 @@ def _seen(
     parameters: Parameters,
     ensemble: Ensemble,
     method: Method,
-    shared: Shared,
+    shared: SharedResultsCache,
     odd: bool,
     first: int,
     stop: int,

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from lgvi_warp.methods.saveat import TimeGrid
     from lgvi_warp.sampling.members import Members
 
-# Numbers of one kind at the looks that are reduced together.
+# Numbers of one kind at the ticks that are reduced together.
 NUMBERS_AT_ONCE = 32_768
 
 # Tells status and last own step of each member (see `Fields`).
@@ -111,7 +111,7 @@ def run_block(
     advanced: called with the vehicle-steps made since the last call (default: nothing).
     Returns: What each keeper closed with; None if the block was halted before the end.
     """
-    from lgvi_warp.engine.host_callback import ask
+    from lgvi_warp.engine.host_callback import call_host
     from lgvi_warp.engine.packets import Packets
 
     # Members that are not finite, or exceed float32, get their status from the kernel: no warning from NumPy.
@@ -123,23 +123,23 @@ def run_block(
 
         # So many numbers of each kind that what is made of them stays in the caches.
         at_once = max(1, NUMBERS_AT_ONCE // block.count)
-        lookers = [looker for keeper in block_keepers if (looker := getattr(keeper, "look", None))]
+        tick_takers = [tick_taker for keeper in block_keepers if (tick_taker := getattr(keeper, "take_ticks", None))]
 
         def keep(when: slice, values: Mapping[str, np.ndarray], ends: Ends) -> None:
             samples = samples_of(plan, plan.grid, when, values, ends)
             for block_keeper in block_keepers:
                 block_keeper.take(when, samples)
 
-        def look(grid: TimeGrid, looks: slice) -> None:
+        def look(grid: TimeGrid, ticks: slice) -> None:
             ends = functools.cache(packets.ended)
-            for first in range(looks.start, looks.stop, at_once):
-                when = slice(first, min(first + at_once, looks.stop))
+            for first in range(ticks.start, ticks.stop, at_once):
+                when = slice(first, min(first + at_once, ticks.stop))
                 values = divided(
-                    plan.layout.look_fields, packets.gathered(when), plan.layout.table, plan.layout.look_entries
+                    plan.layout.tick_fields, packets.gathered(when), plan.layout.table, plan.layout.tick_entries
                 )
                 samples = samples_of(plan, grid, when, values, ends)
-                for looker in lookers:
-                    looker(when, samples)
+                for tick_taker in tick_takers:
+                    tick_taker(when, samples)
 
         def keep_start() -> None:
             running = np.zeros(block.count, np.uint8), np.zeros(block.count, np.int64)
@@ -153,13 +153,13 @@ def run_block(
             if halted():
                 return None
             if plan.launches.asks:
-                ask(packets, k0 * plan.grid.h)
+                call_host(packets, k0 * plan.grid.h)
             raw = packets.advance(k0, k1)[:, : block.count]
             if k0 == 0 and plan.layout.signals:
-                # The first look of a controller is a part of the first launch.
+                # The first tick of a controller is a part of the first launch.
                 keep_start()
-            if plan.launches.gathered and (looks := plan.launches.looks_of(k0, k1)).start < looks.stop:
-                look(plan.launches.gathered, looks)
+            if plan.launches.gathered and (ticks := plan.launches.ticks_of(k0, k1)).start < ticks.stop:
+                look(plan.launches.gathered, ticks)
             when = slice(*plan.launches.due(k0, k1))
             if when.start < when.stop and block_keepers:
                 values = unpacked(plan.layout.sizes, raw, packets.frame, plan.layout.table)

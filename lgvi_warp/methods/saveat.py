@@ -81,8 +81,8 @@ class TimeGrid:
         """Number of steps from the start to the end."""
         return int(self.sample_steps[-1])
 
-    def looks(self, every: int) -> TimeGrid:
-        """The same steps with samples at the looks of a controller alone."""
+    def ticks(self, every: int) -> TimeGrid:
+        """The same steps with samples at the ticks of a controller alone."""
         step, steps = exact(self.h), np.arange(0, self.steps + 1, every)
         times = np.array([k * step.numerator / step.denominator for k in steps.tolist()])
         return TimeGrid(self.h, steps, times, self.messages)

@@ -117,7 +117,7 @@ class Vehicle(Summarized):
     def summary_rows(self) -> tuple[str, summaries.Rows]:
         """The numbers with their units, and the warnings."""
         rows = [("title", self.title)] if self.title else []
-        rows += [(name, summaries.numbers(value, UNITS[name])) for name, value in self.parameters().items()]
+        rows += [(name, summaries.few_digits(value, UNITS[name])) for name, value in self.parameters().items()]
         rows += [("warning", str(text)) for text in self.warnings]
         return f"Vehicle, {'6x6' if self.full else 'simple'} form", rows
 

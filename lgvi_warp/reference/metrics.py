@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Metrics of one member's whole path in plain NumPy, twins of lgvi_warp/statistics/metrics/tracking_metrics.py: same names.
 
-t: times of the looks under way (k,) [s]; y: actual numbers (k,), goal: one number; e: errors (k,), wanted less actual.
+t: times of the ticks under way (k,) [s]; y: actual numbers (k,), goal: one number; e: errors (k,), wanted less actual.
 """
 
 import numpy as np
@@ -15,8 +15,8 @@ def direction(y: np.ndarray, goal: float) -> float:
 def overshoot(t: np.ndarray, y: np.ndarray, goal: float) -> float:
     """How far y goes beyond the goal.
 
-    t: times of the looks under way (k,) [s].
-    y: actual numbers at these looks (k,).
+    t: times of the ticks under way (k,) [s].
+    y: actual numbers at these ticks (k,).
     """
     return max(0.0, float(np.max(direction(y, goal) * (y - goal))))
 
@@ -24,8 +24,8 @@ def overshoot(t: np.ndarray, y: np.ndarray, goal: float) -> float:
 def undershoot(t: np.ndarray, y: np.ndarray, goal: float) -> float:
     """How far y goes the wrong way.
 
-    t: times of the looks under way (k,) [s].
-    y: actual numbers at these looks (k,).
+    t: times of the ticks under way (k,) [s].
+    y: actual numbers at these ticks (k,).
     """
     return max(0.0, float(np.max(direction(y, goal) * (y[0] - y))))
 
@@ -33,8 +33,8 @@ def undershoot(t: np.ndarray, y: np.ndarray, goal: float) -> float:
 def peak(t: np.ndarray, y: np.ndarray, goal: float) -> float:
     """y where it is farthest in the direction of the step.
 
-    t: times of the looks under way (k,) [s].
-    y: actual numbers at these looks (k,).
+    t: times of the ticks under way (k,) [s].
+    y: actual numbers at these ticks (k,).
     """
     return float(y[np.argmax(direction(y, goal) * y)])
 
@@ -42,17 +42,17 @@ def peak(t: np.ndarray, y: np.ndarray, goal: float) -> float:
 def peak_time(t: np.ndarray, y: np.ndarray, goal: float) -> float:
     """The time at which y is farthest in the direction of the step [s].
 
-    t: times of the looks under way (k,) [s].
-    y: actual numbers at these looks (k,).
+    t: times of the ticks under way (k,) [s].
+    y: actual numbers at these ticks (k,).
     """
     return float(t[np.argmax(direction(y, goal) * y)])
 
 
 def rise_time(t: np.ndarray, y: np.ndarray, goal: float) -> float:
-    """From the first look with 10 % of the step done to the first one with 90 %.
+    """From the first tick with 10 % of the step done to the first one with 90 %.
 
-    t: times of the looks under way (k,) [s].
-    y: actual numbers at these looks (k,).
+    t: times of the ticks under way (k,) [s].
+    y: actual numbers at these ticks (k,).
     """
     if goal == y[0]:
         return 0.0
@@ -63,10 +63,10 @@ def rise_time(t: np.ndarray, y: np.ndarray, goal: float) -> float:
 
 
 def settling_time(t: np.ndarray, y: np.ndarray, goal: float, within: float) -> float:
-    """The first look from which on y is within the band.
+    """The first tick from which on y is within the band.
 
-    t: times of the looks under way (k,) [s].
-    y: actual numbers at these looks (k,).
+    t: times of the ticks under way (k,) [s].
+    y: actual numbers at these ticks (k,).
     """
     outside = np.flatnonzero(np.abs(y - goal) > within)
     if not len(outside):
@@ -77,8 +77,8 @@ def settling_time(t: np.ndarray, y: np.ndarray, goal: float, within: float) -> f
 def steady_state_error(t: np.ndarray, e: np.ndarray, end: float, share: float = 0.1) -> float:
     """The mean error over the last part of the run.
 
-    t: times of the looks under way (k,) [s].
-    e: errors at these looks (k,), wanted less actual.
+    t: times of the ticks under way (k,) [s].
+    e: errors at these ticks (k,), wanted less actual.
     end: the end of the run [s].
     """
     if t[-1] < end:
@@ -87,7 +87,7 @@ def steady_state_error(t: np.ndarray, e: np.ndarray, end: float, share: float = 
 
 
 def max_error(t: np.ndarray, e: np.ndarray) -> float:
-    """The largest |e| at any look."""
+    """The largest |e| at any tick."""
     return float(np.max(np.abs(e)))
 
 
@@ -112,20 +112,20 @@ def rms(t: np.ndarray, e: np.ndarray) -> float:
 
 
 def effort(t: np.ndarray, command: np.ndarray) -> float:
-    """The integral of |command|, held from look to look and summed over channels; command: (k, channels)."""
+    """The integral of |command|, held from tick to tick and summed over channels; command: (k, channels)."""
     return float(np.sum(np.abs(command[:-1]) * np.diff(t)[:, None]))
 
 
 def travel(t: np.ndarray, actuator: np.ndarray) -> float:
-    """The sum of |change| from look to look; actuator: (k, channels)."""
+    """The sum of |change| from tick to tick; actuator: (k, channels)."""
     return float(np.sum(np.abs(np.diff(actuator, axis=0))))
 
 
 def saturation_share(t: np.ndarray, command: np.ndarray, limit: np.ndarray) -> float:
     """The share of time with a command at its limit or beyond.
 
-    t: times of the looks under way (k,) [s].
-    command: commands at these looks (k, channels).
+    t: times of the ticks under way (k,) [s].
+    command: commands at these ticks (k, channels).
     limit: the limit of each channel (channels,).
     """
     held = np.any(np.abs(command[:-1]) >= limit * (1.0 - 1e-6), axis=1)
@@ -135,8 +135,8 @@ def saturation_share(t: np.ndarray, command: np.ndarray, limit: np.ndarray) -> f
 def energy(t: np.ndarray, wrench: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray) -> float:
     """The integral of |power| of a delivered wrench [J].
 
-    t: times of the looks under way (k,) [s].
-    wrench: delivered forces and torques at these looks (k, 6) [N, N m], body axes.
+    t: times of the ticks under way (k,) [s].
+    wrench: delivered forces and torques at these ticks (k, 6) [N, N m], body axes.
     velocity: velocities (k, 3) [m/s], body axes.
     angular_velocity: (k, 3) [rad/s], body axes.
     """

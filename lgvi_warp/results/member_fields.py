@@ -12,7 +12,7 @@ import numpy as np
 from lgvi_warp.common.status import Status, Warnings, stopped
 
 if TYPE_CHECKING:
-    from lgvi_warp.engine.outcome import Outcome
+    from lgvi_warp.engine.outcome import MemberStatus
     from lgvi_warp.engine.plan import Plan
 
 
@@ -31,18 +31,18 @@ class MemberField:
     name: str
     dtype: str
     attributes: dict[str, Any]
-    of: Callable[[Plan, Outcome], np.ndarray]
+    of: Callable[[Plan, MemberStatus], np.ndarray]
     when: Callable[[Plan], bool] = lambda plan: True
 
 
-def _failure_time(plan: Plan, outcome: Outcome) -> np.ndarray:
+def _failure_time(plan: Plan, outcome: MemberStatus) -> np.ndarray:
     """Time of the last good state, or of the event [s]; NaN where there was neither."""
     if not outcome.status.any():
         return np.full(len(outcome.status), np.nan)
     return np.where(outcome.status != 0, outcome.end_time(plan), np.nan)
 
 
-def _failure_value(plan: Plan, outcome: Outcome) -> np.ndarray:
+def _failure_value(plan: Plan, outcome: MemberStatus) -> np.ndarray:
     """The value that crossed its limit; 0 for an event, NaN without."""
     if not outcome.status.any():
         return np.full(len(outcome.status), np.nan)
@@ -50,12 +50,12 @@ def _failure_value(plan: Plan, outcome: Outcome) -> np.ndarray:
     return np.where(outcome.status != 0, size, np.nan)
 
 
-def _warning_time(plan: Plan, outcome: Outcome) -> np.ndarray:
+def _warning_time(plan: Plan, outcome: MemberStatus) -> np.ndarray:
     """Time when the most serious warning was first seen [s]; NaN without."""
     return np.where(outcome.warnings != 0, outcome.warning_step * plan.grid.h, np.nan)
 
 
-def _warning_value(plan: Plan, outcome: Outcome) -> np.ndarray:
+def _warning_value(plan: Plan, outcome: MemberStatus) -> np.ndarray:
     """The value that was seen at that time; NaN without."""
     return np.where(outcome.warnings != 0, outcome.warning_value, np.nan)
 
@@ -109,7 +109,7 @@ def size(plan: Plan) -> int:
     return sum(np.dtype(item.dtype).itemsize for item in present(plan))
 
 
-def of(plan: Plan, outcome: Outcome) -> dict[str, np.ndarray]:
+def member_fields(plan: Plan, outcome: MemberStatus) -> dict[str, np.ndarray]:
     """Compute the fields of an outcome's members.
 
     Returns: Arrays of shape (n,), by name.

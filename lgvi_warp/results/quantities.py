@@ -21,7 +21,7 @@ from lgvi_warp.results.result import Result
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.statistics.ends import Ends, check_outcomes, outcomes
 from lgvi_warp.statistics.outcomes import EndTime
-from lgvi_warp.statistics.paths.each import Each
+from lgvi_warp.statistics.paths.member_values import MemberValues
 from lgvi_warp.statistics.values.functional import Functional, functional
 from lgvi_warp.statistics.values.quantity import Quantity
 
@@ -97,7 +97,7 @@ class OfResult:
 
 
 @dataclass(frozen=True)
-class OfEnds(OfResult):
+class EndQuantity(OfResult):
     """How or when members ended, or a quantity there or at a time.
 
     "outcome floor" is 1 for members that ended so, else 0; "end_time floor" says when, and "depth at floor" gives the depth
@@ -132,7 +132,7 @@ class OfEnds(OfResult):
         )
         named = {event.key: event.status for event in events}.get(self.outcome)
         alone = named is None or sum(event.status == named for event in events) == 1
-        return {} if alone else {f"each end_time {self.outcome}": EndTime(self.outcome, then=Each())}
+        return {} if alone else {f"each end_time {self.outcome}": EndTime(self.outcome, then=MemberValues())}
 
     def values(self, result: Result, members: Any = None) -> np.ndarray:
         """Compute its numbers for each member.
@@ -178,11 +178,11 @@ class OfEnds(OfResult):
         return [f"{label} at {end}" for label in super().labels(count)]
 
 
-def _of_ends(text: str) -> OfEnds | None:
+def _of_ends(text: str) -> EndQuantity | None:
     """The quantity that a text names by an outcome or a time; None where it names neither. Raises SceneError."""
     kind, _, outcome = text.partition(" ")
     if kind in ("outcome", "end_time") and outcome.strip():
-        return OfEnds(text, functional("of", "position"), kind=kind, outcome=outcome.strip())
+        return EndQuantity(text, functional("of", "position"), kind=kind, outcome=outcome.strip())
     name, _, end = (part.strip() for part in text.partition(" at "))
     if not end:
         return None
@@ -193,10 +193,10 @@ def _of_ends(text: str) -> OfEnds | None:
     try:
         when = float(end)
     except ValueError:
-        return OfEnds(label, function, outcome=end)
+        return EndQuantity(label, function, outcome=end)
     if not 0.0 <= when < np.inf:
         raise refusal("of", text, "is at no time of a run", "give a time from 0 [s]")
-    return OfEnds(label, function, when=when)
+    return EndQuantity(label, function, when=when)
 
 
 class _Samples(dict[str, np.ndarray]):

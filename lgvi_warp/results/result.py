@@ -16,7 +16,7 @@ import numpy as np
 from lgvi_warp.common import npy_files, summaries
 from lgvi_warp.common.errors import MissingExtra
 from lgvi_warp.common.phases import Phases
-from lgvi_warp.common.reading import understood
+from lgvi_warp.common.reading import corrupt_file_as_scene_error
 from lgvi_warp.common.status import Status, StatusArray, WarningArray
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.control.controller import terms_of
@@ -348,7 +348,7 @@ class Result(Summarized):
             OSError: If the file cannot be read.
             SceneError: If it is damaged, or no result (SceneError is a ValueError).
         """
-        with understood(path, "no result of lgvi-warp", "run the scene again, or ask for the file anew"):
+        with corrupt_file_as_scene_error(path, "no result of lgvi-warp", "run the scene again, or ask for the file anew"):
             content = npy_files.of_npz(path)
             return cls._from(content, result_file.checked(content))
 
@@ -383,7 +383,7 @@ def _below(prefix: str, content: Mapping[str, np.ndarray]) -> dict[str, np.ndarr
     return {name.removeprefix(prefix): value for name, value in content.items() if name.startswith(prefix)}
 
 
-class Drawn(Mapping[str, np.ndarray]):
+class DrawnParameters(Mapping[str, np.ndarray]):
     """Parameters of members of an ensemble that follow each other, drawn when they are first read.
 
     Before that they take no memory.

@@ -11,7 +11,7 @@ import numpy as np
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.common.status import Status
-from lgvi_warp.control.signals import check
+from lgvi_warp.control.signals import check_signals
 from lgvi_warp.engine.executors import executor_of
 from lgvi_warp.engine.executors.base import Executor
 from lgvi_warp.engine.keepers.observation import Observation, observe
@@ -100,7 +100,7 @@ class Request:
         if self.save is not None and not isinstance(self.save, SaveAt):
             faults.add("save", self.save, "is no SaveAt", "give lw.SaveAt(every=1.0) or lw.SaveAt(at=[...])")
         faults.raise_if_any()
-        check(
+        check_signals(
             faults, "run.save_fields" if self.save is None else "save.fields", self.saved, self.fleet.scene.controller
         )
         faults.raise_if_any()
@@ -124,7 +124,7 @@ class Request:
         checks = run.checks if self.checks is None else self.checks
         on_failure = run.on_failure if self.on_failure is None else self.on_failure
         observed, fields = self.observed, self.observed.fields(self.saved)
-        others = (fields, dtype, self.width, checks, on_failure, survey_all, observed.looks, observed.read_at_looks())
+        others = (fields, dtype, self.width, checks, on_failure, survey_all, observed.ticks, observed.read_at_ticks())
         if self.method is None and run.method is None and not run.method_options:
             return planned(self.fleet, grid, others)
         method = self.method if isinstance(self.method, Method) else run.method_of(self.method)

@@ -22,7 +22,7 @@ from lgvi_warp.engine.work import Work
 from lgvi_warp.results import member_fields
 from lgvi_warp.results.outcomes import begun_beyond, failure_text
 from lgvi_warp.results.provenance import at_end, messages, provenance
-from lgvi_warp.results.result import Drawn, Result
+from lgvi_warp.results.result import DrawnParameters, Result
 from lgvi_warp.scene import plausibility
 from lgvi_warp.statistics.estimates.estimate import Estimates
 
@@ -107,12 +107,12 @@ class _Gathered:
         Its arrays are its own: whoever gets it may write into them, and the run goes on with what it has.
         """
         plan, at = self.plan, slice(block.first, block.stop)
-        of_members = {name: values.copy() for name, values in member_fields.of(plan, self.outcomes.all.at(at)).items()}
+        of_members = {name: values.copy() for name, values in member_fields.member_fields(plan, self.outcomes.all.at(at)).items()}
         return Result(
             time=plan.grid.times.copy(),
             samples={name: values.copy() for name, values in self.histories(at).items()},
             **Result.per_member(of_members),
-            parameters=Drawn(plan.ensemble, block.stop, block.first),
+            parameters=DrawnParameters(plan.ensemble, block.stop, block.first),
             messages=(),
             provenance=provenance(plan) | {"members": plan.ensemble.members},
             terms=tuple(plan.ensemble.scene.terms),
@@ -125,7 +125,7 @@ class _Gathered:
             content, texts = provenance(plan, self.observed, self.fields), messages(plan)
         else:
             content, texts = self.known(plan)
-        of_members = {name: values[:n] for name, values in member_fields.of(plan, self.outcomes.all).items()}
+        of_members = {name: values[:n] for name, values in member_fields.member_fields(plan, self.outcomes.all).items()}
         estimates, remarks = Estimates(), tuple[str, ...]()
         if whole:
             estimates, remarks = self.observing.read(content["ensemble"], of_members["status"])
@@ -136,7 +136,7 @@ class _Gathered:
             time=plan.grid.times,
             samples=histories,
             **Result.per_member(of_members),
-            parameters=Drawn(plan.ensemble, n),
+            parameters=DrawnParameters(plan.ensemble, n),
             messages=texts + remarks + on_the_way + begun_beyond(of_members["status"], of_members["failure_time"]),
             provenance=at_end(content, of_members, n, plan.ensemble.members),
             terms=tuple(scene.terms),

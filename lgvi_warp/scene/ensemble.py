@@ -12,7 +12,7 @@ import numpy as np
 
 from lgvi_warp.common import summaries
 from lgvi_warp.common.arguments import of_kind
-from lgvi_warp.common.errors import Faults, ragged, refusal, shown
+from lgvi_warp.common.errors import Faults, ragged, refusal, brief
 from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics.terms import base
@@ -84,7 +84,7 @@ class Ensemble(Summarized):
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
         """Sampling, what varies and the scene's own rows."""
-        varied = [(f"varies {name}", shown(distribution.to_dict())) for name, distribution in self.vary.items()]
+        varied = [(f"varies {name}", brief(distribution.to_dict())) for name, distribution in self.vary.items()]
         rows = [("sampling", f"{self.sampling.kind}, seed {self.seed}"), *varied]
         scene_rows = self.scene.summary_rows()[1] if isinstance(self.scene, Summarized) else ()
         return f"Ensemble of {self.members:,} members", [*rows, *(row for row in scene_rows if row[0] != "ensemble")]
@@ -330,7 +330,7 @@ class Ensemble(Summarized):
         """
         chosen = np.asarray(None if ragged(indices) else indices)
         if chosen.ndim != 1 or not len(chosen) or chosen.dtype.kind not in "iu" or np.ma.is_masked(indices):
-            raise IndexError(f"members {shown(indices)}: give a list of one or more whole numbers")
+            raise IndexError(f"members {brief(indices)}: give a list of one or more whole numbers")
         if chosen.min() < 0 or chosen.max() >= self.members:
             raise IndexError(f"members {chosen.min()} to {chosen.max()} of {self.members}")
         chosen = chosen.astype(np.int64)

@@ -50,10 +50,10 @@ def _whose(odd: Odd, members: int, most: int | None) -> str:
 
 
 # Name of a quantity, mask (1,) or (n,) of the odd members, and the text about member i.
-Look = tuple[str, np.ndarray, Callable[[int], str]]
+OddityCheck = tuple[str, np.ndarray, Callable[[int], str]]
 
 
-def gathered(looks: Iterable[Look], first: int, stop: int) -> Oddities:
+def gathered(looks: Iterable[OddityCheck], first: int, stop: int) -> Oddities:
     """Count the odd values of the members first to stop - 1.
 
     looks: For each check the name of a quantity, the members that are odd (1,) or (n,), and the text about one member. Where

@@ -23,7 +23,7 @@ from lgvi_warp.physics.terms.wrench import holds
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.like import SceneLike
-from lgvi_warp.scene.oddities import Look, Oddities, gathered
+from lgvi_warp.scene.oddities import OddityCheck, Oddities, gathered
 from lgvi_warp.scene.slices import over_members
 
 Numbers = Mapping[str, np.ndarray]
@@ -73,7 +73,7 @@ def _text(template: str, *numbers: np.ndarray) -> Callable[[int], str]:
     return lambda i: template.format(*(values[i] for values in numbers))
 
 
-def net_weight(scene: SceneLike, p: Numbers) -> Iterator[Look]:
+def net_weight(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     """Look for a net weight that hardly any vehicle has.
 
     p: Parameters by name, (1, ...) or (n, ...).
@@ -89,7 +89,7 @@ def net_weight(scene: SceneLike, p: Numbers) -> Iterator[Look]:
     yield "vehicle.buoyancy", np.abs(net) > LIMITS["net weight"].value * weight, text
 
 
-def density(scene: SceneLike, p: Numbers) -> Iterator[Look]:
+def density(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     """Look for a density that water cannot have.
 
     p: Parameters by name, (1, ...) or (n, ...).
@@ -99,7 +99,7 @@ def density(scene: SceneLike, p: Numbers) -> Iterator[Look]:
     yield "environment.water_density", odd, _text("{:.6g} kg/m3 is not water, which has 1,000 or more: a unit?", rho)
 
 
-def currents(scene: SceneLike, p: Numbers) -> Iterator[Look]:
+def currents(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     """Look for currents that are faster than any tide.
 
     p: Parameters by name, (1, ...) or (n, ...).
@@ -113,7 +113,7 @@ def currents(scene: SceneLike, p: Numbers) -> Iterator[Look]:
         yield f"{term.key}.{field}", speed > LIMITS["current"].value, _text(FAST, speed)
 
 
-def fin_angles(scene: SceneLike, p: Numbers) -> Iterator[Look]:
+def fin_angles(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     """Look for fins that turn beyond 90 degrees, by their limit or by their command.
 
     p: Parameters by name, (1, ...) or (n, ...).
@@ -130,7 +130,7 @@ def fin_angles(scene: SceneLike, p: Numbers) -> Iterator[Look]:
             yield f"{term.key}.{field}", angle > LIMITS["fin angle"].value * (1.0 + 1e-9), _text(FAR, angle)
 
 
-def depths(scene: SceneLike, p: Numbers) -> Iterator[Look]:
+def depths(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     """Look for depths above the surface: most likely they are heights.
 
     p: Parameters by name, (1, ...) or (n, ...).
@@ -146,7 +146,7 @@ def depths(scene: SceneLike, p: Numbers) -> Iterator[Look]:
             yield f"{term.key}.{field}", odd, _text(HIGH, values.min(axis=1))
 
 
-def inertia(scene: SceneLike, p: Numbers) -> Iterator[Look]:
+def inertia(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     """Look for inertia that a body of this mass and length cannot have.
 
     The length is that of the stations of a cross flow. Within a length L along x and a breadth D, the variance of a
@@ -163,7 +163,7 @@ def inertia(scene: SceneLike, p: Numbers) -> Iterator[Look]:
             yield from _inertia(p, rigid, arm, x[:, -1] - x[:, 0])
 
 
-def _inertia(p: Numbers, rigid: np.ndarray, arm: np.ndarray, length: np.ndarray) -> Iterator[Look]:
+def _inertia(p: Numbers, rigid: np.ndarray, arm: np.ndarray, length: np.ndarray) -> Iterator[OddityCheck]:
     """Compare the largest moment of inertia about a body axis with its limit; the largest principal one is no less."""
     both = "vehicle.inertia" in p
     name = "vehicle.inertia" if both else "vehicle.rigid_body_mass_matrix"
@@ -182,7 +182,7 @@ def _diagonal(matrices: np.ndarray) -> np.ndarray:
     return np.diagonal(matrices, axis1=1, axis2=2)
 
 
-def actuators(scene: SceneLike, p: Numbers) -> Iterator[Look]:
+def actuators(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     """Look for components of a force or a moment that a controller asks for, and its actuators cannot make.
 
     p: Parameters by name, (1, ...) or (n, ...).
@@ -213,7 +213,7 @@ def of_numbers(
         return gathered(itertools.chain(*looks), first, stop)
 
 
-def _looks(check: Callable[[SceneLike, Numbers], Iterator[Look]], scene: SceneLike, p: Numbers) -> list[Look]:
+def _looks(check: Callable[[SceneLike, Numbers], Iterator[OddityCheck]], scene: SceneLike, p: Numbers) -> list[OddityCheck]:
     return list(check(scene, p))
 
 
@@ -233,7 +233,7 @@ def of_start(scene: SceneLike, members: Members, first: int = 0) -> Oddities:
         return gathered(_of_start(scene, members), first, first + members.count)
 
 
-def _of_start(scene: SceneLike, members: Members) -> Iterator[Look]:
+def _of_start(scene: SceneLike, members: Members) -> Iterator[OddityCheck]:
     speed, depth = _speed(members.velocity), members.position[:, 2]
     limit = LIMITS["speed"].value
     yield "start.velocity", speed > limit, lambda i: f"a speed of {speed[i]:.4g} m/s is beyond {limit:g} m/s: a unit?"
@@ -273,7 +273,7 @@ def on_the_way(scene: SceneLike, samples: Mapping[str, np.ndarray]) -> Oddities:
         high, height = _later(samples.get("position"), _higher, -LIMITS["depth"].value)
     if ends_at_the_surface(scene):
         high = np.zeros_like(high)
-    looks: list[Look] = [
+    looks: list[OddityCheck] = [
         ("velocity", fast, lambda i: f"{speed[i]:.4g} m/s on the way is beyond {limit:g} m/s: a unit, or the step?"),
         ("position", high, lambda i: f"rises {height[i]:.4g} m above the surface, where no water is: {STOP}"),
     ]

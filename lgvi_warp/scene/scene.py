@@ -105,9 +105,9 @@ class Scene(Summarized):
         water, run, settings = self.environment, self.run.to_dict(), self.ensemble_settings
         numbers, start = self.vehicle.parameters().items(), self.start.given().items()
         rows = [("vehicle", self.vehicle.title)] if self.vehicle.title else []
-        rows += [(f"vehicle.{name}", summaries.numbers(value, UNITS[name])) for name, value in numbers]
+        rows += [(f"vehicle.{name}", summaries.few_digits(value, UNITS[name])) for name, value in numbers]
         rows.append(("environment", f"gravity {water.gravity:g} m/s2, water_density {water.water_density:g} kg/m3"))
-        rows += [(f"start.{name}", summaries.numbers(value, TABLE[name].unit)) for name, value in start]
+        rows += [(f"start.{name}", summaries.few_digits(value, TABLE[name].unit)) for name, value in start]
         rows.append(("terms", summaries.listed(term.key for term in self.terms)))
         if self.controller is not None:
             parts = summaries.listed(part.key for part in self.controller.parts)
@@ -236,7 +236,7 @@ class Scene(Summarized):
 
     @classmethod
     def named(cls, name: str, **sections: Any) -> Scene:
-        """Build a scene of a vehicle that comes with the package; `lw.vehicles()` lists their names.
+        """Build a scene of a vehicle that comes with the package; `lw.vehicle_names()` lists their names.
 
         Args:
             name: Name of the vehicle, such as "remus_100".

@@ -11,7 +11,7 @@ from typing import Any
 
 from lgvi_warp.control.base import SECTIONS as LISTS
 from lgvi_warp.control.controller import Controller
-from lgvi_warp.vehicles.fossen import vehicles
+from lgvi_warp.vehicles.fossen import vehicle_names
 from lgvi_warp.physics import terms
 from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.physics.terms import events
@@ -47,7 +47,7 @@ def schema() -> Schema:
     start = {name: _numbers(TABLE[name].shape) for name in (item.name for item in dataclasses.fields(Start))}
     lists = {section: _list(base.kinds, {"faults": "fault"}.get(section)) for section, base in LISTS.items()}
     sections = {
-        "vehicle": _table(Vehicle, {"name": {"enum": vehicles()}}),
+        "vehicle": _table(Vehicle, {"name": {"enum": vehicle_names()}}),
         "environment": _table(Environment),
         "start": _table(Start, start),
         "ensemble": _table(EnsembleSettings, ensemble),

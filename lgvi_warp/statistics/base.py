@@ -107,8 +107,8 @@ class Statistic:
     of_numbers: ClassVar[bool] = True
     # Whether it reads how members end instead of samples.
     of_ends: ClassVar[bool] = False
-    # Whether it takes the samples at all looks of a controller, and not only those that are kept.
-    looks: ClassVar[bool] = False
+    # Whether it takes the samples at all ticks of a controller, and not only those that are kept.
+    ticks: ClassVar[bool] = False
 
     of: Any = None
     name: str | None = field(default=None, kw_only=True)
@@ -354,8 +354,8 @@ class Statistic:
         for argument in fields(self):
             value = getattr(self, argument.name)
             default = None if argument.default is MISSING else argument.default
-            if value is not None and plain(value) != plain(default):
-                content[argument.name] = plain(value)
+            if value is not None and as_toml(value) != as_toml(default):
+                content[argument.name] = as_toml(value)
         return content
 
 
@@ -364,12 +364,12 @@ def together(each: Sequence[Sequence[Part]]) -> list[Part]:
     return [part for parts in zip(*each, strict=True) for part in parts]
 
 
-def plain(value: Any) -> Any:
+def as_toml(value: Any) -> Any:
     """Return a value as TOML and JSON can hold it: lists for arrays, tables for statistics, names for functions."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
+        return [as_toml(item) for item in value]
     if isinstance(value, Statistic):
         return value.to_dict()
     if isinstance(value, Quantity):

@@ -361,7 +361,7 @@ class FirstPassage(Condition, Counted):
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         """Return the estimate of Aalen & Johansen (1978)."""
-        curve = Curve.of(part)
+        curve = PassageCurve.of(part)
         lower, upper = curve.ends(*intervals.wilson(curve.value, curve.members, self.confidence))
         passed, lost, stopped = part["passed"][0, :-1].sum(axis=1), part["lost"][0], part["stopped"][0, :-1]
         arrays = {"value": curve.value[:, -1], "lower": lower[:, -1], "upper": upper[:, -1]}
@@ -379,8 +379,8 @@ class FirstPassage(Condition, Counted):
         # Probabilities with intervals from the spread of the replicates' curves.
         each = self.each_replicate(parts, replicates)
         overall = self.whole(together(each))
-        curve = Curve.of(overall)
-        curves = np.stack([Curve.of(self.whole(replicate_parts)).value for replicate_parts in each])
+        curve = PassageCurve.of(overall)
+        curves = np.stack([PassageCurve.of(self.whole(replicate_parts)).value for replicate_parts in each])
         ends = curve.ends(*intervals.probability_of_replicates(curve.value, curves, curve.members, self.confidence))
         arrays = {"lower": ends[0][:, -1], "upper": ends[1][:, -1]} | self._times(curve.value, *ends, time)
         return [self.read(overall, time).with_interval(by_replicates(replicates), arrays)]
@@ -412,7 +412,7 @@ def check_levels(faults: Faults, levels: Any) -> None:
         faults.add("levels", levels, "are no numbers between 0 and 1", "give (0.05, 0.5, 0.95)")
 
 
-class Curve:
+class PassageCurve:
     """Probability to have passed, by Aalen & Johansen (1978), at the end of each piece of the times before the samples.
 
     A member that ends otherwise passes no more; if none does, this is Kaplan & Meier's curve (1958). A member that is lost
@@ -430,7 +430,7 @@ class Curve:
     """
 
     @classmethod
-    def of(cls, part: Part) -> Curve:
+    def of(cls, part: Part) -> PassageCurve:
         """Return the curve of first passages."""
         passed = part["passed"][0, :-1]
         others = np.zeros_like(passed)

@@ -133,7 +133,7 @@ class Quantiles(Statistic):
         x = values.filled(np.inf)
         # Sorting is most of the work, and takes half as long in float32.
         x = x.astype(np.float32) if values.single else x
-        return {"count": values.count} | sketch.of(x, values.size, self.size, values.block)
+        return {"count": values.count} | sketch.sketch_of(x, values.size, self.size, values.block)
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
         return {"count": left["count"] + right["count"]} | sketch.join(left, right, self.size, place)

@@ -11,14 +11,14 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.statistics.base import Gatherer, Statistic
-from lgvi_warp.statistics.counts import DIRICHLET, Curve, Histogram, by_replicates, check_levels
+from lgvi_warp.statistics.counts import DIRICHLET, PassageCurve, Histogram, by_replicates, check_levels
 from lgvi_warp.statistics.ends import FAILED, Ends
 from lgvi_warp.statistics.estimates import intervals
 from lgvi_warp.statistics.estimates.estimate import Estimate, along
 from lgvi_warp.statistics.estimates.tree import Part
 from lgvi_warp.statistics.moments import Mean, estimate
 from lgvi_warp.statistics.order import Quantiles
-from lgvi_warp.statistics.paths.member_statistic import Then
+from lgvi_warp.statistics.paths.member_statistic import MemberStatistic
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.statistics.values.values import Values
 
@@ -171,7 +171,7 @@ class Outcome(OfEnds):
         return [result.with_interval(by_replicates(replicates), {})]
 
     def _estimate(
-        self, part: Part, at: np.ndarray, curves: Sequence[Curve], ends: Sequence[Pair], time: np.ndarray
+        self, part: Part, at: np.ndarray, curves: Sequence[PassageCurve], ends: Sequence[Pair], time: np.ndarray
     ) -> Estimate:
         """The estimate from the curves at the times `at` (m,) [s], which contain the sample times."""
         rows, members = np.searchsorted(at, time), int(part["members"].sum())
@@ -208,7 +208,7 @@ def _steps_of(part: Part) -> np.ndarray:
     return np.asarray(part["time"][part["kind"] != LOST if lost else part["kind"] == SO])
 
 
-def _curves(part: Part, at: np.ndarray) -> tuple[Curve, Curve]:
+def _curves(part: Part, at: np.ndarray) -> tuple[PassageCurve, PassageCurve]:
     """Aalen & Johansen's curve at rising times `at` [s], and Kaplan & Meier's, in which other events censor too.
 
     An end between two of the times counts at the second one.
@@ -217,7 +217,7 @@ def _curves(part: Part, at: np.ndarray) -> tuple[Curve, Curve]:
     # A member that is censored at one of the times is at risk at that time, and at no later one.
     lost, not_so = (_counted(at, part["time"][which], "right") for which in (part["kind"] == LOST, part["kind"] != SO))
     members = int(part["members"].sum())
-    return Curve(so, others, lost, members), Curve(so, np.zeros_like(so), not_so, members)
+    return PassageCurve(so, others, lost, members), PassageCurve(so, np.zeros_like(so), not_so, members)
 
 
 def _counted(at: np.ndarray, times: np.ndarray, side: Literal["left", "right"]) -> np.ndarray:
@@ -249,7 +249,7 @@ class _EndTimes(Gatherer):
 
 
 @dataclass(frozen=True, eq=False)
-class EndTime(OfEnds, Then):
+class EndTime(OfEnds, MemberStatistic):
     """Statistics of the time [s] at which members ended by an outcome, over the members that did.
 
     Members that end otherwise, or not before the run does, are left out; Outcome takes them into account.

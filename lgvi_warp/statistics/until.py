@@ -163,12 +163,12 @@ def _named(statistics: Sequence[Statistic]) -> dict[str, Named]:
     pairs = [(outer, inner) for outer in statistics for inner in outer.parts()]
     names: dict[str, Named] = {inner.key: (outer, inner.key, {}) for outer, inner in pairs}
     for outer, inner in pairs:
-        for name, entry in _entries(inner).items():
+        for name, entry in _names_of_entries(inner).items():
             names.setdefault(name, (outer, inner.key, entry))
     return names
 
 
-def _entries(one: Statistic) -> dict[str, dict[str, int]]:
+def _names_of_entries(one: Statistic) -> dict[str, dict[str, int]]:
     """Names of a statistic and of its components, levels and entries of a covariance, with their indices."""
     entries: dict[str, dict[str, int]] = {one.key: {}}
     for i, label in enumerate(one.quantity.labels):

@@ -22,7 +22,7 @@ from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.keepers.protocol import Keeper, PartKeeper
 from lgvi_warp.store.commits import Commits
 from lgvi_warp.store.layout import StoreArray
-from lgvi_warp.store.layout_check import is_sum, understood
+from lgvi_warp.store.layout_check import is_sum, corrupt_store_as_scene_error
 from lgvi_warp.store.writer import BlockWriter, Room
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class BlockFiles:
 
     def understood(self, block: Block) -> AbstractContextManager[None]:
         """Turn errors that arise while a block's parts are used into faults of their file."""
-        return understood(self.root / self.parts_key(block))
+        return corrupt_store_as_scene_error(self.root / self.parts_key(block))
 
     def merge(self, block: Block, part: Any) -> None:
         """Do nothing: the block is in its place already."""
@@ -92,7 +92,7 @@ class BlockFiles:
             return None
         if not keepers:
             return ()
-        with understood(self.root / self.parts_key(block)):
+        with corrupt_store_as_scene_error(self.root / self.parts_key(block)):
             return unpacked(keepers, self.root, self.parts_key(block))
 
     def faults(self, block: Block, samples: int, keepers: Sequence[Any]) -> list[str]:
@@ -189,7 +189,7 @@ def read_marker(root: Path, key: str) -> dict[str, list[int]] | None:
     return None
 
 
-def check(
+def check_blocks(
     block_files: BlockFiles, runs: Sequence[Block], samples: int, keepers: Sequence[Any] = ()
 ) -> Iterator[tuple[Block, list[str]]]:
     """Compare the files of blocks with their markers, reading every file.

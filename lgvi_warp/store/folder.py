@@ -32,7 +32,7 @@ from lgvi_warp.store import layout_check as store_check
 from lgvi_warp.store import texts as store_texts
 from lgvi_warp.store.block_files import BlockFiles, damaged, name_of, read_marker
 from lgvi_warp.store.layout import StoreArray
-from lgvi_warp.store.layout_check import understood
+from lgvi_warp.store.layout_check import corrupt_store_as_scene_error
 from lgvi_warp.store.recipe import ensemble_of, plan_of
 from lgvi_warp.store.settings import needed
 
@@ -77,9 +77,9 @@ class Folder:
         if not good:
             problem = "is damaged, or of another version of the format"
             raise SceneError([f"{path / ROOT}: {problem}; run again (--overwrite)"])
-        with understood(path / ROOT):
+        with corrupt_store_as_scene_error(path / ROOT):
             self.provenance, self.recipe, messages, self.shared = (parsed(text) for text in texts)
-            store_texts.check(self.attributes, self.provenance, self.recipe, messages, self.shared)
+            store_texts.check_texts(self.attributes, self.provenance, self.recipe, messages, self.shared)
             self.messages: tuple[str, ...] = tuple(messages)
             self.layout = store_check.layout_of(content, int(self.recipe["members"]))
         # Blocks that this process found finished, those that it ran, and those of kept members that it ran.
@@ -168,13 +168,13 @@ class Folder:
         except (ValueError, OSError, KeyError) as error:
             remedy = "run the same scene again with --store zarr --resume, which mends it"
             raise SceneError([f"{self.path}: {'; '.join(self.damage()) or error}; {remedy}"]) from error
-        with understood(self.path / ROOT):
+        with corrupt_store_as_scene_error(self.path / ROOT):
             if ensemble is None:
                 noise, content = explicit.pop("indices", None), self.provenance
                 ensemble = ensemble_of(content["scene"], content["ensemble"], explicit, noise, self.path)
             gathered = (self.provenance.get("observed") or {}).get("statistics", ())
-            looks = any(TYPES[table["type"]].looks for table in gathered if table.get("type") in TYPES)
-            return plan_of(self.recipe, ensemble, steps, times, looks)
+            ticks = any(TYPES[table["type"]].ticks for table in gathered if table.get("type") in TYPES)
+            return plan_of(self.recipe, ensemble, steps, times, ticks)
 
     def damage(self) -> list[str]:
         """List what is wrong with the files that belong to no block."""
@@ -198,7 +198,7 @@ class Folder:
     def finish(self, members: int | None = None) -> None:
         """Mark the run as complete."""
         if not self.complete:
-            self._say({"complete": True} | ({} if members is None else {"members": members}), below(self.path / KEPT))
+            self._say({"complete": True} | ({} if members is None else {"members": members}), metadata_under(self.path / KEPT))
 
     def take_layout(self, other: Path) -> None:
         """Take over the layout in the root's metadata of another folder of the same run.
@@ -226,7 +226,7 @@ class Folder:
         self.attributes |= said
 
 
-def below(path: Path) -> dict[str, Any]:
+def metadata_under(path: Path) -> dict[str, Any]:
     """Read the metadata of a group and its arrays, in the form that the enclosing group holds them."""
     if not path.exists():
         return {}

@@ -266,7 +266,7 @@ def _checked(arrays: dict[str, StoredArray], groups: tuple[str, ...], members: i
 
 
 @contextlib.contextmanager
-def understood(path: Path) -> Iterator[None]:
+def corrupt_store_as_scene_error(path: Path) -> Iterator[None]:
     """Turn errors that arise while a file is read into faults of the file."""
     try:
         yield

@@ -29,7 +29,7 @@ from lgvi_warp.store.block_files import damaged, name_of
 from lgvi_warp.store.folder import KEPT, ROOT, Folder
 from lgvi_warp.store.kept import keep_of, members_kept
 from lgvi_warp.store.layout import KEPT_MEMBER, MEMBER
-from lgvi_warp.store.layout_check import understood
+from lgvi_warp.store.layout_check import corrupt_store_as_scene_error
 from lgvi_warp.store.recipe import noted_functions
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ def open_run(
     observed_content = folder.provenance.get("observed")
     if members is not None or observed_content is None or (statistics is None and observed_content.get("functions")):
         return result_of(folder, members, messages)
-    with understood(folder.path / ROOT):
+    with corrupt_store_as_scene_error(folder.path / ROOT):
         observed = observation_of(observed_content, statistics)
     now = {"functions": identities(functions_of(None, observed.statistics))}
     noted = noted_functions(folder.provenance, now)
@@ -187,7 +187,7 @@ def gathered(folder: Folder, observed: Observation) -> Observing:
     block_files = folder.block_files
     for block in folder.runs:
         _check_parts(folder, block_files.sums(block), block)
-        with understood(folder.path / block_files.parts_key(block)):
+        with corrupt_store_as_scene_error(folder.path / block_files.parts_key(block)):
             for keeper, part in zip(observing.keepers, block_files.parts(block, observing.keepers) or (), strict=True):
                 keeper.merge(block, part)
     return observing
@@ -226,7 +226,7 @@ def result_of(
     fields = tuple(name for name in arrays if name in IN_FILES)
     varied = tuple(name for name in arrays if "." in name)
     small = Arrays(group, tuple(name for name in arrays if name not in (*fields, *varied, "time", "step")), 0, at)
-    with understood(folder.path / ROOT):
+    with corrupt_store_as_scene_error(folder.path / ROOT):
         shared = {name: np.asarray(value, dtype=np.float64) for name, value in folder.shared.items()}
     strange = np.setdiff1d(small["status"], np.array([int(code) for code in Status]))
     if len(strange):
@@ -235,7 +235,7 @@ def result_of(
     estimates, remarks = Estimates(), tuple[str, ...]()
     if observing is not None:
         estimates, remarks = observing.read(provenance["ensemble"], small["status"])
-    with understood(folder.path / ROOT):
+    with corrupt_store_as_scene_error(folder.path / ROOT):
         of_scene = tuple(terms_of(provenance["scene"]) if terms is None else terms)
     indices, kept = kept_of(folder, of_scene) if members is None else (np.empty(0, np.int64), None)
     return Result(
@@ -269,7 +269,7 @@ def kept_of(folder: Folder, terms: Sequence[Term]) -> tuple[np.ndarray, Result |
     if kept.members != len(wanted):
         count = f"holds {kept.members} members, not {len(wanted)}"
         raise SceneError([f"{group.path}: {count}; `lgvi-warp resume` mends it"])
-    with understood(folder.path / ROOT):
+    with corrupt_store_as_scene_error(folder.path / ROOT):
         places = np.asarray(ensemble.get("indices", range(folder.members)))[wanted]
     return wanted, replace(kept, provenance=kept.provenance | {"ensemble": ensemble | {"indices": places.tolist()}})
 

@@ -42,7 +42,7 @@ def recipe(plan: Plan) -> dict[str, Any]:
 
 
 def plan_of(
-    made: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarray, times: np.ndarray, looks: bool = False
+    made: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarray, times: np.ndarray, ticks: bool = False
 ) -> Plan:
     """Build the plan of a recipe.
 
@@ -54,7 +54,7 @@ def plan_of(
     grid = TimeGrid(made["step"], sample_steps, times, tuple(made["messages"]))
     method, fields = Method(**made["method"]), tuple(made["fields"])
     settings = {name: made[name] for name in ("dtype", "width", "checks", "on_failure")}
-    return choose_plan(ensemble, method, grid, fields, **settings, looks=looks)
+    return choose_plan(ensemble, method, grid, fields, **settings, ticks=ticks)
 
 
 # Key in the stored provenance of an ensemble: SHA-256 of the arrays that it was given, which lie in the group "explicit".

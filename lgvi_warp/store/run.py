@@ -18,7 +18,7 @@ from lgvi_warp.engine.keepers.protocol import Keeper, PartKeeper
 from lgvi_warp.engine.loop import RunProgress, run_blocks
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.engine.work import Work
-from lgvi_warp.store.block_files import BlockFiles, check
+from lgvi_warp.store.block_files import BlockFiles, check_blocks
 from lgvi_warp.store.create import create, names_of, skeleton
 from lgvi_warp.store.folder import ROOT, Folder, foreign, held, refuse_foreign
 from lgvi_warp.store.layout import columns
@@ -69,7 +69,7 @@ class StoredRun:
             self._mend()
             missing = self._left(block_files)
             try:
-                with explained(self.store.whole), block_files.commits:
+                with disk_error_with_remedy(self.store.whole), block_files.commits:
                     members = self._blocks(block_files, missing, executor, progress)
             finally:
                 block_files.remove_unfinished()
@@ -93,7 +93,7 @@ class StoredRun:
             yield
             return
         with contextlib.ExitStack() as stack:
-            with explained(self.store.whole):
+            with disk_error_with_remedy(self.store.whole):
                 stack.enter_context(held(self.store.folder))
             yield
 
@@ -121,7 +121,7 @@ class StoredRun:
                     raise SceneError([f"{path}: stores {present}, not {wanted}; ask for the same, or overwrite"])
             return noted
         refuse_foreign(path)
-        with explained(store.whole):
+        with disk_error_with_remedy(store.whole):
             create(store, self.plan, self.provenance, self.messages, self.keepers)
         return ()
 
@@ -148,7 +148,7 @@ class StoredRun:
     def _left(self, block_files: BlockFiles) -> list[Block]:
         """Blocks that are not finished or not whole; a damaged one loses its marker."""
         missing = []
-        for block, faults in check(block_files, self._runs(), len(self.plan.grid.times), self.keepers):
+        for block, faults in check_blocks(block_files, self._runs(), len(self.plan.grid.times), self.keepers):
             if faults:
                 block_files.marker(block).unlink(missing_ok=True)
                 missing.append(block)
@@ -187,7 +187,7 @@ def check_keepers(keepers: Sequence[Keeper]) -> None:
 
 
 @contextlib.contextmanager
-def explained(path: os.PathLike[str]) -> Iterator[None]:
+def disk_error_with_remedy(path: os.PathLike[str]) -> Iterator[None]:
     """Add to errors of the disk what they mean for the run."""
     try:
         yield

@@ -34,7 +34,7 @@ def run_stored(
 ) -> Result:
     """Run the blocks of a request's plan into a store."""
     only = blocks_there(only, plan)
-    into, kept = settled(store, request)
+    into, kept = with_saved_fields(store, request)
     observed, terms = request.observed, plan.ensemble.scene.terms
     compile_seconds = plan.compile()
     start = time.perf_counter()
@@ -53,7 +53,7 @@ def run_stored(
     folder = run.run(request.executor, progress)
     runs = blocks(plan.ensemble.members)
     members = None if only is None else slice(runs[only[0]].first, runs[only[-1]].stop)
-    remarks = folder.noted + went_on(folder)
+    remarks = folder.noted + resume_message(folder)
     result = result_of(folder, members, messages(plan) + remarks, terms, observing)
     if remarks:
         return result  # what was measured is not the whole run
@@ -77,7 +77,7 @@ def blocks_there(only: range | None, plan: Plan) -> range | None:
     return present
 
 
-def went_on(folder: Folder) -> tuple[str, ...]:
+def resume_message(folder: Folder) -> tuple[str, ...]:
     """Tell how many blocks of a run were in the store already."""
     present, ran, ran_kept = folder.found, folder.ran, folder.ran_kept
     if not present:
@@ -88,7 +88,7 @@ def went_on(folder: Folder) -> tuple[str, ...]:
     return (f"went on: {present} of {present + ran} blocks were there and whole, {ran} ran{kept}",)
 
 
-def settled(store: Store | str | os.PathLike[str], request: Request) -> tuple[Store, tuple[str, ...]]:
+def with_saved_fields(store: Store | str | os.PathLike[str], request: Request) -> tuple[Store, tuple[str, ...]]:
     """Settle which samples a store holds: none if those of all members are not kept.
 
     Returns: The store, and the names of the samples of the members that are kept.

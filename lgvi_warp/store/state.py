@@ -8,7 +8,7 @@ from typing import Any
 
 from lgvi_warp.common import safe_files
 from lgvi_warp.common.errors import SceneError
-from lgvi_warp.store.block_files import check, name_of
+from lgvi_warp.store.block_files import check_blocks, name_of
 from lgvi_warp.store.folder import KEPT, ROOT, Folder
 from lgvi_warp.store.kept import keep_of, members_kept
 from lgvi_warp.store.open import folder_of
@@ -32,7 +32,7 @@ def state(path: str | os.PathLike[str]) -> dict[str, Any]:
     runs, recipe = folder.runs, folder.recipe
     fields, damage = recipe["store"]["fields"], folder.damage()
     samples, finished = folder.layout.times, 0
-    for _, faults in check(folder.block_files, runs, samples, recipe["keepers"]):
+    for _, faults in check_blocks(folder.block_files, runs, samples, recipe["keepers"]):
         if faults != ["is not finished"]:
             finished += not faults
             damage += faults
@@ -64,7 +64,7 @@ def kept_state(folder: Folder, sound: bool) -> tuple[int, list[str]]:
     if group is None:
         return wanted, [f"{KEPT} is missing"] if wanted else []
     damage = group.damage()
-    for block, faults in check(group.block_files, group.runs, group.layout.times):
+    for block, faults in check_blocks(group.block_files, group.runs, group.layout.times):
         if faults == ["is not finished"]:
             faults = [f"blocks/{name_of(block)}.json is missing or damaged"] if folder.complete else []
         damage += faults

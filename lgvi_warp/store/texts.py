@@ -71,7 +71,7 @@ def _store(value: Mapping[str, Any]) -> bool:
     return value.keys() == rules.keys() and all(rule(value[name]) for name, rule in rules.items())
 
 
-def check(attributes: Mapping[str, Any], provenance: Any, recipe: Any, messages: Any, shared: Any) -> None:
+def check_texts(attributes: Mapping[str, Any], provenance: Any, recipe: Any, messages: Any, shared: Any) -> None:
     """Check the attributes and texts of a store."""
     unknown = sorted(attributes.keys() - ATTRIBUTES)
     if unknown:

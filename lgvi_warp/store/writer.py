@@ -14,7 +14,7 @@ from lgvi_warp.results import member_fields
 from lgvi_warp.store.layout import MEMBER, StoreArray
 
 if TYPE_CHECKING:
-    from lgvi_warp.engine.outcome import Outcome
+    from lgvi_warp.engine.outcome import MemberStatus
     from lgvi_warp.engine.plan import Plan
     from lgvi_warp.sampling.members import Members
 
@@ -71,10 +71,10 @@ class BlockWriter:
     def _write(self, column: StoreArray, number: int, chunk: np.ndarray) -> None:
         self._files.write(column.key(self._block, number), chunk, checked=True)
 
-    def close(self, outcome: Outcome) -> Files:
+    def close(self, outcome: MemberStatus) -> Files:
         """Write the fields and parameters of the members."""
         values = {MEMBER: self._members.indices} | self._members.parameters
-        values |= member_fields.of(self._plan, outcome)
+        values |= member_fields.member_fields(self._plan, outcome)
         for column in self._of_members:
             chunk = np.full(column.chunk, column.fill, column.dtype)
             chunk[: self._block.count] = values[column.name]

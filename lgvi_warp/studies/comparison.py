@@ -27,7 +27,7 @@ from lgvi_warp.results.result import Result
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.budget import Budget, rounded_up
-from lgvi_warp.studies.distance import QUANTITIES, Compared, compared_in
+from lgvi_warp.studies.distance import QUANTITIES, Distance, compared_in
 from lgvi_warp.studies.kernels import KERNELS, Kernels
 
 # Error at which a trajectory is no longer meaningful [m or rad].
@@ -269,7 +269,7 @@ def failed(result: Result) -> bool:
     return bool(failed_members(result.status).any())
 
 
-def distances(result: Result, reference: Result, asked: Compared | None = None) -> dict[str, np.ndarray]:
+def distances(result: Result, reference: Result, asked: Distance | None = None) -> dict[str, np.ndarray]:
     """Measure how far two results are apart at each time.
 
     Returns: Quantity -> distance (k, n) [its unit]; NaN from where an event stopped a member in either result.
@@ -322,7 +322,7 @@ class Reference:
     text: str
     own: dict[str, np.ndarray]
     sample: Sample
-    asked: Compared | None = None
+    asked: Distance | None = None
     methods: tuple[str, ...] = ()
     more: float = 0.0
 
@@ -358,7 +358,7 @@ def extrapolated(sample: Sample, method: str, m: int) -> Result:
     return replace(runs[-1], samples=samples, compile_seconds=sum(run.compile_seconds for run in runs))
 
 
-def agreement(a: Result, b: Result, asked: Compared | None = None) -> dict[str, np.ndarray]:
+def agreement(a: Result, b: Result, asked: Distance | None = None) -> dict[str, np.ndarray]:
     """Measure how far two results agree up to each time, over all members.
 
     Returns: Quantity -> largest distance up to each time (k,) [its unit]; infinite where a member failed.
@@ -381,7 +381,7 @@ def paired(names: Sequence[str]) -> tuple[str, str]:
 
 def make_reference(
     sample: Sample,
-    of: str | Compared = "position",
+    of: str | Distance = "position",
     goal: float = 0.0,
     seconds: float = 15.0,
     methods: Sequence[str] | None = None,
@@ -556,7 +556,7 @@ def fitted(times: np.ndarray, curve: np.ndarray, t1: float) -> Growth:
     )
 
 
-def statistics(result: Result, asked: Compared | None = None) -> dict[str, np.ndarray]:
+def statistics(result: Result, asked: Distance | None = None) -> dict[str, np.ndarray]:
     """Collect the quantities that means and spreads are taken of.
 
     The attitude is represented by the vertical in body axes.
@@ -578,7 +578,7 @@ def statistics(result: Result, asked: Compared | None = None) -> dict[str, np.nd
     return values
 
 
-def biases(result: Result, reference: Result, asked: Compared | None = None) -> dict[str, float]:
+def biases(result: Result, reference: Result, asked: Distance | None = None) -> dict[str, float]:
     """Compare means and standard deviations of two results.
 
     Each difference is in standard errors of the sample, as root mean square over components and times after 0. Two

@@ -19,7 +19,7 @@ QUANTITIES = {name: TABLE[name].unit for name in (*FIELDS, "energy")} | {"attitu
 
 
 @dataclass(frozen=True)
-class Compared:
+class Distance:
     """Quantity that errors are measured in.
 
     Attributes:
@@ -77,16 +77,16 @@ def _bias(apart: np.ndarray) -> np.ndarray:
 MEAN = "mean "
 
 
-def compared_in(of: Any) -> Compared:
+def compared_in(of: Any) -> Distance:
     """Find the quantity that a name or a lw.Quantity means.
 
     of: a name such as "position", "depth", "position[2]" or "norm(velocity)", a lw.Quantity, or a Compared; "mean position[0]"
         for the mean over the members.
     """
-    if isinstance(of, Compared):
+    if isinstance(of, Distance):
         return of
     if isinstance(of, str) and of.strip() in QUANTITIES:
-        return Compared(of.strip(), QUANTITIES[of.strip()])
+        return Distance(of.strip(), QUANTITIES[of.strip()])
     if isinstance(of, str) and of.strip().startswith(MEAN):
         entry = compared_in(of.strip().removeprefix(MEAN))
         if entry.name == "attitude" or entry.mean:
@@ -104,4 +104,4 @@ def compared_in(of: Any) -> Compared:
         raise SceneError(
             [f"of = {parsed.label!r}: looks over the path, and errors are of a quantity at each time; {remedy}"]
         )
-    return Compared(parsed.label, parsed.unit or "1", parsed)
+    return Distance(parsed.label, parsed.unit or "1", parsed)

@@ -17,7 +17,7 @@ import numpy as np
 from lgvi_warp.common.arguments import path_of
 from lgvi_warp.common.errors import among
 from lgvi_warp.common.files import write_text
-from lgvi_warp.common.reading import file_json, understood
+from lgvi_warp.common.reading import file_json, corrupt_file_as_scene_error
 from lgvi_warp.common.tables import write_csv
 
 # Study -> pattern of the names of the files that hold what it found.
@@ -45,7 +45,7 @@ def finite_or_none(value: Any) -> Any:
     return value
 
 
-def numbers(value: Any, missing: float) -> Any:
+def with_missing_as(value: Any, missing: float) -> Any:
     """Undo `finite_or_none`.
 
     value: None, numbers, texts, and nested tables and lists of them.
@@ -53,15 +53,15 @@ def numbers(value: Any, missing: float) -> Any:
     Returns: The same with this number in place of None.
     """
     if isinstance(value, dict):
-        return {key: numbers(item, missing) for key, item in value.items()}
+        return {key: with_missing_as(item, missing) for key, item in value.items()}
     if isinstance(value, list):
-        return [numbers(item, missing) for item in value]
+        return [with_missing_as(item, missing) for item in value]
     return missing if value is None else value
 
 
 def of_study(path: str | os.PathLike[str]) -> AbstractContextManager[None]:
     """Turn what the content of a study's file raises in the `with` block into a fault of the file."""
-    return understood(path, "of another version", "run the study again")
+    return corrupt_file_as_scene_error(path, "of another version", "run the study again")
 
 
 class Saved(ABC):

@@ -44,7 +44,7 @@ class Reading(NamedTuple):
     best: int
 
 
-def tune(
+def calibrate(
     rounds: int = ROUNDS, *, prepare: Callable[[Plan], Callable[[], None]] = speed.stepper,
     clock: Callable[[], float] = time.perf_counter, register_width: Callable[[str], int] = machine.register_width,
 ) -> Iterator[Reading]:  # fmt: skip

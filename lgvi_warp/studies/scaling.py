@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common import machine
-from lgvi_warp.common.arguments import listed, whole
+from lgvi_warp.common.arguments import listed, whole_number
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import Method
@@ -200,4 +200,4 @@ def plan_of(
 
 def _numbers(key: str, values: Any) -> list[int]:
     """The numbers of a list, each once, rising."""
-    return sorted({whole(key, value, -(2**31)) for value in listed(key, values, "whole numbers from 1")})
+    return sorted({whole_number(key, value, -(2**31)) for value in listed(key, values, "whole numbers from 1")})

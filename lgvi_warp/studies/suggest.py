@@ -30,7 +30,7 @@ from lgvi_warp.studies import comparison, cost
 from lgvi_warp.studies import tradeoff as tradeoffs
 from lgvi_warp.studies.budget import Budget, rounded_up
 from lgvi_warp.studies.comparison import Candidate, Growth, Reference, Sample
-from lgvi_warp.studies.distance import Compared, compared_in
+from lgvi_warp.studies.distance import Distance, compared_in
 from lgvi_warp.studies.kernels import KERNELS, Kernels
 from lgvi_warp.studies.speed import void
 from lgvi_warp.studies.tradeoff import (
@@ -119,7 +119,7 @@ class Suggestion:
     reference_error: float
     rivals: tuple[tuple[Candidate, float, float], ...] = ()
     worst: tuple[int, ...] = ()
-    asked: Compared | None = field(default=None, repr=False, compare=False)
+    asked: Distance | None = field(default=None, repr=False, compare=False)
     messages: tuple[str, ...] = ()
 
     @property
@@ -205,7 +205,7 @@ def suggest(
 
 
 def suggestion_on(
-    sample: Sample, compared: Compared, error: float, names: Sequence[str], seconds: float,
+    sample: Sample, compared: Distance, error: float, names: Sequence[str], seconds: float,
     report: Callable[[float], None], named: bool, *, threads: int | None = None,
     make_reference: Callable[..., Reference] = comparison.make_reference,
 ) -> Suggestion:  # fmt: skip
@@ -319,7 +319,7 @@ def largest_in_fleet(errors: np.ndarray, members: int) -> float:
 
 
 def checked_reference(
-    sample: Sample, of: Compared, error: float, seconds: float, taken: Sequence[str], *,
+    sample: Sample, of: Distance, error: float, seconds: float, taken: Sequence[str], *,
     make_reference: Callable[..., Reference] = comparison.make_reference, grown: Callable[..., Growth] = growth_of,
 ) -> Reference:  # fmt: skip
     """Make a reference that is ten times better than the error up to the end.
@@ -372,7 +372,7 @@ class Ladders:
     """
 
     def __init__(
-        self, sample: Sample, reference: Reference, asked: Compared, target: float, budget: Budget, named: bool = False
+        self, sample: Sample, reference: Reference, asked: Distance, target: float, budget: Budget, named: bool = False
     ):
         self.sample, self.reference, self.of, self.target = sample, reference, asked.name, target
         self.budget, self.named = budget, named

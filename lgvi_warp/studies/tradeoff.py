@@ -25,8 +25,8 @@ from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies import comparison, cost
 from lgvi_warp.studies.budget import Budget
 from lgvi_warp.studies.comparison import Candidate, Growth, Reference, Sample
-from lgvi_warp.studies.distance import QUANTITIES, Compared, compared_in
-from lgvi_warp.studies.files import Saved, finite_or_none, numbers
+from lgvi_warp.studies.distance import QUANTITIES, Distance, compared_in
+from lgvi_warp.studies.files import Saved, finite_or_none, with_missing_as
 from lgvi_warp.studies.speed import void
 
 # Tried in this order; those that a scene refuses are left out.
@@ -179,17 +179,17 @@ class Tradeoff(Saved):
         """
         measured = []
         for row in content["measurements"]:
-            ends = {name: numbers(row[name], math.nan) for name in ("energy_drift", "biases")}
-            fields = row | ends | {"setting": Candidate(**row["setting"]), "errors": numbers(row["errors"], math.inf)}
+            ends = {name: with_missing_as(row[name], math.nan) for name in ("energy_drift", "biases")}
+            fields = row | ends | {"setting": Candidate(**row["setting"]), "errors": with_missing_as(row["errors"], math.inf)}
             measured.append(Measurement(**fields))
         growth = content["growth"]
         if growth is not None:
-            times = {name: numbers(growth[name], math.inf) for name in ("doubling", "predictable")}
-            curves = {name: np.array(numbers(growth[name], math.nan)) for name in ("times", "curve")}
-            growth = Growth(**growth | times | curves | {"rate": numbers(growth["rate"], math.nan)})
+            times = {name: with_missing_as(growth[name], math.inf) for name in ("doubling", "predictable")}
+            curves = {name: np.array(with_missing_as(growth[name], math.nan)) for name in ("times", "curve")}
+            growth = Growth(**growth | times | curves | {"rate": with_missing_as(growth["rate"], math.nan)})
         values = {name: entry for name, entry in content.items() if name != "front"}
         values |= {"measurements": tuple(measured), "growth": growth, "messages": tuple(content["messages"])}
-        return cls(**values | {"reference_error": numbers(content["reference_error"], math.inf)})
+        return cls(**values | {"reference_error": with_missing_as(content["reference_error"], math.inf)})
 
     def rows(self) -> list[dict[str, Any]]:
         """Flatten the measurements to one record each, as the CSV file has them.
@@ -347,7 +347,7 @@ def tradeoff(
 
 
 def tradeoff_on(
-    sample: Sample, compared: Compared, names: Sequence[str], seconds: float, report: Callable[[float], None],
+    sample: Sample, compared: Distance, names: Sequence[str], seconds: float, report: Callable[[float], None],
     named: bool, *, make_reference: Callable[..., Reference] = comparison.make_reference,
     grown: Callable[..., Growth] | None = None,
 ) -> Tradeoff:  # fmt: skip
@@ -447,12 +447,12 @@ def noise_text(sample: Sample) -> str:
     return f"noise acts: all runs see one path of it, drawn every {every}; errors by paths are of order 1"
 
 
-def reaches_nothing(reference: Reference, of: Compared) -> bool:
+def reaches_nothing(reference: Reference, of: Distance) -> bool:
     """Tell whether a reference is too rough for errors of members even at the first time."""
     return reference.reaches(of.name, comparison.LOST / (TRUST * TRUST)) < 1
 
 
-def trusted_until(reference: Reference, of: Compared, seconds: float) -> int:
+def trusted_until(reference: Reference, of: Distance, seconds: float) -> int:
     """Find the last sample at which errors below 1e-2 can be measured.
 
     seconds: time of the whole trade-off, for the message [s].
@@ -584,10 +584,10 @@ def halved(
     one.best = min(one.best, error)
     noise = TRUST * max(reference.error(of, until) for of in DECIDING)
     longest = budget.seconds / 40.0
-    return not (one.worse >= 2 or error < noise or trial.cpu_seconds > longest or hopeless(trial, trials))
+    return not (one.worse >= 2 or error < noise or trial.cpu_seconds > longest or is_dominated(trial, trials))
 
 
-def hopeless(one: Trial, trials: Sequence[Trial]) -> bool:
+def is_dominated(one: Trial, trials: Sequence[Trial]) -> bool:
     """Tell whether another setting was more accurate in a tenth of the time."""
     error = max(one.error(of) for of in DECIDING)
     rivals = (rival for rival in trials if HOPELESS * rival.cpu_seconds < one.cpu_seconds)
@@ -621,7 +621,7 @@ def measurements(
     reference: Reference | None,
     finest: Result,
     until: int,
-    asked: Compared | None = None,
+    asked: Distance | None = None,
 ) -> list[Measurement]:
     """Measure the cost of the trials and collect their errors, drifts and biases.
 

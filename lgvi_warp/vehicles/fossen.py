@@ -37,7 +37,7 @@ RELATIVE = 1e-6  # how far two printed values of one number, or a sum of them, m
 # The vehicles of the package ----------------------------------------------------------------------------------------
 
 
-def vehicles() -> list[str]:
+def vehicle_names() -> list[str]:
     """Return the names of the vehicles that come with the package.
 
     Returns:
@@ -52,7 +52,7 @@ def vehicle_file(name: str) -> Path:
 
     Returns: Path of a TOML file in the scene file's form, with a table [source].
     """
-    if name not in (known := vehicles()):
+    if name not in (known := vehicle_names()):
         raise SceneError([f"vehicle file {name!r}: is not known; {closest(name, known)}"])
     return Path(str(resources.files("lgvi_warp.vehicles") / f"{name}.toml"))
 
@@ -117,7 +117,7 @@ class Coefficients:
         vehicle |= {
             name: getattr(self, name) for name in ("weight", "center_of_gravity", "buoyancy", "center_of_buoyancy")
         }
-        tables: dict[str, Any] = {"vehicle": {key: plain(value) for key, value in vehicle.items()}}
+        tables: dict[str, Any] = {"vehicle": {key: as_lists(value) for key, value in vehicle.items()}}
         water = {"gravity": self.gravity, "water_density": self.water_density}
         tables["environment"] = {key: float(value) for key, value in water.items() if value is not None}
         tables["terms"] = self.terms()
@@ -147,17 +147,17 @@ class Coefficients:
         pair = (self.linear, self.quadratic)
         if any(np.any(matrix) for matrix in pair):
             diagonal = all(np.array_equal(matrix, np.diag(np.diag(matrix))) for matrix in pair)
-            values = [plain(np.diag(matrix) if diagonal else matrix) for matrix in pair]
+            values = [as_lists(np.diag(matrix) if diagonal else matrix) for matrix in pair]
             kind = "drag" if diagonal else "drag_matrix"
             terms.append({"type": kind, "linear": values[0], "quadratic": values[1]})
         if np.any(self.forward):
-            terms.append({"type": "body_lift", "matrix": plain(self.forward)})
+            terms.append({"type": "body_lift", "matrix": as_lists(self.forward)})
         if np.any(self.current):
-            terms.append({"type": "current", "velocity": plain(self.current)})
+            terms.append({"type": "current", "velocity": as_lists(self.current)})
         return terms
 
 
-def plain(value: Any) -> Any:
+def as_lists(value: Any) -> Any:
     """Convert an array to lists of floats, with 0.0 in place of -0.0.
 
     Returns: A float, or nested lists of the same shape.
@@ -261,7 +261,7 @@ def read_name(name: str) -> Name | None:
     return Name("even" if even else "quadratic", row, columns)
 
 
-def vehicle_tables_from_fossen(
+def from_fossen(
     coefficients: Mapping[str, float],
     *,
     mass: float,

@@ -12,7 +12,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError, closest
 from lgvi_warp.vehicles.fossen import PAIRS, inertia_from_names
 from lgvi_warp.vehicles.poses import HERE, Pose
-from lgvi_warp.vehicles.robot_xml import number, numbers, numbers_in, text_of
+from lgvi_warp.vehicles.robot_xml import number, read_floats, numbers_in, text_of
 from lgvi_warp.physics.notation import hat
 
 
@@ -124,7 +124,7 @@ def size_of(faults: Faults, where: str, shape: Element, key: str, default: str) 
     attribute = shape.get(key)
     if attribute is not None:
         return numbers_in(faults, f"{where}{key}", attribute, len(default.split()))
-    return numbers(faults, where, shape, key, default)
+    return read_floats(faults, where, shape, key, default)
 
 
 def add_volumes(link: Link, shapes: Iterable[tuple[str, float | None, np.ndarray]]) -> None:

@@ -22,7 +22,7 @@ from lgvi_warp.vehicles.plugins import (
     unread,
 )
 from lgvi_warp.vehicles.poses import Poses, Scope, read_pose
-from lgvi_warp.vehicles.robot_xml import child_of, is_true, number, numbers, plugin_name, plugins_of, text_of
+from lgvi_warp.vehicles.robot_xml import child_of, is_true, number, read_floats, plugin_name, plugins_of, text_of
 from lgvi_warp.vehicles.urdf import read_urdf
 
 GAZEBO_GRAVITY = 9.8  # m/s2: of a <world> that gives none
@@ -164,7 +164,7 @@ def _names(pairs: Sequence[tuple[Element, Element | None]]) -> list[str]:
 
 def read_water(faults: Faults, warnings: list[str], world: Element) -> Water:
     """Read gravity and density of a world."""
-    vector = numbers(faults, "<world> ", world, "gravity", f"0 0 {-GAZEBO_GRAVITY}")
+    vector = read_floats(faults, "<world> ", world, "gravity", f"0 0 {-GAZEBO_GRAVITY}")
     if np.any(vector[:2]) or vector[2] > 0.0:
         faults.add("<gravity>", vector, "does not point down", "turn the world so that it is along -z")
     plugin = next((p for p in world.findall("plugin") if is_buoyancy(p)), None)

@@ -11,7 +11,7 @@ from xml.parsers import expat
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, SceneError, shown
+from lgvi_warp.common.errors import Faults, SceneError, brief
 from lgvi_warp.common.reading import MOST_OTHERS, UnreadableError, file_bytes
 
 # Limits of one file. The largest robot descriptions are far below: some 1 MB, 20,000 elements, 20 levels.
@@ -90,7 +90,7 @@ def read_bytes(source: Any, what: str) -> bytes:
     try:
         return file_bytes(source, f"{what} file")
     except UnreadableError as error:
-        raise SceneError([f"{what} file {shown(source)}: {error}"]) from None
+        raise SceneError([f"{what} file {brief(source)}: {error}"]) from None
 
 
 # Values -------------------------------------------------------------------------------------------------------------
@@ -150,7 +150,7 @@ def numbers_in(faults: Faults, key: str, text: str, count: int) -> np.ndarray:
     return np.zeros(count)
 
 
-def numbers(faults: Faults, where: str, parent: Element | None, tag: str, default: str) -> np.ndarray:
+def read_floats(faults: Faults, where: str, parent: Element | None, tag: str, default: str) -> np.ndarray:
     """Return the numbers in a child element.
 
     parent: The element that holds the child; None if there is none.
@@ -171,7 +171,7 @@ def number(faults: Faults, where: str, parent: Element | None, tag: str, default
     Returns:
         The number; 0 after noting a fault.
     """
-    return float(numbers(faults, where, parent, tag, default)[0])
+    return float(read_floats(faults, where, parent, tag, default)[0])
 
 
 def plugins_of(element: Element) -> Iterator[Element]:

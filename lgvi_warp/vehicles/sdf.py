@@ -17,7 +17,7 @@ from lgvi_warp.vehicles.robot_model import GAZEBO_DENSITY, RobotModel, listed, r
 from lgvi_warp.vehicles.robot_xml import parse_xml
 
 
-def vehicle_tables_from_sdf(
+def from_sdf(
     source: str | os.PathLike[str],
     *,
     model: str | None = None,

@@ -38,7 +38,7 @@ _ALIASES = {
 _NOT_NEEDED = ("model", "name", "type", "base_link", "body_frame", "tf_prefix", "length", "width", "height", "radius")
 
 
-def vehicle_tables_from_yaml(
+def from_yaml(
     source: str | os.PathLike[str],
     *,
     position_axes: str = "flu",

@@ -58,7 +58,7 @@ def of_members(count: int, total: int) -> str:
     return f"{total:,} member{'s' * (total != 1)}"
 
 
-def shown(result: Result, most: int = MOST_BODIES) -> Shown:
+def select_members(result: Result, most: int = MOST_BODIES) -> Shown:
     """Choose what is shown of a run; every picture and recording that draws some members follows this rule.
 
     Drawn are the members that reach farthest along each axis; then of those that did not end ok up to a third of the places,
@@ -82,7 +82,7 @@ def shown(result: Result, most: int = MOST_BODIES) -> Shown:
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
         >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
         >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
-        >>> lw.shown(result, most=3).members.tolist()
+        >>> lw.select_members(result, most=3).members.tolist()
         [0, 1, 3]
     """
     result_of(result)

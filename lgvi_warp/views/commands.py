@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 NEAR = 20.0
 
 
-class Channel(NamedTuple):
+class ActuatorChannel(NamedTuple):
     """One channel of an actuator."""
 
     name: str
@@ -39,23 +39,23 @@ class Broken(NamedTuple):
     text: str
 
 
-def channels(result: Result) -> list[Channel]:
+def channels(result: Result) -> list[ActuatorChannel]:
     """Name the channels of a run's actuators."""
     from lgvi_warp.scene.scene import Scene
 
     count = next((result.samples[name].shape[-1] for name in CHANNELS if name in result.samples), 0)
-    unknown = [Channel(f"channel {i}", np.nan) for i in range(count)]
+    unknown = [ActuatorChannel(f"channel {i}", np.nan) for i in range(count)]
     tables = {key: value for key, value in result.provenance["scene"].items() if key not in ("ensemble", "run")}
     try:
         scene = Scene.from_dict(tables)
     except SceneError:  # laws of a user's own, whose names are not known here
         return unknown
     bus = scene.controller.bus if scene.controller is not None else None
-    named: list[Channel] = []
+    named: list[ActuatorChannel] = []
     for key, (_, many) in bus.commands.items() if bus else ():
         limit = result.parameters.get(f"{key}.limit", np.full((1, 1), np.nan))
         most = np.broadcast_to(limit.reshape(len(limit), -1).max(axis=0), many)
-        named += [Channel(f"{key}[{i}]", float(most[i])) for i in range(many)]
+        named += [ActuatorChannel(f"{key}[{i}]", float(most[i])) for i in range(many)]
     return named if len(named) == count else unknown
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from lgvi_warp.results.result import Result
 
 
-class Look(NamedTuple):
+class OutcomeStyle(NamedTuple):
     """How members with one outcome are drawn."""
 
     color: str
@@ -31,16 +31,16 @@ class Look(NamedTuple):
 
 
 # Colours after Okabe & Ito, distinct for every kind of colour vision. All failures share one, with a marker each.
-LOOKS = {
-    Status.OK: Look("#3C82DC", ""),
-    Status.SURFACE: Look("#009E73", "^"),
-    Status.FLOOR: Look("#E69F00", "v"),
-    Status.BOX: Look("#CC79A7", "s"),
-    Status.TIME: Look("#8C8C8C", "o"),
-    Status.CONDITION: Look("#C9B400", "D"),
+OUTCOME_STYLES = {
+    Status.OK: OutcomeStyle("#3C82DC", ""),
+    Status.SURFACE: OutcomeStyle("#009E73", "^"),
+    Status.FLOOR: OutcomeStyle("#E69F00", "v"),
+    Status.BOX: OutcomeStyle("#CC79A7", "s"),
+    Status.TIME: OutcomeStyle("#8C8C8C", "o"),
+    Status.CONDITION: OutcomeStyle("#C9B400", "D"),
 }
-FAILURES = [code for code in Status if code not in LOOKS]
-LOOKS |= {code: Look("#D55E00", marker) for code, marker in zip(FAILURES, "xX*P1+23", strict=True)}
+FAILURES = [code for code in Status if code not in OUTCOME_STYLES]
+OUTCOME_STYLES |= {code: OutcomeStyle("#D55E00", marker) for code, marker in zip(FAILURES, "xX*P1+23", strict=True)}
 
 
 class Curve(NamedTuple):

@@ -8,7 +8,7 @@ import warp as wp
 
 import lgvi_warp as lw
 from lgvi_kernels.lanes.arithmetic import lane, vec3
-from lgvi_kernels.lanes.look import measurement_struct
+from lgvi_kernels.lanes.tick import measurement_struct
 from lgvi_kernels.maps.in_turn import in_turn
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.runs.settle import make_plan
@@ -26,23 +26,23 @@ def scene(sensors, faults=(), period=0.1, **law):
 
 
 def measured(ensemble, truth, h=0.02, dtype="float64", width=4):
-    """What members measure at each look, (looks, members, FIELDS), of motions truth (looks, members or 1, FIELDS)."""
+    """What members measure at each tick, (ticks, members, FIELDS), of motions truth (ticks, members or 1, FIELDS)."""
     controller = ensemble.scene.controller
     plan = make_plan(ensemble, "psi_s", h, 1.0, dtype=dtype, width=width)
-    n, looks = ensemble.members, len(truth)
+    n, ticks = ensemble.members, len(truth)
     packets = Packets(plan, ensemble.select(0, n))
     kernel = _kernel(plan.spec.control.parts, plan.kernel.advance.types.Loop, width, plan.spec.real)
     every, kind = controller.every(h), np.float64 if dtype == "float64" else np.float32
-    lanes = np.zeros((packets.count * width, looks, FIELDS))
-    lanes[:n] = np.broadcast_to(truth, (looks, n, FIELDS)).transpose(1, 0, 2)
-    rows = np.ascontiguousarray(lanes.reshape(packets.count, width, looks, FIELDS).transpose(0, 2, 3, 1), kind)
-    rows = rows.reshape(packets.count, looks * FIELDS, width)
+    lanes = np.zeros((packets.count * width, ticks, FIELDS))
+    lanes[:n] = np.broadcast_to(truth, (ticks, n, FIELDS)).transpose(1, 0, 2)
+    rows = np.ascontiguousarray(lanes.reshape(packets.count, width, ticks, FIELDS).transpose(0, 2, 3, 1), kind)
+    rows = rows.reshape(packets.count, ticks * FIELDS, width)
     given = wp.array(rows, dtype=lane(width, plan.spec.real), device="cpu")
-    out = wp.zeros((packets.count, looks * FIELDS), dtype=lane(width, plan.spec.real), device="cpu")
-    inputs = [given, packets.laws.structs[1].array, packets.memory, every, h, looks, out]
+    out = wp.zeros((packets.count, ticks * FIELDS), dtype=lane(width, plan.spec.real), device="cpu")
+    inputs = [given, packets.laws.structs[1].array, packets.memory, every, h, ticks, out]
     wp.launch(kernel, dim=packets.count, inputs=inputs, device="cpu")
-    seen = out.numpy().reshape(packets.count, looks, FIELDS, width).transpose(1, 0, 3, 2)
-    return seen.reshape(looks, -1, FIELDS)[:, :n]
+    seen = out.numpy().reshape(packets.count, ticks, FIELDS, width).transpose(1, 0, 3, 2)
+    return seen.reshape(ticks, -1, FIELDS)[:, :n]
 
 
 _kernels = {}
@@ -71,10 +71,10 @@ def _make(measure, Loop, width, real):
 
     @wp.kernel(module="unique", enable_backward=False)
     def run(given: wp.array2d(dtype=Lane), loop: wp.array(dtype=Loop), memory: wp.array2d(dtype=Lane), every: int,
-            h: wp.float64, looks: int, out: wp.array2d(dtype=Lane)):  # fmt: skip
+            h: wp.float64, ticks: int, out: wp.array2d(dtype=Lane)):  # fmt: skip
         i = wp.tid()
         p = loop[i % loop.shape[0]]
-        for k in range(looks):
+        for k in range(ticks):
             at = k * wp.static(FIELDS)
             y = Measurement()
             y.position = three(given, i, at)
@@ -86,7 +86,7 @@ def _make(measure, Loop, width, real):
             y.angular_velocity = three(given, i, at + 18)
             y.h = real(h)
             y.step = k * every
-            y.look = k
+            y.tick = k
             y.t = real(wp.float64(y.step) * h)
             y.period = real(wp.float64(every) * h)
             y.memory = memory

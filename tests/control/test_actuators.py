@@ -137,7 +137,7 @@ SCENES = {
 
 
 class Recorder(Loop):
-    """A loop that keeps what was not delivered at each look."""
+    """A loop that keeps what was not delivered at each tick."""
 
     def begin(self):
         super().begin()
@@ -149,7 +149,7 @@ class Recorder(Loop):
 
 
 def twin(name, method, i, steps):
-    """Positions at the looks, and what these did not deliver, of the twin's loop of member i."""
+    """Positions at the ticks, and what these did not deliver, of the twin's loop of member i."""
     actuators, allocation, faults = SCENES[name][0](LOST[i])
     laws = (
         Drag(linear=np.array(LINEAR), quadratic=np.array(QUADRATIC)),

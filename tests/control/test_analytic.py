@@ -48,17 +48,17 @@ def run(scene, members, h, t1, every, states=None):
     return lw.solve(one(scene, *given, parameters=parameters), "psi_s", h=h, t1=t1, save=lw.SaveAt(every=every))
 
 
-def sampled(kp, kd, F, x, v, looks, inertia=MASS):
-    """(x, v) at the looks of a double integrator with the held force F - kp x - kd v."""
+def sampled(kp, kd, F, x, v, ticks, inertia=MASS):
+    """(x, v) at the ticks of a double integrator with the held force F - kp x - kd v."""
     states = [(x, v)]
-    for _ in range(looks):
+    for _ in range(ticks):
         a = (F - kp * x - kd * v) / inertia
         x, v = x + PERIOD * v + 0.5 * PERIOD**2 * a, v + PERIOD * a
         states.append((x, v))
     return np.array(states)
 
 
-def test_a_double_integrator_is_exact_at_the_looks():
+def test_a_double_integrator_is_exact_at_the_ticks():
     kp, kd, F, b0, v0 = (np.array(x) for x in ((30.0, 20.0, 10.0), (40.0, 30.0, 50.0), (3.0, -2.0, 1.0),
                                                (1.0, -2.0, 3.0), (0.5, 0.2, -0.3)))  # fmt: skip
     states = b0[None], np.eye(3)[None], v0[None], np.zeros((1, 3))
@@ -89,7 +89,7 @@ def test_the_gains_at_which_it_turns_unstable(factors, most):
         rate = np.abs(np.linalg.eigvals(A)).max()
         assert (rate < 1.0) == (i == 0)
         x = np.abs(result.velocity[:, i, 0])
-        # The envelope over 200 looks; a beat of the two eigenvalues, or of the phase, is within it.
+        # The envelope over 200 ticks; a beat of the two eigenvalues, or of the phase, is within it.
         grown = (x[380:].max() / x[180:201].max()) ** (1.0 / 200.0)
         assert (grown < 1.0) == (i == 0)
         assert abs(grown - rate) < 1e-3

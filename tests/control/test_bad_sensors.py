@@ -37,7 +37,7 @@ WRONG = [
     ("sensors", {"type": "sensor", "of": "velocity", "bias": "much"}, "sensor.bias"),
     ("sensors", {"type": "sensor", "of": "velocity", "bias": None}, "sensor.bias"),
     ("sensors", {"type": "sensor", "of": "depth", "every": 1.5},
-     "sensor.every = 1.5: is no whole number of looks; give 1 or 2"),
+     "sensor.every = 1.5: is no whole number of ticks; give 1 or 2"),
     ("sensors", {"type": "sensor", "of": "depth", "every": 0}, "sensor.every = 0", "from 1 to 1000"),
     ("sensors", {"type": "sensor", "of": "depth", "latency": -1}, "sensor.latency = -1", "from 0 to 1000"),
     ("sensors", {"type": "sensor", "of": "depth", "dropout": 1.1}, "sensor.dropout = 1.1", "from 0 to 1"),

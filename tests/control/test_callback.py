@@ -41,7 +41,7 @@ def test_it_is_the_law_in_the_kernel():
     # 250 steps of round-off: the two evaluate the same formula in another order.
     assert np.abs(asked.attitude - fused.attitude).max() < 1e-12
     assert np.abs(asked.position - fused.position).max() < 1e-12
-    # Integrals over 5 s of what the two have alike: the command of each look among it, which the host answers after it.
+    # Integrals over 5 s of what the two have alike: the command of each tick among it, which the host answers after it.
     for name, estimate in fused.statistics.items():
         assert estimate.value == pytest.approx(asked.statistics[name].value, rel=1e-10), name
 
@@ -176,7 +176,7 @@ def shares(cases, folder=None, metrics=("iae heading",), **more):
 
 def truth(function):
     """The metric of a run with this function, outside any sweep."""
-    metric = lw.IAE("heading", then=[lw.Each()])
+    metric = lw.IAE("heading", then=[lw.MemberValues()])
     return lw.solve(scene([lw.Callback(function)], 4), "psi_s", h=H, t1=0.5, keep="none", statistics=[metric]).statistics[
         "each iae heading"].value[0, 0]  # fmt: skip
 
@@ -230,12 +230,12 @@ def test_a_sweep_shares_nothing_in_doubt(tmp_path):
 
 
 def test_a_changed_metric_is_run_anew(tmp_path):
-    """What a function of `OwnMetric` names, holds and leaves at the end."""
+    """What a function of `CustomMetric` names, holds and leaves at the end."""
 
     def of(k, method):
-        return lambda state, look: getattr(np, method)(look["position"][:, 0] if state is None else state, k)
+        return lambda state, tick: getattr(np, method)(tick["position"][:, 0] if state is None else state, k)
 
-    metrics = [lw.OwnMetric(of(k, method), name="own", last=last) for k, method, last in (
+    metrics = [lw.CustomMetric(of(k, method), name="own", last=last) for k, method, last in (
         (1.0, "maximum", None), (1.0, "minimum", None), (2.0, "maximum", None), (1.0, "maximum", np.negative))]  # fmt: skip
     # The states begin at 0: max(0, 1), min(0, 1), max(0, 2), -max(0, 1).
     for metric, value in zip(metrics, (1.0, 0.0, 2.0, -1.0), strict=True):

@@ -32,7 +32,7 @@ def test_the_loop_is_that_of_fixed_steps(h, lag, delay):
     exact, tolerances, errors = run("rk8", H / 4, lag, delay), (1e-6, 1e-8, 1e-10), []
     for tolerance in tolerances:
         result = run(chosen(tolerance), h, lag, delay)
-        # Of 100 periods each has its own commands: they are held in all steps between two looks, and only there.
+        # Of 100 periods each has its own commands: they are held in all steps between two ticks, and only there.
         commands = np.abs(result.command - exact.command).max()
         errors.append(max(np.abs(ends(result) - ends(exact)).max(), commands))
     # A step errs by less than atol + rtol |y|, with |y| of some tens; the loop forgets in some seconds, some tens of steps.
@@ -42,7 +42,7 @@ def test_the_loop_is_that_of_fixed_steps(h, lag, delay):
 
 
 def test_what_is_refused():
-    # Looks are at whole steps of the run, whatever steps are chosen within.
+    # Ticks are at whole steps of the run, whatever steps are chosen within.
     sentence = "controller.period = 0.1: is no whole number of steps of 0.04 s; give 0.08 or 0.12 s, or another step"
     with pytest.raises(lw.SceneError, match=re.escape(sentence)):
         lw.solve(scene(NONE), chosen(1e-6), h=0.04, t1=1.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Delays of commands, by member: q periods and s steps, exactly; and faults of actuators at their looks."""
+"""Delays of commands, by member: q periods and s steps, exactly; and faults of actuators at their ticks."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def members(delays, times=np.inf):
 
 
 def wanted(delay, fault=(np.inf, 1.0, 0.0)):
-    """Headings of the exact recursion: between steps a held moment, and the command of a look acts `delay` steps later."""
+    """Headings of the exact recursion: between steps a held moment, and the command of a tick acts `delay` steps later."""
     heading, rate, moments, headings = 0.0, 0.0, [], [0.0]
     for k in range(STEPS):
         if k % EVERY == 0:
@@ -65,8 +65,8 @@ def test_a_delay_that_varies_is_that_of_the_nearest_step():
     assert np.array_equal(nearest.attitude, whole.attitude)
 
 
-def test_a_fault_begins_at_the_first_look_at_or_after_its_time():
-    # Looks at 0.5 and 0.6 s; a time on a look, one after it, never.
+def test_a_fault_begins_at_the_first_tick_at_or_after_its_time():
+    # Ticks at 0.5 and 0.6 s; a time on a tick, one after it, never.
     times = np.array([0.5, 0.51, 0.6, np.inf, 0.0])
     delays = np.repeat((0, 7), len(times))
     result = lw.solve(members(delays, np.tile(times, 2)), "psi_s", h=H, t1=STEPS * H,

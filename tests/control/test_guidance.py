@@ -47,7 +47,7 @@ def test_waypoints_are_their_twin(method, words):
     for i in range(3):
         numbers = {name: values[i] for name, values in parameters.items()}
         b, R = twin_states(way, numbers, [x[i] for x in given], EVERY, H, steps)
-        # 160 looks of a stable loop: round-off of numbers of size 10, as in test_laws.py.
+        # 160 ticks of a stable loop: round-off of numbers of size 10, as in test_laws.py.
         assert np.abs(result.position[:, i] - b).max() < 1e-9
         assert np.abs(result.attitude[:, i] - R).max() < 1e-9
 

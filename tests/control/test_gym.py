@@ -191,7 +191,7 @@ def test_members_without_a_command_end(env):
     assert infos["_status"].tolist() == (~others).tolist()
     assert np.all(infos["status"][[3, 12]] == lw.Status.CONTROL_NON_FINITE)
     assert all(np.array_equal(a[0][others], b[0][others]) for a, b in zip(steps, whole, strict=True))
-    # They stand where they were at the look before, and begin anew at the next step.
+    # They stand where they were at the tick before, and begin anew at the next step.
     assert np.array_equal(steps[1][0][~others], whole[0][0][~others])
     assert env.members[[3, 12]].tolist() == [N + 3, N + 12]
 
@@ -236,8 +236,8 @@ def test_named_numbers_are_those_of_a_policy():
     R = Rotation.random(2 * N, rng=rng).as_matrix()
     vectors = iter(rng.normal(size=(7, N, 3)))
     heading = np.arctan2(R[:, 1, 0], R[:, 0, 0])
-    y = lw.Looks(next(vectors), R[:N], next(vectors), next(vectors), heading[:N], water_velocity=next(vectors))
-    r = lw.Looks(next(vectors), R[N:], next(vectors), next(vectors), heading[N:], speed=rng.normal(size=N))
+    y = lw.CallbackInput(next(vectors), R[:N], next(vectors), next(vectors), heading[:N], water_velocity=next(vectors))
+    r = lw.CallbackInput(next(vectors), R[N:], next(vectors), next(vectors), heading[N:], speed=rng.normal(size=N))
     assert {name: OBSERVATIONS[name][:2] for name in INPUTS} == INPUTS
     for name in INPUTS:
         seen = np.reshape(OBSERVATIONS[name].of(y, r), (N, -1))

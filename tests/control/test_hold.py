@@ -91,21 +91,21 @@ def test_the_loop_meets_an_independent_one():
     for _ in range(100):
         R = Rotation.from_quat(y[3:7]).as_matrix()
         e = 6.0 - y[2]
-        wanted = -(DEPTH["kp"] * e + DEPTH["ki"] * depth_I.at_look(period, 2.0, -beyond, True))
+        wanted = -(DEPTH["kp"] * e + DEPTH["ki"] * depth_I.at_tick(period, 2.0, -beyond, True))
         theta_d = np.clip(wanted, -DEPTH["pitch_limit"], DEPTH["pitch_limit"])
         beyond, depth_I.error = wanted - theta_d, e
         e_theta = theta_d - np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))
         w = np.zeros(6)
         w[4] = (
             DEPTH["kp_pitch"] * e_theta
-            + DEPTH["ki_pitch"] * pitch_I.at_look(period, 1.0, unmet[4], True)
+            + DEPTH["ki_pitch"] * pitch_I.at_tick(period, 1.0, unmet[4], True)
             - DEPTH["kd_pitch"] * y[11]
         )
         pitch_I.error = e_theta
         e_psi = heading_error(Rd, R)
         w[5] = (
             HEADING["kp"] * e_psi
-            + HEADING["ki"] * heading_I.at_look(period, 0.8, unmet[5], True)
+            + HEADING["ki"] * heading_I.at_tick(period, 0.8, unmet[5], True)
             - HEADING["kd"] * y[12]
         )
         heading_I.error = e_psi

@@ -137,7 +137,7 @@ def check(law, steps, scene, run):
     assert result.status.counts() == {"ok": len(NAMES)}
     for got, expected in ((result.position[: len(b), i], b), (result.attitude[: len(b), i], R)):
         error = np.abs(got - expected).reshape(len(b), -1).max(axis=1)
-        # A look is some hundred roundings of numbers of size 10; 200 looks of a stable loop add up what they leave.
+        # A tick is some hundred roundings of numbers of size 10; 200 ticks of a stable loop add up what they leave.
         assert error[1] < 1e-12
         assert error.max() < 1e-9
 

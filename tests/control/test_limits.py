@@ -70,7 +70,7 @@ def growth(gain, steps):
     periods, left = divmod(steps, EVERY)
     old, held = after(A, B, left * H)
     rest, fresh = after(A, B, PERIOD - left * H)
-    # The state: x, I, and the commands of the last looks, of which the oldest acts until the delay is over.
+    # The state: x, I, and the commands of the last ticks, of which the oldest acts until the delay is over.
     n = len(A) + 1 + periods + 1
     law = np.zeros(n)
     law[[4, 2, 5]] = gain * KP, gain * KD, -gain * KI  # d = -N, of errors that are minus the heading

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The closed loop: a look between steps, commands held until the next, whatever the method; against the twin's loop."""
+"""The closed loop: a tick between steps, commands held until the next, whatever the method; against the twin's loop."""
 
 import numpy as np
 import pytest

@@ -8,7 +8,7 @@ from benchmarks.cases.loop_peers import case
 from benchmarks.cases.loop_peers.problem import Problem
 
 # A period of 0.2 s and 2 s in all, in steps of 0.04 and 0.02 s; one member more than fills a packet of 8 lanes.
-MEMBERS, LOOKS, STEPS = 9, 10, ((5, 0.04), (10, 0.02))
+MEMBERS, TICKS, STEPS = 9, 10, ((5, 0.04), (10, 0.02))
 
 
 # Two kernels are compiled, and numba's loop.
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def ends():
     """For each length of step the ends of each way."""
-    return [case.ends_of(case.make_ways(Problem(MEMBERS, LOOKS, every, h))[0]) for every, h in STEPS]
+    return [case.ends_of(case.make_ways(Problem(MEMBERS, TICKS, every, h))[0]) for every, h in STEPS]
 
 
 @pytest.mark.parametrize("name", case.PEERS)
@@ -34,14 +34,14 @@ def test_ways_agree_at_the_order_of_rk4(ends, name):
 
 def test_members_differ_and_move(ends):
     position, attitude = ends[1]["lanes"]
-    start = Problem(MEMBERS, LOOKS).numbers
+    start = Problem(MEMBERS, TICKS).numbers
     assert np.linalg.norm(position - start["b"], axis=1).min() > 0.1
     assert np.abs(attitude - start["R"]).max(axis=(1, 2)).min() > 0.1
     assert len(np.unique(position[:, 0])) == MEMBERS
 
 
 def test_a_second_call_begins_at_the_start(ends):
-    ways, _ = case.make_ways(Problem(MEMBERS, LOOKS, *STEPS[1]))
+    ways, _ = case.make_ways(Problem(MEMBERS, TICKS, *STEPS[1]))
     case.ends_of(ways)
     for name, (position, attitude) in case.ends_of(ways).items():
         assert np.array_equal(position, ends[1][name][0])

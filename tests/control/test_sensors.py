@@ -18,7 +18,7 @@ from lgvi_warp.reference.rotation import exp
 from tests.control.bench import measured, scene
 from tests.support.tools import one
 
-MEMBERS, LOOKS, PERIOD, H = 6, 60, 0.1, 0.02
+MEMBERS, TICKS, PERIOD, H = 6, 60, 0.1, 0.02
 EPS = {"float64": 2.0**-52, "float32": 2.0**-23}
 
 # Chains of parts, so that few kernels are compiled. No part hides what another does.
@@ -81,14 +81,14 @@ VARIED = {
 }
 
 
-def motion(looks=LOOKS, members=MEMBERS, period=PERIOD):
-    """Turns and turns about of each member, (looks, members, FIELDS): the heading goes round, roll and pitch swing."""
+def motion(ticks=TICKS, members=MEMBERS, period=PERIOD):
+    """Turns and turns about of each member, (ticks, members, FIELDS): the heading goes round, roll and pitch swing."""
     rng = np.random.default_rng(3)
-    t = period * np.arange(looks)
-    rows = np.zeros((looks, members, 21))
+    t = period * np.arange(ticks)
+    rows = np.zeros((ticks, members, 21))
     for m in range(members):
         a = rng.normal(size=12)
-        for k in range(looks):
+        for k in range(ticks):
             rates = np.array([0.3 * np.sin(t[k] + a[0]), 0.2 * np.cos(1.3 * t[k] + a[1]), 1.5 + 0.3 * a[2]])
             turn = exp(np.array([0.0, 0.0, 1.5 * t[k] + a[5]])) @ exp(
                 0.5 * np.array([np.sin(t[k] + a[3]), np.cos(t[k]), 0.0])
@@ -127,7 +127,7 @@ def twins(case, m):
 
 
 def of_twin(case, truth):
-    """What the twin measures, (looks, members, FIELDS)."""
+    """What the twin measures, (ticks, members, FIELDS)."""
     seen = np.zeros_like(truth)
     for m in range(truth.shape[1]):
         parts = twins(case, m)
@@ -135,7 +135,7 @@ def of_twin(case, truth):
             part.begin()
         for k, row in enumerate(truth[:, m]):
             vectors = row[:3], row[3:12].reshape(3, 3), row[12:15], row[15:18], row[18:21]
-            y = Measurement(*vectors, t=k * 5 * H, period=PERIOD, h=H, step=5 * k, look=k, member=m)
+            y = Measurement(*vectors, t=k * 5 * H, period=PERIOD, h=H, step=5 * k, tick=k, member=m)
             for part in parts:
                 y = part.measure(y)
             numbers = y.position, y.R.reshape(-1), y.velocity, y.water_velocity, y.angular_velocity
@@ -153,8 +153,8 @@ def members_of(case):
 def test_what_is_measured_is_the_twins(case, dtype):
     truth = motion()
     seen, wanted = measured(members_of(case), truth, H, dtype), of_twin(case, truth)
-    # Some ten operations a look on numbers up to 40; estimators add those of all looks up.
-    assert np.abs(seen - wanted).max() < 10 * LOOKS * 40 * EPS[dtype]
+    # Some ten operations a tick on numbers up to 40; estimators add those of all ticks up.
+    assert np.abs(seen - wanted).max() < 10 * TICKS * 40 * EPS[dtype]
 
 
 # Statistics: the chain "all" with other numbers, so with its kernel. A chance of 6e-7 for a right code; the seed is fixed.
@@ -164,7 +164,7 @@ MANY = 2000
 
 @pytest.fixture(scope="module")
 def readings():
-    """Errors of the readings of many members at rest, (looks, members, FIELDS): gyro walks, log is noisy and lossy."""
+    """Errors of the readings of many members at rest, (ticks, members, FIELDS): gyro walks, log is noisy and lossy."""
     # The estimators do not touch velocities and rates.
     varied = {
         "gyro.noise": np.full((MANY, 3), 1e-30),
@@ -174,7 +174,7 @@ def readings():
         "log.dropout": np.full(MANY, 0.3),
         "weak.time": np.full(MANY, np.inf),
     }
-    truth = np.zeros((LOOKS, 1, 21))
+    truth = np.zeros((TICKS, 1, 21))
     truth[..., 3:12] = np.eye(3).reshape(-1)
     return measured(one(chain("all"), parameters=varied), truth, H)
 
@@ -185,7 +185,7 @@ def test_the_variance_of_a_walk_grows_with_time(readings):
         variance = 0.3**2 * k * PERIOD
         assert np.abs(walk[0]).max() < 1e-29
         assert abs(walk[k].var() / variance - 1.0) < ERRORS * np.sqrt(2.0 / (3 * MANY))
-    # What comes after look 20 does not depend on what was before.
+    # What comes after tick 20 does not depend on what was before.
     after = ((walk[59] - walk[20]) * walk[20]).mean() / np.sqrt(0.3**4 * 39 * 20 * PERIOD**2)
     assert abs(after) < ERRORS / np.sqrt(3 * MANY)
 
@@ -194,7 +194,7 @@ def test_noise_is_white_with_its_deviation(readings):
     fresh = readings[0, :, 12:15]
     assert abs(fresh.std() / 0.2 - 1.0) < ERRORS * np.sqrt(0.5 / (3 * MANY))
     assert abs(fresh.mean()) < ERRORS * 0.2 / np.sqrt(3 * MANY)
-    # Axes, and looks whose reading is not the last one's, are independent.
+    # Axes, and ticks whose reading is not the last one's, are independent.
     pairs = [(fresh[:, 0], fresh[:, 1]), (fresh[:, 1], fresh[:, 2])]
     new = readings[1, :, 12] != readings[0, :, 12]
     pairs.append((readings[0, new, 12], readings[1, new, 12]))
@@ -216,7 +216,7 @@ def test_numbers_that_are_the_same_for_all_designs():
     gains = scene(chain("all").controller.sensors, chain("all").controller.faults, PERIOD, kp=9.0)
     other_gains = one(gains, parameters=VARIED["all"])
     assert np.array_equal(measured(other_gains, truth, H), base)
-    # Another step, with the same looks: the faults begin at the first look at or after their times.
+    # Another step, with the same ticks: the faults begin at the first tick at or after their times.
     assert np.array_equal(measured(members_of("all"), truth, 0.1), base)
     # Fewer members, and only some.
     some = {name: values[:3] for name, values in VARIED["all"].items()}
@@ -235,7 +235,7 @@ def test_each_sensor_and_seed_has_numbers_of_its_own():
             measured(lw.Ensemble(members, 1, seed), truth, H)[:, 0, 18] - truth[:, 0, 18] for seed in (0, 1, 2**40)
         ]
     for i, a in enumerate(errors):
-        assert all(abs(np.corrcoef(a, b)[0, 1]) < ERRORS / np.sqrt(LOOKS) for b in errors[:i])
+        assert all(abs(np.corrcoef(a, b)[0, 1]) < ERRORS / np.sqrt(TICKS) for b in errors[:i])
 
 
 @pytest.mark.parametrize("extreme", [np.nan, 1e200])
@@ -269,20 +269,20 @@ def test_what_no_member_has_is_no_code():
 
 
 def test_a_filters_step_response():
-    # A step of 1 at look 1: after n periods 1 - exp(-n T / tau), exactly, for readings that are held.
-    truth = np.zeros((LOOKS, 1, 21))
+    # A step of 1 at tick 1: after n periods 1 - exp(-n T / tau), exactly, for readings that are held.
+    truth = np.zeros((TICKS, 1, 21))
     truth[..., 3:12] = np.eye(3).reshape(-1)
     truth[1:, :, 12] = 1.0
     numbers = {"slow.time_constant": np.full(MEMBERS, 0.7), "log.bias": np.zeros((MEMBERS, 3))} | VARIED["plain"]
     numbers["log.bias"][1:] = 0.3
     seen = measured(one(chain("plain"), parameters=numbers), truth, H)[:, 0, 12]
-    assert np.abs(seen - (1.0 - np.exp(-np.arange(LOOKS) * PERIOD / 0.7))).max() < LOOKS * EPS["float64"]
+    assert np.abs(seen - (1.0 - np.exp(-np.arange(TICKS) * PERIOD / 0.7))).max() < TICKS * EPS["float64"]
 
 
 def test_dead_reckoning_with_a_bias_goes_astray_with_time():
     # Level, heading north: the error is that of the velocity times the time.
-    truth = np.zeros((LOOKS, 1, 21))
+    truth = np.zeros((TICKS, 1, 21))
     truth[..., 3:12] = np.eye(3).reshape(-1)
     bias = VARIED["reckoned"]["flow.bias"]
     seen = measured(members_of("reckoned"), truth, H)[..., :3]
-    assert np.abs(seen - bias * PERIOD * np.arange(LOOKS)[:, None, None]).max() < 1e-13
+    assert np.abs(seen - bias * PERIOD * np.arange(TICKS)[:, None, None]).max() < 1e-13

@@ -68,10 +68,10 @@ def test_a_type_is_taken_once(monkeypatch):
         with pytest.raises(
             ValueError, match=rf"Mine.type = '{word}': is that of lgvi_warp\..*; give a type that no other"
         ):
-            lw.register_term(taken)
+            lw.register(taken)
         assert base.kinds[word] is not taken
     # A type is one list's: a law may have the type of a guidance.
-    assert lw.register_term(type("Mine", (lw.ControlLaw,), {"type": "waypoints"}))
+    assert lw.register(type("Mine", (lw.ControlLaw,), {"type": "waypoints"}))
 
 
 @wp.func

@@ -14,7 +14,7 @@ from lgvi_warp.statistics.estimates.estimate import Estimate
 from lgvi_warp.store.settings import needed
 from lgvi_warp.studies.sensitivity import analyses
 from lgvi_warp.views import plots
-from lgvi_warp.views.pages import again
+from lgvi_warp.views.pages import run_again as again
 from lgvi_warp.views.recording import rerun
 
 ESTIMATE = Estimate("mean x", {}, "m", 0.95, "", {"value": ("time",)}, {"value": np.zeros(2)}, {"time": np.arange(2.0)})
@@ -33,7 +33,7 @@ DOORS = {
     "YAML": (lambda: yaml_text.parsed("a: 1"), "yaml", "yaml"),
     "plots": (plots.figure_class, "matplotlib.figure", "viz"),
     "reports": (lambda: again.toml_of({}), "tomlkit", "viz"),
-    "recordings": (lambda: rerun.log_rerun(None, "x"), "rerun", "viz"),
+    "recordings": (lambda: rerun.record(None, "x"), "rerun", "viz"),
 }
 
 

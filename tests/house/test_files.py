@@ -88,7 +88,7 @@ def test_the_reader_sees_what_opens_a_file(source, expected):
 
 def test_only_one_pair_of_functions_opens_files():
     found = {}
-    for package in ("lgvi_warp", "lgvi_warp_command", "kernels/lgvi_kernels"):
+    for package in ("lgvi_warp", "kernels/lgvi_kernels"):
         for path in sorted((ROOT / package).rglob("*.py")):
             key = path.relative_to(ROOT / package).as_posix()
             if package == "lgvi_warp" and key.startswith("common/"):

@@ -102,9 +102,9 @@ def test_pictures_and_recordings_of_a_result(scene, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shown = []
     monkeypatch.setattr(lw, "show", lambda *arguments, **named: shown.append(arguments))
-    record, streamed = lw.log_rerun, []
+    record, streamed = lw.record, []
     # A viewer that is open is not there: what would go to it is noted.
-    monkeypatch.setattr(lw, "log_rerun", lambda *a, to=None, **k: streamed.append(to) if to else record(*a, **k))
+    monkeypatch.setattr(lw, "record", lambda *a, to=None, **k: streamed.append(to) if to else record(*a, **k))
     fleet = lw.Ensemble(scene, 20, seed=1, vary={"start.angular_velocity": lw.Normal(std=0.1)})
     names = {"lw": lw, "fleet": fleet, "result": lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=0.5))}
     names |= {"a": names["result"], "b": names["result"]}

@@ -9,7 +9,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 FILES = sorted(
     path
-    for folder in ("lgvi_warp", "lgvi_warp_command", "kernels", "tests", "benchmarks", "examples")
+    for folder in ("lgvi_warp", "kernels", "tests", "benchmarks", "examples")
     for path in (ROOT / folder).rglob("*.py")
 )
 

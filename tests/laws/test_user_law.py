@@ -147,10 +147,10 @@ def test_a_type_is_taken_once(monkeypatch):
     monkeypatch.setattr(lw.Term, "kinds", dict(lw.Term.kinds))
     taken = type("Harbour", (lw.Term,), {"type": "dock"})
     assert lw.Term.kinds["dock"] is own_law.Dock
-    assert lw.register_term(own_law.Dock) is own_law.Dock
+    assert lw.register(own_law.Dock) is own_law.Dock
     for kind in (taken, type("Nameless", (own_law.Dock,), {}), type("Heavy", (lw.Term,), {"type": "weight"})):
         with pytest.raises(ValueError, match="no other term has"):
-            lw.register_term(kind)
+            lw.register(kind)
 
 
 def test_a_class_made_again_replaces_the_former(monkeypatch):

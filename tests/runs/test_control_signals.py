@@ -45,7 +45,7 @@ class Device:
     control = control
 
 
-@lw.register_term
+@lw.register
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Spoiled(ControlLaw):
     """A law that gives no number from a time on."""
@@ -99,7 +99,7 @@ def same(x, y, members=slice(None), names=SAVED):
 
 
 def looked():
-    """The steps at which samples were taken, by the look that holds for each."""
+    """The steps at which samples were taken, by the tick that holds for each."""
     return np.arange(STEPS + 1) // EVERY * EVERY
 
 
@@ -124,14 +124,14 @@ def free(result):
     return np.flatnonzero(result.status == 0)
 
 
-def test_a_sample_on_a_look_shows_what_that_look_demands(whole):
+def test_a_sample_on_a_tick_shows_what_that_tick_demands(whole):
     at, well = looked(), free(whole)
     assert 50 < len(well) < MEMBERS
     assert set(whole.status) == {0, Status.FLOOR}
     R, Om = whole.attitude[:, well], whole.angular_velocity[:, well]
     heading = np.arctan2(R[..., 1, 0], R[..., 0, 0])
     error = np.arctan2(np.sin(0.5 - heading), np.cos(0.5 - heading))
-    # Of the state at the look itself, t = 0 among them, and held until the next one.
+    # Of the state at the tick itself, t = 0 among them, and held until the next one.
     demand = np.zeros((STEPS + 1, len(well), 6))
     demand[..., 2], demand[..., 5] = LEVEL, (KP * error - KD * Om[..., 2])[at]
     np.testing.assert_allclose(whole.demand[:, well], demand, atol=1e-13)
@@ -174,7 +174,7 @@ def test_measured_and_wanted(whole):
 def test_a_member_that_an_event_stops_keeps_the_signals_of_its_last_whole_step(whole):
     stopped = np.flatnonzero(whole.status == Status.FLOOR)
     last = np.floor(whole.failure_time[stopped] / H).astype(int)
-    # In the first step after a look, and in others.
+    # In the first step after a tick, and in others.
     assert len(stopped) > 50
     assert set(last % EVERY) == set(range(EVERY))
     for name in SIGNALS:
@@ -201,7 +201,7 @@ def test_signals_change_nothing_of_the_motion_and_cost_nothing_where_nobody_asks
     assert not plan.spec.control.headings
     assert plan.layout.signal_rows == ()
     assert same(whole, lw.solve(fleet(), "psi_s", **settings), names=FIELDS)
-    # What a look writes anyway needs no other kernel.
+    # What a tick writes anyway needs no other kernel.
     everything = SETTINGS | {"save": lw.SaveAt(every=H, fields=("demand", "measured_position", "reference_attitude"))}
     assert make_plan(fleet(), "psi_s", **everything).spec == plan.spec
     held = SETTINGS | {"save": lw.SaveAt(every=H, fields=("command", "unmet"))}
@@ -218,7 +218,7 @@ SPOILED = {1: 0.0, 7: 0.3, 301: 0.0, 599: 0.3}
 
 
 def check_spoiled(whole, spoiled):
-    """Members whose law gives no number fail at that look; no other bit changes."""
+    """Members whose law gives no number fail at that tick; no other bit changes."""
     members = np.array([*SPOILED])
     assert (whole.status[members] == 0).all()
     others = np.setdiff1d(np.arange(MEMBERS), members)
@@ -229,7 +229,7 @@ def check_spoiled(whole, spoiled):
     for member, at in SPOILED.items():
         k = max(0, round(at / H) - 1)
         for name in FIELDS:
-            # At the first look a member rests at its start.
+            # At the first tick a member rests at its start.
             np.testing.assert_array_equal(
                 getattr(spoiled, name)[: k + 1, member], getattr(whole, name)[: k + 1, member]
             )
@@ -271,8 +271,8 @@ def test_of_other_methods_and_numbers(whole, method, dtype):
 
 
 @pytest.mark.slow
-def test_a_look_sees_both_parts_of_compensated_sums():
-    # Without events the lead of the next step is merged with the end of this one, and undone for a look.
+def test_a_tick_sees_both_parts_of_compensated_sums():
+    # Without events the lead of the next step is merged with the end of this one, and undone for a tick.
     result = lw.solve(fleet(events=False), "psi_s", dtype="float32_compensated", **SETTINGS)
     well = free(result)
     assert result.position.dtype == np.float64
@@ -331,7 +331,7 @@ def test_members_that_are_kept_after_all_have_them(whole, tmp_path):
 
 
 def test_a_recording_shows_commands_and_actuators(whole, tmp_path):
-    path, early = lw.log_rerun(whole, tmp_path / "fleet.rrd"), under_way(whole)[3]
+    path, early = lw.record(whole, tmp_path / "fleet.rrd"), under_way(whole)[3]
     for name in ("command", "actuator"):
         median = np.median(getattr(whole, name)[3, early, 5])
         assert rows(path, f"/{name}/5", "scalars")[3 * H] == pytest.approx([median])

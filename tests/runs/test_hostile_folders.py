@@ -460,7 +460,7 @@ WRITERS = {
     "a table": lambda path: tradeoff_of(4.0).to_csv(path),
     "a picture": lambda path: lw.plot(flown(), path.with_suffix(".png")),
     "a report": lambda path: lw.report(flown(), path),
-    "a recording": lambda path: lw.log_rerun(flown(), path),
+    "a recording": lambda path: lw.record(flown(), path),
     "a text": lambda path: files.write_text(path, "x"),
 }
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Metrics in whole runs: those of the twin on kept paths, at all looks whatever is kept, in stores, of members that end."""
+"""Metrics in whole runs: those of the twin on kept paths, at all ticks whatever is kept, in stores, of members that end."""
 
 import gc
 import weakref
@@ -22,26 +22,26 @@ pytestmark = pytest.mark.kernel
 FIELDS = ("position", "attitude", "velocity", "angular_velocity", "command", "actuator", "demand", "unmet")
 FIELDS += tuple(f"reference_{name}" for name in ("depth", "heading", "speed", "position", "velocity", "attitude"))
 FIELDS += tuple(f"measured_{name}" for name in ("depth", "water_velocity"))
-T1, LOOK = 12.0, 0.1
+T1, TICK = 12.0, 0.1
 BOTH = ("depth", "heading")
 COARSE = {"t1": T1, "save": lw.SaveAt(every=4.0)}
 
 
-def deepest(state, look):
-    depth = look["position"][:, 2]
+def deepest(state, tick):
+    depth = tick["position"][:, 2]
     return depth if state is None else np.maximum(state, depth)
 
 
 def metrics():
-    each = {"then": [lw.Mean(), lw.Each()]}
+    each = {"then": [lw.Mean(), lw.MemberValues()]}
     return [
         *(kind(of, **each) for of in BOTH for kind in (lw.Overshoot, lw.Undershoot, lw.Peak, lw.PeakTime, lw.RiseTime)),
         lw.SettlingTime("heading", within=0.2, **each), lw.SettlingTime("depth", **each), lw.SteadyStateError("depth", **each),
         *(kind(of, **each) for of in BOTH for kind in (lw.IAE, lw.ISE, lw.ITAE, lw.RMSError, lw.MaxError)),
         lw.IAE("depth", measured=True, name="measured", **each), lw.MaxError("speed", **each), lw.MaxError("position", **each),
         lw.MaxError("attitude", **each), lw.CrossTrack(**each), lw.Effort(**each), lw.Effort("command[1]", **each),
-        lw.Travel(**each), lw.SaturationShare(**each), lw.Energy(**each), lw.TimeToFailure(),
-        lw.OwnMetric(deepest, fields=("position",), **each),
+        lw.Travel(**each), lw.SaturationShare(**each), lw.ActuatorEnergy(**each), lw.TimeToFailure(),
+        lw.CustomMetric(deepest, fields=("position",), **each),
     ]  # fmt: skip
 
 
@@ -64,7 +64,7 @@ def coarse(fleet):
 
 @pytest.fixture(scope="module")
 def paths(fleet):
-    return lw.solve(fleet, t1=T1, save=lw.SaveAt(every=LOOK, fields=FIELDS), statistics=metrics())
+    return lw.solve(fleet, t1=T1, save=lw.SaveAt(every=TICK, fields=FIELDS), statistics=metrics())
 
 
 def by_twin(paths, limit):
@@ -134,7 +134,7 @@ def test_metrics_are_the_twins(fleet, paths):
     assert paths.statistics["mean iae depth"].value[0, 0] == pytest.approx(finite.mean(), rel=1e-12)
 
 
-def test_looks_do_not_depend_on_what_is_kept(coarse, paths):
+def test_ticks_do_not_depend_on_what_is_kept(coarse, paths):
     assert coarse.time.tolist() == [0.0, 4.0, 8.0, 12.0]
     assert coarse.position.tobytes() == np.ascontiguousarray(paths.position[::40]).tobytes()
     for name, estimate in paths.statistics.items():
@@ -151,7 +151,7 @@ def test_other_statistics_are_of_the_samples_that_are_kept(fleet, coarse):
 
 
 def test_a_store_that_goes_on_has_the_same_numbers(fleet, coarse, tmp_path):
-    asked = [lw.Overshoot("depth", then=[lw.Mean(), lw.Each()]), lw.Overshoot("heading"), lw.Travel()]
+    asked = [lw.Overshoot("depth", then=[lw.Mean(), lw.MemberValues()]), lw.Overshoot("heading"), lw.Travel()]
     with pytest.raises(RuntimeError):
         lw.solve(fleet, **COARSE, statistics=asked, store=tmp_path / "run.zarr", threads=1, progress=stop)
     result = lw.resume(tmp_path / "run.zarr")
@@ -168,7 +168,7 @@ def stop(share):
         raise RuntimeError("enough")
 
 
-def test_predict_and_prepare_take_looks(fleet):
+def test_predict_and_prepare_take_ticks(fleet):
     assert lw.predict(fleet, t1=T1, statistics=metrics(), keep="none").memory > 0
 
 
@@ -178,13 +178,13 @@ def test_a_scene_without_a_controller_is_told(fleet):
         lw.solve(scene, statistics=[lw.IAE("depth")])
 
 
-def test_numbers_do_not_depend_on_how_many_looks_are_gathered_at_once(fleet, coarse, monkeypatch):
+def test_numbers_do_not_depend_on_how_many_ticks_are_gathered_at_once(fleet, coarse, monkeypatch):
     monkeypatch.setattr(launches, "GATHERED_BYTES", 1)
     monkeypatch.setattr(work, "NUMBERS_AT_ONCE", 1)
-    by_look = lw.solve(fleet, **COARSE, statistics=metrics())
-    assert by_look.position.tobytes() == coarse.position.tobytes()
+    by_tick = lw.solve(fleet, **COARSE, statistics=metrics())
+    assert by_tick.position.tobytes() == coarse.position.tobytes()
     for name, estimate in coarse.statistics.items():
-        assert estimate.value.tobytes() == by_look.statistics[name].value.tobytes(), name
+        assert estimate.value.tobytes() == by_tick.statistics[name].value.tobytes(), name
 
 
 def test_metrics_change_no_bit_of_the_run(fleet, coarse):
@@ -231,8 +231,8 @@ def test_metrics_of_what_no_guidance_wants_are_refused(fleet):
 
 @pytest.mark.slow_for("float32_compensated")
 @pytest.mark.parametrize("dtype", ["float64", "float32_compensated"])
-def test_numbers_do_not_depend_on_what_else_is_read_at_looks(dtype, fleet, coarse):
-    each = {"then": [lw.Each()]}
+def test_numbers_do_not_depend_on_what_else_is_read_at_ticks(dtype, fleet, coarse):
+    each = {"then": [lw.MemberValues()]}
     few = [lw.Overshoot("depth", **each), lw.IAE("heading", **each), lw.MaxError("depth", **each)]
     alone = lw.solve(fleet, **COARSE, statistics=few, keep="none", dtype=dtype)
     whole = coarse if dtype == "float64" else lw.solve(fleet, **COARSE, statistics=metrics(), keep="none", dtype=dtype)
@@ -240,10 +240,10 @@ def test_numbers_do_not_depend_on_what_else_is_read_at_looks(dtype, fleet, coars
         np.testing.assert_array_equal(alone.statistics[name].value, whole.statistics[name].value)
 
 
-def test_a_look_gathers_only_the_numbers_that_are_read(fleet):
+def test_a_tick_gathers_only_the_numbers_that_are_read(fleet):
     def gathered(*statistics):
         observed = Observation(statistics, keep="none")
-        return make_plan(fleet, t1=1.0, observed=observed).layout.look_fields
+        return make_plan(fleet, t1=1.0, observed=observed).layout.tick_fields
 
     assert gathered(lw.IAE("depth"), lw.RMSError("depth")) == {"position": 1, "reference_depth": 1}
     assert gathered(lw.IAE("depth"), lw.IAE("heading")) == {
@@ -253,7 +253,7 @@ def test_a_look_gathers_only_the_numbers_that_are_read(fleet):
 
 
 @pytest.mark.parametrize("keep", ["none", "all"])
-def test_a_metric_may_read_nothing_at_looks(keep, fleet, coarse):
+def test_a_metric_may_read_nothing_at_ticks(keep, fleet, coarse):
     alone = lw.solve(fleet, **COARSE, statistics=[lw.TimeToFailure()], keep=keep)
     name = "each time_to_failure"
     np.testing.assert_array_equal(alone.statistics[name].value, coarse.statistics[name].value)

@@ -80,7 +80,7 @@ def texts(axes):
 
 def marks(axes, code):
     """Where members with an outcome are marked (m, 2)."""
-    color = tuple(part / 255.0 for part in looks.LOOKS[code].rgb)
+    color = tuple(part / 255.0 for part in looks.OUTCOME_STYLES[code].rgb)
     found = [
         one for one in axes.collections if one.get_offsets().size and np.allclose(one.get_facecolor()[0, :3], color)
     ]
@@ -173,16 +173,16 @@ def test_failures_are_drawn_until_they_fail(mixed):
 
 
 def test_outcomes_look_different():
-    seen = [(look.color, look.marker) for look in looks.LOOKS.values()]
-    assert set(looks.LOOKS) == set(Status)
+    seen = [(look.color, look.marker) for look in looks.OUTCOME_STYLES.values()]
+    assert set(looks.OUTCOME_STYLES) == set(Status)
     assert len(set(seen)) == len(seen)
-    assert len({look.color for code, look in looks.LOOKS.items() if code == Status.OK or code.stopped}) == 6
+    assert len({look.color for code, look in looks.OUTCOME_STYLES.items() if code == Status.OK or code.stopped}) == 6
 
 
 def test_nothing_to_draw_says_why(mixed, tmp_path):
     nowhere = {"position": np.full_like(mixed.position, np.nan)}
     lost = ending(dataclasses.replace(mixed, samples=dict(mixed.samples) | nowhere), [3] * 7, [0.0] * 7)
-    for draw in (lw.plot, lw.log_rerun):
+    for draw in (lw.plot, lw.record):
         with pytest.raises(ValueError, match="nothing to draw"):
             draw(lost, tmp_path / "fleet.png")
 
@@ -287,7 +287,7 @@ def test_every_run_has_ids_of_its_own(mixed, sunk, tmp_path):
     other = mixed.part(np.array([2, 3]))
     ids = []
     for i, result in enumerate((mixed, again, sunk, part, other)):
-        entry = entry_of(lw.log_rerun(result, tmp_path / f"{i}.rrd"))
+        entry = entry_of(lw.record(result, tmp_path / f"{i}.rrd"))
         blueprint = RrdReader(tmp_path / f"{i}.rrd").blueprints()[0]
         assert entry.recording_id in entry.application_id
         assert blueprint.application_id == entry.application_id
@@ -303,7 +303,7 @@ def test_the_ids_are_those_of_the_saved_result(mixed, tmp_path):
 
 
 def test_a_recording_shows_each_member_by_its_outcome_from_then_on(mixed, tmp_path):
-    path = lw.log_rerun(mixed, tmp_path / "fleet.rrd")
+    path = lw.record(mixed, tmp_path / "fleet.rrd")
     names = ("ok", "floor", "surface")
     seen = {name: rows(path, f"/world/bodies/{name}", "translations") for name in names}
     scales = {name: rows(path, f"/world/bodies/{name}", "scales") for name in seen}
@@ -323,7 +323,7 @@ def test_a_recording_shows_each_member_by_its_outcome_from_then_on(mixed, tmp_pa
 
 
 def test_the_curves_of_a_recording_are_of_those_under_way(sunk, mixed, tmp_path):
-    path = lw.log_rerun(sunk, tmp_path / "sunk.rrd")
+    path = lw.record(sunk, tmp_path / "sunk.rrd")
     median = rows(path, "/curves/height/median", "scalars")
     assert median[2.0][0] == pytest.approx(-5.0 - 0.65 * 2.0)
     assert np.isnan(median[15.0][0])
@@ -334,7 +334,7 @@ def test_the_curves_of_a_recording_are_of_those_under_way(sunk, mixed, tmp_path)
     assert shares[0][20.0] == [100.0]
     assert shares[1][0.0] == [100.0]
     assert rows(path, "/curves/energy/median", "scalars")
-    driven = lw.log_rerun(acted_on(mixed, ACTING["thrust"][0]), tmp_path / "driven.rrd")
+    driven = lw.record(acted_on(mixed, ACTING["thrust"][0]), tmp_path / "driven.rrd")
     said = [text_of(one, "/run/summary") for one in (path, driven)]
     assert "| energy | drift " in said[0]
     assert "| energy | not conserved: wrench do work |" in said[1]
@@ -346,7 +346,7 @@ def test_a_stored_run_is_recorded_in_pieces_as_one_in_memory(mixed, tmp_path, mo
     stored = lw.solve(divers(SPEEDS), h=0.1, t1=20.0, save=lw.SaveAt(every=1.0), store=lw.Store(tmp_path / "run.zarr"))
     assert stored.store is not None
     monkeypatch.setattr(choice, "AT_ONCE", 21 * 3)  # three members at once
-    paths = [lw.log_rerun(one, tmp_path / f"{i}.rrd") for i, one in enumerate((mixed, stored))]
+    paths = [lw.record(one, tmp_path / f"{i}.rrd") for i, one in enumerate((mixed, stored))]
     for entity, ending in (
         ("/world/bodies/ok", "translations"), ("/curves/height/median", "scalars"), ("/curves/speed/all", ":values"),
         ("/curves/energy/median", "scalars"), ("/members/floor", "scalars"),
@@ -356,7 +356,7 @@ def test_a_stored_run_is_recorded_in_pieces_as_one_in_memory(mixed, tmp_path, mo
         assert len(first) == 21
         for t in first:
             np.testing.assert_array_equal(np.array(first[t]), np.array(second[t]))
-    assert [entry_of(lw.log_rerun(stored, tmp_path / "2.rrd")).recording_id] == [entry_of(paths[1]).recording_id]
+    assert [entry_of(lw.record(stored, tmp_path / "2.rrd")).recording_id] == [entry_of(paths[1]).recording_id]
 
 
 def test_statistics_of_all_make_the_fan_where_few_members_were_kept(mixed):
@@ -386,7 +386,7 @@ def text_of(path, entity):
 
 
 def test_a_recording_says_what_became_of_the_members(mixed, tmp_path):
-    path = lw.log_rerun(mixed, tmp_path / "fleet.rrd")
+    path = lw.record(mixed, tmp_path / "fleet.rrd")
     counts = ", ".join(f"{name} {number}" for name, number in mixed.status.counts().items())
     assert f"| outcome | {counts} |" in text_of(path, "/run/summary")
     said = text_of(path, "/log")

@@ -16,7 +16,7 @@ from lgvi_warp.calls import predict, prepared
 from lgvi_warp.calls.prepared import FailedMembers
 from lgvi_warp.engine import plan as plans
 from lgvi_warp.engine.packets import Packets
-from lgvi_warp.engine.shared import Shared
+from lgvi_warp.engine.shared import SharedResultsCache
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene import ensemble as ensembles
@@ -300,7 +300,7 @@ def test_what_is_shared_changes_no_bit(vehicle, paper):
         plan = make_plan(fleet, method, h=0.01, t1=0.01, width=width)
         alone = arrays(Packets(plan, fleet.select(0, 6)))
         everything = {*scene.parameters(), *fleet.varied_names, "frame", "axes", "members", "seed"}
-        plan = dataclasses.replace(plan, shared=Shared(everything))
+        plan = dataclasses.replace(plan, shared=SharedResultsCache(everything))
         assert alone == arrays(Packets(plan, fleet.select(0, 6))), name
 
 

@@ -32,7 +32,7 @@ SECONDS = 60.0
 # The command, whose progress says every step.
 DRIVER = """
 import os, sys
-from lgvi_warp_command import entry
+from lgvi_warp.__main__ import entry
 if "quick" in os.environ.get("TEST_PROGRESS", ""):
     from lgvi_warp.cli import progress
     class Quick(progress.Progress):
@@ -165,7 +165,7 @@ def test_other_verbs_end_in_a_line(verb, tmp_path):
     "seconds", [0.25, *(pytest.param(seconds, marks=pytest.mark.slow) for seconds in (0.5, 0.75, 1.0, 1.5))]
 )
 def test_a_signal_while_libraries_are_imported(seconds, tmp_path):
-    code = "import sys; print('up', flush=True)\nfrom lgvi_warp_command import entry; entry()"
+    code = "import sys; print('up', flush=True)\nfrom lgvi_warp.__main__ import entry; entry()"
     with begun([*LONG, "--out", str(tmp_path)], code) as process:
         assert process.stdout.readline() == "up\n"
         time.sleep(seconds)
@@ -436,7 +436,7 @@ def plot(*given):
 plots.plot = plot
 from lgvi_warp.cli import runs
 runs.rescued = lambda *given: print("saving", flush=True) or time.sleep(60.0)
-from lgvi_warp_command import entry
+from lgvi_warp.__main__ import entry
 entry()
 """
 

@@ -33,7 +33,7 @@ EVERY = [
     lw.PathRange("position"),
     lw.PathTime("depth", above=-0.5, below=0.5), lw.PathTime("depth", above=0.25, then=[lw.Exceedance(above=0.3)]),
     lw.Outcome("failed"), lw.EndTime("failed"), lw.Mean("depth", at="failed"),
-    lw.Each("depth"),
+    lw.MemberValues("depth"),
 ]  # fmt: skip
 
 
@@ -207,7 +207,7 @@ def test_intervals_of_dependent_members_are_said_to_be(scene, whole, sampling, w
         scene, 16, 1, {"start.position[0]": lw.Normal(std=1.0), "vehicle.mass": lw.Normal(std=1.0)}, sampling
     )
     apart = Gathered(np.zeros(1), 1003, EVERY).apart
-    (text,) = observation.notes(whole.statistics, sampled.to_dict(), np.zeros(1003, np.uint8), apart) or ("",)
+    (text,) = observation.messages_about(whole.statistics, sampled.to_dict(), np.zeros(1003, np.uint8), apart) or ("",)
     assert words in text
     assert bool(text) == bool(words)
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import lgvi_warp as lw
 from lgvi_warp.reference.control import Measurement, Reference, pose_errors
-from lgvi_warp.studies.linear.bench import Bench, plant
+from lgvi_warp.studies.linear.bench import MotionBench, plant
 from tests.laws import test_remus_100 as equations
 
 MASS, INERTIA, GRAVITY, PERIOD, LAG = 20.0, np.array((5.0, 8.0, 11.0)), 10.0, 0.1, 0.3
@@ -63,7 +63,7 @@ def test_a_run_from_a_trim_stays_there():
     assert found.free == tuple(f"control_wrench[{i}]" for i in range(6))
     assert found.fixed["pitch"] == 0.1
     scene = dataclasses.replace(hover(), start=found.start)
-    bench = Bench(lw.Ensemble(plant(scene, 10.0), 1), "psi_s", 0.02, 20.0, 10.0)
+    bench = MotionBench(lw.Ensemble(plant(scene, 10.0), 1), "psi_s", 0.02, 20.0, 10.0)
     motion = bench.start(np.zeros(1, int))
     motion.memory[""][0, :6] = motion.memory["control_wrench"][0] = found.commands["control_wrench"]
     after = bench.run(np.zeros(1, int), motion, 500, 1000)
@@ -190,7 +190,7 @@ def regulator():
 
 def test_a_regulator_in_the_loop(regulator):
     closed = lw.linearize(regulated(regulator.law()), 1.0, closed=True, method="psi_s", h=0.02)
-    # Commands are states of the loop after a look; they add poles at 0.
+    # Commands are states of the loop after a tick; they add poles at 0.
     expected = np.concatenate([regulator.poles, np.zeros(len(closed.poles) - 12)])
     apart = np.abs(closed.poles[:, None] - expected)
     assert apart.min(axis=0).max() < 1e-6
@@ -218,7 +218,7 @@ def test_the_law_of_a_moving_vehicle_has_the_gains_of_the_model(regulator):
 
 
 def cost(result, start=0):
-    """The sum over looks of x^T Q x + u^T R u of each member."""
+    """The sum over ticks of x^T Q x + u^T R u of each member."""
     skew = [result.attitude[:, :, i, j] - result.attitude[:, :, j, i] for i, j in ((2, 1), (0, 2), (1, 0))]
     x = np.concatenate([result.position, 0.5 * np.stack(skew, -1), result.velocity, result.angular_velocity], axis=-1)
     return (x**2 @ WEIGHTS[0] + result.command**2 @ WEIGHTS[1]).sum(axis=0)

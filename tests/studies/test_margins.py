@@ -185,7 +185,7 @@ def test_edges_beside_known_ones():
 
 @pytest.mark.parametrize(("words", "message"), [
     ({"loop": "heding_pid"}, "did you mean 'heading_pid'"), ({"of": "phase"}, "of = 'phase'"),
-    ({"by": "guess"}, "by = 'guess'"), ({"seconds": 0.0}, "seconds"), ({"seconds": 1.0}, "is less than 30 looks"),
+    ({"by": "guess"}, "by = 'guess'"), ({"seconds": 0.0}, "seconds"), ({"seconds": 1.0}, "is less than 30 ticks"),
 ])  # fmt: skip
 def test_bad_arguments(words, message):
     with pytest.raises(lw.SceneError, match=message):
@@ -195,7 +195,7 @@ def test_bad_arguments(words, message):
 def test_what_is_no_scene():
     for ask, words in (
         (lw.trim, {}), (lw.linearize, {}), (lw.margins, {}), (lw.worst_case, {"within": {}, "of": "depth"}),
-        (lw.tune, {"over": {}, "minimise": "depth"}),
+        (lw.tune_gains, {"over": {}, "minimise": "depth"}),
     ):  # fmt: skip
         with pytest.raises(lw.SceneError, match="is neither"):
             ask("scene.toml", **words)

@@ -8,7 +8,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.studies.search.box import Box, search
+from lgvi_warp.studies.search.box import SearchBox, search
 from lgvi_warp.studies.search.risk import risk_of
 from tests.studies.test_linear import PERIOD, cost, regulated, regulator  # noqa: F401  (a fixture)
 
@@ -56,16 +56,16 @@ def test_infinite_costs_do_not_stop_a_search():
 
 
 def test_bounds():
-    box = Box.of("over", {"vehicle.mass": (10.0, 20.0), "start.position[2]": (1.0, 100.0, "log")}, regulated())
+    box = SearchBox.of("over", {"vehicle.mass": (10.0, 20.0), "start.position[2]": (1.0, 100.0, "log")}, regulated())
     np.testing.assert_allclose(box.values(np.array([[0.0, 0.5], [1.0, 1.0]])), [[10.0, 10.0], [20.0, 100.0]])
     assert box.values(np.ones((1, 2))).tolist() == [[20.0, 100.0]]
     bad = {"vehicle.mas": (1.0, 2.0), "vehicle.buoyancy": (2.0, 1.0), "vehicle.mass": (0.0, 1.0, "log"), "x": 3}
     with pytest.raises(lw.SceneError) as caught:
-        Box.of("within", bad, regulated())
+        SearchBox.of("within", bad, regulated())
     for part in ("vehicle.mas", "does not rise", "has no logarithm", '"x"'):
         assert part in str(caught.value)
     with pytest.raises(lw.SceneError, match="maps no names to bounds"):
-        Box.of("within", [], regulated())
+        SearchBox.of("within", [], regulated())
 
 
 def test_risks():
@@ -128,7 +128,7 @@ def test_bad_worst_cases(words, message):
 
 
 def costs(result):
-    """The sum over looks of what a regulator makes least."""
+    """The sum over ticks of what a regulator makes least."""
     return cost(result)
 
 
@@ -141,7 +141,7 @@ STARTS = {"start.position[2]": lw.Normal(std=1.0), "start.velocity[2]": lw.Norma
 def test_tuned_gains_are_those_of_the_regulator(regulator, risk):  # noqa: F811
     """The regulator's gains are the best from every start, so whatever the risk is."""
     fleet = lw.Ensemble(regulated(), 12, 3, STARTS)
-    found = lw.tune(fleet, OVER, costs, risk=risk, budget=12 * 700, fresh=24, save=SAVE, **RUN)
+    found = lw.tune_gains(fleet, OVER, costs, risk=risk, budget=12 * 700, fresh=24, save=SAVE, **RUN)
     best = regulator.K[2, [2, 8]]
     # From a start x the least sum is x^T P x; of the end at 20 s e^-9 is left, squared.
     start = fleet.select(0, 12)
@@ -163,7 +163,7 @@ def test_tuned_gains_are_those_of_the_regulator(regulator, risk):  # noqa: F811
 
 def test_what_is_told_of_fresh_members():
     fleet = lw.Ensemble(regulated(), 4, 3, STARTS)
-    found = lw.tune(fleet, OVER, costs, risk=0.75, budget=4 * 16, fresh=8, save=SAVE, **RUN)
+    found = lw.tune_gains(fleet, OVER, costs, risk=0.75, budget=4 * 16, fresh=8, save=SAVE, **RUN)
     K = np.zeros((6, 12))
     for place, risk in (([0.0, 0.0], found.fresh_before), (list(found.parameters.values()), found.fresh_cost)):
         K[2, [2, 8]] = place
@@ -181,7 +181,7 @@ def test_what_cannot_be_tuned():
         ({"fresh": -1}, "is no number of members"),
     ):
         with pytest.raises(lw.SceneError, match=message):
-            lw.tune(fleet, **{"over": OVER, "minimise": "depth", **words}, **RUN)
+            lw.tune_gains(fleet, **{"over": OVER, "minimise": "depth", **words}, **RUN)
 
 
 def test_indices_of_members_are_whole_numbers():
@@ -207,13 +207,13 @@ def test_candidates_meet_the_noise_of_the_members():
 
 @pytest.mark.slow
 def test_searches_by_metrics_of_a_loop():
-    """What is searched for is the metric of a run, at every look; a loop that never settles is infinitely bad."""
+    """What is searched for is the metric of a run, at every tick; a loop that never settles is infinitely bad."""
     fleet = lw.Ensemble(regulated(), 4, 3, STARTS)
-    tuned = lw.tune(fleet, OVER, "iae depth", risk=lw.CVaR(0.5), budget=4 * 32, fresh=8, **RUN)
+    tuned = lw.tune_gains(fleet, OVER, "iae depth", risk=lw.CVaR(0.5), budget=4 * 32, fresh=8, **RUN)
     K = np.zeros((6, 12))
     K[2, [2, 8]] = list(tuned.parameters.values())
     wanted = dataclasses.replace(regulated(lw.StateFeedback(K=K)))
-    iae = lw.IAE("depth", then=[lw.Each()])
+    iae = lw.IAE("depth", then=[lw.MemberValues()])
     for members, seed, risk in ((4, 3, tuned.cost), (8, 4, tuned.fresh_cost)):
         result = lw.solve(lw.Ensemble(wanted, members, seed, STARTS), "psi_s", h=PERIOD, t1=20.0, statistics=[iae])
         each = result.statistics["each iae depth"].value[0]

@@ -95,7 +95,7 @@ def test_members_are_the_same_in_all_cells_bit_by_bit(found, scene):
     for name in ("start.position[0]", "vehicle.mass"):
         assert all(values[name].tobytes() == inputs[0][name].tobytes() for values in inputs)
     assert [cell.fixed for cell in cells] == [(), (), ("heading_pid.kp",), ("heading_pid.kp",)]
-    # What the compass shows at the first look, before the loop has acted, has the same noise in every case.
+    # What the compass shows at the first tick, before the loop has acted, has the same noise in every case.
     save = lw.SaveAt(every=4.0, fields=("attitude", "measured_heading"))
     first = [found.again(cell.case.name, [0, 7, 299], cell.point, save).measured_heading[0] for cell in cells]
     assert all(heading.tobytes() == first[0].tobytes() for heading in first)

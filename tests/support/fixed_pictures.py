@@ -195,7 +195,7 @@ def picture(name):
 
 def recording(name, folder):
     """What one recording shows."""
-    return of_recording(lw.log_rerun(RECORDINGS[name](), Path(folder) / "fleet.rrd"))
+    return of_recording(lw.record(RECORDINGS[name](), Path(folder) / "fleet.rrd"))
 
 
 def estimated(statistic, result):

@@ -16,7 +16,7 @@ Array = np.ndarray
 GRAVITY, DENSITY = 9.81, 1026.0
 LENGTH, DIAMETER = 1.6, 0.19
 CENTER = np.array([0.0, 0.0, 0.02])  # of gravity
-SAMPLE = 0.02  # s: its step, and the time between two looks of its autopilots
+SAMPLE = 0.02  # s: its step, and the time between two ticks of its autopilots
 
 
 def hat(a: Array) -> Array:
@@ -255,15 +255,15 @@ def simulate(depth: float, heading: float, time: float, sea: Sea, choices: Choic
         time, sea, choices: how long [s], in which current, how.
 
     Returns:
-        Positions (k, 3) [m] and angles (k, 3) [rad] at the looks and at the end.
+        Positions (k, 3) [m] and angles (k, 3) [rad] at the ticks and at the end.
     """
     pilots = Autopilots(depth, heading, choices.model)
     step = {"euler": euler_step, "rk4": rk4_step}[choices.method]
-    state, looks = [np.zeros(3), np.zeros(3), np.zeros(6), np.zeros(3)], []
+    state, ticks = [np.zeros(3), np.zeros(3), np.zeros(6), np.zeros(3)], []
     for _ in range(round(time / SAMPLE)):
-        looks.append(state[:2])
+        ticks.append(state[:2])
         commands = np.array([*pilots.look(*state[:3]), REVOLUTIONS])
         for _ in range(choices.parts):
             state = step(state, commands, sea, choices.level, SAMPLE / choices.parts)
-    looks.append(state[:2])
-    return np.array([x[0] for x in looks]), np.array([x[1] for x in looks])
+    ticks.append(state[:2])
+    return np.array([x[0] for x in ticks]), np.array([x[1] for x in ticks])

@@ -318,7 +318,7 @@ CALM, CURRENT = remus.Sea(), remus.Sea(0.5, np.radians(170.0))
 
 
 def ours(sea: remus.Sea, method: str = "rk8", parts: int = 1, time: float = TIME) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (k, 3) [m] and headings (k,) [rad] of the package's loop at the looks and at the end; parts: of a period."""
+    """Positions (k, 3) [m] and headings (k,) [rad] of the package's loop at the ticks and at the end; parts: of a period."""
     save = lw.SaveAt(every=remus.SAMPLE)
     result = lw.solve(scene(**WANTED, sea=sea), method, h=remus.SAMPLE / parts, t1=time, save=save)
     assert result.status.counts() == {"ok": 1}

@@ -90,7 +90,7 @@ def twin_loop(scene, numbers, every, h):
 
 
 def twin_states(scene, numbers, state, every, h, steps, method="psi_s"):
-    """Positions (k, 3) and attitudes (k, 3, 3) of one member at its looks.
+    """Positions (k, 3) and attitudes (k, 3, 3) of one member at its ticks.
 
     state: position, attitude, velocity, angular velocity at the start.
     """

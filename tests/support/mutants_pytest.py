@@ -40,7 +40,7 @@ def start_coverage(context=None):
 
     import coverage
 
-    files = [f"{ROOT}/lgvi_warp/*", f"{ROOT}/lgvi_warp_command/*", f"{ROOT}/kernels/*"]
+    files = [f"{ROOT}/lgvi_warp/*", f"{ROOT}/kernels/*"]
     data_file = str(Path(os.environ["MUTANTS_RECORD"]) / "coverage")
     measured = coverage.Coverage(data_file, data_suffix=True, include=files, context=context, config_file=False)
     measured.start()

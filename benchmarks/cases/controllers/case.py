@@ -16,7 +16,7 @@ POSE = dict(kp=(40.0, 40.0, 60.0), ki=(4.0, 4.0, 6.0), kd=(60.0, 60.0, 80.0), kr
 
 
 def remus(every, **more):
-    """REMUS 100 with the autopilot of depth and heading; every: steps between looks, 0 for none."""
+    """REMUS 100 with the autopilot of depth and heading; every: steps between ticks, 0 for none."""
     controller = None
     if every:
         controller = lw.Controller(
@@ -113,7 +113,7 @@ def callback(quick):
 
 
 def metrics(quick):
-    """Whole runs that gather metrics at every look, ten steps a look, beside the same runs that gather nothing."""
+    """Whole runs that gather metrics at every tick, ten steps a tick, beside the same runs that gather nothing."""
     members, t1 = (256, 5.0) if quick else (4096, 30.0)
     fleet = lw.Ensemble(remus(10), members, 1, {"start.angular_velocity": lw.Normal(std=0.02)})
     depth = [lw.Overshoot("depth"), lw.SettlingTime("depth", within=0.5)]

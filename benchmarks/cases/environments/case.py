@@ -68,8 +68,8 @@ def environments(members, steps, rounds):
             "to_a_run_of_the_same_loop": round(taken / fused, 2)}  # fmt: skip
 
 
-def looks(members, steps, rounds):
-    """What an exchange with the host takes beside the launches: answers written, looks read."""
+def ticks(members, steps, rounds):
+    """What an exchange with the host takes beside the launches: answers written, ticks read."""
     fleet = lw.Ensemble(scene(lw.Callback(heading), lw.HeadingPID(**GAINS)), members, 1, VARY)
     plan = make_plan(fleet, "psi_x", STEP, STEP * EVERY * steps * (2 * rounds + 2), lw.SaveAt(fields=("position",)))
     plan.compile()
@@ -108,7 +108,7 @@ def run(quick):
         record = environments(members, steps, rounds)
         ours = max(ours, record["environment_steps_per_s"])
         yield record
-        yield looks(members, steps, rounds)
+        yield ticks(members, steps, rounds)
     for members, every in ((256, EVERY),) if quick else ((256, EVERY), (1024, EVERY), (4096, EVERY), (4096, 1)):
         yield exchange(members, every, steps * EVERY if members > 1024 else steps * EVERY * 4, rounds)
     yield from others.measure(quick, ours)

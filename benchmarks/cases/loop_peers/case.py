@@ -46,8 +46,8 @@ def differences(ends):
 
 
 def run(quick):
-    members, looks, rounds = (1024, 20, 2) if quick else (4096, 50, 7)
-    problem = Problem(members, looks)
+    members, ticks, rounds = (1024, 20, 2) if quick else (4096, 50, 7)
+    problem = Problem(members, ticks)
     ways, missing = make_ways(problem)
     apart = differences(ends_of(ways))
     for name, package in missing.items():
@@ -63,8 +63,8 @@ def run(quick):
         yield {
             "way": name,
             "members": members,
-            "seconds": problem.h * problem.every * looks,
-            "ns_per_vehicle_step": round(1e9 * seconds / (members * looks * problem.every), 1),
+            "seconds": problem.h * problem.every * ticks,
+            "ns_per_vehicle_step": round(1e9 * seconds / (members * ticks * problem.every), 1),
             "over_lanes": round(seconds / times[0], 2),
             "ends_within": float(f"{apart[name]:.1g}"),
         }

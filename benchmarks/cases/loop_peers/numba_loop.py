@@ -85,7 +85,7 @@ def moved(y, h, k):
     return plus(b, along(h, k[0])), q, plus(nu, along(h, k[2])), plus(Om, along(h, k[3]))
 
 
-def make_advance(numbers, h, every, looks):
+def make_advance(numbers, h, every, ticks):
     """(b, q, nu, Om, kp, kr, net, d), each (n, ...), to the end, in place; numbers that all members share are constants."""
     three = {name: tuple(float(x) for x in value) for name, value in numbers.items() if np.shape(value) == (3,)}
     ki, kd, ki_r, kw, goal, M, J, d0 = (three[name] for name in ("ki", "kd", "ki_r", "kw", "goal", "M", "J", "d0"))
@@ -125,7 +125,7 @@ def make_advance(numbers, h, every, looks):
             d = ds[i, 0], ds[i, 1], ds[i, 2]
             y, zero = (b, q, nu, Om), (0.0, 0.0, 0.0)
             total, total_R, e, e_R = zero, zero, zero, zero
-            for _ in range(looks):
+            for _ in range(ticks):
                 b, q, nu, Om = y
                 size = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
                 q = q[0] * size, q[1] * size, q[2] * size, q[3] * size
@@ -163,7 +163,7 @@ def make(problem):
     starts = numbers["b"], notation.quaternion_from_matrix(numbers["R"]), numbers["nu"], numbers["Om"]
     states = [np.array(x, order="C") for x in starts]
     varied = [np.ascontiguousarray(numbers[name]) for name in ("kp", "kr", "net", "d")]
-    compiled = make_advance(numbers, problem.h, problem.every, problem.looks)
+    compiled = make_advance(numbers, problem.h, problem.every, problem.ticks)
 
     def begin():
         for state, start in zip(states, starts, strict=True):

@@ -28,7 +28,7 @@ class Block:
     def __init__(self, problem, members):
         """members: a slice of them."""
         numbers, n = problem.numbers, members.stop - members.start
-        self.h, self.every, self.looks = problem.h, problem.every, problem.looks
+        self.h, self.every, self.ticks = problem.h, problem.every, problem.ticks
         R = numbers["R"][members].transpose(2, 1, 0).reshape(9, n)
         self.start = np.concatenate([numbers["b"][members].T, R, numbers["nu"][members].T, numbers["Om"][members].T])
         self.net = np.ascontiguousarray(numbers["net"][members])
@@ -123,7 +123,7 @@ class Block:
         self.y, self.sum = self.sum, self.y
 
     def look(self):
-        """Set the wrench that is held until the next look."""
+        """Set the wrench that is held until the next tick."""
         y, error, integral, six, moved = self.y, self.error, self.integral, self.six, self.moved
         c, period = y[COLUMNS].reshape(3, 3, -1), self.every * self.h
         np.multiply(error, period, out=six)
@@ -158,8 +158,8 @@ class Block:
         np.subtract(six[:3], torque, out=torque)
 
     def advance(self):
-        """All looks and steps."""
-        for _ in range(self.looks):
+        """All ticks and steps."""
+        for _ in range(self.ticks):
             self.look()
             for _ in range(self.every):
                 self.step()

@@ -2,13 +2,13 @@
 """The closed loop that each way computes: a vehicle in water that goes to a place and stays there, by a geometric PID.
 
 M nu' = M nu x Om + net z - D(nu) + f,  J Om' = J Om x Om + M nu x nu - d x z - D(Om) + tau,  b' = R nu,  R' = R hat(Om),
-with z = R^T e3, D(v) = (l + q |v|) v along each axis, d = buoyancy x its lever; by rk4. Every so many steps a look sets f and
+with z = R^T e3, D(v) = (l + q |v|) v along each axis, d = buoyancy x its lever; by rk4. Every so many steps a tick sets f and
 tau, which are held until the next one:
 
 f = R^T (kp e + ki I) - kd nu - net0 z,  tau = -kr e_R - ki_r I_R - kw Om + d0 x z,
 
 e = b_d - b, e_R = sum over inertial axes i of (R_i x R_d,i) / 2; net0, d0 are those of the nominal vehicle. Then the
-integrals are those of the errors of the looks before, and each of their numbers stays within a limit. Members differ in
+integrals are those of the errors of the ticks before, and each of their numbers stays within a limit. Members differ in
 their start, their buoyancy and the gains kp and kr.
 """
 
@@ -54,10 +54,10 @@ class Way(NamedTuple):
 
 @dataclass(frozen=True)
 class Problem:
-    """How many members, looks, steps between looks, and the step [s]."""
+    """How many members, ticks, steps between ticks, and the step [s]."""
 
     members: int
-    looks: int
+    ticks: int
     every: int = EVERY
     h: float = STEP
 
@@ -110,7 +110,7 @@ class Problem:
 
 def make_lanes(problem: Problem) -> Way:
     """Ours: law and steps in one kernel, a vehicle a lane."""
-    steps = problem.looks * problem.every
+    steps = problem.ticks * problem.every
     save = lw.SaveAt(fields=("position", "attitude"))
     plan = make_plan(problem.fleet, "rk4", h=problem.h, t1=problem.h * steps, save=save)
     plan.compile()

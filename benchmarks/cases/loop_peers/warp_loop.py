@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The loop as an ordinary Warp kernel, one vehicle a thread, as a competent Warp user would write it.
 
-wp.vec3d and wp.quatd throughout, the loop over looks and steps within the kernel, Warp's default module options.
+wp.vec3d and wp.quatd throughout, the loop over ticks and steps within the kernel, Warp's default module options.
 """
 
 import numpy as np
@@ -94,7 +94,7 @@ def loop(
     c: Shared,
     h: wp.float64,
     every: int,
-    looks: int,
+    ticks: int,
 ):
     i = wp.tid()
     kp, kr, net, d = kps[i], krs[i], nets[i], ds[i]
@@ -106,7 +106,7 @@ def loop(
     total, total_R, e, e_R = wp.vec3d(), wp.vec3d(), wp.vec3d(), wp.vec3d()
     half, period = wp.float64(0.5) * h, h * wp.float64(every)
     sixth, third = h / wp.float64(6.0), h / wp.float64(3.0)
-    for _ in range(looks):
+    for _ in range(ticks):
         y.q = wp.normalize(y.q)
         total = within(total + period * e, wp.float64(wp.static(LIMIT)))
         total_R = within(total_R + period * e_R, wp.float64(wp.static(LIMIT_R)))
@@ -152,7 +152,7 @@ def make(problem):
     states = [wp.clone(x) for x in starts]
     varied = [array(numbers["kp"], wp.vec3d), array(numbers["kr"], wp.vec3d)]
     varied += [array(numbers["net"], wp.float64), array(numbers["d"], wp.vec3d)]
-    inputs = [*states, *varied, c, wp.float64(problem.h), problem.every, problem.looks]
+    inputs = [*states, *varied, c, wp.float64(problem.h), problem.every, problem.ticks]
     launch = wp.launch(loop, problem.members, inputs=inputs, device="cpu", record_cmd=True)
 
     def begin():

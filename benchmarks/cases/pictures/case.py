@@ -40,10 +40,10 @@ def recording_cost(members, times, folder):
     import lgvi_warp as lw
 
     with tempfile.TemporaryDirectory() as out:
-        lw.log_rerun(solved(10, 5, None), Path(out) / "warm.rrd")
+        lw.record(solved(10, 5, None), Path(out) / "warm.rrd")
         result = lw.open_run(folder) if folder else solved(members, times, None)
         begun = time.process_time()
-        path = lw.log_rerun(result, Path(out) / "fleet.rrd")
+        path = lw.record(result, Path(out) / "fleet.rrd")
         return time.process_time() - begun, path.stat().st_size / 1e6, peak_memory() / 2**30
 
 

@@ -23,7 +23,7 @@ from lgvi_warp.engine.block import blocks
 from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.keepers.observation import Observation, Observing
 from lgvi_warp.engine.loop import RunProgress, run_blocks
-from lgvi_warp.engine.outcome import Outcome
+from lgvi_warp.engine.outcome import MemberStatus
 from lgvi_warp.engine.work import Work
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.provenance import messages, provenance
@@ -82,7 +82,7 @@ def into_store(plan, folder, threads, samples):
         for first in range(0, k, 10):
             when = slice(first, min(first + 10, k))
             writer.take(when, {name: values[when, : block.count] for name, values in samples.items()})
-        block_files.finish(block, writer.close(Outcome.clear(block.count)), (), ())
+        block_files.finish(block, writer.close(MemberStatus.clear(block.count)), (), ())
 
     start = time.perf_counter()
     with block_files.commits, ThreadPoolExecutor(threads) as pool:

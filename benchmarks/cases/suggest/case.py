@@ -75,7 +75,7 @@ def times_best(ensemble, settings, best):
 
 
 def run(quick):
-    for vehicle in ("sphere",) if quick else lw.vehicles():
+    for vehicle in ("sphere",) if quick else lw.vehicle_names():
         ensemble = fleet(vehicle)
         for error in ERRORS[:1] if quick else ERRORS:
             with tempfile.TemporaryDirectory() as cache:

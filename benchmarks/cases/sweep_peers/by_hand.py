@@ -9,13 +9,13 @@ QUADRATIC = np.array([30.0, 80.0, 80.0, 1.0, 2.0, 2.0])
 LIMIT = np.array([80.0, 80.0, 80.0, 5.0, 5.0, 5.0])
 GOAL, HEADING = np.array([2.0, -1.0, 5.0]), 0.5
 GAINS = {"soft": dict(kp=20.0, kd=40.0, kr=4.0, kw=2.0), "stiff": dict(kp=60.0, kd=40.0, kr=12.0, kw=2.0)}
-STEP, EVERY, LOOKS, DELAYS = 0.01, 10, 300, (0.0, 0.2)
+STEP, EVERY, TICKS, DELAYS = 0.01, 10, 300, (0.0, 0.2)
 PERIOD = EVERY * STEP
 CELLS = [(case, delay) for case in GAINS for delay in DELAYS]
 
 
 def metrics_of(place, attitude, command):
-    """Metrics of members (n,) by name from their looks: place (k, 3, n), R (k, 3, 3, n), command (k - 1, 6, n)."""
+    """Metrics of members (n,) by name from their ticks: place (k, 3, n), R (k, 3, 3, n), command (k - 1, 6, n)."""
     beyond = place[:, 2] - GOAL[2]
     outside = np.abs(beyond) > 0.1
     last = len(outside) - 1 - np.argmax(outside[::-1], axis=0)
@@ -28,7 +28,7 @@ def metrics_of(place, attitude, command):
         "overshoot depth": np.maximum(0.0, beyond.max(axis=0)),
         "settling_time depth": np.where(outside[-1], np.inf, settled),
         "iae position": np.trapezoid(away, dx=PERIOD, axis=0),
-        "rms attitude": np.sqrt(np.trapezoid(angle**2, dx=PERIOD, axis=0) / (LOOKS * PERIOD)),
+        "rms attitude": np.sqrt(np.trapezoid(angle**2, dx=PERIOD, axis=0) / (TICKS * PERIOD)),
         "saturation_share": (np.abs(command) >= LIMIT[:, None]).any(axis=1).mean(axis=0),
     }
 

@@ -90,14 +90,14 @@ def disagreements(apart, order):
     """The metrics that differ by more than the methods err.
 
     A method of order p errs by 2^p / (2^p - 1) of what half its step changes; of rk4 both programs err, in numbers of their
-    own for the attitude. Looks are 0.1 s apart: a band or a limit may be met one look earlier or later.
+    own for the attitude. Ticks are 0.1 s apart: a band or a limit may be met one tick earlier or later.
     """
-    of_looks = {"settling_time depth": 0.101, "saturation_share": 1.01 / 300.0}
+    of_ticks = {"settling_time depth": 0.101, "saturation_share": 1.01 / 300.0}
     # A quarter more for what higher orders leave; the errors of two programs that step by rk4.
     error = 1.25 * 2.0**order / (2.0**order - 1.0) * (2.0 if order == 4 else 1.0)
 
     def most(name, change):
-        return error * change + of_looks.get(name, 0.0) + 1e-9
+        return error * change + of_ticks.get(name, 0.0) + 1e-9
 
     return [name for name, (difference, change) in apart.items() if difference > most(name, change)]
 

@@ -47,7 +47,7 @@ def rates(state, wrench, buoyancy, current, out):
 
 
 def law(state, current, gains):
-    """The command (6, n) of a look."""
+    """The command (6, n) of a tick."""
     R = rotation(state[3:7])
     c, s = np.cos(by_hand.HEADING), np.sin(by_hand.HEADING)
     wanted = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -63,12 +63,12 @@ def run(buoyancy, current, gains, delay, parts):
     n, late, h = len(buoyancy), round(delay / by_hand.PERIOD), by_hand.STEP / parts
     state, k1, k2, k3, k4 = (np.zeros((13, n)) for _ in range(5))
     state[3], state[7:10] = 1.0, -current
-    place, attitude = np.empty((by_hand.LOOKS + 1, 3, n)), np.empty((by_hand.LOOKS + 1, 3, 3, n))
-    command = np.empty((by_hand.LOOKS, 6, n))
-    for look in range(by_hand.LOOKS):
-        place[look] = state[:3]
-        command[look], attitude[look] = law(state, current, gains)
-        wrench = command[look - late] if look >= late else np.zeros((6, n))
+    place, attitude = np.empty((by_hand.TICKS + 1, 3, n)), np.empty((by_hand.TICKS + 1, 3, 3, n))
+    command = np.empty((by_hand.TICKS, 6, n))
+    for tick in range(by_hand.TICKS):
+        place[tick] = state[:3]
+        command[tick], attitude[tick] = law(state, current, gains)
+        wrench = command[tick - late] if tick >= late else np.zeros((6, n))
         for _ in range(by_hand.EVERY * parts):
             rates(state, wrench, buoyancy, current, k1)
             rates(state + 0.5 * h * k1, wrench, buoyancy, current, k2)
@@ -76,7 +76,7 @@ def run(buoyancy, current, gains, delay, parts):
             rates(state + h * k3, wrench, buoyancy, current, k4)
             state += h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
             state[3:7] /= np.sqrt((state[3:7] ** 2).sum(axis=0))
-    place[by_hand.LOOKS], attitude[by_hand.LOOKS] = state[:3], rotation(state[3:7])
+    place[by_hand.TICKS], attitude[by_hand.TICKS] = state[:3], rotation(state[3:7])
     return by_hand.metrics_of(place, attitude, command)
 
 

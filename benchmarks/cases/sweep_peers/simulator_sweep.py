@@ -10,7 +10,7 @@ TURN = np.array([1.0, -1.0, -1.0])  # of its axes to ours, in the world and in t
 
 
 def law(state, R, gains):
-    """The command (6,) of a look, in our axes."""
+    """The command (6,) of a tick, in our axes."""
     c, s = np.cos(by_hand.HEADING), np.sin(by_hand.HEADING)
     wanted = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     error = 0.5 * np.cross(R, wanted).sum(axis=0)
@@ -30,12 +30,12 @@ def run(buoyancy, current, gains, delay, parts):
     numbers.current_world = TURN * current
     simulator = AUVDynamics(numbers, state)
     place, attitude, command = [], [], []
-    for look in range(by_hand.LOOKS + 1):
+    for tick in range(by_hand.TICKS + 1):
         place.append(TURN * state.p)
         attitude.append(TURN[:, None] * quat_to_rot(state.q) * TURN)
         command.append(law(state, attitude[-1], gains))
-        wrench = command[look - late] if look >= late else np.zeros(6)
-        for _ in range(by_hand.EVERY * parts if look < by_hand.LOOKS else 0):
+        wrench = command[tick - late] if tick >= late else np.zeros(6)
+        for _ in range(by_hand.EVERY * parts if tick < by_hand.TICKS else 0):
             simulator.step(by_hand.STEP / parts, TURN * wrench[:3], TURN * wrench[3:])
     return np.array(place), np.array(attitude), np.array(command[:-1])
 

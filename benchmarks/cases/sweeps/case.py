@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A sweep with metrics at every look beside the same closed-loop runs without any, and its memory by number of cases."""
+"""A sweep with metrics at every tick beside the same closed-loop runs without any, and its memory by number of cases."""
 
 import time
 

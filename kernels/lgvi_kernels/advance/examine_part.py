@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A kernel that evaluates one part of a controller alone, at looks that are given."""
+"""A kernel that evaluates one part of a controller alone, at ticks that are given."""
 
 import functools
 from typing import Any
@@ -8,20 +8,20 @@ import warp as wp
 
 from lgvi_kernels.advance.examine import Examine
 from lgvi_kernels.lanes.arithmetic import lane, vec3
-from lgvi_kernels.lanes.look import measurement_struct, reference_struct
+from lgvi_kernels.lanes.tick import measurement_struct, reference_struct
 from lgvi_kernels.lanes.packet import put
 from lgvi_kernels.lanes.state import wrench_struct
 from lgvi_kernels.maps.compose import params_of
 from lgvi_kernels.maps.in_turn import ROLES, in_turn
 
-# Vectors of a look in `looks[packet, column]`, three columns each; then the wanted speed, and the true position.
+# Vectors of a tick in `ticks[packet, column]`, three columns each; then the wanted speed, and the true position.
 MEASURED = ("position", "north", "east", "down", "velocity", "water_velocity", "angular_velocity")
 WANTED = ("position", "velocity", "north", "east", "down", "angular_velocity", "angular_acceleration")
 DEMANDED = ("force", "torque")
 SPEED = 3 * (len(MEASURED) + len(WANTED) + len(DEMANDED))
 TRUE_POSITION = SPEED + 1
-LOOK_FIELDS = TRUE_POSITION + 3
-# A look after the part: all but the true position.
+TICK_FIELDS = TRUE_POSITION + 3
+# A tick after the part: all but the true position.
 OUT_FIELDS = TRUE_POSITION
 
 
@@ -31,35 +31,35 @@ def three(rows: Any, i: int, at: int):
 
 
 @wp.func
-def measured_of(y: Any, looks: Any, i: int):
+def measured_of(y: Any, ticks: Any, i: int):
     """y with what is measured."""
-    y.position = three(looks, i, 0)
-    y.north = three(looks, i, 3)
-    y.east = three(looks, i, 6)
-    y.down = three(looks, i, 9)
-    y.velocity = three(looks, i, 12)
-    y.water_velocity = three(looks, i, 15)
-    y.angular_velocity = three(looks, i, 18)
-    y.b = three(looks, i, wp.static(TRUE_POSITION))
+    y.position = three(ticks, i, 0)
+    y.north = three(ticks, i, 3)
+    y.east = three(ticks, i, 6)
+    y.down = three(ticks, i, 9)
+    y.velocity = three(ticks, i, 12)
+    y.water_velocity = three(ticks, i, 15)
+    y.angular_velocity = three(ticks, i, 18)
+    y.b = three(ticks, i, wp.static(TRUE_POSITION))
     return y
 
 
 @wp.func
-def wanted_of(r: Any, looks: Any, i: int):
+def wanted_of(r: Any, ticks: Any, i: int):
     """r with what is wanted."""
-    r.position = three(looks, i, 21)
-    r.velocity = three(looks, i, 24)
-    r.north = three(looks, i, 27)
-    r.east = three(looks, i, 30)
-    r.down = three(looks, i, 33)
-    r.angular_velocity = three(looks, i, 36)
-    r.angular_acceleration = three(looks, i, 39)
-    r.speed = looks[i, wp.static(SPEED)]
+    r.position = three(ticks, i, 21)
+    r.velocity = three(ticks, i, 24)
+    r.north = three(ticks, i, 27)
+    r.east = three(ticks, i, 30)
+    r.down = three(ticks, i, 33)
+    r.angular_velocity = three(ticks, i, 36)
+    r.angular_acceleration = three(ticks, i, 39)
+    r.speed = ticks[i, wp.static(SPEED)]
     return r
 
 
 @wp.func
-def put_look(out: Any, i: int, y: Any, r: Any, w: Any):
+def put_tick(out: Any, i: int, y: Any, r: Any, w: Any):
     """Write what is measured, wanted and demanded after the part."""
     put(out, i, 0, y.position)
     put(out, i, 3, y.north)
@@ -96,9 +96,9 @@ def make_examine_part(module, numbers, width, real):
         # the part's numbers
         params: wp.array(dtype=Params),
         table: wp.array2d(dtype=Lane),
-        # what is measured, wanted and demanded before the part; number of the look, of its step, length of a step
-        looks: wp.array2d(dtype=Lane),
-        look: int,
+        # what is measured, wanted and demanded before the part; number of the tick, of its step, length of a step
+        ticks: wp.array2d(dtype=Lane),
+        tick: int,
         step: int,
         h: real,
         period: real,
@@ -109,22 +109,22 @@ def make_examine_part(module, numbers, width, real):
         # out
         out: wp.array2d(dtype=Lane),
     ):
-        i = wp.tid() % looks.shape[0]
+        i = wp.tid() % ticks.shape[0]
         p = params[i % params.shape[0]]
-        y = measured_of(Measurement(), looks, i)
+        y = measured_of(Measurement(), ticks, i)
         y.t = real(step) * h
         y.h = h
         y.period = period
         y.step = step
-        y.look = look
+        y.tick = tick
         y.table = table
         y.memory = memory
         y.packet = i
         y.entry = i % table.shape[0]
-        r = wanted_of(Reference(), looks, i)
+        r = wanted_of(Reference(), ticks, i)
         w = Wrench()
-        w.force = three(looks, i, 42)
-        w.torque = three(looks, i, 45)
+        w.force = three(ticks, i, 42)
+        w.torque = three(ticks, i, 45)
         if acts > 0:
             if wp.static(measure is not None):
                 y = measure(y, r, y, p)
@@ -136,6 +136,6 @@ def make_examine_part(module, numbers, width, real):
                 w = allocate(w, r, y, p)
             if wp.static(send is not None):
                 y = send(y, r, y, p)
-        put_look(out, i, y, r, w)
+        put_tick(out, i, y, r, w)
 
     return Examine(examine_part, Lane, Params)

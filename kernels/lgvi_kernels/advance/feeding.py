@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The look of a controller: from the state to the commands of its actuators.
+"""The tick of a controller: from the state to the commands of its actuators.
 
-Commands are rows of the memory that a look writes and that every step until the next one reads: so a hold of order zero is
+Commands are rows of the memory that a tick writes and that every step until the next one reads: so a hold of order zero is
 exact, whatever the method. The first rows of the memory are the bus of the controller (lgvi_warp/control/base.py).
 """
 
@@ -21,7 +21,7 @@ from lgvi_kernels.advance.noting import (
     wanted_of,
 )
 from lgvi_kernels.lanes.arithmetic import add, any_positive, cross, mul, neg, ones, positive, sub, vec3  # noqa: F401
-from lgvi_kernels.lanes.look import measurement_struct, reference_struct
+from lgvi_kernels.lanes.tick import measurement_struct, reference_struct
 from lgvi_kernels.lanes.matrix3 import apply
 from lgvi_kernels.lanes.state import wrench_struct
 from lgvi_kernels.lanes.sums import place
@@ -61,7 +61,7 @@ def make_feed(spec, types, method, at_step, opened):
 
     @wp.func(inline=False)
     def respond(x: State, c: Constants, monitor: Monitor, k: int, h: wp.float64):
-        """Control, allocate and send, with what the last look noted and the host's answer."""
+        """Control, allocate and send, with what the last tick noted and the host's answer."""
         y = measured_of(truth(x, c, monitor, k, h), c.memory, c.packet, monitor.bus + wp.static(MEASURED_ROW))
         r = wanted_of(Reference(), c.memory, c.packet, monitor.bus + wp.static(REFERENCE_ROW))
         alarm = acted(x.alarm, y, r, c, monitor)
@@ -111,7 +111,7 @@ def make_truth(spec, types, method):
         y.h = real(h)
         y.period = real(wp.float64(monitor.every) * h)
         y.step = k
-        y.look = k // monitor.every
+        y.tick = k // monitor.every
         y.table = c.table
         y.memory = c.memory
         y.packet = c.packet

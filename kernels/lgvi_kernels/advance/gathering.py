@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is gathered at a controller's looks, and the signals that samples write."""
+"""What is gathered at a controller's ticks, and the signals that samples write."""
 
 import functools
 from typing import Any
@@ -12,49 +12,49 @@ from lgvi_kernels.maps.submaps import look, rotate
 
 
 @wp.func
-def put_look(monitor: Any, start: int, j: int, i: int, v: Any):
+def put_tick(monitor: Any, start: int, j: int, i: int, v: Any):
     """Write those of numbers j to j + 2 of the motion that are gathered."""
     if monitor.columns[j] >= 0:
-        monitor.looks[start + monitor.columns[j], i] = v.x
+        monitor.ticks[start + monitor.columns[j], i] = v.x
     if monitor.columns[j + 1] >= 0:
-        monitor.looks[start + monitor.columns[j + 1], i] = v.y
+        monitor.ticks[start + monitor.columns[j + 1], i] = v.y
     if monitor.columns[j + 2] >= 0:
-        monitor.looks[start + monitor.columns[j + 2], i] = v.z
+        monitor.ticks[start + monitor.columns[j + 2], i] = v.z
 
 
 @wp.func(inline=False)
-def gather_signals(memory: Any, i: int, monitor: Any, look: int):
-    """Write the signals at a look behind its motion."""
+def gather_signals(memory: Any, i: int, monitor: Any, tick: int):
+    """Write the signals at a tick behind its motion."""
     count = monitor.signals.shape[0]
-    start = (look % monitor.slots + 1) * monitor.numbers - count
+    start = (tick % monitor.slots + 1) * monitor.numbers - count
     for j in range(count):
-        monitor.looks[start + j, i] = memory[i, monitor.signals[j]]
+        monitor.ticks[start + j, i] = memory[i, monitor.signals[j]]
 
 
 def make_gather_motion(compensated, moved):
-    """(y, x, c, monitor): write the motion at a look into the look's rows; moved: see make_truth."""
+    """(y, x, c, monitor): write the motion at a look into the tick's rows; moved: see make_truth."""
 
     @wp.func
     def gather_motion(y: Any, x: Any, c: Any, monitor: Any):
-        start = (y.look % monitor.slots) * monitor.numbers
-        put_look(monitor, start, 0, c.packet, y.position)
+        start = (y.tick % monitor.slots) * monitor.numbers
+        put_tick(monitor, start, 0, c.packet, y.position)
         if wp.static(compensated):
             low = (x.b - y.position) + x.b_low
             if wp.static(moved):
                 low = low + rotate(x, c.inertia.user_origin)
             # A pair of sums is gathered whole, three numbers and three more.
-            put_look(monitor, start + 3, 0, c.packet, low)
-        put_look(monitor, start, 3, c.packet, y.north)
-        put_look(monitor, start, 6, c.packet, y.east)
-        put_look(monitor, start, 9, c.packet, y.down)
-        put_look(monitor, start, 12, c.packet, y.velocity)
-        put_look(monitor, start, 15, c.packet, y.angular_velocity)
+            put_tick(monitor, start + 3, 0, c.packet, low)
+        put_tick(monitor, start, 3, c.packet, y.north)
+        put_tick(monitor, start, 6, c.packet, y.east)
+        put_tick(monitor, start, 9, c.packet, y.down)
+        put_tick(monitor, start, 12, c.packet, y.velocity)
+        put_tick(monitor, start, 15, c.packet, y.angular_velocity)
 
     return gather_motion
 
 
 def make_gather(spec, View, at_step):
-    """(x, c, monitor, k, h): write the signals after a look, where something is gathered at all of them."""
+    """(x, c, monitor, k, h): write the signals after a tick, where something is gathered at all of them."""
     reports = spec.control.reports
     note_actuators = make_note_actuators(spec, View, at_step)
 

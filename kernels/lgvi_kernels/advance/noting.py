@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a look of a controller notes in rows of the memory: the demand, the measurement and the reference."""
+"""What a tick of a controller notes in rows of the memory: the demand, the measurement and the reference."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ import warp as wp
 from lgvi_kernels.lanes.arithmetic import element, set_element, vec3
 from lgvi_kernels.lanes.functions import arctangent2
 
-# What each look notes in rows of the memory, in this order, and how many it takes: the demand X Y Z K M N; the measurement:
+# What each tick notes in rows of the memory, in this order, and how many it takes: the demand X Y Z K M N; the measurement:
 # position, attitude row by row, velocities over ground and through the water, angular velocity, heading; the reference:
 # position, attitude, velocity, angular velocity, heading, speed, angular acceleration.
 NOTED = {"demand": 6, "measured": 22, "reference": 23}
@@ -23,7 +23,7 @@ ALL_NOTES = (1 << 14) - 1
 
 
 def bit(group, row):
-    """The bit that says whether a look notes the vector in which this row of a group is."""
+    """The bit that says whether a tick notes the vector in which this row of a group is."""
     return 1 << BITS_OF_ROWS[group][row]
 
 

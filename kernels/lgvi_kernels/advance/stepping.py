@@ -21,7 +21,7 @@ class Stepping(NamedTuple):
 
     method: see Step; watch: see Watch, None without events. at_step: (x, k, h) -> x with the number and the time of step k;
     opened: (x, c, length) -> x moved by the lead; one_step, stepped: one step, and a number of steps.
-    feed, respond: a controller's look (see make_feed); held: a number of steps and the looks between them; all three are
+    feed, respond: a controller's tick (see make_feed); held: a number of steps and the ticks between them; all three are
     `step` where there is no controller.
     """
 
@@ -110,15 +110,15 @@ def make_stepping(spec):
 
 
 def make_held(types, real, one_step, feed):
-    """The function that makes a number of steps, and the looks of a controller between them."""
+    """The function that makes a number of steps, and the ticks of a controller between them."""
     State, Constants, Monitor = types.State, types.Constants, types.Monitor
 
     @wp.func(inline=False)
     def held(x: State, c: Constants, monitor: Monitor, k: int, n: int, h: wp.float64, stage_h: wp.array(dtype=real),
              lead_h: wp.array(dtype=real), first_h: real, opening: real):  # fmt: skip
-        """The steps k to k + n, and a look of the controller at each of its times between and after them.
+        """The steps k to k + n, and a tick of the controller at each of its times between and after them.
 
-        The looks are around the loop over steps: a test in it would cost more, and a chunk that ends at each of them most.
+        The ticks are around the loop over steps: a test in it would cost more, and a chunk that ends at each of them most.
         """
         at = k
         while at < k + n:

@@ -6,7 +6,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes.arithmetic import add, mul, ones, positive, sub  # noqa: F401
-from lgvi_kernels.lanes.look import delayed_key, held_key
+from lgvi_kernels.lanes.tick import delayed_key, held_key
 from lgvi_kernels.lanes.view import remembered
 
 _Held, _Delayed = held_key(), delayed_key()

@@ -54,7 +54,7 @@ def make_driven(name, rows, limit, lag, rate, features):
     moves = lags or limited
 
     def params(width, real, commands):
-        """Params: commands, see lanes/look.py; first rows of the table, the memory, the report; count; alike: one lag."""
+        """Params: commands, see lanes/tick.py; first rows of the table, the memory, the report; count; alike: one lag."""
         words = {"first": wp.int32, "memory": wp.int32, "work": wp.int32, "report": wp.int32}
         words |= dict.fromkeys(("count", "moving", "alike", "shared", "size"), wp.int32)
         return struct(name, commands=commands, **words)

@@ -7,7 +7,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes.arithmetic import lane, lane3
-from lgvi_kernels.lanes.look import delayed_key, held_key
+from lgvi_kernels.lanes.tick import delayed_key, held_key
 from lgvi_kernels.lanes.noise import noise_key
 from lgvi_kernels.lanes.state import struct
 from lgvi_kernels.maps.bounded import BoundedLaw, bounds_struct
@@ -36,7 +36,7 @@ def numbers_struct(law, numbers, width, real):
 def field_type(kind, width, real):
     """The type of a field: 1, a lane; 3, a 3-vector of lanes; "step", "grid": the key of noise (see lanes/noise.py).
 
-    "held", "delayed": where an actuator finds the commands of a controller (see lanes/look.py).
+    "held", "delayed": where an actuator finds the commands of a controller (see lanes/tick.py).
     """
     if kind in ("held", "delayed"):
         return held_key() if kind == "held" else delayed_key()

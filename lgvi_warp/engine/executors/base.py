@@ -72,7 +72,7 @@ def _refusal(name: str, what: str, error: Exception) -> str:
     return f"executor = {name!r}: the run {what} ({type(error).__name__}: {error}); {remedy}"
 
 
-def ended(futures: Mapping[Future[Any], Block]) -> Iterator[tuple[Block, Any]]:
+def finished_blocks(futures: Mapping[Future[Any], Block]) -> Iterator[tuple[Block, Any]]:
     """The blocks that finished although their run was interrupted."""
     for future, block in futures.items():
         done = future.done() and not future.cancelled() and future.exception() is None

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from lgvi_warp.engine.block import Block
-from lgvi_warp.engine.executors.base import MOST_DEATHS, Advanced, deaf, ended, received, sent
+from lgvi_warp.engine.executors.base import MOST_DEATHS, Advanced, deaf, finished_blocks, received, sent
 from lgvi_warp.engine.work import Work
 
 # How often progress is looked at [s].
@@ -80,7 +80,7 @@ class Processes:
         except KeyboardInterrupt:
             steps_made[HALT] = 1
             pool.shutdown(wait=True, cancel_futures=True)
-            yield from ended({future: unfinished[i] for future, i in waiting.items()})
+            yield from finished_blocks({future: unfinished[i] for future, i in waiting.items()})
             raise
         finally:
             steps_made[HALT] = 1

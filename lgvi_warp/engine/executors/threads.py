@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from lgvi_warp.engine.block import Block
-from lgvi_warp.engine.executors.base import Advanced, ended
+from lgvi_warp.engine.executors.base import Advanced, finished_blocks
 from lgvi_warp.engine.work import Work
 
 # Longest delay of a signal that arrives just before the main thread begins to wait [s].
@@ -68,7 +68,7 @@ class Threads:
             except KeyboardInterrupt:
                 stop.set()
                 pool.shutdown(wait=True, cancel_futures=True)
-                yield from ended(futures)
+                yield from finished_blocks(futures)
                 raise
             except BaseException:
                 stop.set()

@@ -12,7 +12,7 @@ import numpy as np
 
 from lgvi_warp.common import machine
 from lgvi_warp.engine.block import Block
-from lgvi_warp.engine.outcome import Outcome
+from lgvi_warp.engine.outcome import MemberStatus
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.statistics.values.samples import Fields
@@ -28,7 +28,7 @@ class Outcomes:
     """
 
     def __init__(self, plan: Plan):
-        self.all = Outcome.clear(plan.ensemble.members, 2 if plan.method.adaptive else 0)
+        self.all = MemberStatus.clear(plan.ensemble.members, 2 if plan.method.adaptive else 0)
 
     def __getstate__(self) -> dict[str, Any]:
         return {}
@@ -37,7 +37,7 @@ class Outcomes:
         """The keeper of a block's outcome."""
         return _BlockOutcome()
 
-    def merge(self, block: Block, part: Outcome) -> None:
+    def merge(self, block: Block, part: MemberStatus) -> None:
         """Copy a block's outcome into its place."""
         if block.count == len(self.all.status):
             self.all = part
@@ -54,7 +54,7 @@ class _BlockOutcome:
     def take(self, when: slice, samples: Fields) -> None:
         """Ignore the samples, which do not affect the outcome."""
 
-    def close(self, outcome: Outcome) -> Outcome:
+    def close(self, outcome: MemberStatus) -> MemberStatus:
         """Return the outcome as it is."""
         return outcome
 
@@ -122,6 +122,6 @@ class _BlockSamples:
         for name, place in self.places.items():
             place[when] = samples[name]
 
-    def close(self, outcome: Outcome) -> dict[str, np.ndarray] | None:
+    def close(self, outcome: MemberStatus) -> dict[str, np.ndarray] | None:
         """Return the samples if only this process has them, else None."""
         return self.places if self.sent else None

@@ -52,14 +52,14 @@ class Observation:
         return isinstance(self.keep, str) and self.keep == "all"
 
     @property
-    def looks(self) -> bool:
-        """Whether some statistic takes the samples at all looks of a controller."""
-        return any(statistic.looks for statistic in self.statistics)
+    def ticks(self) -> bool:
+        """Whether some statistic takes the samples at all ticks of a controller."""
+        return any(statistic.ticks for statistic in self.statistics)
 
-    def read_at_looks(self) -> dict[str, tuple[int, ...]]:
-        """What statistics read of the motion at the looks of a controller."""
+    def read_at_ticks(self) -> dict[str, tuple[int, ...]]:
+        """What statistics read of the motion at the ticks of a controller."""
         entries: dict[str, tuple[int, ...]] = {}
-        for quantity in (statistic.quantity for statistic in self.statistics if statistic.looks):
+        for quantity in (statistic.quantity for statistic in self.statistics if statistic.ticks):
             few = dict(quantity.entries)
             for name in quantity.fields:
                 if name in FIELDS:
@@ -177,7 +177,7 @@ class Observing:
         Returns: (estimates, messages): the estimates by name, and what the user should know about them.
         """
         estimates, members = self._gathered.result() if self._gathered else Estimates(), len(status)
-        messages = notes(estimates, ensemble, status, self._gathered.apart if self._gathered else ())
+        messages = messages_about(estimates, ensemble, status, self._gathered.apart if self._gathered else ())
         return estimates, messages + ((self._watch.report(members, self._watched()),) if self._watch else ())
 
 
@@ -212,7 +212,7 @@ def observe(fleet: Ensemble, given: Any = None, keep: Any = None, until: Any = N
     return Observation(gathered, chosen, stop)
 
 
-def notes(
+def messages_about(
     estimates: Mapping[str, Estimate], ensemble: Mapping[str, Any], status: np.ndarray, apart: Collection[str] = ()
 ) -> tuple[str, ...]:
     """Messages about statistics: members left out, and intervals that do not fit the sampling.

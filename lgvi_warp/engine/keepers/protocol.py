@@ -13,7 +13,7 @@ from lgvi_warp.engine.block import Block
 from lgvi_warp.statistics.values.samples import Fields
 
 if TYPE_CHECKING:
-    from lgvi_warp.engine.outcome import Outcome
+    from lgvi_warp.engine.outcome import MemberStatus
     from lgvi_warp.engine.plan import Plan
     from lgvi_warp.sampling.members import Members
 
@@ -27,9 +27,9 @@ class BlockKeeper(Protocol):
         samples: by field, (times, members of the block, ...).
         """
 
-    # One that has `look(when, samples)` as well receives with that the samples at all looks, before those to keep.
+    # One that has `take_ticks(when, samples)` as well receives with that the samples at all ticks, before those to keep.
 
-    def close(self, outcome: Outcome) -> Any:
+    def close(self, outcome: MemberStatus) -> Any:
         """Return the block's result, small and picklable."""
 
 

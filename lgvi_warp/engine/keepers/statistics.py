@@ -17,7 +17,7 @@ from lgvi_warp.statistics.values.samples import Fields
 from lgvi_warp.statistics.values.values import Values, dealt
 
 if TYPE_CHECKING:
-    from lgvi_warp.engine.outcome import Outcome
+    from lgvi_warp.engine.outcome import MemberStatus
     from lgvi_warp.engine.plan import Plan
     from lgvi_warp.sampling.members import Members
 
@@ -120,25 +120,25 @@ class _BlockStatistics:
         self._plan, self._replicates, self._times = plan, run.replicates, len(run.time)
         # For statistics of members' ends: the quantity at the last sample.
         self._last: dict[Statistic, np.ndarray] = {}
-        self._looking = plan.launches.gathered is not None
-        of_looks = plan.launches.gathered.times if plan.launches.gathered else run.time
-        times = (of_looks if statistic.looks else run.times_of(statistic) for statistic in run.statistics)
+        self._takes_ticks = plan.launches.gathered is not None
+        of_ticks = plan.launches.gathered.times if plan.launches.gathered else run.time
+        times = (of_ticks if statistic.ticks else run.times_of(statistic) for statistic in run.statistics)
         self._open = [
             statistic.open(time, members.count) for statistic, time in zip(run.statistics, times, strict=True)
         ]
 
     def take(self, when: slice, samples: Fields) -> None:
         """Pass to each statistic the values of its quantity; statistics of the same quantity share them."""
-        self._pass(when, samples, looks=not self._looking)
+        self._pass(when, samples, ticks=not self._takes_ticks)
 
-    def look(self, when: slice, samples: Fields) -> None:
-        """Pass the values at all looks to the statistics that want them."""
-        self._pass(when, samples, looks=True, others=False)
+    def take_ticks(self, when: slice, samples: Fields) -> None:
+        """Pass the values at all ticks to the statistics that want them."""
+        self._pass(when, samples, ticks=True, others=False)
 
-    def _pass(self, when: slice, samples: Fields, looks: bool, others: bool = True) -> None:
+    def _pass(self, when: slice, samples: Fields, ticks: bool, others: bool = True) -> None:
         values: dict[Any, Values] = {}
         for statistic, gathers in zip(self._statistics, self._open, strict=True):
-            if not (looks if statistic.looks else others):
+            if not (ticks if statistic.ticks else others):
                 continue
             if statistic.at_end:
                 if when.stop == self._times and not statistic.of_ends:
@@ -157,7 +157,7 @@ class _BlockStatistics:
             return Values(x, good, *self._place)
         return dealt(x, good, *self._place, self._replicates)
 
-    def close(self, outcome: Outcome) -> list[Part]:
+    def close(self, outcome: MemberStatus) -> list[Part]:
         """Return, for each statistic, arrays by name."""
         ends = outcome.ends(self._plan)
         for statistic, gathers in zip(self._statistics, self._open, strict=True):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parts of a controller of one vehicle, in the user's body axes and about his origin: what each does at a look."""
+"""The parts of a controller of one vehicle, in the user's body axes and about his origin: what each does at a tick."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,10 +11,10 @@ from lgvi_warp.reference.rotation import Array
 
 @dataclass(frozen=True)
 class Measurement:
-    """What is taken for the motion at a look: the truth, until a sensor changes it.
+    """What is taken for the motion at a tick: the truth, until a sensor changes it.
 
     position (3,) [m] inertial; R (3, 3) body to inertial; velocity over ground, water_velocity through water (3,) [m/s] and
-    angular_velocity (3,) [rad/s], body axes; t, period, h [s]; step and look, numbers of the step that begins and of the look;
+    angular_velocity (3,) [rad/s], body axes; t, period, h [s]; step and tick, numbers of the step that begins and of the tick;
     member.
     """
 
@@ -27,7 +27,7 @@ class Measurement:
     period: float = 0.0
     h: float = 0.0
     step: int = 0
-    look: int = 0
+    tick: int = 0
     member: int = 0
 
 
@@ -62,7 +62,7 @@ class Part:
         raise AttributeError(f"{type(self).__name__} has no number {name!r}")
 
     def begin(self) -> None:
-        """Forget everything, before the first look."""
+        """Forget everything, before the first tick."""
 
     def measure(self, y: Measurement) -> Measurement:
         """The measurement as a sensor or an estimator changes it."""
@@ -76,7 +76,7 @@ class Part:
         """The demand plus that of this law.
 
         w: Demand of the laws before it (6,) = (X, Y, Z, K, M, N) [N, N m].
-        unmet: Part of the last look's demand that was not delivered (6,) [N, N m].
+        unmet: Part of the last tick's demand that was not delivered (6,) [N, N m].
         """
         return w
 
@@ -125,11 +125,11 @@ class PoseIntegrals:
         zero: Array = np.zeros(3)
         self.I, self.I_R, self.e, self.e_R = zero, zero, zero, zero
 
-    def at_look(self, law: Any, y: Measurement, unmet: Array, e: Array, e_R: Array) -> tuple[Array, Array]:
-        """I and I_R at this look, from the errors of the last one; those of this look are kept.
+    def at_tick(self, law: Any, y: Measurement, unmet: Array, e: Array, e_R: Array) -> tuple[Array, Array]:
+        """I and I_R at this tick, from the errors of the last one; those of this tick are kept.
 
         law: integral_limit (2,) and anti_windup.
-        y, unmet, e, e_R: Measurement; what the last look did not deliver (6,); errors of this look.
+        y, unmet, e, e_R: Measurement; what the last tick did not deliver (6,); errors of this tick.
         """
         conditional = law.anti_windup == "conditional"
         error = y.R @ unhindered(y.R.T @ self.e, unmet[:3], conditional)
@@ -168,10 +168,10 @@ class Integral:
     def __init__(self) -> None:
         self.value, self.error = 0.0, 0.0
 
-    def at_look(self, period: float, limit: float, unmet: float, conditional: bool) -> float:
+    def at_tick(self, period: float, limit: float, unmet: float, conditional: bool) -> float:
         """I + T e within +-limit, unless more of the demand would go where some of it was not delivered.
 
-        period, limit: Time between looks T [s]; largest size of I.
+        period, limit: Time between ticks T [s]; largest size of I.
         """
         if not (conditional and unmet * self.error > 0.0):
             self.value = float(np.clip(self.value + period * self.error, -limit, limit))

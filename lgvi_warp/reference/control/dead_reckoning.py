@@ -19,7 +19,7 @@ class DeadReckoning(Part):
         self.last: np.ndarray | None = None
 
     def measure(self, y: Measurement) -> Measurement:
-        """b <- b + T (v_old + v) / 2, or T v_old, of inertial velocities, from the position measured at the first look."""
+        """b <- b + T (v_old + v) / 2, or T v_old, of inertial velocities, from the position measured at the first tick."""
         v = y.R @ getattr(y, self.velocity)
         if self.last is None:
             self.position = y.position + self.start_error

@@ -23,12 +23,12 @@ class DepthPID(Part):
         """theta_d = -(kp e + ki I) within its limit; M = kp_pitch e_theta + ki_pitch I_theta - kd_pitch q - k_heave w."""
         conditional = self.anti_windup == "conditional"
         e = r.position[2] - y.position[2]
-        total = self.of_depth.at_look(y.period, self.integral_limit[0], -self.beyond, conditional)
+        total = self.of_depth.at_tick(y.period, self.integral_limit[0], -self.beyond, conditional)
         wanted = -(self.kp * e + self.ki * total)
         theta_d = np.clip(wanted, -self.pitch_limit, self.pitch_limit)
         self.beyond, self.of_depth.error = wanted - theta_d, e
         e_theta = theta_d - np.arctan2(-y.R[2, 0], np.hypot(y.R[0, 0], y.R[1, 0]))
-        I_theta = self.of_pitch.at_look(y.period, self.integral_limit[1], unmet[4], conditional)
+        I_theta = self.of_pitch.at_tick(y.period, self.integral_limit[1], unmet[4], conditional)
         self.of_pitch.error = e_theta
         w = w.copy()
         w[4] += self.kp_pitch * e_theta + self.ki_pitch * I_theta

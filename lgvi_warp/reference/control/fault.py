@@ -13,7 +13,7 @@ class SensorFault(Part):
     gain = offset = 0.0
 
     def measure(self, y: Measurement) -> Measurement:
-        """From the first look at or after its time on, one number of the reading is gain * reading + offset."""
+        """From the first tick at or after its time on, one number of the reading is gain * reading + offset."""
         if y.t + 1e-6 * y.h < self.time:
             return y
         v = np.array(values(y, self.of))

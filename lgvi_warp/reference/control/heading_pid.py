@@ -19,7 +19,7 @@ class HeadingPID(Part):
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
         """N = kp e + ki I + kd (r_d - r)."""
         e = heading_error(r.R, y.R)
-        total = self.integral.at_look(y.period, self.integral_limit, unmet[5], self.anti_windup == "conditional")
+        total = self.integral.at_tick(y.period, self.integral_limit, unmet[5], self.anti_windup == "conditional")
         N = self.kp * e + self.ki * total + self.kd * (r.angular_velocity[2] - y.angular_velocity[2])
         self.integral.error = e
         w = w.copy()

@@ -21,7 +21,7 @@ class HeadingSMC(Part):
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
         """Fossen 2021, (16.479), of errors psi - psi_d: N = (T a_v + r_v - k_d sigma - k_sigma sat(sigma / boundary)) / K."""
         error = -heading_error(r.R, y.R)
-        total = -self.integral.at_look(y.period, self.integral_limit, unmet[5], self.anti_windup == "conditional")
+        total = -self.integral.at_tick(y.period, self.integral_limit, unmet[5], self.anti_windup == "conditional")
         self.integral.error = -error
         rate = y.angular_velocity[2] - r.angular_velocity[2]
         sigma = rate + 2.0 * self.lambda_ * error + self.lambda_**2 * total

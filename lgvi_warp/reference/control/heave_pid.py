@@ -19,7 +19,7 @@ class HeavePID(Part):
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
         """Z = kp e + ki I + kd (wanted - measured rate of the depth)."""
         e = r.position[2] - y.position[2]
-        total = self.integral.at_look(y.period, self.integral_limit, unmet[2], self.anti_windup == "conditional")
+        total = self.integral.at_tick(y.period, self.integral_limit, unmet[2], self.anti_windup == "conditional")
         self.integral.error = e
         w = w.copy()
         w[2] += self.kp * e + self.ki * total + self.kd * (r.velocity[2] - (y.R @ y.velocity)[2])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The closed loop of one vehicle: looks between steps, and the commands that are held until the next one."""
+"""The closed loop of one vehicle: ticks between steps, and the commands that are held until the next one."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -28,8 +28,8 @@ class Loop:
     """A controller of one vehicle.
 
     parts: in the order in which they act; actuators: the laws that take commands, by name, each with `command`, an array that
-    the allocation sets, and `held`, by which the law acts; every: steps between looks; delay: steps from a look until its
-    commands act. measured, demand, unmet: of the last look.
+    the allocation sets, and `held`, by which the law acts; every: steps between ticks; delay: steps from a tick until its
+    commands act. measured, demand, unmet: of the last tick.
     """
 
     parts: Sequence[Part]
@@ -43,7 +43,7 @@ class Loop:
     measured: Measurement | None = None
 
     def begin(self) -> None:
-        """Before the first look: no part remembers anything, and no command has come."""
+        """Before the first tick: no part remembers anything, and no command has come."""
         for part in self.parts:
             part.begin()
         for law in self.actuators.values():
@@ -79,11 +79,11 @@ class Loop:
     def act(self, step: int, h: float) -> None:
         """Let the actuators hold what acts in a step: the last commands that have come, with the faults that have begun."""
         arrived = [commands for since, commands in self.sent if since <= step]
-        look_time = step // self.every * self.every * h
+        tick_time = step // self.every * self.every * h
         for name, law in self.actuators.items():
             held = arrived[-1][name].copy() if arrived else np.zeros_like(law.limit)
             for fault in self.faults:
-                if fault.of == name and look_time + 1e-6 * h >= fault.time:
+                if fault.of == name and tick_time + 1e-6 * h >= fault.time:
                     held[fault.channel] = fault.gain * held[fault.channel] + fault.offset
             law.held = held
 
@@ -91,7 +91,7 @@ class Loop:
 def closed_loop(
     x: State, body: Body, loop: Loop, step: Callable[[State, Body, float], State], h: float, steps: int
 ) -> list[State]:
-    """The states after 0, 1, ..., steps steps, with a look before every `every`-th.
+    """The states after 0, 1, ..., steps steps, with a tick before every `every`-th.
 
     step, h, steps: (x, body, h) -> the state h later; step [s]; number of steps.
     """

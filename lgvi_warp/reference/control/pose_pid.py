@@ -22,7 +22,7 @@ class PosePID(Part):
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
         """f = R^T (kp e_b + ki I) + kd (R^T v_d - nu); tau = -kr e_R - kw (Omega - R^T R_d Omega_d) - ki_r I_R."""
         e, e_R, velocity, rate = pose_errors(r, y)
-        total, I_R = self.integrals.at_look(self, y, unmet, e, e_R)
+        total, I_R = self.integrals.at_tick(self, y, unmet, e, e_R)
         force = y.R.T @ (self.kp * e + self.ki * total) + self.kd * velocity
         torque = -self.kr * e_R + self.kw * rate - self.ki_r * I_R
         return np.asarray(w + np.concatenate([force, torque]) + balance(self, y))

@@ -21,7 +21,7 @@ class PoseSMC(Part):
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
         """f = k_d s + k_sigma sat(s / boundary), s = (R^T v_d - nu) + 2 lambda R^T e_b + lambda^2 R^T I; attitude alike."""
         e, e_R, velocity, rate = pose_errors(r, y)
-        total, I_R = self.integrals.at_look(self, y, unmet, e, e_R)
+        total, I_R = self.integrals.at_tick(self, y, unmet, e, e_R)
         s = velocity + 2.0 * self.lambda_ * (y.R.T @ e) + self.lambda_**2 * (y.R.T @ total)
         force = self.k_d * s + self.k_sigma * np.clip(s / self.boundary, -1.0, 1.0)
         s = rate - 2.0 * self.lambda_r * e_R - self.lambda_r**2 * I_R

@@ -25,7 +25,7 @@ class ReferenceModel(Part):
     damping_ratio = rate_limit = None
 
     def begin(self) -> None:
-        """Forget the filtered motion, before the first look."""
+        """Forget the filtered motion, before the first tick."""
         self.z: Array | None = None
 
     def moved(self, i: int, target: float, period: float) -> Array:

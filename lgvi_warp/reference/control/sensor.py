@@ -26,8 +26,8 @@ class Sensor(Part):
         self.arrived: list[Measurement] = []
 
     def drawn(self, y: Measurement, stream: int) -> Array:
-        """Four standard normals of this look."""
-        return normals(self.seed0, self.seed1, y.member, y.look, self.channel + stream)
+        """Four standard normals of this tick."""
+        return normals(self.seed0, self.seed1, y.member, y.tick, self.channel + stream)
 
     def measure(self, y: Measurement) -> Measurement:
         """The reading that has arrived by now."""
@@ -42,9 +42,9 @@ class Sensor(Part):
             z = with_values(z, self.of, v)
         # Phi of a standard normal is uniform.
         lost = 0.5 * math.erfc(-first[3] / math.sqrt(2.0)) < self.dropout
-        old = y.look % self.every != 0
+        old = y.tick % self.every != 0
         self.arrived.append(self.arrived[-1] if self.arrived and (old or lost) else z)
-        delayed = self.arrived[max(y.look - self.latency, 0)]
+        delayed = self.arrived[max(y.tick - self.latency, 0)]
         if self.of == "attitude":
             return replace(y, R=delayed.R)
         return with_values(y, self.of, values(delayed, self.of))

@@ -19,7 +19,7 @@ class SpeedPID(Part):
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
         """X = kp e + ki I + drag u_d |u_d|."""
         e = r.speed - y.water_velocity[0]
-        total = self.integral.at_look(y.period, self.integral_limit, unmet[0], self.anti_windup == "conditional")
+        total = self.integral.at_tick(y.period, self.integral_limit, unmet[0], self.anti_windup == "conditional")
         self.integral.error = e
         w = w.copy()
         w[0] += self.kp * e + self.ki * total + self.drag * r.speed * abs(r.speed)

@@ -99,7 +99,7 @@ def _numbers(faults: Faults, path: str, rows: Any, names: Sequence[str], chosen:
             numbers = [math.nan]
         # The sum is finite where every number is, unless it overflows: then each number is checked.
         if not cells or not math.isfinite(sum(numbers)):
-            reports += _told(rows.line_num, row, names, chosen, cells)
+            reports += _faults_of_line(rows.line_num, row, names, chosen, cells)
             if len(reports) >= MOST_COUNTED:
                 break
         values.extend(numbers)
@@ -113,7 +113,7 @@ def _numbers(faults: Faults, path: str, rows: Any, names: Sequence[str], chosen:
     return np.array(values).reshape(-1, len(chosen)) if not reports else np.empty((0, 0))
 
 
-def _told(
+def _faults_of_line(
     line: int, row: Sequence[str], names: Sequence[str], chosen: Sequence[str], cells: Sequence[str]
 ) -> list[tuple[str, str]]:
     """The faults of one line, each with its remedy."""

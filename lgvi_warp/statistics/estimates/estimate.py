@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.common import summaries
-from lgvi_warp.common.errors import MissingExtra, closest, shown
+from lgvi_warp.common.errors import MissingExtra, closest, brief
 from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.statistics.estimates.lines import texts_of
 from lgvi_warp.statistics.estimates.naming import canonical, free
-from lgvi_warp.statistics.estimates.tree import below
+from lgvi_warp.statistics.estimates.tree import arrays_under
 
 if TYPE_CHECKING:
     import xarray
@@ -157,7 +157,7 @@ class Estimates(Summarized, Mapping[str, Estimate]):
             name = self._spelled.get(canonical(name), name)
         if name not in self._found:
             there = closest(name, self._found) if self._found else "none were asked for: give statistics=[...]"
-            raise KeyError(f"{shown(name)} is no statistic of this run; {there}")
+            raise KeyError(f"{brief(name)} is no statistic of this run; {there}")
         return self._found[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -205,8 +205,8 @@ class Estimates(Summarized, Mapping[str, Estimate]):
         """Return the estimates that `to_arrays` has written."""
         estimates = []
         for i, words in enumerate(parsed(text)):
-            estimate_arrays = below(arrays, f"{i}/")
-            coordinates = below(estimate_arrays, "coordinates/")
+            estimate_arrays = arrays_under(arrays, f"{i}/")
+            coordinates = arrays_under(estimate_arrays, "coordinates/")
             words["dims"] = {name: tuple(dims) for name, dims in words["dims"].items()}
             values = {name: array for name, array in estimate_arrays.items() if not name.startswith("coordinates/")}
             if SINCE.get(words["settings"]["type"], "value") not in values:

@@ -29,7 +29,7 @@ def coin(level: int, place: int, sides: int) -> int:
     return int.from_bytes(digest, "little") % sides
 
 
-def of(x: np.ndarray, members: int, size: int, block: int) -> Part:
+def sketch_of(x: np.ndarray, members: int, size: int, block: int) -> Part:
     """Return the sketch of one block.
 
     x: (k, d, n), the values; +inf where a member does not count.

@@ -12,7 +12,7 @@ Part = dict[str, np.ndarray]
 Join = Callable[[Part, Part, tuple[int, int]], Part]
 
 
-def below(arrays: Mapping[str, np.ndarray], head: str) -> Part:
+def arrays_under(arrays: Mapping[str, np.ndarray], head: str) -> Part:
     """The arrays whose names begin with a head, named without it."""
     return {name.removeprefix(head): array for name, array in arrays.items() if name.startswith(head)}
 

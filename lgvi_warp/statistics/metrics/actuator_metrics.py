@@ -15,7 +15,7 @@ from lgvi_warp.common.identity import check_version
 from lgvi_warp.common.real_numbers import NotReal, real_results
 from lgvi_warp.control.signals import CHANNELS, SAVED, SIGNALS, ordered
 from lgvi_warp.physics.fields import TABLE
-from lgvi_warp.statistics.metrics.tracking_metrics import Looks, Metric, State, accumulated
+from lgvi_warp.statistics.metrics.tracking_metrics import Ticks, Metric, State, accumulated
 from lgvi_warp.statistics.values.quantity import Quantity, named
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ _ALL = {name: all_of(name) for name in CHANNELS}
 class Effort(OfChannels):
     """The integral over time of |command|, summed over channels [unit of the commands, s]; then statistics of it.
 
-    A command counts from its look to the next one: exact, since it is held between them. Faults are in it, delays are not.
+    A command counts from its tick to the next one: exact, since it is held between them. Faults are in it, delays are not.
 
     Args:
         of: "command" (the default), "actuator", or one channel, "command[2]".
@@ -92,14 +92,14 @@ class Effort(OfChannels):
     form: ClassVar[str] = "{0} s"
     default: ClassVar[str | None] = "command"
 
-    def follow(self, state: State, looks: Looks) -> State:
-        size = np.abs(looks.before).sum(axis=1) * looks.dt[:, None]
-        return {"sum": accumulated(state["sum"], looks, size)}
+    def follow(self, state: State, ticks: Ticks) -> State:
+        size = np.abs(ticks.before).sum(axis=1) * ticks.dt[:, None]
+        return {"sum": accumulated(state["sum"], ticks, size)}
 
 
 @dataclass(frozen=True, eq=False)
 class Travel(OfChannels):
-    """How far the actuators move, |change| from look to look summed over channels [unit of the commands]; then statistics.
+    """How far the actuators move, |change| from tick to tick summed over channels [unit of the commands]; then statistics.
 
     Args:
         of: "actuator" (the default: where they are, after delay, fault, limit and lag), "command", or one channel.
@@ -109,8 +109,8 @@ class Travel(OfChannels):
     type: ClassVar[str] = "travel"
     default: ClassVar[str | None] = "actuator"
 
-    def follow(self, state: State, looks: Looks) -> State:
-        return {"sum": accumulated(state["sum"], looks, np.abs(looks.x - looks.before).sum(axis=1))}
+    def follow(self, state: State, ticks: Ticks) -> State:
+        return {"sum": accumulated(state["sum"], ticks, np.abs(ticks.x - ticks.before).sum(axis=1))}
 
 
 def _saturated(samples: Fields, members: Members) -> np.ndarray:
@@ -144,8 +144,8 @@ class SaturationShare(OfChannels):
             raise refusal("saturation_share.of", self.of, "is not the command", "leave it out")
         return _SATURATED
 
-    def follow(self, state: State, looks: Looks) -> State:
-        return {"sum": accumulated(state["sum"], looks, looks.before[:, 0] * looks.dt[:, None])}
+    def follow(self, state: State, ticks: Ticks) -> State:
+        return {"sum": accumulated(state["sum"], ticks, ticks.before[:, 0] * ticks.dt[:, None])}
 
     def finish(self, state: State) -> np.ndarray:
         return state["sum"] / state["until"]
@@ -164,10 +164,10 @@ def _power(samples: Fields, members: Members) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Energy(OfChannels):
+class ActuatorEnergy(OfChannels):
     """The integral over time of |power| that the delivered wrench gives to the motion [J]; then statistics of it.
 
-    The power is (demand - unmet) . (velocity, angular velocity), by the trapezoidal rule between looks: mechanical, without
+    The power is (demand - unmet) . (velocity, angular velocity), by the trapezoidal rule between ticks: mechanical, without
     the losses of motors and propellers, which no term tells.
 
     Args:
@@ -185,9 +185,9 @@ class Energy(OfChannels):
             raise refusal("energy.of", self.of, "is not the demand", "leave it out")
         return _POWER
 
-    def follow(self, state: State, looks: Looks) -> State:
-        mean = 0.5 * (looks.before[:, 0] + looks.x[:, 0])
-        return {"sum": accumulated(state["sum"], looks, mean * looks.dt[:, None])}
+    def follow(self, state: State, ticks: Ticks) -> State:
+        mean = 0.5 * (ticks.before[:, 0] + ticks.x[:, 0])
+        return {"sum": accumulated(state["sum"], ticks, mean * ticks.dt[:, None])}
 
 
 _POWER = Quantity("demand", _power, "W", ("velocity", "angular_velocity", "demand", "unmet"))
@@ -197,12 +197,12 @@ _POWER = Quantity("demand", _power, "W", ("velocity", "angular_velocity", "deman
 class TimeToFailure(Metric):
     """When each member failed or an event stopped it [s], infinite for those that went on to the end; then statistics of it.
 
-    Only lw.Each() tells all of it: other statistics leave out what is infinite, and members that failed. lw.Outcome is the
+    Only lw.MemberValues() tells all of it: other statistics leave out what is infinite, and members that failed. lw.Outcome is the
     probability to have ended by each time.
 
     Args:
         of: "end", the default.
-        then: lw.Each(), the default, or other statistics.
+        then: lw.MemberValues(), the default, or other statistics.
     """
 
     type: ClassVar[str] = "time_to_failure"
@@ -211,9 +211,9 @@ class TimeToFailure(Metric):
 
     def then_default(self) -> Sequence[Any]:
         """Return the number of each member."""
-        from lgvi_warp.statistics.paths.each import Each
+        from lgvi_warp.statistics.paths.member_values import MemberValues
 
-        return [Each()]
+        return [MemberValues()]
 
     def meant(self) -> Quantity:
         """Return a quantity that needs no samples."""
@@ -228,12 +228,12 @@ class TimeToFailure(Metric):
 _END = Quantity("end", _nothing, "s", ())
 
 
-class Look(dict[str, np.ndarray]):
-    """What a metric of the user's own is told of one look: samples (n, ...) by name.
+class TickSamples(dict[str, np.ndarray]):
+    """What a metric of the user's own is told of one tick: samples (n, ...) by name.
 
     Attributes:
         t: time [s].
-        dt: time since the look before [s]; 0 at the first one.
+        dt: time since the tick before [s]; 0 at the first one.
     """
 
     def __init__(self, samples: Mapping[str, np.ndarray], t: float, dt: float):
@@ -242,11 +242,11 @@ class Look(dict[str, np.ndarray]):
 
 
 @dataclass(frozen=True, eq=False)
-class OwnMetric(Metric):
-    """A metric of the user's own: a function that sees each look of a block of members in turn; then statistics of it.
+class CustomMetric(Metric):
+    """A metric of the user's own: a function that sees each tick of a block of members in turn; then statistics of it.
 
-    The function is called as function(state, look): `state` is None at the first look, then what the function returned at the
-    look before; `look` has the samples of n members by name, look["position"] (n, 3), and look.t, look.dt [s]. It returns
+    The function is called as function(state, tick): `state` is None at the first tick, then what the function returned at the
+    tick before; `tick` has the samples of n members by name, tick["position"] (n, 3), and tick.t, tick.dt [s]. It returns
     numbers (n,), or (m, n) for m numbers of each member. A member that is no longer under way keeps its last state.
 
     Args:
@@ -276,7 +276,7 @@ class OwnMetric(Metric):
     def meant(self) -> Quantity:
         """Return the samples that the function reads."""
         if not callable(self.of):
-            remedy = "give a function of (state, look), such as def heel(state, look): ..."
+            remedy = "give a function of (state, tick), such as def heel(state, tick): ..."
             raise refusal("own_metric.of", self.of, "is no function", remedy)
         if not all(isinstance(name, str) and name in SAVED for name in self.fields):
             raise refusal("own_metric.fields", self.fields, "are no names of samples", closest(str(self.fields), SAVED))
@@ -291,9 +291,9 @@ class OwnMetric(Metric):
     def begin(self, x: np.ndarray) -> State:
         return {"own": self._asked(None, x, 0.0, 0.0)}
 
-    def follow(self, state: State, looks: Looks) -> State:
+    def follow(self, state: State, ticks: Ticks) -> State:
         own = state["own"]
-        for (t, x, alive), dt in zip(looks.rows(looks.x), looks.dt, strict=True):
+        for (t, x, alive), dt in zip(ticks.rows(ticks.x), ticks.dt, strict=True):
             own = np.where(alive, self._asked(own, x, float(t), float(dt)), own)
         return {"own": own}
 
@@ -305,8 +305,8 @@ class OwnMetric(Metric):
         return own
 
     def _asked(self, state: np.ndarray | None, x: np.ndarray, t: float, dt: float) -> np.ndarray:
-        """What the function returns at a look; x: (d, n)."""
-        own = self._real(self.of(state, Look(dict(self._divided(x)), t, dt)))
+        """What the function returns at a tick; x: (d, n)."""
+        own = self._real(self.of(state, TickSamples(dict(self._divided(x)), t, dt)))
         if own.shape[-1:] != x.shape[1:] or (state is not None and own.shape != state.shape):
             wanted = f"(..., {x.shape[1]})" if state is None else f"{state.shape}"
             raise ValueError(f"metric {self.key}: gave shape {own.shape}; {wanted} is wanted, members last")

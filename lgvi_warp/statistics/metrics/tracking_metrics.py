@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Metrics of a control loop: one number of each member, gathered look by look; definitions are those of control theory.
+"""Metrics of a control loop: one number of each member, gathered tick by tick; definitions are those of control theory.
 
-A look is a sample at a controller's period. With looks at t_0 = 0, t_1, ... a member counts from the first look to the last
+A tick is a sample at a controller's period. With looks at t_0 = 0, t_1, ... a member counts from the first tick to the last
 one at which it was still under way: a member that stops or fails has the numbers of its time under way. y is the actual
-number, r what is wanted at each look, e = r - y.
+number, r what is wanted at each tick, e = r - y.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from lgvi_warp.control.controller import Controller
 from lgvi_warp.statistics.base import Gatherer, Statistic
 from lgvi_warp.statistics.ends import Ends
 from lgvi_warp.statistics.estimates.tree import Part
-from lgvi_warp.statistics.paths.each import Each
-from lgvi_warp.statistics.paths.member_statistic import Then
+from lgvi_warp.statistics.paths.member_values import MemberValues
+from lgvi_warp.statistics.paths.member_statistic import MemberStatistic
 from lgvi_warp.statistics.values import tracking
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.statistics.values.values import Values
@@ -35,13 +35,13 @@ ROUND_OFF = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Looks:
-    """Some looks in turn at n members, of d numbers, with the look before each.
+class Ticks:
+    """Some ticks in turn at n members, of d numbers, with the tick before each.
 
     Args:
         t: their times (k,) [s].
-        dt: times since the look before each (k,) [s].
-        start: numbers at the look before the first of them (d, n).
+        dt: times since the tick before each (k,) [s].
+        start: numbers at the tick before the first of them (d, n).
         x: numbers (k, d, n).
         alive: which members were still under way (k, n); None if all were.
     """
@@ -54,11 +54,11 @@ class Looks:
 
     @functools.cached_property
     def before(self) -> np.ndarray:
-        """Numbers at the look before each, (k, d, n)."""
+        """Numbers at the tick before each, (k, d, n)."""
         return np.concatenate([self.start[None], self.x[:-1]])
 
     def rows(self, *arrays: np.ndarray) -> Iterator[tuple[Any, ...]]:
-        """Yield for each look its time, its numbers in these arrays, and which members were under way.
+        """Yield for each tick its time, its numbers in these arrays, and which members were under way.
 
         Args:
             *arrays: (k, ...).
@@ -77,7 +77,7 @@ class Looks:
 
 
 class _Follow(Gatherer):
-    """Follows a block's members from look to look."""
+    """Follows a block's members from tick to tick."""
 
     def __init__(self, metric: Metric, time: np.ndarray):
         self._metric, self._time = metric, time
@@ -86,7 +86,7 @@ class _Follow(Gatherer):
         self._place = (0, 0, 0, 1)
 
     def take(self, values: Values, when: slice) -> None:
-        """Take in these looks."""
+        """Take in these ticks."""
         R = values.replicates
         k, d, n = len(values.x) // R, *values.x.shape[1:]
         # Members of the replicates one after the other.
@@ -104,9 +104,9 @@ class _Follow(Gatherer):
             self._last, first = x[0], 1
         if k > first:
             step = np.diff(self._time[max(when.start - 1, 0) : when.stop])
-            looks = Looks(t[first:], step, self._last, x[first:], None if alive is None else alive[first:])
-            self._state |= self._metric.follow(self._state, looks)
-            self._state["until"] = np.maximum(self._state["until"], looks.of_living(looks.t[:, None], 0.0).max(axis=0))
+            ticks = Ticks(t[first:], step, self._last, x[first:], None if alive is None else alive[first:])
+            self._state |= self._metric.follow(self._state, ticks)
+            self._state["until"] = np.maximum(self._state["until"], ticks.of_living(ticks.t[:, None], 0.0).max(axis=0))
         self._last = x[-1].copy()
         self._place = (values.first, values.block, values.size, R)
 
@@ -129,21 +129,21 @@ class _Follow(Gatherer):
 
 
 @dataclass(frozen=True, eq=False)
-class Metric(Then):
-    """One number of each member over all looks of a controller, then statistics of it. Abstract.
+class Metric(MemberStatistic):
+    """One number of each member over all ticks of a controller, then statistics of it. Abstract.
 
-    It takes the samples at every look, whatever the run keeps; in a scene without a controller, at the times of samples. A
-    member that stops or fails has the number of its time under way, up to its last look. Statistics leave out members that
-    failed, and those whose number is not finite; lw.Each() has all of them.
+    It takes the samples at every tick, whatever the run keeps; in a scene without a controller, at the times of samples. A
+    member that stops or fails has the number of its time under way, up to its last tick. Statistics leave out members that
+    failed, and those whose number is not finite; lw.MemberValues() has all of them.
 
     Args:
         of: what is tracked; see the classes derived from it.
-        then: a statistic, or a list, without `of`: lw.Mean() (the default), lw.Quantiles(levels=(0.5, 0.99)), lw.Each().
+        then: a statistic, or a list, without `of`: lw.Mean() (the default), lw.Quantiles(levels=(0.5, 0.99)), lw.MemberValues().
         measured: whether the actual number is what sensors measure, in place of the truth; by default False.
     """
 
     of_numbers: ClassVar[bool] = False
-    looks: ClassVar[bool] = True
+    ticks: ClassVar[bool] = True
     # The unit of the number, with {0} for that of what it is of.
     form: ClassVar[str] = "{0}"
 
@@ -157,19 +157,19 @@ class Metric(Then):
             faults.add("stopped", self.stopped, "has no meaning for a metric", "leave it out")
 
     def begin(self, x: np.ndarray) -> State:
-        """Return the state after the first look.
+        """Return the state after the first tick.
 
         Args:
-            x: numbers at the first look (d, n).
+            x: numbers at the first tick (d, n).
         """
         return {}
 
-    def follow(self, state: State, looks: Looks) -> State:
-        """Return what changes of the state by some more looks.
+    def follow(self, state: State, ticks: Ticks) -> State:
+        """Return what changes of the state by some more ticks.
 
         Args:
             state: the state before them.
-            looks: the looks.
+            ticks: the ticks.
         """
         return {}
 
@@ -177,7 +177,7 @@ class Metric(Then):
         """Return the members' numbers (n,).
 
         Args:
-            state: the state after the last look, with "until" (n,) [s], the time of each member's last look under way,
+            state: the state after the last tick, with "until" (n,) [s], the time of each member's last tick under way,
                 "ended" (n,) [s], when it stopped or failed, else infinite, "failed" (n,), and "end" [s], that of the run.
         """
         raise TypeError(f"{type(self).__name__} is abstract")
@@ -189,12 +189,12 @@ class Metric(Then):
             x: the numbers (replicates, 1, members).
             lost: which members failed (replicates, members).
             place: first member, block, its size, and number of replicates.
-            time: times of all looks [s].
+            time: times of all ticks [s].
         """
         left = Values(x, ~lost, *place)
         parts: Part = {}
         for i, statistic in enumerate(self.then_of(time)):
-            if isinstance(statistic, Each):
+            if isinstance(statistic, MemberValues):
                 part = statistic.rows_of(x, place[3])
             else:
                 gatherer = statistic.open(time[-1:], x.shape[2])
@@ -227,14 +227,14 @@ class Metric(Then):
         return _Follow(self, time)
 
 
-def accumulated(total: np.ndarray, looks: Looks, parts: np.ndarray) -> np.ndarray:
-    """Return a sum with the parts of some looks added in turn, so that its bits do not depend on how many come at once.
+def accumulated(total: np.ndarray, ticks: Ticks, parts: np.ndarray) -> np.ndarray:
+    """Return a sum with the parts of some ticks added in turn, so that its bits do not depend on how many come at once.
 
     total: the sum so far (n,).
     parts: what each adds (k, n).
     """
     total = total.copy()
-    for addend in looks.of_living(parts, 0.0):
+    for addend in ticks.of_living(parts, 0.0):
         total += addend
     return total
 
@@ -251,7 +251,7 @@ class OfTracking(Metric):
     def meant(self) -> Quantity:
         """Return the error."""
         return tracking.error(
-            tracking.check(f"{self.type}.of", self.of, tracking.ERRORS), flag(f"{self.type}.measured", self.measured)
+            tracking.tracked_name(f"{self.type}.of", self.of, tracking.ERRORS), flag(f"{self.type}.measured", self.measured)
         )
 
 
@@ -260,7 +260,7 @@ class OfCourse(Metric):
     """A metric of the way to a goal. Abstract.
 
     The goal is the set point of the scene, before any reference model; where other guidance leads, what is wanted at the
-    first look. It is that of the first look throughout. d is the goal less the actual number, s its value at the first look
+    first tick. It is that of the first tick throughout. d is the goal less the actual number, s its value at the first tick
     (the step); what is below or beyond is meant in the direction of the step, upward if the step is 0.
 
     Args:
@@ -270,7 +270,7 @@ class OfCourse(Metric):
     def meant(self) -> Quantity:
         """Return the number and its goal."""
         known = tuple(tracking.CHANNELS[False])
-        return tracking.course(tracking.check(f"{self.type}.of", self.of, known), bool(self.measured))
+        return tracking.course(tracking.tracked_name(f"{self.type}.of", self.of, known), bool(self.measured))
 
     def begin(self, x: np.ndarray) -> State:
         """Return goal, step and direction, and the way left at first."""
@@ -278,14 +278,14 @@ class OfCourse(Metric):
         step = self._difference(goal, x[0])
         return {"goal": goal, "step": np.abs(step), "sign": np.where(step < 0.0, -1.0, 1.0)}
 
-    def left(self, state: State, looks: Looks) -> np.ndarray:
+    def left(self, state: State, ticks: Ticks) -> np.ndarray:
         """Return the way left to the goal in the direction of the step, (k, n): below 0 beyond the goal.
 
         Args:
             state: the state.
-            looks: the looks.
+            ticks: the ticks.
         """
-        return state["sign"] * self._difference(state["goal"], looks.x[:, 0])
+        return state["sign"] * self._difference(state["goal"], ticks.x[:, 0])
 
     def _difference(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return tracking.CHANNELS[False][self.quantity.name].difference(a, b)
@@ -307,7 +307,7 @@ class OfStep(OfCourse):
         """The unit of the number."""
         return "%" if self.percent else super().unit
 
-    def told(self, state: State, size: np.ndarray) -> np.ndarray:
+    def percent_of_step(self, state: State, size: np.ndarray) -> np.ndarray:
         """Return a size, in percent of the step where that is asked for.
 
         Args:
@@ -333,12 +333,12 @@ class Overshoot(OfStep):
         state = super().begin(x)
         return state | {"least": state["step"]}
 
-    def follow(self, state: State, looks: Looks) -> State:
-        left = looks.of_living(self.left(state, looks), np.inf)
+    def follow(self, state: State, ticks: Ticks) -> State:
+        left = ticks.of_living(self.left(state, ticks), np.inf)
         return {"least": np.minimum(state["least"], left.min(axis=0))}
 
     def finish(self, state: State) -> np.ndarray:
-        return self.told(state, np.maximum(0.0, -state["least"]))
+        return self.percent_of_step(state, np.maximum(0.0, -state["least"]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -357,17 +357,17 @@ class Undershoot(OfStep):
         state = super().begin(x)
         return state | {"most": state["step"]}
 
-    def follow(self, state: State, looks: Looks) -> State:
-        left = looks.of_living(self.left(state, looks), -np.inf)
+    def follow(self, state: State, ticks: Ticks) -> State:
+        left = ticks.of_living(self.left(state, ticks), -np.inf)
         return {"most": np.maximum(state["most"], left.max(axis=0))}
 
     def finish(self, state: State) -> np.ndarray:
-        return self.told(state, state["most"] - state["step"])
+        return self.percent_of_step(state, state["most"] - state["step"])
 
 
 @dataclass(frozen=True, eq=False)
 class PeakTime(OfCourse):
-    """When each member is farthest in the direction of its step [s], the first such look; then statistics of it.
+    """When each member is farthest in the direction of its step [s], the first such tick; then statistics of it.
 
     Args:
         of: "depth", "heading", "speed", "north" or "east"; see `OfCourse` for goal and step.
@@ -381,12 +381,12 @@ class PeakTime(OfCourse):
         state = super().begin(x)
         return state | {"least": state["step"], "at": np.zeros(len(state["step"]))}
 
-    def follow(self, state: State, looks: Looks) -> State:
-        left = looks.of_living(self.left(state, looks), np.inf)
+    def follow(self, state: State, ticks: Ticks) -> State:
+        left = ticks.of_living(self.left(state, ticks), np.inf)
         i = left.argmin(axis=0)
         least = np.take_along_axis(left, i[None], axis=0)[0]
         farther = least < state["least"]
-        return {"least": np.where(farther, least, state["least"]), "at": np.where(farther, looks.t[i], state["at"])}
+        return {"least": np.where(farther, least, state["least"]), "at": np.where(farther, ticks.t[i], state["at"])}
 
     def finish(self, state: State) -> np.ndarray:
         return state["at"]
@@ -413,7 +413,7 @@ class Peak(Overshoot):
 class RiseTime(OfCourse):
     """How long each member takes from 10 % to 90 % of its step [s]; then statistics of it.
 
-    From the first look with at least 10 % of the step done to the first one with at least 90 %. Infinite where a member never
+    From the first tick with at least 10 % of the step done to the first one with at least 90 %. Infinite where a member never
     gets there.
 
     Args:
@@ -438,12 +438,12 @@ class RiseTime(OfCourse):
         done = np.where(state["step"] > 0.0, np.inf, 0.0)
         return state | {"low": np.where(self.limits[0] == 0.0, 0.0, done), "high": done}
 
-    def follow(self, state: State, looks: Looks) -> State:
-        left = looks.of_living(self.left(state, looks), np.inf)
+    def follow(self, state: State, ticks: Ticks) -> State:
+        left = ticks.of_living(self.left(state, ticks), np.inf)
         found = {}
         for name, part in zip(("low", "high"), self.limits, strict=True):
             done = state["step"] - left >= part * state["step"]
-            first = np.where(done.any(axis=0), looks.t[done.argmax(axis=0)], np.inf)
+            first = np.where(done.any(axis=0), ticks.t[done.argmax(axis=0)], np.inf)
             found[name] = np.minimum(state[name], first)
         return found
 
@@ -455,7 +455,7 @@ class RiseTime(OfCourse):
 class SettlingTime(OfCourse):
     """When each member comes within a band about its goal for good [s]; then statistics of it.
 
-    The time of the first look from which on |d| <= within at every look of its time under way; infinite where it is outside
+    The time of the first tick from which on |d| <= within at every tick of its time under way; infinite where it is outside
     at the last one.
 
     Args:
@@ -479,9 +479,9 @@ class SettlingTime(OfCourse):
         band = 0.02 * state["step"] if self.within is None else np.full(len(state["step"]), float(self.within))
         return state | {"band": band, "since": np.where(state["step"] <= band, 0.0, np.inf)}
 
-    def follow(self, state: State, looks: Looks) -> State:
-        outside, since = np.abs(self.left(state, looks)) > state["band"], state["since"].copy()
-        for t, out, alive in looks.rows(outside):
+    def follow(self, state: State, ticks: Ticks) -> State:
+        outside, since = np.abs(self.left(state, ticks)) > state["band"], state["since"].copy()
+        for t, out, alive in ticks.rows(outside):
             np.minimum(since, t, out=since, where=alive)
             np.copyto(since, np.inf, where=out & alive)
         return {"since": since}
@@ -492,9 +492,9 @@ class SettlingTime(OfCourse):
 
 @dataclass(frozen=True, eq=False)
 class SteadyStateError(OfTracking):
-    """The mean error over the last part of the run [unit], of its looks; then statistics of it.
+    """The mean error over the last part of the run [unit], of its ticks; then statistics of it.
 
-    NaN for members that stopped or failed before the last look.
+    NaN for members that stopped or failed before the last tick.
 
     Args:
         of: see `OfTracking`.
@@ -515,10 +515,10 @@ class SteadyStateError(OfTracking):
     def begin(self, x: np.ndarray) -> State:
         return {"sum": np.zeros(x.shape[1]), "count": np.zeros(1)}
 
-    def follow(self, state: State, looks: Looks) -> State:
-        last = looks.t >= state["end"] * (1.0 - self.share - ROUND_OFF)
-        part = np.where(last[:, None], looks.x[:, 0], 0.0)
-        return {"sum": accumulated(state["sum"], looks, part), "count": state["count"] + last.sum()}
+    def follow(self, state: State, ticks: Ticks) -> State:
+        last = ticks.t >= state["end"] * (1.0 - self.share - ROUND_OFF)
+        part = np.where(last[:, None], ticks.x[:, 0], 0.0)
+        return {"sum": accumulated(state["sum"], ticks, part), "count": state["count"] + last.sum()}
 
     def finish(self, state: State) -> np.ndarray:
         return np.where(state["until"] >= state["end"], state["sum"] / state["count"], np.nan)
@@ -538,8 +538,8 @@ class MaxError(OfTracking):
     def begin(self, x: np.ndarray) -> State:
         return {"most": np.abs(x[0])}
 
-    def follow(self, state: State, looks: Looks) -> State:
-        size = looks.of_living(np.abs(looks.x[:, 0]), 0.0)
+    def follow(self, state: State, ticks: Ticks) -> State:
+        size = ticks.of_living(np.abs(ticks.x[:, 0]), 0.0)
         return {"most": np.maximum(state["most"], size.max(axis=0))}
 
     def finish(self, state: State) -> np.ndarray:
@@ -563,7 +563,7 @@ class CrossTrack(MaxError):  # noqa: N818  (no exception)
 
 @dataclass(frozen=True, eq=False)
 class OverTime(OfTracking):
-    """A metric that is an integral over time, by the trapezoidal rule between looks. Abstract."""
+    """A metric that is an integral over time, by the trapezoidal rule between ticks. Abstract."""
 
     def integrand(self, t: np.ndarray, e: np.ndarray) -> np.ndarray:
         """Return what is integrated over time.
@@ -577,10 +577,10 @@ class OverTime(OfTracking):
     def begin(self, x: np.ndarray) -> State:
         return {"sum": np.zeros(x.shape[1])}
 
-    def follow(self, state: State, looks: Looks) -> State:
-        t, dt = looks.t[:, None], looks.dt[:, None]
-        ends = self.integrand(t - dt, looks.before[:, 0]), self.integrand(t, looks.x[:, 0])
-        return {"sum": accumulated(state["sum"], looks, 0.5 * dt * (ends[0] + ends[1]))}
+    def follow(self, state: State, ticks: Ticks) -> State:
+        t, dt = ticks.t[:, None], ticks.dt[:, None]
+        ends = self.integrand(t - dt, ticks.before[:, 0]), self.integrand(t, ticks.x[:, 0])
+        return {"sum": accumulated(state["sum"], ticks, 0.5 * dt * (ends[0] + ends[1]))}
 
     def finish(self, state: State) -> np.ndarray:
         return state["sum"]

@@ -12,14 +12,14 @@ import numpy as np
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.statistics.base import Statistic, from_list
 from lgvi_warp.statistics.estimates.estimate import Estimate
-from lgvi_warp.statistics.estimates.tree import Part, below
+from lgvi_warp.statistics.estimates.tree import Part, arrays_under
 from lgvi_warp.statistics.moments import Mean
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.statistics.values.values import Values
 
 
 @dataclass(frozen=True, eq=False)
-class Then(Statistic):
+class MemberStatistic(Statistic):
     """One number for each component of each member, then statistics of that number. Abstract.
 
     Args:
@@ -94,25 +94,25 @@ class Then(Statistic):
         return _numbered(gatherer.close() for gatherer in gatherers)
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        pairs = ((below(left, f"{i}/"), below(right, f"{i}/")) for i in range(len(self.then)))
+        pairs = ((arrays_under(left, f"{i}/"), arrays_under(right, f"{i}/")) for i in range(len(self.then)))
         return _numbered(statistic.join(*pair, place) for statistic, pair in zip(self.then, pairs, strict=True))
 
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
         """Return the estimates of each statistic, at the end."""
         estimates: list[Estimate] = []
         for i, statistic in enumerate(self.then_of(time)):
-            estimates += statistic.estimates([below(part, f"{i}/") for part in parts], time[-1:])
+            estimates += statistic.estimates([arrays_under(part, f"{i}/") for part in parts], time[-1:])
         return estimates
 
     def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
         each = enumerate(self.then)
-        return _numbered(statistic.of_replicate(below(part, f"{i}/"), replicate, replicates) for i, statistic in each)
+        return _numbered(statistic.of_replicate(arrays_under(part, f"{i}/"), replicate, replicates) for i, statistic in each)
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
         # The estimates of each statistic from its replicates, at the end.
         estimates: list[Estimate] = []
         for i, statistic in enumerate(self.then_of(time)):
-            inner = [below(part, f"{i}/") for part in parts]
+            inner = [arrays_under(part, f"{i}/") for part in parts]
             estimates += statistic.estimates_of_replicates(inner, time[-1:], replicates)
         return estimates
 

@@ -11,7 +11,7 @@ import numpy as np
 from lgvi_warp.statistics.base import Gatherer, Statistic
 from lgvi_warp.statistics.counts import Condition
 from lgvi_warp.statistics.estimates.tree import Part
-from lgvi_warp.statistics.paths.member_statistic import Then
+from lgvi_warp.statistics.paths.member_statistic import MemberStatistic
 from lgvi_warp.statistics.values import reductions
 from lgvi_warp.statistics.values.functional import Functional, functional
 from lgvi_warp.statistics.values.quantity import Quantity
@@ -59,7 +59,7 @@ class _Walk(Gatherer):
 
 
 @dataclass(frozen=True, eq=False)
-class OfPath(Then):
+class OfPath(MemberStatistic):
     """One number for each component of each member's whole path, then statistics of that number. Abstract.
 
     Members that failed are left out: the rest of their path is not known. The name of an estimate has both types: "mean

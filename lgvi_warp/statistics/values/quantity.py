@@ -44,7 +44,7 @@ class Quantity:
         needs_limit: whether a condition on it needs a number to compare with; by default False: the function may return
             true or false.
         entries: (field, numbers) for each field of the motion of which the function reads these alone, counted from 0; at a
-            controller's looks the others are NaN. By default none: it reads whole fields.
+            controller's ticks the others are NaN. By default none: it reads whole fields.
     """
 
     name: str

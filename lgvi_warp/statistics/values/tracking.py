@@ -62,7 +62,7 @@ class Channel:
         return wrapped(a - b) if self.angle else a - b
 
     def reference(self, samples: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Return what is wanted at each look, (k, n) [unit]."""
+        """Return what is wanted at each tick, (k, n) [unit]."""
         values = samples[self.wanted].astype(np.float64, copy=False)
         return values if self.entry is None else values[..., self.entry]
 
@@ -199,7 +199,7 @@ def _of_channel(channel: Channel, function: Function, labels: tuple[str, ...]) -
     return Quantity(channel.name, function, channel.unit, fields, labels, needs_limit=True, entries=entries)
 
 
-def check(key: str, of: Any, known: tuple[str, ...]) -> str:
+def tracked_name(key: str, of: Any, known: tuple[str, ...]) -> str:
     """Return the name of what is tracked."""
     if isinstance(of, str) and of in known:
         return of

@@ -95,7 +95,7 @@ class Motion:
         return np.concatenate([place, turn, velocity, rate], axis=1)
 
 
-class Bench:
+class MotionBench:
     """A plan whose members start from any motion, with any memory, after any step but the first.
 
     Its kernel has no merged lead: what lies in its state between two launches is the motion itself.
@@ -107,7 +107,7 @@ class Bench:
     Attributes:
         fleet: the members.
         plan: the plan.
-        every: steps between two looks; 1 without a controller.
+        every: steps between two ticks; 1 without a controller.
     """
 
     def __init__(
@@ -142,7 +142,7 @@ class Bench:
         return tuple(term.key for term, _ in (*choice.laws, *choice.parts_of_control, *choice.events))
 
     def start(self, places: np.ndarray, numbers: Mapping[str, np.ndarray] | None = None) -> Motion:
-        """The motions of members at t = 0, and what they remember before the first look.
+        """The motions of members at t = 0, and what they remember before the first tick.
 
         places: (m,), which members.
         numbers: Values (m, ...) by name that replace those of the members; None for none (default).
@@ -174,7 +174,7 @@ class Bench:
         plan, m = self.plan, len(places)
         packets = self._filled(places, motion, numbers or {})
         values: Mapping[str, np.ndarray] = {}
-        # Samples are due at each look: as many at once as take some 10 MB.
+        # Samples are due at each tick: as many at once as take some 10 MB.
         most = max(1, AT_ONCE // m) * 16 * self.every
         for first in range(k0, k1, most):
             stop = min(first + most, k1)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lgvi_warp.studies.linear.bench import AT_ONCE, COORDINATES, Bench, Motion
+from lgvi_warp.studies.linear.bench import AT_ONCE, COORDINATES, MotionBench, Motion
 
 # Half a difference, of numbers of size 1: what is cut off and round-off are then alike, 1e-10.
 STEP = 1e-5
@@ -29,7 +29,7 @@ def names_of(rows: Sequence[Row]) -> tuple[str, ...]:
 
 
 def differences(
-    bench: Bench,
+    bench: MotionBench,
     places: np.ndarray,
     about: Motion,
     k0: int,
@@ -60,7 +60,7 @@ def differences(
 
 
 def _differences(
-    bench: Bench, places: np.ndarray, about: Motion, k0: int, steps: int, moved: Sequence[Row], seen: Sequence[Row],
+    bench: MotionBench, places: np.ndarray, about: Motion, k0: int, steps: int, moved: Sequence[Row], seen: Sequence[Row],
     motion: bool, numbers: Mapping[str, np.ndarray], step: float) -> np.ndarray:  # fmt: skip
     n, head = len(places), 12 * motion
     count = head + len(moved)

@@ -17,7 +17,7 @@ from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS, ControlWrench
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.studies.linear.bench import COORDINATES, Bench, Motion, calm, plant
+from lgvi_warp.studies.linear.bench import COORDINATES, MotionBench, Motion, calm, plant
 from lgvi_warp.studies.linear.differences import STEP, Row, differences, names_of
 from lgvi_warp.studies.linear.trim import Trim, step_of
 from lgvi_warp.studies.members import scene_of
@@ -146,7 +146,7 @@ def linearize(
         The model.
 
     Raises:
-        SceneError: If an argument is at fault, a part of the controller acts by chance or at some looks only, or a member that
+        SceneError: If an argument is at fault, a part of the controller acts by chance or at some ticks only, or a member that
             is a little beside the motion fails.
 
     Examples:
@@ -191,7 +191,7 @@ def _plant_model(
     length = period or (scene.controller.period if scene.controller else h)
     name = "wrench_input"
     held = plant(scene, length, [ControlWrench(name=name)] if inputs == "wrench" else [])
-    bench = Bench(Ensemble(held, 1), method, h, 2.0 * length, length)
+    bench = MotionBench(Ensemble(held, 1), method, h, 2.0 * length, length)
     every = bench.every if bench.bus else round(length / bench.plan.grid.h)
     places = np.zeros(1, np.int64)
     motion = bench.start(places)
@@ -230,7 +230,7 @@ def _plant_model(
 def _closed_model(scene: Scene, time: float, method: Any, h: float, step: float) -> LinearModel:
     period = scene.controller.period
     k = max(1, round(time / period))
-    bench = Bench(Ensemble(scene, 1), method, h, (k + 1) * period, period)
+    bench = MotionBench(Ensemble(scene, 1), method, h, (k + 1) * period, period)
     places, begin = np.zeros(1, np.int64), k * bench.every
     motion = bench.run(places, None, 0, begin)
     rows, after = loop_rows(bench, motion.memory, k)
@@ -247,18 +247,18 @@ def _closed_model(scene: Scene, time: float, method: Any, h: float, step: float)
     return model
 
 
-def command_rows(bench: Bench, row: int) -> tuple[int, ...]:
+def command_rows(bench: MotionBench, row: int) -> tuple[int, ...]:
     """Rows of the bus by which a command acts during a period."""
     bus: Any = bench.bus
     return (bus.acting + row, bus.acting + bus.channels + row) if bus.delayed else (row,)
 
 
-def loop_rows(bench: Bench, memory: Mapping[str, np.ndarray], look: int) -> tuple[list[Row], list[Row]]:
-    """What a closed loop remembers after a look, and after the next one.
+def loop_rows(bench: MotionBench, memory: Mapping[str, np.ndarray], tick: int) -> tuple[list[Row], list[Row]]:
+    """What a closed loop remembers after a tick, and after the next one.
 
-    What looks note of themselves is left out, and what was not delivered: only its sign counts, for integrals that wait.
+    What ticks note of themselves is left out, and what was not delivered: only its sign counts, for integrals that wait.
 
-    Returns: (rows, rows a look later), in the same order.
+    Returns: (rows, rows a tick later), in the same order.
     """
     bus: Any = bench.bus
     names = [f"{key}.command[{i}]" for key, (_, count) in bus.commands.items() for i in range(count)]
@@ -274,12 +274,12 @@ def loop_rows(bench: Bench, memory: Mapping[str, np.ndarray], look: int) -> tupl
         for age in range(sets):
             for i, name in enumerate(names):
                 ago = f"{name} {age} ago"
-                before.append(Row("controller", (look - age) % sets * bus.channels + i, ago))
-                after.append(Row("controller", (look + 1 - age) % sets * bus.channels + i, ago))
+                before.append(Row("controller", (tick - age) % sets * bus.channels + i, ago))
+                after.append(Row("controller", (tick + 1 - age) % sets * bus.channels + i, ago))
     return before, after
 
 
-def remembered(bench: Bench, memory: Mapping[str, np.ndarray], terms: bool) -> list[Row]:
+def remembered(bench: MotionBench, memory: Mapping[str, np.ndarray], terms: bool) -> list[Row]:
     """What is remembered beside the commands."""
     choice = bench.plan.kernel_choice
     each = (term for term, _ in (choice.laws if terms else choice.parts_of_control) if term.key in memory)
@@ -291,7 +291,7 @@ def remembered(bench: Bench, memory: Mapping[str, np.ndarray], terms: bool) -> l
     return rows
 
 
-# What of a sensor changes from look to look by chance, in whatever motion.
+# What of a sensor changes from tick to tick by chance, in whatever motion.
 RANDOM = ("noise", "drift")
 
 
@@ -316,7 +316,7 @@ def check_parts(controller: Any, what: str, refused: Collection[str] | None = No
 
 
 def read(A: np.ndarray) -> np.ndarray:
-    """States that something depends on, those of the motion always; the others decay within a look.
+    """States that something depends on, those of the motion always; the others decay within a tick.
 
     A: (n, n).
     """

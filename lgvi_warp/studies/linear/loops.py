@@ -14,7 +14,7 @@ from lgvi_warp.control.loop_gain import FACTOR, with_factor
 from lgvi_warp.control.set_point import SetPoint
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.scene.ensemble import Ensemble
-from lgvi_warp.studies.linear.bench import Bench, Motion
+from lgvi_warp.studies.linear.bench import MotionBench, Motion
 from lgvi_warp.studies.linear.sampled_loop import DELAY, delayed
 
 # Why a member has no margins; "" where it has.
@@ -33,8 +33,8 @@ SETTLED = 1e-6
 TILTS = 10.0
 # What has shrunk to this part of its first third is not growing: where it does not shrink yet, slower modes are left.
 FADED = 0.1
-# Looks of a run below which its thirds show no envelope.
-LEAST_LOOKS = 30
+# Ticks of a run below which its thirds show no envelope.
+LEAST_TICKS = 30
 
 
 class Study:
@@ -48,11 +48,11 @@ class Study:
     h: step [s].
 
     Attributes:
-        period: time between two looks [s].
+        period: time between two ticks [s].
         bench: what makes the steps.
         begin: steps until loops are looked at.
         last: steps until they are looked at last.
-        looks: looks of a run.
+        ticks: ticks of a run.
     """
 
     def __init__(
@@ -72,13 +72,13 @@ class Study:
         # With some delay in the scene, commands may be delayed in any lane.
         laws = with_factor(controller.laws, loop)
         acted = replace(controller, laws=laws, delay=controller.delay if controller.delay > 0.0 else period)
-        first, looks = (max(1, round(time / period)) for time in (about, seconds))
+        first, ticks = (max(1, round(time / period)) for time in (about, seconds))
         last = max(first, round(settle / period))
         inside = fleet.in_scene(replace(scene, controller=acted, events=()), (FACTOR, DELAY))
         self.fleet, self.tilt, self.nominal = fleet, tilt, float(controller.delay)
-        length = (last + 1 + looks + looks // 2) * period
-        self.bench = Bench(inside, method, h, length, period, (*FIELDS, "command"))
-        self.begin, self.last, self.looks = first * self.bench.every, last * self.bench.every, looks
+        length = (last + 1 + ticks + ticks // 2) * period
+        self.bench = MotionBench(inside, method, h, length, period, (*FIELDS, "command"))
+        self.begin, self.last, self.ticks = first * self.bench.every, last * self.bench.every, ticks
         self.held = held(controller)
         self.channels = {key: term.channels for key, term in controller.actuators.items()}
 
@@ -101,7 +101,7 @@ class Study:
         latest: deque[np.ndarray] = deque(maxlen=2)
 
         def keep(_: int, values: Mapping[str, np.ndarray]) -> None:
-            latest.extend(_told(values, self.held)[-2:])
+            latest.extend(_what_repeats(values, self.held)[-2:])
 
         while True:
             latest.clear()
@@ -138,7 +138,7 @@ def held(controller: Any) -> frozenset[str]:
     return frozenset(wishes & {"depth", "heading", "position"} | ({"heading"} if "attitude" in wishes else set()))
 
 
-def _told(values: Mapping[str, np.ndarray], of: Collection[str]) -> np.ndarray:
+def _what_repeats(values: Mapping[str, np.ndarray], of: Collection[str]) -> np.ndarray:
     """What must repeat, of samples (k, m, ...): velocities, rates, down, commands; and what is held."""
     ahead, place = values["attitude"][..., :2, 0], values["position"]
     others = {"depth": place[..., 2:], "position": place, "heading": ahead}
@@ -219,19 +219,19 @@ class Loops:
 
     def _judged(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Whether loops settle, and what `_told` tells after the run."""
-        looks = self.study.looks
-        settled, near, last = self._run(factor, steps, some, looks)
+        ticks = self.study.ticks
+        settled, near, last = self._run(factor, steps, some, ticks)
         again = np.flatnonzero(near)
         if len(again):
-            settled[again] = self._run(factor[again], steps[again], some[again], looks + looks // 2)[0]
+            settled[again] = self._run(factor[again], steps[again], some[again], ticks + ticks // 2)[0]
         return settled, last
 
     def _run(
-        self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray, looks: int
+        self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray, ticks: int
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Whether loops settle in so many looks, whether a longer run may tell more, and what `_told` tells at the end."""
+        """Whether loops settle in so many ticks, whether a longer run may tell more, and what `_told` tells at the end."""
         bench, tilt, limits, m = self.study.bench, self.study.tilt, self.limits[some], len(some)
-        k0, k1 = self.begin, self.begin + looks * bench.every
+        k0, k1 = self.begin, self.begin + ticks * bench.every
         by = np.zeros((m, 12))
         by[:, 3:6] = tilt
         motion = delayed(bench, self.motion.of(some), k0, steps).moved(by)
@@ -242,13 +242,13 @@ class Loops:
         def watch(sample: int, values: Mapping[str, np.ndarray]) -> None:
             nonlocal within
             signals = np.concatenate([values["angular_velocity"], values["command"] / limits], axis=2)
-            third = np.minimum((sample - first + np.arange(len(signals))) // (looks // 3), 2)
+            third = np.minimum((sample - first + np.arange(len(signals))) // (ticks // 3), 2)
             for w in np.unique(third):
                 highest[w] = np.fmax(highest[w], signals[third == w].max(axis=0))
                 lowest[w] = np.fmin(lowest[w], signals[third == w].min(axis=0))
             aside = _aside(values["attitude"][third == 2], begun, "heading" in self.study.held) <= TILTS * tilt
             within &= (aside & ~at_limit(values["command"][third == 2], limits).any(axis=2)).all(axis=0)
-            last[:] = _told(values, self.study.held)[-1]
+            last[:] = _what_repeats(values, self.study.held)[-1]
 
         after = bench.run(self.places[some], motion, k0, k1, {FACTOR: factor, DELAY: steps * bench.plan.grid.h}, watch)
         near, swing = np.zeros(m, bool), highest - lowest

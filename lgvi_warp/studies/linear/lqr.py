@@ -23,7 +23,7 @@ class Regulator:
 
     Attributes:
         K: (m, n).
-        P: (n, n), the least cost from x is x^T P x: the sum over looks of x^T Q x + u^T R u.
+        P: (n, n), the least cost from x is x^T P x: the sum over ticks of x^T Q x + u^T R u.
         poles: eigenvalues of A - B K (n,), the largest first.
         model: the model.
     """
@@ -64,7 +64,7 @@ class Regulator:
 
 
 def lqr(model: LinearModel, Q: Any, R: Any) -> Regulator:
-    """Find the gains that make the sum over looks of x^T Q x + u^T R u least.
+    """Find the gains that make the sum over ticks of x^T Q x + u^T R u least.
 
     Args:
         model: The linear model, as of `lw.linearize` with inputs="wrench" for `lw.StateFeedback`.

@@ -20,7 +20,7 @@ from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.linear.bench import calm
 from lgvi_warp.studies.linear.edges import edges
 from lgvi_warp.studies.linear.linearize import RANDOM, check_parts
-from lgvi_warp.studies.linear.loops import IDLE, LEAST_LOOKS, UNSETTLED, Loops, Study
+from lgvi_warp.studies.linear.loops import IDLE, LEAST_TICKS, UNSETTLED, Loops, Study
 from lgvi_warp.studies.linear.sampled_loop import SampledLoop
 from lgvi_warp.studies.linear.trim import step_of
 
@@ -139,7 +139,7 @@ class Margins:
         return np.argsort(np.where(self.steady, values, -np.inf), kind="stable")[:count]
 
     @property
-    def told(self) -> str:
+    def reasons_text(self) -> str:
         """The reasons in words, the most frequent first."""
         return "; ".join(f"{count:,}: {why}" for why, count in self.reasons.items())
 
@@ -149,7 +149,7 @@ class Margins:
     def __str__(self) -> str:
         lines = [f"{self.loop}: margins of {self.members} members"]
         if self.reasons:
-            lines.append(f"{sum(self.reasons.values())} of them have none ({self.told}); the others:")
+            lines.append(f"{sum(self.reasons.values())} of them have none ({self.reasons_text}); the others:")
         lines.append(f"{'':16}" + "".join(f"{f'{p:g} %':>10}" for p in PERCENTILES))
         for name, row in self.percentiles().items():
             lines.append(f"{f'{name} {UNITS[name]}'.strip():16}" + "".join(f"{value:10.4g}" for value in row))
@@ -224,10 +224,10 @@ def margins(
         faults.add("fleet", "the scene", "has no controller", "give [controller]")
     elif loop is not None and loop not in (keys := [law.key for law in scene.controller.laws]):
         faults.add("loop", loop, "is no law of the controller", closest(loop, keys))
-    elif not faults and seconds < LEAST_LOOKS * scene.controller.period:
-        least = LEAST_LOOKS * scene.controller.period
+    elif not faults and seconds < LEAST_TICKS * scene.controller.period:
+        least = LEAST_TICKS * scene.controller.period
         faults.add(
-            "seconds", seconds, f"is less than {LEAST_LOOKS} looks", f"give {least:g} or more, to see an envelope"
+            "seconds", seconds, f"is less than {LEAST_TICKS} ticks", f"give {least:g} or more, to see an envelope"
         )
     faults.raise_if_any()
     calm(scene, "margins")

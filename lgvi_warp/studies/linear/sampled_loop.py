@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.control.loop_gain import FACTOR
-from lgvi_warp.studies.linear.bench import Bench, Motion
+from lgvi_warp.studies.linear.bench import MotionBench, Motion
 from lgvi_warp.studies.linear.differences import Row, differences
 from lgvi_warp.studies.linear.linearize import remembered
 
@@ -23,7 +23,7 @@ ON_CIRCLE = 1e-9
 NEUTRAL = 1e-3
 
 
-def delayed(bench: Bench, motion: Motion, k: int, steps: np.ndarray) -> Motion:
+def delayed(bench: MotionBench, motion: Motion, k: int, steps: np.ndarray) -> Motion:
     """The motions as after a look at a steady motion, with a delay.
 
     steps: (m,) delay, in steps.
@@ -39,18 +39,18 @@ def delayed(bench: Bench, motion: Motion, k: int, steps: np.ndarray) -> Motion:
 
 
 class SampledLoop:
-    """x' = P x + Q1 u of q looks ago + Q0 u of the look before that; u' and what parts remember follow from x' at the look.
+    """x' = P x + Q1 u of q ticks ago + Q0 u of the tick before that; u' and what parts remember follow from x' at the tick.
 
-    u' is affine in the factor. P, Q1, Q0 for each delay within a period, and what the look does, are differences in lanes.
+    u' is affine in the factor. P, Q1, Q0 for each delay within a period, and what the tick does, are differences in lanes.
 
     places: (n,), which members.
 
     Attributes:
-        every: steps between two looks.
+        every: steps between two ticks.
         moves: (n,), whether the demand of the loop moves anything.
     """
 
-    def __init__(self, bench: Bench, places: np.ndarray, motion: Motion, k: int):
+    def __init__(self, bench: MotionBench, places: np.ndarray, motion: Motion, k: int):
         bus: Any = bench.bus
         n, C, self.every = len(places), bus.channels, bench.every
         zero = np.zeros(n)
@@ -60,21 +60,21 @@ class SampledLoop:
         commands = [Row("", i, f"command {i}") for i in range(C)]
         acting = [Row("", bus.acting + i, f"acting {i}") for i in range(C)]
         s = 12 + len(terms)
-        looks, self._whole = [], np.ones(n, bool)
+        ticks, self._whole = [], np.ones(n, bool)
         for factor in (0.0, 1.0):
             numbers = {FACTOR: zero + factor, DELAY: zero}
             derivatives = differences(
                 bench, places, still, k, bench.every, [*terms, *acting, *parts], [*terms, *commands, *parts],
                 numbers=numbers)  # fmt: skip
             derivatives = self._without_failed(derivatives)
-            # A look sees the motion alone: what it does of x is found behind the period that was between.
+            # A tick sees the motion alone: what it does of x is found behind the period that was between.
             of_motion = np.linalg.solve(
                 np.swapaxes(derivatives[:, :12, :12], 1, 2), np.swapaxes(derivatives[:, s:, :12], 1, 2)
             )
-            looks.append(np.concatenate([np.swapaxes(of_motion, 1, 2), derivatives[:, s:, s + C :]], axis=2))
+            ticks.append(np.concatenate([np.swapaxes(of_motion, 1, 2), derivatives[:, s:, s + C :]], axis=2))
         self._P, total = derivatives[:, :s, :s], derivatives[:, :s, s : s + C]
         # [u, parts] by [x, parts]: of the laws outside of the loop, and what the loop adds.
-        self._look, self._more = looks[0], looks[1] - looks[0]
+        self._tick, self._more = ticks[0], ticks[1] - ticks[0]
         self._late = [total]
         for steps in range(1, bench.every):
             later = delayed(bench, motion, k, np.full(n, steps))
@@ -96,7 +96,7 @@ class SampledLoop:
         for i in np.flatnonzero(self._whole):
             steps = np.zeros((size, size))
             steps[:s, :s] = self._P[i]
-            now, more = (_of_states(look, self._P[i]) for look in (self._look[i], self._more[i]))
+            now, more = (_of_states(tick, self._P[i]) for tick in (self._tick[i], self._more[i]))
             steps[s:] = now[C:]
             rows = np.concatenate([now[:C], more])
             lengths = np.linalg.norm(rows, axis=1, keepdims=True)
@@ -159,18 +159,18 @@ class SampledLoop:
         first = s + m + C * q
         A[:, :s, first : first + C] = newer
         A[:, :s, first + C : first + 2 * C] = self._late[0][some] - newer
-        look = self._look[some] + factor[:, None, None] * self._more[some]
+        tick = self._tick[some] + factor[:, None, None] * self._more[some]
         for rows, places in ((slice(0, C), slice(s + m, s + m + C)), (slice(C, C + m), slice(s, s + m))):
-            A[:, places] = look[:, rows, :12] @ A[:, :12]
-            A[:, places, s : s + m] += look[:, rows, 12:]
+            A[:, places] = tick[:, rows, :12] @ A[:, :12]
+            A[:, places, s : s + m] += tick[:, rows, 12:]
         older = np.arange(C * (q + 1))
         A[:, s + m + C + older, s + m + older] = 1.0
         return A
 
 
-def _of_states(look: np.ndarray, P: np.ndarray) -> np.ndarray:
-    """What a look does (rows, 12 + m) of the motion at it and of parts, by states (s) and parts a period before."""
-    return np.concatenate([look[:, :12] @ P[:12], look[:, 12:]], axis=1)
+def _of_states(tick: np.ndarray, P: np.ndarray) -> np.ndarray:
+    """What a tick does (rows, 12 + m) of the motion at it and of parts, by states (s) and parts a period before."""
+    return np.concatenate([tick[:, :12] @ P[:12], tick[:, 12:]], axis=1)
 
 
 def _settles(A: np.ndarray) -> np.ndarray:

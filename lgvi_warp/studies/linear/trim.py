@@ -15,7 +15,7 @@ from lgvi_warp.physics import notation
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Start
-from lgvi_warp.studies.linear.bench import Bench, Motion, calm, plant
+from lgvi_warp.studies.linear.bench import MotionBench, Motion, calm, plant
 from lgvi_warp.studies.members import scene_of
 
 # Largest acceleration of a steady motion [m/s2, rad/s2]: far above round-off over a step, some 1e-12.
@@ -107,7 +107,7 @@ def trim(
     scene = scene_of(scene)
     calm(scene, "steady motions")
     h = step_of(scene, h)
-    bench = Bench(Ensemble(plant(replace(scene, events=()), h), 1), method, h, 2.0 * h, h)
+    bench = MotionBench(Ensemble(plant(replace(scene, events=()), h), 1), method, h, 2.0 * h, h)
     problem = _Problem(scene, bench, speed, free, dict(fixed or {}))
     best: Any = None
     for part in GUESSES:
@@ -152,7 +152,7 @@ class _Problem:
     """What is free, and the accelerations that follow."""
 
     def __init__(
-        self, scene: Scene, bench: Bench, speed: float | None, free: Sequence[str] | None, fixed: dict[str, float]
+        self, scene: Scene, bench: MotionBench, speed: float | None, free: Sequence[str] | None, fixed: dict[str, float]
     ):
         self.bench = bench
         controller = bench.plan.kernel_choice.controller

@@ -26,7 +26,7 @@ Cost = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
-class Box:
+class SearchBox:
     """Bounds of numbers of a scene.
 
     Attributes:
@@ -42,7 +42,7 @@ class Box:
     log: np.ndarray
 
     @classmethod
-    def of(cls, key: str, bounds: Any, scene: Any) -> Box:
+    def of(cls, key: str, bounds: Any, scene: Any) -> SearchBox:
         """Read bounds.
 
         Args:
@@ -93,7 +93,7 @@ class Box:
 
 
 @dataclass(frozen=True)
-class Found:
+class BestCandidate:
     """The best candidate of a search.
 
     Attributes:
@@ -130,7 +130,7 @@ class _Asked:
         return costs
 
 
-def search(cost: Cost, d: int, most: int, seed: int, restarts: int, good_enough: float = -math.inf) -> Found:
+def search(cost: Cost, d: int, most: int, seed: int, restarts: int, good_enough: float = -math.inf) -> BestCandidate:
     """Find the least cost in the unit cube.
 
     Evolution (Storn & Price 1997) several times, each from other places; then all corners where they are few; then a walk
@@ -167,4 +167,4 @@ def search(cost: Cost, d: int, most: int, seed: int, restarts: int, good_enough:
         ask(np.clip(ask.best + step * np.concatenate([np.eye(d), -np.eye(d)]), 0.0, 1.0))
         step = step if ask.least < before else 0.5 * step
     assert ask.best is not None
-    return Found(ask.best, ask.least, np.array(least), ask.count)
+    return BestCandidate(ask.best, ask.least, np.array(least), ask.count)

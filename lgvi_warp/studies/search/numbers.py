@@ -32,7 +32,7 @@ class Numbers:
         self.of_metric = isinstance(of, Statistic | Mapping) or (isinstance(of, str) and of.partition(" ")[0] in TYPES)
         if self.of_metric:
             self.label, metric = metric_of(key, of)
-            # A metric comes to every look by itself.
+            # A metric comes to every tick by itself.
             few: dict[str, Any] = {"save": SaveAt(fields=("position",)), **settings, "statistics": [metric]}
             self.run: Prepared = prepare(scene, names, None, **few)
         else:

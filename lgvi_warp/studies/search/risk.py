@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, shown
+from lgvi_warp.common.errors import Faults, brief
 
 
 @dataclass(frozen=True)
@@ -78,5 +78,5 @@ def risk_of(faults: Faults, given: Any) -> Any:
     if isinstance(given, float) and 0.0 < given < 1.0:
         return _Quantile(given)
     if not (isinstance(given, str) and given == "mean"):
-        faults.add("risk", shown(given), "is no risk", 'give "mean", a level such as 0.95, or lw.CVaR(0.05)')
+        faults.add("risk", brief(given), "is no risk", 'give "mean", a level such as 0.95, or lw.CVaR(0.05)')
     return _Mean()

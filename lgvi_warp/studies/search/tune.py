@@ -18,7 +18,7 @@ from lgvi_warp.runs.request import ensemble_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics.base import Statistic
-from lgvi_warp.studies.search.box import LEAST, POPULATION, Box, search
+from lgvi_warp.studies.search.box import LEAST, POPULATION, SearchBox, search
 from lgvi_warp.studies.search.numbers import Numbers
 from lgvi_warp.studies.search.risk import risk_of
 
@@ -75,7 +75,7 @@ class Tuned:
 
 
 @shows_progress
-def tune(
+def tune_gains(
     fleet: Ensemble | Scene,
     over: Mapping[str, Any],
     minimise: OfInterest | Statistic | Mapping[str, Any],
@@ -123,7 +123,7 @@ def tune(
         ...     allocation=[lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
         ... )
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]}, controller=controller)
-        >>> best = lw.tune(scene, {"heading_pid.kp": (0.5, 3.0)}, lw.IAE("heading"), budget=500, h=0.05, t1=10.0)
+        >>> best = lw.tune_gains(scene, {"heading_pid.kp": (0.5, 3.0)}, lw.IAE("heading"), budget=500, h=0.05, t1=10.0)
         >>> print(f"{best.parameters['heading_pid.kp']:.1f}")
         3.0
     """
@@ -132,7 +132,7 @@ def tune(
     n, faults = ensemble.members, Faults()
     measure, box = risk_of(faults, risk), None
     with faults.including():
-        box = Box.of("over", over, scene)
+        box = SearchBox.of("over", over, scene)
     varied = {name.split("[")[0] for name in ensemble.varied_names}
     for name in box.names if box else ():
         if name.split("[")[0] in varied:
@@ -187,7 +187,7 @@ def tune(
 class _Costs:
     """Costs of candidates (k, d), of each member: (k, members)."""
 
-    def __init__(self, numbers_of: Numbers, fleet: Ensemble, box: Box):
+    def __init__(self, numbers_of: Numbers, fleet: Ensemble, box: SearchBox):
         self._numbers_of, self._box, self._members, n = numbers_of, box, fleet.select(0, fleet.members), fleet.members
         self._own = {
             name: np.broadcast_to(v, (n, *v.shape[1:]))

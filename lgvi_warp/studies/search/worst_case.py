@@ -18,7 +18,7 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics.base import Statistic
 from lgvi_warp.studies.members import scene_of
-from lgvi_warp.studies.search.box import LEAST, POPULATION, Box, search
+from lgvi_warp.studies.search.box import LEAST, POPULATION, SearchBox, search
 from lgvi_warp.studies.search.numbers import Numbers
 
 WORST = ("largest", "smallest")
@@ -114,7 +114,7 @@ def worst_case(
     faults.choice("worst", worst, WORST)
     box = None
     with faults.including():
-        box = Box.of("within", within, scene)
+        box = SearchBox.of("within", within, scene)
     least = max(LEAST, POPULATION * (len(box.names) if box else 1))
     if not isinstance(budget, int) or budget < least:
         faults.add("budget", budget, "is less than a generation", f"give {least} or more")

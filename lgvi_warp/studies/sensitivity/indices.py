@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from lgvi_warp.studies.files import Saved, finite_or_none, numbers
+from lgvi_warp.studies.files import Saved, finite_or_none, with_missing_as
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,13 +126,13 @@ class Indices(Saved):
         arrays = {name: np.full(shape, np.nan) for name in (*cls.columns, *cls.intervals.values())}
         for row in rows:
             at = places["quantities"][row["quantity"]], places["factors"][row["factor"]]
-            arrays[row["index"]][at] = numbers(row["value"], np.nan)
+            arrays[row["index"]][at] = with_missing_as(row["value"], np.nan)
             if row["index"] in cls.intervals:
-                arrays[cls.intervals[row["index"]]][at] = numbers(row["confidence"], np.nan)
+                arrays[cls.intervals[row["index"]]][at] = with_missing_as(row["confidence"], np.nan)
         names = ("samples", "members", "failed", "confidence", "provenance")
         kept: dict[str, Any] = arrays | {name: content[name] for name in names}
         kept |= {name: tuple(content[name]) for name in ("factors", "quantities", "messages")}
-        kept |= {name: np.array(numbers(content[name], np.nan), dtype=np.float64) for name in ("mean", "std")}
+        kept |= {name: np.array(with_missing_as(content[name], np.nan), dtype=np.float64) for name in ("mean", "std")}
         return cls(**kept, **cls._pairs_from(content))
 
     @classmethod
@@ -197,7 +197,7 @@ class SobolIndices(Indices):
                 [places["factors"][row[name]] for name in ("factor", "other")],
             )
             for j, k in (pair, pair[::-1]):
-                second[q, j, k], half[q, j, k] = (numbers(row[name], np.nan) for name in ("value", "confidence"))
+                second[q, j, k], half[q, j, k] = (with_missing_as(row[name], np.nan) for name in ("value", "confidence"))
         return {"second": second, "second_confidence": half}
 
     def _pairs(self) -> list[tuple[int, int, int]]:

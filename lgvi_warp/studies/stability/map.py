@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common import machine
-from lgvi_warp.common.arguments import listed, whole
+from lgvi_warp.common.arguments import listed, whole_number
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.progress import callback, shows_progress
@@ -24,7 +24,7 @@ from lgvi_warp.results.provenance import provenance
 from lgvi_warp.results.result import Result
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.studies.distance import QUANTITIES, Compared, compared_in
+from lgvi_warp.studies.distance import QUANTITIES, Distance, compared_in
 from lgvi_warp.studies.files import Saved, finite_or_none
 from lgvi_warp.studies.members import scene_of
 from lgvi_warp.studies.speed import void
@@ -34,7 +34,7 @@ from lgvi_warp.studies.stability.runs import (
     LEAST_DRIVEN,
     REFUSED,
     SHORTEST,
-    Found,
+    CellRuns,
     column,
     judged,
     make_references,
@@ -345,7 +345,7 @@ def stability_map(
     grid = None
     with faults.including():
         both = (points, points) if isinstance(points, int) else tuple(listed("points", points, "two numbers"))
-        grid = StabilityGrid(scene, x, y, both, directions, whole("seed", seed, 0), h)
+        grid = StabilityGrid(scene, x, y, both, directions, whole_number("seed", seed, 0), h)
     faults.raise_if_any()
     assert grid is not None
     assert compared is not None
@@ -355,7 +355,7 @@ def stability_map(
 
 
 def map_of(
-    grid: StabilityGrid, names: Sequence[str], compared: Compared, dtype: str, *, error: float, error_time: float | None,
+    grid: StabilityGrid, names: Sequence[str], compared: Distance, dtype: str, *, error: float, error_time: float | None,
     t1: float | None, energy_bound: float, directions: int, seed: int, threads: int | None = None,
     report: Callable[[float], None] = void, run: Callable[..., Result] = run_plan,
     prepare: Callable[[Plan], Any] = Plan.compile,
@@ -432,7 +432,7 @@ def worst_status(grid: StabilityGrid, status: np.ndarray) -> np.ndarray:
     return np.take_along_axis(status.reshape(grid.shape), chosen, axis=2)[:, :, 0]
 
 
-def cells_of(one: Found, verified: np.ndarray, error: float, energy_bound: float) -> np.ndarray:
+def cells_of(one: CellRuns, verified: np.ndarray, error: float, energy_bound: float) -> np.ndarray:
     """Classify every member of a method's runs.
 
     verified: whether each member's reference is good enough (n,).

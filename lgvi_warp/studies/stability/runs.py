@@ -23,7 +23,7 @@ from lgvi_warp.results.result import Result
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.studies import comparison
 from lgvi_warp.studies.comparison import PRECISE, paired
-from lgvi_warp.studies.distance import Compared, compared_in
+from lgvi_warp.studies.distance import Distance, compared_in
 from lgvi_warp.studies.stability.grid import StabilityGrid
 
 # Number of times at which errors are measured, and energies.
@@ -43,7 +43,7 @@ SHORTEST = TimeGrid(1e-9, np.array([0, 1]), np.array([0.0, 1e-9]))
 
 
 @dataclass
-class Found:
+class CellRuns:
     """What a method's runs showed, for each member.
 
     Attributes:
@@ -186,7 +186,7 @@ def precise_pair(grid: StabilityGrid, *, refused: Callable[..., dict[str, str]] 
 
 
 def _reference(
-    grid: StabilityGrid, column: Column, names: tuple[str, str], rates: np.ndarray, of: Compared, goal: float,
+    grid: StabilityGrid, column: Column, names: tuple[str, str], rates: np.ndarray, of: Distance, goal: float,
     run: Callable[..., Result],
 ) -> None:  # fmt: skip
     """Fill in a column's reference by two methods, halving the steps of members that do not agree yet."""
@@ -231,16 +231,16 @@ def joined(whole: Result | None, part: Result, at: np.ndarray) -> Result:
 
 
 def run_method(
-    grid: StabilityGrid, columns: Sequence[Column], method: str, dtype: str, of: Compared, judged: str, threads: int,
+    grid: StabilityGrid, columns: Sequence[Column], method: str, dtype: str, of: Distance, judged: str, threads: int,
     *, plan_of: Callable[..., Plan] = plan_of, run: Callable[..., Result] = run_plan,
     prepare: Callable[[Plan], Any] = Plan.compile,
-) -> tuple[Found, str]:  # fmt: skip
+) -> tuple[CellRuns, str]:  # fmt: skip
     """Run a method over all columns.
 
     Returns: (findings, reason): what the runs showed, and why the program refused some of them; "" where it refused none.
     """
     n = len(grid.h)
-    findings = Found(np.full(n, np.inf), np.zeros(n), np.full(n, REFUSED), np.zeros(n, bool))
+    findings = CellRuns(np.full(n, np.inf), np.zeros(n), np.full(n, REFUSED), np.zeros(n, bool))
     why: list[str] = []
     rows = grid.shape[2]
     prepare(plan_of(grid, np.arange(n), method, SHORTEST, dtype, "all"))
@@ -267,7 +267,7 @@ def run_method(
     return findings, why[0] if why else ""
 
 
-def judge(result: Result, column: Column, at: np.ndarray, found: Found, of: Compared, judged: str) -> None:
+def judge(result: Result, column: Column, at: np.ndarray, found: CellRuns, of: Distance, judged: str) -> None:
     """Write down the errors, energies, statuses and warnings of a run of some members of a column."""
     members = column.members[at]
     found.status[members] = np.asarray(result.status)

@@ -17,13 +17,13 @@ from lgvi_warp.common.tables import write_csv
 from lgvi_warp.studies.files import finite_or_none
 from lgvi_warp.studies.sweeps.setup import END
 from lgvi_warp.studies.sweeps.success import none_text
-from lgvi_warp.studies.sweeps.sweep_table import SUCCESS, Compared, Findings
+from lgvi_warp.studies.sweeps.sweep_table import SUCCESS, PairedComparison, SweepTable
 
 # Worst members that are listed.
 LISTED = 20
 
 
-class Sweep(Findings):
+class Sweep(SweepTable):
     """What a sweep found: success, comparisons, ranks, the worst members; as tables, files and words.
 
     Attributes:
@@ -69,17 +69,17 @@ class Sweep(Findings):
         return summary(self)
 
 
-def against_baseline(found: Findings) -> list[Compared]:
+def against_baseline(found: SweepTable) -> list[PairedComparison]:
     """Return the comparisons of all other cases with the baseline."""
     others = [case for case in found.cases if case != found.baseline]
     rows = [row for case in others for row in found.compare(found.baseline, case)]
     return found.corrected_for_number(rows)
 
 
-def provenance(found: Findings) -> dict[str, Any]:
+def provenance(found: SweepTable) -> dict[str, Any]:
     """Return all that the sweep follows from, of plain types."""
     setup = found.setup
-    cells = [{"case": cell.case.name, "at": {name: plain(value) for name, value in cell.point.items()}, "key": cell.key,
+    cells = [{"case": cell.case.name, "at": {name: as_json(value) for name, value in cell.point.items()}, "key": cell.key,
               "fixed": list(cell.fixed), "refused": found.record(cell).refused, "messages": list(found.record(cell).messages)}
              for cell in found.cells]  # fmt: skip
     scene = setup.scene.to_dict()
@@ -87,11 +87,11 @@ def provenance(found: Findings) -> dict[str, Any]:
     metrics = {name: metric.to_dict() | {"unit": found.unit(name)} for name, metric in setup.metrics.items()}
     return {"scene": scene, "ensemble": setup.members.to_dict(), "metrics": metrics, "success": found.conditions.to_dict(),
             "baseline": found.baseline, "confidence": found.confidence, "interval": found.interval,
-            "settings": {name: plain(value) for name, value in setup.settings.items()}, "cells": cells,
+            "settings": {name: as_json(value) for name, value in setup.settings.items()}, "cells": cells,
             "versions": machine.versions()}  # fmt: skip
 
 
-def plain(value: Any) -> Any:
+def as_json(value: Any) -> Any:
     """Return a value as JSON can hold it: plain types, others as text."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
@@ -105,7 +105,7 @@ def percent(value: float) -> str:
     return f"{100.0 * value:.4g}"
 
 
-def summary(found: Findings) -> str:
+def summary(found: SweepTable) -> str:
     """Return the sweep in words, as Markdown.
 
     Args:
@@ -147,7 +147,7 @@ def summary(found: Findings) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _causes_text(found: Findings, cell: Any) -> str:
+def _causes_text(found: SweepTable, cell: Any) -> str:
     """The inputs that really explain success in a cell; "" for none."""
     if found.record(cell).refused:
         return ""
@@ -159,7 +159,7 @@ def _causes_text(found: Findings, cell: Any) -> str:
     return f"- {cell.name}: {'; '.join(texts)}" if texts else ""
 
 
-def _cell_text(found: Findings, cell: Any) -> str:
+def _cell_text(found: SweepTable, cell: Any) -> str:
     record = found.record(cell)
     if record.refused:
         return f"{cell.name}: refused: {record.refused}"
@@ -171,7 +171,7 @@ def _cell_text(found: Findings, cell: Any) -> str:
     return f"{text}; {more}" if more else text
 
 
-def _compared_text(found: Findings, row: Compared) -> str:
+def _compared_text(found: SweepTable, row: PairedComparison) -> str:
     d, at = row.difference, ", ".join(f"{name} = {value}" for name, value in row.point.items())
     where = f" at {at}" if at else ""
     if row.of == SUCCESS:

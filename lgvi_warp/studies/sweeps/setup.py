@@ -26,8 +26,8 @@ from lgvi_warp.statistics import TYPES
 from lgvi_warp.statistics.base import Statistic, from_list
 from lgvi_warp.statistics.metrics.actuator_metrics import TimeToFailure
 from lgvi_warp.statistics.metrics.tracking_metrics import check_wanted
-from lgvi_warp.statistics.paths.each import Each
-from lgvi_warp.statistics.paths.member_statistic import Then
+from lgvi_warp.statistics.paths.member_values import MemberValues
+from lgvi_warp.statistics.paths.member_statistic import MemberStatistic
 from lgvi_warp.statistics.values.functional import functional
 from lgvi_warp.studies.sweeps.cases import Case, cases_of, ensemble_of, grid_of, known_names, points_of
 from lgvi_warp.studies.sweeps.record import Record, key_of
@@ -93,10 +93,10 @@ class Setup:
                 self.key(fleet)
 
     def kept(self, fleet: Ensemble) -> dict[str, Any]:
-        """Return the arguments of `solve` for what a run keeps: metrics alone, all of them at looks."""
+        """Return the arguments of `solve` for what a run keeps: metrics alone, all of them at ticks."""
         metrics, controller = list(self.metrics.values()), fleet.scene.controller
-        # Metrics come to looks by themselves; expressions over the path are of the samples.
-        by_samples = controller is not None and not all(metric.looks for metric in metrics)
+        # Metrics come to ticks by themselves; expressions over the path are of the samples.
+        by_samples = controller is not None and not all(metric.ticks for metric in metrics)
         save = SaveAt(every=float(controller.period) if by_samples else None, fields=())
         return {"save": save, "statistics": metrics, "keep": "none"}
 
@@ -111,7 +111,7 @@ class Setup:
 
 
 @dataclass(frozen=True, eq=False)
-class Cell:
+class SweepCell:
     """A case at a point of the grid.
 
     fleet: its members; None where it was refused before there were any.
@@ -274,22 +274,22 @@ def metric_of(key: str, entry: Any) -> tuple[str, Statistic]:
             entry = {"type": word, **({"of": of} if of else {})}
         elif functional(key, entry).over_path:
             label = functional(key, entry).label
-            return label, Each(label)
+            return label, MemberValues(label)
         else:
             remedy = 'give "overshoot depth", "iae heading" or "max(depth)"'
             raise refusal(key, entry, "is not one number of each member", remedy)
     (statistic,) = from_list([entry], key, whole=False)
-    if not isinstance(statistic, Then):
+    if not isinstance(statistic, MemberStatistic):
         remedy = 'give a metric such as lw.Overshoot("depth"), or "max(depth)"'
         raise refusal(key, statistic.type, "is no metric: it is not one number of each member", remedy)
     if getattr(statistic, "of", None) is not None:
         quantity = statistic.quantity
         if quantity.size != 1 and len(statistic.then_of(np.array([0.0, 1.0]))[0].quantity.labels) != 1:
             raise refusal(key, statistic.key, f"is {quantity.size} numbers of each member", "give one component")
-    return statistic.key, replace(statistic, then=(Each(),))
+    return statistic.key, replace(statistic, then=(MemberValues(),))
 
 
-def again(setup: Setup, cell: Cell, indices: Sequence[int], save: SaveAt | None, threads: int | None) -> Result:
+def rerun_members_of(setup: Setup, cell: SweepCell, indices: Sequence[int], save: SaveAt | None, threads: int | None) -> Result:
     """Run some members of a cell alone, with the bits that they had in it.
 
     save: what to save of them, and when; None: as the scene says.

@@ -15,7 +15,7 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.sweeps.output import Sweep
 from lgvi_warp.studies.sweeps.record import Record, Records
-from lgvi_warp.studies.sweeps.setup import Cell, Setup, made
+from lgvi_warp.studies.sweeps.setup import SweepCell, Setup, made
 from lgvi_warp.studies.sweeps.success import INTERVALS, success_of
 
 # Said of a cell whose function holds what cannot be compared.
@@ -69,7 +69,7 @@ def sweep(
         interval: Of probabilities: "wilson" (default) or "clopper_pearson".
         out: Folder. What is finished is kept there, so that the same call goes on after a stop, with the same bytes; cells
             whose numbers, metrics, functions or settings have changed run anew. Functions of yours are told apart by their
-            code and what that leads to; by `version` where lw.Callback and lw.OwnMetric have one.
+            code and what that leads to; by `version` where lw.Callback and lw.CustomMetric have one.
         threads: As of solve.
         executor: As of solve.
         scheduler: As of solve.
@@ -134,7 +134,7 @@ def swept(
 
 def _run(
     setup: Setup, records: Records, threads: int | None, executor: Any, scheduler: str | None, progress: Any
-) -> Iterator[Cell]:
+) -> Iterator[SweepCell]:
     """Run the cells that are not recorded yet, and note those that are refused."""
     total = len(setup.cells)
     setup.note_functions()
@@ -153,4 +153,4 @@ def _run(
             records.put(key, Record.of_refusal(" ".join(str(error).split())))
         if share:
             share(1.0)
-        yield Cell(i, case, point, key, fleet, tuple(fixed))
+        yield SweepCell(i, case, point, key, fleet, tuple(fixed))

@@ -19,7 +19,7 @@ from lgvi_warp.statistics.estimates import paired
 from lgvi_warp.statistics.estimates.given_data import explained
 from lgvi_warp.studies.sweeps import setup as setups
 from lgvi_warp.studies.sweeps.record import Record, Records
-from lgvi_warp.studies.sweeps.setup import Cell, Setup
+from lgvi_warp.studies.sweeps.setup import SweepCell, Setup
 from lgvi_warp.studies.sweeps.success import Probability, Success, probability
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ SUCCESS = "success"
 
 
 @dataclass(frozen=True)
-class Compared:
+class PairedComparison:
     """A difference between two cases on the same members, at one point of the grid."""
 
     first: str
@@ -65,7 +65,7 @@ class Compared:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Findings:
+class SweepTable:
     """What a sweep found, without its files.
 
     Attributes:
@@ -79,7 +79,7 @@ class Findings:
     """
 
     setup: Setup
-    cells: list[Cell]
+    cells: list[SweepCell]
     records: Records
     conditions: Success
     baseline: str
@@ -115,7 +115,7 @@ class Findings:
         statistic = self.setup.metrics[metric]
         return str(getattr(statistic, "unit", statistic.quantity.unit))
 
-    def record(self, cell: Cell) -> Record:
+    def record(self, cell: SweepCell) -> Record:
         """Return what the members of a cell showed.
 
         Args:
@@ -123,7 +123,7 @@ class Findings:
         """
         return self.records[cell.key]
 
-    def cells_of(self, case: str, at: Mapping[str, Any] | None = None) -> list[Cell]:
+    def cells_of(self, case: str, at: Mapping[str, Any] | None = None) -> list[SweepCell]:
         """Return the cells of a case.
 
         Args:
@@ -145,7 +145,7 @@ class Findings:
         wanted = (at or {}).items()
         return [cell for cell in self.cells if cell.case.name == case and wanted <= cell.point.items()]
 
-    def cell(self, case: str, at: Mapping[str, Any] | None = None) -> Cell:
+    def cell(self, case: str, at: Mapping[str, Any] | None = None) -> SweepCell:
         """Return the one cell of a case at a point of the grid, which has run.
 
         Args:
@@ -166,7 +166,7 @@ class Findings:
             raise refusal("case", cells[0].name, f"was refused: {record.refused}", "mend it, or ask for another one")
         return cells[0]
 
-    def passed(self, cell: Cell) -> np.ndarray:
+    def passed(self, cell: SweepCell) -> np.ndarray:
         """Return which members of a cell pass, (n,).
 
         Args:
@@ -234,7 +234,7 @@ class Findings:
 
     def compare(
         self, first: str, second: str, at: Mapping[str, Any] | None = None, quantile: float | None = None
-    ) -> list[Compared]:
+    ) -> list[PairedComparison]:
         """Compare two cases on the same members: their success and each metric, at each point of the grid.
 
         Success: difference of proportions of the members that differ, Tango's interval, McNemar's exact test. Metrics:
@@ -254,7 +254,7 @@ class Findings:
         pairs = [(a, b) for a in self.cells_of(first, at) for b in self.cells_of(second, at) if a.point == b.point]
         return self.corrected_for_number([row for a, b in pairs for row in self._compared(a, b, quantile)])
 
-    def corrected_for_number(self, rows: list[Compared]) -> list[Compared]:
+    def corrected_for_number(self, rows: list[PairedComparison]) -> list[PairedComparison]:
         """Return comparisons made together, with p corrected for their number.
 
         Args:
@@ -264,12 +264,12 @@ class Findings:
         real = [self._differs(row, p) for row, p in zip(rows, corrected, strict=True)]
         return [replace(row, p=float(p), real=yes) for row, p, yes in zip(rows, corrected, real, strict=True)]
 
-    def _differs(self, row: Compared, p: float) -> bool:
+    def _differs(self, row: PairedComparison, p: float) -> bool:
         """Whether a difference is real: by its test, or where there is none by its interval."""
         d = row.difference
         return bool(d.lower > 0.0 or d.upper < 0.0) if np.isnan(d.p) else bool(p < 1.0 - self.confidence)
 
-    def _compared(self, a: Cell, b: Cell, quantile: float | None) -> Iterator[Compared]:
+    def _compared(self, a: SweepCell, b: SweepCell, quantile: float | None) -> Iterator[PairedComparison]:
         """Compare two cells; nothing where one was refused."""
         records = self.record(a), self.record(b)
         if any(record.refused for record in records):
@@ -288,14 +288,14 @@ class Findings:
                 d = paired.quantiles(x, y, quantile, self.confidence, seed=self.setup.members.seed)
                 test = "bootstrap of members"
                 values = tuple(float(np.quantile(v[finite], quantile)) if finite.any() else np.nan for v in (x, y))
-            yield Compared(a.case.name, b.case.name, a.point, name, (values[0], values[1]), d, test, np.nan, False)
+            yield PairedComparison(a.case.name, b.case.name, a.point, name, (values[0], values[1]), d, test, np.nan, False)
 
-    def _of_success(self, a: Cell, b: Cell) -> Compared:
+    def _of_success(self, a: SweepCell, b: SweepCell) -> PairedComparison:
         x, y = self.passed(a), self.passed(b)
         only = int((x & ~y).sum()), int((y & ~x).sum())
         d = paired.proportions(*only, len(x), self.confidence)
         values = float(x.mean()), float(y.mean())
-        return Compared(a.case.name, b.case.name, a.point, SUCCESS, values, d, "McNemar, exact", np.nan, False, only)
+        return PairedComparison(a.case.name, b.case.name, a.point, SUCCESS, values, d, "McNemar, exact", np.nan, False, only)
 
     def ranking(self, at: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
         """Rank the cases by success, and say of which others each is better than chance explains, and by how much.
@@ -361,7 +361,7 @@ class Findings:
         if by not in self.metrics:
             raise refusal("by", by, "is no metric of this sweep", closest(str(by), self.metrics))
         cells = [cell for name in ((case,) if case else self.cases) for cell in self.cells_of(name)]
-        ordered: list[tuple[tuple[float, float, int, int], Cell]] = []
+        ordered: list[tuple[tuple[float, float, int, int], SweepCell]] = []
         for cell in cells:
             record = self.record(cell)
             if record.refused:
@@ -375,13 +375,13 @@ class Findings:
         ordered.sort(key=lambda item: item[0])
         return [self._member_row(cell, place[3]) for place, cell in ordered[:count]]
 
-    def _member_row(self, cell: Cell, i: int) -> dict[str, Any]:
+    def _member_row(self, cell: SweepCell, i: int) -> dict[str, Any]:
         record, inputs = self.record(cell), self.inputs(cell, i, i + 1)
         return {"case": cell.case.name, **cell.point, "member": i, "status": int(record.status[i]),
                 "passed": bool(self.passed(cell)[i]), **{name: float(x[i]) for name, x in record.numbers.items()},
                 **{name: float(x[0]) for name, x in inputs.items()}}  # fmt: skip
 
-    def inputs(self, cell: Cell, first: int = 0, stop: int | None = None) -> dict[str, np.ndarray]:
+    def inputs(self, cell: SweepCell, first: int = 0, stop: int | None = None) -> dict[str, np.ndarray]:
         """Return what varies among the members of a cell, one number a name, in the order of `vary`.
 
         Args:
@@ -461,7 +461,7 @@ class Findings:
         Raises:
             SceneError: there is no such case, point or member.
         """
-        return setups.again(self.setup, self.cell(case, at), members, save, threads)
+        return setups.rerun_members_of(self.setup, self.cell(case, at), members, save, threads)
 
     def rows(self) -> list[dict[str, Any]]:
         """Return one record for each cell: success with its interval, and mean, spread and quantiles of each metric.
@@ -470,7 +470,7 @@ class Findings:
         """
         return [self._row(cell) for cell in self.cells]
 
-    def _row(self, cell: Cell) -> dict[str, Any]:
+    def _row(self, cell: SweepCell) -> dict[str, Any]:
         record = self.record(cell)
         row: dict[str, Any] = {"case": cell.case.name, **cell.point, "refused": record.refused}
         if record.refused:

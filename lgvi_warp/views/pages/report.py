@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from lgvi_warp.common.arguments import file_path, path_of, result_of
 from lgvi_warp.common.errors import NothingToDraw, SceneError
 from lgvi_warp.common.files import place_of, write_text
-from lgvi_warp.common.reading import file_bytes, file_json, file_text, understood
+from lgvi_warp.common.reading import file_bytes, file_json, file_text, corrupt_file_as_scene_error
 from lgvi_warp.common.safe_files import inside
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.results.outcomes import outcome_text, outcomes
@@ -26,8 +26,8 @@ from lgvi_warp.statistics.estimates.table import table
 from lgvi_warp.studies.files import STUDY_FILES, of_study
 from lgvi_warp.views import plots
 from lgvi_warp.views.commands import faults
-from lgvi_warp.views.fleet import LOOKS, title
-from lgvi_warp.views.pages.again import again
+from lgvi_warp.views.fleet import OUTCOME_STYLES, title
+from lgvi_warp.views.pages.run_again import how_to_run_again
 from lgvi_warp.views.plots.inputs import inputs_by_outcome, varied
 from lgvi_warp.views.plots.sweep_pictures import PICTURES
 
@@ -93,7 +93,7 @@ def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]
 
 def _of_folder(folder: Path) -> tuple[str, list[str]]:
     """Name and parts of the page of what a folder holds. Raises SceneError where that is damaged."""
-    with understood(folder, "not what a verb wrote", "write it again"):
+    with corrupt_file_as_scene_error(folder, "not what a verb wrote", "write it again"):
         run, studies = run_in(folder), studies_in(folder)
         if run is None and not studies:
             fault = "holds no run and no study"
@@ -171,7 +171,7 @@ def _outcome_table(result: Result) -> str:
     rows = []
     for code in outcomes(result):
         number = counts[code.name.lower()]
-        mark = f'<span class="outcome" style="background:{LOOKS[code].color}"></span> {html.escape(code.name.lower())}'
+        mark = f'<span class="outcome" style="background:{OUTCOME_STYLES[code].color}"></span> {html.escape(code.name.lower())}'
         share = f"{100.0 * number / result.members:.3g} %"
         rows.append((_Html(mark), f"{number:,}", share, outcome_text(result, code)))
     return _table(("outcome", "members", "share", "meaning and remedy"), rows)
@@ -228,7 +228,7 @@ def _settings(result: Result) -> Iterator[tuple[str, str]]:
 
 def _again(result: Result) -> str:
     """The command that runs it again, and the scene."""
-    command, said, text = again(result.provenance)
+    command, said, text = how_to_run_again(result.provenance)
     return _paragraph(said) + (_preformatted(command) if command else "") + _preformatted(text)
 
 

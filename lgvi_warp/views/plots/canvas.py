@@ -17,7 +17,7 @@ from lgvi_warp.common import files as durable
 from lgvi_warp.common.arguments import file_path, of_kind
 from lgvi_warp.common.errors import MissingExtra
 from lgvi_warp.common.status import Status
-from lgvi_warp.views.fleet import LOOKS
+from lgvi_warp.views.fleet import OUTCOME_STYLES
 from lgvi_warp.views.plots.picture import FilePath
 
 # Colours of Okabe & Ito 2008, Color universal design, without the yellow, which is hardly seen on white.
@@ -171,7 +171,7 @@ def style(i: int) -> dict[str, Any]:
 
 def mark(code: Status) -> dict[str, Any]:
     """Colour and marker of an outcome, a dot for members under way; filled markers have a black edge."""
-    look = LOOKS[code]
+    look = OUTCOME_STYLES[code]
     if code == Status.OK:
         return {"color": look.color, "marker": "o", "linewidths": 0}
     edge = {"edgecolors": "black", "linewidths": 0.5} if code.stopped else {"linewidths": 1.4}
@@ -180,7 +180,7 @@ def mark(code: Status) -> dict[str, Any]:
 
 def outcome_style(code: Status) -> dict[str, Any]:
     """Colour and line style of paths with an outcome."""
-    return {"color": LOOKS[code].color, "linestyle": "-" if code == Status.OK else "--" if code.stopped else ":"}
+    return {"color": OUTCOME_STYLES[code].color, "linestyle": "-" if code == Status.OK else "--" if code.stopped else ":"}
 
 
 def hatch(i: int) -> str:
@@ -242,7 +242,7 @@ def widen(axis: Any) -> None:
         axis.axes.set(**{f"{axis.axis_name}lim": (middle - 0.5 * least, middle + 0.5 * least)})
 
 
-def below(axes: Any, ncols: int = 1, **options: Any) -> None:
+def legend_below(axes: Any, ncols: int = 1, **options: Any) -> None:
     """Draw the legend below the axes and their label, where it hides nothing."""
     from matplotlib.transforms import ScaledTranslation
 

@@ -13,7 +13,7 @@ from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.reading import file_text
 from lgvi_warp.common.safe_files import parsed
-from lgvi_warp.views.plots.canvas import COLORS, MARKERS, below, hatch, panel, panels, style
+from lgvi_warp.views.plots.canvas import COLORS, MARKERS, legend_below, hatch, panel, panels, style
 from lgvi_warp.views.plots.picture import FilePath, picture
 
 COST = "ns_per_vehicle_step"
@@ -56,7 +56,7 @@ def scaling(rows: Rows, *, figure: Any = None, path: FilePath | None = None) -> 
             ticks = sorted({point[across] for point in points})
             if len(ticks) < 8:
                 axes.set_xticks(ticks, [f"{tick:,}" for tick in ticks])
-            below(axes, ncols=3)
+            legend_below(axes, ncols=3)
         grid[0, 0].figure.suptitle("Wall time of a whole run over members and steps; dotted: divided by the threads")
     return grid[0]
 
@@ -99,7 +99,7 @@ def term_cost(rows: Rows, *, ax: Any = None, path: FilePath | None = None) -> An
         axes.grid(True, axis="x", alpha=0.3)
         if ax is None:
             axes.set_title(f"{method}, one core; lines: without terms")
-        below(axes, ncols=3)
+        legend_below(axes, ncols=3)
     return axes
 
 

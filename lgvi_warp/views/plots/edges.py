@@ -43,7 +43,7 @@ def margins(found: Margins, *, figure: Any = None, path: FilePath | None = None)
     of_kind("found", found, "steady values by_runs", "of lw.margins", "give what lw.margins returns")
     steady = np.asarray(found.steady)
     if not steady.any():
-        raise NothingToDraw(f"none of the {found.members} members has margins ({found.told}): there is nothing to draw")
+        raise NothingToDraw(f"none of the {found.members} members has margins ({found.reasons_text}): there is nothing to draw")
     names = list(found.values or found.by_runs)
     ways = [way for way, values in (("eigenvalues", found.values), ("runs", found.by_runs)) if values]
     with panels(figure, path, (1, len(names)), (1.0 + 4.5 * len(names), 4.5), sharey=True) as grid:
@@ -56,7 +56,7 @@ def margins(found: Margins, *, figure: Any = None, path: FilePath | None = None)
             axes.legend()
         grid[0, 0].set_ylabel("members with at most that [%]")
         lost = found.members - int(steady.sum())
-        remark = f"; {lost:,} have none ({found.told})" if lost else ""
+        remark = f"; {lost:,} have none ({found.reasons_text})" if lost else ""
         title = f"{found.loop}: margins of {found.members - lost:,} members{remark}"
         grid[0, 0].figure.suptitle(wrapped(title, grid[0, 0].figure))
     return grid.ravel()

@@ -13,9 +13,9 @@ from lgvi_warp.common.errors import Faults, NothingToDraw, refusal
 from lgvi_warp.common.status import Status, stop_time
 from lgvi_warp.results import outcomes as ended_so
 from lgvi_warp.results.quantities import OfResult, quantities
-from lgvi_warp.views.choice import shown
-from lgvi_warp.views.fleet import LOOKS, title
-from lgvi_warp.views.plots.canvas import COLORS, below, hatch, mark, panel, panels, point_down, widen, wrapped
+from lgvi_warp.views.choice import select_members
+from lgvi_warp.views.fleet import OUTCOME_STYLES, title
+from lgvi_warp.views.plots.canvas import COLORS, legend_below, hatch, mark, panel, panels, point_down, widen, wrapped
 from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.read import at_one_time, estimate_for, with_samples
 from lgvi_warp.views.plots.words import DEPTHS, floors, in_words, some_of, unit_of
@@ -61,11 +61,11 @@ def draw_outcomes(axes: Any, result: Result) -> None:
     shares = [100.0 * count / result.members for count in (going, *counts.values())]
     ok = int((status == Status.OK).sum())
     labels = [f"under way, {ok:,} to the end"] + [_first(result, code, when) for code in ended]
-    areas = axes.stackplot(time, *shares, colors=[LOOKS[code].color for code in (Status.OK, *ended)], labels=labels)
+    areas = axes.stackplot(time, *shares, colors=[OUTCOME_STYLES[code].color for code in (Status.OK, *ended)], labels=labels)
     for i, area in enumerate(areas):
         area.set(hatch=hatch(i), edgecolor="white", linewidth=0.0)
     axes.set(xlabel="time [s]", ylabel="share of members [%]", xlim=(time[0], time[-1]), ylim=(0.0, 100.0))
-    below(axes, ncols=1)
+    legend_below(axes, ncols=1)
 
 
 def _first(result: Result, code: Status, when: np.ndarray) -> str:
@@ -126,7 +126,7 @@ def histogram(
         )
         if down:
             point_down(axes, floors(result))
-        below(axes, ncols=3)
+        legend_below(axes, ncols=3)
     return axes
 
 
@@ -147,7 +147,7 @@ def _gathered(statistic: Estimate, component: int, at: float | None) -> Shares:
 
 def _counted(result: Result, of: OfResult, at: float | None) -> Shares:
     """Members counted in bins at the sample nearest to `at`, by what had become of them."""
-    members, frame = shown(result).ranked, _nearest(result.time, at)
+    members, frame = select_members(result).ranked, _nearest(result.time, at)
     values, labels, unit = at_one_time(result, of, members, frame)
     if len(labels) > 1:
         raise refusal("of", of.label, f"has {len(labels)} components", f"name one: {', '.join(labels)}")
@@ -157,7 +157,7 @@ def _counted(result: Result, of: OfResult, at: float | None) -> Shares:
     edges, shares = _edges(values[finite, 0]), {}
     for code, group in _groups(result, members, when):
         share = np.histogram(values[finite & group, 0], edges)[0] * (100.0 / len(members))
-        shares[_counted_text(code, group)] = share, LOOKS[code].color
+        shares[_counted_text(code, group)] = share, OUTCOME_STYLES[code].color
     return edges, when, unit, shares
 
 
@@ -202,7 +202,7 @@ def pairs(
         SceneError: A quantity is not known, or there are fewer than two numbers or more than six.
     """
     result = with_samples(result)
-    choice = shown(result, MOST_POINTS)
+    choice = select_members(result, MOST_POINTS)
     columns: list[np.ndarray] = []
     names: list[str] = []
     for meaning in quantities(listed("of", of, "quantities")):

@@ -11,7 +11,7 @@ from lgvi_warp.common.arguments import result_of
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views.choice import of_members
 from lgvi_warp.views.fleet import members_of_run
-from lgvi_warp.views.plots.canvas import COLORS, band, below, hatch, panels, point_down, style, wrapped
+from lgvi_warp.views.plots.canvas import COLORS, band, legend_below, hatch, panels, point_down, style, wrapped
 from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.words import DEPTHS, floors, in_words, unit_of
 
@@ -100,7 +100,7 @@ def _levels_panel(axes: Any, one: Estimate) -> None:
             axes.plot(
                 one.time, values[:, len(levels) // 2], label=in_words(str(one.coordinates["component"][c])), **look
             )
-    below(axes, ncols=4)
+    legend_below(axes, ncols=4)
 
 
 def _lines_panel(axes: Any, one: Estimate) -> None:
@@ -112,7 +112,7 @@ def _lines_panel(axes: Any, one: Estimate) -> None:
         look = style(c)
         axes.plot(one.time, value[:, c], label=in_words(str(names[c])) if c < len(names) else None, **look)
         axes.fill_between(one.time, lower[:, c], upper[:, c], color=look["color"], alpha=0.3, linewidth=0)
-    below(axes, ncols=4)
+    legend_below(axes, ncols=4)
 
 
 def _extremes_panel(axes: Any, one: Estimate) -> None:
@@ -121,7 +121,7 @@ def _extremes_panel(axes: Any, one: Estimate) -> None:
         color, label = COLORS[c % len(COLORS)], in_words(str(one.coordinates["component"][c]))
         axes.fill_between(one.time, one["minimum"][:, c], one["maximum"][:, c], facecolor=color, alpha=0.3, hatch=hatch(c),
                           edgecolor=color, linewidth=0, label=label)  # fmt: skip
-    below(axes, ncols=4)
+    legend_below(axes, ncols=4)
 
 
 def _histogram_panel(axes: Any, one: Estimate) -> None:

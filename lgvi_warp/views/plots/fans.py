@@ -16,9 +16,9 @@ from lgvi_warp.results.outcomes import outcomes
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.views.choice import mixed, of_members
 from lgvi_warp.views.fleet import members_of_run, title
-from lgvi_warp.views.plots.canvas import COLORS, TINTS, band, below, hatch, mark, panel, point_down, style, wrapped
+from lgvi_warp.views.plots.canvas import COLORS, TINTS, band, legend_below, hatch, mark, panel, point_down, style, wrapped
 from lgvi_warp.views.plots.picture import FilePath, picture
-from lgvi_warp.views.plots.read import Survey, estimate_for, quantity_of, survey_of, unbounded_text, with_samples
+from lgvi_warp.views.plots.read import ValuesUnderWay, estimate_for, quantity_of, survey_of, unbounded_text, with_samples
 from lgvi_warp.views.plots.words import HINT, floors, floors_of_each, in_words, is_depth, label_of
 from lgvi_warp.views.recording.drawn import at_levels
 
@@ -70,11 +70,11 @@ def fan(result: Result, of: Any = "depth", *, ax: Any = None, path: FilePath | N
         if ax is None:
             axes.set_title("\n".join(wrapped(line, axes.figure) for line in (title(result), *notes)))
         if axes.get_legend_handles_labels()[0]:
-            below(axes, ncols=4, title=text)
+            legend_below(axes, ncols=4, title=text)
     return axes
 
 
-def draw_fan(axes: Any, result: Result, of: Quantity) -> Survey:
+def draw_fan(axes: Any, result: Result, of: Quantity) -> ValuesUnderWay:
     """Draw a fan, the ends of members, and labels."""
     survey = survey_of(result, of)
     if failed(result.status).all() and not survey.under_way[1:].any():
@@ -97,13 +97,13 @@ def draw_fan(axes: Any, result: Result, of: Quantity) -> Survey:
     return survey
 
 
-def notes_on(result: Result, survey: Survey) -> list[str]:
+def notes_on(result: Result, survey: ValuesUnderWay) -> list[str]:
     """Say what a reader of a fan has to know beside it."""
     few_times = HINT if len(survey.time) < 3 else ""
     return [note for note in (unbounded_text(result, survey), few_times) if note]
 
 
-def text_of(survey: Survey, total: int) -> str:
+def text_of(survey: ValuesUnderWay, total: int) -> str:
     """Say how many members are in a fan, at its beginning and at its end."""
     first, last = int(survey.under_way[0]), int(survey.under_way[-1])
     text = of_members(survey.total, total)
@@ -129,7 +129,7 @@ def draw_bands(axes: Any, time: np.ndarray, values: np.ndarray, counted: np.ndar
     axes.plot(time, curves[0.5], color="black", linewidth=1.2, label="median", **look)
 
 
-def _ends(axes: Any, result: Result, survey: Survey) -> None:
+def _ends(axes: Any, result: Result, survey: ValuesUnderWay) -> None:
     """Mark by outcome where and when members ended before the end of the run."""
     when, status = stop_time(result), np.asarray(result.status)
     for code in outcomes(result):
@@ -200,12 +200,12 @@ def compare(results: Mapping[str, Result], of: Any = "depth", *, ax: Any = None,
         if is_depth(meaning):
             point_down(axes, floors_of_each(results))
         sampled = any(curve.banded and not curve.from_statistics for curve in curves.values())
-        below(axes, title="median, and band of 90 % of the members under way" if sampled else None)
+        legend_below(axes, title="median, and band of 90 % of the members under way" if sampled else None)
     return axes
 
 
 @dataclass(frozen=True, eq=False)
-class Curve:
+class RunCurve:
     """A number of one of several runs against time.
 
     Attributes:
@@ -227,14 +227,14 @@ class Curve:
     from_statistics: bool
 
 
-def _curve_of(result: Result, of: Quantity) -> Curve:
+def _curve_of(result: Result, of: Quantity) -> RunCurve:
     """The median and the middle 90 % of the members under way, or without samples what quantiles or a mean tell."""
     estimate = None if result.samples else estimate_for(result, of.name, STANDING[:2])
     if estimate is None:
         survey = survey_of(with_samples(result), of)
         low, middle, high = at_levels(survey.values, survey.counted, [0.05, 0.5, 0.95])
         text = text_of(survey, members_of_run(result)).replace("\n", " ")
-        return Curve(survey.time, low, middle, high, text, survey.total > 1, False)
+        return RunCurve(survey.time, low, middle, high, text, survey.total > 1, False)
     statistic, component = estimate
     members = of_members(result.members, members_of_run(result))
     if statistic.settings["type"] == "mean":
@@ -245,4 +245,4 @@ def _curve_of(result: Result, of: Quantity) -> Curve:
         center = int(np.abs(levels - 0.5).argmin())
         edges = values[:, 0], values[:, center], values[:, -1]
         text = f"{members}, {band(0.0, levels[center])} quantile, and band of {band(levels[0], levels[-1])}"
-    return Curve(statistic.time, *edges, text, True, True)
+    return RunCurve(statistic.time, *edges, text, True, True)

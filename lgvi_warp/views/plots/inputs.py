@@ -11,7 +11,7 @@ from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.results.outcomes import outcomes
 from lgvi_warp.statistics.estimates.given_data import explained
 from lgvi_warp.views.choice import mixed
-from lgvi_warp.views.plots.canvas import below, mark, panel, widen, wrapped
+from lgvi_warp.views.plots.canvas import legend_below, mark, panel, widen, wrapped
 from lgvi_warp.views.plots.picture import FilePath
 
 if TYPE_CHECKING:
@@ -44,7 +44,7 @@ def inputs_by_outcome(result: Result, *, ax: Any = None, path: FilePath | None =
         axes.set(xlabel=words[first], ylabel=words[others[0]] if others else "member")
         axes.set_title(wrapped(f"Inputs that tell apart who ended as {most.name.lower()}", axes.figure))
         widen(axes.xaxis)
-        below(axes, ncols=3)
+        legend_below(axes, ncols=3)
     return axes
 
 

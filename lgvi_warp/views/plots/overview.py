@@ -16,7 +16,7 @@ from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.views.choice import AT_ONCE
 from lgvi_warp.views.fleet import members_of_run, title
-from lgvi_warp.views.plots.canvas import below, panel, panels, style, wrapped
+from lgvi_warp.views.plots.canvas import legend_below, panel, panels, style, wrapped
 from lgvi_warp.views.plots.ends import draw_outcomes
 from lgvi_warp.views.plots.estimates import statistics
 from lgvi_warp.views.plots.fans import draw_fan, notes_on, text_of
@@ -87,7 +87,7 @@ def _fan(result: Result, of: Quantity, axes: Any) -> list[str]:
     survey = draw_fan(axes, result, of)
     axes.set_title("Depth" if is_depth(of) else of.name.capitalize())
     if axes.get_legend_handles_labels()[0] and survey.total > 1:
-        below(axes, ncols=4, title=text_of(survey, members_of_run(result)))
+        legend_below(axes, ncols=4, title=text_of(survey, members_of_run(result)))
     return notes_on(result, survey)
 
 
@@ -128,7 +128,7 @@ def drift(result: Result, *, ax: Any = None, path: FilePath | None = None) -> An
         axes.set(xlabel="time [s]", ylabel="largest change since the start", yscale="log")
         axes.set_title(wrapped(f"{head}; {title(result)}", axes.figure))
         axes.grid(True, alpha=0.3)
-        below(axes, ncols=3)
+        legend_below(axes, ncols=3)
     return axes
 
 

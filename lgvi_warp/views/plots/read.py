@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.common.arguments import result_of, whole
+from lgvi_warp.common.arguments import result_of, whole_number
 from lgvi_warp.common.errors import NothingToDraw, refusal
 from lgvi_warp.common.status import under_way
 from lgvi_warp.physics import energy as invariants
-from lgvi_warp.results.quantities import OfEnds, OfResult, samples_of
+from lgvi_warp.results.quantities import EndQuantity, OfResult, samples_of
 from lgvi_warp.statistics.values.functional import quantity
 from lgvi_warp.statistics.values.quantity import Quantity
-from lgvi_warp.views.choice import AT_ONCE, Shown, few, shown
+from lgvi_warp.views.choice import AT_ONCE, Shown, few, select_members
 from lgvi_warp.views.plots.words import DEPTHS, events, is_depth
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ CIRCULAR = ("euler[0]", "euler[2]")
 
 
 @dataclass(frozen=True, eq=False)
-class Survey:
+class ValuesUnderWay:
     """One number of the members under way at each time.
 
     Attributes:
@@ -79,7 +79,7 @@ def selected(result: Result, most: int, fields: tuple[str, ...], what: str) -> t
     """
     result = with_samples(result)
     check_fields(result, fields, what)
-    choice = shown(result, whole("most", most, 1))
+    choice = select_members(result, whole_number("most", most, 1))
     return result, choice, few(result, choice.members, fields, choice.frames)
 
 
@@ -116,7 +116,7 @@ def energy_of(result: Result) -> Quantity:
     return Quantity("energy error", error, energy.unit, energy.fields)
 
 
-def unbounded_text(result: Result, survey: Survey) -> str:
+def unbounded_text(result: Result, survey: ValuesUnderWay) -> str:
     """Say how many members leave water that has no surface."""
     if not survey.above or any(event["type"] == "surface" for event in events(result)):
         return ""
@@ -124,10 +124,10 @@ def unbounded_text(result: Result, survey: Survey) -> str:
     return f"unbounded water: {who} above depth 0"
 
 
-def survey_of(result: Result, of: Quantity, at_once: int = AT_ONCE) -> Survey:
+def survey_of(result: Result, of: Quantity, at_once: int = AT_ONCE) -> ValuesUnderWay:
     """Read one number of all members, in pieces: a large run never lies in memory whole."""
     check_fields(result, of.fields, of.name)
-    choice = shown(result) if "position" in result.samples else everyone(result)
+    choice = select_members(result) if "position" in result.samples else everyone(result)
     frames = choice.frames
     going = under_way(result)[frames]
     direction = _direction(result, of, choice, going)
@@ -139,7 +139,7 @@ def survey_of(result: Result, of: Quantity, at_once: int = AT_ONCE) -> Survey:
     step = max(1, at_once // len(frames) // (10 if len(of.fields) > 2 else 1))
     for first in range(0, result.members, step):
         members = slice(first, min(first + step, result.members))
-        values = numbers(result, of, members, frames)
+        values = values_of(result, of, members, frames)
         last[members] = values[-1]
         if direction is not None:
             last[members] = _about(values[-1], direction[ended[members], 0])
@@ -155,7 +155,7 @@ def survey_of(result: Result, of: Quantity, at_once: int = AT_ONCE) -> Survey:
         raise NothingToDraw(f"no member has a finite {of.name}: there is nothing to draw; see result.status")
     values, counted = np.concatenate(rows, axis=1), np.concatenate(counts, axis=1)
     sums = going.sum(axis=1)
-    return Survey(of, result.time[frames], values, counted, low, high, sums, last, above, result.members)
+    return ValuesUnderWay(of, result.time[frames], values, counted, low, high, sums, last, above, result.members)
 
 
 def everyone(result: Result) -> Shown:
@@ -164,7 +164,7 @@ def everyone(result: Result) -> Shown:
     return Shown(members, np.arange(len(result.time)), members, result.members)
 
 
-def numbers(result: Result, of: Quantity, members: slice | np.ndarray, frames: np.ndarray | None = None) -> np.ndarray:
+def values_of(result: Result, of: Quantity, members: slice | np.ndarray, frames: np.ndarray | None = None) -> np.ndarray:
     """Compute a quantity of some members.
 
     frames: Indices of the times; default None, all.
@@ -184,7 +184,7 @@ def _direction(result: Result, of: Quantity, choice: Shown, going: np.ndarray) -
         return None
     arm = np.zeros(len(choice.frames), complex)
     for members in (choice.members, going.sum(axis=0).argmax(keepdims=True)):
-        angle = numbers(result, of, members, choice.frames)
+        angle = values_of(result, of, members, choice.frames)
         counted = going[:, members] & np.isfinite(angle)
         sums = np.where(counted, np.exp(1j * np.where(counted, angle, 0.0)), 0.0).sum(axis=1)
         arm = np.where(arm == 0.0, sums, arm)
@@ -208,7 +208,7 @@ def at_one_time(
     """
     check_fields(result, of.fields, of.label)
     frame = frame % len(result.time)
-    all_so_far = of.over_path or of.is_function or isinstance(of, OfEnds)
+    all_so_far = of.over_path or of.is_function or isinstance(of, EndQuantity)
     frames = np.arange(frame + 1) if all_so_far else np.array([frame])
     values = of.values(few(result, members, of.fields, frames))
     return values, of.labels(values.shape[1]), of.unit

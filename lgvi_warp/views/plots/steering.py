@@ -10,7 +10,7 @@ import numpy as np
 from lgvi_warp.common.status import under_way
 from lgvi_warp.views.choice import MOST_BODIES
 from lgvi_warp.views.commands import channels, faults
-from lgvi_warp.views.plots.canvas import GREY, below, hatch, style
+from lgvi_warp.views.plots.canvas import GREY, legend_below, hatch, style
 from lgvi_warp.views.plots.read import quantity_of, selected, survey_of
 from lgvi_warp.views.plots.words import WORDS
 from lgvi_warp.views.recording.drawn import at_levels
@@ -35,7 +35,7 @@ def draw_commands(result: Result, axes: Any) -> list[str]:
         axes.axhline(limit, color=GREY, linestyle=(0, (6, 2)), linewidth=1.0, label="limit" if limit > 0.0 else None)
     said = _mark_faults(axes, result)
     axes.set(xlabel="time [s]", ylabel="command [unit of each]", title=f"Commands{_bands(some.members)}")
-    below(axes, ncols=3)
+    legend_below(axes, ncols=3)
     return said
 
 
@@ -55,7 +55,7 @@ def draw_angles(result: Result, axes: Any) -> list[str]:
         _band(axes, survey.time, levels, i, label, banded=survey.total > 1)
     said = _mark_faults(axes, result)
     axes.set(xlabel="time [s]", ylabel="angle [deg]", title=f"Attitude{_bands(survey.total)}")
-    below(axes, ncols=4)
+    legend_below(axes, ncols=4)
     return said
 
 

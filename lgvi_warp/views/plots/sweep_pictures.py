@@ -18,9 +18,9 @@ from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.quantities import samples_of
 from lgvi_warp.statistics.values import tracking
 from lgvi_warp.studies.sweeps.output import Sweep, against_baseline
-from lgvi_warp.studies.sweeps.setup import END, Cell
+from lgvi_warp.studies.sweeps.setup import END, SweepCell
 from lgvi_warp.studies.sweeps.sweep_table import SUCCESS
-from lgvi_warp.views.plots.canvas import COLORS, GREY, MARKERS, below, panels, point_down, style, wrapped
+from lgvi_warp.views.plots.canvas import COLORS, GREY, MARKERS, legend_below, panels, point_down, style, wrapped
 from lgvi_warp.views.plots.fans import draw_bands
 from lgvi_warp.views.plots.picture import FilePath
 
@@ -35,7 +35,7 @@ MOST_LEVEL = 6
 QUARTILES = {"whislo": 0.05, "q1": 0.25, "med": 0.5, "q3": 0.75, "whishi": 0.95}
 
 
-def _ran(sweep: Sweep, case: str | None = None) -> list[Cell]:
+def _ran(sweep: Sweep, case: str | None = None) -> list[SweepCell]:
     """The cells that ran, of all cases or of one; NothingToDraw where no cell of the sweep did."""
     cells = [cell for cell in sweep.cells if not sweep.record(cell).refused]
     if not cells:
@@ -88,7 +88,7 @@ def plot_success(sweep: Sweep, path: FilePath | None = None, *, figure: Any = No
     return grid.ravel()
 
 
-def _ends(axes: Any, sweep: Sweep, cells: list[Cell], places: list[float], name: str | None, **look: Any) -> None:
+def _ends(axes: Any, sweep: Sweep, cells: list[SweepCell], places: list[float], name: str | None, **look: Any) -> None:
     """Success of cells with error bars [%]: one a place, or each at the place of its value of an axis of the grid."""
     if not cells:
         return
@@ -162,7 +162,7 @@ def plot_metrics(sweep: Sweep, path: FilePath | None = None, *, figure: Any = No
     return grid.ravel()
 
 
-def _box(sweep: Sweep, cell: Cell, name: str) -> dict[str, float]:
+def _box(sweep: Sweep, cell: SweepCell, name: str) -> dict[str, float]:
     """Quantiles of a metric in a cell, by Matplotlib's names; NaN where no member has one."""
     record = sweep.record(cell)
     numbers = record.numbers[name][np.isfinite(record.numbers[name]) & ~failed(record.status)]
@@ -192,7 +192,7 @@ def plot_differences(sweep: Sweep, path: FilePath | None = None, *, figure: Any 
         axes.axvline(0.0, color="0.3", linewidth=0.8)
         axes.set_xlabel(f"passes more than {sweep.baseline} [points], {sweep.confidence:.0%} interval")
         axes.grid(alpha=0.3, axis="x")
-        below(axes, ncols=2)
+        legend_below(axes, ncols=2)
     return grid.ravel()
 
 
@@ -255,15 +255,15 @@ def plot_responses(
     return grid.ravel()[: len(cells)]
 
 
-def _most_apart(sweep: Sweep) -> list[Cell]:
+def _most_apart(sweep: Sweep) -> list[SweepCell]:
     """The cells that ran at the point of the grid where the success of the cases differs most."""
-    by_point: dict[tuple[Any, ...], list[Cell]] = {}
+    by_point: dict[tuple[Any, ...], list[SweepCell]] = {}
     for cell in _ran(sweep):
         by_point.setdefault(tuple(cell.point.values()), []).append(cell)
     return max(by_point.values(), key=lambda cells: np.ptp([sweep.passed(cell).mean() for cell in cells]))
 
 
-def _tracked(sweep: Sweep, cells: list[Cell]) -> str:
+def _tracked(sweep: Sweep, cells: list[SweepCell]) -> str:
     """What the metric is of whose medians differ most between cells, of numbers tracked over time; "" without one."""
 
     def apart(name: str) -> float:
@@ -276,7 +276,7 @@ def _tracked(sweep: Sweep, cells: list[Cell]) -> str:
     return str(sweep.setup.metrics[max(known, key=apart)].of) if known else ""
 
 
-def _response(axes: Any, sweep: Sweep, cell: Cell, of: str, count: int) -> None:
+def _response(axes: Any, sweep: Sweep, cell: SweepCell, of: str, count: int) -> None:
     """Draw the fan of the first members of a cell, and what is wanted of a number."""
     assert cell.fleet is not None
     assert cell.fleet.scene.controller is not None

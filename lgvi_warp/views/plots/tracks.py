@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.common.arguments import listed, whole
+from lgvi_warp.common.arguments import listed, whole_number
 from lgvi_warp.common.errors import refusal
 from lgvi_warp.common.status import Status, under_way
-from lgvi_warp.views.plots.canvas import COLORS, STYLES, below, mark, outcome_style, panel, point_down, wrapped
+from lgvi_warp.views.plots.canvas import COLORS, STYLES, legend_below, mark, outcome_style, panel, point_down, wrapped
 from lgvi_warp.views.plots.picture import FilePath, picture
-from lgvi_warp.views.plots.read import numbers, quantity_of, selected, with_samples
+from lgvi_warp.views.plots.read import values_of, quantity_of, selected, with_samples
 from lgvi_warp.views.plots.words import HINT, floors, is_depth, label_of, some_of
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ def paths(result: Result, most: int = MOST_PATHS, *, ax: Any = None, path: FileP
 
     Args:
         result: A result with positions, in memory or in a store.
-        most: The most members to draw, which `lw.shown` chooses; default 12.
+        most: The most members to draw, which `lw.select_members` chooses; default 12.
 
     Returns:
         The axes.
@@ -64,7 +64,7 @@ def plan_view(result: Result, most: int = MOST_PATHS, *, ax: Any = None, path: F
 
     Args:
         result: A result with positions, in memory or in a store.
-        most: The most members to draw, which `lw.shown` chooses; default 12.
+        most: The most members to draw, which `lw.select_members` chooses; default 12.
 
     Returns:
         The axes.
@@ -105,7 +105,7 @@ def phase(
     Args:
         result: A result with the samples that the quantities need, in memory or in a store.
         of: The horizontal and the vertical quantity; default depth and the velocity downwards.
-        most: The most members to draw, which `lw.shown` chooses; default 12.
+        most: The most members to draw, which `lw.select_members` chooses; default 12.
 
     Returns:
         The axes.
@@ -120,7 +120,7 @@ def phase(
     across, upward = map(quantity_of, names)
     fields = tuple(dict.fromkeys(("position", *across.fields, *upward.fields)))
     result, choice, some = selected(result, most, fields, "a phase portrait")
-    x, y = (numbers(result, meaning, choice.members, choice.frames) for meaning in (across, upward))
+    x, y = (values_of(result, meaning, choice.members, choice.frames) for meaning in (across, upward))
     with panel(ax, path) as axes:
         _lines(axes, some, x, y, start=True)
         x_label = label_of(across).removesuffix(", down")
@@ -154,7 +154,7 @@ def _lines(axes: Any, some: Result, x: np.ndarray, y: np.ndarray, start: bool = 
         axes.scatter(x[0], y[0], s=22, marker="o", facecolors="white", edgecolors="black", zorder=3, label="start")
     axes.grid(True, alpha=0.3)
     if start or labelled != {Status.OK}:
-        below(axes, ncols=4)
+        legend_below(axes, ncols=4)
 
 
 # Cosine of 30 degrees.
@@ -178,7 +178,7 @@ def attitude(result: Result, most: int = MOST_AXES, *, ax: Any = None, path: Fil
         NothingToDraw: No attitudes were kept, or no member has a finite start.
     """
     result, choice, some = selected(
-        result, max(whole("most", most, 1), MOST_PATHS), ("position", "attitude"), "attitudes"
+        result, max(whole_number("most", most, 1), MOST_PATHS), ("position", "attitude"), "attitudes"
     )
     # Of the choice those that are under way longest: one that fails at once has no path.
     longest = np.sort(np.argsort(-under_way(some).sum(axis=0), kind="stable")[:most])

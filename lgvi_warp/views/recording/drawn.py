@@ -17,8 +17,8 @@ from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.results.outcomes import outcomes
 from lgvi_warp.views import choice as choices
-from lgvi_warp.views.choice import Shown, finite_rows, of_members, pieces, shown
-from lgvi_warp.views.fleet import LOOKS, energy_curve
+from lgvi_warp.views.choice import Shown, finite_rows, of_members, pieces, select_members
+from lgvi_warp.views.fleet import OUTCOME_STYLES, energy_curve
 
 if TYPE_CHECKING:
     from lgvi_warp.results.result import Result
@@ -125,7 +125,7 @@ class Drawn:
 
     def color(self, code: Status) -> tuple[int, int, int]:
         """Choose the colour of members."""
-        return self.rgb or LOOKS[code].rgb
+        return self.rgb or OUTCOME_STYLES[code].rgb
 
     def path(self, head: str, *parts: str) -> str:
         """Name an entity of this run."""
@@ -153,7 +153,7 @@ def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[in
     if missing := [name for name in NEEDED if source.samples and name not in source.samples]:
         names = ", ".join(missing)
         raise NothingToDraw(f"{names} were not kept: a recording needs them; add them to SaveAt(fields=...)")
-    choice = shown(source)
+    choice = select_members(source)
     if members is not None:
         kept = np.arange(result.members) if source is result else result.kept_members
         choice = dataclasses.replace(choice, members=places_of(members, result.members, kept))

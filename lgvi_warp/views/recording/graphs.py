@@ -12,7 +12,7 @@ from lgvi_warp.control.signals import CHANNELS
 from lgvi_warp.results.outcomes import outcome_text, outcomes
 from lgvi_warp.views.choice import frames_of
 from lgvi_warp.views.commands import channels, faults
-from lgvi_warp.views.fleet import LOOKS
+from lgvi_warp.views.fleet import OUTCOME_STYLES
 from lgvi_warp.views.recording.drawn import LEVELS, Drawn, Fan, at_levels, first_ended
 from lgvi_warp.views.recording.world import TIMELINE
 
@@ -26,7 +26,7 @@ MARKED = 3
 # Most histograms: each takes a message of its own.
 HISTOGRAMS = 60
 # Colours of channels: those of all outcomes, failures once.
-COLORS = list(dict.fromkeys(look.rgb for look in LOOKS.values()))
+COLORS = list(dict.fromkeys(look.rgb for look in OUTCOME_STYLES.values()))
 
 
 def log_graphs(recording: Any, run: Drawn) -> None:
@@ -81,7 +81,7 @@ def log_member(recording: Any, run: Drawn, place: int, member: int) -> None:
     for name, values in (("height", -run.position[:, place, 2]), ("speed", speed)):
         seen_values = np.where(run.counted[:, place], values, np.nan)
         entity = f"curves/{name}/{member}"
-        _series(recording, entity, run.time, seen_values, f"member {member:,}", LOOKS[Status.OK].rgb, 1.0)
+        _series(recording, entity, run.time, seen_values, f"member {member:,}", OUTCOME_STYLES[Status.OK].rgb, 1.0)
 
 
 # Marks of outcomes on the curves of a run that is compared, which are all in its colour; failures have one together.
@@ -153,7 +153,7 @@ def _histogram(recording: Any, run: Drawn) -> None:
     import rerun as rr
 
     centers, widths = 0.5 * (run.bins[1:] + run.bins[:-1]), np.diff(run.bins).astype(np.float32)
-    color, entity = run.rgb or LOOKS[Status.OK].rgb, run.path("histogram", "depth")
+    color, entity = run.rgb or OUTCOME_STYLES[Status.OK].rgb, run.path("histogram", "depth")
     for frame in frames_of(run.time, HISTOGRAMS):
         recording.set_time(TIMELINE, duration=float(run.time[frame]))
         counts = run.heights[frame].astype(np.int64)

@@ -10,14 +10,14 @@ import numpy as np
 from lgvi_warp.control.signals import CHANNELS
 from lgvi_warp.views.recording.drawn import Drawn, Fan
 from lgvi_warp.views.recording.eye import ASPECT, SIGHT, distance
-from lgvi_warp.views.recording.world import TIMELINE, Box
+from lgvi_warp.views.recording.world import TIMELINE, WorldBox
 
 # The whole run is played in this time [s].
 PLAYED = 20.0
 BACKGROUND = (9, 24, 38)
 
 
-def layout(runs: list[Drawn], box: Box, scales: list[int]) -> Any:
+def layout(runs: list[Drawn], box: WorldBox, scales: list[int]) -> Any:
     """Lay out the views: the world on the left, curves and the run's facts on the right."""
     import rerun.blueprint as rrb
     from rerun.blueprint.encodings import TextLogColumn
@@ -39,7 +39,7 @@ def layout(runs: list[Drawn], box: Box, scales: list[int]) -> Any:
     return _whole_window(rrb.Horizontal(world_side, _right(runs), column_shares=[3, 2]), played)
 
 
-def live_layout(run: Drawn, box: Box, scale: int) -> Any:
+def live_layout(run: Drawn, box: WorldBox, scale: int) -> Any:
     """Lay out the views of a run that goes on: the world on the left, curves of single members on the right."""
     import rerun.blueprint as rrb
 
@@ -143,7 +143,7 @@ def _whole(time: np.ndarray) -> Any:
     return rrb.TimeAxis(view_range=rrb.TimeRange(start=start, end=end))
 
 
-def _world(run: Drawn, name: str, box: Box, scale: int, aspect: float) -> Any:
+def _world(run: Drawn, name: str, box: WorldBox, scale: int, aspect: float) -> Any:
     """The view of one run's world: across the fleet's way, from a little above; trails up to the cursor."""
     import rerun.blueprint as rrb
 

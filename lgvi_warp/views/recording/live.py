@@ -18,7 +18,7 @@ from lgvi_warp.views.recording import viewer
 from lgvi_warp.views.recording.drawn import NEEDED, Drawn, drawn_of
 from lgvi_warp.views.recording.graphs import log_member
 from lgvi_warp.views.recording.layout import live_layout
-from lgvi_warp.views.recording.world import Box, box_of, log_bodies, log_frame, log_paths, scale_of
+from lgvi_warp.views.recording.world import WorldBox, box_of, log_bodies, log_frame, log_paths, scale_of
 
 if TYPE_CHECKING:
     from lgvi_warp.results.result import Result
@@ -34,7 +34,7 @@ PATIENCE = 30.0
 class Live:
     """Shows the members of a run in a viewer as their blocks are finished.
 
-    Of each block as many members are drawn as its share of 1,000, in the order of `lgvi_warp.shown`: by a hash of their index.
+    Of each block as many members are drawn as its share of 1,000, in the order of `lgvi_warp.select_members`: by a hash of their index.
     Bodies and paths are coloured by outcome; curves are of single members, since quantiles need all of them.
 
     A viewer that is closed, or takes nothing for a while, ends the view and not the run.
@@ -49,7 +49,7 @@ class Live:
         self._recording = recording
         self._counts: Counter[str] = Counter()
         self._runs: list[Drawn] = []
-        self._box: Box | None = None
+        self._box: WorldBox | None = None
         self._scale, self._curves = 1, 0
 
     def add(self, block: Result) -> None:

@@ -21,13 +21,13 @@ from lgvi_warp.views.recording.eye import ASPECT
 from lgvi_warp.views.recording.graphs import COLORS, log_graphs
 from lgvi_warp.views.recording.layout import layout
 from lgvi_warp.views.recording.words import log_words
-from lgvi_warp.views.recording.world import Box, box_of, log_world, scale_of
+from lgvi_warp.views.recording.world import WorldBox, box_of, log_world, scale_of
 
 if TYPE_CHECKING:
     from lgvi_warp.results.result import Result
 
 
-def log_rerun(
+def record(
     result: Result | Mapping[str, Result],
     path: str | os.PathLike[str] | None = None,
     *,
@@ -36,7 +36,7 @@ def log_rerun(
 ) -> Path | None:
     """Record the fleet for the rerun viewer; a file is there whole or not at all.
 
-    Hulls of the vehicle's shape are drawn for the members and times of `lgvi_warp.shown`, each in the colour of its outcome
+    Hulls of the vehicle's shape are drawn for the members and times of `lgvi_warp.select_members`, each in the colour of its outcome
     from the moment it has it. Curves are of the members under way at each time. The same run always gives the recording and
     the application the same ids: the viewer keeps recordings and layouts apart by them.
 
@@ -44,7 +44,7 @@ def log_rerun(
         result: A result with position, attitude and velocity, in memory or in a store; or several by name, which are shown
             side by side, in one colour each.
         path: The file; None (default) only with `to`.
-        members: Indices of the members to draw, as [3, 17]; default those that `lgvi_warp.shown` chooses.
+        members: Indices of the members to draw, as [3, 17]; default those that `lgvi_warp.select_members` chooses.
         to: Where else to send it: an rr.RecordingStream, or the address of a viewer, as
             "rerun+http://127.0.0.1:9876/proxy"; default nowhere.
 
@@ -63,7 +63,7 @@ def log_rerun(
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
         >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
         >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
-        >>> print(lw.log_rerun(result, "fleet.rrd"))
+        >>> print(lw.record(result, "fleet.rrd"))
         fleet.rrd
     """
     viewer.rerun()
@@ -104,7 +104,7 @@ def show(result: Result | Mapping[str, Result], *, members: Any = None) -> None:
 
     Args:
         result: As for `log_rerun`.
-        members: Indices of the members to draw; default those that `lgvi_warp.shown` chooses.
+        members: Indices of the members to draw; default those that `lgvi_warp.select_members` chooses.
 
     Raises:
         ImportError: rerun-sdk is not installed (extra: viz).
@@ -115,7 +115,7 @@ def show(result: Result | Mapping[str, Result], *, members: Any = None) -> None:
     viewer.rerun()
     # The viewer reads the file after this returns; the system clears its folder for temporary files.
     path = Path(tempfile.mkdtemp(prefix="lgvi_warp_")) / "fleet.rrd"
-    log_rerun(result, path, members=members)
+    record(result, path, members=members)
     viewer.is_open()
     viewer.start([path], f"the recording is {path}: open it where there is a display")
 
@@ -159,7 +159,7 @@ def _write(runs: list[Drawn], path: Path | None, address: str | None) -> None:
         raise OSError(text) from error
 
 
-def _scales(runs: list[Drawn], box: Box) -> list[int]:
+def _scales(runs: list[Drawn], box: WorldBox) -> list[int]:
     """How many times their size hulls are drawn, of each run in a view of its own."""
     return [scale_of(run, box, ASPECT / len(runs)) for run in runs]
 

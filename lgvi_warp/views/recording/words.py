@@ -14,13 +14,13 @@ from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.views.choice import of_members
 from lgvi_warp.views.recording.drawn import Drawn
 from lgvi_warp.views.recording.hull import shape_of
-from lgvi_warp.views.recording.world import Box, chosen_member, floors_of
+from lgvi_warp.views.recording.world import WorldBox, chosen_member, floors_of
 
 # Versions that are among the ten lines, which have room for few words; the provenance has all.
 TOLD = ("lgvi-warp", "warp-lang", "rerun")
 
 
-def log_words(recording: Any, runs: list[Drawn], box: Box, scales: list[int]) -> None:
+def log_words(recording: Any, runs: list[Drawn], box: WorldBox, scales: list[int]) -> None:
     """Log the summary of the runs, and their provenance."""
     import rerun as rr
 
@@ -33,7 +33,7 @@ def log_words(recording: Any, runs: list[Drawn], box: Box, scales: list[int]) ->
             recording.log(run.path(f"run/{name}"), document, static=True, strict=True)
 
 
-def lines(run: Drawn, box: Box, scale: int) -> dict[str, str]:
+def lines(run: Drawn, box: WorldBox, scale: int) -> dict[str, str]:
     """Say of a run in ten lines what it is, what became of it, and what is drawn."""
     result, settings = run.result, run.result.provenance
     counts = ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items())
@@ -75,7 +75,7 @@ def _rerun_version() -> str:
     return str(rr.__version__)
 
 
-def water_text(run: Drawn, box: Box) -> str:
+def water_text(run: Drawn, box: WorldBox) -> str:
     """Say where the water ends, and whether members leave it."""
     kinds = {event["type"] for event in run.result.provenance["scene"].get("events", ())}
     floors = floors_of(run)

@@ -30,7 +30,7 @@ AXES = (("north", (230, 90, 90)), ("east", (90, 200, 90)), ("down", (110, 140, 2
 
 
 @dataclass(frozen=True, eq=False)
-class Box:
+class WorldBox:
     """The part of the world that is in view.
 
     Attributes:
@@ -53,7 +53,7 @@ class Box:
         """Distance between lines of the grid [m], a power of ten."""
         return float(10.0 ** np.floor(np.log10(max(self.high[:2] - self.low[:2]) / 2.0)))
 
-    def joined(self, other: Box) -> Box:
+    def joined(self, other: WorldBox) -> WorldBox:
         """Find the box around this one and another of the same water.
 
         Args:
@@ -63,10 +63,10 @@ class Box:
             A box that holds both.
         """
         low, high = np.minimum(self.low, other.low), np.maximum(self.high, other.high)
-        return Box(low, high, self.surface or other.surface)
+        return WorldBox(low, high, self.surface or other.surface)
 
 
-def box_of(runs: list[Drawn]) -> Box:
+def box_of(runs: list[Drawn]) -> WorldBox:
     """Find the box around all paths, with all floors, and the surface where it is near."""
     ends = [(run.position[mask].min(axis=0), run.position[mask].max(axis=0)) for run in runs for mask in [_whole(run)]]
     low, high = (
@@ -81,7 +81,7 @@ def box_of(runs: list[Drawn]) -> Box:
     surface = bool(low[2] < 0.5 * reach)
     if surface:
         low[2], high[2] = min(low[2], 0.0), max(high[2], 0.0)
-    return Box(low, high, surface)
+    return WorldBox(low, high, surface)
 
 
 def _whole(run: Drawn) -> np.ndarray:
@@ -106,7 +106,7 @@ def _length(run: Drawn) -> tuple[Mesh | tuple[float, float], float]:
     return (shape.length, shape.diameter), max(shape.length, shape.diameter)
 
 
-def scale_of(run: Drawn, box: Box, aspect: float = ASPECT) -> int:
+def scale_of(run: Drawn, box: WorldBox, aspect: float = ASPECT) -> int:
     """How many times its size a hull is drawn, so that it is seen in the box."""
     form, length = _length(run)
     thickness = length if isinstance(form, Mesh) else min(form)
@@ -114,7 +114,7 @@ def scale_of(run: Drawn, box: Box, aspect: float = ASPECT) -> int:
     return max(1, int(np.ceil(wanted)))
 
 
-def log_world(recording: Any, run: Drawn, box: Box, scale: int) -> None:
+def log_world(recording: Any, run: Drawn, box: WorldBox, scale: int) -> None:
     """Log all of one run that stands in its world."""
     log_frame(recording, run, box)
     log_bodies(recording, run, scale)
@@ -123,7 +123,7 @@ def log_world(recording: Any, run: Drawn, box: Box, scale: int) -> None:
     _forces(recording, run, box, scale)
 
 
-def log_frame(recording: Any, run: Drawn, box: Box) -> None:
+def log_frame(recording: Any, run: Drawn, box: WorldBox) -> None:
     """Log what stands around the members of one run: surface, floor, axes and current."""
     import rerun as rr
 
@@ -234,7 +234,7 @@ def _spread(recording: Any, run: Drawn) -> None:
     _columns(recording, entity, run.time, columns.partition(has_one))
 
 
-def _planes(recording: Any, run: Drawn, box: Box) -> None:
+def _planes(recording: Any, run: Drawn, box: WorldBox) -> None:
     """Log the surface and the floor where they are in view, with a grid in metres; unbounded water has no sheet at depth 0."""
     import rerun as rr
 
@@ -270,7 +270,7 @@ def _grid(low: np.ndarray, high: np.ndarray, depth: float, step: float) -> list[
     return lines
 
 
-def _axes(recording: Any, run: Drawn, box: Box) -> None:
+def _axes(recording: Any, run: Drawn, box: WorldBox) -> None:
     """Log arrows to the north, to the east and down, at a corner of the box."""
     import rerun as rr
 
@@ -298,7 +298,7 @@ def water_at(run: Drawn, points: np.ndarray) -> np.ndarray:
     return total
 
 
-def _current(recording: Any, run: Drawn, box: Box) -> None:
+def _current(recording: Any, run: Drawn, box: WorldBox) -> None:
     """Log arrows of the water's motion at the side of the box, where it moves."""
     import rerun as rr
 
@@ -359,7 +359,7 @@ def forces_on(run: Drawn) -> tuple[np.ndarray, np.ndarray]:
     return forces, np.stack([center[0], numbers["vehicle.center_of_buoyancy"][0], np.zeros(3)])
 
 
-def _forces(recording: Any, run: Drawn, box: Box, scale: int) -> None:
+def _forces(recording: Any, run: Drawn, box: WorldBox, scale: int) -> None:
     """Log the forces on the chosen member as arrows; the viewer tells their sizes where the cursor is on them."""
     import rerun as rr
 

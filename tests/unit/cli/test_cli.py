@@ -207,7 +207,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_the_run(tmp_path, mon
 def test_a_recording_that_cannot_be_begun_is_told(finished, tmp_path):
     result = lw.Result.load(finished[0] / "result.npz")
     with pytest.raises(OSError, match=r"there is no such folder: '.*none'"):
-        lw.log_rerun(result, tmp_path / "none" / "fleet.rrd")
+        lw.record(result, tmp_path / "none" / "fleet.rrd")
 
 
 def test_what_an_interrupt_leaves_is_said(tmp_path, capsys):
@@ -238,7 +238,7 @@ def test_info(capsys):
 def test_tune_keeps_what_it_measured(tuned_widths, capsys):
     readings = [tuning.Reading("plain float64", {8: 2.0, 16: 1.5}, 8, 16),
                 tuning.Reading("plain float32", {16: 1.0}, 16, 16)]  # fmt: skip
-    assert main(["tune"], measure=lambda: readings) == 0
+    assert main(["calibrate"], measure=lambda: readings) == 0
     out = capsys.readouterr().out
     assert "8: 2.00 ns, 16: 1.50 ns: 16, 8 by the table" in out
     assert str(tuned_widths) in out

@@ -80,7 +80,7 @@ def test_bench_and_tune_in_full(tuned_widths, capsys):
     assert json.loads(capsys.readouterr().out)["readings"] == [{"a": 1}, {"a": 2}]
     assert [values for values, _ in measure.calls] == [(4096, 1000), (5, 7)]
     readings = [("plain float64", {8: 2.0, 16: 1.525}, 8, 16), ("dense float64", {8: 1.0}, 8, 8)]
-    assert main(["tune"], measure=lambda: readings) == 0
+    assert main(["calibrate"], measure=lambda: readings) == 0
     assert widths.tuned() == {"plain float64": 16, "dense float64": 8}
     assert capsys.readouterr().out == (
         "plain float64       8: 2.00 ns, 16: 1.52 ns: 16, 8 by the table\n"
@@ -152,7 +152,7 @@ def test_lists_in_full(capsys):
         assert cli.main(["list", what, "--json"]) == 0
         names[what] = {entry["name"]: entry["text"] for entry in json.loads(capsys.readouterr().out)["names"]}
     terms, laws = names["terms"], names["laws"]
-    assert list(names["vehicles"]) == lw.vehicles()
+    assert list(names["vehicles"]) == lw.vehicle_names()
     assert names["vehicles"]["sphere"]
     assert list(terms) == sorted(terms)
     assert terms["drag"] == inspect.getdoc(lw.Drag).partition("\n")[0]
@@ -222,7 +222,7 @@ def test_verbs_are_read_from_the_parser():
     options = known["run"].options
     assert set(options["--method"][1]) >= {"psi_s", "rk4", "gauss6"}
     assert options["--dtype"][1][0] == "float64"
-    assert known["new"].options["--vehicle"][1] == tuple(lw.vehicles())
+    assert known["new"].options["--vehicle"][1] == tuple(lw.vehicle_names())
     assert known["export"].options["--to"][1] == ("netcdf", "parquet")
     assert known["help"].words == tuple(known)
     assert options["--store"][1] == ("npz", "zarr")
@@ -236,7 +236,7 @@ def test_verbs_are_read_from_the_parser():
 def test_values_become_plain():
     value = {1: np.float32(0.5), "a": np.array([[1, 2]]), "b": (ROOT, float("nan")), "c": np.bool_(True),
              "d": [np.inf, None]}  # fmt: skip
-    plain = output.plain(value)
+    plain = output.as_json(value)
     assert plain == {"1": 0.5, "a": [[1, 2]], "b": [str(ROOT), None], "c": True, "d": [None, None]}
     assert type(plain["1"]) is float
     assert plain["c"] is True

@@ -40,7 +40,7 @@ def test_a_scene_is_loaded_with_them():
      ("ten", "ten"), ("1e400", "1e400"), ("", "")],
 )  # fmt: skip
 def test_a_whole_number_is_written_in_digits(text, digits):
-    assert settings.whole(text) == digits
+    assert settings.whole_number_text(text) == digits
 
 
 @pytest.mark.parametrize(

@@ -186,7 +186,7 @@ def test_of_a_large_store_some_members_are_drawn():
 
     assert drawn(result, 18 * 3 * 6) == list(range(6))
     for limit, most in ((18 * 3 * 6 - 1, 5), (18 * 3 * 2, 2), (1, 1)):
-        assert drawn(result, limit) == list(lw.shown(whole, most).members)
+        assert drawn(result, limit) == list(lw.select_members(whole, most).members)
         assert len(drawn(result, limit)) == most
     lost = Stored({name: values * np.nan for name, values in whole.samples.items()})
     assert drawn(dataclasses.replace(result, samples=lost), 1) == [0]  # each picture says why it is none
@@ -283,7 +283,7 @@ def test_progress_is_shown_and_closed(quiet, kind):
             ended.append(self)
             super().close()
 
-    with pytest.raises(ZeroDivisionError), progress.shown(quiet, begin=Closing) as shown:
+    with pytest.raises(ZeroDivisionError), progress.progress_bar(quiet, begin=Closing) as shown:
         assert isinstance(shown, kind)
         assert not ended
         raise ZeroDivisionError

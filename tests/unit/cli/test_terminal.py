@@ -163,7 +163,7 @@ def test_every_method_that_is_listed_is_one(capsys):
 
 
 def test_vehicles_terms_and_laws_are_those_of_the_tables(capsys):
-    assert list(listed("vehicles", capsys)) == lw.vehicles()
+    assert list(listed("vehicles", capsys)) == lw.vehicle_names()
     terms = listed("terms", capsys)
     assert "drag" in terms
     assert "weight" not in terms
@@ -173,7 +173,7 @@ def test_vehicles_terms_and_laws_are_those_of_the_tables(capsys):
     assert laws["sensor"].startswith("sensors: ")
 
 
-@pytest.mark.parametrize("name", lw.vehicles())
+@pytest.mark.parametrize("name", lw.vehicle_names())
 def test_a_new_scene_can_run_and_is_not_odd(name, tmp_path, capsys):
     path = tmp_path / "scenes" / "dive.toml"
     assert cli.main(["new", str(path), "--vehicle", name]) == 0
@@ -347,7 +347,7 @@ def test_a_refused_verb_prints_no_document(capsys):
 def test_documents_of_the_machine(tuned_widths, capsys):
     assert document(["info"], capsys, peak_of=lambda dtype: 1e9)["peak"] == {"float64": 1e9, "float32": 1e9}
     readings = [tuning.Reading("plain float64", {8: 2.0, 16: 1.5}, 8, 16)]
-    kept = document(["tune"], capsys, measure=lambda: readings)["kernels"]["plain float64"]
+    kept = document(["calibrate"], capsys, measure=lambda: readings)["kernels"]["plain float64"]
     assert kept == {"ns": {"8": 2.0, "16": 1.5}, "table": 8, "best": 16}
     record = json.dumps({"method": "psi_s", "ns_per_vehicle_step": 9.0})
     assert len(document(["bench"], capsys, measure=lambda members, steps: [record, record])["readings"]) == 2

@@ -26,9 +26,9 @@ WAYS = {"copy": copy.copy, "deepcopy": copy.deepcopy} | {
 }
 
 
-def metric(state, look):
-    """The depth of the last look."""
-    return look["position"][:, 2]
+def metric(state, tick):
+    """The depth of the last tick."""
+    return tick["position"][:, 2]
 
 
 def demand(t, y, r, members):
@@ -85,7 +85,7 @@ V = (1.0, 1.0, 1.0)
 SPHERE = lw.Scene.named("sphere")
 # What the defaults and `goods` do not make.
 OTHERS = {
-    "Callback": lambda: lw.Callback(demand, version="1"), "OwnMetric": lambda: lw.OwnMetric(metric),
+    "Callback": lambda: lw.Callback(demand, version="1"), "OwnMetric": lambda: lw.CustomMetric(metric),
     "Quantity": lambda: lw.Quantity("depth", metric), "Case": lambda: lw.Case("one", {"a.b": 1.0}),
     "Grid": lambda: lw.Grid({"vehicle.mass": [1.0, 2.0]}), "Table": lambda: lw.Table(values={"vehicle.mass": [1.0, 2.0]}),
     "UnitCubePoints": lambda: lw.UnitCubePoints([[0.5]]), "LatinHypercube": lambda: lw.LatinHypercube(4),
@@ -96,7 +96,7 @@ OTHERS = {
     "RotationNormal": lambda: lw.RotationNormal(std=0.1), "Histogram": lambda: lw.Histogram("depth", edges=[0.0, 1.0]),
     "CorrelatedNormal": lambda: lw.CorrelatedNormal(covariance=np.eye(2)),
     "ScipyDistribution": lambda: lw.ScipyDistribution(stats.norm()),
-    "Looks": lambda: lw.Looks(np.ones((1, 3)), np.eye(3)[None], np.ones((1, 3)), np.ones((1, 3)), np.ones(1)),
+    "Ticks": lambda: lw.CallbackInput(np.ones((1, 3)), np.eye(3)[None], np.ones((1, 3)), np.ones((1, 3)), np.ones(1)),
     "Status": lambda: lw.Status.OK, "Warnings": lambda: lw.Warnings(3), "Store": lambda: lw.Store("run.zarr"),
     "PackingContext": lambda: lw.PackingContext({"a.b": np.ones(2)}, None, np.arange(2), 1, 0.1),
 }  # fmt: skip
@@ -234,7 +234,7 @@ def test_what_studies_give():
         "Trim": steady, "LinearModel": model, "Margins": lw.margins(loop, "heading_pid", "gain", about=5.0, **run),
         "Regulator": lw.lqr(model, np.ones(len(model.states)), np.ones(len(model.inputs))),
         "WorstCase": lw.worst_case(loop, {"start.position[2]": (1.0, 2.0)}, "depth", budget=32, **short),
-        "Tuned": lw.tune(lw.Ensemble(loop, 4, 1, vary), {"heading_pid.kp": (1.0, 5.0)}, "depth", budget=64, **short),
+        "Tuned": lw.tune_gains(lw.Ensemble(loop, 4, 1, vary), {"heading_pid.kp": (1.0, 5.0)}, "depth", budget=64, **short),
         "StabilityMap": lw.stability_map(SPHERE, ("h", 0.1, 0.2), ("angular_velocity", 0.5, 1.0), ["psi_s"], points=2,
                                          directions=1, t1=1.0, error_time=0.5, h=0.1),
         "SobolIndices": lw.uq.sobol(SPHERE, "depth", vary=both, samples=16, **short),

@@ -11,7 +11,7 @@ from typing import ClassVar
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.cli.progress import shown
+from lgvi_warp.cli.progress import progress_bar
 from lgvi_warp.common import progress as module
 from lgvi_warp.common.progress import Progress, callback, shows_progress
 
@@ -70,7 +70,7 @@ def test_what_takes_long_without_a_fraction_is_shown_too():
 def test_the_progress_line_is_clean_whatever_happens():
     stream = Terminal()
     at_once = functools.partial(Progress, interval=0.0)
-    with pytest.raises(KeyboardInterrupt), redirect_stderr(stream), shown(False, begin=at_once) as progress:
+    with pytest.raises(KeyboardInterrupt), redirect_stderr(stream), progress_bar(False, begin=at_once) as progress:
         progress(0.5)
         progress(0.75)
         raise KeyboardInterrupt
@@ -81,7 +81,7 @@ def test_the_progress_line_is_clean_whatever_happens():
     assert not blank.strip()
     assert not rest
     assert len(blank) >= len(third.rstrip())
-    with shown(True) as progress:
+    with progress_bar(True) as progress:
         assert progress is None
 
 
@@ -193,7 +193,7 @@ def test_the_real_bar_of_tqdm_takes_the_same_calls():
         lw.tradeoff,
         lw.stability_map,
         lw.uq.evaluate,
-        lw.tune,
+        lw.tune_gains,
         lw.worst_case,
         lw.Prepared.__call__,
     ],
@@ -201,5 +201,5 @@ def test_the_real_bar_of_tqdm_takes_the_same_calls():
 )
 def test_every_long_call_takes_true(call):
     with pytest.raises(lw.SceneError, match="progress = 7: is no function"):
-        call(None, *[None] * (2 if call in (lw.tune, lw.worst_case) else call is lw.uq.evaluate),
+        call(None, *[None] * (2 if call in (lw.tune_gains, lw.worst_case) else call is lw.uq.evaluate),
              *[1.0] * (call is lw.suggest), progress=7)  # fmt: skip

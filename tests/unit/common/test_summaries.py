@@ -124,7 +124,7 @@ def test_texts_are_escaped_and_cut():
     (np.ones((2, 2)), "kg", "2 x 2 numbers kg"), (np.zeros(9), "1", "9 numbers"),
 ])  # fmt: skip
 def test_numbers(value, unit, text):
-    assert summaries.numbers(value, unit) == text
+    assert summaries.few_digits(value, unit) == text
 
 
 def test_the_thumbnail_has_depth_down_and_marks_who_did_not_end_ok():

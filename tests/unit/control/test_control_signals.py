@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of a controller's signals: where each lies in what a look notes, and what its page says."""
+"""The table of a controller's signals: where each lies in what a tick notes, and what its page says."""
 
 import math
 import re
@@ -15,7 +15,7 @@ from lgvi_warp.physics.fields import FIELDS
 PAGE = Path(__file__).parents[3] / "docs" / "controllers" / "signals.md"
 
 
-def test_every_row_that_a_look_notes_is_a_signal():
+def test_every_row_that_a_tick_notes_is_a_signal():
     for group, size in NOTED.items():
         rows = [
             range(signal.row, signal.row + math.prod(signal.field.shape))

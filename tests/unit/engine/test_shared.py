@@ -6,7 +6,7 @@ import copy
 import numpy as np
 import pytest
 
-from lgvi_warp.engine.shared import FRAME, MEMBERS, SEED, Reads, Shared, context
+from lgvi_warp.engine.shared import FRAME, MEMBERS, SEED, TrackedParameters, SharedResultsCache, context
 from lgvi_warp.scene.draws import KEPT
 
 NUMBERS = {"a.x": np.ones((1, 3)), "b.y": np.zeros(5)}
@@ -28,14 +28,14 @@ WAYS = {
 
 @pytest.mark.parametrize("way", WAYS)
 def test_every_way_to_read_is_noted(way):
-    reads = Reads(NUMBERS)
+    reads = TrackedParameters(NUMBERS)
     WAYS[way](reads)
     assert "b.y" in reads.names
 
 
 @pytest.mark.parametrize("way", WAYS)
 def test_what_varies_is_computed_each_time_and_nothing_else(way):
-    shared, calls = Shared({"b.y"}), []
+    shared, calls = SharedResultsCache({"b.y"}), []
 
     def compute(numbers):
         calls.append(1)
@@ -52,7 +52,7 @@ def test_what_varies_is_computed_each_time_and_nothing_else(way):
 
 @pytest.mark.parametrize(("name", "field"), [(FRAME, "frame"), (MEMBERS, "members"), (SEED, "seed")])
 def test_a_context_notes_what_it_is_asked_for(name, field):
-    reads = Reads(NUMBERS)
+    reads = TrackedParameters(NUMBERS)
     asked = context(reads, "frame", np.arange(5), 7, 0.01, True)
     assert asked.h == 0.01
     assert not reads.names
@@ -66,7 +66,7 @@ def test_a_context_notes_what_it_is_asked_for(name, field):
 
 @pytest.mark.parametrize(("members", "remembers"), [(1, True), (KEPT, True), (KEPT + 1, False)])
 def test_what_follows_from_few_members_is_remembered(members, remembers):
-    shared, mass = Shared({"vehicle.mass", MEMBERS}), np.ones(members)
+    shared, mass = SharedResultsCache({"vehicle.mass", MEMBERS}), np.ones(members)
     numbers = {"vehicle.mass": mass, "vehicle.buoyancy": np.ones(1)}
     assert shared.completed(numbers) is None
     with_frame = numbers | {FRAME: "frame", MEMBERS: np.arange(members)}

@@ -114,7 +114,7 @@ def test_provenance_says_what_chose(file):
 @pytest.mark.kernel
 @pytest.mark.slow
 def test_every_kind_is_measured():
-    readings = list(tuning.tune(rounds=1))
+    readings = list(tuning.calibrate(rounds=1))
     assert [reading.kernel for reading in readings] == list(widths.KERNELS)
     for _, ns, of_table, best in readings:
         assert of_table in ns

@@ -269,12 +269,12 @@ FOSSEN = [
 
 @pytest.mark.parametrize(("given", "words"), [(row[0], row[1:]) for row in FOSSEN])
 def test_fossens_coefficients(given, words):
-    (fault,) = faults(lw.vehicle_tables_from_fossen, given, **BODY)
+    (fault,) = faults(lw.from_fossen, given, **BODY)
     assert all(word in fault for word in words), fault
 
 
 def test_fossens_drag_that_creates_energy():
-    made = lw.vehicle_tables_from_fossen({"X_u": -1.0, "X_v": -100.0, "Y_v": -1.0}, **BODY)
+    made = lw.from_fossen({"X_u": -1.0, "X_v": -100.0, "Y_v": -1.0}, **BODY)
     (fault,) = faults(from_dict, made)
     assert "drag_matrix.linear" in fault
     assert "creates energy" in fault
@@ -302,7 +302,7 @@ SDF = [
 
 @pytest.mark.parametrize(("text", "more", "words"), [(row[0], row[1], row[2:]) for row in SDF])
 def test_sdf(text, more, words):
-    fault = next(one for one in faults(lw.vehicle_tables_from_sdf, text, **more) if words[0] in one)
+    fault = next(one for one in faults(lw.from_sdf, text, **more) if words[0] in one)
     assert all(word in fault for word in words), fault
 
 
@@ -323,7 +323,7 @@ YAML = [
 @pytest.mark.parametrize(("text", "words"), [(row[0], row[1:]) for row in YAML])
 def test_yaml(text, words):
     pytest.importorskip("yaml")
-    (fault,) = faults(lw.vehicle_tables_from_yaml, text)
+    (fault,) = faults(lw.from_yaml, text)
     assert all(word in fault for word in words), fault
 
 

@@ -8,7 +8,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.physics import notation
-from lgvi_warp.results.result import Drawn
+from lgvi_warp.results.result import DrawnParameters
 from lgvi_warp.scene import draws
 from tests.support.refusals import faults
 
@@ -131,7 +131,7 @@ def test_few_members_are_drawn_once(scene):
 
 def test_parameters_of_a_result_are_copies(scene):
     fleet = lw.Ensemble(scene, 5, 3, EVERYTHING)
-    drawn, masses = Drawn(fleet, 5), fleet.parameters(0, 5)["vehicle.mass"].copy()
+    drawn, masses = DrawnParameters(fleet, 5), fleet.parameters(0, 5)["vehicle.mass"].copy()
     for name in ("vehicle.mass", "environment.gravity"):
         drawn[name][...] = 7.0
     np.testing.assert_array_equal(fleet.parameters(0, 5)["vehicle.mass"], masses)

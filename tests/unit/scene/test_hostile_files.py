@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import vehicle_tables_from_sdf as from_sdf
-from lgvi_warp import vehicle_tables_from_yaml as from_yaml
+from lgvi_warp import from_sdf
+from lgvi_warp import from_yaml
 from lgvi_warp.cli import main
 from lgvi_warp.cli.settings import out_of
 from lgvi_warp.common import errors, reading
@@ -427,7 +427,7 @@ def test_faults_within_faults_are_counted_once():
     ids=["text", "list", "table", "array", "number", "5,000 digits", "25 digits"],
 )
 def test_a_value_of_any_size_is_shown_on_a_line(value, text):
-    assert errors.shown(value) == text
+    assert errors.brief(value) == text
 
 
 def test_lists_without_end_are_not_numeric():

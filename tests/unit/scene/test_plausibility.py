@@ -228,7 +228,7 @@ def test_a_result_says_what_is_odd():
     assert " of 20 members; first: member " in texts[1]
 
 
-NAMED = {name: lw.Scene.named(name) for name in lw.vehicles()}
+NAMED = {name: lw.Scene.named(name) for name in lw.vehicle_names()}
 
 
 @pytest.mark.parametrize("name", NAMED)

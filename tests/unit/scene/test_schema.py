@@ -8,14 +8,14 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.cli.lists import NEW_SCENE
-from lgvi_warp.vehicles.fossen import vehicle_file, vehicles
+from lgvi_warp.vehicles.fossen import vehicle_file, vehicle_names
 from lgvi_warp.scene.schema import schema
 from tests.conftest import ROOT
 from tests.support.json_schema import faults
 
 SCHEMA = schema()
 FILES = [*sorted((ROOT / "examples").glob("*.toml")), *sorted((ROOT / "examples" / "scenes").glob("*.toml")),
-         *map(vehicle_file, vehicles())]  # fmt: skip
+         *map(vehicle_file, vehicle_names())]  # fmt: skip
 PAPER = tomllib.loads((ROOT / "examples" / "paper.toml").read_text())
 
 
@@ -24,7 +24,7 @@ def test_every_scene_of_the_project_fits(path):
     assert faults(tomllib.loads(path.read_text()), SCHEMA) == []
 
 
-@pytest.mark.parametrize("name", vehicles())
+@pytest.mark.parametrize("name", vehicle_names())
 def test_what_a_scene_writes_of_itself_fits(name):
     events = [lw.Floor(depth=100.0), lw.Box(lower=(-1.0, -1.0, 0.0), upper=(9.0, 9.0, 90.0)), lw.StopTime(at=50.0)]
     run = {"step": 0.01, "duration": 1.0, "statistics": [{"type": "quantiles", "of": "depth"}],

@@ -45,14 +45,14 @@ def course(y, goal=1.0):
 
 
 def each(kind, *args, **settings):
-    return kind(*args, then=[lw.Each()], **settings)
+    return kind(*args, then=[lw.MemberValues()], **settings)
 
 
 def test_second_order_steps_have_their_analytic_numbers():
     damped = OMEGA * np.sqrt(1.0 - ZETA**2)
     over = np.exp(-np.pi * ZETA / np.sqrt(1.0 - ZETA**2))
     dt = T[1]
-    # A look is at most dt / 2 from the peak, where the curvature is at most omega^2: an error of omega^2 dt^2 / 8.
+    # A tick is at most dt / 2 from the peak, where the curvature is at most omega^2: an error of omega^2 dt^2 / 8.
     bound = OMEGA**2 * dt**2 / 8.0
     assert np.all(np.abs(number(each(lw.Overshoot, "depth"), course(RESPONSES)) - over) <= bound)
     percent = number(each(lw.Overshoot, "depth", percent=True), course(RESPONSES))
@@ -70,7 +70,7 @@ def test_a_step_downward_or_from_elsewhere_is_the_same():
     down = course(7.0 - 4.0 * RESPONSES, 3.0)
     np.testing.assert_allclose(number(each(lw.Overshoot, "depth"), down), 4.0 * up[0], rtol=1e-9)
     np.testing.assert_allclose(number(each(lw.Peak, "depth"), down), 3.0 - 4.0 * up[0], rtol=1e-9)
-    # Round-off may move a look across a limit.
+    # Round-off may move a tick across a limit.
     for kind, value in ((lw.RiseTime, up[1]), (lw.SettlingTime, up[2])):
         assert np.all(np.abs(number(each(kind, "depth"), down) - value) <= 1.001 * T[1])
 
@@ -115,7 +115,7 @@ def test_members_that_end_have_the_numbers_of_their_time_under_way():
     t = np.arange(0.0, 10.5, 0.5)
     e = np.ones((len(t), 1, 2)) * (1.0 + t[:, None, None])
     good = np.ones((len(t), 2), bool)
-    good[5:, 1] = False  # the last look under way is at 2 s
+    good[5:, 1] = False  # the last tick under way is at 2 s
     held = e.copy()
     held[5:, :, 1] = 1e9
     ended = np.array([np.inf, 2.2])
@@ -152,32 +152,32 @@ def test_headings_are_wrapped():
     assert number(each(lw.Peak, "heading"), x, t) == pytest.approx(3.5 - 2.0 * np.pi)
 
 
-def test_the_users_own_sees_each_look():
+def test_the_users_own_sees_each_tick():
     seen = []
 
-    def worst(state, look):
-        seen.append((look.t, look.dt, look["position"].shape, look["command"].shape))
-        size = np.stack([look["position"][:, 2], look["command"].sum(axis=1)])
+    def worst(state, tick):
+        seen.append((tick.t, tick.dt, tick["position"].shape, tick["command"].shape))
+        size = np.stack([tick["position"][:, 2], tick["command"].sum(axis=1)])
         return size if state is None else np.maximum(state, size)
 
     t = np.array([0.0, 1.0, 3.0])
     x = np.random.default_rng(1).normal(size=(3, 5, 4))
-    metric = lw.OwnMetric(worst, then=[lw.Each()], fields=("position", "command"), last=lambda state: state.sum(axis=0))
+    metric = lw.CustomMetric(worst, then=[lw.MemberValues()], fields=("position", "command"), last=lambda state: state.sum(axis=0))
     expected = x[:, 2].max(axis=0) + (x[:, 3] + x[:, 4]).max(axis=0)
     np.testing.assert_array_equal(number(metric, x, t, batches=(1,)), expected)
     assert seen == [(0.0, 0.0, (4, 3), (4, 2)), (1.0, 1.0, (4, 3), (4, 2)), (3.0, 2.0, (4, 3), (4, 2))]
     assert metric.key == "worst"
     with pytest.raises(ValueError, match=r"gave shape \(2,\); \(..., 4\) is wanted"):
-        number(lw.OwnMetric(lambda state, look: np.zeros(2), fields=("position",)), x[:, :3], t)
+        number(lw.CustomMetric(lambda state, tick: np.zeros(2), fields=("position",)), x[:, :3], t)
 
 
 @pytest.mark.parametrize(("make", "text"), [
     (lambda: lw.Overshoot("dept"), "did you mean 'depth'"), (lambda: lw.Overshoot("position"), "no goal beyond"),
     (lambda: lw.IAE(None), "is missing"), (lambda: lw.SettlingTime("depth", within=-1.0), "within"),
     (lambda: lw.RiseTime("depth", limits=(0.9, 0.1)), "two rising parts"), (lambda: lw.Effort("speed"), "signal of actuators"),
-    (lambda: lw.SteadyStateError("depth", share=0.0), "part of the run"), (lambda: lw.OwnMetric("depth"), "no function"),
-    (lambda: lw.OwnMetric(len, fields=("dept",)), "fields"), (lambda: lw.IAE("depth", stopped="held"), "no meaning"),
-    (lambda: lw.IAE("depth", at="floor"), "one moment"), (lambda: lw.Energy("depth"), "leave it out"),
+    (lambda: lw.SteadyStateError("depth", share=0.0), "part of the run"), (lambda: lw.CustomMetric("depth"), "no function"),
+    (lambda: lw.CustomMetric(len, fields=("dept",)), "fields"), (lambda: lw.IAE("depth", stopped="held"), "no meaning"),
+    (lambda: lw.IAE("depth", at="floor"), "one moment"), (lambda: lw.ActuatorEnergy("depth"), "leave it out"),
 ])  # fmt: skip
 def test_what_is_asked_wrongly_gets_one_sentence(make, text):
     with pytest.raises(lw.SceneError, match=text):

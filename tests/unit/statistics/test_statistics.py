@@ -756,12 +756,12 @@ OF_EVERY_KIND = {"mean": lambda x: lw.Mean(x), "covariance": lambda x: lw.Covari
                  "path_minimum": lambda x: lw.PathMinimum(x, [lw.Covariance(), lw.Extremes()]),
                  "path_range": lambda x: lw.PathRange(x),
                  "path_mean": lambda x: lw.PathMean(x, [lw.Mean(), lw.Quantiles(size=64)]),
-                 "path_rms": lambda x: lw.PathRms(x), "each": lambda x: lw.Each(x),
+                 "path_rms": lambda x: lw.PathRms(x), "each": lambda x: lw.MemberValues(x),
                  "path_time": lambda x: lw.PathTime(x, above=(999.0, -1.0, -6.0), below=(1001.0, 1.0, -4.0))}  # fmt: skip
 
 
-# Those of ends have no samples: tests/unit/statistics/test_outcomes.py. Those of looks: test_metrics.py.
-@pytest.mark.parametrize("kind", [name for name, one in TYPES.items() if not (one.of_ends or one.looks)])
+# Those of ends have no samples: tests/unit/statistics/test_outcomes.py. Those of ticks: test_metrics.py.
+@pytest.mark.parametrize("kind", [name for name, one in TYPES.items() if not (one.of_ends or one.ticks)])
 def test_blocks_in_any_order_give_the_same_bits(kind, values):
     x, good = values
     x = {
@@ -803,7 +803,7 @@ def check_as_files_hold_it(found):
 
 
 @pytest.mark.parametrize("replicates", [1, 4])
-@pytest.mark.parametrize("kind", [name for name, one in TYPES.items() if not (one.of_ends or one.looks)])
+@pytest.mark.parametrize("kind", [name for name, one in TYPES.items() if not (one.of_ends or one.ticks)])
 def test_every_kind_is_the_same_from_a_file(kind, replicates, values):
     x, good = (array[:, :400] for array in values)
     x = {"first_passage": x[..., :1], "mean_attitude": rotations(0.1 * x).reshape(4, 400, 9)}.get(kind, x)
@@ -916,7 +916,7 @@ def test_coverage_of_runs_that_stop_by_themselves():
     from benchmarks.tables.coverage import stops
 
     for law, least, _, held, _ in stops(REPETITIONS):
-        # Stopping costs some coverage where looks begin early and the distribution is skewed (docs/guide/statistics.md).
+        # Stopping costs some coverage where ticks begin early and the distribution is skewed (docs/guide/statistics.md).
         assert held >= (0.93 if least >= 1024 and law == "normal" else 0.9), (law, least, held)
         assert held <= 0.97
 

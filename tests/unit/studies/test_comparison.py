@@ -465,9 +465,9 @@ def test_statistics_are_of_vectors_energies_and_momenta():
     np.testing.assert_array_equal(values["linear_momentum"], invariants.linear_momentum(result))
     np.testing.assert_array_equal(values["angular_momentum"], invariants.angular_momentum(result))
     assert "depth" in comparison.statistics(result, compared.compared_in("depth"))
-    angle = comparison.statistics(result, compared.Compared("heading", "rad", None))
+    angle = comparison.statistics(result, compared.Distance("heading", "rad", None))
     assert "heading" not in angle
-    assert len(comparison.statistics(result, compared.Compared("position", "m"))) == len(names)
+    assert len(comparison.statistics(result, compared.Distance("position", "m"))) == len(names)
 
 
 def test_part_of_a_result_in_memory():
@@ -497,7 +497,7 @@ def test_a_quantitys_distance_and_size():
 
 def test_angles_differ_the_short_way_round():
     one, other = (made(np.full((2, 1, 3), angle)) for angle in (3.1, -3.1))
-    heading = compared.Compared("heading", "rad", lambda samples, members: samples["position"][..., :1])
+    heading = compared.Distance("heading", "rad", lambda samples, members: samples["position"][..., :1])
     assert heading.distance(one, other) == pytest.approx(np.full((2, 1), 2.0 * np.pi - 6.2))
     plain = dataclasses.replace(heading, unit="m")
     assert plain.distance(one, other) == pytest.approx(np.full((2, 1), 6.2))
@@ -884,12 +884,12 @@ def trial(seconds, position, attitude=0.0, h=0.1, method="psi_s"):
 
 def test_a_setting_is_hopeless_where_a_tenth_of_its_time_does_better():
     slow = trial(10.0, 1e-3)
-    assert tradeoffs.hopeless(slow, [slow, trial(0.9, 1e-4)])
-    assert not tradeoffs.hopeless(slow, [slow, trial(1.0, 1e-4)])
-    assert not tradeoffs.hopeless(slow, [trial(0.9, 1e-3)])
-    assert not tradeoffs.hopeless(slow, [trial(0.9, 1e-4, 1e-2)])
-    assert tradeoffs.hopeless(trial(10.0, 1e-6, 1e-3), [trial(0.9, 1e-4)])
-    assert not tradeoffs.hopeless(trial(10.0, math.inf), [trial(0.9, 1e-4)])
+    assert tradeoffs.is_dominated(slow, [slow, trial(0.9, 1e-4)])
+    assert not tradeoffs.is_dominated(slow, [slow, trial(1.0, 1e-4)])
+    assert not tradeoffs.is_dominated(slow, [trial(0.9, 1e-3)])
+    assert not tradeoffs.is_dominated(slow, [trial(0.9, 1e-4, 1e-2)])
+    assert tradeoffs.is_dominated(trial(10.0, 1e-6, 1e-3), [trial(0.9, 1e-4)])
+    assert not tradeoffs.is_dominated(trial(10.0, math.inf), [trial(0.9, 1e-4)])
 
 
 def test_steps_between_are_tried_near_the_front(scene):

@@ -110,7 +110,7 @@ def test_the_width_of_each_kernel_is_the_fastest(faster, better):
 
         return call
 
-    found = list(tuning.tune(2, prepare=prepare, clock=clock, register_width=lanes_of))
+    found = list(tuning.calibrate(2, prepare=prepare, clock=clock, register_width=lanes_of))
     assert [one.kernel for one in found] == list(widths.KERNELS)
     for one in found:
         kind, dtype = widths.parts(one.kernel)
@@ -230,7 +230,7 @@ def test_numbers_that_json_cannot_hold_are_none():
     plain = files.finite_or_none(content)
     assert plain == {"a": None, "b": [1.0, None, [2, 3.0]], "c": [[1.0, None]], "d": "x", "e": None}
     assert type(plain["b"][2][1]) is float
-    assert files.numbers(plain, 7.0) == {"a": 7.0, "b": [1.0, 7.0, [2, 3.0]], "c": [[1.0, 7.0]], "d": "x", "e": 7.0}
+    assert files.with_missing_as(plain, 7.0) == {"a": 7.0, "b": [1.0, 7.0, [2, 3.0]], "c": [[1.0, 7.0]], "d": "x", "e": 7.0}
 
 
 class Study(files.Saved):

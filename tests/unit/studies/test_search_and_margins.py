@@ -15,7 +15,7 @@ from lgvi_warp.studies.linear import loops
 from lgvi_warp.studies.linear.edges import edges
 from lgvi_warp.studies.linear.margins import Margins
 from lgvi_warp.studies.search import box, numbers, risk, tune, worst_case
-from lgvi_warp.studies.search.box import Box
+from lgvi_warp.studies.search.box import SearchBox
 
 SCENE = lw.Scene(lw.Vehicle(2.0, inertia=(1.0, 1.0, 1.0)), terms=[lw.Drag(linear=[1.0] * 6)])
 STARTS = {"start.position[2]": lw.Normal(std=1.0)}
@@ -70,9 +70,9 @@ def test_a_search_differs_by_its_seed_alone():
 
 
 def test_places_of_the_cube_are_numbers_of_the_box():
-    inside = Box(("a", "b"), np.array([1.0, 1.0]), np.array([3.0, 100.0]), np.array([False, True]))
+    inside = SearchBox(("a", "b"), np.array([1.0, 1.0]), np.array([3.0, 100.0]), np.array([False, True]))
     np.testing.assert_allclose(inside.values(np.array([[0.25, 0.25], [0.5, 0.5]])), [[1.5, 100.0**0.25], [2.0, 10.0]])
-    wide = Box(("a",), np.array([0.1]), np.array([0.3]), np.array([True])).values(np.array([[0.0], [1.0]]))
+    wide = SearchBox(("a",), np.array([0.1]), np.array([0.3]), np.array([True])).values(np.array([[0.0], [1.0]]))
     assert wide.tolist() == [[0.1], [0.3]]
 
 
@@ -84,7 +84,7 @@ def test_places_of_the_cube_are_numbers_of_the_box():
 ])  # fmt: skip
 def test_bounds_that_are_none(bounds, words):
     with pytest.raises(lw.SceneError) as caught:
-        Box.of("over", bounds, SCENE)
+        SearchBox.of("over", bounds, SCENE)
     assert words in str(caught.value)
 
 
@@ -214,7 +214,7 @@ def test_tuning_meets_the_same_members_and_then_fresh_ones(monkeypatch):
 
     told = Told(monkeypatch, answer)
     shares, fleet = [], lw.Ensemble(SCENE, 5, 7, STARTS)
-    found = tune.tune(fleet, OVER, "depth", budget=5 * 300, seed=3, progress=shares.append, h=0.1)
+    found = tune.tune_gains(fleet, OVER, "depth", budget=5 * 300, seed=3, progress=shares.append, h=0.1)
     depth = fleet.select(0, 5).position[:, 2]
     assert list(found.parameters.values()) == pytest.approx([2.5, 10.0], rel=1e-3)
     assert found.cost == pytest.approx((depth**2).mean(), rel=1e-5)
@@ -237,33 +237,33 @@ def test_tuning_meets_the_same_members_and_then_fresh_ones(monkeypatch):
     assert (np.ptp(parameters["vehicle.mass"].reshape(16, 5), axis=1) == 0.0).all()
     assert told.asked[-1][3] == 8
     assert told.asked[-1][2].tolist() == list(range(20))
-    worst = tune.tune(fleet, {"vehicle.mass": (3.0, 4.0)} | {"drag.linear[0]": (1.0, 100.0)}, "depth", budget=600, fresh=0,
+    worst = tune.tune_gains(fleet, {"vehicle.mass": (3.0, 4.0)} | {"drag.linear[0]": (1.0, 100.0)}, "depth", budget=600, fresh=0,
                       risk=lw.CVaR(0.2))  # fmt: skip
     assert worst.at_bounds == ("vehicle.mass",)
     assert math.isnan(worst.fresh_cost)
     assert worst.fresh == 0
     assert worst.cost == pytest.approx((depth**2).max() + 0.25, rel=1e-4)
     assert worst.runs <= 600
-    alone = tune.tune(lw.Ensemble(SCENE, 5, 7), OVER, "depth", budget=100)
+    alone = tune.tune_gains(lw.Ensemble(SCENE, 5, 7), OVER, "depth", budget=100)
     assert alone.fresh == 0
     assert math.isnan(alone.fresh_before)
     lost = Told(
         monkeypatch, lambda depth, parameters, indices, seed: np.where(parameters["vehicle.mass"] > 2.0, np.nan, 1.0)
     )
-    assert tune.tune(fleet, OVER, "depth", budget=200).parameters["vehicle.mass"] <= 2.0
+    assert tune.tune_gains(fleet, OVER, "depth", budget=200).parameters["vehicle.mass"] <= 2.0
     assert lost.asked
     for budget, words in (
         (79, "budget = 79: is less than a generation of all members; give 80 or more"),
         (1e3, "budget = 1000.0"),
     ):
         with pytest.raises(lw.SceneError) as caught:
-            tune.tune(fleet, OVER, "depth", budget=budget)
+            tune.tune_gains(fleet, OVER, "depth", budget=budget)
         assert words in str(caught.value)
     with pytest.raises(lw.SceneError, match="varies by member too; leave it out of one of them"):
-        tune.tune(fleet, {"start.position[0]": (0.0, 1.0)}, "depth")
+        tune.tune_gains(fleet, {"start.position[0]": (0.0, 1.0)}, "depth")
     for fresh in (-1, 1.5):
         with pytest.raises(lw.SceneError, match="is no number of members; give a whole number, 0 for none"):
-            tune.tune(fleet, OVER, "depth", fresh=fresh)
+            tune.tune_gains(fleet, OVER, "depth", fresh=fresh)
 
 
 def test_tuned_numbers_in_words():

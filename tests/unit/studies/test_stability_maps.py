@@ -22,7 +22,7 @@ from lgvi_warp.studies.stability import runs
 from lgvi_warp.studies.stability.grid import ALIASES, Axis, Line, StabilityGrid, axis_of, rotation_vectors
 from lgvi_warp.studies.stability.limits import oscillation_limit, rotation_limit
 from lgvi_warp.studies.stability.map import Cell, StabilityMap, cells_of, map_of, report_text
-from lgvi_warp.studies.stability.runs import REFUSED, Found, column
+from lgvi_warp.studies.stability.runs import REFUSED, CellRuns, column
 from tests.support.made import made
 
 
@@ -228,7 +228,7 @@ def test_classes_are_a_table_of_bounded_and_flagged():
     error = np.array([1e-3, 1.0, np.inf, np.inf, 1e-3, 1e-3, 1e-3, np.inf, 1e-3])
     warned = np.array([False, False, False, False, False, True, False, False, True])
     verified = np.ones(9, bool)
-    found = Found(error, growth, status, warned)
+    found = CellRuns(error, growth, status, warned)
     wanted = [Cell.ACCURATE, Cell.BOUNDED, Cell.FLAGGED, Cell.FAILED, Cell.SILENT, Cell.FLAGGED, Cell.ACCURATE,
               Cell.FLAGGED, Cell.FAILED]  # fmt: skip
     assert list(cells_of(found, verified, 1e-2, 1.0)) == wanted
@@ -554,7 +554,7 @@ def test_errors_and_growth_of_a_run_are_written_down():
     of = compared_in("position")
 
     def found():
-        return Found(np.full(3, -1.0), np.full(3, -1.0), np.full(3, REFUSED), np.zeros(3, bool))
+        return CellRuns(np.full(3, -1.0), np.full(3, -1.0), np.full(3, REFUSED), np.zeros(3, bool))
 
     seen = found()
     runs.judge(result, one, np.arange(3), seen, of, "conservative")

@@ -331,7 +331,7 @@ def test_a_refused_case_is_named_where_it_is_asked_for(found):
     with pytest.raises(lw.SceneError, match=r"case = 'unknown': was refused: .*; mend it, or ask for another one"):
         found.cell("unknown")
     with pytest.raises(lw.SceneError, match="case = 'unknown': was refused; run a member of another one"):
-        setup.again(found.setup, found.cells[2], [0], None, None)
+        setup.rerun_members_of(found.setup, found.cells[2], [0], None, None)
     assert found.cells[2].fleet is None
     assert [cell.index for cell in found.cells] == [0, 1, 2]
 
@@ -461,7 +461,7 @@ def test_files_hold_the_tables(found, tmp_path):
 def test_what_json_cannot_hold_is_written_as_text():
     values = [np.array([1.0, 2.0]), np.float64(3.0), np.inf, 1, "a", True, None, {"type": "drag"}, (1, 2)]
     plain = [[1.0, 2.0], 3.0, "inf", 1, "a", True, None, "{'type': 'drag'}", "(1, 2)"]
-    assert [output.plain(value) for value in values] == plain
+    assert [output.as_json(value) for value in values] == plain
 
 
 # Cases
@@ -675,7 +675,7 @@ def test_a_sweep_asks_solve_for_its_metrics_alone():
         "threads": 2, "executor": "processes", "scheduler": "steal", "h": 0.01, "keep": "none", "until": False}  # fmt: skip
     assert asked["save"] == lw.SaveAt(fields=())
     assert [one.key for one in asked["statistics"]] == list(record.numbers)
-    # Of an expression over the path there is a sample at each look; without a controller, as the scene says.
+    # Of an expression over the path there is a sample at each tick; without a controller, as the scene says.
     by_samples = setup.metrics_of(["max(depth)"])
     assert replace(one, metrics=by_samples).kept(fleet)["save"] == lw.SaveAt(every=0.1, fields=())
     bare = lw.Ensemble(BARE, N, 3)
@@ -693,8 +693,8 @@ def test_keys_are_of_all_that_decides_the_numbers(found):
               one.key(found.cells[1].fleet), replace(one, settings={"h": 0.01}).key(fleet),
               replace(one, metrics=setup.metrics_of(["iae heading"])).key(fleet)]  # fmt: skip
     assert len({key, *others}) == 6
-    twice, thrice = (lambda state, look: 2.0 * look["depth"]), (lambda state, look: 3.0 * look["depth"])
-    metrics = [lw.OwnMetric(function, name="own", fields=("position",), **more) for function, more in (
+    twice, thrice = (lambda state, tick: 2.0 * tick["depth"]), (lambda state, tick: 3.0 * tick["depth"])
+    metrics = [lw.CustomMetric(function, name="own", fields=("position",), **more) for function, more in (
         (twice, {}), (thrice, {}), (twice, {"last": np.sin}), (twice, {"last": np.cos}), (twice, {"version": 1}))]  # fmt: skip
     keys = [replace(one, metrics=setup.metrics_of([metric])).key(fleet) for metric in (*metrics, metrics[0])]
     assert keys[0] == keys[-1]

@@ -13,9 +13,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import lgvi_warp as lw
-from lgvi_warp import vehicle_tables_from_fossen as from_fossen
-from lgvi_warp import vehicle_tables_from_sdf as from_sdf
-from lgvi_warp import vehicle_tables_from_yaml as from_yaml
+from lgvi_warp import from_fossen
+from lgvi_warp import from_sdf
+from lgvi_warp import from_yaml
 from lgvi_warp.vehicles import robot_xml as coefficients_xml
 from lgvi_warp.results.provenance import messages
 from lgvi_warp.runs.settle import make_plan

@@ -12,7 +12,7 @@ from lgvi_warp import cli
 from lgvi_warp.vehicles import fossen as co
 from tests.conftest import ROOT
 
-NAMES = co.vehicles()
+NAMES = co.vehicle_names()
 SIMPLE = [name for name in NAMES if name != "remus_100"]
 
 
@@ -70,7 +70,7 @@ def test_the_remus_matrices_follow_from_the_printed_derivatives():
     printed |= {"Y_rdot": 1.93, "N_vdot": 1.93, "Z_qdot": -1.93, "M_wdot": -1.93}
     printed |= {"X_uu": -1.62, "Y_vv": -1310.0, "Y_rr": 0.632, "Z_ww": -131.0, "Z_qq": -0.632, "K_pp": -0.13}
     printed |= {"M_ww": 3.18, "M_qq": -188.0, "N_vv": -3.18, "N_rr": -94.0}
-    made = co.vehicle_tables_from_fossen(printed, mass=30.48, inertia=(0.177, 3.45, 3.45),
+    made = co.from_fossen(printed, mass=30.48, inertia=(0.177, 3.45, 3.45),
                                          center_of_gravity=(0.0, 0.0, 0.0196), weight=299.0, buoyancy=308.0)  # fmt: skip
     for key, value in made["vehicle"].items():
         np.testing.assert_allclose(v[key], value, rtol=1e-14, atol=1e-15, err_msg=key)

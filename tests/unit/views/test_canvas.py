@@ -41,7 +41,7 @@ def test_rows_of_a_legend_are_as_full_as_each_other(entries, columns):
     axes = Figure(figsize=(12.0, 5.0)).subplots()
     for i in range(entries):
         axes.plot([0.0, 1.0], [0.0, i], label=f"{i}")
-    canvas.below(axes, ncols=4)
+    canvas.legend_below(axes, ncols=4)
     axes.figure.draw_without_rendering()
     places = [round(text.get_window_extent().x0) for text in axes.get_legend().get_texts()]
     assert len(set(places)) == columns

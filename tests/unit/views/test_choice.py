@@ -31,7 +31,7 @@ def points(kind):
 @pytest.mark.parametrize("kind", ["grid", "sobol", "table", "random"])
 def test_the_choice_is_fair(kind):
     all_points = points(kind)
-    few = lw.shown(straight(all_points))
+    few = lw.select_members(straight(all_points))
     assert len(few.members) == 1000
     assert few.text == "1,000 of 10,000 members"
     for axis in range(3):
@@ -46,7 +46,7 @@ def test_few_that_failed_are_all_shown():
     status, end = np.zeros(n, int), np.full(n, np.nan)
     status[lost], end[lost] = Status.NON_FINITE, 0.5
     path = np.random.default_rng(3).normal(size=(2, n, 3))
-    few = lw.shown(made(path, status=status, end=end))
+    few = lw.select_members(made(path, status=status, end=end))
     assert set(lost) <= set(few.members.tolist())
     assert len(few.members) == 1000
     assert len(few.ranked) == choice.MOST_RANKED
@@ -60,7 +60,7 @@ def test_outcomes_share_a_third_of_the_places():
     status[4000:4100] = Status.SURFACE
     status[4100:4110] = Status.STEP_TOO_LARGE
     result = made(np.random.default_rng(4).normal(size=(2, n, 3)), status=status, end=np.where(status, 1.0, np.nan))
-    counts = {code: np.count_nonzero(status[lw.shown(result, 300).members] == code) for code in np.unique(status)}
+    counts = {code: np.count_nonzero(status[lw.select_members(result, 300).members] == code) for code in np.unique(status)}
     # 100 places: all 10 that failed, 45 of each event, which most of those on the floor have by their number already.
     assert counts[Status.STEP_TOO_LARGE] == 10
     assert counts[Status.SURFACE] >= 45
@@ -71,25 +71,25 @@ def test_outcomes_share_a_third_of_the_places():
 def test_the_farthest_are_shown():
     path = np.random.default_rng(5).normal(size=(3, 5000, 3))
     path[1, 123, 2], path[2, 456, 0], path[0, 789, 1] = 50.0, -60.0, 70.0
-    few = lw.shown(made(path), most=20)
+    few = lw.select_members(made(path), most=20)
     assert {123, 456, 789} <= set(few.members.tolist())
     assert len(few.members) == 20
     # What a member is at after its end is not drawn as its path, so it is no reach.
     status, end = np.zeros(5000, int), np.full(5000, np.nan)
     status[456], end[456] = Status.FLOOR, 1.0
-    unlike = lw.shown(made(path, status=status, end=end), most=2)
+    unlike = lw.select_members(made(path, status=status, end=end), most=2)
     assert 456 not in unlike.members
 
 
 def test_the_same_run_gives_the_same_choice_and_one_member_more_changes_a_handful():
     path = np.random.default_rng(6).normal(size=(2, 1001, 3))
-    first, again = (lw.shown(made(path[:, :1000]), most=500) for _ in range(2))
+    first, again = (lw.select_members(made(path[:, :1000]), most=500) for _ in range(2))
     assert (first.members == again.members).all()
-    more = lw.shown(made(path), most=500)
+    more = lw.select_members(made(path), most=500)
     assert len(set(more.members) ^ set(first.members)) <= 14
-    all_but_one = lw.shown(made(path))
+    all_but_one = lw.select_members(made(path))
     assert len(all_but_one.members) == 1000
-    assert lw.shown(made(path[:, :1000])).text == "1,000 members"
+    assert lw.select_members(made(path[:, :1000])).text == "1,000 members"
 
 
 def test_frames_are_even_and_have_both_ends():
@@ -127,9 +127,9 @@ def test_large_runs_are_read_in_pieces():
     # Two million states at once are 99 members at these times.
     seen = [(members.start, members.stop) for members, _ in choice.pieces(result, ("position",))]
     assert seen == [(0, 99), (99, 198), (198, 250)]
-    few = lw.shown(result, most=20)
+    few = lw.select_members(result, most=20)
     assert set(farthest) <= set(few.members.tolist())
-    assert 7 not in lw.shown(result).members
+    assert 7 not in lw.select_members(result).members
 
 
 def test_parameters_of_some_members_are_theirs():
@@ -159,7 +159,7 @@ def test_frames_are_the_nearest():
 
 
 def test_one_member_two_times():
-    few = lw.shown(made(np.zeros((2, 1, 3))))
+    few = lw.select_members(made(np.zeros((2, 1, 3))))
     assert few.members.tolist() == [0]
     assert few.frames.tolist() == [0, 1]
     assert few.text == "1 member"
@@ -168,9 +168,9 @@ def test_one_member_two_times():
 def test_what_cannot_be_shown_says_why():
     result = made(np.zeros((2, 3, 3)))
     with pytest.raises(ValueError, match="most = 0: draws no member"):
-        lw.shown(result, most=0)
+        lw.select_members(result, most=0)
     with pytest.raises(NothingToDraw, match="no member has a finite start"):
-        lw.shown(made(np.full((2, 3, 3), np.nan)))
+        lw.select_members(made(np.full((2, 3, 3), np.nan)))
     bare = lw.Result(**{**vars(result), "samples": {}})
     with pytest.raises(NothingToDraw, match="no positions were kept"):
-        lw.shown(bare)
+        lw.select_members(bare)

@@ -47,10 +47,10 @@ def test_marks_stay_where_members_ended_when_nobody_is_left(turns):
 def test_a_direction_is_known_though_all_that_are_drawn_have_ended():
     """Of more members than are drawn a few turn on, and none of these is drawn."""
     end = np.full(4000, 10.0)
-    drawn = lw.shown(turning(2.5, end)[0]).members
+    drawn = lw.select_members(turning(2.5, end)[0]).members
     end[np.setdiff1d(np.arange(1000, 3000), drawn)[:10]] = np.nan
     result, _ = turning(2.5, end)
-    assert not np.isin(np.flatnonzero(np.isnan(end)), lw.shown(result).members).any()
+    assert not np.isin(np.flatnonzero(np.isnan(end)), lw.select_members(result).members).any()
     axes = lw.plots.fan(result, "euler[2]")
     median = next(line for line in axes.lines if line.get_label() == "median").get_ydata()
     np.testing.assert_allclose(np.diff(median[11:]), 2.0 * np.pi * 2.5 / 60.0, atol=1e-9)
@@ -76,7 +76,7 @@ def test_an_attitude_is_of_a_member_that_goes_on():
 def test_a_folder_that_is_not_there_is_named(tmp_path):
     result, _ = turning(1.0, [np.nan, np.nan])
     path = tmp_path / "nowhere" / "a.png"
-    for write in (lambda: lw.plots.fan(result, path=path), lambda: lw.log_rerun(result, path.with_suffix(".rrd"))):
+    for write in (lambda: lw.plots.fan(result, path=path), lambda: lw.record(result, path.with_suffix(".rrd"))):
         with pytest.raises(FileNotFoundError) as missing:
             write()
         assert missing.value.filename == str(path.parent)

@@ -126,7 +126,7 @@ def test_members_without_paths_are_counted(tmp_path):
 
 def test_a_viewer_gets_what_the_file_gets(tmp_path):
     with receiver(tmp_path / "sent.rrd") as address:
-        lw.log_rerun(fleet(20), tmp_path / "written.rrd", to=address)
+        lw.record(fleet(20), tmp_path / "written.rrd", to=address)
     sent, written = (rows(tmp_path / name, "/world/bodies/ok", "translations") for name in ("sent.rrd", "written.rrd"))
     assert sent == written
     assert len(sent) == 31
@@ -152,7 +152,7 @@ def test_a_viewer_that_ends_before_it_has_a_recording_leaves_the_file(tmp_path):
     path = tmp_path / "fleet.rrd"
     told = r"the viewer ended before it had the recording, which is in .*fleet.rrd"
     with peer(A_VIEWER, times=1) as port, pytest.raises(OSError, match=told):
-        lw.log_rerun(fleet(20), path, to=f"rerun+http://127.0.0.1:{port}/proxy")
+        lw.record(fleet(20), path, to=f"rerun+http://127.0.0.1:{port}/proxy")
     assert len(rows(path, "/world/bodies/ok", "translations")) == 31
 
 
@@ -226,7 +226,7 @@ def test_what_is_no_viewer_is_named_with_the_remedy(tmp_path, capsys):
     with peer(PEERS["goodbye"]) as port:
         address = f"rerun+http://127.0.0.1:{port}/proxy"
         with pytest.raises(OSError, match='what answers is no viewer; start a viewer with "rerun"'):
-            lw.log_rerun(fleet(3), to=address)
+            lw.record(fleet(3), to=address)
         with pytest.raises(OSError, match="port 9876: is taken by what is no viewer; end that, or start"):
             viewer.opened(None, home=address)
         assert cli.main([*run, "--viewer", address]) == 1
@@ -278,4 +278,4 @@ def test_an_open_viewer_is_used(tmp_path):
         assert viewer.is_open(address)
         assert viewer.opened(None, home=address) == address
         assert viewer.opened(address) == address
-        lw.log_rerun(fleet(3, 5), to=address)
+        lw.record(fleet(3, 5), to=address)

@@ -17,7 +17,7 @@ from rerun.chunk import RrdReader
 import lgvi_warp as lw
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import Status, failed, stop_time, under_way
-from lgvi_warp.views.fleet import LOOKS
+from lgvi_warp.views.fleet import OUTCOME_STYLES
 from lgvi_warp.views.recording import drawn, layout, viewer, world
 from lgvi_warp.views.recording import words as ten_words
 from tests.support.made import made
@@ -92,11 +92,11 @@ def mixed():
 
 @pytest.fixture(scope="module")
 def path(mixed, tmp_path_factory):
-    return lw.log_rerun(mixed, tmp_path_factory.mktemp("recording") / "fleet.rrd")
+    return lw.record(mixed, tmp_path_factory.mktemp("recording") / "fleet.rrd")
 
 
 def test_poses_are_those_of_the_members_shown(mixed, path):
-    choice = lw.shown(mixed)
+    choice = lw.select_members(mixed)
     seen = {}
     for code in ("ok", "non_finite", "surface", "floor"):
         positions = rows(path, f"/world/bodies/{code}", "translations")
@@ -141,7 +141,7 @@ def test_curves_are_quantiles_of_those_under_way(mixed, path):
 def test_two_recordings_together_are_each_as_alone(mixed, path, tmp_path):
     import rerun_cli
 
-    other = lw.log_rerun(fleet(20, seed=2), tmp_path / "other.rrd")
+    other = lw.record(fleet(20, seed=2), tmp_path / "other.rrd")
     both = tmp_path / "both.rrd"
     program = str(Path(rerun_cli.__file__).with_name("rerun"))
     subprocess.run([program, "rrd", "merge", str(path), str(other), "-o", str(both)], check=True, capture_output=True)
@@ -207,10 +207,10 @@ def test_extremes_are_of_all_members_and_quantiles_of_many():
 def test_the_water_is_said_to_be_unbounded_where_members_leave_it(tmp_path):
     up = np.linspace(5.0, -0.5, 5)[:, None, None] * np.ones((1, 4, 3))
     up[:, 0, 2] = 5.0
-    path = lw.log_rerun(made(up), tmp_path / "up.rrd")
+    path = lw.record(made(up), tmp_path / "up.rrd")
     assert "| unbounded water: 3 of 4 members pass above depth 0 |" in text_of(path, "/run/summary")
     # Half a metre above the surface a vehicle floats; beyond, there is no surface, but a grid at depth 0.
-    names = [entities(path), entities(lw.log_rerun(made(3.0 * up), tmp_path / "far.rrd"))]
+    names = [entities(path), entities(lw.record(made(3.0 * up), tmp_path / "far.rrd"))]
     assert ["/world/water/surface" in one for one in names] == [True, False]
     assert all("/world/water/surface_grid" in one and "/world/water/floor" not in one for one in names)
 
@@ -237,7 +237,7 @@ def test_the_current_is_drawn_as_it_flows(mixed, path):
     run = drawn.drawn_of(mixed)
     np.testing.assert_allclose(world.water_at(run, np.zeros((2, 3))), np.broadcast_to([0.1, -0.2, 0.0], (31, 2, 3)))
     assert "current, up to 0.22 m/s" in text_of(path, "/world/current")
-    assert "/world/current" not in entities(lw.log_rerun(made(np.zeros((2, 1, 3))), path.parent / "still.rrd"))
+    assert "/world/current" not in entities(lw.record(made(np.zeros((2, 1, 3))), path.parent / "still.rrd"))
 
 
 @pytest.mark.parametrize("spans", [(1.0, 1.0, 1.0), (100.0, 3.0, 1.0), (1.0, 200.0, 5.0), (1.0, 1.0, 300.0)])
@@ -276,7 +276,7 @@ def test_each_run_has_its_own_floors(tmp_path):
     """One with a floor, one without, one with two: side by side, in one box."""
     two = [{"type": "floor", "depth": 18.0}, {"type": "floor", "depth": 25.0, "name": "deep"}]
     scenes = {"one": SCENE, "none": lw.Scene.named("remus_100"), "two": lw.Scene.named("remus_100", events=two)}
-    path = lw.log_rerun({name: fleet(9, 7, scene=scene) for name, scene in scenes.items()}, tmp_path / "three.rrd")
+    path = lw.record({name: fleet(9, 7, scene=scene) for name, scene in scenes.items()}, tmp_path / "three.rrd")
     drawn_planes = {
         name: sorted(
             entity.rsplit("/", 1)[1] for entity in entities(path) if entity.startswith(f"/world/{name}/water/")
@@ -294,7 +294,7 @@ def test_each_run_has_its_own_floors(tmp_path):
 
 def test_members_that_ended_stand_out_from_the_floor():
     """By the ratio of luminances of WCAG 2, section 1.4.11: 3 for what has to be seen."""
-    channel = np.array([[*LOOKS[Status.FLOOR].rgb], world.SAND[:3]]) / 255.0
+    channel = np.array([[*OUTCOME_STYLES[Status.FLOOR].rgb], world.SAND[:3]]) / 255.0
     linear = np.where(channel <= 0.04045, channel / 12.92, ((channel + 0.055) / 1.055) ** 2.4)
     bright, dark = np.sort(linear @ [0.2126, 0.7152, 0.0722])[::-1]
     assert (bright + 0.05) / (dark + 0.05) > 3.0
@@ -329,7 +329,7 @@ def bare(result, *fields):
 @pytest.mark.parametrize("name", ODD)
 def test_odd_runs_have_a_recording_that_fits(name, tmp_path):
     result = ODD[name]()
-    path = lw.log_rerun(result, tmp_path / "odd.rrd")
+    path = lw.record(result, tmp_path / "odd.rrd")
     names, summary = entities(path), text_of(path, "/run/summary")
     bands = {"/curves/height/all", "/curves/height/90_percent", "/curves/height/50_percent"}
     assert bool(bands & names) == (result.members > 1)
@@ -348,7 +348,7 @@ def test_odd_runs_have_a_recording_that_fits(name, tmp_path):
 
 
 def test_members_asked_for_are_drawn(mixed, tmp_path):
-    path = lw.log_rerun(mixed, tmp_path / "few.rrd", members=[17, 3])
+    path = lw.record(mixed, tmp_path / "few.rrd", members=[17, 3])
     assert len(rows(path, "/world/bodies/ok", "translations")[0.0]) == 2
     assert "2 of 40 drawn" in text_of(path, "/run/summary")
     # Curves stay those of all.
@@ -364,14 +364,14 @@ def lean(mixed, **named):
 def test_of_kept_members_alone_no_others_are_drawn(mixed, tmp_path):
     assert drawn.drawn_of(lean(mixed), [9, 3]).members.tolist() == [3, 9]
     with pytest.raises(lw.SceneError, match=r"members = 4: has no samples; keep them: keep=\[4\]"):
-        lw.log_rerun(lean(mixed), tmp_path / "kept.rrd", members=[4])
+        lw.record(lean(mixed), tmp_path / "kept.rrd", members=[4])
 
 
 def test_a_mesh_is_drawn_times_a_whole_number(tmp_path):
     mesh = glb(tmp_path / "hull.glb", 0.5)
     vehicle = dataclasses.replace(lw.Scene.named("sphere").vehicle, shape={"mesh": str(mesh)})
     result = made(np.array([[[0.0, 0, 5]], [[100.0, 0, 5]], [[200.0, 0, 5]]]), scene=lw.Scene(vehicle))
-    path = lw.log_rerun(result, tmp_path / "mesh.rrd")
+    path = lw.record(result, tmp_path / "mesh.rrd")
     run = drawn.drawn_of(result)
     box = world.box_of([run])
     scale = world.scale_of(run, box)
@@ -380,7 +380,7 @@ def test_a_mesh_is_drawn_times_a_whole_number(tmp_path):
     assert f"drawn {scale} times their size" in text_of(path, "/run/summary")
     mesh.unlink()
     with pytest.raises(lw.SceneError, match=r"vehicle\.shape\.mesh = 'hull\.glb': cannot be read"):
-        lw.log_rerun(result, tmp_path / "mesh.rrd")
+        lw.record(result, tmp_path / "mesh.rrd")
 
 
 def test_a_recording_goes_to_a_stream(mixed, tmp_path):
@@ -388,7 +388,7 @@ def test_a_recording_goes_to_a_stream(mixed, tmp_path):
     stream.save(tmp_path / "mine.rrd")
     flushed, flush = [], stream.flush
     stream.flush = lambda **named: flushed.append(flush(**named))
-    assert lw.log_rerun(mixed, to=stream) is None
+    assert lw.record(mixed, to=stream) is None
     # All is with the viewer when the call returns.
     assert len(flushed) == 1
     stream.disconnect()
@@ -396,7 +396,7 @@ def test_a_recording_goes_to_a_stream(mixed, tmp_path):
 
 
 def test_whole(tmp_path, mixed):
-    assert lw.log_rerun(mixed, tmp_path / "fleet.rrd") == tmp_path / "fleet.rrd"
+    assert lw.record(mixed, tmp_path / "fleet.rrd") == tmp_path / "fleet.rrd"
     assert [path.name for path in tmp_path.iterdir()] == ["fleet.rrd"]
 
 
@@ -410,7 +410,7 @@ def test_a_disk_that_is_full(tmp_path, mixed, monkeypatch):
 
     monkeypatch.setattr(rr.RecordingStream, "flush", flush)
     with pytest.raises(OSError, match="is the disk full"):
-        lw.log_rerun(mixed, old)
+        lw.record(mixed, old)
     assert [path.name for path in tmp_path.iterdir()] == ["fleet.rrd"]
     assert old.read_bytes() == b"before"
 
@@ -426,7 +426,7 @@ def test_a_disk_that_is_full(tmp_path, mixed, monkeypatch):
 def test_bad_input_is_one_line_with_the_remedy(mixed, tmp_path, arguments, kind, words):
     given = {"path": tmp_path / "a.rrd"} | arguments
     with pytest.raises(kind, match=words) as caught:
-        lw.log_rerun(mixed, **given)
+        lw.record(mixed, **given)
     assert "\n" not in str(caught.value)
 
 
@@ -437,7 +437,7 @@ def test_nothing_to_draw_is_said(mixed, tmp_path):
         ({}, "there is no result"),
     ):
         with pytest.raises(NothingToDraw, match=words):
-            lw.log_rerun(result, tmp_path / "a.rrd")
+            lw.record(result, tmp_path / "a.rrd")
     assert not list(tmp_path.iterdir())
 
 
@@ -467,18 +467,18 @@ def test_a_viewer_that_stays_is_started(tmp_path, monkeypatch):
 
 
 def test_no_viewer_is_loaded_before_it_is_needed():
-    text = "import sys, lgvi_warp as lw; lw.shown, lw.log_rerun, lw.show; print('rerun' in sys.modules)"
+    text = "import sys, lgvi_warp as lw; lw.select_members, lw.record, lw.show; print('rerun' in sys.modules)"
     said = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
     assert said.stdout == "False\n"
 
 
 def test_2000_members_take_no_second(tmp_path):
     large = fleet(2000, 200)
-    lw.log_rerun(fleet(3, 5), tmp_path / "warm.rrd")
+    lw.record(fleet(3, 5), tmp_path / "warm.rrd")
     costs = []
     for _ in range(2):
         begun = time.process_time()
-        path = lw.log_rerun(large, tmp_path / "large.rrd")
+        path = lw.record(large, tmp_path / "large.rrd")
         costs.append(time.process_time() - begun)
     assert min(costs) < 1.0
     assert path.stat().st_size < 8e6
@@ -488,7 +488,7 @@ def test_2000_members_take_no_second(tmp_path):
 def test_100000_members_take_5_seconds(tmp_path):
     large = fleet(100_000, 200)
     begun = time.process_time()
-    path = lw.log_rerun(large, tmp_path / "large.rrd")
+    path = lw.record(large, tmp_path / "large.rrd")
     assert time.process_time() - begun < 5.0
     assert path.stat().st_size < 15e6
 

@@ -15,7 +15,7 @@ from PIL import Image
 
 import lgvi_warp as lw
 from lgvi_warp import cli
-from lgvi_warp.views.pages.again import again, shortened
+from lgvi_warp.views.pages.run_again import how_to_run_again, shortened
 from lgvi_warp.views.plots.inputs import inputs_by_outcome, varied
 from tests.conftest import ROOT
 from tests.unit.views import test_recording
@@ -82,13 +82,13 @@ def test_the_scene_is_as_the_user_wrote_it(tmp_path):
 def test_settings_that_a_script_gave_are_in_the_command(tmp_path):
     result = of_file(tmp_path)
     told = dict(result.provenance) | {"step": 0.02, "steps": 500, "dtype": "float32", "method": {"name": "rk4"}}
-    command, *_ = again(told)
+    command, *_ = how_to_run_again(told)
     assert command == "lgvi-warp run dive.toml --method rk4 --step 0.02 --duration 10 --dtype float32"
-    assert again(result.provenance)[0] == "lgvi-warp run dive.toml"
+    assert how_to_run_again(result.provenance)[0] == "lgvi-warp run dive.toml"
     stepped = {"name": "rk5", "rtol": 1e-9, "atol": 1e-8}
     told = dict(result.provenance) | {"method": stepped, "checks": "all", "on_failure": "substep"}
     wanted = "--method rk5 --rtol 1e-09 --atol 1e-08 --checks all --on-failure substep"
-    assert again(told)[0] == f"lgvi-warp run dive.toml {wanted}"
+    assert how_to_run_again(told)[0] == f"lgvi-warp run dive.toml {wanted}"
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_an_ensemble_of_python_is_in_the_scene_that_runs_it_again(tmp_path, tail
     scene = lw.Scene.load(tmp_path / "dive.toml", overrides)
     vary = {"start.angular_velocity": lw.Normal(std=2.0), "vehicle.buoyancy": lw.Uniform(low=280.0, high=290.0)}
     drawn = lw.Ensemble(scene, members=4, seed=7, vary=vary, sampling=sampling).subset([1, 3])
-    command, said, text = again(with_ensemble(result, drawn).provenance)
+    command, said, text = how_to_run_again(with_ensemble(result, drawn).provenance)
     assert command == "lgvi-warp run dive.toml --set vehicle.buoyancy=286.0"
     assert "given in Python" in said
     assert "# A heavy REMUS, as ballasted in May." in text
@@ -111,7 +111,7 @@ def test_an_ensemble_of_python_is_in_the_scene_that_runs_it_again(tmp_path, tail
     np.testing.assert_array_equal(ours.angular_velocity, theirs.angular_velocity)
     np.testing.assert_array_equal(ours.parameters["vehicle.buoyancy"], theirs.parameters["vehicle.buoyancy"])
     # The scene's own ensemble is no such one.
-    command, said, text = again(with_ensemble(result, lw.Ensemble.from_scene(scene)).provenance)
+    command, said, text = how_to_run_again(with_ensemble(result, lw.Ensemble.from_scene(scene)).provenance)
     assert text == TEXT + tail
     assert "--set ensemble.members=3" in command
     assert "Python" not in said
@@ -123,7 +123,7 @@ def test_numbers_of_python_are_in_no_file(tmp_path):
     given = lw.Ensemble.from_states(
         scene, np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), np.ones((2, 3))
     )
-    command, said, text = again(with_ensemble(result, given).provenance)
+    command, said, text = how_to_run_again(with_ensemble(result, given).provenance)
     assert command is None
     assert "run the script again" in said
     assert text == TEXT

@@ -11,7 +11,7 @@ import rerun as rr
 
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
-from lgvi_warp.views.fleet import LOOKS
+from lgvi_warp.views.fleet import OUTCOME_STYLES
 from lgvi_warp.views.recording import layout, world
 from lgvi_warp.views.recording import rerun as recordings
 from lgvi_warp.views.recording.hull import FIN
@@ -58,7 +58,7 @@ def faults_in(window, paths, times, rgbs=None):
 
 
 # Of bodies, and of the fin, which is seen where light noses hide all else; the surface, the floor and arrows have other hues.
-COLORS = [*(LOOKS[code].rgb for code in (Status.OK, Status.FLOOR, Status.SURFACE, Status.NON_FINITE)), FIN]
+COLORS = [*(OUTCOME_STYLES[code].rgb for code in (Status.OK, Status.FLOOR, Status.SURFACE, Status.NON_FINITE)), FIN]
 
 
 def many(n=1000):
@@ -131,7 +131,7 @@ RUNS = {"paper": lambda: of_paper(100, 0.01, 60.0, 0.5), "README": lambda: of_pa
 
 @pytest.mark.slow
 def test_two_recordings_are_seen(tmp_path):
-    paths = [lw.log_rerun(fleet(30, seed=seed), tmp_path / f"{seed}.rrd") for seed in (1, 2)]
+    paths = [lw.record(fleet(30, seed=seed), tmp_path / f"{seed}.rrd") for seed in (1, 2)]
     assert faults_of(paths, (0.0, 30.0, 60.0), tmp_path) == []
 
 
@@ -140,14 +140,14 @@ def test_two_recordings_are_seen(tmp_path):
 @pytest.mark.parametrize("name", RUNS)
 def test_a_recording_is_seen(name, tmp_path):
     result = RUNS[name]()
-    path = lw.log_rerun(result, tmp_path / "fleet.rrd")
+    path = lw.record(result, tmp_path / "fleet.rrd")
     times = result.time[[0, len(result.time) // 2, -1]]
     assert faults_of([path], times, tmp_path) == []
 
 
 @pytest.mark.slow
 def test_compared_runs_are_seen(tmp_path):
-    path = lw.log_rerun({"a": fleet(30), "b": fleet(30, seed=2)}, tmp_path / "both.rrd")
+    path = lw.record({"a": fleet(30), "b": fleet(30, seed=2)}, tmp_path / "both.rrd")
     assert faults_of([path], (0.0, 30.0, 60.0), tmp_path, recordings.COLORS[:2]) == []
 
 
@@ -155,7 +155,7 @@ def test_compared_runs_are_seen(tmp_path):
 def test_a_mesh_is_seen(tmp_path):
     mesh = glb(tmp_path / "hull.glb", 2.0)
     scene = dataclasses.replace(SCENE, vehicle=dataclasses.replace(SCENE.vehicle, shape={"mesh": str(mesh)}))
-    path = lw.log_rerun(fleet(30, scene=scene), tmp_path / "fleet.rrd")
+    path = lw.record(fleet(30, scene=scene), tmp_path / "fleet.rrd")
     assert faults_of([path], (0.0, 30.0, 60.0), tmp_path) == []
 
 
@@ -196,7 +196,7 @@ def broken_path(name, folder):
         patched.setattr(module, attribute, replacement)
         if name == "an eye that looks elsewhere":
             patched.setattr(layout, "distance", lambda low, high, aspect: -10.0 * np.linalg.norm(high - low))
-        return lw.log_rerun(fleet(30), folder / "broken.rrd")
+        return lw.record(fleet(30), folder / "broken.rrd")
 
 
 @pytest.mark.slow
@@ -208,7 +208,7 @@ def test_what_is_broken_is_seen(name, tmp_path):
 @pytest.mark.slow
 def test_a_fleet_is_seen_and_poses_that_are_not_finite_are_not(tmp_path):
     # One viewer for both: what a viewer shows of one recording does not hide faults of the next.
-    whole = lw.log_rerun(fleet(60), tmp_path / "fleet.rrd")
+    whole = lw.record(fleet(60), tmp_path / "fleet.rrd")
     broken = broken_path("poses that are not finite", tmp_path)
     with viewer(tmp_path, size="800x560") as window:
         assert faults_in(window, [whole], (0.0, 60.0)) == []

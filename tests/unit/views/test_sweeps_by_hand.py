@@ -13,7 +13,7 @@ from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.status import Status
 from lgvi_warp.studies.sweeps.output import Sweep, against_baseline
 from lgvi_warp.studies.sweeps.record import Record
-from lgvi_warp.studies.sweeps.setup import END, Cell
+from lgvi_warp.studies.sweeps.setup import END, SweepCell
 from lgvi_warp.views.plots import sweep_pictures as sweeps
 from tests.support.made import made
 
@@ -49,7 +49,7 @@ def swept(share, axes=None, cases="ab", refused=(), metrics=("m",), failed=0, ba
     controller = SimpleNamespace(controller=SimpleNamespace(period=0.5), run=SimpleNamespace(duration=100.0))
     cells, records = [], {}
     for i, (case, point) in enumerate(itertools.product(cases, points)):
-        cells.append(Cell(i, case, point, str(i), SimpleNamespace(scene=controller), ()))
+        cells.append(SweepCell(i, case, point, str(i), SimpleNamespace(scene=controller), ()))
         status = np.where(np.arange(N) < failed, Status.NON_FINITE, Status.OK)
         numbers = {"m": np.arange(N) * (1.0 + i), "n": np.full(N, np.nan), END: np.ones(N)}
         numbers["passes"] = np.arange(N) < round(N * share(i))

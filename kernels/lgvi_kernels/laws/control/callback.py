@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A demand that a function of the host writes into the memory, once a look."""
+"""A demand that a function of the host writes into the memory, once a tick."""
 
 import functools
 from typing import Any

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Commands of one actuator that a function of the host writes into the memory, once a look."""
+"""Commands of one actuator that a function of the host writes into the memory, once a tick."""
 
 import functools
 from typing import Any

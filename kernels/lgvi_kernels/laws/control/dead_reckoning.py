@@ -22,12 +22,12 @@ def params(width, real):
 
 @wp.func
 def measure(y: Any, p: Any):
-    """b <- b + T (weight R nu of the last look + weight_now R nu), from the position that is measured at the first look."""
+    """b <- b + T (weight R nu of the last tick + weight_now R nu), from the position that is measured at the first tick."""
     v = to_inertial(y, y.velocity)
     if p.through_water > 0:
         v = to_inertial(y, y.water_velocity)
     b = y.position + p.start_error
-    if y.look > 0:
+    if y.tick > 0:
         last = remembered3(y, p.memory + 3)
         b = remembered3(y, p.memory) + (y.period * p.weight) * last + (y.period * p.weight_now) * v
     remember3(y, p.memory, b)

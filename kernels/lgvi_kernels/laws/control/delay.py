@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The way of commands to the actuators takes time: a ring of the commands of the last looks."""
+"""The way of commands to the actuators takes time: a ring of the commands of the last ticks."""
 
 import functools
 from typing import Any
@@ -22,8 +22,8 @@ def params(width, real):
 
 @wp.func
 def send(y: Any, p: Any):
-    """Put the new commands into the ring; those of `periods` looks ago act from `steps` steps on, those before until then."""
-    newest = y.look % p.sets
+    """Put the new commands into the ring; those of `periods` ticks ago act from `steps` steps on, those before until then."""
+    newest = y.tick % p.sets
     unity = ones(p.periods)
     half = y.h.dtype(0.5) * unity
     for i in range(p.count):

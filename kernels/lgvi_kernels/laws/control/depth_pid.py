@@ -25,7 +25,7 @@ def control(w: Any, r: Any, y: Any, p: Any):
     Pitch up is positive, and depth grows downward: hence the sign. theta = asin of the forward axis' rise.
     """
     e = r.position.z - y.position.z
-    # What the last look wanted of the pitch beyond its limit stands where others have what was not delivered.
+    # What the last tick wanted of the pitch beyond its limit stands where others have what was not delivered.
     total = integral(y, p.memory, p.depth_limit, -remembered(y, p.memory + 4), p.conditional)
     wanted = -(p.kp * e + p.ki * total)
     theta_d = clamp(wanted, -p.pitch_limit, p.pitch_limit)

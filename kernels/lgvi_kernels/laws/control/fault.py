@@ -23,7 +23,7 @@ def params(width, real):
 
 @wp.func
 def send(y: Any, p: Any):
-    """From the first look at or after its time on: command <- gain * command + offset."""
+    """From the first tick at or after its time on: command <- gain * command + offset."""
     begun = since(y, p.begin)
     u = remembered(y, p.fresh)
     remember(y, p.fresh, positive(begun, p.gain * u + p.offset, u))

@@ -10,7 +10,7 @@ from lgvi_kernels.law import *
 
 @wp.func
 def integral(y: Any, row: int, limit: Any, unmet: Any, conditional: int):
-    """I at this look, from I and the error of the last one, in two rows of the memory: I + T e within +-limit.
+    """I at this tick, from I and the error of the last one, in two rows of the memory: I + T e within +-limit.
 
     Where conditional, I stays as it was if more of the demand, of which `unmet` was not delivered, would go the same way.
     """

@@ -10,5 +10,5 @@ from lgvi_kernels.law import *
 
 @wp.func
 def since(y: Any, step: Any):
-    """Above 0 from the first look at or after a step on."""
+    """Above 0 from the first tick at or after a step on."""
     return (y.h.dtype(y.step) + y.h.dtype(0.5)) * ones(step) - step

@@ -41,7 +41,7 @@ def rate_error(r: Any, y: Any):
 
 @wp.func
 def position_integral(y: Any, p: Any, e: Any):
-    """I of e_b, inertial axes; e, that of this look, is kept for the next one.
+    """I of e_b, inertial axes; e, that of this tick, is kept for the next one.
 
     It waits along the body's axes: these are the ones along which actuators push.
     """

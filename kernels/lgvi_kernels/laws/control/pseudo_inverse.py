@@ -92,7 +92,7 @@ def made(features):
             # A side without thrust has the coefficient 0, and gets no command.
             wanted = positive(c, absolute(effort) / c, zero)
             t = least(positive(effort, row1(y, at + 12), row1(y, at + 13)), wanted)
-            # In this order what is no number stays so, and the look sees it.
+            # In this order what is no number stays so, and the tick sees it.
             size = least(row1(y, at + 6), positive(t, size_for(y, p, i, t, effort) + row1(y, at + 9), t))
             remember(y, p.commands + i, positive(effort, size, -size))
             # Nothing is cut off, to the last digit, where the curve reaches the effort: anti-windup looks at the sign.

@@ -21,16 +21,16 @@ def params(width, real):
 
 @wp.func
 def led(y: Any, p: Any, i: int, start: Any, rate: Any):
-    """x, x' and x'' of number i; at the first look those of the measured state."""
+    """x, x' and x'' of number i; at the first tick those of the measured state."""
     z = remembered3(y, p.memory + 3 * i)
-    if y.look == 0:
+    if y.tick == 0:
         z = vec3(start, rate, ones(start) - ones(start))
     return z
 
 
 @wp.func
 def lead(y: Any, p: Any, i: int, z: Any, target: Any):
-    """Move number i on to the next look, with its target held."""
+    """Move number i on to the next tick, with its target held."""
     at = p.first + wp.static(ROWS) * i
     gap = z.x - target
     x = target + (row1(y, at) * gap + row1(y, at + 1) * z.y + row1(y, at + 2) * z.z)

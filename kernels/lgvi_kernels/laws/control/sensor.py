@@ -11,16 +11,16 @@ from lgvi_kernels.lanes.noise import noise_key
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.control.readings import make_reading, remember3, remembered3
 
-# Features that draw random numbers, and those by which a reading is not that of its own look.
+# Features that draw random numbers, and those by which a reading is not that of its own tick.
 DRAWING = ("noise", "drift", "dropout")
 KEEPING = ("every", "latency", "dropout")
 
 
 # Not inlined, for the sake of the compiler: a scene may have many sensors.
 @wp.func(inline=False)
-def drawn(like: Any, key: Any, look: int, stream: int):
-    """Four standard normals of a look, side by side."""
-    return normals(like, key.member, look, key.channel + stream, key.seed0, key.seed1)
+def drawn(like: Any, key: Any, tick: int, stream: int):
+    """Four standard normals of a tick, side by side."""
+    return normals(like, key.member, tick, key.channel + stream, key.seed0, key.seed1)
 
 
 @wp.func
@@ -41,15 +41,15 @@ def make_kept(reading, drifting, rare, late):
 
     @wp.func
     def kept(y: Any, p: Any, lost: Any):
-        """The reading that has arrived by now; `lost` is positive where that of this look never will."""
+        """The reading that has arrived by now; `lost` is positive where that of this tick never will."""
         at = p.memory
         if wp.static(drifting):
             at += wp.static(count)
         unity = ones(y.position.x)
         half = y.h.dtype(0.5) * unity
         fresh = at + p.sets * wp.static(rows)
-        newest = y.look % p.sets
-        last = (y.look + p.sets - 1) % p.sets
+        newest = y.tick % p.sets
+        last = (y.tick + p.sets - 1) % p.sets
         put(y, fresh)
         hold = lost
         if wp.static(rare):
@@ -57,7 +57,7 @@ def make_kept(reading, drifting, rare, late):
             waiting = p.every - half - unity - age
             hold = positive(waiting, unity, hold)
             remember(y, fresh + wp.static(rows), positive(waiting, age + unity, unity - unity))
-        if y.look == 0:
+        if y.tick == 0:
             hold = unity - unity
             if wp.static(rare):
                 remember(y, fresh + wp.static(rows), unity - unity)
@@ -68,7 +68,7 @@ def make_kept(reading, drifting, rare, late):
             if wp.static(late):
                 for s in range(p.sets):
                     age_of = (newest - s + p.sets) % p.sets
-                    wanted = least(p.latency, y.h.dtype(y.look) * unity)
+                    wanted = least(p.latency, y.h.dtype(y.tick) * unity)
                     apart = absolute(y.h.dtype(age_of) * unity - wanted)
                     value = positive(half - apart, remembered(y, at + s * wp.static(rows) + j), value)
             remember(y, fresh + j, value)
@@ -93,7 +93,7 @@ def made(features):
     def params(width, real):
         """Params: the numbers by member; key of the random numbers; first of its rows of the memory; readings that it keeps.
 
-        Its rows: the walk; `sets` readings as they arrive; that of this look; how many looks the last one is old.
+        Its rows: the walk; `sets` readings as they arrive; that of this tick; how many ticks the last one is old.
         """
         Lane, Lane3 = lane(width, real), lane3(width, real)
         vectors = {name: Lane3 for name in others if name in ("bias", "noise", "drift", "quantum")}
@@ -111,7 +111,7 @@ def made(features):
         if wp.static(biased):
             e = e + p.bias
         if wp.static(draws):
-            four = drawn(unity, p.key, y.look, 0)
+            four = drawn(unity, p.key, y.tick, 0)
             if wp.static(noisy):
                 e = e + p.noise * vec3(quarter(four, 0), quarter(four, 1), quarter(four, 2))
             if wp.static(lossy):
@@ -125,7 +125,7 @@ def made(features):
                 else:
                     walks = remembered3(y, p.memory)
                     e = e + walks
-                    more = drawn(unity, p.key, y.look, 1)
+                    more = drawn(unity, p.key, y.tick, 1)
                     steps = vec3(quarter(more, 0), quarter(more, 1), quarter(more, 2))
                     remember3(y, p.memory, walks + spread * (p.drift * steps))
         if wp.static(biased or noisy or drifting):

@@ -28,7 +28,7 @@ def made(features):
 
     @wp.func
     def measure(y: Any, p: Any):
-        """From the first look at or after its time on: reading <- gain * reading + offset."""
+        """From the first tick at or after its time on: reading <- gain * reading + offset."""
         begun = since(y, p.begin)
         v = values(y)
         if p.channel == 0:

@@ -15,7 +15,7 @@ from lgvi_warp.common.errors import MissingExtra, SceneError
 DEFAULTS = {"dtype": "float64", "checks": "safe", "on_failure": "freeze"}
 
 
-def again(provenance: Mapping[str, Any]) -> tuple[str | None, str, str]:
+def how_to_run_again(provenance: Mapping[str, Any]) -> tuple[str | None, str, str]:
     """Say how to run a run again.
 
     Returns: The command, None where no file holds all of the run; what a reader has to know; and the text of the scene file:
@@ -100,11 +100,11 @@ def _same(setting: Any, value: Any) -> bool:
 
 def shortened(scene: Mapping[str, Any]) -> Mapping[str, Any]:
     """Name a vehicle of the package in place of its numbers, where that is the same scene."""
-    from lgvi_warp.vehicles.fossen import vehicles
+    from lgvi_warp.vehicles.fossen import vehicle_names
     from lgvi_warp.scene.scene import Scene
 
     name = scene.get("vehicle", {}).get("title")
-    if name not in vehicles():
+    if name not in vehicle_names():
         return scene
     known = Scene.named(name).to_dict()
     short = dict(scene)

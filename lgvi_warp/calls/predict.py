@@ -111,8 +111,8 @@ def _duration(seconds: float) -> str:
     return f"{seconds / 60.0:.1f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
 
 
-def _share(wanted: int, there: int | None, of: str) -> str:
-    return f" ({wanted / there:.0%} of {of})" if there else ""
+def _share(wanted: int, available: int | None, of: str) -> str:
+    return f" ({wanted / available:.0%} of {of})" if available else ""
 
 
 def predict(

@@ -348,20 +348,20 @@ def _prepared_again(arguments: tuple[Any, ...], settings: dict[str, Any]) -> Pre
 
 
 def _columns(
-    whole: Ensemble, listed: tuple[str, ...], levels: bool
+    full: Ensemble, listed: tuple[str, ...], levels: bool
 ) -> tuple[tuple[str, ...], Ensemble | str, list[int] | None]:
     """(names of the columns of X; an ensemble with these columns, or why X has none; columns of the cube for levels)."""
-    scene, names, cube_columns = whole.scene, listed, None
-    of_sampling = [*whole.sampling.own_values(), *whole.sampling.distributions()]
+    scene, names, cube_columns = full.scene, listed, None
+    of_sampling = [*full.sampling.own_values(), *full.sampling.distributions()]
     if of_sampling:
         dropped = ", ".join(of_sampling[:4])
         return (
             (),
-            f"would drop {dropped}, to which the ensemble's {whole.sampling.kind} gives values; name what varies",
+            f"would drop {dropped}, to which the ensemble's {full.sampling.kind} gives values; name what varies",
             None,
         )
-    if not listed and whole.vary:
-        described = as_given(whole)
+    if not listed and full.vary:
+        described = as_given(full)
         joint = [variation for variation in described if variation.distribution.joint]
         if joint and not levels:
             remedy = "give levels=True, or let members be drawn: run(seed=...)"
@@ -370,12 +370,12 @@ def _columns(
                 f'vary."{joint[0].key}" is a joint distribution, whose values are not single numbers; {remedy}',
                 None,
             )
-        cube_columns = [column for variation in described for column in columns_of(whole.space, variation.key)]
-        cube = salib_problem(whole.space)["names"]
+        cube_columns = [column for variation in described for column in columns_of(full.space, variation.key)]
+        cube = salib_problem(full.space)["names"]
         names = tuple(cube[column] for column in cube_columns)
         if levels:
-            return names, whole, cube_columns
+            return names, full, cube_columns
     if not names:
         return (), "has no columns, since nothing varies; name what varies: prepare(scene, vary=[...])", None
     values = {name: np.array([float(scene_value(scene, name))]) for name in names}
-    return names, Ensemble(scene, None, whole.seed, None, Table(values=values)), None
+    return names, Ensemble(scene, None, full.seed, None, Table(values=values)), None

@@ -129,37 +129,37 @@ def _part(content: Content, chosen: argparse.Namespace, describe: Part) -> tuple
     return head | document, lambda: report
 
 
-def text_of(kind: str, found: Any) -> str:
+def text_of(kind: str, study: Any) -> str:
     """Describe what a study found."""
     if kind == "tradeoff":
         from lgvi_warp.studies.tradeoff import report_text
 
-        return report_text(found)
+        return report_text(study)
     if kind == "stability":
         from lgvi_warp.studies.stability import map as stability
 
-        return stability.report_text(found)
-    return str(found)
+        return stability.report_text(study)
+    return str(study)
 
 
-def store_lines(found: dict[str, Any], chosen: argparse.Namespace) -> Iterator[str]:
+def store_lines(contents: dict[str, Any], chosen: argparse.Namespace) -> Iterator[str]:
     """Say what a store holds."""
-    provenance = found["provenance"]
-    yield f"run         {found['path']} ({found['bytes'] / 1e6:.1f} MB), lgvi-warp {provenance['versions']['lgvi-warp']}"
-    yield members_line(found["members"], provenance)
+    provenance = contents["provenance"]
+    yield f"run         {contents['path']} ({contents['bytes'] / 1e6:.1f} MB), lgvi-warp {provenance['versions']['lgvi-warp']}"
+    yield members_line(contents["members"], provenance)
     yield from controller_lines(provenance["scene"])
     if chosen.verbose:
         yield from how_lines(provenance)
-    fields = ", ".join(found["fields"])
-    yield f"samples     {found['samples']} times" + (f" of {fields}" if fields else ", not of all members")
-    if found["keepers"]:
-        yield f"parts       {', '.join(found['keepers'])} of each block"
-    if found["kept"]:
-        yield f"kept        {found['kept']:,} members' samples, run again"
-    end = "complete" if found["complete"] else f"not complete: lgvi-warp resume {chosen.dir}"
-    yield f"blocks      {found['finished']} of {found['blocks']} finished; {end}"
-    most = len(found["damage"]) if chosen.verbose else MOST_SAID
-    for text in found["damage"][:most]:
+    fields = ", ".join(contents["fields"])
+    yield f"samples     {contents['samples']} times" + (f" of {fields}" if fields else ", not of all members")
+    if contents["keepers"]:
+        yield f"parts       {', '.join(contents['keepers'])} of each block"
+    if contents["kept"]:
+        yield f"kept        {contents['kept']:,} members' samples, run again"
+    end = "complete" if contents["complete"] else f"not complete: lgvi-warp resume {chosen.dir}"
+    yield f"blocks      {contents['finished']} of {contents['blocks']} finished; {end}"
+    most = len(contents["damage"]) if chosen.verbose else MOST_SAID
+    for text in contents["damage"][:most]:
         yield f"damage      {text}"
-    if (more := len(found["damage"]) - most) > 0:
+    if (more := len(contents["damage"]) - most) > 0:
         yield f"damage      and {more:,} more files"

@@ -33,8 +33,8 @@ class Signals:
         said: Whether the end has been reported already.
     """
 
-    def __init__(self, left: Callable[[], str], *, end: Callable[[Signals], None] | None = None):
-        self._left, self._end = left, end or Signals.end_now
+    def __init__(self, what_is_left: Callable[[], str], *, end: Callable[[Signals], None] | None = None):
+        self._left, self._end = what_is_left, end or Signals.end_now
         self._before: dict[int, Any] = {}
         # Number of the first signal heard; None without one.
         self.number: int | None = None

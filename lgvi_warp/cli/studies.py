@@ -129,10 +129,10 @@ def sensitivity(chosen: argparse.Namespace, *, study: Part = None, draw: Part = 
     return finish(written, chosen, {"sensitivity": indices.to_dict()}, str(indices))
 
 
-def _groups(given: Sequence[str]) -> dict[str, list[str]]:
+def _groups(texts: Sequence[str]) -> dict[str, list[str]]:
     """Groups of factors as the command has them: "NAME=FACTOR,FACTOR". Raises SceneError."""
     groups = {}
-    for text in given:
+    for text in texts:
         name, _, members = text.partition("=")
         if not name or not members:
             raise refusal("--group", text, "names no factors", 'give "start=start.position,start.velocity"')

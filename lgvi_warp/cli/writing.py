@@ -39,11 +39,11 @@ class Written:
         except (OSError, ImportError, ValueError) as error:
             self.faults.append(f"{path} was not written: {error}")
 
-    def draw(self, plot: Callable[[Any, Path], Any], found: Any, path: Path) -> None:
+    def draw(self, plot: Callable[[Any, Path], Any], study: Any, path: Path) -> None:
         """Draw a study's picture, or note why it was not drawn."""
 
         def drawn() -> Path:
-            plot(found, path)
+            plot(study, path)
             return path
 
         self.take(path, drawn)

@@ -15,10 +15,10 @@ from lgvi_warp.common.real_numbers import is_whole
 PATH = "give a path, as text or pathlib.Path"
 
 
-def of_kind(key: str, value: Any, attributes: str, what: str, remedy: str) -> Any:
+def of_kind(key: str, value: Any, attributes: str, problem: str, remedy: str) -> Any:
     """Read an object that the function looks into."""
     if isinstance(value, type) or not all(hasattr(value, name) for name in attributes.split()):
-        raise refusal(key, value, f"is not {what}", remedy)
+        raise refusal(key, value, f"is not {problem}", remedy)
     return value
 
 
@@ -54,20 +54,20 @@ def whole_number(key: str, value: Any, least: int, most: int = 2**31 - 1) -> int
     return int(value)
 
 
-def listed(key: str, value: Any, what: str) -> list[Any]:
+def listed(key: str, value: Any, problem: str) -> list[Any]:
     """Read a list; one text alone stands for a list of it."""
     if isinstance(value, str):
         return [value]
     try:
         return list(value)
     except TypeError:
-        raise refusal(key, value, "is no list", f"give a list of {what}") from None
+        raise refusal(key, value, "is no list", f"give a list of {problem}") from None
 
 
-def mapping_of(key: str, value: Any, what: str) -> Mapping[Any, Any]:
+def mapping_of(key: str, value: Any, problem: str) -> Mapping[Any, Any]:
     """Read a mapping."""
     if not isinstance(value, Mapping):
-        raise refusal(key, value, "is no mapping", f"give a dict of {what}")
+        raise refusal(key, value, "is no mapping", f"give a dict of {problem}")
     return value
 
 

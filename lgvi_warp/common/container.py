@@ -17,37 +17,37 @@ from pathlib import Path
 ROOT, OWN = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
 
 
-def cpu_quota(root: Path = ROOT, own: Path = OWN) -> float | None:
+def cpu_quota(root: Path = ROOT, group_file: Path = OWN) -> float | None:
     """CPU time that this process may use.
 
     Returns: The smallest quota of its groups [CPUs], as 1.5 for 150 ms in each 100 ms; None without a quota.
     """
-    return _cpu_quota(root, own, int(time.monotonic()))
+    return _cpu_quota(root, group_file, int(time.monotonic()))
 
 
 @functools.lru_cache(maxsize=1)
-def _cpu_quota(root: Path, own: Path, second: int) -> float | None:
+def _cpu_quota(root: Path, group_file: Path, second: int) -> float | None:
     """The quota, read from its files at most once a second, since short runs ask for it many times in one."""
-    quotas = [_v2_quota(folder) for folder in _folders(root, own, "")]
-    quotas += [_v1_quota(folder) for folder in _folders(root, own, "cpu")]
+    quotas = [_v2_quota(folder) for folder in _folders(root, group_file, "")]
+    quotas += [_v1_quota(folder) for folder in _folders(root, group_file, "cpu")]
     return min((quota for quota in quotas if quota is not None), default=None)
 
 
-def memory_limit(root: Path = ROOT, own: Path = OWN) -> int | None:
+def memory_limit(root: Path = ROOT, group_file: Path = OWN) -> int | None:
     """Memory that this process may use together with the others in its groups.
 
     Returns: The smallest limit of its groups [bytes]; None without one. Version 1 expresses "none" by a number that no machine
         has.
     """
-    limits = [_number(folder / "memory.max") for folder in _folders(root, own, "")]
-    for folder in _folders(root, own, "memory"):
+    limits = [_number(folder / "memory.max") for folder in _folders(root, group_file, "")]
+    for folder in _folders(root, group_file, "memory"):
         limits += [_number(folder / "memory.limit_in_bytes"), _hierarchical(folder / "memory.stat")]
     return min((int(limit) for limit in limits if limit is not None and limit > 0), default=None)
 
 
-def _folders(root: Path, own: Path, controller: str) -> Iterator[Path]:
+def _folders(root: Path, group_file: Path, controller: str) -> Iterator[Path]:
     """Existing folders of this process's group and of its parents; controller: of version 1, "" for version 2."""
-    for line in _text(own).splitlines():
+    for line in _text(group_file).splitlines():
         _, _, rest = line.partition(":")
         names, _, path = rest.partition(":")
         if controller not in names.split(","):

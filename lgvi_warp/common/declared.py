@@ -70,18 +70,18 @@ def read(settings: Any, faults: Faults, *names: str) -> dict[str, Any]:
 Made = TypeVar("Made")
 
 
-def from_table(kind: type[Made], key: str, given: Any, example: str, **needed: str) -> Made:
+def from_table(kind: type[Made], key: str, table: Any, example: str, **needed: str) -> Made:
     """Build settings from a table of a scene file; settings themselves are kept.
 
     needed: Keys that the table must have, each with the remedy where it is missing.
     """
-    if isinstance(given, kind):
-        return given
-    if not isinstance(given, Mapping):
-        raise refusal(key, given, "is no table", example)
+    if isinstance(table, kind):
+        return table
+    if not isinstance(table, Mapping):
+        raise refusal(key, table, "is no table", example)
     faults = Faults()
-    faults.keys(key, given, [item.name for item in dataclasses.fields(kind) if item.init])  # type: ignore[arg-type]
-    for name in (name for name in needed if name not in given):
+    faults.keys(key, table, [item.name for item in dataclasses.fields(kind) if item.init])  # type: ignore[arg-type]
+    for name in (name for name in needed if name not in table):
         faults.add(f"{key}.{name}", "", "is missing", needed[name])
     faults.raise_if_any()
-    return kind(**given)
+    return kind(**table)

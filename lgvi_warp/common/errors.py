@@ -67,9 +67,9 @@ class SceneError(ValueError):
         return SceneError((prefix + fault for fault in self.faults), self.more)
 
 
-def refusal(key: str, value: Any, what: str, remedy: str) -> SceneError:
+def refusal(key: str, value: Any, problem: str, remedy: str) -> SceneError:
     """Make the error of a single fault."""
-    return SceneError([f"{cut(key)} = {brief(value)}: {what}; {remedy}"])
+    return SceneError([f"{cut(key)} = {brief(value)}: {problem}; {remedy}"])
 
 
 class MembersFailed(RuntimeError):  # noqa: N818
@@ -124,9 +124,9 @@ class NothingToDraw(ValueError):  # noqa: N818
 class MissingExtra(ImportError):  # noqa: N818
     """A library of one of the package's extras is not installed."""
 
-    def __init__(self, what: str, library: str, extra: str):
-        super().__init__(f"{what} need {library}: pip install 'lgvi-warp[{extra}]'", name=library)
-        self.what, self.library, self.extra = what, library, extra
+    def __init__(self, purpose: str, library: str, extra: str):
+        super().__init__(f"{purpose} need {library}: pip install 'lgvi-warp[{extra}]'", name=library)
+        self.what, self.library, self.extra = purpose, library, extra
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what the message is made of, so that another process can raise the same error."""
@@ -232,13 +232,13 @@ class Faults:
     def __init__(self, prefix: str = ""):
         self._prefix, self._found, self._more = prefix, list[str](), 0
 
-    def add(self, key: str, value: Any, what: str, remedy: str | Callable[[], str]) -> None:
+    def add(self, key: str, value: Any, problem: str, remedy: str | Callable[[], str]) -> None:
         """Note one fault, as "key = value: what is wrong; the remedy"."""
         if len(self._found) >= MOST_FAULTS:
             self._more += 1
             return
         words = remedy if isinstance(remedy, str) else remedy()
-        self._found.append(f"{self._prefix}{cut(key)} = {brief(value)}: {what}; {words}")
+        self._found.append(f"{self._prefix}{cut(key)} = {brief(value)}: {problem}; {words}")
 
     @contextlib.contextmanager
     def including(self) -> Iterator[None]:
@@ -263,12 +263,12 @@ class Faults:
             self.add(key, value, "is not known", lambda: closest(value, known))
         return good
 
-    def keys(self, key: str, given: Iterable[str], known: Iterable[str]) -> None:
+    def keys(self, key: str, keys: Iterable[str], known: Iterable[str]) -> None:
         """Check that every key is one of those allowed; note a fault for each other one."""
         known = list(known)
-        for name in given:
+        for name in keys:
             if name not in known:
-                value = given[name] if isinstance(given, Mapping) else "..."
+                value = keys[name] if isinstance(keys, Mapping) else "..."
                 remedy = functools.partial(closest, name, known)
                 self.add(f"{key}.{name}" if key else name, value, "is an unknown key", remedy)
 

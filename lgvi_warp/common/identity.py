@@ -60,9 +60,9 @@ def check_version(faults: Faults, version: Any) -> None:
         faults.add("version", version, "is neither a text nor a number", 'give version="2"')
 
 
-def comparable(one: str, other: str) -> bool:
+def comparable(first: str, second: str) -> bool:
     """Tell whether two identities can differ for one reason alone: that the functions do."""
-    return UNKNOWN not in (one, other) and one.partition(" ")[0] == other.partition(" ")[0]
+    return UNKNOWN not in (first, second) and first.partition(" ")[0] == second.partition(" ")[0]
 
 
 class _NotToldError(Exception):

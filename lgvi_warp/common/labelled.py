@@ -44,15 +44,15 @@ def columns_by_name(faults: Faults, key: str, value: Any) -> dict[str, Any]:
     return _read(value, labels)
 
 
-def match(faults: Faults, key: str, given: Sequence[str], wanted: Sequence[str]) -> bool:
+def match(faults: Faults, key: str, labels: Sequence[str], wanted: Sequence[str]) -> bool:
     """Compare labels with those that are wanted, in any order; note a fault for each missing or unknown one."""
-    missing = [name for name in wanted if name not in given]
-    for label in given:
+    missing = [name for name in wanted if name not in labels]
+    for label in labels:
         if label not in wanted:
             faults.add(f'{key}["{label}"]', "...", "is not one of its columns", closest(label, missing or wanted))
     for name in missing:
         faults.add(f'{key}["{name}"]', None, "is missing", f"give a column for each of {', '.join(wanted)}")
-    return not missing and len(given) == len(wanted)
+    return not missing and len(labels) == len(wanted)
 
 
 def _labels(value: Any) -> list[Any] | None:

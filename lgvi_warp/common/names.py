@@ -35,9 +35,9 @@ def wrong_with(name: str) -> tuple[str, str] | None:
     return None
 
 
-def shown_character(one: str) -> str:
+def shown_character(character: str) -> str:
     """Write a character so that a message can show it."""
-    return {" ": "a space", ".": "a point"}.get(one, ascii(one) if not one.isprintable() else repr(one))
+    return {" ": "a space", ".": "a point"}.get(character, ascii(character) if not character.isprintable() else repr(character))
 
 
 def folded(name: str) -> str:

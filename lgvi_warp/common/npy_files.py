@@ -40,11 +40,11 @@ def _in_turn(file: BinaryIO, size: int) -> Iterator[np.ndarray]:
         yield read(file, size - file.tell())
 
 
-def read(file: Any, left: int) -> np.ndarray:
+def read(file: Any, bytes_left: int) -> np.ndarray:
     """Read one array from a stream."""
     shape, fortran, dtype = _described(file)
     count = math.prod(shape)
-    if dtype.kind not in KINDS or dtype.itemsize == 0 or count * dtype.itemsize > left:
+    if dtype.kind not in KINDS or dtype.itemsize == 0 or count * dtype.itemsize > bytes_left:
         raise ValueError(f"promises an array of type {dtype} and shape {shape}, which is not in the file")
     array = np.empty(count, dtype)
     view = memoryview(array.view(np.uint8).data) if count else memoryview(b"")

@@ -31,9 +31,9 @@ OTHER_PATHS = "give the path of a file, or its text"
 class UnreadableError(ValueError):
     """A file is not read."""
 
-    def __init__(self, what: str, remedy: str):
-        super().__init__(f"{what}; {remedy}")
-        self.what, self.remedy = what, remedy
+    def __init__(self, problem: str, remedy: str):
+        super().__init__(f"{problem}; {remedy}")
+        self.what, self.remedy = problem, remedy
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle what the message is made of, so that another process can raise the same error."""
@@ -66,13 +66,13 @@ def file_bytes(path: str | os.PathLike[str], kind: str) -> bytes:
     return content
 
 
-def _refuse(found: os.stat_result, kind: str) -> None:
+def _refuse(stat: os.stat_result, kind: str) -> None:
     """Raise UnreadableError for a file that is not regular, or too large."""
-    if problem := safe_files.kind(found.st_mode):
+    if problem := safe_files.kind(stat.st_mode):
         raise UnreadableError(problem, PATHS.get(kind, OTHER_PATHS))
     most = MOST_BYTES.get(kind, MOST_OTHERS)
-    if found.st_size > most:
-        problem = f"has {found.st_size / 1e6:,.1f} MB, more than the {most / 1e6:,.1f} MB that a {kind} may have"
+    if stat.st_size > most:
+        problem = f"has {stat.st_size / 1e6:,.1f} MB, more than the {most / 1e6:,.1f} MB that a {kind} may have"
         raise UnreadableError(problem, _smaller(kind))
 
 
@@ -115,7 +115,7 @@ def file_json(path: str | os.PathLike[str]) -> Any:
 
 
 @contextlib.contextmanager
-def corrupt_file_as_scene_error(path: str | os.PathLike[str], what: str, remedy: str) -> Iterator[None]:
+def corrupt_file_as_scene_error(path: str | os.PathLike[str], otherwise: str, remedy: str) -> Iterator[None]:
     """Turn what the content of a file raises in the `with` block into a fault of the file."""
     name = str(path_of("path", path))
     try:
@@ -128,7 +128,7 @@ def corrupt_file_as_scene_error(path: str | os.PathLike[str], what: str, remedy:
         raise SceneError([f"{name}: {error.what}; {remedy}"]) from error
     except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
         reason = " ".join(str(error).split())[:200] or type(error).__name__
-        raise SceneError([f"{name}: is damaged, or {what}: {reason}; {remedy}"]) from error
+        raise SceneError([f"{name}: is damaged, or {otherwise}: {reason}; {remedy}"]) from error
     except MemoryError:
         raise SceneError([f"{name}: does not fit into memory; read it on a larger machine"]) from None
 

@@ -17,9 +17,9 @@ class NotReal(ValueError):  # noqa: N818
     remedy: How to mend it; default None, "give numbers".
     """
 
-    def __init__(self, what: str, remedy: str | None = None):
-        super().__init__(what)
-        self.what, self.remedy = what, remedy
+    def __init__(self, problem: str, remedy: str | None = None):
+        super().__init__(problem)
+        self.what, self.remedy = problem, remedy
 
 
 def real_numbers(value: Any) -> np.ndarray:

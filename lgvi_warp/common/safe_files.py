@@ -26,10 +26,10 @@ _PLAIN = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_CLOEXEC", 0) | getattr(os
 _FOLDER = getattr(os, "O_DIRECTORY", 0) | os.O_RDONLY | _PLAIN
 
 
-def refused(path: Path, what: str) -> SceneError:
+def refused(path: Path, problem: str) -> SceneError:
     """Make the error for a file that a store never holds."""
-    remedy = "take it away, and what it leads to is left alone" if what == "is a link" else "take it away"
-    return SceneError([f"{path}: {what}, where a run has plain files and folders only; {remedy}"])
+    remedy = "take it away, and what it leads to is left alone" if problem == "is a link" else "take it away"
+    return SceneError([f"{path}: {problem}, where a run has plain files and folders only; {remedy}"])
 
 
 KINDS = {

@@ -310,16 +310,16 @@ class Controller:
         return content | {section: parts for section, parts in lists.items() if parts}
 
 
-def from_table(given: Any) -> Controller | None:
+def from_table(table: Any) -> Controller | None:
     """A controller from the section of a scene file.
 
-    given: A Controller, a table, or None.
+    table: A Controller, a table, or None.
     Returns: The controller; None for None.
     """
-    if given is None:
+    if table is None:
         return None
     example = "write [controller] and its keys below, or give lw.Controller(...)"
-    return declared.from_table(Controller, "controller", given, example, period="give the time between two ticks [s]")
+    return declared.from_table(Controller, "controller", table, example, period="give the time between two ticks [s]")
 
 
 def terms_of(scene: Mapping[str, Any]) -> tuple[Term, ...]:
@@ -335,12 +335,12 @@ def terms_of(scene: Mapping[str, Any]) -> tuple[Term, ...]:
     return tuple(term.driven_by(bus if term.key in actuators else None) for term in terms)
 
 
-def _parts(section: str, base: type[Part], given: Any) -> tuple[Part, ...]:
+def _parts(section: str, base: type[Part], entries: Any) -> tuple[Part, ...]:
     """The parts of a list, from objects or tables."""
-    check_list(section, given, f"write [[controller.{section}]] and type = ... below")
+    check_list(section, entries, f"write [[controller.{section}]] and type = ... below")
     faults, parts = Faults(), []
     known = base.kinds
-    for i, entry in enumerate(given):
+    for i, entry in enumerate(entries):
         where = f"{section}[{i}]"
         with faults.including():
             if isinstance(entry, Mapping):

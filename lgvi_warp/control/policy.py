@@ -140,15 +140,15 @@ class Policy(ControlLaw):
         return Packed(words | scales, rows[None], work=len(PLACES) + len(OUTPUTS) + 2 * widest)
 
 
-def _named(faults: Faults, key: str, given: Any, known: dict[str, Any]) -> list[str]:
+def _named(faults: Faults, key: str, names: Any, known: dict[str, Any]) -> list[str]:
     """Names of a list that are known and occur once."""
-    if isinstance(given, str) or not isinstance(given, Sequence) or not given:
-        faults.add(key, given, "is no list of names", f"give some of {', '.join(known)}")
+    if isinstance(names, str) or not isinstance(names, Sequence) or not names:
+        faults.add(key, names, "is no list of names", f"give some of {', '.join(known)}")
         return []
-    for i, name in enumerate(given):
-        if faults.choice(f"{key}[{i}]", name, known) and among(name, given[:i]):
+    for i, name in enumerate(names):
+        if faults.choice(f"{key}[{i}]", name, known) and among(name, names[:i]):
             faults.add(f"{key}[{i}]", name, "is named twice", "leave one of them out")
-    return [name for name in given if among(name, known)]
+    return [name for name in names if among(name, known)]
 
 
 def _read(faults: Faults, file: Any) -> list[tuple[np.ndarray, np.ndarray]]:

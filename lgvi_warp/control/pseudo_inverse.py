@@ -109,35 +109,35 @@ class PseudoInverse(Allocation):
         }
         return Packed(words | {"shared": sum(block.shape[1] for block in rows)}, side_by_side(*rows, curves))
 
-    def _sided(self, own: Numbers) -> int:
+    def _sided(self, numbers: Numbers) -> int:
         """1 where the thrusters have polynomials, and some of those astern are others than those ahead; else 0."""
-        return int(self.shape == "polynomial" and not np.array_equal(own["polynomial"], own["polynomial_astern"]))
+        return int(self.shape == "polynomial" and not np.array_equal(numbers["polynomial"], numbers["polynomial_astern"]))
 
-    def _largest(self, own: Numbers, reach: np.ndarray) -> tuple[np.ndarray, ...]:
+    def _largest(self, numbers: Numbers, reach: np.ndarray) -> tuple[np.ndarray, ...]:
         """The largest efforts (1 or n, channels) ahead and astern, without the coefficient; reach: of commands."""
         reach = np.maximum(reach, 0.0)
         if self.shape == "table":
-            at, values = own["table_commands"], own["table_thrusts"]
+            at, values = numbers["table_commands"], numbers["table_thrusts"]
             return tuple(side * _at(at, values, side * reach) for side in (1.0, -1.0))
         if self.shape == "polynomial":
-            curves = [own[key] for key in ("polynomial", "polynomial_astern")]
+            curves = [numbers[key] for key in ("polynomial", "polynomial_astern")]
             turns = (highest(curve, np.max(reach, axis=-1))[:, None] for curve in curves)
             return tuple(_values(curve, np.minimum(reach, turn)) for curve, turn in zip(curves, turns, strict=True))
         return (reach if self.shape == "linear" else reach**2,) * 2
 
-    def _curves(self, own: Numbers) -> tuple[np.ndarray, int]:
+    def _curves(self, numbers: Numbers) -> tuple[np.ndarray, int]:
         """Rows of the curves and of their inverses, and how many there are of a kind."""
         if self.shape in ("linear", "square"):
             return np.zeros((1, 0)), 0
-        curves, size = self.actuator.curve_rows(own)
+        curves, size = self.actuator.curve_rows(numbers)
         if self.shape == "table":
-            at, values = own["table_commands"], own["table_thrusts"]
+            at, values = numbers["table_commands"], numbers["table_thrusts"]
             each = (
                 side_of_table(at, values[:, :, i], side) for i in range(self.actuator.channels) for side in (1.0, -1.0)
             )
             return side_by_side(curves, *(rising_knots(thrusts, commands) for commands, thrusts in each)), size
-        reach = np.max(np.maximum(own["limit"] - own["dead_band"], 0.0), axis=-1)
-        sides = (inverse_rows(own[key], reach) for key in ("polynomial", "polynomial_astern"))
+        reach = np.max(np.maximum(numbers["limit"] - numbers["dead_band"], 0.0), axis=-1)
+        sides = (inverse_rows(numbers[key], reach) for key in ("polynomial", "polynomial_astern"))
         return side_by_side(curves, *sides), size
 
 

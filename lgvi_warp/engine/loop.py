@@ -53,27 +53,27 @@ def run_blocks(
     runs: Sequence[Block],
     executor: Executor,
     advanced: Callable[[Block, int], None],
-    left: Sequence[Block] | None = None,
+    remaining: Sequence[Block] | None = None,
     enough: Callable[[int], bool] = lambda members: False,
     merged: Merged | None = None,
     after: Callable[[Block], None] | None = None,
 ) -> int:
     """Run blocks and merge their results into the keepers, in block order.
 
-    left: blocks that the store does not hold yet; None (default) for all.
+    remaining: blocks that the store does not hold yet; None (default) for all.
     enough: asked after each block, with the number of members so far, whether the run may end (default: never); later blocks
         are then dropped.
     after: called with each block when it is merged; None (default) for nothing.
     """
-    fresh = set(left or ())
+    fresh = set(remaining or ())
     merged = merged or Merged()
-    with contextlib.closing(_in_turn(work, runs, runs if left is None else left, executor, advanced)) as done:
+    with contextlib.closing(_in_turn(work, runs, runs if remaining is None else remaining, executor, advanced)) as done:
         for block, results in done:
             if isinstance(results, Exception):
                 raise results
             merged.begun = block.stop
             # Results from the store may not be this run's own: errors in them are reported as faults of the store.
-            source = work.store if left is not None and block not in fresh else None
+            source = work.store if remaining is not None and block not in fresh else None
             with source.understood(block) if source else contextlib.nullcontext():
                 for keeper, result in zip(work.keepers, results, strict=True):
                     keeper.merge(block, result)
@@ -86,10 +86,10 @@ def run_blocks(
 
 
 def _in_turn(
-    work: Work, runs: Sequence[Block], left: Sequence[Block], executor: Executor, advanced: Callable[[Block, int], None]
+    work: Work, runs: Sequence[Block], remaining: Sequence[Block], executor: Executor, advanced: Callable[[Block, int], None]
 ) -> Generator[tuple[Block, Any], None, None]:
     """Blocks and their results in order, from the store or as they run; nothing runs before it is needed."""
-    wanted = {block.first for block in left}
+    wanted = {block.first for block in remaining}
     with contextlib.ExitStack() as stack:
         fresh: Iterator[tuple[Block, Any]] | None = None
         for block in runs:
@@ -99,7 +99,7 @@ def _in_turn(
                 continue
             if fresh is None:
                 work.plan.compile()
-                fresh = in_order(left, stack.enter_context(contextlib.closing(executor.run(work, left, advanced))))
+                fresh = in_order(remaining, stack.enter_context(contextlib.closing(executor.run(work, remaining, advanced))))
             yield next(fresh)
         # An executor raises an interrupt after the blocks that ended all the same: it is to be heard after the last one too.
         for _ in fresh or ():

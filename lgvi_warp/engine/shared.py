@@ -140,10 +140,10 @@ class SharedResultsCache:
             return None
         return last.numbers
 
-    def remember(self, given: Mapping[str, np.ndarray], numbers: Mapping[str, Any]) -> None:
+    def remember(self, parameters: Mapping[str, np.ndarray], numbers: Mapping[str, Any]) -> None:
         """Keep what follows from the numbers of few members until others come: a run looks at them more than once."""
-        few = all(len(given[name]) <= KEPT for name in self.varied if name in given)
-        self._last = _Few(given, numbers, {}) if few else None
+        few = all(len(parameters[name]) <= KEPT for name in self.varied if name in parameters)
+        self._last = _Few(parameters, numbers, {}) if few else None
 
     def keeps(self, key: Any) -> bool:
         """Whether a computation that ran is shared by all members."""

@@ -244,10 +244,10 @@ UNITS = {item.name: item.metadata["arguments"]["unit"] for item in fields(Vehicl
 SIGN = "added mass is positive here: minus Fossen's X_udot, Y_vdot, Z_wdot ..."
 
 
-def _definite(matrix: np.ndarray, other: Any = 0.0) -> bool:
+def _definite(matrix: np.ndarray, added: Any = 0.0) -> bool:
     """Whether the sum of two matrices is positive definite; False where it overflows."""
     with np.errstate(over="ignore"):
-        total = matrix + other
+        total = matrix + added
     return bool(np.isfinite(total).all() and np.linalg.eigvalsh(total)[0] >= LEAST)
 
 

@@ -49,8 +49,8 @@ def checked(content: Mapping[str, np.ndarray]) -> dict[str, Any]:
     return texts
 
 
-def _provenance(told: Any) -> None:
+def _provenance(table: Any) -> None:
     """Check what the summary and the pictures read of the provenance. Raises ValueError."""
-    good = isinstance(told, dict) and isinstance(told.get("scene"), dict) and isinstance(told.get("method"), dict)
-    if not good or not isinstance(told["method"].get("name"), str) or not isinstance(told.get("step"), int | float):
+    good = isinstance(table, dict) and isinstance(table.get("scene"), dict) and isinstance(table.get("method"), dict)
+    if not good or not isinstance(table["method"].get("name"), str) or not isinstance(table.get("step"), int | float):
         raise ValueError("its provenance tells no scene, method or step")

@@ -52,21 +52,21 @@ def planned(ensemble: Ensemble, grid: TimeGrid, others: tuple[Any, ...]) -> Plan
     raise fault
 
 
-def choices(ensemble: Ensemble, h: float, found: Rates | None = None) -> Iterator[Method]:
+def choices(ensemble: Ensemble, h: float, known_rates: Rates | None = None) -> Iterator[Method]:
     """List the methods for a run, the best first.
 
     h: Step [s].
-    found: The rates of the motion; default None: they are computed.
+    known_rates: The rates of the motion; default None: they are computed.
     """
     if not is_damped(ensemble):
         yield Method("psi_s", reason="since nothing damps the motion")
         yield Method("psi_x", reason="since nothing damps the motion, and psi_s does not take the scene")
         return
-    found = found or rates(ensemble)
-    numbers = h_rates(found, h)
+    known_rates = known_rates or rates(ensemble)
+    numbers = h_rates(known_rates, h)
     well = [name for name in DAMPED if stable(Method(name), numbers)]
     errors = {
-        name: path_error(Method(name), found, h, AHEAD)
+        name: path_error(Method(name), known_rates, h, AHEAD)
         for name in DAMPED
         if name in well or stable(Method(name), numbers, 1.0)
     }
@@ -87,34 +87,34 @@ def ranked(errors: dict[str, float], well: Collection[str]) -> list[str]:
     return sorted(known, key=lambda name: 0.0 if name in well and errors[name] <= ALLOWED else errors[name])
 
 
-def messages(method: Method, found: Rates, h: float, t1: float) -> tuple[str, ...]:
+def messages(method: Method, rates: Rates, h: float, t1: float) -> tuple[str, ...]:
     """Tell that a step is too long to follow the path.
 
     h: Step [s].
     t1: End [s]. A step is judged by no less than AHEAD, as the choice is.
     """
-    near = method.name in DAMPED and not stable(method, h_rates(found, h))
-    if path_error(method, found, h, t1) <= ALLOWED and not near:
+    near = method.name in DAMPED and not stable(method, h_rates(rates, h))
+    if path_error(method, rates, h, t1) <= ALLOWED and not near:
         return ()
     text = (
         f"step h = {h:g} s is long for this motion: by its rates {method.name} may be off by more than 1 % of the path"
     )
     shorter = next(
-        (h / n for n in (2, 5, 10, 20, 50, 100) if best_error(method, found, h / n, t1) <= ALLOWED), math.nan
+        (h / n for n in (2, 5, 10, 20, 50, 100) if best_error(method, rates, h / n, t1) <= ALLOWED), math.nan
     )
     remedy = f"h = {shorter:.3g} s keeps that" if shorter > 0.0 else "shorten it"
     return (f"{text}; {remedy}, or ask for an error: lw.suggest, --error",)
 
 
-def best_error(method: Method, found: Rates, h: float, t1: float) -> float:
+def best_error(method: Method, rates: Rates, h: float, t1: float) -> float:
     """The error at a shorter step, by the method itself or one of those for damped scenes.
 
     h: The shorter step [s].
     t1: End [s].
     """
-    numbers = h_rates(found, h)
-    others = [Method(name) for name in DAMPED] if found.drag != 0.0 else [method]
-    return min((path_error(one, found, h, t1) for one in others if stable(one, numbers)), default=math.inf)
+    numbers = h_rates(rates, h)
+    others = [Method(name) for name in DAMPED] if rates.drag != 0.0 else [method]
+    return min((path_error(one, rates, h, t1) for one in others if stable(one, numbers)), default=math.inf)
 
 
 def stable(method: Method, numbers: dict[str, float], share: float = SHARES["drag"]) -> bool:
@@ -132,10 +132,10 @@ def is_damped(ensemble: Ensemble) -> bool:
     return any(term.present(ensemble.own(term, parameters)) for term in terms)
 
 
-def h_rates(found: Rates, h: float) -> dict[str, float]:
+def h_rates(rates: Rates, h: float) -> dict[str, float]:
     """Multiply the rates of the fastest of the first members by the step.
 
     h: Step [s].
     Returns: "drag" and "rotation" -> number [1]; drag as large as rkw3 takes where a term does not tell how it brakes.
     """
-    return {"drag": MOST_IMPLICIT if found.drag is None else h * found.drag, "rotation": h * found.rotation}
+    return {"drag": MOST_IMPLICIT if rates.drag is None else h * rates.drag, "rotation": h * rates.rotation}

@@ -62,8 +62,8 @@ def run_plan(
     overall = RunProgress(total * plan.grid.steps, progress)
     start = time.perf_counter()
 
-    def ended(n: int, whole: bool = True) -> Result:
-        return gathered.result(n, whole, compile_seconds, time.perf_counter() - start)
+    def ended(n: int, complete: bool = True) -> Result:
+        return gathered.result(n, complete, compile_seconds, time.perf_counter() - start)
 
     def after(block: Block) -> None:
         assert on_block is not None

@@ -160,18 +160,18 @@ def modes(inertia: np.ndarray, damping: np.ndarray, members: Members) -> np.ndar
 
 
 @np.errstate(all="ignore")
-def path_error(method: Method, found: Rates, h: float, t1: float) -> float:
+def path_error(method: Method, rates: Rates, h: float, t1: float) -> float:
     """Estimate how far a method is off.
 
     h: Step [s].
     t1: End [s].
     Returns: Largest error in position over the length of the path, about [1]; infinite where the step is unstable.
     """
-    if not np.isfinite(found.modes).all():
+    if not np.isfinite(rates.modes).all():
         return math.inf
-    z = h * found.modes
+    z = h * rates.modes
     if method.tableau is None:
-        return SPLITTING["damped" if found.drag != 0.0 else "conservative"] * float(np.abs(z).max()) ** 2
+        return SPLITTING["damped" if rates.drag != 0.0 else "conservative"] * float(np.abs(z).max()) ** 2
     # What grows is bounded by the rest of the motion, which turns it over at the same rate.
     z = np.where(z.real > 0.0, 1j * np.abs(z), z)
     explicit = 1j * z.imag if method.linearly_implicit else z
@@ -186,5 +186,5 @@ def path_error(method: Method, found: Rates, h: float, t1: float) -> float:
     unstable = size > 1.0 + LEAST_GROWTH + SHIFT / steps
     left = np.maximum(np.minimum(size, 1.0), np.exp(z.real))
     added = np.minimum(steps, 1.0 / np.maximum(1.0 - left, 1.0 / steps))
-    share = np.minimum(1.0, SHIFT / np.maximum(-found.modes.real * t1, 1e-300))
+    share = np.minimum(1.0, SHIFT / np.maximum(-rates.modes.real * t1, 1e-300))
     return math.inf if unstable.any() else float((wrong * added * share).max())

@@ -42,16 +42,16 @@ def columns_of(space: Space, key: str) -> range:
 
 
 def whole_columns(
-    faults: Faults, names: Sequence[str], scene: Mapping[str, np.ndarray], given: Mapping[str, Any]
+    faults: Faults, names: Sequence[str], scene: Mapping[str, np.ndarray], by_label: Mapping[str, Any]
 ) -> dict[str, np.ndarray]:
     """Select one column for each name from data given by label.
 
-    given: label -> (n,), or (n, *shape) of a whole number that the names hold the entries of.
+    by_label: label -> (n,), or (n, *shape) of a whole number that the names hold the entries of.
     Returns: Name -> column (n,); empty after a fault.
     """
     columns: dict[str, np.ndarray] = {}
     labels: list[str] = []
-    for key, column in given.items():
+    for key, column in by_label.items():
         label = ", ".join(target.label for target in targets(key)) if key not in names else key
         entries = {name: target for name in names for target in targets(name)
                    if target.name == label and target.index is not None}  # fmt: skip
@@ -73,14 +73,14 @@ def whole_columns(
 
 
 def _entries(
-    faults: Faults, key: str, array: np.ndarray, entries: Mapping[str, Target], whole: np.ndarray
+    faults: Faults, key: str, array: np.ndarray, entries: Mapping[str, Target], full: np.ndarray
 ) -> dict[str, np.ndarray]:
     """Select the entries (n,) that vary from the array (n, *shape) of a whole number, by name."""
-    if array.shape[1:] != whole.shape or array.ndim == 0:
-        shape = ", ".join(map(str, whole.shape))
+    if array.shape[1:] != full.shape or array.ndim == 0:
+        shape = ", ".join(map(str, full.shape))
         faults.add(f'X["{key}"]', "...", f"has shape {array.shape}", f"give an array of shape (n, {shape})")
         return {}
-    fixed = np.ones(whole.shape, dtype=bool)
+    fixed = np.ones(full.shape, dtype=bool)
     entry_columns = {}
     for name, target in entries.items():
         index = target.index or ()
@@ -91,7 +91,7 @@ def _entries(
         entry_columns[name] = array[place]
     if key in MATRICES and not np.array_equal(array, np.swapaxes(array, 1, 2)):
         faults.add(f'X["{key}"]', "...", "holds a matrix that is not symmetric", "give symmetric matrices")
-    elif np.any(array[:, fixed] != whole[fixed]):
+    elif np.any(array[:, fixed] != full[fixed]):
         odd = ", ".join(f"{key}{list(map(int, index))}" for index in np.argwhere(fixed)[:4])
         faults.add(f'X["{key}"]', "...", "changes entries that do not vary", f"keep the scene's {odd}, or vary them")
     return entry_columns

@@ -39,9 +39,9 @@ def functions_of(fleet: Ensemble | None, statistics: Iterable[Statistic] = ()) -
     return found
 
 
-def identities(found: dict[str, Own]) -> dict[str, str]:
+def identities(functions: dict[str, Own]) -> dict[str, str]:
     """Return which functions these are, by place."""
-    return {place: identity(*own) for place, own in found.items()}
+    return {place: identity(*own) for place, own in functions.items()}
 
 
 class ToldApart:
@@ -51,15 +51,15 @@ class ToldApart:
         # By place in memory, with the function, so that no other one gets the place.
         self._names: dict[tuple[Any, ...], tuple[Own, tuple[str, int]]] = {}
 
-    def name(self, own: Own) -> tuple[str, int]:
+    def name(self, own_function: Own) -> tuple[str, int]:
         """Return what a function is, as it was when it was met first, and which one of its kind in this call."""
-        function = own.function
+        function = own_function.function
         parts = (function.__self__, function.__func__) if isinstance(function, MethodType) else (function,)
-        key = (*map(id, parts), own.version)
+        key = (*map(id, parts), own_function.version)
         if key not in self._names:
-            what = identity(*own)
+            what = identity(*own_function)
             number = sum(known == what for _, (known, _) in self._names.values())
-            self._names[key] = own, (what, number)
+            self._names[key] = own_function, (what, number)
         return self._names[key][1]
 
 

@@ -47,9 +47,9 @@ class Target:
         """The name with the index, such as "start.position[2]"."""
         return self.name if self.index is None else f"{self.name}[{','.join(map(str, self.index))}]"
 
-    def of(self, whole: np.ndarray) -> np.ndarray:
+    def of(self, array: np.ndarray) -> np.ndarray:
         """Return the target's value out of the whole number."""
-        return np.asarray(whole if self.index is None else whole[self.index])
+        return np.asarray(array if self.index is None else array[self.index])
 
 
 def targets(key: str) -> tuple[Target, ...]:
@@ -82,9 +82,9 @@ class Variation:
         """The scene's values in the form that the distribution draws: of a symmetric matrix, its free entries."""
         return [self._base(target, array) for target, array in zip(self.targets, self.wholes, strict=True)]
 
-    def _base(self, target: Target, whole: np.ndarray) -> np.ndarray:
+    def _base(self, target: Target, array: np.ndarray) -> np.ndarray:
         matrix = target.name in MATRICES and target.index is None and not self._takes_matrices
-        return drawn_entries(whole) if matrix else target.of(whole)
+        return drawn_entries(array) if matrix else target.of(array)
 
     @property
     def _takes_matrices(self) -> bool:
@@ -133,24 +133,24 @@ def diagonal(matrix: np.ndarray) -> bool:
     return not np.any(matrix - np.diag(np.diag(matrix)))
 
 
-def drawn_entries(whole: np.ndarray) -> np.ndarray:
+def drawn_entries(matrix: np.ndarray) -> np.ndarray:
     """Return the entries of a symmetric matrix that vary.
 
-    whole: A symmetric matrix (d, d).
+    matrix: A symmetric matrix (d, d).
     Returns: The diagonal (d,) of a diagonal matrix; else the upper triangle (d (d + 1)/2,), row by row.
     """
-    return np.diag(whole) if diagonal(whole) else whole[np.triu_indices(len(whole))]
+    return np.diag(matrix) if diagonal(matrix) else matrix[np.triu_indices(len(matrix))]
 
 
-def symmetric(drawn: np.ndarray, whole: np.ndarray) -> np.ndarray:
+def symmetric(drawn: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     """Build symmetric matrices from the entries that vary.
 
     drawn: Entries (n, k), in the order of `drawn_entries`.
-    whole: The scene's matrix (d, d), which decides whether they are diagonal.
+    matrix: The scene's matrix (d, d), which decides whether they are diagonal.
     Returns: Matrices (n, d, d).
     """
-    size = len(whole)
-    if diagonal(whole):
+    size = len(matrix)
+    if diagonal(matrix):
         return drawn[:, :, None] * np.eye(size)
     upper = np.zeros((len(drawn), size, size))
     rows, columns = np.triu_indices(size)
@@ -231,9 +231,9 @@ def variation(faults: Faults, key: str, distribution: Any, known: Mapping[str, n
     return described
 
 
-def _misfit(found: Variation) -> tuple[str, str] | None:
+def _misfit(variation: Variation) -> tuple[str, str] | None:
     """Return what is wrong with a distribution and its targets, and the remedy; None if they fit."""
-    distribution, named = found.distribution, found.targets
+    distribution, named = variation.distribution, variation.targets
     turns = isinstance(distribution, AttitudeDistribution)
     chosen = distribution.kind == "choice" and distribution.joint
     if len(named) > 1 and distribution.kind != "correlated_normal":
@@ -248,11 +248,11 @@ def _misfit(found: Variation) -> tuple[str, str] | None:
             return "is a distribution of symmetric matrices", f"vary one of {', '.join(MATRICES)}"
         if isinstance(distribution, PhysicalInertia) and named[0].name not in RIGID:
             return "is a distribution of a rigid body's inertia", "use PositiveDefinite for added mass"
-    wrong: tuple[str, str] | None = distribution.fault([base.shape for base in found.bases])
-    if wrong is None and (width := varies_nothing(distribution, found.bases)):
+    wrong: tuple[str, str] | None = distribution.fault([base.shape for base in variation.bases])
+    if wrong is None and (width := varies_nothing(distribution, variation.bases)):
         return f"is relative to the scene's value, 0, so that its {width} varies nothing", "give an absolute spread"
     if wrong is None and isinstance(distribution, PositiveDefinite):
-        wrong = distribution.unusable(found.wholes[0])
+        wrong = distribution.unusable(variation.wholes[0])
     if wrong is None and chosen:
         wrong = _no_such_matrices(named[0], np.asarray(distribution.values, dtype=np.float64))
     return wrong
@@ -284,9 +284,9 @@ def clashes(faults: Faults, named: Iterable[tuple[str, tuple[Target, ...]]]) -> 
             taken[target.name].append((index, key))
 
 
-def space(seed: int, found: Sequence[Variation]) -> Space:
+def space(seed: int, variations: Sequence[Variation]) -> Space:
     """Return the unit cube of the sampling points."""
-    ordered = sorted(found, key=lambda varied: varied.key)
+    ordered = sorted(variations, key=lambda varied: varied.key)
     factors: list[tuple[str, tuple[int, ...]]] = []
     first = 0
     for varied in ordered:

@@ -333,17 +333,17 @@ class Statistic:
         (overall,) = self.estimates(together(each), time)
         return [self.spread(overall, [self.estimates(replicate_parts, time)[0] for replicate_parts in each])]
 
-    def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
+    def spread(self, pooled: Estimate, each: Sequence[Estimate]) -> Estimate:
         """Return the estimate of all members with Student's t interval from the replicates' estimates.
 
         Args:
-            whole: the estimate of all members.
+            pooled: the estimate of all members.
             each: the estimate of each replicate.
         """
         error, half = intervals.of_replicates(np.stack([replicate.value for replicate in each]), self.confidence)
-        arrays = {"lower": whole.value - half, "upper": whole.value + half}
-        arrays |= {"standard_error": error} if "standard_error" in whole.arrays else {}
-        return whole.with_interval(f"Student's t of {len(each)} replicates", arrays)
+        arrays = {"lower": pooled.value - half, "upper": pooled.value + half}
+        arrays |= {"standard_error": error} if "standard_error" in pooled.arrays else {}
+        return pooled.with_interval(f"Student's t of {len(each)} replicates", arrays)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the scene file's table of this statistic: its type, `of`, and what differs from the defaults.
@@ -398,18 +398,18 @@ def from_list(given: Any, key: str = "statistics", *, whole: bool = True) -> tup
     return tuple(statistics)
 
 
-def _from_table(where: str, given: Any) -> Statistic:
+def _from_table(where: str, entry: Any) -> Statistic:
     """Return the statistic of a table, or the statistic itself."""
-    if isinstance(given, Statistic):
-        return given
-    if not isinstance(given, Mapping):
-        raise refusal(where, given, "is no statistic", 'write type = "mean", or give lw.Mean("position")')
-    word = given.get("type", "")
+    if isinstance(entry, Statistic):
+        return entry
+    if not isinstance(entry, Mapping):
+        raise refusal(where, entry, "is no statistic", 'write type = "mean", or give lw.Mean("position")')
+    word = entry.get("type", "")
     kind = TYPES.get(word) if isinstance(word, str) else None
     if kind is None:
         raise refusal(f"{where}.type", word, "is not known", closest(str(word), TYPES))
     faults = Faults()
-    table = {name: value for name, value in given.items() if name != "type"}
+    table = {name: value for name, value in entry.items() if name != "type"}
     faults.keys(where, table, [argument.name for argument in dataclasses.fields(kind)])
     faults.raise_if_any()
     try:

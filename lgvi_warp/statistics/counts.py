@@ -28,12 +28,12 @@ class Counted(Statistic):
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
         return {key: left[key] + right[key] for key in left}
 
-    def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
+    def spread(self, pooled: Estimate, each: Sequence[Estimate]) -> Estimate:
         """Form Wilson's interval with the variance of the replicates' fractions."""
-        count = whole.count.reshape(-1, *[1] * (whole.value.ndim - 1))
+        count = pooled.count.reshape(-1, *[1] * (pooled.value.ndim - 1))
         fractions = np.stack([replicate.value for replicate in each])
-        lower, upper = intervals.probability_of_replicates(whole.value, fractions, count, self.confidence)
-        return whole.with_interval(by_replicates(len(each)), {"lower": lower, "upper": upper})
+        lower, upper = intervals.probability_of_replicates(pooled.value, fractions, count, self.confidence)
+        return pooled.with_interval(by_replicates(len(each)), {"lower": lower, "upper": upper})
 
 
 def by_replicates(number: int) -> str:

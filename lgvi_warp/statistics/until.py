@@ -76,10 +76,10 @@ class Until:
         return {name: value for name, value in vars(self).items() if name not in defaults or value != defaults[name]}
 
 
-def from_dict(given: Any) -> Until:
+def from_dict(table: Any) -> Until:
     """Return the stopping rule of a table, or the rule itself."""
     example = 'write [run.until] and statistic = "mean position[2]", half_width = 0.01'
-    return from_table(Until, "until", given, example, statistic=example, half_width=example)
+    return from_table(Until, "until", table, example, statistic=example, half_width=example)
 
 
 @dataclass
@@ -168,20 +168,20 @@ def _named(statistics: Sequence[Statistic]) -> dict[str, Named]:
     return names
 
 
-def _names_of_entries(one: Statistic) -> dict[str, dict[str, int]]:
+def _names_of_entries(statistic: Statistic) -> dict[str, dict[str, int]]:
     """Names of a statistic and of its components, levels and entries of a covariance, with their indices."""
-    entries: dict[str, dict[str, int]] = {one.key: {}}
-    for i, label in enumerate(one.quantity.labels):
+    entries: dict[str, dict[str, int]] = {statistic.key: {}}
+    for i, label in enumerate(statistic.quantity.labels):
         index = re.search(r"\[[^\]]*\]", label)
         entry = {"component": i, "component_2": i}
-        entries[f"{one.key}{index[0] if index else f'[{i}]'}"] = entries[f"{one.type} {label}{one.at_text}"] = entry
-    if isinstance(one, Quantiles):
+        entries[f"{statistic.key}{index[0] if index else f'[{i}]'}"] = entries[f"{statistic.type} {label}{statistic.at_text}"] = entry
+    if isinstance(statistic, Quantiles):
         for name, entry in list(entries.items()):
-            for j, level in enumerate(one.levels):
+            for j, level in enumerate(statistic.levels):
                 entries[f"{name} {level!r}"] = entries[f"{name} {level:g}"] = entry | {"level": j}
-    if isinstance(one, Covariance):
-        pairs = itertools.product(enumerate(one.quantity.labels), repeat=2)
-        entries |= {f"{one.type} {a}, {b}": {"component": i, "component_2": j} for (i, a), (j, b) in pairs}
+    if isinstance(statistic, Covariance):
+        pairs = itertools.product(enumerate(statistic.quantity.labels), repeat=2)
+        entries |= {f"{statistic.type} {a}, {b}": {"component": i, "component_2": j} for (i, a), (j, b) in pairs}
     return entries
 
 

@@ -200,13 +200,13 @@ class Folder:
         if not self.complete:
             self._say({"complete": True} | ({} if members is None else {"members": members}), metadata_under(self.path / KEPT))
 
-    def take_layout(self, other: Path) -> None:
+    def take_layout(self, source: Path) -> None:
         """Take over the layout in the root's metadata of another folder of the same run.
 
         If it differs from this folder's, the run is marked as incomplete.
         """
-        content, right = self._root(), safe_files.read_json(other, ROOT)
-        if Folder(other).layout != self.layout:
+        content, right = self._root(), safe_files.read_json(source, ROOT)
+        if Folder(source).layout != self.layout:
             right["attributes"] = content["attributes"] | {"complete": False}
             durable.write_whole(self.path / ROOT, json.dumps(right, indent=2).encode())
 
@@ -215,15 +215,15 @@ class Folder:
         if self.complete:
             self._say({"complete": False}, {})
 
-    def _say(self, said: dict[str, Any], kept: dict[str, Any]) -> None:
+    def _say(self, attributes: dict[str, Any], kept_group: dict[str, Any]) -> None:
         """Write attributes of the run, and the metadata of the group of its kept members."""
         content = self._root()
-        content["attributes"] |= said
+        content["attributes"] |= attributes
         arrays = content["consolidated_metadata"]["metadata"]
         of_run = {name: metadata for name, metadata in arrays.items() if name.partition("/")[0] != KEPT}
-        content["consolidated_metadata"]["metadata"] = of_run | kept
+        content["consolidated_metadata"]["metadata"] = of_run | kept_group
         durable.write_whole(self.path / ROOT, json.dumps(content, indent=2).encode())
-        self.attributes |= said
+        self.attributes |= attributes
 
 
 def metadata_under(path: Path) -> dict[str, Any]:
@@ -241,10 +241,10 @@ def checksum_of(texts: Sequence[str]) -> int:
     return durable.checksum("\0".join(texts).encode())
 
 
-def check_names(found: Sequence[StoreArray]) -> None:
+def check_names(arrays: Sequence[StoreArray]) -> None:
     """Check that each array's name can be that of a folder."""
     faults = Faults("store.")
-    for name in (column.name for column in found if not store_check.is_name(column.name)):
+    for name in (column.name for column in arrays if not store_check.is_name(column.name)):
         remedy = 'give the term or event another name, without / \\ : * ? " < > | and of 200 bytes at most'
         faults.add("fields", name, "cannot be the name of a folder", remedy)
     faults.raise_if_any()

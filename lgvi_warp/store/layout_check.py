@@ -189,30 +189,30 @@ def _table(value: Any, name: str) -> dict[str, Any]:
     return value
 
 
-def _array(name: str, one: dict[str, Any]) -> StoredArray:
+def _array(name: str, metadata: dict[str, Any]) -> StoredArray:
     """An array whose metadata is exactly what this package would write. Raises NotOursError."""
-    shape, dims = one.get("shape"), one.get("dimension_names")
-    grid = _table(one.get("chunk_grid"), f"chunk_grid of {name}").get("configuration")
+    shape, dims = metadata.get("shape"), metadata.get("dimension_names")
+    grid = _table(metadata.get("chunk_grid"), f"chunk_grid of {name}").get("configuration")
     chunk = _table(grid, f"chunk_grid of {name}").get("chunk_shape")
-    dtype = TYPES.get(one["data_type"]) if isinstance(one.get("data_type"), str) else None
+    dtype = TYPES.get(metadata["data_type"]) if isinstance(metadata.get("data_type"), str) else None
     for value, least in ((shape, 0), (chunk, 1)):
         if not isinstance(value, list) or not all(type(n) is int and least <= n < 2**40 for n in value):
             raise NotOursError(f"{name} has the shape {_short(value)}")
     if dtype is None or not isinstance(dims, list) or not all(is_name(dim) for dim in dims):
-        raise NotOursError(f"{name} has the type {_short(one.get('data_type'))} and the dimensions {_short(dims)}")
+        raise NotOursError(f"{name} has the type {_short(metadata.get('data_type'))} and the dimensions {_short(dims)}")
     assert isinstance(shape, list)
     assert isinstance(chunk, list)
     if not 0 < len(shape) == len(chunk) == len(dims) <= MOST_DIMENSIONS:
         raise NotOursError(f"{name} has the shape {_short(shape)} and chunks {_short(chunk)}")
-    attributes = _table(one.get("attributes"), f"attributes of {name}")
+    attributes = _table(metadata.get("attributes"), f"attributes of {name}")
     _plain(attributes, f"attributes of {name}")
     described = StoredArray(tuple(shape), tuple(chunk), dtype, tuple(dims), attributes)
     if described.bytes > MOST_CHUNK_BYTES:
         raise NotOursError(f"{name} has chunks of {described.bytes:,} bytes")
     wanted = described.metadata()
-    for key in sorted(ARRAY_KEYS | one.keys()):
-        if one.get(key) != wanted.get(key):
-            raise NotOursError(f"{key} of {name} is {_short(one.get(key))}, not {_short(wanted.get(key))}")
+    for key in sorted(ARRAY_KEYS | metadata.keys()):
+        if metadata.get(key) != wanted.get(key):
+            raise NotOursError(f"{key} of {name} is {_short(metadata.get(key))}, not {_short(wanted.get(key))}")
     return described
 
 

@@ -42,7 +42,7 @@ def recipe(plan: Plan) -> dict[str, Any]:
 
 
 def plan_of(
-    made: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarray, times: np.ndarray, ticks: bool = False
+    recipe: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarray, times: np.ndarray, ticks: bool = False
 ) -> Plan:
     """Build the plan of a recipe.
 
@@ -51,9 +51,9 @@ def plan_of(
     """
     from lgvi_warp.engine.plan import choose_plan
 
-    grid = TimeGrid(made["step"], sample_steps, times, tuple(made["messages"]))
-    method, fields = Method(**made["method"]), tuple(made["fields"])
-    settings = {name: made[name] for name in ("dtype", "width", "checks", "on_failure")}
+    grid = TimeGrid(recipe["step"], sample_steps, times, tuple(recipe["messages"]))
+    method, fields = Method(**recipe["method"]), tuple(recipe["fields"])
+    settings = {name: recipe[name] for name in ("dtype", "width", "checks", "on_failure")}
     return choose_plan(ensemble, method, grid, fields, **settings, ticks=ticks)
 
 
@@ -145,12 +145,12 @@ def _table(settings: Mapping[str, Any], explicit: Mapping[str, np.ndarray], stor
 
 
 def same_run(
-    stored: Mapping[str, Any], now: Mapping[str, Any], name: str = "the store", other: str | None = None
+    stored: Mapping[str, Any], now: Mapping[str, Any], name: str = "the store", other_name: str | None = None
 ) -> list[str]:
     """List the differences between two provenances that the bits of a run depend on."""
     found = [*differences(_comparable(stored), _comparable(now)), *_functions(stored, now)[0]]
     return [
-        f"{key} is {first!r} in {name} and {second!r} {f'in {other}' if other else 'here'}"
+        f"{key} is {first!r} in {name} and {second!r} {f'in {other_name}' if other_name else 'here'}"
         for key, first, second in found
     ]
 

@@ -157,17 +157,17 @@ class StoredRun:
     def _blocks(
         self,
         block_files: BlockFiles,
-        left: Sequence[Block],
+        remaining: Sequence[Block],
         executor: Executor,
         progress: Callable[[float], None] | None,
     ) -> int:
         """Run the blocks left, and merge the parts of all in order. Returns where their members end."""
         runs, n, steps = self._runs(), self.plan.ensemble.members, self.plan.grid.steps
         overall = RunProgress(n * steps, progress)
-        for block in set(runs) - set(left):
+        for block in set(runs) - set(remaining):
             overall.at(block, block.count * steps)
         members = run_blocks(
-            Work(self.plan, self.keepers, block_files), runs, executor, overall.at, left, self.enough, after=self.after
+            Work(self.plan, self.keepers, block_files), runs, executor, overall.at, remaining, self.enough, after=self.after
         )
         if progress and members < runs[-1].stop:
             progress(1.0)

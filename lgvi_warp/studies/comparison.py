@@ -248,14 +248,14 @@ class Sample:
         return "grid" if all(isinstance(term, NoisyTerm) for term in noisy) else "free"
 
 
-def drawn_every(fleet: Ensemble, noise_step: float, own: bool = True) -> Ensemble:
+def drawn_every(fleet: Ensemble, noise_step: float, own_grid: bool = True) -> Ensemble:
     """Put the noise of an ensemble on a grid.
 
     noise_step: time from one draw to the next [s].
     """
     terms = [
         replace(term, noise_step=noise_step)
-        if isinstance(term, NoisyTerm) and not (own and term.noise_step is not None)
+        if isinstance(term, NoisyTerm) and not (own_grid and term.noise_step is not None)
         else term
         for term in fleet.scene.terms
     ]
@@ -269,7 +269,7 @@ def failed(result: Result) -> bool:
     return bool(failed_members(result.status).any())
 
 
-def distances(result: Result, reference: Result, asked: Distance | None = None) -> dict[str, np.ndarray]:
+def distances(result: Result, reference: Result, distance: Distance | None = None) -> dict[str, np.ndarray]:
     """Measure how far two results are apart at each time.
 
     Returns: Quantity -> distance (k, n) [its unit]; NaN from where an event stopped a member in either result.
@@ -280,8 +280,8 @@ def distances(result: Result, reference: Result, asked: Distance | None = None) 
     lengths["attitude"] = 2.0 * np.arcsin(np.minimum(chord / math.sqrt(8.0), 1.0))
     lengths["energy"] = np.abs(result.energy - reference.energy)
     lengths = {name: lengths[name] for name in QUANTITIES}
-    if asked is not None and asked.name not in lengths:
-        lengths[asked.name] = asked.distance(result, reference)
+    if distance is not None and distance.name not in lengths:
+        lengths[distance.name] = distance.distance(result, reference)
     gone = reference.time[:, None] >= np.minimum(stop_time(result), stop_time(reference))
     return {name: np.where(gone, np.nan, values) for name, values in lengths.items()}
 
@@ -358,16 +358,16 @@ def extrapolated(sample: Sample, method: str, m: int) -> Result:
     return replace(runs[-1], samples=samples, compile_seconds=sum(run.compile_seconds for run in runs))
 
 
-def agreement(a: Result, b: Result, asked: Distance | None = None) -> dict[str, np.ndarray]:
+def agreement(a: Result, b: Result, distance: Distance | None = None) -> dict[str, np.ndarray]:
     """Measure how far two results agree up to each time, over all members.
 
     Returns: Quantity -> largest distance up to each time (k,) [its unit]; infinite where a member failed.
     """
     if failed(a) or failed(b):
-        names = dict.fromkeys([*QUANTITIES, *([asked.name] if asked else [])])
+        names = dict.fromkeys([*QUANTITIES, *([distance.name] if distance else [])])
         return {name: np.where(a.time > 0.0, np.inf, 0.0) for name in names}
     running_maxima = {}
-    for name, values in distances(a, b, asked).items():
+    for name, values in distances(a, b, distance).items():
         largest = np.max(np.where(np.isnan(values), 0.0, values), axis=1)
         running_maxima[name] = np.maximum.accumulate(np.where(np.isfinite(largest), largest, np.inf))
     return running_maxima
@@ -578,7 +578,7 @@ def statistics(result: Result, asked: Distance | None = None) -> dict[str, np.nd
     return values
 
 
-def biases(result: Result, reference: Result, asked: Distance | None = None) -> dict[str, float]:
+def biases(result: Result, reference: Result, distance: Distance | None = None) -> dict[str, float]:
     """Compare means and standard deviations of two results.
 
     Each difference is in standard errors of the sample, as root mean square over components and times after 0. Two
@@ -590,7 +590,7 @@ def biases(result: Result, reference: Result, asked: Distance | None = None) -> 
     if n < 2 or failed(result):
         return {}
     deviations = {}
-    mine, theirs = statistics(result, asked), statistics(reference, asked)
+    mine, theirs = statistics(result, distance), statistics(reference, distance)
     for name, b in theirs.items():
         a, b = mine[name][1:], b[1:]
         spread = b.std(axis=1, ddof=1)

@@ -287,18 +287,18 @@ def suggestion_on(
     )
 
 
-def errors_of(one: Trial, reference: Reference, of: str) -> np.ndarray:
+def errors_of(trial: Trial, reference: Reference, of: str) -> np.ndarray:
     """Largest error over the path of each member of a trial.
 
     Returns: Errors (n,) [its unit].
     """
-    apart = comparison.distances(one.result, reference.result, reference.asked)[of]
+    apart = comparison.distances(trial.result, reference.result, reference.asked)[of]
     return np.asarray(np.max(np.where(np.isnan(apart), 0.0, apart), axis=0))
 
 
-def worst_of(one: Trial, reference: Reference, of: str, members: int = CONFIRMED // 2) -> tuple[int, ...]:
+def worst_of(trial: Trial, reference: Reference, of: str, members: int = CONFIRMED // 2) -> tuple[int, ...]:
     """Find the members of a trial that have the largest errors."""
-    return tuple(int(i) for i in np.argsort(-errors_of(one, reference, of))[:members])
+    return tuple(int(i) for i in np.argsort(-errors_of(trial, reference, of))[:members])
 
 
 def largest_in_fleet(errors: np.ndarray, members: int) -> float:
@@ -372,12 +372,12 @@ class Ladders:
     """
 
     def __init__(
-        self, sample: Sample, reference: Reference, asked: Distance, target: float, budget: Budget, named: bool = False
+        self, sample: Sample, reference: Reference, distance: Distance, target: float, budget: Budget, named: bool = False
     ):
-        self.sample, self.reference, self.of, self.target = sample, reference, asked.name, target
+        self.sample, self.reference, self.of, self.target = sample, reference, distance.name, target
         self.budget, self.named = budget, named
         # A precision whose round-off is near the target is not tried.
-        size = asked.largest(reference.result)
+        size = distance.largest(reference.result)
         coarse = [name for name in PRECISIONS if target > 4.0 * comparison.ROUND_OFF[name] * size]
         self.dtypes = coarse or ["float64"]
         self.priced: list[tuple[float, Trial]] = []
@@ -555,7 +555,7 @@ def memory_of(fleet: Ensemble, candidate: Candidate, t1: float) -> int:
 
 
 def verified(
-    fleet: Ensemble, result: Result, found: Suggestion, *, run: Callable[[Plan, int], Result] = run_plan
+    fleet: Ensemble, result: Result, suggestion: Suggestion, *, run: Callable[[Plan, int], Result] = run_plan
 ) -> tuple[float, int]:
     """Measure the error of a finished run by running some of its members again with half the step.
 
@@ -566,8 +566,8 @@ def verified(
 
     Returns: (error, members): largest error over these members and all samples [found.unit], and how many members they are.
     """
-    candidate = found.setting
-    chosen = list(dict.fromkeys((*found.worst, *range(fleet.members))))[:CONFIRMED]
+    candidate = suggestion.setting
+    chosen = list(dict.fromkeys((*suggestion.worst, *range(fleet.members))))[:CONFIRMED]
     checked_fleet = fleet.subset(chosen)
     plan = make_plan(checked_fleet, candidate.resolved(), candidate.h, float(result.time[-1]), dtype=candidate.dtype)
     h = result.provenance["step"]
@@ -575,11 +575,11 @@ def verified(
     # In double precision, so that the error contains the run's round-off too.
     done, share = comparison.part(result, chosen), 1.0 - 2.0**-plan.method.order
     if any(isinstance(term, NoisyTerm) for term, _ in plan.kernel_choice.laws):
-        checked_fleet, share = comparison.drawn_every(checked_fleet, h / 2.0, own=False), math.sqrt(1.0 - 2.0**-2)
+        checked_fleet, share = comparison.drawn_every(checked_fleet, h / 2.0, own_grid=False), math.sqrt(1.0 - 2.0**-2)
         grid_of_run = TimeGrid(h, steps, result.time)
         done = run(choose_plan(checked_fleet, plan.method, grid_of_run, plan.fields, candidate.dtype), 1)
     half = choose_plan(checked_fleet, plan.method, TimeGrid(h / 2.0, 2 * steps, result.time), plan.fields, "float64")
     with np.errstate(all="ignore"):
-        apart = comparison.distances(done, run(half, 1), found.asked)
-        size = comparison.errors(apart, len(result.time) - 1)[found.of]["path_max"]
+        apart = comparison.distances(done, run(half, 1), suggestion.asked)
+        size = comparison.errors(apart, len(result.time) - 1)[suggestion.of]["path_max"]
     return size / share, len(chosen)

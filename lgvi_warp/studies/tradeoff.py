@@ -564,33 +564,33 @@ def series_of(
 
 
 def halved(
-    sample: Sample, one: Series, trials: list[Trial], reference: Reference | None, until: int, budget: Budget
+    sample: Sample, series: Series, trials: list[Trial], reference: Reference | None, until: int, budget: Budget
 ) -> bool:
     """Run the next step of a series.
 
     reference: what errors are measured against; None where noise acts.
     """
-    trial = tried(sample, sample.candidate(one.method, one.m, one.dtype, one.solver), reference, until, budget)
+    trial = tried(sample, sample.candidate(series.method, series.m, series.dtype, series.solver), reference, until, budget)
     trials.append(trial)
-    one.rungs += 1
-    finer = sample.allowed(2 * one.m)
-    if finer == one.m or one.rungs == (20 if reference else 5):
+    series.rungs += 1
+    finer = sample.allowed(2 * series.m)
+    if finer == series.m or series.rungs == (20 if reference else 5):
         return False
-    one.m = finer
+    series.m = finer
     if reference is None:
         return True
     error = max(trial.error(of) for of in DECIDING)
-    one.worse = one.worse + 1 if error > 0.8 * one.best and one.best < 0.1 else 0
-    one.best = min(one.best, error)
+    series.worse = series.worse + 1 if error > 0.8 * series.best and series.best < 0.1 else 0
+    series.best = min(series.best, error)
     noise = TRUST * max(reference.error(of, until) for of in DECIDING)
     longest = budget.seconds / 40.0
-    return not (one.worse >= 2 or error < noise or trial.cpu_seconds > longest or is_dominated(trial, trials))
+    return not (series.worse >= 2 or error < noise or trial.cpu_seconds > longest or is_dominated(trial, trials))
 
 
-def is_dominated(one: Trial, trials: Sequence[Trial]) -> bool:
+def is_dominated(trial: Trial, trials: Sequence[Trial]) -> bool:
     """Tell whether another setting was more accurate in a tenth of the time."""
-    error = max(one.error(of) for of in DECIDING)
-    rivals = (rival for rival in trials if HOPELESS * rival.cpu_seconds < one.cpu_seconds)
+    error = max(trial.error(of) for of in DECIDING)
+    rivals = (rival for rival in trials if HOPELESS * rival.cpu_seconds < trial.cpu_seconds)
     return math.isfinite(error) and any(max(rival.error(of) for of in DECIDING) < error for rival in rivals)
 
 
@@ -621,7 +621,7 @@ def measurements(
     reference: Reference | None,
     finest: Result,
     until: int,
-    asked: Distance | None = None,
+    distance: Distance | None = None,
 ) -> list[Measurement]:
     """Measure the cost of the trials and collect their errors, drifts and biases.
 
@@ -636,7 +636,7 @@ def measurements(
     for trial, price in zip(good, sample.kernels.costs([trial.plan for trial in good]), strict=True):
         limits = {of: reference.error(of, until) for of in trial.errors} if reference else {}
         with np.errstate(all="ignore"):
-            biases = comparison.biases(trial.result, finest, asked)
+            biases = comparison.biases(trial.result, finest, distance)
             kept = "energy" in invariants.conserved(trial.result)
             drift = invariants.drift(trial.result)["energy"] if kept else math.nan
         measured.append(
@@ -655,59 +655,59 @@ def measurements(
     return measured
 
 
-def report_text(found: Tradeoff) -> str:
+def report_text(tradeoff: Tradeoff) -> str:
     """Write the trade-off as a text of several lines."""
-    unit = found.units[found.of]
-    lines = [f"missing     {name}: {why}" for name, why in found.missing.items()]
-    lines += [f"note        {message}" for message in found.messages]
-    lines.append(f"sample      {found.members} members, 0 to {found.t1:g} s, {len(found.measurements)} settings in "
-                 f"{found.seconds:.0f} s")  # fmt: skip
-    if found.reference_error:
-        apart = found.reference_error[found.of]
-        lines.append(f"reference   {found.reference}: they agree to {apart:.1e} {unit} up to {found.until:g} s")
-    if found.growth:
-        lines.append(f"predictable {growth_text(found.growth)}")
-    if found.refused:
-        lines.append(f"refused     {', '.join(found.refused)} (why: tradeoff.json)")
-    if found.measurements:
-        spreads = [measurement.cost_spread for measurement in found.measurements]
+    unit = tradeoff.units[tradeoff.of]
+    lines = [f"missing     {name}: {why}" for name, why in tradeoff.missing.items()]
+    lines += [f"note        {message}" for message in tradeoff.messages]
+    lines.append(f"sample      {tradeoff.members} members, 0 to {tradeoff.t1:g} s, {len(tradeoff.measurements)} settings in "
+                 f"{tradeoff.seconds:.0f} s")  # fmt: skip
+    if tradeoff.reference_error:
+        apart = tradeoff.reference_error[tradeoff.of]
+        lines.append(f"reference   {tradeoff.reference}: they agree to {apart:.1e} {unit} up to {tradeoff.until:g} s")
+    if tradeoff.growth:
+        lines.append(f"predictable {growth_text(tradeoff.growth)}")
+    if tradeoff.refused:
+        lines.append(f"refused     {', '.join(tradeoff.refused)} (why: tradeoff.json)")
+    if tradeoff.measurements:
+        spreads = [measurement.cost_spread for measurement in tradeoff.measurements]
         lines.append(f"costs       {cost.agreement_text(spreads)}")
-    front = found.front()
+    front = tradeoff.front()
     kept = any(np.isfinite(measurement.energy_drift) for measurement in front)
     if front:
-        header = ("us/vehicle/s", "method", "precision", "step [s]", f"{found.of} [{unit}]", "rms")
+        header = ("us/vehicle/s", "method", "precision", "step [s]", f"{tradeoff.of} [{unit}]", "rms")
         heads = "{:>12}  {:<18}{:<20}{:>10}{:>15}{:>10}".format(*header)
-        without = f"; nothing of {', '.join(found.missing)}" if found.missing else ""
-        lines += ["", f"Cheapest settings for each error ({found.of}, largest over members and path{without}):",
+        without = f"; nothing of {', '.join(tradeoff.missing)}" if tradeoff.missing else ""
+        lines += ["", f"Cheapest settings for each error ({tradeoff.of}, largest over members and path{without}):",
                   heads + ("{:>18}".format("energy drift [J]") if kept else "")]  # fmt: skip
     for measurement in front:
         s = measurement.setting
         lines.append(f"{measurement.us_per_vehicle_second:>12.3g}  {s.name:<18}{s.dtype:<20}{s.h:>10.4g}"
-                     f"{measurement.error(found.of):>15.1e}{measurement.error(found.of, 'path_rms'):>10.1e}"
+                     f"{measurement.error(tradeoff.of):>15.1e}{measurement.error(tradeoff.of, 'path_rms'):>10.1e}"
                      + (f"{measurement.energy_drift:>18.1e}" if kept else ""))  # fmt: skip
-    return "\n".join([*lines, *bias_lines(found)])
+    return "\n".join([*lines, *bias_lines(tradeoff)])
 
 
-def growth_text(found: Growth) -> str:
+def growth_text(growth: Growth) -> str:
     """Describe how errors grow, in words."""
-    if not np.isfinite(found.rate):
+    if not np.isfinite(growth.rate):
         return "unknown: a difference of 1e-8 rad grows beyond measure at once"
-    if found.power is not None:
-        return (f"errors grow like time to the power {found.power:.1f}, {found.factor:.2g} times in this run: single "
+    if growth.power is not None:
+        return (f"errors grow like time to the power {growth.power:.1f}, {growth.factor:.2g} times in this run: single "
                 "trajectories are meaningful throughout")  # fmt: skip
-    until = ", ".join(f"{dtype} to about {t:.3g} s" for dtype, t in found.predictable.items())
-    return (f"errors double every {found.doubling:.3g} s (rate {found.rate:.2g} /s, {found.factor:.2g} times in this run). "
+    until = ", ".join(f"{dtype} to about {t:.3g} s" for dtype, t in growth.predictable.items())
+    return (f"errors double every {growth.doubling:.3g} s (rate {growth.rate:.2g} /s, {growth.factor:.2g} times in this run). "
             f"One round-off reaches {comparison.LOST:g}: {until}; beyond, compare statistics only")  # fmt: skip
 
 
-def bias_lines(found: Tradeoff) -> list[str]:
+def bias_lines(tradeoff: Tradeoff) -> list[str]:
     """Write a table of the statistics' biases against the step.
 
     The table is of one method in float64 with the default solver: the first of order 2, or of the order nearest to it.
     """
     double = [
         measurement
-        for measurement in found.measurements
+        for measurement in tradeoff.measurements
         if measurement.biases and measurement.setting.dtype == "float64" and measurement.setting.plain
     ]
     if not double:
@@ -718,9 +718,9 @@ def bias_lines(found: Tradeoff) -> list[str]:
     means = ("attitude", "velocity", "energy", "angular_momentum")
     columns = ["position_mean", "position_std", *(f"{name}_mean" for name in means)]
     heads = [column.replace("angular_momentum", "ang.mom.").replace("_", " ") for column in columns]
-    if found.of not in QUANTITIES and any(f"{found.of}_mean" in measurement.biases for measurement in chosen):
-        columns, heads = [f"{found.of}_mean", *columns], [f"{found.of} mean", *heads]
-    title = f"Bias of statistics up to {found.t1:g} s by {name}, in standard errors of {found.members} members"
+    if tradeoff.of not in QUANTITIES and any(f"{tradeoff.of}_mean" in measurement.biases for measurement in chosen):
+        columns, heads = [f"{tradeoff.of}_mean", *columns], [f"{tradeoff.of} mean", *heads]
+    title = f"Bias of statistics up to {tradeoff.t1:g} s by {name}, in standard errors of {tradeoff.members} members"
     lines = ["", f"{title} (1.4: chance):", "{:>12}".format("step [s]") + "".join(f"{head:>15}" for head in heads)]
     for measurement in chosen:
         cells = (f"{measurement.biases[key]:>15.1e}" if key in measurement.biases else f"{'-':>15}" for key in columns)

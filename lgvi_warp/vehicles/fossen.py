@@ -377,7 +377,7 @@ def refuse_sign(faults: Faults, key: str, number: float, name: Name) -> None:
 
 
 def with_partners(
-    faults: Faults, matrix: np.ndarray, keys: Mapping[tuple[str, int, int], str], given: Mapping[str, Any]
+    faults: Faults, matrix: np.ndarray, keys: Mapping[tuple[str, int, int], str], coefficients: Mapping[str, Any]
 ) -> np.ndarray:
     """Fill in the missing one of each pair of added masses, and note pairs that differ.
 
@@ -392,8 +392,8 @@ def with_partners(
         elif lower is None:
             full[column, row] = matrix[row, column]
         elif abs(matrix[row, column] - matrix[column, row]) > RELATIVE * abs(matrix[row, column]):
-            problem = f"differs from its partner {lower} = {given[lower]}"
-            faults.add(upper, given[upper], problem, "the added mass matrix is symmetric: mend one or leave it out")
+            problem = f"differs from its partner {lower} = {coefficients[lower]}"
+            faults.add(upper, coefficients[upper], problem, "the added mass matrix is symmetric: mend one or leave it out")
         else:
             full[column, row] = full[row, column]
     return full
@@ -435,11 +435,11 @@ def turned(value: Any, axes: np.ndarray) -> Any:
     return value if checked is None else axes * checked
 
 
-def read_text(source: str | os.PathLike[str], is_text: bool, what: str) -> str:
+def read_text(source: str | os.PathLike[str], is_text: bool, format_name: str) -> str:
     """Return a text, or the content of the file that it names."""
     if is_text:
         text = str(source)
-        if len(text) > (most := MOST_BYTES.get(what, MOST_OTHERS)):
-            raise SceneError([f"{what}: a text of {len(text):,} characters; give at most {most:,}"])
+        if len(text) > (most := MOST_BYTES.get(format_name, MOST_OTHERS)):
+            raise SceneError([f"{format_name}: a text of {len(text):,} characters; give at most {most:,}"])
         return text
-    return file_text(source, what)
+    return file_text(source, format_name)

@@ -201,16 +201,16 @@ def by_diagonal(warnings: list[str], quadratic: np.ndarray) -> np.ndarray:
 # Into one body ------------------------------------------------------------------------------------------------------
 
 
-def add_to(faults: Faults, body: Coefficients, found: Hydrodynamics, pose: Pose) -> None:
+def add_to(faults: Faults, body: Coefficients, hydrodynamics: Hydrodynamics, pose: Pose) -> None:
     """Add a link's coefficients to those of the body."""
     X = HALF_TURN_6[:, None] * carried(pose) * HALF_TURN_6
     for name in ("added_mass", "linear"):
-        setattr(body, name, getattr(body, name) + X.T @ getattr(found, name) @ X)
-    body.current = body.current + found.current
+        setattr(body, name, getattr(body, name) + X.T @ getattr(hydrodynamics, name) @ X)
+    body.current = body.current + hydrodynamics.current
     for name in ("quadratic", "forward"):
-        matrix = getattr(found, name)
+        matrix = getattr(hydrodynamics, name)
         if np.any(matrix) and not np.allclose(X, np.eye(6), atol=1e-12):
-            remedy = f"it has no such form about another point: pass link={found.link!r}, or leave that plugin out"
-            faults.add(f"{name} drag of the link", found.link, "is about another point than the vehicle's", remedy)
+            remedy = f"it has no such form about another point: pass link={hydrodynamics.link!r}, or leave that plugin out"
+            faults.add(f"{name} drag of the link", hydrodynamics.link, "is about another point than the vehicle's", remedy)
         else:
             setattr(body, name, getattr(body, name) + matrix)

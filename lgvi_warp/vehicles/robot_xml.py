@@ -56,13 +56,13 @@ class Reader:
         raise Refused("has a document type declaration (<!DOCTYPE>), which is not read; remove it")
 
 
-def parse_xml(source: str | os.PathLike[str], what: str = "SDF") -> Element:
+def parse_xml(source: str | os.PathLike[str], format_name: str = "SDF") -> Element:
     """Parse the XML of a text or of a file."""
     is_text = isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<")
-    content = str(source).encode() if is_text else read_bytes(source, what)
+    content = str(source).encode() if is_text else read_bytes(source, format_name)
     content = content.removeprefix(b"\xef\xbb\xbf").lstrip(b" \t\r\n")
     if len(content) > MOST_BYTES:
-        raise SceneError([f"{what} is longer than {MOST_BYTES / 2**20:g} MiB; give the model alone"])
+        raise SceneError([f"{format_name} is longer than {MOST_BYTES / 2**20:g} MiB; give the model alone"])
     reader = Reader()
     parser = expat.ParserCreate("utf-8" if is_text else None)
     parser.StartElementHandler, parser.EndElementHandler = reader.start, reader.end
@@ -70,9 +70,9 @@ def parse_xml(source: str | os.PathLike[str], what: str = "SDF") -> Element:
     try:
         parser.Parse(content, True)
     except Refused as error:
-        raise SceneError([f"{what} {error}"]) from None
+        raise SceneError([f"{format_name} {error}"]) from None
     except (expat.ExpatError, ValueError, LookupError) as error:
-        raise SceneError([f"{what} is not XML: {error}; {remedy_for(content)}"]) from None
+        raise SceneError([f"{format_name} is not XML: {error}; {remedy_for(content)}"]) from None
     return reader.tree.close()
 
 
@@ -85,12 +85,12 @@ def remedy_for(content: bytes) -> str:
     return f"it looks like a template: it holds {shown}; {TEMPLATES.get(mark.decode(), TEMPLATES['@'])}"
 
 
-def read_bytes(source: Any, what: str) -> bytes:
+def read_bytes(source: Any, format_name: str) -> bytes:
     """Return the content of a file."""
     try:
-        return file_bytes(source, f"{what} file")
+        return file_bytes(source, f"{format_name} file")
     except UnreadableError as error:
-        raise SceneError([f"{what} file {brief(source)}: {error}"]) from None
+        raise SceneError([f"{format_name} file {brief(source)}: {error}"]) from None
 
 
 # Values -------------------------------------------------------------------------------------------------------------

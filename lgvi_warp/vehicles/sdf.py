@@ -86,10 +86,10 @@ def from_sdf(
 
 
 def add_hydrodynamics(
-    faults: Faults, body: Coefficients, read: RobotModel, main: Link, own: Sequence[Hydrodynamics]
+    faults: Faults, body: Coefficients, read: RobotModel, main: Link, plugins: Sequence[Hydrodynamics]
 ) -> None:
     """Add the coefficients that plugins give to the body."""
-    for hydrodynamics in own:
+    for hydrodynamics in plugins:
         body_link = read.links[hydrodynamics.link]
         if np.any(hydrodynamics.added_mass) and np.any(body_link.added_mass):
             problem, remedy = "and the plugin's xDotU ... both give added mass", "keep one, or set disable_added_mass"
@@ -182,13 +182,13 @@ def set_water(faults: Faults, read: RobotModel, density: float | None, gravity: 
 
 
 def displaced_by(
-    read: RobotModel, parts: Sequence[Link], main: Link, own: Sequence[Hydrodynamics]
+    read: RobotModel, parts: Sequence[Link], main: Link, plugins: Sequence[Hydrodynamics]
 ) -> tuple[float, np.ndarray]:
     """Return displaced volume and its centre, of the shapes or as uuv_simulator's plugin gives it.
 
     Returns: Volume [m3] and its centre (3,) [m] in the main link's axes (z up).
     """
-    by_plugin = [hydrodynamics for hydrodynamics in own if hydrodynamics.volume is not None]
+    by_plugin = [hydrodynamics for hydrodynamics in plugins if hydrodynamics.volume is not None]
     for hydrodynamics in by_plugin:
         body_link = read.links[hydrodynamics.link]
         neutral_volume = body_link.mass / (hydrodynamics.density or 1.0)
@@ -208,12 +208,12 @@ def has_buoyancy(read: RobotModel, name: str) -> bool:
     return not read.water.enabled or any(scoped.startswith(f"{enabled}::") for enabled in read.water.enabled)
 
 
-def refuse_shapeless(faults: Faults, read: RobotModel, parts: Sequence[Link], own: Sequence[Hydrodynamics]) -> None:
+def refuse_shapeless(faults: Faults, read: RobotModel, parts: Sequence[Link], plugins: Sequence[Hydrodynamics]) -> None:
     """Note shapes whose volume lies in another file: without them the vehicle would sink.
 
-    own: Coefficients of the links of the body; one with a volume makes shapes superfluous.
+    plugins: Coefficients of the links of the body; one with a volume makes shapes superfluous.
     """
-    if any(hydrodynamics.volume is not None for hydrodynamics in own):
+    if any(hydrodynamics.volume is not None for hydrodynamics in plugins):
         return
     for body_link in parts:
         if body_link.shapeless and has_buoyancy(read, body_link.name):

@@ -214,8 +214,8 @@ def few(
 class _Part(Mapping[str, np.ndarray]):
     """Parameters of some members, read when they are used: most pictures use none."""
 
-    def __init__(self, whole: Mapping[str, np.ndarray], members: slice | np.ndarray):
-        self._whole, self._members = whole, members
+    def __init__(self, samples: Mapping[str, np.ndarray], members: slice | np.ndarray):
+        self._whole, self._members = samples, members
 
     def __getitem__(self, name: str) -> np.ndarray:
         values = self._whole[name]

@@ -170,7 +170,7 @@ def test_steps_of_a_comparison_divide_the_draws():
     assert [sample.allowed(m) for m in (1, 5, 13, 17, 48, 50)] == [1, 6, 16, 24, 48, 48]
     # The scene's own noise_step is kept, unless all are asked for.
     assert {term.noise_step for term in sample.ensemble.scene.terms[1:]} == {GRID}
-    assert {term.noise_step for term in drawn_every(fleet(members=2), 0.5, own=False).scene.terms[1:]} == {0.5}
+    assert {term.noise_step for term in drawn_every(fleet(members=2), 0.5, own_grid=False).scene.terms[1:]} == {0.5}
     with pytest.raises(
         lw.SceneError, match=r"wrench_noise.noise_step = 0.03: does not divide the 0.1 s.*run.save_every"
     ):

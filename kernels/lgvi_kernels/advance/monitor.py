@@ -174,12 +174,12 @@ def make_matrix_rate(View, Damping, damping, velocities):
     return matrix_rate
 
 
-def make_sum(unity, other):
+def make_sum(unity, damping):
     """The sum of two rates: of drag along axes, and of damping matrices beside it."""
 
     @wp.func
     def rate(x: Any, c: Any):
-        return unity(x, c) + other(x, c)
+        return unity(x, c) + damping(x, c)
 
     return rate
 

@@ -208,10 +208,10 @@ def make_turn(axis, pitched, following, compensated, watched=False):
     return R_i
 
 
-def make_hop(here, there, U12, U13, U23, compensated):
-    """The origin moves from that of axis `here` to that of axis `there` (0, 1, 2), by the elements of U that are not 0."""
-    sign = 1.0 if there > here else -1.0
-    first_two = (here, there) in ((0, 1), (1, 0))
+def make_hop(axis_from, axis_to, U12, U13, U23, compensated):
+    """The origin moves from that of axis `axis_from` to that of axis `axis_to` (0, 1, 2), by the elements of U that are not 0."""
+    sign = 1.0 if axis_to > axis_from else -1.0
+    first_two = (axis_from, axis_to) in ((0, 1), (1, 0))
     along_x, along_y, along_z = (make_shift(axis, compensated) for axis in range(3))
 
     @wp.func

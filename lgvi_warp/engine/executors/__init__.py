@@ -31,29 +31,29 @@ def check_threads(faults: Faults, threads: Any) -> None:
         faults.add("threads", threads, f"is more than {MOST_THREADS:,}", remedy)
 
 
-def executor_of(given: Any, threads: int | None = None, scheduler: str | None = None) -> Executor:
+def executor_of(choice: Any, threads: int | None = None, scheduler: str | None = None) -> Executor:
     """The executor that a name stands for, or the executor itself where an object is given.
 
     threads: number of threads, processes or workers; None (default) for all cores.
     """
     faults = Faults()
     check_threads(faults, threads)
-    if not isinstance(given, Executor) and not among(given, NAMES):
-        faults.add("executor", given, "is not known", f"{closest(str(given), NAMES)}; or give an object with run(...)")
-    if scheduler is not None and not among(given, ("dask",)):
+    if not isinstance(choice, Executor) and not among(choice, NAMES):
+        faults.add("executor", choice, "is not known", f"{closest(str(choice), NAMES)}; or give an object with run(...)")
+    if scheduler is not None and not among(choice, ("dask",)):
         faults.add("scheduler", scheduler, "is for the executor dask alone", 'give executor="dask", or leave it out')
-    if among(given, STARTING) and scheduler is None and multiprocessing.current_process().daemon:
+    if among(choice, STARTING) and scheduler is None and multiprocessing.current_process().daemon:
         problem = "starts processes, which a worker of multiprocessing or Celery may not"
-        faults.add("executor", given, problem, 'use executor="threads" in it, or run outside of it')
+        faults.add("executor", choice, problem, 'use executor="threads" in it, or run outside of it')
     faults.raise_if_any()
-    if isinstance(given, Executor):
-        return given
+    if isinstance(choice, Executor):
+        return choice
     count = threads or machine.thread_count()
-    if given == "processes":
+    if choice == "processes":
         from lgvi_warp.engine.executors.processes import Processes
 
         return Processes(count)
-    if given == "dask":
+    if choice == "dask":
         from lgvi_warp.engine.executors.dask import Dask
 
         cluster = Dask(scheduler, count)

@@ -68,16 +68,16 @@ class Observation:
                     entries[name] = () if whole_field else tuple(sorted({*numbers, *(known or ())}))
         return entries
 
-    def fields(self, asked: Sequence[str]) -> tuple[str, ...]:
+    def fields(self, names: Sequence[str]) -> tuple[str, ...]:
         """The sample fields that the kernel must write: those to keep and those that statistics need."""
         wanted = {name for statistic in self.statistics for name in statistic.quantity.fields}
         if self.until is not None:
             wanted |= set(watch_fields(self.until, self.statistics))
         if self.samples:
-            wanted |= set(asked)
+            wanted |= set(names)
         elif self.keep != "none":
             # Members that are run again have the bits of the run, and so its kernel, which notes these signals.
-            wanted |= set(asked) & SIGNALS.keys()
+            wanted |= set(names) & SIGNALS.keys()
         return ordered(wanted)
 
     def watch(self, times: np.ndarray) -> tuple[tuple[Statistic, ...], Watch | None]:
@@ -121,24 +121,24 @@ def _of_functions(value: Any) -> bool:
     return isinstance(value, Quantity) or callable(value)
 
 
-def observation_of(told: Mapping[str, Any] | None, statistics: Any = None) -> Observation:
+def observation_of(saved: Mapping[str, Any] | None, statistics: Any = None) -> Observation:
     """Restore an observation from its table.
 
-    told: what `to_dict` returned; None for a run that kept nothing but samples.
+    saved: what `to_dict` returned; None for a run that kept nothing but samples.
     statistics: the run's statistics; needed where they depend on functions (default None).
     """
-    if told is None:
+    if saved is None:
         if statistics:
             raise SceneError([f"statistics = {statistics}: the run gathered none; leave them out"])
         return Observation()
-    if statistics is None and told.get("functions"):
-        names = ", ".join(told["functions"])
+    if statistics is None and saved.get("functions"):
+        names = ", ".join(saved["functions"])
         problem = "are of functions that a store does not hold"
         raise SceneError([f"statistics: {names}: {problem}; give statistics=[...] again"])
-    keep = told["keep"] if isinstance(told["keep"], str) else tuple(told["keep"])
-    until = from_dict(told["until"]) if "until" in told else None
-    observation = Observation(from_list(told.get("statistics", ()) if statistics is None else statistics), keep, until)
-    table, expected = observation.to_dict(), {name: value for name, value in told.items() if name != "fields"}
+    keep = saved["keep"] if isinstance(saved["keep"], str) else tuple(saved["keep"])
+    until = from_dict(saved["until"]) if "until" in saved else None
+    observation = Observation(from_list(saved.get("statistics", ()) if statistics is None else statistics), keep, until)
+    table, expected = observation.to_dict(), {name: value for name, value in saved.items() if name != "fields"}
     if table != expected:
         wanted, run_had = table.get("statistics"), expected.get("statistics")
         raise SceneError([f"statistics = {wanted}: are not the run's, {run_had}; give those"])

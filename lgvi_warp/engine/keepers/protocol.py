@@ -70,7 +70,7 @@ class BlockStore(Keeper, Protocol):
         Returns: What each keeper closed with; None if the store does not hold the block.
         """
 
-    def finish(self, block: Block, own: Any, keepers: Sequence[Keeper], parts: Sequence[Any]) -> None:
+    def finish(self, block: Block, arrays: Any, keepers: Sequence[Keeper], parts: Sequence[Any]) -> None:
         """Make a block durable."""
 
     def understood(self, block: Block) -> AbstractContextManager[None]:

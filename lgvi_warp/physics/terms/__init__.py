@@ -77,13 +77,13 @@ def from_list(given: Any) -> tuple[Term, ...]:
     return tuple(terms)
 
 
-def _allowed(where: str, one: Term) -> Term:
+def _allowed(where: str, term: Term) -> Term:
     """The term, unless it is an event or follows from the vehicle: then SceneError."""
-    if not one.acts:
-        raise refusal(where, one.type, "is an event", "give it in events=[...]")
-    if type(one) in (Weight, Restoring):
-        raise refusal(where, one.type, "acts already", "leave it out: it follows from the vehicle")
-    return one
+    if not term.acts:
+        raise refusal(where, term.type, "is an event", "give it in events=[...]")
+    if type(term) in (Weight, Restoring):
+        raise refusal(where, term.type, "acts already", "leave it out: it follows from the vehicle")
+    return term
 
 
 def _from_table(where: str, table: Any) -> Term:

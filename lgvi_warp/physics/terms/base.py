@@ -474,10 +474,10 @@ def own(term: Term, parameters: Numbers) -> dict[str, np.ndarray]:
 
 
 def _checked(
-    faults: Faults, one: dataclasses.Field[Any], value: Any, lengths: dict[str, int], shape: tuple[Any, ...]
+    faults: Faults, field: dataclasses.Field[Any], value: Any, lengths: dict[str, int], shape: tuple[Any, ...]
 ) -> np.ndarray | None:
     """The value of a field as an array of this shape; None after adding a fault."""
-    meta, name = one.metadata, word_of(one)
+    meta, name = field.metadata, word_of(field)
     if value is None and meta["optional"]:
         return None
     unit = meta["unit"]
@@ -502,12 +502,12 @@ def _checked(
         array = faults.finite(name, value, shape, unit)
     if array is None:
         return None
-    if _outside(one, array[None]).any():
+    if _outside(field, array[None]).any():
         words = ((meta["above"], "above"), (meta["least"], "from"), (meta["most"], "to"))
         bounds = " ".join(f"{word} {bound:g}" for bound, word in words if np.isfinite(bound))
         problem = "is not positive" if meta["above"] == 0.0 and np.any(array <= 0.0) else "is out of bounds"
         faults.add(name, value, problem, f"give numbers {bounds} [{unit}]")
-    elif _falling(one, array[None]).any():
+    elif _falling(field, array[None]).any():
         faults.add(name, value, "is not rising", "sort the table and drop repetitions")
     else:
         return array
@@ -519,9 +519,9 @@ def _amount(shape: tuple[Any, ...]) -> str:
     return f"numbers of shape {shape}" if shape else "a number"
 
 
-def _outside(one: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
+def _outside(field: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
     """Mask (n,) of the members whose values (n, ...) of a field are not finite, or out of its bounds."""
-    flat, meta = values.reshape(len(values), -1), one.metadata
+    flat, meta = values.reshape(len(values), -1), field.metadata
     if flat.size:
         low, high = flat.min(), flat.max()  # NaN if any is
         finite = np.isfinite(low) and np.isfinite(high)
@@ -532,9 +532,9 @@ def _outside(one: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
     return ~np.all((np.isfinite(flat) | meta["infinite"]) & inside, axis=1)
 
 
-def _falling(one: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
+def _falling(field: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
     """Mask (n,) of the members whose values (n, k) of a field do not rise, though they must."""
-    if not one.metadata["rising"]:
+    if not field.metadata["rising"]:
         return np.zeros(len(values), bool)
     return np.any(np.diff(np.nan_to_num(values)) <= 0.0, axis=1)
 
@@ -598,9 +598,9 @@ def build(where: str, kind: type[AnyTerm], table: Mapping[str, Any]) -> AnyTerm:
 MOST_TERMS = 1000
 
 
-def check_list(what: str, given: Any, example: str) -> None:
+def check_list(key: str, entries: Any, example: str) -> None:
     """Refuse what is no list, or a list of more terms or events than a scene may have."""
-    if not isinstance(given, Sequence) or isinstance(given, str):
-        raise refusal(what, given, "is no list", example)
-    if len(given) > MOST_TERMS:
-        raise SceneError([f"{what}: are {len(given):,}; give at most {MOST_TERMS:,}"])
+    if not isinstance(entries, Sequence) or isinstance(entries, str):
+        raise refusal(key, entries, "is no list", example)
+    if len(entries) > MOST_TERMS:
+        raise SceneError([f"{key}: are {len(entries):,}; give at most {MOST_TERMS:,}"])

@@ -197,15 +197,15 @@ def moved(file: str, sha256: str | None, beside: Path) -> str:
     return file
 
 
-def _column(faults: Faults, key: str, given: Any) -> np.ndarray | None:
+def _column(faults: Faults, key: str, column: Any) -> np.ndarray | None:
     """A column of finite numbers; None after adding a fault."""
-    plain = isinstance(given, np.ndarray) and given.dtype.kind == "f" and given.ndim and not np.ma.is_masked(given)
-    if plain and not np.isfinite(given).all():
-        row = int(np.argmin(np.isfinite(given.reshape(len(given), -1)).all(axis=1)))
-        faults.add(key, given[row], f"is not finite, of member {row}", "give a number, or drop that member")
+    plain = isinstance(column, np.ndarray) and column.dtype.kind == "f" and column.ndim and not np.ma.is_masked(column)
+    if plain and not np.isfinite(column).all():
+        row = int(np.argmin(np.isfinite(column.reshape(len(column), -1)).all(axis=1)))
+        faults.add(key, column[row], f"is not finite, of member {row}", "give a number, or drop that member")
         return None
-    array = faults.finite(key, given)
+    array = faults.finite(key, column)
     if array is not None and array.ndim == 0:
-        faults.add(key, given, "is no column", "give one value for each member")
+        faults.add(key, column, "is no column", "give one value for each member")
         return None
     return array

@@ -215,10 +215,10 @@ class Estimates(Summarized, Mapping[str, Estimate]):
         return cls(estimates)
 
 
-def _shown(one: Estimate) -> summaries.Rows:
+def _shown(estimate: Estimate) -> summaries.Rows:
     """Label, value and interval of each of an estimate's numbers at the last sample time."""
-    lines = [(label, f"{value}, {ends}, {members}") for label, value, ends, members in texts_of(one)]
-    return lines or [(one.name, f"{' x '.join(map(str, one.value.shape))} values ({', '.join(one.dims['value'])})")]
+    lines = [(label, f"{value}, {ends}, {members}") for label, value, ends, members in texts_of(estimate)]
+    return lines or [(estimate.name, f"{' x '.join(map(str, estimate.value.shape))} values ({', '.join(estimate.dims['value'])})")]
 
 
 def _renamed(single: xarray.Dataset, word: str) -> dict[Hashable, str]:

@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 
 
-def entries_of(one: Any) -> Iterator[tuple[str, str, float, float, float, int]]:
+def entries_of(estimate: Any) -> Iterator[tuple[str, str, float, float, float, int]]:
     """List the numbers of an estimate at its end."""
-    unit = "" if one.unit == "1" or one.unit.startswith("products") else one.unit
-    members = _MEMBERS.get(one.settings["type"], lambda one: one.count[-1])(one)
-    for label, value, lower, upper in _LINES.get(one.settings["type"], _entries)(one):
+    unit = "" if estimate.unit == "1" or estimate.unit.startswith("products") else estimate.unit
+    members = _MEMBERS.get(estimate.settings["type"], lambda one: one.count[-1])(estimate)
+    for label, value, lower, upper in _LINES.get(estimate.settings["type"], _entries)(estimate):
         yield label, unit, float(value), float(lower), float(upper), int(members)
 
 
-def texts_of(one: Any) -> list[tuple[str, str, str, str]]:
+def texts_of(estimate: Any) -> list[tuple[str, str, str, str]]:
     """Return the texts of each number of an estimate: its label, its value, its interval, and its number of members."""
     rows = []
-    for label, unit, value, lower, upper, members in entries_of(one):
+    for label, unit, value, lower, upper, members in entries_of(estimate):
         ends = f"{lower:.5g} to {upper:.5g}" if np.isfinite(lower) or np.isfinite(upper) else "no interval"
         rows.append((label, f"{value:.6g} {unit}".rstrip(), ends, f"{members:,} members"))
     return rows
@@ -29,73 +29,73 @@ def texts_of(one: Any) -> list[tuple[str, str, str, str]]:
 Line = tuple[str, float, float, float]
 
 
-def _labels(one: Any) -> list[str]:
+def _labels(estimate: Any) -> list[str]:
     """Label of each component, preceded by the type of the statistic unless it was given a name."""
-    kind, at = one.settings["type"], f" at {one.settings['at']}" if "at" in one.settings else ""
-    if one.name != f"{kind} {', '.join(one.name.split(' ', 1)[1:])}" or len(one.coordinates["component"]) == 1:
-        names = [one.name] if len(one.coordinates["component"]) == 1 else one.coordinates["component"].tolist()
-        return names if len(names) == 1 else [f"{one.name}: {name}" for name in names]
-    return [f"{kind} {name}{at}" for name in one.coordinates["component"]]
+    kind, at = estimate.settings["type"], f" at {estimate.settings['at']}" if "at" in estimate.settings else ""
+    if estimate.name != f"{kind} {', '.join(estimate.name.split(' ', 1)[1:])}" or len(estimate.coordinates["component"]) == 1:
+        names = [estimate.name] if len(estimate.coordinates["component"]) == 1 else estimate.coordinates["component"].tolist()
+        return names if len(names) == 1 else [f"{estimate.name}: {name}" for name in names]
+    return [f"{kind} {name}{at}" for name in estimate.coordinates["component"]]
 
 
-def _entries(one: Any) -> Iterator[Line]:
+def _entries(estimate: Any) -> Iterator[Line]:
     """One line for each component at the last sample time."""
-    for i, label in enumerate(_labels(one)):
-        yield label, one.value[-1, i], one.lower[-1, i], one.upper[-1, i]
+    for i, label in enumerate(_labels(estimate)):
+        yield label, estimate.value[-1, i], estimate.lower[-1, i], estimate.upper[-1, i]
 
 
-def _quantiles(one: Any) -> Iterator[Line]:
-    for i, label in enumerate(_labels(one)):
-        for j, level in enumerate(one.coordinates["level"]):
-            yield f"{label} {level:g}", one.value[-1, j, i], one.lower[-1, j, i], one.upper[-1, j, i]
+def _quantiles(estimate: Any) -> Iterator[Line]:
+    for i, label in enumerate(_labels(estimate)):
+        for j, level in enumerate(estimate.coordinates["level"]):
+            yield f"{label} {level:g}", estimate.value[-1, j, i], estimate.lower[-1, j, i], estimate.upper[-1, j, i]
 
 
-def _covariance(one: Any) -> Iterator[Line]:
-    names = one.coordinates["component"]
+def _covariance(estimate: Any) -> Iterator[Line]:
+    names = estimate.coordinates["component"]
     for i, first in enumerate(names):
         for j, second in enumerate(names[: i + 1] if len(names) <= 3 else [first]):
             at = (-1, i, j) if len(names) <= 3 else (-1, i, i)
-            yield f"covariance {first}, {second}", one.value[at], one.lower[at], one.upper[at]
+            yield f"covariance {first}, {second}", estimate.value[at], estimate.lower[at], estimate.upper[at]
 
 
-def _extremes(one: Any) -> Iterator[Line]:
-    for i, label in enumerate(_labels(one)):
+def _extremes(estimate: Any) -> Iterator[Line]:
+    for i, label in enumerate(_labels(estimate)):
         for name in ("minimum", "maximum"):
-            member = int(one[f"{name}_member"][-1, i])
-            yield f"{label}: {name} (member {member})", one[name][-1, i], -np.inf, np.inf
+            member = int(estimate[f"{name}_member"][-1, i])
+            yield f"{label}: {name} (member {member})", estimate[name][-1, i], -np.inf, np.inf
 
 
-def _passage(one: Any) -> Iterator[Line]:
-    yield one.name, one.value[-1], one.lower[-1], one.upper[-1]
-    yield from _times(one, "passage_time")
+def _passage(estimate: Any) -> Iterator[Line]:
+    yield estimate.name, estimate.value[-1], estimate.lower[-1], estimate.upper[-1]
+    yield from _times(estimate, "passage_time")
 
 
-def _outcome(one: Any) -> Iterator[Line]:
-    yield one.name, one.value[-1], one.lower[-1], one.upper[-1]
-    if one["failed"][-1]:
-        lower, upper = (float(one[f"fraction_{end}"][-1]) for end in ("lower", "upper"))
-        yield f"{one.name}: of all members", float(one["fraction"][-1]), lower, upper
-    yield from _times(one, "end_time")
+def _outcome(estimate: Any) -> Iterator[Line]:
+    yield estimate.name, estimate.value[-1], estimate.lower[-1], estimate.upper[-1]
+    if estimate["failed"][-1]:
+        lower, upper = (float(estimate[f"fraction_{end}"][-1]) for end in ("lower", "upper"))
+        yield f"{estimate.name}: of all members", float(estimate["fraction"][-1]), lower, upper
+    yield from _times(estimate, "end_time")
 
 
-def _times(one: Any, name: str) -> Iterator[Line]:
+def _times(estimate: Any, name: str) -> Iterator[Line]:
     """A line for the time by which each level is reached."""
-    for j, level in enumerate(one.coordinates["level"]):
-        value, lower, upper = (float(one[f"{name}{end}"][j]) for end in ("", "_lower", "_upper"))
-        yield f"{one.name}: time [s] of {level:g}", value, lower, upper
+    for j, level in enumerate(estimate.coordinates["level"]):
+        value, lower, upper = (float(estimate[f"{name}{end}"][j]) for end in ("", "_lower", "_upper"))
+        yield f"{estimate.name}: time [s] of {level:g}", value, lower, upper
 
 
-def _attitude(one: Any) -> Iterator[Line]:
-    yield f"{one.name}: dispersion [rad]", one["dispersion"][-1], -np.inf, np.inf
-    for i, half in enumerate(one["rotation_half_width"][-1]):
-        yield f"{one.name}: about {'xyz'[i]} [rad]", 0.0, -half, half
+def _attitude(estimate: Any) -> Iterator[Line]:
+    yield f"{estimate.name}: dispersion [rad]", estimate["dispersion"][-1], -np.inf, np.inf
+    for i, half in enumerate(estimate["rotation_half_width"][-1]):
+        yield f"{estimate.name}: about {'xyz'[i]} [rad]", 0.0, -half, half
 
 
-def _histogram(one: Any) -> Iterator[Line]:
-    for i, label in enumerate(_labels(one)):
-        at = -1, i, int(np.argmax(one["counts"][-1, i]))
-        middle = one.coordinates["bin"][at[2]]
-        yield f"{label}: fullest bin, at {middle:g}", one.value[at], one.lower[at], one.upper[at]
+def _histogram(estimate: Any) -> Iterator[Line]:
+    for i, label in enumerate(_labels(estimate)):
+        at = -1, i, int(np.argmax(estimate["counts"][-1, i]))
+        middle = estimate.coordinates["bin"][at[2]]
+        yield f"{label}: fullest bin, at {middle:g}", estimate.value[at], estimate.lower[at], estimate.upper[at]
 
 
 _LINES: dict[str, Callable[[Any], Iterator[Line]]] = {

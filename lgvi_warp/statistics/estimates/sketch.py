@@ -54,14 +54,14 @@ def _part(values: np.ndarray, weights: np.ndarray, error: float, variance: float
     return {"values": values, "weights": weights} | {name: np.array([value]) for name, value in numbers.items()}
 
 
-def merged(left: np.ndarray, right: np.ndarray) -> np.ndarray:
+def merged(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Merge sorted rows of two arrays: NumPy's stable sort detects the two runs and merges them.
 
-    left: (k, d, a), sorted along the last axis.
-    right: (k, d, b), sorted along the last axis.
+    first: (k, d, a), sorted along the last axis.
+    second: (k, d, b), sorted along the last axis.
     Returns: (k, d, a + b), sorted along the last axis.
     """
-    both = np.concatenate([left, right], axis=2)
+    both = np.concatenate([first, second], axis=2)
     both.sort(axis=2, kind="stable")
     return both
 

@@ -81,17 +81,17 @@ class Motion:
             self, position=self.position + place, attitude=attitude, velocity=self.velocity + velocity,
             angular_velocity=self.angular_velocity + rate)  # fmt: skip
 
-    def apart(self, other: Motion) -> np.ndarray:
+    def apart(self, others: Motion) -> np.ndarray:
         """How far these are beside others, in the coordinates of `moved`.
 
         Returns: (m, 12).
         """
-        R = np.swapaxes(other.attitude, 1, 2) @ self.attitude
+        R = np.swapaxes(others.attitude, 1, 2) @ self.attitude
         skew = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
         sine = np.linalg.norm(skew, axis=1, keepdims=True)
         turn = skew * np.where(sine > 0.0, np.arcsin(np.minimum(sine, 1.0)) / np.where(sine > 0.0, sine, 1.0), 1.0)
         straight = ("position", "velocity", "angular_velocity")
-        place, velocity, rate = (getattr(self, name) - getattr(other, name) for name in straight)
+        place, velocity, rate = (getattr(self, name) - getattr(others, name) for name in straight)
         return np.concatenate([place, turn, velocity, rate], axis=1)
 
 
@@ -224,12 +224,12 @@ class MotionBench:
             view[:, rows] = padded.reshape(len(view), view.shape[2], -1).transpose(0, 2, 1)
 
 
-def calm(scene: Any, what: str) -> None:
+def calm(scene: Any, purpose: str) -> None:
     """Refuse a scene in which something acts by chance or in waves: no motion of it is steady."""
     for term in scene.terms:
         if isinstance(term, NoisyTerm | Waves):
             raise refusal(
-                "terms", term.key, f"lets no motion be steady, as {what} need it", "leave it out of this scene"
+                "terms", term.key, f"lets no motion be steady, as {purpose} need it", "leave it out of this scene"
             )
 
 

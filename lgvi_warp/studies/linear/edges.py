@@ -12,7 +12,7 @@ Holds = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 def edges(
-    holds: Holds, start: np.ndarray, last: np.ndarray, guess: np.ndarray, narrow: float, whole: bool = False
+    holds: Holds, start: np.ndarray, last: np.ndarray, guess: np.ndarray, narrow: float, to_the_end: bool = False
 ) -> np.ndarray:
     """Find, for each member, where an answer that holds at the start ceases to.
 
@@ -25,8 +25,8 @@ def edges(
     Returns: (n, 2): the value nearest to the edge where it holds, and where it does not; infinite or 0 (as `last` is above or
         below) where it holds at the last one.
     """
-    forward, backward = (lambda v: v, lambda v: v) if whole else (np.log, np.exp)
-    n, least = len(start), 1.0 if whole else narrow
+    forward, backward = (lambda v: v, lambda v: v) if to_the_end else (np.log, np.exp)
+    n, least = len(start), 1.0 if to_the_end else narrow
     with np.errstate(invalid="ignore", divide="ignore"):
         begin = forward(np.asarray(start, float))
         far, near = np.abs(forward(np.asarray(last, float)) - begin), np.abs(forward(guess) - begin)
@@ -43,9 +43,9 @@ def edges(
         bad[members] = np.where(well, bad[members], np.minimum(bad[members], distance))
 
     def rounded(values: np.ndarray) -> np.ndarray:
-        return np.round(values) if whole else values
+        return np.round(values) if to_the_end else values
 
-    width = np.where(known, np.maximum(0.02 * near, least), np.where(whole, 1.0, 0.2))
+    width = np.where(known, np.maximum(0.02 * near, least), np.where(to_the_end, 1.0, 0.2))
     centre = np.where(known, near, 0.0)
     while True:
         # Those whose bracket is open above, then those whose guess lay beyond the edge.

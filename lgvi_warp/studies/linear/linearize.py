@@ -295,15 +295,15 @@ def remembered(bench: MotionBench, memory: Mapping[str, np.ndarray], terms: bool
 RANDOM = ("noise", "drift")
 
 
-def check_parts(controller: Any, what: str, refused: Collection[str] | None = None) -> None:
+def check_parts(controller: Any, purpose: str, refused: Collection[str] | None = None) -> None:
     """Refuse parts of a controller that no linear model of one period has, or that let no motion be steady.
 
     refused: numbers of sensors that are refused; None (default) for all but the bias, of which there is no linear model.
     """
     problem = (
-        f"lets no motion be steady, as {what} need it"
+        f"lets no motion be steady, as {purpose} need it"
         if refused
-        else (f"has no linear model of one period, which {what} needs")
+        else (f"has no linear model of one period, which {purpose} needs")
     )
     faults = Faults()
     for part in controller.sensors:

@@ -153,9 +153,9 @@ def _what_repeats(values: Mapping[str, np.ndarray], of: Collection[str]) -> np.n
     return np.concatenate(told, axis=-1)
 
 
-def _commands(told: np.ndarray, limits: np.ndarray) -> np.ndarray:
+def _commands(repeating: np.ndarray, limits: np.ndarray) -> np.ndarray:
     """The commands (m, channels) of what must repeat."""
-    return told[:, 9 : 9 + limits.shape[1]]
+    return repeating[:, 9 : 9 + limits.shape[1]]
 
 
 def at_limit(command: np.ndarray, limits: np.ndarray) -> np.ndarray:
@@ -166,13 +166,13 @@ def at_limit(command: np.ndarray, limits: np.ndarray) -> np.ndarray:
     return np.asarray((limits > 0.0) & (np.abs(command) >= limits * (1.0 - AT_LIMIT)))
 
 
-def _apart(told: np.ndarray, other: np.ndarray, limits: np.ndarray) -> np.ndarray:
+def _apart(repeating: np.ndarray, other: np.ndarray, limits: np.ndarray) -> np.ndarray:
     """How far what must repeat is apart (m, ...): of what is large, as a part of its size."""
     size = np.maximum(1.0, np.abs(other))
     of_commands = _commands(size, limits)
     of_commands[:] = np.minimum(of_commands, np.maximum(limits, np.finfo(float).tiny))
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.abs(told - other) / size)
+        return np.asarray(np.abs(repeating - other) / size)
 
 
 class Loops:
@@ -191,11 +191,11 @@ class Loops:
         delay: np.ndarray,
         limits: np.ndarray,
         motion: Motion,
-        told: np.ndarray,
+        repeating: np.ndarray,
         begin: int,
     ):
         self.study, self.places, self.delay = study, places, delay
-        self.limits, self.motion, self.told, self.begin = np.maximum(limits, 1e-12), motion, told, begin
+        self.limits, self.motion, self.told, self.begin = np.maximum(limits, 1e-12), motion, repeating, begin
 
     def return_to_it(self) -> np.ndarray:
         """Whether loops as they are come back to their motions, by a run.

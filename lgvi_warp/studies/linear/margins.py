@@ -290,7 +290,7 @@ def _group(
                 return np.asarray(holds(unity[some], delays_now[some] + values.astype(np.int64), some))
 
             guess = np.rint(known["delay"] / h) if "delay" in known else np.full(n, np.nan)
-            brackets = edges(delays, start - 1.0, last.astype(float), guess, 1.0, whole=True)
+            brackets = edges(delays, start - 1.0, last.astype(float), guess, 1.0, to_the_end=True)
             held = np.where(np.isinf(brackets[:, 1]), np.inf, brackets[:, 0])
             answers[way]["delay"] = np.where(why == "", held * h, np.nan)
     return why, answers

@@ -67,16 +67,16 @@ class _Quantile:
         return f"{100.0 * self.level:g} % quantile"
 
 
-def risk_of(faults: Faults, given: Any) -> Any:
+def risk_of(faults: Faults, risk: Any) -> Any:
     """Read a risk.
 
-    given: "mean", the level of a quantile in (0, 1), or a `CVaR`.
+    risk: "mean", the level of a quantile in (0, 1), or a `CVaR`.
     Returns: The risk, a function of costs (k, members); the mean where it is at fault.
     """
-    if isinstance(given, CVaR):
-        return given
-    if isinstance(given, float) and 0.0 < given < 1.0:
-        return _Quantile(given)
-    if not (isinstance(given, str) and given == "mean"):
-        faults.add("risk", brief(given), "is no risk", 'give "mean", a level such as 0.95, or lw.CVaR(0.05)')
+    if isinstance(risk, CVaR):
+        return risk
+    if isinstance(risk, float) and 0.0 < risk < 1.0:
+        return _Quantile(risk)
+    if not (isinstance(risk, str) and risk == "mean"):
+        faults.add("risk", brief(risk), "is no risk", 'give "mean", a level such as 0.95, or lw.CVaR(0.05)')
     return _Mean()

@@ -163,10 +163,10 @@ class _Column:
         raise KeyError(label)
 
 
-def entries_of(one: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarray]]]:
+def entries_of(estimate: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarray]]]:
     """List the distributions of the single entries of a variation."""
-    (base,) = one.bases
-    distribution = one.distribution
+    (base,) = estimate.bases
+    distribution = estimate.distribution
     numbers = {name: np.broadcast_to(value, base.shape).reshape(-1)
                for name, value in distribution.numbers_by_name().items()
                if np.ndim(value) <= base.ndim and distribution.kind != "choice"}  # fmt: skip

@@ -55,17 +55,17 @@ def sobol_estimates(Y: np.ndarray, replicate: np.ndarray, second_order: bool, co
     return SobolEstimates(ratio(first), ratio(0.5 * (A - AB) ** 2), second)
 
 
-def _ratio(parts: np.ndarray, whole: np.ndarray, replicate: np.ndarray, confidence: float) -> Ratio:
-    """The ratio of the means of `parts` (N, d) and `whole` (N,), with the interval of its linearisation.
+def _ratio(parts: np.ndarray, totals: np.ndarray, replicate: np.ndarray, confidence: float) -> Ratio:
+    """The ratio of the means of `parts` (N, d) and `totals` (N,), with the interval of its linearisation.
 
     Of R replicates with sums n_r and w_r the error of T = n / w is that of the sum of u_r = n_r - T w_r, over w.
     """
-    value = parts.mean(axis=0) / whole.mean()
+    value = parts.mean(axis=0) / totals.mean()
     _, place = np.unique(replicate, return_inverse=True)
     R = int(place.max()) + 1
     if R < 2:
         return Ratio(value, np.full_like(value, np.nan))
     residues = np.zeros((R, parts.shape[1]))
-    np.add.at(residues, place.reshape(-1), parts - value * whole[:, None])
-    error = np.sqrt(R / (R - 1.0) * np.square(residues).sum(axis=0)) / whole.sum()
+    np.add.at(residues, place.reshape(-1), parts - value * totals[:, None])
+    error = np.sqrt(R / (R - 1.0) * np.square(residues).sum(axis=0)) / totals.sum()
     return Ratio(value, float(student(np.array(R), confidence)) * error)

@@ -120,16 +120,16 @@ class Line:
         return cls(**content | {"values": np.asarray(content["values"], dtype=np.float64)})
 
 
-def axis_of(given: Any) -> Axis:
+def axis_of(axis: Any) -> Axis:
     """Convert a user's description to an Axis.
 
-    given: an Axis, a text for Axis.parse, or (name, low, high).
+    axis: an Axis, a text for Axis.parse, or (name, low, high).
     """
-    if isinstance(given, Axis):
-        return given
-    if isinstance(given, tuple | list) and len(given) == 3:
-        return Axis(str(given[0]), given[1], given[2])
-    return Axis.parse(given)
+    if isinstance(axis, Axis):
+        return axis
+    if isinstance(axis, tuple | list) and len(axis) == 3:
+        return Axis(str(axis[0]), axis[1], axis[2])
+    return Axis.parse(axis)
 
 
 class StabilityGrid:

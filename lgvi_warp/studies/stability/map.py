@@ -432,15 +432,15 @@ def worst_status(grid: StabilityGrid, status: np.ndarray) -> np.ndarray:
     return np.take_along_axis(status.reshape(grid.shape), chosen, axis=2)[:, :, 0]
 
 
-def cells_of(one: CellRuns, verified: np.ndarray, error: float, energy_bound: float) -> np.ndarray:
+def cells_of(runs: CellRuns, verified: np.ndarray, error: float, energy_bound: float) -> np.ndarray:
     """Classify every member of a method's runs.
 
     verified: whether each member's reference is good enough (n,).
     Returns: Cell codes (n,).
     """
-    unbounded = ~(one.growth / energy_bound <= 1.0)
-    flagged = one.warned | failed(one.status)
-    masks = [unbounded & ~flagged, unbounded, flagged, verified & (one.error <= error)]
+    unbounded = ~(runs.growth / energy_bound <= 1.0)
+    flagged = runs.warned | failed(runs.status)
+    masks = [unbounded & ~flagged, unbounded, flagged, verified & (runs.error <= error)]
     return np.select(masks, [Cell.SILENT, Cell.FAILED, Cell.FLAGGED, Cell.ACCURATE], Cell.BOUNDED)
 
 
@@ -468,24 +468,24 @@ def _provenance(
     return content | {"axes": {name: vars(axis) for name, axis in (("x", grid.x), ("y", grid.y))}}
 
 
-def report_text(found: StabilityMap) -> str:
+def report_text(stability: StabilityMap) -> str:
     """Write the map as a text of several lines."""
-    unit = found.unit
-    lines = [f"note        {message}" for message in found.messages]
+    unit = stability.unit
+    lines = [f"note        {message}" for message in stability.messages]
     lines += [
-        f"map         {found.x.label} x {found.y.label}: {len(found.x.values)} x {len(found.y.values)} cells, "
-        f"{found.directions} starts each, {found.seconds:.0f} s",
-        f"accurate    {found.of} to {found.error_bound:g} {unit} up to {found.error_time:.3g} s; bounded: energy up to "
-        f"{found.t1:.3g} s ({found.judged})",
-        f"reference   {found.reference}" + (f"; not in {found.unverified} cells" if found.unverified else ""),
+        f"map         {stability.x.label} x {stability.y.label}: {len(stability.x.values)} x {len(stability.y.values)} cells, "
+        f"{stability.directions} starts each, {stability.seconds:.0f} s",
+        f"accurate    {stability.of} to {stability.error_bound:g} {unit} up to {stability.error_time:.3g} s; bounded: energy up to "
+        f"{stability.t1:.3g} s ({stability.judged})",
+        f"reference   {stability.reference}" + (f"; not in {stability.unverified} cells" if stability.unverified else ""),
     ]
-    if found.refused:
-        lines.append(f"refused     {', '.join(f'{name}: {why}' for name, why in found.refused.items())}")
+    if stability.refused:
+        lines.append(f"refused     {', '.join(f'{name}: {why}' for name, why in stability.refused.items())}")
     heads = "".join(f"{cell.name.lower():>10}" for cell in Cell)
-    lines += ["", f"{'cells':<18}{heads}   limit of {found.x.name} over {found.y.name}, least to most"]
-    for method in found.methods:
-        limit, numbers = found.limit(method), found.counts(method).values()
+    lines += ["", f"{'cells':<18}{heads}   limit of {stability.x.name} over {stability.y.name}, least to most"]
+    for method in stability.methods:
+        limit, numbers = stability.limit(method), stability.counts(method).values()
         good = limit[np.isfinite(limit)]
         span = f"{good.min():.3g} to {good.max():.3g}" if len(good) else "none"
-        lines.append(f"{method:<18}" + "".join(f"{number:>10}" for number in numbers) + f"   {span} {found.x.unit}")
+        lines.append(f"{method:<18}" + "".join(f"{number:>10}" for number in numbers) + f"   {span} {stability.x.unit}")
     return "\n".join(lines)

@@ -79,12 +79,12 @@ class Column:
     reference: Result | None = None
     verified: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
 
-    def grid(self, finer: int = 1, whole: bool = True) -> TimeGrid:
+    def grid(self, finer: int = 1, to_the_end: bool = True) -> TimeGrid:
         """Make the steps and sample times of a run.
 
         Returns: The steps and the times [s].
         """
-        steps = self.steps if whole else self.error_steps
+        steps = self.steps if to_the_end else self.error_steps
         return TimeGrid(self.h / finer, steps * finer, steps * self.h)
 
 
@@ -198,7 +198,7 @@ def _reference(
         members = column.members[open_]
         try:
             with np.errstate(all="ignore"):
-                a, b = (run(plan_of(grid, members, name, column.grid(k, whole=False), "float64"), 1)
+                a, b = (run(plan_of(grid, members, name, column.grid(k, to_the_end=False), "float64"), 1)
                         for name, k in zip(names, (finer, math.ceil(1.5 * finer)), strict=True))  # fmt: skip
                 apart = comparison.distances(a, b, of)[of.name]
                 good = ~failed(a.status) & ~failed(b.status) & np.isfinite(b.attitude).all(axis=(0, 2, 3))
@@ -215,19 +215,19 @@ def _reference(
             break
 
 
-def joined(whole: Result | None, part: Result, at: np.ndarray) -> Result:
+def joined(result: Result | None, part: Result, at: np.ndarray) -> Result:
     """Replace members of a result by those of another one.
 
-    whole: the result, which is changed; None for none.
+    result: the result, which is changed; None for none.
     """
-    if whole is None:
+    if result is None:
         return part
     for name, values in part.samples.items():
-        whole.samples[name][:, at] = values
-    whole.status[at], whole.failure_time[at] = part.status, part.failure_time
+        result.samples[name][:, at] = values
+    result.status[at], result.failure_time[at] = part.status, part.failure_time
     # A cached energy belongs to the old samples.
-    vars(whole).pop("energy", None)
-    return whole
+    vars(result).pop("energy", None)
+    return result
 
 
 def run_method(
@@ -267,13 +267,13 @@ def run_method(
     return findings, why[0] if why else ""
 
 
-def judge(result: Result, column: Column, at: np.ndarray, found: CellRuns, of: Distance, judged: str) -> None:
+def judge(result: Result, column: Column, at: np.ndarray, runs: CellRuns, of: Distance, judged: str) -> None:
     """Write down the errors, energies, statuses and warnings of a run of some members of a column."""
     members = column.members[at]
-    found.status[members] = np.asarray(result.status)
+    runs.status[members] = np.asarray(result.status)
     warnings = getattr(result, "warnings", None)
     if warnings is not None:
-        found.warned[members] = np.asarray(warnings) != 0
+        runs.warned[members] = np.asarray(warnings) != 0
     early = np.searchsorted(column.steps, column.error_steps)
     if column.reference is not None:
         reference = comparison.part(column.reference, at.tolist())
@@ -282,14 +282,14 @@ def judge(result: Result, column: Column, at: np.ndarray, found: CellRuns, of: D
         stopped = np.isfinite(np.minimum(stop_time(result), stop_time(reference)))
         lost = failed(result.status) | (np.isnan(apart).any(axis=0) & ~stopped)
         largest = np.max(np.nan_to_num(apart, posinf=np.inf), axis=0)
-        found.error[members] = np.where(lost, np.inf, largest)
+        runs.error[members] = np.where(lost, np.inf, largest)
         if judged == "driven":
             energy, size = reference.energy, np.max(invariants.kinetic_energy(reference), axis=0)
             change = np.max(np.abs(result.energy[early] - energy), axis=0)
-            found.growth[members] = _with_rotation(change / np.maximum(size, 1e-300), result)
+            runs.growth[members] = _with_rotation(change / np.maximum(size, 1e-300), result)
             return
     growth = invariants.energy_growth(result, dissipative=judged == "dissipative")
-    found.growth[members] = _with_rotation(growth, result)
+    runs.growth[members] = _with_rotation(growth, result)
 
 
 def _at_times(result: Result, rows: np.ndarray) -> Result:

@@ -113,17 +113,17 @@ def cases_of(given: Any) -> tuple[Case, ...]:
     return tuple(cases)
 
 
-def grid_of(given: Any) -> dict[str, list[Any]]:
+def grid_of(grid: Any) -> dict[str, list[Any]]:
     """Return the axes of a sweep's grid.
 
-    given: name of a number -> its values; None for no grid.
+    grid: name of a number -> its values; None for no grid.
     """
-    if given is None:
+    if grid is None:
         return {}
-    if not isinstance(given, Mapping):
-        raise refusal("grid", given, "is no table", 'write [grid] and "controller.delay" = [0.0, 0.1] below')
+    if not isinstance(grid, Mapping):
+        raise refusal("grid", grid, "is no table", 'write [grid] and "controller.delay" = [0.0, 0.1] below')
     faults = Faults("grid.")
-    axes = {name: values.tolist() if isinstance(values, np.ndarray) else values for name, values in given.items()}
+    axes = {name: values.tolist() if isinstance(values, np.ndarray) else values for name, values in grid.items()}
     for name, values in axes.items():
         if isinstance(values, str) or not isinstance(values, Sequence) or not len(values):
             faults.add(f'"{name}"', values, "is no list of values", "give [0.0, 0.1, 0.2]")

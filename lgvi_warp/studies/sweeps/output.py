@@ -69,24 +69,24 @@ class Sweep(SweepTable):
         return summary(self)
 
 
-def against_baseline(found: SweepTable) -> list[PairedComparison]:
+def against_baseline(table: SweepTable) -> list[PairedComparison]:
     """Return the comparisons of all other cases with the baseline."""
-    others = [case for case in found.cases if case != found.baseline]
-    rows = [row for case in others for row in found.compare(found.baseline, case)]
-    return found.corrected_for_number(rows)
+    others = [case for case in table.cases if case != table.baseline]
+    rows = [row for case in others for row in table.compare(table.baseline, case)]
+    return table.corrected_for_number(rows)
 
 
-def provenance(found: SweepTable) -> dict[str, Any]:
+def provenance(table: SweepTable) -> dict[str, Any]:
     """Return all that the sweep follows from, of plain types."""
-    setup = found.setup
+    setup = table.setup
     cells = [{"case": cell.case.name, "at": {name: as_json(value) for name, value in cell.point.items()}, "key": cell.key,
-              "fixed": list(cell.fixed), "refused": found.record(cell).refused, "messages": list(found.record(cell).messages)}
-             for cell in found.cells]  # fmt: skip
+              "fixed": list(cell.fixed), "refused": table.record(cell).refused, "messages": list(table.record(cell).messages)}
+             for cell in table.cells]  # fmt: skip
     scene = setup.scene.to_dict()
     scene.pop("ensemble", None)
-    metrics = {name: metric.to_dict() | {"unit": found.unit(name)} for name, metric in setup.metrics.items()}
-    return {"scene": scene, "ensemble": setup.members.to_dict(), "metrics": metrics, "success": found.conditions.to_dict(),
-            "baseline": found.baseline, "confidence": found.confidence, "interval": found.interval,
+    metrics = {name: metric.to_dict() | {"unit": table.unit(name)} for name, metric in setup.metrics.items()}
+    return {"scene": scene, "ensemble": setup.members.to_dict(), "metrics": metrics, "success": table.conditions.to_dict(),
+            "baseline": table.baseline, "confidence": table.confidence, "interval": table.interval,
             "settings": {name: as_json(value) for name, value in setup.settings.items()}, "cells": cells,
             "versions": machine.versions()}  # fmt: skip
 
@@ -147,11 +147,11 @@ def summary(found: SweepTable) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _causes_text(found: SweepTable, cell: Any) -> str:
+def _causes_text(table: SweepTable, cell: Any) -> str:
     """The inputs that really explain success in a cell; "" for none."""
-    if found.record(cell).refused:
+    if table.record(cell).refused:
         return ""
-    rows = [row for row in found.causes(cell.case.name, cell.point) if row["p"] < 1.0 - found.confidence]
+    rows = [row for row in table.causes(cell.case.name, cell.point) if row["p"] < 1.0 - table.confidence]
     texts = []
     for row in rows[:3]:
         medians = f"median {row['median_failed']:.4g} where it fails, {row['median_passed']:.4g} where it passes"
@@ -159,19 +159,19 @@ def _causes_text(found: SweepTable, cell: Any) -> str:
     return f"- {cell.name}: {'; '.join(texts)}" if texts else ""
 
 
-def _cell_text(found: SweepTable, cell: Any) -> str:
-    record = found.record(cell)
+def _cell_text(table: SweepTable, cell: Any) -> str:
+    record = table.record(cell)
     if record.refused:
         return f"{cell.name}: refused: {record.refused}"
-    passed = found.passed(cell)
-    value, lower, upper = found.success(cell.case.name, cell.point)
+    passed = table.passed(cell)
+    value, lower, upper = table.success(cell.case.name, cell.point)
     counts = f"{int(passed.sum()):,} of {len(passed):,}, {percent(value)} %"
     text = f"{cell.name}: passes {percent(lower)} to {percent(upper)} % ({counts})"
-    more = none_text(int(passed.sum()), len(passed), found.confidence)
+    more = none_text(int(passed.sum()), len(passed), table.confidence)
     return f"{text}; {more}" if more else text
 
 
-def _compared_text(found: SweepTable, row: PairedComparison) -> str:
+def _compared_text(table: SweepTable, row: PairedComparison) -> str:
     d, at = row.difference, ", ".join(f"{name} = {value}" for name, value in row.point.items())
     where = f" at {at}" if at else ""
     if row.of == SUCCESS:
@@ -180,5 +180,5 @@ def _compared_text(found: SweepTable, row: PairedComparison) -> str:
         seen = f"{row.only[1]:,} pass only there, {row.only[0]:,} only with {row.first}" if row.only else ""
         points = f"{percent(ends[0])} to {percent(ends[1])} points"
         return f"{row.second}{where}: {word} by {points}, seen on the same members ({seen})"
-    unit = "" if found.unit(row.of) == "1" else f" {found.unit(row.of)}"
+    unit = "" if table.unit(row.of) == "1" else f" {table.unit(row.of)}"
     return f"{row.second}{where}: {row.of} {d.value:+.4g}{unit} ({d.lower:+.4g} to {d.upper:+.4g}), from {row.values[0]:.4g}"

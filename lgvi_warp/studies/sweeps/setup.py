@@ -249,12 +249,12 @@ def _given(scene: Any, vary: Any) -> tuple[Ensemble, dict[Any, Any]]:
     return scene, {**scene.vary, **(vary or {})}
 
 
-def metrics_of(given: Any) -> dict[str, Statistic]:
+def metrics_of(entries: Any) -> dict[str, Statistic]:
     """Return metrics by name, each with the number of every member; "time_to_failure" is added."""
-    if isinstance(given, str | Mapping) or not isinstance(given, Sequence):
-        raise refusal("metrics", given, "is no list", 'give ["overshoot depth", lw.IAE("heading")]')
+    if isinstance(entries, str | Mapping) or not isinstance(entries, Sequence):
+        raise refusal("metrics", entries, "is no list", 'give ["overshoot depth", lw.IAE("heading")]')
     faults, metrics = Faults(), dict[str, Statistic]()
-    for i, entry in enumerate((*given, TimeToFailure())):
+    for i, entry in enumerate((*entries, TimeToFailure())):
         with faults.including():
             name, metric = metric_of(f"metrics[{i}]", entry)
             if name in metrics and name != END:

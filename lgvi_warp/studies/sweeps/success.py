@@ -101,30 +101,30 @@ class Success:
         return {"status": self.status[0] if len(self.status) == 1 else list(self.status), **limits}
 
 
-def success_of(given: Any, metrics: Sequence[str]) -> Success:
+def success_of(conditions: Any, metrics: Sequence[str]) -> Success:
     """Return the conditions of a table.
 
     Args:
-        given: a `Success`, or {"status": "ok", "overshoot depth": {"below": 1.0}}; None for "ok" alone.
+        conditions: a `Success`, or {"status": "ok", "overshoot depth": {"below": 1.0}}; None for "ok" alone.
         metrics: names of the sweep's metrics.
 
     Raises:
         SceneError: with every fault.
     """
-    if given is None:
+    if conditions is None:
         return Success()
-    if isinstance(given, Success):
-        given = given.to_dict()
-    if not isinstance(given, Mapping):
-        raise refusal("success", given, "is no table", 'write [success] and "overshoot depth" = { below = 1.0 } below')
+    if isinstance(conditions, Success):
+        conditions = conditions.to_dict()
+    if not isinstance(conditions, Mapping):
+        raise refusal("success", conditions, "is no table", 'write [success] and "overshoot depth" = { below = 1.0 } below')
     faults = Faults("success.")
-    words = given.get("status", OK)
+    words = conditions.get("status", OK)
     statuses = (words,) if isinstance(words, str) else tuple(words) if isinstance(words, list | tuple) else (words,)
     known = (OK, NOT_FAILED, *(status.name.lower() for status in Status if status.stopped))
     for word in statuses:
         faults.choice("status", word, known)
     limits: dict[str, tuple[float, float]] = {}
-    for name, table in given.items():
+    for name, table in conditions.items():
         if name == "status":
             continue
         if name not in metrics:

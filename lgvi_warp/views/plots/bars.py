@@ -66,17 +66,17 @@ def sensitivity(found: Indices, *, figure: Any = None, path: FilePath | None = N
     return grid.ravel()[: len(drawn)]
 
 
-def _bars(axes: Any, found: Indices, q: int, shown: np.ndarray) -> None:
+def _bars(axes: Any, indices: Indices, q: int, shown: np.ndarray) -> None:
     """Draw the bars of one quantity, the columns of a factor side by side; shown: indices of the factors."""
     places = np.arange(len(shown))
-    width = 0.8 / len(found.columns)
-    for i, column in enumerate(found.columns):
-        name = found.intervals.get(column)
-        half = getattr(found, name)[q][shown] if name else None
-        at = places + (i - 0.5 * (len(found.columns) - 1)) * width
+    width = 0.8 / len(indices.columns)
+    for i, column in enumerate(indices.columns):
+        name = indices.intervals.get(column)
+        half = getattr(indices, name)[q][shown] if name else None
+        at = places + (i - 0.5 * (len(indices.columns) - 1)) * width
         axes.barh(
             at,
-            getattr(found, column)[q][shown],
+            getattr(indices, column)[q][shown],
             width,
             xerr=half,
             label=column,
@@ -88,7 +88,7 @@ def _bars(axes: Any, found: Indices, q: int, shown: np.ndarray) -> None:
         )
     axes.axvline(0.0, color="black", linewidth=0.5)
     axes.set(
-        title=in_words(found.quantities[q]),
-        xlabel="part of the variance" if found.name.startswith("Sobol") else "effect",
+        title=in_words(indices.quantities[q]),
+        xlabel="part of the variance" if indices.name.startswith("Sobol") else "effect",
     )
     axes.grid(True, axis="x", alpha=0.3)

@@ -87,53 +87,53 @@ def drawable(result: Result) -> list[Estimate]:
     ]
 
 
-def _levels_panel(axes: Any, one: Estimate) -> None:
+def _levels_panel(axes: Any, estimate: Estimate) -> None:
     """Draw pairs of quantiles as bands about the middle one, with a colour and a hatch for each component."""
-    levels = one.coordinates["level"]
-    for c in range(min(one.value.shape[2], LINES)):
-        look, values = style(c), one.value[:, :, c]
+    levels = estimate.coordinates["level"]
+    for c in range(min(estimate.value.shape[2], LINES)):
+        look, values = style(c), estimate.value[:, :, c]
         for i in range(len(levels) // 2):
             label = band(levels[i], levels[-1 - i]) if c == 0 else None
-            axes.fill_between(one.time, values[:, i], values[:, -1 - i], facecolor=look["color"], alpha=0.15 * (i + 1),
+            axes.fill_between(estimate.time, values[:, i], values[:, -1 - i], facecolor=look["color"], alpha=0.15 * (i + 1),
                               hatch=hatch(c + i), edgecolor=look["color"], linewidth=0, label=label)  # fmt: skip
         if len(levels) % 2:
             axes.plot(
-                one.time, values[:, len(levels) // 2], label=in_words(str(one.coordinates["component"][c])), **look
+                estimate.time, values[:, len(levels) // 2], label=in_words(str(estimate.coordinates["component"][c])), **look
             )
     legend_below(axes, ncols=4)
 
 
-def _lines_panel(axes: Any, one: Estimate) -> None:
+def _lines_panel(axes: Any, estimate: Estimate) -> None:
     """Draw a line for each component, with its interval."""
-    shape = (len(one.time), -1)
-    value, lower, upper = (array.reshape(shape) for array in (one.value, one.lower, one.upper))
-    names = one.coordinates["component"] if one.coordinates["component"].size else np.array([one.name])
+    shape = (len(estimate.time), -1)
+    value, lower, upper = (array.reshape(shape) for array in (estimate.value, estimate.lower, estimate.upper))
+    names = estimate.coordinates["component"] if estimate.coordinates["component"].size else np.array([estimate.name])
     for c in range(min(value.shape[1], LINES)):
         look = style(c)
-        axes.plot(one.time, value[:, c], label=in_words(str(names[c])) if c < len(names) else None, **look)
-        axes.fill_between(one.time, lower[:, c], upper[:, c], color=look["color"], alpha=0.3, linewidth=0)
+        axes.plot(estimate.time, value[:, c], label=in_words(str(names[c])) if c < len(names) else None, **look)
+        axes.fill_between(estimate.time, lower[:, c], upper[:, c], color=look["color"], alpha=0.3, linewidth=0)
     legend_below(axes, ncols=4)
 
 
-def _extremes_panel(axes: Any, one: Estimate) -> None:
+def _extremes_panel(axes: Any, estimate: Estimate) -> None:
     """Draw a band from the smallest to the largest value of each component."""
-    for c in range(min(one.value.shape[1], LINES)):
-        color, label = COLORS[c % len(COLORS)], in_words(str(one.coordinates["component"][c]))
-        axes.fill_between(one.time, one["minimum"][:, c], one["maximum"][:, c], facecolor=color, alpha=0.3, hatch=hatch(c),
+    for c in range(min(estimate.value.shape[1], LINES)):
+        color, label = COLORS[c % len(COLORS)], in_words(str(estimate.coordinates["component"][c]))
+        axes.fill_between(estimate.time, estimate["minimum"][:, c], estimate["maximum"][:, c], facecolor=color, alpha=0.3, hatch=hatch(c),
                           edgecolor=color, linewidth=0, label=label)  # fmt: skip
     legend_below(axes, ncols=4)
 
 
-def _histogram_panel(axes: Any, one: Estimate) -> None:
+def _histogram_panel(axes: Any, estimate: Estimate) -> None:
     """Draw the fractions of the first component, bins against time; by square roots, since at the start all are in one bin."""
     from matplotlib.colors import PowerNorm
 
-    time, edge = one.time, one.coordinates["edge"]
+    time, edge = estimate.time, estimate.coordinates["edge"]
     middle = 0.5 * (time[1:] + time[:-1])
     drawn = axes.pcolormesh(
         np.concatenate([time[:1], middle, time[-1:]]),
         edge,
-        100.0 * one.value[:, 0].T,
+        100.0 * estimate.value[:, 0].T,
         cmap="cividis",
         norm=PowerNorm(0.5, vmin=0.0),
     )

@@ -65,31 +65,31 @@ def _edges(line: Line) -> np.ndarray:
     return np.exp(edges) if line.log else edges
 
 
-def _cells(axes: Any, found: StabilityMap, method: str) -> None:
+def _cells(axes: Any, stability: StabilityMap, method: str) -> None:
     """Draw the classes as colours."""
     from matplotlib.colors import ListedColormap
 
-    classes = found.classes[method]
-    x, y = _edges(found.x), _edges(found.y)
+    classes = stability.classes[method]
+    x, y = _edges(stability.x), _edges(stability.y)
     axes.pcolormesh(x, y, classes, cmap=ListedColormap(CELLS), vmin=-0.5, vmax=len(CELLS) - 0.5, shading="flat")
     silent = np.ma.masked_where(classes != len(CELLS) - 1, classes)
     if not silent.mask.all():
         axes.pcolor(x, y, silent, cmap=ListedColormap(CELLS[-1:]), hatch="xxx", edgecolor="black", linewidth=0.0)
-    axes.set_xscale("log" if found.x.log else "linear")
-    axes.set_yscale("log" if found.y.log else "linear")
+    axes.set_xscale("log" if stability.x.log else "linear")
+    axes.set_yscale("log" if stability.y.log else "linear")
 
 
-def _limits(axes: Any, found: StabilityMap, method: str) -> set[str]:
+def _limits(axes: Any, stability: StabilityMap, method: str) -> set[str]:
     """Draw where h reaches each analytic limit, black on white to be seen on every colour; return the limits drawn."""
     drawn: set[str] = set()
-    if min(len(found.x.values), len(found.y.values)) < 2:
+    if min(len(stability.x.values), len(stability.y.values)) < 2:
         return drawn
-    for name, ratios in found.ratios[method].items():
+    for name, ratios in stability.ratios[method].items():
         level = np.log(np.maximum(ratios, 1e-12))
         if level.min() < 0.0 < level.max():
             drawn.add(name)
             for color, width in (("white", 4.0), ("black", 1.7)):
-                axes.contour(found.x.values, found.y.values, level, [0.0], colors=color, linewidths=width,
+                axes.contour(stability.x.values, stability.y.values, level, [0.0], colors=color, linewidths=width,
                              linestyles="-" if color == "white" else STYLES[name])  # fmt: skip
     return drawn
 

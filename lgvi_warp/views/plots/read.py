@@ -72,22 +72,22 @@ def with_samples(result: Result) -> Result:
     )
 
 
-def selected(result: Result, most: int, fields: tuple[str, ...], what: str) -> tuple[Result, Shown, Result]:
+def selected(result: Result, most: int, fields: tuple[str, ...], picture: str) -> tuple[Result, Shown, Result]:
     """Choose the members that a picture draws, and read their samples.
 
     Returns: The result that has the samples, the choice, and the samples of those members at the times that are drawn.
     """
     result = with_samples(result)
-    check_fields(result, fields, what)
+    check_fields(result, fields, picture)
     choice = select_members(result, whole_number("most", most, 1))
     return result, choice, few(result, choice.members, fields, choice.frames)
 
 
-def check_fields(result: Result, fields: tuple[str, ...], what: str) -> None:
+def check_fields(result: Result, fields: tuple[str, ...], picture: str) -> None:
     """Refuse to draw what was not kept."""
     if missing := [name for name in fields if name not in result.samples]:
         raise NothingToDraw(
-            f"{', '.join(missing)} not kept: {what} needs {'them' if len(missing) > 1 else 'it'}; "
+            f"{', '.join(missing)} not kept: {picture} needs {'them' if len(missing) > 1 else 'it'}; "
             "name all in SaveAt(fields=...)"
         )
 

@@ -84,16 +84,16 @@ def _errors_and_costs(points: list[Measurement], of: str) -> tuple[list[float], 
     return [point.error(of) for point in points], [point.us_per_vehicle_second for point in points]
 
 
-def _words(costs: Any, biases: Any, found: Tradeoff, of: str, any_shown: bool) -> None:
+def _words(costs: Any, biases: Any, tradeoff: Tradeoff, of: str, any_shown: bool) -> None:
     """Label the axes, and say why one is empty."""
     figure = costs.figure
-    costs.set(xlabel=f"largest error of {of} [{found.units[of]}], up to {found.until:g} s",
+    costs.set(xlabel=f"largest error of {of} [{tradeoff.units[of]}], up to {tradeoff.until:g} s",
               ylabel="cost [us of a core per vehicle and second]", title="Cost of accuracy")  # fmt: skip
-    biases.set(xlabel="step [s]", ylabel=f"bias / standard error of {found.members} members",
-               title=wrapped(f"Bias of the mean of {of} up to {found.t1:g} s", figure, 0.4))  # fmt: skip
+    biases.set(xlabel="step [s]", ylabel=f"bias / standard error of {tradeoff.members} members",
+               title=wrapped(f"Bias of the mean of {of} up to {tradeoff.t1:g} s", figure, 0.4))  # fmt: skip
     for axes, drawn, reason in (
         (costs, any_shown, "no error of members: noise acts, or the reference is not good enough"),
-        (biases, any(point.biases for point in found.measurements), "no statistics: there is one member"),
+        (biases, any(point.biases for point in tradeoff.measurements), "no statistics: there is one member"),
     ):
         if drawn:
             axes.set(xscale="log", yscale="log")
@@ -104,12 +104,12 @@ def _words(costs: Any, biases: Any, found: Tradeoff, of: str, any_shown: bool) -
         axes.grid(True, alpha=0.3)
     if any_shown:
         costs.invert_xaxis()
-    if any(point.biases for point in found.measurements):
+    if any(point.biases for point in tradeoff.measurements):
         biases.axhline(CHANCE, color="black", linewidth=0.8, linestyle=":")
         biases.text(1.01, CHANCE, "chance", va="center", transform=biases.get_yaxis_transform())
-    sample = f"{found.members} members, 0 to {found.t1:g} s"
-    without = f"no reading of {', '.join(found.missing)}; " if found.missing else ""
-    figure.suptitle(wrapped(f"{without}{sample}; reference {found.reference}; better is to the right and down", figure))
+    sample = f"{tradeoff.members} members, 0 to {tradeoff.t1:g} s"
+    without = f"no reading of {', '.join(tradeoff.missing)}; " if tradeoff.missing else ""
+    figure.suptitle(wrapped(f"{without}{sample}; reference {tradeoff.reference}; better is to the right and down", figure))
 
 
 def _name(axes: Any, named: list[tuple[str, float, float, Any]]) -> None:

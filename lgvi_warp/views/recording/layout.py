@@ -104,23 +104,23 @@ def _high(fan: Fan, limits: tuple[float, float] | None) -> bool:
 
 
 def _curve(
-    origin: str, name: str, whole: Any, limits: tuple[float, float] | None, legend: bool, below: bool = False
+    origin: str, name: str, time_range: Any, limits: tuple[float, float] | None, legend: bool, below: bool = False
 ) -> Any:
     """A view of curves over the whole time, with the legend above or below them."""
     import rerun.blueprint as rrb
 
     return rrb.TimeSeriesView(
-        origin=f"/{origin}", name=name, axis_x=whole, axis_y=rrb.ScalarAxis(range=limits) if limits else None,
+        origin=f"/{origin}", name=name, axis_x=time_range, axis_y=rrb.ScalarAxis(range=limits) if limits else None,
         plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftBottom if below else rrb.Corner2D.LeftTop, visible=legend),
     )  # fmt: skip
 
 
-def _curve_of_channels(whole: Any) -> Any:
+def _curve_of_channels(time_range: Any) -> Any:
     """A view of commands, actuators and limits."""
     import rerun.blueprint as rrb
 
     return rrb.TimeSeriesView(
-        origin="/", contents=["+ /command/**", "+ /actuator/**", "+ /limit/**"], axis_x=whole,
+        origin="/", contents=["+ /command/**", "+ /actuator/**", "+ /limit/**"], axis_x=time_range,
         name="Commands (thin) and actuators, medians", plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
     )  # fmt: skip
 

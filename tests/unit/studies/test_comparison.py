@@ -177,7 +177,7 @@ def test_draws_that_the_scene_fixes(scene):
     assert words in str(caught.value)
     own = lw.Ensemble(dataclasses.replace(scene, terms=[dataclasses.replace(CURRENT, noise_step=0.1)]), 2)
     assert comparison.drawn_every(own, 0.05).scene.terms[0].noise_step == 0.1
-    assert comparison.drawn_every(own, 0.05, own=False).scene.terms[0].noise_step == 0.05
+    assert comparison.drawn_every(own, 0.05, own_grid=False).scene.terms[0].noise_step == 0.05
     assert own.scene.terms[0].noise_step == 0.1
 
 

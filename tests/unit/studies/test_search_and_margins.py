@@ -337,7 +337,7 @@ def test_edges_are_found_from_any_guess(guess):
     assert inner[2] == pytest.approx(40.0)
     assert inner[3] / outer[3] < np.exp(1.0011e-3)
     whole = edges(
-        lambda values, members: values <= 7.0, np.zeros(2), np.array([100.0, 5.0]), np.full(2, guess), 1.0, whole=True
+        lambda values, members: values <= 7.0, np.zeros(2), np.array([100.0, 5.0]), np.full(2, guess), 1.0, to_the_end=True
     )
     assert whole.tolist() == [[7.0, 8.0], [5.0, np.inf]]
     nobody = edges(holds, np.full(4, np.nan), last, np.full(4, guess), 1e-3)

@@ -473,7 +473,7 @@ def test_columns_hold_both_times_in_whole_steps():
     least = column(1.0, np.arange(1), 1.0, 1.0, 16)
     assert least.error_steps.tolist() == [0, 2, 4, 6, 8, 10, 12, 14, 16]
     assert least.steps.tolist() == list(range(17))
-    finer, whole = one.grid(4, whole=False), one.grid()
+    finer, whole = one.grid(4, to_the_end=False), one.grid()
     assert finer.h == 0.025
     assert finer.steps == 40
     assert finer.times == pytest.approx(0.1 * one.error_steps)

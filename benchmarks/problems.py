@@ -176,7 +176,7 @@ def all_terms(noise=True):
 
 def each_term():
     """Name -> the scene with that term alone; "none" has weight, buoyancy and restoring moment, as all have."""
-    box = lw.Box(lower=[-1e4] * 3, upper=[1e4] * 3)
+    box = lw.events.Box(lower=[-1e4] * 3, upper=[1e4] * 3)
     alone = {make.__name__: scene(make()) for make in ALL}
     first = {"none": scene(), "drag": scene(drag()), "quadratic drag": scene(drag(quadratic_only=True))}
     return first | alone | {"events: box": scene(events=[box])}

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The documentation site: `make docs` builds it, without network, from the Markdown pages and the docstrings."""
 
+import inspect
 import re
 import sys
 from pathlib import Path
@@ -38,6 +39,7 @@ nb_merge_streams = True
 highlight_language = "none"
 smartquotes = False
 
+DOORS = "|".join(name for name in lw.__all__ if inspect.ismodule(getattr(lw, name)))
 # Page -> the pages below it: Markdown pages have no table of contents of their own.
 BELOW = {
     "guide/terms/README": [f"/guide/terms/{page.stem}" for page in sorted(DOCS.glob("guide/terms/[a-z]*.md"))],
@@ -67,7 +69,7 @@ def shorten(
 def link_public_names(app: Sphinx, tree: nodes.document) -> None:
     """Let each `lw.Name` of the text lead to its entry in the reference."""
     for literal in list(tree.findall(nodes.literal)):
-        found = re.match(r"lw\.((?:(?:uq|gym|notation)\.)?\w+)", literal.astext())
+        found = re.match(rf"lw\.((?:(?:{DOORS})\.)?\w+)", literal.astext())
         if found and not isinstance(literal.parent, nodes.reference | nodes.title | addnodes.pending_xref):
             target = {"refdomain": "py", "reftype": "obj", "reftarget": f"lgvi_warp.{found[1]}"}
             link = addnodes.pending_xref("", refdoc=app.env.docname, refexplicit=True, **target)

@@ -26,8 +26,8 @@ fleet = lw.Ensemble(
     members=1000,
     seed=1,
     vary={
-        "vehicle.mass": lw.TruncatedNormal(relative=0.001),
-        "start.angular_velocity": lw.Normal(std=[0.01, 0.01, 0.02]),
+        "vehicle.mass": lw.distributions.TruncatedNormal(relative=0.001),
+        "start.angular_velocity": lw.distributions.Normal(std=[0.01, 0.01, 0.02]),
     },
 )
 
@@ -36,4 +36,4 @@ if __name__ == "__main__":
     depth = result.position[-1, :, 2]
     print(result.status.counts())
     print(f"depth after 60 s: {depth.mean():.2f} m on average, from {depth.min():.2f} to {depth.max():.2f} m")
-    print(lw.plot(result, "01_first_dive.png"), lw.record(result, "01_first_dive.rrd"))
+    print(lw.plots.plot(result, "01_first_dive.png"), lw.record(result, "01_first_dive.rrd"))

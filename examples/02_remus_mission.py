@@ -13,22 +13,22 @@ POINTS = np.array([[0.0, 0.0, 5.0], [200.0, 0.0, 5.0], [200.0, 60.0, 15.0], [0.0
 
 controller = lw.Controller(
     period=0.1,  # s between ticks
-    guidance=[lw.Waypoints(points=POINTS, speed=1.54, look_ahead=20.0, radius=12.0, method="ilos", kappa=0.8)],
+    guidance=[lw.control.Waypoints(points=POINTS, speed=1.54, look_ahead=20.0, radius=12.0, method="ilos", kappa=0.8)],
     laws=[
-        lw.DepthPID(kp=0.15, ki=0.002, pitch_limit=0.35, kp_pitch=2.0, ki_pitch=0.2, kd_pitch=1.5),
-        lw.HeadingPID(kp=1.0, ki=0.02, kd=2.0),
+        lw.control.DepthPID(kp=0.15, ki=0.002, pitch_limit=0.35, kp_pitch=2.0, ki_pitch=0.2, kd_pitch=1.5),
+        lw.control.HeadingPID(kp=1.0, ki=0.02, kd=2.0),
     ],
     # The gains are radians of a fin for each radian of error: rows rudder and stern planes, columns X Y Z K M N.
-    allocation=[lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])],
+    allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])],
 )
 scene = lw.Scene.named(
     "remus_100",
     vehicle={"buoyancy": 300.0},  # N: one newton more than the weight
-    terms=[lw.Current(velocity=[0.0, 0.3, 0.0])],  # m/s
+    terms=[lw.terms.Current(velocity=[0.0, 0.3, 0.0])],  # m/s
     start={"position": POINTS[0], "velocity": [1.54, 0.0, 0.0]},
     controller=controller,
 )
-fleet = lw.Ensemble(scene, members=200, seed=1, vary={"current.velocity": lw.Normal(std=[0.1, 0.1, 0.0])})
+fleet = lw.Ensemble(scene, members=200, seed=1, vary={"current.velocity": lw.distributions.Normal(std=[0.1, 0.1, 0.0])})
 
 
 def off_track(position):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Your own force, in one file: a dock that draws vehicles in.
 
-The function runs in the kernel, for all vehicles of a packet at once. `lw.check_law` compares it with its potential first.
+The function runs in the kernel, for all vehicles of a packet at once. `lw.laws.check_law` compares it with its potential first.
 """
 
 from dataclasses import dataclass
@@ -32,15 +32,15 @@ class DockOnDevice:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Dock(lw.Term):
+class Dock(lw.laws.Term):
     """A dock that draws the nose in, out to a few times its reach."""
 
     type: ClassVar[str] = "dock"
     device: ClassVar[Any] = DockOnDevice
-    place: Any = lw.number((3,), "m")
-    nose: Any = lw.number((3,), "m", axes="point")
-    energy: Any = lw.number((), "J", least=0.0)
-    inverse_square: Any = lw.number((), "1/m2", least=0.0)  # 1 / reach^2
+    place: Any = lw.laws.number((3,), "m")
+    nose: Any = lw.laws.number((3,), "m", axes="point")
+    energy: Any = lw.laws.number((), "J", least=0.0)
+    inverse_square: Any = lw.laws.number((), "1/m2", least=0.0)  # 1 / reach^2
 
     def potential(self, numbers, position, attitude, parameters):
         """U [J]."""
@@ -50,7 +50,7 @@ class Dock(lw.Term):
 
 PLACE, NOSE = np.array([8.0, 0.0, 20.0]), np.array([0.6, 0.0, 0.0])  # m
 dock = Dock(place=PLACE, nose=NOSE, energy=40.0, inverse_square=1.0 / 16.0)
-drag = lw.Drag(linear=[2.0, 20.0, 20.0, 0.5, 5.0, 5.0], quadratic=[4.0, 100.0, 100.0, 0.0, 20.0, 20.0])
+drag = lw.terms.Drag(linear=[2.0, 20.0, 20.0, 0.5, 5.0, 5.0], quadratic=[4.0, 100.0, 100.0, 0.0, 20.0, 20.0])
 body = {"mass": 31.0, "inertia": [0.2, 8.0, 8.0], "added_mass": [1.0, 30.0, 30.0]}  # kg, kg m2, kg
 vehicle = lw.Vehicle(**body, buoyancy=304.0, center_of_buoyancy=[0.0, 0.0, -0.02])  # N, m
 start = lw.Start(position=[0.0, -1.0, 17.0], velocity=[0.6, 0.0, 0.0])
@@ -64,15 +64,15 @@ def distance(samples, members=None):
 def solve(terms):
     """Run 500 vehicles with these terms."""
     scene = lw.Scene(vehicle=vehicle, environment=lw.Environment(gravity=9.8), start=start, terms=terms)
-    fleet = lw.Ensemble(scene, 500, seed=2, vary={"start.position": lw.Normal(std=[0.5, 1.5, 1.5])})
+    fleet = lw.Ensemble(scene, 500, seed=2, vary={"start.position": lw.distributions.Normal(std=[0.5, 1.5, 1.5])})
     return lw.solve(fleet, h=0.02, t1=60.0, save=lw.SaveAt(every=0.25))
 
 
 if __name__ == "__main__":
-    print(lw.check_law(dock))
+    print(lw.laws.check_law(dock))
     results = {"drag": solve([drag]), "drag and dock": solve([drag, dock])}
     for label, result in results.items():
         near = np.mean(distance(result.samples)[-1] < 1.0)
         print(f"{label}: {near:.0%} of the noses within 1 m of the dock after 60 s")
-    lw.plots.compare(results, lw.Quantity("distance to the dock", distance, "m"), path="03_your_own_force.png")
+    lw.plots.compare(results, lw.statistics.Quantity("distance to the dock", distance, "m"), path="03_your_own_force.png")
     print("03_your_own_force.png")

@@ -13,9 +13,9 @@ import lgvi_warp as lw
 ANCHOR, STIFFNESS, LENGTH = np.array([0.0, 0.0, 20.0]), 40.0, 9.5  # m, N/m, m
 FOOT = np.array([0.0, 0.0, 0.5])  # m: where the mooring holds a buoy
 
-waves = lw.Waves(amplitudes=[0.9, 0.5, 0.3], periods=[9.0, 7.0, 5.5], headings_deg=[0.0, 25.0, -20.0])
-tether = lw.Tether(anchor=ANCHOR, stiffness=STIFFNESS, attachment=FOOT, rest_length=LENGTH)
-drag = lw.Drag(linear=[5.0, 5.0, 5.0, 2.0, 2.0, 2.0], quadratic=[60.0, 60.0, 60.0, 5.0, 5.0, 5.0])
+waves = lw.terms.Waves(amplitudes=[0.9, 0.5, 0.3], periods=[9.0, 7.0, 5.5], headings_deg=[0.0, 25.0, -20.0])
+tether = lw.terms.Tether(anchor=ANCHOR, stiffness=STIFFNESS, attachment=FOOT, rest_length=LENGTH)
+drag = lw.terms.Drag(linear=[5.0, 5.0, 5.0, 2.0, 2.0, 2.0], quadratic=[60.0, 60.0, 60.0, 5.0, 5.0, 5.0])
 buoy = lw.Vehicle(
     mass=60.0,  # kg
     added_mass=[30.0, 30.0, 30.0],  # kg
@@ -28,7 +28,7 @@ fleet = lw.Ensemble(
     lw.Scene(buoy, start=start, terms=[waves, tether, drag]),
     members=300,
     seed=1,
-    vary={"waves.phases": lw.Uniform(low=0.0, high=2.0 * np.pi)},
+    vary={"waves.phases": lw.distributions.Uniform(low=0.0, high=2.0 * np.pi)},
 )
 
 
@@ -47,6 +47,6 @@ if __name__ == "__main__":
     figure = Figure(figsize=(12.0, 5.5), layout="constrained")
     left, right = figure.subplots(1, 2)
     lw.plots.phase(result, ("position[0]", "depth"), ax=left)
-    lw.plots.fan(result, lw.Quantity("pull of the mooring", pull, "N"), ax=right)
+    lw.plots.fan(result, lw.statistics.Quantity("pull of the mooring", pull, "N"), ax=right)
     figure.savefig("04_waves_and_a_tether.png", dpi=100)
     print("04_waves_and_a_tether.png")

@@ -10,17 +10,17 @@ import lgvi_warp as lw
 scene = lw.Scene.named(
     "torpedo",
     terms=[
-        lw.GaussMarkovCurrent(standard_deviation=[0.1, 0.1, 0.02], time_constant=60.0, start="stationary"),
-        lw.WrenchNoise(force=[0.5, 0.5, 0.5], torque=[0.01, 0.01, 0.01]),
+        lw.terms.GaussMarkovCurrent(standard_deviation=[0.1, 0.1, 0.02], time_constant=60.0, start="stationary"),
+        lw.terms.WrenchNoise(force=[0.5, 0.5, 0.5], torque=[0.01, 0.01, 0.01]),
     ],
     start={"position": [0.0, 0.0, 30.0], "velocity": [1.0, 0.0, 0.0]},
 )
 fleet = lw.Ensemble(scene, members=4000, seed=1)
 statistics = [
-    lw.Mean("position"),
-    lw.Quantiles("position[1]", (0.05, 0.25, 0.5, 0.75, 0.95)),
-    lw.Histogram("depth", bins=30, limits=(20.0, 40.0)),
-    lw.Exceedance("depth", above=32.0),
+    lw.statistics.Mean("position"),
+    lw.statistics.Quantiles("position[1]", (0.05, 0.25, 0.5, 0.75, 0.95)),
+    lw.statistics.Histogram("depth", bins=30, limits=(20.0, 40.0)),
+    lw.statistics.Exceedance("depth", above=32.0),
 ]
 
 if __name__ == "__main__":

@@ -10,14 +10,14 @@ import lgvi_warp as lw
 scene = lw.Scene.named(
     "remus_100",
     vehicle={"buoyancy": 299.0},  # N: as heavy as the vehicle
-    terms=[lw.Current(velocity=[0.0, 0.2, 0.0])],  # m/s
+    terms=[lw.terms.Current(velocity=[0.0, 0.2, 0.0])],  # m/s
     start={"position": [0.0, 0.0, 30.0], "velocity": [1.5, 0.0, 0.0]},
 )
 vary = {
-    "vehicle.buoyancy": lw.Normal(std=0.5),  # N
-    "wrench.force": lw.Normal(std=[0.1, 0.0, 0.0]),  # N: thrust
-    "current.velocity": lw.Normal(std=[0.05, 0.05, 0.0]),  # m/s
-    "start.velocity": lw.Normal(std=[0.1, 0.0, 0.0]),  # m/s
+    "vehicle.buoyancy": lw.distributions.Normal(std=0.5),  # N
+    "wrench.force": lw.distributions.Normal(std=[0.1, 0.0, 0.0]),  # N: thrust
+    "current.velocity": lw.distributions.Normal(std=[0.05, 0.05, 0.0]),  # m/s
+    "start.velocity": lw.distributions.Normal(std=[0.1, 0.0, 0.0]),  # m/s
 }
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ The front names what is cheapest; `lw.suggest` takes one setting from such measu
 import lgvi_warp as lw
 
 scene = lw.Scene.named("torpedo", start={"position": [0.0, 0.0, 50.0], "velocity": [1.5, 0.0, 0.0]})
-fleet = lw.Ensemble(scene, members=64, seed=1, vary={"start.angular_velocity": lw.Normal(std=0.1)})
+fleet = lw.Ensemble(scene, members=64, seed=1, vary={"start.angular_velocity": lw.distributions.Normal(std=0.1)})
 
 if __name__ == "__main__":
     found = lw.tradeoff(

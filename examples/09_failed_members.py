@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 import lgvi_warp as lw
 
 scene = lw.Scene.load(Path(__file__).parent / "paper.toml")
-fleet = lw.Ensemble(scene, members=400, seed=1, vary={"start.angular_velocity": lw.Normal(std=2.0)})
+fleet = lw.Ensemble(scene, members=400, seed=1, vary={"start.angular_velocity": lw.distributions.Normal(std=2.0)})
 
 
 def plot(rates, failed, path):

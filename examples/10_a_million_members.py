@@ -11,12 +11,12 @@ from pathlib import Path
 import lgvi_warp as lw
 
 scene = lw.Scene.load(Path(__file__).parent / "paper.toml")
-vary = {"start.angular_velocity": lw.Normal(std=0.03), "vehicle.mass": lw.TruncatedNormal(relative=0.001)}
+vary = {"start.angular_velocity": lw.distributions.Normal(std=0.03), "vehicle.mass": lw.distributions.TruncatedNormal(relative=0.001)}
 fleet = lw.Ensemble(scene, members=1_000_000, seed=1, vary=vary)
 statistics = [
-    lw.Mean("position"),
-    lw.Quantiles("depth", (0.001, 0.05, 0.5, 0.95, 0.999)),
-    lw.Histogram("speed", bins=40, limits=(0.6, 1.1)),
+    lw.statistics.Mean("position"),
+    lw.statistics.Quantiles("depth", (0.001, 0.05, 0.5, 0.95, 0.999)),
+    lw.statistics.Histogram("speed", bins=40, limits=(0.6, 1.1)),
 ]
 save = lw.SaveAt(every=0.5)
 

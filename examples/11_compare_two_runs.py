@@ -11,22 +11,22 @@ import lgvi_warp as lw
 
 WANTED = 10.0  # m
 GAINS = {"proportional": 0.0, "with an integral": 0.002}  # ki of the depth, 1/(m s)
-vary = {"vehicle.buoyancy": lw.Uniform(low=299.0, high=308.0), "waves.phases": lw.Uniform(low=0.0, high=2.0 * np.pi)}
+vary = {"vehicle.buoyancy": lw.distributions.Uniform(low=299.0, high=308.0), "waves.phases": lw.distributions.Uniform(low=0.0, high=2.0 * np.pi)}
 
 
 def fleet(ki):
     """Vehicles whose law of depth has this gain of its integral."""
     controller = lw.Controller(
         period=0.1,  # s between ticks
-        guidance=[lw.SetPoint(depth=WANTED, heading=0.0)],
+        guidance=[lw.control.SetPoint(depth=WANTED, heading=0.0)],
         laws=[
-            lw.DepthPID(kp=0.05, ki=ki, pitch_limit=0.35, kp_pitch=2.0, ki_pitch=0.0, kd_pitch=1.5),
-            lw.HeadingPID(kp=1.0, ki=0.02, kd=2.0),
+            lw.control.DepthPID(kp=0.05, ki=ki, pitch_limit=0.35, kp_pitch=2.0, ki_pitch=0.0, kd_pitch=1.5),
+            lw.control.HeadingPID(kp=1.0, ki=0.02, kd=2.0),
         ],
         # The gains are radians of a fin for each radian of error: rows rudder and stern planes, columns X Y Z K M N.
-        allocation=[lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])],
+        allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])],
     )
-    waves = lw.Waves(amplitudes=[0.3, 0.2], periods=[8.0, 6.0], headings_deg=[180.0, 150.0])
+    waves = lw.terms.Waves(amplitudes=[0.3, 0.2], periods=[8.0, 6.0], headings_deg=[180.0, 150.0])
     start = {"position": [0.0, 0.0, 5.0], "velocity": [1.54, 0.0, 0.0]}
     scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 303.0}, terms=[waves], start=start, controller=controller)
     return lw.Ensemble(scene, members=300, seed=3, vary=vary)

@@ -25,7 +25,7 @@ scene = lw.Scene(
     lw.Vehicle(MASS, inertia=INERTIA, added_mass=ADDED, buoyancy=BUOYANCY, center_of_buoyancy=CENTER),
     environment=lw.Environment(gravity=GRAVITY),
     start=lw.Start(**START),
-    terms=[lw.Drag(linear=LINEAR, quadratic=QUADRATIC)],
+    terms=[lw.terms.Drag(linear=LINEAR, quadratic=QUADRATIC)],
 )
 
 

@@ -36,7 +36,7 @@ DESIGNS = (
 
 
 def quantity(d=1):
-    return lw.Quantity("x", lambda samples, members: None, "1", (), tuple(f"x[{i}]" for i in range(d)))
+    return lw.statistics.Quantity("x", lambda samples, members: None, "1", (), tuple(f"x[{i}]" for i in range(d)))
 
 
 def parts(statistic, blocks, replicates=1):
@@ -78,7 +78,7 @@ def passages(repetitions, members, loss):
     rng, times, good = np.random.default_rng(3), np.arange(8.0), []
     for _ in range(repetitions):
         passage, lost = rng.exponential(5.0, members), rng.exponential(loss, members)
-        statistic = lw.FirstPassage(quantity(), above=0.5)
+        statistic = lw.statistics.FirstPassage(quantity(), above=0.5)
         gathers = statistic.open(times, members)
         x = (passage <= times[:, None]).astype(float)[:, None]
         gathers.take(Values(x, lost > times[:, None]), slice(0, len(times)))
@@ -93,7 +93,7 @@ def attitudes(repetitions, members, at_once=500):
     for first in range(0, repetitions, at_once):
         shape = (min(at_once, repetitions - first), members, 3)
         R = matrix_from_rotation_vector(rng.normal(size=shape) * [0.2, 0.5, 0.3])
-        found = last(lw.MeanAttitude(), R.reshape(*shape[:2], 9))
+        found = last(lw.statistics.MeanAttitude(), R.reshape(*shape[:2], 9))
         X = found.value
         turn = 0.5 * np.stack([X[:, 2, 1] - X[:, 1, 2], X[:, 0, 2] - X[:, 2, 0], X[:, 1, 0] - X[:, 0, 1]], axis=1)
         good.append(np.abs(turn) <= found["rotation_half_width"])
@@ -107,21 +107,21 @@ def kinds(repetitions, members):
     b = 0.6 * a + 0.8 * rng.normal(size=a.shape)
     x, heavy = quantity(), np.exp(a)
     levels = (0.1, 0.5, 0.9)
-    cov = last(lw.Covariance(quantity(2)), np.concatenate([a, b], axis=2))
+    cov = last(lw.statistics.Covariance(quantity(2)), np.concatenate([a, b], axis=2))
     inside = (cov.lower <= (truth := np.array([[1.0, 0.6], [0.6, 1.0]]))) & (truth <= cov.upper)
-    yield "mean, normal", held(last(lw.Mean(x), a), 0.0)
-    yield "mean, lognormal", held(last(lw.Mean(x), heavy), np.exp(0.5))
+    yield "mean, normal", held(last(lw.statistics.Mean(x), a), 0.0)
+    yield "mean, lognormal", held(last(lw.statistics.Mean(x), heavy), np.exp(0.5))
     yield "variance, normal", float(inside[:, [0, 1], [0, 1]].mean())
     yield "covariance, normal, correlated by 0.6", float(inside[:, 0, 1].mean())
-    yield "variance, lognormal", held(last(lw.Covariance(x), heavy), (np.e - 1.0) * np.e)
-    yield "quantiles 0.1, 0.5, 0.9", held(last(lw.Quantiles(x, levels), a), ndtri(np.array(levels))[:, None])
+    yield "variance, lognormal", held(last(lw.statistics.Covariance(x), heavy), (np.e - 1.0) * np.e)
+    yield "quantiles 0.1, 0.5, 0.9", held(last(lw.statistics.Quantiles(x, levels), a), ndtri(np.array(levels))[:, None])
     yield (
         "the same from a sketch of 64",
-        held(last(lw.Quantiles(x, levels, size=64), a), ndtri(np.array(levels))[:, None]),
+        held(last(lw.statistics.Quantiles(x, levels, size=64), a), ndtri(np.array(levels))[:, None]),
     )
-    yield "probability of 0.16", held(last(lw.Exceedance(x, above=1.0), a), ndtr(-1.0))
-    yield "probability of 0.01", held(last(lw.Exceedance(x, above=2.3263), a), ndtr(-2.3263))
-    circle = last(lw.CircularMean(x), rng.vonmises(1.0, 2.0, size=a.shape))
+    yield "probability of 0.16", held(last(lw.statistics.Exceedance(x, above=1.0), a), ndtr(-1.0))
+    yield "probability of 0.01", held(last(lw.statistics.Exceedance(x, above=2.3263), a), ndtr(-2.3263))
+    circle = last(lw.statistics.CircularMean(x), rng.vonmises(1.0, 2.0, size=a.shape))
     yield "circular mean", held_on_circle(circle, 1.0)
     yield "resultant length", held(circle, ive(1, 2.0) / ive(0, 2.0), "resultant_length_")
     yield "mean attitude", attitudes(repetitions, members)
@@ -131,7 +131,7 @@ def kinds(repetitions, members):
 
 def stopped(repetitions, until, blocks, truth, replicates=1):
     """Coverage of a mean where each repetition stops by itself, and the members it took on average."""
-    statistic = lw.Mean(quantity())
+    statistic = lw.statistics.Mean(quantity())
     watch = Watch(until, statistic, statistic.key, {}, np.zeros(1, int), doubling=replicates > 1)
     good, members = np.zeros(repetitions, bool), np.zeros(repetitions)
     for i, tree in enumerate(parts(statistic, blocks, replicates), 1):
@@ -180,13 +180,13 @@ def judged(xy, replicates):
     c, levels = A @ A[::-1], np.array([0.1, 0.5, 0.9])
     angles = (1.0 + 0.8 * x + np.pi) % (2.0 * np.pi) - np.pi
     cases = [
-        ("mean of a linear function", lw.Mean(quantity()), x, 0.0),
-        ("mean, lognormal", lw.Mean(quantity()), np.exp(x), np.exp(0.5)),
-        ("covariance", lw.Covariance(quantity(2)), xy, np.array([[1.0, c], [c, 1.0]])),
-        ("quantiles 0.1, 0.5, 0.9", lw.Quantiles(quantity(), levels), x, ndtri(levels)[:, None]),
-        ("probability of 0.16", lw.Exceedance(quantity(), above=1.0), x, ndtr(-1.0)),
-        ("probability of 0.01", lw.Exceedance(quantity(), above=2.3263), x, ndtr(-2.3263)),
-        ("circular mean", lw.CircularMean(quantity()), angles, 1.0),
+        ("mean of a linear function", lw.statistics.Mean(quantity()), x, 0.0),
+        ("mean, lognormal", lw.statistics.Mean(quantity()), np.exp(x), np.exp(0.5)),
+        ("covariance", lw.statistics.Covariance(quantity(2)), xy, np.array([[1.0, c], [c, 1.0]])),
+        ("quantiles 0.1, 0.5, 0.9", lw.statistics.Quantiles(quantity(), levels), x, ndtri(levels)[:, None]),
+        ("probability of 0.16", lw.statistics.Exceedance(quantity(), above=1.0), x, ndtr(-1.0)),
+        ("probability of 0.01", lw.statistics.Exceedance(quantity(), above=2.3263), x, ndtr(-2.3263)),
+        ("circular mean", lw.statistics.CircularMean(quantity()), angles, 1.0),
     ]
     for name, statistic, values, truth in cases:
         found = last(statistic, values, replicates)

@@ -14,7 +14,7 @@ from benchmarks.fronts_picture import SUBJECTS, draw, picture_of, rows_of
 from benchmarks.pages import ROOT, markdown, stamp
 
 DECADES = range(-1, -13, -1)
-SPREAD = {"start.angular_velocity": lw.Normal(relative=0.1)}
+SPREAD = {"start.angular_velocity": lw.distributions.Normal(relative=0.1)}
 # At most seven, that a picture stays readable and a machine measures them in minutes.
 METHODS = {
     "conservative": ("psi_x", "psi_s", "bm4(psi_x)", "kl8(psi_x)", "rkn6_14", "rk4", "rk8"),

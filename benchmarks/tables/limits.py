@@ -84,7 +84,7 @@ def drag(method, numbers, _):
     """Linear drag of a body of mass 1 that moves straight: whether its speed stays below the start's."""
     n = len(numbers)
     vehicle = lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0), added_mass=None, buoyancy=0.0)
-    scene = lw.Scene(vehicle, lw.Environment(gravity=0.0), terms=[lw.Drag(linear=[1.0, 0, 0, 0, 0, 0])])
+    scene = lw.Scene(vehicle, lw.Environment(gravity=0.0), terms=[lw.terms.Drag(linear=[1.0, 0, 0, 0, 0, 0])])
     linear = np.outer(numbers, np.eye(6)[0])
     velocity = np.tile([1.0, 0.0, 0.0], (n, 1))
     fleet = lw.Ensemble.from_states(scene, still(n), tilted(n, 0, 0.0), velocity, still(n), {"drag.linear": linear})

@@ -20,10 +20,10 @@ SAMPLINGS: dict[str, Any] = {
     "halton": "halton",
 }
 VARY = {
-    "vehicle.mass": lw.Normal(relative=0.001),
-    "vehicle.inertia": lw.PhysicalInertia(sigma=0.05),
-    "vehicle.center_of_buoyancy": lw.Normal(std=0.001),
-    "start.angular_velocity": lw.Normal(std=(0.03, 0.02, 0.01)),
+    "vehicle.mass": lw.distributions.Normal(relative=0.001),
+    "vehicle.inertia": lw.distributions.PhysicalInertia(sigma=0.05),
+    "vehicle.center_of_buoyancy": lw.distributions.Normal(std=0.001),
+    "start.angular_velocity": lw.distributions.Normal(std=(0.03, 0.02, 0.01)),
 }
 MEMBERS = (256, 1024, 4096)
 T1 = 10.0

@@ -14,8 +14,15 @@ from lgvi_warp.sampling.designs.base import Sampling
 from lgvi_warp.sampling.distributions.basic import Distribution
 from lgvi_warp.statistics.base import Statistic
 
+# Classes of all doors.
+PUBLIC = {
+    thing
+    for door in (lw, *(getattr(lw, name) for name in lw.__all__ if inspect.ismodule(getattr(lw, name))))
+    for thing in (getattr(door, name) for name in door.__all__)
+    if inspect.isclass(thing)
+}
 # Users give the parameters of what scene files name by type, and call no methods of it.
-NAMED_IN_FILES = (lw.Term, Distribution, Sampling, Statistic)
+NAMED_IN_FILES = (lw.laws.Term, Distribution, Sampling, Statistic)
 SECTION = r"^(Args|Attributes|Returns|Yields|Raises|Examples):\n((?:    .*(?:\n|\Z)|\n)+)"
 # A line that begins an item of a list, or any space.
 SPACE = re.compile(r"\n\s*(\* )|\s+")
@@ -98,7 +105,7 @@ def methods(kind: type) -> list[str]:
     """Public methods and properties of a class that a user may call, but for those that a public base of it documents."""
     if issubclass(kind, NAMED_IN_FILES) and (getattr(kind, "type", "") or getattr(kind, "kind", "")):
         return []
-    public = [base for base in kind.__mro__[1:] if getattr(lw, base.__name__, None) is base or not _of_package(base)]
+    public = [base for base in kind.__mro__[1:] if base in PUBLIC or not _of_package(base)]
     hidden = {*fields_of(kind), *getattr(kind, "_fields", ()), *(name for base in public for name in vars(base))}
     own = [base for base in kind.__mro__ if base not in public]
     found = {name: member for owner in own for name, member in vars(owner).items() if name not in hidden}

@@ -42,10 +42,10 @@ def record(path: Path) -> np.ndarray:
         "remus_100",
         vehicle={"buoyancy": 285.0},  # N: 14 N less than the weight
         start={"position": [0.0, 0.0, 5.0], "velocity": [1.5, 0.0, 0.0]},
-        terms=[lw.Current(velocity=[0.0, 0.2, 0.0])],
-        events=[lw.Floor(depth=20.0)],
+        terms=[lw.terms.Current(velocity=[0.0, 0.2, 0.0])],
+        events=[lw.events.Floor(depth=20.0)],
     )
-    vary = {"vehicle.buoyancy": lw.Normal(std=1.0), "current.velocity": lw.Normal(std=[0.05, 0.05, 0.0])}
+    vary = {"vehicle.buoyancy": lw.distributions.Normal(std=1.0), "current.velocity": lw.distributions.Normal(std=[0.05, 0.05, 0.0])}
     result = lw.solve(lw.Ensemble(scene, 300, seed=1, vary=vary), h=0.02, t1=110.0, save=lw.SaveAt(every=1.0))
     lw.record(result, path)
     return np.asarray(result.time)

@@ -3,6 +3,7 @@
 
 import argparse
 import inspect
+import operator
 import os
 import re
 import textwrap
@@ -21,7 +22,7 @@ from lgvi_warp.physics.terms.base import word_of
 from lgvi_warp.sampling.designs import KINDS as SAMPLINGS
 from lgvi_warp.sampling.distributions.named import KINDS as DISTRIBUTIONS
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
-from lgvi_warp.statistics import TYPES as STATISTICS
+from lgvi_warp.statistics.base import TYPES as STATISTICS
 
 from . import documented
 
@@ -65,16 +66,17 @@ def write(folder: Path) -> None:
 def groups() -> dict[str, list[str]]:
     """Heading -> public names of each table of docs/reference/api.md; a table of terms stands for their classes."""
     found: dict[str, list[str]] = {}
-    page = (DOCS / "reference" / "api.md").read_text().partition("## Old names")[0]
+    page = (DOCS / "reference" / "api.md").read_text()
     for heading, text in re.findall(r"^## (.*)\n([^#]*)", page, re.MULTILINE):
         title = heading.partition(" (")[0]
-        found[title] = re.findall(r"^\| `lw\.(\w+)` \|", text, re.MULTILINE) or sorted(terms_of_the_package())
+        names = re.findall(r"^\| `lw\.([\w.]+)` \|", text, re.MULTILINE)
+        found[title] = terms_of_the_package() if title.startswith("Terms") else names
     return found
 
 
 def terms_of_the_package() -> list[str]:
     """Public names of the terms that scene files know."""
-    return [kind.__name__ for kind in terms.TYPES.values() if getattr(lw, kind.__name__, None) is kind]
+    return sorted(f"terms.{kind.__name__}" for kind in terms.TYPES.values() if kind.__name__ in lw.terms.__all__)
 
 
 def slug(title: str) -> str:
@@ -89,7 +91,7 @@ def names_page(title: str, names: list[str]) -> str:
 
 def _entry(name: str) -> Iterator[str]:
     """The directives that document a public name, or what a public module holds."""
-    subject = getattr(lw, name)
+    subject = operator.attrgetter(name)(lw)
     if inspect.ismodule(subject):
         yield from (heading(f"lw.{name}", "-"), escaped(documented.first_line(subject)), "")
         for inner in in_module(subject):
@@ -99,12 +101,8 @@ def _entry(name: str) -> Iterator[str]:
 
 
 def in_module(module: Any) -> list[str]:
-    """Public functions and classes of a module that are not public names of the package as well."""
-    if module is lw.gym:
-        return ["VectorEnv"]  # made when it is used first
-    of_module = [name for name, value in vars(module).items() if getattr(value, "__module__", "") == module.__name__]
-    names = [name for name in vars(module).get("__all__", of_module) if callable(getattr(module, name))]
-    return sorted(name for name in names if not name.startswith("_") and name not in lw.__all__)
+    """Public functions and classes of a door."""
+    return [name for name in module.__all__ if callable(getattr(module, name))]
 
 
 def _directive(path: str, subject: Any) -> Iterator[str]:
@@ -209,8 +207,9 @@ def indented(text: str) -> str:
 
 def linked(note: str) -> str:
     """Types and defaults with links to the public names among them."""
-    names = "|".join(sorted(lw.__all__, key=len, reverse=True))
+    paths = {path.rpartition(".")[2]: path for names in groups().values() for path in names}
+    names = "|".join(sorted(paths, key=len, reverse=True))
     parts = re.split(rf"(?<![\w.'\"])({names})(?![\w'\"])", note)
     return "".join(
-        f"\\ :py:obj:`{part} <lgvi_warp.{part}>`\\ " if place % 2 else escaped(part) for place, part in enumerate(parts)
+        f"\\ :py:obj:`{part} <lgvi_warp.{paths[part]}>`\\ " if place % 2 else escaped(part) for place, part in enumerate(parts)
     )

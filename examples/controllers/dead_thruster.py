@@ -23,12 +23,12 @@ def scene(known):
     gains = {"kp": [80.0] * 3, "ki": [15.0] * 3, "kd": [80.0, 80.0, 100.0], "kr": [10.0] * 3, "kw": [4.0] * 3}
     controller = lw.Controller(
         period=0.05,  # s between ticks
-        guidance=[lw.SetPoint(position=PLACE, heading=0.0)],
-        laws=[lw.PosePID(**gains, feedforward="restoring")],
-        allocation=[lw.PseudoInverse(to="thrusters")],
-        faults=[lw.Fault(of="thrusters", channel=DEAD, time=DIES, gain=0.0, known=known)],
+        guidance=[lw.control.SetPoint(position=PLACE, heading=0.0)],
+        laws=[lw.control.PosePID(**gains, feedforward="restoring")],
+        allocation=[lw.control.PseudoInverse(to="thrusters")],
+        faults=[lw.control.Fault(of="thrusters", channel=DEAD, time=DIES, gain=0.0, known=known)],
     )
-    current = lw.Current(velocity=[-0.3, 0.15, 0.0])
+    current = lw.terms.Current(velocity=[-0.3, 0.15, 0.0])
     start = lw.Start(position=PLACE)
     return lw.Scene.named("bluerov2_heavy", terms=[current], start=start, controller=controller)
 
@@ -48,7 +48,7 @@ def plot(runs, path):
     figure.suptitle("BlueROV2 in a current of 0.34 m/s; at 20 s the thruster ahead right dies")
     grid, first = figure.subplots(3, 2, sharex=True, sharey="row"), next(iter(runs))
     for column, (title, result) in zip(grid.T, runs.items(), strict=True):
-        (thrusters,) = (term for term in scene(False).terms if isinstance(term, lw.Thrusters))
+        (thrusters,) = (term for term in scene(False).terms if isinstance(term, lw.terms.Thrusters))
         thrusts = thrusters.thrust(result.actuator[:, 0])[:, :4]
         values = (100.0 * (result.position[:, 0] - PLACE), turns(result), thrusts)
         for axes, styles, lines, label in zip(column, (AXES, TURNS, THRUSTS), values, LABELS, strict=True):

@@ -11,17 +11,17 @@ import lgvi_warp as lw
 WANTED, LIMIT = 10.0, 20.0  # m, deg of a fin
 GROUPS = {"the least buoyant fifth": ("#0072B2", "-"), "the most buoyant fifth": ("#D55E00", "--")}
 
-waves = lw.Waves(amplitudes=[0.75, 0.45, 0.3], periods=[9.0, 7.0, 5.5], headings_deg=[180.0, 150.0, 200.0])
+waves = lw.terms.Waves(amplitudes=[0.75, 0.45, 0.3], periods=[9.0, 7.0, 5.5], headings_deg=[180.0, 150.0, 200.0])
 controller = lw.Controller(
     period=0.1,  # s between ticks
-    sensors=[lw.Sensor(name="depth_cell", of="depth", noise=0.02)],  # m
-    guidance=[lw.SetPoint(depth=WANTED, heading=0.0), lw.ReferenceModel(natural_frequency=[0.2, 0.3])],
+    sensors=[lw.control.Sensor(name="depth_cell", of="depth", noise=0.02)],  # m
+    guidance=[lw.control.SetPoint(depth=WANTED, heading=0.0), lw.control.ReferenceModel(natural_frequency=[0.2, 0.3])],
     laws=[
-        lw.DepthPID(kp=0.15, ki=0.004, pitch_limit=0.35, kp_pitch=2.0, ki_pitch=0.2, kd_pitch=1.5),
-        lw.HeadingPID(kp=1.0, ki=0.02, kd=2.0),
+        lw.control.DepthPID(kp=0.15, ki=0.004, pitch_limit=0.35, kp_pitch=2.0, ki_pitch=0.2, kd_pitch=1.5),
+        lw.control.HeadingPID(kp=1.0, ki=0.02, kd=2.0),
     ],
     # The gains are radians of a fin for each radian of error: rows rudder and stern planes, columns X Y Z K M N.
-    allocation=[lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])],
+    allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])],
 )
 scene = lw.Scene.named(
     "remus_100",
@@ -30,7 +30,7 @@ scene = lw.Scene.named(
     start={"position": [0.0, 0.0, 5.0], "velocity": [1.54, 0.0, 0.0]},
     controller=controller,
 )
-vary = {"vehicle.buoyancy": lw.Uniform(low=299.0, high=308.0), "waves.phases": lw.Uniform(low=0.0, high=2.0 * np.pi)}
+vary = {"vehicle.buoyancy": lw.distributions.Uniform(low=299.0, high=308.0), "waves.phases": lw.distributions.Uniform(low=0.0, high=2.0 * np.pi)}
 fleet = lw.Ensemble(scene, members=500, seed=4, vary=vary)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""REMUS 100 learns to keep its depth: trained as an environment of Gymnasium, then run in the lanes as lw.Policy.
+"""REMUS 100 learns to keep its depth: trained as an environment of Gymnasium, then run in the lanes as lw.control.Policy.
 
     python examples/controllers/train_a_policy.py [minutes] [picture]
 
@@ -24,21 +24,21 @@ WANTED, EPISODE, PERIOD = 10.0, 40.0, 0.1  # m, s, s
 SHAPES = [(HIDDEN, len(INPUTS)), (HIDDEN,), (1, HIDDEN), (1,)]
 NUMBERS = sum(int(np.prod(shape)) for shape in SHAPES)
 VARY = {
-    "vehicle.buoyancy": lw.Uniform(low=297.0, high=302.0),
-    "start.position[2]": lw.Uniform(low=5.0, high=15.0),
-    "start.velocity[0]": lw.Uniform(low=1.2, high=1.8),
+    "vehicle.buoyancy": lw.distributions.Uniform(low=297.0, high=302.0),
+    "start.position[2]": lw.distributions.Uniform(low=5.0, high=15.0),
+    "start.velocity[0]": lw.distributions.Uniform(low=1.2, high=1.8),
 }
 # Of these demands the matrix makes radians of the planes: K M N -> rudder, stern planes.
-PLANES = lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])
-HEADING = lw.HeadingPID(kp=1.0, ki=0.02, kd=2.0, integral_limit=20.0)
-DEPTH = lw.DepthPID(
+PLANES = lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])
+HEADING = lw.control.HeadingPID(kp=1.0, ki=0.02, kd=2.0, integral_limit=20.0)
+DEPTH = lw.control.DepthPID(
     kp=0.1, ki=0.001, pitch_limit=0.5, kp_pitch=5.0, ki_pitch=0.3, kd_pitch=2.0, integral_limit=[20, 20]
 )
 
 
 def scene(depth_law):
     """REMUS 100 with a heading law and a depth law."""
-    wanted = lw.SetPoint(depth=WANTED, heading=0.5)
+    wanted = lw.control.SetPoint(depth=WANTED, heading=0.5)
     controller = lw.Controller(period=PERIOD, guidance=[wanted], laws=[depth_law, HEADING], allocation=[PLANES])
     return lw.Scene.named("remus_100", start={"velocity": [1.54, 0.0, 0.0]}, controller=controller)
 
@@ -97,7 +97,7 @@ def train(minutes):
 
 
 def save(numbers, path):
-    """Write the file that lw.Policy reads."""
+    """Write the file that lw.control.Policy reads."""
     names = ("weights_0", "biases_0", "weights_1", "biases_1")
     np.savez(path, **dict(zip(names, weights(numbers), strict=True)))
     return path
@@ -136,7 +136,7 @@ if __name__ == "__main__":
     best, history = train(minutes)
     file = save(best, target.with_suffix(".npz"))
     settings = dict(inputs=INPUTS, outputs=["M"], scale=[MOST_PLANES], output_activation="tanh")
-    each = {"policy": errors(lw.Policy(file=str(file), **settings)), "depth_pid": errors(DEPTH)}
+    each = {"policy": errors(lw.control.Policy(file=str(file), **settings)), "depth_pid": errors(DEPTH)}
     for name, (error, t) in each.items():
         late = error[t >= 30.0]
         print(f"{name}: root mean square depth error after 30 s {np.sqrt(np.mean(late**2)):.3f} m")

@@ -15,18 +15,18 @@ STYLES = {"los": ("plain line of sight", "#D55E00", "--"), "ilos": ("integral li
 
 def scene(method):
     """The vehicle at its first waypoint, in a current towards the east."""
-    way = lw.Waypoints(points=POINTS, speed=1.54, look_ahead=20.0, radius=12.0, method=method, kappa=0.8)
+    way = lw.control.Waypoints(points=POINTS, speed=1.54, look_ahead=20.0, radius=12.0, method=method, kappa=0.8)
     controller = lw.Controller(
         period=0.1,  # s between ticks
         guidance=[way],
         laws=[
-            lw.DepthPID(kp=0.15, ki=0.002, pitch_limit=0.35, kp_pitch=2.0, ki_pitch=0.2, kd_pitch=1.5),
-            lw.HeadingPID(kp=1.0, ki=0.02, kd=2.0),
+            lw.control.DepthPID(kp=0.15, ki=0.002, pitch_limit=0.35, kp_pitch=2.0, ki_pitch=0.2, kd_pitch=1.5),
+            lw.control.HeadingPID(kp=1.0, ki=0.02, kd=2.0),
         ],
         # The gains are radians of a fin for each radian of error: rows rudder and stern planes, columns X Y Z K M N.
-        allocation=[lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])],
+        allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])],
     )
-    current = lw.CurrentProfile(depths=DEPTHS, velocities=[[0.0, east, 0.0] for east in EAST])
+    current = lw.terms.CurrentProfile(depths=DEPTHS, velocities=[[0.0, east, 0.0] for east in EAST])
     start = lw.Start(position=POINTS[0], velocity=[1.54, 0.6, 0.0])
     return lw.Scene.named("remus_100", vehicle={"buoyancy": 300.0}, terms=[current], start=start, controller=controller)
 

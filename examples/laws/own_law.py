@@ -59,16 +59,16 @@ class DockOnDevice:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Dock(lw.Term):
+class Dock(lw.laws.Term):
     """A dock that draws the nose in, out to a few times its reach."""
 
     type: ClassVar[str] = "dock"
     device: ClassVar[Any] = DockOnDevice
 
-    position: Any = lw.number((3,), "m")
-    nose: Any = lw.number((3,), "m", (0.0, 0.0, 0.0))
-    energy: Any = lw.number((), "J", least=0.0)
-    reach: Any = lw.number((), "m", least=1e-3)
+    position: Any = lw.laws.number((3,), "m")
+    nose: Any = lw.laws.number((3,), "m", (0.0, 0.0, 0.0))
+    energy: Any = lw.laws.number((), "J", least=0.0)
+    reach: Any = lw.laws.number((), "m", least=1e-3)
 
     def packed(self, numbers, context):
         """As dock_params() has them: the nose from the origin of the forces, in the kernel's axes."""
@@ -77,7 +77,7 @@ class Dock(lw.Term):
             "energy": numbers["energy"],
             "inverse_square": numbers["reach"] ** -2.0,
         }
-        return lw.Packed(values | {"nose": context.frame.point(numbers["nose"])})
+        return lw.laws.Packed(values | {"nose": context.frame.point(numbers["nose"])})
 
     def potential(self, numbers, position, attitude, parameters):
         """U [J]."""
@@ -117,18 +117,18 @@ class MudOnDevice:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Mud(lw.Term):
+class Mud(lw.laws.Term):
     """Drag that grows towards the sea floor: by e every `height` metres, to what linear and angular say at the floor."""
 
     type: ClassVar[str] = "mud"
     device: ClassVar[Any] = MudOnDevice
 
-    floor: Any = lw.number((), "m")
-    height: Any = lw.number((), "m", least=1e-3)
-    linear: Any = lw.number((), "N s/m", 0.0, least=0.0)
-    angular: Any = lw.number((), "N m s", 0.0, least=0.0)
+    floor: Any = lw.laws.number((), "m")
+    height: Any = lw.laws.number((), "m", least=1e-3)
+    linear: Any = lw.laws.number((), "N s/m", 0.0, least=0.0)
+    angular: Any = lw.laws.number((), "N m s", 0.0, least=0.0)
     # A point of the body, which the device gets from the origin of the forces and in the kernel's axes.
-    center: Any = lw.number((3,), "m", (0.0, 0.0, 0.0), axes="point")
+    center: Any = lw.laws.number((3,), "m", (0.0, 0.0, 0.0), axes="point")
 
 
 # 3. A fleet that feels both.
@@ -144,15 +144,15 @@ vehicle = lw.Vehicle(
     center_of_buoyancy=[0.0, 0.0, -0.02],  # m
 )
 start = lw.Start(position=[0.0, -1.0, 17.0], velocity=[0.6, 0.0, 0.0])
-drag = lw.Drag(linear=[2.0, 20.0, 20.0, 0.5, 5.0, 5.0], quadratic=[4.0, 100.0, 100.0, 0.0, 20.0, 20.0])
+drag = lw.terms.Drag(linear=[2.0, 20.0, 20.0, 0.5, 5.0, 5.0], quadratic=[4.0, 100.0, 100.0, 0.0, 20.0, 20.0])
 
 
 def fleet(terms, members=500):
     """Vehicles that pass the dock, each a little otherwise; the dock's energy differs as well, where there is one."""
     scene = lw.Scene(vehicle=vehicle, environment=lw.Environment(gravity=9.8), start=start, terms=terms)
-    vary = {"start.position": lw.Normal(std=[0.5, 1.5, 1.5]), "start.velocity": lw.Normal(std=[0.1, 0.02, 0.02])}
+    vary = {"start.position": lw.distributions.Normal(std=[0.5, 1.5, 1.5]), "start.velocity": lw.distributions.Normal(std=[0.1, 0.02, 0.02])}
     if dock in terms:
-        vary["dock.energy"] = lw.LogNormal(0.2)
+        vary["dock.energy"] = lw.distributions.LogNormal(0.2)
     return lw.Ensemble(scene, members=members, seed=2, vary=vary)
 
 
@@ -179,7 +179,7 @@ def distance(result):
 
 if __name__ == "__main__":
     for law in (dock, mud):
-        report = lw.check_law(law, scene=fleet([]).scene)
+        report = lw.laws.check_law(law, scene=fleet([]).scene)
         print(report)
         assert report.ok
     runs = {"drag": fleet([drag]), "drag and dock": fleet([drag, dock]), "drag, dock and mud": fleet([drag, dock, mud])}

@@ -46,11 +46,11 @@ class Vehicles:
     that varies. Laws of the scene go on, and the actions are added to their demands.
 
     `observe`, `reward` and `terminated` may be functions of (t, y, r): the time since all began [s], what is measured and what
-    is wanted (`lw.CallbackInput`) of m vehicles at once.
+    is wanted (`lw.control.CallbackInput`) of m vehicles at once.
 
     Args:
         fleet: The ensemble, or a scene with its own; with a controller.
-        observe: Names of numbers (docs/controllers/gym.md has the list), those of `lw.Policy` among them; or a function that
+        observe: Names of numbers (docs/controllers/gym.md has the list), those of `lw.control.Policy` among them; or a function that
             returns (m, k).
         act: "demand" (default): actions are added to the laws' demands. "command": they are the commands of the only term that
             takes some, on which then no law acts; or the key of such a term.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a learner may see: names for numbers of what a controller measures and wants, those of `lw.Policy` among them."""
+"""What a learner may see: names for numbers of what a controller measures and wants, those of `lw.control.Policy` among them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def heading_error(y: CallbackInput, r: CallbackInput) -> np.ndarray:
 
 
 def attitude_error(y: CallbackInput, r: CallbackInput) -> np.ndarray:
-    """e_R = vee(R_d^T R - R^T R_d) / 2, as of `lw.PosePID`.
+    """e_R = vee(R_d^T R - R^T R_d) / 2, as of `lw.control.PosePID`.
 
     Returns: (m, 3) [1], body axes.
     """
@@ -107,7 +107,7 @@ def observer(faults: Faults, names: Any, wishes: Sequence[str]) -> Callable[[flo
         name, index = known[entry]
         wish = OBSERVATIONS[name].wish
         if wish is not None and wish not in wishes:
-            remedy = "give guidance that wants it, such as lw.SetPoint"
+            remedy = "give guidance that wants it, such as lw.control.SetPoint"
             faults.add(f"observe[{i}]", entry, f"needs a wanted {wish}, which no guidance gives", remedy)
         chosen.append((OBSERVATIONS[name], index))
 

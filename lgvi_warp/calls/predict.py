@@ -140,7 +140,7 @@ def predict(
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
-        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
         >>> prediction = lw.predict(fleet, h=0.1, t1=2.0)
         >>> prediction.members, prediction.steps, prediction.seconds > 0.0
         (8, 20, True)

@@ -67,7 +67,7 @@ def solve(
             the symmetry of each step are kept, symplecticity is not.
         progress: True shows a bar on a terminal and in a notebook, lines elsewhere, on stderr; a function is called with the
             fraction of the work that is done, in [0, 1], from the threads that do it. Default: nothing is shown.
-        statistics: Statistics gathered over the members at every sample time during the run, such as lw.Mean("position");
+        statistics: Statistics gathered over the members at every sample time during the run, such as lw.statistics.Mean("position");
             they are in result.statistics. An empty sequence gathers none, whatever the scene says.
         keep: Members whose samples are kept. "all" (default). "none": memory grows with neither members nor steps.
             "failed" (without those that an event stopped) or indices of members: these are run again after the run, with the
@@ -95,8 +95,8 @@ def solve(
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
-        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
-        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0), statistics=[lw.Mean("depth")])
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0), statistics=[lw.statistics.Mean("depth")])
         >>> result.position.shape
         (3, 8, 3)
         >>> print(f"{result.statistics['mean depth'].value[-1, 0]:.2f} m")

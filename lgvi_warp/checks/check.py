@@ -70,12 +70,12 @@ def check_law(
 
     Examples:
         >>> import lgvi_warp as lw
-        >>> report = lw.check_law(lw.Drag(linear=[10.0, 20.0, 20.0, 1.0, 2.0, 2.0]))
+        >>> report = lw.laws.check_law(lw.terms.Drag(linear=[10.0, 20.0, 20.0, 1.0, 2.0, 2.0]))
         >>> report.ok
         True
     """
     if not isinstance(term, Term):
-        raise SceneError([f"term = {term!r}: is no term; give an object such as lw.Drag(...), not its class"])
+        raise SceneError([f"term = {term!r}: is no term; give an object such as lw.terms.Drag(...), not its class"])
     module = kernel_choice.device_module(term, term.device_in(False), built_in)
     packets = -(-whole_number("samples", samples, 1, MOST_SAMPLES) // register_width("float64"))
     bench = Bench(term, module, of_scene(scene), packets, whole_number("seed", seed, 0))

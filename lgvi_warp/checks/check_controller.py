@@ -114,7 +114,7 @@ def check_controller(
     Args:
         part: a sensor, a guidance, a law, an allocation or a fault, built-in or the user's own.
         scene: scene with the vehicle, the actuators and, where the part needs others, a controller: the part joins it, or
-            replaces the one of its name. None (default) for a simple vehicle with a `lw.ControlWrench`.
+            replaces the one of its name. None (default) for a simple vehicle with a `lw.terms.ControlWrench`.
         twin: an object with the same role for one vehicle in NumPy, as the parts in `lgvi_warp/reference/control`: some of
             `begin()`, `measure(y)`, `guide(r, y)`, `control(w, r, y, unmet)`, `allocate(w, actuators)`. None (default): none.
         samples: number of members (default 64), of four ticks each: any attitudes, positions some metres around the scene's
@@ -129,7 +129,7 @@ def check_controller(
             does not compile.
     """
     if not isinstance(part, Part) or part.section not in SECTIONS:
-        remedy = "give an object such as lw.HeadingPID(kp=1.0), not its class; lw.check_law checks terms"
+        remedy = "give an object such as lw.control.HeadingPID(kp=1.0), not its class; lw.laws.check_law checks terms"
         raise SceneError([f"part = {part!r}: is no part of a controller; {remedy}"])
     if twin is not None:
         roles = [role for role in TWIN_ROLES if callable(getattr(twin, role, None))]
@@ -204,7 +204,7 @@ def _finite(bench: PartBench, packed: Any, here: Answers) -> Iterator[Check]:
         answers = attempt(
             lambda: bench.answers(bench.packed(bounds), bench.ticks).all(), "with numbers at their bounds"
         )
-        remedy = "guard divisions and roots, or declare lw.number(..., above=0.0)"
+        remedy = "guard divisions and roots, or declare lw.laws.number(..., above=0.0)"
         yield finite(name, answers, bench.ticks, remedy)
 
 

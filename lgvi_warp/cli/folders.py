@@ -57,7 +57,7 @@ def _study(kind: str) -> Any:
 
         return Tradeoff
     if kind == "sensitivity":
-        from lgvi_warp.studies.sensitivity import Indices
+        from lgvi_warp.studies.sensitivity.indices import Indices
 
         return Indices
     from lgvi_warp.studies.stability.map import StabilityMap

@@ -68,7 +68,7 @@ def _draw(content: Content, written: Written, out: Path) -> None:
             f"{content.path}: its pictures are drawn again by the same lgvi-warp sweep, which runs nothing twice"
         )
         return
-    from lgvi_warp.views import plots
+    from lgvi_warp import plots
 
     drawings: dict[str, Callable[[Any, Path], Path]] = {
         "tradeoff": plots.plot_tradeoff,

@@ -130,7 +130,7 @@ def pictures(result: Any, drawn: Any, viewer: str | None = None) -> dict[str, Ca
     drawn: The members of the picture, from `shown_members`; None for neither picture nor recording.
     viewer: Address of a viewer that gets the recording too; default None.
     """
-    from lgvi_warp.views import plots
+    from lgvi_warp import plots
 
     drawings: dict[str, Callable[[Path], Path]] = {}
     if drawn is not None:

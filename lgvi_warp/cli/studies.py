@@ -53,7 +53,7 @@ def tradeoff(chosen: argparse.Namespace, *, study: Part = None, draw: Part = Non
     scene = load_scene(chosen)
     out = folder(chosen, "_tradeoff")
     from lgvi_warp.studies.tradeoff import tradeoff as measure
-    from lgvi_warp.views.plots import plot_tradeoff
+    from lgvi_warp.views.plots.files import plot_tradeoff
 
     with progress_bar(chosen.quiet) as progress:
         measurements = (study or measure)(
@@ -102,8 +102,8 @@ def sensitivity(chosen: argparse.Namespace, *, study: Part = None, draw: Part = 
 
     Returns: The exit code: 1 if members, a file or a library failed, otherwise 0.
     """
-    from lgvi_warp.studies import sensitivity as uq
-    from lgvi_warp.views.plots import plot_sensitivity
+    from lgvi_warp import uq
+    from lgvi_warp.views.plots.files import plot_sensitivity
 
     scene = load_scene(chosen)
     out = folder(chosen, "_sensitivity")
@@ -177,7 +177,7 @@ def stability(chosen: argparse.Namespace, *, study: Part = None, draw: Part = No
     seed = scene.ensemble_settings.seed if scene.ensemble_settings else 0
     out = folder(chosen, "_stability")
     from lgvi_warp.studies.stability.map import GRIDS, stability_map
-    from lgvi_warp.views.plots import plot_stability
+    from lgvi_warp.views.plots.files import plot_stability
 
     maps = {"stability": (chosen.x or "h", chosen.y or "angular_velocity")}
     if chosen.grid:

@@ -82,7 +82,7 @@ class MembersFailed(RuntimeError):  # noqa: N818
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
-        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
         >>> fast = scene.with_numbers({"start.angular_velocity": [0.0, 900.0, 0.0]})
         >>> try:
         ...     lw.solve(fast, "rk4", h=0.1, t1=2.0, on_failure="raise")

@@ -79,7 +79,7 @@ def _refuse(stat: os.stat_result, kind: str) -> None:
 def _smaller(kind: str) -> str:
     """The remedy for a file that is too large."""
     if kind == "CSV file":
-        return "leave out columns or members, or give the numbers as arrays: lw.Table({name: array})"
+        return "leave out columns or members, or give the numbers as arrays: lw.designs.Table({name: array})"
     if kind == "scene file":
         return "give members' own numbers as a table (CSV), long schedules as arrays"
     return "give a shorter one"

@@ -34,7 +34,7 @@ SPANNED = 1e-8
 class Controller:
     """A controller that acts at control ticks, once a period; its commands are held until the next one.
 
-    Each list holds parts such as lw.HeadingPID(...), or tables as in a scene file.
+    Each list holds parts such as lw.control.HeadingPID(...), or tables as in a scene file.
 
     Args:
         period: Time between two ticks [s], a whole number of steps.
@@ -53,9 +53,9 @@ class Controller:
         >>> import lgvi_warp as lw
         >>> controller = lw.Controller(
         ...     period=0.1,
-        ...     guidance=[lw.SetPoint(heading=0.5)],
-        ...     laws=[lw.HeadingPID(kp=1.0, ki=0.02, kd=2.0)],
-        ...     allocation=[lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
+        ...     guidance=[lw.control.SetPoint(heading=0.5)],
+        ...     laws=[lw.control.HeadingPID(kp=1.0, ki=0.02, kd=2.0)],
+        ...     allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
         ... )
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]}, controller=controller)
         >>> result = lw.solve(scene, h=0.05, t1=60.0)
@@ -88,7 +88,7 @@ class Controller:
             with faults.including():
                 object.__setattr__(self, section, _parts(section, base, getattr(self, section)))
         if not faults and not self.laws:
-            faults.add("laws", "", "are missing", "give at least one, such as lw.HeadingPID(kp=...)")
+            faults.add("laws", "", "are missing", "give at least one, such as lw.control.HeadingPID(kp=...)")
         if not faults:
             refuse_second([part for part in self.laws if isinstance(part, Callback)])
             self._check_wishes(faults)

@@ -27,9 +27,9 @@ class HeadingPID(IntegralLaw):
         >>> import lgvi_warp as lw
         >>> controller = lw.Controller(
         ...     period=0.1,
-        ...     guidance=[lw.SetPoint(heading=0.5)],
-        ...     laws=[lw.HeadingPID(kp=1.0, ki=0.02, kd=2.0)],
-        ...     allocation=[lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
+        ...     guidance=[lw.control.SetPoint(heading=0.5)],
+        ...     laws=[lw.control.HeadingPID(kp=1.0, ki=0.02, kd=2.0)],
+        ...     allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
         ... )
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]}, controller=controller)
         >>> heading = lw.solve(scene, h=0.05, t1=60.0).euler[-1, 0, 2]

@@ -21,7 +21,7 @@ class LowPass(MeasuringPart):
     headings is within half a turn; an attitude goes the same part of the turn to the measured one.
 
     Args:
-        of: What it filters, as of `lw.Sensor`.
+        of: What it filters, as of `lw.control.Sensor`.
         time_constant: Its time constant [s]; 0 for no filter.
 
     Raises:

@@ -43,7 +43,7 @@ class Waypoints(Guidance):
     Examples:
         >>> import lgvi_warp as lw
         >>> points = [[0.0, 0.0, 5.0], [100.0, 0.0, 5.0], [100.0, 100.0, 5.0]]
-        >>> guidance = lw.Waypoints(points=points, speed=1.5, look_ahead=10.0, radius=5.0)
+        >>> guidance = lw.control.Waypoints(points=points, speed=1.5, look_ahead=10.0, radius=5.0)
         >>> guidance.points.shape
         (3, 3)
     """

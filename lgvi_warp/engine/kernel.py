@@ -74,8 +74,8 @@ class Kernel:
                 raise
             problem = f"one of them does not compile ({type(error).__name__}: {error})"
             remedies = {
-                False: "lw.check_law(term) says where, docs/develop/add_a_force.md how",
-                True: "lw.check_controller(part) says where, docs/develop/add_a_controller.md how",
+                False: "lw.laws.check_law(term) says where, docs/develop/add_a_force.md how",
+                True: "lw.laws.check_controller(part) says where, docs/develop/add_a_controller.md how",
             }
             remedy = " and ".join(remedies[kind] for kind in sorted({isinstance(term, Part) for term in of_user}))
             raise SceneError([f"law {', '.join(term.key for term in of_user)}: {problem}; {remedy}"]) from error

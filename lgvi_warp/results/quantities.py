@@ -160,7 +160,7 @@ class EndQuantity(OfResult):
             if name in result.statistics:
                 return ~np.isnan(result.statistics[name].value[0, 0])
             problem = f"is one of several events of the status {named[self.outcome].name.lower()}"
-            raise refusal("of", self.label, problem, "gather lw.Outcome, or ask lw.uq or lw.prepare for it")
+            raise refusal("of", self.label, problem, "gather lw.statistics.Outcome, or ask lw.uq or lw.prepare for it")
         if self.outcome in named:
             return np.asarray(status == named[self.outcome])
         return Ends(status, np.zeros_like(status), result.end_time).are(self.outcome)

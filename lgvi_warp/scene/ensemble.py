@@ -50,8 +50,8 @@ class Ensemble(Summarized):
         members: Number of members, >= 1; None for as many as the sampling has, or 1 (default).
         seed: Whole number >= 0; by default 0.
         vary: Distributions by name, of lgvi_warp or frozen ones of scipy.stats; None if nothing varies (default).
-        sampling: "random" (default), "sobol", "halton", "saltelli", lw.LatinHypercube(...), lw.Grid(...),
-            lw.Table(...) and others, or a table as in a scene file.
+        sampling: "random" (default), "sobol", "halton", "saltelli", lw.designs.LatinHypercube(...), lw.designs.Grid(...),
+            lw.designs.Table(...) and others, or a table as in a scene file.
 
     Raises:
         SceneError: If anything is wrong; the message lists every fault. Unphysical members are counted, and the first
@@ -60,7 +60,7 @@ class Ensemble(Summarized):
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
-        >>> vary = {"vehicle.buoyancy": lw.Normal(std=1.0), "start.velocity": lw.Normal(std=[0.1, 0.0, 0.0])}
+        >>> vary = {"vehicle.buoyancy": lw.distributions.Normal(std=1.0), "start.velocity": lw.distributions.Normal(std=[0.1, 0.0, 0.0])}
         >>> fleet = lw.Ensemble(scene, members=1000, seed=1, vary=vary)
         >>> fleet.parameters(0, 1000)["vehicle.buoyancy"].shape
         (1000,)
@@ -78,7 +78,7 @@ class Ensemble(Summarized):
         if not isinstance(scene, SceneLike):
             faults.add("scene", scene, "is no Scene", "give lw.Scene(...) or lw.Scene.load(path)")
         if vary is not None and not (isinstance(vary, Mapping) and all(_is_name(name) for name in vary)):
-            faults.add("vary", vary, "does not map names to distributions", 'give {"vehicle.mass": lw.Normal(...)}')
+            faults.add("vary", vary, "does not map names to distributions", 'give {"vehicle.mass": lw.distributions.Normal(...)}')
         faults.raise_if_any()
         self._setup(scene, EnsembleSettings(members, seed, dict(vary or {}), sampling), {})
 

@@ -280,7 +280,7 @@ def on_the_way(scene: SceneLike, samples: Mapping[str, np.ndarray]) -> Oddities:
     return gathered(looks, 0, max(len(fast), len(high)))
 
 
-STOP = "stop members there by the event lw.Surface()"
+STOP = "stop members there by the event lw.events.Surface()"
 
 
 def _higher(position: np.ndarray) -> np.ndarray:

@@ -45,19 +45,19 @@ class Scene(Summarized):
     Args:
         vehicle: The body, as lw.Vehicle(...).
         environment: Gravity and water, as lw.Environment(...); by default the standard values.
-        terms: What else acts, such as lw.Drag(...), or tables as in a scene file.
+        terms: What else acts, such as lw.terms.Drag(...), or tables as in a scene file.
         start: The state at t = 0, as lw.Start(...); by default at rest at the origin.
         controller: What steers the vehicle, as lw.Controller(...) or a table as in a scene file; None, the default, for none.
         run: Settings of the run, the section [run] of a scene file.
         ensemble_settings: What varies, the section [ensemble] of a scene file; None if nothing does.
-        events: What stops a member, such as lw.Surface(), or tables as in a scene file.
+        events: What stops a member, such as lw.events.Surface(), or tables as in a scene file.
 
     Raises:
         SceneError: If anything is wrong; the message lists every fault.
 
     Examples:
         >>> import lgvi_warp as lw
-        >>> scene = lw.Scene.named("remus_100", events=[lw.Floor(depth=40.0)])
+        >>> scene = lw.Scene.named("remus_100", events=[lw.events.Floor(depth=40.0)])
         >>> heavier = scene.with_numbers({"vehicle.weight": 310.0})
         >>> scene.vehicle.weight, heavier.vehicle.weight
         (299.0, 310.0)
@@ -236,7 +236,7 @@ class Scene(Summarized):
 
     @classmethod
     def named(cls, name: str, **sections: Any) -> Scene:
-        """Build a scene of a vehicle that comes with the package; `lw.vehicle_names()` lists their names.
+        """Build a scene of a vehicle that comes with the package; `lw.vehicles.names()` lists their names.
 
         Args:
             name: Name of the vehicle, such as "remus_100".

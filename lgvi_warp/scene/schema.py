@@ -23,7 +23,7 @@ from lgvi_warp.sampling.distributions.named import SCIPY, ScipyDistribution, Use
 from lgvi_warp.scene.scene import SECTIONS
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 from lgvi_warp.scene.start import Environment, Start
-from lgvi_warp.statistics import TYPES as STATISTICS
+from lgvi_warp.statistics.base import TYPES as STATISTICS
 from lgvi_warp.statistics.until import Until
 
 Schema = dict[str, Any]

@@ -168,7 +168,7 @@ class EnsembleSettings:
         members: Number of members, from 1 to 2**31; None for as many as the sampling has, or 1 (default).
         seed: Whole number from 0; by default 0.
         vary: Distributions by name of what varies, as in Ensemble; by default nothing varies.
-        sampling: How points are drawn: a name, an object such as lw.Grid(...), or a table; by default "random".
+        sampling: How points are drawn: a name, an object such as lw.designs.Grid(...), or a table; by default "random".
         indices: Indices of the members to run; None for all (default).
 
     Raises:

@@ -4,6 +4,8 @@
 import sys
 
 from lgvi_warp.common import registry
-from lgvi_warp.statistics.base import TYPES as TYPES
+from lgvi_warp.common.doors import names_in_stub
 
 registry.load_modules(sys.modules[__name__])
+
+__all__, __getattr__, __dir__ = names_in_stub(__name__)

@@ -82,7 +82,7 @@ class Statistic:
     Members that failed are left out from their failure on.
 
     Args:
-        of: a quantity (see lw.Quantity): "position", "position[2]", "depth", "speed", "euler[0]", "energy", ..., a
+        of: a quantity (see lw.statistics.Quantity): "position", "position[2]", "depth", "speed", "euler[0]", "energy", ..., a
             function of (samples, members), or a list of these taken together; or one number of each member's path,
             "max(depth)", for statistics of numbers.
         name: key of the estimate in the result; by default the type and the quantity, as in "mean position".
@@ -171,7 +171,8 @@ class Statistic:
         """
         meaning: Quantity | None = getattr(self, "_quantity", None)
         if meaning is None:
-            remedy = f"say what it is of: lw.{type(self).__name__}('depth')"
+            door = "metrics" if self.ticks else "statistics"
+            remedy = f"say what it is of: lw.{door}.{type(self).__name__}('depth')"
             raise refusal(f"{self.type}.of", None, "is missing", remedy)
         return meaning
 
@@ -380,7 +381,7 @@ def as_toml(value: Any) -> Any:
 def from_list(given: Any, key: str = "statistics", *, whole: bool = True) -> tuple[Statistic, ...]:
     """Return statistics from tables of a scene file, from `Statistic` objects, or from a mix of both."""
     if isinstance(given, str | Mapping | Statistic) or not isinstance(given, Sequence):
-        example = 'write [[run.statistics]] and type = "mean" below, or statistics=[lw.Mean("position")]'
+        example = 'write [[run.statistics]] and type = "mean" below, or statistics=[lw.statistics.Mean("position")]'
         raise refusal(key, given, "is no list", example)
     faults, statistics = Faults(), list[Statistic]()
     for i, entry in enumerate(given):
@@ -403,7 +404,7 @@ def _from_table(where: str, entry: Any) -> Statistic:
     if isinstance(entry, Statistic):
         return entry
     if not isinstance(entry, Mapping):
-        raise refusal(where, entry, "is no statistic", 'write type = "mean", or give lw.Mean("position")')
+        raise refusal(where, entry, "is no statistic", 'write type = "mean", or give lw.statistics.Mean("position")')
     word = entry.get("type", "")
     kind = TYPES.get(word) if isinstance(word, str) else None
     if kind is None:

@@ -116,8 +116,8 @@ class Mean(Statistic):
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
-        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
-        >>> result = lw.solve(fleet, h=0.1, t1=2.0, statistics=[lw.Mean("depth")])
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, statistics=[lw.statistics.Mean("depth")])
         >>> result.statistics["mean depth"].half_width.shape
         (2, 1)
     """

@@ -103,8 +103,8 @@ class Quantiles(Statistic):
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
-        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
-        >>> result = lw.solve(fleet, h=0.1, t1=2.0, statistics=[lw.Quantiles("depth", levels=[0.1, 0.9])])
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, statistics=[lw.statistics.Quantiles("depth", levels=[0.1, 0.9])])
         >>> result.statistics["quantiles depth"].value.shape
         (2, 2, 1)
     """

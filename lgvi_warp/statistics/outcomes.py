@@ -111,9 +111,9 @@ class Outcome(OfEnds):
 
     Examples:
         >>> import lgvi_warp as lw
-        >>> scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0}, events=[lw.Floor(depth=1.0)])
-        >>> fleet = lw.Ensemble(scene, members=64, vary={"vehicle.buoyancy": lw.Normal(std=2.0)})
-        >>> result = lw.solve(fleet, h=0.1, t1=20.0, statistics=[lw.Outcome("floor")])
+        >>> scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0}, events=[lw.events.Floor(depth=1.0)])
+        >>> fleet = lw.Ensemble(scene, members=64, vary={"vehicle.buoyancy": lw.distributions.Normal(std=2.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=20.0, statistics=[lw.statistics.Outcome("floor")])
         >>> print(f"{result.statistics['outcome floor'].value[-1]:.2f}")
         0.27
     """

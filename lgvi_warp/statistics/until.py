@@ -52,9 +52,9 @@ class Until:
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
-        >>> fleet = lw.Ensemble(scene, members=100_000, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> fleet = lw.Ensemble(scene, members=100_000, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
         >>> until = lw.Until("mean depth", half_width=0.05)
-        >>> result = lw.solve(fleet, h=0.1, t1=2.0, statistics=[lw.Mean("depth")], keep="none", until=until)
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, statistics=[lw.statistics.Mean("depth")], keep="none", until=until)
         >>> result.members < 100_000
         True
     """

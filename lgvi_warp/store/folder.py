@@ -27,7 +27,7 @@ from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.common.write_lock import write_lock
 from lgvi_warp.engine.block import Block, blocks
-from lgvi_warp.statistics import TYPES
+from lgvi_warp.statistics.base import TYPES
 from lgvi_warp.store import layout_check as store_check
 from lgvi_warp.store import texts as store_texts
 from lgvi_warp.store.block_files import BlockFiles, damaged, name_of, read_marker

@@ -133,7 +133,7 @@ def open_run(
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
-        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
         >>> result = lw.solve(fleet, h=0.1, t1=2.0, store="run.zarr")
         >>> lw.open_run("run.zarr", members=slice(2, 4)).position.shape
         (2, 2, 3)

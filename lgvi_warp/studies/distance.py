@@ -73,14 +73,14 @@ def _bias(apart: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(np.abs(apart.mean(axis=1)) + error, axis=-1))
 
 
-# What begins the name of a mean over the members, as lw.Mean has it.
+# What begins the name of a mean over the members, as lw.statistics.Mean has it.
 MEAN = "mean "
 
 
 def compared_in(of: Any) -> Distance:
-    """Find the quantity that a name or a lw.Quantity means.
+    """Find the quantity that a name or a lw.statistics.Quantity means.
 
-    of: a name such as "position", "depth", "position[2]" or "norm(velocity)", a lw.Quantity, or a Compared; "mean position[0]"
+    of: a name such as "position", "depth", "position[2]" or "norm(velocity)", a lw.statistics.Quantity, or a Compared; "mean position[0]"
         for the mean over the members.
     """
     if isinstance(of, Distance):

@@ -167,7 +167,7 @@ def suggest(
         fleet: the ensemble, or a Scene with one.
         error: largest error allowed, over members and path, in the unit of `of`; above 0. Default 1e-3.
         of: quantity that the error is of: any that statistics know, such as "position" [m], "attitude" [rad], "depth" [m],
-            "position[2]" [m], "speed" [m/s] or "energy" [J], or a lw.Quantity. Default "position".
+            "position[2]" [m], "speed" [m/s] or "energy" [J], or a lw.statistics.Quantity. Default "position".
         t1: end time [s]. Default: run.duration of the scene.
         methods: names of the methods to try. Default: a few by what acts in the scene, the others where these fail.
         members: size of the sample that is searched. Default 128.
@@ -186,7 +186,7 @@ def suggest(
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
-        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
         >>> suggestion = lw.suggest(fleet, error=1e-3, t1=2.0, methods=["rk4"], members=4, seconds=5.0)
         >>> suggestion.settings["method"], suggestion.expected < 1e-3
         ('rk4', True)

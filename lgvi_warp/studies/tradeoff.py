@@ -313,7 +313,7 @@ def tradeoff(
         fleet: the ensemble, or a Scene with one.
         t1: end time [s]. Default: run.duration of the scene.
         of: quantity that decides how far the reference is good enough: any that statistics know ("position", "attitude",
-            "depth", "position[2]", "speed", "euler", ...), or a lw.Quantity. Errors of position, attitude, velocity,
+            "depth", "position[2]", "speed", "euler", ...), or a lw.statistics.Quantity. Errors of position, attitude, velocity,
             angular_velocity and energy are measured as well. Default "position".
         methods: names of the methods to try; each has a setting measured, or is named in `missing`. Default: all that the
             scene takes.
@@ -332,7 +332,7 @@ def tradeoff(
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
-        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
         >>> found = lw.tradeoff(fleet, t1=1.0, methods=["rk4"], members=2, seconds=2.0)
         >>> found.front()[0].setting.method
         'rk4'

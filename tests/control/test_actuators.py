@@ -120,17 +120,17 @@ def auv(lost):
 SCENES = {
     "rov": (
         rov,
-        [lw.Thrusters(**THRUSTERS, **CURVES, coefficient=COEFFICIENTS[0], coefficient_astern=COEFFICIENTS[1])],
-        [lw.PseudoInverse(to="thrusters", weights=WEIGHTS)],
+        [lw.terms.Thrusters(**THRUSTERS, **CURVES, coefficient=COEFFICIENTS[0], coefficient_astern=COEFFICIENTS[1])],
+        [lw.control.PseudoInverse(to="thrusters", weights=WEIGHTS)],
         [
-            lw.Fault(name="dead", of="thrusters", channel=4, time=LOST[0], known=True),
-            lw.Fault(name="weak", of="thrusters", **WEAK),
+            lw.control.Fault(name="dead", of="thrusters", channel=4, time=LOST[0], known=True),
+            lw.control.Fault(name="weak", of="thrusters", **WEAK),
         ],
     ),
     "auv": (
         auv,
-        [lw.ControlFins(**FINS), lw.Thrusters(**PAIR)],
-        [lw.PseudoInverse(name="fins", to="control_fins", speed=SPEED), lw.PseudoInverse(name="pair", to="thrusters")],
+        [lw.terms.ControlFins(**FINS), lw.terms.Thrusters(**PAIR)],
+        [lw.control.PseudoInverse(name="fins", to="control_fins", speed=SPEED), lw.control.PseudoInverse(name="pair", to="thrusters")],
         [],
     ),
 }
@@ -167,7 +167,7 @@ def solved(name, method, h, steps, every):
     """The result of members that differ in a gain and in the time of the fault that the loop knows."""
     _, terms, allocation, faults = SCENES[name]
     water = lw.Environment(gravity=GRAVITY, water_density=DENSITY)
-    terms = [lw.Drag(linear=LINEAR, quadratic=QUADRATIC), *terms, lw.Wrench(force=AHEAD)]
+    terms = [lw.terms.Drag(linear=LINEAR, quadratic=QUADRATIC), *terms, lw.terms.Wrench(force=AHEAD)]
     scene = lw.Scene(VEHICLE, water, terms, lw.Start(**STATE), controller(allocation, faults))
     varied = {"heading_pid.kp": STIFF} | ({"dead.time": LOST} if faults else {})
     fleet = one(scene, STATE["position"], None, STATE["velocity"], STATE["angular_velocity"], varied)

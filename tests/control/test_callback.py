@@ -13,11 +13,11 @@ H, GAINS = 0.02, dict(kp=3.0, kd=2.0)
 
 def scene(laws, members=20, **more):
     """A body with a heading law and an ideal actuator; members that differ."""
-    controller = lw.Controller(period=5 * H, guidance=[lw.SetPoint(heading=0.8)], laws=laws, **more)
+    controller = lw.Controller(period=5 * H, guidance=[lw.control.SetPoint(heading=0.8)], laws=laws, **more)
     vehicle = lw.Vehicle(10.0, inertia=(1.0, 2.0, 3.0))
-    terms = [lw.ControlWrench(limit=2.0), lw.Drag(linear=(1.0, 2.0, 2.0, 0.1, 0.1, 0.1), quadratic=(0.0,) * 6)]
+    terms = [lw.terms.ControlWrench(limit=2.0), lw.terms.Drag(linear=(1.0, 2.0, 2.0, 0.1, 0.1, 0.1), quadratic=(0.0,) * 6)]
     plain = lw.Scene(vehicle, terms=terms, controller=controller)
-    vary = {"start.angular_velocity": lw.Normal(std=0.1), "start.velocity": lw.Normal(std=0.2)}
+    vary = {"start.angular_velocity": lw.distributions.Normal(std=0.1), "start.velocity": lw.distributions.Normal(std=0.2)}
     return lw.Ensemble(plain, members, 3, vary)
 
 
@@ -36,8 +36,8 @@ def run(laws, **named):
 
 @pytest.mark.slow
 def test_it_is_the_law_in_the_kernel():
-    metrics = [lw.IAE("heading"), lw.Effort(), lw.MaxError("attitude")]
-    asked, fused = (run([law], statistics=metrics) for law in (lw.Callback(heading), lw.HeadingPID(**GAINS)))
+    metrics = [lw.metrics.IAE("heading"), lw.metrics.Effort(), lw.metrics.MaxError("attitude")]
+    asked, fused = (run([law], statistics=metrics) for law in (lw.control.Callback(heading), lw.control.HeadingPID(**GAINS)))
     # 250 steps of round-off: the two evaluate the same formula in another order.
     assert np.abs(asked.attitude - fused.attitude).max() < 1e-12
     assert np.abs(asked.position - fused.position).max() < 1e-12
@@ -50,8 +50,8 @@ def test_commands():
     def commands(t, y, r, members):
         return np.clip(heading(t, y, r, members), -9.0, 9.0)
 
-    asked = run([lw.Callback(commands, to="control_wrench")])
-    fused = run([lw.Callback(heading)])
+    asked = run([lw.control.Callback(commands, to="control_wrench")])
+    fused = run([lw.control.Callback(heading)])
     assert np.abs(asked.attitude - fused.attitude).max() < 1e-12
 
 
@@ -61,7 +61,7 @@ def test_one_member_without_an_answer():
         demand[(members == 3) & (t > 1.0)] = np.nan
         return demand
 
-    result, whole = run([lw.Callback(broken)]), run([lw.Callback(heading)])
+    result, whole = run([lw.control.Callback(broken)]), run([lw.control.Callback(heading)])
     assert result.status.counts() == {"ok": 19, "control_non_finite": 1}
     assert result.status[3] == lw.Status.CONTROL_NON_FINITE
     assert 1.0 < result.failure_time[3] <= 1.1 + 1e-9
@@ -71,7 +71,7 @@ def test_one_member_without_an_answer():
 
 def test_wrong_shape():
     with pytest.raises(ValueError, match=r"returned shape \(20,\); return \(20, 6\)"):
-        run([lw.Callback(lambda t, y, r, members: np.zeros(len(members)))])
+        run([lw.control.Callback(lambda t, y, r, members: np.zeros(len(members)))])
 
 
 ODD = {
@@ -87,7 +87,7 @@ ODD = {
 def test_what_is_no_real_number_is_refused(odd, words):
     """Imaginary parts and masks would be lost without a word."""
     with pytest.raises(ValueError, match=f"callback 'callback' at t = 0 s, members 0 to 19: .*{words}"):
-        run([lw.Callback(lambda t, y, r, members: odd(heading(t, y, r, members)))])
+        run([lw.control.Callback(lambda t, y, r, members: odd(heading(t, y, r, members)))])
 
 
 def test_an_exception_says_where():
@@ -95,7 +95,7 @@ def test_an_exception_says_where():
         raise RuntimeError("no solution")
 
     with pytest.raises(RuntimeError, match="no solution") as info:
-        run([lw.Callback(fails)])
+        run([lw.control.Callback(fails)])
     assert "t = 0 s, members 0 to 19" in info.value.__notes__[0]
 
 
@@ -115,16 +115,16 @@ def test_a_stopped_run_goes_on_with_the_mended_function(tmp_path):
     """It is another function than the run began with: that is refused, or taken and told."""
     settings, mended.now = dict(method="psi_s", h=H, t1=1.0, threads=1), False
     with pytest.raises(RuntimeError, match="no solution"):
-        lw.solve(scene([lw.Callback(mended)], 300), **settings, store=tmp_path / "run.zarr")
+        lw.solve(scene([lw.control.Callback(mended)], 300), **settings, store=tmp_path / "run.zarr")
     with pytest.raises(lw.SceneError, match=r"lw\.resume\(path, fleet\)"):
         lw.resume(tmp_path / "run.zarr")
     mended.now = True
-    fleet = scene([lw.Callback(mended)], 300)
+    fleet = scene([lw.control.Callback(mended)], 300)
     with pytest.raises(lw.SceneError, match=r"functions\.laws\.callback is .*force=True"):
         lw.resume(tmp_path / "run.zarr", fleet, threads=1)
     resumed = lw.resume(tmp_path / "run.zarr", fleet, threads=1, force=True)
     assert any("continued although functions.laws.callback is" in text for text in resumed.messages)
-    whole = lw.solve(scene([lw.Callback(heading)], 300), **settings)
+    whole = lw.solve(scene([lw.control.Callback(heading)], 300), **settings)
     assert np.array_equal(resumed.position, whole.position)
 
 
@@ -132,7 +132,7 @@ def test_a_stopped_run_goes_on_with_the_mended_function(tmp_path):
 def test_a_run_goes_on_with_its_function_alone(tmp_path, version):
     """A function of the same name, gain and all but one number in a closure is another one, unless its version is given."""
     path, settings = tmp_path / "run.zarr", dict(method="psi_s", h=H, t1=0.2, threads=1)
-    first, same, other = (scene([lw.Callback(turning(k), version=version)], 300) for k in (1.0, 1.0, 2.0))
+    first, same, other = (scene([lw.control.Callback(turning(k), version=version)], 300) for k in (1.0, 1.0, 2.0))
     lw.solve(first, **settings, store=lw.Store(path), only=range(1))
     if version is None:
         for existing in (
@@ -153,7 +153,7 @@ def test_a_function_that_cannot_be_compared_is_noted(tmp_path):
         with lock:
             return heading(t, y, r, members)
 
-    fleet = scene([lw.Callback(locked)], 300)
+    fleet = scene([lw.control.Callback(locked)], 300)
     lw.solve(fleet, **settings, store=lw.Store(path), only=range(1))
     assert any("laws.callback" in text and "version" in text for text in lw.resume(path, fleet).messages)
 
@@ -170,20 +170,20 @@ def turning(k):
 def shares(cases, folder=None, metrics=("iae heading",), **more):
     """Metrics by case of a sweep of the scene; and how often each case asked its function."""
     settings = dict(metrics=list(metrics), h=H, t1=0.5, method="psi_s", out=folder, **more)
-    found = lw.sweep(scene([lw.Callback(heading)], 4), cases, **settings)
+    found = lw.sweep(scene([lw.control.Callback(heading)], 4), cases, **settings)
     return {case.name: found.values(case.name, next(iter(found.metrics))) for case in found.setup.cases}
 
 
 def truth(function):
     """The metric of a run with this function, outside any sweep."""
-    metric = lw.IAE("heading", then=[lw.MemberValues()])
-    return lw.solve(scene([lw.Callback(function)], 4), "psi_s", h=H, t1=0.5, keep="none", statistics=[metric]).statistics[
+    metric = lw.metrics.IAE("heading", then=[lw.statistics.MemberValues()])
+    return lw.solve(scene([lw.control.Callback(function)], 4), "psi_s", h=H, t1=0.5, keep="none", statistics=[metric]).statistics[
         "each iae heading"].value[0, 0]  # fmt: skip
 
 
 def replacing(**functions):
     """Cases of other functions."""
-    return [lw.Case(name, replace={"laws": [lw.Callback(function)]}) for name, function in functions.items()]
+    return [lw.studies.Case(name, replace={"laws": [lw.control.Callback(function)]}) for name, function in functions.items()]
 
 
 @pytest.mark.parametrize("on_disk", [False, True])
@@ -235,7 +235,7 @@ def test_a_changed_metric_is_run_anew(tmp_path):
     def of(k, method):
         return lambda state, tick: getattr(np, method)(tick["position"][:, 0] if state is None else state, k)
 
-    metrics = [lw.CustomMetric(of(k, method), name="own", last=last) for k, method, last in (
+    metrics = [lw.metrics.CustomMetric(of(k, method), name="own", last=last) for k, method, last in (
         (1.0, "maximum", None), (1.0, "minimum", None), (2.0, "maximum", None), (1.0, "maximum", np.negative))]  # fmt: skip
     # The states begin at 0: max(0, 1), min(0, 1), max(0, 2), -max(0, 1).
     for metric, value in zip(metrics, (1.0, 0.0, 2.0, -1.0), strict=True):
@@ -272,16 +272,16 @@ def test_the_wanted_acceleration_reaches_the_function_and_the_laws_beside_it():
     def turned(laws):
         fleet = scene(laws)
         loop = fleet.scene.controller
-        led = (*loop.guidance, lw.ReferenceModel(natural_frequency=(1.0, 1.0)))
+        led = (*loop.guidance, lw.control.ReferenceModel(natural_frequency=(1.0, 1.0)))
         loop = lw.Controller(period=loop.period, guidance=led, laws=laws)
-        terms = [lw.ControlWrench(), *fleet.scene.terms[1:]]
+        terms = [lw.terms.ControlWrench(), *fleet.scene.terms[1:]]
         whole = lw.Scene(fleet.scene.vehicle, terms=terms, controller=loop)
         fields = ("attitude", "reference_angular_acceleration")
         fleet = lw.Ensemble(whole, fleet.members, 3, fleet.vary)
         return lw.solve(fleet, "psi_s", h=H, t1=5.0, save=lw.SaveAt(every=0.5, fields=fields))
 
-    fused = turned([lw.HeadingSMC(nomoto_gain=0.4, **SMC)])
-    halves = turned([lw.HeadingSMC(nomoto_gain=0.8, **SMC), lw.Callback(Sliding(20, 0.8))])
+    fused = turned([lw.control.HeadingSMC(nomoto_gain=0.4, **SMC)])
+    halves = turned([lw.control.HeadingSMC(nomoto_gain=0.8, **SMC), lw.control.Callback(Sliding(20, 0.8))])
     assert np.abs(halves.attitude - fused.attitude).max() < 1e-12
     # It is felt: some 0.1 rad/s^2 times the time of Nomoto's model.
     assert np.abs(fused.reference_angular_acceleration[:, :, 2]).max() > 0.05
@@ -289,6 +289,6 @@ def test_the_wanted_acceleration_reaches_the_function_and_the_laws_beside_it():
 
 @pytest.mark.slow
 def test_other_processes_call_it():
-    fleet, settings = scene([lw.Callback(heading)], 300), dict(method="psi_s", h=H, t1=1.0)
+    fleet, settings = scene([lw.control.Callback(heading)], 300), dict(method="psi_s", h=H, t1=1.0)
     apart = lw.solve(fleet, **settings, executor="processes", threads=2)
     assert np.array_equal(apart.position, lw.solve(fleet, **settings).position)

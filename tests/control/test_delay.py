@@ -16,10 +16,10 @@ DELAYS = np.array([0, 1, 4, 5, 7, 10, 22, 48])
 def members(delays, times=np.inf):
     """Members with these delays in steps, and with a fault from these times on: one kernel for all."""
     vehicle = torpedo(196.0, (0.0, 0.0, -0.02), (1.5, 4.0, J))
-    guidance = [lw.SetPoint(heading=0.3)]
-    faults = [lw.Fault(of="control_wrench", channel=5, gain=0.5, offset=0.05)]
-    controller = lw.Controller(period=EVERY * H, guidance=guidance, laws=[lw.HeadingPID(kp=KP, kd=KD)], faults=faults)
-    scene = lw.Scene(vehicle, lw.Environment(9.8), [lw.ControlWrench()], controller=controller)
+    guidance = [lw.control.SetPoint(heading=0.3)]
+    faults = [lw.control.Fault(of="control_wrench", channel=5, gain=0.5, offset=0.05)]
+    controller = lw.Controller(period=EVERY * H, guidance=guidance, laws=[lw.control.HeadingPID(kp=KP, kd=KD)], faults=faults)
+    scene = lw.Scene(vehicle, lw.Environment(9.8), [lw.terms.ControlWrench()], controller=controller)
     times = np.broadcast_to(times, len(delays))
     return one(scene, parameters={"controller.delay": np.asarray(delays) * H, "fault.time": times})
 

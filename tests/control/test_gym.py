@@ -21,7 +21,7 @@ from tests.conftest import ROOT
 from tests.control.test_callback import GAINS, ODD, H, heading, scene
 
 N, PERIOD = 20, 5 * H
-LAW = [lw.HeadingPID(**GAINS)]
+LAW = [lw.control.HeadingPID(**GAINS)]
 SETTINGS = dict(method="psi_s", h=H, instead_of="heading_pid")
 
 
@@ -61,7 +61,7 @@ def test_the_bits_of_a_run(env):
     assert env.time == 0.0
     observed = steer(env, observed, 50)[0]
     assert np.isclose(env.time, 50 * PERIOD)
-    assert np.array_equal(observed[:, 1:], solved(scene([lw.Callback(heading)]), 50))
+    assert np.array_equal(observed[:, 1:], solved(scene([lw.control.Callback(heading)]), 50))
 
 
 @pytest.mark.parametrize("odd, words", ODD.values(), ids=ODD)
@@ -82,7 +82,7 @@ def test_what_is_no_real_number_is_refused(env, odd, words):
 def test_members_that_come_again_have_other_noise():
     """Of three given members, two environments: each member's first episode has its own noise, each later one new noise."""
     part = lw.Ensemble(
-        replace(scene(LAW).scene, terms=[*scene(LAW).scene.terms, lw.WrenchNoise(force=(1.0, 1.0, 1.0))]), 3, 3
+        replace(scene(LAW).scene, terms=[*scene(LAW).scene.terms, lw.terms.WrenchNoise(force=(1.0, 1.0, 1.0))]), 3, 3
     )
     given = part.select(0, 3)
     fleet = lw.Ensemble.from_states(part.scene, given.position, given.attitude, given.velocity, given.angular_velocity)
@@ -93,14 +93,14 @@ def test_members_that_come_again_have_other_noise():
         ends += list(steer(env, observed, 3)[0])
     assert members == [0, 1, 2] * 4
     assert len({end.tobytes() for end in ends}) == 12
-    run = lw.solve(fleet.in_scene(replace(fleet.scene, controller=scene([lw.Callback(heading)]).scene.controller)), "psi_s",
+    run = lw.solve(fleet.in_scene(replace(fleet.scene, controller=scene([lw.control.Callback(heading)]).scene.controller)), "psi_s",
                    h=H, t1=3 * PERIOD, save=lw.SaveAt())  # fmt: skip
     np.testing.assert_array_equal([end[1:4] for end in ends[:3]], run.position[-1])
 
 
 def test_members_that_start_while_others_go_on():
     def varied(law):
-        numbers = {"vehicle.mass": lw.Normal(std=0.5), "drag.linear[5]": lw.Uniform(low=0.05, high=0.2)}
+        numbers = {"vehicle.mass": lw.distributions.Normal(std=0.5), "drag.linear[5]": lw.distributions.Uniform(low=0.05, high=0.2)}
         fleet = scene([law])
         return lw.Ensemble(fleet.scene, N, 3, fleet.vary | numbers)
 
@@ -113,7 +113,7 @@ def test_members_that_start_while_others_go_on():
     assert np.array_equal(both[~mask], later[~mask])
     assert env.members[[0, 1, 9, 19]].tolist() == [20, 1, 29, 39]
     last = steer(env, both, 30)[0][:, 1:]
-    drawn = varied(lw.Callback(heading)).with_seed(7, 2 * N)
+    drawn = varied(lw.control.Callback(heading)).with_seed(7, 2 * N)
     assert np.array_equal(last[~mask], solved(drawn.subset(np.flatnonzero(~mask)), 40))
     assert np.array_equal(last[mask], solved(drawn.subset(env.members[mask]), 30))
 
@@ -231,13 +231,13 @@ def test_gymnasiums_own_wrappers():
 
 
 def test_named_numbers_are_those_of_a_policy():
-    """The twin of `lw.Policy` sees the same of random motions, to the round-off of sums of six products."""
+    """The twin of `lw.control.Policy` sees the same of random motions, to the round-off of sums of six products."""
     rng, twin = np.random.default_rng(0), PolicyTwin()
     R = Rotation.random(2 * N, rng=rng).as_matrix()
     vectors = iter(rng.normal(size=(7, N, 3)))
     heading = np.arctan2(R[:, 1, 0], R[:, 0, 0])
-    y = lw.CallbackInput(next(vectors), R[:N], next(vectors), next(vectors), heading[:N], water_velocity=next(vectors))
-    r = lw.CallbackInput(next(vectors), R[N:], next(vectors), next(vectors), heading[N:], speed=rng.normal(size=N))
+    y = lw.control.CallbackInput(next(vectors), R[:N], next(vectors), next(vectors), heading[:N], water_velocity=next(vectors))
+    r = lw.control.CallbackInput(next(vectors), R[N:], next(vectors), next(vectors), heading[N:], speed=rng.normal(size=N))
     assert {name: OBSERVATIONS[name][:2] for name in INPUTS} == INPUTS
     for name in INPUTS:
         seen = np.reshape(OBSERVATIONS[name].of(y, r), (N, -1))
@@ -311,14 +311,14 @@ def falling():
     controller = lw.Controller(
         period=PERIOD,
         delay=0.04,
-        sensors=[lw.Sensor(of="depth", latency=2, noise=0.0), lw.LowPass(of="velocity", time_constant=1.0)],
-        guidance=[lw.SetPoint(heading=0.8)],
+        sensors=[lw.control.Sensor(of="depth", latency=2, noise=0.0), lw.control.LowPass(of="velocity", time_constant=1.0)],
+        guidance=[lw.control.SetPoint(heading=0.8)],
         laws=LAW,
     )
-    terms = [lw.ControlWrench(limit=2.0, time_constant=0.1)]
+    terms = [lw.terms.ControlWrench(limit=2.0, time_constant=0.1)]
     vehicle = lw.Vehicle(10.0, inertia=(1.0, 2.0, 3.0), buoyancy=10.0 * 9.80665 - 5.0)
-    plain = lw.Scene(vehicle, terms=terms, controller=controller, events=[lw.Floor(depth=5.0)])
-    fleet = lw.Ensemble(plain, N, 3, {"start.position[2]": lw.Uniform(low=0.0, high=4.9)})
+    plain = lw.Scene(vehicle, terms=terms, controller=controller, events=[lw.events.Floor(depth=5.0)])
+    fleet = lw.Ensemble(plain, N, 3, {"start.position[2]": lw.distributions.Uniform(low=0.0, high=4.9)})
     names = ["depth", "velocity[2]"]
     return lambda act="command": lw.gym.VectorEnv(fleet, act=act, observe=names, **SETTINGS)
 

@@ -28,7 +28,7 @@ def test_a_period_is_its_steps_under_the_held_wrench(method, dtype):
     )
     command = first.command[0, 0]
     assert np.array_equal(first.command[:steps, 0], np.repeat(command[None], steps, axis=0))
-    held = lw.Wrench(name="held", force=command[:3], torque=command[3:])
+    held = lw.terms.Wrench(name="held", force=command[:3], torque=command[3:])
     others = [term for term in plain.terms if term.type != "control_wrench"]
     bare = lw.Scene(plain.vehicle, plain.environment, [*others, held], plain.start)
     looped = lw.solve(plain, method, h=H, t1=steps * H, dtype=dtype)

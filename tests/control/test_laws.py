@@ -64,25 +64,25 @@ def scene(tmp_path_factory):
         lambda_=(0.3, 0.4, 0.5), boundary=(0.1, 0.2, 0.3), lambda_r=(0.5, 0.6, 0.7), boundary_r=(0.1, 0.2, 0.3)
     )
     laws = [
-        lw.HeadingPID(**IDLE["heading_pid"]),
-        lw.DepthPID(**IDLE["depth_pid"], pitch_limit=0.3, integral_limit=(2.0, 1.0)),
-        lw.HeavePID(**IDLE["heave_pid"]),
-        lw.SpeedPID(**IDLE["speed_pid"]),
-        lw.PosePID(**IDLE["pose_pid"], feedforward="restoring"),
-        lw.PoseSMC(**IDLE["pose_smc"], **three),
-        lw.HeadingSMC(**IDLE["heading_smc"], lambda_=0.4, boundary=0.1),
-        lw.StateFeedback(**IDLE["state_feedback"]),
-        lw.Policy(file=file, inputs=inputs, outputs=["Z", "K", "N"], **IDLE["policy"], output_activation="tanh"),
+        lw.control.HeadingPID(**IDLE["heading_pid"]),
+        lw.control.DepthPID(**IDLE["depth_pid"], pitch_limit=0.3, integral_limit=(2.0, 1.0)),
+        lw.control.HeavePID(**IDLE["heave_pid"]),
+        lw.control.SpeedPID(**IDLE["speed_pid"]),
+        lw.control.PosePID(**IDLE["pose_pid"], feedforward="restoring"),
+        lw.control.PoseSMC(**IDLE["pose_smc"], **three),
+        lw.control.HeadingSMC(**IDLE["heading_smc"], lambda_=0.4, boundary=0.1),
+        lw.control.StateFeedback(**IDLE["state_feedback"]),
+        lw.control.Policy(file=file, inputs=inputs, outputs=["Z", "K", "N"], **IDLE["policy"], output_activation="tanh"),
     ]
     guidance = [
-        lw.Trajectory(times=(0.5, 3.0, 8.0, 12.0), positions=[(0, 0, 3), (2, 1, 4), (5, -2, 6), (4, 3, 5)],
+        lw.control.Trajectory(times=(0.5, 3.0, 8.0, 12.0), positions=[(0, 0, 3), (2, 1, 4), (5, -2, 6), (4, 3, 5)],
                       headings=(0.3, 2.0, -2.5, 1.0), interpolation="cubic"),
-        lw.ReferenceModel(natural_frequency=(1.0, 1.2, 0.8, 1.5), damping_ratio=(1.0, 0.8, 1.2, 1.0),
+        lw.control.ReferenceModel(natural_frequency=(1.0, 1.2, 0.8, 1.5), damping_ratio=(1.0, 0.8, 1.2, 1.0),
                           rate_limit=(0.6, 0.5, 0.4, 0.5)),
     ]  # fmt: skip
     terms = [
-        lw.Drag(linear=(3.0, 4.0, 5.0, 0.3, 0.4, 0.5), quadratic=(10.0, 30.0, 40.0, 1.0, 2.0, 3.0)),
-        lw.ControlWrench(limit=LIMIT),
+        lw.terms.Drag(linear=(3.0, 4.0, 5.0, 0.3, 0.4, 0.5), quadratic=(10.0, 30.0, 40.0, 1.0, 2.0, 3.0)),
+        lw.terms.ControlWrench(limit=LIMIT),
     ]
     controller = lw.Controller(period=EVERY * H, guidance=guidance, laws=laws)
     return lw.Scene(VEHICLE, lw.Environment(gravity=9.8), terms, controller=controller)
@@ -117,9 +117,9 @@ def run(scene):
 def other(scene):
     """The same kernel with other words: straight pieces, speeds, two numbers filtered, another policy, no waiting."""
     guidance = [
-        lw.Trajectory(times=(0.0, 1.0, 2.0, 2.5), positions=[(0, 0, 3), (1, 1, 4), (1, -2, 6), (1, 0, 5)],
+        lw.control.Trajectory(times=(0.0, 1.0, 2.0, 2.5), positions=[(0, 0, 3), (1, 1, 4), (1, -2, 6), (1, 0, 5)],
                       headings=(0.3, 2.0, -2.5, 1.0), speed=(0.5, 1.0, 0.8, 0.2)),
-        lw.ReferenceModel(natural_frequency=(2.0, 1.5)),
+        lw.control.ReferenceModel(natural_frequency=(2.0, 1.5)),
     ]  # fmt: skip
     words = {"policy": {"activation": "relu", "output_activation": "clip"}, "pose_pid": {"anti_windup": "none"}}
     laws = [dataclasses.replace(law, **words.get(law.key, {})) for law in scene.controller.laws]
@@ -183,12 +183,12 @@ def test_widths_give_the_same_bits_and_float32_is_near(scene, run, monkeypatch):
 @pytest.mark.slow
 def test_guidance_keeps_what_others_want():
     # A kernel of its own: the set-point's heading and the trajectory's place, whatever their order.
-    point = lw.SetPoint(heading=0.7)
-    places = lw.Trajectory(times=(0.0, 3.0), positions=[(0, 0, 3), (2, 1, 4)])
+    point = lw.control.SetPoint(heading=0.7)
+    places = lw.control.Trajectory(times=(0.0, 3.0), positions=[(0, 0, 3), (2, 1, 4)])
     for guidance in ([point, places], [places, point]):
         gains = {**dict.fromkeys(("kp", "kd"), (20.0, 25.0, 30.0)), **dict.fromkeys(("kr", "kw"), (6.0, 7.0, 8.0))}
-        controller = lw.Controller(period=EVERY * H, guidance=guidance, laws=[lw.PosePID(**gains)])
-        way = lw.Scene(VEHICLE, lw.Environment(gravity=9.8), [lw.ControlWrench(limit=LIMIT)], controller=controller)
+        controller = lw.Controller(period=EVERY * H, guidance=guidance, laws=[lw.control.PosePID(**gains)])
+        way = lw.Scene(VEHICLE, lw.Environment(gravity=9.8), [lw.terms.ControlWrench(limit=LIMIT)], controller=controller)
         given = states(1)
         result = lw.solve(lw.Ensemble.from_states(way, *given), "psi_s", h=H, t1=6.0, save=lw.SaveAt(every=EVERY * H))
         b, R = twin_states(way, {}, [x[0] for x in given], EVERY, H, 120)

@@ -22,8 +22,8 @@ def scene():
 
     Drag of heave and pitch keeps it level: by itself its pitch swings, which slows it down.
     """
-    guidance, laws = [lw.SetPoint(heading=0.0)], [lw.HeadingPID(kp=KP, ki=KI, kd=KD)]
-    allocation = [lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])]
+    guidance, laws = [lw.control.SetPoint(heading=0.0)], [lw.control.HeadingPID(kp=KP, ki=KI, kd=KD)]
+    allocation = [lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])]
     controller = lw.Controller(period=PERIOD, delay=H, guidance=guidance, laws=laws, allocation=allocation)
     level = {"type": "drag", "linear": [0.0, 0.0, 2000.0, 0.0, 2000.0, 0.0], "quadratic": [0.0] * 6}
     terms = [{"type": "wrench", "force": [THRUST, 0.0, 0.0]}, level]

@@ -22,15 +22,15 @@ H, EVERY = 0.02, 5
 
 def controller(allocation, faults, **more):
     """Depth and heading loops."""
-    laws, guidance = [lw.DepthPID(**DEPTH), lw.HeadingPID(**HEADING)], [lw.SetPoint(**WANTED)]
+    laws, guidance = [lw.control.DepthPID(**DEPTH), lw.control.HeadingPID(**HEADING)], [lw.control.SetPoint(**WANTED)]
     return lw.Controller(period=EVERY * H, guidance=guidance, laws=laws, allocation=allocation, faults=faults, **more)
 
 
 def scene(lag, delay=0.0, faults=(), **more):
     """A torpedo-like body with these loops and an ideal actuator."""
-    loops = controller([lw.AllocationMatrix(to="control_wrench", matrix=MATRIX)], faults, delay=delay)
-    terms = [lw.Drag(linear=LINEAR, quadratic=QUADRATIC), lw.ControlWrench(limit=LIMIT, time_constant=lag),
-             lw.Wrench(force=(15.0, 0.0, 0.0))]  # fmt: skip
+    loops = controller([lw.control.AllocationMatrix(to="control_wrench", matrix=MATRIX)], faults, delay=delay)
+    terms = [lw.terms.Drag(linear=LINEAR, quadratic=QUADRATIC), lw.terms.ControlWrench(limit=LIMIT, time_constant=lag),
+             lw.terms.Wrench(force=(15.0, 0.0, 0.0))]  # fmt: skip
     return lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), terms, lw.Start(**STATE), loops, **more)
 
 
@@ -41,7 +41,7 @@ def scene(lag, delay=0.0, faults=(), **more):
 def test_the_loop_is_the_twins(method, lag, delay):
     time_constant = LAG if lag else (0.0,) * 6
     steps = 300
-    faults = [lw.Fault(of="control_wrench", channel=5, time=4.0, gain=0.5, offset=0.2)]
+    faults = [lw.control.Fault(of="control_wrench", channel=5, time=4.0, gain=0.5, offset=0.2)]
     looped = scene(time_constant, delay * H, faults)
     result = lw.solve(looped, method, h=H, t1=steps * H, save=lw.SaveAt(every=50 * H))
     start = STATE["position"], np.eye(3), STATE["velocity"], STATE["angular_velocity"]

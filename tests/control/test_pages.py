@@ -8,7 +8,7 @@ import pytest
 import lgvi_warp as lw
 from tests.conftest import ROOT
 
-PAGES = {"laws": lw.ControlLaw, "guidance": lw.Guidance}
+PAGES = {"laws": lw.laws.ControlLaw, "guidance": lw.laws.Guidance}
 
 
 def text(page):

@@ -35,12 +35,12 @@ def steered(sensors, faults=()):
     controller = lw.Controller(
         period=EVERY * H,
         sensors=sensors,
-        guidance=[lw.SetPoint(**WANTED)],
-        laws=[lw.DepthPID(**DEPTH), lw.HeadingPID(**HEADING)],
-        allocation=[lw.AllocationMatrix(to="control_wrench", matrix=np.diag((0.0, 0.0, 0.0, 0.0, 1.0, 1.0)))],
+        guidance=[lw.control.SetPoint(**WANTED)],
+        laws=[lw.control.DepthPID(**DEPTH), lw.control.HeadingPID(**HEADING)],
+        allocation=[lw.control.AllocationMatrix(to="control_wrench", matrix=np.diag((0.0, 0.0, 0.0, 0.0, 1.0, 1.0)))],
         faults=faults,
     )
-    terms = [lw.Drag(linear=LINEAR, quadratic=QUADRATIC), lw.ControlWrench(limit=LIMIT)]
+    terms = [lw.terms.Drag(linear=LINEAR, quadratic=QUADRATIC), lw.terms.ControlWrench(limit=LIMIT)]
     return lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), terms, controller=controller)
 
 
@@ -61,8 +61,8 @@ def twin(m):
 @pytest.mark.slow_for("float32")
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 def test_the_loop_is_the_twins(dtype):
-    sensors = [*(lw.Sensor(**numbers) for numbers in SENSORS), lw.DeadReckoning(depth="measured")]
-    members = one(steered(sensors, [lw.Fault(**FAULT)]), parameters=VARIED)
+    sensors = [*(lw.control.Sensor(**numbers) for numbers in SENSORS), lw.control.DeadReckoning(depth="measured")]
+    members = one(steered(sensors, [lw.control.Fault(**FAULT)]), parameters=VARIED)
     result = lw.solve(members, "psi_s", h=H, t1=STEPS * H, save=lw.SaveAt(every=50 * H), dtype=dtype)
     assert result.status.counts() == {"ok": MEMBERS}
     for m in range(MEMBERS):
@@ -73,10 +73,10 @@ def test_the_loop_is_the_twins(dtype):
 
 @pytest.mark.slow
 def test_a_dead_sensor_of_the_depth_makes_the_vehicle_dive():
-    dead = [lw.Fault(of="cell", time=np.inf)]
-    sensors = [lw.Sensor(name="cell", of="depth", noise=0.01)]
+    dead = [lw.control.Fault(of="cell", time=np.inf)]
+    sensors = [lw.control.Sensor(name="cell", of="depth", noise=0.01)]
     still = steered(sensors, dead)
-    pushed = lw.Wrench(force=(15.0, 0.0, 0.0))
+    pushed = lw.terms.Wrench(force=(15.0, 0.0, 0.0))
     scene = lw.Scene(still.vehicle, still.environment, [*still.terms, pushed], controller=still.controller)
     members = one(scene, parameters={"fault.time": np.array([np.inf, 50.0])})
     depth = lw.solve(members, "psi_s", h=H, t1=120.0, save=lw.SaveAt(every=40.0)).position[..., 2]
@@ -93,13 +93,13 @@ HEADING_NOISE, RATE_NOISE = 0.01, 0.004
 
 @pytest.mark.slow
 def test_the_variance_under_white_noise_is_that_of_the_lyapunov_equation():
-    sensors = [lw.Sensor(of="heading", name="compass", noise=HEADING_NOISE)]
-    sensors += [lw.Sensor(of="angular_velocity", name="gyro", noise=RATE_NOISE)]
+    sensors = [lw.control.Sensor(of="heading", name="compass", noise=HEADING_NOISE)]
+    sensors += [lw.control.Sensor(of="angular_velocity", name="gyro", noise=RATE_NOISE)]
     controller = lw.Controller(
-        period=PERIOD, sensors=sensors, guidance=[lw.SetPoint(heading=0.0)], laws=[lw.HeadingPID(kp=KP, kd=KD)]
+        period=PERIOD, sensors=sensors, guidance=[lw.control.SetPoint(heading=0.0)], laws=[lw.control.HeadingPID(kp=KP, kd=KD)]
     )
     vehicle = torpedo(20.0 * GRAVITY, (0.0, 0.0, -0.02), (1.5, 4.0, J))
-    scene = lw.Scene(vehicle, lw.Environment(GRAVITY), [lw.ControlWrench()], controller=controller)
+    scene = lw.Scene(vehicle, lw.Environment(GRAVITY), [lw.terms.ControlWrench()], controller=controller)
     members = 4096
     result = lw.solve(lw.Ensemble(scene, members, 3), "psi_s", h=0.05, t1=60.0, save=lw.SaveAt(every=10.0))
     heading = np.arctan2(result.attitude[..., 1, 0], result.attitude[..., 0, 0])

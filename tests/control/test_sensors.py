@@ -100,9 +100,9 @@ def motion(ticks=TICKS, members=MEMBERS, period=PERIOD):
 
 
 def chain(case):
-    parts = [lw.Sensor(**numbers) for numbers in SENSORS[case]]
-    parts += [getattr(lw, kind)(**numbers) for kind, numbers in ESTIMATORS[case]]
-    return scene(parts, [lw.Fault(**numbers) for numbers in FAULTS[case]], PERIOD)
+    parts = [lw.control.Sensor(**numbers) for numbers in SENSORS[case]]
+    parts += [getattr(lw.control, kind)(**numbers) for kind, numbers in ESTIMATORS[case]]
+    return scene(parts, [lw.control.Fault(**numbers) for numbers in FAULTS[case]], PERIOD)
 
 
 def twins(case, m):
@@ -261,11 +261,11 @@ def test_what_no_member_has_is_no_code():
         plan = make_plan(lw.Ensemble(scene(sensors), 4, 0, vary or {}), "psi_s", H, 1.0)
         return plan.spec.control.parts
 
-    ideal = modules([lw.Sensor(of="depth")])[0]
+    ideal = modules([lw.control.Sensor(of="depth")])[0]
     assert ideal is built_in("laws.control", "sensor:depth")
-    assert modules([lw.Sensor(of="depth", noise=0.1)])[0] is built_in("laws.control", "sensor:depth,noise")
-    varied = {"sensor.dropout": lw.Uniform(0.0, 0.5), "sensor.bias": lw.Normal(std=0.1)}
-    assert modules([lw.Sensor(of="depth")], varied)[0] is built_in("laws.control", "sensor:depth,bias,dropout")
+    assert modules([lw.control.Sensor(of="depth", noise=0.1)])[0] is built_in("laws.control", "sensor:depth,noise")
+    varied = {"sensor.dropout": lw.distributions.Uniform(0.0, 0.5), "sensor.bias": lw.distributions.Normal(std=0.1)}
+    assert modules([lw.control.Sensor(of="depth")], varied)[0] is built_in("laws.control", "sensor:depth,bias,dropout")
 
 
 def test_a_filters_step_response():

@@ -22,7 +22,7 @@ def page(tmp_path_factory):
     text = (ROOT / "docs" / "develop" / "add_a_controller.md").read_text().split("## Four roles")[0]
     code = "\n".join(line[4:] for line in text.splitlines() if line.startswith("    ") or not line)
     yield load(tmp_path_factory.mktemp("page") / "page_of_controllers.py", code)
-    del lw.ControlLaw.kinds["bang"]
+    del lw.laws.ControlLaw.kinds["bang"]
 
 
 def wrong_checks(report):
@@ -49,7 +49,7 @@ vary = { "bang.level" = { uniform = { low = 2.0, high = 4.0 } } }
 
 
 def test_the_law_on_the_page_is_right_and_keeps_the_depth(page):
-    report = lw.check_controller(page.Bang(level=3.0))
+    report = lw.laws.check_controller(page.Bang(level=3.0))
     assert report.ok, str(report)
     assert "nanoseconds" in str(report), str(report)
     scene = scenes.loads(SCENE)
@@ -62,16 +62,16 @@ def test_the_law_on_the_page_is_right_and_keeps_the_depth(page):
 
 
 def test_a_type_is_taken_once(monkeypatch):
-    for base, word in ((lw.ControlLaw, "heading_pid"), (lw.Guidance, "waypoints"), (lw.MeasuringPart, "sensor")):
+    for base, word in ((lw.laws.ControlLaw, "heading_pid"), (lw.laws.Guidance, "waypoints"), (lw.laws.MeasuringPart, "sensor")):
         monkeypatch.setattr(base, "kinds", dict(base.kinds))
         taken = type("Mine", (base,), {"type": word})
         with pytest.raises(
             ValueError, match=rf"Mine.type = '{word}': is that of lgvi_warp\..*; give a type that no other"
         ):
-            lw.register(taken)
+            lw.laws.register(taken)
         assert base.kinds[word] is not taken
     # A type is one list's: a law may have the type of a guidance.
-    assert lw.register(type("Mine", (lw.ControlLaw,), {"type": "waypoints"}))
+    assert lw.laws.register(type("Mine", (lw.laws.ControlLaw,), {"type": "waypoints"}))
 
 
 @wp.func
@@ -98,35 +98,35 @@ class Careless:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class CarelessLaw(lw.ControlLaw):
+class CarelessLaw(lw.laws.ControlLaw):
     device: ClassVar[Any] = Careless
 
     type: ClassVar[str] = "careless_of_tests"
-    level: Any = lw.number((), "N", least=0.0)
+    level: Any = lw.laws.number((), "N", least=0.0)
 
     def packed(self, numbers, context):
         turned = context.frame.vector(np.ones((1, 3)))[:, 0] * numbers["level"]
-        return lw.Packed({"level": turned}, memory=np.zeros((1, 1)))
+        return lw.laws.Packed({"level": turned}, memory=np.zeros((1, 1)))
 
 
 class Forgetful(CarelessLaw):
     type: ClassVar[str] = "forgetful_of_tests"
 
     def packed(self, numbers, context):
-        return lw.Packed({"level": numbers["level"][:1]}, memory=np.zeros((1, 1)))
+        return lw.laws.Packed({"level": numbers["level"][:1]}, memory=np.zeros((1, 1)))
 
 
 def test_what_is_wrong_is_said():
     wide = scenes.loads(SCENE.replace("bang", "heading_pid").replace("level = 3.0", "kp = 1.0").split("[ensemble]")[0]
                         .replace("depth = 1.0", "heading = 1.0"))  # fmt: skip
-    report = lw.check_controller(CarelessLaw(level=2.0), scene=wide)
+    report = lw.laws.check_controller(CarelessLaw(level=2.0), scene=wide)
     wrong = wrong_checks(report)
     assert set(wrong) == {
         "finite at bounds of numbers", "lanes apart", "packets of one", "blind to the truth", "any axes", "memory in its rows"
     }, str(report)  # fmt: skip
     assert "above=0.0" in wrong["finite at bounds of numbers"]
     assert "y.position" in wrong["blind to the truth"]
-    assert "varied numbers" in wrong_checks(lw.check_controller(Forgetful(level=2.0), scene=wide))
+    assert "varied numbers" in wrong_checks(lw.laws.check_controller(Forgetful(level=2.0), scene=wide))
     assert "p.memory + 1" in wrong["memory in its rows"]
     assert "user's axes" in wrong["any axes"]
 
@@ -135,9 +135,9 @@ GAINS = dict(kp=1.0, ki=0.2, kd=0.3, integral_limit=0.05)
 
 
 def test_a_twin_agrees_or_is_said_to_differ():
-    part = lw.HeadingPID(**GAINS)
-    assert lw.check_controller(part, twin=heading_pid.HeadingPID(**GAINS)).ok
-    other = lw.check_controller(part, twin=heading_pid.HeadingPID(**GAINS | {"ki": 0.21}))
+    part = lw.control.HeadingPID(**GAINS)
+    assert lw.laws.check_controller(part, twin=heading_pid.HeadingPID(**GAINS)).ok
+    other = lw.laws.check_controller(part, twin=heading_pid.HeadingPID(**GAINS | {"ki": 0.21}))
     assert set(wrong_checks(other)) == {"as the twin"}
 
 
@@ -148,41 +148,41 @@ def shapeless_control(w: Any, r: Any, y: Any, p: Any):
 
 def test_what_is_no_part_or_does_not_compile_is_refused():
     with pytest.raises(lw.SceneError, match="is no part of a controller; give an object"):
-        lw.check_controller(lw.HeadingPID)
+        lw.laws.check_controller(lw.control.HeadingPID)
     with pytest.raises(lw.SceneError, match="is no part of a controller"):
-        lw.check_controller(lw.Current(velocity=(1.0, 0.0, 0.0)))
+        lw.laws.check_controller(lw.terms.Current(velocity=(1.0, 0.0, 0.0)))
     device = type("Shapeless", (), {"control": shapeless_control})
-    kind = type("ShapelessLaw", (lw.ControlLaw,), {"device": device})
+    kind = type("ShapelessLaw", (lw.laws.ControlLaw,), {"device": device})
     with pytest.raises(lw.SceneError, match=r"does not compile.*add_a_controller\.md"):
-        lw.check_controller(kind(name="shapeless"))
-    empty = type("EmptyLaw", (lw.ControlLaw,), {"device": type("Empty", (), {})})
+        lw.laws.check_controller(kind(name="shapeless"))
+    empty = type("EmptyLaw", (lw.laws.ControlLaw,), {"device": type("Empty", (), {})})
     with pytest.raises(lw.SceneError, match=r"has none of measure.*add_a_controller\.md"):
-        lw.check_controller(empty(name="empty"))
+        lw.laws.check_controller(empty(name="empty"))
 
 
 V = (0.3, 0.4, 0.5)
 PARTS = {
-    "depth sensor": (lw.Sensor(of="depth", noise=0.02, quantum=0.005, bias=0.1), None),
-    "heading sensor": (lw.Sensor(of="heading", noise=0.01, drift=0.1, every=3, latency=2, dropout=0.1), None),
-    "attitude sensor": (lw.Sensor(of="attitude", noise=0.01, latency=1), None),
-    "dead reckoning": (lw.DeadReckoning(), None),
-    "low-pass": (lw.LowPass(of="attitude", time_constant=0.5), None),
-    "complementary": (lw.ComplementaryFilter(time_constant=2.0), None),
-    "set-point": (lw.SetPoint(depth=3.0, speed=1.0), set_point.SetPoint(depth=3.0, speed=1.0)),
-    "waypoints": (lw.Waypoints(points=[(0, 0, 5), (9, 0, 5), (9, 9, 6)], speed=1.0, look_ahead=3.0, radius=1.0), None),
-    "trajectory": (lw.Trajectory(times=(0.1, 0.2, 0.3), positions=[(0, 0, 3), (2, 1, 4), (5, -2, 6)]), None),
-    "reference model": (lw.ReferenceModel(natural_frequency=(1, 1.2, 0.8, 1.5), damping_ratio=(1, 0.8, 1.2, 1)), None),
-    "depth": (lw.DepthPID(kp=0.3, ki=0.02, kp_pitch=12.0), None),
-    "heave": (lw.HeavePID(kp=3.0, ki=0.2), None),
-    "speed": (lw.SpeedPID(kp=3.0, ki=0.2), None),
-    "pose": (lw.PosePID(kp=V, ki=V, kd=V, kr=V, kw=V, feedforward="restoring"), None),
-    "pose smc": (lw.PoseSMC(lambda_=V, boundary=V, lambda_r=V, boundary_r=V, k_sigma=V, k_d=V, k_sigma_r=V, k_d_r=V), None),
-    "heading smc": (lw.HeadingSMC(lambda_=0.4, boundary=0.1, k_sigma=0.2, nomoto_gain=0.25, nomoto_time=1.5), None),
-    "state feedback": (lw.StateFeedback(K=np.ones((6, 12))), None),
-    "matrix": (lw.AllocationMatrix(to="control_wrench", matrix=2.0 * np.eye(6)),
+    "depth sensor": (lw.control.Sensor(of="depth", noise=0.02, quantum=0.005, bias=0.1), None),
+    "heading sensor": (lw.control.Sensor(of="heading", noise=0.01, drift=0.1, every=3, latency=2, dropout=0.1), None),
+    "attitude sensor": (lw.control.Sensor(of="attitude", noise=0.01, latency=1), None),
+    "dead reckoning": (lw.control.DeadReckoning(), None),
+    "low-pass": (lw.control.LowPass(of="attitude", time_constant=0.5), None),
+    "complementary": (lw.control.ComplementaryFilter(time_constant=2.0), None),
+    "set-point": (lw.control.SetPoint(depth=3.0, speed=1.0), set_point.SetPoint(depth=3.0, speed=1.0)),
+    "waypoints": (lw.control.Waypoints(points=[(0, 0, 5), (9, 0, 5), (9, 9, 6)], speed=1.0, look_ahead=3.0, radius=1.0), None),
+    "trajectory": (lw.control.Trajectory(times=(0.1, 0.2, 0.3), positions=[(0, 0, 3), (2, 1, 4), (5, -2, 6)]), None),
+    "reference model": (lw.control.ReferenceModel(natural_frequency=(1, 1.2, 0.8, 1.5), damping_ratio=(1, 0.8, 1.2, 1)), None),
+    "depth": (lw.control.DepthPID(kp=0.3, ki=0.02, kp_pitch=12.0), None),
+    "heave": (lw.control.HeavePID(kp=3.0, ki=0.2), None),
+    "speed": (lw.control.SpeedPID(kp=3.0, ki=0.2), None),
+    "pose": (lw.control.PosePID(kp=V, ki=V, kd=V, kr=V, kw=V, feedforward="restoring"), None),
+    "pose smc": (lw.control.PoseSMC(lambda_=V, boundary=V, lambda_r=V, boundary_r=V, k_sigma=V, k_d=V, k_sigma_r=V, k_d_r=V), None),
+    "heading smc": (lw.control.HeadingSMC(lambda_=0.4, boundary=0.1, k_sigma=0.2, nomoto_gain=0.25, nomoto_time=1.5), None),
+    "state feedback": (lw.control.StateFeedback(K=np.ones((6, 12))), None),
+    "matrix": (lw.control.AllocationMatrix(to="control_wrench", matrix=2.0 * np.eye(6)),
                matrix.AllocationMatrix(to="control_wrench", matrix=2.0 * np.eye(6))),
-    "pseudo-inverse": (lw.PseudoInverse(to="control_wrench"), None),
-    "fault": (lw.Fault(of="control_wrench", channel=2, gain=0.5), None),
+    "pseudo-inverse": (lw.control.PseudoInverse(to="control_wrench"), None),
+    "fault": (lw.control.Fault(of="control_wrench", channel=2, gain=0.5), None),
 }  # fmt: skip
 
 
@@ -190,6 +190,6 @@ PARTS = {
 @pytest.mark.parametrize("name", PARTS)
 def test_the_parts_of_the_package_are_right(name):
     part, twin = PARTS[name]
-    report = lw.check_controller(part, twin=twin)
+    report = lw.laws.check_controller(part, twin=twin)
     assert report.ok, str(report)
     assert not any("note: changes nothing" in check.text for check in report.checks), str(report)

@@ -81,7 +81,7 @@ def ensemble(group):
     mass = np.minimum(M.min(axis=1), np.where(g > 0.0, np.inf, M.min(axis=1)))
     buoyancy = mass * g - net
     arm = np.divide(Br, buoyancy[:, None], out=np.zeros_like(Br), where=Br != 0.0)
-    terms = [lw.Drag(linear=(1.0,) * 6, quadratic=(1.0,) * 6)] if group.dragged else []
+    terms = [lw.terms.Drag(linear=(1.0,) * 6, quadratic=(1.0,) * 6)] if group.dragged else []
     scene = lw.Scene(lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0)), lw.Environment(gravity=9.8), terms=terms)
     parameters = {
         "vehicle.mass": mass, "vehicle.added_mass": M - mass[:, None], "vehicle.inertia": array(cases, "J"),

@@ -16,7 +16,7 @@ SLOW = pytest.mark.slow
 KAPPAS = tuple(10.0**k for k in range(-6, 7))
 SPHERE = {"M": (10.0, 10.0, 10.0), "J": (1.0, 1.0, 1.0)}
 BRAKED = lw.Scene(lw.Vehicle(10.0, inertia=(1.0,) * 3, buoyancy=98.0), lw.Environment(9.8),
-                  [lw.DragMatrix(linear=np.eye(6), quadratic=np.eye(6))])  # fmt: skip
+                  [lw.terms.DragMatrix(linear=np.eye(6), quadratic=np.eye(6))])  # fmt: skip
 
 
 def rising(values, unit):

@@ -15,7 +15,7 @@ GENERAL = scene_of((10.0, 12.0, 15.0), (1.0, 2.0, 2.5), net=-0.3, moment=(0.0, 0
 H, STEPS, WIDEST = 0.05, 300, 16
 
 # Thrusters that lag: a law that remembers from step to step, as a controller does.
-LAGGING = lw.Thrusters(position=[[-0.5, 0.2, 0.0]], direction=[[1.0, 0.0, 0.0]], coefficient=[0.5], time_constant=[1.0],
+LAGGING = lw.terms.Thrusters(position=[[-0.5, 0.2, 0.0]], direction=[[1.0, 0.0, 0.0]], coefficient=[0.5], time_constant=[1.0],
                        times=[0.0, 5.0], command_schedule=[[0.0], [1.0]])  # fmt: skip
 
 

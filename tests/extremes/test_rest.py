@@ -16,7 +16,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 # Momenta fall by at least e^16 a second: in 60 s far below the least subnormal number of float64, e^-744.
-FALL = lw.Drag(linear=(300.0,) * 3 + (40.0,) * 3)
+FALL = lw.terms.Drag(linear=(300.0,) * 3 + (40.0,) * 3)
 SCENE = scene_of((10.0, 12.0, 15.0), (1.0, 2.0, 2.5))
 DAMPED = lw.Scene(SCENE.vehicle, SCENE.environment, terms=[FALL])
 

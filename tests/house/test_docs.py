@@ -13,7 +13,7 @@ import SALib.sample.sobol
 import scipy.stats
 
 import lgvi_warp as lw
-from lgvi_warp.statistics import TYPES as STATISTICS
+from lgvi_warp.statistics.base import TYPES as STATISTICS
 from tests.conftest import ROOT
 
 matplotlib.use("Agg")

@@ -13,15 +13,15 @@ from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.statistics.estimates.estimate import Estimate
 from lgvi_warp.store.settings import needed
 from lgvi_warp.studies.sensitivity import analyses
-from lgvi_warp.views import plots
+from lgvi_warp import plots
 from lgvi_warp.views.pages import run_again as again
 from lgvi_warp.views.recording import rerun
 
 ESTIMATE = Estimate("mean x", {}, "m", 0.95, "", {"value": ("time",)}, {"value": np.zeros(2)}, {"time": np.arange(2.0)})
 TWO = Space(0, ("a", "b"), (1, 1), (("a", (0,)), ("b", (1,))))
-MODEL = lw.LinearModel(*np.zeros((4, 12, 12)), 0.1, (), (), {})
+MODEL = lw.linear.LinearModel(*np.zeros((4, 12, 12)), 0.1, (), (), {})
 DOORS = {
-    "screening": (lambda: lw.Morris(4).draw(TWO, np.arange(3)), "SALib.sample", "uq"),
+    "screening": (lambda: lw.designs.Morris(4).draw(TWO, np.arange(3)), "SALib.sample", "uq"),
     "sensitivity": (lambda: analyses.salib(), "SALib.analyze.morris", "uq"),
     "datasets of statistics": (lambda: ESTIMATE.dataset, "xarray", "store"),
     "stores: checksums": (needed, "google_crc32c", "store"),

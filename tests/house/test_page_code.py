@@ -105,7 +105,7 @@ def test_pictures_and_recordings_of_a_result(scene, tmp_path, monkeypatch):
     record, streamed = lw.record, []
     # A viewer that is open is not there: what would go to it is noted.
     monkeypatch.setattr(lw, "record", lambda *a, to=None, **k: streamed.append(to) if to else record(*a, **k))
-    fleet = lw.Ensemble(scene, 20, seed=1, vary={"start.angular_velocity": lw.Normal(std=0.1)})
+    fleet = lw.Ensemble(scene, 20, seed=1, vary={"start.angular_velocity": lw.distributions.Normal(std=0.1)})
     names = {"lw": lw, "fleet": fleet, "result": lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=0.5))}
     names |= {"a": names["result"], "b": names["result"]}
     for page in OF_A_RESULT:

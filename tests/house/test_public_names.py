@@ -1,51 +1,59 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Public names that were replaced: the old ones still work, warn, and name the new ones."""
+"""Public names: each has one door, the root has few, every door finds what its stub lists; and verbs of two names."""
 
+import importlib
 import inspect
-import pickle
-from pathlib import Path
+from collections import Counter
 
 import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.cli.arguments import parser
 from lgvi_warp.cli.command import VERBS
+from tests.conftest import ROOT
 
-RENAMED = {
-    "Frozen": "ScipyDistribution",
-    "Levels": "UnitCubePoints",
-    "Setting": "PackingContext",
-    "from_fossen": "vehicle_tables_from_fossen",
-    "from_sdf": "vehicle_tables_from_sdf",
-    "from_yaml": "vehicle_tables_from_yaml",
-    "quantity": "number",
-    "register": "register_term",
-}
+DOORS = sorted(name for name in lw.__all__ if inspect.ismodule(getattr(lw, name)))
+STUBS = sorted(path.relative_to(ROOT) for path in (ROOT / "lgvi_warp").rglob("*.pyi"))
+MOST_NAMES_OF_THE_ROOT = 40
 
 
-@pytest.mark.parametrize(("old", "new"), RENAMED.items())
-def test_an_old_name_is_the_new_thing_and_warns_each_time(old, new):
-    for _ in range(2):
-        with pytest.warns(DeprecationWarning, match=rf"lw\.{old} is now lw\.{new};") as warned:
-            assert getattr(lw, old) is getattr(lw, new)
-        assert warned[0].filename == __file__
-    assert new in lw.__all__
-    assert old not in lw.__all__
+def names():
+    """(door, name) of all public names; "" is the root."""
+    return [("", name) for name in lw.__all__ if name not in DOORS] + [
+        (door, name) for door in DOORS for name in getattr(lw, door).__all__
+    ]
 
 
-def test_the_old_name_of_uq():
-    with pytest.warns(DeprecationWarning, match=r"lw\.uq\.Model is now lw\.uq\.ScalarModel;"):
-        assert lw.uq.Model is lw.uq.ScalarModel
-    with pytest.raises(AttributeError, match="no attribute 'Models'"):
-        lw.uq.Models
+def test_the_root_has_few_names():
+    assert len([name for door, name in names() if not door]) <= MOST_NAMES_OF_THE_ROOT
 
 
-def test_an_old_name_pickles_as_the_new_class():
-    with pytest.warns(DeprecationWarning, match="UnitCubePoints"):
-        design = lw.Levels([[0.25, 0.5]])
-    loaded = pickle.loads(pickle.dumps(design))
-    assert type(loaded) is lw.UnitCubePoints
-    assert loaded.points.tolist() == [[0.25, 0.5]]
+def test_each_thing_has_one_door():
+    things = Counter(id(getattr(getattr(lw, door) if door else lw, name)) for door, name in names())
+    twice = [
+        (door, name) for door, name in names() if things[id(getattr(getattr(lw, door) if door else lw, name))] > 1
+    ]
+    assert twice == []
+
+
+def test_only_doors_have_stubs():
+    paths = [path.with_suffix("") for path in STUBS]
+    doors = {(path.parent if path.name == "__init__" else path).relative_to("lgvi_warp").as_posix() for path in paths}
+    assert doors == {".", *DOORS}
+
+
+@pytest.mark.parametrize("door", DOORS)
+def test_a_door_can_be_imported_by_its_name(door):
+    assert importlib.import_module(f"lgvi_warp.{door}") is getattr(lw, door)
+
+
+@pytest.mark.parametrize("door", DOORS)
+def test_a_door_finds_its_names_and_no_others(door):
+    module = getattr(lw, door)
+    assert dir(module) == module.__all__
+    assert all(getattr(module, name) is not None for name in module.__all__)
+    with pytest.raises(AttributeError, match="has no attribute 'Setings'"):
+        module.Setings
 
 
 def test_the_verb_plan_is_the_verb_predict():
@@ -55,9 +63,3 @@ def test_the_verb_plan_is_the_verb_predict():
     assert chosen[0] == chosen[1]
     assert VERBS["plan"] is VERBS["predict"]
     assert "predict (plan)" in parser().format_help()
-
-
-def test_no_room_bears_the_name_of_a_function():
-    # Once a room is imported, it is an attribute of the package.
-    rooms = {path.stem for path in Path(lw.__path__[0]).iterdir()}
-    assert {name for name in rooms & set(lw.__all__) if not inspect.ismodule(getattr(lw, name))} == set()

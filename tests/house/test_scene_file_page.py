@@ -19,7 +19,7 @@ from lgvi_warp.sampling.distributions.named import KINDS as DISTRIBUTIONS
 from lgvi_warp.sampling.distributions.named import SCIPY
 from lgvi_warp.scene.scene import SECTIONS
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
-from lgvi_warp.statistics import TYPES as STATISTICS
+from lgvi_warp.statistics.base import TYPES as STATISTICS
 from lgvi_warp.statistics.base import Statistic
 from tests.conftest import ROOT
 
@@ -37,8 +37,8 @@ KEYS = {
 }
 # Introduction of each table of types -> its classes by type, and the class whose fields they share.
 KINDS = {
-    "`[[terms]]`": (terms.TYPES, lw.Term),
-    "`[[events]]`": (events.TYPES, lw.Event),
+    "`[[terms]]`": (terms.TYPES, lw.laws.Term),
+    "`[[events]]`": (events.TYPES, lw.laws.Event),
     "Distributions and their keys": (DISTRIBUTIONS, None),
     "Samplings and their keys": (SAMPLINGS, None),
     "Types and their further keys": (STATISTICS, Statistic),

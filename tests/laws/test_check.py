@@ -33,7 +33,7 @@ EACH = pytest.mark.parametrize("term", [term for _, term in BUILT_IN], ids=[name
 
 @EACH
 def test_a_built_in_law_is_right(term):
-    report = lw.check_law(term)
+    report = lw.laws.check_law(term)
     assert report.ok, str(report)
     assert len(report.checks) >= 4
 
@@ -47,30 +47,30 @@ def test_a_scene_file_holds_it(term):
         np.testing.assert_array_equal(getattr(again, key), value, err_msg=key)
 
 
-@pytest.mark.parametrize("term", [lw.Weight(), lw.Restoring(), lw.Surface(), lw.StopTime(at=3.0)], ids=lambda t: t.type)
+@pytest.mark.parametrize("term", [lw.terms.Weight(), lw.terms.Restoring(), lw.events.Surface(), lw.events.StopTime(at=3.0)], ids=lambda t: t.type)
 def test_what_follows_from_the_vehicle_and_events_are_right(term):
-    assert lw.check_law(term).ok
+    assert lw.laws.check_law(term).ok
     # Another vehicle and environment, and no new kernel.
     other = lw.Scene(FULL, lw.Environment(gravity=3.7), start=lw.Start(position=[0.0, 0.0, 50.0]))
-    assert lw.check_law(term, scene=other, samples=5, seed=7).ok
+    assert lw.laws.check_law(term, scene=other, samples=5, seed=7).ok
 
 
 def test_a_law_may_remember_a_single_number():
     wing = dict(
         position=[[-0.5, 0.0, 0.0]], chord=[[1.0, 0.0, 0.0]], normal=[[0.0, 0.0, -1.0]], area=0.01, lift_slope=3.0
     )
-    fin = lw.ControlFins(**wing, command=[0.1], rate_limit=0.5, drag=0.0)
+    fin = lw.terms.ControlFins(**wing, command=[0.1], rate_limit=0.5, drag=0.0)
     assert fin.memory
-    assert lw.check_law(fin).ok
+    assert lw.laws.check_law(fin).ok
 
 
 @pytest.mark.parametrize("step", [1e-4, 1e-6])
 def test_the_tolerance_follows_the_step(step):
-    assert lw.check_law(CASES["tether"].terms[0], step=step, samples=256).ok
+    assert lw.laws.check_law(CASES["tether"].terms[0], step=step, samples=256).ok
 
 
 def test_a_report_is_a_table():
-    report = lw.check_law(CASES["tether"].terms[0])
+    report = lw.laws.check_law(CASES["tether"].terms[0])
     lines = str(report).splitlines()
     assert lines[0] == "Tether (tether): ok"
     assert len(lines) == len(report.checks) + 2
@@ -78,7 +78,7 @@ def test_a_report_is_a_table():
 
 
 def test_a_law_that_sleeps_is_noted():
-    asleep = lw.check_law(CASES["slack tether"].terms[0])
+    asleep = lw.laws.check_law(CASES["slack tether"].terms[0])
     assert asleep.ok
     assert "zero at every view" in str(asleep)
 
@@ -96,26 +96,26 @@ class ReversedDevice:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Reversed(lw.Restoring):
+class Reversed(lw.terms.Restoring):
     type: ClassVar[str] = "reversed"
     device: ClassVar[Any] = ReversedDevice
 
 
-class Unturned(lw.Tether):
+class Unturned(lw.terms.Tether):
     """Forgets that the kernel's axes and origin are not the user's."""
 
     def packed(self, numbers, context):
-        return lw.Packed({key: numbers[key] for key in ("anchor", "attachment", "stiffness", "rest_length")})
+        return lw.laws.Packed({key: numbers[key] for key in ("anchor", "attachment", "stiffness", "rest_length")})
 
 
-class NoPotential(lw.Tether):
+class NoPotential(lw.terms.Tether):
     """Says it has a potential, and has none."""
 
     def potential(self, numbers, position, attitude, parameters):
         return 0.0
 
 
-class Creating(lw.DragMatrix):
+class Creating(lw.terms.DragMatrix):
     """Takes any matrix."""
 
     def check(self, faults):
@@ -132,13 +132,13 @@ def test_damping_that_creates_energy():
     # Positive on the diagonal, and yet less than nothing along (1, -1, 0, 0, 0, 0).
     linear = np.eye(6)
     linear[0, 1] = linear[1, 0] = 1.001
-    report = lw.check_law(Creating(linear=linear))
+    report = lw.laws.check_law(Creating(linear=linear))
     assert names_of_failed(report) == ["damping: power >= 0"]
     worst = next(one for one in report.checks if not one.ok)
     np.testing.assert_allclose(worst.worst, 0.001, rtol=1e-9)
     assert "dissipative = False" in worst.text
     assert "velocity" in worst.text
-    noted = lw.check_law(Lifting(linear=linear))
+    noted = lw.laws.check_law(Lifting(linear=linear))
     assert noted.ok
     assert "note: least power -0.001 W" in str(noted)
 
@@ -165,14 +165,14 @@ class StirredDevice:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Stirred(lw.Term):
+class Stirred(lw.laws.Term):
     type: ClassVar[str] = "stirred"
     device: ClassVar[Any] = StirredDevice
 
-    strength: Any = lw.number((), "1/s")
+    strength: Any = lw.laws.number((), "1/s")
 
     def packed(self, numbers, context):
-        return lw.Packed(dict(numbers))
+        return lw.laws.Packed(dict(numbers))
 
 
 def with_device(device, strength=0.3):
@@ -185,7 +185,7 @@ def with_role(role, function, strength=0.3):
 
 
 def test_a_flow_whose_gradient_is_wrong():
-    report = lw.check_law(Stirred(strength=0.3))
+    report = lw.laws.check_law(Stirred(strength=0.3))
     wrong = {"rate = du/dt", "by_depth = du/db3", "FLOW", "water()", "blind to time"}
     assert set(names_of_failed(report)) == {f"flow: {name}" for name in wrong}
     assert "write FLOW = 'varying'" in str(report)
@@ -243,7 +243,7 @@ def heading_law(w: Any, view: Any, p: Any):
 
 
 def test_damping_along_one_axis_is_right():
-    report = lw.check_law(with_role("damping", resisting_damping))
+    report = lw.laws.check_law(with_role("damping", resisting_damping))
     assert "finite at rest, along axes" not in names_of_failed(report)
 
 
@@ -283,19 +283,19 @@ class Drifting(Stirred):
     memory = True
 
     def packed(self, numbers, context):
-        return lw.Packed({"strength": numbers["strength"]}, memory=np.zeros((1, 1)))
+        return lw.laws.Packed({"strength": numbers["strength"]}, memory=np.zeros((1, 1)))
 
 
 class Forgetful(Stirred):
     device = type("Hasty", (), {"params": staticmethod(stirred_params), "law": hasty_law})
 
     def packed(self, numbers, context):
-        return lw.Packed({"strange": numbers["strength"]})
+        return lw.laws.Packed({"strange": numbers["strength"]})
 
 
-class Shared(lw.Wrench):
+class Shared(lw.terms.Wrench):
     def packed(self, numbers, context):
-        return lw.Packed({key: numbers[key].reshape(1, 3) for key in ("force", "torque")})
+        return lw.laws.Packed({key: numbers[key].reshape(1, 3) for key in ("force", "torque")})
 
 
 @wp.func
@@ -303,7 +303,7 @@ def energy_of_nothing(u: Any, view: Any, p: Any):
     return u + p.stiffness
 
 
-class WrongEnergy(lw.Tether):
+class WrongEnergy(lw.terms.Tether):
     """A tether whose energy is not its potential."""
 
     device: ClassVar[Any] = type("Spring", (), {"law": tether.law, "energy": energy_of_nothing, "POTENTIAL": True})
@@ -338,7 +338,7 @@ WRONG = {
 
 @pytest.mark.parametrize(("term", "failed", "words"), [(row[0], row[1], row[2:]) for row in WRONG.values()], ids=WRONG)
 def test_what_is_wrong_is_said(term, failed, words):
-    report = lw.check_law(term)
+    report = lw.laws.check_law(term)
     named = [name for name in failed if name is not ...]
     assert set(named) <= set(names_of_failed(report)) if ... in failed else named == names_of_failed(report)
     assert all(text in str(report) for text in words), str(report)
@@ -372,20 +372,20 @@ UNBUILT = {
 @pytest.mark.parametrize(("term", "words"), UNBUILT.values(), ids=UNBUILT)
 def test_a_law_that_cannot_be_built(term, words, capfd):
     with pytest.raises(lw.SceneError) as error:
-        lw.check_law(term)
+        lw.laws.check_law(term)
     assert words in str(error.value)
     assert "stirred." in str(error.value)
 
 
 def test_what_is_no_term():
     with pytest.raises(lw.SceneError, match="not its class"):
-        lw.check_law(lw.Tether)
+        lw.laws.check_law(lw.terms.Tether)
 
 
 def test_a_second_check_builds_no_kernel():
     from lgvi_kernels.advance.examine import make_examine
 
-    lw.check_law(CASES["tether"].terms[0])
+    lw.laws.check_law(CASES["tether"].terms[0])
     before = make_examine.cache_info().misses
-    lw.check_law(lw.Tether(anchor=(0.0, 0.0, 1.0), stiffness=1.0), seed=3, samples=16)
+    lw.laws.check_law(lw.terms.Tether(anchor=(0.0, 0.0, 1.0), stiffness=1.0), seed=3, samples=16)
     assert make_examine.cache_info().misses == before

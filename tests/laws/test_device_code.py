@@ -26,8 +26,8 @@ PACKETS, SEED = 16, 12 + (34 << 32)
 ROUND_OFF = 100.0 * np.finfo(float).eps
 SCENE = lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), start=lw.Start(position=STATE["b"]))
 IMPLIED = {
-    "weight": Case((lw.Weight(),), (Weight(net=VEHICLE.mass * GRAVITY - VEHICLE.buoyancy),)),
-    "restoring": Case((lw.Restoring(),), (Restoring(moment=VEHICLE.buoyancy * np.array(VEHICLE.center_of_buoyancy)),)),
+    "weight": Case((lw.terms.Weight(),), (Weight(net=VEHICLE.mass * GRAVITY - VEHICLE.buoyancy),)),
+    "restoring": Case((lw.terms.Restoring(),), (Restoring(moment=VEHICLE.buoyancy * np.array(VEHICLE.center_of_buoyancy)),)),
 }
 ALONE = IMPLIED | {name: case for name, case in CASES.items() if len(case.terms) == 1}
 (LAGGING,), (LAGGING_TWIN,), _ = CASES["thrusters"]
@@ -120,10 +120,10 @@ def assert_close(actual, desired):
 
 LOWER, UPPER = np.array((-3.0, -4.0, 6.0)), np.array((4.0, 3.0, 11.0))
 EVENTS = {
-    lw.Surface(depth=1.5): lambda b, t: b[:, 2] - 1.5,
-    lw.Floor(depth=9.0): lambda b, t: 9.0 - b[:, 2],
-    lw.Box(lower=LOWER, upper=UPPER): lambda b, t: np.minimum(b - LOWER, UPPER - b).min(axis=1),
-    lw.StopTime(at=0.7): lambda b, t: 0.7 - t,
+    lw.events.Surface(depth=1.5): lambda b, t: b[:, 2] - 1.5,
+    lw.events.Floor(depth=9.0): lambda b, t: 9.0 - b[:, 2],
+    lw.events.Box(lower=LOWER, upper=UPPER): lambda b, t: np.minimum(b - LOWER, UPPER - b).min(axis=1),
+    lw.events.StopTime(at=0.7): lambda b, t: 0.7 - t,
 }
 
 

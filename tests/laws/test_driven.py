@@ -27,9 +27,9 @@ POLYNOMIAL = dict(polynomial=(3.0, 0.5, 8.0, -2.0, 1.0), polynomial_astern=(2.0,
 COEFFICIENTS = dict(coefficient=(2.0, 3.0, 1.0), coefficient_astern=(1.5, 2.5, 0.5))
 LAGGED = dict(limit=(0.35, 0.2, 0.5), rate_limit=RATES, time_constant=(0.1, 0.3, 0.0))
 ACTUATORS = {
-    "control wrench": (lw.ControlWrench(**WRENCH), ControlWrench(**arrays(WRENCH))),
+    "control wrench": (lw.terms.ControlWrench(**WRENCH), ControlWrench(**arrays(WRENCH))),
     "thrusters": (
-        lw.Thrusters(**THRUSTERS, **PROPELLERS, **POLYNOMIAL, **COEFFICIENTS),
+        lw.terms.Thrusters(**THRUSTERS, **PROPELLERS, **POLYNOMIAL, **COEFFICIENTS),
         Thrusters(
             **arrays(THRUSTERS | PROPELLERS),
             **POLYNOMIAL,
@@ -38,7 +38,7 @@ ACTUATORS = {
         ),
     ),
     "control fins without flow angle": (
-        lw.ControlFins(**FINS, **LAGGED, **STALL, flow_angle=False),
+        lw.terms.ControlFins(**FINS, **LAGGED, **STALL, flow_angle=False),
         ControlFins(**arrays(FINS | LAGGED | STALL), density=DENSITY, flow_angle=False),
     ),
 }  # fmt: skip

@@ -133,7 +133,7 @@ def test_a_scene_file_keeps_it_and_nothing_varies_it():
     assert "noise_step" not in terms.WrenchNoise(force=S).to_dict()
     assert not any("noise_step" in name for name in scene.parameters())
     with pytest.raises(lw.SceneError, match=r'"wrench_noise.noise_step".*does not name what the scene has'):
-        lw.Ensemble(scene, 4, vary={"wrench_noise.noise_step": lw.Uniform(0.1, 0.2)})
+        lw.Ensemble(scene, 4, vary={"wrench_noise.noise_step": lw.distributions.Uniform(0.1, 0.2)})
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, "short", [0.1, 0.2], np.nan])
@@ -157,7 +157,7 @@ def test_a_step_that_is_no_multiple_is_refused_with_the_nearest(h, every, text):
 
 def test_a_third_of_a_second_is_a_multiple_of_a_ninth():
     plan = make_plan(fleet(members=1, grid=1.0 / 9.0), "psi_x", 1.0 / 3.0, 2.0)
-    assert [term.draws(plan.grid.h) for term, _ in plan.kernel_choice.laws if isinstance(term, lw.NoisyTerm)] == [3, 3]
+    assert [term.draws(plan.grid.h) for term, _ in plan.kernel_choice.laws if isinstance(term, lw.laws.NoisyTerm)] == [3, 3]
 
 
 def test_more_draws_than_a_counter_has_are_refused():
@@ -194,10 +194,10 @@ class QuietDevice:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Gust(lw.NoisyTerm):
+class Gust(lw.laws.NoisyTerm):
     type: ClassVar[str] = "gust_of_test"
     device: ClassVar[Any] = Device
-    strength: Any = lw.number((3,), "N s^1/2", axes="vector")
+    strength: Any = lw.laws.number((3,), "N s^1/2", axes="vector")
 
 
 @pytest.mark.parametrize("noise_step", [None, KICK, KICK / 5.0])
@@ -213,7 +213,7 @@ def test_a_users_law_asks_for_the_draws_of_its_step(noise_step):
 
 
 def test_check_law_takes_it_and_a_device_that_hides_its_noise_is_refused():
-    assert lw.check_law(Gust(strength=S)).ok
+    assert lw.laws.check_law(Gust(strength=S)).ok
 
     @dataclass(frozen=True, eq=False, kw_only=True)
     class Quiet(Gust):
@@ -221,7 +221,7 @@ def test_check_law_takes_it_and_a_device_that_hides_its_noise_is_refused():
         device: ClassVar[Any] = QuietDevice
 
     with pytest.raises(lw.SceneError, match=r"quiet_gust_of_test.device.*write NOISE = True"):
-        lw.check_law(Quiet(strength=S))
+        lw.laws.check_law(Quiet(strength=S))
 
 
 SPLIT = ("psi_s", "psi_x", "psi_x8", "psi_w", "phi", "phi_adjoint")

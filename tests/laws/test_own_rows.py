@@ -75,20 +75,20 @@ def wild_distance(view: Any, p: Any):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Reading(lw.Term):
+class Reading(lw.laws.Term):
     """The numbers of both."""
 
-    values: Any = lw.number(("k",), "1")
-    row: Any = lw.number((), "1")
-    count: Any = lw.number((), "1")
-    place: Any = lw.number((), "1")
-    spread: Any = lw.number((), "1")
+    values: Any = lw.laws.number(("k",), "1")
+    row: Any = lw.laws.number((), "1")
+    count: Any = lw.laws.number((), "1")
+    place: Any = lw.laws.number((), "1")
+    spread: Any = lw.laws.number((), "1")
 
     def packed(self, numbers, context):
         words = {name: int(numbers[name].flat[0]) for name in ("row", "count", "place")}
         rows = np.atleast_2d(numbers["values"])
         memory = None if "memory" not in vars(type(self)) else 0.5 * rows[:1, :2]
-        return lw.Packed({**words, "spread": numbers["spread"]}, rows, memory)
+        return lw.laws.Packed({**words, "spread": numbers["spread"]}, rows, memory)
 
 
 WILD = dict(values=np.linspace(-1.0, 1.0, 11), row=0, count=1, place=0, spread=0.0)
@@ -116,7 +116,7 @@ class EventDevice:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class WildEvent(lw.Event, Reading):
+class WildEvent(lw.laws.Event, Reading):
     type: ClassVar[str] = "wild_event"
     device: ClassVar[Any] = EventDevice
 
@@ -126,7 +126,7 @@ def foreign(shared):
     n = 3000 if shared else 3
     force = np.full((n, 3), FOREIGN)
     force[0] = 0.0
-    return lw.WrenchSchedule(name="foreign", times=1e9 + np.arange(n), force=force, torque=force)
+    return lw.terms.WrenchSchedule(name="foreign", times=1e9 + np.arange(n), force=force, torque=force)
 
 
 def wild_numbers(rng):
@@ -188,16 +188,16 @@ class KeeperDevice:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Keeper(lw.Term):
+class Keeper(lw.laws.Term):
     """A force that it remembers."""
 
     type: ClassVar[str] = "keeper"
     device: ClassVar[Any] = KeeperDevice
     memory: ClassVar[bool] = True
-    kept: Any = lw.number((2,), "N")
+    kept: Any = lw.laws.number((2,), "N")
 
     def packed(self, numbers, context):
-        return lw.Packed({}, memory=numbers["kept"])
+        return lw.laws.Packed({}, memory=numbers["kept"])
 
 
 @functools.cache
@@ -209,7 +209,7 @@ def copied(name):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class OwnActuator(lw.ControlWrench):
+class OwnActuator(lw.terms.ControlWrench):
     type: ClassVar[str] = "own_actuator"
 
     def device_in(self, aligned):
@@ -219,7 +219,7 @@ class OwnActuator(lw.ControlWrench):
 def test_an_actuator_of_a_users_own_reports_where_it_is():
     # A torque that lags behind a command that never changes: 1 - e^(-t / T) of it.
     lag, t1 = 0.5, 1.5
-    controller = lw.Controller(period=0.1, guidance=[lw.SetPoint(heading=1.0)], laws=[lw.HeadingPID(kp=2.0)])
+    controller = lw.Controller(period=0.1, guidance=[lw.control.SetPoint(heading=1.0)], laws=[lw.control.HeadingPID(kp=2.0)])
     still = lw.Vehicle(1e9, inertia=(1e9,) * 3, added_mass=(0.0,) * 3, buoyancy=1e9 * GRAVITY)
     scene = lw.Scene(still, terms=[OwnActuator(time_constant=lag)], controller=controller)
     result = lw.solve(one(scene), "psi_s", h=0.05, t1=t1, save=lw.SaveAt(every=0.5, fields=("actuator", "command")))
@@ -246,15 +246,15 @@ class PickedDevice:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Picked(lw.Term):
+class Picked(lw.laws.Term):
     """A force of four readings, at the index that is the place to the east [m]."""
 
     type: ClassVar[str] = "picked"
     device: ClassVar[Any] = PickedDevice
-    values: Any = lw.number(("k",), "1")
+    values: Any = lw.laws.number(("k",), "1")
 
     def packed(self, numbers, context):
-        return lw.Packed({}, numbers["values"])
+        return lw.laws.Packed({}, numbers["values"])
 
 
 OTHERS = [(40, 9, dtype, False, width) for dtype in ("float64", "float32") for width in (1, 2, 4, 8, 16, 32)]
@@ -311,17 +311,17 @@ class ProfileDevice:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Profile(lw.Event):
+class Profile(lw.laws.Event):
     """A sea floor whose depth changes to the north."""
 
     type: ClassVar[str] = "profile"
     device: ClassVar[Any] = ProfileDevice
-    depth: Any = lw.number(("k",), "m")
-    spacing: Any = lw.number((), "m", above=0.0)
+    depth: Any = lw.laws.number(("k",), "m")
+    spacing: Any = lw.laws.number((), "m", above=0.0)
 
     def packed(self, numbers, context):
         last = np.full(1, numbers["depth"].shape[1] - 1.0)
-        return lw.Packed({"last": last, "inverse": 1.0 / numbers["spacing"]}, numbers["depth"])
+        return lw.laws.Packed({"last": last, "inverse": 1.0 / numbers["spacing"]}, numbers["depth"])
 
 
 @pytest.mark.parametrize("knots", [7, 4000])
@@ -330,12 +330,12 @@ def test_an_event_with_rows_stops_at_the_table(knots):
     north = 5.0 * np.arange(knots)
     depth = 60.0 + rng.uniform(-4.0, 4.0, knots)
     profile = Profile(depth=depth, spacing=5.0)
-    assert lw.check_law(profile).ok
+    assert lw.laws.check_law(profile).ok
     n = 20
     b = np.stack([rng.uniform(-10.0, 25.0, n), np.zeros(n), rng.uniform(40.0, 50.0, n)], axis=1)
     nu = np.stack([rng.uniform(-1.0, 1.0, n), np.zeros(n), rng.uniform(0.5, 1.5, n)], axis=1)
     # Another term with rows before it, and another event beside it.
-    scene = lw.Scene(BODY, terms=[foreign(False)], events=[lw.Surface(), profile])
+    scene = lw.Scene(BODY, terms=[foreign(False)], events=[lw.events.Surface(), profile])
     result = lw.solve(one(scene, b=b, nu=nu), "psi_s", h=0.05, t1=60.0)
     assert result.status.counts() == {"condition": n}
     # Straight lines: the first crossing lies on a fine grid of times, then by halving.
@@ -363,13 +363,13 @@ class NoseDevice:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Nose(lw.Event):
+class Nose(lw.laws.Event):
     """The floor, where a point of the body touches it."""
 
     type: ClassVar[str] = "nose"
     device: ClassVar[Any] = NoseDevice
-    depth: Any = lw.number((), "m")
-    nose: Any = lw.number((3,), "m", axes="point")
+    depth: Any = lw.laws.number((), "m")
+    nose: Any = lw.laws.number((3,), "m", axes="point")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -379,13 +379,13 @@ class NoseAsItStands(Nose):
     type: ClassVar[str] = "nose_as_it_stands"
 
     def packed(self, numbers, context):
-        return lw.Packed({"depth": numbers["depth"], "nose": numbers["nose"]})
+        return lw.laws.Packed({"depth": numbers["depth"], "nose": numbers["nose"]})
 
 
 def test_a_point_of_the_body_is_that_of_an_event_in_all_axes():
     point = dict(depth=60.0, nose=[0.8, 0.1, -0.05])
-    assert lw.check_law(Nose(**point)).ok
-    wrong = lw.check_law(NoseAsItStands(**point))
+    assert lw.laws.check_law(Nose(**point)).ok
+    wrong = lw.laws.check_law(NoseAsItStands(**point))
     assert [check.name for check in wrong.checks if not check.ok] == ["distance: any axes"]
     # A coupled body, whose forces act about another origin than the user's, at rest but for its sinking.
     C = np.array([[0.0, 4.0, 0.0], [-4.0, 0.0, 6.0], [0.0, -6.0, 0.0]])

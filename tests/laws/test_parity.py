@@ -68,7 +68,7 @@ def both(case, method, h, steps, dtype="float64", vehicle=VEHICLE, state=STATE):
 
 def test_all_together_has_every_type():
     types = {type(term) for case in CASES.values() for term in case.terms}
-    assert {type(term) for term in CASES["all together"].terms} == types - {lw.Drag}
+    assert {type(term) for term in CASES["all together"].terms} == types - {lw.terms.Drag}
 
 
 # Drag along the axes, which has no matrix beside it, and one law of each type at once.
@@ -89,7 +89,7 @@ def test_a_hundred_steps(name):
 
 def test_drag_along_axes_that_are_not_principal():
     # Strong in yaw and sway: each axis changes the velocities along all others.
-    strong = case(lw.Drag, linear=(8.0, 60.0, 5.0, 0.7, 0.4, 9.0), quadratic=(10.0, 30.0, 90.0, 1.0, 6.0, 3.0))
+    strong = case(lw.terms.Drag, linear=(8.0, 60.0, 5.0, 0.7, 0.4, 9.0), quadratic=(10.0, 30.0, 90.0, 1.0, 6.0, 3.0))
     kernel, twin = both(strong, "psi_s", 0.05, 10, vehicle=BENT)
     assert difference(kernel, twin) < 2e-13
 

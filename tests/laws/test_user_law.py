@@ -47,8 +47,8 @@ def solve(laws, h=0.05, t1=5.0, vehicle=own_law.vehicle, **named):
 
 def test_each_law_is_right():
     near = lw.Scene(own_law.vehicle, start=lw.Start(position=[1.0, 1.0, 3.0]))
-    assert lw.check_law(own_law.Dock(**DOCK), scene=near).ok
-    assert lw.check_law(own_law.Mud(**MUD, center=(0.3, 0.0, -0.1)), scene=near).ok
+    assert lw.laws.check_law(own_law.Dock(**DOCK), scene=near).ok
+    assert lw.laws.check_law(own_law.Mud(**MUD, center=(0.3, 0.0, -0.1)), scene=near).ok
 
 
 @pytest.mark.slow
@@ -144,30 +144,30 @@ def test_a_scene_file_without_them_is_refused(monkeypatch):
 
 
 def test_a_type_is_taken_once(monkeypatch):
-    monkeypatch.setattr(lw.Term, "kinds", dict(lw.Term.kinds))
-    taken = type("Harbour", (lw.Term,), {"type": "dock"})
-    assert lw.Term.kinds["dock"] is own_law.Dock
-    assert lw.register(own_law.Dock) is own_law.Dock
-    for kind in (taken, type("Nameless", (own_law.Dock,), {}), type("Heavy", (lw.Term,), {"type": "weight"})):
+    monkeypatch.setattr(lw.laws.Term, "kinds", dict(lw.laws.Term.kinds))
+    taken = type("Harbour", (lw.laws.Term,), {"type": "dock"})
+    assert lw.laws.Term.kinds["dock"] is own_law.Dock
+    assert lw.laws.register(own_law.Dock) is own_law.Dock
+    for kind in (taken, type("Nameless", (own_law.Dock,), {}), type("Heavy", (lw.laws.Term,), {"type": "weight"})):
         with pytest.raises(ValueError, match="no other term has"):
-            lw.register(kind)
+            lw.laws.register(kind)
 
 
 def test_a_class_made_again_replaces_the_former(monkeypatch):
-    monkeypatch.setattr(lw.Term, "kinds", dict(lw.Term.kinds))
-    first, second = (type("Cell", (lw.Term,), {"type": "cell"}) for _ in range(2))
+    monkeypatch.setattr(lw.laws.Term, "kinds", dict(lw.laws.Term.kinds))
+    first, second = (type("Cell", (lw.laws.Term,), {"type": "cell"}) for _ in range(2))
     assert first is not second
-    assert lw.Term.kinds["cell"] is second
+    assert lw.laws.Term.kinds["cell"] is second
     # A subclass without a type of its own replaces nothing.
-    assert type("Mine", (lw.Drag,), {}).type == "drag"
-    assert lw.Term.kinds["drag"] is lw.Drag
+    assert type("Mine", (lw.terms.Drag,), {}).type == "drag"
+    assert lw.laws.Term.kinds["drag"] is lw.terms.Drag
 
 
 def test_the_law_on_the_page_is_right(tmp_path):
     lines = (ROOT / "docs" / "develop" / "add_a_force.md").read_text().split("## Six roles")[0].splitlines()
     code = "\n".join(line[4:] for line in lines if line.startswith("    ") or not line)
     page = load(tmp_path / "page.py", code)
-    assert lw.check_law(page.spring, scene=lw.Scene(own_law.vehicle, start=lw.Start(position=[0.0, 0.0, 20.0]))).ok
+    assert lw.laws.check_law(page.spring, scene=lw.Scene(own_law.vehicle, start=lw.Start(position=[0.0, 0.0, 20.0]))).ok
     energy = solve([page.spring], save=lw.SaveAt(every=1.0)).energy[:, 0]
     assert np.abs(energy - energy[0]).max() < 1e-3 * energy[0]
 

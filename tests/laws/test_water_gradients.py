@@ -98,7 +98,7 @@ def by_pressure(cases):
 
 def test_the_flow_of_these_tests_is_what_it_says():
     strain = np.array([[0.1, -0.05, 0.2], [-0.05, -0.04, 0.08], [0.2, 0.08, -0.06]])
-    report = lw.check_law(
+    report = lw.laws.check_law(
         LinearFlow(velocity=(0.2, -0.1, 0.3), acceleration=(0.05, 0.1, -0.08), growth=0.3, **columns(strain))
     )
     assert report.ok, report
@@ -299,7 +299,7 @@ class Wave(NamedTuple):
 
     def term(self):
         numbers = {"amplitudes": [self.amplitude], "periods": [self.period], "phases": [0.0]}
-        return lw.Waves(**numbers, headings_deg=[float(np.degrees(self.heading))])
+        return lw.terms.Waves(**numbers, headings_deg=[float(np.degrees(self.heading))])
 
 
 class Driven(NamedTuple):
@@ -345,7 +345,7 @@ class Driven(NamedTuple):
         hull = lw.Vehicle(rigid_body_mass_matrix=self.rigid, added_mass_matrix=self.added, weight=self.rigid[0, 0] * GRAVITY,
                           center_of_gravity=self.center, buoyancy=self.displaced * GRAVITY,
                           center_of_buoyancy=self.buoyancy_center)  # fmt: skip
-        acting = [self.wave.term(), lw.Wrench(force=self.thrust, torque=self.torque), lw.Drag(linear=self.linear)]
+        acting = [self.wave.term(), lw.terms.Wrench(force=self.thrust, torque=self.torque), lw.terms.Drag(linear=self.linear)]
         return lw.Scene(hull, lw.Environment(GRAVITY), terms=acting)
 
 

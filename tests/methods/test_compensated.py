@@ -132,7 +132,7 @@ def test_coupled_inertia(method):
 
 def test_events_stop_where_they_do():
     # Straight lines from 5 m to the surface, 1e7 m north: the crossing is known.
-    scene = lw.Scene(STRAIGHT.vehicle, STRAIGHT.environment, events=[lw.Surface()])
+    scene = lw.Scene(STRAIGHT.vehicle, STRAIGHT.environment, events=[lw.events.Surface()])
     n = 40
     nu = np.stack([np.ones(n), np.zeros(n), -np.linspace(0.4, 2.0, n)], axis=1)
     fleet = one(scene, np.array([1e7, 0.0, 5.0]), nu=nu)
@@ -147,7 +147,7 @@ def test_events_stop_where_they_do():
     np.testing.assert_allclose(result.position[-1, :, 0], 1e7 + at, atol=2e-5)
     np.testing.assert_allclose(result.position[-1, stopped, 2], 0.0, atol=1e-6)
     # Those that go on make the same steps as where the event is far away.
-    far = lw.Scene(STRAIGHT.vehicle, STRAIGHT.environment, events=[lw.Surface(depth=-1e6)])
+    far = lw.Scene(STRAIGHT.vehicle, STRAIGHT.environment, events=[lw.events.Surface(depth=-1e6)])
     alone = run(one(far, np.array([1e7, 0.0, 5.0]), nu=nu), h=1e-3, t1=6.0, width=1)
     for name in FIELDS:
         assert getattr(result, name)[:, ~stopped].tobytes() == getattr(alone, name)[:, ~stopped].tobytes()

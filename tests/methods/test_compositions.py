@@ -20,7 +20,7 @@ from tests.support.tools import body_of, difference, from_state, last, one, scen
 STEPS, ROUND_OFF = 4, 1e-12
 # u = 6e-8 some three times a map in up to 84 maps and a few steps, as a random walk, and the samples' rounding.
 SINGLE = 5e-6
-BOX = lw.Box(lower=[-1e4] * 3, upper=[1e4] * 3)
+BOX = lw.events.Box(lower=[-1e4] * 3, upper=[1e4] * 3)
 
 
 def kernel(method, shape="diagonal", h=0.1, dtype="float64", steps=STEPS, events=(), width=None):

@@ -92,7 +92,7 @@ def test_steps_go_on_from_sample_to_sample(scene, example):
 
 
 def test_the_same_bits_for_any_number_of_threads(scene):
-    fleet = lw.Ensemble(scene, 700, 3, {"start.angular_velocity": lw.Normal(relative=0.3)})
+    fleet = lw.Ensemble(scene, 700, 3, {"start.angular_velocity": lw.distributions.Normal(relative=0.3)})
     method = lw.Method("rk8", rtol=1e-9, atol=1e-12)
     a, b = (lw.solve(fleet, method, h=0.5, t1=2.0, threads=n) for n in (1, 3))
     for name in ("position", "attitude", "velocity", "angular_velocity"):
@@ -127,7 +127,7 @@ def test_one_that_fails_leaves_the_others(scene):
 
 @pytest.mark.slow
 def test_an_event_is_seen_at_the_end_of_h(scene):
-    stopped = lw.Scene(scene.vehicle, scene.environment, start=scene.start, events=[lw.StopTime(at=1.3)])
+    stopped = lw.Scene(scene.vehicle, scene.environment, start=scene.start, events=[lw.events.StopTime(at=1.3)])
     method = lw.Method("rk5", rtol=1e-8, atol=1e-8)
     result = lw.solve(stopped, method, h=0.5, t1=3.0)
     assert result.status[0] == Status.TIME

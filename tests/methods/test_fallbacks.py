@@ -36,7 +36,7 @@ def test_raise_keeps_the_result(scene):
 
 def test_raise_is_quiet_without_failures_and_about_events(scene):
     # The kernel of test_compositions.py, test_events_change_round_off_only. Up to 5 mm in about 0.6 s.
-    box = lw.Box(lower=[-9.0, -9.0, -0.005], upper=[9.0, 9.0, 9.0])
+    box = lw.events.Box(lower=[-9.0, -9.0, -0.005], upper=[9.0, 9.0, 9.0])
     result = lw.solve(one(lw.Scene(scene.vehicle, scene.environment, events=[box])), "bm4(psi_x)", h=0.1, t1=1.0,
                       on_failure="raise", width=1)  # fmt: skip
     assert result.status.counts() == {"box": 1}
@@ -153,7 +153,7 @@ def pushed_to_the_wall(force):
     base = scene_of((2.0, 2.0, 2.0))
     law = terms.WrenchSchedule(times=[0.0, 2.0], force=[[0.0, 0.0, 0.0], [0.0, 0.0, force]], torque=[[0.0] * 3] * 2)
     return lw.Scene(base.vehicle, base.environment, terms=[law],
-                    events=[lw.Box(lower=[-9.0] * 3, upper=[1.0, 9.0, 9.0])])  # fmt: skip
+                    events=[lw.events.Box(lower=[-9.0] * 3, upper=[1.0, 9.0, 9.0])])  # fmt: skip
 
 
 def test_events_stop_a_divided_step():

@@ -121,8 +121,8 @@ def test_the_kernel_is_as_the_twin(method, dtype, bound):
 
 def test_a_member_has_the_same_bits_among_others():
     # Commands that turn at other times, other lags and rates: the pieces of one lane are not those of its neighbours.
-    varied = {"thrusters.times": lw.Normal(relative=0.1), "thrusters.time_constant": lw.Uniform(relative=0.5),
-              "control_fins.rate_limit": lw.Uniform(relative=0.5)}  # fmt: skip
+    varied = {"thrusters.times": lw.distributions.Normal(relative=0.1), "thrusters.time_constant": lw.distributions.Uniform(relative=0.5),
+              "control_fins.rate_limit": lw.distributions.Uniform(relative=0.5)}  # fmt: skip
     fleet = lw.Ensemble(test_terms.scene_of(ROUGH), 24, 5, varied)
     result = lw.solve(fleet, "rk4", h=0.1, t1=1.2)
     for i in range(0, 24, 5):
@@ -152,7 +152,7 @@ def test_chosen_steps(body):
 def test_a_member_stops_with_what_its_laws_remember_there():
     # The part of a step up to the event is a step of that length.
     scene, body = test_terms.scene_of(ROUGH), test_terms.body_of(ROUGH)
-    stopping = lw.Scene(scene.vehicle, scene.environment, terms=scene.terms, events=[lw.StopTime(at=0.37)])
+    stopping = lw.Scene(scene.vehicle, scene.environment, terms=scene.terms, events=[lw.events.StopTime(at=0.37)])
     result = lw.solve(one(stopping, **test_terms.STATE), "rk8", h=0.1, t1=1.0, width=1)
     x = explicit.advance(STEPPERS["rk8"], begun(body), body, 0.1, 3)
     x = STEPPERS["rk8"](x, body, 0.07)

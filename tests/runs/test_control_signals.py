@@ -45,7 +45,7 @@ class Device:
     control = control
 
 
-@lw.register
+@lw.laws.register
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Spoiled(ControlLaw):
     """A law that gives no number from a time on."""
@@ -54,8 +54,8 @@ class Spoiled(ControlLaw):
     demands: ClassVar[tuple[str, ...]] = ("Z",)
     device: ClassVar[Any] = Device
 
-    level: Any = lw.number((), "N")
-    time: Any = lw.number((), "s", 1e6)
+    level: Any = lw.laws.number((), "N")
+    time: Any = lw.laws.number((), "s", 1e6)
 
 
 def scene(controller=True, lag=LAG, delay=DELAY * H, events=True):
@@ -304,12 +304,12 @@ def test_a_store_holds_them_and_goes_on(whole, tmp_path):
 
 @pytest.mark.slow_for("laws1")
 @pytest.mark.parametrize(
-    "laws", [[lw.HeadingPID(kp=KP)], [lw.Callback(lambda t, y, r, members: np.zeros((len(members), 6)))]]
+    "laws", [[lw.control.HeadingPID(kp=KP)], [lw.control.Callback(lambda t, y, r, members: np.zeros((len(members), 6)))]]
 )
 def test_a_file_knows_which_terms_the_controller_drives(laws, tmp_path):
     """Fins that are driven have no command of their own: energies and pictures of a file must not ask for it."""
-    wanted = lw.SetPoint(heading=0.5)
-    loop = lw.Controller(period=0.1, guidance=[wanted], laws=laws, allocation=[lw.PseudoInverse(to="control_fins")])
+    wanted = lw.control.SetPoint(heading=0.5)
+    loop = lw.Controller(period=0.1, guidance=[wanted], laws=laws, allocation=[lw.control.PseudoInverse(to="control_fins")])
     (fins,) = (term for term in lw.Scene.named("remus_100", controller=loop).terms if term.type == "control_fins")
     start = lw.Start(velocity=[1.54, 0.0, 0.0])
     driven = lw.Scene(lw.Vehicle(30.0, inertia=(0.2, 3.0, 3.0)), terms=[fins], start=start, controller=loop)
@@ -319,7 +319,7 @@ def test_a_file_knows_which_terms_the_controller_drives(laws, tmp_path):
     for other in (loaded, lw.open_run(tmp_path / "run.zarr")):
         assert other.energy.tobytes() == result.energy.tobytes()
         assert invariants.at_work(other) == invariants.at_work(result)
-        assert lw.plot(other, tmp_path / "fleet.png").stat().st_size > 0
+        assert lw.plots.plot(other, tmp_path / "fleet.png").stat().st_size > 0
 
 
 def test_members_that_are_kept_after_all_have_them(whole, tmp_path):
@@ -341,8 +341,8 @@ def test_a_recording_shows_commands_and_actuators(whole, tmp_path):
 
 @pytest.mark.slow
 def test_statistics_and_quantities_of_interest(whole):
-    statistics = [lw.Mean("command[5]"), lw.Mean("measured_depth"), lw.Mean("max(norm(demand))")]
-    statistics += [lw.Quantiles("actuator[2]"), lw.Mean("reference_speed")]
+    statistics = [lw.statistics.Mean("command[5]"), lw.statistics.Mean("measured_depth"), lw.statistics.Mean("max(norm(demand))")]
+    statistics += [lw.statistics.Quantiles("actuator[2]"), lw.statistics.Mean("reference_speed")]
     lean = lw.solve(fleet(), "psi_s", **SETTINGS, statistics=statistics, keep="none")
     found = lean.statistics
     np.testing.assert_allclose(found["mean command[5]"].value[:, 0], whole.command[..., 5].mean(axis=1), rtol=1e-12)
@@ -357,7 +357,7 @@ def test_statistics_and_quantities_of_interest(whole):
 
 @pytest.mark.parametrize(("asked", "text"), [
     ({"save": lw.SaveAt(fields=("position", "demand"))}, "save.fields = 'demand'"),
-    ({"statistics": [lw.Mean("command[0]")]}, "statistics = 'command'"),
+    ({"statistics": [lw.statistics.Mean("command[0]")]}, "statistics = 'command'"),
 ])  # fmt: skip
 def test_a_scene_without_a_controller_has_none(asked, text):
     why = r": is a signal of a controller, which this scene has not; give \[controller\]"
@@ -369,8 +369,8 @@ def test_names_that_are_not_known():
     with pytest.raises(lw.SceneError, match=r"save.fields = 'commands': is not known; did you mean 'command'\?"):
         lw.SaveAt(fields=("commands",))
     with pytest.raises(lw.SceneError, match=r"is not one channel of command; give one: 'command\[0\]'"):
-        lw.Mean("command")
+        lw.statistics.Mean("command")
     with pytest.raises(lw.SceneError, match=r"demand has the components demand\[0\]"):
-        lw.Mean("demand[6]")
+        lw.statistics.Mean("demand[6]")
     with pytest.raises(lw.SceneError, match=r"is beyond the 6 channels .*; give 'command\[0\]' to 'command\[5\]'"):
-        lw.solve(fleet(), "psi_s", **SETTINGS, statistics=[lw.Mean("command[6]")])
+        lw.solve(fleet(), "psi_s", **SETTINGS, statistics=[lw.statistics.Mean("command[6]")])

@@ -17,8 +17,8 @@ from lgvi_warp.scene.settings import RunSettings
 from lgvi_warp.store import recipe
 from tests.laws.cases import CASES
 
-DRAG = lw.Drag(linear=[5.0, 10.0, 10.0, 0.5, 2.0, 2.0])
-MATRIX = lw.DragMatrix(linear=np.diag(DRAG.linear))
+DRAG = lw.terms.Drag(linear=[5.0, 10.0, 10.0, 0.5, 2.0, 2.0])
+MATRIX = lw.terms.DragMatrix(linear=np.diag(DRAG.linear))
 AHEAD = lw.Start(position=[0.0, 0.0, 10.0], velocity=[1.5, 0.0, 0.0])
 REMUS = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0}, start={"velocity": [1.5, 0.0, 0.0]})
 
@@ -58,8 +58,8 @@ def test_remus_takes_runge_kutta_methods_by_its_step():
 
 def test_what_is_not_damped_keeps_its_method_and_bits(scene):
     """Whatever drives it, and where a term brakes by nothing; psi_x where the inertia refuses psi_s."""
-    assert chosen() == chosen(lw.Wrench(force=[1.0, 0.0, 0.0])) == chosen(lw.Drag()) == "psi_s"
-    assert chosen(lw.BodyLift(matrix=0.1 * np.ones((6, 6)))) == "psi_s"
+    assert chosen() == chosen(lw.terms.Wrench(force=[1.0, 0.0, 0.0])) == chosen(lw.terms.Drag()) == "psi_s"
+    assert chosen(lw.terms.BodyLift(matrix=0.1 * np.ones((6, 6)))) == "psi_s"
     coupled = dataclasses.replace(lw.Scene.named("remus_100"), terms=[])
     assert planned(coupled).method.name == "psi_x"
     bare = dataclasses.replace(scene, run=RunSettings())
@@ -68,7 +68,7 @@ def test_what_is_not_damped_keeps_its_method_and_bits(scene):
 
 
 def test_what_runge_kutta_methods_do_not_take():
-    noise = lw.GaussMarkovCurrent(standard_deviation=[0.1, 0.1, 0.0], time_constant=20.0)
+    noise = lw.terms.GaussMarkovCurrent(standard_deviation=[0.1, 0.1, 0.0], time_constant=20.0)
     assert chosen(DRAG, noise) == chosen(DRAG, dtype="float32_compensated") == "psi_x"
     assert chosen(DRAG, on_failure="substep") == "psi_s"
     spinning = dataclasses.replace(AHEAD, angular_velocity=[8.0, 0.0, 0.0])
@@ -77,12 +77,12 @@ def test_what_runge_kutta_methods_do_not_take():
 
 @pytest.mark.parametrize(("strength", "name"), [(1.0, "rk4"), (1e3, "rkw3"), (1e6, "psi_x")])
 def test_strong_damping(strength, name):
-    assert chosen(lw.DragMatrix(linear=strength * MATRIX.linear)) == name
+    assert chosen(lw.terms.DragMatrix(linear=strength * MATRIX.linear)) == name
 
 
 def test_a_law_that_does_not_tell_how_it_brakes_is_advanced_implicitly(monkeypatch):
     assert chosen(MATRIX) == "rk4"
-    monkeypatch.setattr(lw.DragMatrix, "braking", lw.Term.braking)
+    monkeypatch.setattr(lw.terms.DragMatrix, "braking", lw.laws.Term.braking)
     assert chosen(MATRIX) == "rkw3"
 
 
@@ -155,9 +155,9 @@ def test_terminal_speeds_balance(rng):
 
 def test_a_drive_brings_speed_where_a_start_has_none():
     """From rest quadratic drag has no rate; under thrust it has."""
-    drag = lw.Drag(quadratic=[5.0, 5.0, 5.0, 1.0, 1.0, 1.0])
+    drag = lw.terms.Drag(quadratic=[5.0, 5.0, 5.0, 1.0, 1.0, 1.0])
     rest = lw.Start(position=[0.0, 0.0, 10.0])
-    pushed = [chosen(drag, lw.Wrench(force=[x, 0.0, 0.0]), start=rest, h=1.0) for x in (1.0, 100.0, 1000.0)]
+    pushed = [chosen(drag, lw.terms.Wrench(force=[x, 0.0, 0.0]), start=rest, h=1.0) for x in (1.0, 100.0, 1000.0)]
     assert pushed == ["rk4", "rk8", "rkw3"]
 
 
@@ -226,9 +226,9 @@ def spinning_bluerov():
 
 
 def torpedo_in_a_turn():
-    push = lw.Wrench(force=[8.0, 0.0, 0.0], torque=[0.0, 0.0, 0.5])
-    drag = lw.Drag(linear=[1.0, 4.0, 4.0, 0.2, 1.0, 1.0], quadratic=[2.0, 15.0, 15.0, 0.5, 3.0, 3.0])
-    vary = {"start.velocity": lw.Normal(std=0.1), "start.angular_velocity": lw.Normal(std=0.1)}
+    push = lw.terms.Wrench(force=[8.0, 0.0, 0.0], torque=[0.0, 0.0, 0.5])
+    drag = lw.terms.Drag(linear=[1.0, 4.0, 4.0, 0.2, 1.0, 1.0], quadratic=[2.0, 15.0, 15.0, 0.5, 3.0, 3.0])
+    vary = {"start.velocity": lw.distributions.Normal(std=0.1), "start.angular_velocity": lw.distributions.Normal(std=0.1)}
     return lw.Ensemble(torpedo(drag, push), 4, 1, vary), 20.0
 
 
@@ -332,7 +332,7 @@ def test_the_modes_are_those_of_the_motion():
     found = step_error.rates(lw.Ensemble.from_scene(scene))
     assert np.abs(found.modes).max() == pytest.approx(np.sqrt(10.0 * 9.8 * 0.05 / 2.0))
     assert found.drag == 0.0
-    braked = dataclasses.replace(scene, terms=[lw.Drag(linear=[30.0] * 3 + [0.0] * 3)])
+    braked = dataclasses.replace(scene, terms=[lw.terms.Drag(linear=[30.0] * 3 + [0.0] * 3)])
     found = step_error.rates(lw.Ensemble.from_scene(braked))
     assert found.modes.real.min() == pytest.approx(-30.0 / 15.0)
     assert found.drag == pytest.approx(2.0)

@@ -382,7 +382,7 @@ def own_law(base):
 
 
 def test_a_law_that_cannot_be_sent_is_refused_with_the_reason():
-    scene = lw.Scene(speed.example().vehicle, terms=[own_law(lw.Wrench)(force=[0.1, 0, 0], torque=[0, 0, 0])])
+    scene = lw.Scene(speed.example().vehicle, terms=[own_law(lw.terms.Wrench)(force=[0.1, 0, 0], torque=[0, 0, 0])])
     work = Work(make_plan(lw.Ensemble(scene, 10), **SETTINGS), ())
     for name in ("processes", "dask"):
         with pytest.raises(lw.SceneError, match=rf"executor = '{name}'.*cannot be sent.*own_law.*Local.*top level"):

@@ -19,7 +19,7 @@ from lgvi_warp import cli
 from lgvi_warp.common import files, machine, safe_files
 from lgvi_warp.store import folder as store
 from lgvi_warp.store.state import state
-from lgvi_warp.studies.sensitivity import Indices
+from lgvi_warp.studies.sensitivity.indices import Indices
 from lgvi_warp.studies.stability.map import StabilityMap
 from lgvi_warp.studies.sweeps import record as records
 from lgvi_warp.studies.tradeoff import Tradeoff
@@ -458,7 +458,7 @@ def test_the_place_is_told_and_not_the_run(verb, kind, good, home, capsys):
 WRITERS = {
     "a result": lambda path: flown().save(path),
     "a table": lambda path: tradeoff_of(4.0).to_csv(path),
-    "a picture": lambda path: lw.plot(flown(), path.with_suffix(".png")),
+    "a picture": lambda path: lw.plots.plot(flown(), path.with_suffix(".png")),
     "a report": lambda path: lw.report(flown(), path),
     "a recording": lambda path: lw.record(flown(), path),
     "a text": lambda path: files.write_text(path, "x"),

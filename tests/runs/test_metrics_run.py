@@ -33,15 +33,15 @@ def deepest(state, tick):
 
 
 def metrics():
-    each = {"then": [lw.Mean(), lw.MemberValues()]}
+    each = {"then": [lw.statistics.Mean(), lw.statistics.MemberValues()]}
     return [
-        *(kind(of, **each) for of in BOTH for kind in (lw.Overshoot, lw.Undershoot, lw.Peak, lw.PeakTime, lw.RiseTime)),
-        lw.SettlingTime("heading", within=0.2, **each), lw.SettlingTime("depth", **each), lw.SteadyStateError("depth", **each),
-        *(kind(of, **each) for of in BOTH for kind in (lw.IAE, lw.ISE, lw.ITAE, lw.RMSError, lw.MaxError)),
-        lw.IAE("depth", measured=True, name="measured", **each), lw.MaxError("speed", **each), lw.MaxError("position", **each),
-        lw.MaxError("attitude", **each), lw.CrossTrack(**each), lw.Effort(**each), lw.Effort("command[1]", **each),
-        lw.Travel(**each), lw.SaturationShare(**each), lw.ActuatorEnergy(**each), lw.TimeToFailure(),
-        lw.CustomMetric(deepest, fields=("position",), **each),
+        *(kind(of, **each) for of in BOTH for kind in (lw.metrics.Overshoot, lw.metrics.Undershoot, lw.metrics.Peak, lw.metrics.PeakTime, lw.metrics.RiseTime)),
+        lw.metrics.SettlingTime("heading", within=0.2, **each), lw.metrics.SettlingTime("depth", **each), lw.metrics.SteadyStateError("depth", **each),
+        *(kind(of, **each) for of in BOTH for kind in (lw.metrics.IAE, lw.metrics.ISE, lw.metrics.ITAE, lw.metrics.RMSError, lw.metrics.MaxError)),
+        lw.metrics.IAE("depth", measured=True, name="measured", **each), lw.metrics.MaxError("speed", **each), lw.metrics.MaxError("position", **each),
+        lw.metrics.MaxError("attitude", **each), lw.metrics.CrossTrack(**each), lw.metrics.Effort(**each), lw.metrics.Effort("command[1]", **each),
+        lw.metrics.Travel(**each), lw.metrics.SaturationShare(**each), lw.metrics.ActuatorEnergy(**each), lw.metrics.TimeToFailure(),
+        lw.metrics.CustomMetric(deepest, fields=("position",), **each),
     ]  # fmt: skip
 
 
@@ -51,10 +51,10 @@ def fleet():
     path = ROOT / "examples" / "scenes" / "remus_100_autopilot.toml"
     scene = lw.Scene.load(path, {"start.position": [0.0, 0.0, 3.0], "run.save_every": 4.0})
     # All that metrics are of is wanted: a place and a speed too, which no law of this loop follows.
-    wishes = [lw.SetPoint(position=[20.0, 5.0, 10.0], heading=0.5, speed=1.5), *scene.controller.guidance[1:]]
-    scene = replace(scene, events=[lw.Floor(depth=8.5)], controller=replace(scene.controller, guidance=wishes))
-    vary = {"vehicle.buoyancy": lw.Uniform(low=297.0, high=310.0), "start.position[2]": lw.Uniform(low=7.8, high=8.45)}
-    return lw.Ensemble(scene, 300, seed=1, vary=vary | {"heading_pid.kp": lw.Uniform(low=0.7, high=60.0)})
+    wishes = [lw.control.SetPoint(position=[20.0, 5.0, 10.0], heading=0.5, speed=1.5), *scene.controller.guidance[1:]]
+    scene = replace(scene, events=[lw.events.Floor(depth=8.5)], controller=replace(scene.controller, guidance=wishes))
+    vary = {"vehicle.buoyancy": lw.distributions.Uniform(low=297.0, high=310.0), "start.position[2]": lw.distributions.Uniform(low=7.8, high=8.45)}
+    return lw.Ensemble(scene, 300, seed=1, vary=vary | {"heading_pid.kp": lw.distributions.Uniform(low=0.7, high=60.0)})
 
 
 @pytest.fixture(scope="module")
@@ -142,7 +142,7 @@ def test_ticks_do_not_depend_on_what_is_kept(coarse, paths):
 
 
 def test_other_statistics_are_of_the_samples_that_are_kept(fleet, coarse):
-    asked = [lw.Mean("depth"), lw.PathMaximum("depth"), *metrics()]
+    asked = [lw.statistics.Mean("depth"), lw.statistics.PathMaximum("depth"), *metrics()]
     both = lw.solve(fleet, **COARSE, keep="none", statistics=asked)
     alone = coarse.position[..., 2]
     np.testing.assert_allclose(both.statistics["mean depth"].value[:, 0], alone.mean(axis=1), rtol=1e-13)
@@ -151,7 +151,7 @@ def test_other_statistics_are_of_the_samples_that_are_kept(fleet, coarse):
 
 
 def test_a_store_that_goes_on_has_the_same_numbers(fleet, coarse, tmp_path):
-    asked = [lw.Overshoot("depth", then=[lw.Mean(), lw.MemberValues()]), lw.Overshoot("heading"), lw.Travel()]
+    asked = [lw.metrics.Overshoot("depth", then=[lw.statistics.Mean(), lw.statistics.MemberValues()]), lw.metrics.Overshoot("heading"), lw.metrics.Travel()]
     with pytest.raises(RuntimeError):
         lw.solve(fleet, **COARSE, statistics=asked, store=tmp_path / "run.zarr", threads=1, progress=stop)
     result = lw.resume(tmp_path / "run.zarr")
@@ -175,7 +175,7 @@ def test_predict_and_prepare_take_ticks(fleet):
 def test_a_scene_without_a_controller_is_told(fleet):
     scene = lw.Scene.named("remus_100", run={"step": 0.01, "duration": 1.0, "method": "psi_x"})
     with pytest.raises(lw.SceneError, match="signal of a controller"):
-        lw.solve(scene, statistics=[lw.IAE("depth")])
+        lw.solve(scene, statistics=[lw.metrics.IAE("depth")])
 
 
 def test_numbers_do_not_depend_on_how_many_ticks_are_gathered_at_once(fleet, coarse, monkeypatch):
@@ -221,19 +221,19 @@ def test_the_arrays_of_a_run_are_freed_at_its_end(fleet, monkeypatch):
 
 def test_metrics_of_what_no_guidance_wants_are_refused(fleet):
     controller = fleet.scene.controller
-    few = replace(controller, guidance=[lw.SetPoint(depth=10.0, heading=0.5), *controller.guidance[1:]])
+    few = replace(controller, guidance=[lw.control.SetPoint(depth=10.0, heading=0.5), *controller.guidance[1:]])
     for run in (lw.solve, lw.predict):
         with pytest.raises(
             lw.SceneError, match=r"statistics = 'iae speed': is of the speed, and no guidance .* wants a speed"
         ):
-            run(replace(fleet.scene, controller=few), t1=1.0, statistics=[lw.IAE("depth"), lw.IAE("speed")])
+            run(replace(fleet.scene, controller=few), t1=1.0, statistics=[lw.metrics.IAE("depth"), lw.metrics.IAE("speed")])
 
 
 @pytest.mark.slow_for("float32_compensated")
 @pytest.mark.parametrize("dtype", ["float64", "float32_compensated"])
 def test_numbers_do_not_depend_on_what_else_is_read_at_ticks(dtype, fleet, coarse):
-    each = {"then": [lw.MemberValues()]}
-    few = [lw.Overshoot("depth", **each), lw.IAE("heading", **each), lw.MaxError("depth", **each)]
+    each = {"then": [lw.statistics.MemberValues()]}
+    few = [lw.metrics.Overshoot("depth", **each), lw.metrics.IAE("heading", **each), lw.metrics.MaxError("depth", **each)]
     alone = lw.solve(fleet, **COARSE, statistics=few, keep="none", dtype=dtype)
     whole = coarse if dtype == "float64" else lw.solve(fleet, **COARSE, statistics=metrics(), keep="none", dtype=dtype)
     for name in ("each overshoot depth", "each iae heading", "each max_error depth"):
@@ -245,15 +245,15 @@ def test_a_tick_gathers_only_the_numbers_that_are_read(fleet):
         observed = Observation(statistics, keep="none")
         return make_plan(fleet, t1=1.0, observed=observed).layout.tick_fields
 
-    assert gathered(lw.IAE("depth"), lw.RMSError("depth")) == {"position": 1, "reference_depth": 1}
-    assert gathered(lw.IAE("depth"), lw.IAE("heading")) == {
+    assert gathered(lw.metrics.IAE("depth"), lw.metrics.RMSError("depth")) == {"position": 1, "reference_depth": 1}
+    assert gathered(lw.metrics.IAE("depth"), lw.metrics.IAE("heading")) == {
         "position": 1, "attitude": 2, "reference_depth": 1, "reference_heading": 1}  # fmt: skip
-    assert gathered(lw.IAE("north"), lw.IAE("east"))["position"] == 2
-    assert gathered(lw.IAE("depth"), lw.MaxError("position"))["position"] == 3
+    assert gathered(lw.metrics.IAE("north"), lw.metrics.IAE("east"))["position"] == 2
+    assert gathered(lw.metrics.IAE("depth"), lw.metrics.MaxError("position"))["position"] == 3
 
 
 @pytest.mark.parametrize("keep", ["none", "all"])
 def test_a_metric_may_read_nothing_at_ticks(keep, fleet, coarse):
-    alone = lw.solve(fleet, **COARSE, statistics=[lw.TimeToFailure()], keep=keep)
+    alone = lw.solve(fleet, **COARSE, statistics=[lw.metrics.TimeToFailure()], keep=keep)
     name = "each time_to_failure"
     np.testing.assert_array_equal(alone.statistics[name].value, coarse.statistics[name].value)

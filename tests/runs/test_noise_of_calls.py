@@ -19,16 +19,16 @@ NAMES = ["start.position[2]", "start.velocity[2]"]
 @pytest.fixture(scope="module")
 def noisy():
     """A neutral body with linear drag under white force and torque, in a random current, which holds a heading."""
-    controller = lw.Controller(period=H, sensors=[lw.Sensor(of="heading", noise=0.1, name="compass")],
-                               guidance=[lw.SetPoint(heading=0.5)], laws=[lw.HeadingPID(kp=1.0, kd=1.0)])  # fmt: skip
-    terms = [lw.Drag(linear=(DRAG,) * 6), lw.WrenchNoise(force=(0.0, 0.0, STRENGTH), torque=(0.1, 0.1, 0.1)),
-             lw.GaussMarkovCurrent(standard_deviation=(0.1,) * 3, time_constant=5.0), lw.ControlWrench(limit=2.0)]  # fmt: skip
+    controller = lw.Controller(period=H, sensors=[lw.control.Sensor(of="heading", noise=0.1, name="compass")],
+                               guidance=[lw.control.SetPoint(heading=0.5)], laws=[lw.control.HeadingPID(kp=1.0, kd=1.0)])  # fmt: skip
+    terms = [lw.terms.Drag(linear=(DRAG,) * 6), lw.terms.WrenchNoise(force=(0.0, 0.0, STRENGTH), torque=(0.1, 0.1, 0.1)),
+             lw.terms.GaussMarkovCurrent(standard_deviation=(0.1,) * 3, time_constant=5.0), lw.terms.ControlWrench(limit=2.0)]  # fmt: skip
     return lw.Scene(BODY, terms=terms, controller=controller)
 
 
 def test_rows_have_the_noise_of_the_members_that_are_named(noisy):
     """All draws: of forces, of the current and of sensors. To the bit, in any order, twice the same, in one row or in many."""
-    vary = {"start.velocity[2]": lw.Normal(mean=0.2, std=0.1)}
+    vary = {"start.velocity[2]": lw.distributions.Normal(mean=0.2, std=0.1)}
     settings = dict(method="psi_x", h=H, t1=1.0)
     run = lw.prepare(noisy, list(vary), of=["position", "euler[2]"], **settings)
     for seed in (0, 7, 2**40 + 1):
@@ -48,8 +48,8 @@ def test_rows_have_the_noise_of_the_members_that_are_named(noisy):
 
 
 def test_a_seed_beside_levels_is_that_of_the_noise_alone():
-    quiet = lw.Scene(BODY, terms=[lw.Drag(linear=(DRAG,) * 6)])
-    run = lw.prepare(quiet, {NAMES[1]: lw.Normal(std=1.0)}, of="depth", levels=True, method="psi_x", h=H, t1=T)
+    quiet = lw.Scene(BODY, terms=[lw.terms.Drag(linear=(DRAG,) * 6)])
+    run = lw.prepare(quiet, {NAMES[1]: lw.distributions.Normal(std=1.0)}, of="depth", levels=True, method="psi_x", h=H, t1=T)
     X = np.linspace(0.1, 0.9, 5)[:, None]
     np.testing.assert_array_equal(run(X), run(X, seed=9, indices=[5, 6, 7, 8, 2]))
 
@@ -87,7 +87,7 @@ def test_a_model_for_other_libraries_takes_them_too(prepared):
 
 def scene():
     """A neutral body with linear drag under white force: an Ornstein-Uhlenbeck velocity, and a depth that is normal."""
-    return lw.Scene(BODY, terms=[lw.Drag(linear=(DRAG,) * 6), lw.WrenchNoise(force=(0.0, 0.0, STRENGTH))])
+    return lw.Scene(BODY, terms=[lw.terms.Drag(linear=(DRAG,) * 6), lw.terms.WrenchNoise(force=(0.0, 0.0, STRENGTH))])
 
 
 # Variance of the depth at T by the force, by the stochastic integral over (1 - e^(-a (T - s))) / a; and of the start, four

@@ -13,8 +13,8 @@ from tests.conftest import ROOT
 from tests.support.stops import FarAway, stops
 
 STATISTICS = [
-    lw.Outcome("floor"), lw.EndTime("floor"), lw.Exceedance("depth", above=26.0), lw.FirstPassage("depth", above=26.0),
-    lw.Mean("position", at="floor"), lw.Extremes("depth", at="floor"), lw.PathMaximum("depth", lw.Exceedance(above=26.0)),
+    lw.statistics.Outcome("floor"), lw.statistics.EndTime("floor"), lw.statistics.Exceedance("depth", above=26.0), lw.statistics.FirstPassage("depth", above=26.0),
+    lw.statistics.Mean("position", at="floor"), lw.statistics.Extremes("depth", at="floor"), lw.statistics.PathMaximum("depth", lw.statistics.Exceedance(above=26.0)),
 ]  # fmt: skip
 SETTINGS = {"method": "psi_s", "h": 0.04, "t1": 40.0, "save": lw.SaveAt(every=4.0), "statistics": STATISTICS}
 
@@ -23,7 +23,7 @@ def fleet(members, ends=None, more=(), **ensemble):
     """The paper's vehicle a little too heavy or too light, from a depth of 20 m."""
     scene = lw.Scene.named("nordkvist_sanyal", start={"position": [0, 0, 20.0], "velocity": [0.1, 0, 0]},
                            vehicle={"buoyancy": 1212.0}, events=ends or stops(floor=26.0))  # fmt: skip
-    vary = {"vehicle.buoyancy": lw.Normal(std=3.0), "start.angular_velocity": lw.Normal(std=(0.02, 0.05, 0.02))}
+    vary = {"vehicle.buoyancy": lw.distributions.Normal(std=3.0), "start.angular_velocity": lw.distributions.Normal(std=(0.02, 0.05, 0.02))}
     return lw.Ensemble(scene, members, 1, vary | dict(more), **ensemble)
 
 
@@ -96,7 +96,7 @@ def test_processes_give_the_same(tmp_path):
 def test_several_events_by_their_names():
     surface, floor, *others = stops(surface=17.0, floor=26.0)
     ends = [surface, dataclasses.replace(floor, name="sea floor"), *others]
-    asked = [lw.Outcome("sea floor"), lw.Outcome("surface"), lw.Outcome("stopped"), lw.Mean("depth", at="surface")]
+    asked = [lw.statistics.Outcome("sea floor"), lw.statistics.Outcome("surface"), lw.statistics.Outcome("stopped"), lw.statistics.Mean("depth", at="surface")]
     result = lw.solve(fleet(1000, ends), **SETTINGS | {"statistics": asked})
     counts, s = result.status.counts(), result.statistics
     assert s["outcome sea floor"]["ended"][-1] == counts["floor"]
@@ -115,9 +115,9 @@ def test_an_own_monte_carlo_with_three_competing_events():
     depth, surface, floor, t1, n, many = 20.0, 17.0, 26.0, 40.0, 2000, 400_000
     scene = lw.Scene.named("nordkvist_sanyal", start={"position": [0, 0, depth]}, vehicle={"buoyancy": 1212.5},
                            events=stops(floor=floor, surface=surface, at=20.0))  # fmt: skip
-    vary = {"vehicle.buoyancy": lw.Normal(std=3.0), "start.velocity[2]": lw.Normal(std=0.1),
-            "time.at": lw.Uniform(low=2.0, high=80.0)}  # fmt: skip
-    asked = [lw.Outcome(name) for name in ("floor", "surface", "time", "ok")] + [lw.FirstPassage("depth", above=floor)]
+    vary = {"vehicle.buoyancy": lw.distributions.Normal(std=3.0), "start.velocity[2]": lw.distributions.Normal(std=0.1),
+            "time.at": lw.distributions.Uniform(low=2.0, high=80.0)}  # fmt: skip
+    asked = [lw.statistics.Outcome(name) for name in ("floor", "surface", "time", "ok")] + [lw.statistics.FirstPassage("depth", above=floor)]
     result = lw.solve(lw.Ensemble(scene, n, 1, vary), **SETTINGS | {"statistics": asked})
 
     rng = np.random.default_rng(5)
@@ -156,24 +156,24 @@ def named(name, vary, ends, **start):
 
 BOTH = {"floor": 26.0, "surface": 17.0}
 ALL = {"floor": 24.0, "surface": 17.0, "lower": (-1e6, -1e6, 0.0), "upper": (2.0, 1e6, 30.0), "radius": 1.5, "at": 30.0}
-FAST = {"start.angular_velocity": lw.Normal(std=(40.0, 5.0, 0.02))}
-HEAVE = {"vehicle.buoyancy": lw.Normal(relative=0.02), "start.velocity[2]": lw.Normal(std=0.3)}
-NEAR = [lw.Floor(depth=11.0), lw.Surface(depth=9.0)]
-WALLS = [lw.Box(lower=(-0.3, -9.0, 0.0), upper=(1e3, 9.0, 99.0), name="astern"),
-         lw.Box(lower=(-1e3, -9.0, 0.0), upper=(0.3, 9.0, 99.0), name="ahead"), lw.Surface(depth=9.5)]  # fmt: skip
+FAST = {"start.angular_velocity": lw.distributions.Normal(std=(40.0, 5.0, 0.02))}
+HEAVE = {"vehicle.buoyancy": lw.distributions.Normal(relative=0.02), "start.velocity[2]": lw.distributions.Normal(std=0.3)}
+NEAR = [lw.events.Floor(depth=11.0), lw.events.Surface(depth=9.0)]
+WALLS = [lw.events.Box(lower=(-0.3, -9.0, 0.0), upper=(1e3, 9.0, 99.0), name="astern"),
+         lw.events.Box(lower=(-1e3, -9.0, 0.0), upper=(0.3, 9.0, 99.0), name="ahead"), lw.events.Surface(depth=9.5)]  # fmt: skip
 # Members, with settings of the run beside those of SETTINGS.
 TEN = {
     "nobody ends": (lambda: fleet(256, stops()), {}),
     "every event": (lambda: fleet(256, stops(**ALL)), {}),
     "some fail": (lambda: fleet(256, stops(**BOTH), more=FAST), {}),
     "some fail, and soon over": (lambda: fleet(256, stops(surface=17.0, at=20.0), more=FAST), {}),
-    "replicates": (lambda: fleet(256, stops(**BOTH), sampling=lw.Sobol(replicates=4)), {}),
-    "replicates, some fail": (lambda: fleet(256, stops(**BOTH), more=FAST, sampling=lw.Sobol(replicates=4)), {}),
+    "replicates": (lambda: fleet(256, stops(**BOTH), sampling=lw.designs.Sobol(replicates=4)), {}),
+    "replicates, some fail": (lambda: fleet(256, stops(**BOTH), more=FAST, sampling=lw.designs.Sobol(replicates=4)), {}),
     "until": (lambda: fleet(4000, stops(**BOTH)), {"until": lw.Until("outcome floor", 0.05, members=256)}),
     "remus_100": (lambda: named("remus_100", HEAVE, NEAR, velocity=[1.5, 0, 0]), {"method": "psi_x", "t1": 12.0}),
-    "bluerov2_heavy": (lambda: named("bluerov2_heavy", HEAVE | {"start.velocity[0]": lw.Normal(std=0.5)}, WALLS),
+    "bluerov2_heavy": (lambda: named("bluerov2_heavy", HEAVE | {"start.velocity[0]": lw.distributions.Normal(std=0.5)}, WALLS),
                        {"method": "rk4", "dtype": "float32", "t1": 8.0}),
-    "bluerov2_dead_thruster": (lambda: named("bluerov2_dead_thruster", HEAVE, [lw.Floor(depth=4.0), lw.StopTime(at=6.0)]),
+    "bluerov2_dead_thruster": (lambda: named("bluerov2_dead_thruster", HEAVE, [lw.events.Floor(depth=4.0), lw.events.StopTime(at=6.0)]),
                                {"method": None, "h": 0.05, "t1": 8.0}),
 }  # fmt: skip
 
@@ -185,7 +185,7 @@ def test_the_sum_over_outcomes_and_ok_is_1_over_ten_scenes(name, stored, monkeyp
     make, more = TEN[name]
     one = make()
     ends = one.scene.events
-    asked = [lw.Outcome(kind) for kind in (*(end.key for end in ends), "ok", "stopped", "failed")]
+    asked = [lw.statistics.Outcome(kind) for kind in (*(end.key for end in ends), "ok", "stopped", "failed")]
     how = SETTINGS | {"save": lw.SaveAt(every=2.0)} | more | {"statistics": asked}
     if stored:
         lw.solve(one, **how, store=tmp_path / "run.zarr")
@@ -207,7 +207,7 @@ def test_the_sum_over_outcomes_and_ok_is_1_over_ten_scenes(name, stored, monkeyp
 
 
 def test_replicates_of_a_design():
-    result = lw.solve(fleet(512, sampling=lw.Sobol(replicates=4)), **SETTINGS)
+    result = lw.solve(fleet(512, sampling=lw.designs.Sobol(replicates=4)), **SETTINGS)
     hits = (np.asarray(result.status) == lw.Status.FLOOR).sum()
     for name in ("outcome floor", "exceedance depth above 26", "first_passage depth above 26"):
         assert round(float(np.ravel(result.statistics[name].value)[-1]) * 512) == hits
@@ -251,8 +251,8 @@ def test_quantities_of_outcomes_and_times():
 
 def test_quantities_of_two_events_of_one_status():
     """Two shelves end a drift to the north and one to the south: by hand, since it goes straight on at its first velocity."""
-    shelves = [lw.Box(lower=(-1e6,) * 3, upper=(4.0, 1e6, 1e6), name="north"),
-               lw.Box(lower=(-2.0, -1e6, -1e6), upper=(1e6,) * 3, name="south"), lw.Floor(depth=1e6)]  # fmt: skip
+    shelves = [lw.events.Box(lower=(-1e6,) * 3, upper=(4.0, 1e6, 1e6), name="north"),
+               lw.events.Box(lower=(-2.0, -1e6, -1e6), upper=(1e6,) * 3, name="south"), lw.events.Floor(depth=1e6)]  # fmt: skip
     scene = lw.Scene.named("sphere", start={"position": [0, 0, 20.0]}, events=shelves)
     u, t1 = np.array([0.5, -0.5, 0.3, -0.1, 0.2]), 10.0
     of = ["outcome north", "outcome south", "outcome box", "outcome floor", "end_time south", "position[0] at north"]
@@ -266,7 +266,7 @@ def test_quantities_of_two_events_of_one_status():
     np.testing.assert_allclose(ends, np.where(u < -0.2, -2.0 / u, np.nan), atol=1e-9)
     there = lw.uq.model(scene, ["start.velocity[0]"], "position[0] at north", **how, failed="nan")(u[:, None])
     np.testing.assert_allclose(there, np.where(u > 0.4, 4.0, np.nan), atol=1e-9)
-    vary = {"start.velocity[0]": lw.Uniform(low=-0.6, high=0.6)}
+    vary = {"start.velocity[0]": lw.distributions.Uniform(low=-0.6, high=0.6)}
     share = lw.uq.sobol(scene, of[:2], vary=vary, samples=256, second_order=False, **how).mean
     assert share == pytest.approx([1.0 / 6.0, 1.0 / 3.0], abs=0.02)
     result = lw.solve(lw.Ensemble(scene, 4, 1, vary), **how)
@@ -276,15 +276,15 @@ def test_quantities_of_two_events_of_one_status():
 
 def test_an_outcome_that_no_member_can_have_is_refused():
     with pytest.raises(lw.SceneError) as error:
-        lw.solve(fleet(10, [lw.Floor(depth=26.0)]), "psi_s", h=0.04, t1=1.0,
-                 statistics=[lw.Outcome("surface"), lw.Mean("depth", at="flor")])  # fmt: skip
+        lw.solve(fleet(10, [lw.events.Floor(depth=26.0)]), "psi_s", h=0.04, t1=1.0,
+                 statistics=[lw.statistics.Outcome("surface"), lw.statistics.Mean("depth", at="flor")])  # fmt: skip
     text = str(error.value)
     assert "outcome.of = 'surface': is no outcome of this scene" in text
     assert "did you mean 'floor'" in text
 
 
 def test_until_an_outcome_is_sure_enough():
-    asked = SETTINGS | {"statistics": [lw.Outcome("floor"), lw.EndTime("floor", lw.Mean())]}
+    asked = SETTINGS | {"statistics": [lw.statistics.Outcome("floor"), lw.statistics.EndTime("floor", lw.statistics.Mean())]}
     for watched, half in (("outcome floor", 0.03), ("mean end_time floor", 1.0)):
         result = lw.solve(fleet(4000), **asked, until=lw.Until(watched, half, members=512))
         assert len(result.status) < 4000

@@ -32,7 +32,7 @@ OUTCOMES = [Status.FLOOR] * 3 + [Status.OK] * 2 + [Status.SURFACE] * 2
 def divers(speeds):
     """Members that start at depth 5 and sink at these speeds [m/s]."""
     n = len(speeds)
-    scene = lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), events=[lw.Surface(), lw.Floor(depth=FLOOR)])
+    scene = lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), events=[lw.events.Surface(), lw.events.Floor(depth=FLOOR)])
     down = np.array([0.0, 0.0, 1.0])
     level = np.broadcast_to(np.eye(3), (n, 3, 3))
     return lw.Ensemble.from_states(scene, np.tile(5.0 * down, (n, 1)), level, np.outer(speeds, down), np.zeros((n, 3)))
@@ -124,7 +124,7 @@ def test_the_first_in_time_is_named(mixed):
 
 
 def test_a_run_that_all_sink_is_drawn(sunk, tmp_path):
-    picture = imread(lw.plot(sunk, tmp_path / "fleet.png"))
+    picture = imread(lw.plots.plot(sunk, tmp_path / "fleet.png"))
     assert all(third.std() > 0.05 for third in np.array_split(picture[..., :3], 3, axis=1))
 
 
@@ -182,7 +182,7 @@ def test_outcomes_look_different():
 def test_nothing_to_draw_says_why(mixed, tmp_path):
     nowhere = {"position": np.full_like(mixed.position, np.nan)}
     lost = ending(dataclasses.replace(mixed, samples=dict(mixed.samples) | nowhere), [3] * 7, [0.0] * 7)
-    for draw in (lw.plot, lw.record):
+    for draw in (lw.plots.plot, lw.record):
         with pytest.raises(ValueError, match="nothing to draw"):
             draw(lost, tmp_path / "fleet.png")
 
@@ -202,12 +202,12 @@ def test_drift_is_of_the_times_under_way(mixed, sunk):
 
 # What acts beside weight and buoyancy, and what is conserved then.
 ALL = {"energy", "horizontal_momentum", "vertical_angular_momentum"}
-ACTING = {"still drag": (lw.Drag(linear=np.zeros(6), quadratic=np.zeros(6)), ALL),
-          "drag": (lw.Drag(linear=np.ones(6), quadratic=np.zeros(6)), set()),
-          "thrust": (lw.Wrench(force=[1.0, 0.0, 0.0]), set()), "noise": (lw.WrenchNoise(force=[0.1, 0.0, 0.0]), set()),
-          "moving water": (lw.Current(velocity=[0.2, 0.0, 0.0]), set()),
-          "layers": (lw.Stratification(gradient=0.01), ALL),
-          "an anchor": (lw.Tether(anchor=[0.0, 0.0, 8.0], stiffness=2.0), {"energy"})}  # fmt: skip
+ACTING = {"still drag": (lw.terms.Drag(linear=np.zeros(6), quadratic=np.zeros(6)), ALL),
+          "drag": (lw.terms.Drag(linear=np.ones(6), quadratic=np.zeros(6)), set()),
+          "thrust": (lw.terms.Wrench(force=[1.0, 0.0, 0.0]), set()), "noise": (lw.terms.WrenchNoise(force=[0.1, 0.0, 0.0]), set()),
+          "moving water": (lw.terms.Current(velocity=[0.2, 0.0, 0.0]), set()),
+          "layers": (lw.terms.Stratification(gradient=0.01), ALL),
+          "an anchor": (lw.terms.Tether(anchor=[0.0, 0.0, 8.0], stiffness=2.0), {"energy"})}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ACTING)
@@ -234,7 +234,7 @@ def test_terms_say_of_energy_what_their_device_code_does(name):
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class Own(lw.Term):
+class Own(lw.laws.Term):
     """A law of a user's own."""
 
     type = "own"
@@ -362,7 +362,7 @@ def test_a_stored_run_is_recorded_in_pieces_as_one_in_memory(mixed, tmp_path, mo
 def test_statistics_of_all_make_the_fan_where_few_members_were_kept(mixed):
     from lgvi_warp.views.recording.drawn import LEVELS, drawn_of
 
-    statistics = [lw.Quantiles("depth"), lw.Extremes("depth")]
+    statistics = [lw.statistics.Quantiles("depth"), lw.statistics.Extremes("depth")]
     save = lw.SaveAt(every=1.0)
     lean = lw.solve(divers(SPEEDS), h=0.1, t1=20.0, save=save, keep=[0, 3], statistics=statistics)
     run = drawn_of(lean)

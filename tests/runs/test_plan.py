@@ -82,7 +82,7 @@ def test_a_second_solve_builds_no_kernel():
 @pytest.mark.parametrize("names", [("su4(psi_s)", "kl6(psi_s)", "su8_15(psi_s)"), ("bm4(psi_x)", "bm6(psi_x)")])
 def test_compositions_of_a_method_share_its_kernel(names):
     """Their coefficients are numbers that the kernel gets, unless a law asks for the time within a step."""
-    plain, held = scene_of(net=1.0), lw.Wrench(force=[1.0, 0.0, 0.0])
+    plain, held = scene_of(net=1.0), lw.terms.Wrench(force=[1.0, 0.0, 0.0])
     schedule = lw.terms.WrenchSchedule(times=(0.0, 1.0), force=((0.0,) * 3, (1.0,) * 3), torque=((0.0,) * 3,) * 2)
     for terms, kernels in (([], 1), ([held], 1), ([schedule], len(names))):
         scene = lw.Scene(plain.vehicle, plain.environment, terms)
@@ -92,7 +92,7 @@ def test_compositions_of_a_method_share_its_kernel(names):
 
 def test_varying_a_parameter_compiles_nothing_else(scene):
     shared = make_plan(lw.Ensemble(scene, 16), h=0.01, t1=1.0)
-    varied = make_plan(lw.Ensemble(scene, 16, vary={"vehicle.mass": lw.Normal(relative=0.01)}), h=0.01, t1=1.0)
+    varied = make_plan(lw.Ensemble(scene, 16, vary={"vehicle.mass": lw.distributions.Normal(relative=0.01)}), h=0.01, t1=1.0)
     assert shared.spec == varied.spec
     assert shared.kernel.advance is varied.kernel.advance
 
@@ -156,7 +156,7 @@ def test_segments_are_contiguous_and_their_buffer_is_bounded(scene):
 
 
 def test_segments_change_no_bit(scene, monkeypatch):
-    fleet = lw.Ensemble(scene, 16, vary={"start.angular_velocity": lw.Normal(std=0.1)})
+    fleet = lw.Ensemble(scene, 16, vary={"start.angular_velocity": lw.distributions.Normal(std=0.1)})
     whole = lw.solve(fleet, h=0.01, t1=2.0, save=lw.SaveAt(every=0.5))
     monkeypatch.setattr("lgvi_warp.engine.launches.SEGMENT_VEHICLE_STEPS", 16 * 48)
     monkeypatch.setattr("lgvi_warp.engine.launches.SEGMENT_SAMPLE_BYTES", 1)
@@ -244,7 +244,7 @@ def test_kernels_compile_for_cuda(tmp_path):
 @pytest.mark.slow_for("cayley*")
 @pytest.mark.parametrize(("solver", "h", "n"), [("quartic", 1e-4, 0), ("quartic", 0.01, 1), ("cayley", 0.1, 2)])
 def test_as_many_newton_steps_as_the_start_needs(scene, solver, h, n):
-    fleet = lw.Ensemble(scene, 20, 1, {"start.angular_velocity": lw.Normal(relative=0.1)})
+    fleet = lw.Ensemble(scene, 20, 1, {"start.angular_velocity": lw.distributions.Normal(relative=0.1)})
     chosen = lw.solve(fleet, lw.Method("psi_s", solver, "auto"), h=h, t1=10 * h, save=lw.SaveAt())
     assert chosen.provenance["method"]["iterations"] == n
     assert str(n) in chosen.messages[0]
@@ -257,7 +257,7 @@ def test_as_many_newton_steps_as_the_start_needs(scene, solver, h, n):
 def test_a_member_that_spins_up_is_told():
     # At rest no Newton step is needed; 2 rad/s later, at h = 0.1 s, one would be.
     body = lw.Vehicle(20.0, inertia=(1.5, 4.0, 4.5), added_mass=(5.0, 22.0, 25.0), buoyancy=0.0)
-    resting = lw.Scene(body, lw.Environment(gravity=0.0), [lw.Wrench(torque=(1.5, 3.0, 4.0))])
+    resting = lw.Scene(body, lw.Environment(gravity=0.0), [lw.terms.Wrench(torque=(1.5, 3.0, 4.0))])
     result = lw.solve(resting, lw.Method("psi_s", iterations="auto"), h=0.1, t1=5.0)
     assert result.status.counts() == {"not_converged": 1}
     assert 0.0 < result.failure_time[0] < 5.0

@@ -109,7 +109,7 @@ def test_too_little_room_is_said():
 
 
 def test_statistics_without_samples_take_little(tmp_path):
-    own = {"statistics": [lw.Mean("position")], "keep": "none"}
+    own = {"statistics": [lw.statistics.Mean("position")], "keep": "none"}
     path = tmp_path / "run.zarr"
     found = lw.predict(fleet(), **SETTINGS, **own, store=path)
     assert found.advance > 0.0
@@ -155,7 +155,7 @@ MEASURED = """
 import sys
 import lgvi_warp as lw
 from tests.support.stores import fleet
-own = {"statistics": [lw.Mean("position"), lw.Quantiles("position"), lw.Covariance(["position", "velocity"])]}
+own = {"statistics": [lw.statistics.Mean("position"), lw.statistics.Quantiles("position"), lw.statistics.Covariance(["position", "velocity"])]}
 own |= {"keep": range(0, 2000, 2), "method": "psi_s", "h": 0.01, "t1": 3.0, "save": lw.SaveAt(every=0.01), "threads": 2}
 lw.solve(fleet(64), "psi_s", h=0.01, t1=3.0, save=lw.SaveAt(every=0.01))
 store = sys.argv[2] if len(sys.argv) > 2 else None

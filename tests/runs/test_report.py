@@ -23,7 +23,7 @@ def result():
     content = scene.to_dict() | {"events": [{"type": "floor", "depth": DEPTH}]}
     start = {"start.position[2]": {"uniform": {"low": DEPTH - 40.0, "high": DEPTH - 0.01}}}
     content["ensemble"]["vary"] = start
-    statistics = [lw.Mean("position"), lw.Quantiles("depth")]
+    statistics = [lw.statistics.Mean("position"), lw.statistics.Quantiles("depth")]
     return lw.solve(lw.Scene.from_dict(content), h=0.02, t1=4.0, save=lw.SaveAt(every=0.5), statistics=statistics)
 
 
@@ -82,7 +82,7 @@ def test_of_a_folder_by_the_command(result, tmp_path, capsys):
 
 def test_of_a_run_without_samples(result, tmp_path):
     few = lw.solve(lw.Scene.load(ROOT / "examples" / "paper.toml", {"ensemble.members": 8}), h=0.02, t1=4.0, keep="none",
-                   statistics=[lw.Mean("position")])  # fmt: skip
+                   statistics=[lw.statistics.Mean("position")])  # fmt: skip
     text = lw.report(few, tmp_path / "report.html").read_text(encoding="utf-8")
     assert Page(text).tags.count("svg") == 1
 

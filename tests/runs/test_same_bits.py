@@ -105,7 +105,7 @@ def test_any_width(name, method, dtype, monkeypatch):
     assert flags != CPU_FLAGS
     monkeypatch.setattr(kernel, "CPU_FLAGS", flags)
     monkeypatch.setattr(kernels, "make_advance", kernel.make_advance.__wrapped__)
-    fleet = lw.Ensemble(scene_called(name), 37, 1, {"start.angular_velocity": lw.Normal(std=0.1)})
+    fleet = lw.Ensemble(scene_called(name), 37, 1, {"start.angular_velocity": lw.distributions.Normal(std=0.1)})
 
     def solve(width):
         return lw.solve(fleet, method, h=0.01, t1=3.0, dtype=dtype, width=width)

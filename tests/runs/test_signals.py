@@ -330,15 +330,15 @@ def test_the_second_signal_ends_the_process():
 
 
 def test_solve_gives_what_is_finished():
-    whole = lw.solve(fleet(), **SETTINGS, statistics=[lw.Mean("position")])
+    whole = lw.solve(fleet(), **SETTINGS, statistics=[lw.statistics.Mean("position")])
     with pytest.raises(lw.Interrupted, match="the first 512 of 1,003 members were finished") as caught:
-        lw.solve(fleet(), **SETTINGS, statistics=[lw.Mean("position")], executor=Interrupting(2))
+        lw.solve(fleet(), **SETTINGS, statistics=[lw.statistics.Mean("position")], executor=Interrupting(2))
     part = caught.value.result
     assert isinstance(caught.value, KeyboardInterrupt)
     assert part.members == part.provenance["members"] == 512
     assert part.position.tobytes() == whole.position[:, :512].tobytes()
     assert part.status.shape == (512,)
-    again = lw.solve(lw.Ensemble.subset(fleet(), range(512)), **SETTINGS, statistics=[lw.Mean("position")])
+    again = lw.solve(lw.Ensemble.subset(fleet(), range(512)), **SETTINGS, statistics=[lw.statistics.Mean("position")])
     assert bits(part) == bits(again)
 
 
@@ -461,7 +461,7 @@ def test_twice_while_files_are_written_names_what_is_there(tmp_path):
 
 
 def test_an_interrupt_while_files_are_written_leaves_them_whole(tmp_path, monkeypatch, capsys):
-    from lgvi_warp.views import plots
+    from lgvi_warp import plots
 
     plot = plots.plot
 

@@ -205,13 +205,13 @@ def shallow(samples, members):
 
 
 def test_statistics_of_functions_are_asked_for_again(tmp_path):
-    statistics = [lw.Mean(shallow)]
+    statistics = [lw.statistics.Mean(shallow)]
     first = lw.solve(fleet(), **SETTINGS, statistics=statistics, keep="none", store=tmp_path / "run.zarr")
     (tmp_path / "run.zarr/blocks/000000256.json").unlink()
     with pytest.raises(lw.SceneError, match=r"mean shallow: are of functions .* give statistics="):
         lw.resume(tmp_path)
     with pytest.raises(lw.SceneError, match="are not the run's"):
-        lw.resume(tmp_path, statistics=[lw.Mean("depth")])
+        lw.resume(tmp_path, statistics=[lw.statistics.Mean("depth")])
     assert bits(lw.resume(tmp_path, statistics=statistics)) == bits(first)
     assert not lw.open_run(tmp_path).statistics
     assert bits(lw.open_run(tmp_path, statistics=statistics)) == bits(first)
@@ -220,13 +220,13 @@ def test_statistics_of_functions_are_asked_for_again(tmp_path):
 def test_another_observation_is_another_run(whole):
     store = lw.Store(whole, existing="resume")
     with pytest.raises(lw.SceneError, match=r"observed\.statistics"):
-        lw.solve(fleet(), **SETTINGS, statistics=[lw.Mean("position")], keep="none", store=store)
+        lw.solve(fleet(), **SETTINGS, statistics=[lw.statistics.Mean("position")], keep="none", store=store)
 
 
 def test_replicates_of_a_store_are_those_of_memory(tmp_path):
     base = fleet(2)
-    members = lw.Ensemble(base.scene, 1024, 1, base.vary, lw.Sobol(replicates=16))
-    asked = {"statistics": [*STATISTICS, lw.FirstPassage("depth", above=11.0)], "keep": "none"}
+    members = lw.Ensemble(base.scene, 1024, 1, base.vary, lw.designs.Sobol(replicates=16))
+    asked = {"statistics": [*STATISTICS, lw.statistics.FirstPassage("depth", above=11.0)], "keep": "none"}
     memory = lw.solve(members, **SETTINGS, **asked)
     stored = lw.solve(members, **SETTINGS, **asked, store=tmp_path / "run.zarr", threads=2)
     assert bits(memory) == bits(stored) == bits(lw.open_run(tmp_path))
@@ -234,7 +234,7 @@ def test_replicates_of_a_store_are_those_of_memory(tmp_path):
     (tmp_path / "run.zarr/blocks/000000256.json").unlink()
     assert bits(lw.resume(tmp_path)) == bits(memory)
     again = lw.Store(tmp_path / "run.zarr", existing="resume")
-    for other in ("sobol", lw.Sobol(replicates=8)):
+    for other in ("sobol", lw.designs.Sobol(replicates=8)):
         with pytest.raises(lw.SceneError, match=r"ensemble\.sampling"):
             lw.solve(lw.Ensemble(base.scene, 1024, 1, base.vary, other), **SETTINGS, **asked, store=again)
 
@@ -258,8 +258,8 @@ def test_an_observation_is_told_and_read(given):
     assert observation_of(observed.to_dict() | {"fields": ["position"]}).to_dict() == observed.to_dict()
 
 
-MASS = {"vehicle.mass": lw.Normal(relative=0.001)}
-RATES = {"start.angular_velocity": lw.Normal(std=0.01)}
+MASS = {"vehicle.mass": lw.distributions.Normal(relative=0.001)}
+RATES = {"start.angular_velocity": lw.distributions.Normal(std=0.01)}
 
 
 def known(plan):
@@ -270,10 +270,10 @@ def known(plan):
 
 
 @pytest.mark.parametrize(("vary", "sampling"), [
-    (MASS | RATES, "sobol"), (MASS | RATES, lw.Sobol(replicates=4)), (MASS, lw.Halton(replicates=8)),
-    (MASS, lw.LatinHypercube(8)),
-    ({}, lw.Grid({"start.position[0]": [0.0, 1.0], "vehicle.mass": [123.0, 124.0, 125.0, 126.0]})),
-    ({}, lw.Table(values={"vehicle.mass": np.linspace(123.0, 124.0, 8)})), (RATES, "random"),
+    (MASS | RATES, "sobol"), (MASS | RATES, lw.designs.Sobol(replicates=4)), (MASS, lw.designs.Halton(replicates=8)),
+    (MASS, lw.designs.LatinHypercube(8)),
+    ({}, lw.designs.Grid({"start.position[0]": [0.0, 1.0], "vehicle.mass": [123.0, 124.0, 125.0, 126.0]})),
+    ({}, lw.designs.Table(values={"vehicle.mass": np.linspace(123.0, 124.0, 8)})), (RATES, "random"),
 ])  # fmt: skip
 @pytest.mark.parametrize("chosen", [None, [5, 2, 3]])
 def test_the_plan_of_a_store_is_the_plan_of_the_run(vary, sampling, chosen, tmp_path):

@@ -96,7 +96,7 @@ def test_what_takes_blocks_cannot_change_the_run(into, memory, tmp_path):
                 values.view(np.ndarray)[...] = 77
 
     store = {} if into == "memory" else {"store": tmp_path / "run.zarr"}
-    statistic = lw.Mean("position")
+    statistic = lw.statistics.Mean("position")
     more = dict(threads=2, statistics=[statistic])
     result = lw.solve(fleet(), **SETTINGS, **store, **more, on_block=lambda block: (spoil(block), handed.append(block)))
     for block in handed:
@@ -498,14 +498,14 @@ def test_explicit_states_and_subsets_go_on_from_the_store_alone(tmp_path):
 
 RANDOM = np.random.default_rng(5).uniform(0.1, 0.9, (700, 4))
 # 600 members of each: given as arrays, of 700 rows.
-ARRAYS = {"table": lambda u: lw.Table({"vehicle.mass": 123.0 + u[:, 0], "start.angular_velocity": u[:, 1:]}),
-          "levels": lambda u: lw.UnitCubePoints(u)}  # fmt: skip
+ARRAYS = {"table": lambda u: lw.designs.Table({"vehicle.mass": 123.0 + u[:, 0], "start.angular_velocity": u[:, 1:]}),
+          "levels": lambda u: lw.designs.UnitCubePoints(u)}  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", ARRAYS)
 def test_values_given_as_arrays_lie_in_the_store_as_arrays(kind, tmp_path):
     def members(u):
-        vary = fleet().vary if kind == "levels" else {"start.position": lw.Normal(std=1.0)}
+        vary = fleet().vary if kind == "levels" else {"start.position": lw.distributions.Normal(std=1.0)}
         return lw.Ensemble(fleet().scene, 600, 1, vary, ARRAYS[kind](u))
 
     whole = lw.solve(members(RANDOM), **SETTINGS)
@@ -542,7 +542,7 @@ def test_other_states_are_another_run(tmp_path):
     np.testing.assert_array_equal(lw.resume(tmp_path / "a.zarr").position, whole.position)
 
 
-class Mine(lw.Wrench):
+class Mine(lw.terms.Wrench):
     """A law of a user."""
 
     type = "mine"
@@ -550,9 +550,9 @@ class Mine(lw.Wrench):
 
 def test_a_law_of_your_own_goes_on_with_its_ensemble(tmp_path, monkeypatch):
     # As in another process, which has not made the class: no scene file knows it.
-    monkeypatch.delitem(lw.Term.kinds, "mine")
+    monkeypatch.delitem(lw.laws.Term.kinds, "mine")
     scene = lw.Scene(fleet().scene.vehicle, terms=[Mine(force=[0.1, 0.0, 0.0], torque=[0.0, 0.0, 0.0])])
-    own = lw.Ensemble(scene, 300, 1, {"mine.force": lw.Normal(std=0.1)})
+    own = lw.Ensemble(scene, 300, 1, {"mine.force": lw.distributions.Normal(std=0.1)})
     whole = lw.solve(own, **SETTINGS, store=tmp_path / "a.zarr")
     lw.solve(own, **SETTINGS, store=tmp_path / "b.zarr", only=range(0, 1))
     with pytest.raises(lw.SceneError, match=r"'mine': is not known"):

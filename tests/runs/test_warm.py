@@ -40,7 +40,7 @@ def test_every_method_and_precision_has_a_kernel():
 
 def test_statistics_and_kept_members_take_the_kernel_of_the_scene():
     scene = lw.Scene.load(PAPER)
-    run = dataclasses.replace(scene.run, keep="failed", statistics=(lw.Mean("position"),))
+    run = dataclasses.replace(scene.run, keep="failed", statistics=(lw.statistics.Mean("position"),))
     watched = dataclasses.replace(scene, run=run)
     assert kernels_of(watched) == kernels_of(scene) == [("psi_s", "float64", kernel_of_solve(watched))]
 

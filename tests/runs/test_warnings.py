@@ -169,14 +169,14 @@ def shrunk(z, steps):
 
 @pytest.mark.parametrize("kept", [
     {},
-    {"keep": "none", "statistics": [lw.Mean("position")]},
+    {"keep": "none", "statistics": [lw.statistics.Mean("position")]},
     {"keep": [1]},
     {"save": lw.SaveAt(every=12.8)},
 ])  # fmt: skip
 def test_an_attitude_that_is_no_rotation_is_told_by_default(kept):
     # Of two members one turns fast. The method is the one that is chosen where drag acts; this drag acts on no turn.
     scene = scene_of(**PLAIN)
-    scene = lw.Scene(scene.vehicle, scene.environment, terms=[lw.Drag(linear=[1e-9] * 3 + [0.0] * 3)])
+    scene = lw.Scene(scene.vehicle, scene.environment, terms=[lw.terms.Drag(linear=[1e-9] * 3 + [0.0] * 3)])
     h, steps = 0.4, 128
     fleet = one(scene, Om=[[0.0, 0.0, 0.5], [0.0, 0.0, 1.0]])
     result = lw.solve(fleet, None, h=h, t1=steps * h, **kept)
@@ -208,7 +208,7 @@ def test_an_attitude_that_was_no_rotation_on_the_way_is_told(dtype):
 @pytest.mark.parametrize("checks", ["safe", pytest.param("all", marks=pytest.mark.slow)])
 def test_an_attitude_of_a_member_that_stopped_is_told_of_where_it_stopped(tmp_path, checks):
     scene = scene_of(**PLAIN)
-    scene = lw.Scene(scene.vehicle, scene.environment, events=[lw.StopTime(at=20.0)])
+    scene = lw.Scene(scene.vehicle, scene.environment, events=[lw.events.StopTime(at=20.0)])
     fleet = one(scene, Om=[[0.0, 0.0, 1.0]] * 5)
     in_memory = lw.solve(fleet, "rk4", h=0.4, t1=80.0, checks=checks)
     stored = lw.solve(fleet, "rk4", h=0.4, t1=80.0, checks=checks, store=tmp_path / "run.zarr")
@@ -227,7 +227,7 @@ def test_stiff_drag_of_splittings(method, checks):
     scene = scene_of((M, M, M), (30.0, 30.0, 30.0))
     for part in BOTH:
         linear = part * step_warnings.SPLIT_DRAG_NUMBER * M / h - 2.0 * q * v
-        laws = [terms.Drag(linear=[linear] * 6, quadratic=[q] * 6), lw.Current(velocity=[0.5, 0.0, 0.0])]
+        laws = [terms.Drag(linear=[linear] * 6, quadratic=[q] * 6), lw.terms.Current(velocity=[0.5, 0.0, 0.0])]
         stiff = lw.Scene(scene.vehicle, scene.environment, terms=laws)
         result = lw.solve(one(stiff, nu=[v + 0.5, 0.0, 0.0]), method, h=h, t1=h, checks=checks)
         assert warned(result, Warnings.DRAG_STIFF) == [part > 1.0]
@@ -259,7 +259,7 @@ def test_a_splitting_loses_order_where_its_drag_is_called_stiff(method):
         start = np.concatenate([np.eye(3).ravel(), nu, Om])
         truth = solve_ivp(rates_of_a_body(M, J, linear), (0.0, 2.0), start, "Radau", rtol=1e-10, atol=1e-12).y[:9, -1]
         body = lw.Vehicle(30.0, inertia=J, added_mass=M - 30.0, buoyancy=0.0)
-        scene = lw.Scene(body, lw.Environment(gravity=0.0), terms=[lw.Drag(linear=linear)])
+        scene = lw.Scene(body, lw.Environment(gravity=0.0), terms=[lw.terms.Drag(linear=linear)])
         runs = [lw.solve(one(scene, nu=nu, Om=Om), method, h=step, t1=2.0) for step in (h, h / 2.0, h / 4.0)]
         assert [warned(run, Warnings.DRAG_STIFF) for run in runs] == [[number / n > 5.0] for n in (1, 2, 4)]
         errors = [np.abs(run.attitude[-1, 0].ravel() - truth).max() for run in runs]

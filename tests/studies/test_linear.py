@@ -24,7 +24,7 @@ LAGS = (LAG, 0.0, 0.0, 0.0, 0.0, LAG)
 
 def hover(drag=DRAG, buoyancy=BUOYANCY, center=CENTER, lags=LAGS, velocity=NONE):
     """A body with drag, whose actuator lags in X and N alone."""
-    terms = [lw.ControlWrench(limit=1e3, time_constant=lags), lw.Drag(quadratic=drag)]
+    terms = [lw.terms.ControlWrench(limit=1e3, time_constant=lags), lw.terms.Drag(quadratic=drag)]
     vehicle = lw.Vehicle(
         MASS, inertia=INERTIA, added_mass=(5.0, 22.0, 25.0), buoyancy=buoyancy, center_of_buoyancy=center
     )
@@ -40,7 +40,7 @@ def at(names, *wanted):
 
 
 def test_a_trim_balances_the_forces_of_the_equations():
-    found = lw.trim(hover(), 1.5, method="psi_s", h=0.02)
+    found = lw.linear.trim(hover(), 1.5, method="psi_s", h=0.02)
     R, nu = found.start.attitude, found.start.velocity
     assert np.abs(R @ nu - (1.5, 0.0, 0.0)).max() < 1e-12 or found.values["drift"] != 0.0
     assert abs((R @ nu)[2]) < 1e-12
@@ -59,7 +59,7 @@ def test_a_trim_balances_the_forces_of_the_equations():
 
 
 def test_a_run_from_a_trim_stays_there():
-    found = lw.trim(hover(), 1.0, free=("control_wrench",), fixed={"pitch": 0.1}, method="psi_s", h=0.02)
+    found = lw.linear.trim(hover(), 1.0, free=("control_wrench",), fixed={"pitch": 0.1}, method="psi_s", h=0.02)
     assert found.free == tuple(f"control_wrench[{i}]" for i in range(6))
     assert found.fixed["pitch"] == 0.1
     scene = dataclasses.replace(hover(), start=found.start)
@@ -81,13 +81,13 @@ def test_a_run_from_a_trim_stays_there():
 ])  # fmt: skip
 def test_what_has_no_trim(words, message):
     with pytest.raises(lw.SceneError, match=message):
-        lw.trim(hover(), **words, method="psi_s", h=0.02)
+        lw.linear.trim(hover(), **words, method="psi_s", h=0.02)
 
 
 def test_waves_and_noise_let_nothing_be_steady():
     scene = hover()
-    noisy = dataclasses.replace(scene, terms=[*scene.terms, lw.WrenchNoise(force=(1.0, 0.0, 0.0))])
-    for study in (lw.trim, lw.linearize):
+    noisy = dataclasses.replace(scene, terms=[*scene.terms, lw.terms.WrenchNoise(force=(1.0, 0.0, 0.0))])
+    for study in (lw.linear.trim, lw.linear.linearize):
         with pytest.raises(lw.SceneError, match=r"wrench_noise.*lets no motion be steady"):
             study(noisy, h=0.02)
 
@@ -110,7 +110,7 @@ def test_a_double_integrator_and_a_lag():
     masses = {"X": (MASS + 5.0, "position[0]", "velocity[0]"), "N": (INERTIA[2], "rotation[2]", "angular_velocity[2]")}
     errors = {name: [] for name in masses}
     for h in (0.02, 0.01):
-        linear = lw.linearize(neutral(), period=PERIOD, method="psi_s", h=h)
+        linear = lw.linear.linearize(neutral(), period=PERIOD, method="psi_s", h=h)
         for i, (name, (mass, place, rate)) in enumerate(masses.items()):
             rows = at(linear.states, place, rate, f"control_wrench.place[{5 * i}]")
             A, B = lagged(mass, LAG, PERIOD)
@@ -138,20 +138,20 @@ def test_the_error_of_the_differences_goes_with_their_square():
     scene = hover(**NEUTRAL, velocity=(speed, 0.0, 0.0))
     errors = []
     for step in (0.04, 0.02):
-        linear = lw.linearize(scene, period=PERIOD, method="psi_s", h=0.02, step=step)
+        linear = lw.linear.linearize(scene, period=PERIOD, method="psi_s", h=0.02, step=step)
         row = linear.states.index("velocity[0]")
         errors.append(linear.A[row, row] - 1.0 / (1.0 + q * speed * PERIOD) ** 2)
     # step^2 v^2 / 6 times the third derivative, 6 (q T)^2 / (1 + q v T)^4.
     for step, error in zip((0.04, 0.02), errors, strict=True):
         expected = (step * speed * q * PERIOD) ** 2 / (1.0 + q * speed * PERIOD) ** 4
         assert abs(error / expected - 1.0) < 0.01
-    linear = lw.linearize(scene, period=PERIOD, method="psi_s", h=0.02)
+    linear = lw.linear.linearize(scene, period=PERIOD, method="psi_s", h=0.02)
     assert abs(linear.A[row, row] - 1.0 / (1.0 + q * speed * PERIOD) ** 2) < 1e-10
 
 
 def test_a_part_and_a_state_space():
     control = pytest.importorskip("control")
-    linear = lw.linearize(neutral(), period=PERIOD, method="psi_s", h=0.02)
+    linear = lw.linear.linearize(neutral(), period=PERIOD, method="psi_s", h=0.02)
     surge = linear.part(("position[0]", "velocity[0]", "control_wrench.place[0]"), ("control_wrench[0]",))
     system = surge.state_space()
     assert isinstance(system, control.StateSpace)
@@ -171,25 +171,25 @@ def regulated(law=None):
 
     So the kernel of its runs is that of the models above, which have no merged lead.
     """
-    law = law or lw.StateFeedback(K=np.zeros((6, 12)))
+    law = law or lw.control.StateFeedback(K=np.zeros((6, 12)))
     controller = lw.Controller(
-        period=PERIOD, guidance=[lw.SetPoint(position=NONE, heading=0.0)], laws=[law],
-        allocation=[lw.AllocationMatrix(to="control_wrench", matrix=np.eye(6))])  # fmt: skip
+        period=PERIOD, guidance=[lw.control.SetPoint(position=NONE, heading=0.0)], laws=[law],
+        allocation=[lw.control.AllocationMatrix(to="control_wrench", matrix=np.eye(6))])  # fmt: skip
     free = hover(drag=1e-12 * DRAG, lags=(1e-9,) * 6, **NEUTRAL)
-    return dataclasses.replace(free, controller=controller, events=[lw.StopTime(at=1e9)])
+    return dataclasses.replace(free, controller=controller, events=[lw.events.StopTime(at=1e9)])
 
 
 @pytest.fixture(scope="module")
 def regulator():
-    linear = lw.linearize(regulated(), method="psi_s", h=0.02)
+    linear = lw.linear.linearize(regulated(), method="psi_s", h=0.02)
     # Nothing depends on where an actuator was that follows at once.
     assert not linear.A[:, 12:].any()
     motion = linear.part(("position", "rotation", "velocity", "angular_velocity"))
-    return lw.lqr(dataclasses.replace(motion, inputs=("X", "Y", "Z", "K", "M", "N")), *WEIGHTS)
+    return lw.linear.lqr(dataclasses.replace(motion, inputs=("X", "Y", "Z", "K", "M", "N")), *WEIGHTS)
 
 
 def test_a_regulator_in_the_loop(regulator):
-    closed = lw.linearize(regulated(regulator.law()), 1.0, closed=True, method="psi_s", h=0.02)
+    closed = lw.linear.linearize(regulated(regulator.law()), 1.0, closed=True, method="psi_s", h=0.02)
     # Commands are states of the loop after a tick; they add poles at 0.
     expected = np.concatenate([regulator.poles, np.zeros(len(closed.poles) - 12)])
     apart = np.abs(closed.poles[:, None] - expected)
@@ -250,14 +250,14 @@ def test_the_cost_of_a_run_is_that_of_the_matrix_and_no_other_gains_have_less(re
 
 def test_what_has_no_regulator(regulator):
     with pytest.raises(lw.SceneError, match=r"Q = .*has shape"):
-        lw.lqr(regulator.model, np.ones(3), np.ones(6))
+        lw.linear.lqr(regulator.model, np.ones(3), np.ones(6))
     with pytest.raises(lw.SceneError, match=r"R = .*is not symmetric and positive"):
-        lw.lqr(regulator.model, np.ones(12), np.zeros(6))
+        lw.linear.lqr(regulator.model, np.ones(12), np.zeros(6))
     with pytest.raises(lw.SceneError, match="poles that no input moves are 1"):
-        lw.lqr(regulator.model.part(regulator.model.states, ("X",)), np.ones(12), np.ones(1))
-    lagging = lw.linearize(neutral(), period=PERIOD, method="psi_s", h=0.02)
+        lw.linear.lqr(regulator.model.part(regulator.model.states, ("X",)), np.ones(12), np.ones(1))
+    lagging = lw.linear.linearize(neutral(), period=PERIOD, method="psi_s", h=0.02)
     with pytest.raises(lw.SceneError, match=r"control_wrench\.place\[0\].*is nothing that a state feedback knows"):
-        lw.lqr(lagging, np.ones(18), np.ones(6)).law()
+        lw.linear.lqr(lagging, np.ones(18), np.ones(6)).law()
 
 
 @pytest.mark.parametrize(("words", "message"), [
@@ -266,9 +266,9 @@ def test_what_has_no_regulator(regulator):
 ])  # fmt: skip
 def test_what_cannot_be_linearised(words, message):
     with pytest.raises(lw.SceneError, match=message):
-        lw.linearize(regulated(), **words, method="psi_s", h=0.02)
+        lw.linear.linearize(regulated(), **words, method="psi_s", h=0.02)
     with pytest.raises(lw.SceneError, match="needs a controller"):
-        lw.linearize(neutral(), closed=True, h=0.02)
+        lw.linear.linearize(neutral(), closed=True, h=0.02)
 
 
 def by_equations(start, rudder):
@@ -293,11 +293,11 @@ def test_trim_and_model_of_remus_beside_equations_written_once_more():
     scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0}, start=lw.Start(velocity=(1.5, 0.0, 0.0)))
     left, errors = [], []
     for h in (0.02, 0.01):
-        found = lw.trim(scene, method="psi_x", h=h)
+        found = lw.linear.trim(scene, method="psi_x", h=h)
         F, G, rates = by_equations(found.start, found.commands["control_fins"][0])
         left.append(np.abs(rates).max())
         whole = expm(np.block([[F, G[:, None]], [np.zeros((1, 13))]]) * PERIOD)
-        linear = lw.linearize(scene, found, period=PERIOD)
+        linear = lw.linear.linearize(scene, found, period=PERIOD)
         errors.append([np.abs(linear.A - whole[:12, :12]).max(), np.abs(linear.B[:, 0] - whole[:12, 12]).max()])
     # The steady speed is known, and so is the roll that the propeller's torque holds.
     assert abs(found.values["speed"] - equations.CRUISE) < 1e-4

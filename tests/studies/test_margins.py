@@ -22,27 +22,27 @@ MEMBERS = 6
 
 def scene(delay=0.0, laws=(), **gains):
     """A neutral body that turns its head."""
-    law = lw.HeadingPID(**{"kp": 6.0, "ki": 0.8, "kd": 9.0} | gains)
+    law = lw.control.HeadingPID(**{"kp": 6.0, "ki": 0.8, "kd": 9.0} | gains)
     controller = lw.Controller(
-        period=PERIOD, delay=delay, guidance=[lw.SetPoint(heading=0.0)], laws=[law, *laws],
-        allocation=[lw.AllocationMatrix(to="control_wrench", matrix=np.eye(6))])  # fmt: skip
+        period=PERIOD, delay=delay, guidance=[lw.control.SetPoint(heading=0.0)], laws=[law, *laws],
+        allocation=[lw.control.AllocationMatrix(to="control_wrench", matrix=np.eye(6))])  # fmt: skip
     vehicle = lw.Vehicle(
         20.0, inertia=(5.0, 8.0, J), added_mass=(0.0, 0.0, 0.0), buoyancy=200.0, center_of_buoyancy=(0.0, 0.0, 0.0)
     )
-    return lw.Scene(vehicle, lw.Environment(10.0), [lw.ControlWrench()], controller=controller)
+    return lw.Scene(vehicle, lw.Environment(10.0), [lw.terms.ControlWrench()], controller=controller)
 
 
 @pytest.fixture(scope="module")
 def fleet():
     vary = {
-        "heading_pid.kp": lw.Uniform(4.0, 8.0), "heading_pid.kd": lw.Uniform(7.0, 12.0),
-        "heading_pid.ki": lw.Uniform(0.4, 1.2), "controller.delay": lw.Choice([0.0, 0.06, 0.12])}  # fmt: skip
+        "heading_pid.kp": lw.distributions.Uniform(4.0, 8.0), "heading_pid.kd": lw.distributions.Uniform(7.0, 12.0),
+        "heading_pid.ki": lw.distributions.Uniform(0.4, 1.2), "controller.delay": lw.distributions.Choice([0.0, 0.06, 0.12])}  # fmt: skip
     return lw.Ensemble(scene(delay=0.06), MEMBERS, 5, vary)
 
 
 @pytest.fixture(scope="module")
 def found(fleet):
-    return lw.margins(fleet, "heading_pid", by=("eigenvalues", "runs"), about=80.0, method="psi_s", h=H)
+    return lw.linear.margins(fleet, "heading_pid", by=("eigenvalues", "runs"), about=80.0, method="psi_s", h=H)
 
 
 def radius(kp, ki, kd, g, steps, T=PERIOD, drag=0.0):
@@ -115,7 +115,7 @@ def test_margins_by_runs_are_those_at_which_the_envelope_shrinks(fleet, found):
 @pytest.mark.slow
 def test_the_poles_of_a_closed_loop_with_a_delay_are_those_of_the_system_by_hand():
     for steps in (0, 3, 11):
-        closed = lw.linearize(scene(delay=steps * H), 80.0, closed=True, method="psi_s", h=H)
+        closed = lw.linear.linearize(scene(delay=steps * H), 80.0, closed=True, method="psi_s", h=H)
         turning = [name for name in closed.states if not name.startswith(("position", "velocity"))]
         # Beside roll and pitch, which nothing turns: two integrators each, at 1.
         others = [f"{word}[{i}]" for word in ("rotation", "angular_velocity") for i in (0, 1)]
@@ -143,7 +143,7 @@ def test_a_loop_that_does_not_settle_has_no_margins():
     loops = lw.Ensemble.from_states(
         scene(delay=0.06), np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), np.zeros((2, 3)),
         {"heading_pid.kd": np.array([9.0, 2.1 * J / PERIOD])})  # fmt: skip
-    found = lw.margins(loops, None, "gain", about=1.0, method="psi_s", h=H)
+    found = lw.linear.margins(loops, None, "gain", about=1.0, method="psi_s", h=H)
     assert found.steady.tolist() == [True, False]
     assert found.loop == "all laws"
     assert np.isnan(found.values["gain_upper"][1])
@@ -189,12 +189,12 @@ def test_edges_beside_known_ones():
 ])  # fmt: skip
 def test_bad_arguments(words, message):
     with pytest.raises(lw.SceneError, match=message):
-        lw.margins(scene(), **words, h=H)
+        lw.linear.margins(scene(), **words, h=H)
 
 
 def test_what_is_no_scene():
     for ask, words in (
-        (lw.trim, {}), (lw.linearize, {}), (lw.margins, {}), (lw.worst_case, {"within": {}, "of": "depth"}),
+        (lw.linear.trim, {}), (lw.linear.linearize, {}), (lw.linear.margins, {}), (lw.worst_case, {"within": {}, "of": "depth"}),
         (lw.tune_gains, {"over": {}, "minimise": "depth"}),
     ):  # fmt: skip
         with pytest.raises(lw.SceneError, match="is neither"):
@@ -215,21 +215,21 @@ def test_a_copy_that_fails_does_not_settle(fleet):
 
 def test_scenes_without_margins():
     with pytest.raises(lw.SceneError, match="has no controller"):
-        lw.margins(dataclasses.replace(scene(), controller=None), h=H)
+        lw.linear.margins(dataclasses.replace(scene(), controller=None), h=H)
     whole = scene()
-    noisy = dataclasses.replace(whole.controller, sensors=[lw.Sensor(of="heading", noise=0.1)])
+    noisy = dataclasses.replace(whole.controller, sensors=[lw.control.Sensor(of="heading", noise=0.1)])
     with pytest.raises(lw.SceneError, match=r"sensor\.noise.*has no linear model"):
-        lw.margins(dataclasses.replace(whole, controller=noisy), h=H)
+        lw.linear.margins(dataclasses.replace(whole, controller=noisy), h=H)
 
 
 def autopilot():
     """REMUS 100, ballasted, on a straight way."""
     start = lw.Start(velocity=(1.54, 0.0, 0.0))
     controller = lw.Controller(
-        period=0.1, guidance=[lw.SetPoint(heading=0.0, depth=0.0)],
-        laws=[lw.HeadingPID(kp=1.0, kd=2.0, ki=0.02),
-              lw.DepthPID(kp=0.1, ki=0.001, kp_pitch=5.0, ki_pitch=0.3, kd_pitch=2.0, pitch_limit=0.5)],
-        allocation=[lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])])  # fmt: skip
+        period=0.1, guidance=[lw.control.SetPoint(heading=0.0, depth=0.0)],
+        laws=[lw.control.HeadingPID(kp=1.0, kd=2.0, ki=0.02),
+              lw.control.DepthPID(kp=0.1, ki=0.001, kp_pitch=5.0, ki_pitch=0.3, kd_pitch=2.0, pitch_limit=0.5)],
+        allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])])  # fmt: skip
     run = RunSettings(method="psi_x", step=0.01, duration=20.0, save_every=1.0)
     return lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0}, start=start, controller=controller, run=run)
 
@@ -239,7 +239,7 @@ def autopilot():
 def test_a_factor_of_1_changes_nothing(loop):
     """Laws with integrals of their own, whose demands are added: the factor is that of one, or of both."""
     scene = dataclasses.replace(autopilot(), start=lw.Start(velocity=(1.54, 0.0, 0.0), position=(0.0, 0.0, 1.0)))
-    fleet = lw.Ensemble(scene, 3, 1, {"heading_pid.ki": lw.Uniform(0.1, 0.3), "depth_pid.ki": lw.Uniform(0.01, 0.03)})
+    fleet = lw.Ensemble(scene, 3, 1, {"heading_pid.ki": lw.distributions.Uniform(0.1, 0.3), "depth_pid.ki": lw.distributions.Uniform(0.01, 0.03)})
     members = study.Study(fleet, loop, 20.0, 20.0, 10.0, 1e-3, None, 0.01)
     numbers = {FACTOR: np.ones(3), DELAY: np.zeros(3)}
     motion = members.bench.run(np.arange(3), None, 0, members.begin, numbers)
@@ -251,8 +251,8 @@ def test_a_factor_of_1_changes_nothing(loop):
 
 @pytest.mark.slow
 def test_the_heading_loop_of_remus():
-    vary = {"heading_pid.kp": lw.Uniform(0.7, 1.3), "heading_pid.kd": lw.Uniform(1.5, 3.0)}
-    found = lw.margins(lw.Ensemble(autopilot(), 64, 1, vary), "heading_pid", by=("eigenvalues", "runs"))
+    vary = {"heading_pid.kp": lw.distributions.Uniform(0.7, 1.3), "heading_pid.kd": lw.distributions.Uniform(1.5, 3.0)}
+    found = lw.linear.margins(lw.Ensemble(autopilot(), 64, 1, vary), "heading_pid", by=("eigenvalues", "runs"))
     assert found.steady.all()
     for name in ("gain_lower", "gain_upper"):
         np.testing.assert_allclose(found.by_runs[name], found.values[name], rtol=1e-2)
@@ -271,7 +271,7 @@ def test_the_snippets_of_a_page(page, tmp_path, monkeypatch):
         for long, brief in short.items():
             text = text.replace(long, brief)
         exec(text, names)
-    assert isinstance(names["found"], lw.Margins if "margins" in page else lw.Tuned)
+    assert isinstance(names["found"], lw.linear.Margins if "margins" in page else lw.studies.Tuned)
 
 
 def unsettled(name, vehicle, vary, members, by):
@@ -282,7 +282,7 @@ def unsettled(name, vehicle, vary, members, by):
     # After 400 s, rates swing ten times as far as what counts as settled at most; or the depth runs away; or the run fails.
     rates, depths = (np.ptp(each[1:], axis=0) for each in (found.angular_velocity, found.position[..., 2]))
     assert ((rates.max(axis=1) > 0.1) | (depths > 10.0) | ~np.isfinite(depths)).all(), name
-    found = lw.margins(fleet, None, "gain", by=by, method="psi_x", h=STEP)
+    found = lw.linear.margins(fleet, None, "gain", by=by, method="psi_x", h=STEP)
     return found
 
 
@@ -300,7 +300,7 @@ def test_of_loops_that_do_not_settle_none_is_steady():
 @pytest.mark.slow
 @pytest.mark.parametrize("vehicle", ["remus", "rov"])
 def test_loops_that_settle_have_margins(vehicle):
-    found = lw.margins(fleet_of(vehicle, {}, 16), None, "gain", by=("eigenvalues", "runs"), method="psi_x", h=STEP)
+    found = lw.linear.margins(fleet_of(vehicle, {}, 16), None, "gain", by=("eigenvalues", "runs"), method="psi_x", h=STEP)
     assert found.steady.all()
     assert set(found.why) == {""}
     assert (found.values["gain_upper"] > 1.2).all()
@@ -309,8 +309,8 @@ def test_loops_that_settle_have_margins(vehicle):
 def sampled(limit=49.85, heading=0.0, most=1e6, **gains):
     """A heading loop of 0.05 s whose gain limit is known: of a double integrator with kp, kd it is 2 J / (T kd)."""
     one = scene(kp=6.0, ki=0.0, kd=2.0 * J / (0.05 * limit), **gains)
-    controller = dataclasses.replace(one.controller, period=0.05, guidance=[lw.SetPoint(heading=heading)])
-    return dataclasses.replace(one, controller=controller, terms=[lw.ControlWrench(limit=[most] * 6)])
+    controller = dataclasses.replace(one.controller, period=0.05, guidance=[lw.control.SetPoint(heading=heading)])
+    return dataclasses.replace(one, controller=controller, terms=[lw.terms.ControlWrench(limit=[most] * 6)])
 
 
 @pytest.mark.filterwarnings("error")
@@ -321,7 +321,7 @@ def test_a_gain_limit_that_is_known_for_any_length_of_runs_heading_and_limit(sec
     """At 0.8 rad, round-off couples neutral velocities to the others; beyond the limit swings saturate, and headings wrap."""
     one = sampled(heading=heading, most=most)
     for by, asked in (("eigenvalues", ("eigenvalues",)), ("runs", ("runs",)), ("runs", ("eigenvalues", "runs"))):
-        found = lw.margins(one, "heading_pid", "gain", by=asked, seconds=seconds, tilt=tilt, method="psi_s", h=0.01)
+        found = lw.linear.margins(one, "heading_pid", "gain", by=asked, seconds=seconds, tilt=tilt, method="psi_s", h=0.01)
         values = found.to_dict()[by]
         assert found.steady.all()
         assert values["gain_lower"][0] < 0.02
@@ -331,10 +331,10 @@ def test_a_gain_limit_that_is_known_for_any_length_of_runs_heading_and_limit(sec
 
 def test_runs_judge_swings_by_angles_and_not_by_parts_of_limits():
     """A demand of 60 N m/rad at factors up to 5 is 60 tilts of a limit of 5 N m: small all the same, since it shrinks."""
-    one = dataclasses.replace(scene(delay=0.06, kp=60.0, ki=0.0, kd=20.0), terms=[lw.ControlWrench(limit=[5.0] * 6)])
+    one = dataclasses.replace(scene(delay=0.06, kp=60.0, ki=0.0, kd=20.0), terms=[lw.terms.ControlWrench(limit=[5.0] * 6)])
     expected = edge(lambda g: radius(60.0, 0.0, 20.0, g, 3) < study.SHRINKS ** (PERIOD / 80.0), 1.0, 100.0)
     for seconds in (240.0, 900.0):
-        found = lw.margins(one, None, "gain", by="runs", seconds=seconds, method="psi_s", h=H)
+        found = lw.linear.margins(one, None, "gain", by="runs", seconds=seconds, method="psi_s", h=H)
         # Half of a bracket, and that a run of 900 s comes nearer to the edge.
         assert found.by_runs["gain_upper"][0] == pytest.approx(expected, rel=3e-3 if seconds == 240.0 else 1e-2)
 
@@ -349,10 +349,10 @@ def test_runs_judge_swings_by_angles_and_not_by_parts_of_limits():
 def test_swings_that_wrap_and_slow_integrals(kp, ki, kd, drag, steps, most, tilt):
     assert radius(kp, ki, kd, 49.84, steps, 0.05, drag) < 1.0 < radius(kp, ki, kd, 49.86, steps, 0.05, drag)
     one = scene(delay=0.01 * steps, kp=kp, ki=ki, kd=kd)
-    acting = [lw.ControlWrench(limit=[most] * 6), lw.Drag(linear=[drag] * 6)]
+    acting = [lw.terms.ControlWrench(limit=[most] * 6), lw.terms.Drag(linear=[drag] * 6)]
     one = dataclasses.replace(one, controller=dataclasses.replace(one.controller, period=0.05), terms=acting)
-    found = lw.margins(one, "heading_pid", "gain", by=("eigenvalues",), tilt=tilt, method="rk4", h=0.01)
-    by_runs = lw.margins(one, "heading_pid", "gain", by="runs", tilt=tilt, method="rk4", h=0.01).by_runs
+    found = lw.linear.margins(one, "heading_pid", "gain", by=("eigenvalues",), tilt=tilt, method="rk4", h=0.01)
+    by_runs = lw.linear.margins(one, "heading_pid", "gain", by="runs", tilt=tilt, method="rk4", h=0.01).by_runs
     assert found.values["gain_upper"][0] == pytest.approx(49.85, rel=1e-3)
     assert by_runs["gain_upper"][0] == pytest.approx(49.85, rel=1e-2)
 
@@ -366,12 +366,12 @@ def test_saturated_members_whose_sampled_loop_grows_are_never_steady():
     radii = np.array([radius(*each, 1.0, 0) for each in zip(gains["kp"], gains["ki"], gains["kd"], strict=True)])
     spins, eye, zero = rng.normal(0.0, 0.1, (n, 3)), np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
     numbers = {f"heading_pid.{name}": values for name, values in gains.items()}
-    one = dataclasses.replace(scene(), terms=[lw.ControlWrench(limit=[2.0] * 6)])
+    one = dataclasses.replace(scene(), terms=[lw.terms.ControlWrench(limit=[2.0] * 6)])
     fleet = lw.Ensemble.from_states(one, zero, eye, zero, spins * [0.0, 0.0, 1.0], numbers)
     assert (radii > 1.0).sum() > n / 4
     assert (radii < 0.99).any()
     for by in ("eigenvalues", "runs"):
-        found = lw.margins(fleet, None, "gain", by=by, about=5.0, method="psi_s", h=H)
+        found = lw.linear.margins(fleet, None, "gain", by=by, about=5.0, method="psi_s", h=H)
         assert not found.steady[radii > 1.0].any(), by
         assert set(found.why[radii > 1.0]) <= {"does not settle", "at its limit: control_wrench[5]"}
         assert found.steady.any()
@@ -379,35 +379,35 @@ def test_saturated_members_whose_sampled_loop_grows_are_never_steady():
 
 
 def turning(terms, allocation, laws=(), **wanted):
-    guidance = [lw.SetPoint(heading=0.3, **wanted)]
-    law = lw.HeadingPID(kp=6.0, kd=9.0)
+    guidance = [lw.control.SetPoint(heading=0.3, **wanted)]
+    law = lw.control.HeadingPID(kp=6.0, kd=9.0)
     controller = lw.Controller(period=PERIOD, guidance=guidance, laws=[law, *laws], allocation=[allocation])
     return dataclasses.replace(scene(), terms=terms, controller=controller)
 
 
 def test_members_at_a_limit_and_members_that_fail_are_named():
     """A speed that drag does not allow: 1 N against 10 N s/m makes 0.1 m/s."""
-    acting = [lw.ControlWrench(limit=[1.0] * 5 + [50.0]), lw.Drag(linear=[10.0] * 3 + [1.0] * 3)]
-    one = turning(acting, lw.AllocationMatrix(to="control_wrench", matrix=np.eye(6)), [lw.SpeedPID(kp=20.0)], speed=0.5)
+    acting = [lw.terms.ControlWrench(limit=[1.0] * 5 + [50.0]), lw.terms.Drag(linear=[10.0] * 3 + [1.0] * 3)]
+    one = turning(acting, lw.control.AllocationMatrix(to="control_wrench", matrix=np.eye(6)), [lw.control.SpeedPID(kp=20.0)], speed=0.5)
     zero, eye = np.zeros((3, 3)), np.tile(np.eye(3), (3, 1, 1))
     spins = zero.copy()
     spins[2] = 5.0 / H
     limits = {"control_wrench.limit": np.array([[1.0] * 6, [20.0] * 6, [20.0] * 6])}
     fleet = lw.Ensemble.from_states(one, zero, eye, zero, spins, limits)
     for by in ("eigenvalues", "runs"):
-        found = lw.margins(fleet, "heading_pid", "delay", by=by, method="psi_s", h=H)
+        found = lw.linear.margins(fleet, "heading_pid", "delay", by=by, method="psi_s", h=H)
         assert found.why.tolist() == ["at its limit: control_wrench[0]", "", "failed"]
         assert "1: at its limit: control_wrench[0]; 1: failed" in str(found)
         assert [value is None for value in found.to_dict()[by]["delay"]] == [True, False, True]
 
 
 def test_a_loop_within_a_dead_band_moves_nothing():
-    pushes = lw.Thrusters(position=[[0.0, 0.3, 0.0], [0.0, -0.3, 0.0]], direction=[[1.0, 0.0, 0.0]] * 2,
+    pushes = lw.terms.Thrusters(position=[[0.0, 0.3, 0.0], [0.0, -0.3, 0.0]], direction=[[1.0, 0.0, 0.0]] * 2,
                           coefficient=[40.0] * 2, dead_band=[0.1] * 2, limit=[1.0] * 2)  # fmt: skip
     matrix = [[0, 0, 0, 0, 0, -0.1], [0, 0, 0, 0, 0, 0.1]]
-    one = turning([pushes, lw.Drag(linear=[10.0] * 3 + [1.0] * 3)], lw.AllocationMatrix(to="thrusters", matrix=matrix))
+    one = turning([pushes, lw.terms.Drag(linear=[10.0] * 3 + [1.0] * 3)], lw.control.AllocationMatrix(to="thrusters", matrix=matrix))
     one = dataclasses.replace(one, start=lw.Start(euler_deg=[0.0, 0.0, np.rad2deg(0.3)]))
-    found = lw.margins(one, None, "gain", method="psi_s", h=0.03)
+    found = lw.linear.margins(one, None, "gain", method="psi_s", h=0.03)
     assert "step shortened from 0.03 s to 0.025 s" in str(found)
     assert found.to_dict()["messages"] == list(found.messages)
     assert found.why.tolist() == ["moves nothing"]
@@ -417,6 +417,6 @@ def test_a_loop_within_a_dead_band_moves_nothing():
 def test_noise_lets_no_motion_be_steady():
     whole = scene()
     for words in ({"noise": 0.1}, {"drift": 0.1}):
-        noisy = dataclasses.replace(whole.controller, sensors=[lw.Sensor(of="heading", **words)])
+        noisy = dataclasses.replace(whole.controller, sensors=[lw.control.Sensor(of="heading", **words)])
         with pytest.raises(lw.SceneError, match="lets no motion be steady, as margins need it"):
-            lw.margins(dataclasses.replace(whole, controller=noisy), by="runs", h=H)
+            lw.linear.margins(dataclasses.replace(whole, controller=noisy), by="runs", h=H)

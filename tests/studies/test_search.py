@@ -71,21 +71,21 @@ def test_bounds():
 def test_risks():
     costs = np.array([[3.0, 1.0, 2.0, 4.0, 5.0], [1.0, 1.0, 1.0, 1.0, np.inf]])
     # The worst 30 % of five members are one and a half.
-    assert lw.CVaR(0.3)(costs[:1])[0] == pytest.approx((5.0 + 0.5 * 4.0) / 1.5)
-    assert lw.CVaR(1.0)(costs[:1])[0] == pytest.approx(3.0)
-    assert lw.CVaR(0.2)(costs).tolist() == [5.0, np.inf]
+    assert lw.metrics.CVaR(0.3)(costs[:1])[0] == pytest.approx((5.0 + 0.5 * 4.0) / 1.5)
+    assert lw.metrics.CVaR(1.0)(costs[:1])[0] == pytest.approx(3.0)
+    assert lw.metrics.CVaR(0.2)(costs).tolist() == [5.0, np.inf]
     faults = Faults()
     mean, quantile = risk_of(faults, "mean"), risk_of(faults, 0.8)
     assert not faults
     assert mean(costs[:1])[0] == 3.0
     assert quantile(costs).tolist() == [4.0, 1.0]
-    assert [str(risk) for risk in (lw.CVaR(0.05), mean, quantile)] == ["mean of the worst 5 %", "mean", "80 % quantile"]
+    assert [str(risk) for risk in (lw.metrics.CVaR(0.05), mean, quantile)] == ["mean of the worst 5 %", "mean", "80 % quantile"]
     for wrong in ("median", 2.0, None):
         with pytest.raises(lw.SceneError, match="is no risk"):
             risk_of(faults := Faults(), wrong)
             faults.raise_if_any()
     with pytest.raises(lw.SceneError, match="is no part"):
-        lw.CVaR(0.0)
+        lw.metrics.CVaR(0.0)
 
 
 def test_a_known_worst_corner():
@@ -134,10 +134,10 @@ def costs(result):
 
 OVER = {"state_feedback.K[2, 2]": (3.0, 60.0, "log"), "state_feedback.K[2, 8]": (3.0, 80.0, "log")}
 SAVE = lw.SaveAt(every=PERIOD, fields=("position", "attitude", "velocity", "angular_velocity", "command"))
-STARTS = {"start.position[2]": lw.Normal(std=1.0), "start.velocity[2]": lw.Normal(std=0.5)}
+STARTS = {"start.position[2]": lw.distributions.Normal(std=1.0), "start.velocity[2]": lw.distributions.Normal(std=0.5)}
 
 
-@pytest.mark.parametrize("risk", ["mean", lw.CVaR(0.2)], ids=str)
+@pytest.mark.parametrize("risk", ["mean", lw.metrics.CVaR(0.2)], ids=str)
 def test_tuned_gains_are_those_of_the_regulator(regulator, risk):  # noqa: F811
     """The regulator's gains are the best from every start, so whatever the risk is."""
     fleet = lw.Ensemble(regulated(), 12, 3, STARTS)
@@ -147,7 +147,7 @@ def test_tuned_gains_are_those_of_the_regulator(regulator, risk):  # noqa: F811
     start = fleet.select(0, 12)
     x = np.concatenate([start.position, np.zeros((12, 3)), start.velocity, start.angular_velocity], axis=1)
     least = np.einsum("ni,ij,nj->n", x, regulator.P, x)
-    expected = least.mean() if risk == "mean" else lw.CVaR(0.2)(least[None])[0]
+    expected = least.mean() if risk == "mean" else lw.metrics.CVaR(0.2)(least[None])[0]
     assert abs(found.cost / expected - 1.0) < 1e-5
     # Near the least a cost that is 1e-6 larger is that of gains 1e-3 beside.
     np.testing.assert_allclose(list(found.parameters.values()), best, rtol=1e-2)
@@ -167,7 +167,7 @@ def test_what_is_told_of_fresh_members():
     K = np.zeros((6, 12))
     for place, risk in (([0.0, 0.0], found.fresh_before), (list(found.parameters.values()), found.fresh_cost)):
         K[2, [2, 8]] = place
-        scene = regulated(lw.StateFeedback(K=K))
+        scene = regulated(lw.control.StateFeedback(K=K))
         result = lw.solve(lw.Ensemble(scene, 8, 4, STARTS), "psi_s", h=PERIOD, t1=20.0, save=SAVE)
         assert risk == pytest.approx(np.quantile(costs(result), 0.75, method="inverted_cdf"), rel=1e-12)
 
@@ -194,7 +194,7 @@ def test_indices_of_members_are_whole_numbers():
 @pytest.mark.slow
 def test_candidates_meet_the_noise_of_the_members():
     scene = regulated()
-    noisy = dataclasses.replace(scene, terms=[*scene.terms, lw.WrenchNoise(force=(1.0, 1.0, 1.0))])
+    noisy = dataclasses.replace(scene, terms=[*scene.terms, lw.terms.WrenchNoise(force=(1.0, 1.0, 1.0))])
     fleet = lw.Ensemble(noisy, 5, 7, STARTS)
     members = fleet.select(0, 5)
     run = lw.prepare(noisy, None, "norm(position)", **RUN)
@@ -209,19 +209,19 @@ def test_candidates_meet_the_noise_of_the_members():
 def test_searches_by_metrics_of_a_loop():
     """What is searched for is the metric of a run, at every tick; a loop that never settles is infinitely bad."""
     fleet = lw.Ensemble(regulated(), 4, 3, STARTS)
-    tuned = lw.tune_gains(fleet, OVER, "iae depth", risk=lw.CVaR(0.5), budget=4 * 32, fresh=8, **RUN)
+    tuned = lw.tune_gains(fleet, OVER, "iae depth", risk=lw.metrics.CVaR(0.5), budget=4 * 32, fresh=8, **RUN)
     K = np.zeros((6, 12))
     K[2, [2, 8]] = list(tuned.parameters.values())
-    wanted = dataclasses.replace(regulated(lw.StateFeedback(K=K)))
-    iae = lw.IAE("depth", then=[lw.MemberValues()])
+    wanted = dataclasses.replace(regulated(lw.control.StateFeedback(K=K)))
+    iae = lw.metrics.IAE("depth", then=[lw.statistics.MemberValues()])
     for members, seed, risk in ((4, 3, tuned.cost), (8, 4, tuned.fresh_cost)):
         result = lw.solve(lw.Ensemble(wanted, members, seed, STARTS), "psi_s", h=PERIOD, t1=20.0, statistics=[iae])
         each = result.statistics["each iae depth"].value[0]
-        assert risk == pytest.approx(lw.CVaR(0.5)(each)[0], rel=1e-12)
+        assert risk == pytest.approx(lw.metrics.CVaR(0.5)(each)[0], rel=1e-12)
     assert tuned.of == "iae depth"
     assert tuned.fresh_before > tuned.fresh_cost
     within = {"start.position[2]": (-1.0, 2.0)}
-    for of in (lw.MaxError("depth"), {"type": "max_error", "of": "depth"}):
+    for of in (lw.metrics.MaxError("depth"), {"type": "max_error", "of": "depth"}):
         far = lw.worst_case(regulated(), within, of, budget=64, **RUN)
         assert far.value == pytest.approx(2.0, abs=1e-9)
         assert far.of == "max_error depth"
@@ -230,6 +230,6 @@ def test_searches_by_metrics_of_a_loop():
     never = lw.worst_case(regulated(), within, "settling_time depth", budget=64, **RUN)
     assert never.value == np.inf
     assert str(never).startswith("settling_time depth is infinite, or a member fails: start.position[2]")
-    for of, message in (("iae depht", "depht"), ("mean", "is no metric"), (lw.Mean("depth"), "is no metric")):
+    for of, message in (("iae depht", "depht"), ("mean", "is no metric"), (lw.statistics.Mean("depth"), "is no metric")):
         with pytest.raises(lw.SceneError, match=message):
             lw.worst_case(regulated(), within, of, budget=64, **RUN)

@@ -17,13 +17,13 @@ import lgvi_warp as lw
 from lgvi_warp import cli
 from lgvi_warp.results import quantities
 from lgvi_warp.scene.settings import RunSettings
-from lgvi_warp.studies import sensitivity as uq
+from lgvi_warp import uq
 from tests.conftest import ROOT
 
 FIVE = 5.0 / 1.96
 RUN = {"h": 0.01, "t1": 0.02, "save": lw.SaveAt()}
 PI = np.pi
-BOX = {f"start.position[{i}]": lw.Uniform(low=-PI, high=PI) for i in range(3)}
+BOX = {f"start.position[{i}]": lw.distributions.Uniform(low=-PI, high=PI) for i in range(3)}
 
 
 def ishigami(result):
@@ -89,7 +89,7 @@ def test_indices_of_ishigamis_function(found):
 
 # Of Sobol's g, by factor; the vehicle's start has a factor for each.
 WEIGHTS = np.array([0.0, 1.0, 4.5, 9.0, 99.0])
-UNIT = {name: lw.Uniform(low=0.0, high=1.0) for name in (*(f"start.angular_velocity[{i}]" for i in range(2)),
+UNIT = {name: lw.distributions.Uniform(low=0.0, high=1.0) for name in (*(f"start.angular_velocity[{i}]" for i in range(2)),
                                                          *(f"start.position[{i}]" for i in range(3)))}  # fmt: skip
 
 
@@ -137,7 +137,7 @@ def test_the_table_and_its_files(found, tmp_path):
 def test_the_picture(found, tmp_path):
     from matplotlib.image import imread
 
-    picture = imread(lw.plot_sensitivity(found, tmp_path / "bars.png"))
+    picture = imread(lw.plots.plot_sensitivity(found, tmp_path / "bars.png"))
     assert picture.shape[0] > 150
     assert picture[..., :3].std() > 0.05
 
@@ -154,7 +154,7 @@ def sinking(scene):
 
 T1 = 2.0
 SPREADS = {"vehicle.mass": 0.1, "vehicle.buoyancy": 2.0, "start.velocity[2]": 0.003}
-LAWS = {name: lw.Normal(std=std) for name, std in SPREADS.items()}
+LAWS = {name: lw.distributions.Normal(std=std) for name, std in SPREADS.items()}
 SINK = {"h": 0.02, "t1": T1, "save": lw.SaveAt()}
 
 
@@ -213,8 +213,8 @@ def test_the_adaptor_serves_scipy_and_salib(sinking):
 
 
 def test_laws_in_salibs_words(sinking):
-    vary = {"vehicle.mass": lw.Uniform(relative=0.1), "vehicle.buoyancy": lw.LogNormal(sigma=0.1),
-            "vehicle.center_of_buoyancy": lw.Uniform(low=(0, 0, -0.1), high=(0.1, 0.2, 0.1))}  # fmt: skip
+    vary = {"vehicle.mass": lw.distributions.Uniform(relative=0.1), "vehicle.buoyancy": lw.distributions.LogNormal(sigma=0.1),
+            "vehicle.center_of_buoyancy": lw.distributions.Uniform(low=(0, 0, -0.1), high=(0.1, 0.2, 0.1))}  # fmt: skip
     problem = uq.model(sinking, vary, "position", **SINK).problem
     assert problem["dists"] == ["unif", "lognorm", "unif", "unif", "unif"]
     expected = [[111.42, 136.18], [np.log(1215.8), 0.1], [0.0, 0.1], [0.0, 0.2], [-0.1, 0.1]]
@@ -222,14 +222,14 @@ def test_laws_in_salibs_words(sinking):
     other = uq.model(sinking, {"vehicle.mass": stats.gamma(400.0, scale=0.3)}, "position", **SINK)
     assert "levels=True" in fault(lambda: other.problem)
     np.testing.assert_array_equal(other.distributions[0].ppf([0.2, 0.7]), stats.gamma(400.0, scale=0.3).ppf([0.2, 0.7]))
-    joint = {"start.attitude": lw.UniformRotation()}
+    joint = {"start.attitude": lw.distributions.UniformRotation()}
     assert "levels=True" in fault(uq.model, sinking, joint, "position", **SINK)
     assert uq.model(sinking, joint, "position", levels=True, **SINK).problem["groups"] == ["start.attitude"] * 3
 
 
 def test_morris_of_a_linear_quantity(sinking):
-    laws = {"vehicle.buoyancy": lw.Uniform(half_width=2.0), "start.velocity[2]": lw.Uniform(half_width=0.01),
-            "environment.water_density": lw.Uniform(relative=0.1)}  # fmt: skip
+    laws = {"vehicle.buoyancy": lw.distributions.Uniform(half_width=2.0), "start.velocity[2]": lw.distributions.Uniform(half_width=0.01),
+            "environment.water_density": lw.distributions.Uniform(relative=0.1)}  # fmt: skip
     found = uq.morris(sinking, "position[2]", samples=8, vary=laws, **SINK)
     assert found.factors == tuple(laws)
     # Per side of the cube: a width of 4 N and of 0.02 m/s; nothing depends on the water's density. Round-off of Morris'
@@ -243,7 +243,7 @@ def test_morris_of_a_linear_quantity(sinking):
 
 
 def test_a_joint_law_is_one_factor_of_a_screening(sinking):
-    vary = {"start.attitude": lw.RotationNormal(std=0.1), "vehicle.buoyancy": lw.Normal(std=1.0)}
+    vary = {"start.attitude": lw.distributions.RotationNormal(std=0.1), "vehicle.buoyancy": lw.distributions.Normal(std=1.0)}
     found = uq.morris(sinking, ["position[0]", "position[2]"], samples=4, vary=vary, **SINK)
     assert found.factors == ("start.attitude", "vehicle.buoyancy")
     assert found.mu_star.shape == (2, 2)
@@ -260,8 +260,8 @@ def test_what_does_not_vary_has_no_indices_and_says_so(sinking):
 
 
 def test_noise_that_acts_alike_belongs_to_no_factor(sinking):
-    noisy = dataclasses.replace(sinking, terms=[lw.WrenchNoise(force=(1.0, 1.0, 1.0), torque=(0.0, 0.0, 0.0))])
-    vary = {"vehicle.buoyancy": lw.Normal(std=1.0), "environment.water_density": lw.Normal(std=1.0)}
+    noisy = dataclasses.replace(sinking, terms=[lw.terms.WrenchNoise(force=(1.0, 1.0, 1.0), torque=(0.0, 0.0, 0.0))])
+    vary = {"vehicle.buoyancy": lw.distributions.Normal(std=1.0), "environment.water_density": lw.distributions.Normal(std=1.0)}
     alone, alike = (
         uq.sobol(noisy, "position[2]", samples=16, vary=vary, common_noise=c, **SINK) for c in (False, True)
     )
@@ -270,7 +270,7 @@ def test_noise_that_acts_alike_belongs_to_no_factor(sinking):
     assert alike.total[0, 1] < 1e-20
 
 
-NOISE = lw.WrenchNoise(force=(1.0, 1.0, 1.0), torque=(0.0, 0.0, 0.0))
+NOISE = lw.terms.WrenchNoise(force=(1.0, 1.0, 1.0), torque=(0.0, 0.0, 0.0))
 HEAVIER = {"vehicle.mass": np.linspace(123.0, 125.0, 40)}
 LINES = np.random.default_rng(0).uniform(0.01, 0.99, (40, 3))
 
@@ -278,12 +278,12 @@ LINES = np.random.default_rng(0).uniform(0.01, 0.99, (40, 3))
 @pytest.mark.parametrize(
     "sampling",
     ["random", "sobol", "halton", {"latin_hypercube": {"group": 20}}, "saltelli", "morris",
-     lw.Grid({"vehicle.buoyancy": 8, "vehicle.mass": 5}), lw.Table(values=HEAVIER), lw.UnitCubePoints(LINES)],
+     lw.designs.Grid({"vehicle.buoyancy": 8, "vehicle.mass": 5}), lw.designs.Table(values=HEAVIER), lw.designs.UnitCubePoints(LINES)],
     ids=lambda one: str(one)[:20],
 )  # fmt: skip
 def test_a_member_runs_again_alone_with_its_bits(sinking, sampling):
     noisy = dataclasses.replace(sinking, terms=[NOISE])
-    laws = {name: law for name, law in LAWS.items() if not (isinstance(sampling, lw.Table) and name in HEAVIER)}
+    laws = {name: law for name, law in LAWS.items() if not (isinstance(sampling, lw.designs.Table) and name in HEAVIER)}
     fleet = lw.Ensemble(noisy, 40, 3, laws, sampling)
     whole = lw.solve(fleet, **SINK).position
     assert len(np.unique(whole[-1, :, 2])) == 40
@@ -305,7 +305,7 @@ def test_members_that_are_added_leave_the_others_bits(sinking, sampling):
 # Members that fail --------------------------------------------------------------------------------------------------------
 
 # Beyond 2 / h = 200 rad/s the step is too large: 1 of 20 points of the cube.
-FAST = {"start.angular_velocity[2]": lw.Uniform(low=0.0, high=210.0), "vehicle.buoyancy": lw.Normal(std=1.0)}
+FAST = {"start.angular_velocity[2]": lw.distributions.Uniform(low=0.0, high=210.0), "vehicle.buoyancy": lw.distributions.Normal(std=1.0)}
 
 
 def test_members_that_fail_are_counted_and_refused(scene):
@@ -314,7 +314,7 @@ def test_members_that_fail_are_counted_and_refused(scene):
     assert 'failed="drop"' in message
     with pytest.raises(uq.FailedMembers):
         uq.morris(scene, "position[2]", samples=20,
-                  vary=FAST | {"start.angular_velocity[2]": lw.Uniform(low=100.0, high=300.0)}, **RUN)  # fmt: skip
+                  vary=FAST | {"start.angular_velocity[2]": lw.distributions.Uniform(low=100.0, high=300.0)}, **RUN)  # fmt: skip
 
 
 def test_whole_groups_are_used_alone(scene):
@@ -325,7 +325,7 @@ def test_whole_groups_are_used_alone(scene):
     assert f"the {64 - found.samples} of 64 groups" in found.messages[0]
     assert np.isfinite(found.first).all()
     message = fault(uq.sobol, scene, "position[2]", samples=8, failed="drop", **RUN,
-                    vary=FAST | {"start.angular_velocity[2]": lw.Uniform(low=300.0, high=400.0)})  # fmt: skip
+                    vary=FAST | {"start.angular_velocity[2]": lw.distributions.Uniform(low=300.0, high=400.0)})  # fmt: skip
     assert "0 groups" in message
 
 
@@ -341,7 +341,7 @@ def test_a_quantity_that_is_not_finite_is_a_failure(scene):
     def odd(result):
         return np.where(result.position[0, :, 0] > 0.5, np.nan, result.position[0, :, 0])
 
-    message = fault(uq.sobol, scene, odd, samples=8, vary={"start.position[0]": lw.Normal(std=1.0)}, **RUN)
+    message = fault(uq.sobol, scene, odd, samples=8, vary={"start.position[0]": lw.distributions.Normal(std=1.0)}, **RUN)
     assert "quantity not finite" in message
 
 
@@ -349,7 +349,7 @@ def test_members_that_reach_the_surface_count_with_where_they_arrive():
     """Neutral bodies that rise at their own speeds: at t1 each is where it is, or has been stopped at the surface."""
     body = lw.Vehicle(20.0, inertia=(1.0, 1.2, 1.4), added_mass=(10.0, 10.0, 10.0), buoyancy=20.0 * 9.8)
     start = lw.Start(position=(0.0, 0.0, 5.0), velocity=(0.3, 0.0, -1.0))
-    rising = lw.Scene(body, lw.Environment(gravity=9.8), start=start, events=[lw.Surface()])
+    rising = lw.Scene(body, lw.Environment(gravity=9.8), start=start, events=[lw.events.Surface()])
     names, settings = ["start.position[2]", "start.velocity[2]"], {"h": 0.1, "t1": 4.0}
     X = np.column_stack([np.linspace(0.5, 6.0, 12), np.repeat([-1.0, -0.2], 6)])
     Y = uq.model(rising, names, ["position[2]", "position[0]"], **settings)(X)
@@ -357,7 +357,7 @@ def test_members_that_reach_the_surface_count_with_where_they_arrive():
     np.testing.assert_allclose(Y, np.column_stack([X[:, 0] + X[:, 1] * end, 0.3 * end]), atol=1e-9)
     assert 0 < (end < 4.0).sum() < 12
 
-    vary = {"start.position[2]": lw.Uniform(low=1.0, high=7.0), "start.velocity[0]": lw.Uniform(low=0.2, high=0.4)}
+    vary = {"start.position[2]": lw.distributions.Uniform(low=1.0, high=7.0), "start.velocity[0]": lw.distributions.Uniform(low=0.2, high=0.4)}
     found = uq.sobol(rising, "position[2]", samples=256, vary=vary, seed=1, **settings)
     # z - 4 above 4 m, else 0: half of the members arrive, and the speed to the north is no matter.
     assert found.failed == 0
@@ -382,12 +382,12 @@ def test_quantities_of_a_path(scene):
         ("max(position)[2]", b[:, :, 2].max(axis=0)),
         ("euler[1]", -np.arcsin(result.attitude[-1, :, 2, 0])),
         ("velocity_inertial", np.einsum("nij,nj->ni", result.attitude[-1], v[-1])),
-        (lw.Quantity("sunk", lambda samples, members: samples["position"][..., 2] - 10.0), b[-1, :, 2] - 10.0),
+        (lw.statistics.Quantity("sunk", lambda samples, members: samples["position"][..., 2] - 10.0), b[-1, :, 2] - 10.0),
         (lambda samples, members: samples["velocity"][..., 0] ** 2, v[-1, :, 0] ** 2),
     ):  # fmt: skip
         (one,) = quantities.quantities(text)
         np.testing.assert_allclose(one.values(result), np.reshape(exact, (5, -1)), rtol=1e-15, err_msg=str(text))
-    # The average over time, as of `lw.PathMean`, not over samples; some roundings of a sum of four parts.
+    # The average over time, as of `lw.statistics.PathMean`, not over samples; some roundings of a sum of four parts.
     (average,) = quantities.quantities("mean(energy)")
     exact = np.trapezoid(result.energy, result.time, axis=0) / result.time[-1]
     np.testing.assert_allclose(average.values(result)[:, 0], exact, rtol=2e-15)
@@ -402,9 +402,9 @@ def test_quantities_of_a_path(scene):
 
 
 def test_a_quantity_of_the_users_sees_what_members_start_from(sinking):
-    fallen = lw.Quantity("fallen", lambda samples, members: samples["position"][..., 2] - members.position[None, :, 2],
+    fallen = lw.statistics.Quantity("fallen", lambda samples, members: samples["position"][..., 2] - members.position[None, :, 2],
                          fields=("position",))  # fmt: skip
-    vary = {"start.position[2]": lw.Uniform(half_width=5.0), "start.velocity[2]": lw.Normal(std=0.01)}
+    vary = {"start.position[2]": lw.distributions.Uniform(half_width=5.0), "start.velocity[2]": lw.distributions.Normal(std=0.01)}
     X = np.array([[3.0, 0.1], [9.0, 0.2]])
     f = uq.model(sinking, vary, [fallen, "depth"], **SINK)
     np.testing.assert_allclose(f(X)[:, 0], depth(123.8, 1215.8, X[:, 1]), rtol=0, atol=1e-13)

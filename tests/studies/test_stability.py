@@ -116,16 +116,16 @@ def test_what_acts_decides_how_energy_is_judged(scene):
         one = dataclasses.replace(scene, terms=list(terms))
         return judged(StabilityGrid(one, "h", "angular_velocity", (2, 2), 1, 0, None), ["psi_s"])
 
-    drag, current = lw.Drag(linear=[1.0] * 6), lw.Current(velocity=[0.3, 0.0, 0.0])
+    drag, current = lw.terms.Drag(linear=[1.0] * 6), lw.terms.Current(velocity=[0.3, 0.0, 0.0])
     assert kind() == "conservative"
     assert kind(drag) == "dissipative"
     assert kind(current) == "conservative"
     assert kind(drag, current) == "dissipative"
-    assert kind(lw.Current(velocity=[0.0, 0.0, 0.1])) == "driven"
-    assert kind(current, lw.Tether(anchor=[0.0, 0.0, 0.0], stiffness=5.0)) == "driven"
-    assert kind(lw.Wrench(force=[1.0, 0.0, 0.0])) == "driven"
+    assert kind(lw.terms.Current(velocity=[0.0, 0.0, 0.1])) == "driven"
+    assert kind(current, lw.terms.Tether(anchor=[0.0, 0.0, 0.0], stiffness=5.0)) == "driven"
+    assert kind(lw.terms.Wrench(force=[1.0, 0.0, 0.0])) == "driven"
     with pytest.raises(lw.SceneError, match="noise acts"):
-        kind(lw.WrenchNoise(force=[1.0, 0.0, 0.0]))
+        kind(lw.terms.WrenchNoise(force=[1.0, 0.0, 0.0]))
 
 
 def test_growth_of_energy_is_over_what_the_start_can_hold(scene):
@@ -210,7 +210,7 @@ def test_exact_drag_has_no_limit_and_explicit_drag_has(scene):
 
 @pytest.mark.slow
 def test_what_drives_a_scene_is_compared_with_the_reference(scene):
-    pushed = dataclasses.replace(scene, terms=[lw.Wrench(force=[500.0, 0.0, 0.0])])
+    pushed = dataclasses.replace(scene, terms=[lw.terms.Wrench(force=[500.0, 0.0, 0.0])])
     one = lw.stability_map(pushed, ("h", 0.01, 0.3), "angular_velocity", ["psi_s"], points=4)
     assert one.judged == "driven"
     assert one.t1 == one.error_time
@@ -219,7 +219,7 @@ def test_what_drives_a_scene_is_compared_with_the_reference(scene):
 
 def test_a_method_that_the_scene_refuses_is_named(scene):
     """gauss4 takes no drag; the rest goes on."""
-    damped = dataclasses.replace(scene, terms=[lw.Drag(linear=[1.0] * 6)])
+    damped = dataclasses.replace(scene, terms=[lw.terms.Drag(linear=[1.0] * 6)])
     with pytest.raises(lw.SceneError, match="gauss4"):
         lw.stability_map(damped, ("h", 0.05, 1.0), "angular_velocity", ["gauss4"], points=2, t1=1.0, error_time=0.5)
 
@@ -232,9 +232,9 @@ def panels(picture, n):
 def test_the_picture_shows_every_class(found, tmp_path):
     from matplotlib.image import imread
 
-    from lgvi_warp.views.plots import CELLS
+    from lgvi_warp.views.plots.maps import CELLS
 
-    path = lw.plot_stability(found, tmp_path / "map.png")
+    path = lw.plots.plot_stability(found, tmp_path / "map.png")
     picture = imread(path)[..., :3]
     assert picture.shape[0] > 400
     assert picture.shape[1] > 900
@@ -248,7 +248,7 @@ def test_a_picture_of_linear_axes_and_of_one_row(scene, tmp_path):
     axes = "angular_velocity=1:4:linear", "h=0.05:1"
     for points in ((3, 2), (3, 1)):
         one = lw.stability_map(scene, *axes, ["psi_s"], points=points, t1=4.0, error_time=1.0)
-        assert lw.plot_stability(one, tmp_path / "one.png").stat().st_size > 5000
+        assert lw.plots.plot_stability(one, tmp_path / "one.png").stat().st_size > 5000
 
 
 def test_the_report_says_what_must_be_known(found):

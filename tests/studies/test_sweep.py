@@ -21,8 +21,8 @@ from tests.support.json_page import differing
 pytestmark = pytest.mark.kernel
 
 MEMBERS = 300
-METRICS = ["overshoot heading", lw.MaxError("north", name="way"), lw.RMSError("heading"),
-           lw.SteadyStateError("heading")]  # fmt: skip
+METRICS = ["overshoot heading", lw.metrics.MaxError("north", name="way"), lw.metrics.RMSError("heading"),
+           lw.metrics.SteadyStateError("heading")]  # fmt: skip
 CASES = [{"name": "soft"}, {"name": "stiff", "set": {"heading_pid.kp": 8.0}},
          {"name": "unknown", "set": {"heading_pid.kq": 1.0}}]  # fmt: skip
 GRID = {"controller.delay": [0.02, 0.04]}
@@ -62,8 +62,8 @@ def scene(tmp_path_factory):
     return lw.Scene.load(path)
 
 
-VARY = {"start.position[0]": lw.Normal(std=0.8), "vehicle.mass": lw.Uniform(low=45.0, high=55.0),
-        "heading_pid.kp": lw.Uniform(low=2.0, high=4.0)}  # fmt: skip
+VARY = {"start.position[0]": lw.distributions.Normal(std=0.8), "vehicle.mass": lw.distributions.Uniform(low=45.0, high=55.0),
+        "heading_pid.kp": lw.distributions.Uniform(low=2.0, high=4.0)}  # fmt: skip
 
 
 def swept(scene, out=None, **more):
@@ -267,7 +267,7 @@ def test_a_metric_of_what_a_case_does_not_want_refuses_the_case(scene):
 
 
 def test_members_that_fail_do_not_pass_and_come_first(scene):
-    bad = swept(scene, grid=None, cases=None, vary={**VARY, "start.velocity[0]": lw.Choice([0.0, 1e307], [0.9, 0.1])})
+    bad = swept(scene, grid=None, cases=None, vary={**VARY, "start.velocity[0]": lw.distributions.Choice([0.0, 1e307], [0.9, 0.1])})
     record = bad.record(bad.cells[0])
     lost = failed(record.status)
     assert 0 < lost.sum() < MEMBERS
@@ -352,7 +352,7 @@ baseline = "stiff"
     ({"success": {"status": "fine"}}, "success.status"),
     ({"metrics": ["overshoot headin"]}, "did you mean 'heading'"),
     ({"metrics": ["depth"]}, "not one number of each member"),
-    ({"metrics": [lw.Mean("depth")]}, "is no metric"),
+    ({"metrics": [lw.statistics.Mean("depth")]}, "is no metric"),
     ({"metrics": ["iae heading", "iae heading"]}, "name of another metric"),
     ({"cases": [{"set": {}}]}, "has no name"),
     ({"cases": [{"name": "a"}, {"name": "a"}]}, "name of 2 cases"),

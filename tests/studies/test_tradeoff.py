@@ -147,7 +147,7 @@ def test_errors_of_whatever_statistics_know(scene, tmp_path):
     assert f"{of}_path_max" in found.rows()[0]
     assert json.loads(found.to_json())["units"][of]
     assert of in tradeoffs.report_text(found)
-    assert lw.plot_tradeoff(found, tmp_path / "of.png").stat().st_size > 10_000
+    assert lw.plots.plot_tradeoff(found, tmp_path / "of.png").stat().st_size > 10_000
     suggested = lw.suggest(fleet, 1e-4, of, t1=4.0, methods=["su4(psi_x)"], seconds=ENOUGH)
     assert suggested.of == of
     assert suggested.margin >= 1.0
@@ -158,8 +158,8 @@ def test_errors_of_whatever_statistics_know(scene, tmp_path):
 
 @pytest.mark.parametrize(("vehicle", "terms", "names"), [
     ("torpedo", [], ["rk8", "kl8(psi_x)", "psi_x", "psi_1"]), ("remus_100", [], ["rk4", "rk8"]),
-    ("torpedo", [lw.Drag(linear=[5.0] * 6)], ["rk4", "rk8", "psi_x"]),
-    ("torpedo", [lw.GaussMarkovCurrent(standard_deviation=[0.1] * 3, time_constant=9.0)], ["psi_x", "psi_s"]),
+    ("torpedo", [lw.terms.Drag(linear=[5.0] * 6)], ["rk4", "rk8", "psi_x"]),
+    ("torpedo", [lw.terms.GaussMarkovCurrent(standard_deviation=[0.1] * 3, time_constant=9.0)], ["psi_x", "psi_s"]),
 ])  # fmt: skip
 def test_few_methods_are_tried_first_by_what_acts(vehicle, terms, names):
     sample = Sample(lw.Ensemble(lw.Scene.named(vehicle, terms=terms)), 4.0)
@@ -267,19 +267,19 @@ class Shaker:
 
 
 @dataclasses.dataclass(frozen=True, eq=False, kw_only=True)
-class Shaken(lw.Term):
+class Shaken(lw.laws.Term):
     """Noise by its own key, which knows no grid."""
 
     type: ClassVar[str] = "shaken_of_test"
     device: ClassVar[Any] = Shaker
     timed: ClassVar[bool] = True
-    strength: Any = lw.number((), "N s^1/2")
+    strength: Any = lw.laws.number((), "N s^1/2")
 
     def packed(self, numbers, context):
-        return lw.Packed({"strength": numbers["strength"], "member": context.members.astype(np.int32)})
+        return lw.laws.Packed({"strength": numbers["strength"], "member": context.members.astype(np.int32)})
 
 
-CURRENT = lw.GaussMarkovCurrent(standard_deviation=[0.2, 0.2, 0.05], time_constant=30.0)
+CURRENT = lw.terms.GaussMarkovCurrent(standard_deviation=[0.2, 0.2, 0.05], time_constant=30.0)
 
 
 def noisy_fleet(term):
@@ -296,7 +296,7 @@ def test_noise_without_a_grid_compares_statistics_only(tmp_path):
     assert found.front() == []
     assert "noise acts" in found.messages[0]
     assert all(0.0 < one.biases["position_mean"] < 5.0 for one in found.measurements)
-    assert lw.plot_tradeoff(found, tmp_path / "noise.png").stat().st_size > 10_000
+    assert lw.plots.plot_tradeoff(found, tmp_path / "noise.png").stat().st_size > 10_000
     with pytest.raises(lw.SceneError, match=r"error = 0.001: noise acts.*tradeoff"):
         lw.suggest(fleet, 1e-3, t1=4.0)
 
@@ -334,7 +334,7 @@ def test_events_end_what_is_compared(scene, tmp_path):
     found = lw.tradeoff(lw.Ensemble(falling, 1, 1), 4.0, methods=["psi_x"], seconds=ENOUGH)
     assert found.front()[-1].error() < 1e-6
     assert found.measurements[0].biases == {}
-    assert lw.plot_tradeoff(found, tmp_path / "one.png").stat().st_size > 10_000
+    assert lw.plots.plot_tradeoff(found, tmp_path / "one.png").stat().st_size > 10_000
 
 
 def test_time_that_is_up_leaves_the_first_method(scene):
@@ -497,9 +497,9 @@ def test_options_that_contradict_are_refused(options, words, tmp_path, capsys):
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_a_suggestion_keeps_its_error_on_fresh_members(seed):
     """Brute force: a fleet drawn by another seed, run by what was suggested, beside rk8 at a step of 1/400 s."""
-    drag = lw.Drag(linear=[4.0, 12.0, 12.0, 0.5, 2.0, 2.0], quadratic=[5.0, 30.0, 30.0, 1.0, 5.0, 5.0])
+    drag = lw.terms.Drag(linear=[4.0, 12.0, 12.0, 0.5, 2.0, 2.0], quadratic=[5.0, 30.0, 30.0, 1.0, 5.0, 5.0])
     scene = dataclasses.replace(lw.Scene.named("torpedo"), terms=[drag], start=lw.Start(velocity=[1.0, 0.0, 0.0]))
-    vary = {"start.angular_velocity": lw.Normal(std=0.3), "start.velocity": lw.Normal(std=0.2)}
+    vary = {"start.angular_velocity": lw.distributions.Normal(std=0.3), "start.velocity": lw.distributions.Normal(std=0.2)}
     found = lw.suggest(lw.Ensemble(scene, 2000, seed, vary), 1e-3, t1=8.0, methods=("rk4", "rk8"), seconds=ENOUGH)
     fresh, save = lw.Ensemble(scene, 2000, seed + 100, vary), lw.SaveAt(every=1.6)
     result = lw.solve(fresh, t1=8.0, save=save, **found.settings)

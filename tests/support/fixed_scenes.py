@@ -22,16 +22,16 @@ FILE = Path(__file__).parents[1] / "data" / "bits.json"
 MEMBERS = 300
 
 STATISTICS = [
-    lw.Mean("position"), lw.Covariance(["position", "speed"]), lw.Quantiles("depth", (0.05, 0.5, 0.95), size=64),
-    lw.Extremes("velocity"), lw.Histogram("depth", bins=10, limits=(0.0, 30.0)), lw.Exceedance("depth", above=10.1),
-    lw.FirstPassage("depth", above=10.1), lw.CircularMean("euler[2]"), lw.MeanAttitude(), lw.Mean("energy"),
-    lw.PathMaximum("speed", then=[lw.Mean(), lw.Quantiles(levels=(0.5, 0.99), size=64)]), lw.PathTime("depth", above=10.1),
-    lw.PathMean("depth"), lw.PathRms("speed"), lw.PathRange("position"), lw.Outcome("stopped"), lw.EndTime("failed"),
+    lw.statistics.Mean("position"), lw.statistics.Covariance(["position", "speed"]), lw.statistics.Quantiles("depth", (0.05, 0.5, 0.95), size=64),
+    lw.statistics.Extremes("velocity"), lw.statistics.Histogram("depth", bins=10, limits=(0.0, 30.0)), lw.statistics.Exceedance("depth", above=10.1),
+    lw.statistics.FirstPassage("depth", above=10.1), lw.statistics.CircularMean("euler[2]"), lw.statistics.MeanAttitude(), lw.statistics.Mean("energy"),
+    lw.statistics.PathMaximum("speed", then=[lw.statistics.Mean(), lw.statistics.Quantiles(levels=(0.5, 0.99), size=64)]), lw.statistics.PathTime("depth", above=10.1),
+    lw.statistics.PathMean("depth"), lw.statistics.PathRms("speed"), lw.statistics.PathRange("position"), lw.statistics.Outcome("stopped"), lw.statistics.EndTime("failed"),
 ]  # fmt: skip
 VARY = {
-    "start.angular_velocity": lw.Normal(std=0.05),
-    "start.position": lw.Normal(std=0.2),
-    "vehicle.buoyancy": lw.Normal(relative=0.001),
+    "start.angular_velocity": lw.distributions.Normal(std=0.05),
+    "start.position": lw.distributions.Normal(std=0.2),
+    "vehicle.buoyancy": lw.distributions.Normal(relative=0.001),
 }
 
 
@@ -118,8 +118,8 @@ def _methods() -> dict[str, Callable[[], str]]:
 
 def _samplings() -> dict[str, Callable[[], str]]:
     kinds = {
-        "random": "random", "sobol": lw.Sobol(replicates=4), "halton": lw.Halton(),
-        "latin hypercube": lw.LatinHypercube(group=100),
+        "random": "random", "sobol": lw.designs.Sobol(replicates=4), "halton": lw.designs.Halton(),
+        "latin hypercube": lw.designs.LatinHypercube(group=100),
     }  # fmt: skip
     return {
         f"statistics, {name}": functools.partial(
@@ -130,7 +130,7 @@ def _samplings() -> dict[str, Callable[[], str]]:
 
 
 def _others() -> dict[str, Callable[[], str]]:
-    floor = [lw.Floor(depth=10.1), lw.StopTime(at=0.73)]
+    floor = [lw.events.Floor(depth=10.1), lw.events.StopTime(at=0.73)]
     return {
         **{f"vehicle {name}": functools.partial(lambda name: hashed(solved(named(name), "psi_x")), name)
            for name in ("remus_100", "bluerov2_heavy", "sphere")},

@@ -223,16 +223,16 @@ class OnDevice:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class ForeignRemus(lw.Term):
+class ForeignRemus(lw.laws.Term):
     """The other simulator's hull, fins and propeller; it takes the commands of rudder and planes [rad]."""
 
     type: ClassVar[str] = "foreign_remus"
     device: ClassVar[Any] = OnDevice
     dissipative: ClassVar[bool] = False
 
-    current: Any = lw.number((3,), "m/s", (0.0, 0.0, 0.0))
+    current: Any = lw.laws.number((3,), "m/s", (0.0, 0.0, 0.0))
     # Of the commands, as an allocation asks; what stops is the fin.
-    limit: Any = lw.number((2,), "rad", (1e6, 1e6))
+    limit: Any = lw.laws.number((2,), "rad", (1e6, 1e6))
 
     @property
     def channels(self) -> int:
@@ -247,7 +247,7 @@ class ForeignRemus(lw.Term):
         vectors = {name: context.frame.vector(axis) for name, axis in axes.items()}
         vectors |= {"origin": context.frame.point(np.zeros((1, 3))), "current": numbers["current"]}
         values = {name: np.array([value]) for name, value in NUMBERS.items()}
-        return lw.Packed(values | vectors | self.driver.values_of(self.key), memory=np.zeros((1, 3)))
+        return lw.laws.Packed(values | vectors | self.driver.values_of(self.key), memory=np.zeros((1, 3)))
 
 
 @wp.func
@@ -274,40 +274,40 @@ class FilterOnDevice:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class DepthFilter(lw.Guidance):
+class DepthFilter(lw.laws.Guidance):
     """A wanted depth behind a first-order lag, from 0."""
 
     type: ClassVar[str] = "depth_filter"
     device: ClassVar[Any] = FilterOnDevice
 
-    depth: Any = lw.number((), "m")
-    rate: Any = lw.number((), "1/s", above=0.0)
+    depth: Any = lw.laws.number((), "m")
+    rate: Any = lw.laws.number((), "1/s", above=0.0)
 
     @property
     def gives(self):
         return ("depth",)
 
     def packed(self, numbers, context):
-        return lw.Packed(dict(numbers), memory=np.zeros((1, 1)))
+        return lw.laws.Packed(dict(numbers), memory=np.zeros((1, 1)))
 
 
 def scene(depth: float, heading: float, sea: remus.Sea) -> lw.Scene:
     """The loop of the package: its depth law, sliding mode and reference model with the other simulator's numbers."""
     guidance = [
-        lw.SetPoint(depth=depth, heading=heading),
-        lw.ReferenceModel(natural_frequency=(1.0, 0.1), rate_limit=(1e3, np.radians(5.0))),
+        lw.control.SetPoint(depth=depth, heading=heading),
+        lw.control.ReferenceModel(natural_frequency=(1.0, 0.1), rate_limit=(1e3, np.radians(5.0))),
         DepthFilter(depth=depth, rate=0.02),
     ]
     depths = dict(kp=0.1, ki=0.001, pitch_limit=1e3, kp_pitch=5.0, ki_pitch=0.3, kd_pitch=2.0, k_heave=5.0)
     headings = dict(lambda_=0.1, boundary=0.1, k_sigma=0.05, k_d=0.5, nomoto_gain=0.25, nomoto_time=1.0)
-    laws = [lw.DepthPID(**depths, anti_windup="none"), lw.HeadingSMC(**headings, anti_windup="none")]
+    laws = [lw.control.DepthPID(**depths, anti_windup="none"), lw.control.HeadingSMC(**headings, anti_windup="none")]
     matrix = [[0, 0, 0, 0, 0, 1], [0, 0, 0, 0, -1, 0]]
-    allocation = [lw.AllocationMatrix(to="foreign_remus", matrix=matrix)]
+    allocation = [lw.control.AllocationMatrix(to="foreign_remus", matrix=matrix)]
     controller = lw.Controller(period=remus.SAMPLE, guidance=guidance, laws=laws, allocation=allocation)
     vehicle = lw.Vehicle(
         rigid_body_mass_matrix=remus.RIGID, added_mass_matrix=remus.ADDED, weight=remus.WEIGHT, buoyancy=remus.WEIGHT
     )
-    terms = [ForeignRemus(current=sea.velocity), lw.Current(velocity=sea.velocity)]
+    terms = [ForeignRemus(current=sea.velocity), lw.terms.Current(velocity=sea.velocity)]
     environment = lw.Environment(gravity=remus.GRAVITY, water_density=remus.DENSITY)
     return lw.Scene(vehicle, environment, terms, controller=controller)
 

@@ -30,19 +30,19 @@ class Device:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class LinearFlow(lw.Term):
+class LinearFlow(lw.laws.Term):
     """velocity [m/s] at t = 0 at the origin; acceleration [m/s2]; the columns of G [1/s]; growth of G [1/s]: inertial axes."""
 
     type: ClassVar[str] = "linear_flow"
     device: ClassVar[Any] = Device
     timed: ClassVar[bool] = True
 
-    velocity: Any = lw.number((3,), "m/s", (0.0, 0.0, 0.0))
-    acceleration: Any = lw.number((3,), "m/s2", (0.0, 0.0, 0.0))
-    north: Any = lw.number((3,), "1/s", (0.0, 0.0, 0.0))
-    east: Any = lw.number((3,), "1/s", (0.0, 0.0, 0.0))
-    down: Any = lw.number((3,), "1/s", (0.0, 0.0, 0.0))
-    growth: Any = lw.number((), "1/s", 0.0)
+    velocity: Any = lw.laws.number((3,), "m/s", (0.0, 0.0, 0.0))
+    acceleration: Any = lw.laws.number((3,), "m/s2", (0.0, 0.0, 0.0))
+    north: Any = lw.laws.number((3,), "1/s", (0.0, 0.0, 0.0))
+    east: Any = lw.laws.number((3,), "1/s", (0.0, 0.0, 0.0))
+    down: Any = lw.laws.number((3,), "1/s", (0.0, 0.0, 0.0))
+    growth: Any = lw.laws.number((), "1/s", 0.0)
 
     def water(self, numbers, position, time, parameters):
         t = time[:, None, None]

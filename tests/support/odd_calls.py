@@ -6,6 +6,7 @@ import inspect
 import numpy as np
 
 import lgvi_warp as lw
+from tests.support.public import NAMED
 
 ODD = (
     None, True, "", "x", "no\x00thing", b"x", -1, 0, 2.5, 2**63, 10**400, float("nan"), float("inf"), 1j, [], [[1]],
@@ -19,10 +20,10 @@ POINT, AHEAD, DOWN = [[0.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]], [[0.0, 0.0, 1.0]]
 
 # Records that the library itself makes, errors, and base classes: nobody calls them.
 UNCALLED = {
-    "Interrupted", "MembersFailed", "Status", "Warnings", "Looks", "Allocation", "ControlLaw", "Guidance",
+    "Interrupted", "MembersFailed", "Status", "Warnings", "CallbackInput", "Allocation", "ControlLaw", "Guidance",
     "MeasuringPart", "Packed", "PackingContext", "Term", "Event", "NoisyTerm", "Prepared", "Result", "LinearModel",
     "Regulator", "Margins", "Trim", "Tuned", "WorstCase", "StabilityMap", "Sweep", "SceneError", "show",
-    "register_term", "number",
+    "register", "number",
 }  # fmt: skip
 
 
@@ -47,7 +48,7 @@ def goods(scene, fleet, result, folder):
         "force": [[0.0] * 3, [1.0] * 3], "vehicle": lw.Vehicle(**BODY), "name": "depth", "function": len,
         "statistic": "mean depth", "half_width": 1.0, "file": str(folder / "none.npz"), "inputs": ["north"],
         "outputs": ["X"], "to": "csv", "coefficients": {}, "source": "none", "mass": 20.0,
-        "term": lw.Drag(linear=[1.0] * 6), "part": lw.HeadingPID(kp=1.0), "model": None, "Q": np.eye(2), "R": np.eye(2),
+        "term": lw.terms.Drag(linear=[1.0] * 6), "part": lw.control.HeadingPID(kp=1.0), "model": None, "Q": np.eye(2), "R": np.eye(2),
         "over": {}, "within": {}, "of": "depth", "minimise": "depth", "found": None, "matrix": np.eye(6),
     }  # fmt: skip
     own = {
@@ -59,7 +60,7 @@ def goods(scene, fleet, result, folder):
         "Quantity": {"name": "depth2"}, "solve": {"h": 0.1, "t1": 0.2}, "predict": {"h": 0.1, "t1": 0.2},
         "prepare": {"h": 0.1, "t1": 0.2}, "Ensemble": {"members": 4}, "Case": {"name": "a"},
         "Tether": {"anchor": [0.0] * 3, "stiffness": 1.0},
-        "vehicle_tables_from_fossen": {"mass": 20.0, "inertia": [1.5, 4.0, 4.5]},
+        "from_fossen": {"mass": 20.0, "inertia": [1.5, 4.0, 4.5]},
     }  # fmt: skip
     return by_name, own
 
@@ -67,8 +68,8 @@ def goods(scene, fleet, result, folder):
 def odd_calls(scene, fleet, result, folder):
     """(label, function, arguments by name), each with one odd argument."""
     by_name, own = goods(scene, fleet, result, folder)
-    for name in sorted(set(lw.__all__) - UNCALLED):
-        function = getattr(lw, name)
+    for name in sorted(set(NAMED) - UNCALLED):
+        function = NAMED[name]
         if not callable(function) or inspect.ismodule(function):
             continue
         known = [
@@ -90,7 +91,7 @@ def odd_calls_within(scene, result, folder, studies):
     rows = [
         {"members": 4, "threads": 1, "method": "rk4", "term": "drag", "dtype": "float64", "ns_per_member_step": 9.0}
     ]
-    saltelli = lw.Ensemble(scene, None, 1, {"vehicle.buoyancy": lw.Normal(relative=0.01)}, lw.Saltelli(replicates=2))
+    saltelli = lw.Ensemble(scene, None, 1, {"vehicle.buoyancy": lw.distributions.Normal(relative=0.01)}, lw.designs.Saltelli(replicates=2))
     path = folder / "within.png"
     pictures = {
         name: {"result": result, "results": {"a": result}, "rows": rows, "path": path, "figure": None, "found": None}
@@ -105,11 +106,11 @@ def odd_calls_within(scene, result, folder, studies):
     called += [(f"uq.{name}", getattr(lw.uq, name), asked) for name in ("evaluate", "model", "morris_of", "sobol_of")]
     of_file = {"path": folder / "none.json", "folder": folder / "within"}
     methods = [(scene, "with_numbers", {}), (result, "save", {"path": folder / "a.npz"}), (result, "load", of_file),
-               (result.warnings, "has", {}), (lw.terms, "register_term", {})]  # fmt: skip
+               (result.warnings, "has", {}), (lw.terms, "register", {})]  # fmt: skip
     methods += [
         (study, name, of_file) for study in studies for name in ("load", "save", "to_csv") if hasattr(study, name)
     ]
-    methods += [(study, name, {}) for study in studies for name in ("shown", "front") if hasattr(study, name)]
+    methods += [(study, name, {}) for study in studies for name in ("select_members", "front") if hasattr(study, name)]
     called += [(f"{type(one).__name__}.{name}", getattr(one, name), given) for one, name, given in methods]
     for label, function, goods in called:
         known = [p for p in inspect.signature(function).parameters.values() if p.kind is not p.VAR_KEYWORD]

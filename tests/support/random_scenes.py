@@ -23,20 +23,20 @@ def random_scene(seed):
     vehicle = lw.Vehicle(mass, inertia=inertia, added_mass=added_mass, buoyancy=buoyancy, center_of_buoyancy=center)
     terms = []
     if rng.random() < 0.3:
-        terms.append(lw.Current(velocity=rng.normal(scale=0.3, size=3)))
+        terms.append(lw.terms.Current(velocity=rng.normal(scale=0.3, size=3)))
     if rng.random() < 0.3:
         scale = np.repeat([mass, mass * size**2], 3)
-        terms.append(lw.Drag(linear=0.05 * scale * rng.random(6), quadratic=0.1 * scale * rng.random(6)))
+        terms.append(lw.terms.Drag(linear=0.05 * scale * rng.random(6), quadratic=0.1 * scale * rng.random(6)))
     if rng.random() < 0.3:
         force, torque = rng.normal(scale=0.05 * mass, size=3), rng.normal(scale=0.02 * mass * size**2, size=3)
-        terms.append(lw.Wrench(force=force, torque=torque))
+        terms.append(lw.terms.Wrench(force=force, torque=torque))
     spin = rng.normal(scale=10.0 ** rng.uniform(-1.0, 0.3), size=3)
     start = lw.Start([0.0, 0.0, 20.0], rotation_vector=rng.normal(size=3), velocity=rng.normal(scale=0.5, size=3),
                      angular_velocity=spin)  # fmt: skip
     scene = lw.Scene(vehicle, lw.Environment(gravity=9.81), terms, start)
     vary = {
-        "start.angular_velocity": lw.Normal(std=0.05 * np.linalg.norm(spin)),
-        "vehicle.mass": lw.Normal(relative=0.002),
+        "start.angular_velocity": lw.distributions.Normal(std=0.05 * np.linalg.norm(spin)),
+        "vehicle.mass": lw.distributions.Normal(relative=0.002),
     }
     of = ("position", "attitude")[int(rng.integers(2))]
     asked = {"error": 10.0 ** rng.uniform(-7.0, -1.5), "of": of, "t1": float(rng.integers(3, 40))}

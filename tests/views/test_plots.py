@@ -28,15 +28,15 @@ from tests.support.made import made, turned
 from tests.unit.views.test_cost_pictures import RUNS, TERMS
 
 N, FLOOR = 40, 20.0
-STATISTICS = [lw.Quantiles("depth"), lw.Mean("velocity"), lw.Histogram("depth", bins=10, limits=(0.0, 25.0)),
-              lw.Covariance("position"), lw.PathMaximum("speed")]  # fmt: skip
+STATISTICS = [lw.statistics.Quantiles("depth"), lw.statistics.Mean("velocity"), lw.statistics.Histogram("depth", bins=10, limits=(0.0, 25.0)),
+              lw.statistics.Covariance("position"), lw.statistics.PathMaximum("speed")]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def solved():
     """One run: samples of all members and statistics; some reach the floor, none fails."""
     vehicle = lw.Vehicle(20.0, inertia=(1.0, 1.2, 1.4), added_mass=(10.0, 10.0, 10.0), buoyancy=200.0)
-    scene = lw.Scene(vehicle, lw.Environment(gravity=10.0), events=[lw.Floor(depth=FLOOR)])
+    scene = lw.Scene(vehicle, lw.Environment(gravity=10.0), events=[lw.events.Floor(depth=FLOOR)])
     speeds = np.linspace(-0.5, 2.0, N)
     down, side = np.array([0.0, 0.0, 1.0]), np.array([0.3, 0.0, 0.0])
     level, turn = np.broadcast_to(np.eye(3), (N, 3, 3)), np.tile([0.0, 0.0, 0.1], (N, 1))
@@ -345,8 +345,8 @@ def test_files_and_axes(solved, tmp_path, ending_of_name):
     assert lw.plots.paths(solved, ax=right, path=path) is right
     assert path.stat().st_size > 5000
     assert len(figure.axes) == 2
-    assert lw.plot(solved, tmp_path / "all.svg") == tmp_path / "all.svg"
-    assert len(lw.plot(solved)) == 4
+    assert lw.plots.plot(solved, tmp_path / "all.svg") == tmp_path / "all.svg"
+    assert len(lw.plots.plot(solved)) == 4
 
 
 def test_refusals_name_the_remedy(solved):
@@ -398,7 +398,7 @@ def test_margins_of_nobody_are_no_picture(tmp_path):
 
 def test_a_drift_of_nothing_names_what_does_work():
     pushed = lw.Scene(
-        lw.Scene.named("sphere").vehicle, terms=[lw.Wrench(force=[1.0, 2.0, 3.0], torque=[1.0, 2.0, 3.0])]
+        lw.Scene.named("sphere").vehicle, terms=[lw.terms.Wrench(force=[1.0, 2.0, 3.0], torque=[1.0, 2.0, 3.0])]
     )
     with pytest.raises(NothingToDraw, match=r"nothing is conserved, since wrench does work: draw lw\.plots\.fan"):
         lw.plots.drift(made(np.arange(18.0).reshape(3, 2, 3), scene=pushed))

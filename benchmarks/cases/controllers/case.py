@@ -21,9 +21,9 @@ def remus(every, **more):
     if every:
         controller = lw.Controller(
             period=every * H,
-            guidance=[lw.SetPoint(depth=10.0, heading=0.5)],
-            laws=[lw.DepthPID(**DEPTH), lw.HeadingPID(**HEADING)],
-            allocation=[lw.AllocationMatrix(to="control_fins", matrix=((0, 0, 0, 0, 0, -1), (0, 0, 0, 0, -1, 0)))],
+            guidance=[lw.control.SetPoint(depth=10.0, heading=0.5)],
+            laws=[lw.control.DepthPID(**DEPTH), lw.control.HeadingPID(**HEADING)],
+            allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=((0, 0, 0, 0, 0, -1), (0, 0, 0, 0, -1, 0)))],
             **more,
         )
     return lw.Scene.named("remus_100", start={"velocity": [1.54, 0.0, 0.0]}, controller=controller)
@@ -35,15 +35,15 @@ def bluerov2(every):
     if every:
         controller = lw.Controller(
             period=every * H,
-            guidance=[lw.SetPoint(position=(0.0, 0.0, 5.0), heading=0.0)],
-            laws=[lw.PosePID(**POSE, feedforward="restoring")],
+            guidance=[lw.control.SetPoint(position=(0.0, 0.0, 5.0), heading=0.0)],
+            laws=[lw.control.PosePID(**POSE, feedforward="restoring")],
         )
     return lw.Scene.named("bluerov2_heavy", controller=controller)
 
 
 def packets_of(scene, method, dtype, members, steps):
     """Packets of members that start a little apart."""
-    vary = {"start.velocity": lw.Normal(std=0.02), "start.angular_velocity": lw.Normal(std=0.02)}
+    vary = {"start.velocity": lw.distributions.Normal(std=0.02), "start.angular_velocity": lw.distributions.Normal(std=0.02)}
     plan = make_plan(lw.Ensemble(scene, members, 1, vary), method, h=H, t1=H * steps, dtype=dtype)
     plan.compile()
     return Packets(plan, plan.ensemble.select(0, members))
@@ -91,17 +91,17 @@ def callback(quick):
         demand[:, 5] -= HEADING["kd"] * y.angular_velocity[:, 2]
         return demand
 
-    laws = {"fused": lw.HeadingPID(kp=HEADING["kp"], kd=HEADING["kd"]), "callback": lw.Callback(heading)}
+    laws = {"fused": lw.control.HeadingPID(kp=HEADING["kp"], kd=HEADING["kd"]), "callback": lw.control.Callback(heading)}
     times = {}
     for label, law in laws.items():
         controller = lw.Controller(
             period=10 * H,
-            guidance=[lw.SetPoint(heading=0.5)],
+            guidance=[lw.control.SetPoint(heading=0.5)],
             laws=[law],
-            allocation=[lw.AllocationMatrix(to="control_fins", matrix=((0, 0, 0, 0, 0, -1), (0,) * 6))],
+            allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=((0, 0, 0, 0, 0, -1), (0,) * 6))],
         )
         scene = lw.Scene.named("remus_100", start={"velocity": [1.54, 0.0, 0.0]}, controller=controller)
-        fleet = lw.Ensemble(scene, members, 1, {"start.angular_velocity": lw.Normal(std=0.02)})
+        fleet = lw.Ensemble(scene, members, 1, {"start.angular_velocity": lw.distributions.Normal(std=0.02)})
         best = np.inf
         for _ in range(2 if quick else 4):
             begun = time.process_time()
@@ -115,9 +115,9 @@ def callback(quick):
 def metrics(quick):
     """Whole runs that gather metrics at every tick, ten steps a tick, beside the same runs that gather nothing."""
     members, t1 = (256, 5.0) if quick else (4096, 30.0)
-    fleet = lw.Ensemble(remus(10), members, 1, {"start.angular_velocity": lw.Normal(std=0.02)})
-    depth = [lw.Overshoot("depth"), lw.SettlingTime("depth", within=0.5)]
-    others = [lw.IAE("heading"), lw.Travel(), lw.SaturationShare()]
+    fleet = lw.Ensemble(remus(10), members, 1, {"start.angular_velocity": lw.distributions.Normal(std=0.02)})
+    depth = [lw.metrics.Overshoot("depth"), lw.metrics.SettlingTime("depth", within=0.5)]
+    others = [lw.metrics.IAE("heading"), lw.metrics.Travel(), lw.metrics.SaturationShare()]
     asked = {"none": [], "two of depth": depth, "five": depth + others}
     times = dict.fromkeys(asked, np.inf)
     for _ in range(2 if quick else 5):
@@ -138,10 +138,10 @@ def run(quick):
     delay_and_faults = dict(
         delay=0.05,
         sensors=[
-            lw.Sensor(name="cell", of="depth", noise=0.02, quantum=0.005),
-            lw.Sensor(name="compass", of="heading", noise=0.01),
+            lw.control.Sensor(name="cell", of="depth", noise=0.02, quantum=0.005),
+            lw.control.Sensor(name="compass", of="heading", noise=0.01),
         ],
-        faults=[lw.Fault(of="control_fins", channel=0, time=5.0, gain=0.5)],
+        faults=[lw.control.Fault(of="control_fins", channel=0, time=5.0, gain=0.5)],
     )
     for dtype in ("float64", "float32"):
         scenes = {"none": remus(0), "every 10": remus(10), "every step": remus(1)}

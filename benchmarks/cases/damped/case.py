@@ -60,9 +60,9 @@ def scene(vehicle, terms, strength, rolling):
     linear = np.diag([0.0, 0.0, 0.0, rolling, 0.0, 0.0])
 
     def changed(term):
-        if isinstance(term, lw.DragMatrix):
+        if isinstance(term, lw.terms.DragMatrix):
             return dataclasses.replace(term, linear=linear, quadratic=strength * np.asarray(term.quadratic))
-        if isinstance(term, lw.ControlFins) and terms is LAGGING:
+        if isinstance(term, lw.terms.ControlFins) and terms is LAGGING:
             return dataclasses.replace(term, **RUDDER_STEPS)
         return term
 

@@ -14,17 +14,17 @@ from lgvi_warp.engine.episodes import Episodes
 from lgvi_warp.runs.settle import make_plan
 
 EPISODE = 20.0
-VARY = {"vehicle.buoyancy": lw.Uniform(low=297.0, high=302.0), "start.position[2]": lw.Uniform(low=5.0, high=15.0)}
+VARY = {"vehicle.buoyancy": lw.distributions.Uniform(low=297.0, high=302.0), "start.position[2]": lw.distributions.Uniform(low=5.0, high=15.0)}
 GAINS = dict(kp=1.0, kd=2.0)
-PLANES = lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])
-DEPTH = lw.DepthPID(
+PLANES = lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])
+DEPTH = lw.control.DepthPID(
     kp=0.1, ki=0.001, pitch_limit=0.5, kp_pitch=5.0, ki_pitch=0.3, kd_pitch=2.0, integral_limit=[20, 20]
 )
 
 
 def scene(*laws, every=EVERY):
     """REMUS 100 with these laws; every: steps a period."""
-    wanted = lw.SetPoint(depth=10.0, heading=0.5)
+    wanted = lw.control.SetPoint(depth=10.0, heading=0.5)
     controller = lw.Controller(period=every * STEP, guidance=[wanted], laws=laws, allocation=[PLANES])
     return lw.Scene.named("remus_100", start={"velocity": [1.54, 0.0, 0.0]}, controller=controller)
 
@@ -40,7 +40,7 @@ def heading(t, y, r, members):
 
 def environments(members, steps, rounds):
     """Steps of environments whose episodes end at different times, beside a run with all laws in the kernel."""
-    fleet = lw.Ensemble(scene(DEPTH, lw.HeadingPID(**GAINS)), members, 1, VARY)
+    fleet = lw.Ensemble(scene(DEPTH, lw.control.HeadingPID(**GAINS)), members, 1, VARY)
     env = lw.gym.VectorEnv(
         fleet,
         observe=["depth_error", "down[0]", "velocity", "angular_velocity"],
@@ -58,7 +58,7 @@ def environments(members, steps, rounds):
         for _ in range(steps):
             env.step(actions)
 
-    whole = lw.Ensemble(scene(DEPTH, lw.HeadingPID(**GAINS)), members, 1, VARY)
+    whole = lw.Ensemble(scene(DEPTH, lw.control.HeadingPID(**GAINS)), members, 1, VARY)
     begun = dict(method="psi_x", h=STEP, t1=STEP * EVERY * steps, threads=1, save=lw.SaveAt(fields=("position",)))
     lw.solve(whole, **begun)
     env.reset(seed=1)
@@ -70,7 +70,7 @@ def environments(members, steps, rounds):
 
 def ticks(members, steps, rounds):
     """What an exchange with the host takes beside the launches: answers written, ticks read."""
-    fleet = lw.Ensemble(scene(lw.Callback(heading), lw.HeadingPID(**GAINS)), members, 1, VARY)
+    fleet = lw.Ensemble(scene(lw.control.Callback(heading), lw.control.HeadingPID(**GAINS)), members, 1, VARY)
     plan = make_plan(fleet, "psi_x", STEP, STEP * EVERY * steps * (2 * rounds + 2), lw.SaveAt(fields=("position",)))
     plan.compile()
     episodes, values = Episodes(plan, fleet.select(0, members)), np.zeros((members, 6))
@@ -91,7 +91,7 @@ def ticks(members, steps, rounds):
 
 def exchange(members, every, steps, rounds):
     """A run whose heading law is in NumPy, beside the same law in the kernel; every: steps a period."""
-    laws = {"callback": lw.Callback(heading), "fused": lw.HeadingPID(**GAINS)}
+    laws = {"callback": lw.control.Callback(heading), "fused": lw.control.HeadingPID(**GAINS)}
     settings = dict(method="psi_x", h=STEP, t1=STEP * steps, threads=1, save=lw.SaveAt(fields=("position",)))
     fleets = {name: lw.Ensemble(scene(DEPTH, law, every=every), members, 1, VARY) for name, law in laws.items()}
     for fleet in fleets.values():

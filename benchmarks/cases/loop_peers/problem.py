@@ -34,11 +34,11 @@ GAINS = dict(kp=(40.0, 40.0, 60.0), ki=(2.0, 2.0, 3.0), kd=(150.0, 150.0, 200.0)
 LIMITS = (20.0, 5.0)
 GOAL, HEADING = (1.0, -0.5, 11.0), 0.5
 VARY = {
-    "start.velocity_inertial": lw.Normal(std=0.05),
-    "start.angular_velocity": lw.Normal(std=0.05),
-    "vehicle.buoyancy": lw.Normal(std=1.0),
-    "pose_pid.kp": lw.Normal(relative=0.1),
-    "pose_pid.kr": lw.Normal(relative=0.1),
+    "start.velocity_inertial": lw.distributions.Normal(std=0.05),
+    "start.angular_velocity": lw.distributions.Normal(std=0.05),
+    "vehicle.buoyancy": lw.distributions.Normal(std=1.0),
+    "pose_pid.kp": lw.distributions.Normal(relative=0.1),
+    "pose_pid.kr": lw.distributions.Normal(relative=0.1),
 }
 # Position (members, 3) and attitude (members, 3, 3) at the end.
 End = tuple[np.ndarray, np.ndarray]
@@ -66,8 +66,8 @@ class Problem:
         """The members as lgvi_warp takes them: the paper's vehicle with drag and an ideal actuator."""
         controller = lw.Controller(
             period=self.every * self.h,
-            guidance=[lw.SetPoint(position=GOAL, heading=HEADING)],
-            laws=[lw.PosePID(**GAINS, integral_limit=LIMITS, feedforward="restoring")],
+            guidance=[lw.control.SetPoint(position=GOAL, heading=HEADING)],
+            laws=[lw.control.PosePID(**GAINS, integral_limit=LIMITS, feedforward="restoring")],
         )
         vehicle = lw.Vehicle(
             123.8,
@@ -76,7 +76,7 @@ class Problem:
             buoyancy=1213.0,
             center_of_buoyancy=[0.002, -0.001, -0.007],
         )
-        environment, terms = lw.Environment(gravity=problems.GRAVITY), [problems.drag(), lw.ControlWrench()]
+        environment, terms = lw.Environment(gravity=problems.GRAVITY), [problems.drag(), lw.terms.ControlWrench()]
         scene = lw.Scene(vehicle, environment, terms, problems.START, controller)
         return lw.Ensemble(scene, self.members, 1, VARY)
 

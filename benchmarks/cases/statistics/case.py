@@ -20,10 +20,10 @@ from lgvi_warp.studies import speed
 
 def statistics():
     return (
-        lw.Mean("position"),
-        lw.Covariance("position"),
-        lw.Quantiles("position", (0.05, 0.5, 0.95)),
-        lw.Extremes("position"),
+        lw.statistics.Mean("position"),
+        lw.statistics.Covariance("position"),
+        lw.statistics.Quantiles("position", (0.05, 0.5, 0.95)),
+        lw.statistics.Extremes("position"),
     )
 
 

@@ -46,7 +46,7 @@ def fleet(vehicle):
         else term
         for term in scene.terms
     ]
-    vary = {"start.velocity": lw.Normal(std=0.02), "start.angular_velocity": lw.Normal(std=0.02)}
+    vary = {"start.velocity": lw.distributions.Normal(std=0.02), "start.angular_velocity": lw.distributions.Normal(std=0.02)}
     return lw.Ensemble(dataclasses.replace(scene, terms=terms), 128, 1, vary)
 
 
@@ -75,7 +75,7 @@ def times_best(ensemble, settings, best):
 
 
 def run(quick):
-    for vehicle in ("sphere",) if quick else lw.vehicle_names():
+    for vehicle in ("sphere",) if quick else lw.vehicles.names():
         ensemble = fleet(vehicle)
         for error in ERRORS[:1] if quick else ERRORS:
             with tempfile.TemporaryDirectory() as cache:

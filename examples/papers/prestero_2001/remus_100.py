@@ -55,7 +55,7 @@ def solve(scene, rudders, speeds, duration):
 def rudder_steps():
     """Prestero (2001), section 8.3: rudder 0, from 10 s +4, from 40 s to 70 s -4 degrees; the start of table 8.1."""
     scene = full_scene()
-    (fins,) = (term for term in scene.terms if isinstance(term, lw.ControlFins))
+    (fins,) = (term for term in scene.terms if isinstance(term, lw.terms.ControlFins))
     degrees = [0.0, 0.0, 4.0, 4.0, -4.0, -4.0]
     table = {"times": [0.0, 10.0, 10.0 + TURNED_IN, 40.0, 40.0 + TURNED_IN, 70.0]}
     table["command_schedule"] = [[np.radians(angle), 0.0] for angle in degrees]

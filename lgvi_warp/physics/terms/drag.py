@@ -35,7 +35,7 @@ class Drag(Term):
 
     Examples:
         >>> import lgvi_warp as lw
-        >>> drag = lw.Drag(quadratic=[2.0, 50.0, 50.0, 0.5, 20.0, 20.0])
+        >>> drag = lw.terms.Drag(quadratic=[2.0, 50.0, 50.0, 0.5, 20.0, 20.0])
         >>> result = lw.solve(lw.Scene.named("torpedo", start={"velocity": [1.5, 0, 0]}, terms=[drag]), h=0.05, t1=10.0)
         >>> print(f"{result.velocity[-1, 0, 0]:.2f} m/s")
         0.81 m/s

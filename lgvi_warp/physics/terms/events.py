@@ -106,7 +106,7 @@ TYPES = Event.kinds
 
 def from_list(given: Any) -> tuple[Event, ...]:
     """Build the events of a scene."""
-    check_list("events", given, "write [[events]] and type = ... below, or events=[lw.Surface()]")
+    check_list("events", given, "write [[events]] and type = ... below, or events=[lw.events.Surface()]")
     faults, events = Faults(), list[Event]()
     for i, entry in enumerate(given):
         with faults.including():

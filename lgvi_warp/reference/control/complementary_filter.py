@@ -10,7 +10,7 @@ from lgvi_warp.reference.rotation import exp
 
 
 class ComplementaryFilter(Part):
-    """Numbers as those of `lw.ComplementaryFilter`."""
+    """Numbers as those of `lw.control.ComplementaryFilter`."""
 
     def begin(self) -> None:
         """Forget the estimate, before the first reading."""

@@ -9,7 +9,7 @@ from lgvi_warp.reference.control import Measurement, Part
 
 
 class DeadReckoning(Part):
-    """Numbers as those of `lw.DeadReckoning`."""
+    """Numbers as those of `lw.control.DeadReckoning`."""
 
     rule, velocity, depth = "trapezoid", "velocity", "reckoned"
     start_error = np.zeros(3)

@@ -8,7 +8,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class DepthPID(Part):
-    """Numbers as those of `lw.DepthPID`."""
+    """Numbers as those of `lw.control.DepthPID`."""
 
     ki = ki_pitch = kd_pitch = k_heave = 0.0
     pitch_limit = 0.5

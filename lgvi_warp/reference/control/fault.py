@@ -8,7 +8,7 @@ from lgvi_warp.reference.control.readings import values, with_values
 
 
 class SensorFault(Part):
-    """Numbers as those of `lw.Fault`, of a sensor; of: what that sensor reads."""
+    """Numbers as those of `lw.control.Fault`, of a sensor; of: what that sensor reads."""
 
     gain = offset = 0.0
 

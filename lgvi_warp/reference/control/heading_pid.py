@@ -6,7 +6,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class HeadingPID(Part):
-    """Numbers as those of `lw.HeadingPID`."""
+    """Numbers as those of `lw.control.HeadingPID`."""
 
     ki = kd = 0.0
     integral_limit = 1e6

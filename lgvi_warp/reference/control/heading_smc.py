@@ -8,7 +8,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class HeadingSMC(Part):
-    """Numbers as those of `lw.HeadingSMC`."""
+    """Numbers as those of `lw.control.HeadingSMC`."""
 
     k_d = nomoto_time = 0.0
     integral_limit = 1e6

@@ -6,7 +6,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class HeavePID(Part):
-    """Numbers as those of `lw.HeavePID`."""
+    """Numbers as those of `lw.control.HeavePID`."""
 
     ki = kd = 0.0
     integral_limit = 1e6

@@ -20,7 +20,7 @@ def share(period: float, time_constant: float) -> float:
 
 
 class LowPass(Part):
-    """Numbers as those of `lw.LowPass`."""
+    """Numbers as those of `lw.control.LowPass`."""
 
     def begin(self) -> None:
         """Begin without a reading: the first one passes whole."""

@@ -10,7 +10,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class AllocationMatrix(Part):
-    """Numbers as those of `lw.AllocationMatrix`; `to` names an actuator, which has a limit."""
+    """Numbers as those of `lw.control.AllocationMatrix`; `to` names an actuator, which has a limit."""
 
     def allocate(self, w: Array, actuators: dict[str, Any]) -> Array:
         """u = A w within the limits; left are (I - A^+ A) w and A^+ of what the limits cut off."""

@@ -17,7 +17,7 @@ FUNCTIONS: dict[str, Callable[[Array], Array]] = {
 
 
 class Policy(Part):
-    """Numbers as those of `lw.Policy`; in place of its file, layers: pairs of weights (n, m) and biases (n,)."""
+    """Numbers as those of `lw.control.Policy`; in place of its file, layers: pairs of weights (n, m) and biases (n,)."""
 
     scale = 1.0
     activation, output_activation = "tanh", "linear"

@@ -8,7 +8,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class PosePID(Part):
-    """Numbers as those of `lw.PosePID`; weight, buoyancy, center_of_mass, center_of_buoyancy: see `balance`."""
+    """Numbers as those of `lw.control.PosePID`; weight, buoyancy, center_of_mass, center_of_buoyancy: see `balance`."""
 
     ki = ki_r = np.zeros(3)
     integral_limit = (1e6, 1e6)

@@ -10,7 +10,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class PseudoInverse(Part):
-    """Numbers as those of `lw.PseudoInverse`; effect (6, n): the wrench of a unit of effort of each channel of `to`.
+    """Numbers as those of `lw.control.PseudoInverse`; effect (6, n): the wrench of a unit of effort of each channel of `to`.
 
     The actuator has limit, and effort(command) with its inverse command_for(effort). losses: (channel, time [s]) of each
     channel that is known to be lost.

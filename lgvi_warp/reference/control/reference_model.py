@@ -20,7 +20,7 @@ def exponential(A: Array) -> Array:
 
 
 class ReferenceModel(Part):
-    """Numbers as those of `lw.ReferenceModel`."""
+    """Numbers as those of `lw.control.ReferenceModel`."""
 
     damping_ratio = rate_limit = None
 

@@ -14,7 +14,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class Sensor(Part):
-    """Numbers as those of `lw.Sensor`, those of a 3-vector for all axes or (3,); the key of its random numbers."""
+    """Numbers as those of `lw.control.Sensor`, those of a 3-vector for all axes or (3,); the key of its random numbers."""
 
     noise = bias = drift = quantum = dropout = 0.0
     every, latency = 1, 0

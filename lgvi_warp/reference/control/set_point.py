@@ -9,7 +9,7 @@ from lgvi_warp.reference.control import Measurement, Part, Reference, upright
 
 
 class SetPoint(Part):
-    """Numbers as those of `lw.SetPoint`; what is None is not wanted."""
+    """Numbers as those of `lw.control.SetPoint`; what is None is not wanted."""
 
     position = depth = heading = speed = None
 

@@ -6,7 +6,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class SpeedPID(Part):
-    """Numbers as those of `lw.SpeedPID`."""
+    """Numbers as those of `lw.control.SpeedPID`."""
 
     ki = drag = 0.0
     integral_limit = 1e6

@@ -10,7 +10,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class Trajectory(Part):
-    """Numbers as those of `lw.Trajectory`."""
+    """Numbers as those of `lw.control.Trajectory`."""
 
     headings = speed = None
     interpolation = "linear"

@@ -10,7 +10,7 @@ from lgvi_warp.reference.rotation import Array
 
 
 class Waypoints(Part):
-    """Numbers as those of `lw.Waypoints`."""
+    """Numbers as those of `lw.control.Waypoints`."""
 
     method, kappa, gamma, at_end = "los", 0.1, 0.002, "stop"
 

@@ -13,7 +13,7 @@ from lgvi_warp.reference.terms.following import Following
 
 
 class ControlFins(Following, Fins):
-    """Numbers as those of `lw.ControlFins`, and of `Following`."""
+    """Numbers as those of `lw.terms.ControlFins`, and of `Following`."""
 
     flow_angle = True
     lift_angles: Any = None

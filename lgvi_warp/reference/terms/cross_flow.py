@@ -10,7 +10,7 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class CrossFlow(Law):
-    """Numbers as those of `lw.CrossFlow`; density [kg/m3]."""
+    """Numbers as those of `lw.terms.CrossFlow`; density [kg/m3]."""
 
     def points(self) -> list[tuple[float, float]]:
         """(x, weight times Cd D) of each Gauss point, Cd D linear in each segment."""

@@ -7,7 +7,7 @@ from lgvi_warp.reference.terms import Flow, Law, View
 
 
 class Current(Law):
-    """Numbers as those of `lw.Current`."""
+    """Numbers as those of `lw.terms.Current`."""
 
     def flow(self, view: View) -> Flow:
         """The constant velocity, without derivatives."""
@@ -15,7 +15,7 @@ class Current(Law):
 
 
 class CurrentProfile(Law):
-    """Numbers as those of `lw.CurrentProfile`."""
+    """Numbers as those of `lw.terms.CurrentProfile`."""
 
     def flow(self, view: View) -> Flow:
         """u(b3), and its slope within the segment."""

@@ -7,7 +7,7 @@ from lgvi_warp.reference.terms import Flow, Law, View
 
 
 class CurrentHarmonics(Law):
-    """Numbers as those of `lw.CurrentHarmonics`."""
+    """Numbers as those of `lw.terms.CurrentHarmonics`."""
 
     def flow(self, view: View) -> Flow:
         """u = sum a cos(omega t + phase) and its derivative."""

@@ -10,7 +10,7 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class Fins(Law):
-    """Numbers as those of `lw.Fins`; density [kg/m3]."""
+    """Numbers as those of `lw.terms.Fins`; density [kg/m3]."""
 
     def deflection(self, view: View) -> Array:
         """Angles (n,) [rad]: 0, since these fins do not turn."""

@@ -11,7 +11,7 @@ from lgvi_warp.reference.terms import Flow, Law, View
 
 
 class GaussMarkovCurrent(Law):
-    """Numbers as those of `lw.GaussMarkovCurrent`; the key of its noise; initial (3,) [m/s]."""
+    """Numbers as those of `lw.terms.GaussMarkovCurrent`; the key of its noise; initial (3,) [m/s]."""
 
     channel = 0
     seed0 = 0

@@ -8,7 +8,7 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class Stratification(Law):
-    """Numbers as those of `lw.Stratification`; buoyancy [N], center_of_buoyancy (3,) [m, body]."""
+    """Numbers as those of `lw.terms.Stratification`; buoyancy [N], center_of_buoyancy (3,) [m, body]."""
 
     potential_force = True
 

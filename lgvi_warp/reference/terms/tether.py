@@ -8,7 +8,7 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class Tether(Law):
-    """Numbers as those of `lw.Tether`."""
+    """Numbers as those of `lw.terms.Tether`."""
 
     rest_length = 0.0
     potential_force = True

@@ -11,7 +11,7 @@ from lgvi_warp.reference.terms.following import Following
 
 
 class Thrusters(Following):
-    """Numbers as those of `lw.Thrusters`, with coefficients forward, backward (n,), and of `Following`."""
+    """Numbers as those of `lw.terms.Thrusters`, with coefficients forward, backward (n,), and of `Following`."""
 
     polynomial = (0.0, 1.0)
     polynomial_astern = (0.0, 1.0)

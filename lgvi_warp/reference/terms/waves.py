@@ -9,7 +9,7 @@ from lgvi_warp.reference.terms import STILL, Flow, Law, View
 
 
 class Waves(Law):
-    """Numbers as those of `lw.Waves`; gravity [m/s2]."""
+    """Numbers as those of `lw.terms.Waves`; gravity [m/s2]."""
 
     def flow(self, view: View) -> Flow:
         """The sum of the components (Faltinsen 1990, table 2.1)."""

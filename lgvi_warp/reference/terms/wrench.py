@@ -10,7 +10,7 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class Wrench(Law):
-    """Numbers as those of `lw.Wrench`."""
+    """Numbers as those of `lw.terms.Wrench`."""
 
     def wrench(self, view: View) -> tuple[Array, Array]:
         """The constant force [N] and torque [N m]."""
@@ -18,7 +18,7 @@ class Wrench(Law):
 
 
 class WrenchSchedule(Law):
-    """Numbers as those of `lw.WrenchSchedule`; steps: whether each value is held until the next time."""
+    """Numbers as those of `lw.terms.WrenchSchedule`; steps: whether each value is held until the next time."""
 
     steps = False
 

@@ -9,7 +9,7 @@ from lgvi_warp.reference.terms import Law, View
 
 
 class WrenchNoise(Law):
-    """Numbers as those of `lw.WrenchNoise`; the key of its noise."""
+    """Numbers as those of `lw.terms.WrenchNoise`; the key of its noise."""
 
     channel = 0
     seed0 = 0

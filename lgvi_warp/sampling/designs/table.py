@@ -140,7 +140,7 @@ class Table(Sampling):
             faults.add("file", path, f"cannot be read ({error.what})", error.remedy)
             return {}
         if content.startswith(BINARY):
-            remedy = "give a CSV file, or arrays: lw.Table({name: array})"
+            remedy = "give a CSV file, or arrays: lw.designs.Table({name: array})"
             faults.add("file", path, "is a file of NumPy, or an archive", remedy)
             return {}
         checksum = hashlib.sha256(content).hexdigest()

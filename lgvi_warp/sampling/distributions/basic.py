@@ -170,7 +170,7 @@ class Normal(Distribution):
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
-        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
         >>> fleet.parameters(0, 8)["vehicle.buoyancy"].round(1)
         array([308.3, 306.5, 308.7, 309.8, 308.3, 306.9, 307.5, 308.3])
     """

@@ -34,7 +34,7 @@ ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
 @dataclass(frozen=True, eq=False)
 class ScipyDistribution(Distribution):
-    """A frozen distribution of scipy.stats, as lw.ScipyDistribution(scipy.stats.gamma(2.0, scale=3.0)).
+    """A frozen distribution of scipy.stats, as lw.distributions.ScipyDistribution(scipy.stats.gamma(2.0, scale=3.0)).
 
     In `vary` it needs no wrapper. Its values are absolute: the scene's own value plays no part.
 
@@ -144,7 +144,7 @@ class BinnedDistribution(Distribution):
     """Distribution given by a histogram, uniform within each bin.
 
     Its values are absolute: the scene's own value plays no part. It is "histogram" in a scene file and
-    scipy.stats.rv_histogram in `vary`; lw.Histogram is the statistic.
+    scipy.stats.rv_histogram in `vary`; lw.statistics.Histogram is the statistic.
 
     Args:
         counts: Weights of the bins, (k,), from 0, in any scale.

@@ -197,12 +197,12 @@ _POWER = Quantity("demand", _power, "W", ("velocity", "angular_velocity", "deman
 class TimeToFailure(Metric):
     """When each member failed or an event stopped it [s], infinite for those that went on to the end; then statistics of it.
 
-    Only lw.MemberValues() tells all of it: other statistics leave out what is infinite, and members that failed. lw.Outcome is the
+    Only lw.statistics.MemberValues() tells all of it: other statistics leave out what is infinite, and members that failed. lw.statistics.Outcome is the
     probability to have ended by each time.
 
     Args:
         of: "end", the default.
-        then: lw.MemberValues(), the default, or other statistics.
+        then: lw.statistics.MemberValues(), the default, or other statistics.
     """
 
     type: ClassVar[str] = "time_to_failure"

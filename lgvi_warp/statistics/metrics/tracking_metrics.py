@@ -134,11 +134,11 @@ class Metric(MemberStatistic):
 
     It takes the samples at every tick, whatever the run keeps; in a scene without a controller, at the times of samples. A
     member that stops or fails has the number of its time under way, up to its last tick. Statistics leave out members that
-    failed, and those whose number is not finite; lw.MemberValues() has all of them.
+    failed, and those whose number is not finite; lw.statistics.MemberValues() has all of them.
 
     Args:
         of: what is tracked; see the classes derived from it.
-        then: a statistic, or a list, without `of`: lw.Mean() (the default), lw.Quantiles(levels=(0.5, 0.99)), lw.MemberValues().
+        then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5, 0.99)), lw.statistics.MemberValues().
         measured: whether the actual number is what sensors measure, in place of the truth; by default False.
     """
 

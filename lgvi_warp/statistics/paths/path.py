@@ -67,8 +67,8 @@ class OfPath(MemberStatistic):
 
     Args:
         of: a quantity; see `Statistic`, also for name, confidence and stopped.
-        then: a statistic, or a list, without `of`: lw.Mean() (the default), lw.Quantiles(levels=(0.5, 0.99)),
-            lw.Exceedance(above=2.0).
+        then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5, 0.99)),
+            lw.statistics.Exceedance(above=2.0).
     """
 
     of_numbers: ClassVar[bool] = False
@@ -93,8 +93,8 @@ class PathMaximum(OfPath):
 
     Args:
         of: a quantity; see `Statistic`, also for name, confidence and stopped.
-        then: a statistic, or a list, without `of`: lw.Mean() (the default), lw.Quantiles(levels=(0.5, 0.99)),
-            lw.Exceedance(above=2.0).
+        then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5, 0.99)),
+            lw.statistics.Exceedance(above=2.0).
     """
 
     type: ClassVar[str] = "path_maximum"
@@ -107,7 +107,7 @@ class PathMinimum(OfPath):
 
     Args:
         of: a quantity; see PathMaximum.
-        then: a statistic, or a list, without `of`; by default lw.Mean().
+        then: a statistic, or a list, without `of`; by default lw.statistics.Mean().
     """
 
     type: ClassVar[str] = "path_minimum"
@@ -120,7 +120,7 @@ class PathRange(OfPath):
 
     Args:
         of: a quantity; see PathMaximum.
-        then: a statistic, or a list, without `of`; by default lw.Mean().
+        then: a statistic, or a list, without `of`; by default lw.statistics.Mean().
     """
 
     type: ClassVar[str] = "path_range"
@@ -136,7 +136,7 @@ class PathMean(OfPath):
 
     Args:
         of: a quantity; see PathMaximum.
-        then: a statistic, or a list, without `of`; by default lw.Mean().
+        then: a statistic, or a list, without `of`; by default lw.statistics.Mean().
     """
 
     type: ClassVar[str] = "path_mean"
@@ -151,7 +151,7 @@ class PathRms(OfPath):
 
     Args:
         of: a quantity; see PathMaximum.
-        then: a statistic, or a list, without `of`; by default lw.Mean().
+        then: a statistic, or a list, without `of`; by default lw.statistics.Mean().
     """
 
     type: ClassVar[str] = "path_rms"
@@ -168,7 +168,7 @@ class PathTime(OfPath, Condition):
 
     Args:
         of: a quantity; see PathMaximum.
-        then: a statistic, or a list, without `of`; by default lw.Mean().
+        then: a statistic, or a list, without `of`; by default lw.statistics.Mean().
         above: one number, or one for each component, in the quantity's unit.
         below: the same for the upper limit; with both, the time between them.
     """

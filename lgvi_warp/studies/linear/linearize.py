@@ -132,7 +132,7 @@ def linearize(
 
     Args:
         scene: The scene, without waves and noise; of an Ensemble, its scene.
-        about: The motion: what `lw.trim` returns; for a closed loop also the time [s] after which the run has it. None, the
+        about: The motion: what `lw.linear.trim` returns; for a closed loop also the time [s] after which the run has it. None, the
             default: the start of the scene, with commands of 0; a closed loop after its first period.
         inputs: "commands" of the actuators, the default; or "wrench": X, Y, Z [N], K, M, N [N m], body axes about its origin,
             held for a period beside actuators that keep their commands. Of a plant only.
@@ -152,8 +152,8 @@ def linearize(
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("bluerov2_heavy")
-        >>> steady = lw.trim(scene, speed=0.5, fixed={"pitch": 0.0}, method="psi_s", h=0.02)
-        >>> model = lw.linearize(scene, steady, period=0.1)
+        >>> steady = lw.linear.trim(scene, speed=0.5, fixed={"pitch": 0.0}, method="psi_s", h=0.02)
+        >>> model = lw.linear.linearize(scene, steady, period=0.1)
         >>> model.A.shape, model.B.shape
         ((20, 20), (20, 8))
     """
@@ -171,7 +171,7 @@ def linearize(
         misplaced = "period" if period is not None else "inputs"
         faults.add(misplaced, period or inputs, "is that of a plant", "leave it out, or closed=True")
     if not (about is None or isinstance(about, Trim) or (closed and isinstance(about, int | float))):
-        remedy = "give what lw.trim returns" + (", or a time in seconds" if closed else ", or leave it out")
+        remedy = "give what lw.linear.trim returns" + (", or a time in seconds" if closed else ", or leave it out")
         faults.add("about", about, "is no motion", remedy)
     faults.raise_if_any()
     if isinstance(about, Trim):

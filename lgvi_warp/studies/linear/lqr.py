@@ -49,7 +49,7 @@ class Regulator:
         for key, names, known in (("inputs", model.inputs, COMPONENTS), ("states", model.states, COORDINATES)):
             wrong = [each for each in names if each not in known]
             if wrong:
-                remedy = 'give lw.linearize(scene, inputs="wrench"), and .part(...) without what actuators remember'
+                remedy = 'give lw.linear.linearize(scene, inputs="wrench"), and .part(...) without what actuators remember'
                 faults.add(f"model.{key}", ", ".join(wrong), "is nothing that a state feedback knows", remedy)
         faults.raise_if_any()
         gains = np.zeros((6, 12))
@@ -67,7 +67,7 @@ def lqr(model: LinearModel, Q: Any, R: Any) -> Regulator:
     """Find the gains that make the sum over ticks of x^T Q x + u^T R u least.
 
     Args:
-        model: The linear model, as of `lw.linearize` with inputs="wrench" for `lw.StateFeedback`.
+        model: The linear model, as of `lw.linear.linearize` with inputs="wrench" for `lw.control.StateFeedback`.
         Q: Weights of the states, (n, n), or (n,) of its diagonal, >= 0.
         R: Weights of the inputs, (m, m), or (m,) of its diagonal, > 0.
 
@@ -80,16 +80,16 @@ def lqr(model: LinearModel, Q: Any, R: Any) -> Regulator:
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("bluerov2_heavy")
-        >>> steady = lw.trim(scene, speed=0.5, fixed={"pitch": 0.0}, method="psi_s", h=0.02)
-        >>> model = lw.linearize(scene, steady, period=0.1, inputs="wrench")
-        >>> regulator = lw.lqr(model, Q=[4.0] * 3 + [9.0] * 3 + [1.0] * 6, R=[0.01] * 6)
+        >>> steady = lw.linear.trim(scene, speed=0.5, fixed={"pitch": 0.0}, method="psi_s", h=0.02)
+        >>> model = lw.linear.linearize(scene, steady, period=0.1, inputs="wrench")
+        >>> regulator = lw.linear.lqr(model, Q=[4.0] * 3 + [9.0] * 3 + [1.0] * 6, R=[0.01] * 6)
         >>> regulator.K.shape, bool((abs(regulator.poles) < 1.0).all())
         ((6, 12), True)
     """
     from scipy.linalg import solve_discrete_are
 
     faults = Faults()
-    n, m = of_kind("model", model, "A B C D", "a LinearModel", "give what lw.linearize returns").B.shape
+    n, m = of_kind("model", model, "A B C D", "a LinearModel", "give what lw.linear.linearize returns").B.shape
     Q, R = _weights(faults, "Q", Q, n, 0.0), _weights(faults, "R", R, m, np.finfo(float).tiny)
     faults.raise_if_any()
     A, B = model.A, model.B

@@ -98,7 +98,7 @@ def trim(
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("bluerov2_heavy")
-        >>> steady = lw.trim(scene, speed=0.5, fixed={"pitch": 0.0}, method="psi_s", h=0.02)
+        >>> steady = lw.linear.trim(scene, speed=0.5, fixed={"pitch": 0.0}, method="psi_s", h=0.02)
         >>> steady.start.velocity.round(3)
         array([0.5, 0. , 0. ])
     """

@@ -78,5 +78,5 @@ def risk_of(faults: Faults, risk: Any) -> Any:
     if isinstance(risk, float) and 0.0 < risk < 1.0:
         return _Quantile(risk)
     if not (isinstance(risk, str) and risk == "mean"):
-        faults.add("risk", brief(risk), "is no risk", 'give "mean", a level such as 0.95, or lw.CVaR(0.05)')
+        faults.add("risk", brief(risk), "is no risk", 'give "mean", a level such as 0.95, or lw.metrics.CVaR(0.05)')
     return _Mean()

@@ -97,8 +97,8 @@ def tune_gains(
         fleet: The members, drawn by distributions; or a Scene, whose [ensemble] is meant.
         over: (low, high), or (low, high, "log"), of each number by name: {"heading_pid.kp": (0.1, 10.0, "log")}.
         minimise: The cost, one number of each member: a quantity, as of `lw.prepare`; or a metric, as of `lw.sweep`:
-            "iae depth", lw.SettlingTime("depth", within=0.5).
-        risk: "mean", the default; the level of a quantity's quantile, such as 0.95; or `lw.CVaR(0.05)`, the mean of the worst
+            "iae depth", lw.metrics.SettlingTime("depth", within=0.5).
+        risk: "mean", the default; the level of a quantity's quantile, such as 0.95; or `lw.metrics.CVaR(0.05)`, the mean of the worst
             5 %. A member that fails has an infinite cost.
         budget: Number of members that the search may run, those of all candidates together; 100,000 by default.
         fresh: Number of fresh members; None, the default, for four times those of the fleet.
@@ -118,12 +118,12 @@ def tune_gains(
         >>> import lgvi_warp as lw
         >>> controller = lw.Controller(
         ...     period=0.1,
-        ...     guidance=[lw.SetPoint(heading=0.5)],
-        ...     laws=[lw.HeadingPID(kp=1.0, ki=0.02, kd=2.0)],
-        ...     allocation=[lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
+        ...     guidance=[lw.control.SetPoint(heading=0.5)],
+        ...     laws=[lw.control.HeadingPID(kp=1.0, ki=0.02, kd=2.0)],
+        ...     allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
         ... )
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]}, controller=controller)
-        >>> best = lw.tune_gains(scene, {"heading_pid.kp": (0.5, 3.0)}, lw.IAE("heading"), budget=500, h=0.05, t1=10.0)
+        >>> best = lw.tune_gains(scene, {"heading_pid.kp": (0.5, 3.0)}, lw.metrics.IAE("heading"), budget=500, h=0.05, t1=10.0)
         >>> print(f"{best.parameters['heading_pid.kp']:.1f}")
         3.0
     """

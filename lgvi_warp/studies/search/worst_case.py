@@ -86,7 +86,7 @@ def worst_case(
         within: (low, high) of each number by name, such as {"vehicle.buoyancy": (297.0, 302.0)}; (low, high, "log") where
             the search should go by the logarithm.
         of: A quantity of one number, as of `lw.prepare`: "max(depth)", a Quantity, a function of a Result; or a metric, as of
-            `lw.sweep`: "overshoot depth", lw.SettlingTime("depth", within=0.5).
+            `lw.sweep`: "overshoot depth", lw.metrics.SettlingTime("depth", within=0.5).
         worst: "largest", the default, or "smallest". A member that fails is worse than all others, and ends the search.
         budget: Number of members that may be run; 20,000 by default.
         restarts: Number of evolutions; 3 by default, fewer where the budget is small.

@@ -51,7 +51,7 @@ def sobol(
 
     Args:
         scene: a Scene, with what varies in its ensemble or in `vary`; or an Ensemble, for its scene, vary and seed.
-        of: "position[2]" or "depth" (at the end), "max(energy)" (over the path), "outcome floor", a lw.Quantity, a function of
+        of: "position[2]" or "depth" (at the end), "max(energy)" (over the path), "outcome floor", a lw.statistics.Quantity, a function of
             a Result to (n,) or (n, m), or several of these.
         samples: N, a multiple of `replicates`, best a power of two; N (2 d + 2) members are run for d factors, N (d + 2)
             without second_order. Default 1024.
@@ -134,8 +134,8 @@ def _design_of(fleet: Ensemble, outputs: Outputs, kind: type[Design]) -> Design:
     of_kind("outputs", outputs, "values labels failed counts", "of lw.uq.evaluate", "give what it returns")
     design = ensemble_of(fleet).sampling
     if not isinstance(design, kind):
-        example = f"give lw.Ensemble(..., sampling=lw.{kind.__name__}())"
-        raise refusal("fleet.sampling", design, f"is not lw.{kind.__name__}", example)
+        example = f"give lw.Ensemble(..., sampling=lw.designs.{kind.__name__}())"
+        raise refusal("fleet.sampling", design, f"is not lw.designs.{kind.__name__}", example)
     return design
 
 

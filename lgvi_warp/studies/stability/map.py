@@ -299,7 +299,7 @@ def stability_map(
         t1: time up to which energy counts [s]. Default: ten periods of the fastest motion at the start.
         error: largest error of an accurate cell, in the unit of `of`; above 0. Default 1e-2.
         of: quantity that errors are of: any that statistics know ("attitude", "position", "depth", "euler[1]", ...), or a
-            lw.Quantity. Default "attitude" [rad].
+            lw.statistics.Quantity. Default "attitude" [rad].
         error_time: time up to which errors count [s]. Default: one period of the fastest motion at the start.
         energy_bound: largest growth of energy of a bounded cell [1]. Default 1.
         directions: number of starts of each cell: the scene's own, and others with velocity and spin turned at random; the

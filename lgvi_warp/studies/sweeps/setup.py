@@ -22,7 +22,7 @@ from lgvi_warp.scene import variations
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.functions import Own, ToldApart, functions_of
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.statistics import TYPES
+from lgvi_warp.statistics.base import TYPES
 from lgvi_warp.statistics.base import Statistic, from_list
 from lgvi_warp.statistics.metrics.actuator_metrics import TimeToFailure
 from lgvi_warp.statistics.metrics.tracking_metrics import check_wanted
@@ -245,14 +245,14 @@ def _given(scene: Any, vary: Any) -> tuple[Ensemble, dict[Any, Any]]:
         problem = "has members that were given or chosen one by one"
         raise refusal("scene", "...", problem, "give an Ensemble that draws its members, or a table as its sampling")
     if vary is not None and not isinstance(vary, Mapping):
-        raise refusal("vary", vary, "does not map names to distributions", 'give {"vehicle.mass": lw.Normal(...)}')
+        raise refusal("vary", vary, "does not map names to distributions", 'give {"vehicle.mass": lw.distributions.Normal(...)}')
     return scene, {**scene.vary, **(vary or {})}
 
 
 def metrics_of(entries: Any) -> dict[str, Statistic]:
     """Return metrics by name, each with the number of every member; "time_to_failure" is added."""
     if isinstance(entries, str | Mapping) or not isinstance(entries, Sequence):
-        raise refusal("metrics", entries, "is no list", 'give ["overshoot depth", lw.IAE("heading")]')
+        raise refusal("metrics", entries, "is no list", 'give ["overshoot depth", lw.metrics.IAE("heading")]')
     faults, metrics = Faults(), dict[str, Statistic]()
     for i, entry in enumerate((*entries, TimeToFailure())):
         with faults.including():
@@ -280,7 +280,7 @@ def metric_of(key: str, entry: Any) -> tuple[str, Statistic]:
             raise refusal(key, entry, "is not one number of each member", remedy)
     (statistic,) = from_list([entry], key, whole=False)
     if not isinstance(statistic, MemberStatistic):
-        remedy = 'give a metric such as lw.Overshoot("depth"), or "max(depth)"'
+        remedy = 'give a metric such as lw.metrics.Overshoot("depth"), or "max(depth)"'
         raise refusal(key, statistic.type, "is no metric: it is not one number of each member", remedy)
     if getattr(statistic, "of", None) is not None:
         quantity = statistic.quantity

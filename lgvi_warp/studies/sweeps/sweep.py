@@ -61,7 +61,7 @@ def sweep(
         members: Number of members of every cell; default those of the scene.
         seed: Seed of the members; default that of the scene.
         sampling: As for Ensemble; default that of the scene.
-        metrics: One number of each member: lw.Overshoot("depth"), a table {"type": "iae", "of": "heading"}, "iae heading", or
+        metrics: One number of each member: lw.metrics.Overshoot("depth"), a table {"type": "iae", "of": "heading"}, "iae heading", or
             an expression over the path, "max(norm(demand))". "time_to_failure" is always among them.
         success: What a member must fulfil: {"status": "ok", "overshoot depth": {"below": 1.0}}. Default: reach the end.
         baseline: Name of the case that others are compared with; default the first one.
@@ -69,7 +69,7 @@ def sweep(
         interval: Of probabilities: "wilson" (default) or "clopper_pearson".
         out: Folder. What is finished is kept there, so that the same call goes on after a stop, with the same bytes; cells
             whose numbers, metrics, functions or settings have changed run anew. Functions of yours are told apart by their
-            code and what that leads to; by `version` where lw.Callback and lw.CustomMetric have one.
+            code and what that leads to; by `version` where lw.control.Callback and lw.metrics.CustomMetric have one.
         threads: As of solve.
         executor: As of solve.
         scheduler: As of solve.
@@ -87,17 +87,17 @@ def sweep(
         >>> import lgvi_warp as lw
         >>> controller = lw.Controller(
         ...     period=0.1,
-        ...     guidance=[lw.SetPoint(heading=0.5)],
-        ...     laws=[lw.HeadingPID(kp=1.0, ki=0.02, kd=2.0)],
-        ...     allocation=[lw.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
+        ...     guidance=[lw.control.SetPoint(heading=0.5)],
+        ...     laws=[lw.control.HeadingPID(kp=1.0, ki=0.02, kd=2.0)],
+        ...     allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
         ... )
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]}, controller=controller)
         >>> table = lw.sweep(
         ...     scene,
         ...     {"slow": {}, "quick": {"heading_pid.kp": 2.0}},
         ...     members=16,
-        ...     vary={"control_fins.area": lw.Normal(relative=0.05)},
-        ...     metrics=[lw.IAE("heading")],
+        ...     vary={"control_fins.area": lw.distributions.Normal(relative=0.05)},
+        ...     metrics=[lw.metrics.IAE("heading")],
         ...     h=0.05,
         ...     t1=30.0,
         ... )

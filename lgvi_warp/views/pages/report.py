@@ -24,7 +24,7 @@ from lgvi_warp.common.status import Warnings
 from lgvi_warp.results.outcomes import outcome_text, outcomes
 from lgvi_warp.statistics.estimates.table import table
 from lgvi_warp.studies.files import STUDY_FILES, of_study
-from lgvi_warp.views import plots
+from lgvi_warp import plots
 from lgvi_warp.views.commands import faults
 from lgvi_warp.views.fleet import OUTCOME_STYLES, title
 from lgvi_warp.views.pages.run_again import how_to_run_again
@@ -75,7 +75,7 @@ def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
-        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.Normal(std=1.0)})
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
         >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
         >>> print(lw.report(result, "report.html"))
         report.html

@@ -17,7 +17,7 @@ from lgvi_warp.views.plots.canvas import COLORS, MARKERS, legend_below, hatch, p
 from lgvi_warp.views.plots.picture import FilePath, picture
 
 COST = "ns_per_vehicle_step"
-# The row of a scene without terms, in what `lw.term_cost` and the benchmarks write.
+# The row of a scene without terms, in what `lw.bench.term_cost` and the benchmarks write.
 NONE = "none"
 
 Rows = Iterable[Mapping[str, Any]] | str | os.PathLike[str]
@@ -30,7 +30,7 @@ def scaling(rows: Rows, *, figure: Any = None, path: FilePath | None = None) -> 
     A dotted line says what as many threads would cost if each were as fast as one alone.
 
     Args:
-        rows: Rows of `lw.scaling`, or a file of JSON lines that `python -m benchmarks run members threads` printed; rows of
+        rows: Rows of `lw.bench.scaling`, or a file of JSON lines that `python -m benchmarks run members threads` printed; rows of
             other measurements are left out.
 
     Returns:
@@ -40,7 +40,7 @@ def scaling(rows: Rows, *, figure: Any = None, path: FilePath | None = None) -> 
         NothingToDraw: There is no row with members, threads and a cost.
         OSError: A file cannot be read or written.
     """
-    points = measured(rows, ("members", "threads"), "lw.scaling(fleet)")
+    points = measured(rows, ("members", "threads"), "lw.bench.scaling(fleet)")
     with panels(figure, path, (1, 2), (12.0, 5.6)) as grid:
         for axes, across, of_line in ((grid[0, 0], "members", "threads"), (grid[0, 1], "threads", "members")):
             for i, count in enumerate(sorted({point[of_line] for point in points})):
@@ -66,7 +66,7 @@ def term_cost(rows: Rows, *, ax: Any = None, path: FilePath | None = None) -> An
     """Draw what a step costs with each term alone, beside the scene without terms, which is a line.
 
     Args:
-        rows: Rows of `lw.term_cost`, or a file of JSON lines that `python -m benchmarks run terms` printed; of several methods
+        rows: Rows of `lw.bench.term_cost`, or a file of JSON lines that `python -m benchmarks run terms` printed; of several methods
             the first is drawn, with a bar for each precision.
 
     Returns:
@@ -76,7 +76,7 @@ def term_cost(rows: Rows, *, ax: Any = None, path: FilePath | None = None) -> An
         NothingToDraw: There is no row with a term and a cost.
         OSError: A file cannot be read or written.
     """
-    points = measured(rows, ("term", "method", "dtype"), "lw.term_cost(scene)")
+    points = measured(rows, ("term", "method", "dtype"), "lw.bench.term_cost(scene)")
     method = points[0]["method"]
     points = [point for point in points if point["method"] == method]
     terms = list(dict.fromkeys(point["term"] for point in points))

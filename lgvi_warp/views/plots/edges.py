@@ -32,7 +32,7 @@ def margins(found: Margins, *, figure: Any = None, path: FilePath | None = None)
     what all but one in twenty members bear. Infinite margins lie beyond the right edge: their curve ends below 100 %.
 
     Args:
-        found: Margins of `lw.margins`.
+        found: Margins of `lw.linear.margins`.
 
     Returns:
         The axes, shape (margins,).
@@ -40,7 +40,7 @@ def margins(found: Margins, *, figure: Any = None, path: FilePath | None = None)
     Raises:
         NothingToDraw: No member has margins; the message says why.
     """
-    of_kind("found", found, "steady values by_runs", "of lw.margins", "give what lw.margins returns")
+    of_kind("found", found, "steady values by_runs", "of lw.linear.margins", "give what lw.linear.margins returns")
     steady = np.asarray(found.steady)
     if not steady.any():
         raise NothingToDraw(f"none of the {found.members} members has margins ({found.reasons_text}): there is nothing to draw")

@@ -83,11 +83,11 @@ def histogram(
     """Draw how a number of the members is spread at one time, stacked by what had become of them by then.
 
     Members that ended are counted at their last state. Depths are on the vertical axis, downwards. Without samples a statistic
-    lw.Histogram of the quantity is drawn.
+    lw.statistics.Histogram of the quantity is drawn.
 
     Args:
         result: A result, in memory or in a store.
-        of: A quantity of one number, also over the path: "depth", "max(speed)", a `lw.Quantity`; default "depth".
+        of: A quantity of one number, also over the path: "depth", "max(speed)", a `lw.statistics.Quantity`; default "depth".
         at: Time [s], of which the nearest sample is taken; default None, the last.
 
     Returns:
@@ -135,7 +135,7 @@ Shares = tuple[np.ndarray, float, str, dict[str, tuple[np.ndarray, str]]]
 
 
 def _gathered(statistic: Estimate, component: int, at: float | None) -> Shares:
-    """What a statistic lw.Histogram counted at the time nearest to `at`."""
+    """What a statistic lw.statistics.Histogram counted at the time nearest to `at`."""
     frame = _nearest(statistic.time, at)
     outside = int(statistic["below"][frame, component] + statistic["above"][frame, component])
     more = f", {outside:,} of them outside the bins" if outside else ""

@@ -43,7 +43,7 @@ def fan(result: Result, of: Any = "depth", *, ax: Any = None, path: FilePath | N
 
     Args:
         result: A result, in memory or in a store.
-        of: Name of the quantity or of one component, as "depth", "speed", "position[0]", or a `lw.Quantity`; default "depth".
+        of: Name of the quantity or of one component, as "depth", "speed", "position[0]", or a `lw.statistics.Quantity`; default "depth".
 
     Returns:
         The axes.
@@ -169,11 +169,11 @@ def _draw_estimate(axes: Any, estimate: Estimate, component: int) -> None:
 def compare(results: Mapping[str, Result], of: Any = "depth", *, ax: Any = None, path: FilePath | None = None) -> Any:
     """Draw one number of several runs against time: a median and a band of 90 % of the members under way for each.
 
-    Without samples a run is drawn by its statistics `lw.Quantiles` or `lw.Mean` of the quantity.
+    Without samples a run is drawn by its statistics `lw.statistics.Quantiles` or `lw.statistics.Mean` of the quantity.
 
     Args:
         results: Results by label.
-        of: Name of the quantity or of one component, or a `lw.Quantity`; default "depth".
+        of: Name of the quantity or of one component, or a `lw.statistics.Quantity`; default "depth".
 
     Returns:
         The axes.

@@ -15,7 +15,7 @@ from lgvi_warp.views.plots.tradeoffs import tradeoff
 
 if TYPE_CHECKING:
     from lgvi_warp.results.result import Result
-    from lgvi_warp.studies.sensitivity import Indices
+    from lgvi_warp.studies.sensitivity.indices import Indices
     from lgvi_warp.studies.stability.map import StabilityMap
     from lgvi_warp.studies.tradeoff import Tradeoff
 

@@ -17,15 +17,15 @@ from tests.unit.studies.test_cost import found as tradeoff_of
 # What a call may end with: the refusal, a picture of nothing, a library that is not installed, a file that is not there.
 DELIBERATE = (lw.SceneError, NothingToDraw, MissingExtra, OSError)
 # Studies and trials of the disk: seconds each where an odd argument is taken, as None is.
-LONG = {"stability_map", "suggest", "term_cost", "scaling", "linearize", "trim", "tradeoff", "margins", "sweep", "tune",
-        "worst_case", "predict", "plot", "log_rerun", "report", "plot_statistics"}  # fmt: skip
+LONG = {"stability_map", "suggest", "term_cost", "scaling", "linearize", "trim", "tradeoff", "margins", "sweep", "tune_gains",
+        "worst_case", "predict", "plot", "record", "report", "plot_statistics"}  # fmt: skip
 PACKAGE = str(Path(lw.__file__).parent)
 
 
 @pytest.fixture(scope="module")
 def given(tmp_path_factory):
-    scene = lw.Scene(lw.Vehicle(**odd_calls.BODY), terms=[lw.Drag(linear=[1.0] * 6)])
-    fleet = lw.Ensemble(scene, 4, 1, {"vehicle.buoyancy": lw.Normal(relative=0.01)})
+    scene = lw.Scene(lw.Vehicle(**odd_calls.BODY), terms=[lw.terms.Drag(linear=[1.0] * 6)])
+    fleet = lw.Ensemble(scene, 4, 1, {"vehicle.buoyancy": lw.distributions.Normal(relative=0.01)})
     return scene, fleet, lw.solve(fleet, h=0.1, t1=0.4), tmp_path_factory.mktemp("odd")
 
 

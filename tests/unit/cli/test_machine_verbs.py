@@ -152,10 +152,10 @@ def test_lists_in_full(capsys):
         assert cli.main(["list", what, "--json"]) == 0
         names[what] = {entry["name"]: entry["text"] for entry in json.loads(capsys.readouterr().out)["names"]}
     terms, laws = names["terms"], names["laws"]
-    assert list(names["vehicles"]) == lw.vehicle_names()
+    assert list(names["vehicles"]) == lw.vehicles.names()
     assert names["vehicles"]["sphere"]
     assert list(terms) == sorted(terms)
-    assert terms["drag"] == inspect.getdoc(lw.Drag).partition("\n")[0]
+    assert terms["drag"] == inspect.getdoc(lw.terms.Drag).partition("\n")[0]
     sections = [text.partition(":")[0] for text in laws.values()]
     assert sections[0] == "laws"
     assert len(dict.fromkeys(sections)) == sum(a != b for a, b in zip(sections, sections[1:])) + 1
@@ -222,7 +222,7 @@ def test_verbs_are_read_from_the_parser():
     options = known["run"].options
     assert set(options["--method"][1]) >= {"psi_s", "rk4", "gauss6"}
     assert options["--dtype"][1][0] == "float64"
-    assert known["new"].options["--vehicle"][1] == tuple(lw.vehicle_names())
+    assert known["new"].options["--vehicle"][1] == tuple(lw.vehicles.names())
     assert known["export"].options["--to"][1] == ("netcdf", "parquet")
     assert known["help"].words == tuple(known)
     assert options["--store"][1] == ("npz", "zarr")

@@ -12,7 +12,7 @@ from lgvi_warp import cli
 from lgvi_warp.cli import studies
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw
-from lgvi_warp.studies import sensitivity as uq
+from lgvi_warp import uq
 from lgvi_warp.studies.stability.map import GRIDS
 from tests.conftest import ROOT
 from tests.support.verbs import Study, main

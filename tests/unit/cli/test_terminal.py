@@ -19,7 +19,9 @@ from lgvi_warp.calls import predict as prediction
 from lgvi_warp.cli import arguments, command, output, signals
 from lgvi_warp.common.phases import Phases
 from lgvi_warp.studies import packet_width as tuning
-from lgvi_warp.studies.sensitivity import Indices, MorrisEffects, SobolIndices
+from lgvi_warp.studies.sensitivity.indices import Indices
+from lgvi_warp.studies.sensitivity.indices import MorrisEffects
+from lgvi_warp.studies.sensitivity.indices import SobolIndices
 from lgvi_warp.studies.stability.grid import Line
 from lgvi_warp.studies.stability.map import StabilityMap
 from lgvi_warp.studies.tradeoff import Tradeoff
@@ -163,17 +165,17 @@ def test_every_method_that_is_listed_is_one(capsys):
 
 
 def test_vehicles_terms_and_laws_are_those_of_the_tables(capsys):
-    assert list(listed("vehicles", capsys)) == lw.vehicle_names()
+    assert list(listed("vehicles", capsys)) == lw.vehicles.names()
     terms = listed("terms", capsys)
     assert "drag" in terms
     assert "weight" not in terms
-    assert set(terms) <= set(lw.Term.kinds)
+    assert set(terms) <= set(lw.laws.Term.kinds)
     laws = listed("laws", capsys)
     assert laws["heading_pid"].startswith("laws: PID of the heading")
     assert laws["sensor"].startswith("sensors: ")
 
 
-@pytest.mark.parametrize("name", lw.vehicle_names())
+@pytest.mark.parametrize("name", lw.vehicles.names())
 def test_a_new_scene_can_run_and_is_not_odd(name, tmp_path, capsys):
     path = tmp_path / "scenes" / "dive.toml"
     assert cli.main(["new", str(path), "--vehicle", name]) == 0

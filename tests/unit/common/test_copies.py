@@ -17,6 +17,7 @@ from lgvi_warp.common.errors import MissingExtra, NothingToDraw, NotReal
 from lgvi_warp.common.identity import UNKNOWN, identity
 from lgvi_warp.common.reading import UnreadableError
 from lgvi_warp.control.base import SECTIONS
+from tests.support.public import DOORS, NAMED
 from tests.conftest import ROOT
 from tests.support.odd_calls import goods
 
@@ -62,7 +63,7 @@ def test_errors(name, way):
 
 
 def test_every_public_error_is_among_them():
-    public = {value for module in (lw, lw.uq) for value in (getattr(module, name) for name in module.__all__)}
+    public = {*NAMED.values(), *(getattr(lw.uq, name) for name in lw.uq.__all__)}
     errors = {value.__name__ for value in public if inspect.isclass(value) and issubclass(value, BaseException)}
     assert errors <= ERRORS.keys()
 
@@ -85,20 +86,20 @@ V = (1.0, 1.0, 1.0)
 SPHERE = lw.Scene.named("sphere")
 # What the defaults and `goods` do not make.
 OTHERS = {
-    "Callback": lambda: lw.Callback(demand, version="1"), "OwnMetric": lambda: lw.CustomMetric(metric),
-    "Quantity": lambda: lw.Quantity("depth", metric), "Case": lambda: lw.Case("one", {"a.b": 1.0}),
-    "Grid": lambda: lw.Grid({"vehicle.mass": [1.0, 2.0]}), "Table": lambda: lw.Table(values={"vehicle.mass": [1.0, 2.0]}),
-    "UnitCubePoints": lambda: lw.UnitCubePoints([[0.5]]), "LatinHypercube": lambda: lw.LatinHypercube(4),
-    "Fins": lambda: lw.Fins(position=[V], chord=[(1, 0, 0)], normal=[(0, 0, 1)], area=0.1, drag=0.1, lift_slope=3.0),
-    "LowPass": lambda: lw.LowPass(of="depth", time_constant=1.0), "Packed": lambda: lw.Packed({"a": np.ones(2)}),
-    "PoseSMC": lambda: lw.PoseSMC(lambda_=V, boundary=V, lambda_r=V, boundary_r=V, k_sigma=V, k_d=V, k_sigma_r=V, k_d_r=V),
-    "PhysicalInertia": lambda: lw.PhysicalInertia(sigma=0.1), "PositiveDefinite": lambda: lw.PositiveDefinite(sigma=0.1),
-    "RotationNormal": lambda: lw.RotationNormal(std=0.1), "Histogram": lambda: lw.Histogram("depth", edges=[0.0, 1.0]),
-    "CorrelatedNormal": lambda: lw.CorrelatedNormal(covariance=np.eye(2)),
-    "ScipyDistribution": lambda: lw.ScipyDistribution(stats.norm()),
-    "Ticks": lambda: lw.CallbackInput(np.ones((1, 3)), np.eye(3)[None], np.ones((1, 3)), np.ones((1, 3)), np.ones(1)),
+    "Callback": lambda: lw.control.Callback(demand, version="1"), "CustomMetric": lambda: lw.metrics.CustomMetric(metric),
+    "Quantity": lambda: lw.statistics.Quantity("depth", metric), "Case": lambda: lw.studies.Case("one", {"a.b": 1.0}),
+    "Grid": lambda: lw.designs.Grid({"vehicle.mass": [1.0, 2.0]}), "Table": lambda: lw.designs.Table(values={"vehicle.mass": [1.0, 2.0]}),
+    "UnitCubePoints": lambda: lw.designs.UnitCubePoints([[0.5]]), "LatinHypercube": lambda: lw.designs.LatinHypercube(4),
+    "Fins": lambda: lw.terms.Fins(position=[V], chord=[(1, 0, 0)], normal=[(0, 0, 1)], area=0.1, drag=0.1, lift_slope=3.0),
+    "LowPass": lambda: lw.control.LowPass(of="depth", time_constant=1.0), "Packed": lambda: lw.laws.Packed({"a": np.ones(2)}),
+    "PoseSMC": lambda: lw.control.PoseSMC(lambda_=V, boundary=V, lambda_r=V, boundary_r=V, k_sigma=V, k_d=V, k_sigma_r=V, k_d_r=V),
+    "PhysicalInertia": lambda: lw.distributions.PhysicalInertia(sigma=0.1), "PositiveDefinite": lambda: lw.distributions.PositiveDefinite(sigma=0.1),
+    "RotationNormal": lambda: lw.distributions.RotationNormal(std=0.1), "Histogram": lambda: lw.statistics.Histogram("depth", edges=[0.0, 1.0]),
+    "CorrelatedNormal": lambda: lw.distributions.CorrelatedNormal(covariance=np.eye(2)),
+    "ScipyDistribution": lambda: lw.distributions.ScipyDistribution(stats.norm()),
+    "Ticks": lambda: lw.control.CallbackInput(np.ones((1, 3)), np.eye(3)[None], np.ones((1, 3)), np.ones((1, 3)), np.ones(1)),
     "Status": lambda: lw.Status.OK, "Warnings": lambda: lw.Warnings(3), "Store": lambda: lw.Store("run.zarr"),
-    "PackingContext": lambda: lw.PackingContext({"a.b": np.ones(2)}, None, np.arange(2), 1, 0.1),
+    "PackingContext": lambda: lw.laws.PackingContext({"a.b": np.ones(2)}, None, np.arange(2), 1, 0.1),
 }  # fmt: skip
 
 
@@ -112,7 +113,7 @@ OF_STUDIES = {"Trim", "LinearModel", "Regulator", "Margins", "WorstCase", "Tuned
 
 def classes():
     """The public classes by name, but for errors."""
-    public = {name: getattr(module, name) for module in (lw, lw.uq) for name in module.__all__}
+    public = NAMED | {name: getattr(lw.uq, name) for name in lw.uq.__all__}
     return {
         name: value for name, value in public.items() if inspect.isclass(value) and not issubclass(value, BaseException)
     }
@@ -140,8 +141,8 @@ def made():
         parts(lw.Scene.load(path))
     by_name, own = goods(SPHERE, None, None, ROOT)
     for name in sorted(classes().keys() - found.keys() - OF_RUNS - OF_STUDIES - APART):
-        needed = [p.name for p in inspect.signature(getattr(lw, name)).parameters.values() if p.default is p.empty]
-        note(getattr(lw, name)(**({key: by_name[key] for key in needed if key in by_name} | own.get(name, {}))))
+        needed = [p.name for p in inspect.signature(NAMED[name]).parameters.values() if p.default is p.empty]
+        note(NAMED[name](**({key: by_name[key] for key in needed if key in by_name} | own.get(name, {}))))
     return found
 
 
@@ -171,15 +172,15 @@ def test_every_public_class_is_among_them():
 @pytest.mark.parametrize("way", WAYS)
 def test_a_policy_without_its_file(way, tmp_path):
     np.savez(tmp_path / "policy.npz", weights_0=np.ones((1, 1)), biases_0=np.zeros(1))
-    one = lw.Policy(file=tmp_path / "policy.npz", inputs=["depth_error"], outputs=["Z"])
+    one = lw.control.Policy(file=tmp_path / "policy.npz", inputs=["depth_error"], outputs=["Z"])
     (tmp_path / "policy.npz").unlink()
     again = WAYS[way](one)
-    assert type(again) is lw.Policy
+    assert type(again) is lw.control.Policy
     assert again.to_dict() == one.to_dict()
 
 
 def test_public_functions_and_classes_are_themselves():
-    for module in (lw, lw.uq, lw.plots):
+    for module in (lw, *DOORS.values()):
         for name in module.__all__:
             value = getattr(module, name)
             if callable(value):
@@ -189,10 +190,10 @@ def test_public_functions_and_classes_are_themselves():
 @pytest.fixture(scope="module")
 def ran():
     """What runs give."""
-    vary = {"start.velocity[0]": lw.Normal(std=0.1)}
+    vary = {"start.velocity[0]": lw.distributions.Normal(std=0.1)}
     fleet = lw.Ensemble(SPHERE, 4, 0, vary)
     settings = dict(method="psi_s", h=0.1, t1=0.5)
-    found = lw.solve(fleet, **settings, statistics=[lw.Mean("position")])
+    found = lw.solve(fleet, **settings, statistics=[lw.statistics.Mean("position")])
     run = lw.prepare(SPHERE, list(vary), of="depth", **settings)
     made = {"Result": found, "Estimates": found.statistics, "Estimate": found.statistics["mean position"], "Prepared": run,
             "ScalarModel": lw.uq.model(SPHERE, vary, "depth", **settings),
@@ -223,16 +224,16 @@ def test_what_runs_give(ran, way):
 @pytest.mark.slow
 @pytest.mark.kernel
 def test_what_studies_give():
-    drag, run = lw.Drag(linear=(4.0, 9.0, 12.0, 1.0, 2.0, 3.0)), dict(method="psi_s", h=0.1)
-    body = lw.Scene(lw.Vehicle(20.0, inertia=(5.0, 8.0, 11.0)), terms=[lw.ControlWrench(limit=1e3), drag])
-    turn = lw.Controller(period=0.1, guidance=[lw.SetPoint(heading=0.1)], laws=[lw.HeadingPID(kp=5.0, kd=5.0)])
-    loop, vary, short = replace(body, controller=turn), {"start.position[2]": lw.Normal(std=1.0)}, run | {"t1": 0.2}
-    steady = lw.trim(body, 1.0, **run)
-    model = lw.linearize(replace(body, start=steady.start), **run)
-    both = vary | {"start.velocity[1]": lw.Normal(std=0.1)}
+    drag, run = lw.terms.Drag(linear=(4.0, 9.0, 12.0, 1.0, 2.0, 3.0)), dict(method="psi_s", h=0.1)
+    body = lw.Scene(lw.Vehicle(20.0, inertia=(5.0, 8.0, 11.0)), terms=[lw.terms.ControlWrench(limit=1e3), drag])
+    turn = lw.Controller(period=0.1, guidance=[lw.control.SetPoint(heading=0.1)], laws=[lw.control.HeadingPID(kp=5.0, kd=5.0)])
+    loop, vary, short = replace(body, controller=turn), {"start.position[2]": lw.distributions.Normal(std=1.0)}, run | {"t1": 0.2}
+    steady = lw.linear.trim(body, 1.0, **run)
+    model = lw.linear.linearize(replace(body, start=steady.start), **run)
+    both = vary | {"start.velocity[1]": lw.distributions.Normal(std=0.1)}
     found = {
-        "Trim": steady, "LinearModel": model, "Margins": lw.margins(loop, "heading_pid", "gain", about=5.0, **run),
-        "Regulator": lw.lqr(model, np.ones(len(model.states)), np.ones(len(model.inputs))),
+        "Trim": steady, "LinearModel": model, "Margins": lw.linear.margins(loop, "heading_pid", "gain", about=5.0, **run),
+        "Regulator": lw.linear.lqr(model, np.ones(len(model.states)), np.ones(len(model.inputs))),
         "WorstCase": lw.worst_case(loop, {"start.position[2]": (1.0, 2.0)}, "depth", budget=32, **short),
         "Tuned": lw.tune_gains(lw.Ensemble(loop, 4, 1, vary), {"heading_pid.kp": (1.0, 5.0)}, "depth", budget=64, **short),
         "StabilityMap": lw.stability_map(SPHERE, ("h", 0.1, 0.2), ("angular_velocity", 0.5, 1.0), ["psi_s"], points=2,

@@ -48,7 +48,7 @@ def test_a_name_that_is_a_folder_everywhere_is_taken(name):
 
 
 def test_a_type_of_the_user_is_a_name_too():
-    kind = type("Odd", (lw.Current,), {"type": "../odd"})
+    kind = type("Odd", (lw.terms.Current,), {"type": "../odd"})
     with pytest.raises(lw.SceneError, match="has '/'"):
         kind(velocity=[0.1, 0.0, 0.0])
     assert kind(velocity=[0.1, 0.0, 0.0], name="even").key == "even"
@@ -72,7 +72,7 @@ def test_a_section_of_the_scene_is_no_name(name, section):
 
 def test_the_longest_name_leaves_room_for_every_field_within_255_bytes():
     scene = from_dict({"vehicle": BODY, "terms": [DRAG | {"name": "a" * names.MOST_NAME_BYTES}]})
-    vary = {f"{'a' * names.MOST_NAME_BYTES}.linear": lw.Uniform(relative=0.1)}
+    vary = {f"{'a' * names.MOST_NAME_BYTES}.linear": lw.distributions.Uniform(relative=0.1)}
     plan = make_plan(lw.Ensemble(scene, 4, vary=vary), "psi_s", 0.01, 0.1)
     found = [one.name for one in columns(plan, lw.Store("anywhere.zarr"))]
     assert max(len(name.encode()) for name in found) < 150

@@ -11,7 +11,7 @@ from lgvi_warp.common import registry
 from lgvi_warp.physics.terms import events
 from lgvi_warp.sampling.designs import KINDS as SAMPLINGS
 from lgvi_warp.sampling.distributions.named import KINDS as DISTRIBUTIONS
-from lgvi_warp.statistics import TYPES as STATISTICS
+from lgvi_warp.statistics.base import TYPES as STATISTICS
 
 
 def kind(name, word=None, module=__name__):
@@ -45,8 +45,8 @@ def test_a_class_without_a_word_is_not_added(word):
 
 
 def test_each_family_knows_its_classes():
-    tables = (lw.Term.kinds, events.TYPES, STATISTICS, SAMPLINGS, DISTRIBUTIONS)
-    some = (lw.Waves, lw.StopTime, lw.PathTime, lw.UnitCubePoints, lw.PhysicalInertia)
+    tables = (lw.laws.Term.kinds, events.TYPES, STATISTICS, SAMPLINGS, DISTRIBUTIONS)
+    some = (lw.terms.Waves, lw.events.StopTime, lw.statistics.PathTime, lw.designs.UnitCubePoints, lw.distributions.PhysicalInertia)
     assert all(one in known.values() for known, one in zip(tables, some, strict=True))
 
 

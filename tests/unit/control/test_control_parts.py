@@ -16,25 +16,25 @@ THREE = (1.0, 1.0, 1.0)
 
 
 @pytest.mark.parametrize(("make", "said"), [
-    (lambda: lw.Waypoints(points=POINTS[:1], speed=1.0, look_ahead=1.0, radius=1.0),
+    (lambda: lw.control.Waypoints(points=POINTS[:1], speed=1.0, look_ahead=1.0, radius=1.0),
      "waypoints.points.*less than two"),
-    (lambda: lw.Waypoints(points=[*POINTS, (5.0, 0.0, 9.0)], speed=1.0, look_ahead=1.0, radius=1.0),
+    (lambda: lw.control.Waypoints(points=[*POINTS, (5.0, 0.0, 9.0)], speed=1.0, look_ahead=1.0, radius=1.0),
      r"waypoints.points\[2\].*same place.*leave it out"),
-    (lambda: lw.Waypoints(points=POINTS, speed=1.0, look_ahead=0.0, radius=1.0),
+    (lambda: lw.control.Waypoints(points=POINTS, speed=1.0, look_ahead=0.0, radius=1.0),
      "waypoints.look_ahead.*not positive"),
-    (lambda: lw.Waypoints(points=POINTS, speed=1.0, look_ahead=1.0, radius=1.0, method="lose"), "method.*los"),
-    (lambda: lw.Trajectory(times=(0.0, 2.0, 1.0), positions=[THREE] * 3), "trajectory.times.*not rising"),
-    (lambda: lw.Trajectory(times=(0.0, 2.0), positions=[THREE] * 3), "trajectory.positions.*give 2 x 3 numbers"),
-    (lambda: lw.Trajectory(times=(0.0,), positions=[THREE]), "trajectory.times.*less than two"),
-    (lambda: lw.ReferenceModel(natural_frequency=THREE),
+    (lambda: lw.control.Waypoints(points=POINTS, speed=1.0, look_ahead=1.0, radius=1.0, method="lose"), "method.*los"),
+    (lambda: lw.control.Trajectory(times=(0.0, 2.0, 1.0), positions=[THREE] * 3), "trajectory.times.*not rising"),
+    (lambda: lw.control.Trajectory(times=(0.0, 2.0), positions=[THREE] * 3), "trajectory.positions.*give 2 x 3 numbers"),
+    (lambda: lw.control.Trajectory(times=(0.0,), positions=[THREE]), "trajectory.times.*less than two"),
+    (lambda: lw.control.ReferenceModel(natural_frequency=THREE),
      "natural_frequency.*has 3 numbers.*2 numbers, of depth and heading"),
-    (lambda: lw.ReferenceModel(natural_frequency=(1.0, 0.0)), "natural_frequency.*not positive"),
-    (lambda: lw.HeadingSMC(lambda_=-1.0, boundary=0.1, k_sigma=1.0, nomoto_gain=1.0), r"heading_smc.lambda = -1"),
-    (lambda: lw.PosePID(kp=THREE, kd=THREE, kr=THREE, kw=THREE, feedforward="restore"),
+    (lambda: lw.control.ReferenceModel(natural_frequency=(1.0, 0.0)), "natural_frequency.*not positive"),
+    (lambda: lw.control.HeadingSMC(lambda_=-1.0, boundary=0.1, k_sigma=1.0, nomoto_gain=1.0), r"heading_smc.lambda = -1"),
+    (lambda: lw.control.PosePID(kp=THREE, kd=THREE, kr=THREE, kw=THREE, feedforward="restore"),
      "pose_pid.feedforward.*restoring"),
-    (lambda: lw.PosePID(kp=THREE, kd=THREE, kr=THREE, kw=THREE, anti_windup="on"),
+    (lambda: lw.control.PosePID(kp=THREE, kd=THREE, kr=THREE, kw=THREE, anti_windup="on"),
      "pose_pid.anti_windup = .*not known"),
-    (lambda: lw.StateFeedback(K=np.ones((6, 11))), "state_feedback.K.*shape"),
+    (lambda: lw.control.StateFeedback(K=np.ones((6, 11))), "state_feedback.K.*shape"),
 ])  # fmt: skip
 def test_what_is_wrong_is_said(make, said):
     with pytest.raises(lw.SceneError, match=said):
@@ -42,7 +42,7 @@ def test_what_is_wrong_is_said(make, said):
 
 
 def test_lambda_is_a_key_of_scenes_and_of_members():
-    law = lw.HeadingSMC(lambda_=0.4, boundary=0.1, k_sigma=1.0, nomoto_gain=1.0)
+    law = lw.control.HeadingSMC(lambda_=0.4, boundary=0.1, k_sigma=1.0, nomoto_gain=1.0)
     assert law.to_dict()["lambda"] == 0.4
     assert "lambda" in law.parameters()
     assert "lambda_" not in law.to_dict()
@@ -53,14 +53,14 @@ def test_lambda_is_a_key_of_scenes_and_of_members():
 
 
 def test_a_law_says_what_it_needs_of_guidance():
-    law = lw.PosePID(kp=THREE, kd=THREE, kr=THREE, kw=THREE)
+    law = lw.control.PosePID(kp=THREE, kd=THREE, kr=THREE, kw=THREE)
     with pytest.raises(lw.SceneError, match=r"pose_pid.*needs a wanted position"):
-        lw.Controller(period=0.1, guidance=[lw.SetPoint(depth=1.0, heading=0.0)], laws=[law])
+        lw.Controller(period=0.1, guidance=[lw.control.SetPoint(depth=1.0, heading=0.0)], laws=[law])
 
 
 def policy(tmp_path, arrays=ONE, **words):
     np.savez(tmp_path / "policy.npz", **arrays)
-    return lw.Policy(**dict(file=tmp_path / "policy.npz", inputs=["depth_error"], outputs=["Z"]) | words)
+    return lw.control.Policy(**dict(file=tmp_path / "policy.npz", inputs=["depth_error"], outputs=["Z"]) | words)
 
 
 @pytest.mark.parametrize(("arrays", "words", "said"), [
@@ -88,7 +88,7 @@ def test_a_policy_knows_its_file_again(tmp_path):
     law = policy(tmp_path)
     told = law.to_dict()
     assert told["checksum"] == law.checksum
-    assert lw.Policy(**{k: v for k, v in told.items() if k != "type"}).to_dict() == told
+    assert lw.control.Policy(**{k: v for k, v in told.items() if k != "type"}).to_dict() == told
     with pytest.raises(lw.SceneError, match="checksum"):
         policy(tmp_path, ONE | {"biases_0": np.ones(1)}, checksum=law.checksum)
 
@@ -102,23 +102,23 @@ def test_no_file_of_a_stranger_runs_code(tmp_path):
     np.savez(pickled, weights_0=np.array([Bomb()], dtype=object), biases_0=np.zeros(1))
     words = dict(file=pickled, inputs=["depth"], outputs=["Z"])
     with pytest.raises(lw.SceneError, match=r"policy.file"):
-        lw.Policy(**words)
+        lw.control.Policy(**words)
     pickled.write_bytes(pickle.dumps(Bomb()))
     with pytest.raises(lw.SceneError, match=r"policy.file"):
-        lw.Policy(**words)
+        lw.control.Policy(**words)
     for other in (tmp_path, tmp_path / "missing.npz", 3, "\0"):
         with pytest.raises(lw.SceneError, match=r"policy.file"):
-            lw.Policy(**words | {"file": other})
+            lw.control.Policy(**words | {"file": other})
     np.savez_compressed(pickled, **ONE)
     with pytest.raises(lw.SceneError, match="compressed"):
-        lw.Policy(**words)
+        lw.control.Policy(**words)
     with zipfile.ZipFile(pickled, "w") as archive:
         archive.writestr(
             "weights_0.npy", b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, 'shape': (10**12, 1), }"
         )
         archive.writestr("biases_0.npy", b"")
     with pytest.raises(lw.SceneError, match=r"policy.file"):
-        lw.Policy(**words)
+        lw.control.Policy(**words)
     assert not (tmp_path / "ran").exists()
 
 
@@ -135,4 +135,4 @@ def test_a_policy_lies_beside_its_scene(tmp_path):
 def test_what_wiring_sets_is_not_given():
     for name, value in {"bus": None, "actuators": {}}.items():
         with pytest.raises(TypeError, match=name):
-            lw.Controller(period=0.1, laws=[lw.HeadingPID(kp=1.0)], **{name: value})
+            lw.Controller(period=0.1, laws=[lw.control.HeadingPID(kp=1.0)], **{name: value})

@@ -11,7 +11,7 @@ from lgvi_warp.engine.keepers.statistics import Gathered
 
 
 def test_statistics_are_sent_without_what_they_gathered():
-    statistics = [lw.Mean("depth"), lw.Quantiles("speed")]
+    statistics = [lw.statistics.Mean("depth"), lw.statistics.Quantiles("speed")]
     gathered = Gathered(np.arange(3.0), 1000, statistics)
     empty = pickle.dumps(gathered)
     part = {"samples": np.random.default_rng(1).normal(size=100_000)}

@@ -53,10 +53,10 @@ def test_a_kernel_has_what_any_of_its_terms_needs(names, timed, memory, flow):
 
 @pytest.mark.parametrize("at", [0, 1])
 def test_an_event_of_the_time_wants_the_time(at):
-    events = [lw.Floor(depth=10.0)]
-    events.insert(at, lw.StopTime(at=1.0))
+    events = [lw.events.Floor(depth=10.0)]
+    events.insert(at, lw.events.StopTime(at=1.0))
     assert choice_of(lw.Scene(vehicle(), events=events)).timed
-    assert not choice_of(lw.Scene(vehicle(), events=[lw.Floor(depth=10.0)])).timed
+    assert not choice_of(lw.Scene(vehicle(), events=[lw.events.Floor(depth=10.0)])).timed
 
 
 @pytest.mark.parametrize("method", ["psi_s", "psi", "psi_1", "kl6(psi_s)", "psi_x", "psi_w"])
@@ -69,16 +69,16 @@ def test_without_forces_nothing_is_kicked(method):
     assert letters[0.0] == letters[2.0] - {"K"}
 
 
-class Mooring(lw.Tether):
+class Mooring(lw.terms.Tether):
     """A tether by another name, whose device code is that of one."""
 
     type = "mooring"
     device = "tether"
 
 
-@pytest.mark.parametrize("kind", [lw.Tether, Mooring])
+@pytest.mark.parametrize("kind", [lw.terms.Tether, Mooring])
 @pytest.mark.parametrize("velocity", [(0.1, 0.0, 0.0), None])
 def test_a_current_works_against_what_says_that_it_is_anchored(kind, velocity):
     terms = [kind(anchor=(0.0, 0.0, 0.0), stiffness=1.0)]
-    terms += [] if velocity is None else [lw.Current(velocity=velocity)]
+    terms += [] if velocity is None else [lw.terms.Current(velocity=velocity)]
     assert choice_of(lw.Scene(vehicle(), terms=terms)).conservative is (velocity is None)

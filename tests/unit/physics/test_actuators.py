@@ -16,8 +16,8 @@ PAIR = dict(position=((-0.5, 0.2, 0.0), (-0.5, -0.2, 0.0)), direction=((1.0, 0.0
 TABLE = dict(table_commands=(-1.0, -0.2, 0.1, 1.0), table_thrusts=(-8.0, 0.0, 0.0, 20.0))
 FIN = dict(position=((-0.6, 0.0, 0.0),), chord=((1.0, 0.0, 0.0),), normal=((0.0, 1.0, 0.0),), area=0.01, drag=0.02)
 LIFT = dict(lift_angles=(0.0, 0.3, 1.6), lift_coefficients=(0.0, 0.9, 0.0))
-WANTED = dict(guidance=[lw.SetPoint(depth=5.0, heading=0.0)])
-HEADING, DEPTH = lw.HeadingPID(kp=5.0), lw.DepthPID(kp=0.1, kp_pitch=5.0)
+WANTED = dict(guidance=[lw.control.SetPoint(depth=5.0, heading=0.0)])
+HEADING, DEPTH = lw.control.HeadingPID(kp=5.0), lw.control.DepthPID(kp=0.1, kp_pitch=5.0)
 
 
 def scene(terms, **controller):
@@ -26,11 +26,11 @@ def scene(terms, **controller):
 
 
 def thrusters(**more):
-    return lw.Thrusters(**PAIR, **({"coefficient": (20.0, 20.0)} | more))
+    return lw.terms.Thrusters(**PAIR, **({"coefficient": (20.0, 20.0)} | more))
 
 
 def fins(**more):
-    return lw.ControlFins(**FIN, **({"lift_slope": 3.0} | more))
+    return lw.terms.ControlFins(**FIN, **({"lift_slope": 3.0} | more))
 
 
 FAULTY_TERMS = {
@@ -40,8 +40,8 @@ FAULTY_TERMS = {
     "is given beside a table": lambda: thrusters(**TABLE, polynomial=(1.0, 2.0)),
     "torque_loss = [0.1, 0.1]: is given without torque_coefficient": lambda: thrusters(torque_loss=0.1),
     "thrusters.rate_limit": lambda: thrusters(rate_limit=-1.0),
-    "give (n,) [N per unit^2], a table [N], or a polynomial [N]": lambda: lw.Thrusters(**PAIR),
-    "give it [1/rad], or a table of lift": lambda: lw.ControlFins(**FIN),
+    "give (n,) [N per unit^2], a table [N], or a polynomial [N]": lambda: lw.terms.Thrusters(**PAIR),
+    "give it [1/rad], or a table of lift": lambda: lw.terms.ControlFins(**FIN),
     "does not begin with no lift at 0": lambda: fins(lift_angles=(0.1, 0.3), lift_coefficients=(0.0, 0.9)),
     "control_fins.lift_angles = [0.0, 0.3]: is given alone": lambda: fins(lift_angles=(0.0, 0.3)),
     "control_fins.flow_angle = 'no': is neither true nor false": lambda: fins(flow_angle="no"),
@@ -63,13 +63,13 @@ FAULTY_LOOPS = {
     ),
     "thrusters.limit": lambda: scene([thrusters(**POLYNOMIAL)], laws=[HEADING]),
     "give 2, one for each channel of thrusters": lambda: scene(
-        [thrusters()], laws=[HEADING], allocation=[lw.PseudoInverse(to="thrusters", weights=(1.0, 1.0, 1.0))]
+        [thrusters()], laws=[HEADING], allocation=[lw.control.PseudoInverse(to="thrusters", weights=(1.0, 1.0, 1.0))]
     ),
-    "fault.known = 1: is neither true nor false": lambda: lw.Fault(of="thrusters", known=1),
+    "fault.known = 1: is neither true nor false": lambda: lw.control.Fault(of="thrusters", known=1),
     "has 5 channels with known faults; let at most 4 be known": lambda: scene(
-        [lw.ControlWrench()],
+        [lw.terms.ControlWrench()],
         laws=[HEADING],
-        faults=[lw.Fault(name=f"f{i}", of="control_wrench", channel=i, known=True) for i in range(5)],
+        faults=[lw.control.Fault(name=f"f{i}", of="control_wrench", channel=i, known=True) for i in range(5)],
     ),
     "has commands of its own": lambda: scene([thrusters(command=0.5)], laws=[HEADING]),
 }
@@ -84,7 +84,7 @@ def test_faulty_loops(text):
 
 def test_what_actuators_cannot_make_is_said():
     # Two thrusters ahead make X and N. A law that asks for all six gets these two.
-    class Everything(lw.ControlLaw):
+    class Everything(lw.laws.ControlLaw):
         type = "everything"
         device = None
 
@@ -174,6 +174,6 @@ def test_absent_numbers_are_no_parameters():
     ("has", "varied"), [({"time_constant": 0.2}, "rate_limit"), ({"rate_limit": 5.0}, "time_constant")]
 )
 def test_members_bring_in_no_lag_or_limit_that_the_scene_has_not(has, varied):
-    looped = scene([lw.ControlWrench(**has)], laws=[HEADING])
+    looped = scene([lw.terms.ControlWrench(**has)], laws=[HEADING])
     with pytest.raises(SceneError, match=f"control_wrench.{varied} = .*: does not act: the scene has none; give"):
-        lw.Ensemble(looped, 4, 1, {f"control_wrench.{varied}": lw.Uniform(low=1.0, high=2.0)})
+        lw.Ensemble(looped, 4, 1, {f"control_wrench.{varied}": lw.distributions.Uniform(low=1.0, high=2.0)})

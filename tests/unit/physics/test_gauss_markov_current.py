@@ -11,7 +11,7 @@ SPREAD = np.array([[0.3, 0.1, 0.02]])
 
 
 def starts(start, members, seed=1):
-    term = lw.GaussMarkovCurrent(standard_deviation=SPREAD[0], time_constant=10.0, start=start)
+    term = lw.terms.GaussMarkovCurrent(standard_deviation=SPREAD[0], time_constant=10.0, start=start)
     context = PackingContext({}, None, members, seed, 0.01)
     return term.water_at_start({"standard_deviation": SPREAD}, np.zeros((len(members), 3)), context)
 

@@ -14,19 +14,19 @@ TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Buoys(lw.Term):
+class Buoys(lw.laws.Term):
     type: ClassVar[str] = "buoys"
 
-    pull: Any = lw.number((), "N", above=0.0, most=5.0)
-    least_pull: Any = lw.number((), "N", 2.0, above=1.0)
-    anchor: Any = lw.number((3,), "m", (1.0, 2.0, 3.0))
-    side: Any = lw.number((3,), "1", (1.0, 0.0, 0.0), axes="vector")
-    knot: Any = lw.number((3,), "m", (0.5, 0.0, 0.0), axes="point")
+    pull: Any = lw.laws.number((), "N", above=0.0, most=5.0)
+    least_pull: Any = lw.laws.number((), "N", 2.0, above=1.0)
+    anchor: Any = lw.laws.number((3,), "m", (1.0, 2.0, 3.0))
+    side: Any = lw.laws.number((3,), "1", (1.0, 0.0, 0.0), axes="vector")
+    knot: Any = lw.laws.number((3,), "m", (0.5, 0.0, 0.0), axes="point")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Row(Buoys):
-    places: Any = lw.number(("k",), "m", rising=True)
+    places: Any = lw.laws.number(("k",), "m", rising=True)
 
 
 @pytest.mark.parametrize(("numbers", "words"), [
@@ -54,7 +54,7 @@ def test_bounds_hold_for_each_member():
 def context(origin):
     none = np.zeros((1, 3, 3))
     frame = Frame(TURN[None], origin[None], origin[None], np.eye(3)[None], np.ones((1, 3)), none, none)
-    return lw.PackingContext({}, frame, np.arange(1), 0, 0.1)
+    return lw.laws.PackingContext({}, frame, np.arange(1), 0, 0.1)
 
 
 def test_numbers_are_packed_as_they_are_declared():
@@ -80,4 +80,4 @@ def test_a_number_of_another_shape_is_not_packed():
 
 def test_axes_that_are_not_known():
     with pytest.raises(ValueError, match="axes = 'body': is not known; give 'vector', 'point' or None"):
-        lw.number((3,), "m", axes="body")
+        lw.laws.number((3,), "m", axes="body")

@@ -28,7 +28,7 @@ def test_a_wrong_shape_is_refused(shape, words):
     assert all(";" in fault for fault in caught.value.faults)
 
 
-@pytest.mark.parametrize("name", lw.vehicle_names())
+@pytest.mark.parametrize("name", lw.vehicles.names())
 def test_the_vehicles_of_the_package_have_one_that_holds_their_water(name):
     vehicle = lw.Scene.named(name).vehicle
     shape = vehicle.shape

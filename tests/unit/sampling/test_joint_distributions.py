@@ -55,7 +55,7 @@ def test_uniforms_of_scattered_members():
 
 
 def test_correlated_normals_have_their_covariance():
-    a, b = drawn(lw.CorrelatedNormal(covariance=COVARIANCE), 10.0, [1.0, -2.0])
+    a, b = drawn(lw.distributions.CorrelatedNormal(covariance=COVARIANCE), 10.0, [1.0, -2.0])
     assert a.shape == (N,)
     assert b.shape == (N, 2)
     assert_covariance(np.column_stack([a, b]), [10.0, 1.0, -2.0], COVARIANCE)
@@ -64,28 +64,28 @@ def test_correlated_normals_have_their_covariance():
 def test_correlation_and_deviations():
     std = np.sqrt(np.diag(COVARIANCE))
     correlation = COVARIANCE / np.outer(std, std)
-    (x,) = drawn(lw.CorrelatedNormal(std=std, correlation=correlation, mean=(0.0, 1.0, 2.0)), np.zeros(3))
+    (x,) = drawn(lw.distributions.CorrelatedNormal(std=std, correlation=correlation, mean=(0.0, 1.0, 2.0)), np.zeros(3))
     assert_covariance(x, [0.0, 1.0, 2.0], COVARIANCE)
-    (x,) = drawn(lw.CorrelatedNormal(std=0.5), np.zeros(3))
+    (x,) = drawn(lw.distributions.CorrelatedNormal(std=0.5), np.zeros(3))
     assert_covariance(x, np.zeros(3), 0.25 * np.eye(3))
 
 
 def test_a_singular_covariance_keeps_what_it_says():
-    (x,) = drawn(lw.CorrelatedNormal(covariance=[[1.0, 2.0, 0.0], [2.0, 4.0, 0.0], [0.0, 0.0, 0.0]]), [1.0, 2.0, 3.0])
+    (x,) = drawn(lw.distributions.CorrelatedNormal(covariance=[[1.0, 2.0, 0.0], [2.0, 4.0, 0.0], [0.0, 0.0, 0.0]]), [1.0, 2.0, 3.0])
     # The root of a matrix with eigenvalues of round-off, 1e-16 of 5, is good to the square root of that.
     np.testing.assert_allclose(x[:, 1], 2.0 * x[:, 0], rtol=0, atol=1e-7)
     np.testing.assert_allclose(x[:, 2], 3.0, rtol=0, atol=1e-7)
 
 
 def test_all_faults_of_a_covariance_come_at_once():
-    message = refused(lw.CorrelatedNormal, covariance="wide", mean=np.nan)
+    message = refused(lw.distributions.CorrelatedNormal, covariance="wide", mean=np.nan)
     assert "covariance = 'wide'" in message
     assert "mean = nan" in message
 
 
 def test_a_singular_covariance_of_six_digits():
     S = np.array([[0.333333, 0.471405], [0.471405, 0.666667]])
-    (x,) = drawn(lw.CorrelatedNormal(covariance=S.tolist()), [0.0, 0.0])
+    (x,) = drawn(lw.distributions.CorrelatedNormal(covariance=S.tolist()), [0.0, 0.0])
     # The eigenvalue -1.1e-6 of the correlation is taken for 0: the spread changes by as much.
     assert_covariance(x, 0.0, S)
     np.testing.assert_allclose(x[:, 1], np.sqrt(2.0) * x[:, 0], rtol=0, atol=5e-3)
@@ -93,7 +93,7 @@ def test_a_singular_covariance_of_six_digits():
 
 def test_entries_of_any_sizes_have_their_covariance():
     S = np.outer((1e-6, 1e3, 1.0), (1e-6, 1e3, 1.0)) * [[1.0, 0.9, 0.0], [0.9, 1.0, -0.3], [0.0, -0.3, 1.0]]
-    (x,) = drawn(lw.CorrelatedNormal(covariance=S.tolist()), np.zeros(3))
+    (x,) = drawn(lw.distributions.CorrelatedNormal(covariance=S.tolist()), np.zeros(3))
     scale = 1.0 / np.array((1e-6, 1e3, 1.0))
     assert_covariance(x * scale, 0.0, S * np.outer(scale, scale))
 
@@ -104,7 +104,7 @@ R0 = notation.matrix_from_rotation_vector(np.array([0.4, -0.7, 1.2]))
 
 
 @pytest.mark.parametrize(
-    "law", [lw.RotationNormal(std=(0.3, 0.1, 0.2)), lw.RotationNormal(covariance=0.02 * COVARIANCE)]
+    "law", [lw.distributions.RotationNormal(std=(0.3, 0.1, 0.2)), lw.distributions.RotationNormal(covariance=0.02 * COVARIANCE)]
 )
 def test_turns_about_the_body_have_their_covariance(law):
     (R,) = drawn(law, R0)
@@ -118,14 +118,14 @@ def test_the_mean_matrix_of_an_isotropic_law():
     """E exp(hat(v)) = (1 + 2 E cos|v|) / 3 I, and E cos|v| = (1 - s^2) exp(-s^2/2) for v ~ N(0, s^2 I): its characteristic
     function in the radius of three normal numbers."""
     s = 0.8
-    (R,) = drawn(lw.RotationNormal(std=s), np.eye(3))
+    (R,) = drawn(lw.distributions.RotationNormal(std=s), np.eye(3))
     expected = (1.0 + 2.0 * (1.0 - s**2) * np.exp(-0.5 * s**2)) / 3.0
     # Entries are within -1 and 1: a standard deviation of at most 1.
     np.testing.assert_allclose(R.mean(axis=0), expected * np.eye(3), rtol=0, atol=ERRORS / np.sqrt(N))
 
 
 def test_uniform_attitudes_are_haars():
-    (R,) = drawn(lw.UniformRotation(), R0)
+    (R,) = drawn(lw.distributions.UniformRotation(), R0)
     # Of Haar's measure: E R = 0, E R_ij R_kl = delta / 3, and each entry is uniform in (-1, 1) (Archimedes).
     flat = R.reshape(N, 9)
     assert np.abs(flat.mean(axis=0)).max() < ERRORS * np.sqrt(1.0 / 3.0 / N)
@@ -156,7 +156,7 @@ def turned(values, turn):
 def test_inertias_stay_those_of_rigid_bodies(moments, turn, sigma, off, seed):
     S = turned(moments, turn)
     J = np.trace(S) * np.eye(3) - S
-    law = lw.PhysicalInertia(sigma=sigma, off_diagonal=off)
+    law = lw.distributions.PhysicalInertia(sigma=sigma, off_diagonal=off)
     if law.unusable(J) is not None:
         assume(False)  # so flat that round-off decides
     (drawn_J,) = drawn(law, J, count=50, seed=seed)
@@ -169,7 +169,7 @@ def test_inertias_stay_those_of_rigid_bodies(moments, turn, sigma, off, seed):
 @settings(deadline=None, max_examples=60)
 @given(st.lists(positive, min_size=6, max_size=6), spreads, st.floats(0.0, 1.0), st.integers(0, 2**31))
 def test_positive_matrices_stay_positive(values, sigma, off, seed):
-    (A,) = drawn(lw.PositiveDefinite(sigma=sigma, off_diagonal=off), np.diag(values), count=20, seed=seed)
+    (A,) = drawn(lw.distributions.PositiveDefinite(sigma=sigma, off_diagonal=off), np.diag(values), count=20, seed=seed)
     np.testing.assert_array_equal(A, np.swapaxes(A, 1, 2))
     scale = np.sqrt(np.einsum("nii->ni", A))
     # Scaled to a diagonal of 1, a positive definite matrix has positive eigenvalues; round-off is some 1e-15.
@@ -178,7 +178,7 @@ def test_positive_matrices_stay_positive(values, sigma, off, seed):
 
 def test_the_second_moments_are_lognormal():
     J = np.diag([5.46, 5.29, 5.72])
-    (found,) = drawn(lw.PhysicalInertia(sigma=0.2), J)
+    (found,) = drawn(lw.distributions.PhysicalInertia(sigma=0.2), J)
     S = joint_laws.second_moments(found)
     logs = np.log(np.einsum("nii->ni", S) / np.diag(joint_laws.second_moments(J)))
     assert_covariance(logs, np.zeros(3), 0.04 * np.eye(3))
@@ -186,10 +186,10 @@ def test_the_second_moments_are_lognormal():
 
 
 def test_what_is_zero_stays_zero():
-    (A,) = drawn(lw.PositiveDefinite(sigma=0.5, off_diagonal=0.3), np.diag([65.0, 0.0, 75.0]), count=20)
+    (A,) = drawn(lw.distributions.PositiveDefinite(sigma=0.5, off_diagonal=0.3), np.diag([65.0, 0.0, 75.0]), count=20)
     np.testing.assert_allclose(A[:, 1], 0.0, rtol=0, atol=1e-12)
     assert len(np.unique(A[:, 0, 0])) == 20
-    (A,) = drawn(lw.PositiveDefinite(sigma=0.5), np.zeros((3, 3)), count=20)
+    (A,) = drawn(lw.distributions.PositiveDefinite(sigma=0.5), np.zeros((3, 3)), count=20)
     assert not A.any()
 
 
@@ -198,7 +198,7 @@ def test_a_rigid_body_of_six_dimensions_keeps_its_centre():
     J = turned([0.177, 3.45, 3.46], (0.1, 0.02, -0.03))
     H = notation_hat(r)
     base = np.block([[m * np.eye(3), -m * H], [m * H, J - m * H @ H]])
-    law = lw.PhysicalInertia(sigma=0.1, off_diagonal=0.05, mass_sigma=0.02)
+    law = lw.distributions.PhysicalInertia(sigma=0.1, off_diagonal=0.05, mass_sigma=0.02)
     (found,) = drawn(law, base, count=200)
     masses = found[:, 0, 0]
     assert len(np.unique(masses)) == 200
@@ -226,12 +226,12 @@ def test_matrix_laws_that_do_not_fit(scene):
             lw.Ensemble(other, 2, 0, {name: law})
         return str(caught.value)
 
-    assert "no rigid body has" in found("vehicle.inertia", lw.PhysicalInertia(sigma=0.1), inertia=(1.0, 1.0, 3.0))
+    assert "no rigid body has" in found("vehicle.inertia", lw.distributions.PhysicalInertia(sigma=0.1), inertia=(1.0, 1.0, 3.0))
     assert "not positive in the scene" in found(
-        "vehicle.added_mass", lw.PositiveDefinite(sigma=0.1), added_mass=(-10.0, 5.0, 5.0)
+        "vehicle.added_mass", lw.distributions.PositiveDefinite(sigma=0.1), added_mass=(-10.0, 5.0, 5.0)
     )
-    assert "rigid body's inertia" in found("vehicle.added_mass", lw.PhysicalInertia(sigma=0.1))
-    assert "mass_sigma" in found("vehicle.inertia", lw.PhysicalInertia(sigma=0.1, mass_sigma=0.1))
+    assert "rigid body's inertia" in found("vehicle.added_mass", lw.distributions.PhysicalInertia(sigma=0.1))
+    assert "mass_sigma" in found("vehicle.inertia", lw.distributions.PhysicalInertia(sigma=0.1, mass_sigma=0.1))
 
 
 # scipy's laws and choices --------------------------------------------------------------------------------------------
@@ -251,7 +251,7 @@ FROZEN = {
 def test_laws_of_scipy_by_name(kind):
     exact, values = FROZEN[kind]
     law = from_dict("key", {kind: values})
-    assert law == lw.ScipyDistribution(exact)
+    assert law == lw.distributions.ScipyDistribution(exact)
     assert law.to_dict() == {kind: values}
     u = uniforms(5, kind, 0, 20_000, 1)[:, 0]
     x = law.quantile(u, np.array(10.0))
@@ -265,7 +265,7 @@ def test_any_law_of_scipy():
         (stats.binom(5, 0.3), {"name": "binom", "n": 5, "p": 0.3}),
         (stats.norm([1.0, 2.0, 3.0], 0.1), {"name": "norm", "loc": [1.0, 2.0, 3.0], "scale": 0.1}),
     ):
-        mine = lw.ScipyDistribution(law)
+        mine = lw.distributions.ScipyDistribution(law)
         assert mine.to_dict() == {"scipy": content}
         assert from_dict("key", mine.to_dict()) == mine
 
@@ -319,28 +319,28 @@ def test_histograms_are_laws_in_files_too(scene):
 def test_scipys_multivariate_normal_is_correlated_normals(scene):
     law = stats.multivariate_normal([100.0, 200.0], [[1.0, 0.5], [0.5, 2.0]])
     found = lw.Ensemble(scene, 4, vary={"vehicle.mass, vehicle.buoyancy": law}).vary
-    expected = lw.CorrelatedNormal(covariance=[[1.0, 0.5], [0.5, 2.0]], mean=[100.0, 200.0])
+    expected = lw.distributions.CorrelatedNormal(covariance=[[1.0, 0.5], [0.5, 2.0]], mean=[100.0, 200.0])
     assert found == {"vehicle.mass, vehicle.buoyancy": expected}
 
 
 def test_choices_come_as_often_as_they_weigh():
-    law = lw.Choice(values=(1.0, -2.0, 5.0), weights=(1.0, 2.0, 5.0))
+    law = lw.distributions.Choice(values=(1.0, -2.0, 5.0), weights=(1.0, 2.0, 5.0))
     x = law.quantile(uniforms(1, "x", 0, N, 2), np.zeros(2))
     for value, chance in zip((1.0, -2.0, 5.0), (0.125, 0.25, 0.625)):
         share = (x == value).mean(axis=0)
         assert (np.abs(share - chance) < ERRORS * np.sqrt(chance * (1.0 - chance) / N)).all()
     assert set(x.ravel()) == {1.0, -2.0, 5.0}
     assert (x[:, 0] != x[:, 1]).any()
-    whole = lw.Choice(values=[[1.0, 2.0], [3.0, 4.0]])
+    whole = lw.distributions.Choice(values=[[1.0, 2.0], [3.0, 4.0]])
     assert whole.joint
     assert set(map(tuple, whole.draw(uniforms(1, "x", 0, 100, 1), [np.zeros(2)])[0])) == {(1.0, 2.0), (3.0, 4.0)}
 
 
 @pytest.mark.parametrize("law", [
-    lw.Choice(values=[1.0, 2.0], weights=[1.0, 3.0]),
-    lw.CorrelatedNormal(std=[1.0, 2.0], correlation=[[1.0, 0.5], [0.5, 1.0]]), lw.RotationNormal(std=[0.1, 0.2, 0.3]),
-    lw.UniformRotation(), lw.PositiveDefinite(sigma=0.1, off_diagonal=0.2),
-    lw.PhysicalInertia(sigma=0.1, mass_sigma=0.01),
+    lw.distributions.Choice(values=[1.0, 2.0], weights=[1.0, 3.0]),
+    lw.distributions.CorrelatedNormal(std=[1.0, 2.0], correlation=[[1.0, 0.5], [0.5, 1.0]]), lw.distributions.RotationNormal(std=[0.1, 0.2, 0.3]),
+    lw.distributions.UniformRotation(), lw.distributions.PositiveDefinite(sigma=0.1, off_diagonal=0.2),
+    lw.distributions.PhysicalInertia(sigma=0.1, mass_sigma=0.01),
 ])  # fmt: skip
 def test_there_and_back(law):
     assert from_dict("key", law.to_dict()) == law

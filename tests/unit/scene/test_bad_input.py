@@ -142,13 +142,13 @@ def test_an_event(table, words):
 
 
 LISTS = [
-    ([lw.Drag(), lw.Drag()], "terms = 'drag'", "name of 2 terms", 'name = "drag_2"'),
-    ([lw.Drag(name="current"), lw.Current(velocity=[1, 0, 0])], "terms = 'current'", "name of 2 terms", "current_2"),
-    ([lw.Current(velocity=[1, 0, 0], name="environment")], "terms = 'environment'", "environment_term"),
-    ([lw.Surface()], "terms[0] = 'surface'", "is an event", "events=[...]"),
-    ([lw.Weight()], "terms[0] = 'weight'", "acts already", "leave it out"),
-    ([lw.Drag], "terms[0] = <class", "is no term", "lw.Drag(quadratic=...)"),
-    (lw.Drag(), "terms = Drag", "is no list", "terms=[lw.Drag(...)]"),
+    ([lw.terms.Drag(), lw.terms.Drag()], "terms = 'drag'", "name of 2 terms", 'name = "drag_2"'),
+    ([lw.terms.Drag(name="current"), lw.terms.Current(velocity=[1, 0, 0])], "terms = 'current'", "name of 2 terms", "current_2"),
+    ([lw.terms.Current(velocity=[1, 0, 0], name="environment")], "terms = 'environment'", "environment_term"),
+    ([lw.events.Surface()], "terms[0] = 'surface'", "is an event", "events=[...]"),
+    ([lw.terms.Weight()], "terms[0] = 'weight'", "acts already", "leave it out"),
+    ([lw.terms.Drag], "terms[0] = <class", "is no term", "lw.terms.Drag(quadratic=...)"),
+    (lw.terms.Drag(), "terms = Drag", "is no list", "terms=[lw.terms.Drag(...)]"),
 ]
 
 
@@ -269,12 +269,12 @@ FOSSEN = [
 
 @pytest.mark.parametrize(("given", "words"), [(row[0], row[1:]) for row in FOSSEN])
 def test_fossens_coefficients(given, words):
-    (fault,) = faults(lw.from_fossen, given, **BODY)
+    (fault,) = faults(lw.vehicles.from_fossen, given, **BODY)
     assert all(word in fault for word in words), fault
 
 
 def test_fossens_drag_that_creates_energy():
-    made = lw.from_fossen({"X_u": -1.0, "X_v": -100.0, "Y_v": -1.0}, **BODY)
+    made = lw.vehicles.from_fossen({"X_u": -1.0, "X_v": -100.0, "Y_v": -1.0}, **BODY)
     (fault,) = faults(from_dict, made)
     assert "drag_matrix.linear" in fault
     assert "creates energy" in fault
@@ -302,7 +302,7 @@ SDF = [
 
 @pytest.mark.parametrize(("text", "more", "words"), [(row[0], row[1], row[2:]) for row in SDF])
 def test_sdf(text, more, words):
-    fault = next(one for one in faults(lw.from_sdf, text, **more) if words[0] in one)
+    fault = next(one for one in faults(lw.vehicles.from_sdf, text, **more) if words[0] in one)
     assert all(word in fault for word in words), fault
 
 
@@ -323,7 +323,7 @@ YAML = [
 @pytest.mark.parametrize(("text", "words"), [(row[0], row[1:]) for row in YAML])
 def test_yaml(text, words):
     pytest.importorskip("yaml")
-    (fault,) = faults(lw.from_yaml, text)
+    (fault,) = faults(lw.vehicles.from_yaml, text)
     assert all(word in fault for word in words), fault
 
 
@@ -358,7 +358,7 @@ def test_a_scene_file_that_is_not_there(path):
     assert "give the path of a TOML file" in fault
 
 
-FAR = lw.Normal(std=100.0)
+FAR = lw.distributions.Normal(std=100.0)
 VARIED = [(PROFILE, "current_profile.depths", FAR), (SCHEDULE, "wrench_schedule.times", FAR),
           (THRUSTER | {"times": [0.0, 1.0], "command_schedule": [[0.0], [1.0]]}, "thrusters.times", FAR),
           (HULL, "cross_flow.stations", FAR), (THRUSTER, "thrusters.coefficient", FAR),
@@ -381,7 +381,7 @@ NAMES = [({"type": "drag"}, "drag.quadrtic", "did you mean 'drag.quadratic'?"),
 
 @pytest.mark.parametrize(("table", "name", "remedy"), NAMES)
 def test_what_cannot_vary(table, name, remedy):
-    (fault,) = faults(lw.Ensemble, from_table(table), 5, 0, {name: lw.Normal(std=1.0)})
+    (fault,) = faults(lw.Ensemble, from_table(table), 5, 0, {name: lw.distributions.Normal(std=1.0)})
     assert f'ensemble.vary."{name}"' in fault
     assert "does not name what the scene has" in fault
     assert remedy in fault
@@ -401,7 +401,7 @@ IDLE = [
 
 @pytest.mark.parametrize(("table", "name", "remedy"), IDLE)
 def test_numbers_that_would_do_nothing(table, name, remedy):
-    (fault,) = faults(lw.Ensemble, from_table(table), 5, 0, {name: lw.Uniform(0.1, 0.2)})
+    (fault,) = faults(lw.Ensemble, from_table(table), 5, 0, {name: lw.distributions.Uniform(0.1, 0.2)})
     assert name in fault
     assert "does not act: the scene has" in fault
     assert remedy in fault
@@ -467,11 +467,11 @@ def device(**functions):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Pull(lw.Term):
+class Pull(lw.laws.Term):
     type: ClassVar[str] = "pull"
     device: ClassVar[Any] = device(law=pull_law)
 
-    k: Any = lw.number((), "N")
+    k: Any = lw.laws.number((), "N")
 
 
 class Packs(Pull):
@@ -494,26 +494,26 @@ LAWS = [
 def test_a_users_law(made, words):
     term = type("Bad", (Pull,), {"device": made, "__annotations__": {}})(k=1.0)
     fleet = lw.Ensemble(lw.Scene(lw.Vehicle(**BODY), terms=[term]))
-    for check in (lambda: lw.check_law(term), lambda: make_plan(fleet, h=0.01, t1=0.1)):
+    for check in (lambda: lw.laws.check_law(term), lambda: make_plan(fleet, h=0.01, t1=0.1)):
         (fault,) = faults(check)
         assert all(word in fault for word in words), fault
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Wide(Pull):
-    row: Any = lw.number((6,), "N", (1.0,) * 6)
+    row: Any = lw.laws.number((6,), "N", (1.0,) * 6)
 
 
 def test_a_law_without_a_struct_whose_numbers_make_none():
     bare = type("Bare", (Wide,), {"device": device(law=pull_law, params=None), "__annotations__": {}})
-    (fault,) = faults(lw.check_law, bare(k=1.0))
+    (fault,) = faults(lw.laws.check_law, bare(k=1.0))
     assert all(word in fault for word in ("pull.device", "has no params(width, real)", "add_a_force.md")), fault
 
 
 @pytest.mark.kernel
 def test_a_law_that_returns_nothing():
     term = type("Bad", (Packs,), {"device": device(law=pull_silent), "__annotations__": {}})(k=1.0)
-    (fault,) = faults(lw.check_law, term)
+    (fault,) = faults(lw.laws.check_law, term)
     assert "pull.device" in fault
     assert "does not compile" in fault
     assert "return what the role adds to" in fault
@@ -522,17 +522,17 @@ def test_a_law_that_returns_nothing():
 @pytest.mark.kernel
 @pytest.mark.parametrize("given", [None, {"k": np.ones(1)}], ids=["nothing", "a dict"])
 def test_packed_that_returns_something_else(given):
-    report = lw.check_law(type("Bad", (Packs,), {"what": given, "__annotations__": {}})(k=1.0))
+    report = lw.laws.check_law(type("Bad", (Packs,), {"what": given, "__annotations__": {}})(k=1.0))
     assert not report.ok
     assert "packed() returns" in str(report)
-    assert "lw.Packed({name: numbers})" in str(report)
+    assert "lw.laws.Packed({name: numbers})" in str(report)
 
 
 @pytest.mark.kernel
 def test_packed_left_out():
     # Numbers and vectors are packed as they are declared; a number of another shape is not.
-    assert next(check for check in lw.check_law(Pull(k=1.0)).checks if check.name == "numbers").ok
-    report = lw.check_law(Wide(k=1.0))
+    assert next(check for check in lw.laws.check_law(Pull(k=1.0)).checks if check.name == "numbers").ok
+    report = lw.laws.check_law(Wide(k=1.0))
     assert not report.ok
     assert "NotImplementedError" in str(report)
     assert "write packed(self, numbers, context)" in str(report)
@@ -540,8 +540,8 @@ def test_packed_left_out():
 
 @pytest.mark.kernel
 def test_numbers_of_the_wrong_shape():
-    wrong = type("Bad", (Packs,), {"what": lw.Packed({"k": np.ones((1, 3))}), "__annotations__": {}})
-    report = lw.check_law(wrong(k=1.0))
+    wrong = type("Bad", (Packs,), {"what": lw.laws.Packed({"k": np.ones((1, 3))}), "__annotations__": {}})
+    report = lw.laws.check_law(wrong(k=1.0))
     assert not report.ok
     assert "packed() fails" in str(report)
     assert "give arrays (1,), (1, 3)" in str(report)
@@ -553,31 +553,31 @@ def test_what_is_no_fleet():
         assert "give lw.Scene(" in fault
     (fault,) = faults(lw.Ensemble, from_table(MATRIX), 5, 0, [1])
     assert "vary = [1]" in fault
-    assert "lw.Normal" in fault
+    assert "lw.distributions.Normal" in fault
 
 
 def test_two_events_of_one_name():
-    events = [lw.Floor(depth=1.0), lw.Floor(depth=2.0)]
+    events = [lw.events.Floor(depth=1.0), lw.events.Floor(depth=2.0)]
     (fault,) = faults(lw.Scene, from_table(MATRIX).vehicle, events=events)
     assert "events = 'floor'" in fault
     assert 'name = "floor_2"' in fault
-    second = lw.Floor(depth=2.0, name="lower")
+    second = lw.events.Floor(depth=2.0, name="lower")
     assert len(lw.Scene(from_table(MATRIX).vehicle, events=[events[0], second]).events) == 2
 
 
 def test_a_quadratic_matrix_of_members_that_creates_energy():
     scene = from_table({"type": "drag_matrix", "quadratic": np.eye(6).tolist()})
-    (fault,) = faults(lw.Ensemble, scene, 2000, 0, {"drag_matrix.quadratic": lw.Normal(std=1.0)})
+    (fault,) = faults(lw.Ensemble, scene, 2000, 0, {"drag_matrix.quadratic": lw.distributions.Normal(std=1.0)})
     assert "drag_matrix.quadratic of member" in fault
     assert "unphysical" in fault
-    lw.Ensemble(scene, 2000, 0, {"drag_matrix.quadratic": lw.Uniform(relative=0.3)})
+    lw.Ensemble(scene, 2000, 0, {"drag_matrix.quadratic": lw.distributions.Uniform(relative=0.3)})
 
 
 @pytest.mark.kernel
 def test_a_broken_law_in_solve():
     broken = device(law=pull_silent)
     Broken = type("Broken", (Pull,), {"device": broken})
-    with pytest.raises(lw.SceneError, match=r"(?s)law pull: .*does not compile.*lw.check_law"):
+    with pytest.raises(lw.SceneError, match=r"(?s)law pull: .*does not compile.*lw.laws.check_law"):
         lw.solve(lw.Scene(from_table(MATRIX).vehicle, terms=[Broken(k=1.0)]), h=0.01, t1=0.1)
     wavy = type("Wavy", (Pull,), {"device": device(law=pull_law, FLOW="wavy")})
     (fault,) = faults(lw.solve, lw.Scene(from_table(MATRIX).vehicle, terms=[wavy(k=1.0)]), h=0.01, t1=0.1)
@@ -613,7 +613,7 @@ def test_a_law_defined_twice_as_in_a_notebook(tmp_path):
         cell = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(cell)
         Lift = type(
-            "Lift", (Pull,), {"device": cell, "packed": lambda self, numbers, context: lw.Packed(dict(numbers))}
+            "Lift", (Pull,), {"device": cell, "packed": lambda self, numbers, context: lw.laws.Packed(dict(numbers))}
         )
         results.append(lw.solve(lw.Scene(from_table(MATRIX).vehicle, terms=[Lift(k=1.0)]), h=0.01, t1=0.1).position)
     assert np.array_equal(*results)

@@ -17,8 +17,8 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import from_sdf
-from lgvi_warp import from_yaml
+from lgvi_warp.vehicles import from_sdf
+from lgvi_warp.vehicles import from_yaml
 from lgvi_warp.cli import main
 from lgvi_warp.cli.settings import out_of
 from lgvi_warp.common import errors, reading
@@ -241,7 +241,7 @@ def test_yaml_that_two_versions_read_alike_is_read():
 # Files that are none. What opens them waits, or never ends.
 
 
-DOORS = {"scene": lw.Scene.load, "table": lambda path: lw.Table(str(path)), "YAML": from_yaml, "SDF": from_sdf}
+DOORS = {"scene": lw.Scene.load, "table": lambda path: lw.designs.Table(str(path)), "YAML": from_yaml, "SDF": from_sdf}
 # A harm to a path, or a whole path, and words of the refusal.
 KINDS = {
     "folder": (hostile.folder, "is a folder"),

@@ -63,20 +63,20 @@ DOORS = {
     "vehicle's mass": lambda x: lw.Vehicle(mass=x[1], inertia=[5.0, 6.0, 7.0]),
     "vehicle's buoyancy": lambda x: lw.Vehicle(mass=10.0, inertia=[5.0, 6.0, 7.0], center_of_buoyancy=x),
     "start": lambda x: lw.Start(position=x),
-    "term": lambda x: lw.Current(velocity=x),
-    "schedule": lambda x: lw.WrenchSchedule(times=[0.0, 1.0, 2.0], force=[x] * 3),
-    "normal": lambda x: lw.Normal(std=x),
-    "uniform": lambda x: lw.Uniform(low=[-9.0] * 3, high=x),
-    "choice": lambda x: lw.Choice(x),
-    "weights": lambda x: lw.Choice([1.0, 2.0, 3.0], weights=x),
-    "correlated": lambda x: lw.CorrelatedNormal(std=x),
-    "frozen": lambda x: lw.ScipyDistribution(stats.norm(loc=x)),
-    "table": lambda x: lw.Table({"vehicle.mass": x}),
-    "levels": lambda x: lw.UnitCubePoints([x]),
-    "grid": lambda x: lw.Grid({"vehicle.mass": x}),
+    "term": lambda x: lw.terms.Current(velocity=x),
+    "schedule": lambda x: lw.terms.WrenchSchedule(times=[0.0, 1.0, 2.0], force=[x] * 3),
+    "normal": lambda x: lw.distributions.Normal(std=x),
+    "uniform": lambda x: lw.distributions.Uniform(low=[-9.0] * 3, high=x),
+    "choice": lambda x: lw.distributions.Choice(x),
+    "weights": lambda x: lw.distributions.Choice([1.0, 2.0, 3.0], weights=x),
+    "correlated": lambda x: lw.distributions.CorrelatedNormal(std=x),
+    "frozen": lambda x: lw.distributions.ScipyDistribution(stats.norm(loc=x)),
+    "table": lambda x: lw.designs.Table({"vehicle.mass": x}),
+    "levels": lambda x: lw.designs.UnitCubePoints([x]),
+    "grid": lambda x: lw.designs.Grid({"vehicle.mass": x}),
     "saving": lambda x: lw.SaveAt(at=x),
-    "limits": lambda x: lw.Exceedance("position", above=x),
-    "edges": lambda x: lw.Histogram("depth", edges=x),
+    "limits": lambda x: lw.statistics.Exceedance("position", above=x),
+    "edges": lambda x: lw.statistics.Histogram("depth", edges=x),
 }  # fmt: skip
 
 
@@ -109,7 +109,7 @@ def test_a_mask_says_how_many_and_where():
 @pytest.mark.parametrize("name", ["norm", "gamma", "uniform", "poisson", "t", "beta", "lognorm"])
 def test_a_law_without_its_numbers_is_refused(scene, name):
     law = getattr(stats, name)
-    for make in (lambda: lw.Ensemble(scene, 4, 0, {"vehicle.mass": law}), lambda: lw.ScipyDistribution(law),
+    for make in (lambda: lw.Ensemble(scene, 4, 0, {"vehicle.mass": law}), lambda: lw.distributions.ScipyDistribution(law),
                  lambda: EnsembleSettings(4, 0, {"vehicle.mass": law}),
                  lambda: lw.uq.model(scene, {"vehicle.mass": law}, "depth", h=0.01, t1=0.1),
                  lambda: lw.uq.sobol(scene, "depth", vary={"vehicle.mass": law}, h=0.01, t1=0.1)):  # fmt: skip
@@ -143,7 +143,7 @@ def test_a_table_of_a_law_without_numbers_is_refused(scene, table):
 
 
 def test_what_was_frozen_without_numbers_is_read_again():
-    law = lw.ScipyDistribution(stats.norm())
+    law = lw.distributions.ScipyDistribution(stats.norm())
     settings = EnsembleSettings(4, 0, {"vehicle.mass": law.to_dict()})
     levels = np.array([0.2, 0.7])
     np.testing.assert_array_equal(settings.vary["vehicle.mass"].quantile(levels, 0.0), stats.norm().ppf(levels))
@@ -173,11 +173,11 @@ def test_what_a_quantity_of_the_users_gives():
 
     samples = type("Samples", (dict,), {"time": np.arange(2.0), "terms": ()})(position=np.arange(18.0).reshape(2, 3, 3))
     members = SimpleNamespace(count=3)
-    hidden = lw.Quantity("hidden", lambda samples, members: np.ma.masked_less(samples["position"][..., 0], 4.0))
+    hidden = lw.statistics.Quantity("hidden", lambda samples, members: np.ma.masked_less(samples["position"][..., 0], 4.0))
     np.testing.assert_array_equal(hidden(samples, members)[:, 0], [[np.nan, np.nan, 6.0], [9.0, 12.0, 15.0]])
     for odd in (lambda s, m: s["position"][..., 0] + 0j, lambda s, m: s["position"][..., 0].astype(str)):
         with pytest.raises(ValueError, match="quantity odd: gave"):
-            lw.Quantity("odd", odd)(samples, members)
+            lw.statistics.Quantity("odd", odd)(samples, members)
 
 
 def test_what_a_function_of_a_result_gives():
@@ -193,10 +193,10 @@ def test_what_a_function_of_a_result_gives():
 # Conditions without a number -----------------------------------------------------------------------------------------------
 
 LIMITED = [
-    lambda of, **limits: lw.Exceedance(of, **limits),
-    lambda of, **limits: lw.FirstPassage(of, **limits),
-    lambda of, **limits: lw.PathTime(of, **limits),
-    lambda of, **limits: lw.PathMaximum(of, then=lw.Exceedance(**limits)),
+    lambda of, **limits: lw.statistics.Exceedance(of, **limits),
+    lambda of, **limits: lw.statistics.FirstPassage(of, **limits),
+    lambda of, **limits: lw.statistics.PathTime(of, **limits),
+    lambda of, **limits: lw.statistics.PathMaximum(of, then=lw.statistics.Exceedance(**limits)),
 ]
 ONE_NUMBER = ["depth", "position[2]", "speed", "euler[1]", "energy", "norm(velocity)", ["depth"]]
 
@@ -224,5 +224,5 @@ def below(samples, members):
 
 @pytest.mark.parametrize("make", LIMITED)
 def test_a_function_says_true_or_false(make):
-    for of in (below, lw.Quantity("below", below)):
+    for of in (below, lw.statistics.Quantity("below", below)):
         assert make(of) is not None

@@ -65,7 +65,7 @@ def test_laws_of_libraries_say_what_they_are():
     for law in (
         stats.gamma(2.0),
         stats.Normal(mu=1.0, sigma=2.0),
-        lw.Normal(std=1.0),
+        lw.distributions.Normal(std=1.0),
         stats.rv_histogram(([1, 2], [0, 1, 2]))(),
     ):
         assert told(law) == {}
@@ -81,7 +81,7 @@ def test_a_store_and_a_sweep_take_no_law_for_another(tmp_path):
     assert lw.resume(tmp_path / "run.zarr", one).members == 300
     for fleet in (one, other, one):
         found = lw.sweep(
-            fleet, [{"name": "all"}], metrics=[lw.CustomMetric(north, name="north")], out=tmp_path / "sweep", **SETTINGS
+            fleet, [{"name": "all"}], metrics=[lw.metrics.CustomMetric(north, name="north")], out=tmp_path / "sweep", **SETTINGS
         )
         np.testing.assert_array_equal(found.values("all", "north"), fleet.select(0, 300).position[:, 0])
     assert len(list((tmp_path / "sweep" / "cells").iterdir())) == 2

@@ -72,7 +72,7 @@ def test_other_laws_are_refused_with_the_reason():
     (fault,) = faults(lw.Scene, VEHICLE, terms=["drag"])
     assert "terms[0]" in fault
     assert "drag" in fault
-    assert "lw.Drag" in fault
+    assert "lw.terms.Drag" in fault
     (fault,) = faults(lw.Scene, VEHICLE, terms=[{"type": "buoyancy"}])
     assert "follows from the vehicle" in fault
     assert "controller" in faults(lw.Scene, VEHICLE, controller="pid")[0]

@@ -42,8 +42,8 @@ def test_the_paper_in_numbers():
     }  # fmt: skip
     settings = scene.ensemble_settings
     assert (settings.members, settings.seed) == (4096, 1)
-    assert settings.vary["start.angular_velocity"] == lw.Normal(std=[0.03, 0.02, 0.01])
-    assert settings.vary["vehicle.mass"] == lw.Normal(relative=0.001)
+    assert settings.vary["start.angular_velocity"] == lw.distributions.Normal(std=[0.03, 0.02, 0.01])
+    assert settings.vary["vehicle.mass"] == lw.distributions.Normal(relative=0.001)
 
 
 def test_the_papers_start(example):
@@ -101,8 +101,8 @@ def test_overrides():
     np.testing.assert_array_equal(scene.start.position, [0.0, 0.0, 5.0])
     settings = scene.ensemble_settings
     assert settings.members == 7
-    assert settings.vary["vehicle.mass"] == lw.Uniform(half_width=0.5)
-    assert settings.vary["vehicle.buoyancy"] == lw.Normal(std=0.1)
+    assert settings.vary["vehicle.mass"] == lw.distributions.Uniform(half_width=0.5)
+    assert settings.vary["vehicle.buoyancy"] == lw.distributions.Normal(std=0.1)
 
 
 @pytest.mark.parametrize("key", ["mass", "terms.x", "ensemble.vary.x"])

@@ -26,7 +26,7 @@ def test_every_scene_of_the_project_fits(path):
 
 @pytest.mark.parametrize("name", vehicle_names())
 def test_what_a_scene_writes_of_itself_fits(name):
-    events = [lw.Floor(depth=100.0), lw.Box(lower=(-1.0, -1.0, 0.0), upper=(9.0, 9.0, 90.0)), lw.StopTime(at=50.0)]
+    events = [lw.events.Floor(depth=100.0), lw.events.Box(lower=(-1.0, -1.0, 0.0), upper=(9.0, 9.0, 90.0)), lw.events.StopTime(at=50.0)]
     run = {"step": 0.01, "duration": 1.0, "statistics": [{"type": "quantiles", "of": "depth"}],
            "until": {"statistic": "mean depth", "half_width": 0.1}}  # fmt: skip
     vary = {"vehicle.buoyancy": {"normal": {"relative": 0.01}}, "start.position": {"gamma": {"a": 2.0}}}
@@ -80,10 +80,10 @@ def test_keys_are_described():
 
 
 def test_a_registered_term_is_in_it():
-    before = dict(lw.Term.kinds)
+    before = dict(lw.laws.Term.kinds)
     try:
 
-        class Anchor(lw.Term):
+        class Anchor(lw.laws.Term):
             type = "anchor_of_a_test"
 
         types = [entry["properties"]["type"]["const"] for entry in schema()["properties"]["terms"]["items"]["anyOf"]]
@@ -91,8 +91,8 @@ def test_a_registered_term_is_in_it():
         assert "restoring" not in types
         assert "weight" not in types
     finally:
-        lw.Term.kinds.clear()
-        lw.Term.kinds.update(before)
+        lw.laws.Term.kinds.clear()
+        lw.laws.Term.kinds.update(before)
 
 
 def test_the_scene_of_new_has_comments_on_every_key():

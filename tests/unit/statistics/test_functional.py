@@ -31,9 +31,9 @@ OVER_PATH = {
     "norm(mean(norm(velocity)))": ("m/s", 1), "mean( attitude [1, 0] )": ("1", 1),
 }  # fmt: skip
 SAME = {
-    "max(depth)": lw.PathMaximum("depth"), "min(position)": lw.PathMinimum("position"),
-    "mean(velocity)": lw.PathMean("velocity"), "range(euler[2])": lw.PathRange("euler[2]"),
-    "max(norm(angular_velocity))": lw.PathMaximum("norm(angular_velocity)"), "max(position)[1]": lw.PathMaximum("position[1]"),
+    "max(depth)": lw.statistics.PathMaximum("depth"), "min(position)": lw.statistics.PathMinimum("position"),
+    "mean(velocity)": lw.statistics.PathMean("velocity"), "range(euler[2])": lw.statistics.PathRange("euler[2]"),
+    "max(norm(angular_velocity))": lw.statistics.PathMaximum("norm(angular_velocity)"), "max(position)[1]": lw.statistics.PathMaximum("position[1]"),
 }  # fmt: skip
 REFUSED = {
     "deph": "is not known; did you mean 'depth'?", "max(deph)": "is not known; did you mean 'depth'?",
@@ -92,7 +92,7 @@ def test_each_door_gives_the_same_numbers(result, text):
     values = interest.values(result)
     assert values.shape == (N, size)
     assert len(interest.labels(size)) == size
-    extremes, mean = (estimated(kind(text), result) for kind in (lw.Extremes, lw.Mean))
+    extremes, mean = (estimated(kind(text), result) for kind in (lw.statistics.Extremes, lw.statistics.Mean))
     assert extremes["maximum"][-1].tolist() == values.max(axis=0).tolist()
     assert extremes["minimum"][-1].tolist() == values.min(axis=0).tolist()
     np.testing.assert_allclose(mean.value[-1], values.mean(axis=0), rtol=1e-13, atol=1e-15)
@@ -114,30 +114,30 @@ def test_each_door_gives_the_same_numbers(result, text):
 
 @pytest.mark.parametrize("text", SAME)
 def test_an_expression_over_the_path_has_the_bits_of_the_statistic_of_paths(result, text):
-    expression, of_path = estimated(lw.Mean(text), result), estimated(SAME[text], result)
+    expression, of_path = estimated(lw.statistics.Mean(text), result), estimated(SAME[text], result)
     assert expression.arrays.keys() == of_path.arrays.keys()
     assert all(expression[name].tobytes() == of_path[name].tobytes() for name in expression.arrays)
 
 
 def test_names_and_labels_of_paths(result):
-    covariance = estimated(lw.Covariance("max(velocity)", stopped="left_out", confidence=0.5), result)
+    covariance = estimated(lw.statistics.Covariance("max(velocity)", stopped="left_out", confidence=0.5), result)
     assert covariance.name == "covariance max(velocity)"
     assert covariance.unit == "(m/s)^2"
     assert covariance.confidence == 0.5
     assert covariance.coordinates["component"].tolist() == [f"max(velocity)[{i}]" for i in range(3)]
     settings = {"type": "covariance", "of": "max(velocity)", "stopped": "left_out", "confidence": 0.5}
     assert (
-        covariance.settings == lw.Covariance("max(velocity)", stopped="left_out", confidence=0.5).to_dict() == settings
+        covariance.settings == lw.statistics.Covariance("max(velocity)", stopped="left_out", confidence=0.5).to_dict() == settings
     )
-    assert estimated(lw.Mean("max(depth)", name="deepest"), result).name == "deepest"
+    assert estimated(lw.statistics.Mean("max(depth)", name="deepest"), result).name == "deepest"
 
 
 def test_only_whole_paths_count(result):
-    gathers = followed(lw.Mean("max(position)[1]")).open(result.time, N)
+    gathers = followed(lw.statistics.Mean("max(position)[1]")).open(result.time, N)
     good = np.ones((K, N), bool)
     good[4:, 0] = False
     gathers.take(Values(np.moveaxis(result.position, 1, 2), good), slice(0, K))
-    (found,) = followed(lw.Mean("max(position)[1]")).estimates([gathers.close()], result.time)
+    (found,) = followed(lw.statistics.Mean("max(position)[1]")).estimates([gathers.close()], result.time)
     assert found.count.tolist() == [N - 1]
     np.testing.assert_allclose(found.value, result.position[:, 1:, 1].max(axis=0).mean(), rtol=1e-14)
 
@@ -154,11 +154,11 @@ def said_by(door, capsys):
 
 @pytest.mark.parametrize("text", REFUSED)
 def test_each_door_refuses_with_the_same_words(scene, text, tmp_path, capsys):
-    vary = {"start.position": lw.Normal(std=1.0)}
+    vary = {"start.position": lw.distributions.Normal(std=1.0)}
     settings = {"h": 0.02, "t1": 0.1}
     doors = {
-        "statistics": lambda: lw.Mean(text),
-        "a list of quantities": lambda: lw.Covariance(["depth", text]),
+        "statistics": lambda: lw.statistics.Mean(text),
+        "a list of quantities": lambda: lw.statistics.Covariance(["depth", text]),
         "until": lambda: watch(lw.Until(f"mean {text}", 1.0), (), np.zeros(1)),
         "sensitivity": lambda: lw.uq.sobol(scene, text, vary=vary, samples=8, **settings),
         "tradeoff": lambda: lw.tradeoff(scene, ["psi_s"], of=text),
@@ -183,21 +183,21 @@ def test_what_has_no_number_at_each_time_is_refused_with_a_remedy(scene, capsys)
 
 
 @pytest.mark.parametrize(("make", "words"), [
-    (lambda: lw.FirstPassage("max(depth)", above=1.0), "is of samples in time, and max(depth) is one number of each member"),
-    (lambda: lw.PathMean("max(depth)"), "max(depth) is one number of each member; ask for its mean"),
-    (lambda: lw.Mean("max(depth)", at="floor"), "mean.at = 'floor': says when, and max(depth) has no time; leave it out"),
-    (lambda: lw.Mean(["speed", "max(depth)"]), "mean.of[1] = 'max(depth)': looks over the path, and a list is of"),
-    (lambda: lw.Exceedance("max(depth)"), "max(depth) is compared with nothing; give above=... or below=... [m]"),
-    (lambda: lw.PathMaximum("depth", lw.Mean("max(depth)")), "is given already"),
+    (lambda: lw.statistics.FirstPassage("max(depth)", above=1.0), "is of samples in time, and max(depth) is one number of each member"),
+    (lambda: lw.statistics.PathMean("max(depth)"), "max(depth) is one number of each member; ask for its mean"),
+    (lambda: lw.statistics.Mean("max(depth)", at="floor"), "mean.at = 'floor': says when, and max(depth) has no time; leave it out"),
+    (lambda: lw.statistics.Mean(["speed", "max(depth)"]), "mean.of[1] = 'max(depth)': looks over the path, and a list is of"),
+    (lambda: lw.statistics.Exceedance("max(depth)"), "max(depth) is compared with nothing; give above=... or below=... [m]"),
+    (lambda: lw.statistics.PathMaximum("depth", lw.statistics.Mean("max(depth)")), "is given already"),
 ])  # fmt: skip
 def test_what_a_statistic_of_one_number_cannot_do(make, words, capsys):
     assert words in said_by(make, capsys)
 
 
 @pytest.mark.parametrize(("statistics", "name", "words"), [
-    ([lw.Mean("max(depth)")], "mean max(deph)", "did you mean 'mean max(depth)'?"),
-    ([lw.Quantiles("max(depth)")], "quantiles max(deph) 0.95", "did you mean 'quantiles max(depth) 0.95'?"),
-    ([lw.Quantiles("speed")], "wholly else", "known: quantiles speed"),
+    ([lw.statistics.Mean("max(depth)")], "mean max(deph)", "did you mean 'mean max(depth)'?"),
+    ([lw.statistics.Quantiles("max(depth)")], "quantiles max(deph) 0.95", "did you mean 'quantiles max(depth) 0.95'?"),
+    ([lw.statistics.Quantiles("speed")], "wholly else", "known: quantiles speed"),
     ([], "median depth", 'give a mean, such as "mean depth", or statistics'),
 ])  # fmt: skip
 def test_what_is_watched_is_one_of_the_statistics_or_a_mean(statistics, name, words, capsys):
@@ -206,10 +206,10 @@ def test_what_is_watched_is_one_of_the_statistics_or_a_mean(statistics, name, wo
 
 
 def test_a_watched_name_may_have_other_spaces():
-    statistic = lw.Quantiles(["attitude[0, 1]", "norm(velocity)"], (0.5,))
+    statistic = lw.statistics.Quantiles(["attitude[0, 1]", "norm(velocity)"], (0.5,))
     for name in ("quantiles attitude[0,1],norm( velocity ) 0.5", "quantiles attitude[0, 1], norm(velocity) 0.5"):
         assert watch(lw.Until(name, 1.0), [statistic], np.zeros(1)).statistic is statistic
-    mean = lw.Mean("attitude[0, 1]")
+    mean = lw.statistics.Mean("attitude[0, 1]")
     assert watch(lw.Until("mean attitude[0,1]", 1.0), [mean], np.zeros(1)).statistic is mean
 
 

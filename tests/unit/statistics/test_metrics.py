@@ -45,7 +45,7 @@ def course(y, goal=1.0):
 
 
 def each(kind, *args, **settings):
-    return kind(*args, then=[lw.MemberValues()], **settings)
+    return kind(*args, then=[lw.statistics.MemberValues()], **settings)
 
 
 def test_second_order_steps_have_their_analytic_numbers():
@@ -54,24 +54,24 @@ def test_second_order_steps_have_their_analytic_numbers():
     dt = T[1]
     # A tick is at most dt / 2 from the peak, where the curvature is at most omega^2: an error of omega^2 dt^2 / 8.
     bound = OMEGA**2 * dt**2 / 8.0
-    assert np.all(np.abs(number(each(lw.Overshoot, "depth"), course(RESPONSES)) - over) <= bound)
-    percent = number(each(lw.Overshoot, "depth", percent=True), course(RESPONSES))
+    assert np.all(np.abs(number(each(lw.metrics.Overshoot, "depth"), course(RESPONSES)) - over) <= bound)
+    percent = number(each(lw.metrics.Overshoot, "depth", percent=True), course(RESPONSES))
     assert np.all(np.abs(percent - 100.0 * over) <= 100.0 * bound)
-    assert np.all(np.abs(number(each(lw.Peak, "depth"), course(RESPONSES)) - 1.0 - over) <= bound)
-    assert np.all(np.abs(number(each(lw.PeakTime, "depth"), course(RESPONSES)) - np.pi / damped) <= 0.5001 * dt)
-    assert np.all(number(each(lw.Undershoot, "depth"), course(RESPONSES)) == 0.0)
+    assert np.all(np.abs(number(each(lw.metrics.Peak, "depth"), course(RESPONSES)) - 1.0 - over) <= bound)
+    assert np.all(np.abs(number(each(lw.metrics.PeakTime, "depth"), course(RESPONSES)) - np.pi / damped) <= 0.5001 * dt)
+    assert np.all(number(each(lw.metrics.Undershoot, "depth"), course(RESPONSES)) == 0.0)
     # The integral of e^2 of such a step is (1 + 4 zeta^2) / (4 zeta omega), of e itself 2 zeta / omega.
-    ise = number(each(lw.ISE, "depth"), 1.0 - RESPONSES[:, None])
+    ise = number(each(lw.metrics.ISE, "depth"), 1.0 - RESPONSES[:, None])
     np.testing.assert_allclose(ise, (1.0 + 4.0 * ZETA**2) / (4.0 * ZETA * OMEGA), rtol=1e-4)
 
 
 def test_a_step_downward_or_from_elsewhere_is_the_same():
-    up = [number(each(kind, "depth"), course(RESPONSES)) for kind in (lw.Overshoot, lw.RiseTime, lw.SettlingTime)]
+    up = [number(each(kind, "depth"), course(RESPONSES)) for kind in (lw.metrics.Overshoot, lw.metrics.RiseTime, lw.metrics.SettlingTime)]
     down = course(7.0 - 4.0 * RESPONSES, 3.0)
-    np.testing.assert_allclose(number(each(lw.Overshoot, "depth"), down), 4.0 * up[0], rtol=1e-9)
-    np.testing.assert_allclose(number(each(lw.Peak, "depth"), down), 3.0 - 4.0 * up[0], rtol=1e-9)
+    np.testing.assert_allclose(number(each(lw.metrics.Overshoot, "depth"), down), 4.0 * up[0], rtol=1e-9)
+    np.testing.assert_allclose(number(each(lw.metrics.Peak, "depth"), down), 3.0 - 4.0 * up[0], rtol=1e-9)
     # Round-off may move a tick across a limit.
-    for kind, value in ((lw.RiseTime, up[1]), (lw.SettlingTime, up[2])):
+    for kind, value in ((lw.metrics.RiseTime, up[1]), (lw.metrics.SettlingTime, up[2])):
         assert np.all(np.abs(number(each(kind, "depth"), down) - value) <= 1.001 * T[1])
 
 
@@ -80,9 +80,9 @@ def test_step_info_of_python_control_says_the_same():
     y = np.concatenate([RESPONSES, -0.1 * np.sin(T[:, None]) * (T[:, None] < 3.0) + RESPONSES[:, 1:2]], axis=1)
     x = course(y)
     names = {
-        "RiseTime": each(lw.RiseTime, "depth"), "SettlingTime": each(lw.SettlingTime, "depth"),
-        "Overshoot": each(lw.Overshoot, "depth", percent=True), "Undershoot": each(lw.Undershoot, "depth", percent=True),
-        "Peak": each(lw.Peak, "depth"), "PeakTime": each(lw.PeakTime, "depth"),
+        "RiseTime": each(lw.metrics.RiseTime, "depth"), "SettlingTime": each(lw.metrics.SettlingTime, "depth"),
+        "Overshoot": each(lw.metrics.Overshoot, "depth", percent=True), "Undershoot": each(lw.metrics.Undershoot, "depth", percent=True),
+        "Peak": each(lw.metrics.Peak, "depth"), "PeakTime": each(lw.metrics.PeakTime, "depth"),
     }  # fmt: skip
     for i in range(y.shape[1]):
         info = control.step_info(y[:, i], T=T, yfinal=1.0)
@@ -94,16 +94,16 @@ def test_batches_and_replicates_change_no_bit():
     x = course(RESPONSES[:, [0, 1, 2, 0, 1, 2, 1, 0]] + np.arange(8) * 0.01)
     e = x[:, :1]
     for metric, samples in (
-        (each(lw.Overshoot, "depth"), x), (each(lw.SettlingTime, "depth"), x), (each(lw.RiseTime, "depth"), x),
-        (each(lw.PeakTime, "depth"), x), (each(lw.ITAE, "depth"), e), (each(lw.RMSError, "depth"), e),
-        (each(lw.SteadyStateError, "depth"), e), (each(lw.MaxError, "heading"), e), (each(lw.Travel), e),
+        (each(lw.metrics.Overshoot, "depth"), x), (each(lw.metrics.SettlingTime, "depth"), x), (each(lw.metrics.RiseTime, "depth"), x),
+        (each(lw.metrics.PeakTime, "depth"), x), (each(lw.metrics.ITAE, "depth"), e), (each(lw.metrics.RMSError, "depth"), e),
+        (each(lw.metrics.SteadyStateError, "depth"), e), (each(lw.metrics.MaxError, "heading"), e), (each(lw.metrics.Travel), e),
     ):  # fmt: skip
         whole = number(metric, samples, batches=())
         for batches in ((1,), (1, 2, 3), (5, 500, 5_000)):
             assert number(metric, samples, batches=batches).tobytes() == whole.tobytes()
     from lgvi_warp.statistics.values.values import dealt
 
-    metric = each(lw.IAE, "depth")
+    metric = each(lw.metrics.IAE, "depth")
     gatherer = metric.open(T, 8)
     gatherer.take(dealt(e, None, 0, 0, 8, 4), slice(0, len(T)))
     gatherer.end(Ends(np.zeros(8, np.uint8), np.zeros(8, int), np.full(8, T[-1])), 4)
@@ -119,28 +119,28 @@ def test_members_that_end_have_the_numbers_of_their_time_under_way():
     held = e.copy()
     held[5:, :, 1] = 1e9
     ended = np.array([np.inf, 2.2])
-    iae = number(each(lw.IAE, "depth"), held, t, good, ended)
+    iae = number(each(lw.metrics.IAE, "depth"), held, t, good, ended)
     assert iae.tolist() == [60.0, 4.0]
-    assert number(each(lw.MaxError, "depth"), held, t, good, ended).tolist() == [11.0, 3.0]
-    assert number(each(lw.RMSError, "depth"), held, t, good, ended)[1] == pytest.approx(
+    assert number(each(lw.metrics.MaxError, "depth"), held, t, good, ended).tolist() == [11.0, 3.0]
+    assert number(each(lw.metrics.RMSError, "depth"), held, t, good, ended)[1] == pytest.approx(
         np.sqrt(np.trapezoid(e[:5, 0, 1] ** 2, t[:5]) / 2.0)
     )
-    assert number(each(lw.TimeToFailure), held, t, good, ended).tolist() == [np.inf, 2.2]
-    last = number(each(lw.SteadyStateError, "depth"), held, t, good, ended)
+    assert number(each(lw.metrics.TimeToFailure), held, t, good, ended).tolist() == [np.inf, 2.2]
+    last = number(each(lw.metrics.SteadyStateError, "depth"), held, t, good, ended)
     assert last[0] == pytest.approx(np.mean([10.0, 10.5, 11.0]))
     assert np.isnan(last[1])
     # Statistics count members that stopped, and leave out those that failed.
-    assert number(lw.IAE("depth"), held, t, good, ended) == pytest.approx(32.0)
-    assert number(lw.IAE("depth"), held, t, good, ended, lost=True) == pytest.approx(60.0)
+    assert number(lw.metrics.IAE("depth"), held, t, good, ended) == pytest.approx(32.0)
+    assert number(lw.metrics.IAE("depth"), held, t, good, ended, lost=True) == pytest.approx(60.0)
 
 
 def test_what_never_comes_is_infinite():
     y = 0.5 * RESPONSES
-    assert np.all(np.isinf(number(each(lw.RiseTime, "depth"), course(y))))
-    assert np.all(np.isinf(number(each(lw.SettlingTime, "depth"), course(y))))
+    assert np.all(np.isinf(number(each(lw.metrics.RiseTime, "depth"), course(y))))
+    assert np.all(np.isinf(number(each(lw.metrics.SettlingTime, "depth"), course(y))))
     still = course(np.ones((len(T), 1)))
-    assert number(each(lw.RiseTime, "depth"), still) == number(each(lw.SettlingTime, "depth"), still) == 0.0
-    assert np.isnan(number(each(lw.Overshoot, "depth", percent=True), still))
+    assert number(each(lw.metrics.RiseTime, "depth"), still) == number(each(lw.metrics.SettlingTime, "depth"), still) == 0.0
+    assert np.isnan(number(each(lw.metrics.Overshoot, "depth", percent=True), still))
 
 
 def test_headings_are_wrapped():
@@ -148,8 +148,8 @@ def test_headings_are_wrapped():
     y = np.arctan2(np.sin(turn), np.cos(turn))[:, None]
     x, t = course(y, -3.0), np.linspace(0.0, 10.0, 101)
     # From 3.0 rad up to 2 pi - 3.0 = 3.283 rad, and beyond it to 3.5 rad.
-    assert number(each(lw.Overshoot, "heading"), x, t) == pytest.approx(3.5 - (2.0 * np.pi - 3.0))
-    assert number(each(lw.Peak, "heading"), x, t) == pytest.approx(3.5 - 2.0 * np.pi)
+    assert number(each(lw.metrics.Overshoot, "heading"), x, t) == pytest.approx(3.5 - (2.0 * np.pi - 3.0))
+    assert number(each(lw.metrics.Peak, "heading"), x, t) == pytest.approx(3.5 - 2.0 * np.pi)
 
 
 def test_the_users_own_sees_each_tick():
@@ -162,22 +162,22 @@ def test_the_users_own_sees_each_tick():
 
     t = np.array([0.0, 1.0, 3.0])
     x = np.random.default_rng(1).normal(size=(3, 5, 4))
-    metric = lw.CustomMetric(worst, then=[lw.MemberValues()], fields=("position", "command"), last=lambda state: state.sum(axis=0))
+    metric = lw.metrics.CustomMetric(worst, then=[lw.statistics.MemberValues()], fields=("position", "command"), last=lambda state: state.sum(axis=0))
     expected = x[:, 2].max(axis=0) + (x[:, 3] + x[:, 4]).max(axis=0)
     np.testing.assert_array_equal(number(metric, x, t, batches=(1,)), expected)
     assert seen == [(0.0, 0.0, (4, 3), (4, 2)), (1.0, 1.0, (4, 3), (4, 2)), (3.0, 2.0, (4, 3), (4, 2))]
     assert metric.key == "worst"
     with pytest.raises(ValueError, match=r"gave shape \(2,\); \(..., 4\) is wanted"):
-        number(lw.CustomMetric(lambda state, tick: np.zeros(2), fields=("position",)), x[:, :3], t)
+        number(lw.metrics.CustomMetric(lambda state, tick: np.zeros(2), fields=("position",)), x[:, :3], t)
 
 
 @pytest.mark.parametrize(("make", "text"), [
-    (lambda: lw.Overshoot("dept"), "did you mean 'depth'"), (lambda: lw.Overshoot("position"), "no goal beyond"),
-    (lambda: lw.IAE(None), "is missing"), (lambda: lw.SettlingTime("depth", within=-1.0), "within"),
-    (lambda: lw.RiseTime("depth", limits=(0.9, 0.1)), "two rising parts"), (lambda: lw.Effort("speed"), "signal of actuators"),
-    (lambda: lw.SteadyStateError("depth", share=0.0), "part of the run"), (lambda: lw.CustomMetric("depth"), "no function"),
-    (lambda: lw.CustomMetric(len, fields=("dept",)), "fields"), (lambda: lw.IAE("depth", stopped="held"), "no meaning"),
-    (lambda: lw.IAE("depth", at="floor"), "one moment"), (lambda: lw.ActuatorEnergy("depth"), "leave it out"),
+    (lambda: lw.metrics.Overshoot("dept"), "did you mean 'depth'"), (lambda: lw.metrics.Overshoot("position"), "no goal beyond"),
+    (lambda: lw.metrics.IAE(None), "is missing"), (lambda: lw.metrics.SettlingTime("depth", within=-1.0), "within"),
+    (lambda: lw.metrics.RiseTime("depth", limits=(0.9, 0.1)), "two rising parts"), (lambda: lw.metrics.Effort("speed"), "signal of actuators"),
+    (lambda: lw.metrics.SteadyStateError("depth", share=0.0), "part of the run"), (lambda: lw.metrics.CustomMetric("depth"), "no function"),
+    (lambda: lw.metrics.CustomMetric(len, fields=("dept",)), "fields"), (lambda: lw.metrics.IAE("depth", stopped="held"), "no meaning"),
+    (lambda: lw.metrics.IAE("depth", at="floor"), "one moment"), (lambda: lw.metrics.ActuatorEnergy("depth"), "leave it out"),
 ])  # fmt: skip
 def test_what_is_asked_wrongly_gets_one_sentence(make, text):
     with pytest.raises(lw.SceneError, match=text):

@@ -44,7 +44,7 @@ def other(result, change):
 
 @pytest.mark.parametrize("text", AT_EACH_TIME)
 def test_every_door_knows_what_has_a_number_at_each_time(result, text):
-    assert lw.Mean(text).quantity.size == functional("of", text).size
+    assert lw.statistics.Mean(text).quantity.size == functional("of", text).size
     (at_end,) = quantities(text)
     assert at_end.values(result).shape == (N, functional("of", text).size)
     asked = compared_in(text)
@@ -62,12 +62,12 @@ def test_what_looks_over_the_path(result, text):
     message = refused(compared_in, text)
     assert "looks over the path" in message
     assert "largest error over the path" in message
-    assert lw.Mean(text).key == f"mean {text}"
+    assert lw.statistics.Mean(text).key == f"mean {text}"
 
 
 @pytest.mark.parametrize("text", UNKNOWN)
 def test_what_is_not_known_is_known_nowhere(text):
-    for make in (compared_in, quantities, lw.Mean, lambda of: functional("of", of)):
+    for make in (compared_in, quantities, lw.statistics.Mean, lambda of: functional("of", of)):
         message = refused(make, text)
         assert "of = " in message
         assert "give" in message or "write" in message or "did you" in message or "known" in message
@@ -145,7 +145,7 @@ def test_the_five_keep_their_own_distances():
 
 
 def test_a_quantity_of_the_users_may_be_asked_for_everywhere(result):
-    own = lw.Quantity(
+    own = lw.statistics.Quantity(
         "sunk", lambda samples, members: samples["position"][..., 2] - members.position[None, :, 2], "m", ("position",)
     )
     sunk = result.position[..., 2] - result.position[0, :, 2]
@@ -153,7 +153,7 @@ def test_a_quantity_of_the_users_may_be_asked_for_everywhere(result):
     asked = compared_in(own)
     assert (asked.name, asked.unit) == ("sunk", "m")
     np.testing.assert_array_equal(asked.values(result)[..., 0], sunk)
-    assert lw.Mean(own).quantity is own
+    assert lw.statistics.Mean(own).quantity is own
 
 
 @pytest.mark.parametrize(("of", "labels"), [

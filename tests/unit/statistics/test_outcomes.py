@@ -69,7 +69,7 @@ def incidence(ends, status, t):
 def test_an_outcome_is_aalen_and_johansens(step):
     # With a step many members end at the same times, some of them at sample times.
     ends = ends_of(1000, step=step)
-    (found,) = gathered(lw.Outcome("floor"), ends)
+    (found,) = gathered(lw.statistics.Outcome("floor"), ends)
     floor, lost = ends.status == FLOOR, ends.status == FAILED
     np.testing.assert_allclose(found.value, [incidence(ends, FLOOR, t) for t in TIMES], rtol=1e-12)
     for name, which in {"ended": floor, "otherwise": (ends.status != OK) & ~floor, "failed": lost}.items():
@@ -95,11 +95,11 @@ def test_an_outcome_is_aalen_and_johansens(step):
 def test_the_sum_over_outcomes_and_ok_is_1(rates, replicates):
     # What fails does so before the end of the run: at 9.9 s at the latest.
     ends = ends_of(1024, rates=rates, step=0.3)
-    each = [gathered(lw.Outcome(name), ends, replicates=replicates)[0] for name in ("floor", "top", "ok")]
+    each = [gathered(lw.statistics.Outcome(name), ends, replicates=replicates)[0] for name in ("floor", "top", "ok")]
     assert sum(one.value[-1] for one in each) == pytest.approx(1.0, abs=1e-12)
-    (stopped,) = gathered(lw.Outcome("stopped"), ends, replicates=replicates)
+    (stopped,) = gathered(lw.statistics.Outcome("stopped"), ends, replicates=replicates)
     np.testing.assert_allclose(each[0].value + each[1].value, stopped.value, rtol=1e-12)
-    (failed,) = gathered(lw.Outcome("failed"), ends, replicates=replicates)
+    (failed,) = gathered(lw.statistics.Outcome("failed"), ends, replicates=replicates)
     np.testing.assert_array_equal(failed.value, failed["fraction"])
     if not rates[2]:
         assert sum(one["fraction"][-1] for one in each) == 1.0
@@ -108,7 +108,7 @@ def test_the_sum_over_outcomes_and_ok_is_1(rates, replicates):
 @pytest.mark.parametrize("rates", [(0.1, 0.0, 0.0), (0.1, 0.3, 0.0)])
 def test_without_failures_an_outcome_is_a_fraction_with_wilsons_interval(rates):
     ends = ends_of(700, rates=rates)
-    (found,) = gathered(lw.Outcome("floor"), ends)
+    (found,) = gathered(lw.statistics.Outcome("floor"), ends)
     hits = np.array([((ends.status == FLOOR) & (ends.time <= t)).sum() for t in TIMES])
     np.testing.assert_array_equal(found.value, hits / 700)
     for hit, low, high in zip(hits, found.lower, found.upper, strict=True):
@@ -123,14 +123,14 @@ def test_all_that_are_left_fail():
     """Of 100 members 20 sink, 50 rise, and then 30 fail: these may sink or rise, all of them."""
     time = np.repeat([1.0, 1.5, 3.0], [20, 50, 30])
     ends = Ends(np.repeat([FLOOR, SURFACE, FAILED], [20, 50, 30]), np.repeat([1, 2, 0], [20, 50, 30]), time, EVENTS)
-    (found,) = gathered(lw.Outcome("floor"), ends)
+    (found,) = gathered(lw.statistics.Outcome("floor"), ends)
     assert found.value.tolist() == [0.0, 0.2, 0.2, 0.2, 0.2, 0.2]
     wilson = stats.binomtest(20, 100).proportion_ci(0.95, "wilson")
     assert found.upper[1] == pytest.approx(wilson.high)
     assert 0.3 + wilson.high <= found.upper[-1] < 1.0
     assert found.lower[1] == pytest.approx(wilson.low)
     assert found.lower[-1] <= wilson.low
-    (alone,) = gathered(lw.Outcome("floor"), part_of(ends, slice(70, 100)))
+    (alone,) = gathered(lw.statistics.Outcome("floor"), part_of(ends, slice(70, 100)))
     assert (alone.value[-1], alone.lower[-1], alone.upper[-1]) == (0.0, 0.0, 1.0)
 
 
@@ -152,7 +152,7 @@ def test_words_for_outcomes():
 
 def test_end_times_of_those_that_ended_so():
     ends = ends_of(1000)
-    mean, quantiles, histogram = gathered(lw.EndTime("floor"), ends)
+    mean, quantiles, histogram = gathered(lw.statistics.EndTime("floor"), ends)
     time = ends.time[ends.status == FLOOR]
     assert (mean.name, quantiles.name, histogram.name) == (
         "mean end_time floor", "quantiles end_time floor", "histogram end_time floor",
@@ -168,12 +168,12 @@ def test_end_times_of_those_that_ended_so():
 
 def test_a_statistic_at_an_outcome_is_of_those_that_had_it():
     ends, last = ends_of(900), np.random.default_rng(3).normal(size=(900, 3))
-    (mean,) = gathered(lw.Mean("position", at="floor"), ends, last=last)
+    (mean,) = gathered(lw.statistics.Mean("position", at="floor"), ends, last=last)
     floor = ends.status == FLOOR
     assert mean.name == "mean position at floor"
     assert mean.count == floor.sum()
     np.testing.assert_allclose(mean.value[0], last[floor].mean(axis=0), rtol=1e-12)
-    (beyond,) = gathered(lw.Exceedance("position", above=0.5, at="top"), ends, last=last)
+    (beyond,) = gathered(lw.statistics.Exceedance("position", above=0.5, at="top"), ends, last=last)
     assert beyond.name == "exceedance position above 0.5 at top"
     np.testing.assert_allclose(beyond.value[0], (last[ends.event == 2] > 0.5).mean(axis=0))
     lines = "\n".join(table(Estimates([mean, beyond])))
@@ -181,7 +181,7 @@ def test_a_statistic_at_an_outcome_is_of_those_that_had_it():
     assert f"{floor.sum()} members" in lines
 
 
-OF_ENDS = {"outcome": lw.Outcome("floor"), "end_time": lw.EndTime("floor", [lw.Mean(), lw.Quantiles(size=64)])}
+OF_ENDS = {"outcome": lw.statistics.Outcome("floor"), "end_time": lw.statistics.EndTime("floor", [lw.statistics.Mean(), lw.statistics.Quantiles(size=64)])}
 
 
 @pytest.mark.parametrize("kind", OF_ENDS)
@@ -198,7 +198,7 @@ def test_blocks_in_any_order_give_the_same_bits(kind, replicates):
 
 def test_replicates_give_the_value_of_all_and_an_interval_of_their_spread():
     ends = ends_of(4096)
-    (whole,), (found,) = gathered(lw.Outcome("floor"), ends), gathered(lw.Outcome("floor"), ends, replicates=8)
+    (whole,), (found,) = gathered(lw.statistics.Outcome("floor"), ends), gathered(lw.statistics.Outcome("floor"), ends, replicates=8)
     np.testing.assert_allclose(found.value, whole.value, rtol=1e-12)
     np.testing.assert_array_equal(found["ended"], whole["ended"])
     assert "8 replicates" in found.interval
@@ -215,7 +215,7 @@ def test_coverage(rates):
     true, alone = -a / both * np.expm1(-both * TIMES[-1]), -np.expm1(-a * TIMES[-1])
     values, sizes, hold, alone_hold = [], [], 0, 0
     for seed in range(1000):
-        (found,) = gathered(lw.Outcome("floor"), ends_of(200, seed, rates))
+        (found,) = gathered(lw.statistics.Outcome("floor"), ends_of(200, seed, rates))
         hold += found.lower[-1] <= true <= found.upper[-1]
         # The clocks of the three are independent here, which `alone` takes for granted.
         alone_hold += found["alone_lower"][-1] <= alone <= found["alone_upper"][-1]
@@ -230,11 +230,11 @@ def test_coverage(rates):
 
 
 def test_nobody():
-    (found,) = gathered(lw.Outcome("floor"), part_of(ends_of(10, rates=(0.0, 0.0, 0.0)), slice(0, 10)))
+    (found,) = gathered(lw.statistics.Outcome("floor"), part_of(ends_of(10, rates=(0.0, 0.0, 0.0)), slice(0, 10)))
     np.testing.assert_array_equal(found.value, 0.0)
     assert np.isinf(found["end_time"]).all()
     assert (found.upper > 0.1).all()
-    mean, quantiles, _ = gathered(lw.EndTime("top"), ends_of(10, rates=(0.0, 0.0, 0.0)))
+    mean, quantiles, _ = gathered(lw.statistics.EndTime("top"), ends_of(10, rates=(0.0, 0.0, 0.0)))
     assert np.isnan(mean.value).all()
     assert np.isnan(quantiles.value).all()
     assert mean.count == 0
@@ -242,7 +242,7 @@ def test_nobody():
 
 def test_first_passage_knows_when_a_member_was_stopped():
     # It sinks at 1 m/s to a floor at 3 m, between the samples at 2 and 4 s: in the second it stands on the floor.
-    statistic = lw.FirstPassage(lw.Quantity("x", lambda s, m: None, "m", (), ("x",)), above=2.5, levels=(0.5,))
+    statistic = lw.statistics.FirstPassage(lw.statistics.Quantity("x", lambda s, m: None, "m", (), ("x",)), above=2.5, levels=(0.5,))
     gathers = statistic.open(TIMES, 4)
     x = np.minimum(TIMES, 3.0)[:, None, None] * np.ones((1, 1, 4))
     gathers.take(Values(x[:1]), slice(0, 1))
@@ -257,7 +257,7 @@ def test_first_passage_knows_when_a_member_was_stopped():
 @pytest.mark.parametrize("replicates", [1, 2])
 def test_first_passage_takes_stopped_members_for_what_they_are(replicates):
     """Of 100 members 50 are stopped elsewhere at 1 s, 26 fail at 5 s and 24 pass at 7 s: of the 50 all would have passed."""
-    statistic = lw.FirstPassage(lw.Quantity("x", lambda s, m: None, "m", (), ("x",)), above=2.5, levels=(0.4, 0.6))
+    statistic = lw.statistics.FirstPassage(lw.statistics.Quantity("x", lambda s, m: None, "m", (), ("x",)), above=2.5, levels=(0.4, 0.6))
     end = np.repeat([1.0, 5.0, 10.0], [50, 26, 24])
     x = np.where((np.arange(100) >= 76) & (TIMES[:, None] >= 7.0), 3.0, 2.0)[:, None]
     good = (np.arange(100) < 50) | (np.arange(100) >= 76) | (TIMES[:, None] < 5.0)
@@ -277,19 +277,19 @@ def test_first_passage_takes_stopped_members_for_what_they_are(replicates):
     assert found["passage_time"][0] < 8.0
     assert found["passage_time"][1] == np.inf
     assert found["censored"] == 0
-    (outcome,) = gathered(lw.Outcome("floor"), Ends(
+    (outcome,) = gathered(lw.statistics.Outcome("floor"), Ends(
         np.where(ends.status == OK, FLOOR, ends.status), np.where(ends.status == OK, 1, ends.event), end, EVENTS))  # fmt: skip
     assert outcome.value[-1] == pytest.approx(found.value[-1], rel=1e-15)
 
 
 def test_parts_and_estimates_of_an_earlier_version_are_refused():
-    (found,) = gathered(lw.Outcome("floor"), ends_of(100))
+    (found,) = gathered(lw.statistics.Outcome("floor"), ends_of(100))
     arrays, text = Estimates([found]).to_arrays()
     assert Estimates.from_arrays(arrays, text)["outcome floor"]["alone"].tobytes() == found["alone"].tobytes()
     del arrays["0/alone"]
     with pytest.raises(ValueError, match="'outcome floor' is of an earlier version"):
         Estimates.from_arrays(arrays, text)
-    gather = Gathered(TIMES, 100, [lw.Outcome("floor")])
+    gather = Gathered(TIMES, 100, [lw.statistics.Outcome("floor")])
     old = {"members": np.array([1]), "time": np.array([1.0]), "so": np.array([True]),
            "replicate": np.zeros(1, np.int32)}  # fmt: skip
     with pytest.raises(ValueError, match="'outcome floor' is of an earlier version"):
@@ -308,13 +308,13 @@ def test_from_a_scene_file():
 
 
 @pytest.mark.parametrize(("make", "text"), [
-    (lambda: lw.Outcome(3), "is no outcome"), (lambda: lw.Outcome("floor", levels=(0.0,)), "between 0 and 1"),
-    (lambda: lw.EndTime("floor", lw.FirstPassage(above=1.0)), "one number of each member"),
-    (lambda: lw.EndTime("floor", lw.Mean(at="floor")), "leave it out"),
-    (lambda: lw.FirstPassage("depth", above=1.0, at="floor"), "of all times"),
-    (lambda: lw.PathMean("depth", at="floor"), "of all times"), (lambda: lw.Mean("depth", at=""), "is no outcome"),
-    (lambda: lw.Outcome("floor", at="floor"), "of all times"),
-    (lambda: lw.Histogram("depth", bins=3, limits="run"), "lw.EndTime"),
+    (lambda: lw.statistics.Outcome(3), "is no outcome"), (lambda: lw.statistics.Outcome("floor", levels=(0.0,)), "between 0 and 1"),
+    (lambda: lw.statistics.EndTime("floor", lw.statistics.FirstPassage(above=1.0)), "one number of each member"),
+    (lambda: lw.statistics.EndTime("floor", lw.statistics.Mean(at="floor")), "leave it out"),
+    (lambda: lw.statistics.FirstPassage("depth", above=1.0, at="floor"), "of all times"),
+    (lambda: lw.statistics.PathMean("depth", at="floor"), "of all times"), (lambda: lw.statistics.Mean("depth", at=""), "is no outcome"),
+    (lambda: lw.statistics.Outcome("floor", at="floor"), "of all times"),
+    (lambda: lw.statistics.Histogram("depth", bins=3, limits="run"), "lw.statistics.EndTime"),
 ])  # fmt: skip
 def test_what_is_refused(make, text):
     with pytest.raises(lw.SceneError) as error:
@@ -325,5 +325,5 @@ def test_what_is_refused(make, text):
 @pytest.mark.parametrize("replicates", [1, 4])
 def test_every_kind_is_the_same_from_a_file(replicates):
     ends = ends_of(400)
-    for statistic in (lw.Outcome("floor"), lw.EndTime("floor")):
+    for statistic in (lw.statistics.Outcome("floor"), lw.statistics.EndTime("floor")):
         check_as_files_hold_it(gathered(statistic, ends, replicates=replicates))

@@ -52,7 +52,7 @@ def estimate(kind, *arguments, d=2, **named):
 COUNT = int(GOOD[-1].sum())
 
 
-@pytest.mark.parametrize("kind", [lw.Mean, lw.CircularMean])
+@pytest.mark.parametrize("kind", [lw.statistics.Mean, lw.statistics.CircularMean])
 def test_one_line_a_component(kind):
     one = estimate(kind)
     name = one.settings["type"]
@@ -64,7 +64,7 @@ def test_one_line_a_component(kind):
 
 
 def test_a_line_for_each_level_of_quantiles():
-    one = estimate(lw.Quantiles, levels=(0.1, 0.9))
+    one = estimate(lw.statistics.Quantiles, levels=(0.1, 0.9))
     expected = [
         (f"quantiles x[{i}] {level}", *entries(one, (-1, j, i)), COUNT)
         for i in (0, 1)
@@ -74,18 +74,18 @@ def test_a_line_for_each_level_of_quantiles():
 
 
 def test_lines_of_a_covariance():
-    one = estimate(lw.Covariance)
+    one = estimate(lw.statistics.Covariance)
     expected = [(f"covariance x[{i}], x[{j}]", *entries(one, (-1, i, j)), COUNT) for i, j in ((0, 0), (1, 0), (1, 1))]
     assert rows_of(one) == said(expected)
     x = np.random.default_rng(1).normal(size=(2, 300, 4)) * np.arange(1.0, 5.0)
-    (many,) = gathered(lw.Covariance(scalar(4)), x)
+    (many,) = gathered(lw.statistics.Covariance(scalar(4)), x)
     # Of more than three components the variances alone.
     expected = [(f"covariance x[{i}], x[{i}]", *entries(many, (-1, i, i)), 300) for i in range(4)]
     assert rows_of(many) == said(expected)
 
 
 def test_lines_of_extremes_name_their_members():
-    one = estimate(lw.Extremes)
+    one = estimate(lw.statistics.Extremes)
     expected = []
     for i in (0, 1):
         x = np.where(GOOD[-1], X[-1, :, i], np.nan)
@@ -96,7 +96,7 @@ def test_lines_of_extremes_name_their_members():
 
 def test_the_fullest_bin_of_a_histogram():
     edges = np.linspace(0.0, 60.0, 7)
-    one = estimate(lw.Histogram, edges=edges)
+    one = estimate(lw.statistics.Histogram, edges=edges)
     expected = []
     for i in (0, 1):
         best = np.argmax(np.histogram(X[-1, GOOD[-1], i], edges)[0])
@@ -106,7 +106,7 @@ def test_the_fullest_bin_of_a_histogram():
 
 
 def test_lines_of_a_passage():
-    (one,) = gathered(lw.FirstPassage(scalar(1), above=8.0, levels=(0.1, 0.3)), X[..., :1], good=GOOD)
+    (one,) = gathered(lw.statistics.FirstPassage(scalar(1), above=8.0, levels=(0.1, 0.3)), X[..., :1], good=GOOD)
     (label, *first), *times = rows_of(one)
     assert label == one.name
     assert first[0] == float(f"{one.value[-1]:.6g}")
@@ -119,7 +119,7 @@ def test_lines_of_a_passage():
 
 def test_lines_of_an_outcome():
     members = test_outcomes.ends_of(1000)
-    (one,) = test_outcomes.gathered(lw.Outcome("floor", levels=(0.25, 0.5)), members)
+    (one,) = test_outcomes.gathered(lw.statistics.Outcome("floor", levels=(0.25, 0.5)), members)
     whole, of_all, *times = rows_of(one)
     assert whole == said([(one.name, one.value[-1], one.lower[-1], one.upper[-1], 1000)])[0]
     share = np.mean(members.status == test_outcomes.FLOOR)
@@ -132,14 +132,14 @@ def test_lines_of_an_outcome():
     ]
     assert times == said(expected)
     # Where nothing else ends a member, both fractions are one.
-    (alone,) = test_outcomes.gathered(lw.Outcome("floor"), test_outcomes.ends_of(500, rates=(0.1, 0.0, 0.0)))
+    (alone,) = test_outcomes.gathered(lw.statistics.Outcome("floor"), test_outcomes.ends_of(500, rates=(0.1, 0.0, 0.0)))
     assert not any("of all members" in row[0] for row in rows_of(alone))
 
 
 def test_lines_of_a_mean_attitude():
     rng = np.random.default_rng(8)
     R = rotations(np.array([0.02, 0.01, 0.03]) * np.arange(1, 3)[:, None, None] * rng.normal(size=(2, 500, 3)))
-    (one,) = gathered(lw.MeanAttitude(), R.reshape(2, 500, 9))
+    (one,) = gathered(lw.statistics.MeanAttitude(), R.reshape(2, 500, 9))
     spread, *axes = rows_of(one)
     assert spread == said([(f"{one.name}: dispersion [rad]", one["dispersion"][-1], None, None, 500)])[0]
     half = one["rotation_half_width"][-1]

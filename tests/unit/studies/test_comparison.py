@@ -30,7 +30,7 @@ from tests.conftest import ROOT
 from tests.support.made import made
 
 ENOUGH = 1e4
-CURRENT = lw.GaussMarkovCurrent(standard_deviation=[0.2, 0.2, 0.05], time_constant=30.0)
+CURRENT = lw.terms.GaussMarkovCurrent(standard_deviation=[0.2, 0.2, 0.05], time_constant=30.0)
 # No method on the front.
 BAD = dict.fromkeys((*suggest.CANDIDATES, *comparison.PRECISE), 1e12)
 NAMES = ["position", "attitude", "velocity", "angular_velocity", "energy"]
@@ -191,7 +191,7 @@ def test_methods_are_taken_refused_or_the_same_as_others(scene):
     names = ["psi_x", "rk4", "psi_s"]
     assert sample.accepted(names) == (names, {})
     assert sample.accepted(names, most=2)[0] == names[:2]
-    damped = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[lw.Drag(linear=[1.0] * 6)]), 2), 4.0)
+    damped = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[lw.terms.Drag(linear=[1.0] * 6)]), 2), 4.0)
     taken, refused = damped.accepted(["gauss4", "rk4"])
     assert taken == ["rk4"]
     assert list(refused) == ["gauss4"]
@@ -1215,7 +1215,7 @@ def test_ladders_give_up_what_is_dear_or_stalls(scene):
     assert one.cheapest()[1:] == ["nearer", "near"]
     assert ladders(1e-3).limited_by_damping
     assert ladders(1e-3).cheapest() == []
-    damped = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[lw.Drag(linear=[1.0] * 6)]), 2), 4.0, samples=5)
+    damped = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[lw.terms.Drag(linear=[1.0] * 6)]), 2), 4.0, samples=5)
     rate = h_rates(rates(damped.ensemble), 1.0)["drag"]
     for ratio, limited in ((1.99, False), (2.01, True)):
         one = suggest.Ladders(damped, reference, of, 1e-3, Budget(ENOUGH))

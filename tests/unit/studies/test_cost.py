@@ -179,7 +179,7 @@ def test_which_steps_are_more_work_when_longer(scene, method, grows):
 
 @pytest.mark.parametrize("noise_step", [None, 0.0125])
 def test_steps_of_several_draws_are_more_work(scene, noise_step):
-    noise = lw.WrenchNoise(force=[1.0, 1.0, 1.0], noise_step=noise_step)
+    noise = lw.terms.WrenchNoise(force=[1.0, 1.0, 1.0], noise_step=noise_step)
     sample = Sample(lw.Scene(scene.vehicle, scene.environment, terms=[noise], start=scene.start), 1.0, 1).on_grid(4)
     candidates = [sample.candidate("psi_x", m) for m in (1, 4)]
     # Every run of the comparison draws on one grid; a run outside it as the scene says.

@@ -66,13 +66,13 @@ def test_members_and_threads_by_default():
 ])  # fmt: skip
 def test_numbers_of_members_and_threads_that_are_none(arguments, words):
     with pytest.raises(lw.SceneError) as caught:
-        lw.scaling(speed.fleet(8), **arguments)
+        lw.bench.scaling(speed.fleet(8), **arguments)
     assert words in str(caught.value)
 
 
 def test_what_each_term_costs():
     """Ten nanoseconds without terms, seven more for each of a scene's."""
-    drag, wrench = lw.Drag(linear=[1.0] * 6), lw.Wrench(force=[1.0, 0.0, 0.0])
+    drag, wrench = lw.terms.Drag(linear=[1.0] * 6), lw.terms.Wrench(force=[1.0, 0.0, 0.0])
     scene = dataclasses.replace(speed.example(), terms=[drag, wrench])
     plans = scaling.plans_of_terms(scene, 16, "psi_x", 0.02, "float32")
     prices = [Cost(1e-3 * (10.0 + 7.0 * len(plan.ensemble.scene.terms)) / plan.grid.h, 1.0) for plan in plans.values()]
@@ -91,7 +91,7 @@ def test_what_each_term_costs():
     with pytest.raises(
         lw.SceneError, match=r"scene\.terms: is empty; give the scene terms whose cost is to be measured"
     ):
-        lw.term_cost(speed.example())
+        lw.bench.term_cost(speed.example())
 
 
 @pytest.mark.parametrize(("faster", "better"), [(0.96, True), (0.98, False)])
@@ -299,7 +299,7 @@ def test_speeds_beside_the_peak_of_the_core():
     assert speed.operations("phi") == 133 + 8
     assert speed.operations("psi_x", 5) == 171
     assert speed.operations("psi_s", 0) == 239
-    example = speed.fleet(5, lw.Drag(linear=[1.0] * 6))
+    example = speed.fleet(5, lw.terms.Drag(linear=[1.0] * 6))
     assert example.members == 5
     assert example.seed == 1
     assert [term.key for term in example.scene.terms] == ["drag"]

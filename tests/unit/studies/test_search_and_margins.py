@@ -17,8 +17,8 @@ from lgvi_warp.studies.linear.margins import Margins
 from lgvi_warp.studies.search import box, numbers, risk, tune, worst_case
 from lgvi_warp.studies.search.box import SearchBox
 
-SCENE = lw.Scene(lw.Vehicle(2.0, inertia=(1.0, 1.0, 1.0)), terms=[lw.Drag(linear=[1.0] * 6)])
-STARTS = {"start.position[2]": lw.Normal(std=1.0)}
+SCENE = lw.Scene(lw.Vehicle(2.0, inertia=(1.0, 1.0, 1.0)), terms=[lw.terms.Drag(linear=[1.0] * 6)])
+STARTS = {"start.position[2]": lw.distributions.Normal(std=1.0)}
 OVER = {"vehicle.mass": (1.0, 4.0), "drag.linear[0]": (1.0, 100.0, "log")}
 
 
@@ -90,13 +90,13 @@ def test_bounds_that_are_none(bounds, words):
 
 def test_risks_at_their_ends():
     costs = np.array([[4.0, 1.0, 3.0, 2.0]])
-    assert lw.CVaR(0.25)(costs).tolist() == [4.0]
-    assert lw.CVaR(0.5)(costs).tolist() == [3.5]
-    assert lw.CVaR()(costs).tolist() == [4.0]
-    assert lw.CVaR(0.375)(costs)[0] == pytest.approx((4.0 + 0.5 * 3.0) / 1.5)
-    assert lw.CVaR(1.0)(costs)[0] == 2.5
-    assert lw.CVaR().share == 0.05
-    assert str(lw.CVaR(0.125)) == "mean of the worst 12.5 %"
+    assert lw.metrics.CVaR(0.25)(costs).tolist() == [4.0]
+    assert lw.metrics.CVaR(0.5)(costs).tolist() == [3.5]
+    assert lw.metrics.CVaR()(costs).tolist() == [4.0]
+    assert lw.metrics.CVaR(0.375)(costs)[0] == pytest.approx((4.0 + 0.5 * 3.0) / 1.5)
+    assert lw.metrics.CVaR(1.0)(costs)[0] == 2.5
+    assert lw.metrics.CVaR().share == 0.05
+    assert str(lw.metrics.CVaR(0.125)) == "mean of the worst 12.5 %"
     assert risk.risk_of(Faults(), 0.25)(costs).tolist() == [1.0]
     assert risk.risk_of(Faults(), 0.26)(costs).tolist() == [2.0]
     for wrong in (0.0, 1.0, 1, "means"):
@@ -107,8 +107,8 @@ def test_risks_at_their_ends():
         with pytest.raises(
             lw.SceneError, match=r"CVaR\.share = .*: is no part; give a number in \(0, 1\], such as 0\.05"
         ):
-            lw.CVaR(wrong)
-    given = lw.CVaR(0.3)
+            lw.metrics.CVaR(wrong)
+    given = lw.metrics.CVaR(0.3)
     assert risk.risk_of(Faults(), given) is given
 
 
@@ -145,7 +145,7 @@ def test_numbers_of_quantities_and_of_metrics(monkeypatch):
     assert numbers.Numbers(SCENE, None, "of", test_risks_at_their_ends, {}).label == "test_risks_at_their_ends"
     with pytest.raises(lw.SceneError, match="of = '3 numbers': is not a single number; name one of its entries"):
         plain(lambda run: np.zeros((2, 3)))
-    for of in ("iae depth", lw.IAE("depth"), {"type": "iae", "of": "depth"}):
+    for of in ("iae depth", lw.metrics.IAE("depth"), {"type": "iae", "of": "depth"}):
         told.asked.clear()
         metric = numbers.Numbers(SCENE, None, "minimise", of, {"h": 0.1})
         assert (metric.label, metric.of_metric) == ("iae depth", True)
@@ -238,7 +238,7 @@ def test_tuning_meets_the_same_members_and_then_fresh_ones(monkeypatch):
     assert told.asked[-1][3] == 8
     assert told.asked[-1][2].tolist() == list(range(20))
     worst = tune.tune_gains(fleet, {"vehicle.mass": (3.0, 4.0)} | {"drag.linear[0]": (1.0, 100.0)}, "depth", budget=600, fresh=0,
-                      risk=lw.CVaR(0.2))  # fmt: skip
+                      risk=lw.metrics.CVaR(0.2))  # fmt: skip
     assert worst.at_bounds == ("vehicle.mass",)
     assert math.isnan(worst.fresh_cost)
     assert worst.fresh == 0

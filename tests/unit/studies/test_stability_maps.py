@@ -36,7 +36,7 @@ def by_cell(grid, values):
 
 
 def drag_scene(scene):
-    return dataclasses.replace(scene, terms=[lw.Drag(linear=[1.0] * 6, quadratic=[0, 0, 40.0, 0, 0, 0])])
+    return dataclasses.replace(scene, terms=[lw.terms.Drag(linear=[1.0] * 6, quadratic=[0, 0, 40.0, 0, 0, 0])])
 
 
 @pytest.mark.parametrize(("text", "axis"), [
@@ -164,7 +164,7 @@ def test_bad_axes_are_refused(scene, x, y, words):
 
 
 def test_drag_that_is_zero_at_the_start_cannot_be_scaled():
-    scene = lw.Scene(lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0)), terms=[lw.Drag(quadratic=[1.0] * 6)])
+    scene = lw.Scene(lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0)), terms=[lw.terms.Drag(quadratic=[1.0] * 6)])
     with pytest.raises(lw.SceneError, match="zero at the scene's start"):
         grid_of(scene, "h", "drag_number")
 
@@ -611,7 +611,7 @@ def test_a_column_that_is_refused_is_tried_in_halves(scene):
 
 def test_a_map_of_runs_made_by_hand(scene):
     """psi_s errs and gets warnings beyond a step; rk4 fails beyond another; gauss4 is refused by the drag."""
-    damped = dataclasses.replace(scene, terms=[lw.Drag(linear=[1.0] * 6)])
+    damped = dataclasses.replace(scene, terms=[lw.terms.Drag(linear=[1.0] * 6)])
     asked, shares = [], []
 
     def run_plan(plan, threads):
@@ -669,7 +669,7 @@ def test_times_of_a_map_follow_the_fastest_motion(scene):
     assert (of().error_time, of().t1) == pytest.approx((period, 10.0 * period))
     assert (of(t1=1.0).error_time, of(t1=1.0).t1) == (1.0, 1.0)
     assert of(t1=1.0, error_time=2.0).t1 == 2.0
-    pushed = dataclasses.replace(scene, terms=[lw.Wrench(force=[500.0, 0.0, 0.0])])
+    pushed = dataclasses.replace(scene, terms=[lw.terms.Wrench(force=[500.0, 0.0, 0.0])])
     driven = of(pushed, error_time=0.5, t1=9.0)
     assert (driven.judged, driven.t1, driven.error_time) == ("driven", 0.5, 0.5)
     assert of().reference.startswith("rk8 against kl8(psi_x), steps")
@@ -680,12 +680,12 @@ def test_what_drives_a_scene_by_kind(scene):
     def kind(*terms):
         return runs.judged(grid_of(dataclasses.replace(scene, terms=list(terms))), ["psi_s"])
 
-    drag, current = lw.Drag(linear=[1.0] * 6), lw.Current(velocity=[0.3, 0.0, 0.0])
+    drag, current = lw.terms.Drag(linear=[1.0] * 6), lw.terms.Current(velocity=[0.3, 0.0, 0.0])
     assert [kind(), kind(drag), kind(current), kind(drag, current)] == [
         "conservative", "dissipative", "conservative", "dissipative"]  # fmt: skip
-    assert kind(lw.Current(velocity=[0.0, 0.0, 0.1])) == kind(lw.Wrench(force=[1.0, 0.0, 0.0])) == "driven"
+    assert kind(lw.terms.Current(velocity=[0.0, 0.0, 0.1])) == kind(lw.terms.Wrench(force=[1.0, 0.0, 0.0])) == "driven"
     with pytest.raises(lw.SceneError, match="terms: noise acts, whose path differs from step to step"):
-        kind(lw.WrenchNoise(force=[1.0, 0.0, 0.0]))
+        kind(lw.terms.WrenchNoise(force=[1.0, 0.0, 0.0]))
 
 
 @pytest.mark.parametrize(("name", "first"), [("rkn6_11", "B"), ("rkn6_14", "A")])

@@ -36,7 +36,7 @@ TABLES = {
 }
 SCENE = lw.Scene.from_dict(TABLES)
 BARE = replace(SCENE, controller=None)
-VARY = {"start.position": lw.Normal(std=0.8), "vehicle.mass": lw.Uniform(low=45.0, high=55.0)}
+VARY = {"start.position": lw.distributions.Normal(std=0.8), "vehicle.mass": lw.distributions.Uniform(low=45.0, high=55.0)}
 METRICS = ["overshoot heading", "iae heading"]
 CASES = [{"name": "soft"}, {"name": "stiff", "set": {"heading_pid.kp": 8.0}},
          {"name": "unknown", "set": {"heading_pid.kq": 1.0}}]  # fmt: skip
@@ -573,7 +573,7 @@ def test_points_go_through_the_last_axis_first():
 
 
 def test_what_a_case_sets_does_not_vary_in_it():
-    vary = VARY | {"heading_pid.kp": lw.Uniform(low=1.0, high=2.0)}
+    vary = VARY | {"heading_pid.kp": lw.distributions.Uniform(low=1.0, high=2.0)}
     like = lw.Ensemble(SCENE, 5, 3, vary)
     fleet, dropped = cases.ensemble_of(SCENE, {"heading_pid.kp": 2.0}, vary, like)
     assert dropped == ["heading_pid.kp"]
@@ -593,13 +593,13 @@ def test_numbers_that_only_a_case_has_vary_in_it():
     law = {"type": "heave_pid", "kp": 2.0}
     names = [{"name": "plain"},
              {"name": "deep", "replace": {"laws": [law], "guidance": [{"type": "set_point", "depth": 1.0}]}}]  # fmt: skip
-    found = swept([record(), record()], names, vary=VARY | {"heave_pid.kp": lw.Uniform(low=1.0, high=3.0)},
+    found = swept([record(), record()], names, vary=VARY | {"heave_pid.kp": lw.distributions.Uniform(low=1.0, high=3.0)},
                   metrics=METRICS)  # fmt: skip
     assert [cell.fixed for cell in found.cells] == [("heave_pid.kp",), ()]
     assert "heave_pid.kp" in found.inputs(found.cells[1])
     assert "heave_pid.kp" not in found.setup.members.vary
     with pytest.raises(lw.SceneError, match=r"heave_pid\.kq"):
-        swept([], names, vary={"heave_pid.kq": lw.Uniform(low=1.0, high=3.0)})
+        swept([], names, vary={"heave_pid.kq": lw.distributions.Uniform(low=1.0, high=3.0)})
 
 
 # Success
@@ -694,7 +694,7 @@ def test_keys_are_of_all_that_decides_the_numbers(found):
               replace(one, metrics=setup.metrics_of(["iae heading"])).key(fleet)]  # fmt: skip
     assert len({key, *others}) == 6
     twice, thrice = (lambda state, tick: 2.0 * tick["depth"]), (lambda state, tick: 3.0 * tick["depth"])
-    metrics = [lw.CustomMetric(function, name="own", fields=("position",), **more) for function, more in (
+    metrics = [lw.metrics.CustomMetric(function, name="own", fields=("position",), **more) for function, more in (
         (twice, {}), (thrice, {}), (twice, {"last": np.sin}), (twice, {"last": np.cos}), (twice, {"version": 1}))]  # fmt: skip
     keys = [replace(one, metrics=setup.metrics_of([metric])).key(fleet) for metric in (*metrics, metrics[0])]
     assert keys[0] == keys[-1]
@@ -747,7 +747,7 @@ def test_progress_is_that_of_all_cells():
 
 def test_the_sweep_keeps_what_the_ensemble_says_unless_it_is_asked():
     base = lw.Ensemble(SCENE, 6, 7, VARY, "sobol")
-    one = setup.made(base, None, None, {"vehicle.mass": lw.Uniform(low=1.0, high=2.0)}, None, None, None, [], {})
+    one = setup.made(base, None, None, {"vehicle.mass": lw.distributions.Uniform(low=1.0, high=2.0)}, None, None, None, [], {})
     assert (one.members.members, one.members.seed, one.members.sampling.kind) == (6, 7, "sobol")
     assert set(one.vary) == set(VARY)
     assert one.members.vary["vehicle.mass"].high == 2.0
@@ -763,10 +763,10 @@ def test_the_sweep_keeps_what_the_ensemble_says_unless_it_is_asked():
     ({"scene": lw.Ensemble(SCENE, 6, 7).subset([1, 2])}, "has members that were given or chosen one by one"),
     ({"vary": [1]}, "vary = [1]: does not map names to distributions"),
     ({"metrics": "iae heading"}, "metrics = 'iae heading': is no list"),
-    ({"metrics": {"type": "iae"}}, "is no list; give [\"overshoot depth\", lw.IAE(\"heading\")]"),
+    ({"metrics": {"type": "iae"}}, "is no list; give [\"overshoot depth\", lw.metrics.IAE(\"heading\")]"),
     ({"metrics": ["depth"]}, "metrics[0] = 'depth': is not one number of each member; give \"overshoot depth\""),
-    ({"metrics": ["iae heading", lw.Mean("depth")]}, "metrics[1] = 'mean': is no metric: it is not one number"),
-    ({"metrics": ["iae heading", lw.IAE("heading")]}, "metrics[1] = 'iae heading': is the name of another metric"),
+    ({"metrics": ["iae heading", lw.statistics.Mean("depth")]}, "metrics[1] = 'mean': is no metric: it is not one number"),
+    ({"metrics": ["iae heading", lw.metrics.IAE("heading")]}, "metrics[1] = 'iae heading': is the name of another metric"),
     ({"confidence": 0.0}, "confidence = 0.0: is not between 0 and 1; give 0.95"),
     ({"confidence": 1.0}, "confidence = 1.0: is not between 0 and 1"),
 ])  # fmt: skip

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import from_fossen
-from lgvi_warp import from_sdf
-from lgvi_warp import from_yaml
+from lgvi_warp.vehicles import from_fossen
+from lgvi_warp.vehicles import from_sdf
+from lgvi_warp.vehicles import from_yaml
 from lgvi_warp.vehicles import fossen as co
 from lgvi_warp.vehicles import poses as coefficients_poses
 

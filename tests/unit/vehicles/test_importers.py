@@ -13,9 +13,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import lgvi_warp as lw
-from lgvi_warp import from_fossen
-from lgvi_warp import from_sdf
-from lgvi_warp import from_yaml
+from lgvi_warp.vehicles import from_fossen
+from lgvi_warp.vehicles import from_sdf
+from lgvi_warp.vehicles import from_yaml
 from lgvi_warp.vehicles import robot_xml as coefficients_xml
 from lgvi_warp.results.provenance import messages
 from lgvi_warp.runs.settle import make_plan
@@ -467,7 +467,7 @@ def test_inertia_that_misses_the_triangle_is_taken_from_a_file():
     scene = lw.Scene.from_dict(from_fossen({}, mass=69.7, inertia=inertia))
     assert "by 13 % of it" in scene.vehicle.warnings[0]
     assert lw.Scene.from_dict(scene.to_dict()).vehicle.warnings == scene.vehicle.warnings
-    varied = {"vehicle.rigid_body_mass_matrix": lw.Normal(relative=1e-3)}
+    varied = {"vehicle.rigid_body_mass_matrix": lw.distributions.Normal(relative=1e-3)}
     assert lw.Ensemble(scene, 20, 1, varied).members == 20
     far = from_fossen({}, mass=69.7, inertia=(0.6, 20.0, 35.0))
     assert "no rigid body has" in refused(lw.Scene.from_dict, far)

@@ -172,9 +172,9 @@ def test_commands_for_thrusts():
     """The inverse of a curve with a dead band, of another shape astern; the least command; 0 for 0; the limit beyond reach."""
     numbers = {"position": [[0.0, 0.0, 0.0]] * 3, "direction": [[1.0, 0.0, 0.0]] * 3, "dead_band": [0.0, 0.1, 0.1],
                "limit": 0.9}  # fmt: skip
-    square = lw.Thrusters(coefficient=[10.0, 20.0, 0.0], coefficient_astern=[5.0, 10.0, 1.0], **numbers)
+    square = lw.terms.Thrusters(coefficient=[10.0, 20.0, 0.0], coefficient_astern=[5.0, 10.0, 1.0], **numbers)
     np.testing.assert_allclose(square.command_for([2.5, -2.5, 1.0]), [0.5, -0.6, 0.0], rtol=1e-12)
-    curved = lw.Thrusters(polynomial=[2.0, 0.0, 40.0], polynomial_astern=[3.0], **numbers)
+    curved = lw.terms.Thrusters(polynomial=[2.0, 0.0, 40.0], polynomial_astern=[3.0], **numbers)
     thrust = np.array([5.0, -1.0, 0.0])
     np.testing.assert_allclose(curved.thrust(curved.command_for(thrust)), thrust, rtol=1e-12)
     assert curved.command_for([1e3, -1e3, 0.0]).tolist() == [0.9, -0.9, 0.0]

@@ -86,25 +86,25 @@ def rising():
     """REMUS 100 vehicles of which the lighter ones reach the surface."""
     start = lw.Start(position=[0.0, 0.0, 8.0], velocity=[1.5, 0.0, 0.0])
     scene = lw.Scene.named("remus_100", events=[{"type": "surface", "depth": 0.5}], start=start)
-    fleet = lw.Ensemble(scene, 60, 1, {"vehicle.buoyancy": lw.Uniform(low=295.0, high=312.0)})
+    fleet = lw.Ensemble(scene, 60, 1, {"vehicle.buoyancy": lw.distributions.Uniform(low=295.0, high=312.0)})
     return lw.solve(fleet, h=0.05, t1=60.0, save=lw.SaveAt(every=1.0))
 
 
 def sinking():
     """REMUS 100 vehicles that all sink to the floor."""
     start = lw.Start(position=[0.0, 0.0, 5.0])
-    scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 280.0}, events=[lw.Floor(depth=20.0)], start=start)
-    fleet = lw.Ensemble(scene, 60, 1, {"vehicle.buoyancy": lw.Normal(std=1.0)})
+    scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 280.0}, events=[lw.events.Floor(depth=20.0)], start=start)
+    fleet = lw.Ensemble(scene, 60, 1, {"vehicle.buoyancy": lw.distributions.Normal(std=1.0)})
     return lw.solve(fleet, h=0.05, t1=120.0, save=lw.SaveAt(every=1.0))
 
 
 def tethered():
     """REMUS 100 vehicles at a tether in waves."""
-    waves = lw.Waves(amplitudes=[0.5, 0.3], periods=[9.0, 7.0], headings_deg=[180.0, 150.0])
-    tether = lw.Tether(anchor=[0.0, 0.0, 20.0], rest_length=12.0, stiffness=20.0)
+    waves = lw.terms.Waves(amplitudes=[0.5, 0.3], periods=[9.0, 7.0], headings_deg=[180.0, 150.0])
+    tether = lw.terms.Tether(anchor=[0.0, 0.0, 20.0], rest_length=12.0, stiffness=20.0)
     start = lw.Start(position=[0.0, 0.0, 9.0], velocity=[0.5, 0.0, 0.0])
     scene = lw.Scene.named("remus_100", terms=[waves, tether], start=start)
-    fleet = lw.Ensemble(scene, 60, 1, {"waves.phases": lw.Uniform(low=0.0, high=2.0 * np.pi)})
+    fleet = lw.Ensemble(scene, 60, 1, {"waves.phases": lw.distributions.Uniform(low=0.0, high=2.0 * np.pi)})
     return lw.solve(fleet, h=0.05, t1=60.0, save=lw.SaveAt(every=1.0))
 
 
@@ -117,7 +117,7 @@ def first_dive():
 def of_paper(members, h, t1, every):
     """The paper's case, as its file and the README vary it."""
     scene = lw.Scene.load(ROOT / "examples" / "paper.toml")
-    vary = {"start.angular_velocity": lw.Normal(std=0.03), "vehicle.mass": lw.Normal(relative=0.001)}
+    vary = {"start.angular_velocity": lw.distributions.Normal(std=0.03), "vehicle.mass": lw.distributions.Normal(relative=0.001)}
     return lw.solve(lw.Ensemble(scene, members, 1, vary), h=h, t1=t1, save=lw.SaveAt(every=every))
 
 

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a door, a module that users import, finds its names: a stub beside it lists them, each imported when it is used."""
+
+import ast
+import sys
+from collections.abc import Callable
+from importlib import import_module
+from typing import Any
+
+
+def names_in_stub(door: str) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
+    """What a door assigns to `__all__`, `__getattr__` and `__dir__`.
+
+    NumPy, SciPy and Warp take longer to import than a script may take that only asks for help or a version: so nothing is
+    imported before its name is used.
+
+    door: the module's name; the stub stands beside its file, with one line "from module import name as public_name" a name.
+    """
+    module = sys.modules[door]
+    stub = ast.parse(module.__loader__.get_data(f"{module.__file__}i"))  # type: ignore[union-attr]
+    places = {
+        alias.asname or alias.name: (str(line.module), alias.name)
+        for line in stub.body
+        if isinstance(line, ast.ImportFrom)
+        for alias in line.names
+    }
+
+    def find(name: str) -> Any:
+        if name not in places:
+            raise AttributeError(f"module {door!r} has no attribute {name!r}")
+        home, name_there = places[name]
+        # What a door holds of itself is a module.
+        value = import_module(f"{door}.{name}") if home == door else getattr(import_module(home), name_there)
+        setattr(module, name, value)
+        return value
+
+    return sorted(places), find, lambda: sorted(places)

@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Metrics of a control loop, one number of each member, and the risk of a fleet's numbers."""
+
+from lgvi_warp.common.doors import names_in_stub
+
+__all__, __getattr__, __dir__ = names_in_stub(__name__)

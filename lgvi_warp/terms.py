@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Forces and other terms of a scene: what acts on a vehicle, for `Scene(terms=[...])`."""
+
+from lgvi_warp.common.doors import names_in_stub
+
+__all__, __getattr__, __dir__ = names_in_stub(__name__)

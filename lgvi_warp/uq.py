@@ -1,0 +1,12 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which of the varied parameters make a quantity of interest vary: Sobol indices, Morris' screening, and adaptors.
+
+    indices = lw.uq.sobol(scene, "position[2]", samples=1024, h=0.01, t1=60.0)
+    print(indices)
+
+The designs and the estimates are SALib's (extra: uq).
+"""
+
+from lgvi_warp.common.doors import names_in_stub
+
+__all__, __getattr__, __dir__ = names_in_stub(__name__)

@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: Apache-2.0
+# The public names of this door, one a line.
+
+from lgvi_warp.studies.sensitivity.adaptor import ScalarModel as ScalarModel
+from lgvi_warp.studies.sensitivity.adaptor import model as model
+from lgvi_warp.studies.sensitivity.analyses import morris as morris
+from lgvi_warp.studies.sensitivity.analyses import morris_of as morris_of
+from lgvi_warp.studies.sensitivity.analyses import sobol as sobol
+from lgvi_warp.studies.sensitivity.analyses import sobol_of as sobol_of
+from lgvi_warp.studies.sensitivity.indices import Indices as Indices
+from lgvi_warp.studies.sensitivity.indices import MorrisEffects as MorrisEffects
+from lgvi_warp.studies.sensitivity.indices import SobolIndices as SobolIndices
+from lgvi_warp.studies.sensitivity.outputs import FailedMembers as FailedMembers
+from lgvi_warp.studies.sensitivity.outputs import Outputs as Outputs
+from lgvi_warp.studies.sensitivity.outputs import evaluate as evaluate

@@ -11,7 +11,10 @@ from pathlib import Path
 import lgvi_warp as lw
 
 scene = lw.Scene.load(Path(__file__).parent / "paper.toml")
-vary = {"start.angular_velocity": lw.distributions.Normal(std=0.03), "vehicle.mass": lw.distributions.TruncatedNormal(relative=0.001)}
+vary = {
+    "start.angular_velocity": lw.distributions.Normal(std=0.03),
+    "vehicle.mass": lw.distributions.TruncatedNormal(relative=0.001),
+}
 fleet = lw.Ensemble(scene, members=1_000_000, seed=1, vary=vary)
 statistics = [
     lw.statistics.Mean("position"),

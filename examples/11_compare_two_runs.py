@@ -11,7 +11,10 @@ import lgvi_warp as lw
 
 WANTED = 10.0  # m
 GAINS = {"proportional": 0.0, "with an integral": 0.002}  # ki of the depth, 1/(m s)
-vary = {"vehicle.buoyancy": lw.distributions.Uniform(low=299.0, high=308.0), "waves.phases": lw.distributions.Uniform(low=0.0, high=2.0 * np.pi)}
+vary = {
+    "vehicle.buoyancy": lw.distributions.Uniform(low=299.0, high=308.0),
+    "waves.phases": lw.distributions.Uniform(low=0.0, high=2.0 * np.pi),
+}
 
 
 def fleet(ki):

@@ -32,7 +32,12 @@ def measure(members, kind, folder):
     """One run, in this process: prediction, seconds, peak memory and bytes on the disk."""
     folder, chosen, observed = Path(folder), None, {}
     if kind == "statistics":
-        kept = (lw.statistics.Mean("position"), lw.statistics.Covariance("position"), lw.statistics.Extremes("position"), lw.statistics.Quantiles("position"))
+        kept = (
+            lw.statistics.Mean("position"),
+            lw.statistics.Covariance("position"),
+            lw.statistics.Extremes("position"),
+            lw.statistics.Quantiles("position"),
+        )
         observed = {"statistics": kept, "keep": "none"}
     elif kind != "memory":
         fields = ("position",) if kind == "float32" else None

@@ -45,7 +45,10 @@ def record(path: Path) -> np.ndarray:
         terms=[lw.terms.Current(velocity=[0.0, 0.2, 0.0])],
         events=[lw.events.Floor(depth=20.0)],
     )
-    vary = {"vehicle.buoyancy": lw.distributions.Normal(std=1.0), "current.velocity": lw.distributions.Normal(std=[0.05, 0.05, 0.0])}
+    vary = {
+        "vehicle.buoyancy": lw.distributions.Normal(std=1.0),
+        "current.velocity": lw.distributions.Normal(std=[0.05, 0.05, 0.0]),
+    }
     result = lw.solve(lw.Ensemble(scene, 300, seed=1, vary=vary), h=0.02, t1=110.0, save=lw.SaveAt(every=1.0))
     lw.record(result, path)
     return np.asarray(result.time)

@@ -211,5 +211,6 @@ def linked(note: str) -> str:
     names = "|".join(sorted(paths, key=len, reverse=True))
     parts = re.split(rf"(?<![\w.'\"])({names})(?![\w'\"])", note)
     return "".join(
-        f"\\ :py:obj:`{part} <lgvi_warp.{paths[part]}>`\\ " if place % 2 else escaped(part) for place, part in enumerate(parts)
+        f"\\ :py:obj:`{part} <lgvi_warp.{paths[part]}>`\\ " if place % 2 else escaped(part)
+        for place, part in enumerate(parts)
     )

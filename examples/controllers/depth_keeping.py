@@ -30,7 +30,10 @@ scene = lw.Scene.named(
     start={"position": [0.0, 0.0, 5.0], "velocity": [1.54, 0.0, 0.0]},
     controller=controller,
 )
-vary = {"vehicle.buoyancy": lw.distributions.Uniform(low=299.0, high=308.0), "waves.phases": lw.distributions.Uniform(low=0.0, high=2.0 * np.pi)}
+vary = {
+    "vehicle.buoyancy": lw.distributions.Uniform(low=299.0, high=308.0),
+    "waves.phases": lw.distributions.Uniform(low=0.0, high=2.0 * np.pi),
+}
 fleet = lw.Ensemble(scene, members=500, seed=4, vary=vary)
 
 

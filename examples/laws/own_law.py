@@ -150,7 +150,10 @@ drag = lw.terms.Drag(linear=[2.0, 20.0, 20.0, 0.5, 5.0, 5.0], quadratic=[4.0, 10
 def fleet(terms, members=500):
     """Vehicles that pass the dock, each a little otherwise; the dock's energy differs as well, where there is one."""
     scene = lw.Scene(vehicle=vehicle, environment=lw.Environment(gravity=9.8), start=start, terms=terms)
-    vary = {"start.position": lw.distributions.Normal(std=[0.5, 1.5, 1.5]), "start.velocity": lw.distributions.Normal(std=[0.1, 0.02, 0.02])}
+    vary = {
+        "start.position": lw.distributions.Normal(std=[0.5, 1.5, 1.5]),
+        "start.velocity": lw.distributions.Normal(std=[0.1, 0.02, 0.02]),
+    }
     if dock in terms:
         vary["dock.energy"] = lw.distributions.LogNormal(0.2)
     return lw.Ensemble(scene, members=members, seed=2, vary=vary)

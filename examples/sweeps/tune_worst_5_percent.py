@@ -20,7 +20,10 @@ controller = lw.Controller(
     period=0.1,
     sensors=[lw.control.Sensor(name="depth_cell", of="depth", noise=0.02)],
     guidance=[lw.control.SetPoint(depth=WANTED, heading=0.0)],
-    laws=[lw.control.DepthPID(kp=0.1, pitch_limit=0.35, kp_pitch=2.0, kd_pitch=1.5), lw.control.HeadingPID(kp=1.0, kd=2.0)],
+    laws=[
+        lw.control.DepthPID(kp=0.1, pitch_limit=0.35, kp_pitch=2.0, kd_pitch=1.5),
+        lw.control.HeadingPID(kp=1.0, kd=2.0),
+    ],
     allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])],
 )
 start = {"position": [0.0, 0.0, 5.0], "velocity": [1.54, 0.0, 0.0]}
@@ -34,7 +37,9 @@ vary = {
 def tuned(members, budget):
     """The best gains for each risk, by the integral of time times the depth's error."""
     fleet = lw.Ensemble(scene, members, seed=1, vary=vary)
-    return {name: lw.tune_gains(fleet, OVER, "itae depth", risk=risk, budget=budget, **RUN) for name, risk in RISKS.items()}
+    return {
+        name: lw.tune_gains(fleet, OVER, "itae depth", risk=risk, budget=budget, **RUN) for name, risk in RISKS.items()
+    }
 
 
 def fresh_costs(gains, members):
@@ -72,6 +77,7 @@ if __name__ == "__main__":
     for name, each in costs.items():
         numbers = ", ".join(f"{key.split('.')[1]} {value:.3f}" for key, value in gains[name].parameters.items())
         print(
-            f"{name}: {numbers}: {each.mean():.0f} m s2 on average, {lw.metrics.CVaR(0.05)(each[None])[0]:.0f} m s2 in the worst 5 %"
+            f"{name}: {numbers}: {each.mean():.0f} m s2 on average, "
+            f"{lw.metrics.CVaR(0.05)(each[None])[0]:.0f} m s2 in the worst 5 %"
         )
     print(plot(costs, target))

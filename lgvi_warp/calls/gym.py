@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.calls.observations import observer
-from lgvi_warp.common.errors import Faults, MissingExtra, closest, ragged, refusal, brief
+from lgvi_warp.common.errors import Faults, MissingExtra, brief, closest, ragged, refusal
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.real_numbers import answered
 from lgvi_warp.control.callback import Callback
@@ -50,8 +50,8 @@ class Vehicles:
 
     Args:
         fleet: The ensemble, or a scene with its own; with a controller.
-        observe: Names of numbers (docs/controllers/gym.md has the list), those of `lw.control.Policy` among them; or a function that
-            returns (m, k).
+        observe: Names of numbers (docs/controllers/gym.md has the list), those of `lw.control.Policy` among them; or a
+            function that returns (m, k).
         act: "demand" (default): actions are added to the laws' demands. "command": they are the commands of the only term that
             takes some, on which then no law acts; or the key of such a term.
         reward: Function that returns (m,); it may take the actions (m, n) as a fourth argument. None (default): 0.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a learner may see: names for numbers of what a controller measures and wants, those of `lw.control.Policy` among them."""
+"""What a learner may see: names for numbers that a controller measures and wants, those of `lw.control.Policy` among them."""
 
 from __future__ import annotations
 
@@ -86,7 +86,9 @@ OBSERVATIONS |= {
 }
 
 
-def observer(faults: Faults, names: Any, wishes: Sequence[str]) -> Callable[[float, CallbackInput, CallbackInput], np.ndarray]:
+def observer(
+    faults: Faults, names: Any, wishes: Sequence[str]
+) -> Callable[[float, CallbackInput, CallbackInput], np.ndarray]:
     """The function that gathers named numbers.
 
     Returns: Function of the time and of the measured and wanted motion of m members that returns (m, k).

@@ -67,8 +67,9 @@ def solve(
             the symmetry of each step are kept, symplecticity is not.
         progress: True shows a bar on a terminal and in a notebook, lines elsewhere, on stderr; a function is called with the
             fraction of the work that is done, in [0, 1], from the threads that do it. Default: nothing is shown.
-        statistics: Statistics gathered over the members at every sample time during the run, such as lw.statistics.Mean("position");
-            they are in result.statistics. An empty sequence gathers none, whatever the scene says.
+        statistics: Statistics gathered over the members at every sample time during the run, such as
+            lw.statistics.Mean("position"); they are in result.statistics. An empty sequence gathers none, whatever the scene
+            says.
         keep: Members whose samples are kept. "all" (default). "none": memory grows with neither members nor steps.
             "failed" (without those that an event stopped) or indices of members: these are run again after the run, with the
             same bits, and are in result.kept.

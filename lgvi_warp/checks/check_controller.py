@@ -15,9 +15,9 @@ from lgvi_warp.checks.bench import MOST_SAMPLES, of_scene
 from lgvi_warp.checks.part_bench import (
     COLUMNS,
     EVERY,
-    TICKS,
     OUT_FIELDS,
     SPEED,
+    TICKS,
     Answers,
     PartBench,
     RandomTicks,
@@ -139,7 +139,9 @@ def check_controller(
     (wired,) = (candidate for candidate in completed.controller.parts if candidate.key == part.key)
     numbers = {name: np.asarray(value)[None] for name, value in wired.parameters().items()}
     wired = wired.with_features(frozenset(f"{part.key}.{word}" for word in wired.features(numbers)))
-    bench = PartBench(wired, completed, whole_number("samples", samples, 1, MOST_SAMPLES), whole_number("seed", seed, 0))
+    bench = PartBench(
+        wired, completed, whole_number("samples", samples, 1, MOST_SAMPLES), whole_number("seed", seed, 0)
+    )
     with np.errstate(all="ignore"):  # what is not finite is found by its check
         packed, checks = packed_numbers(wired, bench.Params, bench.packed)
         if packed is None or not all(check.ok for check in checks):

@@ -12,7 +12,7 @@ import numpy as np
 
 from lgvi_kernels import built_in
 from lgvi_kernels.advance import examine_part
-from lgvi_kernels.advance.examine_part import TICK_FIELDS, OUT_FIELDS, make_examine_part
+from lgvi_kernels.advance.examine_part import OUT_FIELDS, TICK_FIELDS, make_examine_part
 from lgvi_kernels.maps.in_turn import ROLES
 from lgvi_warp.checks.bench import Device, TermBench, packing_context, short, sizes
 from lgvi_warp.common.machine import register_width

@@ -123,7 +123,9 @@ def packed_numbers(term: Term, Params: np.dtype, pack: Callable[[], Any]) -> tup
     packed = attempt(pack, "with shared numbers")
     if not isinstance(packed, Packed):
         text = packed if isinstance(packed, str) else f"packed() returns {packed!r:.60}"
-        remedy = "write packed(self, numbers, context) that returns lw.laws.Packed({name: numbers}), names as in params()"
+        remedy = (
+            "write packed(self, numbers, context) that returns lw.laws.Packed({name: numbers}), names as in params()"
+        )
         return None, [Check("packed", 1.0, 0.0, False, f"{text}; {remedy}")]
     places = {"first": packed.rows is not None, "memory": packed.memory is not None, "work": packed.work}
     own = Params["own"]

@@ -12,7 +12,7 @@ from lgvi_warp import __version__
 from lgvi_warp.cli.check import check
 from lgvi_warp.cli.completion import completion
 from lgvi_warp.cli.lists import list_names, new, schema, show_help
-from lgvi_warp.cli.machine import bench, info, calibrate
+from lgvi_warp.cli.machine import bench, calibrate, info
 from lgvi_warp.cli.plot import plot
 from lgvi_warp.cli.runs import predict, resume, run
 from lgvi_warp.cli.stores import export, merge, report

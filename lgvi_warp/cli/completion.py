@@ -28,11 +28,11 @@ def values() -> dict[str, tuple[str, ...]]:
     """List the values of options that are checked with the scene and not by the parser."""
     from lgvi_warp.common.machine import DTYPES
     from lgvi_warp.engine.executors import NAMES
-    from lgvi_warp.vehicles.fossen import vehicle_names
     from lgvi_warp.methods import method
     from lgvi_warp.physics.fields import TABLE
     from lgvi_warp.scene.settings import KEEP
     from lgvi_warp.store.export import FORMATS
+    from lgvi_warp.vehicles.fossen import vehicle_names
 
     # Compositions stand without the method that they are of: parentheses mean something to shells.
     methods = (

@@ -14,7 +14,7 @@ from lgvi_warp.cli import documents
 from lgvi_warp.cli.output import Part, tell
 from lgvi_warp.cli.report import controller_lines, file_line, how_lines, members_line, shown_members, summary
 from lgvi_warp.common.errors import SceneError
-from lgvi_warp.common.reading import file_json, file_text, corrupt_file_as_scene_error
+from lgvi_warp.common.reading import corrupt_file_as_scene_error, file_json, file_text
 from lgvi_warp.common.safe_files import inside
 
 # Endings of what verbs write beside the numbers.

@@ -134,7 +134,7 @@ def _methods() -> dict[str, str]:
 
 def _vehicles() -> dict[str, str]:
     """Vehicle -> its title, and what its numbers lead to that few would expect."""
-    from lgvi_warp.vehicles.fossen import vehicle_tables, vehicle_names
+    from lgvi_warp.vehicles.fossen import vehicle_names, vehicle_tables
 
     sources = {name: vehicle_tables(name)["source"] for name in vehicle_names()}
     return {name: "; ".join(of[key] for key in ("title", "remark") if key in of) for name, of in sources.items()}

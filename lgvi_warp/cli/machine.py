@@ -93,7 +93,9 @@ def bench(chosen: argparse.Namespace, *, measure: Part = None) -> int:
     return 0
 
 
-@as_verb("calibrate", "measure how many vehicles a packet should hold on this machine, for runs from now on", reads=True)
+@as_verb(
+    "calibrate", "measure how many vehicles a packet should hold on this machine, for runs from now on", reads=True
+)
 def calibrate(chosen: argparse.Namespace, *, measure: Part = None) -> int:
     """Run the verb calibrate: measure the widths of packets on this machine, and keep the best ones for later runs."""
     from lgvi_warp.studies import packet_width as tuning

@@ -69,8 +69,8 @@ def shown_members(result: Any, *, limit: int = MOST_DRAWN, load: Part = None) ->
 
     limit: Most numbers of their samples.
     load: What takes members of a stored result into memory; default None, that of the store.
-    Returns: The result itself; members of a large one in a store, in memory, as `lw.select_members` chooses them; without samples, the
-        kept members, or None where there are none, or where a field of the motion was not saved.
+    Returns: The result itself; members of a large one in a store, in memory, as `lw.select_members` chooses them; without
+        samples, the kept members, or None where there are none, or where a field of the motion was not saved.
     """
     if not result.samples:
         return result.kept and shown_members(result.kept, limit=limit)

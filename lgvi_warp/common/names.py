@@ -37,7 +37,9 @@ def wrong_with(name: str) -> tuple[str, str] | None:
 
 def shown_character(character: str) -> str:
     """Write a character so that a message can show it."""
-    return {" ": "a space", ".": "a point"}.get(character, ascii(character) if not character.isprintable() else repr(character))
+    return {" ": "a space", ".": "a point"}.get(
+        character, ascii(character) if not character.isprintable() else repr(character)
+    )
 
 
 def folded(name: str) -> str:

@@ -23,7 +23,8 @@ class Callback(ControlLaw):
     """A law in Python: `function(t, y, r, members)` returns the demand of all members of a block, (m, 6) [N, N m].
 
     t is the time of the tick [s]; y what is measured and r what is wanted, each with arrays of m members (see
-    `lw.control.CallbackInput`); members are their indices (m,). NumPy, PyTorch, JAX or any solver may compute it. It costs a launch
+    `lw.control.CallbackInput`); members are their indices (m,). NumPy, PyTorch, JAX or any solver may compute it. It costs a
+    launch
     a period: docs/controllers/callback.md has the price. Calls for one block come in the order of time; blocks run in threads.
 
     Args:

@@ -111,7 +111,9 @@ class PseudoInverse(Allocation):
 
     def _sided(self, numbers: Numbers) -> int:
         """1 where the thrusters have polynomials, and some of those astern are others than those ahead; else 0."""
-        return int(self.shape == "polynomial" and not np.array_equal(numbers["polynomial"], numbers["polynomial_astern"]))
+        return int(
+            self.shape == "polynomial" and not np.array_equal(numbers["polynomial"], numbers["polynomial_astern"])
+        )
 
     def _largest(self, numbers: Numbers, reach: np.ndarray) -> tuple[np.ndarray, ...]:
         """The largest efforts (1 or n, channels) ahead and astern, without the coefficient; reach: of commands."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.common.errors import refusal
-from lgvi_warp.engine.host_callback import CallbackInput, write_answer, last_tick
+from lgvi_warp.engine.host_callback import CallbackInput, last_tick, write_answer
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.sampling.members import Members

@@ -52,7 +52,9 @@ def last_tick(packets: Packets, members: np.ndarray | None = None) -> tuple[Call
     y, r = (_numbers(packets, packets.plan.layout.noted_rows[name], members) for name in ("measured", "reference"))
     measured_attitude, wanted_attitude = (rows[:, 3:12].reshape(-1, 3, 3) for rows in (y, r))
     headings = [np.arctan2(R[:, 1, 0], R[:, 0, 0]) for R in (measured_attitude, wanted_attitude)]
-    measured = CallbackInput(y[:, :3], measured_attitude, y[:, 12:15], y[:, 18:21], headings[0], water_velocity=y[:, 15:18])
+    measured = CallbackInput(
+        y[:, :3], measured_attitude, y[:, 12:15], y[:, 18:21], headings[0], water_velocity=y[:, 15:18]
+    )
     rates = {"speed": r[:, 19], "angular_acceleration": r[:, 20:23]}
     return measured, CallbackInput(r[:, :3], wanted_attitude, r[:, 12:15], r[:, 15:18], headings[1], **rates)
 

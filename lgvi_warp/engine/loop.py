@@ -86,7 +86,11 @@ def run_blocks(
 
 
 def _in_turn(
-    work: Work, runs: Sequence[Block], remaining: Sequence[Block], executor: Executor, advanced: Callable[[Block, int], None]
+    work: Work,
+    runs: Sequence[Block],
+    remaining: Sequence[Block],
+    executor: Executor,
+    advanced: Callable[[Block, int], None],
 ) -> Generator[tuple[Block, Any], None, None]:
     """Blocks and their results in order, from the store or as they run; nothing runs before it is needed."""
     wanted = {block.first for block in remaining}
@@ -99,7 +103,9 @@ def _in_turn(
                 continue
             if fresh is None:
                 work.plan.compile()
-                fresh = in_order(remaining, stack.enter_context(contextlib.closing(executor.run(work, remaining, advanced))))
+                fresh = in_order(
+                    remaining, stack.enter_context(contextlib.closing(executor.run(work, remaining, advanced)))
+                )
             yield next(fresh)
         # An executor raises an interrupt after the blocks that ended all the same: it is to be heard after the last one too.
         for _ in fresh or ():

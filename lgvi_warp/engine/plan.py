@@ -23,7 +23,7 @@ from lgvi_warp.engine.kernel_choice import KernelChoice, check_backward_drag, ch
 from lgvi_warp.engine.kernel_spec import COMPENSATED, kind_of, lengths_of, spec_of
 from lgvi_warp.engine.launches import Launches
 from lgvi_warp.engine.packing import rows_shared
-from lgvi_warp.engine.plan_checks import check_ticks, check_noise_steps, check_settings, check_substep
+from lgvi_warp.engine.plan_checks import check_noise_steps, check_settings, check_substep, check_ticks
 from lgvi_warp.engine.sample_layout import SampleLayout
 from lgvi_warp.engine.shared import MEMBERS, SEED, SharedResultsCache
 from lgvi_warp.engine.survey import Survey, survey, survey_of

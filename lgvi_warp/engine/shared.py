@@ -73,7 +73,7 @@ class TrackedParameters(dict[str, np.ndarray]):
 
 
 class TrackedContext(PackingContext):
-    """A packing context that notes when the frame, the members' indices or the seed are read. Its parameters are `TrackedParameters`."""
+    """A packing context that notes when the frame, members or the seed are read; parameters are `TrackedParameters`."""
 
     def __getattribute__(self, name: str) -> Any:
         value = super().__getattribute__(name)

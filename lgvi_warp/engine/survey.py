@@ -160,7 +160,9 @@ def survey(
     return functools.reduce(Survey.joined, over_members(look, count))
 
 
-def survey_of(parameters: Parameters, ensemble: Ensemble, method: Method, shared: SharedResultsCache, block: Block) -> Survey:
+def survey_of(
+    parameters: Parameters, ensemble: Ensemble, method: Method, shared: SharedResultsCache, block: Block
+) -> Survey:
     """Look at the members of one block, whose parameters are drawn already."""
     return _seen(parameters, ensemble, method, shared, False, block.first, block.stop)
 

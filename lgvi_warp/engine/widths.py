@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How many vehicles a packet holds: by a table for each kind of processor, or as `lgvi-warp calibrate` measured on this machine.
+"""How many vehicles a packet holds: by a table for each kind of processor, or as `lgvi-warp calibrate` measured here.
 
 What was measured is kept beside Warp's kernel caches, in CACHE/lgvi_warp_widths.json: machine and versions -> kernel -> width.
 """

@@ -348,7 +348,9 @@ class Result(Summarized):
             OSError: If the file cannot be read.
             SceneError: If it is damaged, or no result (SceneError is a ValueError).
         """
-        with corrupt_file_as_scene_error(path, "no result of lgvi-warp", "run the scene again, or ask for the file anew"):
+        with corrupt_file_as_scene_error(
+            path, "no result of lgvi-warp", "run the scene again, or ask for the file anew"
+        ):
             content = npy_files.of_npz(path)
             return cls._from(content, result_file.checked(content))
 

@@ -107,7 +107,9 @@ class _Gathered:
         Its arrays are its own: whoever gets it may write into them, and the run goes on with what it has.
         """
         plan, at = self.plan, slice(block.first, block.stop)
-        of_members = {name: values.copy() for name, values in member_fields.member_fields(plan, self.outcomes.all.at(at)).items()}
+        of_members = {
+            name: values.copy() for name, values in member_fields.member_fields(plan, self.outcomes.all.at(at)).items()
+        }
         return Result(
             time=plan.grid.times.copy(),
             samples={name: values.copy() for name, values in self.histories(at).items()},

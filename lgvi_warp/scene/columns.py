@@ -19,7 +19,10 @@ def names_of(faults: Faults, vary: Any) -> tuple[str, ...]:
     """Check and normalise a list of names without distributions."""
     listed = [vary] if isinstance(vary, str) else vary
     if not isinstance(listed, Sequence) or not listed or not all(isinstance(name, str) for name in listed):
-        remedy = 'give {"vehicle.mass": lw.distributions.Normal(...)} or a list of names, ["vehicle.mass", "start.position[2]"]'
+        remedy = (
+            'give {"vehicle.mass": lw.distributions.Normal(...)} '
+            'or a list of names, ["vehicle.mass", "start.position[2]"]'
+        )
         faults.add("vary", vary, "is neither a list of names nor a mapping of names to distributions", remedy)
         return ()
     names = tuple(", ".join(target.label for target in targets(name)) for name in listed)

@@ -12,7 +12,7 @@ import numpy as np
 
 from lgvi_warp.common import summaries
 from lgvi_warp.common.arguments import of_kind
-from lgvi_warp.common.errors import Faults, ragged, refusal, brief
+from lgvi_warp.common.errors import Faults, brief, ragged, refusal
 from lgvi_warp.common.real_numbers import is_whole
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.physics.terms import base
@@ -60,8 +60,8 @@ class Ensemble(Summarized):
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
-        >>> vary = {"vehicle.buoyancy": lw.distributions.Normal(std=1.0), "start.velocity": lw.distributions.Normal(std=[0.1, 0.0, 0.0])}
-        >>> fleet = lw.Ensemble(scene, members=1000, seed=1, vary=vary)
+        >>> vary = {"vehicle.buoyancy": lw.distributions.Normal(std=1.0), "start.velocity": lw.distributions.Normal(std=[0.1,
+        0.0, 0.0])} >>> fleet = lw.Ensemble(scene, members=1000, seed=1, vary=vary)
         >>> fleet.parameters(0, 1000)["vehicle.buoyancy"].shape
         (1000,)
     """
@@ -78,7 +78,12 @@ class Ensemble(Summarized):
         if not isinstance(scene, SceneLike):
             faults.add("scene", scene, "is no Scene", "give lw.Scene(...) or lw.Scene.load(path)")
         if vary is not None and not (isinstance(vary, Mapping) and all(_is_name(name) for name in vary)):
-            faults.add("vary", vary, "does not map names to distributions", 'give {"vehicle.mass": lw.distributions.Normal(...)}')
+            faults.add(
+                "vary",
+                vary,
+                "does not map names to distributions",
+                'give {"vehicle.mass": lw.distributions.Normal(...)}',
+            )
         faults.raise_if_any()
         self._setup(scene, EnsembleSettings(members, seed, dict(vary or {}), sampling), {})
 

@@ -23,7 +23,7 @@ from lgvi_warp.physics.terms.wrench import holds
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.like import SceneLike
-from lgvi_warp.scene.oddities import OddityCheck, Oddities, gathered
+from lgvi_warp.scene.oddities import Oddities, OddityCheck, gathered
 from lgvi_warp.scene.slices import over_members
 
 Numbers = Mapping[str, np.ndarray]
@@ -213,7 +213,9 @@ def of_numbers(
         return gathered(itertools.chain(*looks), first, stop)
 
 
-def _looks(check: Callable[[SceneLike, Numbers], Iterator[OddityCheck]], scene: SceneLike, p: Numbers) -> list[OddityCheck]:
+def _looks(
+    check: Callable[[SceneLike, Numbers], Iterator[OddityCheck]], scene: SceneLike, p: Numbers
+) -> list[OddityCheck]:
     return list(check(scene, p))
 
 

@@ -11,7 +11,6 @@ from typing import Any
 
 from lgvi_warp.control.base import SECTIONS as LISTS
 from lgvi_warp.control.controller import Controller
-from lgvi_warp.vehicles.fossen import vehicle_names
 from lgvi_warp.physics import terms
 from lgvi_warp.physics.fields import TABLE
 from lgvi_warp.physics.terms import events
@@ -25,6 +24,7 @@ from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
 from lgvi_warp.scene.start import Environment, Start
 from lgvi_warp.statistics.base import TYPES as STATISTICS
 from lgvi_warp.statistics.until import Until
+from lgvi_warp.vehicles.fossen import vehicle_names
 
 Schema = dict[str, Any]
 

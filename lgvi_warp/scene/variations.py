@@ -207,7 +207,8 @@ def known_target(
 
 
 ROTATIONS = (
-    "give lw.distributions.RotationNormal, lw.distributions.UniformRotation or a Choice of matrices; or vary rotation_vector or euler_deg instead"
+    "give lw.distributions.RotationNormal, lw.distributions.UniformRotation or a Choice of matrices; "
+    "or vary rotation_vector or euler_deg instead"
 )
 
 
@@ -217,7 +218,9 @@ def variation(faults: Faults, key: str, distribution: Any, known: Mapping[str, n
     Returns: The variation; None if anything is wrong.
     """
     if not isinstance(distribution, Distribution):
-        remedy = "give lw.distributions.Normal(std=...) or another, or an object with ppf(u), such as scipy.stats.gamma(2.0)"
+        remedy = (
+            "give lw.distributions.Normal(std=...) or another, or an object with ppf(u), such as scipy.stats.gamma(2.0)"
+        )
         faults.add(f'"{key}"', distribution, "is not a distribution", remedy)
         return None
     named = targets(key)
@@ -237,7 +240,10 @@ def _misfit(variation: Variation) -> tuple[str, str] | None:
     turns = isinstance(distribution, AttitudeDistribution)
     chosen = distribution.kind == "choice" and distribution.joint
     if len(named) > 1 and distribution.kind != "correlated_normal":
-        return "draws one quantity, several are named", "give lw.distributions.CorrelatedNormal, or a distribution to each"
+        return (
+            "draws one quantity, several are named",
+            "give lw.distributions.CorrelatedNormal, or a distribution to each",
+        )
     attitude = any(target.name == ATTITUDE for target in named)
     if turns and not attitude:
         return "is a distribution of attitudes", f'vary "{ATTITUDE}"'

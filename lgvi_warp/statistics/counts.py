@@ -78,7 +78,9 @@ class Histogram(Counted):
             return
         run = isinstance(self.limits, str) and self.limits == "run"
         if run and self.of is not None:
-            faults.add("limits", self.limits, "is for times alone, as in lw.statistics.EndTime", "give limits=(low, high)")
+            faults.add(
+                "limits", self.limits, "is for times alone, as in lw.statistics.EndTime", "give limits=(low, high)"
+            )
             return
         if self.edges is None:
             limits, bins = np.array([0.0, 1.0]) if run else faults.finite("limits", self.limits, (2,)), self.bins

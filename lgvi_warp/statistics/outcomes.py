@@ -11,7 +11,7 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.statistics.base import Gatherer, Statistic
-from lgvi_warp.statistics.counts import DIRICHLET, PassageCurve, Histogram, by_replicates, check_levels
+from lgvi_warp.statistics.counts import DIRICHLET, Histogram, PassageCurve, by_replicates, check_levels
 from lgvi_warp.statistics.ends import FAILED, Ends
 from lgvi_warp.statistics.estimates import intervals
 from lgvi_warp.statistics.estimates.estimate import Estimate, along

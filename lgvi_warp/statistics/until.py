@@ -174,7 +174,9 @@ def _names_of_entries(statistic: Statistic) -> dict[str, dict[str, int]]:
     for i, label in enumerate(statistic.quantity.labels):
         index = re.search(r"\[[^\]]*\]", label)
         entry = {"component": i, "component_2": i}
-        entries[f"{statistic.key}{index[0] if index else f'[{i}]'}"] = entries[f"{statistic.type} {label}{statistic.at_text}"] = entry
+        entries[f"{statistic.key}{index[0] if index else f'[{i}]'}"] = entries[
+            f"{statistic.type} {label}{statistic.at_text}"
+        ] = entry
     if isinstance(statistic, Quantiles):
         for name, entry in list(entries.items()):
             for j, level in enumerate(statistic.levels):

@@ -22,7 +22,7 @@ from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.keepers.protocol import Keeper, PartKeeper
 from lgvi_warp.store.commits import Commits
 from lgvi_warp.store.layout import StoreArray
-from lgvi_warp.store.layout_check import is_sum, corrupt_store_as_scene_error
+from lgvi_warp.store.layout_check import corrupt_store_as_scene_error, is_sum
 from lgvi_warp.store.writer import BlockWriter, Room
 
 if TYPE_CHECKING:

@@ -198,7 +198,9 @@ class Folder:
     def finish(self, members: int | None = None) -> None:
         """Mark the run as complete."""
         if not self.complete:
-            self._say({"complete": True} | ({} if members is None else {"members": members}), metadata_under(self.path / KEPT))
+            self._say(
+                {"complete": True} | ({} if members is None else {"members": members}), metadata_under(self.path / KEPT)
+            )
 
     def take_layout(self, source: Path) -> None:
         """Take over the layout in the root's metadata of another folder of the same run.

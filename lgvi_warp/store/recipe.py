@@ -156,7 +156,9 @@ def same_run(
 
 
 # What is said of functions whose code does not tell which they are.
-UNTOLD = "cannot be compared with what the run began with; give it a version, as lw.control.Callback(function, version=1)"
+UNTOLD = (
+    "cannot be compared with what the run began with; give it a version, as lw.control.Callback(function, version=1)"
+)
 
 
 def _functions(stored: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[list[tuple[str, str, str]], list[str]]:

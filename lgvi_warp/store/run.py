@@ -167,7 +167,13 @@ class StoredRun:
         for block in set(runs) - set(remaining):
             overall.at(block, block.count * steps)
         members = run_blocks(
-            Work(self.plan, self.keepers, block_files), runs, executor, overall.at, remaining, self.enough, after=self.after
+            Work(self.plan, self.keepers, block_files),
+            runs,
+            executor,
+            overall.at,
+            remaining,
+            self.enough,
+            after=self.after,
         )
         if progress and members < runs[-1].stop:
             progress(1.0)

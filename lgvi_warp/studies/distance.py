@@ -80,8 +80,8 @@ MEAN = "mean "
 def compared_in(of: Any) -> Distance:
     """Find the quantity that a name or a lw.statistics.Quantity means.
 
-    of: a name such as "position", "depth", "position[2]" or "norm(velocity)", a lw.statistics.Quantity, or a Compared; "mean position[0]"
-        for the mean over the members.
+    of: a name such as "position", "depth", "position[2]" or "norm(velocity)", a lw.statistics.Quantity, or a Compared; "mean
+        position[0]" for the mean over the members.
     """
     if isinstance(of, Distance):
         return of

@@ -17,7 +17,7 @@ import numpy as np
 from lgvi_warp.common.arguments import path_of
 from lgvi_warp.common.errors import among
 from lgvi_warp.common.files import write_text
-from lgvi_warp.common.reading import file_json, corrupt_file_as_scene_error
+from lgvi_warp.common.reading import corrupt_file_as_scene_error, file_json
 from lgvi_warp.common.tables import write_csv
 
 # Study -> pattern of the names of the files that hold what it found.

@@ -372,7 +372,13 @@ class Ladders:
     """
 
     def __init__(
-        self, sample: Sample, reference: Reference, distance: Distance, target: float, budget: Budget, named: bool = False
+        self,
+        sample: Sample,
+        reference: Reference,
+        distance: Distance,
+        target: float,
+        budget: Budget,
+        named: bool = False,
     ):
         self.sample, self.reference, self.of, self.target = sample, reference, distance.name, target
         self.budget, self.named = budget, named

@@ -180,7 +180,11 @@ class Tradeoff(Saved):
         measured = []
         for row in content["measurements"]:
             ends = {name: with_missing_as(row[name], math.nan) for name in ("energy_drift", "biases")}
-            fields = row | ends | {"setting": Candidate(**row["setting"]), "errors": with_missing_as(row["errors"], math.inf)}
+            fields = (
+                row
+                | ends
+                | {"setting": Candidate(**row["setting"]), "errors": with_missing_as(row["errors"], math.inf)}
+            )
             measured.append(Measurement(**fields))
         growth = content["growth"]
         if growth is not None:
@@ -313,8 +317,8 @@ def tradeoff(
         fleet: the ensemble, or a Scene with one.
         t1: end time [s]. Default: run.duration of the scene.
         of: quantity that decides how far the reference is good enough: any that statistics know ("position", "attitude",
-            "depth", "position[2]", "speed", "euler", ...), or a lw.statistics.Quantity. Errors of position, attitude, velocity,
-            angular_velocity and energy are measured as well. Default "position".
+            "depth", "position[2]", "speed", "euler", ...), or a lw.statistics.Quantity. Errors of position, attitude,
+            velocity, angular_velocity and energy are measured as well. Default "position".
         methods: names of the methods to try; each has a setting measured, or is named in `missing`. Default: all that the
             scene takes.
         members: size of the sample. Default 128.
@@ -570,7 +574,9 @@ def halved(
 
     reference: what errors are measured against; None where noise acts.
     """
-    trial = tried(sample, sample.candidate(series.method, series.m, series.dtype, series.solver), reference, until, budget)
+    trial = tried(
+        sample, sample.candidate(series.method, series.m, series.dtype, series.solver), reference, until, budget
+    )
     trials.append(trial)
     series.rungs += 1
     finer = sample.allowed(2 * series.m)

@@ -393,7 +393,9 @@ def with_partners(
             full[column, row] = matrix[row, column]
         elif abs(matrix[row, column] - matrix[column, row]) > RELATIVE * abs(matrix[row, column]):
             problem = f"differs from its partner {lower} = {coefficients[lower]}"
-            faults.add(upper, coefficients[upper], problem, "the added mass matrix is symmetric: mend one or leave it out")
+            faults.add(
+                upper, coefficients[upper], problem, "the added mass matrix is symmetric: mend one or leave it out"
+            )
         else:
             full[column, row] = full[row, column]
     return full

@@ -10,10 +10,10 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, SceneError, closest
+from lgvi_warp.physics.notation import hat
 from lgvi_warp.vehicles.fossen import PAIRS, inertia_from_names
 from lgvi_warp.vehicles.poses import HERE, Pose
-from lgvi_warp.vehicles.robot_xml import number, read_floats, numbers_in, text_of
-from lgvi_warp.physics.notation import hat
+from lgvi_warp.vehicles.robot_xml import number, numbers_in, read_floats, text_of
 
 
 def _zeros() -> np.ndarray:

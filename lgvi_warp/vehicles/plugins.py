@@ -210,7 +210,11 @@ def add_to(faults: Faults, body: Coefficients, hydrodynamics: Hydrodynamics, pos
     for name in ("quadratic", "forward"):
         matrix = getattr(hydrodynamics, name)
         if np.any(matrix) and not np.allclose(X, np.eye(6), atol=1e-12):
-            remedy = f"it has no such form about another point: pass link={hydrodynamics.link!r}, or leave that plugin out"
-            faults.add(f"{name} drag of the link", hydrodynamics.link, "is about another point than the vehicle's", remedy)
+            remedy = (
+                f"it has no such form about another point: pass link={hydrodynamics.link!r}, or leave that plugin out"
+            )
+            faults.add(
+                f"{name} drag of the link", hydrodynamics.link, "is about another point than the vehicle's", remedy
+            )
         else:
             setattr(body, name, getattr(body, name) + matrix)

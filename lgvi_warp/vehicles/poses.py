@@ -11,8 +11,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, closest
-from lgvi_warp.vehicles.robot_xml import child_of, is_true, numbers_in, text_of
 from lgvi_warp.physics.notation import hat
+from lgvi_warp.vehicles.robot_xml import child_of, is_true, numbers_in, text_of
 
 # Most frames of which each is given relative to the next.
 LONGEST_CHAIN = 200

@@ -22,7 +22,7 @@ from lgvi_warp.vehicles.plugins import (
     unread,
 )
 from lgvi_warp.vehicles.poses import Poses, Scope, read_pose
-from lgvi_warp.vehicles.robot_xml import child_of, is_true, number, read_floats, plugin_name, plugins_of, text_of
+from lgvi_warp.vehicles.robot_xml import child_of, is_true, number, plugin_name, plugins_of, read_floats, text_of
 from lgvi_warp.vehicles.urdf import read_urdf
 
 GAZEBO_GRAVITY = 9.8  # m/s2: of a <world> that gives none

@@ -22,7 +22,9 @@ def scene(sensors, faults=(), period=0.1, **law):
     """A vehicle with these sensors and a law that needs nothing of them."""
     laws, guidance = [lw.control.HeadingPID(**{"kp": 1.0} | law)], [lw.control.SetPoint(heading=0.0)]
     controller = lw.Controller(period=period, sensors=sensors, guidance=guidance, laws=laws, faults=faults)
-    return lw.Scene(torpedo(196.0, (0.0, 0.0, -0.02)), lw.Environment(9.8), [lw.terms.ControlWrench()], controller=controller)
+    return lw.Scene(
+        torpedo(196.0, (0.0, 0.0, -0.02)), lw.Environment(9.8), [lw.terms.ControlWrench()], controller=controller
+    )
 
 
 def measured(ensemble, truth, h=0.02, dtype="float64", width=4):

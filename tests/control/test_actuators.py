@@ -130,7 +130,10 @@ SCENES = {
     "auv": (
         auv,
         [lw.terms.ControlFins(**FINS), lw.terms.Thrusters(**PAIR)],
-        [lw.control.PseudoInverse(name="fins", to="control_fins", speed=SPEED), lw.control.PseudoInverse(name="pair", to="thrusters")],
+        [
+            lw.control.PseudoInverse(name="fins", to="control_fins", speed=SPEED),
+            lw.control.PseudoInverse(name="pair", to="thrusters"),
+        ],
         [],
     ),
 }

@@ -33,8 +33,13 @@ OTHERS = {
 
 def scene(period=PERIOD, position=NONE, heading=0.0, **words):
     """A neutral body, set-point, PID of pose and of heading with gains of 0."""
-    laws = [lw.control.PosePID(**dict.fromkeys(("kp", "ki", "kd", "kr", "kw"), NONE), **words), lw.control.HeadingPID(kp=0.0)]
-    controller = lw.Controller(period=period, guidance=[lw.control.SetPoint(position=position, heading=heading)], laws=laws)
+    laws = [
+        lw.control.PosePID(**dict.fromkeys(("kp", "ki", "kd", "kr", "kw"), NONE), **words),
+        lw.control.HeadingPID(kp=0.0),
+    ]
+    controller = lw.Controller(
+        period=period, guidance=[lw.control.SetPoint(position=position, heading=heading)], laws=laws
+    )
     vehicle = lw.Vehicle(MASS, inertia=INERTIA, added_mass=NONE, buoyancy=MASS * GRAVITY, center_of_buoyancy=NONE)
     terms = [lw.terms.ControlWrench(limit=FAR), lw.terms.Wrench()]
     return lw.Scene(vehicle, lw.Environment(gravity=GRAVITY), terms, controller=controller)

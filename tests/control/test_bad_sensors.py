@@ -100,7 +100,10 @@ def test_all_faults_at_once():
 
 
 def test_a_scene_with_sensors_is_its_own_file():
-    sensors = [lw.control.Sensor(name="cell", of="depth", noise=0.1), lw.control.Sensor(name="log", of="velocity", bias=0.2, latency=2)]
+    sensors = [
+        lw.control.Sensor(name="cell", of="depth", noise=0.1),
+        lw.control.Sensor(name="log", of="velocity", bias=0.2, latency=2),
+    ]
     sensors += [lw.control.DeadReckoning(rule="euler"), lw.control.LowPass(of="heading", time_constant=1.0)]
     sensors += [lw.control.ComplementaryFilter(time_constant=2.0)]
     first = scene(sensors, [lw.control.Fault(of="log", channel=2, time=np.inf)])

@@ -15,9 +15,15 @@ def scene(laws, members=20, **more):
     """A body with a heading law and an ideal actuator; members that differ."""
     controller = lw.Controller(period=5 * H, guidance=[lw.control.SetPoint(heading=0.8)], laws=laws, **more)
     vehicle = lw.Vehicle(10.0, inertia=(1.0, 2.0, 3.0))
-    terms = [lw.terms.ControlWrench(limit=2.0), lw.terms.Drag(linear=(1.0, 2.0, 2.0, 0.1, 0.1, 0.1), quadratic=(0.0,) * 6)]
+    terms = [
+        lw.terms.ControlWrench(limit=2.0),
+        lw.terms.Drag(linear=(1.0, 2.0, 2.0, 0.1, 0.1, 0.1), quadratic=(0.0,) * 6),
+    ]
     plain = lw.Scene(vehicle, terms=terms, controller=controller)
-    vary = {"start.angular_velocity": lw.distributions.Normal(std=0.1), "start.velocity": lw.distributions.Normal(std=0.2)}
+    vary = {
+        "start.angular_velocity": lw.distributions.Normal(std=0.1),
+        "start.velocity": lw.distributions.Normal(std=0.2),
+    }
     return lw.Ensemble(plain, members, 3, vary)
 
 
@@ -37,7 +43,9 @@ def run(laws, **named):
 @pytest.mark.slow
 def test_it_is_the_law_in_the_kernel():
     metrics = [lw.metrics.IAE("heading"), lw.metrics.Effort(), lw.metrics.MaxError("attitude")]
-    asked, fused = (run([law], statistics=metrics) for law in (lw.control.Callback(heading), lw.control.HeadingPID(**GAINS)))
+    asked, fused = (
+        run([law], statistics=metrics) for law in (lw.control.Callback(heading), lw.control.HeadingPID(**GAINS))
+    )
     # 250 steps of round-off: the two evaluate the same formula in another order.
     assert np.abs(asked.attitude - fused.attitude).max() < 1e-12
     assert np.abs(asked.position - fused.position).max() < 1e-12
@@ -177,13 +185,16 @@ def shares(cases, folder=None, metrics=("iae heading",), **more):
 def truth(function):
     """The metric of a run with this function, outside any sweep."""
     metric = lw.metrics.IAE("heading", then=[lw.statistics.MemberValues()])
-    return lw.solve(scene([lw.control.Callback(function)], 4), "psi_s", h=H, t1=0.5, keep="none", statistics=[metric]).statistics[
+    return lw.solve(scene([lw.control.Callback(function)], 4), "psi_s", h=H, t1=0.5, keep="none",
+                    statistics=[metric]).statistics[
         "each iae heading"].value[0, 0]  # fmt: skip
 
 
 def replacing(**functions):
     """Cases of other functions."""
-    return [lw.studies.Case(name, replace={"laws": [lw.control.Callback(function)]}) for name, function in functions.items()]
+    return [
+        lw.studies.Case(name, replace={"laws": [lw.control.Callback(function)]}) for name, function in functions.items()
+    ]
 
 
 @pytest.mark.parametrize("on_disk", [False, True])

@@ -18,7 +18,9 @@ def members(delays, times=np.inf):
     vehicle = torpedo(196.0, (0.0, 0.0, -0.02), (1.5, 4.0, J))
     guidance = [lw.control.SetPoint(heading=0.3)]
     faults = [lw.control.Fault(of="control_wrench", channel=5, gain=0.5, offset=0.05)]
-    controller = lw.Controller(period=EVERY * H, guidance=guidance, laws=[lw.control.HeadingPID(kp=KP, kd=KD)], faults=faults)
+    controller = lw.Controller(
+        period=EVERY * H, guidance=guidance, laws=[lw.control.HeadingPID(kp=KP, kd=KD)], faults=faults
+    )
     scene = lw.Scene(vehicle, lw.Environment(9.8), [lw.terms.ControlWrench()], controller=controller)
     times = np.broadcast_to(times, len(delays))
     return one(scene, parameters={"controller.delay": np.asarray(delays) * H, "fault.time": times})

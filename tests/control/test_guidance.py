@@ -16,7 +16,11 @@ POINTS = [(0.0, 0.0, 2.0), (4.0, 0.0, 3.0), (4.0, 3.0, 3.0), (1.0, 5.0, 2.5)]
 def scene(current=(0.0, 0.0, 0.0), **words):
     """A body that is pushed along its waypoints, in a current."""
     words = dict(points=POINTS, speed=1.0, look_ahead=1.5, radius=0.8) | words
-    laws = [lw.control.SpeedPID(kp=40.0, ki=4.0, drag=20.0), lw.control.HeavePID(kp=30.0, kd=40.0), lw.control.HeadingPID(kp=30.0, kd=40.0)]
+    laws = [
+        lw.control.SpeedPID(kp=40.0, ki=4.0, drag=20.0),
+        lw.control.HeavePID(kp=30.0, kd=40.0),
+        lw.control.HeadingPID(kp=30.0, kd=40.0),
+    ]
     controller = lw.Controller(period=EVERY * H, guidance=[lw.control.Waypoints(**words)], laws=laws)
     vehicle = torpedo(20.0 * 9.8, (0.0, 0.0, -0.1))
     terms = [lw.terms.Drag(linear=(3.0, 40.0, 40.0, 3.0, 4.0, 5.0), quadratic=(20.0, 90.0, 90.0, 1.0, 2.0, 3.0)),

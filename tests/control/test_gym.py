@@ -93,14 +93,18 @@ def test_members_that_come_again_have_other_noise():
         ends += list(steer(env, observed, 3)[0])
     assert members == [0, 1, 2] * 4
     assert len({end.tobytes() for end in ends}) == 12
-    run = lw.solve(fleet.in_scene(replace(fleet.scene, controller=scene([lw.control.Callback(heading)]).scene.controller)), "psi_s",
+    run = lw.solve(fleet.in_scene(replace(fleet.scene,
+                                          controller=scene([lw.control.Callback(heading)]).scene.controller)), "psi_s",
                    h=H, t1=3 * PERIOD, save=lw.SaveAt())  # fmt: skip
     np.testing.assert_array_equal([end[1:4] for end in ends[:3]], run.position[-1])
 
 
 def test_members_that_start_while_others_go_on():
     def varied(law):
-        numbers = {"vehicle.mass": lw.distributions.Normal(std=0.5), "drag.linear[5]": lw.distributions.Uniform(low=0.05, high=0.2)}
+        numbers = {
+            "vehicle.mass": lw.distributions.Normal(std=0.5),
+            "drag.linear[5]": lw.distributions.Uniform(low=0.05, high=0.2),
+        }
         fleet = scene([law])
         return lw.Ensemble(fleet.scene, N, 3, fleet.vary | numbers)
 
@@ -236,8 +240,12 @@ def test_named_numbers_are_those_of_a_policy():
     R = Rotation.random(2 * N, rng=rng).as_matrix()
     vectors = iter(rng.normal(size=(7, N, 3)))
     heading = np.arctan2(R[:, 1, 0], R[:, 0, 0])
-    y = lw.control.CallbackInput(next(vectors), R[:N], next(vectors), next(vectors), heading[:N], water_velocity=next(vectors))
-    r = lw.control.CallbackInput(next(vectors), R[N:], next(vectors), next(vectors), heading[N:], speed=rng.normal(size=N))
+    y = lw.control.CallbackInput(
+        next(vectors), R[:N], next(vectors), next(vectors), heading[:N], water_velocity=next(vectors)
+    )
+    r = lw.control.CallbackInput(
+        next(vectors), R[N:], next(vectors), next(vectors), heading[N:], speed=rng.normal(size=N)
+    )
     assert {name: OBSERVATIONS[name][:2] for name in INPUTS} == INPUTS
     for name in INPUTS:
         seen = np.reshape(OBSERVATIONS[name].of(y, r), (N, -1))
@@ -311,7 +319,10 @@ def falling():
     controller = lw.Controller(
         period=PERIOD,
         delay=0.04,
-        sensors=[lw.control.Sensor(of="depth", latency=2, noise=0.0), lw.control.LowPass(of="velocity", time_constant=1.0)],
+        sensors=[
+            lw.control.Sensor(of="depth", latency=2, noise=0.0),
+            lw.control.LowPass(of="velocity", time_constant=1.0),
+        ],
         guidance=[lw.control.SetPoint(heading=0.8)],
         laws=LAW,
     )

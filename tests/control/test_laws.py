@@ -72,7 +72,9 @@ def scene(tmp_path_factory):
         lw.control.PoseSMC(**IDLE["pose_smc"], **three),
         lw.control.HeadingSMC(**IDLE["heading_smc"], lambda_=0.4, boundary=0.1),
         lw.control.StateFeedback(**IDLE["state_feedback"]),
-        lw.control.Policy(file=file, inputs=inputs, outputs=["Z", "K", "N"], **IDLE["policy"], output_activation="tanh"),
+        lw.control.Policy(
+            file=file, inputs=inputs, outputs=["Z", "K", "N"], **IDLE["policy"], output_activation="tanh"
+        ),
     ]
     guidance = [
         lw.control.Trajectory(times=(0.5, 3.0, 8.0, 12.0), positions=[(0, 0, 3), (2, 1, 4), (5, -2, 6), (4, 3, 5)],
@@ -188,7 +190,9 @@ def test_guidance_keeps_what_others_want():
     for guidance in ([point, places], [places, point]):
         gains = {**dict.fromkeys(("kp", "kd"), (20.0, 25.0, 30.0)), **dict.fromkeys(("kr", "kw"), (6.0, 7.0, 8.0))}
         controller = lw.Controller(period=EVERY * H, guidance=guidance, laws=[lw.control.PosePID(**gains)])
-        way = lw.Scene(VEHICLE, lw.Environment(gravity=9.8), [lw.terms.ControlWrench(limit=LIMIT)], controller=controller)
+        way = lw.Scene(
+            VEHICLE, lw.Environment(gravity=9.8), [lw.terms.ControlWrench(limit=LIMIT)], controller=controller
+        )
         given = states(1)
         result = lw.solve(lw.Ensemble.from_states(way, *given), "psi_s", h=H, t1=6.0, save=lw.SaveAt(every=EVERY * H))
         b, R = twin_states(way, {}, [x[0] for x in given], EVERY, H, 120)

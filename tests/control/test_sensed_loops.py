@@ -96,7 +96,10 @@ def test_the_variance_under_white_noise_is_that_of_the_lyapunov_equation():
     sensors = [lw.control.Sensor(of="heading", name="compass", noise=HEADING_NOISE)]
     sensors += [lw.control.Sensor(of="angular_velocity", name="gyro", noise=RATE_NOISE)]
     controller = lw.Controller(
-        period=PERIOD, sensors=sensors, guidance=[lw.control.SetPoint(heading=0.0)], laws=[lw.control.HeadingPID(kp=KP, kd=KD)]
+        period=PERIOD,
+        sensors=sensors,
+        guidance=[lw.control.SetPoint(heading=0.0)],
+        laws=[lw.control.HeadingPID(kp=KP, kd=KD)],
     )
     vehicle = torpedo(20.0 * GRAVITY, (0.0, 0.0, -0.02), (1.5, 4.0, J))
     scene = lw.Scene(vehicle, lw.Environment(GRAVITY), [lw.terms.ControlWrench()], controller=controller)

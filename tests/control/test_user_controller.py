@@ -62,7 +62,11 @@ def test_the_law_on_the_page_is_right_and_keeps_the_depth(page):
 
 
 def test_a_type_is_taken_once(monkeypatch):
-    for base, word in ((lw.laws.ControlLaw, "heading_pid"), (lw.laws.Guidance, "waypoints"), (lw.laws.MeasuringPart, "sensor")):
+    for base, word in (
+        (lw.laws.ControlLaw, "heading_pid"),
+        (lw.laws.Guidance, "waypoints"),
+        (lw.laws.MeasuringPart, "sensor"),
+    ):
         monkeypatch.setattr(base, "kinds", dict(base.kinds))
         taken = type("Mine", (base,), {"type": word})
         with pytest.raises(
@@ -176,7 +180,8 @@ PARTS = {
     "heave": (lw.control.HeavePID(kp=3.0, ki=0.2), None),
     "speed": (lw.control.SpeedPID(kp=3.0, ki=0.2), None),
     "pose": (lw.control.PosePID(kp=V, ki=V, kd=V, kr=V, kw=V, feedforward="restoring"), None),
-    "pose smc": (lw.control.PoseSMC(lambda_=V, boundary=V, lambda_r=V, boundary_r=V, k_sigma=V, k_d=V, k_sigma_r=V, k_d_r=V), None),
+    "pose smc": (lw.control.PoseSMC(lambda_=V, boundary=V, lambda_r=V, boundary_r=V, k_sigma=V, k_d=V, k_sigma_r=V,
+                                    k_d_r=V), None),
     "heading smc": (lw.control.HeadingSMC(lambda_=0.4, boundary=0.1, k_sigma=0.2, nomoto_gain=0.25, nomoto_time=1.5), None),
     "state feedback": (lw.control.StateFeedback(K=np.ones((6, 12))), None),
     "matrix": (lw.control.AllocationMatrix(to="control_wrench", matrix=2.0 * np.eye(6)),

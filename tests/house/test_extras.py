@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp import plots
 from lgvi_warp.common import yaml_text
 from lgvi_warp.engine.executors import executor_of
 from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.statistics.estimates.estimate import Estimate
 from lgvi_warp.store.settings import needed
 from lgvi_warp.studies.sensitivity import analyses
-from lgvi_warp import plots
 from lgvi_warp.views.pages import run_again as again
 from lgvi_warp.views.recording import rerun
 

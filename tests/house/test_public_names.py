@@ -30,9 +30,7 @@ def test_the_root_has_few_names():
 
 def test_each_thing_has_one_door():
     things = Counter(id(getattr(getattr(lw, door) if door else lw, name)) for door, name in names())
-    twice = [
-        (door, name) for door, name in names() if things[id(getattr(getattr(lw, door) if door else lw, name))] > 1
-    ]
+    twice = [(door, name) for door, name in names() if things[id(getattr(getattr(lw, door) if door else lw, name))] > 1]
     assert twice == []
 
 

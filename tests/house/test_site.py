@@ -189,6 +189,8 @@ def test_the_site_is_built_without_warnings_and_its_links_lead_somewhere(tmp_pat
     assert broken_links(site) == []
     text = "".join(Path(page).read_text() for page in (site / "reference" / "built").glob("*.html"))
     missing = [
-        name for name in NAMES if not inspect.ismodule(operator.attrgetter(name)(lw)) and f'id="lgvi_warp.{name}"' not in text
+        name
+        for name in NAMES
+        if not inspect.ismodule(operator.attrgetter(name)(lw)) and f'id="lgvi_warp.{name}"' not in text
     ]
     assert not missing

@@ -47,7 +47,11 @@ def test_a_scene_file_holds_it(term):
         np.testing.assert_array_equal(getattr(again, key), value, err_msg=key)
 
 
-@pytest.mark.parametrize("term", [lw.terms.Weight(), lw.terms.Restoring(), lw.events.Surface(), lw.events.StopTime(at=3.0)], ids=lambda t: t.type)
+@pytest.mark.parametrize(
+    "term",
+    [lw.terms.Weight(), lw.terms.Restoring(), lw.events.Surface(), lw.events.StopTime(at=3.0)],
+    ids=lambda t: t.type,
+)
 def test_what_follows_from_the_vehicle_and_events_are_right(term):
     assert lw.laws.check_law(term).ok
     # Another vehicle and environment, and no new kernel.

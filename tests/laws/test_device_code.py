@@ -27,7 +27,9 @@ ROUND_OFF = 100.0 * np.finfo(float).eps
 SCENE = lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), start=lw.Start(position=STATE["b"]))
 IMPLIED = {
     "weight": Case((lw.terms.Weight(),), (Weight(net=VEHICLE.mass * GRAVITY - VEHICLE.buoyancy),)),
-    "restoring": Case((lw.terms.Restoring(),), (Restoring(moment=VEHICLE.buoyancy * np.array(VEHICLE.center_of_buoyancy)),)),
+    "restoring": Case(
+        (lw.terms.Restoring(),), (Restoring(moment=VEHICLE.buoyancy * np.array(VEHICLE.center_of_buoyancy)),)
+    ),
 }
 ALONE = IMPLIED | {name: case for name, case in CASES.items() if len(case.terms) == 1}
 (LAGGING,), (LAGGING_TWIN,), _ = CASES["thrusters"]

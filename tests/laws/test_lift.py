@@ -9,12 +9,12 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.engine.packets import Packets
-from lgvi_warp.vehicles import fossen as coefficients
 from lgvi_warp.physics import terms
 from lgvi_warp.reference.terms import View
 from lgvi_warp.reference.terms.cross_flow import CrossFlow
 from lgvi_warp.reference.terms.fins import Fins
 from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.vehicles import fossen as coefficients
 from tests.laws.cases_lift import CASES, DENSITY, FINS, HULL, LIFT, arrays
 from tests.laws.test_parity import STATE, VEHICLE
 from tests.support.tools import difference, last, one, random_states, slope

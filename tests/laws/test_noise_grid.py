@@ -157,7 +157,10 @@ def test_a_step_that_is_no_multiple_is_refused_with_the_nearest(h, every, text):
 
 def test_a_third_of_a_second_is_a_multiple_of_a_ninth():
     plan = make_plan(fleet(members=1, grid=1.0 / 9.0), "psi_x", 1.0 / 3.0, 2.0)
-    assert [term.draws(plan.grid.h) for term, _ in plan.kernel_choice.laws if isinstance(term, lw.laws.NoisyTerm)] == [3, 3]
+    assert [term.draws(plan.grid.h) for term, _ in plan.kernel_choice.laws if isinstance(term, lw.laws.NoisyTerm)] == [
+        3,
+        3,
+    ]
 
 
 def test_more_draws_than_a_counter_has_are_refused():

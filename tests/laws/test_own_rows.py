@@ -219,7 +219,9 @@ class OwnActuator(lw.terms.ControlWrench):
 def test_an_actuator_of_a_users_own_reports_where_it_is():
     # A torque that lags behind a command that never changes: 1 - e^(-t / T) of it.
     lag, t1 = 0.5, 1.5
-    controller = lw.Controller(period=0.1, guidance=[lw.control.SetPoint(heading=1.0)], laws=[lw.control.HeadingPID(kp=2.0)])
+    controller = lw.Controller(
+        period=0.1, guidance=[lw.control.SetPoint(heading=1.0)], laws=[lw.control.HeadingPID(kp=2.0)]
+    )
     still = lw.Vehicle(1e9, inertia=(1e9,) * 3, added_mass=(0.0,) * 3, buoyancy=1e9 * GRAVITY)
     scene = lw.Scene(still, terms=[OwnActuator(time_constant=lag)], controller=controller)
     result = lw.solve(one(scene), "psi_s", h=0.05, t1=t1, save=lw.SaveAt(every=0.5, fields=("actuator", "command")))

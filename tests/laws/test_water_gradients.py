@@ -345,7 +345,11 @@ class Driven(NamedTuple):
         hull = lw.Vehicle(rigid_body_mass_matrix=self.rigid, added_mass_matrix=self.added, weight=self.rigid[0, 0] * GRAVITY,
                           center_of_gravity=self.center, buoyancy=self.displaced * GRAVITY,
                           center_of_buoyancy=self.buoyancy_center)  # fmt: skip
-        acting = [self.wave.term(), lw.terms.Wrench(force=self.thrust, torque=self.torque), lw.terms.Drag(linear=self.linear)]
+        acting = [
+            self.wave.term(),
+            lw.terms.Wrench(force=self.thrust, torque=self.torque),
+            lw.terms.Drag(linear=self.linear),
+        ]
         return lw.Scene(hull, lw.Environment(GRAVITY), terms=acting)
 
 

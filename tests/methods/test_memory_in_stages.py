@@ -121,7 +121,8 @@ def test_the_kernel_is_as_the_twin(method, dtype, bound):
 
 def test_a_member_has_the_same_bits_among_others():
     # Commands that turn at other times, other lags and rates: the pieces of one lane are not those of its neighbours.
-    varied = {"thrusters.times": lw.distributions.Normal(relative=0.1), "thrusters.time_constant": lw.distributions.Uniform(relative=0.5),
+    varied = {"thrusters.times": lw.distributions.Normal(relative=0.1),
+              "thrusters.time_constant": lw.distributions.Uniform(relative=0.5),
               "control_fins.rate_limit": lw.distributions.Uniform(relative=0.5)}  # fmt: skip
     fleet = lw.Ensemble(test_terms.scene_of(ROUGH), 24, 5, varied)
     result = lw.solve(fleet, "rk4", h=0.1, t1=1.2)

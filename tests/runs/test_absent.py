@@ -152,10 +152,13 @@ def test_a_polynomial_is_there_only_if_asked_for(tmp_path):
 
 
 VARIED = {"vehicle.mass": lw.distributions.Normal(relative=0.01), "vehicle.inertia": lw.distributions.Normal(relative=0.01),
-          "drag_matrix.linear": lw.distributions.Normal(relative=0.01), "drag_matrix.quadratic": lw.distributions.Normal(relative=0.01),
+          "drag_matrix.linear": lw.distributions.Normal(relative=0.01),
+          "drag_matrix.quadratic": lw.distributions.Normal(relative=0.01),
           "current.velocity": lw.distributions.Normal(std=0.1), "tether.anchor": lw.distributions.Normal(std=0.1),
-          "tether.stiffness": lw.distributions.LogNormal(sigma=0.1), "wrench.force": lw.distributions.Normal(std=(0.1, 0.0, 0.0)),
-          "thrusters.coefficient": lw.distributions.Uniform(relative=0.1), "thrusters.position": lw.distributions.Normal(std=0.01),
+          "tether.stiffness": lw.distributions.LogNormal(sigma=0.1),
+          "wrench.force": lw.distributions.Normal(std=(0.1, 0.0, 0.0)),
+          "thrusters.coefficient": lw.distributions.Uniform(relative=0.1),
+          "thrusters.position": lw.distributions.Normal(std=0.01),
           "environment.gravity": lw.distributions.Uniform(low=9.78, high=9.83)}  # fmt: skip
 
 
@@ -214,7 +217,10 @@ def test_unphysical_members_are_counted():
 def test_the_same_bits_for_any_number_of_threads(dtype):
     everything = scene_of(CASES["all together"])
     fleet = lw.Ensemble(
-        everything, 700, 3, {"current.velocity": lw.distributions.Normal(std=0.1), "vehicle.mass": lw.distributions.Normal(relative=0.01)}
+        everything,
+        700,
+        3,
+        {"current.velocity": lw.distributions.Normal(std=0.1), "vehicle.mass": lw.distributions.Normal(relative=0.01)},
     )
     runs = [lw.solve(fleet, h=0.02, t1=0.5, dtype=dtype, threads=threads) for threads in (1, 2, 4)]
     for name in ("position", "attitude", "velocity", "angular_velocity"):
@@ -222,7 +228,9 @@ def test_the_same_bits_for_any_number_of_threads(dtype):
 
 
 def test_a_controller_that_is_absent_is_no_code(tmp_path):
-    wanted = lw.Controller(period=0.1, guidance=[lw.control.SetPoint(heading=0.5)], laws=[lw.control.HeadingPID(kp=1.0)])
+    wanted = lw.Controller(
+        period=0.1, guidance=[lw.control.SetPoint(heading=0.5)], laws=[lw.control.HeadingPID(kp=1.0)]
+    )
     (fins,) = CASES["control fins"].terms
     driven = dataclasses.replace(fins, command=None, command_schedule=None, times=None)
     scenes = {"plain": lw.Scene(BARE, terms=[fins]), "steered": lw.Scene(BARE, terms=[driven], controller=wanted)}

@@ -304,12 +304,15 @@ def test_a_store_holds_them_and_goes_on(whole, tmp_path):
 
 @pytest.mark.slow_for("laws1")
 @pytest.mark.parametrize(
-    "laws", [[lw.control.HeadingPID(kp=KP)], [lw.control.Callback(lambda t, y, r, members: np.zeros((len(members), 6)))]]
+    "laws",
+    [[lw.control.HeadingPID(kp=KP)], [lw.control.Callback(lambda t, y, r, members: np.zeros((len(members), 6)))]],
 )
 def test_a_file_knows_which_terms_the_controller_drives(laws, tmp_path):
     """Fins that are driven have no command of their own: energies and pictures of a file must not ask for it."""
     wanted = lw.control.SetPoint(heading=0.5)
-    loop = lw.Controller(period=0.1, guidance=[wanted], laws=laws, allocation=[lw.control.PseudoInverse(to="control_fins")])
+    loop = lw.Controller(
+        period=0.1, guidance=[wanted], laws=laws, allocation=[lw.control.PseudoInverse(to="control_fins")]
+    )
     (fins,) = (term for term in lw.Scene.named("remus_100", controller=loop).terms if term.type == "control_fins")
     start = lw.Start(velocity=[1.54, 0.0, 0.0])
     driven = lw.Scene(lw.Vehicle(30.0, inertia=(0.2, 3.0, 3.0)), terms=[fins], start=start, controller=loop)
@@ -341,7 +344,11 @@ def test_a_recording_shows_commands_and_actuators(whole, tmp_path):
 
 @pytest.mark.slow
 def test_statistics_and_quantities_of_interest(whole):
-    statistics = [lw.statistics.Mean("command[5]"), lw.statistics.Mean("measured_depth"), lw.statistics.Mean("max(norm(demand))")]
+    statistics = [
+        lw.statistics.Mean("command[5]"),
+        lw.statistics.Mean("measured_depth"),
+        lw.statistics.Mean("max(norm(demand))"),
+    ]
     statistics += [lw.statistics.Quantiles("actuator[2]"), lw.statistics.Mean("reference_speed")]
     lean = lw.solve(fleet(), "psi_s", **SETTINGS, statistics=statistics, keep="none")
     found = lean.statistics

@@ -228,7 +228,10 @@ def spinning_bluerov():
 def torpedo_in_a_turn():
     push = lw.terms.Wrench(force=[8.0, 0.0, 0.0], torque=[0.0, 0.0, 0.5])
     drag = lw.terms.Drag(linear=[1.0, 4.0, 4.0, 0.2, 1.0, 1.0], quadratic=[2.0, 15.0, 15.0, 0.5, 3.0, 3.0])
-    vary = {"start.velocity": lw.distributions.Normal(std=0.1), "start.angular_velocity": lw.distributions.Normal(std=0.1)}
+    vary = {
+        "start.velocity": lw.distributions.Normal(std=0.1),
+        "start.angular_velocity": lw.distributions.Normal(std=0.1),
+    }
     return lw.Ensemble(torpedo(drag, push), 4, 1, vary), 20.0
 
 

@@ -161,8 +161,10 @@ def test_what_begins_beyond_in_moving_water_or_under_control_keeps_its_start(tmp
     """The state of such a kernel is relative to the water, which goes on moving; a controller has measured at t = 0."""
     start = {"position": [0.0, 0.0, 21.0], "velocity": [0.5, 0.0, -3.0]}
     scene = lw.Scene.named("remus_100", start=start, events=[{"type": "floor", "depth": 20.0}],
-                           terms=[lw.terms.GaussMarkovCurrent(standard_deviation=(0.3, 0.3, 0.0), time_constant=2.0)])  # fmt: skip
-    r = lw.solve(lw.Ensemble(scene, 20, 1, {"start.position[2]": lw.distributions.Uniform(low=19.0, high=23.0)}), h=0.05, t1=2.0,
+                           terms=[lw.terms.GaussMarkovCurrent(standard_deviation=(0.3, 0.3, 0.0),
+                                                              time_constant=2.0)])  # fmt: skip
+    r = lw.solve(lw.Ensemble(scene, 20, 1, {"start.position[2]": lw.distributions.Uniform(low=19.0, high=23.0)}),
+                 h=0.05, t1=2.0,
                  save=lw.SaveAt(every=0.5), store=tmp_path / "run.zarr")  # fmt: skip
     beyond = r.position[0, :, 2] > 20.0
     assert 5 < beyond.sum() < 20
@@ -261,7 +263,10 @@ def test_an_adaptive_method_arrives_within_its_tolerance(method, true):
 @pytest.mark.parametrize("dtype", ["float32", "float32_compensated"])
 def test_single_precision_stands_at_the_event(dtype):
     ensemble = fleet(200, stops(floor=8.0, surface=0.0))
-    statistics = [lw.statistics.Exceedance("depth", above=8.0, name="deep"), lw.statistics.Exceedance("depth", below=0.0, name="out")]
+    statistics = [
+        lw.statistics.Exceedance("depth", above=8.0, name="deep"),
+        lw.statistics.Exceedance("depth", below=0.0, name="out"),
+    ]
     r = lw.solve(ensemble, h=0.1, t1=20.0, dtype=dtype, statistics=statistics)
     counts = r.status.counts()
     assert round(float(r.statistics["deep"].value[-1, 0]) * 200) == counts["floor"] > 20
@@ -304,7 +309,9 @@ def test_a_stopped_member_stays_and_the_others_do_not_notice(terms):
     b, R, nu, Om = random_states(2, 40)
 
     def run(depth):
-        scene = lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), terms=TERMS[terms], events=[lw.events.Floor(depth=depth)])
+        scene = lw.Scene(
+            VEHICLE, lw.Environment(gravity=GRAVITY), terms=TERMS[terms], events=[lw.events.Floor(depth=depth)]
+        )
         return lw.solve(
             lw.Ensemble.from_states(scene, b, R, nu, Om), "psi_s", h=0.05, t1=4.0, save=lw.SaveAt(every=0.5)
         )
@@ -337,7 +344,8 @@ def test_an_event_in_a_step_that_was_divided():
     b, R, nu, Om = random_states(2, 8, spin=0.1)
     Om[:4] *= 400.0
     scene = lw.Scene(lw.Vehicle(20.0, inertia=(1.0, 1.2, 1.4), added_mass=(0.0, 0.0, 0.0), buoyancy=20.0 * GRAVITY),
-                     lw.Environment(gravity=GRAVITY), events=[lw.events.Floor(depth=2.0), lw.events.Surface(depth=-2.0)])  # fmt: skip
+                     lw.Environment(gravity=GRAVITY),
+                     events=[lw.events.Floor(depth=2.0), lw.events.Surface(depth=-2.0)])  # fmt: skip
     r = lw.solve(lw.Ensemble.from_states(scene, b, R, nu, Om), h=0.1, t1=20.0, on_failure="substep")
     hit = np.asarray(r.status) >= lw.Status.SURFACE
     inside = np.abs(b[:, 2]) < 2.0

@@ -20,7 +20,10 @@ from tests.runs.test_store import FIELDS, flip, remove, tear
 from tests.support.stores import MEMBERS, SETTINGS, differing, fleet, forked, tree
 
 # Some members turn too fast for the step: |J^-1 a| reaches 1.
-VARY = {"start.angular_velocity": lw.distributions.Normal(std=115.0), "vehicle.mass": lw.distributions.Normal(relative=0.001)}
+VARY = {
+    "start.angular_velocity": lw.distributions.Normal(std=115.0),
+    "vehicle.mass": lw.distributions.Normal(relative=0.001),
+}
 
 
 def failing(members=MEMBERS):
@@ -206,7 +209,11 @@ def test_killed_among_its_kept_members(wanted, tmp_path):
 
 
 def test_with_statistics_until_and_fewer_fields(tmp_path):
-    own = {"statistics": [lw.statistics.Mean("depth")], "until": lw.Until("mean depth", 1e9, members=512), "keep": "failed"}
+    own = {
+        "statistics": [lw.statistics.Mean("depth")],
+        "until": lw.Until("mean depth", 1e9, members=512),
+        "keep": "failed",
+    }
     chosen = lw.Store(tmp_path / "run.zarr", dtype="float32", fields=("position", "velocity"))
     save = lw.SaveAt(every=0.1, fields=("position", "attitude"))
     result = lw.solve(failing(), **SETTINGS | {"save": save}, **own, store=chosen)

@@ -35,12 +35,18 @@ def deepest(state, tick):
 def metrics():
     each = {"then": [lw.statistics.Mean(), lw.statistics.MemberValues()]}
     return [
-        *(kind(of, **each) for of in BOTH for kind in (lw.metrics.Overshoot, lw.metrics.Undershoot, lw.metrics.Peak, lw.metrics.PeakTime, lw.metrics.RiseTime)),
-        lw.metrics.SettlingTime("heading", within=0.2, **each), lw.metrics.SettlingTime("depth", **each), lw.metrics.SteadyStateError("depth", **each),
-        *(kind(of, **each) for of in BOTH for kind in (lw.metrics.IAE, lw.metrics.ISE, lw.metrics.ITAE, lw.metrics.RMSError, lw.metrics.MaxError)),
-        lw.metrics.IAE("depth", measured=True, name="measured", **each), lw.metrics.MaxError("speed", **each), lw.metrics.MaxError("position", **each),
-        lw.metrics.MaxError("attitude", **each), lw.metrics.CrossTrack(**each), lw.metrics.Effort(**each), lw.metrics.Effort("command[1]", **each),
-        lw.metrics.Travel(**each), lw.metrics.SaturationShare(**each), lw.metrics.ActuatorEnergy(**each), lw.metrics.TimeToFailure(),
+        *(kind(of, **each) for of in BOTH for kind in (lw.metrics.Overshoot, lw.metrics.Undershoot, lw.metrics.Peak,
+                                                       lw.metrics.PeakTime, lw.metrics.RiseTime)),
+        lw.metrics.SettlingTime("heading", within=0.2, **each), lw.metrics.SettlingTime("depth", **each),
+        lw.metrics.SteadyStateError("depth", **each),
+        *(kind(of, **each) for of in BOTH for kind in (lw.metrics.IAE, lw.metrics.ISE, lw.metrics.ITAE,
+                                                       lw.metrics.RMSError, lw.metrics.MaxError)),
+        lw.metrics.IAE("depth", measured=True, name="measured", **each), lw.metrics.MaxError("speed", **each),
+        lw.metrics.MaxError("position", **each),
+        lw.metrics.MaxError("attitude", **each), lw.metrics.CrossTrack(**each), lw.metrics.Effort(**each),
+        lw.metrics.Effort("command[1]", **each),
+        lw.metrics.Travel(**each), lw.metrics.SaturationShare(**each), lw.metrics.ActuatorEnergy(**each),
+        lw.metrics.TimeToFailure(),
         lw.metrics.CustomMetric(deepest, fields=("position",), **each),
     ]  # fmt: skip
 
@@ -53,7 +59,10 @@ def fleet():
     # All that metrics are of is wanted: a place and a speed too, which no law of this loop follows.
     wishes = [lw.control.SetPoint(position=[20.0, 5.0, 10.0], heading=0.5, speed=1.5), *scene.controller.guidance[1:]]
     scene = replace(scene, events=[lw.events.Floor(depth=8.5)], controller=replace(scene.controller, guidance=wishes))
-    vary = {"vehicle.buoyancy": lw.distributions.Uniform(low=297.0, high=310.0), "start.position[2]": lw.distributions.Uniform(low=7.8, high=8.45)}
+    vary = {
+        "vehicle.buoyancy": lw.distributions.Uniform(low=297.0, high=310.0),
+        "start.position[2]": lw.distributions.Uniform(low=7.8, high=8.45),
+    }
     return lw.Ensemble(scene, 300, seed=1, vary=vary | {"heading_pid.kp": lw.distributions.Uniform(low=0.7, high=60.0)})
 
 
@@ -151,7 +160,11 @@ def test_other_statistics_are_of_the_samples_that_are_kept(fleet, coarse):
 
 
 def test_a_store_that_goes_on_has_the_same_numbers(fleet, coarse, tmp_path):
-    asked = [lw.metrics.Overshoot("depth", then=[lw.statistics.Mean(), lw.statistics.MemberValues()]), lw.metrics.Overshoot("heading"), lw.metrics.Travel()]
+    asked = [
+        lw.metrics.Overshoot("depth", then=[lw.statistics.Mean(), lw.statistics.MemberValues()]),
+        lw.metrics.Overshoot("heading"),
+        lw.metrics.Travel(),
+    ]
     with pytest.raises(RuntimeError):
         lw.solve(fleet, **COARSE, statistics=asked, store=tmp_path / "run.zarr", threads=1, progress=stop)
     result = lw.resume(tmp_path / "run.zarr")
@@ -226,14 +239,22 @@ def test_metrics_of_what_no_guidance_wants_are_refused(fleet):
         with pytest.raises(
             lw.SceneError, match=r"statistics = 'iae speed': is of the speed, and no guidance .* wants a speed"
         ):
-            run(replace(fleet.scene, controller=few), t1=1.0, statistics=[lw.metrics.IAE("depth"), lw.metrics.IAE("speed")])
+            run(
+                replace(fleet.scene, controller=few),
+                t1=1.0,
+                statistics=[lw.metrics.IAE("depth"), lw.metrics.IAE("speed")],
+            )
 
 
 @pytest.mark.slow_for("float32_compensated")
 @pytest.mark.parametrize("dtype", ["float64", "float32_compensated"])
 def test_numbers_do_not_depend_on_what_else_is_read_at_ticks(dtype, fleet, coarse):
     each = {"then": [lw.statistics.MemberValues()]}
-    few = [lw.metrics.Overshoot("depth", **each), lw.metrics.IAE("heading", **each), lw.metrics.MaxError("depth", **each)]
+    few = [
+        lw.metrics.Overshoot("depth", **each),
+        lw.metrics.IAE("heading", **each),
+        lw.metrics.MaxError("depth", **each),
+    ]
     alone = lw.solve(fleet, **COARSE, statistics=few, keep="none", dtype=dtype)
     whole = coarse if dtype == "float64" else lw.solve(fleet, **COARSE, statistics=metrics(), keep="none", dtype=dtype)
     for name in ("each overshoot depth", "each iae heading", "each max_error depth"):

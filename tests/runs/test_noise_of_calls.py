@@ -20,9 +20,11 @@ NAMES = ["start.position[2]", "start.velocity[2]"]
 def noisy():
     """A neutral body with linear drag under white force and torque, in a random current, which holds a heading."""
     controller = lw.Controller(period=H, sensors=[lw.control.Sensor(of="heading", noise=0.1, name="compass")],
-                               guidance=[lw.control.SetPoint(heading=0.5)], laws=[lw.control.HeadingPID(kp=1.0, kd=1.0)])  # fmt: skip
+                               guidance=[lw.control.SetPoint(heading=0.5)],
+                               laws=[lw.control.HeadingPID(kp=1.0, kd=1.0)])  # fmt: skip
     terms = [lw.terms.Drag(linear=(DRAG,) * 6), lw.terms.WrenchNoise(force=(0.0, 0.0, STRENGTH), torque=(0.1, 0.1, 0.1)),
-             lw.terms.GaussMarkovCurrent(standard_deviation=(0.1,) * 3, time_constant=5.0), lw.terms.ControlWrench(limit=2.0)]  # fmt: skip
+             lw.terms.GaussMarkovCurrent(standard_deviation=(0.1,) * 3, time_constant=5.0),
+             lw.terms.ControlWrench(limit=2.0)]  # fmt: skip
     return lw.Scene(BODY, terms=terms, controller=controller)
 
 
@@ -49,7 +51,9 @@ def test_rows_have_the_noise_of_the_members_that_are_named(noisy):
 
 def test_a_seed_beside_levels_is_that_of_the_noise_alone():
     quiet = lw.Scene(BODY, terms=[lw.terms.Drag(linear=(DRAG,) * 6)])
-    run = lw.prepare(quiet, {NAMES[1]: lw.distributions.Normal(std=1.0)}, of="depth", levels=True, method="psi_x", h=H, t1=T)
+    run = lw.prepare(
+        quiet, {NAMES[1]: lw.distributions.Normal(std=1.0)}, of="depth", levels=True, method="psi_x", h=H, t1=T
+    )
     X = np.linspace(0.1, 0.9, 5)[:, None]
     np.testing.assert_array_equal(run(X), run(X, seed=9, indices=[5, 6, 7, 8, 2]))
 

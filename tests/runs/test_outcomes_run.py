@@ -13,8 +13,10 @@ from tests.conftest import ROOT
 from tests.support.stops import FarAway, stops
 
 STATISTICS = [
-    lw.statistics.Outcome("floor"), lw.statistics.EndTime("floor"), lw.statistics.Exceedance("depth", above=26.0), lw.statistics.FirstPassage("depth", above=26.0),
-    lw.statistics.Mean("position", at="floor"), lw.statistics.Extremes("depth", at="floor"), lw.statistics.PathMaximum("depth", lw.statistics.Exceedance(above=26.0)),
+    lw.statistics.Outcome("floor"), lw.statistics.EndTime("floor"), lw.statistics.Exceedance("depth", above=26.0),
+    lw.statistics.FirstPassage("depth", above=26.0),
+    lw.statistics.Mean("position", at="floor"), lw.statistics.Extremes("depth", at="floor"),
+    lw.statistics.PathMaximum("depth", lw.statistics.Exceedance(above=26.0)),
 ]  # fmt: skip
 SETTINGS = {"method": "psi_s", "h": 0.04, "t1": 40.0, "save": lw.SaveAt(every=4.0), "statistics": STATISTICS}
 
@@ -23,7 +25,10 @@ def fleet(members, ends=None, more=(), **ensemble):
     """The paper's vehicle a little too heavy or too light, from a depth of 20 m."""
     scene = lw.Scene.named("nordkvist_sanyal", start={"position": [0, 0, 20.0], "velocity": [0.1, 0, 0]},
                            vehicle={"buoyancy": 1212.0}, events=ends or stops(floor=26.0))  # fmt: skip
-    vary = {"vehicle.buoyancy": lw.distributions.Normal(std=3.0), "start.angular_velocity": lw.distributions.Normal(std=(0.02, 0.05, 0.02))}
+    vary = {
+        "vehicle.buoyancy": lw.distributions.Normal(std=3.0),
+        "start.angular_velocity": lw.distributions.Normal(std=(0.02, 0.05, 0.02)),
+    }
     return lw.Ensemble(scene, members, 1, vary | dict(more), **ensemble)
 
 
@@ -96,7 +101,12 @@ def test_processes_give_the_same(tmp_path):
 def test_several_events_by_their_names():
     surface, floor, *others = stops(surface=17.0, floor=26.0)
     ends = [surface, dataclasses.replace(floor, name="sea floor"), *others]
-    asked = [lw.statistics.Outcome("sea floor"), lw.statistics.Outcome("surface"), lw.statistics.Outcome("stopped"), lw.statistics.Mean("depth", at="surface")]
+    asked = [
+        lw.statistics.Outcome("sea floor"),
+        lw.statistics.Outcome("surface"),
+        lw.statistics.Outcome("stopped"),
+        lw.statistics.Mean("depth", at="surface"),
+    ]
     result = lw.solve(fleet(1000, ends), **SETTINGS | {"statistics": asked})
     counts, s = result.status.counts(), result.statistics
     assert s["outcome sea floor"]["ended"][-1] == counts["floor"]
@@ -117,7 +127,9 @@ def test_an_own_monte_carlo_with_three_competing_events():
                            events=stops(floor=floor, surface=surface, at=20.0))  # fmt: skip
     vary = {"vehicle.buoyancy": lw.distributions.Normal(std=3.0), "start.velocity[2]": lw.distributions.Normal(std=0.1),
             "time.at": lw.distributions.Uniform(low=2.0, high=80.0)}  # fmt: skip
-    asked = [lw.statistics.Outcome(name) for name in ("floor", "surface", "time", "ok")] + [lw.statistics.FirstPassage("depth", above=floor)]
+    asked = [lw.statistics.Outcome(name) for name in ("floor", "surface", "time", "ok")] + [
+        lw.statistics.FirstPassage("depth", above=floor)
+    ]
     result = lw.solve(lw.Ensemble(scene, n, 1, vary), **SETTINGS | {"statistics": asked})
 
     rng = np.random.default_rng(5)
@@ -157,10 +169,14 @@ def named(name, vary, ends, **start):
 BOTH = {"floor": 26.0, "surface": 17.0}
 ALL = {"floor": 24.0, "surface": 17.0, "lower": (-1e6, -1e6, 0.0), "upper": (2.0, 1e6, 30.0), "radius": 1.5, "at": 30.0}
 FAST = {"start.angular_velocity": lw.distributions.Normal(std=(40.0, 5.0, 0.02))}
-HEAVE = {"vehicle.buoyancy": lw.distributions.Normal(relative=0.02), "start.velocity[2]": lw.distributions.Normal(std=0.3)}
+HEAVE = {
+    "vehicle.buoyancy": lw.distributions.Normal(relative=0.02),
+    "start.velocity[2]": lw.distributions.Normal(std=0.3),
+}
 NEAR = [lw.events.Floor(depth=11.0), lw.events.Surface(depth=9.0)]
 WALLS = [lw.events.Box(lower=(-0.3, -9.0, 0.0), upper=(1e3, 9.0, 99.0), name="astern"),
-         lw.events.Box(lower=(-1e3, -9.0, 0.0), upper=(0.3, 9.0, 99.0), name="ahead"), lw.events.Surface(depth=9.5)]  # fmt: skip
+         lw.events.Box(lower=(-1e3, -9.0, 0.0), upper=(0.3, 9.0, 99.0), name="ahead"),
+         lw.events.Surface(depth=9.5)]  # fmt: skip
 # Members, with settings of the run beside those of SETTINGS.
 TEN = {
     "nobody ends": (lambda: fleet(256, stops()), {}),
@@ -173,7 +189,8 @@ TEN = {
     "remus_100": (lambda: named("remus_100", HEAVE, NEAR, velocity=[1.5, 0, 0]), {"method": "psi_x", "t1": 12.0}),
     "bluerov2_heavy": (lambda: named("bluerov2_heavy", HEAVE | {"start.velocity[0]": lw.distributions.Normal(std=0.5)}, WALLS),
                        {"method": "rk4", "dtype": "float32", "t1": 8.0}),
-    "bluerov2_dead_thruster": (lambda: named("bluerov2_dead_thruster", HEAVE, [lw.events.Floor(depth=4.0), lw.events.StopTime(at=6.0)]),
+    "bluerov2_dead_thruster": (lambda: named("bluerov2_dead_thruster", HEAVE,
+                                             [lw.events.Floor(depth=4.0), lw.events.StopTime(at=6.0)]),
                                {"method": None, "h": 0.05, "t1": 8.0}),
 }  # fmt: skip
 
@@ -252,7 +269,8 @@ def test_quantities_of_outcomes_and_times():
 def test_quantities_of_two_events_of_one_status():
     """Two shelves end a drift to the north and one to the south: by hand, since it goes straight on at its first velocity."""
     shelves = [lw.events.Box(lower=(-1e6,) * 3, upper=(4.0, 1e6, 1e6), name="north"),
-               lw.events.Box(lower=(-2.0, -1e6, -1e6), upper=(1e6,) * 3, name="south"), lw.events.Floor(depth=1e6)]  # fmt: skip
+               lw.events.Box(lower=(-2.0, -1e6, -1e6), upper=(1e6,) * 3, name="south"),
+               lw.events.Floor(depth=1e6)]  # fmt: skip
     scene = lw.Scene.named("sphere", start={"position": [0, 0, 20.0]}, events=shelves)
     u, t1 = np.array([0.5, -0.5, 0.3, -0.1, 0.2]), 10.0
     of = ["outcome north", "outcome south", "outcome box", "outcome floor", "end_time south", "position[0] at north"]
@@ -284,7 +302,9 @@ def test_an_outcome_that_no_member_can_have_is_refused():
 
 
 def test_until_an_outcome_is_sure_enough():
-    asked = SETTINGS | {"statistics": [lw.statistics.Outcome("floor"), lw.statistics.EndTime("floor", lw.statistics.Mean())]}
+    asked = SETTINGS | {
+        "statistics": [lw.statistics.Outcome("floor"), lw.statistics.EndTime("floor", lw.statistics.Mean())]
+    }
     for watched, half in (("outcome floor", 0.03), ("mean end_time floor", 1.0)):
         result = lw.solve(fleet(4000), **asked, until=lw.Until(watched, half, members=512))
         assert len(result.status) < 4000

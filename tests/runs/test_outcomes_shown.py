@@ -32,7 +32,9 @@ OUTCOMES = [Status.FLOOR] * 3 + [Status.OK] * 2 + [Status.SURFACE] * 2
 def divers(speeds):
     """Members that start at depth 5 and sink at these speeds [m/s]."""
     n = len(speeds)
-    scene = lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), events=[lw.events.Surface(), lw.events.Floor(depth=FLOOR)])
+    scene = lw.Scene(
+        VEHICLE, lw.Environment(gravity=GRAVITY), events=[lw.events.Surface(), lw.events.Floor(depth=FLOOR)]
+    )
     down = np.array([0.0, 0.0, 1.0])
     level = np.broadcast_to(np.eye(3), (n, 3, 3))
     return lw.Ensemble.from_states(scene, np.tile(5.0 * down, (n, 1)), level, np.outer(speeds, down), np.zeros((n, 3)))
@@ -204,7 +206,8 @@ def test_drift_is_of_the_times_under_way(mixed, sunk):
 ALL = {"energy", "horizontal_momentum", "vertical_angular_momentum"}
 ACTING = {"still drag": (lw.terms.Drag(linear=np.zeros(6), quadratic=np.zeros(6)), ALL),
           "drag": (lw.terms.Drag(linear=np.ones(6), quadratic=np.zeros(6)), set()),
-          "thrust": (lw.terms.Wrench(force=[1.0, 0.0, 0.0]), set()), "noise": (lw.terms.WrenchNoise(force=[0.1, 0.0, 0.0]), set()),
+          "thrust": (lw.terms.Wrench(force=[1.0, 0.0, 0.0]), set()),
+          "noise": (lw.terms.WrenchNoise(force=[0.1, 0.0, 0.0]), set()),
           "moving water": (lw.terms.Current(velocity=[0.2, 0.0, 0.0]), set()),
           "layers": (lw.terms.Stratification(gradient=0.01), ALL),
           "an anchor": (lw.terms.Tether(anchor=[0.0, 0.0, 8.0], stiffness=2.0), {"energy"})}  # fmt: skip

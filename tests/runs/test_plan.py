@@ -92,7 +92,9 @@ def test_compositions_of_a_method_share_its_kernel(names):
 
 def test_varying_a_parameter_compiles_nothing_else(scene):
     shared = make_plan(lw.Ensemble(scene, 16), h=0.01, t1=1.0)
-    varied = make_plan(lw.Ensemble(scene, 16, vary={"vehicle.mass": lw.distributions.Normal(relative=0.01)}), h=0.01, t1=1.0)
+    varied = make_plan(
+        lw.Ensemble(scene, 16, vary={"vehicle.mass": lw.distributions.Normal(relative=0.01)}), h=0.01, t1=1.0
+    )
     assert shared.spec == varied.spec
     assert shared.kernel.advance is varied.kernel.advance
 

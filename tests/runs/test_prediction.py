@@ -155,7 +155,8 @@ MEASURED = """
 import sys
 import lgvi_warp as lw
 from tests.support.stores import fleet
-own = {"statistics": [lw.statistics.Mean("position"), lw.statistics.Quantiles("position"), lw.statistics.Covariance(["position", "velocity"])]}
+own = {"statistics": [lw.statistics.Mean("position"), lw.statistics.Quantiles("position"),
+                          lw.statistics.Covariance(["position", "velocity"])]}
 own |= {"keep": range(0, 2000, 2), "method": "psi_s", "h": 0.01, "t1": 3.0, "save": lw.SaveAt(every=0.01), "threads": 2}
 lw.solve(fleet(64), "psi_s", h=0.01, t1=3.0, save=lw.SaveAt(every=0.01))
 store = sys.argv[2] if len(sys.argv) > 2 else None

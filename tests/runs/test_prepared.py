@@ -76,7 +76,10 @@ def test_columns_may_have_names(paper):
 
 
 def test_members_may_be_drawn(paper):
-    vary = {"vehicle.mass": lw.distributions.Normal(relative=0.01), "start.angular_velocity": lw.distributions.Normal(std=0.1)}
+    vary = {
+        "vehicle.mass": lw.distributions.Normal(relative=0.01),
+        "start.angular_velocity": lw.distributions.Normal(std=0.1),
+    }
     run = lw.prepare(lw.Ensemble(paper, 40, 7, vary), of="position", **SETTINGS)
     for seed, members in ((None, None), (8, None), (8, 5), (7, 40)):
         fleet = lw.Ensemble(paper, members or 40, 7 if seed is None else seed, vary)
@@ -116,7 +119,10 @@ def test_given_states_are_not_drawn(paper):
 
 def test_columns_that_a_sampling_has_are_not_dropped(paper):
     vary = {"vehicle.buoyancy": lw.distributions.Normal(relative=0.01)}
-    for sampling in (lw.designs.Table(values={"vehicle.mass": np.full(4, 120.0)}), lw.designs.Grid({"vehicle.mass": [120.0, 121.0]})):
+    for sampling in (
+        lw.designs.Table(values={"vehicle.mass": np.full(4, 120.0)}),
+        lw.designs.Grid({"vehicle.mass": [120.0, 121.0]}),
+    ):
         run = lw.prepare(lw.Ensemble(paper, None, 0, vary, sampling), of="position", **SETTINGS)
         assert len(run()) in (2, 4)
         with pytest.raises(lw.SceneError, match=r"X: .*vehicle\.mass"):
@@ -124,7 +130,10 @@ def test_columns_that_a_sampling_has_are_not_dropped(paper):
 
 
 def test_levels_stand_for_distributions(paper):
-    vary = {"vehicle.mass": lw.distributions.Normal(relative=0.01), "start.attitude": lw.distributions.RotationNormal(std=0.1)}
+    vary = {
+        "vehicle.mass": lw.distributions.Normal(relative=0.01),
+        "start.attitude": lw.distributions.RotationNormal(std=0.1),
+    }
     run = lw.prepare(paper, vary, of="position", levels=True, **SETTINGS)
     X = np.random.default_rng(0).random((6, len(run.names)))
     space = lw.Ensemble(paper, 1, 0, vary).space
@@ -183,7 +192,9 @@ def test_unphysical_numbers_are_refused(paper):
 
 def test_whole_numbers_are_refused_with_the_name_of_an_entry(paper):
     for name, entry in (("start.position", "start.position[0]"), ("drag_matrix.linear", "drag_matrix.linear[0,0]")):
-        scene = lw.Scene(paper.vehicle, paper.environment, terms=[lw.terms.DragMatrix(linear=np.eye(6))], start=paper.start)
+        scene = lw.Scene(
+            paper.vehicle, paper.environment, terms=[lw.terms.DragMatrix(linear=np.eye(6))], start=paper.start
+        )
         with pytest.raises(lw.SceneError, match=rf'such as "{re.escape(entry)}"'):
             lw.prepare(scene, [name], of="depth", **SETTINGS)
         lw.Ensemble(scene, 1, 0, {entry: lw.distributions.Uniform(1.0, 2.0)})
@@ -315,7 +326,9 @@ def test_packets_take_members_whose_laws_have_other_rows(columns):
     drag = lw.terms.DragMatrix(linear=np.eye(6), quadratic=np.diag([10.0, 20.0, 0.0, 1.0, 2.0, 0.0]))
     scene = lw.Scene(vehicle, terms=[drag, thrusters], start=lw.Start(velocity=[1.0, 0.2, 0.1]))
     names = ["drag_matrix.quadratic[2,2]", "drag_matrix.quadratic[5,5]"]
-    fleet = lw.Ensemble(scene, None, 0, None, lw.designs.Table(values={name: np.linspace(0.0, 5.0, 6) for name in names}))
+    fleet = lw.Ensemble(
+        scene, None, 0, None, lw.designs.Table(values={name: np.linspace(0.0, 5.0, 6) for name in names})
+    )
     plan = make_plan(fleet, "psi_x", **SHORT)
     few, more = [np.zeros((6, 2)) for _ in range(2)]
     more[:, [names.index(f"drag_matrix.quadratic[{j},{j}]") for j in columns]] = 3.0
@@ -341,7 +354,11 @@ def late(scene, members, odd, values):
             return found
 
     return Late(
-        scene, members, 0, {"vehicle.mass": lw.distributions.Normal(std=1e-3)} | {name: lw.distributions.Normal(std=0.0) for name in values}
+        scene,
+        members,
+        0,
+        {"vehicle.mass": lw.distributions.Normal(std=1e-3)}
+        | {name: lw.distributions.Normal(std=0.0) for name in values},
     )
 
 

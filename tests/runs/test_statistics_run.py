@@ -25,13 +25,19 @@ from tests.support.stops import stops
 from tests.support.tools import one, random_states, scene_of
 
 EVERY = [
-    lw.statistics.Mean("position"), lw.statistics.Covariance(["position", "speed"]), lw.statistics.Quantiles("depth", (0.05, 0.5, 0.95), size=64),
-    lw.statistics.Extremes("velocity"), lw.statistics.Histogram("depth", bins=10, limits=(-3.0, 3.0)), lw.statistics.Exceedance("depth", above=0.5),
-    lw.statistics.FirstPassage("depth", above=1.0), lw.statistics.CircularMean("euler[2]"), lw.statistics.MeanAttitude(), lw.statistics.Mean("energy"),
+    lw.statistics.Mean("position"), lw.statistics.Covariance(["position", "speed"]),
+    lw.statistics.Quantiles("depth", (0.05, 0.5, 0.95), size=64),
+    lw.statistics.Extremes("velocity"), lw.statistics.Histogram("depth", bins=10, limits=(-3.0, 3.0)),
+    lw.statistics.Exceedance("depth", above=0.5),
+    lw.statistics.FirstPassage("depth", above=1.0), lw.statistics.CircularMean("euler[2]"),
+    lw.statistics.MeanAttitude(), lw.statistics.Mean("energy"),
     lw.statistics.PathMaximum("speed", then=[lw.statistics.Mean(), lw.statistics.Quantiles(levels=(0.5, 0.99), size=64)]),
-    lw.statistics.PathMinimum("depth"), lw.statistics.PathMean("depth", then=[lw.statistics.Mean(), lw.statistics.Extremes()]), lw.statistics.PathRms("speed"),
+    lw.statistics.PathMinimum("depth"),
+    lw.statistics.PathMean("depth", then=[lw.statistics.Mean(), lw.statistics.Extremes()]),
+    lw.statistics.PathRms("speed"),
     lw.statistics.PathRange("position"),
-    lw.statistics.PathTime("depth", above=-0.5, below=0.5), lw.statistics.PathTime("depth", above=0.25, then=[lw.statistics.Exceedance(above=0.3)]),
+    lw.statistics.PathTime("depth", above=-0.5, below=0.5),
+    lw.statistics.PathTime("depth", above=0.25, then=[lw.statistics.Exceedance(above=0.3)]),
     lw.statistics.Outcome("failed"), lw.statistics.EndTime("failed"), lw.statistics.Mean("depth", at="failed"),
     lw.statistics.MemberValues("depth"),
 ]  # fmt: skip
@@ -123,7 +129,10 @@ def test_what_is_too_large_to_square_says_so(fleet):
     ]
     states[0][300, 2] = 1e200
     huge = lw.solve(
-        one(fleet.scene, *states), **SETTINGS, keep="none", statistics=[lw.statistics.Mean("depth"), lw.statistics.Covariance("depth")]
+        one(fleet.scene, *states),
+        **SETTINGS,
+        keep="none",
+        statistics=[lw.statistics.Mean("depth"), lw.statistics.Covariance("depth")],
     )
     assert np.all(huge.statistics["mean depth"].value > 1e197)
     assert not np.isfinite(huge.statistics["mean depth"].half_width).any()
@@ -134,7 +143,9 @@ def test_euler_angles_are_fossens():
     R = lw.notation.matrix_from_euler_deg(angles)
     states = (np.zeros((2, 3)), R, np.zeros((2, 3)), np.zeros((2, 3)))
     scene = scene_of((1.0, 2.0, 3.0), net=-0.3, moment=(0.1, 0.2, -0.5))
-    found = lw.solve(one(scene, *states), **SETTINGS, statistics=[lw.statistics.Extremes("euler")]).statistics["extremes euler"]
+    found = lw.solve(one(scene, *states), **SETTINGS, statistics=[lw.statistics.Extremes("euler")]).statistics[
+        "extremes euler"
+    ]
     np.testing.assert_allclose(found["maximum"][0], np.deg2rad(angles.max(axis=0)), atol=1e-14)
     np.testing.assert_allclose(found["minimum"][0], np.deg2rad(angles.min(axis=0)), atol=1e-14)
 
@@ -204,7 +215,11 @@ def test_parts_pass_through_files(fleet, whole, tmp_path):
 ])  # fmt: skip
 def test_intervals_of_dependent_members_are_said_to_be(scene, whole, sampling, words):
     sampled = lw.Ensemble(
-        scene, 16, 1, {"start.position[0]": lw.distributions.Normal(std=1.0), "vehicle.mass": lw.distributions.Normal(std=1.0)}, sampling
+        scene,
+        16,
+        1,
+        {"start.position[0]": lw.distributions.Normal(std=1.0), "vehicle.mass": lw.distributions.Normal(std=1.0)},
+        sampling,
     )
     apart = Gathered(np.zeros(1), 1003, EVERY).apart
     (text,) = observation.messages_about(whole.statistics, sampled.to_dict(), np.zeros(1003, np.uint8), apart) or ("",)
@@ -268,7 +283,9 @@ def spinning():
 
 def test_members_that_fail_are_left_out_from_then_on(spinning):
     settings = {"h": 0.1, "t1": 4.0, "save": lw.SaveAt(every=0.5)}
-    r = lw.solve(spinning, **settings, statistics=[lw.statistics.Mean("depth"), lw.statistics.PathMaximum("depth")], threads=2)
+    r = lw.solve(
+        spinning, **settings, statistics=[lw.statistics.Mean("depth"), lw.statistics.PathMaximum("depth")], threads=2
+    )
     failed = r.status != 0
     assert 100 < failed.sum() < 500
     good = ~failed | (r.time[:, None] <= r.failure_time + 1e-9)
@@ -289,7 +306,10 @@ def test_members_that_fail_are_left_out_from_then_on(spinning):
 
 def test_paths_of_members_that_fail_are_left_out(spinning):
     settings = {"h": 0.1, "t1": 4.0, "save": lw.SaveAt(every=0.5)}
-    asked = [*(kind("depth") for kind in (lw.statistics.PathMean, lw.statistics.PathRms, lw.statistics.PathRange)), lw.statistics.PathTime("depth", above=0.0)]
+    asked = [
+        *(kind("depth") for kind in (lw.statistics.PathMean, lw.statistics.PathRms, lw.statistics.PathRange)),
+        lw.statistics.PathTime("depth", above=0.0),
+    ]
     r = lw.solve(spinning, **settings, statistics=asked)
     whole, depth = r.status == 0, r.position[..., 2]
     assert 0 < whole.sum() < 600
@@ -302,7 +322,9 @@ def test_paths_of_members_that_fail_are_left_out(spinning):
 
 def test_what_is_left_out_is_said_with_its_reason(spinning):
     settings = {"h": 0.1, "t1": 1.0}
-    none = lw.statistics.Quantity("none", lambda s, m: np.where(s["position"][..., 2] < 50.0, np.nan, 1.0), "1", ("position",))
+    none = lw.statistics.Quantity(
+        "none", lambda s, m: np.where(s["position"][..., 2] < 50.0, np.nan, 1.0), "1", ("position",)
+    )
     r = lw.solve(spinning, **settings, statistics=[lw.statistics.Mean("depth")])
     failed = int(((r.status != 0) & (r.status < lw.Status.SURFACE)).sum())
     (said,) = (text for text in r.messages if "leave out" in text)
@@ -312,8 +334,10 @@ def test_what_is_left_out_is_said_with_its_reason(spinning):
     assert f"{failed} members from their failure on, and members where a number of theirs is not finite: " in said
     left_out = 'members from the event on that stopped them (stopped = "left_out")'
     for kind, words in (
-        (lw.statistics.Mean("depth"), None), (lw.statistics.Mean(none), "leave out members where a number of theirs is not finite: 0 of 300"),
-        (lw.statistics.Mean("depth", stopped="left_out"), left_out), (lw.statistics.PathMean("depth", stopped="left_out"), left_out),
+        (lw.statistics.Mean("depth"), None),
+        (lw.statistics.Mean(none), "leave out members where a number of theirs is not finite: 0 of 300"),
+        (lw.statistics.Mean("depth", stopped="left_out"), left_out),
+        (lw.statistics.PathMean("depth", stopped="left_out"), left_out),
     ):  # fmt: skip
         r = lw.solve(grounding(), h=0.1, t1=2.0, save=lw.SaveAt(every=0.5), statistics=[kind])
         said = [text for text in r.messages if "leave out" in text]
@@ -355,7 +379,10 @@ def test_members_that_stop_are_held_or_left_out():
     expected = [r.position[t, ~stopped[t], 2].mean() for t in range(5)]
     np.testing.assert_allclose(r.statistics["left out"].value[:, 0], expected, rtol=0, atol=1e-14)
     # A stop is no failure.
-    assert lw.solve(fleet, h=0.1, t1=2.0, keep="failed", statistics=[lw.statistics.Mean(name) for name in FIELDS]).kept is None
+    assert (
+        lw.solve(fleet, h=0.1, t1=2.0, keep="failed", statistics=[lw.statistics.Mean(name) for name in FIELDS]).kept
+        is None
+    )
 
 
 def test_a_linear_gaussian_case_has_its_exact_moments():
@@ -369,7 +396,10 @@ def test_a_linear_gaussian_case_has_its_exact_moments():
     base = scene_of((M, M, M))
     start = lw.Start(position=[1.0, -2.0, 10.0], velocity=[0.5, 0.0, -1.0])
     scene = lw.Scene(base.vehicle, base.environment, [lw.terms.WrenchNoise(force=tuple(S))], start)
-    vary = {"start.position": lw.distributions.Normal(std=tuple(sb)), "start.velocity": lw.distributions.Normal(std=tuple(sv))}
+    vary = {
+        "start.position": lw.distributions.Normal(std=tuple(sb)),
+        "start.velocity": lw.distributions.Normal(std=tuple(sv)),
+    }
     fleet = lw.Ensemble(scene, n, 4, vary)
     j = np.arange(steps) + 0.5
     q = S**2 / M**2 * h
@@ -418,7 +448,9 @@ def falling(n=20_000):
 @pytest.mark.parametrize("threads", [1, 2, 3])
 def test_a_run_stops_when_it_knows_enough(threads):
     until = lw.Until("mean position[2]", 0.05)
-    r = lw.solve(falling(), h=0.1, t1=1.0, statistics=[lw.statistics.Mean("position")], keep="none", until=until, threads=threads)
+    r = lw.solve(
+        falling(), h=0.1, t1=1.0, statistics=[lw.statistics.Mean("position")], keep="none", until=until, threads=threads
+    )
     # 1.96 / sqrt(n) <= 0.05 from 1,537 members on: a block is 512; looks come at 1,024 and at each block from there.
     assert len(blocks(20_000)) == 40
     assert r.members in (1536, 2048)
@@ -428,7 +460,9 @@ def test_a_run_stops_when_it_knows_enough(threads):
     assert found.half_width[-1, 2] == pytest.approx(1.96 / np.sqrt(r.members), rel=0.1)
     assert any("reached with" in message for message in r.messages)
     assert r.provenance["members"] == r.members
-    first = lw.solve(falling(), h=0.1, t1=1.0, statistics=[lw.statistics.Mean("position")], keep="none", until=until, threads=1)
+    first = lw.solve(
+        falling(), h=0.1, t1=1.0, statistics=[lw.statistics.Mean("position")], keep="none", until=until, threads=1
+    )
     assert same(first.statistics, r.statistics)
     assert first.members == r.members
     assert r.parameters["vehicle.mass"].shape == (1,)
@@ -445,7 +479,8 @@ def test_a_run_stops_when_it_knows_enough_of_paths():
 def test_an_expression_over_the_path_is_what_the_statistic_of_paths_is():
     ask = {"h": 0.1, "t1": 1.0, "save": lw.SaveAt(every=0.2), "keep": "none"}
     pairs = {
-        "max(depth)": lw.statistics.PathMaximum, "min(velocity)": lw.statistics.PathMinimum, "range(norm(velocity))": lw.statistics.PathRange,
+        "max(depth)": lw.statistics.PathMaximum, "min(velocity)": lw.statistics.PathMinimum,
+        "range(norm(velocity))": lw.statistics.PathRange,
         "mean(position[2])": lw.statistics.PathMean,
     }  # fmt: skip
     asked = [lw.statistics.Mean(text) for text in pairs] + [lw.statistics.Quantiles("max(depth)", (0.05, 0.95))]
@@ -480,9 +515,12 @@ def test_a_run_says_when_it_does_not_know_enough():
 
 
 REPLICATED = [
-    lw.statistics.Mean("position"), lw.statistics.Quantiles("depth", (0.05, 0.5, 0.95), size=64), lw.statistics.Extremes("depth"), lw.statistics.MeanAttitude(),
-    lw.statistics.Exceedance("depth", above=12.0), lw.statistics.FirstPassage("depth", above=12.0), lw.statistics.CircularMean("euler"),
-    lw.statistics.PathMaximum("speed", then=[lw.statistics.Mean(), lw.statistics.Quantiles(levels=(0.5,), size=64)]), lw.statistics.PathMean("depth"),
+    lw.statistics.Mean("position"), lw.statistics.Quantiles("depth", (0.05, 0.5, 0.95), size=64),
+    lw.statistics.Extremes("depth"), lw.statistics.MeanAttitude(),
+    lw.statistics.Exceedance("depth", above=12.0), lw.statistics.FirstPassage("depth", above=12.0),
+    lw.statistics.CircularMean("euler"),
+    lw.statistics.PathMaximum("speed", then=[lw.statistics.Mean(), lw.statistics.Quantiles(levels=(0.5,), size=64)]),
+    lw.statistics.PathMean("depth"),
     lw.statistics.Mean("angular_velocity"),
 ]  # fmt: skip
 STARTS = {"start.position": lw.distributions.Normal(std=0.1), "start.velocity_inertial": lw.distributions.Normal(std=0.02),
@@ -497,7 +535,12 @@ def designed(scene):
         sampling: lw.solve(
             lw.Ensemble(scene, 1024, 1, STARTS, sampling), h=0.01, t1=5.0, save=save, statistics=REPLICATED
         )
-        for sampling in ("random", "sobol", lw.designs.Sobol(replicates=16), lw.designs.LatinHypercube(64, replicates=16))
+        for sampling in (
+            "random",
+            "sobol",
+            lw.designs.Sobol(replicates=16),
+            lw.designs.LatinHypercube(64, replicates=16),
+        )
     }
 
 
@@ -551,7 +594,9 @@ def test_chosen_members_of_a_design_are_no_design(scene):
 
 def test_a_run_of_replicates_stops_at_a_power_of_two():
     base = falling()
-    fleet = lw.Ensemble(base.scene, 20_480, 1, {"start.position": lw.distributions.Normal(std=1.0)}, lw.designs.Sobol(replicates=8))
+    fleet = lw.Ensemble(
+        base.scene, 20_480, 1, {"start.position": lw.distributions.Normal(std=1.0)}, lw.designs.Sobol(replicates=8)
+    )
     fleet_of = {"h": 0.1, "t1": 1.0, "keep": "none", "statistics": [lw.statistics.Quantiles("position", (0.5, 0.95))]}
     r = lw.solve(fleet, **fleet_of, until=lw.Until("quantiles position[2] 0.5", 0.02))
     found = r.statistics["quantiles position"]
@@ -568,8 +613,10 @@ def test_a_run_of_replicates_stops_at_a_power_of_two():
 @pytest.mark.parametrize(("given", "text"), [
     ({"statistics": "mean"}, "no list"), ({"statistics": [3]}, "no statistic"), ({"keep": "some"}, "keep"),
     ({"keep": [5]}, "beyond the last"), ({"keep": [-1]}, "names no members"), ({"keep": 3}, "names no members"),
-    ({"statistics": [lw.statistics.Mean("depth"), lw.statistics.Mean("depth")]}, "name of 2 statistics"), ({"until": 3}, "no table"),
-    ({"statistics": [lw.statistics.Mean()]}, "mean.of"), ({"until": lw.Until("median depth", 1.0)}, "none of the run's statistics"),
+    ({"statistics": [lw.statistics.Mean("depth"), lw.statistics.Mean("depth")]}, "name of 2 statistics"),
+    ({"until": 3}, "no table"),
+    ({"statistics": [lw.statistics.Mean()]}, "mean.of"),
+    ({"until": lw.Until("median depth", 1.0)}, "none of the run's statistics"),
     ({"until": {"statistic": "mean depth"}}, "half_width"), ({"until": lw.Until("mean depth", 1.0, at=0.3)}, "no sample time"),
     ({"statistics": [lw.statistics.Extremes("depth")], "until": lw.Until("extremes depth", 1.0)}, "no interval"),
 ])  # fmt: skip
@@ -583,7 +630,9 @@ def test_a_function_of_ones_own(fleet, whole):
         return samples["position"][..., 2] - members.position[None, :, 2]
 
     pair = lw.statistics.Quantity("pair", lambda s, m: s["velocity"][..., :2], "m/s", ("velocity",), ("u", "v"))
-    found = lw.solve(fleet, **SETTINGS, statistics=[lw.statistics.Mean(drop), lw.statistics.Mean(pair)], keep="none").statistics
+    found = lw.solve(
+        fleet, **SETTINGS, statistics=[lw.statistics.Mean(drop), lw.statistics.Mean(pair)], keep="none"
+    ).statistics
     expected = (whole.position[..., 2] - whole.position[0, :, 2]).mean(axis=1)
     np.testing.assert_allclose(found["mean drop"].value[:, 0], expected, atol=1e-14)
     np.testing.assert_allclose(found["mean pair"].value, whole.velocity[..., :2].mean(axis=1), atol=1e-14)
@@ -596,10 +645,14 @@ def test_a_function_of_ones_own(fleet, whole):
 
 
 def test_float32_is_summed_up_in_float64(fleet):
-    ask = [lw.statistics.Mean("position"), lw.statistics.Covariance("position"), lw.statistics.Quantiles("position", (0.1, 0.9)),
+    ask = [lw.statistics.Mean("position"), lw.statistics.Covariance("position"),
+           lw.statistics.Quantiles("position", (0.1, 0.9)),
            lw.statistics.Quantiles("speed", (0.5,))]  # fmt: skip
     found = lw.solve(
-        fleet, **SETTINGS, dtype="float32", statistics=[*ask, lw.statistics.PathMaximum("depth", lw.statistics.Quantiles(levels=(0.5,)))]
+        fleet,
+        **SETTINGS,
+        dtype="float32",
+        statistics=[*ask, lw.statistics.PathMaximum("depth", lw.statistics.Quantiles(levels=(0.5,)))],
     )
     b = found.position.astype(np.float64)
     np.testing.assert_allclose(found.statistics["mean position"].value, b.mean(axis=1), rtol=0, atol=1e-14)
@@ -617,7 +670,9 @@ def test_only_the_fields_that_statistics_need_are_written(fleet):
     assert settings.fields(FIELDS) == ("position",)
     assert observation.Observation(keep="none").fields(FIELDS) == ()
     assert observation.Observation((lw.statistics.Mean("speed"),)).fields(("position",)) == ("position", "velocity")
-    shown = lw.solve(fleet, **(SETTINGS | {"save": lw.SaveAt(fields=("position",))}), statistics=[lw.statistics.Mean("speed")])
+    shown = lw.solve(
+        fleet, **(SETTINGS | {"save": lw.SaveAt(fields=("position",))}), statistics=[lw.statistics.Mean("speed")]
+    )
     assert list(shown.samples) == ["position"]
 
 
@@ -759,7 +814,9 @@ def test_memory_grows_with_neither_members_nor_steps():
     def peak(n, steps):
         fleet, save = falling(n), lw.SaveAt(every=0.01 * steps / 10)
         tracemalloc.start()
-        lw.solve(fleet, h=0.01, t1=0.01 * steps, save=save, statistics=[lw.statistics.Mean("depth")], keep="none", threads=1)
+        lw.solve(
+            fleet, h=0.01, t1=0.01 * steps, save=save, statistics=[lw.statistics.Mean("depth")], keep="none", threads=1
+        )
         found = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         return found

@@ -36,7 +36,8 @@ def scene(delay=0.0, laws=(), **gains):
 def fleet():
     vary = {
         "heading_pid.kp": lw.distributions.Uniform(4.0, 8.0), "heading_pid.kd": lw.distributions.Uniform(7.0, 12.0),
-        "heading_pid.ki": lw.distributions.Uniform(0.4, 1.2), "controller.delay": lw.distributions.Choice([0.0, 0.06, 0.12])}  # fmt: skip
+        "heading_pid.ki": lw.distributions.Uniform(0.4, 1.2),
+        "controller.delay": lw.distributions.Choice([0.0, 0.06, 0.12])}  # fmt: skip
     return lw.Ensemble(scene(delay=0.06), MEMBERS, 5, vary)
 
 
@@ -178,7 +179,9 @@ def test_edges_beside_known_ones():
     assert found[2, 1] == np.inf
     assert np.isnan(found[3]).all()
     counts = rng.integers(0, 100, 50).astype(float)
-    inside = edges(lambda v, i: v <= counts[i], np.zeros(50), np.full(50, 60.0), np.full(50, np.nan), 1.0, to_the_end=True)
+    inside = edges(
+        lambda v, i: v <= counts[i], np.zeros(50), np.full(50, 60.0), np.full(50, np.nan), 1.0, to_the_end=True
+    )
     np.testing.assert_array_equal(inside[:, 0], np.minimum(counts, 60.0))
     assert np.array_equal(np.isinf(inside[:, 1]), counts >= 60.0)
 
@@ -194,7 +197,8 @@ def test_bad_arguments(words, message):
 
 def test_what_is_no_scene():
     for ask, words in (
-        (lw.linear.trim, {}), (lw.linear.linearize, {}), (lw.linear.margins, {}), (lw.worst_case, {"within": {}, "of": "depth"}),
+        (lw.linear.trim, {}), (lw.linear.linearize, {}), (lw.linear.margins, {}),
+        (lw.worst_case, {"within": {}, "of": "depth"}),
         (lw.tune_gains, {"over": {}, "minimise": "depth"}),
     ):  # fmt: skip
         with pytest.raises(lw.SceneError, match="is neither"):
@@ -229,7 +233,8 @@ def autopilot():
         period=0.1, guidance=[lw.control.SetPoint(heading=0.0, depth=0.0)],
         laws=[lw.control.HeadingPID(kp=1.0, kd=2.0, ki=0.02),
               lw.control.DepthPID(kp=0.1, ki=0.001, kp_pitch=5.0, ki_pitch=0.3, kd_pitch=2.0, pitch_limit=0.5)],
-        allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])])  # fmt: skip
+        allocation=[lw.control.AllocationMatrix(to="control_fins",
+                                                matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])])  # fmt: skip
     run = RunSettings(method="psi_x", step=0.01, duration=20.0, save_every=1.0)
     return lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0}, start=start, controller=controller, run=run)
 
@@ -239,7 +244,12 @@ def autopilot():
 def test_a_factor_of_1_changes_nothing(loop):
     """Laws with integrals of their own, whose demands are added: the factor is that of one, or of both."""
     scene = dataclasses.replace(autopilot(), start=lw.Start(velocity=(1.54, 0.0, 0.0), position=(0.0, 0.0, 1.0)))
-    fleet = lw.Ensemble(scene, 3, 1, {"heading_pid.ki": lw.distributions.Uniform(0.1, 0.3), "depth_pid.ki": lw.distributions.Uniform(0.01, 0.03)})
+    fleet = lw.Ensemble(
+        scene,
+        3,
+        1,
+        {"heading_pid.ki": lw.distributions.Uniform(0.1, 0.3), "depth_pid.ki": lw.distributions.Uniform(0.01, 0.03)},
+    )
     members = study.Study(fleet, loop, 20.0, 20.0, 10.0, 1e-3, None, 0.01)
     numbers = {FACTOR: np.ones(3), DELAY: np.zeros(3)}
     motion = members.bench.run(np.arange(3), None, 0, members.begin, numbers)
@@ -300,7 +310,9 @@ def test_of_loops_that_do_not_settle_none_is_steady():
 @pytest.mark.slow
 @pytest.mark.parametrize("vehicle", ["remus", "rov"])
 def test_loops_that_settle_have_margins(vehicle):
-    found = lw.linear.margins(fleet_of(vehicle, {}, 16), None, "gain", by=("eigenvalues", "runs"), method="psi_x", h=STEP)
+    found = lw.linear.margins(
+        fleet_of(vehicle, {}, 16), None, "gain", by=("eigenvalues", "runs"), method="psi_x", h=STEP
+    )
     assert found.steady.all()
     assert set(found.why) == {""}
     assert (found.values["gain_upper"] > 1.2).all()
@@ -321,7 +333,9 @@ def test_a_gain_limit_that_is_known_for_any_length_of_runs_heading_and_limit(sec
     """At 0.8 rad, round-off couples neutral velocities to the others; beyond the limit swings saturate, and headings wrap."""
     one = sampled(heading=heading, most=most)
     for by, asked in (("eigenvalues", ("eigenvalues",)), ("runs", ("runs",)), ("runs", ("eigenvalues", "runs"))):
-        found = lw.linear.margins(one, "heading_pid", "gain", by=asked, seconds=seconds, tilt=tilt, method="psi_s", h=0.01)
+        found = lw.linear.margins(
+            one, "heading_pid", "gain", by=asked, seconds=seconds, tilt=tilt, method="psi_s", h=0.01
+        )
         values = found.to_dict()[by]
         assert found.steady.all()
         assert values["gain_lower"][0] < 0.02
@@ -331,7 +345,9 @@ def test_a_gain_limit_that_is_known_for_any_length_of_runs_heading_and_limit(sec
 
 def test_runs_judge_swings_by_angles_and_not_by_parts_of_limits():
     """A demand of 60 N m/rad at factors up to 5 is 60 tilts of a limit of 5 N m: small all the same, since it shrinks."""
-    one = dataclasses.replace(scene(delay=0.06, kp=60.0, ki=0.0, kd=20.0), terms=[lw.terms.ControlWrench(limit=[5.0] * 6)])
+    one = dataclasses.replace(
+        scene(delay=0.06, kp=60.0, ki=0.0, kd=20.0), terms=[lw.terms.ControlWrench(limit=[5.0] * 6)]
+    )
     expected = edge(lambda g: radius(60.0, 0.0, 20.0, g, 3) < study.SHRINKS ** (PERIOD / 80.0), 1.0, 100.0)
     for seconds in (240.0, 900.0):
         found = lw.linear.margins(one, None, "gain", by="runs", seconds=seconds, method="psi_s", h=H)
@@ -388,7 +404,12 @@ def turning(terms, allocation, laws=(), **wanted):
 def test_members_at_a_limit_and_members_that_fail_are_named():
     """A speed that drag does not allow: 1 N against 10 N s/m makes 0.1 m/s."""
     acting = [lw.terms.ControlWrench(limit=[1.0] * 5 + [50.0]), lw.terms.Drag(linear=[10.0] * 3 + [1.0] * 3)]
-    one = turning(acting, lw.control.AllocationMatrix(to="control_wrench", matrix=np.eye(6)), [lw.control.SpeedPID(kp=20.0)], speed=0.5)
+    one = turning(
+        acting,
+        lw.control.AllocationMatrix(to="control_wrench", matrix=np.eye(6)),
+        [lw.control.SpeedPID(kp=20.0)],
+        speed=0.5,
+    )
     zero, eye = np.zeros((3, 3)), np.tile(np.eye(3), (3, 1, 1))
     spins = zero.copy()
     spins[2] = 5.0 / H
@@ -405,7 +426,10 @@ def test_a_loop_within_a_dead_band_moves_nothing():
     pushes = lw.terms.Thrusters(position=[[0.0, 0.3, 0.0], [0.0, -0.3, 0.0]], direction=[[1.0, 0.0, 0.0]] * 2,
                           coefficient=[40.0] * 2, dead_band=[0.1] * 2, limit=[1.0] * 2)  # fmt: skip
     matrix = [[0, 0, 0, 0, 0, -0.1], [0, 0, 0, 0, 0, 0.1]]
-    one = turning([pushes, lw.terms.Drag(linear=[10.0] * 3 + [1.0] * 3)], lw.control.AllocationMatrix(to="thrusters", matrix=matrix))
+    one = turning(
+        [pushes, lw.terms.Drag(linear=[10.0] * 3 + [1.0] * 3)],
+        lw.control.AllocationMatrix(to="thrusters", matrix=matrix),
+    )
     one = dataclasses.replace(one, start=lw.Start(euler_deg=[0.0, 0.0, np.rad2deg(0.3)]))
     found = lw.linear.margins(one, None, "gain", method="psi_s", h=0.03)
     assert "step shortened from 0.03 s to 0.025 s" in str(found)

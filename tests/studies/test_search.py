@@ -79,7 +79,11 @@ def test_risks():
     assert not faults
     assert mean(costs[:1])[0] == 3.0
     assert quantile(costs).tolist() == [4.0, 1.0]
-    assert [str(risk) for risk in (lw.metrics.CVaR(0.05), mean, quantile)] == ["mean of the worst 5 %", "mean", "80 % quantile"]
+    assert [str(risk) for risk in (lw.metrics.CVaR(0.05), mean, quantile)] == [
+        "mean of the worst 5 %",
+        "mean",
+        "80 % quantile",
+    ]
     for wrong in ("median", 2.0, None):
         with pytest.raises(lw.SceneError, match="is no risk"):
             risk_of(faults := Faults(), wrong)
@@ -230,6 +234,10 @@ def test_searches_by_metrics_of_a_loop():
     never = lw.worst_case(regulated(), within, "settling_time depth", budget=64, **RUN)
     assert never.value == np.inf
     assert str(never).startswith("settling_time depth is infinite, or a member fails: start.position[2]")
-    for of, message in (("iae depht", "depht"), ("mean", "is no metric"), (lw.statistics.Mean("depth"), "is no metric")):
+    for of, message in (
+        ("iae depht", "depht"),
+        ("mean", "is no metric"),
+        (lw.statistics.Mean("depth"), "is no metric"),
+    ):
         with pytest.raises(lw.SceneError, match=message):
             lw.worst_case(regulated(), within, of, budget=64, **RUN)

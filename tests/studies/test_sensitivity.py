@@ -14,10 +14,9 @@ import pytest
 from scipy import stats
 
 import lgvi_warp as lw
-from lgvi_warp import cli
+from lgvi_warp import cli, uq
 from lgvi_warp.results import quantities
 from lgvi_warp.scene.settings import RunSettings
-from lgvi_warp import uq
 from tests.conftest import ROOT
 
 FIVE = 5.0 / 1.96
@@ -228,7 +227,8 @@ def test_laws_in_salibs_words(sinking):
 
 
 def test_morris_of_a_linear_quantity(sinking):
-    laws = {"vehicle.buoyancy": lw.distributions.Uniform(half_width=2.0), "start.velocity[2]": lw.distributions.Uniform(half_width=0.01),
+    laws = {"vehicle.buoyancy": lw.distributions.Uniform(half_width=2.0),
+            "start.velocity[2]": lw.distributions.Uniform(half_width=0.01),
             "environment.water_density": lw.distributions.Uniform(relative=0.1)}  # fmt: skip
     found = uq.morris(sinking, "position[2]", samples=8, vary=laws, **SINK)
     assert found.factors == tuple(laws)
@@ -243,7 +243,10 @@ def test_morris_of_a_linear_quantity(sinking):
 
 
 def test_a_joint_law_is_one_factor_of_a_screening(sinking):
-    vary = {"start.attitude": lw.distributions.RotationNormal(std=0.1), "vehicle.buoyancy": lw.distributions.Normal(std=1.0)}
+    vary = {
+        "start.attitude": lw.distributions.RotationNormal(std=0.1),
+        "vehicle.buoyancy": lw.distributions.Normal(std=1.0),
+    }
     found = uq.morris(sinking, ["position[0]", "position[2]"], samples=4, vary=vary, **SINK)
     assert found.factors == ("start.attitude", "vehicle.buoyancy")
     assert found.mu_star.shape == (2, 2)
@@ -261,7 +264,10 @@ def test_what_does_not_vary_has_no_indices_and_says_so(sinking):
 
 def test_noise_that_acts_alike_belongs_to_no_factor(sinking):
     noisy = dataclasses.replace(sinking, terms=[lw.terms.WrenchNoise(force=(1.0, 1.0, 1.0), torque=(0.0, 0.0, 0.0))])
-    vary = {"vehicle.buoyancy": lw.distributions.Normal(std=1.0), "environment.water_density": lw.distributions.Normal(std=1.0)}
+    vary = {
+        "vehicle.buoyancy": lw.distributions.Normal(std=1.0),
+        "environment.water_density": lw.distributions.Normal(std=1.0),
+    }
     alone, alike = (
         uq.sobol(noisy, "position[2]", samples=16, vary=vary, common_noise=c, **SINK) for c in (False, True)
     )
@@ -278,7 +284,8 @@ LINES = np.random.default_rng(0).uniform(0.01, 0.99, (40, 3))
 @pytest.mark.parametrize(
     "sampling",
     ["random", "sobol", "halton", {"latin_hypercube": {"group": 20}}, "saltelli", "morris",
-     lw.designs.Grid({"vehicle.buoyancy": 8, "vehicle.mass": 5}), lw.designs.Table(values=HEAVIER), lw.designs.UnitCubePoints(LINES)],
+     lw.designs.Grid({"vehicle.buoyancy": 8, "vehicle.mass": 5}), lw.designs.Table(values=HEAVIER),
+     lw.designs.UnitCubePoints(LINES)],
     ids=lambda one: str(one)[:20],
 )  # fmt: skip
 def test_a_member_runs_again_alone_with_its_bits(sinking, sampling):
@@ -305,7 +312,10 @@ def test_members_that_are_added_leave_the_others_bits(sinking, sampling):
 # Members that fail --------------------------------------------------------------------------------------------------------
 
 # Beyond 2 / h = 200 rad/s the step is too large: 1 of 20 points of the cube.
-FAST = {"start.angular_velocity[2]": lw.distributions.Uniform(low=0.0, high=210.0), "vehicle.buoyancy": lw.distributions.Normal(std=1.0)}
+FAST = {
+    "start.angular_velocity[2]": lw.distributions.Uniform(low=0.0, high=210.0),
+    "vehicle.buoyancy": lw.distributions.Normal(std=1.0),
+}
 
 
 def test_members_that_fail_are_counted_and_refused(scene):
@@ -314,7 +324,8 @@ def test_members_that_fail_are_counted_and_refused(scene):
     assert 'failed="drop"' in message
     with pytest.raises(uq.FailedMembers):
         uq.morris(scene, "position[2]", samples=20,
-                  vary=FAST | {"start.angular_velocity[2]": lw.distributions.Uniform(low=100.0, high=300.0)}, **RUN)  # fmt: skip
+                  vary=FAST | {"start.angular_velocity[2]": lw.distributions.Uniform(low=100.0, high=300.0)},
+                  **RUN)  # fmt: skip
 
 
 def test_whole_groups_are_used_alone(scene):
@@ -341,7 +352,9 @@ def test_a_quantity_that_is_not_finite_is_a_failure(scene):
     def odd(result):
         return np.where(result.position[0, :, 0] > 0.5, np.nan, result.position[0, :, 0])
 
-    message = fault(uq.sobol, scene, odd, samples=8, vary={"start.position[0]": lw.distributions.Normal(std=1.0)}, **RUN)
+    message = fault(
+        uq.sobol, scene, odd, samples=8, vary={"start.position[0]": lw.distributions.Normal(std=1.0)}, **RUN
+    )
     assert "quantity not finite" in message
 
 
@@ -357,7 +370,10 @@ def test_members_that_reach_the_surface_count_with_where_they_arrive():
     np.testing.assert_allclose(Y, np.column_stack([X[:, 0] + X[:, 1] * end, 0.3 * end]), atol=1e-9)
     assert 0 < (end < 4.0).sum() < 12
 
-    vary = {"start.position[2]": lw.distributions.Uniform(low=1.0, high=7.0), "start.velocity[0]": lw.distributions.Uniform(low=0.2, high=0.4)}
+    vary = {
+        "start.position[2]": lw.distributions.Uniform(low=1.0, high=7.0),
+        "start.velocity[0]": lw.distributions.Uniform(low=0.2, high=0.4),
+    }
     found = uq.sobol(rising, "position[2]", samples=256, vary=vary, seed=1, **settings)
     # z - 4 above 4 m, else 0: half of the members arrive, and the speed to the north is no matter.
     assert found.failed == 0
@@ -402,9 +418,13 @@ def test_quantities_of_a_path(scene):
 
 
 def test_a_quantity_of_the_users_sees_what_members_start_from(sinking):
-    fallen = lw.statistics.Quantity("fallen", lambda samples, members: samples["position"][..., 2] - members.position[None, :, 2],
+    fallen = lw.statistics.Quantity("fallen", lambda samples,
+                                    members: samples["position"][..., 2] - members.position[None, :, 2],
                          fields=("position",))  # fmt: skip
-    vary = {"start.position[2]": lw.distributions.Uniform(half_width=5.0), "start.velocity[2]": lw.distributions.Normal(std=0.01)}
+    vary = {
+        "start.position[2]": lw.distributions.Uniform(half_width=5.0),
+        "start.velocity[2]": lw.distributions.Normal(std=0.01),
+    }
     X = np.array([[3.0, 0.1], [9.0, 0.2]])
     f = uq.model(sinking, vary, [fallen, "depth"], **SINK)
     np.testing.assert_allclose(f(X)[:, 0], depth(123.8, 1215.8, X[:, 1]), rtol=0, atol=1e-13)

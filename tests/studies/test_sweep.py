@@ -267,7 +267,12 @@ def test_a_metric_of_what_a_case_does_not_want_refuses_the_case(scene):
 
 
 def test_members_that_fail_do_not_pass_and_come_first(scene):
-    bad = swept(scene, grid=None, cases=None, vary={**VARY, "start.velocity[0]": lw.distributions.Choice([0.0, 1e307], [0.9, 0.1])})
+    bad = swept(
+        scene,
+        grid=None,
+        cases=None,
+        vary={**VARY, "start.velocity[0]": lw.distributions.Choice([0.0, 1e307], [0.9, 0.1])},
+    )
     record = bad.record(bad.cells[0])
     lost = failed(record.status)
     assert 0 < lost.sum() < MEMBERS

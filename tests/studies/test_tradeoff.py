@@ -499,7 +499,10 @@ def test_a_suggestion_keeps_its_error_on_fresh_members(seed):
     """Brute force: a fleet drawn by another seed, run by what was suggested, beside rk8 at a step of 1/400 s."""
     drag = lw.terms.Drag(linear=[4.0, 12.0, 12.0, 0.5, 2.0, 2.0], quadratic=[5.0, 30.0, 30.0, 1.0, 5.0, 5.0])
     scene = dataclasses.replace(lw.Scene.named("torpedo"), terms=[drag], start=lw.Start(velocity=[1.0, 0.0, 0.0]))
-    vary = {"start.angular_velocity": lw.distributions.Normal(std=0.3), "start.velocity": lw.distributions.Normal(std=0.2)}
+    vary = {
+        "start.angular_velocity": lw.distributions.Normal(std=0.3),
+        "start.velocity": lw.distributions.Normal(std=0.2),
+    }
     found = lw.suggest(lw.Ensemble(scene, 2000, seed, vary), 1e-3, t1=8.0, methods=("rk4", "rk8"), seconds=ENOUGH)
     fresh, save = lw.Ensemble(scene, 2000, seed + 100, vary), lw.SaveAt(every=1.6)
     result = lw.solve(fresh, t1=8.0, save=save, **found.settings)

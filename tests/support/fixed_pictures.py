@@ -46,7 +46,8 @@ RANDOM = re.compile(r"[0-9a-f]{8}-[0-9a-f-]{27}|lgvi_warp_[0-9a-f]+|rec_[0-9a-f]
 # Components that hold such names, or times of recording.
 OF_THE_HOUR = ("RowId", "root_container", "start_time", "log_time", "log_tick", "blueprint")
 VERSIONS = re.compile(r"^\| *(versions?|machine).*$", re.MULTILINE)
-STATISTICS = (lw.statistics.Quantiles("depth"), lw.statistics.Extremes("depth"), lw.statistics.Mean("velocity"), lw.statistics.Covariance("velocity"),
+STATISTICS = (lw.statistics.Quantiles("depth"), lw.statistics.Extremes("depth"), lw.statistics.Mean("velocity"),
+              lw.statistics.Covariance("velocity"),
               lw.statistics.Histogram("depth", bins=5, limits=(0.0, 20.0)))  # fmt: skip
 
 

@@ -22,11 +22,16 @@ FILE = Path(__file__).parents[1] / "data" / "bits.json"
 MEMBERS = 300
 
 STATISTICS = [
-    lw.statistics.Mean("position"), lw.statistics.Covariance(["position", "speed"]), lw.statistics.Quantiles("depth", (0.05, 0.5, 0.95), size=64),
-    lw.statistics.Extremes("velocity"), lw.statistics.Histogram("depth", bins=10, limits=(0.0, 30.0)), lw.statistics.Exceedance("depth", above=10.1),
-    lw.statistics.FirstPassage("depth", above=10.1), lw.statistics.CircularMean("euler[2]"), lw.statistics.MeanAttitude(), lw.statistics.Mean("energy"),
-    lw.statistics.PathMaximum("speed", then=[lw.statistics.Mean(), lw.statistics.Quantiles(levels=(0.5, 0.99), size=64)]), lw.statistics.PathTime("depth", above=10.1),
-    lw.statistics.PathMean("depth"), lw.statistics.PathRms("speed"), lw.statistics.PathRange("position"), lw.statistics.Outcome("stopped"), lw.statistics.EndTime("failed"),
+    lw.statistics.Mean("position"), lw.statistics.Covariance(["position", "speed"]),
+    lw.statistics.Quantiles("depth", (0.05, 0.5, 0.95), size=64),
+    lw.statistics.Extremes("velocity"), lw.statistics.Histogram("depth", bins=10, limits=(0.0, 30.0)),
+    lw.statistics.Exceedance("depth", above=10.1),
+    lw.statistics.FirstPassage("depth", above=10.1), lw.statistics.CircularMean("euler[2]"),
+    lw.statistics.MeanAttitude(), lw.statistics.Mean("energy"),
+    lw.statistics.PathMaximum("speed", then=[lw.statistics.Mean(), lw.statistics.Quantiles(levels=(0.5, 0.99), size=64)]),
+    lw.statistics.PathTime("depth", above=10.1),
+    lw.statistics.PathMean("depth"), lw.statistics.PathRms("speed"), lw.statistics.PathRange("position"),
+    lw.statistics.Outcome("stopped"), lw.statistics.EndTime("failed"),
 ]  # fmt: skip
 VARY = {
     "start.angular_velocity": lw.distributions.Normal(std=0.05),

@@ -23,7 +23,13 @@ import lgvi_warp as lw
 from tests.support.stores import fleet, tree
 
 # Enough files that the parent's threads which wait for the disk are as many as there may be.
-SETTINGS = {"method": "psi_s", "h": 0.01, "t1": 0.1, "save": lw.SaveAt(every=0.05), "statistics": [lw.statistics.Mean("position")]}
+SETTINGS = {
+    "method": "psi_s",
+    "h": 0.01,
+    "t1": 0.1,
+    "save": lw.SaveAt(every=0.05),
+    "statistics": [lw.statistics.Mean("position")],
+}
 CHILDREN, MEMBERS = 2, 4096
 
 

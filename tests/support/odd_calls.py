@@ -48,7 +48,8 @@ def goods(scene, fleet, result, folder):
         "force": [[0.0] * 3, [1.0] * 3], "vehicle": lw.Vehicle(**BODY), "name": "depth", "function": len,
         "statistic": "mean depth", "half_width": 1.0, "file": str(folder / "none.npz"), "inputs": ["north"],
         "outputs": ["X"], "to": "csv", "coefficients": {}, "source": "none", "mass": 20.0,
-        "term": lw.terms.Drag(linear=[1.0] * 6), "part": lw.control.HeadingPID(kp=1.0), "model": None, "Q": np.eye(2), "R": np.eye(2),
+        "term": lw.terms.Drag(linear=[1.0] * 6), "part": lw.control.HeadingPID(kp=1.0), "model": None, "Q": np.eye(2),
+        "R": np.eye(2),
         "over": {}, "within": {}, "of": "depth", "minimise": "depth", "found": None, "matrix": np.eye(6),
     }  # fmt: skip
     own = {
@@ -91,7 +92,9 @@ def odd_calls_within(scene, result, folder, studies):
     rows = [
         {"members": 4, "threads": 1, "method": "rk4", "term": "drag", "dtype": "float64", "ns_per_member_step": 9.0}
     ]
-    saltelli = lw.Ensemble(scene, None, 1, {"vehicle.buoyancy": lw.distributions.Normal(relative=0.01)}, lw.designs.Saltelli(replicates=2))
+    saltelli = lw.Ensemble(
+        scene, None, 1, {"vehicle.buoyancy": lw.distributions.Normal(relative=0.01)}, lw.designs.Saltelli(replicates=2)
+    )
     path = folder / "within.png"
     pictures = {
         name: {"result": result, "results": {"a": result}, "rows": rows, "path": path, "figure": None, "found": None}

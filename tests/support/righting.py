@@ -14,8 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from lgvi_warp.vehicles import from_sdf
-from lgvi_warp.vehicles import from_yaml
+from lgvi_warp.vehicles import from_sdf, from_yaml
 
 SHAPES = {
     "box": lambda g: np.prod([float(x) for x in (g.findtext("size") or "1 1 1").split()]),

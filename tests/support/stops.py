@@ -36,5 +36,6 @@ class FarAway(events.Event):
 
 def stops(floor=1e6, surface=-1e6, lower=(-1e6,) * 3, upper=(1e6,) * 3, at=1e6, radius=1e6):
     """Every kind of event, those not asked for far away."""
-    return [lw.events.Surface(depth=surface), lw.events.Floor(depth=floor), lw.events.Box(lower=lower, upper=upper), lw.events.StopTime(at=at),
+    return [lw.events.Surface(depth=surface), lw.events.Floor(depth=floor), lw.events.Box(lower=lower, upper=upper),
+            lw.events.StopTime(at=at),
             FarAway(radius=radius)]  # fmt: skip

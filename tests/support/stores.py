@@ -10,7 +10,8 @@ from lgvi_warp.studies import speed
 
 # 4 blocks of 256 members, the last one ragged; 31 samples.
 MEMBERS, SETTINGS = 1003, {"method": "psi_s", "h": 0.01, "t1": 3.0, "save": lw.SaveAt(every=0.1)}
-STATISTICS = [lw.statistics.Mean("position"), lw.statistics.Quantiles("depth"), lw.statistics.PathMaximum("speed"), lw.statistics.Covariance("angular_velocity"),
+STATISTICS = [lw.statistics.Mean("position"), lw.statistics.Quantiles("depth"), lw.statistics.PathMaximum("speed"),
+              lw.statistics.Covariance("angular_velocity"),
               lw.statistics.Quantiles("max(norm(velocity))"), lw.statistics.MeanAttitude()]  # fmt: skip
 # Reached with 512 members.
 UNTIL = lw.Until("mean angular_velocity[0]", 3.7e-3, members=256)
@@ -24,7 +25,10 @@ def bits(result):
 
 def fleet(members=MEMBERS):
     """Members of the paper's vehicle with other rates and masses."""
-    vary = {"start.angular_velocity": lw.distributions.Normal(relative=0.1), "vehicle.mass": lw.distributions.Normal(relative=0.001)}
+    vary = {
+        "start.angular_velocity": lw.distributions.Normal(relative=0.1),
+        "vehicle.mass": lw.distributions.Normal(relative=0.001),
+    }
     return lw.Ensemble(speed.example(), members, 1, vary)
 
 

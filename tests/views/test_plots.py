@@ -28,7 +28,8 @@ from tests.support.made import made, turned
 from tests.unit.views.test_cost_pictures import RUNS, TERMS
 
 N, FLOOR = 40, 20.0
-STATISTICS = [lw.statistics.Quantiles("depth"), lw.statistics.Mean("velocity"), lw.statistics.Histogram("depth", bins=10, limits=(0.0, 25.0)),
+STATISTICS = [lw.statistics.Quantiles("depth"), lw.statistics.Mean("velocity"),
+              lw.statistics.Histogram("depth", bins=10, limits=(0.0, 25.0)),
               lw.statistics.Covariance("position"), lw.statistics.PathMaximum("speed")]  # fmt: skip
 
 

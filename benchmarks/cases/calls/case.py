@@ -10,7 +10,10 @@ from lgvi_warp.engine.packets import Packets
 from lgvi_warp.runs.settle import make_plan
 
 # Varied numbers of each vehicle; of REMUS 100 twelve, six of its drag matrix among them.
-PAPER = {name: lw.distributions.Normal(std=1e-3) for name in ("vehicle.mass", "start.angular_velocity[0]", "vehicle.buoyancy")}
+PAPER = {
+    name: lw.distributions.Normal(std=1e-3)
+    for name in ("vehicle.mass", "start.angular_velocity[0]", "vehicle.buoyancy")
+}
 REMUS = {
     **{f"drag_matrix.quadratic[{i},{i}]": lw.distributions.Normal(relative=0.01) for i in range(6)},
     **{f"start.velocity[{i}]": lw.distributions.Normal(std=0.01) for i in range(3)},

@@ -23,7 +23,9 @@ def remus(every, **more):
             period=every * H,
             guidance=[lw.control.SetPoint(depth=10.0, heading=0.5)],
             laws=[lw.control.DepthPID(**DEPTH), lw.control.HeadingPID(**HEADING)],
-            allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=((0, 0, 0, 0, 0, -1), (0, 0, 0, 0, -1, 0)))],
+            allocation=[
+                lw.control.AllocationMatrix(to="control_fins", matrix=((0, 0, 0, 0, 0, -1), (0, 0, 0, 0, -1, 0)))
+            ],
             **more,
         )
     return lw.Scene.named("remus_100", start={"velocity": [1.54, 0.0, 0.0]}, controller=controller)
@@ -43,7 +45,10 @@ def bluerov2(every):
 
 def packets_of(scene, method, dtype, members, steps):
     """Packets of members that start a little apart."""
-    vary = {"start.velocity": lw.distributions.Normal(std=0.02), "start.angular_velocity": lw.distributions.Normal(std=0.02)}
+    vary = {
+        "start.velocity": lw.distributions.Normal(std=0.02),
+        "start.angular_velocity": lw.distributions.Normal(std=0.02),
+    }
     plan = make_plan(lw.Ensemble(scene, members, 1, vary), method, h=H, t1=H * steps, dtype=dtype)
     plan.compile()
     return Packets(plan, plan.ensemble.select(0, members))
@@ -91,7 +96,10 @@ def callback(quick):
         demand[:, 5] -= HEADING["kd"] * y.angular_velocity[:, 2]
         return demand
 
-    laws = {"fused": lw.control.HeadingPID(kp=HEADING["kp"], kd=HEADING["kd"]), "callback": lw.control.Callback(heading)}
+    laws = {
+        "fused": lw.control.HeadingPID(kp=HEADING["kp"], kd=HEADING["kd"]),
+        "callback": lw.control.Callback(heading),
+    }
     times = {}
     for label, law in laws.items():
         controller = lw.Controller(

@@ -14,7 +14,10 @@ from lgvi_warp.engine.episodes import Episodes
 from lgvi_warp.runs.settle import make_plan
 
 EPISODE = 20.0
-VARY = {"vehicle.buoyancy": lw.distributions.Uniform(low=297.0, high=302.0), "start.position[2]": lw.distributions.Uniform(low=5.0, high=15.0)}
+VARY = {
+    "vehicle.buoyancy": lw.distributions.Uniform(low=297.0, high=302.0),
+    "start.position[2]": lw.distributions.Uniform(low=5.0, high=15.0),
+}
 GAINS = dict(kp=1.0, kd=2.0)
 PLANES = lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])
 DEPTH = lw.control.DepthPID(

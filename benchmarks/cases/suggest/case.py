@@ -46,7 +46,10 @@ def fleet(vehicle):
         else term
         for term in scene.terms
     ]
-    vary = {"start.velocity": lw.distributions.Normal(std=0.02), "start.angular_velocity": lw.distributions.Normal(std=0.02)}
+    vary = {
+        "start.velocity": lw.distributions.Normal(std=0.02),
+        "start.angular_velocity": lw.distributions.Normal(std=0.02),
+    }
     return lw.Ensemble(dataclasses.replace(scene, terms=terms), 128, 1, vary)
 
 

@@ -8,9 +8,9 @@ import warp as wp
 
 from lgvi_kernels.advance.examine import Examine
 from lgvi_kernels.lanes.arithmetic import lane, vec3
-from lgvi_kernels.lanes.tick import measurement_struct, reference_struct
 from lgvi_kernels.lanes.packet import put
 from lgvi_kernels.lanes.state import wrench_struct
+from lgvi_kernels.lanes.tick import measurement_struct, reference_struct
 from lgvi_kernels.maps.compose import params_of
 from lgvi_kernels.maps.in_turn import ROLES, in_turn
 

@@ -21,10 +21,10 @@ from lgvi_kernels.advance.noting import (
     wanted_of,
 )
 from lgvi_kernels.lanes.arithmetic import add, any_positive, cross, mul, neg, ones, positive, sub, vec3  # noqa: F401
-from lgvi_kernels.lanes.tick import measurement_struct, reference_struct
 from lgvi_kernels.lanes.matrix3 import apply
 from lgvi_kernels.lanes.state import wrench_struct
 from lgvi_kernels.lanes.sums import place
+from lgvi_kernels.lanes.tick import measurement_struct, reference_struct
 from lgvi_kernels.lanes.view import remember, remembered
 from lgvi_kernels.maps.compose import superpose
 from lgvi_kernels.maps.in_turn import in_turn

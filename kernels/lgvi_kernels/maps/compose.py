@@ -7,9 +7,9 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.lanes.arithmetic import lane, lane3
-from lgvi_kernels.lanes.tick import delayed_key, held_key
 from lgvi_kernels.lanes.noise import noise_key
 from lgvi_kernels.lanes.state import struct
+from lgvi_kernels.lanes.tick import delayed_key, held_key
 from lgvi_kernels.maps.bounded import BoundedLaw, bounds_struct
 
 

@@ -209,7 +209,7 @@ def make_turn(axis, pitched, following, compensated, watched=False):
 
 
 def make_hop(axis_from, axis_to, U12, U13, U23, compensated):
-    """The origin moves from that of axis `axis_from` to that of axis `axis_to` (0, 1, 2), by the elements of U that are not 0."""
+    """The origin moves from that of axis `axis_from` to that of axis `axis_to` (0, 1, 2), by the elements of U but 0."""
     sign = 1.0 if axis_to > axis_from else -1.0
     first_two = (axis_from, axis_to) in ((0, 1), (1, 0))
     along_x, along_y, along_z = (make_shift(axis, compensated) for axis in range(3))

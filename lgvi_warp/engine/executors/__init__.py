@@ -39,7 +39,9 @@ def executor_of(choice: Any, threads: int | None = None, scheduler: str | None =
     faults = Faults()
     check_threads(faults, threads)
     if not isinstance(choice, Executor) and not among(choice, NAMES):
-        faults.add("executor", choice, "is not known", f"{closest(str(choice), NAMES)}; or give an object with run(...)")
+        faults.add(
+            "executor", choice, "is not known", f"{closest(str(choice), NAMES)}; or give an object with run(...)"
+        )
     if scheduler is not None and not among(choice, ("dask",)):
         faults.add("scheduler", scheduler, "is for the executor dask alone", 'give executor="dask", or leave it out')
     if among(choice, STARTING) and scheduler is None and multiprocessing.current_process().daemon:

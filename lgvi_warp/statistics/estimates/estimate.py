@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from lgvi_warp.common import summaries
-from lgvi_warp.common.errors import MissingExtra, closest, brief
+from lgvi_warp.common.errors import MissingExtra, brief, closest
 from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.common.summaries import Summarized
 from lgvi_warp.statistics.estimates.lines import texts_of
@@ -218,7 +218,9 @@ class Estimates(Summarized, Mapping[str, Estimate]):
 def _shown(estimate: Estimate) -> summaries.Rows:
     """Label, value and interval of each of an estimate's numbers at the last sample time."""
     lines = [(label, f"{value}, {ends}, {members}") for label, value, ends, members in texts_of(estimate)]
-    return lines or [(estimate.name, f"{' x '.join(map(str, estimate.value.shape))} values ({', '.join(estimate.dims['value'])})")]
+    return lines or [
+        (estimate.name, f"{' x '.join(map(str, estimate.value.shape))} values ({', '.join(estimate.dims['value'])})")
+    ]
 
 
 def _renamed(single: xarray.Dataset, word: str) -> dict[Hashable, str]:

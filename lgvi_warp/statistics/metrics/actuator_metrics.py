@@ -15,7 +15,7 @@ from lgvi_warp.common.identity import check_version
 from lgvi_warp.common.real_numbers import NotReal, real_results
 from lgvi_warp.control.signals import CHANNELS, SAVED, SIGNALS, ordered
 from lgvi_warp.physics.fields import TABLE
-from lgvi_warp.statistics.metrics.tracking_metrics import Ticks, Metric, State, accumulated
+from lgvi_warp.statistics.metrics.tracking_metrics import Metric, State, Ticks, accumulated
 from lgvi_warp.statistics.values.quantity import Quantity, named
 
 if TYPE_CHECKING:
@@ -197,8 +197,8 @@ _POWER = Quantity("demand", _power, "W", ("velocity", "angular_velocity", "deman
 class TimeToFailure(Metric):
     """When each member failed or an event stopped it [s], infinite for those that went on to the end; then statistics of it.
 
-    Only lw.statistics.MemberValues() tells all of it: other statistics leave out what is infinite, and members that failed. lw.statistics.Outcome is the
-    probability to have ended by each time.
+    Only lw.statistics.MemberValues() tells all of it: other statistics leave out what is infinite, and members that failed.
+    lw.statistics.Outcome is the probability to have ended by each time.
 
     Args:
         of: "end", the default.

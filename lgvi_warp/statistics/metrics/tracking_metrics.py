@@ -22,8 +22,8 @@ from lgvi_warp.control.controller import Controller
 from lgvi_warp.statistics.base import Gatherer, Statistic
 from lgvi_warp.statistics.ends import Ends
 from lgvi_warp.statistics.estimates.tree import Part
-from lgvi_warp.statistics.paths.member_values import MemberValues
 from lgvi_warp.statistics.paths.member_statistic import MemberStatistic
+from lgvi_warp.statistics.paths.member_values import MemberValues
 from lgvi_warp.statistics.values import tracking
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.statistics.values.values import Values
@@ -138,7 +138,8 @@ class Metric(MemberStatistic):
 
     Args:
         of: what is tracked; see the classes derived from it.
-        then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5, 0.99)), lw.statistics.MemberValues().
+        then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5,
+            0.99)), lw.statistics.MemberValues().
         measured: whether the actual number is what sensors measure, in place of the truth; by default False.
     """
 
@@ -251,7 +252,8 @@ class OfTracking(Metric):
     def meant(self) -> Quantity:
         """Return the error."""
         return tracking.error(
-            tracking.tracked_name(f"{self.type}.of", self.of, tracking.ERRORS), flag(f"{self.type}.measured", self.measured)
+            tracking.tracked_name(f"{self.type}.of", self.of, tracking.ERRORS),
+            flag(f"{self.type}.measured", self.measured),
         )
 
 

@@ -106,7 +106,9 @@ class MemberStatistic(Statistic):
 
     def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
         each = enumerate(self.then)
-        return _numbered(statistic.of_replicate(arrays_under(part, f"{i}/"), replicate, replicates) for i, statistic in each)
+        return _numbered(
+            statistic.of_replicate(arrays_under(part, f"{i}/"), replicate, replicates) for i, statistic in each
+        )
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
         # The estimates of each statistic from its replicates, at the end.

@@ -20,8 +20,9 @@ from lgvi_warp.statistics.values.values import Values
 class MemberValues(Statistic):
     """The number of every member, in the order of the members: eight bytes a member, component and row.
 
-    It is meant for `then`, which has one row: lw.metrics.Overshoot("depth", then=[lw.statistics.Mean(), lw.statistics.MemberValues()]). Of a metric it has the
-    numbers of members that failed too; otherwise those of members that are left out are NaN. It has no interval.
+    It is meant for `then`, which has one row: lw.metrics.Overshoot("depth", then=[lw.statistics.Mean(),
+    lw.statistics.MemberValues()]). Of a metric it has the numbers of members that failed too; otherwise those of members that
+    are left out are NaN. It has no interval.
 
     Arrays of the estimate:
 

@@ -67,8 +67,8 @@ class OfPath(MemberStatistic):
 
     Args:
         of: a quantity; see `Statistic`, also for name, confidence and stopped.
-        then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5, 0.99)),
-            lw.statistics.Exceedance(above=2.0).
+        then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5,
+            0.99)), lw.statistics.Exceedance(above=2.0).
     """
 
     of_numbers: ClassVar[bool] = False
@@ -93,8 +93,8 @@ class PathMaximum(OfPath):
 
     Args:
         of: a quantity; see `Statistic`, also for name, confidence and stopped.
-        then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5, 0.99)),
-            lw.statistics.Exceedance(above=2.0).
+        then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5,
+            0.99)), lw.statistics.Exceedance(above=2.0).
     """
 
     type: ClassVar[str] = "path_maximum"

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lgvi_warp.studies.linear.bench import AT_ONCE, COORDINATES, MotionBench, Motion
+from lgvi_warp.studies.linear.bench import AT_ONCE, COORDINATES, Motion, MotionBench
 
 # Half a difference, of numbers of size 1: what is cut off and round-off are then alike, 1e-10.
 STEP = 1e-5

@@ -17,7 +17,7 @@ from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.control_wrench import COMPONENTS, ControlWrench
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.studies.linear.bench import COORDINATES, MotionBench, Motion, calm, plant
+from lgvi_warp.studies.linear.bench import COORDINATES, Motion, MotionBench, calm, plant
 from lgvi_warp.studies.linear.differences import STEP, Row, differences, names_of
 from lgvi_warp.studies.linear.trim import Trim, step_of
 from lgvi_warp.studies.members import scene_of
@@ -132,7 +132,8 @@ def linearize(
 
     Args:
         scene: The scene, without waves and noise; of an Ensemble, its scene.
-        about: The motion: what `lw.linear.trim` returns; for a closed loop also the time [s] after which the run has it. None, the
+        about: The motion: what `lw.linear.trim` returns; for a closed loop also the time [s] after which the run has it. None,
+            the
             default: the start of the scene, with commands of 0; a closed loop after its first period.
         inputs: "commands" of the actuators, the default; or "wrench": X, Y, Z [N], K, M, N [N m], body axes about its origin,
             held for a period beside actuators that keep their commands. Of a plant only.

@@ -14,7 +14,7 @@ from lgvi_warp.control.loop_gain import FACTOR, with_factor
 from lgvi_warp.control.set_point import SetPoint
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.scene.ensemble import Ensemble
-from lgvi_warp.studies.linear.bench import MotionBench, Motion
+from lgvi_warp.studies.linear.bench import Motion, MotionBench
 from lgvi_warp.studies.linear.sampled_loop import DELAY, delayed
 
 # Why a member has no margins; "" where it has.

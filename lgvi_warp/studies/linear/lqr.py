@@ -49,7 +49,9 @@ class Regulator:
         for key, names, known in (("inputs", model.inputs, COMPONENTS), ("states", model.states, COORDINATES)):
             wrong = [each for each in names if each not in known]
             if wrong:
-                remedy = 'give lw.linear.linearize(scene, inputs="wrench"), and .part(...) without what actuators remember'
+                remedy = (
+                    'give lw.linear.linearize(scene, inputs="wrench"), and .part(...) without what actuators remember'
+                )
                 faults.add(f"model.{key}", ", ".join(wrong), "is nothing that a state feedback knows", remedy)
         faults.raise_if_any()
         gains = np.zeros((6, 12))

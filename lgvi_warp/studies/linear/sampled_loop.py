@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from lgvi_warp.control.loop_gain import FACTOR
-from lgvi_warp.studies.linear.bench import MotionBench, Motion
+from lgvi_warp.studies.linear.bench import Motion, MotionBench
 from lgvi_warp.studies.linear.differences import Row, differences
 from lgvi_warp.studies.linear.linearize import remembered
 

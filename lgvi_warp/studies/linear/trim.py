@@ -15,7 +15,7 @@ from lgvi_warp.physics import notation
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Start
-from lgvi_warp.studies.linear.bench import MotionBench, Motion, calm, plant
+from lgvi_warp.studies.linear.bench import Motion, MotionBench, calm, plant
 from lgvi_warp.studies.members import scene_of
 
 # Largest acceleration of a steady motion [m/s2, rad/s2]: far above round-off over a step, some 1e-12.

@@ -13,8 +13,7 @@ from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.status import failed
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.statistics.base import TYPES
-from lgvi_warp.statistics.base import Statistic
+from lgvi_warp.statistics.base import TYPES, Statistic
 from lgvi_warp.studies.sweeps.setup import metric_of
 
 

@@ -98,8 +98,8 @@ def tune_gains(
         over: (low, high), or (low, high, "log"), of each number by name: {"heading_pid.kp": (0.1, 10.0, "log")}.
         minimise: The cost, one number of each member: a quantity, as of `lw.prepare`; or a metric, as of `lw.sweep`:
             "iae depth", lw.metrics.SettlingTime("depth", within=0.5).
-        risk: "mean", the default; the level of a quantity's quantile, such as 0.95; or `lw.metrics.CVaR(0.05)`, the mean of the worst
-            5 %. A member that fails has an infinite cost.
+        risk: "mean", the default; the level of a quantity's quantile, such as 0.95; or `lw.metrics.CVaR(0.05)`, the mean of
+            the worst 5 %. A member that fails has an infinite cost.
         budget: Number of members that the search may run, those of all candidates together; 100,000 by default.
         fresh: Number of fresh members; None, the default, for four times those of the fleet.
         restarts: Number of evolutions; 1 by default.

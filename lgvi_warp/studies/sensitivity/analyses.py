@@ -51,8 +51,8 @@ def sobol(
 
     Args:
         scene: a Scene, with what varies in its ensemble or in `vary`; or an Ensemble, for its scene, vary and seed.
-        of: "position[2]" or "depth" (at the end), "max(energy)" (over the path), "outcome floor", a lw.statistics.Quantity, a function of
-            a Result to (n,) or (n, m), or several of these.
+        of: "position[2]" or "depth" (at the end), "max(energy)" (over the path), "outcome floor", a lw.statistics.Quantity, a
+            function of a Result to (n,) or (n, m), or several of these.
         samples: N, a multiple of `replicates`, best a power of two; N (2 d + 2) members are run for d factors, N (d + 2)
             without second_order. Default 1024.
         vary: name -> distribution. Default: that of the scene or the ensemble.

@@ -197,7 +197,9 @@ class SobolIndices(Indices):
                 [places["factors"][row[name]] for name in ("factor", "other")],
             )
             for j, k in (pair, pair[::-1]):
-                second[q, j, k], half[q, j, k] = (with_missing_as(row[name], np.nan) for name in ("value", "confidence"))
+                second[q, j, k], half[q, j, k] = (
+                    with_missing_as(row[name], np.nan) for name in ("value", "confidence")
+                )
         return {"second": second, "second_confidence": half}
 
     def _pairs(self) -> list[tuple[int, int, int]]:

@@ -475,9 +475,11 @@ def report_text(stability: StabilityMap) -> str:
     lines += [
         f"map         {stability.x.label} x {stability.y.label}: {len(stability.x.values)} x {len(stability.y.values)} cells, "
         f"{stability.directions} starts each, {stability.seconds:.0f} s",
-        f"accurate    {stability.of} to {stability.error_bound:g} {unit} up to {stability.error_time:.3g} s; bounded: energy up to "
+        f"accurate    {stability.of} to {stability.error_bound:g} {unit} up to {stability.error_time:.3g} s; "
+        "bounded: energy up to "
         f"{stability.t1:.3g} s ({stability.judged})",
-        f"reference   {stability.reference}" + (f"; not in {stability.unverified} cells" if stability.unverified else ""),
+        f"reference   {stability.reference}"
+        + (f"; not in {stability.unverified} cells" if stability.unverified else ""),
     ]
     if stability.refused:
         lines.append(f"refused     {', '.join(f'{name}: {why}' for name, why in stability.refused.items())}")

@@ -22,12 +22,11 @@ from lgvi_warp.scene import variations
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.functions import Own, ToldApart, functions_of
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.statistics.base import TYPES
-from lgvi_warp.statistics.base import Statistic, from_list
+from lgvi_warp.statistics.base import TYPES, Statistic, from_list
 from lgvi_warp.statistics.metrics.actuator_metrics import TimeToFailure
 from lgvi_warp.statistics.metrics.tracking_metrics import check_wanted
-from lgvi_warp.statistics.paths.member_values import MemberValues
 from lgvi_warp.statistics.paths.member_statistic import MemberStatistic
+from lgvi_warp.statistics.paths.member_values import MemberValues
 from lgvi_warp.statistics.values.functional import functional
 from lgvi_warp.studies.sweeps.cases import Case, cases_of, ensemble_of, grid_of, known_names, points_of
 from lgvi_warp.studies.sweeps.record import Record, key_of
@@ -245,7 +244,9 @@ def _given(scene: Any, vary: Any) -> tuple[Ensemble, dict[Any, Any]]:
         problem = "has members that were given or chosen one by one"
         raise refusal("scene", "...", problem, "give an Ensemble that draws its members, or a table as its sampling")
     if vary is not None and not isinstance(vary, Mapping):
-        raise refusal("vary", vary, "does not map names to distributions", 'give {"vehicle.mass": lw.distributions.Normal(...)}')
+        raise refusal(
+            "vary", vary, "does not map names to distributions", 'give {"vehicle.mass": lw.distributions.Normal(...)}'
+        )
     return scene, {**scene.vary, **(vary or {})}
 
 
@@ -289,7 +290,9 @@ def metric_of(key: str, entry: Any) -> tuple[str, Statistic]:
     return statistic.key, replace(statistic, then=(MemberValues(),))
 
 
-def rerun_members_of(setup: Setup, cell: SweepCell, indices: Sequence[int], save: SaveAt | None, threads: int | None) -> Result:
+def rerun_members_of(
+    setup: Setup, cell: SweepCell, indices: Sequence[int], save: SaveAt | None, threads: int | None
+) -> Result:
     """Run some members of a cell alone, with the bits that they had in it.
 
     save: what to save of them, and when; None: as the scene says.

@@ -116,7 +116,9 @@ def success_of(conditions: Any, metrics: Sequence[str]) -> Success:
     if isinstance(conditions, Success):
         conditions = conditions.to_dict()
     if not isinstance(conditions, Mapping):
-        raise refusal("success", conditions, "is no table", 'write [success] and "overshoot depth" = { below = 1.0 } below')
+        raise refusal(
+            "success", conditions, "is no table", 'write [success] and "overshoot depth" = { below = 1.0 } below'
+        )
     faults = Faults("success.")
     words = conditions.get("status", OK)
     statuses = (words,) if isinstance(words, str) else tuple(words) if isinstance(words, list | tuple) else (words,)

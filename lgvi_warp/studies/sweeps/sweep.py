@@ -15,7 +15,7 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.sweeps.output import Sweep
 from lgvi_warp.studies.sweeps.record import Record, Records
-from lgvi_warp.studies.sweeps.setup import SweepCell, Setup, made
+from lgvi_warp.studies.sweeps.setup import Setup, SweepCell, made
 from lgvi_warp.studies.sweeps.success import INTERVALS, success_of
 
 # Said of a cell whose function holds what cannot be compared.
@@ -61,8 +61,8 @@ def sweep(
         members: Number of members of every cell; default those of the scene.
         seed: Seed of the members; default that of the scene.
         sampling: As for Ensemble; default that of the scene.
-        metrics: One number of each member: lw.metrics.Overshoot("depth"), a table {"type": "iae", "of": "heading"}, "iae heading", or
-            an expression over the path, "max(norm(demand))". "time_to_failure" is always among them.
+        metrics: One number of each member: lw.metrics.Overshoot("depth"), a table {"type": "iae", "of": "heading"}, "iae
+            heading", or an expression over the path, "max(norm(demand))". "time_to_failure" is always among them.
         success: What a member must fulfil: {"status": "ok", "overshoot depth": {"below": 1.0}}. Default: reach the end.
         baseline: Name of the case that others are compared with; default the first one.
         confidence: Confidence level of all intervals, between 0 and 1; by default 0.95.

@@ -19,7 +19,7 @@ from lgvi_warp.statistics.estimates import paired
 from lgvi_warp.statistics.estimates.given_data import explained
 from lgvi_warp.studies.sweeps import setup as setups
 from lgvi_warp.studies.sweeps.record import Record, Records
-from lgvi_warp.studies.sweeps.setup import SweepCell, Setup
+from lgvi_warp.studies.sweeps.setup import Setup, SweepCell
 from lgvi_warp.studies.sweeps.success import Probability, Success, probability
 
 if TYPE_CHECKING:
@@ -288,14 +288,18 @@ class SweepTable:
                 d = paired.quantiles(x, y, quantile, self.confidence, seed=self.setup.members.seed)
                 test = "bootstrap of members"
                 values = tuple(float(np.quantile(v[finite], quantile)) if finite.any() else np.nan for v in (x, y))
-            yield PairedComparison(a.case.name, b.case.name, a.point, name, (values[0], values[1]), d, test, np.nan, False)
+            yield PairedComparison(
+                a.case.name, b.case.name, a.point, name, (values[0], values[1]), d, test, np.nan, False
+            )
 
     def _of_success(self, a: SweepCell, b: SweepCell) -> PairedComparison:
         x, y = self.passed(a), self.passed(b)
         only = int((x & ~y).sum()), int((y & ~x).sum())
         d = paired.proportions(*only, len(x), self.confidence)
         values = float(x.mean()), float(y.mean())
-        return PairedComparison(a.case.name, b.case.name, a.point, SUCCESS, values, d, "McNemar, exact", np.nan, False, only)
+        return PairedComparison(
+            a.case.name, b.case.name, a.point, SUCCESS, values, d, "McNemar, exact", np.nan, False, only
+        )
 
     def ranking(self, at: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
         """Rank the cases by success, and say of which others each is better than chance explains, and by how much.

@@ -15,16 +15,16 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from lgvi_warp import plots
 from lgvi_warp.common.arguments import file_path, path_of, result_of
 from lgvi_warp.common.errors import NothingToDraw, SceneError
 from lgvi_warp.common.files import place_of, write_text
-from lgvi_warp.common.reading import file_bytes, file_json, file_text, corrupt_file_as_scene_error
+from lgvi_warp.common.reading import corrupt_file_as_scene_error, file_bytes, file_json, file_text
 from lgvi_warp.common.safe_files import inside
 from lgvi_warp.common.status import Warnings
 from lgvi_warp.results.outcomes import outcome_text, outcomes
 from lgvi_warp.statistics.estimates.table import table
 from lgvi_warp.studies.files import STUDY_FILES, of_study
-from lgvi_warp import plots
 from lgvi_warp.views.commands import faults
 from lgvi_warp.views.fleet import OUTCOME_STYLES, title
 from lgvi_warp.views.pages.run_again import how_to_run_again
@@ -171,7 +171,8 @@ def _outcome_table(result: Result) -> str:
     rows = []
     for code in outcomes(result):
         number = counts[code.name.lower()]
-        mark = f'<span class="outcome" style="background:{OUTCOME_STYLES[code].color}"></span> {html.escape(code.name.lower())}'
+        color = OUTCOME_STYLES[code].color
+        mark = f'<span class="outcome" style="background:{color}"></span> {html.escape(code.name.lower())}'
         share = f"{100.0 * number / result.members:.3g} %"
         rows.append((_Html(mark), f"{number:,}", share, outcome_text(result, code)))
     return _table(("outcome", "members", "share", "meaning and remedy"), rows)

@@ -100,8 +100,8 @@ def _same(setting: Any, value: Any) -> bool:
 
 def shortened(scene: Mapping[str, Any]) -> Mapping[str, Any]:
     """Name a vehicle of the package in place of its numbers, where that is the same scene."""
-    from lgvi_warp.vehicles.fossen import vehicle_names
     from lgvi_warp.scene.scene import Scene
+    from lgvi_warp.vehicles.fossen import vehicle_names
 
     name = scene.get("vehicle", {}).get("title")
     if name not in vehicle_names():

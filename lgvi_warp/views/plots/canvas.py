@@ -180,7 +180,10 @@ def mark(code: Status) -> dict[str, Any]:
 
 def outcome_style(code: Status) -> dict[str, Any]:
     """Colour and line style of paths with an outcome."""
-    return {"color": OUTCOME_STYLES[code].color, "linestyle": "-" if code == Status.OK else "--" if code.stopped else ":"}
+    return {
+        "color": OUTCOME_STYLES[code].color,
+        "linestyle": "-" if code == Status.OK else "--" if code.stopped else ":",
+    }
 
 
 def hatch(i: int) -> str:

@@ -13,7 +13,7 @@ from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.common.reading import file_text
 from lgvi_warp.common.safe_files import parsed
-from lgvi_warp.views.plots.canvas import COLORS, MARKERS, legend_below, hatch, panel, panels, style
+from lgvi_warp.views.plots.canvas import COLORS, MARKERS, hatch, legend_below, panel, panels, style
 from lgvi_warp.views.plots.picture import FilePath, picture
 
 COST = "ns_per_vehicle_step"
@@ -30,8 +30,8 @@ def scaling(rows: Rows, *, figure: Any = None, path: FilePath | None = None) -> 
     A dotted line says what as many threads would cost if each were as fast as one alone.
 
     Args:
-        rows: Rows of `lw.bench.scaling`, or a file of JSON lines that `python -m benchmarks run members threads` printed; rows of
-            other measurements are left out.
+        rows: Rows of `lw.bench.scaling`, or a file of JSON lines that `python -m benchmarks run members threads` printed; rows
+            of other measurements are left out.
 
     Returns:
         The axes of members and of threads, shape (2,).
@@ -66,8 +66,8 @@ def term_cost(rows: Rows, *, ax: Any = None, path: FilePath | None = None) -> An
     """Draw what a step costs with each term alone, beside the scene without terms, which is a line.
 
     Args:
-        rows: Rows of `lw.bench.term_cost`, or a file of JSON lines that `python -m benchmarks run terms` printed; of several methods
-            the first is drawn, with a bar for each precision.
+        rows: Rows of `lw.bench.term_cost`, or a file of JSON lines that `python -m benchmarks run terms` printed; of several
+            methods the first is drawn, with a bar for each precision.
 
     Returns:
         The axes.

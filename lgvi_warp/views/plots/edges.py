@@ -43,7 +43,9 @@ def margins(found: Margins, *, figure: Any = None, path: FilePath | None = None)
     of_kind("found", found, "steady values by_runs", "of lw.linear.margins", "give what lw.linear.margins returns")
     steady = np.asarray(found.steady)
     if not steady.any():
-        raise NothingToDraw(f"none of the {found.members} members has margins ({found.reasons_text}): there is nothing to draw")
+        raise NothingToDraw(
+            f"none of the {found.members} members has margins ({found.reasons_text}): there is nothing to draw"
+        )
     names = list(found.values or found.by_runs)
     ways = [way for way, values in (("eigenvalues", found.values), ("runs", found.by_runs)) if values]
     with panels(figure, path, (1, len(names)), (1.0 + 4.5 * len(names), 4.5), sharey=True) as grid:

@@ -15,7 +15,7 @@ from lgvi_warp.results import outcomes as ended_so
 from lgvi_warp.results.quantities import OfResult, quantities
 from lgvi_warp.views.choice import select_members
 from lgvi_warp.views.fleet import OUTCOME_STYLES, title
-from lgvi_warp.views.plots.canvas import COLORS, legend_below, hatch, mark, panel, panels, point_down, widen, wrapped
+from lgvi_warp.views.plots.canvas import COLORS, hatch, legend_below, mark, panel, panels, point_down, widen, wrapped
 from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.read import at_one_time, estimate_for, with_samples
 from lgvi_warp.views.plots.words import DEPTHS, floors, in_words, some_of, unit_of
@@ -61,7 +61,9 @@ def draw_outcomes(axes: Any, result: Result) -> None:
     shares = [100.0 * count / result.members for count in (going, *counts.values())]
     ok = int((status == Status.OK).sum())
     labels = [f"under way, {ok:,} to the end"] + [_first(result, code, when) for code in ended]
-    areas = axes.stackplot(time, *shares, colors=[OUTCOME_STYLES[code].color for code in (Status.OK, *ended)], labels=labels)
+    areas = axes.stackplot(
+        time, *shares, colors=[OUTCOME_STYLES[code].color for code in (Status.OK, *ended)], labels=labels
+    )
     for i, area in enumerate(areas):
         area.set(hatch=hatch(i), edgecolor="white", linewidth=0.0)
     axes.set(xlabel="time [s]", ylabel="share of members [%]", xlim=(time[0], time[-1]), ylim=(0.0, 100.0))

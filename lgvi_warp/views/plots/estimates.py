@@ -11,7 +11,7 @@ from lgvi_warp.common.arguments import result_of
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views.choice import of_members
 from lgvi_warp.views.fleet import members_of_run
-from lgvi_warp.views.plots.canvas import COLORS, band, legend_below, hatch, panels, point_down, style, wrapped
+from lgvi_warp.views.plots.canvas import COLORS, band, hatch, legend_below, panels, point_down, style, wrapped
 from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.words import DEPTHS, floors, in_words, unit_of
 
@@ -98,7 +98,10 @@ def _levels_panel(axes: Any, estimate: Estimate) -> None:
                               hatch=hatch(c + i), edgecolor=look["color"], linewidth=0, label=label)  # fmt: skip
         if len(levels) % 2:
             axes.plot(
-                estimate.time, values[:, len(levels) // 2], label=in_words(str(estimate.coordinates["component"][c])), **look
+                estimate.time,
+                values[:, len(levels) // 2],
+                label=in_words(str(estimate.coordinates["component"][c])),
+                **look,
             )
     legend_below(axes, ncols=4)
 
@@ -119,7 +122,8 @@ def _extremes_panel(axes: Any, estimate: Estimate) -> None:
     """Draw a band from the smallest to the largest value of each component."""
     for c in range(min(estimate.value.shape[1], LINES)):
         color, label = COLORS[c % len(COLORS)], in_words(str(estimate.coordinates["component"][c]))
-        axes.fill_between(estimate.time, estimate["minimum"][:, c], estimate["maximum"][:, c], facecolor=color, alpha=0.3, hatch=hatch(c),
+        axes.fill_between(estimate.time, estimate["minimum"][:, c], estimate["maximum"][:, c], facecolor=color,
+                          alpha=0.3, hatch=hatch(c),
                           edgecolor=color, linewidth=0, label=label)  # fmt: skip
     legend_below(axes, ncols=4)
 

@@ -16,9 +16,27 @@ from lgvi_warp.results.outcomes import outcomes
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.views.choice import mixed, of_members
 from lgvi_warp.views.fleet import members_of_run, title
-from lgvi_warp.views.plots.canvas import COLORS, TINTS, band, legend_below, hatch, mark, panel, point_down, style, wrapped
+from lgvi_warp.views.plots.canvas import (
+    COLORS,
+    TINTS,
+    band,
+    hatch,
+    legend_below,
+    mark,
+    panel,
+    point_down,
+    style,
+    wrapped,
+)
 from lgvi_warp.views.plots.picture import FilePath, picture
-from lgvi_warp.views.plots.read import ValuesUnderWay, estimate_for, quantity_of, survey_of, unbounded_text, with_samples
+from lgvi_warp.views.plots.read import (
+    ValuesUnderWay,
+    estimate_for,
+    quantity_of,
+    survey_of,
+    unbounded_text,
+    with_samples,
+)
 from lgvi_warp.views.plots.words import HINT, floors, floors_of_each, in_words, is_depth, label_of
 from lgvi_warp.views.recording.drawn import at_levels
 
@@ -43,7 +61,8 @@ def fan(result: Result, of: Any = "depth", *, ax: Any = None, path: FilePath | N
 
     Args:
         result: A result, in memory or in a store.
-        of: Name of the quantity or of one component, as "depth", "speed", "position[0]", or a `lw.statistics.Quantity`; default "depth".
+        of: Name of the quantity or of one component, as "depth", "speed", "position[0]", or a `lw.statistics.Quantity`;
+            default "depth".
 
     Returns:
         The axes.

@@ -164,7 +164,9 @@ def everyone(result: Result) -> Shown:
     return Shown(members, np.arange(len(result.time)), members, result.members)
 
 
-def values_of(result: Result, of: Quantity, members: slice | np.ndarray, frames: np.ndarray | None = None) -> np.ndarray:
+def values_of(
+    result: Result, of: Quantity, members: slice | np.ndarray, frames: np.ndarray | None = None
+) -> np.ndarray:
     """Compute a quantity of some members.
 
     frames: Indices of the times; default None, all.

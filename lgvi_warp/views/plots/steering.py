@@ -10,7 +10,7 @@ import numpy as np
 from lgvi_warp.common.status import under_way
 from lgvi_warp.views.choice import MOST_BODIES
 from lgvi_warp.views.commands import channels, faults
-from lgvi_warp.views.plots.canvas import GREY, legend_below, hatch, style
+from lgvi_warp.views.plots.canvas import GREY, hatch, legend_below, style
 from lgvi_warp.views.plots.read import quantity_of, selected, survey_of
 from lgvi_warp.views.plots.words import WORDS
 from lgvi_warp.views.recording.drawn import at_levels

@@ -13,7 +13,7 @@ from lgvi_warp.common.errors import refusal
 from lgvi_warp.common.status import Status, under_way
 from lgvi_warp.views.plots.canvas import COLORS, STYLES, legend_below, mark, outcome_style, panel, point_down, wrapped
 from lgvi_warp.views.plots.picture import FilePath, picture
-from lgvi_warp.views.plots.read import values_of, quantity_of, selected, with_samples
+from lgvi_warp.views.plots.read import quantity_of, selected, values_of, with_samples
 from lgvi_warp.views.plots.words import HINT, floors, is_depth, label_of, some_of
 
 if TYPE_CHECKING:

@@ -109,7 +109,9 @@ def _words(costs: Any, biases: Any, tradeoff: Tradeoff, of: str, any_shown: bool
         biases.text(1.01, CHANCE, "chance", va="center", transform=biases.get_yaxis_transform())
     sample = f"{tradeoff.members} members, 0 to {tradeoff.t1:g} s"
     without = f"no reading of {', '.join(tradeoff.missing)}; " if tradeoff.missing else ""
-    figure.suptitle(wrapped(f"{without}{sample}; reference {tradeoff.reference}; better is to the right and down", figure))
+    figure.suptitle(
+        wrapped(f"{without}{sample}; reference {tradeoff.reference}; better is to the right and down", figure)
+    )
 
 
 def _name(axes: Any, named: list[tuple[str, float, float, Any]]) -> None:

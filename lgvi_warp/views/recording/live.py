@@ -34,8 +34,8 @@ PATIENCE = 30.0
 class Live:
     """Shows the members of a run in a viewer as their blocks are finished.
 
-    Of each block as many members are drawn as its share of 1,000, in the order of `lgvi_warp.select_members`: by a hash of their index.
-    Bodies and paths are coloured by outcome; curves are of single members, since quantiles need all of them.
+    Of each block as many members are drawn as its share of 1,000, in the order of `lgvi_warp.select_members`: by a hash of
+    their index. Bodies and paths are coloured by outcome; curves are of single members, since quantiles need all of them.
 
     A viewer that is closed, or takes nothing for a while, ends the view and not the run.
 

@@ -36,8 +36,9 @@ def record(
 ) -> Path | None:
     """Record the fleet for the rerun viewer; a file is there whole or not at all.
 
-    Hulls of the vehicle's shape are drawn for the members and times of `lgvi_warp.select_members`, each in the colour of its outcome
-    from the moment it has it. Curves are of the members under way at each time. The same run always gives the recording and
+    Hulls of the vehicle's shape are drawn for the members and times of `lgvi_warp.select_members`, each in the colour of its
+    outcome from the moment it has it. Curves are of the members under way at each time. The same run always gives the
+    recording and
     the application the same ids: the viewer keeps recordings and layouts apart by them.
 
     Args:

@@ -8,11 +8,10 @@ from types import SimpleNamespace
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import cli
+from lgvi_warp import cli, uq
 from lgvi_warp.cli import studies
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.errors import MissingExtra, NothingToDraw
-from lgvi_warp import uq
 from lgvi_warp.studies.stability.map import GRIDS
 from tests.conftest import ROOT
 from tests.support.verbs import Study, main

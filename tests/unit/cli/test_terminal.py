@@ -19,9 +19,7 @@ from lgvi_warp.calls import predict as prediction
 from lgvi_warp.cli import arguments, command, output, signals
 from lgvi_warp.common.phases import Phases
 from lgvi_warp.studies import packet_width as tuning
-from lgvi_warp.studies.sensitivity.indices import Indices
-from lgvi_warp.studies.sensitivity.indices import MorrisEffects
-from lgvi_warp.studies.sensitivity.indices import SobolIndices
+from lgvi_warp.studies.sensitivity.indices import Indices, MorrisEffects, SobolIndices
 from lgvi_warp.studies.stability.grid import Line
 from lgvi_warp.studies.stability.map import StabilityMap
 from lgvi_warp.studies.tradeoff import Tradeoff

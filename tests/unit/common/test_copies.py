@@ -17,9 +17,9 @@ from lgvi_warp.common.errors import MissingExtra, NothingToDraw, NotReal
 from lgvi_warp.common.identity import UNKNOWN, identity
 from lgvi_warp.common.reading import UnreadableError
 from lgvi_warp.control.base import SECTIONS
-from tests.support.public import DOORS, NAMED
 from tests.conftest import ROOT
 from tests.support.odd_calls import goods
+from tests.support.public import DOORS, NAMED
 
 WAYS = {"copy": copy.copy, "deepcopy": copy.deepcopy} | {
     f"pickle {protocol}": lambda value, protocol=protocol: pickle.loads(pickle.dumps(value, protocol))
@@ -88,13 +88,17 @@ SPHERE = lw.Scene.named("sphere")
 OTHERS = {
     "Callback": lambda: lw.control.Callback(demand, version="1"), "CustomMetric": lambda: lw.metrics.CustomMetric(metric),
     "Quantity": lambda: lw.statistics.Quantity("depth", metric), "Case": lambda: lw.studies.Case("one", {"a.b": 1.0}),
-    "Grid": lambda: lw.designs.Grid({"vehicle.mass": [1.0, 2.0]}), "Table": lambda: lw.designs.Table(values={"vehicle.mass": [1.0, 2.0]}),
+    "Grid": lambda: lw.designs.Grid({"vehicle.mass": [1.0, 2.0]}),
+    "Table": lambda: lw.designs.Table(values={"vehicle.mass": [1.0, 2.0]}),
     "UnitCubePoints": lambda: lw.designs.UnitCubePoints([[0.5]]), "LatinHypercube": lambda: lw.designs.LatinHypercube(4),
     "Fins": lambda: lw.terms.Fins(position=[V], chord=[(1, 0, 0)], normal=[(0, 0, 1)], area=0.1, drag=0.1, lift_slope=3.0),
     "LowPass": lambda: lw.control.LowPass(of="depth", time_constant=1.0), "Packed": lambda: lw.laws.Packed({"a": np.ones(2)}),
-    "PoseSMC": lambda: lw.control.PoseSMC(lambda_=V, boundary=V, lambda_r=V, boundary_r=V, k_sigma=V, k_d=V, k_sigma_r=V, k_d_r=V),
-    "PhysicalInertia": lambda: lw.distributions.PhysicalInertia(sigma=0.1), "PositiveDefinite": lambda: lw.distributions.PositiveDefinite(sigma=0.1),
-    "RotationNormal": lambda: lw.distributions.RotationNormal(std=0.1), "Histogram": lambda: lw.statistics.Histogram("depth", edges=[0.0, 1.0]),
+    "PoseSMC": lambda: lw.control.PoseSMC(lambda_=V, boundary=V, lambda_r=V, boundary_r=V, k_sigma=V, k_d=V,
+                                          k_sigma_r=V, k_d_r=V),
+    "PhysicalInertia": lambda: lw.distributions.PhysicalInertia(sigma=0.1),
+    "PositiveDefinite": lambda: lw.distributions.PositiveDefinite(sigma=0.1),
+    "RotationNormal": lambda: lw.distributions.RotationNormal(std=0.1),
+    "Histogram": lambda: lw.statistics.Histogram("depth", edges=[0.0, 1.0]),
     "CorrelatedNormal": lambda: lw.distributions.CorrelatedNormal(covariance=np.eye(2)),
     "ScipyDistribution": lambda: lw.distributions.ScipyDistribution(stats.norm()),
     "Ticks": lambda: lw.control.CallbackInput(np.ones((1, 3)), np.eye(3)[None], np.ones((1, 3)), np.ones((1, 3)), np.ones(1)),
@@ -226,8 +230,14 @@ def test_what_runs_give(ran, way):
 def test_what_studies_give():
     drag, run = lw.terms.Drag(linear=(4.0, 9.0, 12.0, 1.0, 2.0, 3.0)), dict(method="psi_s", h=0.1)
     body = lw.Scene(lw.Vehicle(20.0, inertia=(5.0, 8.0, 11.0)), terms=[lw.terms.ControlWrench(limit=1e3), drag])
-    turn = lw.Controller(period=0.1, guidance=[lw.control.SetPoint(heading=0.1)], laws=[lw.control.HeadingPID(kp=5.0, kd=5.0)])
-    loop, vary, short = replace(body, controller=turn), {"start.position[2]": lw.distributions.Normal(std=1.0)}, run | {"t1": 0.2}
+    turn = lw.Controller(
+        period=0.1, guidance=[lw.control.SetPoint(heading=0.1)], laws=[lw.control.HeadingPID(kp=5.0, kd=5.0)]
+    )
+    loop, vary, short = (
+        replace(body, controller=turn),
+        {"start.position[2]": lw.distributions.Normal(std=1.0)},
+        run | {"t1": 0.2},
+    )
     steady = lw.linear.trim(body, 1.0, **run)
     model = lw.linear.linearize(replace(body, start=steady.start), **run)
     both = vary | {"start.velocity[1]": lw.distributions.Normal(std=0.1)}

@@ -7,12 +7,16 @@ import pytest
 import xarray as xr
 
 import lgvi_warp as lw
-from lgvi_warp.calls.runner import Runner
 from lgvi_warp import uq
+from lgvi_warp.calls.runner import Runner
 from tests.support.refusals import refused
 
 MASS, BUOYANCY, DENSITY = "vehicle.mass", "vehicle.buoyancy", "environment.water_density"
-VARY = {MASS: lw.distributions.Normal(std=0.1), BUOYANCY: lw.distributions.Normal(std=1.0), "current.velocity": lw.distributions.Uniform(half_width=0.5)}
+VARY = {
+    MASS: lw.distributions.Normal(std=0.1),
+    BUOYANCY: lw.distributions.Normal(std=1.0),
+    "current.velocity": lw.distributions.Uniform(half_width=0.5),
+}
 NAMES = (MASS, BUOYANCY, "current.velocity[0]", "current.velocity[1]", "current.velocity[2]")
 ROWS = np.array([[123.0, 1215.0, 0.3, -0.2, 0.01], [124.0, 1216.0, 0.1, 0.2, 0.0], [125.0, 1217.0, 0.0, 0.4, 0.05]])
 
@@ -132,7 +136,11 @@ def test_levels_are_read_in_the_order_of_the_laws(drifting, seen):
 
 def test_a_joint_law_keeps_its_place_among_levels(drifting, seen):
     gravity = {"environment.gravity": lw.distributions.Normal(std=0.1)}
-    vary = {"vehicle.mass": lw.distributions.Normal(std=0.1), "start.attitude": lw.distributions.UniformRotation(), **gravity}
+    vary = {
+        "vehicle.mass": lw.distributions.Normal(std=0.1),
+        "start.attitude": lw.distributions.UniformRotation(),
+        **gravity,
+    }
     model = uq.model(drifting, vary, "position[2]", levels=True, h=0.01, t1=0.02)
     joint = [f"start.attitude {i}" for i in range(3)]
     assert model.names == ("vehicle.mass", *joint, "environment.gravity")
@@ -185,7 +193,10 @@ def test_a_model_refuses_what_does_not_fit(drifting, seen, case):
 
 
 def test_entries_that_do_not_vary_stay_the_scenes(drifting, seen):
-    vary = {"current.velocity[1]": lw.distributions.Normal(std=0.1), "vehicle.inertia": lw.distributions.Uniform(relative=0.01)}
+    vary = {
+        "current.velocity[1]": lw.distributions.Normal(std=0.1),
+        "vehicle.inertia": lw.distributions.Uniform(relative=0.01),
+    }
     model = uq.model(drifting, vary, "position[2]", h=0.01, t1=0.02)
     assert model.names == ("current.velocity[1]", *(f"vehicle.inertia[{i},{i}]" for i in range(3)))
     velocity, inertia = np.array([[0.2, 0.1, 0.0]] * 2), np.array([np.diag([5.4, 5.3, 5.8])] * 2)
@@ -273,7 +284,9 @@ def test_levels_with_names(drifting):
         for one in (fleet, back):
             np.testing.assert_array_equal(one.parameters(0, 2)[MASS], by_order[MASS])
             np.testing.assert_array_equal(one.parameters(0, 2)[BUOYANCY], by_order[BUOYANCY])
-    message = refused(lw.Ensemble, drifting, None, 0, vary, lw.designs.UnitCubePoints({"mass": u[:, 0], BUOYANCY: u[:, 1]}))
+    message = refused(
+        lw.Ensemble, drifting, None, 0, vary, lw.designs.UnitCubePoints({"mass": u[:, 0], BUOYANCY: u[:, 1]})
+    )
     assert "did you mean 'vehicle.mass'" in message
     assert "do not name 2 columns" in refused(lw.designs.UnitCubePoints, u, [MASS])
 

@@ -50,7 +50,9 @@ def result(members=5, times=4, statuses=(0,), samples=True):
 
 SCENE = lw.Scene.load(ROOT / "examples" / "scenes" / "remus_100_autopilot.toml")
 MANY = {
-    f"start.{name}[{i}]": lw.distributions.Normal(std=0.1) for name in ("position", "velocity", "angular_velocity") for i in range(3)
+    f"start.{name}[{i}]": lw.distributions.Normal(std=0.1)
+    for name in ("position", "velocity", "angular_velocity")
+    for i in range(3)
 }
 OBJECTS = {"vehicle": SCENE.vehicle, "scene": SCENE,
            "remarks": lw.Vehicle(mass=1.0, inertia=(1.0, 1.0, 1.0), warnings=["x" * 500] * 50),

@@ -6,7 +6,7 @@ import copy
 import numpy as np
 import pytest
 
-from lgvi_warp.engine.shared import FRAME, MEMBERS, SEED, TrackedParameters, SharedResultsCache, context
+from lgvi_warp.engine.shared import FRAME, MEMBERS, SEED, SharedResultsCache, TrackedParameters, context
 from lgvi_warp.scene.draws import KEPT
 
 NUMBERS = {"a.x": np.ones((1, 3)), "b.y": np.zeros(5)}

@@ -92,7 +92,9 @@ def test_each_coupling_alone_is_seen(i, j):
 
 def test_laws_that_one_member_feels(at_once):
     bare = scene_of()
-    scene = lw.Scene(bare.vehicle, bare.environment, terms=[lw.terms.Drag(), lw.terms.Current(velocity=(0.0, 0.0, 0.0))])
+    scene = lw.Scene(
+        bare.vehicle, bare.environment, terms=[lw.terms.Drag(), lw.terms.Current(velocity=(0.0, 0.0, 0.0))]
+    )
     assert not seen(fleet(scene)).felt
     one = seen(fleet(scene, drag__linear=(0.0, 0.0, 0.0, 0.0, 1.0, 0.0)))
     assert one.felt == {"drag"}
@@ -105,7 +107,10 @@ def test_laws_that_one_member_feels(at_once):
 
 def test_parts_join_to_the_whole(monkeypatch):
     scene = lw.Scene(lw.Scene.named("remus_100").vehicle, terms=[lw.terms.Drag(quadratic=(1.0,) * 6)])
-    vary = {"vehicle.added_mass_matrix": lw.distributions.Normal(relative=0.01), "drag.quadratic": lw.distributions.Uniform(relative=0.5)}
+    vary = {
+        "vehicle.added_mass_matrix": lw.distributions.Normal(relative=0.01),
+        "drag.quadratic": lw.distributions.Uniform(relative=0.5),
+    }
     members = lw.Ensemble(scene, 500, 3, vary)
     found = []
     for size in (7, 64, 1000):
@@ -124,7 +129,9 @@ def test_the_first_unphysical_member_is_named_whatever_the_parts(at_once):
 
 def test_memory_of_a_plan_does_not_grow_with_members(monkeypatch):
     monkeypatch.setattr(slices, "AT_ONCE", 512)
-    members = lw.Ensemble(scene_of((1.0, 2.0, 3.0)), 60_000, 1, {"vehicle.inertia": lw.distributions.Normal(relative=0.01)})
+    members = lw.Ensemble(
+        scene_of((1.0, 2.0, 3.0)), 60_000, 1, {"vehicle.inertia": lw.distributions.Normal(relative=0.01)}
+    )
     make_plan(members.subset([0]), h=0.01, t1=0.1)  # the kernel's own
     tracemalloc.start()
     make_plan(members, h=0.01, t1=0.1)

@@ -72,8 +72,10 @@ def test_uniforms_are_uniform_and_their_components_independent():
 
 @pytest.mark.parametrize("law, exact", [
     (lw.distributions.Normal(std=0.5), stats.norm(10.0, 0.5)), (lw.distributions.Normal(relative=0.02), stats.norm(10.0, 0.2)),
-    (lw.distributions.Normal(mean=-1.0, std=2.0), stats.norm(-1.0, 2.0)), (lw.distributions.Uniform(low=-1.0, high=3.0), stats.uniform(-1.0, 4.0)),
-    (lw.distributions.Uniform(half_width=2.0), stats.uniform(8.0, 4.0)), (lw.distributions.Uniform(relative=0.1), stats.uniform(9.0, 2.0)),
+    (lw.distributions.Normal(mean=-1.0, std=2.0), stats.norm(-1.0, 2.0)),
+    (lw.distributions.Uniform(low=-1.0, high=3.0), stats.uniform(-1.0, 4.0)),
+    (lw.distributions.Uniform(half_width=2.0), stats.uniform(8.0, 4.0)),
+    (lw.distributions.Uniform(relative=0.1), stats.uniform(9.0, 2.0)),
     (lw.distributions.LogNormal(sigma=0.3), stats.lognorm(0.3, scale=10.0)),
     (lw.distributions.LogNormal(sigma=0.3, median=2.0), stats.lognorm(0.3, scale=2.0)),
     (lw.distributions.TruncatedNormal(std=2.0), stats.truncnorm(-3.0, 3.0, 10.0, 2.0)),
@@ -94,7 +96,8 @@ def test_quantiles(law, exact):
 
 
 @pytest.mark.parametrize("law, exact", [
-    (lw.distributions.Normal(std=0.5), stats.norm(10.0, 0.5)), (lw.distributions.Uniform(half_width=2.0), stats.uniform(8.0, 4.0)),
+    (lw.distributions.Normal(std=0.5), stats.norm(10.0, 0.5)),
+    (lw.distributions.Uniform(half_width=2.0), stats.uniform(8.0, 4.0)),
     (lw.distributions.LogNormal(sigma=0.3), stats.lognorm(0.3, scale=10.0)),
     (lw.distributions.TruncatedNormal(std=2.0, low=9.0, high=13.0), stats.truncnorm(-0.5, 1.5, 10.0, 2.0)),
 ])  # fmt: skip
@@ -118,7 +121,12 @@ def test_components_have_their_own_spread_about_their_own_value():
 
 def test_a_spread_of_zero_is_the_value_itself():
     u = np.array([0.01, 0.5, 0.9])
-    for law in (lw.distributions.Normal(std=0.0), lw.distributions.Uniform(half_width=0.0), lw.distributions.LogNormal(sigma=0.0), lw.distributions.TruncatedNormal(std=0.0)):
+    for law in (
+        lw.distributions.Normal(std=0.0),
+        lw.distributions.Uniform(half_width=0.0),
+        lw.distributions.LogNormal(sigma=0.0),
+        lw.distributions.TruncatedNormal(std=0.0),
+    ):
         np.testing.assert_array_equal(law.quantile(u, np.array(10.0)), [10.0, 10.0, 10.0])
 
 
@@ -145,10 +153,16 @@ def test_far_tails_against_scipy(bound):
 
 
 def test_a_law_relative_to_nothing_is_refused(scene):
-    for law in (lw.distributions.Normal(relative=0.1), lw.distributions.Uniform(relative=0.1), lw.distributions.LogNormal(sigma=0.1)):
+    for law in (
+        lw.distributions.Normal(relative=0.1),
+        lw.distributions.Uniform(relative=0.1),
+        lw.distributions.LogNormal(sigma=0.1),
+    ):
         with pytest.raises(lw.SceneError, match=r"0, so that its \w+ varies nothing; give an absolute spread"):
             lw.Ensemble(scene, 4, vary={"vehicle.center_of_buoyancy[0]": law})
-    lw.Ensemble(scene, 4, vary={"vehicle.center_of_buoyancy": lw.distributions.Normal(relative=0.1)})  # one entry is not 0
+    lw.Ensemble(
+        scene, 4, vary={"vehicle.center_of_buoyancy": lw.distributions.Normal(relative=0.1)}
+    )  # one entry is not 0
     lw.Ensemble(scene, 4, vary={"vehicle.center_of_buoyancy[0]": lw.distributions.Normal(relative=0.0)})
     lw.Ensemble(scene, 4, vary={"vehicle.center_of_buoyancy[0]": lw.distributions.LogNormal(sigma=0.1, median=0.01)})
 
@@ -202,8 +216,16 @@ def test_tables_are_laws_in_code_too(scene):
         (lw.distributions.CorrelatedNormal, {"std": (1.0, 1.0, 1.0), "correlation": np.eye(2)}, "does not fit 2"),
         (lw.distributions.CorrelatedNormal, {"std": 1.0, "correlation": 2.0 * np.eye(2)}, "diagonal that is not 1"),
         # Metres beside newtons: the sizes of the entries say nothing about whether they can go together.
-        (lw.distributions.CorrelatedNormal, {"std": (1e-3, 1e3), "correlation": [[1.0, 1.2], [1.2, 1.0]]}, "positive semidefinite"),
-        (lw.distributions.CorrelatedNormal, {"covariance": [[1e-10, 50.0 * 1e-2], [50.0 * 1e-2, 1e6]]}, "positive semidefinite"),
+        (
+            lw.distributions.CorrelatedNormal,
+            {"std": (1e-3, 1e3), "correlation": [[1.0, 1.2], [1.2, 1.0]]},
+            "positive semidefinite",
+        ),
+        (
+            lw.distributions.CorrelatedNormal,
+            {"covariance": [[1e-10, 50.0 * 1e-2], [50.0 * 1e-2, 1e6]]},
+            "positive semidefinite",
+        ),
         (lw.distributions.CorrelatedNormal, {"covariance": [[0.0, 0.1], [0.1, 1.0]]}, "positive semidefinite"),
         (lw.distributions.CorrelatedNormal, {"covariance": [[-1.0, 0.0], [0.0, 1.0]]}, "negative variance"),
         (lw.distributions.RotationNormal, {}, "nothing given"),
@@ -235,7 +257,8 @@ def test_all_faults_of_a_law_come_at_once():
 
 
 @pytest.mark.parametrize("law", [
-    lw.distributions.Normal(std=[0.03, 0.02, 0.01]), lw.distributions.Uniform(low=0.0, high=1.0), lw.distributions.LogNormal(sigma=0.1),
+    lw.distributions.Normal(std=[0.03, 0.02, 0.01]), lw.distributions.Uniform(low=0.0, high=1.0),
+    lw.distributions.LogNormal(sigma=0.1),
     lw.distributions.TruncatedNormal(relative=0.1, width=2.0),
 ])  # fmt: skip
 def test_there_and_back(law):

@@ -71,7 +71,10 @@ def test_correlation_and_deviations():
 
 
 def test_a_singular_covariance_keeps_what_it_says():
-    (x,) = drawn(lw.distributions.CorrelatedNormal(covariance=[[1.0, 2.0, 0.0], [2.0, 4.0, 0.0], [0.0, 0.0, 0.0]]), [1.0, 2.0, 3.0])
+    (x,) = drawn(
+        lw.distributions.CorrelatedNormal(covariance=[[1.0, 2.0, 0.0], [2.0, 4.0, 0.0], [0.0, 0.0, 0.0]]),
+        [1.0, 2.0, 3.0],
+    )
     # The root of a matrix with eigenvalues of round-off, 1e-16 of 5, is good to the square root of that.
     np.testing.assert_allclose(x[:, 1], 2.0 * x[:, 0], rtol=0, atol=1e-7)
     np.testing.assert_allclose(x[:, 2], 3.0, rtol=0, atol=1e-7)
@@ -104,7 +107,11 @@ R0 = notation.matrix_from_rotation_vector(np.array([0.4, -0.7, 1.2]))
 
 
 @pytest.mark.parametrize(
-    "law", [lw.distributions.RotationNormal(std=(0.3, 0.1, 0.2)), lw.distributions.RotationNormal(covariance=0.02 * COVARIANCE)]
+    "law",
+    [
+        lw.distributions.RotationNormal(std=(0.3, 0.1, 0.2)),
+        lw.distributions.RotationNormal(covariance=0.02 * COVARIANCE),
+    ],
 )
 def test_turns_about_the_body_have_their_covariance(law):
     (R,) = drawn(law, R0)
@@ -226,7 +233,9 @@ def test_matrix_laws_that_do_not_fit(scene):
             lw.Ensemble(other, 2, 0, {name: law})
         return str(caught.value)
 
-    assert "no rigid body has" in found("vehicle.inertia", lw.distributions.PhysicalInertia(sigma=0.1), inertia=(1.0, 1.0, 3.0))
+    assert "no rigid body has" in found(
+        "vehicle.inertia", lw.distributions.PhysicalInertia(sigma=0.1), inertia=(1.0, 1.0, 3.0)
+    )
     assert "not positive in the scene" in found(
         "vehicle.added_mass", lw.distributions.PositiveDefinite(sigma=0.1), added_mass=(-10.0, 5.0, 5.0)
     )
@@ -338,7 +347,8 @@ def test_choices_come_as_often_as_they_weigh():
 
 @pytest.mark.parametrize("law", [
     lw.distributions.Choice(values=[1.0, 2.0], weights=[1.0, 3.0]),
-    lw.distributions.CorrelatedNormal(std=[1.0, 2.0], correlation=[[1.0, 0.5], [0.5, 1.0]]), lw.distributions.RotationNormal(std=[0.1, 0.2, 0.3]),
+    lw.distributions.CorrelatedNormal(std=[1.0, 2.0], correlation=[[1.0, 0.5], [0.5, 1.0]]),
+    lw.distributions.RotationNormal(std=[0.1, 0.2, 0.3]),
     lw.distributions.UniformRotation(), lw.distributions.PositiveDefinite(sigma=0.1, off_diagonal=0.2),
     lw.distributions.PhysicalInertia(sigma=0.1, mass_sigma=0.01),
 ])  # fmt: skip

@@ -75,7 +75,10 @@ def test_blocks_subsets_and_longer_ensembles_have_the_same_members(scene, conten
 def test_lines_may_be_added(scene, kind):
     """Members of the lines that were there stay as they are, and so do the numbers drawn beside a table."""
     lines = np.random.default_rng(2).uniform(0.1, 0.9, (50, 2))
-    vary = {"vehicle.buoyancy": lw.distributions.Uniform(half_width=1.0), "start.position[2]": lw.distributions.Normal(std=1.0)}
+    vary = {
+        "vehicle.buoyancy": lw.distributions.Uniform(half_width=1.0),
+        "start.position[2]": lw.distributions.Normal(std=1.0),
+    }
 
     def of(rows):
         if kind is lw.designs.UnitCubePoints:
@@ -123,7 +126,10 @@ def test_no_sampling_has_more_members_than_there_can_be(scene):
     assert f"ensemble.sampling.grid = {3000**6}: are more members" in fault
     assert "fewer values" in fault
     # Beyond whole numbers of 64 bits.
-    assert "more members" in faults(lw.Ensemble, scene, None, 0, {names[0]: uniform}, lw.designs.Grid({names[0]: 10**30}))[0]
+    assert (
+        "more members"
+        in faults(lw.Ensemble, scene, None, 0, {names[0]: uniform}, lw.designs.Grid({names[0]: 10**30}))[0]
+    )
     fleet = lw.Ensemble(scene, None, 0, {names[0]: uniform}, lw.designs.Grid({names[0]: 2**10}))
     assert fleet.members == 2**30
     assert len(fleet.select(2**30 - 3, 2**30).position) == 3
@@ -242,9 +248,13 @@ def test_whole_numbers_of_numpy(scene):
 
     pairs = [(lw.designs.LatinHypercube(np.int64(10), replicates=np.int32(2)), lw.designs.LatinHypercube(10, replicates=2)),
              (lw.designs.Sobol(replicates=np.uint8(4)), lw.designs.Sobol(replicates=4)),
-             (lw.designs.Halton(replicates=np.int16(4)), lw.designs.Halton(replicates=4)), (lw.designs.Morris(np.int64(6)), lw.designs.Morris(6)),
+             (lw.designs.Halton(replicates=np.int16(4)), lw.designs.Halton(replicates=4)),
+             (lw.designs.Morris(np.int64(6)), lw.designs.Morris(6)),
              (lw.designs.Grid({"vehicle.buoyancy": np.int64(4)}), lw.designs.Grid({"vehicle.buoyancy": 4}))]  # fmt: skip
-    vary = {"vehicle.buoyancy": lw.distributions.Uniform(half_width=1.0), "start.position[2]": lw.distributions.Normal(std=1.0)}
+    vary = {
+        "vehicle.buoyancy": lw.distributions.Uniform(half_width=1.0),
+        "start.position[2]": lw.distributions.Normal(std=1.0),
+    }
     for ours, theirs in pairs:
         n = {"grid": 4, "morris": 60}.get(ours.kind, 80)
         fleets = [lw.Ensemble(scene, kind(n), kind(3), vary, one) for kind, one in ((np.int64, ours), (int, theirs))]
@@ -298,7 +308,10 @@ def test_a_path_moves_one_factor_at_a_time_by_half_the_levels():
 def test_a_grid_is_every_combination(scene):
     grid = lw.designs.Grid({"vehicle.mass": [120.0, 121.0, 125.0], "start.position[2]": [5.0, 6.0], "vehicle.buoyancy": 4,
                     "start.angular_velocity": [[0.0, 0.0, 0.1], [0.0, 0.2, 0.0]]})  # fmt: skip
-    vary = {"vehicle.buoyancy": lw.distributions.Uniform(low=1000.0, high=1400.0), "environment.gravity": lw.distributions.Normal(std=0.001)}
+    vary = {
+        "vehicle.buoyancy": lw.distributions.Uniform(low=1000.0, high=1400.0),
+        "environment.gravity": lw.distributions.Normal(std=0.001),
+    }
     fleet = lw.Ensemble(scene, None, 1, vary, grid)
     assert fleet.members == 2 * 2 * 4 * 3
     m = fleet.select(0, 48)
@@ -318,7 +331,9 @@ def test_a_table_of_arrays(scene):
     R = stats.special_ortho_group(3, seed=1).rvs(6)
     values = {"vehicle.mass": rng.uniform(100, 150, 6), "start.position[1]": np.arange(6.0), "vehicle.inertia": J,
               "start.attitude": R, "vehicle.added_mass[0,1]": np.arange(6.0)}  # fmt: skip
-    fleet = lw.Ensemble(scene, sampling=lw.designs.Table(values), vary={"environment.gravity": lw.distributions.Normal(std=0.001)})
+    fleet = lw.Ensemble(
+        scene, sampling=lw.designs.Table(values), vary={"environment.gravity": lw.distributions.Normal(std=0.001)}
+    )
     m = fleet.select(0, 6)
     np.testing.assert_array_equal(m.parameters["vehicle.mass"], values["vehicle.mass"])
     np.testing.assert_array_equal(m.position, [[0.0, i, 10.0] for i in range(6)])
@@ -406,7 +421,11 @@ def test_columns_that_no_scene_has_are_left_out(scene, tmp_path):
 def test_the_first_lines_alone(scene, kind):
     lines = np.random.default_rng(4).uniform(0.1, 0.9, (30, 1))
     vary = {"start.position[2]": lw.distributions.Normal(std=1.0)}
-    design = lw.designs.UnitCubePoints(lines) if kind == "levels" else lw.designs.Table({"vehicle.mass": 120.0 + lines[:, 0]})
+    design = (
+        lw.designs.UnitCubePoints(lines)
+        if kind == "levels"
+        else lw.designs.Table({"vehicle.mass": 120.0 + lines[:, 0]})
+    )
     whole, part = (lw.Ensemble(scene, members, 3, vary, design) for members in (None, 20))
     assert (whole.members, part.members) == (30, 20)
     assert_same(part.select(0, 20), whole.select(0, 30), slice(0, 20))
@@ -418,7 +437,10 @@ def test_the_first_lines_alone(scene, kind):
 
 def test_a_design_of_ones_own(scene):
     u = np.random.default_rng(1).random((20, 2))
-    vary = {"vehicle.mass": lw.distributions.Uniform(low=100.0, high=110.0), "environment.gravity": lw.distributions.Uniform(low=9.0, high=10.0)}
+    vary = {
+        "vehicle.mass": lw.distributions.Uniform(low=100.0, high=110.0),
+        "environment.gravity": lw.distributions.Uniform(low=9.0, high=10.0),
+    }
     fleet = lw.Ensemble(scene, None, 0, vary, lw.designs.UnitCubePoints(u))
     assert fleet.space.keys == ("environment.gravity", "vehicle.mass")
     np.testing.assert_allclose(fleet.parameters(0, 20)["environment.gravity"], 9.0 + u[:, 0], rtol=1e-15)
@@ -592,12 +614,15 @@ def test_files_that_are_none(scene, tmp_path):
 
 
 def test_bad_names_and_laws_come_in_one_message(scene):
-    vary = {"vehicle.mass, vehicle.buoyancy": lw.distributions.Normal(std=1.0), "vehicle.inertia[0,5]": lw.distributions.Normal(std=1.0),
+    vary = {"vehicle.mass, vehicle.buoyancy": lw.distributions.Normal(std=1.0),
+            "vehicle.inertia[0,5]": lw.distributions.Normal(std=1.0),
             "vehicle.mass[0]": lw.distributions.Normal(std=1.0), "start.position": lw.distributions.Normal(std=1.0),
-            "start.position[1]": lw.distributions.Normal(std=1.0), "vehicle.added_mass": lw.distributions.RotationNormal(std=0.1),
+            "start.position[1]": lw.distributions.Normal(std=1.0),
+            "vehicle.added_mass": lw.distributions.RotationNormal(std=0.1),
             "vehicle.center_of_buoyancy": lw.distributions.PositiveDefinite(sigma=0.1),
             "environment.gravity, environment.water_density": lw.distributions.CorrelatedNormal(covariance=np.eye(3)),
-            "vehicle.inertia": lw.distributions.PositiveDefinite(sigma=(0.1, 0.2)), "vehicle.nothing": stats.gamma(2.0)}  # fmt: skip
+            "vehicle.inertia": lw.distributions.PositiveDefinite(sigma=(0.1, 0.2)),
+            "vehicle.nothing": stats.gamma(2.0)}  # fmt: skip
     found = faults(lw.Ensemble, scene, 4, 0, vary)
     assert len(found) == 9
     for key in vary:
@@ -644,18 +669,29 @@ def test_attitudes_of_a_list(scene):
 def test_attitudes_that_are_no_rotations(scene):
     R = stats.special_ortho_group(3, seed=1).rvs(4)
     R[2, 0] *= -1.0
-    for sampling_, vary in ((lw.designs.Grid({"start.attitude": R}), None), ("random", {"start.attitude": lw.distributions.Choice(R)})):
+    for sampling_, vary in (
+        (lw.designs.Grid({"start.attitude": R}), None),
+        ("random", {"start.attitude": lw.distributions.Choice(R)}),
+    ):
         (fault,) = faults(lw.Ensemble, scene, None, 0, vary, sampling_)
         assert 'vary."start.attitude"' in fault
         assert "no rotation to 1e-9 (number 3)" in fault
     assert "by entry" in faults(lw.Ensemble, scene, 4, 0, {"start.attitude": lw.distributions.Choice([0.0, 1.0])})[0]
-    assert "shape (2, 2)" in faults(lw.Ensemble, scene, 4, 0, {"start.attitude": lw.distributions.Choice([np.eye(2)])})[0]
+    assert (
+        "shape (2, 2)" in faults(lw.Ensemble, scene, 4, 0, {"start.attitude": lw.distributions.Choice([np.eye(2)])})[0]
+    )
 
 
 def test_the_attitude_varies_in_one_way_only(scene):
-    vary = {"start.attitude": lw.distributions.UniformRotation(), "start.rotation_vector": lw.distributions.Normal(std=0.1)}
+    vary = {
+        "start.attitude": lw.distributions.UniformRotation(),
+        "start.rotation_vector": lw.distributions.Normal(std=0.1),
+    }
     assert "keep one of them" in faults(lw.Ensemble, scene, 4, 0, vary)[0]
-    assert "RotationNormal" in faults(lw.Ensemble, scene, 4, 0, {"start.attitude[0,0]": lw.distributions.Normal(std=0.1)})[0]
+    assert (
+        "RotationNormal"
+        in faults(lw.Ensemble, scene, 4, 0, {"start.attitude[0,0]": lw.distributions.Normal(std=0.1)})[0]
+    )
 
 
 def test_indices_that_are_not_there(scene):
@@ -676,7 +712,10 @@ def test_names_and_entries():
 
 
 def test_an_entry_varies_alone(scene):
-    vary = {"start.position[2]": lw.distributions.Normal(std=1.0), "vehicle.inertia[0,1]": lw.distributions.Normal(std=0.01)}
+    vary = {
+        "start.position[2]": lw.distributions.Normal(std=1.0),
+        "vehicle.inertia[0,1]": lw.distributions.Normal(std=0.01),
+    }
     m = lw.Ensemble(scene, 30, 0, vary).select(0, 30)
     np.testing.assert_array_equal(m.position[:, :2], 0.0)
     J = m.parameters["vehicle.inertia"]
@@ -731,7 +770,9 @@ def test_a_posterior_by_chain_and_draw_is_a_table_of_all_draws():
     np.testing.assert_array_equal(table.own_values()["vehicle.buoyancy"], np.arange(6.0))
     np.testing.assert_array_equal(table.own_values()["start.position"], np.arange(18.0).reshape(6, 3))
     # One chain is as good, and what has other dimensions is read as before.
-    np.testing.assert_array_equal(lw.designs.Table(posterior.isel(chain=0)).own_values()["vehicle.buoyancy"], [0.0, 1.0, 2.0])
+    np.testing.assert_array_equal(
+        lw.designs.Table(posterior.isel(chain=0)).own_values()["vehicle.buoyancy"], [0.0, 1.0, 2.0]
+    )
     for other in (
         posterior.transpose("axis", "draw", "chain"),
         xr.DataTree.from_dict({"posterior": posterior})["posterior"],

@@ -143,7 +143,12 @@ def test_an_event(table, words):
 
 LISTS = [
     ([lw.terms.Drag(), lw.terms.Drag()], "terms = 'drag'", "name of 2 terms", 'name = "drag_2"'),
-    ([lw.terms.Drag(name="current"), lw.terms.Current(velocity=[1, 0, 0])], "terms = 'current'", "name of 2 terms", "current_2"),
+    (
+        [lw.terms.Drag(name="current"), lw.terms.Current(velocity=[1, 0, 0])],
+        "terms = 'current'",
+        "name of 2 terms",
+        "current_2",
+    ),
     ([lw.terms.Current(velocity=[1, 0, 0], name="environment")], "terms = 'environment'", "environment_term"),
     ([lw.events.Surface()], "terms[0] = 'surface'", "is an event", "events=[...]"),
     ([lw.terms.Weight()], "terms[0] = 'weight'", "acts already", "leave it out"),

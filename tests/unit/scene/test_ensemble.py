@@ -13,12 +13,16 @@ from lgvi_warp.scene import draws
 from tests.support.refusals import faults
 
 FULL = np.array([[5.0, 0.3, 0.1], [0.3, 6.0, -0.2], [0.1, -0.2, 7.0]])
-EVERYTHING = {"vehicle.mass": lw.distributions.Normal(relative=0.01), "vehicle.added_mass": lw.distributions.Uniform(relative=0.1),
-              "vehicle.inertia": lw.distributions.LogNormal(sigma=0.05), "vehicle.buoyancy": lw.distributions.TruncatedNormal(std=1.0),
+EVERYTHING = {"vehicle.mass": lw.distributions.Normal(relative=0.01),
+              "vehicle.added_mass": lw.distributions.Uniform(relative=0.1),
+              "vehicle.inertia": lw.distributions.LogNormal(sigma=0.05),
+              "vehicle.buoyancy": lw.distributions.TruncatedNormal(std=1.0),
               "vehicle.center_of_buoyancy": lw.distributions.Normal(std=(0.001, 0.001, 0.002)),
               "environment.gravity": lw.distributions.Uniform(low=9.78, high=9.83),
-              "environment.water_density": lw.distributions.Uniform(low=1020.0, high=1030.0), "start.position": lw.distributions.Normal(std=0.5),
-              "start.rotation_vector": lw.distributions.Normal(std=0.1), "start.velocity_inertial": lw.distributions.Normal(std=0.05),
+              "environment.water_density": lw.distributions.Uniform(low=1020.0, high=1030.0),
+              "start.position": lw.distributions.Normal(std=0.5),
+              "start.rotation_vector": lw.distributions.Normal(std=0.1),
+              "start.velocity_inertial": lw.distributions.Normal(std=0.05),
               "start.angular_velocity": lw.distributions.Normal(std=(0.03, 0.02, 0.01))}  # fmt: skip
 
 
@@ -274,20 +278,26 @@ def test_names_that_the_scene_does_not_have(scene, name, text):
 
 def test_an_attitude_matrix_cannot_vary_by_entry(scene):
     other = dataclasses.replace(scene, start=lw.Start(attitude=np.eye(3)))
-    assert "rotation_vector" in faults(lw.Ensemble, other, 4, 0, {"start.attitude": lw.distributions.Normal(std=0.1)})[0]
+    assert (
+        "rotation_vector" in faults(lw.Ensemble, other, 4, 0, {"start.attitude": lw.distributions.Normal(std=0.1)})[0]
+    )
 
 
 def test_a_full_matrix_varies_and_stays_symmetric(scene):
     other = dataclasses.replace(scene, vehicle=dataclasses.replace(scene.vehicle, inertia=FULL))
-    J = lw.Ensemble(other, 4, 0, {"vehicle.inertia": lw.distributions.Normal(relative=0.01)}).parameters(0, 4)["vehicle.inertia"]
+    J = lw.Ensemble(other, 4, 0, {"vehicle.inertia": lw.distributions.Normal(relative=0.01)}).parameters(0, 4)[
+        "vehicle.inertia"
+    ]
     np.testing.assert_array_equal(J, np.swapaxes(J, 1, 2))
     assert len(np.unique(J.reshape(4, 9)[:, [0, 1, 2, 4, 5, 8]])) == 24
     np.testing.assert_allclose(J, np.broadcast_to(FULL, J.shape), rtol=0.05)
 
 
 @pytest.mark.parametrize("name, law", [
-    ("vehicle.mass", lw.distributions.Normal(std=(1.0, 2.0, 3.0))), ("start.position", lw.distributions.Normal(std=(1.0, 2.0))),
-    ("start.position", lw.distributions.Normal(std=np.ones((3, 3)))), ("vehicle.inertia", lw.distributions.Uniform(low=np.ones((3, 3)), high=2.0)),
+    ("vehicle.mass", lw.distributions.Normal(std=(1.0, 2.0, 3.0))),
+    ("start.position", lw.distributions.Normal(std=(1.0, 2.0))),
+    ("start.position", lw.distributions.Normal(std=np.ones((3, 3)))),
+    ("vehicle.inertia", lw.distributions.Uniform(low=np.ones((3, 3)), high=2.0)),
 ])  # fmt: skip
 def test_laws_of_the_wrong_shape(scene, name, law):
     assert "does not fit a quantity of shape" in faults(lw.Ensemble, scene, 4, 0, {name: law})[0]
@@ -298,7 +308,11 @@ def test_numbers_are_no_laws(scene):
 
 
 def test_all_bad_laws_come_in_one_message(scene):
-    vary = {"vehicle.mas": lw.distributions.Normal(std=1.0), "vehicle.mass": 3, "start.velocity": lw.distributions.Normal(std=1.0)}
+    vary = {
+        "vehicle.mas": lw.distributions.Normal(std=1.0),
+        "vehicle.mass": 3,
+        "start.velocity": lw.distributions.Normal(std=1.0),
+    }
     assert len(faults(lw.Ensemble, scene, 4, 0, vary)) == 3
 
 

@@ -17,12 +17,11 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.vehicles import from_sdf
-from lgvi_warp.vehicles import from_yaml
 from lgvi_warp.cli import main
 from lgvi_warp.cli.settings import out_of
 from lgvi_warp.common import errors, reading
 from lgvi_warp.scene.scene import from_dict
+from lgvi_warp.vehicles import from_sdf, from_yaml
 from tests.conftest import ROOT
 from tests.support import hostile
 

@@ -173,7 +173,9 @@ def test_what_a_quantity_of_the_users_gives():
 
     samples = type("Samples", (dict,), {"time": np.arange(2.0), "terms": ()})(position=np.arange(18.0).reshape(2, 3, 3))
     members = SimpleNamespace(count=3)
-    hidden = lw.statistics.Quantity("hidden", lambda samples, members: np.ma.masked_less(samples["position"][..., 0], 4.0))
+    hidden = lw.statistics.Quantity(
+        "hidden", lambda samples, members: np.ma.masked_less(samples["position"][..., 0], 4.0)
+    )
     np.testing.assert_array_equal(hidden(samples, members)[:, 0], [[np.nan, np.nan, 6.0], [9.0, 12.0, 15.0]])
     for odd in (lambda s, m: s["position"][..., 0] + 0j, lambda s, m: s["position"][..., 0].astype(str)):
         with pytest.raises(ValueError, match="quantity odd: gave"):

@@ -81,7 +81,11 @@ def test_a_store_and_a_sweep_take_no_law_for_another(tmp_path):
     assert lw.resume(tmp_path / "run.zarr", one).members == 300
     for fleet in (one, other, one):
         found = lw.sweep(
-            fleet, [{"name": "all"}], metrics=[lw.metrics.CustomMetric(north, name="north")], out=tmp_path / "sweep", **SETTINGS
+            fleet,
+            [{"name": "all"}],
+            metrics=[lw.metrics.CustomMetric(north, name="north")],
+            out=tmp_path / "sweep",
+            **SETTINGS,
         )
         np.testing.assert_array_equal(found.values("all", "north"), fleet.select(0, 300).position[:, 0])
     assert len(list((tmp_path / "sweep" / "cells").iterdir())) == 2

@@ -124,16 +124,22 @@ def test_a_number_that_is_set_or_varies_is_seen_as_the_one_in_a_scene(name):
     assert said(usual.with_numbers(numbers)) == said(odd)
     if "euler" in "".join(numbers):  # Attitudes are drawn by laws of their own.
         return
-    (message,) = said(lw.Ensemble(usual, 3, 1, {key: lw.distributions.Choice([value.tolist()]) for key, value in numbers.items()}))
+    (message,) = said(
+        lw.Ensemble(usual, 3, 1, {key: lw.distributions.Choice([value.tolist()]) for key, value in numbers.items()})
+    )
     assert message == f"{said(odd)[0]} (all 3 members)"
 
 
 def test_a_command_of_a_shipped_vehicle_that_varies_in_radians_or_in_degrees():
     remus = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0})
-    (message,) = said(lw.Ensemble(remus, 50, 1, {"control_fins.command[1]": lw.distributions.Uniform(low=4.0, high=20.0)}))
+    (message,) = said(
+        lw.Ensemble(remus, 50, 1, {"control_fins.command[1]": lw.distributions.Uniform(low=4.0, high=20.0)})
+    )
     assert message.startswith("control_fins.command: an angle of")
     assert "all 50 members" in message
-    assert said(lw.Ensemble(remus, 50, 1, {"control_fins.command[1]": lw.distributions.Uniform(low=-0.3, high=0.3)})) == ()
+    assert (
+        said(lw.Ensemble(remus, 50, 1, {"control_fins.command[1]": lw.distributions.Uniform(low=-0.3, high=0.3)})) == ()
+    )
 
 
 def test_without_a_stated_length_any_inertia_is_possible():

@@ -8,8 +8,8 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.cli.lists import NEW_SCENE
-from lgvi_warp.vehicles.fossen import vehicle_file, vehicle_names
 from lgvi_warp.scene.schema import schema
+from lgvi_warp.vehicles.fossen import vehicle_file, vehicle_names
 from tests.conftest import ROOT
 from tests.support.json_schema import faults
 
@@ -26,7 +26,11 @@ def test_every_scene_of_the_project_fits(path):
 
 @pytest.mark.parametrize("name", vehicle_names())
 def test_what_a_scene_writes_of_itself_fits(name):
-    events = [lw.events.Floor(depth=100.0), lw.events.Box(lower=(-1.0, -1.0, 0.0), upper=(9.0, 9.0, 90.0)), lw.events.StopTime(at=50.0)]
+    events = [
+        lw.events.Floor(depth=100.0),
+        lw.events.Box(lower=(-1.0, -1.0, 0.0), upper=(9.0, 9.0, 90.0)),
+        lw.events.StopTime(at=50.0),
+    ]
     run = {"step": 0.01, "duration": 1.0, "statistics": [{"type": "quantiles", "of": "depth"}],
            "until": {"statistic": "mean depth", "half_width": 0.1}}  # fmt: skip
     vary = {"vehicle.buoyancy": {"normal": {"relative": 0.01}}, "start.position": {"gamma": {"a": 2.0}}}

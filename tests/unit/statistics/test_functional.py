@@ -33,7 +33,8 @@ OVER_PATH = {
 SAME = {
     "max(depth)": lw.statistics.PathMaximum("depth"), "min(position)": lw.statistics.PathMinimum("position"),
     "mean(velocity)": lw.statistics.PathMean("velocity"), "range(euler[2])": lw.statistics.PathRange("euler[2]"),
-    "max(norm(angular_velocity))": lw.statistics.PathMaximum("norm(angular_velocity)"), "max(position)[1]": lw.statistics.PathMaximum("position[1]"),
+    "max(norm(angular_velocity))": lw.statistics.PathMaximum("norm(angular_velocity)"),
+    "max(position)[1]": lw.statistics.PathMaximum("position[1]"),
 }  # fmt: skip
 REFUSED = {
     "deph": "is not known; did you mean 'depth'?", "max(deph)": "is not known; did you mean 'depth'?",
@@ -127,7 +128,9 @@ def test_names_and_labels_of_paths(result):
     assert covariance.coordinates["component"].tolist() == [f"max(velocity)[{i}]" for i in range(3)]
     settings = {"type": "covariance", "of": "max(velocity)", "stopped": "left_out", "confidence": 0.5}
     assert (
-        covariance.settings == lw.statistics.Covariance("max(velocity)", stopped="left_out", confidence=0.5).to_dict() == settings
+        covariance.settings
+        == lw.statistics.Covariance("max(velocity)", stopped="left_out", confidence=0.5).to_dict()
+        == settings
     )
     assert estimated(lw.statistics.Mean("max(depth)", name="deepest"), result).name == "deepest"
 
@@ -183,9 +186,11 @@ def test_what_has_no_number_at_each_time_is_refused_with_a_remedy(scene, capsys)
 
 
 @pytest.mark.parametrize(("make", "words"), [
-    (lambda: lw.statistics.FirstPassage("max(depth)", above=1.0), "is of samples in time, and max(depth) is one number of each member"),
+    (lambda: lw.statistics.FirstPassage("max(depth)", above=1.0),
+     "is of samples in time, and max(depth) is one number of each member"),
     (lambda: lw.statistics.PathMean("max(depth)"), "max(depth) is one number of each member; ask for its mean"),
-    (lambda: lw.statistics.Mean("max(depth)", at="floor"), "mean.at = 'floor': says when, and max(depth) has no time; leave it out"),
+    (lambda: lw.statistics.Mean("max(depth)", at="floor"),
+     "mean.at = 'floor': says when, and max(depth) has no time; leave it out"),
     (lambda: lw.statistics.Mean(["speed", "max(depth)"]), "mean.of[1] = 'max(depth)': looks over the path, and a list is of"),
     (lambda: lw.statistics.Exceedance("max(depth)"), "max(depth) is compared with nothing; give above=... or below=... [m]"),
     (lambda: lw.statistics.PathMaximum("depth", lw.statistics.Mean("max(depth)")), "is given already"),

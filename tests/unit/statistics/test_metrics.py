@@ -66,7 +66,10 @@ def test_second_order_steps_have_their_analytic_numbers():
 
 
 def test_a_step_downward_or_from_elsewhere_is_the_same():
-    up = [number(each(kind, "depth"), course(RESPONSES)) for kind in (lw.metrics.Overshoot, lw.metrics.RiseTime, lw.metrics.SettlingTime)]
+    up = [
+        number(each(kind, "depth"), course(RESPONSES))
+        for kind in (lw.metrics.Overshoot, lw.metrics.RiseTime, lw.metrics.SettlingTime)
+    ]
     down = course(7.0 - 4.0 * RESPONSES, 3.0)
     np.testing.assert_allclose(number(each(lw.metrics.Overshoot, "depth"), down), 4.0 * up[0], rtol=1e-9)
     np.testing.assert_allclose(number(each(lw.metrics.Peak, "depth"), down), 3.0 - 4.0 * up[0], rtol=1e-9)
@@ -81,7 +84,8 @@ def test_step_info_of_python_control_says_the_same():
     x = course(y)
     names = {
         "RiseTime": each(lw.metrics.RiseTime, "depth"), "SettlingTime": each(lw.metrics.SettlingTime, "depth"),
-        "Overshoot": each(lw.metrics.Overshoot, "depth", percent=True), "Undershoot": each(lw.metrics.Undershoot, "depth", percent=True),
+        "Overshoot": each(lw.metrics.Overshoot, "depth", percent=True),
+        "Undershoot": each(lw.metrics.Undershoot, "depth", percent=True),
         "Peak": each(lw.metrics.Peak, "depth"), "PeakTime": each(lw.metrics.PeakTime, "depth"),
     }  # fmt: skip
     for i in range(y.shape[1]):
@@ -94,9 +98,11 @@ def test_batches_and_replicates_change_no_bit():
     x = course(RESPONSES[:, [0, 1, 2, 0, 1, 2, 1, 0]] + np.arange(8) * 0.01)
     e = x[:, :1]
     for metric, samples in (
-        (each(lw.metrics.Overshoot, "depth"), x), (each(lw.metrics.SettlingTime, "depth"), x), (each(lw.metrics.RiseTime, "depth"), x),
+        (each(lw.metrics.Overshoot, "depth"), x), (each(lw.metrics.SettlingTime, "depth"), x),
+        (each(lw.metrics.RiseTime, "depth"), x),
         (each(lw.metrics.PeakTime, "depth"), x), (each(lw.metrics.ITAE, "depth"), e), (each(lw.metrics.RMSError, "depth"), e),
-        (each(lw.metrics.SteadyStateError, "depth"), e), (each(lw.metrics.MaxError, "heading"), e), (each(lw.metrics.Travel), e),
+        (each(lw.metrics.SteadyStateError, "depth"), e), (each(lw.metrics.MaxError, "heading"), e),
+        (each(lw.metrics.Travel), e),
     ):  # fmt: skip
         whole = number(metric, samples, batches=())
         for batches in ((1,), (1, 2, 3), (5, 500, 5_000)):
@@ -139,7 +145,11 @@ def test_what_never_comes_is_infinite():
     assert np.all(np.isinf(number(each(lw.metrics.RiseTime, "depth"), course(y))))
     assert np.all(np.isinf(number(each(lw.metrics.SettlingTime, "depth"), course(y))))
     still = course(np.ones((len(T), 1)))
-    assert number(each(lw.metrics.RiseTime, "depth"), still) == number(each(lw.metrics.SettlingTime, "depth"), still) == 0.0
+    assert (
+        number(each(lw.metrics.RiseTime, "depth"), still)
+        == number(each(lw.metrics.SettlingTime, "depth"), still)
+        == 0.0
+    )
     assert np.isnan(number(each(lw.metrics.Overshoot, "depth", percent=True), still))
 
 
@@ -162,7 +172,9 @@ def test_the_users_own_sees_each_tick():
 
     t = np.array([0.0, 1.0, 3.0])
     x = np.random.default_rng(1).normal(size=(3, 5, 4))
-    metric = lw.metrics.CustomMetric(worst, then=[lw.statistics.MemberValues()], fields=("position", "command"), last=lambda state: state.sum(axis=0))
+    metric = lw.metrics.CustomMetric(
+        worst, then=[lw.statistics.MemberValues()], fields=("position", "command"), last=lambda state: state.sum(axis=0)
+    )
     expected = x[:, 2].max(axis=0) + (x[:, 3] + x[:, 4]).max(axis=0)
     np.testing.assert_array_equal(number(metric, x, t, batches=(1,)), expected)
     assert seen == [(0.0, 0.0, (4, 3), (4, 2)), (1.0, 1.0, (4, 3), (4, 2)), (3.0, 2.0, (4, 3), (4, 2))]
@@ -172,11 +184,15 @@ def test_the_users_own_sees_each_tick():
 
 
 @pytest.mark.parametrize(("make", "text"), [
-    (lambda: lw.metrics.Overshoot("dept"), "did you mean 'depth'"), (lambda: lw.metrics.Overshoot("position"), "no goal beyond"),
+    (lambda: lw.metrics.Overshoot("dept"), "did you mean 'depth'"),
+    (lambda: lw.metrics.Overshoot("position"), "no goal beyond"),
     (lambda: lw.metrics.IAE(None), "is missing"), (lambda: lw.metrics.SettlingTime("depth", within=-1.0), "within"),
-    (lambda: lw.metrics.RiseTime("depth", limits=(0.9, 0.1)), "two rising parts"), (lambda: lw.metrics.Effort("speed"), "signal of actuators"),
-    (lambda: lw.metrics.SteadyStateError("depth", share=0.0), "part of the run"), (lambda: lw.metrics.CustomMetric("depth"), "no function"),
-    (lambda: lw.metrics.CustomMetric(len, fields=("dept",)), "fields"), (lambda: lw.metrics.IAE("depth", stopped="held"), "no meaning"),
+    (lambda: lw.metrics.RiseTime("depth", limits=(0.9, 0.1)), "two rising parts"),
+    (lambda: lw.metrics.Effort("speed"), "signal of actuators"),
+    (lambda: lw.metrics.SteadyStateError("depth", share=0.0), "part of the run"),
+    (lambda: lw.metrics.CustomMetric("depth"), "no function"),
+    (lambda: lw.metrics.CustomMetric(len, fields=("dept",)), "fields"),
+    (lambda: lw.metrics.IAE("depth", stopped="held"), "no meaning"),
     (lambda: lw.metrics.IAE("depth", at="floor"), "one moment"), (lambda: lw.metrics.ActuatorEnergy("depth"), "leave it out"),
 ])  # fmt: skip
 def test_what_is_asked_wrongly_gets_one_sentence(make, text):

@@ -181,7 +181,10 @@ def test_a_statistic_at_an_outcome_is_of_those_that_had_it():
     assert f"{floor.sum()} members" in lines
 
 
-OF_ENDS = {"outcome": lw.statistics.Outcome("floor"), "end_time": lw.statistics.EndTime("floor", [lw.statistics.Mean(), lw.statistics.Quantiles(size=64)])}
+OF_ENDS = {
+    "outcome": lw.statistics.Outcome("floor"),
+    "end_time": lw.statistics.EndTime("floor", [lw.statistics.Mean(), lw.statistics.Quantiles(size=64)]),
+}
 
 
 @pytest.mark.parametrize("kind", OF_ENDS)
@@ -198,7 +201,10 @@ def test_blocks_in_any_order_give_the_same_bits(kind, replicates):
 
 def test_replicates_give_the_value_of_all_and_an_interval_of_their_spread():
     ends = ends_of(4096)
-    (whole,), (found,) = gathered(lw.statistics.Outcome("floor"), ends), gathered(lw.statistics.Outcome("floor"), ends, replicates=8)
+    (whole,), (found,) = (
+        gathered(lw.statistics.Outcome("floor"), ends),
+        gathered(lw.statistics.Outcome("floor"), ends, replicates=8),
+    )
     np.testing.assert_allclose(found.value, whole.value, rtol=1e-12)
     np.testing.assert_array_equal(found["ended"], whole["ended"])
     assert "8 replicates" in found.interval
@@ -242,7 +248,9 @@ def test_nobody():
 
 def test_first_passage_knows_when_a_member_was_stopped():
     # It sinks at 1 m/s to a floor at 3 m, between the samples at 2 and 4 s: in the second it stands on the floor.
-    statistic = lw.statistics.FirstPassage(lw.statistics.Quantity("x", lambda s, m: None, "m", (), ("x",)), above=2.5, levels=(0.5,))
+    statistic = lw.statistics.FirstPassage(
+        lw.statistics.Quantity("x", lambda s, m: None, "m", (), ("x",)), above=2.5, levels=(0.5,)
+    )
     gathers = statistic.open(TIMES, 4)
     x = np.minimum(TIMES, 3.0)[:, None, None] * np.ones((1, 1, 4))
     gathers.take(Values(x[:1]), slice(0, 1))
@@ -257,7 +265,9 @@ def test_first_passage_knows_when_a_member_was_stopped():
 @pytest.mark.parametrize("replicates", [1, 2])
 def test_first_passage_takes_stopped_members_for_what_they_are(replicates):
     """Of 100 members 50 are stopped elsewhere at 1 s, 26 fail at 5 s and 24 pass at 7 s: of the 50 all would have passed."""
-    statistic = lw.statistics.FirstPassage(lw.statistics.Quantity("x", lambda s, m: None, "m", (), ("x",)), above=2.5, levels=(0.4, 0.6))
+    statistic = lw.statistics.FirstPassage(
+        lw.statistics.Quantity("x", lambda s, m: None, "m", (), ("x",)), above=2.5, levels=(0.4, 0.6)
+    )
     end = np.repeat([1.0, 5.0, 10.0], [50, 26, 24])
     x = np.where((np.arange(100) >= 76) & (TIMES[:, None] >= 7.0), 3.0, 2.0)[:, None]
     good = (np.arange(100) < 50) | (np.arange(100) >= 76) | (TIMES[:, None] < 5.0)
@@ -308,11 +318,13 @@ def test_from_a_scene_file():
 
 
 @pytest.mark.parametrize(("make", "text"), [
-    (lambda: lw.statistics.Outcome(3), "is no outcome"), (lambda: lw.statistics.Outcome("floor", levels=(0.0,)), "between 0 and 1"),
+    (lambda: lw.statistics.Outcome(3), "is no outcome"),
+    (lambda: lw.statistics.Outcome("floor", levels=(0.0,)), "between 0 and 1"),
     (lambda: lw.statistics.EndTime("floor", lw.statistics.FirstPassage(above=1.0)), "one number of each member"),
     (lambda: lw.statistics.EndTime("floor", lw.statistics.Mean(at="floor")), "leave it out"),
     (lambda: lw.statistics.FirstPassage("depth", above=1.0, at="floor"), "of all times"),
-    (lambda: lw.statistics.PathMean("depth", at="floor"), "of all times"), (lambda: lw.statistics.Mean("depth", at=""), "is no outcome"),
+    (lambda: lw.statistics.PathMean("depth", at="floor"), "of all times"),
+    (lambda: lw.statistics.Mean("depth", at=""), "is no outcome"),
     (lambda: lw.statistics.Outcome("floor", at="floor"), "of all times"),
     (lambda: lw.statistics.Histogram("depth", bins=3, limits="run"), "lw.statistics.EndTime"),
 ])  # fmt: skip

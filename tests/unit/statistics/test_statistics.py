@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.statistics.base import TYPES
-from lgvi_warp.statistics.base import from_list
+from lgvi_warp.statistics.base import TYPES, from_list
 from lgvi_warp.statistics.estimates import intervals, sketch
 from lgvi_warp.statistics.estimates.estimate import Estimate, Estimates
 from lgvi_warp.statistics.estimates.tree import Tree
@@ -92,7 +91,10 @@ def test_two_members_say_nothing_of_a_spread():
     assert np.all(np.isfinite(cov["standard_error"]))
     assert np.all(circle["resultant_length_lower"] == 0.0)
     assert np.all(circle["resultant_length_upper"] == 1.0)
-    three, circle = (of(kind, np.concatenate([x, x[:, :1] + 1.0], axis=1)) for kind in (lw.statistics.Covariance, lw.statistics.CircularMean))
+    three, circle = (
+        of(kind, np.concatenate([x, x[:, :1] + 1.0], axis=1))
+        for kind in (lw.statistics.Covariance, lw.statistics.CircularMean)
+    )
     assert np.all(np.isfinite(three.half_width))
     assert np.all(three.lower < three.value)
     assert np.all(three.half_width > 0.0)
@@ -137,7 +139,9 @@ def test_extremes_name_their_members(values):
     np.testing.assert_array_equal(found["minimum"], np.nanmin(masked, axis=1))
     np.testing.assert_array_equal(found["maximum_member"], np.nanargmax(masked, axis=1))
     # With 95 % confidence a maximum of 59 independent members lies above 95 % of all (Wilks 1941).
-    assert of(lw.statistics.Extremes, x[:, :59])["beyond"][0] <= 0.05 < of(lw.statistics.Extremes, x[:, :58])["beyond"][0]
+    assert (
+        of(lw.statistics.Extremes, x[:, :59])["beyond"][0] <= 0.05 < of(lw.statistics.Extremes, x[:, :58])["beyond"][0]
+    )
 
 
 def test_counts_are_numpys(values):
@@ -246,7 +250,9 @@ def test_members_that_are_lost_censor_passages_between_samples_too():
     n, time = 200_000, np.arange(6.0)
     passage, loss = rng.exponential(2.5, n), rng.exponential(4.0, n)
     x = time[:, None] - passage
-    found = of(lw.statistics.FirstPassage, x[..., None], 0.0, levels=(0.1, 0.5, 0.8), good=loss > time[:, None], block=4096)
+    found = of(
+        lw.statistics.FirstPassage, x[..., None], 0.0, levels=(0.1, 0.5, 0.8), good=loss > time[:, None], block=4096
+    )
     exact = -2.5 * np.log1p(-np.array([0.1, 0.5, 0.8]))
     assert np.all((found["passage_time_lower"] <= exact) & (exact <= found["passage_time_upper"]))
     assert np.all(found["passage_time_upper"] - found["passage_time_lower"] < 0.1)
@@ -281,11 +287,15 @@ def test_paths_come_to_what_numpy_says(replicates):
     time, x = paths()
     span = time[-1] - time[0]
     expected = {
-        lw.statistics.PathMaximum: x.max(axis=0), lw.statistics.PathMinimum: x.min(axis=0), lw.statistics.PathRange: np.ptp(x, axis=0),
-        lw.statistics.PathMean: np.trapezoid(x, time, axis=0) / span, lw.statistics.PathRms: np.sqrt(np.trapezoid(x**2, time, axis=0) / span),
+        lw.statistics.PathMaximum: x.max(axis=0), lw.statistics.PathMinimum: x.min(axis=0),
+        lw.statistics.PathRange: np.ptp(x, axis=0),
+        lw.statistics.PathMean: np.trapezoid(x, time, axis=0) / span,
+        lw.statistics.PathRms: np.sqrt(np.trapezoid(x**2, time, axis=0) / span),
     }  # fmt: skip
     for kind, truth in expected.items():
-        mean, least = gathered(kind(scalar(2), [lw.statistics.Mean(), lw.statistics.Extremes()]), x, replicates, time=time, block=128)
+        mean, least = gathered(
+            kind(scalar(2), [lw.statistics.Mean(), lw.statistics.Extremes()]), x, replicates, time=time, block=128
+        )
         np.testing.assert_allclose(mean.value[0], truth.mean(axis=0), rtol=1e-12)
         np.testing.assert_allclose(least["minimum"][0], truth.min(axis=0), rtol=1e-12, atol=1e-15)
         np.testing.assert_allclose(least["maximum"][0], truth.max(axis=0), rtol=1e-12)
@@ -301,7 +311,9 @@ def test_paths_come_to_what_numpy_says(replicates):
 ])  # fmt: skip
 def test_the_time_that_a_condition_holds_is_that_of_the_lines(limits, holds):
     time, x = paths(n=40)
-    mean, extremes = gathered(lw.statistics.PathTime(scalar(2), **limits, then=[lw.statistics.Mean(), lw.statistics.Extremes()]), x, time=time)
+    mean, extremes = gathered(
+        lw.statistics.PathTime(scalar(2), **limits, then=[lw.statistics.Mean(), lw.statistics.Extremes()]), x, time=time
+    )
     exact = finely(time, x, holds)
     # Each line crosses a number once or twice: points miss as many pieces of a 20,000th at most.
     np.testing.assert_allclose(mean.value[0], exact.mean(axis=0), atol=2e-4 * time[-1])
@@ -312,7 +324,11 @@ def test_the_time_that_a_condition_holds_is_that_of_the_lines(limits, holds):
 def test_the_time_of_what_is_true_or_false_is_counted_by_samples():
     time, x = paths()
     truth = np.trapezoid((x > 0.0).astype(float), time, axis=0)
-    mean, most = gathered(lw.statistics.PathTime(scalar(2), then=[lw.statistics.Mean(), lw.statistics.Extremes()]), 1.0 * (x > 0.0), time=time)
+    mean, most = gathered(
+        lw.statistics.PathTime(scalar(2), then=[lw.statistics.Mean(), lw.statistics.Extremes()]),
+        1.0 * (x > 0.0),
+        time=time,
+    )
     np.testing.assert_allclose(mean.value[0], truth.mean(axis=0), rtol=1e-12)
     np.testing.assert_allclose(most["maximum"][0], truth.max(axis=0), rtol=1e-12)
     still = np.tile(np.array([1.0, 2.0, 3.0]).reshape(1, 3, 1), (3, 1, 1))
@@ -336,7 +352,11 @@ def test_a_path_counts_once():
     x = rng.normal(size=(7, 900, 2))
     good = np.ones((7, 900), bool)
     good[5:, :100] = False
-    then = [lw.statistics.Mean(), lw.statistics.Quantiles(levels=LEVELS), lw.statistics.Exceedance(above=1.0, name="high")]
+    then = [
+        lw.statistics.Mean(),
+        lw.statistics.Quantiles(levels=LEVELS),
+        lw.statistics.Exceedance(above=1.0, name="high"),
+    ]
     highest, quantiles, high = gathered(lw.statistics.PathMaximum(scalar(2), then), x, good=good)
     best = x[:, 100:].max(axis=0)
     np.testing.assert_allclose(highest.value[0], best.mean(axis=0), rtol=1e-14)
@@ -357,7 +377,8 @@ def test_what_is_not_finite_is_left_out_and_counted():
     empty = of(lw.statistics.Mean, np.full((1, 3, 1), np.nan))
     assert empty.count.tolist() == [0]
     assert np.isnan(empty.value).all()
-    for kind, more in ((lw.statistics.Covariance, {}), (lw.statistics.Quantiles, {}), (lw.statistics.Extremes, {}), (lw.statistics.Exceedance, {"above": 0.0}),
+    for kind, more in ((lw.statistics.Covariance, {}), (lw.statistics.Quantiles, {}), (lw.statistics.Extremes, {}),
+                       (lw.statistics.Exceedance, {"above": 0.0}),
                        (lw.statistics.CircularMean, {}), (lw.statistics.Histogram, {"edges": (0, 1)})):  # fmt: skip
         assert np.isnan(of(kind, np.full((1, 3, 1), np.nan), **more).value).all()
 
@@ -506,9 +527,12 @@ def test_coverage_of_first_passage():
 # Replicates of a design ------------------------------------------------------------------------------------------------
 
 EVERY = [
-    (lw.statistics.Mean, {}), (lw.statistics.Covariance, {}), (lw.statistics.Extremes, {}), (lw.statistics.Quantiles, {"size": 64}), (lw.statistics.Exceedance, {"above": 0.5}),
-    (lw.statistics.Histogram, {"bins": 4, "limits": (-2.0, 2.0)}), (lw.statistics.CircularMean, {}), (lw.statistics.FirstPassage, {"above": 1.0}),
-    (lw.statistics.PathMaximum, {"then": [lw.statistics.Mean(), lw.statistics.Quantiles(levels=(0.5,), size=64), lw.statistics.Extremes()]}),
+    (lw.statistics.Mean, {}), (lw.statistics.Covariance, {}), (lw.statistics.Extremes, {}),
+    (lw.statistics.Quantiles, {"size": 64}), (lw.statistics.Exceedance, {"above": 0.5}),
+    (lw.statistics.Histogram, {"bins": 4, "limits": (-2.0, 2.0)}), (lw.statistics.CircularMean, {}),
+    (lw.statistics.FirstPassage, {"above": 1.0}),
+    (lw.statistics.PathMaximum, {"then": [lw.statistics.Mean(), lw.statistics.Quantiles(levels=(0.5,), size=64),
+                                          lw.statistics.Extremes()]}),
     (lw.statistics.PathRms, {}), (lw.statistics.PathRange, {}), (lw.statistics.PathTime, {"above": 0.2}),
 ]  # fmt: skip
 
@@ -569,8 +593,10 @@ def test_a_replicate_without_members_leaves_no_interval():
     x = np.random.default_rng(22).normal(size=(2, 256, 1))
     good = np.ones((2, 256), bool)
     good[1, 3::8] = False
-    for kind, more, end in ((lw.statistics.Mean, {}, np.inf), (lw.statistics.Covariance, {}, np.inf), (lw.statistics.Quantiles, {}, np.inf),
-                            (lw.statistics.Exceedance, {"above": 0.0}, 1.0), (lw.statistics.CircularMean, {}, np.pi)):  # fmt: skip
+    for kind, more, end in ((lw.statistics.Mean, {}, np.inf), (lw.statistics.Covariance, {}, np.inf),
+                            (lw.statistics.Quantiles, {}, np.inf),
+                            (lw.statistics.Exceedance, {"above": 0.0}, 1.0),
+                            (lw.statistics.CircularMean, {}, np.pi)):  # fmt: skip
         with np.errstate(invalid="ignore"):
             found = of(kind, x, good=good, replicates=8, **more)
         at = (1, slice(None))
@@ -643,10 +669,13 @@ def test_coverage_of_sobol_sequences():
 
 
 WATCHED = [
-    lw.statistics.Mean("position"), lw.statistics.Quantiles("depth", (0.05, 0.5, 0.95)), lw.statistics.Quantiles("position", (0.5, 0.975)),
-    lw.statistics.Covariance(["position", "speed"]), lw.statistics.PathMaximum("speed", [lw.statistics.Quantiles(levels=(0.5, 0.99))]),
+    lw.statistics.Mean("position"), lw.statistics.Quantiles("depth", (0.05, 0.5, 0.95)),
+    lw.statistics.Quantiles("position", (0.5, 0.975)),
+    lw.statistics.Covariance(["position", "speed"]),
+    lw.statistics.PathMaximum("speed", [lw.statistics.Quantiles(levels=(0.5, 0.99))]),
     lw.statistics.Quantiles("speed", (0.123456789, 0.5), name="fast"), lw.statistics.Exceedance("depth", above=10),
-    lw.statistics.Exceedance("velocity", above=[0.5, -1, 2.0]), lw.statistics.PathTime("position", above=2.0, below=np.int64(3)),
+    lw.statistics.Exceedance("velocity", above=[0.5, -1, 2.0]),
+    lw.statistics.PathTime("position", above=2.0, below=np.int64(3)),
 ]  # fmt: skip
 
 
@@ -751,13 +780,19 @@ OF_EVERY_KIND = {"mean": lambda x: lw.statistics.Mean(x), "covariance": lambda x
                  "histogram": lambda x: lw.statistics.Histogram(x, bins=30, limits=(-10.0, 1010.0)),
                  "exceedance": lambda x: lw.statistics.Exceedance(x, above=(1000.0, 0.0, -5.0)),
                  "first_passage": lambda x: lw.statistics.FirstPassage(scalar(), above=1002.0),
-                 "circular_mean": lambda x: lw.statistics.CircularMean(x), "mean_attitude": lambda x: lw.statistics.MeanAttitude(),
-                 "path_maximum": lambda x: lw.statistics.PathMaximum(x, [lw.statistics.Mean(), lw.statistics.Quantiles(size=64)]),
-                 "path_minimum": lambda x: lw.statistics.PathMinimum(x, [lw.statistics.Covariance(), lw.statistics.Extremes()]),
+                 "circular_mean": lambda x: lw.statistics.CircularMean(x),
+                 "mean_attitude": lambda x: lw.statistics.MeanAttitude(),
+                 "path_maximum": lambda x: lw.statistics.PathMaximum(x,
+                                                                     [lw.statistics.Mean(),
+                                                                      lw.statistics.Quantiles(size=64)]),
+                 "path_minimum": lambda x: lw.statistics.PathMinimum(x,
+                                                                     [lw.statistics.Covariance(),
+                                                                      lw.statistics.Extremes()]),
                  "path_range": lambda x: lw.statistics.PathRange(x),
                  "path_mean": lambda x: lw.statistics.PathMean(x, [lw.statistics.Mean(), lw.statistics.Quantiles(size=64)]),
                  "path_rms": lambda x: lw.statistics.PathRms(x), "each": lambda x: lw.statistics.MemberValues(x),
-                 "path_time": lambda x: lw.statistics.PathTime(x, above=(999.0, -1.0, -6.0), below=(1001.0, 1.0, -4.0))}  # fmt: skip
+                 "path_time": lambda x: lw.statistics.PathTime(x, above=(999.0, -1.0, -6.0),
+                                                               below=(1001.0, 1.0, -4.0))}  # fmt: skip
 
 
 # Those of ends have no samples: tests/unit/statistics/test_outcomes.py. Those of ticks: test_metrics.py.
@@ -818,19 +853,25 @@ def test_coins_are_fair_and_fixed():
 
 
 @pytest.mark.parametrize(("make", "text"), [
-    (lambda: lw.statistics.Mean("positon"), "did you mean 'position'"), (lambda: lw.statistics.Mean("position[3]"), "components position"),
+    (lambda: lw.statistics.Mean("positon"), "did you mean 'position'"),
+    (lambda: lw.statistics.Mean("position[3]"), "components position"),
     (lambda: lw.statistics.Mean("depth[0]"), "has one component"), (lambda: lw.statistics.Mean(3.0), "is no quantity"),
-    (lambda: lw.statistics.Mean("depth", confidence=1.5), "between 0 and 1"), (lambda: lw.statistics.Mean("depth", stopped="no"), "held"),
-    (lambda: lw.statistics.Quantiles("depth", (0.0, 0.5)), "between 0 and 1"), (lambda: lw.statistics.Quantiles("depth", size=1000), "power of two"),
+    (lambda: lw.statistics.Mean("depth", confidence=1.5), "between 0 and 1"),
+    (lambda: lw.statistics.Mean("depth", stopped="no"), "held"),
+    (lambda: lw.statistics.Quantiles("depth", (0.0, 0.5)), "between 0 and 1"),
+    (lambda: lw.statistics.Quantiles("depth", size=1000), "power of two"),
     (lambda: lw.statistics.Histogram("depth"), "edges"), (lambda: lw.statistics.Histogram("depth", (1.0, 0.0)), "rise"),
     (lambda: lw.statistics.Exceedance("position", (1.0, 2.0)), "one for each component"),
     (lambda: lw.statistics.Exceedance("depth", 2.0, 1.0), "have nothing between"),
     (lambda: lw.statistics.FirstPassage("position", 1.0), "3 components"),
-    (lambda: lw.statistics.MeanAttitude("depth"), "no attitude"), (lambda: lw.statistics.PathMaximum("depth", lw.statistics.Mean("speed")), "leave it out"),
+    (lambda: lw.statistics.MeanAttitude("depth"), "no attitude"),
+    (lambda: lw.statistics.PathMaximum("depth", lw.statistics.Mean("speed")), "leave it out"),
     (lambda: lw.Until("mean depth", -1.0), "half_width"), (lambda: lw.Until(3, 1.0), "no name"),
     (lambda: lw.statistics.Mean(name=3, of="depht"), "did you mean 'depth'"),
-    (lambda: lw.statistics.PathMaximum("depth", lw.statistics.FirstPassage(above=1.0)), "ask for its mean, quantiles, or an exceedance"),
-    (lambda: lw.statistics.PathMean("depth", lw.statistics.PathTime(above=1.0)), "ask for its mean, quantiles, or an exceedance"),
+    (lambda: lw.statistics.PathMaximum("depth", lw.statistics.FirstPassage(above=1.0)),
+     "ask for its mean, quantiles, or an exceedance"),
+    (lambda: lw.statistics.PathMean("depth", lw.statistics.PathTime(above=1.0)),
+     "ask for its mean, quantiles, or an exceedance"),
     (lambda: lw.statistics.PathTime("depth", above="x"), "is not numeric"),
     (lambda: lw.statistics.Histogram("depth", bins=True, limits=(0, 1)), "bins"),
     (lambda: lw.statistics.Quantiles("depth", size=True), "power of two"),
@@ -845,7 +886,10 @@ def test_what_makes_no_sense_is_refused(make, text):
 
 def test_whole_numbers_of_numpy_are_whole_numbers():
     histogram = lw.statistics.Histogram("depth", bins=np.int64(4), limits=(0, 1))
-    quantiles, until = lw.statistics.Quantiles("depth", size=np.uint16(128)), lw.Until("mean depth", 1.0, members=np.int32(64))
+    quantiles, until = (
+        lw.statistics.Quantiles("depth", size=np.uint16(128)),
+        lw.Until("mean depth", 1.0, members=np.int32(64)),
+    )
     assert [type(one) for one in (histogram.bins, quantiles.size, until.members)] == [int] * 3
     assert histogram.to_dict()["bins"] == 4
     assert quantiles.size == 128
@@ -876,7 +920,9 @@ def dataset(*statistics):
 
 
 def test_estimates_are_found_by_numbers_written_otherwise():
-    found = dataset(lw.statistics.Exceedance(scalar(), above=10), lw.statistics.Exceedance(scalar(), above=0.5, name="half of 1.0"))
+    found = dataset(
+        lw.statistics.Exceedance(scalar(), above=10), lw.statistics.Exceedance(scalar(), above=0.5, name="half of 1.0")
+    )
     assert list(found) == ["exceedance x above 10", "half of 1.0"]
     assert "exceedance x above 10.0" in found
     assert found["exceedance x above 10.0"] is found["exceedance x above 10"]
@@ -892,14 +938,18 @@ def test_variables_of_a_dataset_are_distinct():
         one = of(lw.statistics.Exceedance, np.random.default_rng(40).normal(size=(3, 50, 1)), limit)
         np.testing.assert_array_equal(found[f"exceedance_x_above_{word}_upper"], one.upper)
     names = ("a b", "a_b", "a-b", "a b lower", "time")
-    found = dataset(*(lw.statistics.Mean(scalar(), name=one, confidence=0.5 + 0.1 * i) for i, one in enumerate(names))).dataset
+    found = dataset(
+        *(lw.statistics.Mean(scalar(), name=one, confidence=0.5 + 0.1 * i) for i, one in enumerate(names))
+    ).dataset
     assert {"a_b", "a_b_2", "a_b_3", "a_b_lower", "a_b_lower_2", "time_2"} <= set(found.variables)
     upper = [found[f"{one}_upper"].values[0, 0] for one in ("a_b", "a_b_2", "a_b_3", "a_b_lower_2", "time_2")]
     assert np.all(np.diff(upper) > 0.0)
 
 
 def test_a_dataset_has_the_edges_of_histograms():
-    found = dataset(lw.statistics.Histogram(scalar(), (0.0, 1.0, 3.0)), lw.statistics.Histogram(scalar(), (0.0, 2.0), name="two")).dataset
+    found = dataset(
+        lw.statistics.Histogram(scalar(), (0.0, 1.0, 3.0)), lw.statistics.Histogram(scalar(), (0.0, 2.0), name="two")
+    ).dataset
     np.testing.assert_array_equal(found["edge_of_histogram_x"], [0.0, 1.0, 3.0])
     np.testing.assert_array_equal(found["edge_of_two"], [0.0, 2.0])
     np.testing.assert_array_equal(found["bin_of_histogram_x"], [0.5, 2.0])

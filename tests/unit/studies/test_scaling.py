@@ -230,7 +230,13 @@ def test_numbers_that_json_cannot_hold_are_none():
     plain = files.finite_or_none(content)
     assert plain == {"a": None, "b": [1.0, None, [2, 3.0]], "c": [[1.0, None]], "d": "x", "e": None}
     assert type(plain["b"][2][1]) is float
-    assert files.with_missing_as(plain, 7.0) == {"a": 7.0, "b": [1.0, 7.0, [2, 3.0]], "c": [[1.0, 7.0]], "d": "x", "e": 7.0}
+    assert files.with_missing_as(plain, 7.0) == {
+        "a": 7.0,
+        "b": [1.0, 7.0, [2, 3.0]],
+        "c": [[1.0, 7.0]],
+        "d": "x",
+        "e": 7.0,
+    }
 
 
 class Study(files.Saved):

@@ -237,7 +237,8 @@ def test_tuning_meets_the_same_members_and_then_fresh_ones(monkeypatch):
     assert (np.ptp(parameters["vehicle.mass"].reshape(16, 5), axis=1) == 0.0).all()
     assert told.asked[-1][3] == 8
     assert told.asked[-1][2].tolist() == list(range(20))
-    worst = tune.tune_gains(fleet, {"vehicle.mass": (3.0, 4.0)} | {"drag.linear[0]": (1.0, 100.0)}, "depth", budget=600, fresh=0,
+    worst = tune.tune_gains(fleet, {"vehicle.mass": (3.0, 4.0)} | {"drag.linear[0]": (1.0, 100.0)}, "depth", budget=600,
+                            fresh=0,
                       risk=lw.metrics.CVaR(0.2))  # fmt: skip
     assert worst.at_bounds == ("vehicle.mass",)
     assert math.isnan(worst.fresh_cost)
@@ -337,7 +338,12 @@ def test_edges_are_found_from_any_guess(guess):
     assert inner[2] == pytest.approx(40.0)
     assert inner[3] / outer[3] < np.exp(1.0011e-3)
     whole = edges(
-        lambda values, members: values <= 7.0, np.zeros(2), np.array([100.0, 5.0]), np.full(2, guess), 1.0, to_the_end=True
+        lambda values, members: values <= 7.0,
+        np.zeros(2),
+        np.array([100.0, 5.0]),
+        np.full(2, guess),
+        1.0,
+        to_the_end=True,
     )
     assert whole.tolist() == [[7.0, 8.0], [5.0, np.inf]]
     nobody = edges(holds, np.full(4, np.nan), last, np.full(4, guess), 1e-3)

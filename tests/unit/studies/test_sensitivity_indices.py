@@ -21,7 +21,8 @@ from lgvi_warp.studies.sensitivity.estimates import sobol_estimates
 from lgvi_warp.studies.sensitivity.indices import Indices, MorrisEffects, SobolIndices
 
 BARE = lw.Scene(lw.Vehicle(1.0, inertia=(1.0, 1.0, 1.0)))
-VARY = {"start.position[0]": lw.distributions.Uniform(low=0.0, high=1.0), "start.position[1]": lw.distributions.Uniform(low=0.0, high=2.0),
+VARY = {"start.position[0]": lw.distributions.Uniform(low=0.0, high=1.0),
+        "start.position[1]": lw.distributions.Uniform(low=0.0, high=2.0),
         "vehicle.mass": lw.distributions.Uniform(low=1.0, high=3.0)}  # fmt: skip
 FIELDS = {"factors": ("a", "bc"), "quantities": ("depth", "energy"), "mean": np.array([1.23456789, np.nan]),
           "std": np.array([0.12345, 2.0]), "samples": 8, "members": 48, "failed": 1, "confidence": 0.9,
@@ -218,7 +219,8 @@ def test_intervals_of_indices_hold_and_are_no_wider_than_they_need(function, sam
 
 
 def test_factors_are_in_the_users_order_and_in_groups():
-    vary = {"vehicle.mass": lw.distributions.Uniform(low=1.0, high=3.0), "start.position": lw.distributions.Uniform(low=[0.0] * 3, high=[1.0, 2.0, 1.0]),
+    vary = {"vehicle.mass": lw.distributions.Uniform(low=1.0, high=3.0),
+            "start.position": lw.distributions.Uniform(low=[0.0] * 3, high=[1.0, 2.0, 1.0]),
             "environment.gravity": lw.distributions.Uniform(low=9.0, high=10.0)}  # fmt: skip
     labels = ("vehicle.mass", *(f"start.position[{i}]" for i in range(3)), "environment.gravity")
 
@@ -438,9 +440,18 @@ def test_distributions_in_salibs_words():
     assert told(lw.distributions.Normal(relative=0.1), -2.0) == [("norm", [-2.0, 0.2])]
     assert told(lw.distributions.Uniform(low=1.0, high=3.0)) == [("unif", [1.0, 3.0])]
     assert told(lw.distributions.Uniform(half_width=0.5)) == [("unif", [1.5, 2.5])]
-    assert told(lw.distributions.Uniform(half_width=[0.5, 1.0]), [0.0, 2.0]) == [("unif", [-0.5, 0.5]), ("unif", [1.0, 3.0])]
-    assert told(lw.distributions.Uniform(relative=[0.5, 0.25]), [-2.0, 4.0]) == [("unif", [-3.0, -1.0]), ("unif", [3.0, 5.0])]
-    assert told(lw.distributions.Uniform(low=[1.0, 2.0], high=[3.0, 5.0]), [0.0, 0.0]) == [("unif", [1.0, 3.0]), ("unif", [2.0, 5.0])]
+    assert told(lw.distributions.Uniform(half_width=[0.5, 1.0]), [0.0, 2.0]) == [
+        ("unif", [-0.5, 0.5]),
+        ("unif", [1.0, 3.0]),
+    ]
+    assert told(lw.distributions.Uniform(relative=[0.5, 0.25]), [-2.0, 4.0]) == [
+        ("unif", [-3.0, -1.0]),
+        ("unif", [3.0, 5.0]),
+    ]
+    assert told(lw.distributions.Uniform(low=[1.0, 2.0], high=[3.0, 5.0]), [0.0, 0.0]) == [
+        ("unif", [1.0, 3.0]),
+        ("unif", [2.0, 5.0]),
+    ]
     ((name, (log, sigma)),) = told(lw.distributions.LogNormal(median=3.0, sigma=0.2))
     assert (name, sigma) == ("lognorm", 0.2)
     assert log == pytest.approx(np.log(3.0))
@@ -452,7 +463,10 @@ def test_distributions_in_salibs_words():
 def test_a_model_describes_its_columns(monkeypatch):
     monkeypatch.setattr(Plan, "compile", lambda plan: 0.0)
     settings = {"method": "psi_s", "h": 0.1, "t1": 1.0}
-    vary = {"vehicle.mass": lw.distributions.Normal(std=0.1), "start.position": lw.distributions.Uniform(half_width=[1.0, 2.0, 3.0])}
+    vary = {
+        "vehicle.mass": lw.distributions.Normal(std=0.1),
+        "start.position": lw.distributions.Uniform(half_width=[1.0, 2.0, 3.0]),
+    }
     model = adaptor.model(BARE, vary, "depth", **settings)
     names = ["vehicle.mass", "start.position[0]", "start.position[1]", "start.position[2]"]
     assert list(model.names) == names

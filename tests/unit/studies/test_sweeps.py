@@ -36,7 +36,10 @@ TABLES = {
 }
 SCENE = lw.Scene.from_dict(TABLES)
 BARE = replace(SCENE, controller=None)
-VARY = {"start.position": lw.distributions.Normal(std=0.8), "vehicle.mass": lw.distributions.Uniform(low=45.0, high=55.0)}
+VARY = {
+    "start.position": lw.distributions.Normal(std=0.8),
+    "vehicle.mass": lw.distributions.Uniform(low=45.0, high=55.0),
+}
 METRICS = ["overshoot heading", "iae heading"]
 CASES = [{"name": "soft"}, {"name": "stiff", "set": {"heading_pid.kp": 8.0}},
          {"name": "unknown", "set": {"heading_pid.kq": 1.0}}]  # fmt: skip
@@ -747,7 +750,9 @@ def test_progress_is_that_of_all_cells():
 
 def test_the_sweep_keeps_what_the_ensemble_says_unless_it_is_asked():
     base = lw.Ensemble(SCENE, 6, 7, VARY, "sobol")
-    one = setup.made(base, None, None, {"vehicle.mass": lw.distributions.Uniform(low=1.0, high=2.0)}, None, None, None, [], {})
+    one = setup.made(
+        base, None, None, {"vehicle.mass": lw.distributions.Uniform(low=1.0, high=2.0)}, None, None, None, [], {}
+    )
     assert (one.members.members, one.members.seed, one.members.sampling.kind) == (6, 7, "sobol")
     assert set(one.vary) == set(VARY)
     assert one.members.vary["vehicle.mass"].high == 2.0

@@ -13,12 +13,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import lgvi_warp as lw
-from lgvi_warp.vehicles import from_fossen
-from lgvi_warp.vehicles import from_sdf
-from lgvi_warp.vehicles import from_yaml
-from lgvi_warp.vehicles import robot_xml as coefficients_xml
 from lgvi_warp.results.provenance import messages
 from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.vehicles import from_fossen, from_sdf, from_yaml
+from lgvi_warp.vehicles import robot_xml as coefficients_xml
 from tests.support import righting
 from tests.support.refusals import refused
 from tests.support.tools import one

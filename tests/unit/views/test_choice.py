@@ -60,7 +60,9 @@ def test_outcomes_share_a_third_of_the_places():
     status[4000:4100] = Status.SURFACE
     status[4100:4110] = Status.STEP_TOO_LARGE
     result = made(np.random.default_rng(4).normal(size=(2, n, 3)), status=status, end=np.where(status, 1.0, np.nan))
-    counts = {code: np.count_nonzero(status[lw.select_members(result, 300).members] == code) for code in np.unique(status)}
+    counts = {
+        code: np.count_nonzero(status[lw.select_members(result, 300).members] == code) for code in np.unique(status)
+    }
     # 100 places: all 10 that failed, 45 of each event, which most of those on the floor have by their number already.
     assert counts[Status.STEP_TOO_LARGE] == 10
     assert counts[Status.SURFACE] >= 45

@@ -99,7 +99,10 @@ def test_an_ensemble_of_python_is_in_the_scene_that_runs_it_again(tmp_path, tail
     overrides = {"ensemble.members": "3", "vehicle.buoyancy": "286.0"}
     result = of_file(tmp_path, TEXT + tail, overrides)
     scene = lw.Scene.load(tmp_path / "dive.toml", overrides)
-    vary = {"start.angular_velocity": lw.distributions.Normal(std=2.0), "vehicle.buoyancy": lw.distributions.Uniform(low=280.0, high=290.0)}
+    vary = {
+        "start.angular_velocity": lw.distributions.Normal(std=2.0),
+        "vehicle.buoyancy": lw.distributions.Uniform(low=280.0, high=290.0),
+    }
     drawn = lw.Ensemble(scene, members=4, seed=7, vary=vary, sampling=sampling).subset([1, 3])
     command, said, text = how_to_run_again(with_ensemble(result, drawn).provenance)
     assert command == "lgvi-warp run dive.toml --set vehicle.buoyancy=286.0"

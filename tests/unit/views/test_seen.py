@@ -117,7 +117,10 @@ def first_dive():
 def of_paper(members, h, t1, every):
     """The paper's case, as its file and the README vary it."""
     scene = lw.Scene.load(ROOT / "examples" / "paper.toml")
-    vary = {"start.angular_velocity": lw.distributions.Normal(std=0.03), "vehicle.mass": lw.distributions.Normal(relative=0.001)}
+    vary = {
+        "start.angular_velocity": lw.distributions.Normal(std=0.03),
+        "vehicle.mass": lw.distributions.Normal(relative=0.001),
+    }
     return lw.solve(lw.Ensemble(scene, members, 1, vary), h=h, t1=t1, save=lw.SaveAt(every=every))
 
 

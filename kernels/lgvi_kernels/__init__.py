@@ -8,7 +8,7 @@ The rooms; each may import from the earlier ones only:
 - laws, stops: one file for each force, one file for each event;
 - maps: the maps that a step is made of, and the solvers of equation (24);
 - advance: the kernel. method.py makes a step from maps and laws, stepping.py loops over steps, chunks.py looks at the alarms
-  between them, kernel.py is launched; feeding.py is the look of a controller.
+  between them, kernel.py is launched; feeding.py is the tick of a controller.
 
 Equations of Nordkvist & Sanyal (2010): (12), (23) are in `Ab`, the rotation in (10), (11), (13), (14) and its adjoint
 (19)-(22) in `D`, the potential's force and moment in (13), (14), (19), (20) in `K`, their Munk moment in `Ap`, all in

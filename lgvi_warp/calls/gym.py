@@ -181,7 +181,7 @@ class Vehicles:
         box, batched = gymnasium.spaces.Box, gymnasium.vector.utils.batch_space
         self._answer = np.zeros((self.num_envs, size if to else len(COMPONENTS)))
         self._kind = kind
-        observed = self._seen(*self._episodes.look())
+        observed = self._seen(*self._episodes.signals())
         self.single_action_space = box(-most.astype(kind), most.astype(kind), dtype=kind.type)
         self.single_observation_space = box(-np.inf, np.inf, observed.shape[1:], kind.type)
         self.action_space = batched(self.single_action_space, self.num_envs)
@@ -256,7 +256,7 @@ class Vehicles:
             self._done[:] = False
             self._prepared[:] = -1
             self._episodes.begin(self._drawn(self._episode_of(self._numbers)))
-            self._observed = self._seen(*self._episodes.look())
+            self._observed = self._seen(*self._episodes.signals())
         else:
             self._observed = self._observed.copy()
             self._observed[mask] = self._restarted(np.flatnonzero(mask))
@@ -293,7 +293,7 @@ class Vehicles:
             self._answer[:, self._columns] = scaled
         episodes.advance(self._answer)
         self._made += 1
-        y, r = episodes.look()
+        y, r = episodes.signals()
         status = episodes.status()
         ended = status != 0
         if np.any(ended & ~last):
@@ -346,7 +346,7 @@ class Vehicles:
 
     def _tick_at_ends(self, envs: np.ndarray, y: CallbackInput, r: CallbackInput) -> None:
         """Put what is seen in the states in which vehicles ended in place of what is seen of them at rest."""
-        for whole, part in zip((y, r), self._episodes.look_at(envs), strict=True):
+        for whole, part in zip((y, r), self._episodes.signals_of(envs), strict=True):
             for name, value in vars(part).items():
                 if value is not None:
                     getattr(whole, name)[envs] = value

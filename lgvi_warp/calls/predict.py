@@ -299,7 +299,7 @@ class Sized:
         row = sum(plan.layout.sizes.values()) * np.dtype(machine.DTYPES[plan.dtype]).itemsize
         segment = min(SEGMENT_SAMPLE_BYTES, row * runs[0].count * len(plan.grid.times))
         # Those gathered at ticks are held once, as the kernel wrote them.
-        ticks = plan.launches.slots(runs[0].count) * plan.launches.tick_bytes(runs[0].count)
+        ticks = plan.launches.ticks_held(runs[0].count) * plan.launches.tick_bytes(runs[0].count)
         # A segment's samples are held three times: as the kernel wrote them, in order of members, and as rotated or moved
         # copies. Parts are held twice: their rows, and all joined.
         each = 3 * segment + ticks + 2 * self.statistics.part + self.statistics.taking

@@ -59,8 +59,10 @@ def sizes(plan: Plan, statistics: Sequence[Statistic]) -> Sizes:
 
     values = {name: at(name, times) for name in ("file", "part", "joined", "estimates")}
     # Samples come one launch at a time; sketches are read at_once times together, which bounds the memory.
-    due = (s1 - s0 for s0, s1 in (plan.launches.due(*segment) for segment in plan.launches.segments(runs[0].count)))
-    launch = max(plan.launches.slots(runs[0].count), *due)
+    due = (
+        s1 - s0 for s0, s1 in (plan.launches.samples_due(*segment) for segment in plan.launches.segments(runs[0].count))
+    )
+    launch = max(plan.launches.ticks_held(runs[0].count), *due)
     at_once = max(1, SORTED_AT_ONCE * times * 8 // max(values["joined"], 1))
     return Sizes(**values, taking=at("taking", launch), reading=at("reading", min(times, at_once)))
 

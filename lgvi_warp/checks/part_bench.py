@@ -130,7 +130,7 @@ class PartBench(TermBench):
     def answers(self, packed: Any, ticks: RandomTicks, width: int | None = None) -> Answers:
         """Let the part act at each tick, from its memory at the start."""
         device = _PartDevice(self, packed, ticks, width or self.width)
-        out = np.stack([device.look(k) for k in range(TICKS)], axis=1)
+        out = np.stack([device.tick(k) for k in range(TICKS)], axis=1)
         return Answers(out.reshape(self.count, -1), device.memory(), (self.bus.rows, device.end))
 
     def nanoseconds(self, packed: Any) -> float:
@@ -158,7 +158,7 @@ class _PartDevice(Device):
         put_rows(rows[:, : bench.bus.rows], ticks.bus)
         self.rows = Lanes(self.packets, TICK_FIELDS, self.kernel.Lane)
 
-    def look(self, k: int) -> np.ndarray:
+    def tick(self, k: int) -> np.ndarray:
         """Let the part act once: (count, OUT_FIELDS)."""
         put_rows(self.rows.view, self.ticks.rows[k])
         self.act(k, 1, 1)

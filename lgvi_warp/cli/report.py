@@ -297,7 +297,7 @@ def controller_lines(scene: Mapping[str, Any]) -> list[str]:
         word: section[word] for word in ("sensors", "guidance", "laws", "allocation", "faults") if section.get(word)
     }
     texts = [f"{word} {', '.join(part.get('name') or part['type'] for part in parts)}" for word, parts in lists.items()]
-    return [f"controller  looks every {section['period']:g} s{delay}; {'; '.join(texts)}"]
+    return [f"controller  acts every {section['period']:g} s{delay}; {'; '.join(texts)}"]
 
 
 def file_line(path: Path) -> str:

@@ -103,7 +103,7 @@ class Part(Term):
         return ()
 
     @property
-    def looks_before(self) -> int:
+    def ticks_before(self) -> int:
         """Number of ticks that it must have had before a time at which a member starts anew beside others; by default 0."""
         return 0
 

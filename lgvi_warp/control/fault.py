@@ -21,7 +21,7 @@ def _is_int(value: Any) -> bool:
 class Fault(Sending):
     """A fault of one channel of an actuator or of a sensor: from a time on, x <- gain * x + offset, x its command or reading.
 
-    gain = 0 is dead, or stuck at the offset; 0.5 is weak; gain = 1 with an offset is biased. It begins at the first look at or
+    gain = 0 is dead, or stuck at the offset; 0.5 is weak; gain = 1 with an offset is biased. It begins at the first tick at or
     after its time. A sensor's fault acts right after the sensor, on what has arrived of its reading.
 
     Args:

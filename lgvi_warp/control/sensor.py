@@ -53,8 +53,8 @@ class Sensor(MeasuringPart):
     bias: Any = number((3,), "unit", 0.0)
     drift: Any = number((3,), "unit/s^1/2", 0.0, least=0.0)
     quantum: Any = number((3,), "unit", 0.0, least=0.0)
-    every: Any = number((), "looks", IDLE["every"], least=1.0, most=MOST_TICKS)
-    latency: Any = number((), "looks", IDLE["latency"], least=0.0, most=MOST_TICKS)
+    every: Any = number((), "ticks", IDLE["every"], least=1.0, most=MOST_TICKS)
+    latency: Any = number((), "ticks", IDLE["latency"], least=0.0, most=MOST_TICKS)
     dropout: Any = number((), "1", IDLE["dropout"], least=0.0, most=1.0)
 
     def __post_init__(self) -> None:
@@ -78,7 +78,7 @@ class Sensor(MeasuringPart):
                 faults.add(name, value, "is no whole number of ticks", f"give {near}")
 
     @property
-    def looks_before(self) -> int:
+    def ticks_before(self) -> int:
         """Those until a reading arrives, and the one at which it does."""
         late = int(np.max(self.latency))
         return late + 1 if late else 0

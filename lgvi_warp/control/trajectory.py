@@ -43,7 +43,7 @@ class Trajectory(Guidance):
     interpolation: str = word("linear", known=INTERPOLATIONS)
 
     @property
-    def looks_before(self) -> int:
+    def ticks_before(self) -> int:
         """One: what is wanted depends on the time."""
         return 1
 

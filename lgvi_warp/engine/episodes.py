@@ -27,7 +27,7 @@ class Episodes:
     """
 
     def __init__(self, plan: Plan, members: Members):
-        assert plan.launches.asks
+        assert plan.launches.has_callback
         assert plan.kernel_choice.controller is not None
         self.plan, self.packets, self.steps = plan, Packets(plan, members), 0
         self._controller = plan.kernel_choice.controller
@@ -57,7 +57,7 @@ class Episodes:
         self.packets.launch(self.steps, self.steps + self.every)
         self.steps += self.every
 
-    def look(self) -> tuple[CallbackInput, CallbackInput]:
+    def signals(self) -> tuple[CallbackInput, CallbackInput]:
         """What is measured and what is wanted now.
 
         Returns: (measured, wanted).
@@ -113,8 +113,8 @@ class Episodes:
         self._copy(_lanes_of(aside), places, self._lanes, lanes)
         return last_tick(aside, places)
 
-    def look_at(self, lanes: np.ndarray) -> tuple[CallbackInput, CallbackInput]:
-        """Look at members that have ended, in the state in which they did; in the block itself they rest meanwhile.
+    def signals_of(self, lanes: np.ndarray) -> tuple[CallbackInput, CallbackInput]:
+        """What members that have ended measure and want in their last state; in the block itself they rest meanwhile.
 
         lanes: (r,), which of the m lanes.
         Returns: What is measured of them and wanted, (r, ...).

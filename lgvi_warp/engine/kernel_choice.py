@@ -72,8 +72,8 @@ class KernelChoice:
     parts_of_control: tuple[tuple[Part, Any], ...] = ()
 
     @property
-    def asks(self) -> bool:
-        """Whether a function of the host answers each look."""
+    def has_callback(self) -> bool:
+        """Whether a function of the host answers each tick."""
         return self.controller is not None and self.controller.callback is not None
 
 

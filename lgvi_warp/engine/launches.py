@@ -29,7 +29,7 @@ class Launches:
     real: Warp's type of the kernel's numbers.
     sample_bytes, bytes_at_tick: memory of what the kernel writes of one member, of a sample and at a tick [bytes].
     every: steps between two ticks of the controller; None without one.
-    asks: whether a function of the host answers each tick.
+    has_callback: whether a function of the host answers each tick.
     ticks: whether samples are gathered at all ticks.
     """
 
@@ -39,7 +39,7 @@ class Launches:
     sample_bytes: int
     bytes_at_tick: int
     every: int | None
-    asks: bool
+    has_callback: bool
     ticks: bool
 
     @functools.cached_property
@@ -62,7 +62,7 @@ class Launches:
             wp.array(due, dtype=wp.int32, device="cpu"),
         )
 
-    def due(self, k0: int, k1: int) -> tuple[int, int]:
+    def samples_due(self, k0: int, k1: int) -> tuple[int, int]:
         """Which samples fall due in the launch of steps k0 to k1.
 
         Returns: (s0, s1): samples s0 to s1 - 1 are due after step k0 and no later than step k1.
@@ -74,7 +74,7 @@ class Launches:
         """Memory of what is gathered at a tick of a block of so many members [bytes]."""
         return self.bytes_at_tick * count
 
-    def slots(self, count: int) -> int:
+    def ticks_held(self, count: int) -> int:
         """How many ticks of a block of so many members are gathered at once; 0 where none are."""
         if self.gathered is None:
             return 0
@@ -88,7 +88,7 @@ class Launches:
         """
         assert self.gathered is not None
         bounds = np.array([k0 + 1 if k0 else 0, k1 + 1])
-        if self.asks:
+        if self.has_callback:
             bounds = np.array([k0, k1 if k1 < self.grid.steps else k1 + 1])
         first, stop = np.searchsorted(self.gathered.sample_steps, bounds)
         return slice(int(first), int(stop))
@@ -98,19 +98,19 @@ class Launches:
 
         Yields: (k0, k1): a launch makes the steps from k0 to k1.
         """
-        if self.asks:
+        if self.has_callback:
             yield from self._periods()
             return
-        due, slots = self.grid.sample_steps, self.slots(count)
+        due, slots = self.grid.sample_steps, self.ticks_held(count)
         every = int(self.gathered.sample_steps[1]) if self.gathered and len(self.gathered.times) > 1 else 0
         most_samples = max(1, SEGMENT_SAMPLE_BYTES // max(self.sample_bytes * count, 1))
         most_steps = max(CHUNK, SEGMENT_VEHICLE_STEPS // count // CHUNK * CHUNK)
         k = 0
         while k < self.grid.steps:
-            last = self.due(k, k)[1] + most_samples
+            last = self.samples_due(k, k)[1] + most_samples
             k1 = min(k + most_steps, int(due[min(last, len(due)) - 1]))
             if every:
-                # Up to the last look for which there is a slot before those of earlier ones are taken again.
+                # Up to the last tick for which there is a slot before those of earlier ones are taken again.
                 k1 = min(k1, ((k // every + 1) // slots * slots + slots - 1) * every)
             yield k, k1
             k = k1

@@ -68,7 +68,7 @@ class Plan:
     facts: Survey = field(compare=False, repr=False)
     shared: SharedResultsCache = field(compare=False, repr=False)
     free_packets: list[Any] = field(default_factory=list, compare=False, repr=False)
-    whole: tuple[Plan, Sequence[int], Sequence[str]] | None = field(default=None, compare=False, repr=False)
+    parent: tuple[Plan, Sequence[int], Sequence[str]] | None = field(default=None, compare=False, repr=False)
 
     @property
     def phases(self) -> Phases:
@@ -97,9 +97,9 @@ class Plan:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the settings alone: a kernel cannot be pickled, and the other process finds it in Warp's cache."""
-        if self.whole:
+        if self.parent:
             # Made anew from these members alone, the plan might choose another kernel.
-            return Plan.subplan, self.whole
+            return Plan.subplan, self.parent
         return functools.partial(choose_plan, **self._settings(), width_source=self.width_source), ()
 
     def for_members(self, ensemble: Ensemble) -> Plan:
@@ -120,8 +120,8 @@ class Plan:
             layout=layout,
             launches=_launches(self.grid, self.method, self.spec, layout, False),
             shared=_shared(self.ensemble),
-            idle=[],
-            whole=(self, indices, fields),
+            free_packets=[],
+            parent=(self, indices, fields),
         )
 
     def with_neighbours(self, indices: np.ndarray) -> np.ndarray:
@@ -138,7 +138,7 @@ class Plan:
     def check_block(self, block: Block, members: Members) -> None:
         """Look at members that were not looked at before the run; raise NotSurveyed where the kernel lacks something."""
         self.ensemble.check_block(block.first, block.stop, members.parameters)
-        unseen = not self.surveyed_all and block.stop > SURVEYED and self.whole is None
+        unseen = not self.surveyed_all and block.stop > SURVEYED and self.parent is None
         if unseen and not self.serves(self.ensemble, block, members):
             raise NotSurveyed(f"a member of {block.first} to {block.stop - 1} needs what the first {SURVEYED} do not")
 
@@ -221,7 +221,7 @@ def _launches(grid: TimeGrid, method: Method, spec: Spec, layout: SampleLayout, 
         sample_bytes=sum(layout.sizes.values()) * size,
         bytes_at_tick=sum(layout.tick_fields.values()) * size,
         every=None if controller is None else controller.every(grid.h),
-        asks=layout.choice.asks,
+        has_callback=layout.choice.has_callback,
         ticks=ticks,
     )
 

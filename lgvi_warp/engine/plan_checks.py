@@ -87,7 +87,7 @@ def check_noise_steps(choice: KernelChoice, grid: TimeGrid) -> None:
     faults.raise_if_any()
 
 
-def check_looks(choice: KernelChoice, h: float) -> None:
+def check_ticks(choice: KernelChoice, h: float) -> None:
     """Refuse a period or a delay of the controller that is no whole number of steps [s]."""
     faults = Faults()
     if choice.controller is not None:

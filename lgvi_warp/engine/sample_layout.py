@@ -77,10 +77,10 @@ class SampleLayout:
         return name in SIGNALS or self.read_at_ticks is None or name in self.read_at_ticks
 
     @property
-    def notes(self) -> int:
+    def noted_bits(self) -> int:
         """What ticks note, as bits (see noting.py): that of which something is saved, and all where the host is asked."""
         noted = [signal for name in self.signals if (signal := SIGNALS[name]).group in NOTED]
-        return ALL_NOTES if self.choice.asks else sum({bit(signal.group, signal.row) for signal in noted})
+        return ALL_NOTES if self.choice.has_callback else sum({bit(signal.group, signal.row) for signal in noted})
 
     @functools.cached_property
     def noted_rows(self) -> dict[str, range]:

@@ -130,7 +130,7 @@ def run_block(
             for block_keeper in block_keepers:
                 block_keeper.take(when, samples)
 
-        def look(grid: TimeGrid, ticks: slice) -> None:
+        def keep_ticks(grid: TimeGrid, ticks: slice) -> None:
             ends = functools.cache(packets.ended)
             for first in range(ticks.start, ticks.stop, at_once):
                 when = slice(first, min(first + at_once, ticks.stop))
@@ -147,20 +147,20 @@ def run_block(
 
         if not plan.layout.signals:
             keep_start()
-        if plan.launches.asks:
+        if plan.launches.has_callback:
             packets.advance(0, 0)
         for k0, k1 in plan.launches.segments(block.count):
             if halted():
                 return None
-            if plan.launches.asks:
+            if plan.launches.has_callback:
                 call_host(packets, k0 * plan.grid.h)
             raw = packets.advance(k0, k1)[:, : block.count]
             if k0 == 0 and plan.layout.signals:
                 # The first tick of a controller is a part of the first launch.
                 keep_start()
             if plan.launches.gathered and (ticks := plan.launches.ticks_of(k0, k1)).start < ticks.stop:
-                look(plan.launches.gathered, ticks)
-            when = slice(*plan.launches.due(k0, k1))
+                keep_ticks(plan.launches.gathered, ticks)
+            when = slice(*plan.launches.samples_due(k0, k1))
             if when.start < when.stop and block_keepers:
                 values = unpacked(plan.layout.sizes, raw, packets.frame, plan.layout.table)
                 keep(when, {name: values[name] for name in plan.fields}, packets.ended)

@@ -53,14 +53,14 @@ def _whose(odd: Odd, members: int, most: int | None) -> str:
 OddityCheck = tuple[str, np.ndarray, Callable[[int], str]]
 
 
-def gathered(looks: Iterable[OddityCheck], first: int, stop: int) -> Oddities:
+def gathered(checked: Iterable[OddityCheck], first: int, stop: int) -> Oddities:
     """Count the odd values of the members first to stop - 1.
 
-    looks: For each check the name of a quantity, the members that are odd (1,) or (n,), and the text about one member. Where
+    checked: For each check the name of a quantity, the members that are odd (1,) or (n,), and the text about one member. Where
         several checks bear one name, the first that finds an odd member counts.
     """
     odd_by_name: dict[str, Odd] = {}
-    for key, odd, text in looks:
+    for key, odd, text in checked:
         odd = np.atleast_1d(odd)
         if key not in odd_by_name and odd.any():
             i = int(odd.argmax())

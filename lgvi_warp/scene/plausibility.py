@@ -209,11 +209,11 @@ def of_numbers(
         computes each time.
     """
     with np.errstate(all="ignore"):
-        looks = [once(check, p, functools.partial(_looks, check, scene)) for check in OF_NUMBERS]
-        return gathered(itertools.chain(*looks), first, stop)
+        checked = [once(check, p, functools.partial(_checked, check, scene)) for check in OF_NUMBERS]
+        return gathered(itertools.chain(*checked), first, stop)
 
 
-def _looks(
+def _checked(
     check: Callable[[SceneLike, Numbers], Iterator[OddityCheck]], scene: SceneLike, p: Numbers
 ) -> list[OddityCheck]:
     return list(check(scene, p))
@@ -275,11 +275,11 @@ def on_the_way(scene: SceneLike, samples: Mapping[str, np.ndarray]) -> Oddities:
         high, height = _later(samples.get("position"), _higher, -LIMITS["depth"].value)
     if ends_at_the_surface(scene):
         high = np.zeros_like(high)
-    looks: list[OddityCheck] = [
+    checked: list[OddityCheck] = [
         ("velocity", fast, lambda i: f"{speed[i]:.4g} m/s on the way is beyond {limit:g} m/s: a unit, or the step?"),
         ("position", high, lambda i: f"rises {height[i]:.4g} m above the surface, where no water is: {STOP}"),
     ]
-    return gathered(looks, 0, max(len(fast), len(high)))
+    return gathered(checked, 0, max(len(fast), len(high)))
 
 
 STOP = "stop members there by the event lw.events.Surface()"

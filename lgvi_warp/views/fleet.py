@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the picture and the recording of a fleet share: looks of outcomes, the title, and curves of members under way."""
+"""What the picture and the recording of a fleet share: styles of outcomes, the title, and curves of members under way."""
 
 from __future__ import annotations
 

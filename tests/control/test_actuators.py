@@ -146,8 +146,8 @@ class Recorder(Loop):
         super().begin()
         self.rests = []
 
-    def look(self, x, body, h):
-        super().look(x, body, h)
+    def tick(self, x, body, h):
+        super().tick(x, body, h)
         self.rests.append(self.unmet)
 
 

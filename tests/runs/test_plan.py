@@ -149,7 +149,7 @@ def test_shares_keep_all_threads_at_work(n, steps, threads):
 def test_segments_are_contiguous_and_their_buffer_is_bounded(scene):
     plan = make_plan(lw.Ensemble(scene, 4096), h=0.01, t1=1000.0, save=lw.SaveAt(every=0.01))
     segments = list(plan.launches.segments(4096))
-    samples = [plan.launches.due(k0, k1) for k0, k1 in segments]
+    samples = [plan.launches.samples_due(k0, k1) for k0, k1 in segments]
     assert segments[0][0] == 0
     assert segments[-1][1] == plan.grid.steps
     assert samples[-1][1] == len(plan.grid.times)

@@ -151,7 +151,7 @@ def test_euler_angles_are_fossens():
 
 
 def test_every_statistic_is_among_them():
-    assert {one.type for one in EVERY} == {word for word, kind in TYPES.items() if not kind.looks}
+    assert {one.type for one in EVERY} == {word for word, kind in TYPES.items() if not kind.ticks}
 
 
 @pytest.mark.parametrize("threads", [1, 2, 3])

@@ -86,7 +86,7 @@ def ticks(members, steps, rounds):
     def exchanged():
         for _ in range(steps):
             episodes.advance(values)
-            episodes.look()
+            episodes.signals()
 
     alone, both = least([launch, exchanged], rounds, clock=time.process_time)
     return {"members": members, "steps_a_period": EVERY, "part_of_the_exchange": round(1.0 - alone / both, 3)}

@@ -34,7 +34,7 @@ CONTROL_NON_FINITE = 8
 
 
 def make_feed(spec, types, method, at_step, opened):
-    """(feed, respond): the alarm after a look at the state after k steps.
+    """(feed, respond): the alarm after a tick at the state after k steps.
 
     Where the host is asked, feed only measures and guides; respond, at the start of the next launch, does the rest with what
     the host has written into the memory. method: see Step; at_step, opened: see Stepping.

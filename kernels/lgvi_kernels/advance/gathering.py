@@ -32,7 +32,7 @@ def gather_signals(memory: Any, i: int, monitor: Any, tick: int):
 
 
 def make_gather_motion(compensated, moved):
-    """(y, x, c, monitor): write the motion at a look into the tick's rows; moved: see make_truth."""
+    """(y, x, c, monitor): write the motion at a tick into the tick's rows; moved: see make_truth."""
 
     @wp.func
     def gather_motion(y: Any, x: Any, c: Any, monitor: Any):

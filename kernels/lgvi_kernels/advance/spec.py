@@ -24,7 +24,7 @@ class Control(NamedTuple):
     numbers: the declared numbers of each part (see params_of).
     reports: whether samples show where actuators are.
     headings: whether the headings among what is noted are computed: others read attitudes.
-    asked: whether a function of the host answers each look: a look then ends with the measurement and the wanted motion, and
+    asked: whether a function of the host answers each tick: a tick then ends with the measurement and the wanted motion, and
         the next launch begins with the commands. Such a kernel has no lead.
     """
 
@@ -61,7 +61,7 @@ class Spec(NamedTuple):
     lead_time: the part of a step for which the lead drifts.
     explicit: an explicit method, which has no maps.
     compensated: sums of two float32 (see sums).
-    looks: rows of warnings (see monitor).
+    watched: rows of warnings (see monitor).
     energy: whether its growth is a failure.
     backward: whether drag is checked for stages that go backward.
     substep: whether a step that has no solution is divided.
@@ -94,7 +94,7 @@ class Spec(NamedTuple):
     lead_time: float = 0.0
     explicit: Any = None
     compensated: bool = False
-    looks: tuple = ()
+    watched: tuple = ()
     energy: bool = False
     backward: bool = False
     substep: bool = False
@@ -207,7 +207,7 @@ def make_types(spec):
         Inertia,
         Params,
         Events,
-        monitors.limits_struct(width, real, spec.looks),
-        monitors.monitor_struct(width, real, spec.looks, spec.energy, spec.backward, spec.substep, spec.still, Loop),
+        monitors.limits_struct(width, real, spec.watched),
+        monitors.monitor_struct(width, real, spec.watched, spec.energy, spec.backward, spec.substep, spec.still, Loop),
         Loop,
     )

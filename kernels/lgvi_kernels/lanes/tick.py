@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a controller sees and wants when it looks: the structs that its parts hand on.
+"""What a controller measures and wants at a tick: the structs that its parts hand on.
 
 Both are in the user's body axes and about the user's origin, whatever the kernel's own are.
 """

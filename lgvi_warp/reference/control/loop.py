@@ -51,7 +51,7 @@ class Loop:
             law.held = np.zeros_like(law.limit)
         self.sent, self.unmet = [], np.zeros(6)
 
-    def look(self, x: State, body: Body, h: float) -> None:
+    def tick(self, x: State, body: Body, h: float) -> None:
         """Measure, guide, control and allocate at the start of step x.step.
 
         h: Step [s].
@@ -100,7 +100,7 @@ def closed_loop(
     for k in range(steps):
         x = replace(x, t=k * h, step=k)
         if k % loop.every == 0:
-            loop.look(x, body, h)
+            loop.tick(x, body, h)
         loop.act(k, h)
         x = step(x, body, h)
         states.append(x)

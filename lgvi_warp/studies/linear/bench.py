@@ -121,7 +121,7 @@ class MotionBench:
     ):
         request = Request(fleet, method, h, t1, SaveAt(every=spacing, fields=tuple(fields)), "float64")
         plan = request.plan()
-        if plan.launches.asks:
+        if plan.launches.has_callback:
             key = plan.kernel_choice.controller.callback.key  # type: ignore[union-attr]
             raise refusal("laws", key, "is a Python function, of which no lane knows", "give a law with device code")
         if plan.kernel_choice.lead is not None:
@@ -169,7 +169,7 @@ class MotionBench:
         motion: their motions after the look at step k0; None for their own at t = 0, with k0 = 0.
         numbers: Values (m, ...) by name that replace those of the members; None for none (default).
         watch: called with the step of each sample and the sample; None for nobody (default).
-        Returns: The motions after k1 steps, and what is remembered after a look at them. Where a member failed it is NaN.
+        Returns: The motions after k1 steps, and what is remembered after a tick at them. Where a member failed it is NaN.
         """
         plan, m = self.plan, len(places)
         packets = self._filled(places, motion, numbers or {})
@@ -181,7 +181,7 @@ class MotionBench:
             raw = packets.advance(first, stop)[:, :m]
             values = unpacked(plan.layout.sizes, raw, packets.frame, plan.layout.table)
             if watch:
-                watch(plan.launches.due(first, stop)[0], values)
+                watch(plan.launches.samples_due(first, stop)[0], values)
         failed = packets.ended()[0] != 0
         last = {name: values[name][-1] for name in FIELDS}
         states: Any = {name: np.where(failed.reshape(-1, *(1,) * (v.ndim - 1)), np.nan, v) for name, v in last.items()}

@@ -235,7 +235,7 @@ class Loops:
         by = np.zeros((m, 12))
         by[:, 3:6] = tilt
         motion = delayed(bench, self.motion.of(some), k0, steps).moved(by)
-        highest, first = np.full((3, m, 3 + limits.shape[1]), -np.inf), bench.plan.launches.due(k0, k0)[1]
+        highest, first = np.full((3, m, 3 + limits.shape[1]), -np.inf), bench.plan.launches.samples_due(k0, k0)[1]
         lowest, last, within = -highest, np.zeros_like(self.told[some]), np.ones(m, bool)
         begun = self.motion.attitude[some]
 

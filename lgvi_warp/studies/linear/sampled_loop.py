@@ -24,7 +24,7 @@ NEUTRAL = 1e-3
 
 
 def delayed(bench: MotionBench, motion: Motion, k: int, steps: np.ndarray) -> Motion:
-    """The motions as after a look at a steady motion, with a delay.
+    """The motions as after a tick at a steady motion, with a delay.
 
     steps: (m,) delay, in steps.
     """

@@ -302,7 +302,7 @@ def test_a_step_is_chosen_by_options(tmp_path, capsys):
 
 AUTOPILOT = str(ROOT / "examples" / "scenes" / "remus_100_autopilot.toml")
 LOOP = (
-    "controller  looks every 0.1 s, 0.02 s until they act; sensors depth_cell, compass; guidance set_point, reference_model; "
+    "controller  acts every 0.1 s, 0.02 s until they act; sensors depth_cell, compass; guidance set_point, reference_model; "
     "laws depth_pid, heading_pid; allocation matrix; faults stuck_rudder\n"
 )
 

@@ -44,7 +44,7 @@ def test_lines_of_a_store(store, tmp_path):
                                   "blocks      2 of 3 finished; complete"]  # fmt: skip
     store["provenance"]["scene"]["controller"] = {"period": 0.5, "laws": [{"type": "pid"}]}
     said = lines_of(store, "-v")
-    assert said[2] == "controller  looks every 0.5 s; laws pid"
+    assert said[2] == "controller  acts every 0.5 s; laws pid"
     assert said[3].startswith("how         seed 1, checks safe")
     assert said[4] == "versions    lgvi-warp 1.0"
     assert len(said) == 7

@@ -131,10 +131,10 @@ def test_a_controller_is_one_line():
     }  # fmt: skip
     said = report.controller_lines({"controller": {"period": 0.25, "delay": 0.5, **lists}})
     assert said == [
-        "controller  looks every 0.25 s, 0.5 s until they act; sensors compass, sensor; laws pid; faults stuck"
+        "controller  acts every 0.25 s, 0.5 s until they act; sensors compass, sensor; laws pid; faults stuck"
     ]
     short = report.controller_lines({"controller": {"period": 2.0, "delay": 0.0, "laws": [{"type": "pid"}]}})
-    assert short == ["controller  looks every 2 s; laws pid"]
+    assert short == ["controller  acts every 2 s; laws pid"]
     assert report.controller_lines({"controller": None}) == []
 
 

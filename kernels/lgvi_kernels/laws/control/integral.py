@@ -25,7 +25,7 @@ def integral(y: Any, row: int, limit: Any, unmet: Any, conditional: int):
 
 @wp.func
 def keep_error(y: Any, row: int, error: Any):
-    """Keep the error of this look for the next one's integral."""
+    """Keep the error of this tick for the next one's integral."""
     remember(y, row + 1, error)
 
 

@@ -50,7 +50,7 @@ def spec_of(
         lead_time=lengths_of(method, choice)[1][-1] if choice.timed else 0.0,
         explicit=_explicit(method, choice),
         compensated=dtype == COMPENSATED,
-        watched=watched(method, choice, dtype, checks),
+        warning_rows=watched(method, choice, dtype, checks),
         energy=choice.conservative,
         backward=checked and back,
         substep=on_failure == "substep",
@@ -79,7 +79,7 @@ def _control(choice: KernelChoice, signals: tuple[str, ...]) -> Control | None:
     reports = any(SIGNALS[name].group == "actuator" for name in signals)
     numbers = tuple(declared(part, module) for part, module in parts)
     headings = any(name.endswith("_heading") for name in signals)
-    return Control(tuple(module for _, module in parts), numbers, reports, choice.has_callback, headings)
+    return Control(tuple(module for _, module in parts), numbers, reports, choice.asks, headings)
 
 
 def _explicit(method: Method, choice: KernelChoice) -> Explicit | None:

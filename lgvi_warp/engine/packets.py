@@ -99,7 +99,7 @@ class Packets:
         self.laws.write(groups, packing.scratch([law for group in groups for law in group.packed], bus), bus)
         if self._controlled:
             self.monitor.loop = self.laws.structs[1].array
-        if plan.spec.watched:
+        if plan.spec.warning_rows:
             self._limits.write(self.count, [((), self._watched_limits(), False)])
             self.monitor.limits = self._limits.array
         m = members.count
@@ -133,7 +133,7 @@ class Packets:
     def _written_by_the_kernel(self) -> list[Any]:
         monitor, spec = self.monitor, self.plan.spec
         arrays = [self.status, self.failed_step, self.failed_size]
-        arrays += [monitor.warned, monitor.warned_step, monitor.warned_size] if spec.watched else []
+        arrays += [monitor.warned, monitor.warned_step, monitor.warned_size] if spec.warning_rows else []
         parts = ("energy", spec.energy), ("substeps", spec.substep), ("still", spec.still)
         return arrays + [getattr(monitor, name) for name, present in parts if present]
 
@@ -142,14 +142,14 @@ class Packets:
         controller = self.plan.kernel_choice.controller
         if controller is None:
             return 0, 0
-        kept = controller.bus.rows + bool(self.plan.layout.noted_bits) * sum(NOTED.values())
+        kept = controller.bus.rows + bool(self.plan.layout.notes) * sum(NOTED.values())
         return kept + len(self.plan.layout.signal_rows), kept
 
     def _monitor(self) -> Any:
         """The arrays where the kernel notes what it saw at intervals."""
         plan, monitor = self.plan, self.plan.kernel.advance.types.Monitor()
         Lane, Ints = plan.kernel.advance.types.Lane, int_lane(plan.spec.width)
-        if plan.spec.watched:
+        if plan.spec.warning_rows:
             for name, kind in (("warned", Ints), ("warned_step", Ints), ("warned_size", Lane)):
                 setattr(monitor, name, wp.zeros(self.count, dtype=kind, device="cpu"))
         if plan.spec.energy:
@@ -162,10 +162,10 @@ class Packets:
         if controller is not None:
             rows = plan.layout.signal_rows
             monitor.every, monitor.commands = controller.every(plan.grid.h), controller.bus.channels
-            monitor.bus, monitor.kept, monitor.noting = controller.bus.rows, self._bus()[1], self.plan.layout.noted_bits
+            monitor.bus, monitor.kept, monitor.noting = controller.bus.rows, self._bus()[1], self.plan.layout.notes
             monitor.signals = wp.array(np.array(rows, np.int32), dtype=wp.int32, device="cpu")
             monitor.first_signals = wp.zeros((self.count, max(1, len(rows))), dtype=Lane, device="cpu")
-            monitor.slots = plan.launches.ticks_held(self.count * plan.spec.width)
+            monitor.slots = plan.launches.slots(self.count * plan.spec.width)
             monitor.numbers, columns = sum(plan.layout.tick_fields.values()), columns_at_ticks(plan)
             monitor.columns = wp.array(columns, dtype=wp.int32, device="cpu")
             if monitor.slots:
@@ -178,7 +178,7 @@ class Packets:
 
     def _watched_limits(self) -> dict[str, Any]:
         """Limits of the watched rows, squared, in the block's scaled numbers."""
-        rows, h = self.plan.spec.watched, self.plan.grid.h
+        rows, h = self.plan.spec.warning_rows, self.plan.grid.h
         fields: dict[str, Any] = {f"{row}_limit": limit**2 for row, limit in row_limits(self.plan).items()}
         if "munk_coarse" in rows:
             fields["munk"] = (h * self.scale) ** 2 * munk_factor(self.frame)
@@ -202,7 +202,7 @@ class Packets:
             that the next launch overwrites.
         """
         plan = self.plan
-        s0, s1 = plan.launches.samples_due(k0, k1)
+        s0, s1 = plan.launches.due(k0, k1)
         numbers = sum(plan.layout.sizes.values())
         width = plan.spec.width
         waste = WASTE if SAMPLE_FIELDS.keys() - plan.layout.sizes.keys() else 0
@@ -302,7 +302,7 @@ class Packets:
         bits, value = self._warned
         step = np.zeros(len(bits), np.int64)
         value = value if len(value) else np.full(len(bits), np.nan)
-        if not self.plan.spec.watched:
+        if not self.plan.spec.warning_rows:
             return bits, step, value
         monitor = self.monitor
         noted = self._of_members(monitor.warned, np.uint16)

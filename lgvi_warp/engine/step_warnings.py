@@ -149,7 +149,7 @@ def row_limits(plan: Watched) -> dict[str, float]:
         "munk_unstable": oscillation_limit(method, MUNK),
         "energy": ENERGY,
     }
-    return {row: known[row] for row in plan.spec.watched}
+    return {row: known[row] for row in plan.spec.warning_rows}
 
 
 def munk_factor(frame: Frame) -> np.ndarray:

@@ -211,6 +211,6 @@ def test_studies_try_it_where_something_is_damped():
 
 def test_drag_has_no_limit_of_the_step():
     fleet = lw.Ensemble.from_scene(test_parity.scene_of(CASES["drag"]))
-    looks = {m: make_plan(fleet, m, h=0.1, t1=1.0, checks="all").spec.watched for m in (METHOD, "rk4")}
-    assert "drag" in looks["rk4"]
-    assert set(looks["rk4"]) - {"drag"} == set(looks[METHOD])
+    rows = {m: make_plan(fleet, m, h=0.1, t1=1.0, checks="all").spec.warning_rows for m in (METHOD, "rk4")}
+    assert "drag" in rows["rk4"]
+    assert set(rows["rk4"]) - {"drag"} == set(rows[METHOD])

@@ -75,7 +75,7 @@ def make_opening(spec):
     types, stepping, watching = make_types(spec), make_stepping(spec), make_watching(spec)
     State, Constants, Monitor, Alarm, Lane = types.State, types.Constants, types.Monitor, types.Alarm, types.Lane
     feed, respond, opened, begin = stepping.feed, stepping.respond, stepping.opened, watching.begin
-    real, looking, controlled = spec.real, bool(spec.watched) or spec.energy, spec.control is not None
+    real, looking, controlled = spec.real, bool(spec.warning_rows) or spec.energy, spec.control is not None
     asked, reports = controlled and spec.control.asked, controlled and spec.control.reports
     note_actuators = make_note_actuators(spec, types.View, stepping.at_step)
 

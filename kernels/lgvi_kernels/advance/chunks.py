@@ -29,7 +29,7 @@ def make_inspected(spec):
         x: State, c: Constants, monitor: Monitor, k: int, last: int, h: wp.float64, opening: real, frozen: Lane
     ):
         """last: the step of the last sample."""
-        if wp.static(bool(spec.watched)):
+        if wp.static(bool(spec.warning_rows)):
             if k % wp.static(CHUNK) == 0 or k == last:
                 note(x, c, monitor, k, h, opening, frozen)
         if wp.static(real == wp.float32):
@@ -91,7 +91,7 @@ def make_chunks(spec):
         s = s0
         suspects = ones(x.b.x) - ones(x.b.x)
         last = int(0)
-        if wp.static(bool(spec.watched) or spec.energy):
+        if wp.static(bool(spec.warning_rows) or spec.energy):
             # sample_step ends with a step that no run reaches, which saves a test for its end.
             last = sample_step[sample_step.shape[0] - 2]
         # singles: steps still to be made one at a time, after an alarm.

@@ -61,7 +61,7 @@ class Spec(NamedTuple):
     lead_time: the part of a step for which the lead drifts.
     explicit: an explicit method, which has no maps.
     compensated: sums of two float32 (see sums).
-    watched: rows of warnings (see monitor).
+    warning_rows: rows of warnings (see monitor).
     energy: whether its growth is a failure.
     backward: whether drag is checked for stages that go backward.
     substep: whether a step that has no solution is divided.
@@ -94,7 +94,7 @@ class Spec(NamedTuple):
     lead_time: float = 0.0
     explicit: Any = None
     compensated: bool = False
-    watched: tuple = ()
+    warning_rows: tuple = ()
     energy: bool = False
     backward: bool = False
     substep: bool = False
@@ -207,7 +207,9 @@ def make_types(spec):
         Inertia,
         Params,
         Events,
-        monitors.limits_struct(width, real, spec.watched),
-        monitors.monitor_struct(width, real, spec.watched, spec.energy, spec.backward, spec.substep, spec.still, Loop),
+        monitors.limits_struct(width, real, spec.warning_rows),
+        monitors.monitor_struct(
+            width, real, spec.warning_rows, spec.energy, spec.backward, spec.substep, spec.still, Loop
+        ),
         Loop,
     )

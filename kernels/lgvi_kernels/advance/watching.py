@@ -33,7 +33,7 @@ def make_watching(spec):
     types, stepping, real, width = make_types(spec), make_stepping(spec), spec.real, spec.width
     Lane, State, Constants, Monitor = types.Lane, types.State, types.Constants, types.Monitor
     at_step, opened, momentum = stepping.at_step, stepping.opened, stepping.method.momentum
-    energetic, warned = spec.energy, bool(spec.watched)
+    energetic, warned = spec.energy, bool(spec.warning_rows)
     look_at, energies, supplies, growth = _looks(spec, stepping.method)
 
     @wp.func
@@ -109,15 +109,15 @@ def _looks(spec, method):
     directions = bool(laws) and laws[0] is drag_directions
     velocities, of_forces = method.velocities, method.velocities_of_forces
     look_at, energies, supplies, growth = (method.step,) * 4
-    if spec.watched:
+    if spec.warning_rows:
         rates = []
         damping = superpose(laws, "damping")
-        if "drag" in spec.watched and spec.drag:
+        if "drag" in spec.warning_rows and spec.drag:
             rates.append(monitors.make_drag_rate(directions, spec.drag, of_forces, 2.0))
-        if "drag" in spec.watched and damping is not None:
+        if "drag" in spec.warning_rows and damping is not None:
             rates.append(monitors.make_matrix_rate(types.View, damping_struct(width, real), damping, of_forces))
         rate = monitors.make_sum(*rates) if len(rates) == 2 else (*rates, None)[0]
-        look_at = monitors.make_look(spec.watched, width, real, velocities, rate)
+        look_at = monitors.make_look(spec.warning_rows, width, real, velocities, rate)
     if spec.energy:
         energies, supplies, growth = monitors.make_energy(laws, real, types.View, velocities, "origin" in spec.parts)
     return look_at, energies, supplies, growth

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`tune`: numbers of a controller for which the risk of a fleet is least."""
+"""`tune_gains`: numbers of a controller for which the risk of a fleet is least."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ def test_a_machine_in_words():
         assert next(machine_lines(document, quota, 4, None)) == "cpu         a cpu, avx2, 4 threads"
 
 
-def test_bench_and_tune_in_full(tuned_widths, capsys):
+def test_bench_and_calibrate_in_full(tuned_widths, capsys):
     lines = ['{"a": 1}', '{"a": 2}']
     measure = Study([lines, lines])
     assert main(["bench"], measure=measure) == 0
@@ -87,7 +87,7 @@ def test_bench_and_tune_in_full(tuned_widths, capsys):
         "dense float64       8: 1.00 ns: 8, as by the table\n"
         f"kept in {tuned_widths}, for runs from now on; without that file the table counts\n"
     )
-    assert main(["tune", "--json"], measure=lambda: readings) == 0
+    assert main(["calibrate", "--json"], measure=lambda: readings) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["kernels"]["plain float64"] == {"ns": {"8": 2.0, "16": 1.525}, "table": 8, "best": 16}
     assert document["file"] == str(tuned_widths)

@@ -13,6 +13,7 @@ import warp as wp
 import lgvi_warp as lw
 from lgvi_kernels.lanes.arithmetic import add, lane, mul  # noqa: F401
 from lgvi_kernels.lanes.state import struct
+from lgvi_warp.physics.terms import TYPES
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene import scene as scenes
 from lgvi_warp.scene.scene import from_dict
@@ -111,7 +112,7 @@ def test_a_term_of_a_scene_file(table, words):
 
 def from_python(table):
     """The same with keyword arguments; Python itself refuses what it does not know."""
-    return lw.terms.TYPES[table["type"]](**{key: value for key, value in table.items() if key != "type"})
+    return TYPES[table["type"]](**{key: value for key, value in table.items() if key != "type"})
 
 
 @pytest.mark.parametrize(("table", "words"), [(row[0], row[1:]) for row in TERMS if not row[1].startswith("terms")])

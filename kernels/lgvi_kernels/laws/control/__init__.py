@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The parts of a controller, one file each: the struct `params(width, real)`, and one function or more.
 
-A controller acts at control ticks, once a period, between two steps. Its parts then act in this order, those of one role in the scene's order:
+A controller acts at control ticks, once a period, between two steps. Its parts then act in this order, those of one role in
+the scene's order:
 
 measure(y, p): the Measurement, the truth at first, as a sensor or an estimator changes it;
 guide(r, y, p): the Reference, that is the wanted motion, as a guidance changes it;

@@ -36,4 +36,5 @@ if __name__ == "__main__":
     depth = result.position[-1, :, 2]
     print(result.status.counts())
     print(f"depth after 60 s: {depth.mean():.2f} m on average, from {depth.min():.2f} to {depth.max():.2f} m")
-    print(lw.plots.plot(result, "01_first_dive.png"), lw.record(result, "01_first_dive.rrd"))
+    lw.plots.summary(result, path="01_first_dive.png")
+    print("01_first_dive.png", lw.record(result, "01_first_dive.rrd"))

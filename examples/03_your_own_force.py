@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Your own force, in one file: a dock that draws vehicles in.
 
-The function runs in the kernel, for all vehicles of a packet at once. `lw.laws.check_law` compares it with its potential
-first.
+The function runs in the kernel, for all vehicles of a packet at once. First `lw.laws.check_law` compares it with its potential.
 """
 
 from dataclasses import dataclass
@@ -75,7 +74,6 @@ if __name__ == "__main__":
     for label, result in results.items():
         near = np.mean(distance(result.samples)[-1] < 1.0)
         print(f"{label}: {near:.0%} of the noses within 1 m of the dock after 60 s")
-    lw.plots.compare(
-        results, lw.statistics.Quantity("distance to the dock", distance, "m"), path="03_your_own_force.png"
-    )
+    far = lw.statistics.Quantity("distance to the dock", distance, "m")
+    lw.plots.compare(results, far, path="03_your_own_force.png")
     print("03_your_own_force.png")

@@ -2,24 +2,15 @@
 # The public names of this door, one a line.
 
 from lgvi_warp.views.plots.bars import sensitivity as sensitivity
-from lgvi_warp.views.plots.canvas import figure_class as figure_class
-from lgvi_warp.views.plots.canvas import save_figure as save_figure
 from lgvi_warp.views.plots.costs import scaling as scaling
 from lgvi_warp.views.plots.costs import term_cost as term_cost
 from lgvi_warp.views.plots.edges import margins as margins
 from lgvi_warp.views.plots.ends import histogram as histogram
 from lgvi_warp.views.plots.ends import outcomes as outcomes
 from lgvi_warp.views.plots.ends import pairs as pairs
-from lgvi_warp.views.plots.estimates import drawable as drawable
 from lgvi_warp.views.plots.estimates import statistics as statistics
 from lgvi_warp.views.plots.fans import compare as compare
 from lgvi_warp.views.plots.fans import fan as fan
-from lgvi_warp.views.plots.files import plot as plot
-from lgvi_warp.views.plots.files import plot_sensitivity as plot_sensitivity
-from lgvi_warp.views.plots.files import plot_stability as plot_stability
-from lgvi_warp.views.plots.files import plot_statistics as plot_statistics
-from lgvi_warp.views.plots.files import plot_tradeoff as plot_tradeoff
-from lgvi_warp.views.plots.maps import CELLS as CELLS
 from lgvi_warp.views.plots.maps import stability as stability
 from lgvi_warp.views.plots.overview import drift as drift
 from lgvi_warp.views.plots.overview import summary as summary

@@ -40,7 +40,7 @@ def room(name: str) -> tuple[str, ...]:
 
 def sources_of(script: Path) -> tuple[str, ...]:
     """The code that draws an example's picture: the example, and the package's where it draws by that."""
-    return (script.relative_to(ROOT).as_posix(), *(room("plots") if "lw.plots.plot" in script.read_text() else ()))
+    return (script.relative_to(ROOT).as_posix(), *(room("plots") if "lw.plots." in script.read_text() else ()))
 
 
 def of_script(script: str, *options: str) -> Made:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -70,10 +69,5 @@ def _draw(content: Content, written: Written, out: Path) -> None:
         return
     from lgvi_warp import plots
 
-    drawings: dict[str, Callable[[Any, Path], Path]] = {
-        "tradeoff": plots.plot_tradeoff,
-        "stability": plots.plot_stability,
-        "sensitivity": plots.plot_sensitivity,
-    }
     with content.understood():
-        written.draw(drawings[content.kind], numbers, out / content.path.with_suffix(".png").name)
+        written.draw(getattr(plots, content.kind), numbers, out / content.path.with_suffix(".png").name)

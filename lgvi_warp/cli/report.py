@@ -124,22 +124,23 @@ def _record(result: Any, path: Path, viewer: str | None) -> Path:
     return path
 
 
-def pictures(result: Any, drawn: Any, viewer: str | None = None) -> dict[str, Callable[[Path], Path]]:
+def pictures(result: Any, drawn: Any, viewer: str | None = None) -> dict[str, Callable[[Path], Any]]:
     """The pictures that a run has.
 
     drawn: The members of the picture, from `shown_members`; None for neither picture nor recording.
     viewer: Address of a viewer that gets the recording too; default None.
     """
     from lgvi_warp import plots
+    from lgvi_warp.views.plots.estimates import drawable
 
-    drawings: dict[str, Callable[[Path], Path]] = {}
+    drawings: dict[str, Callable[[Path], Any]] = {}
     if drawn is not None:
         drawings |= {
-            "fleet.png": lambda path: plots.plot(drawn, path),
+            "fleet.png": lambda path: plots.summary(drawn, path=path),
             "fleet.rrd": lambda path: _record(result, path, viewer),
         }
-    if plots.drawable(result):
-        drawings["statistics.png"] = lambda path: plots.plot_statistics(result, path)
+    if drawable(result):
+        drawings["statistics.png"] = lambda path: plots.statistics(result, path=path)
     return drawings
 
 

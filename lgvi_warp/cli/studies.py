@@ -52,8 +52,8 @@ def tradeoff(chosen: argparse.Namespace, *, study: Part = None, draw: Part = Non
     """
     scene = load_scene(chosen)
     out = folder(chosen, "_tradeoff")
+    from lgvi_warp import plots
     from lgvi_warp.studies.tradeoff import tradeoff as measure
-    from lgvi_warp.views.plots.files import plot_tradeoff
 
     with progress_bar(chosen.quiet) as progress:
         measurements = (study or measure)(
@@ -61,7 +61,7 @@ def tradeoff(chosen: argparse.Namespace, *, study: Part = None, draw: Part = Non
         )
     with progress_bar(chosen.quiet, "writing"):
         written = Written(measurements.save(out))
-        written.draw(draw or plot_tradeoff, measurements, out / "tradeoff.png")
+        written.draw(draw or plots.tradeoff, measurements, out / "tradeoff.png")
     code = finish(written, chosen, {"tradeoff": measurements.to_dict()}, text_of("tradeoff", measurements))
     missing = [f"--methods {name}: has no measurement: {why}" for name, why in measurements.missing.items()]
     return 1 if print_faults(missing) else code
@@ -102,8 +102,7 @@ def sensitivity(chosen: argparse.Namespace, *, study: Part = None, draw: Part = 
 
     Returns: The exit code: 1 if members, a file or a library failed, otherwise 0.
     """
-    from lgvi_warp import uq
-    from lgvi_warp.views.plots.files import plot_sensitivity
+    from lgvi_warp import plots, uq
 
     scene = load_scene(chosen)
     out = folder(chosen, "_sensitivity")
@@ -125,7 +124,7 @@ def sensitivity(chosen: argparse.Namespace, *, study: Part = None, draw: Part = 
         return len(print_faults([str(error)]))
     with progress_bar(chosen.quiet, "writing"):
         written = Written(indices.save(out))
-        written.draw(draw or plot_sensitivity, indices, out / "sensitivity.png")
+        written.draw(draw or plots.sensitivity, indices, out / "sensitivity.png")
     return finish(written, chosen, {"sensitivity": indices.to_dict()}, str(indices))
 
 
@@ -176,8 +175,8 @@ def stability(chosen: argparse.Namespace, *, study: Part = None, draw: Part = No
     # Seed of the random directions, the only setting of the scene's ensemble that is used here.
     seed = scene.ensemble_settings.seed if scene.ensemble_settings else 0
     out = folder(chosen, "_stability")
+    from lgvi_warp import plots
     from lgvi_warp.studies.stability.map import GRIDS, stability_map
-    from lgvi_warp.views.plots.files import plot_stability
 
     maps = {"stability": (chosen.x or "h", chosen.y or "angular_velocity")}
     if chosen.grid:
@@ -197,7 +196,7 @@ def stability(chosen: argparse.Namespace, *, study: Part = None, draw: Part = No
                     raise
                 raise Ended(f"{i} of {len(maps)} maps are finished, in {out}") from error
             written.files += regions_by_name[name].save(out, name)
-            written.draw(draw or plot_stability, regions_by_name[name], out / f"{name}.png")
+            written.draw(draw or plots.stability, regions_by_name[name], out / f"{name}.png")
     text = "\n\n".join(text_of("stability", regions) for regions in regions_by_name.values())
     return finish(written, chosen, {name: regions.to_dict() for name, regions in regions_by_name.items()}, text)
 

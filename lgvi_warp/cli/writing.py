@@ -39,11 +39,11 @@ class Written:
         except (OSError, ImportError, ValueError) as error:
             self.faults.append(f"{path} was not written: {error}")
 
-    def draw(self, plot: Callable[[Any, Path], Any], study: Any, path: Path) -> None:
+    def draw(self, plot: Callable[..., Any], study: Any, path: Path) -> None:
         """Draw a study's picture, or note why it was not drawn."""
 
         def drawn() -> Path:
-            plot(study, path)
+            plot(study, path=path)
             return path
 
         self.take(path, drawn)

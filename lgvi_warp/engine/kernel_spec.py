@@ -79,7 +79,7 @@ def _control(choice: KernelChoice, signals: tuple[str, ...]) -> Control | None:
     reports = any(SIGNALS[name].group == "actuator" for name in signals)
     numbers = tuple(declared(part, module) for part, module in parts)
     headings = any(name.endswith("_heading") for name in signals)
-    return Control(tuple(module for _, module in parts), numbers, reports, choice.asks, headings)
+    return Control(tuple(module for _, module in parts), numbers, reports, choice.has_callback, headings)
 
 
 def _explicit(method: Method, choice: KernelChoice) -> Explicit | None:

@@ -142,7 +142,7 @@ class Packets:
         controller = self.plan.kernel_choice.controller
         if controller is None:
             return 0, 0
-        kept = controller.bus.rows + bool(self.plan.layout.notes) * sum(NOTED.values())
+        kept = controller.bus.rows + bool(self.plan.layout.noted_bits) * sum(NOTED.values())
         return kept + len(self.plan.layout.signal_rows), kept
 
     def _monitor(self) -> Any:
@@ -162,10 +162,10 @@ class Packets:
         if controller is not None:
             rows = plan.layout.signal_rows
             monitor.every, monitor.commands = controller.every(plan.grid.h), controller.bus.channels
-            monitor.bus, monitor.kept, monitor.noting = controller.bus.rows, self._bus()[1], self.plan.layout.notes
+            monitor.bus, monitor.kept, monitor.noting = controller.bus.rows, self._bus()[1], self.plan.layout.noted_bits
             monitor.signals = wp.array(np.array(rows, np.int32), dtype=wp.int32, device="cpu")
             monitor.first_signals = wp.zeros((self.count, max(1, len(rows))), dtype=Lane, device="cpu")
-            monitor.slots = plan.launches.slots(self.count * plan.spec.width)
+            monitor.slots = plan.launches.ticks_held(self.count * plan.spec.width)
             monitor.numbers, columns = sum(plan.layout.tick_fields.values()), columns_at_ticks(plan)
             monitor.columns = wp.array(columns, dtype=wp.int32, device="cpu")
             if monitor.slots:
@@ -202,7 +202,7 @@ class Packets:
             that the next launch overwrites.
         """
         plan = self.plan
-        s0, s1 = plan.launches.due(k0, k1)
+        s0, s1 = plan.launches.samples_due(k0, k1)
         numbers = sum(plan.layout.sizes.values())
         width = plan.spec.width
         waste = WASTE if SAMPLE_FIELDS.keys() - plan.layout.sizes.keys() else 0

@@ -60,8 +60,11 @@ class Ensemble(Summarized):
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
-        >>> vary = {"vehicle.buoyancy": lw.distributions.Normal(std=1.0), "start.velocity": lw.distributions.Normal(std=[0.1,
-        0.0, 0.0])} >>> fleet = lw.Ensemble(scene, members=1000, seed=1, vary=vary)
+        >>> vary = {
+        ...     "vehicle.buoyancy": lw.distributions.Normal(std=1.0),
+        ...     "start.velocity": lw.distributions.Normal(std=[0.1, 0.0, 0.0]),
+        ... }
+        >>> fleet = lw.Ensemble(scene, members=1000, seed=1, vary=vary)
         >>> fleet.parameters(0, 1000)["vehicle.buoyancy"].shape
         (1000,)
     """

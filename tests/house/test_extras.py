@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp import plots
 from lgvi_warp.common import yaml_text
 from lgvi_warp.engine.executors import executor_of
 from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.statistics.estimates.estimate import Estimate
 from lgvi_warp.store.settings import needed
 from lgvi_warp.studies.sensitivity import analyses
-from lgvi_warp.views.pages import run_again as again
+from lgvi_warp.views.pages import run_again
+from lgvi_warp.views.plots import canvas
 from lgvi_warp.views.recording import rerun
 
 ESTIMATE = Estimate("mean x", {}, "m", 0.95, "", {"value": ("time",)}, {"value": np.zeros(2)}, {"time": np.arange(2.0)})
@@ -31,8 +31,8 @@ DOORS = {
     "environments": (lambda: lw.gym.VectorEnv(None, observe=[]), "gymnasium", "gym"),
     "state spaces": (lambda: MODEL.state_space(), "control", "control"),
     "YAML": (lambda: yaml_text.parsed("a: 1"), "yaml", "yaml"),
-    "plots": (plots.figure_class, "matplotlib.figure", "viz"),
-    "reports": (lambda: again.toml_of({}), "tomlkit", "viz"),
+    "plots": (canvas.figure_class, "matplotlib.figure", "viz"),
+    "reports": (lambda: run_again.toml_of({}), "tomlkit", "viz"),
     "recordings": (lambda: rerun.record(None, "x"), "rerun", "viz"),
 }
 

@@ -458,7 +458,7 @@ def test_the_place_is_told_and_not_the_run(verb, kind, good, home, capsys):
 WRITERS = {
     "a result": lambda path: flown().save(path),
     "a table": lambda path: tradeoff_of(4.0).to_csv(path),
-    "a picture": lambda path: lw.plots.plot(flown(), path.with_suffix(".png")),
+    "a picture": lambda path: lw.plots.summary(flown(), path=path.with_suffix(".png")),
     "a report": lambda path: lw.report(flown(), path),
     "a recording": lambda path: lw.record(flown(), path),
     "a text": lambda path: files.write_text(path, "x"),

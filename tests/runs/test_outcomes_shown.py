@@ -126,7 +126,8 @@ def test_the_first_in_time_is_named(mixed):
 
 
 def test_a_run_that_all_sink_is_drawn(sunk, tmp_path):
-    picture = imread(lw.plots.plot(sunk, tmp_path / "fleet.png"))
+    lw.plots.summary(sunk, path=tmp_path / "fleet.png")
+    picture = imread(tmp_path / "fleet.png")
     assert all(third.std() > 0.05 for third in np.array_split(picture[..., :3], 3, axis=1))
 
 
@@ -184,9 +185,9 @@ def test_outcomes_look_different():
 def test_nothing_to_draw_says_why(mixed, tmp_path):
     nowhere = {"position": np.full_like(mixed.position, np.nan)}
     lost = ending(dataclasses.replace(mixed, samples=dict(mixed.samples) | nowhere), [3] * 7, [0.0] * 7)
-    for draw in (lw.plots.plot, lw.record):
+    for draw in (lw.plots.summary, lw.record):
         with pytest.raises(ValueError, match="nothing to draw"):
-            draw(lost, tmp_path / "fleet.png")
+            draw(lost, path=tmp_path / "fleet.png")
 
 
 def test_drift_is_of_the_times_under_way(mixed, sunk):

@@ -429,11 +429,11 @@ def test_a_signal_while_clang_is_at_work(tmp_path, monkeypatch):
 # The command, whose pictures begin when the result is saved, and last until it is ended.
 DRAWING = """
 import time
-from lgvi_warp.views import plots
-def plot(*given):
+from lgvi_warp import plots
+def draw(*given, **more):
     print("drawing", flush=True)
     time.sleep(60.0)
-plots.plot = plot
+plots.summary = draw
 from lgvi_warp.cli import runs
 runs.rescued = lambda *given: print("saving", flush=True) or time.sleep(60.0)
 from lgvi_warp.__main__ import entry
@@ -463,15 +463,15 @@ def test_twice_while_files_are_written_names_what_is_there(tmp_path):
 def test_an_interrupt_while_files_are_written_leaves_them_whole(tmp_path, monkeypatch, capsys):
     from lgvi_warp import plots
 
-    plot = plots.plot
+    draw = plots.summary
 
-    def slow(*given):
+    def slow(*given, **more):
         time.sleep(0.2)  # until the other files are begun
         os.kill(os.getpid(), signal.SIGINT)
         time.sleep(0.2)
-        return plot(*given)
+        return draw(*given, **more)
 
-    monkeypatch.setattr(plots, "plot", slow)
+    monkeypatch.setattr(plots, "summary", slow)
     assert cli.main([*SHORT, "--out", str(tmp_path), "--quiet"]) == 130
     there = sorted(path.name for path in tmp_path.iterdir())
     assert there == ["fleet.png", "fleet.rrd", "result.npz"]

@@ -99,7 +99,7 @@ def odd_calls_within(scene, result, folder, studies):
     pictures = {
         name: {"result": result, "results": {"a": result}, "rows": rows, "path": path, "figure": None, "found": None}
         for name in ("attitude", "compare", "drift", "fan", "histogram", "margins", "outcomes", "pairs", "paths", "phase",
-                     "plan_view", "save_figure", "scaling", "statistics", "summary", "term_cost")
+                     "plan_view", "scaling", "statistics", "summary", "term_cost")
     }  # fmt: skip
     asked = {
         "scene": scene, "of": "depth", "fleet": saltelli, "outputs": None, "vary": ["vehicle.mass"], "h": 0.1,
@@ -109,7 +109,7 @@ def odd_calls_within(scene, result, folder, studies):
     called += [(f"uq.{name}", getattr(lw.uq, name), asked) for name in ("evaluate", "model", "morris_of", "sobol_of")]
     of_file = {"path": folder / "none.json", "folder": folder / "within"}
     methods = [(scene, "with_numbers", {}), (result, "save", {"path": folder / "a.npz"}), (result, "load", of_file),
-               (result.warnings, "has", {}), (lw.terms, "register", {})]  # fmt: skip
+               (result.warnings, "has", {}), (lw.laws, "register", {})]  # fmt: skip
     methods += [
         (study, name, of_file) for study in studies for name in ("load", "save", "to_csv") if hasattr(study, name)
     ]

@@ -64,8 +64,10 @@ class Thrusters(Term):
 
     Examples:
         >>> import lgvi_warp as lw
-        >>> thrusters = lw.terms.Thrusters(position=[[-0.7, 0, 0]], direction=[[1, 0, 0]], coefficient=[4e-6],
-        command=[1200.0]) >>> result = lw.solve(lw.Scene.named("torpedo", terms=[thrusters]), h=0.05, t1=1.0)
+        >>> thrusters = lw.terms.Thrusters(
+        ...     position=[[-0.7, 0, 0]], direction=[[1, 0, 0]], coefficient=[4e-6], command=[1200.0]
+        ... )
+        >>> result = lw.solve(lw.Scene.named("torpedo", terms=[thrusters]), h=0.05, t1=1.0)
         >>> print(f"{result.velocity[-1, 0, 0]:.2f} m/s")
         0.16 m/s
     """

@@ -31,9 +31,11 @@ class Sobol(Replicated):
     Examples:
         >>> import lgvi_warp as lw
         >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
-        >>> fleet = lw.Ensemble(scene, 64, vary={"vehicle.buoyancy": lw.distributions.Normal(std=1.0)},
-        sampling=lw.designs.Sobol()) >>> print(f"{fleet.parameters(0, 64)['vehicle.buoyancy'].mean() -
-        scene.vehicle.buoyancy:.3f} N") -0.011 N
+        >>> vary = {"vehicle.buoyancy": lw.distributions.Normal(std=1.0)}
+        >>> fleet = lw.Ensemble(scene, 64, vary=vary, sampling=lw.designs.Sobol())
+        >>> buoyancy = fleet.parameters(0, 64)["vehicle.buoyancy"]
+        >>> print(f"{buoyancy.mean() - scene.vehicle.buoyancy:.3f} N")
+        -0.011 N
     """
 
     kind: ClassVar[str] = "sobol"

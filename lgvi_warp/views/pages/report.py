@@ -28,6 +28,7 @@ from lgvi_warp.studies.files import STUDY_FILES, of_study
 from lgvi_warp.views.commands import faults
 from lgvi_warp.views.fleet import OUTCOME_STYLES, title
 from lgvi_warp.views.pages.run_again import how_to_run_again
+from lgvi_warp.views.plots.estimates import drawable
 from lgvi_warp.views.plots.inputs import inputs_by_outcome, varied
 from lgvi_warp.views.plots.sweep_pictures import PICTURES
 
@@ -190,7 +191,7 @@ def _pictures_of(result: Result) -> list[Callable[..., Any]]:
     sampled = result.samples or result.kept is not None
     drawn: list[Callable[..., Any]] = [plots.summary] if sampled else [plots.outcomes] * differ
     drawn += [inputs_by_outcome] if differ and varied(result) else []
-    return drawn + ([plots.statistics] if plots.drawable(result) else [])
+    return drawn + ([plots.statistics] if drawable(result) else [])
 
 
 def inline(draw: Callable[..., Any], result: Result) -> str:

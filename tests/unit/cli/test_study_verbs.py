@@ -21,7 +21,7 @@ from tests.unit.studies.test_cost import found as tradeoff_of
 PAPER = str(ROOT / "examples" / "paper.toml")
 
 
-def draw(found, path):
+def draw(found, *, path):
     """Stands for what draws a picture."""
     path.write_text("a picture")
 

@@ -47,9 +47,7 @@ def test_rows_of_a_legend_are_as_full_as_each_other(entries, columns):
     assert len(set(places)) == columns
 
 
-@pytest.mark.parametrize(
-    "name", [name for name in lw.plots.__all__ if name not in ("CELLS", "drawable", "figure_class")]
-)
+@pytest.mark.parametrize("name", lw.plots.__all__)
 def test_help_tells_every_argument_and_the_errors_of_all(name):
     draw = getattr(lw.plots, name)
     told = inspect.getdoc(draw)

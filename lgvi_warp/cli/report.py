@@ -8,6 +8,7 @@ import contextlib
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -115,7 +116,13 @@ def write(result: Any, drawn: Any, out: Path, viewer: str | None = None) -> Writ
     return written
 
 
-def _record(result: Any, path: Path, viewer: str | None) -> Path:
+def _draw(draw: Callable[..., Any], result: Any, path: Path) -> Path:
+    """Draw a picture of a result, and give its path."""
+    draw(result, path=path)
+    return path
+
+
+def _record(result: Any, viewer: str | None, path: Path) -> Path:
     """Write the recording of a result, and send it to a viewer where there is one."""
     from lgvi_warp.views.recording.rerun import record
     from lgvi_warp.views.recording.viewer import answers
@@ -124,7 +131,7 @@ def _record(result: Any, path: Path, viewer: str | None) -> Path:
     return path
 
 
-def pictures(result: Any, drawn: Any, viewer: str | None = None) -> dict[str, Callable[[Path], Any]]:
+def pictures(result: Any, drawn: Any, viewer: str | None = None) -> dict[str, Callable[[Path], Path]]:
     """The pictures that a run has.
 
     drawn: The members of the picture, from `shown_members`; None for neither picture nor recording.
@@ -133,14 +140,14 @@ def pictures(result: Any, drawn: Any, viewer: str | None = None) -> dict[str, Ca
     from lgvi_warp import plots
     from lgvi_warp.views.plots.estimates import drawable
 
-    drawings: dict[str, Callable[[Path], Any]] = {}
+    drawings: dict[str, Callable[[Path], Path]] = {}
     if drawn is not None:
         drawings |= {
-            "fleet.png": lambda path: plots.summary(drawn, path=path),
-            "fleet.rrd": lambda path: _record(result, path, viewer),
+            "fleet.png": partial(_draw, plots.summary, drawn),
+            "fleet.rrd": partial(_record, result, viewer),
         }
     if drawable(result):
-        drawings["statistics.png"] = lambda path: plots.statistics(result, path=path)
+        drawings["statistics.png"] = partial(_draw, plots.statistics, result)
     return drawings
 
 

@@ -263,6 +263,6 @@ def test_files_that_were_written_and_why_not(tmp_path):
     with pytest.raises(KeyError):
         written.take(tmp_path / "h", Study(KeyError("a bug")))
     calls = []
-    written.draw(lambda *given: calls.append(given), "numbers", tmp_path / "i")
+    written.draw(lambda study, path: calls.append((study, path)), "numbers", tmp_path / "i")
     assert calls == [("numbers", tmp_path / "i")]
     assert written.files[-1] == tmp_path / "i"

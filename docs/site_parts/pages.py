@@ -64,19 +64,14 @@ def write(folder: Path) -> None:
 
 
 def groups() -> dict[str, list[str]]:
-    """Heading -> public names of each table of docs/reference/api.md; a table of terms stands for their classes."""
+    """Heading -> public names of each table of docs/reference/api.md."""
     found: dict[str, list[str]] = {}
     page = (DOCS / "reference" / "api.md").read_text()
     for heading, text in re.findall(r"^## (.*)\n([^#]*)", page, re.MULTILINE):
         title = heading.partition(" (")[0]
         names = re.findall(r"^\| `lw\.([\w.]+)` \|", text, re.MULTILINE)
-        found[title] = terms_of_the_package() if title.startswith("Terms") else names
+        found[title] = names
     return found
-
-
-def terms_of_the_package() -> list[str]:
-    """Public names of the terms that scene files know."""
-    return sorted(f"terms.{kind.__name__}" for kind in terms.TYPES.values() if kind.__name__ in lw.terms.__all__)
 
 
 def slug(title: str) -> str:

@@ -32,7 +32,9 @@ def doors():
 def in_words(of_room):
     """`lw.terms` (20); of the root its names."""
     root = ", ".join(f"`lw.{name}`" for name in sorted(of_room.get("", [])))
-    return ", ".join([*filter(None, [root]), *(f"`lw.{door}` ({len(of_room[door])})" for door in sorted(of_room) if door)])
+    return ", ".join(
+        [*filter(None, [root]), *(f"`lw.{door}` ({len(of_room[door])})" for door in sorted(of_room) if door)]
+    )
 
 
 def order():

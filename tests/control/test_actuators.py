@@ -207,3 +207,27 @@ def test_psi_x_meets_other_methods(name):
     assert errors[0] < 0.05
     assert 2.5 < errors[0] / errors[1] < 6.0
     assert 2.5 < errors[1] / errors[2] < 6.0
+
+
+def test_what_a_lost_channel_made_is_not_delivered():
+    # One thruster ahead, one to the side at the stern: alone the second makes a moment.
+    terms = [
+        lw.terms.Drag(linear=LINEAR),
+        lw.terms.Thrusters(position=((0.0,) * 3, (-1.0, 0.0, 0.0)), direction=np.eye(3)[:2], coefficient=(9.0, 9.0)),
+    ]
+    loop = lw.Controller(
+        period=0.1,
+        guidance=[lw.control.SetPoint(heading=0.5)],
+        laws=[lw.control.HeadingPID(kp=1.0, kd=0.5)],
+        allocation=[lw.control.PseudoInverse(to="thrusters")],
+        faults=[lw.control.Fault(of="thrusters", channel=1, time=1.0, known=True)],
+    )
+    scene = lw.Scene(VEHICLE, lw.Environment(gravity=GRAVITY), terms, lw.Start(**STATE), loop)
+    result = lw.solve(scene, h=0.05, t1=2.0, save=lw.SaveAt(every=0.1, fields=("demand", "unmet", "command")))
+    demand, unmet, command = (result.samples[name][:, 0] for name in ("demand", "unmet", "command"))
+    early, late = result.time < 1.0 - 1e-9, result.time > 1.0 - 1e-9
+    assert np.abs(demand[:, 5]).min() > 1e-3
+    np.testing.assert_allclose(unmet[early], 0.0, atol=1e-12)
+    np.testing.assert_allclose(command[early, 1], -np.sign(demand[early, 5]) * np.sqrt(np.abs(demand[early, 5]) / 9.0))
+    np.testing.assert_allclose(unmet[late, 5], demand[late, 5], rtol=1e-12)
+    np.testing.assert_array_equal(command[late], 0.0)

@@ -61,10 +61,8 @@ def draw_outcomes(axes: Any, result: Result) -> None:
     shares = [100.0 * count / result.members for count in (going, *counts.values())]
     ok = int((status == Status.OK).sum())
     labels = [f"under way, {ok:,} to the end"] + [_first(result, code, when) for code in ended]
-    areas = axes.stackplot(
-        time, *shares, colors=[OUTCOME_STYLES[code].color for code in (Status.OK, *ended)], labels=labels
-    )
-    for i, area in enumerate(areas):
+    colors = [OUTCOME_STYLES[code].color for code in (Status.OK, *ended)]
+    for i, area in enumerate(axes.stackplot(time, *shares, colors=colors, labels=labels)):
         area.set(hatch=hatch(i), edgecolor="white", linewidth=0.0)
     axes.set(xlabel="time [s]", ylabel="share of members [%]", xlim=(time[0], time[-1]), ylim=(0.0, 100.0))
     legend_below(axes, ncols=1)
@@ -73,9 +71,8 @@ def draw_outcomes(axes: Any, result: Result) -> None:
 def _first(result: Result, code: Status, when: np.ndarray) -> str:
     """An outcome, how many members had it, and when the first had it."""
     members = np.asarray(result.status) == code
-    return (
-        f"{code.name.lower()}: {int(members.sum()):,} of {result.members:,}, the first at {when[members].min():.4g} s"
-    )
+    count = f"{int(members.sum()):,} of {result.members:,}"
+    return f"{code.name.lower()}: {count}, the first at {when[members].min():.4g} s"
 
 
 @picture
@@ -110,22 +107,14 @@ def histogram(
     with panel(ax, path) as axes:
         base = np.zeros(len(edges) - 1)
         for i, (label, (share, color)) in enumerate(shares.items()):
-            look = {
-                "color": color,
-                "hatch": hatch(i),
-                "edgecolor": "white",
-                "linewidth": 0.3,
-                "align": "edge",
-                "label": label,
-            }
             draw, start = (axes.barh, {"left": base}) if down else (axes.bar, {"bottom": base})
-            draw(edges[:-1], share, np.diff(edges), **start, **look)
+            draw(edges[:-1], share, np.diff(edges), **start, color=color, hatch=hatch(i), edgecolor="white",
+                 linewidth=0.3, align="edge", label=label)  # fmt: skip
             base = base + share
         name, count = f"{in_words(meaning.label)} [{unit or '1'}]", "share of members [%]"
         axes.set(xlabel=count if down else name, ylabel=f"{name}, down" if down else count)
-        axes.set_title(
-            wrapped(f"{in_words(meaning.label)} of {some_of(result, result.members)} at {when:g} s", axes.figure)
-        )
+        text = f"{in_words(meaning.label)} of {some_of(result, result.members)} at {when:g} s"
+        axes.set_title(wrapped(text, axes.figure))
         if down:
             point_down(axes, floors(result))
         legend_below(axes, ncols=3)
@@ -175,11 +164,8 @@ def _edges(values: np.ndarray) -> np.ndarray:
 def _groups(result: Result, members: np.ndarray, when: float) -> list[tuple[Status, np.ndarray]]:
     """Masks of the members under way at a time, and of those that ended by then, by outcome; only those that occur."""
     status, ended = np.asarray(result.status)[members], stop_time(result)[members] <= when
-    groups = [
-        (Status.OK, ~ended),
-        *((code, ended & (status == code)) for code in ended_so.outcomes(result) if code != Status.OK),
-    ]
-    return [(code, group) for code, group in groups if group.any()]
+    early = ((code, ended & (status == code)) for code in ended_so.outcomes(result) if code != Status.OK)
+    return [(code, group) for code, group in ((Status.OK, ~ended), *early) if group.any()]
 
 
 @picture

@@ -31,7 +31,7 @@ class Content:
     path: Path
 
     def load(self) -> Any:
-        """Read the numbers."""
+        """Read the numbers of a run or of a study."""
         if self.kind == "store":
             from lgvi_warp.store.open import open_run
 

@@ -46,9 +46,8 @@ def export_arguments(verb: Any) -> None:
     """Add the arguments of the verb export."""
     add_shared(verb, "dir")
     verb.add_argument("--to", required=True, help="netcdf or parquet")
-    verb.add_argument(
-        "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: beside the store)"
-    )
+    verb.add_argument("--out", metavar="FILE", type=Path,
+                      help="the file, replaced if it exists (default: beside the store)")  # fmt: skip
 
 
 @as_verb("export", "write a run as one NetCDF or Parquet file", export_arguments)
@@ -64,12 +63,10 @@ def export(chosen: argparse.Namespace, *, write: Part = None) -> int:
 
 def report_arguments(verb: Any) -> None:
     """Add the arguments of the verb report."""
-    verb.add_argument(
-        "dir", metavar="DIR", type=Path, help="folder that run, tradeoff, stability, sensitivity or sweep wrote"
-    )
-    verb.add_argument(
-        "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: DIR/report.html)"
-    )
+    verb.add_argument("dir", metavar="DIR", type=Path,
+                      help="folder that run, tradeoff, stability, sensitivity or sweep wrote")  # fmt: skip
+    verb.add_argument("--out", metavar="FILE", type=Path,
+                      help="the file, replaced if it exists (default: DIR/report.html)")  # fmt: skip
     verb.add_argument("--open", action="store_true", help="show it in the browser")
 
 

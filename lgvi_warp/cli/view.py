@@ -55,11 +55,7 @@ def run_in(path: Path) -> Content:
 
 
 def indices(text: str | None) -> list[int] | None:
-    """Read the indices of members.
-
-    text: Numbers with commas, as "3,17"; None for none.
-    Returns: The indices; None for none.
-    """
+    """Read the indices of members, as "3,17"; None for none."""
     if text is None:
         return None
     words = [word.strip() for word in text.split(",")]

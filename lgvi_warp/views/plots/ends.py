@@ -42,6 +42,13 @@ def outcomes(result: Result, *, ax: Any = None, path: FilePath | None = None) ->
 
     Returns:
         The axes.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> fleet = lw.Ensemble(lw.Scene.named("remus_100"), members=8)
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
+        >>> lw.plots.outcomes(result).get_ylabel()
+        'share of members [%]'
     """
     result_of(result)
     with panel(ax, path) as axes:
@@ -95,6 +102,13 @@ def histogram(
     Raises:
         NothingToDraw: Nothing of the quantity was kept or gathered, or no member has a finite number.
         SceneError: The quantity is not known, or has several numbers.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> fleet = lw.Ensemble(lw.Scene.named("remus_100"), members=8)
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
+        >>> lw.plots.histogram(result, "max(speed)", at=1.0).get_xlabel()
+        'max(speed) [m/s]'
     """
     (meaning,) = quantities([of])
     faults = Faults()

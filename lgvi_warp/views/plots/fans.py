@@ -71,6 +71,13 @@ def fan(result: Result, of: Any = "depth", *, ax: Any = None, path: FilePath | N
     Raises:
         NothingToDraw: Nothing of the quantity was kept or gathered, or no member has a finite number.
         SceneError: The quantity is not known, or has several components.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> fleet = lw.Ensemble(lw.Scene.named("remus_100"), members=8)
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
+        >>> lw.plots.fan(result, "speed", path="speed.png").get_ylabel()
+        'speed [m/s]'
     """
     meaning = quantity_of(of)
     estimate = None if result_of(result).samples else estimate_for(result, meaning.name, STANDING)
@@ -196,6 +203,14 @@ def compare(results: Mapping[str, Result], of: Any = "depth", *, ax: Any = None,
     Raises:
         NothingToDraw: Of some run nothing of the quantity was kept or gathered, or no member has a finite number.
         SceneError: There are no results, or the quantity is not known or has several components.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> fleet = lw.Ensemble(lw.Scene.named("remus_100"), members=8)
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
+        >>> axes = lw.plots.compare({"a": result, "b": lw.solve(fleet, h=0.05, t1=2.0)}, "speed")
+        >>> [line.get_label() for line in axes.lines]
+        ['a: 8 members', 'b: 8 members']
     """
     for result in mapping_of("results", results, "labels to results").values():
         result_of(result)

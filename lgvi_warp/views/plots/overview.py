@@ -51,6 +51,13 @@ def summary(result: Result, *, figure: Any = None, path: FilePath | None = None)
 
     Raises:
         NothingToDraw: Every member failed before the second sample, none has a finite position, or nothing was kept.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> fleet = lw.Ensemble(lw.Scene.named("remus_100"), members=8)
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
+        >>> [axes.get_title() for axes in lw.plots.summary(result, path="fleet.png")]
+        ['8 members from above', 'Depth', 'Attitude: medians, bands of 90 %', 'Energy']
     """
     result_of(result)
     if not result.samples and result.kept is None and result.statistics:

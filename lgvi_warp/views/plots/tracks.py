@@ -48,6 +48,13 @@ def paths(result: Result, most: int = MOST_PATHS, *, ax: Any = None, path: FileP
 
     Raises:
         NothingToDraw: No positions were kept, or no member has a finite start.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> fleet = lw.Ensemble(lw.Scene.named("remus_100"), members=8)
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
+        >>> lw.plots.paths(result, most=3, path="paths.svg").get_title()
+        'Paths of 3 of 8 members'
     """
     return _titled(draw_paths, with_samples(result), most, ax, path, (8.0, 5.0))
 

@@ -71,7 +71,7 @@ def report_arguments(verb: Any) -> None:
 
 
 @as_verb("report", "write one HTML file about a run or studies: report.html", report_arguments)
-def report(chosen: argparse.Namespace, *, write: Part = None, look: Part = None) -> int:
+def report(chosen: argparse.Namespace, *, write: Part = None, browse: Part = None) -> int:
     """Run the verb report: write one HTML file about a run or a study."""
     import webbrowser
 
@@ -83,5 +83,5 @@ def report(chosen: argparse.Namespace, *, write: Part = None, look: Part = None)
         path = (write or write_report)(chosen.dir, chosen.out or chosen.dir / "report.html")
     tell(chosen, lambda: {"file": path, "bytes": path.stat().st_size}, lambda: file_line(path))
     if chosen.open:
-        (look or webbrowser.open)(path.resolve().as_uri())
+        (browse or webbrowser.open)(path.resolve().as_uri())
     return 0

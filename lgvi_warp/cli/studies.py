@@ -259,17 +259,17 @@ def sweep(chosen: argparse.Namespace, *, study: Part = None, drawings: Part = No
     return 1 if all(compared.record(cell).refused for cell in compared.cells) else code
 
 
-def record_worst(found: Any, count: int, out: Path, written: Written, *, log: Part = None) -> None:
+def record_worst(compared: Any, count: int, out: Path, written: Written, *, log: Part = None) -> None:
     """Run the worst members again, those of each cell together, and write a recording of them."""
     from lgvi_warp.views.recording.rerun import record
 
     write = log or record
     members: dict[int, list[int]] = {}
-    for row in found.worst(count):
-        at = {name: row[name] for name in found.setup.axes}
-        members.setdefault(found.cell(row["case"], at).index, []).append(row["member"])
+    for row in compared.worst(count):
+        at = {name: row[name] for name in compared.setup.axes}
+        members.setdefault(compared.cell(row["case"], at).index, []).append(row["member"])
     for index, chosen in members.items():
-        cell = found.cells[index]
+        cell = compared.cells[index]
         path = out / f"worst_{index:04d}.rrd"
-        result = found.again(cell.case.name, sorted(chosen), cell.point)
+        result = compared.again(cell.case.name, sorted(chosen), cell.point)
         written.draw(lambda result, path: write(result, path) or path, result, path)

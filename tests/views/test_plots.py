@@ -313,12 +313,6 @@ def test_a_histogram_counts_every_member_once(solved, drawn):
     assert sum(bar.get_width() for bar in lw.plots.histogram(same).patches) == pytest.approx(100.0)
 
 
-def test_a_panel_with_nothing_below_has_numbers_on_its_axis(drawn):
-    panels = drawn["stability"].axes[:3]
-    numbered = [any(tick.label1.get_visible() for tick in axes.xaxis.get_major_ticks()) for axes in panels]
-    assert numbered == [False, True, True]
-
-
 def test_the_front_is_in_colour_and_named_at_its_lines(drawn):
     found, figure = of_methods(), drawn["tradeoff"]
     best = {point.setting.name for point in found.front()}

@@ -154,10 +154,12 @@ def test_lists_in_full(capsys):
     terms, laws = names["terms"], names["laws"]
     assert list(names["vehicles"]) == lw.vehicles.names()
     assert names["vehicles"]["sphere"]
-    assert list(terms) == sorted(terms)
+    assert list(terms) == sorted(set(lw.laws.Term.kinds) & set(terms))
+    assert "weight" not in terms
     assert terms["drag"] == inspect.getdoc(lw.terms.Drag).partition("\n")[0]
     sections = [text.partition(":")[0] for text in laws.values()]
     assert sections[0] == "laws"
+    assert laws["heading_pid"].startswith("laws: PID of the heading")
     assert len(dict.fromkeys(sections)) == sum(a != b for a, b in zip(sections, sections[1:])) + 1
     assert [name for name, text in laws.items() if text.startswith("laws:")] == sorted(
         name for name, text in laws.items() if text.startswith("laws:"))  # fmt: skip

@@ -162,17 +162,6 @@ def test_every_method_that_is_listed_is_one(capsys):
         assert text.startswith(f"order {lw.Method(name).order}, ")
 
 
-def test_vehicles_terms_and_laws_are_those_of_the_tables(capsys):
-    assert list(listed("vehicles", capsys)) == lw.vehicles.names()
-    terms = listed("terms", capsys)
-    assert "drag" in terms
-    assert "weight" not in terms
-    assert set(terms) <= set(lw.laws.Term.kinds)
-    laws = listed("laws", capsys)
-    assert laws["heading_pid"].startswith("laws: PID of the heading")
-    assert laws["sensor"].startswith("sensors: ")
-
-
 @pytest.mark.parametrize("name", lw.vehicles.names())
 def test_a_new_scene_can_run_and_is_not_odd(name, tmp_path, capsys):
     path = tmp_path / "scenes" / "dive.toml"
@@ -513,9 +502,3 @@ def test_studies_print_a_document_and_info_and_plot_know_their_folders(verb, tmp
     (tmp_path / f"{verb}.json").write_text('{"name": 3}')
     assert cli.main(["info", out]) == 2
     assert f"{verb}.json: is damaged" in capsys.readouterr().err
-
-
-def test_a_folder_of_something_else_is_refused(tmp_path, capsys):
-    for verb in ("info", "plot"):
-        assert cli.main([verb, str(tmp_path)]) == 2
-        assert f"{tmp_path}: holds nothing that a verb wrote" in capsys.readouterr().err

@@ -155,21 +155,6 @@ def test_a_run_in_a_store(tmp_path, capsys):
     assert (out / "run.parquet").exists()
 
 
-@pytest.mark.kernel
-def test_a_run_in_parts(tmp_path, capsys):
-    """run --blocks into two folders, merge; what is in none of them is named and resumed."""
-    run = ["run", PAPER, "--members", "600", *SMALL[2:], "--store", "zarr", "--quiet"]
-    for name, part in (("a", "0:1"), ("b", "2:3"), ("c", "1:2")):
-        assert cli.main([*run, "--out", str(tmp_path / name), "--blocks", part]) == 0
-    parts = [str(tmp_path / name) for name in "abc"]
-    assert cli.main(["info", parts[0]]) == 1
-    assert "1 of 3 finished; not complete: lgvi-warp resume" in capsys.readouterr().out
-    assert cli.main(["merge", *parts[:2], "--out", str(tmp_path / "some")]) == 1
-    assert "1 of 3 blocks are in none of the folders" in capsys.readouterr().err
-    assert cli.main(["merge", *parts, "--out", str(tmp_path / "all")]) == 0
-    assert "complete" in capsys.readouterr().out
-
-
 def test_members_that_an_event_stopped_have_not_failed():
     for status, failed in (([16, 17], False), ([1, 0], False), ([1, 16], False), ([1, 3], True)):
         assert all_failed(SimpleNamespace(status=np.array(status))) == failed

@@ -17,8 +17,6 @@ import lgvi_warp as lw
 from lgvi_warp import cli
 from lgvi_warp.calls import predict as prediction
 from lgvi_warp.cli import arguments, command, output, signals
-from lgvi_warp.common.phases import Phases
-from lgvi_warp.studies import packet_width as tuning
 from lgvi_warp.studies.sensitivity.indices import Indices, MorrisEffects, SobolIndices
 from lgvi_warp.studies.stability.grid import Line
 from lgvi_warp.studies.stability.map import StabilityMap
@@ -333,19 +331,7 @@ def test_a_refused_verb_prints_no_document(capsys):
     assert capsys.readouterr().out == ""
 
 
-def test_documents_of_the_machine(tuned_widths, capsys):
-    assert document(["info"], capsys, peak_of=lambda dtype: 1e9)["peak"] == {"float64": 1e9, "float32": 1e9}
-    readings = [tuning.Reading("plain float64", {8: 2.0, 16: 1.5}, 8, 16)]
-    kept = document(["calibrate"], capsys, measure=lambda: readings)["kernels"]["plain float64"]
-    assert kept == {"ns": {"8": 2.0, "16": 1.5}, "table": 8, "best": 16}
-    record = json.dumps({"method": "psi_s", "ns_per_vehicle_step": 9.0})
-    assert len(document(["bench"], capsys, measure=lambda members, steps: [record, record])["readings"]) == 2
-
-
-def test_documents_of_kernels_and_predictions(capsys):
-    compiled = lambda plans, workers: ((plan, Phases(0.1, 0.0, 0.2)) for plan in plans)  # noqa: E731
-    content = document(["warm", PAPER, "--methods", "psi_s,rk4"], capsys, compile_plans=compiled)
-    assert [kernel["method"] for kernel in content["kernels"]] == ["psi_s", "rk4"]
+def test_the_document_of_a_prediction(capsys):
     study = Study(prediction.Prediction(5, 4, 3, 2, 0.1, 0.2, 0.3, 0.4, 5, 6, None, 7))
     assert document(["plan", PAPER], capsys, study=study)["seconds"] == 0.2 + 0.4
     assert main(["predict", PAPER, "-q"], study=study) == 0

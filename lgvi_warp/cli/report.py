@@ -59,12 +59,10 @@ MOST_DRAWN = 30_000_000
 
 
 def shown_members(result: Any, *, limit: int = MOST_DRAWN, load: Part = None) -> Any:
-    """Select the members that the picture and the drift are made of.
+    """Select the members that the picture and the drift are made of; of a large store some, as `lw.select_members` does.
 
-    limit: Most numbers of their samples.
-    load: What takes members of a stored result into memory; default None, that of the store.
-    Returns: The result itself; members of a large one in a store, in memory, as `lw.select_members` chooses them; without
-        samples, the kept members, or None where there are none, or where a field of the motion was not saved.
+    limit: Most numbers of their samples; load: what takes members of a stored result into memory, default that of the store.
+    Returns: A result; without samples, the kept members; None without these, or where a field of the motion was not saved.
     """
     if not result.samples:
         return result.kept and shown_members(result.kept, limit=limit)

@@ -164,9 +164,8 @@ def rescued(result: Any, out: Path) -> str:
     # Keep an existing result of another run.
     path = next(path for path in (out / RESULT, out / PART) if path.name == PART or not path.exists())
     n, total = result.members, result.provenance["ensemble"]["members"]
-    members = (
-        f"the first {n:,} of {total:,} members are" if n < total else f"the run is finished: its {n:,} members are"
-    )
+    finished = f"the run is finished: its {n:,} members are"
+    members = f"the first {n:,} of {total:,} members are" if n < total else finished
     try:
         place_of(path, out)
         result.save(path)
@@ -183,30 +182,24 @@ def all_failed(result: Any) -> bool:
 
 
 def suggestion(scene: Any, chosen: argparse.Namespace, suggest: Part = None) -> Any:
-    """Choose method, step and precision for --error, and print them.
-
-    Returns: The suggestion; None without --error.
-    """
+    """Choose method, step and precision for --error, and print them; None without --error."""
     if chosen.error is None:
         if chosen.of is not None:
             raise SceneError([f"--of {chosen.of}: has no effect without --error; add --error 1e-3"])
         return None
     if not (isinstance(scene.run.keep, str) and scene.run.keep == "all") or scene.run.until is not None:
-        raise SceneError(
-            [f'--error {chosen.error:g}: is checked on samples of all members; give run.keep="all", no run.until']
-        )
+        fault = 'is checked on samples of all members; give run.keep="all", no run.until'
+        raise SceneError([f"--error {chosen.error:g}: {fault}"])
     for name in ("step", "dtype"):
         if getattr(chosen, name) is not None:
             text = f"--{name} {getattr(chosen, name)}: is what --error chooses"
             raise SceneError([f"{text}; leave out --{name} or --error"])
     from lgvi_warp.studies import suggest as study
 
-    methods = [chosen.method] if chosen.method else None
-    of = chosen.of or "position"
+    settings = {"methods": [chosen.method] if chosen.method else None, "threads": chosen.threads}
     with progress_bar(chosen.quiet) as progress:
-        suggested = (suggest or study.suggest)(
-            scene, chosen.error, of, methods=methods, threads=chosen.threads, progress=progress
-        )
+        choose = suggest or study.suggest
+        suggested = choose(scene, chosen.error, chosen.of or "position", progress=progress, **settings)
     say(chosen, str(suggested))
     return suggested
 

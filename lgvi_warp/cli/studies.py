@@ -55,10 +55,9 @@ def tradeoff(chosen: argparse.Namespace, *, study: Part = None, draw: Part = Non
     from lgvi_warp import plots
     from lgvi_warp.studies.tradeoff import tradeoff as measure
 
+    settings = {"of": chosen.of, "methods": chosen.methods, "seconds": chosen.seconds}
     with progress_bar(chosen.quiet) as progress:
-        measurements = (study or measure)(
-            scene, of=chosen.of, methods=chosen.methods, seconds=chosen.seconds, progress=progress
-        )
+        measurements = (study or measure)(scene, progress=progress, **settings)
     with progress_bar(chosen.quiet, "writing"):
         written = Written(measurements.save(out))
         written.draw(draw or plots.tradeoff, measurements, out / "tradeoff.png")
@@ -109,11 +108,8 @@ def sensitivity(chosen: argparse.Namespace, *, study: Part = None, draw: Part = 
     samples = {"sobol": 256, "morris": 64}[chosen.analysis] if chosen.samples is None else chosen.samples
     options: dict[str, Any] = {}
     if chosen.analysis == "sobol":
-        options = {
-            "second_order": not chosen.first_order,
-            "replicates": chosen.replicates,
-            "groups": _groups(chosen.group),
-        }
+        options = {"second_order": not chosen.first_order, "replicates": chosen.replicates}
+        options["groups"] = _groups(chosen.group)
     try:
         with progress_bar(chosen.quiet) as progress:
             indices: uq.Indices = (study or getattr(uq, chosen.analysis))(
@@ -168,9 +164,8 @@ def stability(chosen: argparse.Namespace, *, study: Part = None, draw: Part = No
     Returns: The exit code: 1 if a file failed, otherwise 0. Raises Ended: interrupted after a map was finished.
     """
     if chosen.grid is not None and (chosen.x is not None or chosen.y is not None):
-        raise SceneError(
-            [f"--grid {chosen.grid}: names the same axes as --x and --y; leave out --grid, or both of them"]
-        )
+        fault = "names the same axes as --x and --y; leave out --grid, or both of them"
+        raise SceneError([f"--grid {chosen.grid}: {fault}"])
     scene = load_scene(chosen)
     # Seed of the random directions, the only setting of the scene's ensemble that is used here.
     seed = scene.ensemble_settings.seed if scene.ensemble_settings else 0

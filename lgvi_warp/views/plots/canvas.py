@@ -130,7 +130,7 @@ def wrapped(text: str, figure: Any, share: float = 1.0) -> str:
     return "\n".join(textwrap.wrap(text, int(share * 72.0 * width / (0.6 * text_size(figure)))))
 
 
-def wrapped_lines(lines: Iterable[str], figure: Any) -> str:
+def wrap_each(lines: Iterable[str], figure: Any) -> str:
     """Break each of several lines into as many as a figure has room for."""
     return "\n".join(wrapped(line, figure) for line in lines)
 

@@ -27,7 +27,7 @@ from lgvi_warp.views.plots.canvas import (
     point_down,
     shade,
     style,
-    wrapped_lines,
+    wrap_each,
 )
 from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.read import (
@@ -95,7 +95,7 @@ def fan(result: Result, of: Any = "depth", *, ax: Any = None, path: FilePath | N
             if is_depth(meaning):
                 point_down(axes, floors(result))
         if ax is None:
-            axes.set_title(wrapped_lines((title(result), *notes), axes.figure))
+            axes.set_title(wrap_each((title(result), *notes), axes.figure))
         if axes.get_legend_handles_labels()[0]:
             legend_below(axes, ncols=4, title=text)
     return axes

@@ -16,7 +16,7 @@ from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.views.choice import AT_ONCE
 from lgvi_warp.views.fleet import members_of_run, title
-from lgvi_warp.views.plots.canvas import legend_below, line_marker, panel, panels, style, wrapped, wrapped_lines
+from lgvi_warp.views.plots.canvas import legend_below, line_marker, panel, panels, style, wrap_each, wrapped
 from lgvi_warp.views.plots.ends import draw_outcomes
 from lgvi_warp.views.plots.estimates import statistics
 from lgvi_warp.views.plots.fans import draw_fan, notes_on, text_of
@@ -79,7 +79,7 @@ def summary(result: Result, *, figure: Any = None, path: FilePath | None = None)
         for axes, draw in zip(grid.flat, drawings, strict=False):
             lines += draw(axes)
         figure = grid[0, 0].figure
-        figure.suptitle(wrapped_lines(dict.fromkeys(lines), figure))
+        figure.suptitle(wrap_each(dict.fromkeys(lines), figure))
     return grid.ravel()[: len(drawings)]
 
 

@@ -12,16 +12,7 @@ import numpy as np
 from lgvi_warp.common.arguments import listed, whole_number
 from lgvi_warp.common.errors import refusal
 from lgvi_warp.common.status import Status, under_way
-from lgvi_warp.views.plots.canvas import (
-    COLORS,
-    STYLES,
-    legend_below,
-    mark,
-    outcome_style,
-    panel,
-    point_down,
-    wrapped_lines,
-)
+from lgvi_warp.views.plots.canvas import COLORS, STYLES, legend_below, mark, outcome_style, panel, point_down, wrap_each
 from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.read import quantity_of, selected, values_of, with_samples
 from lgvi_warp.views.plots.words import HINT, floors, is_depth, label_of, some_of
@@ -153,7 +144,7 @@ def _titled(
 
 def _title(axes: Any, text: str, result: Result) -> str:
     """A title, with the hint that start and end alone were kept where that is so."""
-    return wrapped_lines((text, *([HINT] if len(result.time) < 3 else [])), axes.figure)
+    return wrap_each((text, *([HINT] if len(result.time) < 3 else [])), axes.figure)
 
 
 def _lines(axes: Any, some: Result, x: np.ndarray, y: np.ndarray, start: bool = False) -> None:

@@ -36,9 +36,8 @@ from tests.conftest import ROOT
 from tests.support.swept import swept
 from tests.unit.cli.test_terminal import morris, region, sobol
 from tests.unit.statistics.test_statistics import gathered
-from tests.unit.views.test_cost_pictures import RUNS, TERMS
 from tests.unit.views.test_recording import fleet
-from tests.views.test_plots import margins_of, of_cells, of_factors, of_methods
+from tests.views.test_plots import of_cells, of_methods, of_studies
 
 FILE = Path(__file__).parents[1] / "data" / "pictures.json"
 ROUND_OFF = 1e-6
@@ -181,20 +180,14 @@ def pictures():
     found["drift"] = lw.plots.drift, (fleet(9, scene=lw.Scene(lw.Scene.named("sphere").vehicle)),)
     found["summary of members kept"] = lw.plots.summary, (followed(),)
     found["statistics"] = lw.plots.statistics, (followed(),)
-    found["margins"] = lw.plots.margins, (margins_of([True, True, True, True, False]),)
     found["one vehicle"] = lw.plots.summary, (fleet(1, 60),)
     found["compare"] = lw.plots.compare, ({"a": result, "b": fleet(9, 31, 2)}, "speed")
-    found["tradeoff"] = lw.plots.tradeoff, (of_methods(),)
-    found["stability"] = lw.plots.stability, (of_cells(),)
-    found["sensitivity"] = lw.plots.sensitivity, (of_factors(),)
-    found["scaling"] = lw.plots.scaling, (RUNS,)
-    found["term cost"] = lw.plots.term_cost, (TERMS,)
     for statistic in STATISTICS[:3]:
         estimates = Estimates([estimated(statistic, result)])
         of = "velocity[0]" if statistic.type == "mean" else "depth"
         bare = dataclasses.replace(result, samples={}, statistics=estimates)
         found[f"fan of {statistic.type}"] = lw.plots.fan, (bare, of)
-    return found | sweeps()
+    return found | of_studies() | sweeps()
 
 
 def sweeps():
@@ -255,9 +248,8 @@ RECORDINGS = {
     "one vehicle": lambda: fleet(1, 12),
     "two runs": lambda: {"a": fleet(9, 7), "b": fleet(12, 7, seed=2)},
 }
-PICTURES = (*OF_A_RUN, "drift", "summary of members kept", "statistics", "margins", "fan of the energy", "one vehicle",
-            "compare", "tradeoff", "stability", "sensitivity", "scaling", "term cost", "fan of quantiles", "fan of extremes",
-            "fan of mean", *sweeps())  # fmt: skip
+PICTURES = (*OF_A_RUN, "drift", "summary of members kept", "statistics", "fan of the energy", "one vehicle", "compare",
+            "fan of quantiles", "fan of extremes", "fan of mean", *of_studies(), *sweeps())  # fmt: skip
 
 
 PROVENANCE = {

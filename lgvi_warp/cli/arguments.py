@@ -57,11 +57,7 @@ DEFAULTS = {"quiet": False, "verbose": False, "json": False, "color": "auto"}
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose errors suggest the nearest name.
-
-    Attributes:
-        verbs: parser of each verb.
-    """
+    """A parser whose errors suggest the nearest name; verbs: the parser of each verb."""
 
     verbs: Mapping[str, Parser] = {}
 
@@ -74,10 +70,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def parsed(arguments: Sequence[str] | None = None) -> argparse.Namespace:
-    """Read the command's arguments; a fault, or a help that was asked for, ends the process.
-
-    arguments: The arguments; default None, those of the process.
-    """
+    """Read the command's arguments, by default the process's; a fault, or a help that was asked for, ends the process."""
     top = parser()
     chosen, unknown = top.parse_known_args(arguments)
     if unknown:

@@ -81,7 +81,7 @@ def left(chosen: argparse.Namespace) -> str:
         if not count:
             return "nothing was written"
         return (
-            f"{WRITTEN.last} was written" if count == 1 else f"{count} files were written, the last one {WRITTEN.last}"
+            f"{count} files were written, the last one {WRITTEN.last}" if count > 1 else f"{WRITTEN.last} was written"
         )
     return f"finished blocks are kept: go on with lgvi-warp resume {store}"
 

@@ -35,14 +35,8 @@ def values() -> dict[str, tuple[str, ...]]:
     from lgvi_warp.vehicles.fossen import vehicle_names
 
     # Compositions stand without the method that they are of: parentheses mean something to shells.
-    methods = (
-        *method.PROGRAMS,
-        *method.TWO_PART,
-        *method.GAUSS,
-        *method.RUNGE_KUTTA,
-        *method.COMPOSITIONS,
-        *method.HALVES,
-    )
+    methods = (*method.PROGRAMS, *method.TWO_PART, *method.GAUSS, *method.RUNGE_KUTTA, *method.COMPOSITIONS,
+               *method.HALVES)  # fmt: skip
     return {
         "--method": methods, "--methods": methods, "--dtype": tuple(DTYPES), "--dtypes": tuple(DTYPES),
         "--store-dtype": ("float32", "float64"), "--solver": method.SOLVERS, "--iterations": ("auto",), "--checks": CHECKS,
@@ -150,9 +144,8 @@ def zsh(known: list[CompletedVerb]) -> str:
 
 def fish(known: list[CompletedVerb]) -> str:
     """Write the script for fish."""
-    lines = [
-        f"complete -c lgvi-warp -n __fish_use_subcommand -f -a {verb.name} -d {_quoted(verb.text)}" for verb in known
-    ]
+    head = "complete -c lgvi-warp -n __fish_use_subcommand -f -a"
+    lines = [f"{head} {verb.name} -d {_quoted(verb.text)}" for verb in known]
     for verb in known:
         head = f"complete -c lgvi-warp -n '__fish_seen_subcommand_from {verb.name}'"
         if verb.words:

@@ -11,10 +11,7 @@ from lgvi_warp.cli.writing import Written
 
 
 def of_settings(provenance: dict[str, Any]) -> dict[str, Any]:
-    """How a run was computed.
-
-    Returns: Method, precision, step, number of steps and end of the run [s], seed, versions and machine.
-    """
+    """How a run was computed: method, precision, step, number of steps and end of the run [s], seed, versions and machine."""
     names = ("dtype", "step", "steps", "versions", "machine")
     method, duration = provenance["method"], provenance["step"] * provenance["steps"]
     content = {"method": method["name"], "chosen": method.get("chosen"), "duration": duration}
@@ -22,10 +19,7 @@ def of_settings(provenance: dict[str, Any]) -> dict[str, Any]:
 
 
 def of_result(result: Any) -> dict[str, Any]:
-    """What became of the members of a run.
-
-    Returns: Members by outcome and by warning, messages, statistics at the end of the run, and how it was computed.
-    """
+    """What became of the members of a run, statistics at its end, and how it was computed."""
     divided = result.substeps > 0
     return {
         "members": result.members,
@@ -50,10 +44,9 @@ def of_statistics(estimates: Any) -> list[dict[str, Any]]:
 
 
 def of_energy(drawn: Any, members: int) -> dict[str, Any] | None:
-    """The drift of what the motion conserves, and the change of energy.
+    """Largest changes over some members of what the motion may conserve, what of it is conserved, and what does work.
 
-    drawn: The members that it is taken of, as a result; None for none.
-    Returns: Largest change of each quantity over members and samples, the quantities that are conserved, and what does work.
+    drawn: These members, as a result; None for none.
     """
     from lgvi_warp.physics import energy as invariants
 
@@ -70,11 +63,7 @@ def of_energy(drawn: Any, members: int) -> dict[str, Any] | None:
 
 
 def of_run(result: Any, drawn: Any, written: Written, faults: Sequence[str], seconds: float) -> dict[str, Any]:
-    """A run, as the verbs run and resume print it.
-
-    drawn: The members of the pictures, as a result; None for none.
-    seconds: Time that the verb took [s].
-    """
+    """A run, as the verbs run and resume print it, which took so many seconds; drawn: as of `of_energy`."""
     rate = result.members * result.provenance["steps"] / result.run_seconds if result.run_seconds else None
     return of_result(result) | {
         "energy": of_energy(drawn, result.members) if result.samples else None,
@@ -99,7 +88,7 @@ def of_prediction(prediction: Any) -> dict[str, Any]:
 
 
 def of_store(contents: dict[str, Any]) -> dict[str, Any]:
-    """What a store holds."""
+    """What a store holds, and how its run was computed."""
     return {name: value for name, value in contents.items() if name != "provenance"} | {
         "settings": of_settings(contents["provenance"])
     }

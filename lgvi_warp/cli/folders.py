@@ -31,7 +31,7 @@ class Content:
     path: Path
 
     def load(self) -> Any:
-        """Read the numbers."""
+        """Read the numbers of a run or of a study."""
         if self.kind == "store":
             from lgvi_warp.store.open import open_run
 
@@ -92,16 +92,8 @@ def info_of_folder(chosen: argparse.Namespace, describe: Part = None) -> int:
     parts = [_part(content, chosen, describe) for content in contents(chosen.dir)]
     others = [path for path in sorted(chosen.dir.glob("*")) if path.suffix in OTHERS and chosen.dir.suffix != ".zarr"]
     undamaged = all(document.get("complete", True) for document, _ in parts)
-    tell(
-        chosen,
-        lambda: {
-            "path": chosen.dir,
-            "complete": undamaged,
-            "holds": [document for document, _ in parts],
-            "files": others,
-        },
-        lambda: "\n".join([*(text() for _, text in parts), *map(file_line, others)]),
-    )
+    document = {"path": chosen.dir, "complete": undamaged, "holds": [part for part, _ in parts], "files": others}
+    tell(chosen, lambda: document, lambda: "\n".join([*(text() for _, text in parts), *map(file_line, others)]))
     return 0 if undamaged else 1
 
 
@@ -119,10 +111,8 @@ def _part(content: Content, chosen: argparse.Namespace, describe: Part) -> tuple
             text = file_text(inside(content.path.parent, "summary.md"), "summary").rstrip()
             return head | {"content": numbers}, lambda: text
         if content.kind == "result":
-            document, text = (
-                documents.of_result(numbers),
-                summary(numbers, shown_members(numbers), [], verbose=chosen.verbose),
-            )
+            document = documents.of_result(numbers)
+            text = summary(numbers, shown_members(numbers), [], verbose=chosen.verbose)
         else:
             document, text = {"content": numbers.to_dict()}, text_of(content.kind, numbers)
     report = f"{file_line(content.path)}\n{text}"

@@ -7,6 +7,7 @@ import argparse
 import inspect
 import json
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -72,9 +73,8 @@ COLUMN = 41
 def new_arguments(verb: Any) -> None:
     """Add the arguments of the verb new."""
     verb.add_argument("scene", metavar="SCENE", type=Path, help="the file, which must not be there yet")
-    verb.add_argument(
-        "--vehicle", metavar="NAME", default="remus_100", help="as list vehicles has it (default remus_100)"
-    )
+    verb.add_argument("--vehicle", metavar="NAME", default="remus_100",
+                      help="as list vehicles has it (default remus_100)")  # fmt: skip
 
 
 @as_verb("new", "write a scene file to begin with, with comments", new_arguments)
@@ -120,14 +120,11 @@ def _methods() -> dict[str, str]:
     """Method -> its order and kind."""
     from lgvi_warp.methods import method as methods
 
-    kinds = dict.fromkeys(methods.PROGRAMS, "splitting") | dict.fromkeys(
-        methods.TWO_PART, "two parts, for weight alone"
-    )
-    kinds |= dict.fromkeys(methods.GAUSS, "Gauss collocation") | dict.fromkeys(methods.RUNGE_KUTTA, "explicit")
-    for name, (_, stages) in methods.COMPOSITIONS.items():
-        kinds[f"{name}(psi_x)"] = (
-            f"composition of {len(stages)} stages, of psi_x or another symmetric method of order 2"
-        )
+    tables: dict[str, Iterable[str]] = {"splitting": methods.PROGRAMS, "two parts, for weight alone": methods.TWO_PART,
+              "Gauss collocation": methods.GAUSS, "explicit": methods.RUNGE_KUTTA}  # fmt: skip
+    kinds = {name: kind for kind, names in tables.items() for name in names}
+    kinds |= {f"{name}(psi_x)": f"composition of {len(stages)} stages, of psi_x or another symmetric method of order 2"
+              for name, (_, stages) in methods.COMPOSITIONS.items()}  # fmt: skip
     kinds |= {f"{name}(psi_x)": "composition of the halves of psi_x or another such method" for name in methods.HALVES}
     return {name: f"order {methods.Method(name).order}, {kind}" for name, kind in kinds.items()}
 

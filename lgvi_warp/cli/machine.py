@@ -53,8 +53,7 @@ def info(chosen: argparse.Namespace, *, peak_of: Callable[[str], float] = fma_pe
 def machine_lines(document: dict[str, Any], quota: float | None, cores: int, physical: int | None) -> Iterator[str]:
     """The document of info as lines of text, with what a container leaves of the machine.
 
-    quota: CPU time of the container [CPUs]; None without one.
-    physical: Memory of the machine [bytes]; None if unknown.
+    quota: CPU time of the container [CPUs]; None without one. physical: memory of the machine [bytes]; None if unknown.
     """
     described, memory = document["machine"], document["memory"]
     of_quota = "" if quota is None or quota >= cores else f" (a quota of {quota:g} CPUs; {cores} cores)"

@@ -60,10 +60,7 @@ def tell(chosen: argparse.Namespace, document: Callable[[], dict[str, Any]], tex
 
 
 def as_json(value: Any) -> Any:
-    """Turn a value into what JSON holds.
-
-    Returns: The same in plain types; numbers that are not finite are None.
-    """
+    """Turn a value into what JSON holds: the same in plain types, None for numbers that are not finite."""
     if isinstance(value, dict):
         return {str(key): as_json(item) for key, item in value.items()}
     if isinstance(value, Path):
@@ -76,7 +73,7 @@ def as_json(value: Any) -> Any:
 
 
 def print_faults(faults: Iterable[str]) -> list[str]:
-    """Print faults on stderr."""
+    """Print faults on stderr, a line each; return them as a list."""
     faults = list(faults)
     name = painted("lgvi-warp:", RED) if colored(sys.stderr) else "lgvi-warp:"
     for fault in faults:

@@ -26,23 +26,9 @@ def plot_arguments(verb: Any) -> None:
 
 @as_verb("plot", "draw the pictures of a folder again, from the numbers in it", plot_arguments)
 def plot(chosen: argparse.Namespace) -> int:
-    """Run the verb plot: draw the pictures of a run or of studies from their numbers.
-
-    Args:
-        chosen: The command's parsed arguments.
-
-    Returns:
-        The exit code: 1 if a picture failed, otherwise 0.
-
-    Raises:
-        SceneError: The folder holds no numbers, or damaged ones.
-        ImportError: Matplotlib or rerun-sdk is not installed (extra: viz).
-        OSError: The folder for the pictures cannot be written.
-    """
-    held = contents(chosen.dir)
-    home = chosen.dir.parent if chosen.dir.suffix == ".zarr" else chosen.dir
-    out = writable(chosen.out or home)
-    written = Written()
+    """Run the verb plot: draw the pictures of a run or of studies from their numbers."""
+    held, written = contents(chosen.dir), Written()
+    out = writable(chosen.out or (chosen.dir.parent if chosen.dir.suffix == ".zarr" else chosen.dir))
     with progress_bar(chosen.quiet, "drawing"):
         for content in held:
             _draw(content, written, out)
@@ -63,9 +49,8 @@ def _draw(content: Content, written: Written, out: Path) -> None:
                 written.take(out / name, partial(draw, out / name))
         return
     if content.kind == "sweep":
-        written.empty.append(
-            f"{content.path}: its pictures are drawn again by the same lgvi-warp sweep, which runs nothing twice"
-        )
+        remedy = "its pictures are drawn again by the same lgvi-warp sweep, which runs nothing twice"
+        written.empty.append(f"{content.path}: {remedy}")
         return
     from lgvi_warp import plots
 

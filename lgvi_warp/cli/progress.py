@@ -14,15 +14,9 @@ from lgvi_warp.common.progress import Progress
 def progress_bar(
     quiet: bool, phase: str = "compiling", *, begin: Callable[..., Progress] | None = None
 ) -> Iterator[Progress | None]:
-    """Show progress on stderr inside the `with` block, and clear its line afterwards.
+    """Show progress on stderr inside the `with` block, unless quiet, and clear its line afterwards.
 
-    Args:
-        quiet: Whether to show nothing.
-        phase: What is done first; default "compiling".
-        begin: What makes the progress of a stream and a phase; default None, `Progress`.
-
-    Yields:
-        The progress to call with fractions; None if quiet.
+    begin: What makes the progress of a stream and a phase; default None, `Progress`.
     """
     progress = None if quiet else (begin or Progress)(sys.stderr, phase)
     try:
@@ -33,9 +27,5 @@ def progress_bar(
 
 
 def part_of(progress: Progress | None, i: int, n: int) -> Callable[[float], None] | None:
-    """Turn the progress of one part into that of the whole.
-
-    progress: Progress of the whole; None for none.
-    Returns: A function of the part's fraction; None without a progress.
-    """
+    """Turn the progress of the whole, if there is one, into that of its i-th part of n."""
     return progress and (lambda part: progress((i + part) / n))

@@ -23,20 +23,13 @@ from lgvi_warp.common.write_lock import write_lock
 
 def report(result: Any, out: Path, chosen: argparse.Namespace, begun: float, failures: Sequence[str] = (),
            viewer: str | None = None, *, writer: Part = None, store: Part = None) -> list[str]:  # fmt: skip
-    """Write the files of a finished run and print its summary.
+    """Write the files of a finished run into a folder and print its summary.
 
-    Args:
-        result: The run's result.
-        out: Folder of the files.
-        chosen: The command's parsed arguments.
-        begun: When the verb began [s], by time.perf_counter.
-        failures: Texts on what failed before; default none.
-        viewer: Address of a viewer that gets the recording too; default None.
-        writer: What writes the files; default None, `write`.
-        store: What opens the folder of a store; default None, `Folder`.
-
-    Returns:
-        These, and one text for each file that could not be written.
+    begun: When the verb began [s], by time.perf_counter.
+    failures: Texts on what failed before; default none.
+    viewer: Address of a viewer that gets the recording too; default None.
+    writer, store: What writes the files, and opens the folder of a store; default None, `write` and `Folder`.
+    Returns: The failures, and one text for each file that could not be written.
     """
     from lgvi_warp.store.folder import Folder
 
@@ -66,12 +59,10 @@ MOST_DRAWN = 30_000_000
 
 
 def shown_members(result: Any, *, limit: int = MOST_DRAWN, load: Part = None) -> Any:
-    """Select the members that the picture and the drift are made of.
+    """Select the members that the picture and the drift are made of; of a large store some, as `lw.select_members` does.
 
-    limit: Most numbers of their samples.
-    load: What takes members of a stored result into memory; default None, that of the store.
-    Returns: The result itself; members of a large one in a store, in memory, as `lw.select_members` chooses them; without
-        samples, the kept members, or None where there are none, or where a field of the motion was not saved.
+    limit: Most numbers of their samples; load: what takes members of a stored result into memory, default that of the store.
+    Returns: A result; without samples, the kept members; None without these, or where a field of the motion was not saved.
     """
     if not result.samples:
         return result.kept and shown_members(result.kept, limit=limit)
@@ -98,11 +89,7 @@ def unsaved(result: Any) -> list[str]:
 
 
 def write(result: Any, drawn: Any, out: Path, viewer: str | None = None) -> Written:
-    """Write result.npz, fleet.png, fleet.rrd and statistics.png side by side, as far as the run has them.
-
-    drawn: The members of the picture, from `shown_members`; None for neither picture nor recording.
-    viewer: Address of a viewer that gets the recording too; default None.
-    """
+    """Write result.npz, fleet.png, fleet.rrd and statistics.png side by side, as far as the run has them: see `pictures`."""
     written = Written([result.store] if result.store else [])
     writers: dict[str, Callable[[Path], Path]] = {} if result.store else {"result.npz": result.save}
     writers |= pictures(result, drawn, viewer)
@@ -142,10 +129,7 @@ def pictures(result: Any, drawn: Any, viewer: str | None = None) -> dict[str, Ca
 
     drawings: dict[str, Callable[[Path], Path]] = {}
     if drawn is not None:
-        drawings |= {
-            "fleet.png": partial(_draw, plots.summary, drawn),
-            "fleet.rrd": partial(_record, result, viewer),
-        }
+        drawings |= {"fleet.png": partial(_draw, plots.summary, drawn), "fleet.rrd": partial(_record, result, viewer)}
     if drawable(result):
         drawings["statistics.png"] = partial(_draw, plots.statistics, result)
     return drawings
@@ -156,16 +140,9 @@ def summary(
 ) -> str:
     """Summarise a run in a few lines.
 
-    Args:
-        result: The run's result.
-        drawn: The members that the drift is taken of, from `shown_members`.
-        files: The files that were written.
-        seconds: Time that the verb took [s]; default 0, for a run that was not computed now.
-        verbose: Whether to say how it was run; default False.
-        limit: Most numbers of samples that are looked through.
-
-    Returns:
-        The lines as one text.
+    drawn: The members that the drift is taken of, from `shown_members`.
+    seconds: Time that the verb took [s]; default 0, for a run that was not computed now.
+    limit: Most numbers of samples that are looked through.
     """
     from lgvi_warp.common.status import Status
     from lgvi_warp.results.outcomes import outcome_text, outcomes
@@ -195,10 +172,8 @@ def summary(
         lines.append(f"unmet       {short:,} members asked at some sample for more than their actuators deliver")
     if result.substeps.any():
         divided = result.substeps > 0
-        lines.append(
-            f"substeps    {int(result.substeps.sum()):,} steps of {int(divided.sum()):,} members were divided: those paths "
-            "are not symplectic"
-        )
+        lines.append(f"substeps    {int(result.substeps.sum()):,} steps of {int(divided.sum()):,} members were divided: "
+                     "those paths are not symplectic")  # fmt: skip
     if result.statistics:
         lines.append(f"statistics  at {result.time[-1]:g} s, with intervals")
         lines += [f"  {line}" for line in table(result.statistics)]
@@ -288,10 +263,8 @@ def _speed(result: Any, seconds: float) -> list[str]:
 def members_line(members: int, provenance: dict[str, Any]) -> str:
     """Say how many members were run, and how."""
     name, chosen = provenance["method"]["name"], provenance["method"].get("chosen")
-    line = (
-        f"members     {members:,}, {name}, {provenance['dtype']}, step {provenance['step']:g} s, "
-        f"{provenance['steps']:,} steps"
-    )
+    step = f"step {provenance['step']:g} s, {provenance['steps']:,} steps"
+    line = f"members     {members:,}, {name}, {provenance['dtype']}, {step}"
     return f"{line}\nmethod      {name}, chosen {chosen}" if chosen else line
 
 
@@ -301,9 +274,8 @@ def controller_lines(scene: Mapping[str, Any]) -> list[str]:
     if not section:
         return []
     delay = f", {section['delay']:g} s until they act" if section.get("delay") else ""
-    lists = {
-        word: section[word] for word in ("sensors", "guidance", "laws", "allocation", "faults") if section.get(word)
-    }
+    words = ("sensors", "guidance", "laws", "allocation", "faults")
+    lists = {word: section[word] for word in words if section.get(word)}
     texts = [f"{word} {', '.join(part.get('name') or part['type'] for part in parts)}" for word, parts in lists.items()]
     return [f"controller  acts every {section['period']:g} s{delay}; {'; '.join(texts)}"]
 

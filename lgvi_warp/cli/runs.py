@@ -29,22 +29,18 @@ RESULT, PART = "result.npz", "result_part.npz"
 def run_arguments(verb: Any) -> None:
     """Add the arguments of the verb run."""
     add_shared(verb, "scene")
-    what = verb.add_argument_group("what runs")
-    add_shared(what, "--duration --members --seed --set")
+    fleet = verb.add_argument_group("what runs")
+    add_shared(fleet, "--duration --members --seed --set")
     _how(verb.add_argument_group("method, step and precision"))
     _solves(verb.add_argument_group("solves and checks"))
     files = verb.add_argument_group("files")
     add_shared(files, "--out --keep", out=FOLDER.format("runs/NAME of the scene"))
     _stored(files)
     live = verb.add_argument_group("a look while it runs")
-    live.add_argument(
-        "--live", action="store_true", help="show members in the rerun viewer as they are done, then the whole run"
-    )
-    live.add_argument(
-        "--viewer",
-        metavar="ADDRESS",
-        help="with --live: a viewer that is open (default: one on this machine, or a new one)",
-    )
+    live.add_argument("--live", action="store_true",
+                      help="show members in the rerun viewer as they are done, then the whole run")  # fmt: skip
+    live.add_argument("--viewer", metavar="ADDRESS",
+                      help="with --live: a viewer that is open (default: one on this machine, or a new one)")  # fmt: skip
     machine = verb.add_argument_group("the machine")
     add_shared(machine, EXECUTOR, threads=WORKERS)
     machine.add_argument("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
@@ -59,12 +55,8 @@ def _how(group: Any) -> None:
         dtype="float64, float32, or float32_compensated: sums of two float32",
     )
     add = group.add_argument
-    add(
-        "--error",
-        metavar="E",
-        type=float,
-        help="choose the cheapest method, step and precision that keep this error, and check it after the run",
-    )
+    add("--error", metavar="E", type=float,
+        help="choose the cheapest method, step and precision that keep this error, and check it after the run")  # fmt: skip
     add("--of", help=f"what --error is of (default: position [m]); {OF}")
     add("--rtol", metavar="R", help="with --atol, rk5 and rk8 choose their own steps: relative error of each")
     add("--atol", metavar="A", help="with --rtol: absolute error of each step")
@@ -88,16 +80,12 @@ def _stored(group: Any) -> None:
         store="result.npz when the run ends (default), or run.zarr block by block, which resume can go on with",
         store_dtype="float32: samples of a float64 run take half the room in the store",
     )
-    group.add_argument(
-        "--blocks",
-        metavar="A:B",
-        help="with --store zarr: run only these blocks, to be merged later (as many of them as there are)",
-    )
+    group.add_argument("--blocks", metavar="A:B", help="with --store zarr: run only these blocks, to be merged later "
+                       "(as many of them as there are)")  # fmt: skip
     existing = group.add_mutually_exclusive_group()
     add_shared(existing, "--overwrite")
-    existing.add_argument(
-        "--resume", action="store_true", help="go on with a run.zarr that is there, if it is this run"
-    )
+    existing.add_argument("--resume", action="store_true",
+                          help="go on with a run.zarr that is there, if it is this run")  # fmt: skip
 
 
 @as_verb("run", "run a scene's ensemble: result.npz, fleet.png, fleet.rrd and a summary", run_arguments)
@@ -143,10 +131,7 @@ def run(
 
 
 def live_address(scene: Any, chosen: argparse.Namespace, viewer: Part = None) -> str | None:
-    """Find the viewer of --live, before anything runs.
-
-    Returns: Its address; None without --live.
-    """
+    """Find the address of the viewer of --live, before anything runs; None without --live."""
     if not chosen.live:
         if chosen.viewer is not None:
             raise SceneError([f"--viewer {chosen.viewer}: has no effect without --live; add --live"])
@@ -163,11 +148,7 @@ def live_address(scene: Any, chosen: argparse.Namespace, viewer: Part = None) ->
 
 
 def live_view(scene: Any, address: str | None, live: Part = None) -> Callable[[Any], None] | None:
-    """Open the recording of --live.
-
-    address: Address of the viewer; None without --live.
-    Returns: What takes the members that are done; None without --live.
-    """
+    """Open the recording of --live at the address of a viewer, and give what takes the members that are done."""
     if address is None:
         return None
     from lgvi_warp.views.recording.live import live as view
@@ -183,9 +164,8 @@ def rescued(result: Any, out: Path) -> str:
     # Keep an existing result of another run.
     path = next(path for path in (out / RESULT, out / PART) if path.name == PART or not path.exists())
     n, total = result.members, result.provenance["ensemble"]["members"]
-    members = (
-        f"the first {n:,} of {total:,} members are" if n < total else f"the run is finished: its {n:,} members are"
-    )
+    finished = f"the run is finished: its {n:,} members are"
+    members = f"the first {n:,} of {total:,} members are" if n < total else finished
     try:
         place_of(path, out)
         result.save(path)
@@ -202,30 +182,24 @@ def all_failed(result: Any) -> bool:
 
 
 def suggestion(scene: Any, chosen: argparse.Namespace, suggest: Part = None) -> Any:
-    """Choose method, step and precision for --error, and print them.
-
-    Returns: The suggestion; None without --error.
-    """
+    """Choose method, step and precision for --error, and print them; None without --error."""
     if chosen.error is None:
         if chosen.of is not None:
             raise SceneError([f"--of {chosen.of}: has no effect without --error; add --error 1e-3"])
         return None
     if not (isinstance(scene.run.keep, str) and scene.run.keep == "all") or scene.run.until is not None:
-        raise SceneError(
-            [f'--error {chosen.error:g}: is checked on samples of all members; give run.keep="all", no run.until']
-        )
+        fault = 'is checked on samples of all members; give run.keep="all", no run.until'
+        raise SceneError([f"--error {chosen.error:g}: {fault}"])
     for name in ("step", "dtype"):
         if getattr(chosen, name) is not None:
             text = f"--{name} {getattr(chosen, name)}: is what --error chooses"
             raise SceneError([f"{text}; leave out --{name} or --error"])
     from lgvi_warp.studies import suggest as study
 
-    methods = [chosen.method] if chosen.method else None
-    of = chosen.of or "position"
+    settings = {"methods": [chosen.method] if chosen.method else None, "threads": chosen.threads}
     with progress_bar(chosen.quiet) as progress:
-        suggested = (suggest or study.suggest)(
-            scene, chosen.error, of, methods=methods, threads=chosen.threads, progress=progress
-        )
+        choose = suggest or study.suggest
+        suggested = choose(scene, chosen.error, chosen.of or "position", progress=progress, **settings)
     say(chosen, str(suggested))
     return suggested
 

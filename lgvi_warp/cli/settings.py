@@ -94,17 +94,13 @@ def writable(out: Path) -> Path:
     except FileExistsError:
         raise SceneError([f"--out {out}: is a file; give a folder"]) from None
     if not os.access(out, os.W_OK | os.X_OK):
-        raise PermissionError(
-            errno.EACCES, f"{os.strerror(errno.EACCES)}: choose a folder that can be written", str(out)
-        )
+        fault = f"{os.strerror(errno.EACCES)}: choose a folder that can be written"
+        raise PermissionError(errno.EACCES, fault, str(out))
     return out
 
 
 def store_settings(chosen: argparse.Namespace) -> Any:
-    """Read the store from the arguments.
-
-    Returns: A `Store`; None for a run in memory.
-    """
+    """Read the `Store` from the arguments; None for a run in memory."""
     if chosen.store == "npz":
         names = ("store_dtype", "blocks", "overwrite", "resume")
         options = [f"--{name.replace('_', '-')}" for name in names if getattr(chosen, name, None)]
@@ -118,15 +114,11 @@ def store_settings(chosen: argparse.Namespace) -> Any:
 
 
 def block_range(chosen: argparse.Namespace) -> range | None:
-    """Read the blocks to run from --blocks A:B.
-
-    Returns: The blocks from A to B - 1; None for all.
-    """
+    """Read the blocks to run, from A to B - 1, from --blocks A:B; None for all."""
     if chosen.blocks is None:
         return None
     first, colon, stop = chosen.blocks.partition(":")
     if not (colon and first.isdigit() and stop.isdigit()):
-        raise SceneError(
-            [f"--blocks {chosen.blocks}: is no range of blocks; write --blocks 0:100 for the first hundred"]
-        )
+        fault = "is no range of blocks; write --blocks 0:100 for the first hundred"
+        raise SceneError([f"--blocks {chosen.blocks}: {fault}"])
     return range(int(first), int(stop))

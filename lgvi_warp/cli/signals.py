@@ -27,10 +27,6 @@ class Signals:
 
     A thread listens for the second one, since the main thread may be in a long call of native code. Ignored signals stay
     ignored; previous handlers are restored at the end. Outside the main thread the context does nothing.
-
-    Attributes:
-        number: Number of the first signal heard; None without one.
-        said: Whether the end has been reported already.
     """
 
     def __init__(self, what_is_left: Callable[[], str], *, end: Callable[[Signals], None] | None = None):
@@ -115,10 +111,7 @@ class Signals:
 
 
 class Lasting:
-    """A stream that ignores a reader's disappearance: a run goes on without its terminal.
-
-    stream: The stream to write to; None for one that was closed before Python started.
-    """
+    """A stream that ignores a reader's disappearance, or is None from the start: a run goes on without its terminal."""
 
     # Whether texts are in colors: "auto", "always" or "never".
     color = "auto"

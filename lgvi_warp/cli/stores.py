@@ -46,9 +46,8 @@ def export_arguments(verb: Any) -> None:
     """Add the arguments of the verb export."""
     add_shared(verb, "dir")
     verb.add_argument("--to", required=True, help="netcdf or parquet")
-    verb.add_argument(
-        "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: beside the store)"
-    )
+    verb.add_argument("--out", metavar="FILE", type=Path,
+                      help="the file, replaced if it exists (default: beside the store)")  # fmt: skip
 
 
 @as_verb("export", "write a run as one NetCDF or Parquet file", export_arguments)
@@ -64,17 +63,15 @@ def export(chosen: argparse.Namespace, *, write: Part = None) -> int:
 
 def report_arguments(verb: Any) -> None:
     """Add the arguments of the verb report."""
-    verb.add_argument(
-        "dir", metavar="DIR", type=Path, help="folder that run, tradeoff, stability, sensitivity or sweep wrote"
-    )
-    verb.add_argument(
-        "--out", metavar="FILE", type=Path, help="the file, replaced if it exists (default: DIR/report.html)"
-    )
+    verb.add_argument("dir", metavar="DIR", type=Path,
+                      help="folder that run, tradeoff, stability, sensitivity or sweep wrote")  # fmt: skip
+    verb.add_argument("--out", metavar="FILE", type=Path,
+                      help="the file, replaced if it exists (default: DIR/report.html)")  # fmt: skip
     verb.add_argument("--open", action="store_true", help="show it in the browser")
 
 
 @as_verb("report", "write one HTML file about a run or studies: report.html", report_arguments)
-def report(chosen: argparse.Namespace, *, write: Part = None, look: Part = None) -> int:
+def report(chosen: argparse.Namespace, *, write: Part = None, browse: Part = None) -> int:
     """Run the verb report: write one HTML file about a run or a study."""
     import webbrowser
 
@@ -86,5 +83,5 @@ def report(chosen: argparse.Namespace, *, write: Part = None, look: Part = None)
         path = (write or write_report)(chosen.dir, chosen.out or chosen.dir / "report.html")
     tell(chosen, lambda: {"file": path, "bytes": path.stat().st_size}, lambda: file_line(path))
     if chosen.open:
-        (look or webbrowser.open)(path.resolve().as_uri())
+        (browse or webbrowser.open)(path.resolve().as_uri())
     return 0

@@ -55,10 +55,9 @@ def tradeoff(chosen: argparse.Namespace, *, study: Part = None, draw: Part = Non
     from lgvi_warp import plots
     from lgvi_warp.studies.tradeoff import tradeoff as measure
 
+    settings = {"of": chosen.of, "methods": chosen.methods, "seconds": chosen.seconds}
     with progress_bar(chosen.quiet) as progress:
-        measurements = (study or measure)(
-            scene, of=chosen.of, methods=chosen.methods, seconds=chosen.seconds, progress=progress
-        )
+        measurements = (study or measure)(scene, progress=progress, **settings)
     with progress_bar(chosen.quiet, "writing"):
         written = Written(measurements.save(out))
         written.draw(draw or plots.tradeoff, measurements, out / "tradeoff.png")
@@ -109,11 +108,8 @@ def sensitivity(chosen: argparse.Namespace, *, study: Part = None, draw: Part = 
     samples = {"sobol": 256, "morris": 64}[chosen.analysis] if chosen.samples is None else chosen.samples
     options: dict[str, Any] = {}
     if chosen.analysis == "sobol":
-        options = {
-            "second_order": not chosen.first_order,
-            "replicates": chosen.replicates,
-            "groups": _groups(chosen.group),
-        }
+        options = {"second_order": not chosen.first_order, "replicates": chosen.replicates}
+        options["groups"] = _groups(chosen.group)
     try:
         with progress_bar(chosen.quiet) as progress:
             indices: uq.Indices = (study or getattr(uq, chosen.analysis))(
@@ -168,9 +164,8 @@ def stability(chosen: argparse.Namespace, *, study: Part = None, draw: Part = No
     Returns: The exit code: 1 if a file failed, otherwise 0. Raises Ended: interrupted after a map was finished.
     """
     if chosen.grid is not None and (chosen.x is not None or chosen.y is not None):
-        raise SceneError(
-            [f"--grid {chosen.grid}: names the same axes as --x and --y; leave out --grid, or both of them"]
-        )
+        fault = "names the same axes as --x and --y; leave out --grid, or both of them"
+        raise SceneError([f"--grid {chosen.grid}: {fault}"])
     scene = load_scene(chosen)
     # Seed of the random directions, the only setting of the scene's ensemble that is used here.
     seed = scene.ensemble_settings.seed if scene.ensemble_settings else 0
@@ -259,17 +254,17 @@ def sweep(chosen: argparse.Namespace, *, study: Part = None, drawings: Part = No
     return 1 if all(compared.record(cell).refused for cell in compared.cells) else code
 
 
-def record_worst(found: Any, count: int, out: Path, written: Written, *, log: Part = None) -> None:
+def record_worst(compared: Any, count: int, out: Path, written: Written, *, log: Part = None) -> None:
     """Run the worst members again, those of each cell together, and write a recording of them."""
     from lgvi_warp.views.recording.rerun import record
 
     write = log or record
     members: dict[int, list[int]] = {}
-    for row in found.worst(count):
-        at = {name: row[name] for name in found.setup.axes}
-        members.setdefault(found.cell(row["case"], at).index, []).append(row["member"])
+    for row in compared.worst(count):
+        at = {name: row[name] for name in compared.setup.axes}
+        members.setdefault(compared.cell(row["case"], at).index, []).append(row["member"])
     for index, chosen in members.items():
-        cell = found.cells[index]
+        cell = compared.cells[index]
         path = out / f"worst_{index:04d}.rrd"
-        result = found.again(cell.case.name, sorted(chosen), cell.point)
+        result = compared.again(cell.case.name, sorted(chosen), cell.point)
         written.draw(lambda result, path: write(result, path) or path, result, path)

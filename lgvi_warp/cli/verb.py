@@ -55,13 +55,9 @@ COMMON: dict[tuple[str, ...], dict[str, Any]] = {
 
 @dataclass(frozen=True)
 class Verb:
-    """A verb: a function of its arguments that returns the exit code.
+    """A verb: a function of its arguments that returns the exit code, and what its help says in one line.
 
-    Attributes:
-        help: what it does, in one line.
-        arguments: adds its arguments to a parser.
-        reads: whether it writes no files of the user's.
-        aliases: other names of it.
+    arguments: Adds its arguments to a parser. reads: whether it writes no files of the user's. aliases: other names of it.
     """
 
     call: Callable[[argparse.Namespace], int]
@@ -72,7 +68,7 @@ class Verb:
     aliases: tuple[str, ...]
 
     def __call__(self, chosen: argparse.Namespace) -> int:
-        """Run the verb."""
+        """Run the verb; return the exit code."""
         return self.call(chosen)
 
     def add(self, verbs: Any) -> None:

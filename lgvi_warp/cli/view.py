@@ -24,7 +24,7 @@ def view_arguments(verb: Any) -> None:
 
 
 @as_verb("view", "look at a run in the rerun viewer", view_arguments)
-def view(chosen: argparse.Namespace, *, look: Part = None, log: Part = None) -> int:
+def view(chosen: argparse.Namespace, *, viewer: Part = None, log: Part = None) -> int:
     """Run the verb view: open a run in the rerun viewer, or write its recording."""
     members, content = indices(chosen.members), run_in(chosen.dir)
     if chosen.out is not None:
@@ -35,7 +35,7 @@ def view(chosen: argparse.Namespace, *, look: Part = None, log: Part = None) -> 
     try:
         with progress_bar(chosen.quiet, "drawing"), content.understood():
             if chosen.out is None:
-                (look or show)(result, members=members)
+                (viewer or show)(result, members=members)
             else:
                 (log or record)(result, chosen.out, members=members)
     except NothingToDraw as error:
@@ -55,11 +55,7 @@ def run_in(path: Path) -> Content:
 
 
 def indices(text: str | None) -> list[int] | None:
-    """Read the indices of members.
-
-    text: Numbers with commas, as "3,17"; None for none.
-    Returns: The indices; None for none.
-    """
+    """Read the indices of members, as "3,17"; None for none."""
     if text is None:
         return None
     words = [word.strip() for word in text.split(",")]

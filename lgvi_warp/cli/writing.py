@@ -55,9 +55,8 @@ class Written:
         files, errors = ", ".join(self.missing), self.missing.values()
         extras = ",".join(dict.fromkeys(error.extra for error in errors))
         libraries = " and ".join(dict.fromkeys(error.library for error in errors))
-        return [
-            f"note        {files}: not made without {libraries}; to have pictures: pip install 'lgvi-warp[{extras}]'"
-        ]
+        remedy = f"to have pictures: pip install 'lgvi-warp[{extras}]'"
+        return [f"note        {files}: not made without {libraries}; {remedy}"]
 
 
 def side_by_side(

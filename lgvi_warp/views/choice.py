@@ -50,6 +50,10 @@ class Shown:
         """How many members are drawn of how many, as "1,000 of 100,000 members"."""
         return of_members(len(self.members), self.total)
 
+    def ranked_of(self, members: slice) -> np.ndarray:
+        """Places, among successive members, of those that quantiles are taken of."""
+        return self.ranked[(self.ranked >= members.start) & (self.ranked < members.stop)] - members.start
+
 
 def of_members(count: int, total: int) -> str:
     """Say how many members of how many."""
@@ -103,10 +107,7 @@ def select_members(result: Result, most: int = MOST_BODIES) -> Shown:
 
 
 def frames_of(time: np.ndarray, most: int = MOST_FRAMES) -> np.ndarray:
-    """Choose samples that are even in time.
-
-    time: Times of the samples [s], rising, shape (k,).
-    """
+    """Choose samples that are even in time, of rising times (k,) [s]."""
     if len(time) <= most:
         return np.arange(len(time))
     wanted = np.linspace(time[0], time[-1], most)
@@ -118,10 +119,7 @@ def frames_of(time: np.ndarray, most: int = MOST_FRAMES) -> np.ndarray:
 def mixed(index: np.ndarray) -> np.ndarray:
     """Hash whole numbers so that neighbours are far apart: the finalizer of SplitMix64.
 
-    Steele, Lea & Flood 2014, Fast splittable pseudorandom number generators, OOPSLA.
-
-    index: Whole numbers from 0, shape (n,).
-    Returns: uint64, shape (n,); different for different numbers.
+    Steele, Lea & Flood 2014, Fast splittable pseudorandom number generators, OOPSLA. Different numbers have different ones.
     """
     z = (index.astype(np.uint64) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -130,10 +128,7 @@ def mixed(index: np.ndarray) -> np.ndarray:
 
 
 def pieces(result: Result, fields: tuple[str, ...]) -> Iterator[tuple[slice, Mapping[str, np.ndarray]]]:
-    """Read samples of successive members, so that a large run in a store never lies in memory whole.
-
-    Yields: Pairs (members, samples): a slice of the members, and their samples by name, shape (k, members, ...).
-    """
+    """Read samples (k, members, ...) of slices of the members, so that a large run in a store never lies in memory whole."""
     many = max(1, AT_ONCE // len(result.time))
     for first in range(0, result.members, many):
         members = slice(first, min(first + many, result.members))
@@ -143,11 +138,9 @@ def pieces(result: Result, fields: tuple[str, ...]) -> Iterator[tuple[slice, Map
 def samples_of(
     result: Result, fields: tuple[str, ...], members: slice | np.ndarray, frames: np.ndarray | None = None
 ) -> dict[str, np.ndarray]:
-    """Read samples of some members.
+    """Read samples (k, members, ...) of some members by name, at these times, by default all.
 
-    frames: Indices of the samples' times; default None, all.
-    Returns: Samples by name, shape (k, members, ...); views where the result is in memory, members are a slice and times are
-        all.
+    They are views where the result is in memory, members are a slice and times are all.
     """
     at: Any = slice(None) if frames is None else frames
     if result.store is not None:
@@ -176,11 +169,7 @@ def _survey(result: Result, frames: np.ndarray) -> tuple[np.ndarray, list[int]]:
 
 
 def finite_rows(vectors: np.ndarray) -> np.ndarray:
-    """Tell which vectors are finite.
-
-    vectors: Numbers, shape (..., 3).
-    Returns: Mask (...).
-    """
+    """Tell which vectors (..., 3) are finite."""
     # One sum and one test: reducing a short axis takes several times as long.
     with np.errstate(invalid="ignore", over="ignore"):
         return np.isfinite(0.0 * vectors[..., 0] + 0.0 * vectors[..., 1] + 0.0 * vectors[..., 2])
@@ -200,10 +189,7 @@ def _ended(result: Result, rank: np.ndarray, places: int) -> list[int]:
 def few(
     result: Result, members: slice | np.ndarray, fields: tuple[str, ...], frames: np.ndarray | None = None
 ) -> Result:
-    """Take some members at some times into memory.
-
-    frames: Indices of the samples' times; default None, all.
-    """
+    """Take some members at some times, by default all, into memory."""
     samples = samples_of(result, tuple(name for name in fields if name in result.samples), members, frames)
     of_members = {item.name: getattr(result, item.name)[members] for item in member_fields.EVERY}
     time = result.time if frames is None else result.time[frames]
@@ -215,14 +201,14 @@ class _Part(Mapping[str, np.ndarray]):
     """Parameters of some members, read when they are used: most pictures use none."""
 
     def __init__(self, samples: Mapping[str, np.ndarray], members: slice | np.ndarray):
-        self._whole, self._members = samples, members
+        self._of_all, self._members = samples, members
 
     def __getitem__(self, name: str) -> np.ndarray:
-        values = self._whole[name]
+        values = self._of_all[name]
         return values[self._members] if len(values) > 1 else values
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._whole)
+        return iter(self._of_all)
 
     def __len__(self) -> int:
-        return len(self._whole)
+        return len(self._of_all)

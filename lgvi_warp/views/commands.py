@@ -30,10 +30,7 @@ class ActuatorChannel(NamedTuple):
 
 
 class Broken(NamedTuple):
-    """A fault of a run.
-
-    time: When it begins for the first member [s].
-    """
+    """A fault of a run, and when it begins for the first member [s]."""
 
     time: float
     text: str
@@ -61,7 +58,7 @@ def channels(result: Result) -> list[ActuatorChannel]:
 
 def faults(result: Result) -> list[Broken]:
     """List the faults of actuators and sensors that begin during a run."""
-    found = []
+    broken = []
     for table in result.provenance["scene"].get("controller", {}).get("faults", ()):
         key = table.get("name") or table["type"]
         numbers = {name: np.atleast_1d(result.parameters[f"{key}.{name}"]) for name in ("time", "gain", "offset")}
@@ -70,10 +67,9 @@ def faults(result: Result) -> list[Broken]:
             gain, offset = (_between(numbers[name]) for name in ("gain", "offset"))
             when = f"from {first:g} s" if first == last else f"from {first:g} s, of the last member from {last:g} s"
             head = f"fault {key}" if table.get("name") else "fault"
-            found.append(
-                Broken(first, f"{head}: {table['of']}[{table.get('channel', 0)}] times {gain} plus {offset}, {when}")
-            )
-    return sorted(found)
+            channel = f"{table['of']}[{table.get('channel', 0)}]"
+            broken.append(Broken(first, f"{head}: {channel} times {gain} plus {offset}, {when}"))
+    return sorted(broken)
 
 
 def _between(values: np.ndarray) -> str:

@@ -44,10 +44,7 @@ OUTCOME_STYLES |= {code: OutcomeStyle("#D55E00", marker) for code, marker in zip
 
 
 class Curve(NamedTuple):
-    """One number of all members against time.
-
-    values: The numbers, shape (k, n).
-    """
+    """One number of all members against time, shape (k, n)."""
 
     name: str
     label: str
@@ -55,10 +52,7 @@ class Curve(NamedTuple):
 
 
 def energy_curve(result: Result) -> Curve:
-    """Energy against time, as its error where the scene's laws conserve it.
-
-    Returns: E(t) - E(0), or E(t) where a force does work [J], shape (k, n).
-    """
+    """Energy against time [J], as its error E(t) - E(0) where the scene's laws conserve it."""
     if "energy" in invariants.conserved(result):
         return Curve("Energy error", "E(t) - E(0) [J]", result.energy - result.energy[:1])
     return Curve("Energy", "E(t) [J]", result.energy)
@@ -81,10 +75,7 @@ def members_of_run(result: Result) -> int:
 
 
 def identity(result: Result) -> str:
-    """Identifier of a run: a hash of its provenance and samples.
-
-    The provenance alone is not enough, since parts of a run share it.
-    """
+    """Identifier of a run: a hash of its provenance, which parts of a run share, and samples."""
     digest = hashlib.sha256(json.dumps(result.provenance, sort_keys=True).encode())
     arrays = [result.time, np.asarray(result.status), stop_time(result)]
     for array in (*arrays, *(samples["position"][[0, -1]] for _, samples in pieces(result, ("position",)))):

@@ -6,8 +6,10 @@ import inspect
 
 import pytest
 
+import lgvi_warp as lw
 from tests.support.public import NAMED
 
+PUBLIC = NAMED | {f"plots.{name}": getattr(lw.plots, name) for name in lw.plots.__all__}
 # Those whose kernels no other quick test needs, or that search.
 LONG = {"Until", "linearize", "lqr", "stability_map", "sweep", "tradeoff", "trim", "tune_gains", "worst_case"}
 
@@ -15,13 +17,13 @@ LONG = {"Until", "linearize", "lqr", "stability_map", "sweep", "tradeoff", "trim
 def examples() -> dict[str, doctest.DocTest]:
     """Name -> the example of each public name that has one."""
     parser = doctest.DocTestParser()
-    texts = {name: inspect.getdoc(NAMED[name]) or "" for name in NAMED if "Examples:" in documented(name)}
+    texts = {name: inspect.getdoc(PUBLIC[name]) or "" for name in PUBLIC if "Examples:" in documented(name)}
     return {name: parser.get_doctest(text, {}, name, None, None) for name, text in texts.items()}
 
 
 def documented(name: str) -> str:
     """The docstring of the name itself, not that of a base."""
-    return vars(NAMED[name]).get("__doc__") or getattr(NAMED[name], "__doc__", "") or ""
+    return vars(PUBLIC[name]).get("__doc__") or getattr(PUBLIC[name], "__doc__", "") or ""
 
 
 EXAMPLES = examples()
@@ -29,7 +31,7 @@ EXAMPLES = examples()
 
 def test_the_main_names_have_examples():
     assert len(EXAMPLES) >= 30
-    main = {"Scene", "solve", "prepare", "Result", "Ensemble", "Controller", "open_run", "suggest"}
+    main = {"Scene", "solve", "prepare", "Result", "Ensemble", "Controller", "open_run", "suggest", "plots.fan"}
     assert set(EXAMPLES) >= LONG | main
 
 

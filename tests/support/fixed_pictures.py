@@ -31,12 +31,13 @@ from lgvi_warp.cli.folders import text_of
 from lgvi_warp.cli.writing import Written
 from lgvi_warp.common.status import WarningArray
 from lgvi_warp.statistics.estimates.estimate import Estimates
+from lgvi_warp.views.plots import sweep_pictures
 from tests.conftest import ROOT
+from tests.support.swept import swept
 from tests.unit.cli.test_terminal import morris, region, sobol
 from tests.unit.statistics.test_statistics import gathered
-from tests.unit.views.test_cost_pictures import RUNS, TERMS
 from tests.unit.views.test_recording import fleet
-from tests.views.test_plots import margins_of, of_cells, of_factors, of_methods
+from tests.views.test_plots import of_cells, of_methods, of_studies
 
 FILE = Path(__file__).parents[1] / "data" / "pictures.json"
 ROUND_OFF = 1e-6
@@ -108,9 +109,11 @@ def of_axes(axes):
         "scales": [axes.get_xscale(), axes.get_yscale(), axes.axison, axes.get_visible(), str(axes.get_aspect())],
         "limits": [sums(axes.get_xlim()), sums(axes.get_ylim())],
         "ticks": [sums(axes.get_xticks()), sums(axes.get_yticks())],
+        "tick labels": [[label.get_text() for label in axis.get_ticklabels() if label.get_visible()]
+                        for axis in (axes.xaxis, axes.yaxis)],
         "legend": legend and of_legend(legend),
         "drawn": [drawn(artist) for artist in content],
-    }
+    }  # fmt: skip
 
 
 def of_figure(figure):
@@ -177,15 +180,30 @@ def pictures():
     found["drift"] = lw.plots.drift, (fleet(9, scene=lw.Scene(lw.Scene.named("sphere").vehicle)),)
     found["summary of members kept"] = lw.plots.summary, (followed(),)
     found["statistics"] = lw.plots.statistics, (followed(),)
-    found["margins"] = lw.plots.margins, (margins_of([True, True, True, True, False]),)
     found["one vehicle"] = lw.plots.summary, (fleet(1, 60),)
     found["compare"] = lw.plots.compare, ({"a": result, "b": fleet(9, 31, 2)}, "speed")
-    found["tradeoff"] = lw.plots.tradeoff, (of_methods(),)
-    found["stability"] = lw.plots.stability, (of_cells(),)
-    found["sensitivity"] = lw.plots.sensitivity, (of_factors(),)
-    found["scaling"] = lw.plots.scaling, (RUNS,)
-    found["term cost"] = lw.plots.term_cost, (TERMS,)
-    return found
+    for statistic in STATISTICS[:3]:
+        estimates = Estimates([estimated(statistic, result)])
+        of = "velocity[0]" if statistic.type == "mean" else "depth"
+        bare = dataclasses.replace(result, samples={}, statistics=estimates)
+        found[f"fan of {statistic.type}"] = lw.plots.fan, (bare, of)
+    return found | of_studies() | sweeps()
+
+
+def sweeps():
+    """Pictures of sweeps, as of `pictures`."""
+    axes = {"x": [1, 2, 3], "y": [5, 6], "z": [0.5, 0.6], "w": ["u", "v"], "one": [1]}
+    delays = {"delay": [0.5, 2.0, 4], "gain": [1.0]}
+    return {
+        "success of cases": (sweep_pictures.plot_success, (swept(lambda i: i / 8, cases="abcdefg"),)),
+        "success over delays": (sweep_pictures.plot_success, (swept(lambda i: 0.5, delays, refused=(0, 3)),)),
+        "success as maps": (sweep_pictures.plot_success, (swept(lambda i: (i % 24) / 24, axes, refused=(4,)),)),
+        "metrics": (sweep_pictures.plot_metrics,
+                    (swept(lambda i: 0.5, {"delay": [1, 2]}, metrics=("m", "n"), failed=3, refused=(3,)),)),
+        "differences": (sweep_pictures.plot_differences, (swept((0.2, 0.95, 0.225).__getitem__, cases="abc"),)),
+        "causes": (sweep_pictures.plot_causes, (swept((0.9, 0.4, 0.65).__getitem__, cases="abc"),)),
+        "responses": (sweep_pictures.plot_responses, (swept(lambda i: 0.5, {"k": [1, 2]}, cases="abcd"), None, "", 7)),
+    }  # fmt: skip
 
 
 def picture(name):
@@ -230,8 +248,8 @@ RECORDINGS = {
     "one vehicle": lambda: fleet(1, 12),
     "two runs": lambda: {"a": fleet(9, 7), "b": fleet(12, 7, seed=2)},
 }
-PICTURES = (*OF_A_RUN, "drift", "summary of members kept", "statistics", "margins", "fan of the energy", "one vehicle",
-            "compare", "tradeoff", "stability", "sensitivity", "scaling", "term cost")  # fmt: skip
+PICTURES = (*OF_A_RUN, "drift", "summary of members kept", "statistics", "fan of the energy", "one vehicle", "compare",
+            "fan of quantiles", "fan of extremes", "fan of mean", *of_studies(), *sweeps())  # fmt: skip
 
 
 PROVENANCE = {

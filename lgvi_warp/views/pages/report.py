@@ -85,8 +85,8 @@ def report(result: Result | str | os.PathLike[str], path: str | os.PathLike[str]
     if isinstance(result, str | os.PathLike):
         name, parts = _of_folder(path_of("result", result))
     else:
-        found = result_of(result)
-        name, parts = name_of(found.provenance), [_paragraph(f"Written on {_day(time.time())}."), *_of_run(found)]
+        run = result_of(result)
+        name, parts = name_of(run.provenance), [_paragraph(f"Written on {_day(time.time())}."), *_of_run(run)]
     heading = html.escape(name)
     head = f'<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><title>{heading}</title><style>{STYLE}</style></head>'
     return write_text(path, f"{head}<body><h1>{heading}</h1>{''.join(parts)}</body></html>\n")
@@ -102,21 +102,18 @@ def _of_folder(folder: Path) -> tuple[str, list[str]]:
             raise SceneError([f"{folder}: {fault}; {remedy}"])
         place, parts = folder.resolve().name, list[str]()
         if run is not None:
-            found, file = run
-            parts += [_paragraph(f"Run of {_day(file.stat().st_mtime)}, in {place}."), *_of_run(found)]
+            held, file = run
+            parts += [_paragraph(f"Run of {_day(file.stat().st_mtime)}, in {place}."), *_of_run(held)]
         parts += [_paragraph(f"{_words(study)} of {_day(study.stat().st_mtime)}, in {place}.") for study in studies]
         if studies:
             parts += [_section(_words(picture), _pixels(picture)) for picture in _pictures_in(folder, run is not None)]
         for study in studies:
             parts += _of_study(study)
-        return name_of(found.provenance) if run is not None else f"{_words(studies[0])} of {place}", parts
+        return name_of(held.provenance) if run is not None else f"{_words(studies[0])} of {place}", parts
 
 
 def run_in(folder: Path) -> tuple[Result, Path] | None:
-    """Read the run that a folder holds.
-
-    Returns: The result, and the file or the store; None without one.
-    """
+    """Read the run that a folder holds, if it does: the result, and the file or the store."""
     from lgvi_warp.results.result import Result
     from lgvi_warp.store.open import open_run
 
@@ -230,8 +227,8 @@ def _settings(result: Result) -> Iterator[tuple[str, str]]:
 
 def _again(result: Result) -> str:
     """The command that runs it again, and the scene."""
-    command, said, text = how_to_run_again(result.provenance)
-    return _paragraph(said) + (_preformatted(command) if command else "") + _preformatted(text)
+    command, remark, text = how_to_run_again(result.provenance)
+    return _paragraph(remark) + (_preformatted(command) if command else "") + _preformatted(text)
 
 
 def _of_study(path: Path) -> Iterator[str]:

@@ -16,11 +16,9 @@ DEFAULTS = {"dtype": "float64", "checks": "safe", "on_failure": "freeze"}
 
 
 def how_to_run_again(provenance: Mapping[str, Any]) -> tuple[str | None, str, str]:
-    """Say how to run a run again.
+    """Say how to run a run again: the command, None where no file holds all of it; a remark; and the text of the scene file.
 
-    Returns: The command, None where no file holds all of the run; what a reader has to know; and the text of the scene file:
-        as it was written, else of the scene's tables. An ensemble that was given in Python stands in it in place of the file's
-        own.
+    That is as it was written, else of the scene's tables. An ensemble given in Python stands in it in place of the file's own.
     """
     scene, source = provenance["scene"], provenance.get("source", {})
     written = isinstance(source.get("text"), str)
@@ -28,26 +26,28 @@ def how_to_run_again(provenance: Mapping[str, Any]) -> tuple[str | None, str, st
     ensemble = _given_ensemble(provenance)
     if any(law.get("type") == "callback" for law in scene.get("controller", {}).get("laws", ())):
         reason = "A law is a Python function, which no file holds"
-    elif ensemble is not None and not _is_scene(whole := {**scene, "ensemble": ensemble}):
+    elif ensemble is not None and not _is_scene(with_ensemble := {**scene, "ensemble": ensemble}):
         reason = "The ensemble was given in Python, with numbers that no file holds"
     else:
-        reason, said = "", f"Save this scene as {name}, then:"
+        reason, remark = "", f"Save this scene as {name}, then:"
     text = source["text"] if written else ""
     if not reason and ensemble is not None:
-        said = f"The ensemble was given in Python: it stands here in place of the file's own. {said}"
+        remark = f"The ensemble was given in Python: it stands here in place of the file's own. {remark}"
         changes = {key: value for key, value in changes.items() if not key.startswith("ensemble.")}
-        text = _with_ensemble(text, ensemble) if written else toml_of(shortened(whole))
+        text = _with_ensemble(text, ensemble) if written else toml_of(shortened(with_ensemble))
     text = text or toml_of(shortened(scene))
     if reason:
         return None, f"{reason}: run the script again. The scene but for it:", text
     sets = [word for key, value in changes.items() for word in ("--set", f"{key}={value}")]
-    return shlex.join(["lgvi-warp", "run", name, *sets, *_given(provenance)]), said, text
+    return shlex.join(["lgvi-warp", "run", name, *sets, *_given(provenance)]), remark, text
 
 
 def _given_ensemble(provenance: Mapping[str, Any]) -> Mapping[str, Any] | None:
     """The section [ensemble] that a run had, where that is not its scene's own; None where it is."""
-    had, own = provenance.get("ensemble"), provenance["scene"].get("ensemble", {"members": 1, "seed": 0})
-    if had is None or json.dumps(had, sort_keys=True) == json.dumps({"members": had["members"]} | own, sort_keys=True):
+    had, of_scene = provenance.get("ensemble"), provenance["scene"].get("ensemble", {"members": 1, "seed": 0})
+    if had is None or json.dumps(had, sort_keys=True) == json.dumps(
+        {"members": had["members"]} | of_scene, sort_keys=True
+    ):
         return None
     return dict(had)
 
@@ -109,8 +109,8 @@ def shortened(scene: Mapping[str, Any]) -> Mapping[str, Any]:
     known = Scene.named(name).to_dict()
     short = dict(scene)
     for section in ("vehicle", "environment"):
-        own = {key: value for key, value in scene[section].items() if known[section].get(key) != value}
-        short[section] = {"name": name} | own if section == "vehicle" else own
+        changed = {key: value for key, value in scene[section].items() if known[section].get(key) != value}
+        short[section] = {"name": name} | changed if section == "vehicle" else changed
     short["terms"] = [term for term in scene.get("terms", ()) if term not in known.get("terms", ())]
     short = {section: content for section, content in short.items() if content}
     try:

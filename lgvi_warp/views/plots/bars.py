@@ -33,9 +33,8 @@ def sensitivity(found: Indices, *, figure: Any = None, path: FilePath | None = N
     Raises:
         NothingToDraw: No quantity varies.
     """
-    of_kind(
-        "found", found, "quantities factors columns", "sensitivity indices", "give what lw.uq.sobol and its like return"
-    )
+    remedy = "give what lw.uq.sobol and its like return"
+    of_kind("found", found, "quantities factors columns", "sensitivity indices", remedy)
     varied = [q for q in range(len(found.quantities)) if np.isfinite(getattr(found, found.columns[0])[q]).any()]
     drawn = varied[:MOST]
     if not drawn:
@@ -59,10 +58,8 @@ def sensitivity(found: Indices, *, figure: Any = None, path: FilePath | None = N
         more = f"; not shown: {', '.join(names)}" if names else ""
         still = [name for name, acts in zip(found.factors, acting, strict=True) if not acts and acting.any()]
         more += f"; without any effect: {', '.join(still)}" if still else ""
-        text = (
-            f"{found.name}, {found.samples} samples, {found.members} members{failed}; {found.confidence:.0%} intervals"
-        )
-        figure.suptitle(wrapped(f"{text}{more}", figure))
+        text = f"{found.name}, {found.samples} samples, {found.members} members{failed}"
+        figure.suptitle(wrapped(f"{text}; {found.confidence:.0%} intervals{more}", figure))
     return grid.ravel()[: len(drawn)]
 
 
@@ -74,21 +71,9 @@ def _bars(axes: Any, indices: Indices, q: int, shown: np.ndarray) -> None:
         name = indices.intervals.get(column)
         half = getattr(indices, name)[q][shown] if name else None
         at = places + (i - 0.5 * (len(indices.columns) - 1)) * width
-        axes.barh(
-            at,
-            getattr(indices, column)[q][shown],
-            width,
-            xerr=half,
-            label=column,
-            color=COLORS[i],
-            hatch=hatch(i),
-            edgecolor="white",
-            linewidth=0.0,
-            error_kw={"capsize": 2.0},
-        )
+        axes.barh(at, getattr(indices, column)[q][shown], width, xerr=half, label=column, color=COLORS[i], hatch=hatch(i),
+                  edgecolor="white", linewidth=0.0, error_kw={"capsize": 2.0})  # fmt: skip
     axes.axvline(0.0, color="black", linewidth=0.5)
-    axes.set(
-        title=in_words(indices.quantities[q]),
-        xlabel="part of the variance" if indices.name.startswith("Sobol") else "effect",
-    )
+    of_variance = indices.name.startswith("Sobol")
+    axes.set(title=in_words(indices.quantities[q]), xlabel="part of the variance" if of_variance else "effect")
     axes.grid(True, axis="x", alpha=0.3)

@@ -32,20 +32,22 @@ GREY = "#9A9A9A"
 # Points of text to an inch of width: 8.75 pixels where the picture is 700 pixels wide.
 TEXT = 0.9
 LEAST_TEXT = 9.0
+# Matplotlib's settings of the size of text, but for titles.
+TEXTS = (
+    "font.size",
+    "axes.labelsize",
+    "legend.fontsize",
+    "legend.title_fontsize",
+    "xtick.labelsize",
+    "ytick.labelsize",
+)
 # Matplotlib's settings are those of the process, and pictures are drawn side by side in threads; one picture draws in another.
 LOCK = threading.RLock()
 DPI = 100
 
 
 def figure_class() -> Any:
-    """Load Matplotlib's Figure.
-
-    Returns:
-        The class.
-
-    Raises:
-        ImportError: Matplotlib is not installed; the message has the remedy.
-    """
+    """Load Matplotlib's Figure. Raises ImportError with the remedy where it is not installed."""
     try:
         from matplotlib.figure import Figure
     except ModuleNotFoundError as error:
@@ -54,19 +56,7 @@ def figure_class() -> Any:
 
 
 def save_figure(figure: Any, path: FilePath, dpi: int = DPI) -> Path:
-    """Write a picture; the file is there whole or not at all.
-
-    Args:
-        figure: A Matplotlib figure.
-        path: The file; its ending chooses the format.
-        dpi: Dots per inch; default 100.
-
-    Returns:
-        The path.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
+    """Write a picture in the format of the file's ending; the file is there whole or not at all."""
     of_kind("figure", figure, "savefig", "a figure of Matplotlib", "give one, as axes.figure")
     target = file_path("path", path)
     with durable.placed(target) as beside:
@@ -78,13 +68,7 @@ def save_figure(figure: Any, path: FilePath, dpi: int = DPI) -> Path:
 def panel(
     ax: Any, path: FilePath | None, size: tuple[float, float] = (8.0, 5.0), projection: str | None = None
 ) -> Iterator[Any]:
-    """Give axes to draw on; when the drawing is done, write the file that was asked for.
-
-    ax: The user's axes; None for a figure of one's own.
-    path: The file; None for none.
-    size: Width and height of an own figure [in]; default (8, 5).
-    projection: Projection of own axes; default None, plane.
-    """
+    """Give axes to draw on, the user's or those of a figure of this size [in]; then write the file, if there is a path."""
     of_class = figure_class()
     if ax is not None:
         of_kind("ax", ax, "figure plot", "axes of Matplotlib", "give those that plt.subplots returns, or leave it out")
@@ -102,13 +86,9 @@ def panels(
     used: int | None = None,
     **options: Any,
 ) -> Iterator[np.ndarray]:
-    """Give several axes to draw on; when the drawing is done, write the file that was asked for.
+    """Give axes (rows, columns) on the user's figure or one of this size [in]; then write the file, if there is a path.
 
-    figure: The user's figure; None for one's own.
-    path: The file; None for none.
-    size: Width and height of an own figure [in].
     used: How many of them are drawn on; the others are not seen. Default None, all.
-    Yields: The axes, shape (rows, columns).
     """
     of_class = figure_class()
     if figure is not None:
@@ -123,26 +103,13 @@ def panels(
 
 @contextmanager
 def drawing(figure: Any, path: FilePath | None, sized: bool) -> Iterator[None]:
-    """Draw with text that can be read in a small picture; then write the file.
-
-    path: The file; None for none.
-    """
+    """Draw with text that can be read in a small picture; then write the file, if there is a path."""
     import matplotlib as mpl
 
     if path is not None:
         durable.place_of(file_path("path", path))  # before anything is drawn
     size = text_size(figure)
-    settings = dict.fromkeys(
-        (
-            "font.size",
-            "axes.labelsize",
-            "legend.fontsize",
-            "legend.title_fontsize",
-            "xtick.labelsize",
-            "ytick.labelsize",
-        ),
-        size,
-    ) | dict.fromkeys(("axes.titlesize", "figure.titlesize"), 1.1 * size)
+    settings = dict.fromkeys(TEXTS, size) | dict.fromkeys(("axes.titlesize", "figure.titlesize"), 1.1 * size)
     with LOCK, mpl.rc_context(settings | {"hatch.linewidth": 0.6, "pdf.fonttype": 42}):
         yield
         if sized:
@@ -163,6 +130,11 @@ def wrapped(text: str, figure: Any, share: float = 1.0) -> str:
     return "\n".join(textwrap.wrap(text, int(share * 72.0 * width / (0.6 * text_size(figure)))))
 
 
+def wrap_each(lines: Iterable[str], figure: Any) -> str:
+    """Break each of several lines into as many as a figure has room for."""
+    return "\n".join(wrapped(line, figure) for line in lines)
+
+
 def style(i: int) -> dict[str, Any]:
     """Colour and line style of the i-th of several lines, pairwise different for 49 of them."""
     turn = i // len(COLORS)
@@ -171,24 +143,35 @@ def style(i: int) -> dict[str, Any]:
 
 def mark(code: Status) -> dict[str, Any]:
     """Colour and marker of an outcome, a dot for members under way; filled markers have a black edge."""
-    look = OUTCOME_STYLES[code]
+    color, marker = OUTCOME_STYLES[code]
     if code == Status.OK:
-        return {"color": look.color, "marker": "o", "linewidths": 0}
+        return {"color": color, "marker": "o", "linewidths": 0}
     edge = {"edgecolors": "black", "linewidths": 0.5} if code.stopped else {"linewidths": 1.4}
-    return {"color": look.color, "marker": look.marker} | edge
+    return {"color": color, "marker": marker} | edge
 
 
 def outcome_style(code: Status) -> dict[str, Any]:
     """Colour and line style of paths with an outcome."""
-    return {
-        "color": OUTCOME_STYLES[code].color,
-        "linestyle": "-" if code == Status.OK else "--" if code.stopped else ":",
-    }
+    line = "-" if code == Status.OK else "--" if code.stopped else ":"
+    return {"color": OUTCOME_STYLES[code].color, "linestyle": line}
 
 
 def hatch(i: int) -> str:
     """Hatch of the i-th of several areas."""
     return HATCHES[i % len(HATCHES)]
+
+
+def shade(axes: Any, time: np.ndarray, low: np.ndarray, high: np.ndarray, i: int, hatched: int | None = None,
+          alpha: float = 0.2, label: str | None = None) -> None:  # fmt: skip
+    """Fill the i-th of several bands against time with its colour and a hatch, by default the i-th one."""
+    color, pattern = COLORS[i % len(COLORS)], hatch(i if hatched is None else hatched)
+    axes.fill_between(time, low, high, facecolor=color, alpha=alpha, hatch=pattern, edgecolor=color, linewidth=0,
+                      label=label)  # fmt: skip
+
+
+def line_marker(time: np.ndarray) -> str:
+    """Marker of a line against so many times: two alone would hardly be seen."""
+    return "o" if len(time) < 3 else ""
 
 
 def band(low: float, high: float) -> str:
@@ -204,7 +187,6 @@ def point_down(axes: Any, floors: Mapping[str, Iterable[float]] = MappingProxyTy
     """Turn the vertical axis, which has depths [m], downwards; draw the surface, and the floors that are near.
 
     Their names stand beside the axes, where no data are. A text says how far away the surface is where it is not drawn.
-
     floors: Depths [m] by what is said of them, as {"floor": [20.0]}; default none.
     """
     low, high = sorted(axes.get_ylim())

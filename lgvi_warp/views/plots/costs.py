@@ -91,9 +91,8 @@ def term_cost(rows: Rows, *, ax: Any = None, path: FilePath | None = None) -> An
             axes.bar_label(bars, fmt="%.3g", padding=3)
             if NONE in prices:
                 axes.axvline(prices[NONE], linewidth=1.0, **style(i))
-        axes.set(
-            xlabel="cost of a member's step [ns]", ylabel="term [name]", yticks=range(len(terms)), yticklabels=terms
-        )
+        axes.set(xlabel="cost of a member's step [ns]", ylabel="term [name]")
+        axes.set_yticks(range(len(terms)), terms)
         axes.margins(x=0.12)
         axes.invert_yaxis()
         axes.grid(True, axis="x", alpha=0.3)
@@ -104,10 +103,7 @@ def term_cost(rows: Rows, *, ax: Any = None, path: FilePath | None = None) -> An
 
 
 def measured(rows: Rows, keys: tuple[str, ...], remedy: str) -> list[Mapping[str, Any]]:
-    """Take the rows of one kind of measurement.
-
-    keys: What a row of that kind has, besides the cost.
-    """
+    """Take the rows of one kind of measurement, which have these keys and a cost."""
     if isinstance(rows, str | os.PathLike):
         rows = [parsed(line) for line in file_text(rows, "cost file").splitlines() if line.startswith("{")]
     rows = listed("rows", rows, "rows")

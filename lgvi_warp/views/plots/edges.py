@@ -43,9 +43,8 @@ def margins(found: Margins, *, figure: Any = None, path: FilePath | None = None)
     of_kind("found", found, "steady values by_runs", "of lw.linear.margins", "give what lw.linear.margins returns")
     steady = np.asarray(found.steady)
     if not steady.any():
-        raise NothingToDraw(
-            f"none of the {found.members} members has margins ({found.reasons_text}): there is nothing to draw"
-        )
+        fault = f"none of the {found.members} members has margins ({found.reasons_text})"
+        raise NothingToDraw(f"{fault}: there is nothing to draw")
     names = list(found.values or found.by_runs)
     ways = [way for way, values in (("eigenvalues", found.values), ("runs", found.by_runs)) if values]
     with panels(figure, path, (1, len(names)), (1.0 + 4.5 * len(names), 4.5), sharey=True) as grid:
@@ -64,12 +63,12 @@ def margins(found: Margins, *, figure: Any = None, path: FilePath | None = None)
     return grid.ravel()
 
 
-def _curve(axes: Any, values: np.ndarray, shares: np.ndarray, **look: Any) -> None:
+def _curve(axes: Any, values: np.ndarray, shares: np.ndarray, **line: Any) -> None:
     """Draw the part of the members with at most so much (n,), up to the largest finite value."""
     finite = np.isfinite(values)
     start = values[finite][:1]
     x, y = np.concatenate([start, values[finite]]), np.concatenate([0.0 * start, 100.0 * shares[finite]])
-    axes.step(x, y, where="post", **look)
+    axes.step(x, y, where="post", **line)
 
 
 def _mark(axes: Any, values: np.ndarray, name: str) -> None:
@@ -77,6 +76,5 @@ def _mark(axes: Any, values: np.ndarray, name: str) -> None:
     level = 1.0 - MARKED if name == "gain_lower" else MARKED
     edge = float(np.quantile(values, level, method="inverted_cdf"))
     if np.isfinite(edge):
-        axes.axvline(
-            edge, color="0.3", linestyle=":", label=f"{100.0 * (1.0 - MARKED):g} % of the members bear {edge:.3g}"
-        )
+        label = f"{100.0 * (1.0 - MARKED):g} % of the members bear {edge:.3g}"
+        axes.axvline(edge, color="0.3", linestyle=":", label=label)

@@ -42,6 +42,13 @@ def outcomes(result: Result, *, ax: Any = None, path: FilePath | None = None) ->
 
     Returns:
         The axes.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> fleet = lw.Ensemble(lw.Scene.named("remus_100"), members=8)
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
+        >>> lw.plots.outcomes(result).get_ylabel()
+        'share of members [%]'
     """
     result_of(result)
     with panel(ax, path) as axes:
@@ -61,10 +68,8 @@ def draw_outcomes(axes: Any, result: Result) -> None:
     shares = [100.0 * count / result.members for count in (going, *counts.values())]
     ok = int((status == Status.OK).sum())
     labels = [f"under way, {ok:,} to the end"] + [_first(result, code, when) for code in ended]
-    areas = axes.stackplot(
-        time, *shares, colors=[OUTCOME_STYLES[code].color for code in (Status.OK, *ended)], labels=labels
-    )
-    for i, area in enumerate(areas):
+    colors = [OUTCOME_STYLES[code].color for code in (Status.OK, *ended)]
+    for i, area in enumerate(axes.stackplot(time, *shares, colors=colors, labels=labels)):
         area.set(hatch=hatch(i), edgecolor="white", linewidth=0.0)
     axes.set(xlabel="time [s]", ylabel="share of members [%]", xlim=(time[0], time[-1]), ylim=(0.0, 100.0))
     legend_below(axes, ncols=1)
@@ -73,9 +78,8 @@ def draw_outcomes(axes: Any, result: Result) -> None:
 def _first(result: Result, code: Status, when: np.ndarray) -> str:
     """An outcome, how many members had it, and when the first had it."""
     members = np.asarray(result.status) == code
-    return (
-        f"{code.name.lower()}: {int(members.sum()):,} of {result.members:,}, the first at {when[members].min():.4g} s"
-    )
+    count = f"{int(members.sum()):,} of {result.members:,}"
+    return f"{code.name.lower()}: {count}, the first at {when[members].min():.4g} s"
 
 
 @picture
@@ -98,6 +102,13 @@ def histogram(
     Raises:
         NothingToDraw: Nothing of the quantity was kept or gathered, or no member has a finite number.
         SceneError: The quantity is not known, or has several numbers.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> fleet = lw.Ensemble(lw.Scene.named("remus_100"), members=8)
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
+        >>> lw.plots.histogram(result, "max(speed)", at=1.0).get_xlabel()
+        'max(speed) [m/s]'
     """
     (meaning,) = quantities([of])
     faults = Faults()
@@ -110,22 +121,14 @@ def histogram(
     with panel(ax, path) as axes:
         base = np.zeros(len(edges) - 1)
         for i, (label, (share, color)) in enumerate(shares.items()):
-            look = {
-                "color": color,
-                "hatch": hatch(i),
-                "edgecolor": "white",
-                "linewidth": 0.3,
-                "align": "edge",
-                "label": label,
-            }
             draw, start = (axes.barh, {"left": base}) if down else (axes.bar, {"bottom": base})
-            draw(edges[:-1], share, np.diff(edges), **start, **look)
+            draw(edges[:-1], share, np.diff(edges), **start, color=color, hatch=hatch(i), edgecolor="white",
+                 linewidth=0.3, align="edge", label=label)  # fmt: skip
             base = base + share
         name, count = f"{in_words(meaning.label)} [{unit or '1'}]", "share of members [%]"
         axes.set(xlabel=count if down else name, ylabel=f"{name}, down" if down else count)
-        axes.set_title(
-            wrapped(f"{in_words(meaning.label)} of {some_of(result, result.members)} at {when:g} s", axes.figure)
-        )
+        text = f"{in_words(meaning.label)} of {some_of(result, result.members)} at {when:g} s"
+        axes.set_title(wrapped(text, axes.figure))
         if down:
             point_down(axes, floors(result))
         legend_below(axes, ncols=3)
@@ -175,11 +178,8 @@ def _edges(values: np.ndarray) -> np.ndarray:
 def _groups(result: Result, members: np.ndarray, when: float) -> list[tuple[Status, np.ndarray]]:
     """Masks of the members under way at a time, and of those that ended by then, by outcome; only those that occur."""
     status, ended = np.asarray(result.status)[members], stop_time(result)[members] <= when
-    groups = [
-        (Status.OK, ~ended),
-        *((code, ended & (status == code)) for code in ended_so.outcomes(result) if code != Status.OK),
-    ]
-    return [(code, group) for code, group in groups if group.any()]
+    early = ((code, ended & (status == code)) for code in ended_so.outcomes(result) if code != Status.OK)
+    return [(code, group) for code, group in ((Status.OK, ~ended), *early) if group.any()]
 
 
 @picture

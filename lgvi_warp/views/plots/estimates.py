@@ -11,7 +11,7 @@ from lgvi_warp.common.arguments import result_of
 from lgvi_warp.common.errors import NothingToDraw
 from lgvi_warp.views.choice import of_members
 from lgvi_warp.views.fleet import members_of_run
-from lgvi_warp.views.plots.canvas import COLORS, band, hatch, legend_below, panels, point_down, style, wrapped
+from lgvi_warp.views.plots.canvas import band, legend_below, panels, point_down, shade, style, wrapped
 from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.words import DEPTHS, floors, in_words, unit_of
 
@@ -72,14 +72,7 @@ def _units(axes: Any, result: Result, estimate: Estimate) -> None:
 
 
 def drawable(result: Result) -> list[Estimate]:
-    """Select the statistics that `lw.plots.statistics` draws.
-
-    Args:
-        result: A result.
-
-    Returns:
-        Its estimates against time, in the order of the result.
-    """
+    """Select the statistics against time, which `lw.plots.statistics` draws."""
     return [
         estimate
         for estimate in result_of(result).statistics.values()
@@ -91,18 +84,12 @@ def _levels_panel(axes: Any, estimate: Estimate) -> None:
     """Draw pairs of quantiles as bands about the middle one, with a colour and a hatch for each component."""
     levels = estimate.coordinates["level"]
     for c in range(min(estimate.value.shape[2], LINES)):
-        look, values = style(c), estimate.value[:, :, c]
+        values, name = estimate.value[:, :, c], in_words(str(estimate.coordinates["component"][c]))
         for i in range(len(levels) // 2):
             label = band(levels[i], levels[-1 - i]) if c == 0 else None
-            axes.fill_between(estimate.time, values[:, i], values[:, -1 - i], facecolor=look["color"], alpha=0.15 * (i + 1),
-                              hatch=hatch(c + i), edgecolor=look["color"], linewidth=0, label=label)  # fmt: skip
+            shade(axes, estimate.time, values[:, i], values[:, -1 - i], c, c + i, 0.15 * (i + 1), label)
         if len(levels) % 2:
-            axes.plot(
-                estimate.time,
-                values[:, len(levels) // 2],
-                label=in_words(str(estimate.coordinates["component"][c])),
-                **look,
-            )
+            axes.plot(estimate.time, values[:, len(levels) // 2], label=name, **style(c))
     legend_below(axes, ncols=4)
 
 
@@ -112,19 +99,17 @@ def _lines_panel(axes: Any, estimate: Estimate) -> None:
     value, lower, upper = (array.reshape(shape) for array in (estimate.value, estimate.lower, estimate.upper))
     names = estimate.coordinates["component"] if estimate.coordinates["component"].size else np.array([estimate.name])
     for c in range(min(value.shape[1], LINES)):
-        look = style(c)
-        axes.plot(estimate.time, value[:, c], label=in_words(str(names[c])) if c < len(names) else None, **look)
-        axes.fill_between(estimate.time, lower[:, c], upper[:, c], color=look["color"], alpha=0.3, linewidth=0)
+        line = style(c)
+        axes.plot(estimate.time, value[:, c], label=in_words(str(names[c])) if c < len(names) else None, **line)
+        axes.fill_between(estimate.time, lower[:, c], upper[:, c], color=line["color"], alpha=0.3, linewidth=0)
     legend_below(axes, ncols=4)
 
 
 def _extremes_panel(axes: Any, estimate: Estimate) -> None:
     """Draw a band from the smallest to the largest value of each component."""
     for c in range(min(estimate.value.shape[1], LINES)):
-        color, label = COLORS[c % len(COLORS)], in_words(str(estimate.coordinates["component"][c]))
-        axes.fill_between(estimate.time, estimate["minimum"][:, c], estimate["maximum"][:, c], facecolor=color,
-                          alpha=0.3, hatch=hatch(c),
-                          edgecolor=color, linewidth=0, label=label)  # fmt: skip
+        label = in_words(str(estimate.coordinates["component"][c]))
+        shade(axes, estimate.time, estimate["minimum"][:, c], estimate["maximum"][:, c], c, alpha=0.3, label=label)
     legend_below(axes, ncols=4)
 
 
@@ -134,13 +119,8 @@ def _histogram_panel(axes: Any, estimate: Estimate) -> None:
 
     time, edge = estimate.time, estimate.coordinates["edge"]
     middle = 0.5 * (time[1:] + time[:-1])
-    drawn = axes.pcolormesh(
-        np.concatenate([time[:1], middle, time[-1:]]),
-        edge,
-        100.0 * estimate.value[:, 0].T,
-        cmap="cividis",
-        norm=PowerNorm(0.5, vmin=0.0),
-    )
+    edges, shares = np.concatenate([time[:1], middle, time[-1:]]), 100.0 * estimate.value[:, 0].T
+    drawn = axes.pcolormesh(edges, edge, shares, cmap="cividis", norm=PowerNorm(0.5, vmin=0.0))
     axes.grid(False)
     axes.figure.colorbar(drawn, ax=axes, label="share of members [%]")
 

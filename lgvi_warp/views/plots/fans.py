@@ -20,13 +20,14 @@ from lgvi_warp.views.plots.canvas import (
     COLORS,
     TINTS,
     band,
-    hatch,
     legend_below,
+    line_marker,
     mark,
     panel,
     point_down,
+    shade,
     style,
-    wrapped,
+    wrap_each,
 )
 from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.read import (
@@ -70,6 +71,13 @@ def fan(result: Result, of: Any = "depth", *, ax: Any = None, path: FilePath | N
     Raises:
         NothingToDraw: Nothing of the quantity was kept or gathered, or no member has a finite number.
         SceneError: The quantity is not known, or has several components.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> fleet = lw.Ensemble(lw.Scene.named("remus_100"), members=8)
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
+        >>> lw.plots.fan(result, "speed", path="speed.png").get_ylabel()
+        'speed [m/s]'
     """
     meaning = quantity_of(of)
     estimate = None if result_of(result).samples else estimate_for(result, meaning.name, STANDING)
@@ -87,7 +95,7 @@ def fan(result: Result, of: Any = "depth", *, ax: Any = None, path: FilePath | N
             if is_depth(meaning):
                 point_down(axes, floors(result))
         if ax is None:
-            axes.set_title("\n".join(wrapped(line, axes.figure) for line in (title(result), *notes)))
+            axes.set_title(wrap_each((title(result), *notes), axes.figure))
         if axes.get_legend_handles_labels()[0]:
             legend_below(axes, ncols=4, title=text)
     return axes
@@ -97,10 +105,9 @@ def draw_fan(axes: Any, result: Result, of: Quantity) -> ValuesUnderWay:
     """Draw a fan, the ends of members, and labels."""
     survey = survey_of(result, of)
     if failed(result.status).all() and not survey.under_way[1:].any():
-        raise NothingToDraw(
-            "every member failed before the second sample: there is nothing to draw; see result.status and result.failure_time"
-        )
-    marker = "o" if len(survey.time) < 3 else ""
+        raise NothingToDraw("every member failed before the second sample: there is nothing to draw; "
+                            "see result.status and result.failure_time")  # fmt: skip
+    marker = line_marker(survey.time)
     if survey.total == 1:
         line = np.where(survey.counted, survey.values, np.nan)[:, 0]
         axes.plot(survey.time, line, color=COLORS[0], marker=marker, label=in_words(of.name))
@@ -131,21 +138,18 @@ def text_of(survey: ValuesUnderWay, total: int) -> str:
     return text if survey.ranked == survey.total else f"{text}; quantiles of {survey.ranked:,}"
 
 
-def draw_bands(axes: Any, time: np.ndarray, values: np.ndarray, counted: np.ndarray, **look: Any) -> None:
-    """Draw bands between quantiles of many members against time, and their median.
+def draw_bands(axes: Any, time: np.ndarray, values: np.ndarray, counted: np.ndarray, **median: Any) -> None:
+    """Draw bands between quantiles of the members (k, n) that count at each time [s], and their median.
 
-    time: Times [s], shape (k,).
-    values: A number of each member, shape (k, n).
-    counted: Mask (k, n) of the members that count at each time.
-    **look: Arguments of Axes.plot for the median; and low and high (k,), extremes where they are of more members.
+    **median: Arguments of Axes.plot for the median; and low and high (k,), extremes where they are of more members.
     """
     levels = sorted({q for band in BANDS for q in band} | {0.5})
     curves = dict(zip(levels, at_levels(values, counted, levels), strict=True))
-    curves[0.0], curves[1.0] = look.pop("low", curves[0.0]), look.pop("high", curves[1.0])
+    curves[0.0], curves[1.0] = median.pop("low", curves[0.0]), median.pop("high", curves[1.0])
     for (low, high), color in zip(BANDS, TINTS, strict=True):
         label = "all" if low == 0.0 else band(low, high)
         axes.fill_between(time, curves[low], curves[high], color=color, linewidth=0, label=label)
-    axes.plot(time, curves[0.5], color="black", linewidth=1.2, label="median", **look)
+    axes.plot(time, curves[0.5], color="black", linewidth=1.2, label="median", **median)
 
 
 def _ends(axes: Any, result: Result, survey: ValuesUnderWay) -> None:
@@ -171,9 +175,8 @@ def _draw_estimate(axes: Any, estimate: Estimate, component: int) -> None:
             color, label = TINTS[max(0, len(TINTS) - pairs + i)], band(levels[i], levels[-1 - i])
             axes.fill_between(time, values[:, i], values[:, -1 - i], color=color, linewidth=0, label=label)
         if len(levels) % 2:
-            axes.plot(
-                time, values[:, pairs], color="black", linewidth=1.2, label=f"{band(0.0, levels[pairs])} quantile"
-            )
+            label = f"{band(0.0, levels[pairs])} quantile"
+            axes.plot(time, values[:, pairs], color="black", linewidth=1.2, label=label)
     elif kind == "mean":
         low, high = estimate.lower[:, component], estimate.upper[:, component]
         axes.fill_between(time, low, high, color=TINTS[1], linewidth=0, label=f"its {estimate.confidence:.0%} interval")
@@ -200,6 +203,14 @@ def compare(results: Mapping[str, Result], of: Any = "depth", *, ax: Any = None,
     Raises:
         NothingToDraw: Of some run nothing of the quantity was kept or gathered, or no member has a finite number.
         SceneError: There are no results, or the quantity is not known or has several components.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> fleet = lw.Ensemble(lw.Scene.named("remus_100"), members=8)
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
+        >>> axes = lw.plots.compare({"a": result, "b": lw.solve(fleet, h=0.05, t1=2.0)}, "speed")
+        >>> [line.get_label() for line in axes.lines]
+        ['a: 8 members', 'b: 8 members']
     """
     for result in mapping_of("results", results, "labels to results").values():
         result_of(result)
@@ -209,11 +220,10 @@ def compare(results: Mapping[str, Result], of: Any = "depth", *, ax: Any = None,
     curves = {label: _curve_of(result, meaning) for label, result in results.items()}
     with panel(ax, path) as axes:
         for i, (label, curve) in enumerate(curves.items()):
-            look, marker = style(i), "o" if len(curve.time) < 3 else ""
             if curve.banded:
-                axes.fill_between(curve.time, curve.low, curve.high, facecolor=look["color"], alpha=0.2, hatch=hatch(i),
-                                  edgecolor=look["color"], linewidth=0)  # fmt: skip
-            axes.plot(curve.time, curve.middle, marker=marker, label=f"{label}: {curve.text}", **look)
+                shade(axes, curve.time, curve.low, curve.high, i)
+            marker = line_marker(curve.time)
+            axes.plot(curve.time, curve.middle, marker=marker, label=f"{label}: {curve.text}", **style(i))
         axes.set(xlabel="time [s]", ylabel=label_of(meaning))
         axes.grid(True, alpha=0.3)
         if is_depth(meaning):
@@ -225,16 +235,10 @@ def compare(results: Mapping[str, Result], of: Any = "depth", *, ax: Any = None,
 
 @dataclass(frozen=True, eq=False)
 class RunCurve:
-    """A number of one of several runs against time.
+    """A number of one of several runs against time [s]: a line and the edges of a band about it, shape (k,) each.
 
-    Attributes:
-        time: Times [s], shape (k,).
-        low: Lower edge of the band, shape (k,).
-        middle: The line, shape (k,).
-        high: Upper edge of the band, shape (k,).
-        text: Of how many members it is, and of what statistic if it is of one.
-        banded: Whether there is a band: one vehicle has none.
-        from_statistics: Whether it is of a statistic, since no samples were kept.
+    text: Of how many members it is, and of what statistic if it is of one.
+    banded: Whether there is a band: one vehicle has none.
     """
 
     time: np.ndarray

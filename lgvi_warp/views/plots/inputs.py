@@ -29,9 +29,8 @@ def inputs_by_outcome(result: Result, *, ax: Any = None, path: FilePath | None =
     if len(codes) < 2 or not inputs:
         raise NothingToDraw("all members ended alike, or nothing varies: no input tells them apart")
     most = max(codes, key=lambda code: int((status == code).sum()))
-    shares = {
-        name: one.share for name, one in explained(inputs, np.where(status == most, 1.0, 0.0), CONFIDENCE).items()
-    }
+    parts = explained(inputs, np.where(status == most, 1.0, 0.0), CONFIDENCE)
+    shares = {name: part.share for name, part in parts.items()}
     first, *others = sorted(inputs, key=lambda name: -np.nan_to_num(shares[name], nan=-1.0))
     members = np.sort(np.argsort(mixed(np.arange(result.members)), kind="stable")[:MOST_POINTS])
     upward = inputs[others[0]] if others else np.arange(result.members)
@@ -49,11 +48,8 @@ def inputs_by_outcome(result: Result, *, ax: Any = None, path: FilePath | None =
 
 
 def varied(result: Result) -> dict[str, np.ndarray]:
-    """Collect the numbers that differ between members.
-
-    Returns: Values (n,) by name and component: parameters, and of the start what was kept.
-    """
-    found = {}
+    """Collect the parameters (n,) that differ between members, and what was kept of the start, by name and component."""
+    inputs = {}
     starts = {f"start.{name}": values[0] for name, values in result.samples.items() if name in STARTS}
     for name, values in (*result.parameters.items(), *starts.items()):
         if len(values) != result.members:
@@ -61,10 +57,9 @@ def varied(result: Result) -> dict[str, np.ndarray]:
         columns = values.reshape(len(values), -1)
         # What differs by round-off alone does not vary.
         for i in np.flatnonzero(np.ptp(columns, axis=0) > 1e-12 * np.abs(columns).max(initial=0.0)):
-            found[name if values.ndim == 1 else f"{name}{[int(k) for k in np.unravel_index(i, values.shape[1:])]}"] = (
-                columns[:, i]
-            )
-    return found
+            place = "" if values.ndim == 1 else [int(k) for k in np.unravel_index(i, values.shape[1:])]
+            inputs[f"{name}{place}"] = columns[:, i]
+    return inputs
 
 
 STARTS = ("position", "velocity", "angular_velocity")

@@ -16,7 +16,7 @@ from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.views.choice import AT_ONCE
 from lgvi_warp.views.fleet import members_of_run, title
-from lgvi_warp.views.plots.canvas import legend_below, panel, panels, style, wrapped
+from lgvi_warp.views.plots.canvas import legend_below, line_marker, panel, panels, style, wrap_each, wrapped
 from lgvi_warp.views.plots.ends import draw_outcomes
 from lgvi_warp.views.plots.estimates import statistics
 from lgvi_warp.views.plots.fans import draw_fan, notes_on, text_of
@@ -51,6 +51,13 @@ def summary(result: Result, *, figure: Any = None, path: FilePath | None = None)
 
     Raises:
         NothingToDraw: Every member failed before the second sample, none has a finite position, or nothing was kept.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> fleet = lw.Ensemble(lw.Scene.named("remus_100"), members=8)
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
+        >>> [axes.get_title() for axes in lw.plots.summary(result, path="fleet.png")]
+        ['8 members from above', 'Depth', 'Attitude: medians, bands of 90 %', 'Energy']
     """
     result_of(result)
     if not result.samples and result.kept is None and result.statistics:
@@ -72,12 +79,12 @@ def summary(result: Result, *, figure: Any = None, path: FilePath | None = None)
         for axes, draw in zip(grid.flat, drawings, strict=False):
             lines += draw(axes)
         figure = grid[0, 0].figure
-        figure.suptitle("\n".join(wrapped(line, figure) for line in dict.fromkeys(lines)))
+        figure.suptitle(wrap_each(dict.fromkeys(lines), figure))
     return grid.ravel()[: len(drawings)]
 
 
 def _plan(result: Result, axes: Any) -> list[str]:
-    """Draw paths from above."""
+    """Draw paths from above, of which nothing is told beside them."""
     draw_plan(axes, result)
     return []
 
@@ -124,7 +131,7 @@ def drift(result: Result, *, ax: Any = None, path: FilePath | None = None) -> An
             change = np.abs(values - values[:1]).max(axis=-1)
             largest = np.fmax.reduce(np.where(counted, change, np.nan), axis=1)
             axes.plot(some.time, np.where(largest > 0.0, largest, np.nan), label=f"{name.replace('_', ' ')} [{unit}]",
-                      marker="o" if len(some.time) < 3 else "", **style(i))  # fmt: skip
+                      marker=line_marker(some.time), **style(i))  # fmt: skip
         axes.set(xlabel="time [s]", ylabel="largest change since the start", yscale="log")
         axes.set_title(wrapped(f"{head}; {title(result)}", axes.figure))
         axes.grid(True, alpha=0.3)

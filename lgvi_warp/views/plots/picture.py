@@ -23,10 +23,13 @@ NOT_WRITTEN = "OSError: The file cannot be written."
 def picture(draw: Draws) -> Draws:
     """Say in the help of a picture what is the same of all: where it is drawn, the file, and what it may raise."""
     taken, text = inspect.signature(draw).parameters, inspect.getdoc(draw) or ""
+    text, example, code = text.partition("\n\nExamples:")
     arguments, _, rest = text.partition("\n\nReturns:")
     returns, _, raises = rest.partition("\n\nRaises:")
     missing = [name for name in HELP if name in taken and f"\n    {name}: " not in arguments]
-    told = "".join(f"\n    {name}: {HELP[name]}" for name in missing)
+    common = "".join(f"\n    {name}: {HELP[name]}" for name in missing)
     written = "" if "OSError: " in raises else f"\n    {NOT_WRITTEN}"
-    draw.__doc__ = f"{arguments}{told}\n\nReturns:{returns}\n\nRaises:\n    {NOT_INSTALLED}{raises}{written}"
+    draw.__doc__ = (
+        f"{arguments}{common}\n\nReturns:{returns}\n\nRaises:\n    {NOT_INSTALLED}{raises}{written}{example}{code}"
+    )
     return draw

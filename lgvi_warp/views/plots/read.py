@@ -17,6 +17,7 @@ from lgvi_warp.statistics.values.functional import quantity
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.views.choice import AT_ONCE, Shown, few, select_members
 from lgvi_warp.views.plots.words import DEPTHS, events, is_depth
+from lgvi_warp.views.recording.drawn import about
 
 if TYPE_CHECKING:
     from lgvi_warp.results.result import Result
@@ -28,19 +29,13 @@ CIRCULAR = ("euler[0]", "euler[2]")
 
 @dataclass(frozen=True, eq=False)
 class ValuesUnderWay:
-    """One number of the members under way at each time.
+    """One number of the members under way at each time drawn [s].
 
-    Attributes:
-        of: The quantity.
-        time: Times drawn [s], shape (f,).
-        values: Numbers of the members that quantiles are taken of, shape (f, q).
-        counted: Which of them count, shape (f, q).
-        low: Smallest number of all members, shape (f,); NaN where none counts.
-        high: Largest number of all members, shape (f,).
-        under_way: Number of members under way, shape (f,).
-        last: The last number of every member, shape (n,).
-        above: Number of members that are above the surface at some time; 0 for other quantities than depth.
-        total: Number of members.
+    values: Numbers of the members that quantiles are taken of, shape (f, q); counted: which of them count.
+    low, high: Smallest and largest number of all members, shape (f,); NaN where none counts.
+    under_way: Number of members under way, shape (f,).
+    last: The last number of every member, shape (n,).
+    above: Number of members that are above the surface at some time; 0 for other quantities than depth.
     """
 
     of: Quantity
@@ -73,10 +68,7 @@ def with_samples(result: Result) -> Result:
 
 
 def selected(result: Result, most: int, fields: tuple[str, ...], picture: str) -> tuple[Result, Shown, Result]:
-    """Choose the members that a picture draws, and read their samples.
-
-    Returns: The result that has the samples, the choice, and the samples of those members at the times that are drawn.
-    """
+    """Choose the members that a picture draws: the result that has samples, the choice, and what it has of them, in memory."""
     result = with_samples(result)
     check_fields(result, fields, picture)
     choice = select_members(result, whole_number("most", most, 1))
@@ -101,10 +93,7 @@ def quantity_of(of: Any) -> Quantity:
 
 
 def energy_of(result: Result) -> Quantity:
-    """Energy, as its error where the scene's laws conserve it.
-
-    Returns: The quantity "energy error", E(t) - E(0), or "energy", E(t) [J].
-    """
+    """Energy [J], as the quantity "energy error", E(t) - E(0), where the scene's laws conserve it."""
     energy = quantity("of", "energy")
     if "energy" not in invariants.conserved(result):
         return energy
@@ -142,13 +131,13 @@ def survey_of(result: Result, of: Quantity, at_once: int = AT_ONCE) -> ValuesUnd
         values = values_of(result, of, members, frames)
         last[members] = values[-1]
         if direction is not None:
-            last[members] = _about(values[-1], direction[ended[members], 0])
-            values = _about(values, direction)
+            last[members] = about(values[-1], direction[ended[members], 0], 2.0 * np.pi)
+            values = about(values, direction, 2.0 * np.pi)
         counted = going[:, members] & np.isfinite(values)
         masked = np.where(counted, values, np.nan)
         low, high = np.fmin(low, np.fmin.reduce(masked, axis=1)), np.fmax(high, np.fmax.reduce(masked, axis=1))
         above += int((masked < 0.0).any(axis=0).sum()) if is_depth(of) else 0
-        ranked = choice.ranked[(choice.ranked >= members.start) & (choice.ranked < members.stop)] - members.start
+        ranked = choice.ranked_of(members)
         rows.append(values[:, ranked])
         counts.append(counted[:, ranked])
     if not np.isfinite(low).any():
@@ -167,11 +156,7 @@ def everyone(result: Result) -> Shown:
 def values_of(
     result: Result, of: Quantity, members: slice | np.ndarray, frames: np.ndarray | None = None
 ) -> np.ndarray:
-    """Compute a quantity of some members.
-
-    frames: Indices of the times; default None, all.
-    Returns: Numbers, float64, shape (f, m).
-    """
+    """Compute a quantity of some members at these times, by default at all: float64, shape (f, m)."""
     part = few(result, members, of.fields, frames)
     with np.errstate(invalid="ignore"):
         return of(*samples_of(part))[:, 0].astype(np.float64)
@@ -194,20 +179,10 @@ def _direction(result: Result, of: Quantity, choice: Shown, going: np.ndarray) -
     return np.unwrap(np.angle(arm[known]))[:, None]
 
 
-def _about(angle: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Angles [rad] within half a turn of a direction."""
-    off = angle - direction
-    return np.asarray(direction + off - 2.0 * np.pi * np.round(off / (2.0 * np.pi)))
-
-
 def at_one_time(
     result: Result, of: OfResult, members: np.ndarray, frame: int = -1
 ) -> tuple[np.ndarray, list[str], str]:
-    """Compute a quantity of interest of some members at one time.
-
-    members: Indices of the members, shape (m,).
-    Returns: Numbers (m, c), the names of the c components, and the unit.
-    """
+    """Compute a quantity of interest of m members at one time: numbers (m, c), names of the c components, and the unit."""
     check_fields(result, of.fields, of.label)
     frame = frame % len(result.time)
     all_so_far = of.over_path or of.is_function or isinstance(of, EndQuantity)
@@ -217,10 +192,7 @@ def at_one_time(
 
 
 def estimate_for(result: Result, of: str, types: tuple[str, ...]) -> tuple[Estimate, int] | None:
-    """Find a statistic of a quantity.
-
-    Returns: The estimate and the index of the component; None where there is none.
-    """
+    """Find a statistic of a quantity, and the index of its component; None where there is none."""
     names = DEPTHS if of in DEPTHS else (of,)
     for kind in types:
         for estimate in result.statistics.values():

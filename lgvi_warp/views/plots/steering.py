@@ -10,7 +10,7 @@ import numpy as np
 from lgvi_warp.common.status import under_way
 from lgvi_warp.views.choice import MOST_BODIES
 from lgvi_warp.views.commands import channels, faults
-from lgvi_warp.views.plots.canvas import GREY, hatch, legend_below, style
+from lgvi_warp.views.plots.canvas import GREY, legend_below, line_marker, shade, style
 from lgvi_warp.views.plots.read import quantity_of, selected, survey_of
 from lgvi_warp.views.plots.words import WORDS
 from lgvi_warp.views.recording.drawn import at_levels
@@ -33,10 +33,10 @@ def draw_commands(result: Result, axes: Any) -> list[str]:
         lined |= set(channel.limits(levels))
     for limit in lined:
         axes.axhline(limit, color=GREY, linestyle=(0, (6, 2)), linewidth=1.0, label="limit" if limit > 0.0 else None)
-    said = _mark_faults(axes, result)
+    fault_texts = _mark_faults(axes, result)
     axes.set(xlabel="time [s]", ylabel="command [unit of each]", title=f"Commands{_bands(some.members)}")
     legend_below(axes, ncols=3)
-    return said
+    return fault_texts
 
 
 def draw_angles(result: Result, axes: Any) -> list[str]:
@@ -53,10 +53,10 @@ def draw_angles(result: Result, axes: Any) -> list[str]:
         gaps = ": all ways" if scattered.all() else "; gaps: all ways" if scattered.any() else ""
         label = f"{WORDS[name]}{gaps}"
         _band(axes, survey.time, levels, i, label, banded=survey.total > 1)
-    said = _mark_faults(axes, result)
+    fault_texts = _mark_faults(axes, result)
     axes.set(xlabel="time [s]", ylabel="angle [deg]", title=f"Attitude{_bands(survey.total)}")
     legend_below(axes, ncols=4)
-    return said
+    return fault_texts
 
 
 def _bands(members: int) -> str:
@@ -66,18 +66,16 @@ def _bands(members: int) -> str:
 
 def _band(axes: Any, time: np.ndarray, levels: np.ndarray, i: int, label: str, banded: bool = True) -> None:
     """Draw a median and the band about it (3, f)."""
-    look, marker = style(i), "o" if len(time) < 3 else ""
     if banded and (levels[2] > levels[0]).any():
-        axes.fill_between(time, levels[0], levels[2], facecolor=look["color"], alpha=0.2, hatch=hatch(i),
-                          edgecolor=look["color"], linewidth=0)  # fmt: skip
-    axes.plot(time, levels[1], label=label, marker=marker, linewidth=1.4, **look)
+        shade(axes, time, levels[0], levels[2], i)
+    axes.plot(time, levels[1], label=label, marker=line_marker(time), linewidth=1.4, **style(i))
     axes.grid(True, alpha=0.3)
 
 
 def _mark_faults(axes: Any, result: Result) -> list[str]:
     """Draw a line where each fault begins; return what each does."""
-    found = faults(result)
-    for i, fault in enumerate(found):
+    broken = faults(result)
+    for i, fault in enumerate(broken):
         axes.axvline(max(fault.time, float(result.time[0])), color="black", linestyle=":", linewidth=1.4,
                      label="fault" if i == 0 else None)  # fmt: skip
-    return [fault.text for fault in found]
+    return [fault.text for fault in broken]

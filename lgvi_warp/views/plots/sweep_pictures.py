@@ -62,8 +62,6 @@ def plot_success(sweep: Sweep, path: FilePath | None = None, *, figure: Any = No
     """Draw the success of each case with its intervals: by case, over the axis of the grid, or a map over its first two axes.
 
     A map has the interval in each field, and is drawn at the first value of any further axis.
-
-    Returns: The axes, (panels,).
     """
     cells, long = _ran(sweep), _long(sweep)
     if len(long) >= 2:
@@ -73,9 +71,8 @@ def plot_success(sweep: Sweep, path: FilePath | None = None, *, figure: Any = No
         if long:
             values = sweep.setup.axes[long[0]]
             for i, case in enumerate(sweep.cases):
-                _ends(
-                    axes, sweep, _ran(sweep, case), _places(values), long[0], marker=MARKERS[i], label=case, **style(i)
-                )
+                line = {"marker": MARKERS[i], "label": case} | style(i)
+                _ends(axes, sweep, _ran(sweep, case), _places(values), long[0], **line)
             axes.set_xticks(_places(values), [str(value) for value in values])
             axes.set_xlabel(long[0])
             axes.legend()
@@ -88,7 +85,7 @@ def plot_success(sweep: Sweep, path: FilePath | None = None, *, figure: Any = No
     return grid.ravel()
 
 
-def _ends(axes: Any, sweep: Sweep, cells: list[SweepCell], places: list[float], name: str | None, **look: Any) -> None:
+def _ends(axes: Any, sweep: Sweep, cells: list[SweepCell], places: list[float], name: str | None, **line: Any) -> None:
     """Success of cells with error bars [%]: one a place, or each at the place of its value of an axis of the grid."""
     if not cells:
         return
@@ -97,7 +94,7 @@ def _ends(axes: Any, sweep: Sweep, cells: list[SweepCell], places: list[float], 
         places = [places[values.index(cell.point[name])] for cell in cells]
     value, lower, upper = 100.0 * np.array([sweep.success(cell.case.name, cell.point) for cell in cells]).T
     bars = np.maximum(0.0, [value - lower, upper - value])
-    axes.errorbar(places, value, bars, capsize=4.0, **look)
+    axes.errorbar(places, value, bars, capsize=4.0, **line)
 
 
 def _places(values: list[Any]) -> list[float]:
@@ -138,8 +135,6 @@ def plot_metrics(sweep: Sweep, path: FilePath | None = None, *, figure: Any = No
     """Draw boxes of each metric by case, at each point of the grid: quartiles, whiskers at 5 and 95 %.
 
     Boxes are of members that did not fail and whose number is finite. The first 40 cells that ran are drawn.
-
-    Returns: The axes, (metrics,).
     """
     every = _ran(sweep)
     cells, names = every[:MOST_BOXES], [name for name in sweep.metrics if name != END]
@@ -171,10 +166,7 @@ def _box(sweep: Sweep, cell: SweepCell, name: str) -> dict[str, float]:
 
 
 def plot_differences(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
-    """Draw the differences of success to the baseline on the same members, with their intervals.
-
-    Returns: The axes, (1,).
-    """
+    """Draw the differences of success to the baseline on the same members, with their intervals."""
     rows = [row for row in against_baseline(sweep) if row.of == SUCCESS]
     if not rows:
         raise NothingToDraw("there is no other case that ran to compare with the baseline")
@@ -197,10 +189,7 @@ def plot_differences(sweep: Sweep, path: FilePath | None = None, *, figure: Any 
 
 
 def plot_causes(sweep: Sweep, path: FilePath | None = None, *, figure: Any = None) -> np.ndarray:
-    """Draw which members pass over the two inputs that explain most of it, in the cell where most is open.
-
-    Returns: The axes, (1,).
-    """
+    """Draw which members pass over the two inputs that explain most of it, in the cell where most is open."""
     away, _, cell = min((abs(sweep.passed(cell).mean() - 0.5), cell.index, cell) for cell in _ran(sweep))
     rows = sweep.causes(cell.case.name, cell.point)[:2]
     if away == 0.5 or not rows:
@@ -230,7 +219,6 @@ def plot_responses(
     of: "depth", "heading", "speed", "north" or "east"; or a distance from what is wanted, "position", "attitude" or
         "cross_track". By default what that metric is of whose medians differ most between cases there, in interquartile
         ranges; the first one of equals.
-    Returns: The axes, (cases that ran,).
     """
     cells = _most_apart(sweep)
     of = of or _tracked(sweep, cells)
@@ -239,9 +227,8 @@ def plot_responses(
     count = min(members, sweep.members_count)
     columns = min(MOST_COLUMNS, len(cells))
     rows = -(-len(cells) // columns)
-    with panels(
-        figure, path, (rows, columns), (4.5 * columns, 4.0 * rows), len(cells), sharex=True, sharey=True
-    ) as grid:
+    size = 4.5 * columns, 4.0 * rows
+    with panels(figure, path, (rows, columns), size, len(cells), sharex=True, sharey=True) as grid:
         for axes, cell in zip(grid.flat, cells, strict=False):
             _response(axes, sweep, cell, of, count)
             axes.set_title(wrapped(cell.name, axes.figure, 0.9 / columns))

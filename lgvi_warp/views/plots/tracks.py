@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ import numpy as np
 from lgvi_warp.common.arguments import listed, whole_number
 from lgvi_warp.common.errors import refusal
 from lgvi_warp.common.status import Status, under_way
-from lgvi_warp.views.plots.canvas import COLORS, STYLES, legend_below, mark, outcome_style, panel, point_down, wrapped
+from lgvi_warp.views.plots.canvas import COLORS, STYLES, legend_below, mark, outcome_style, panel, point_down, wrap_each
 from lgvi_warp.views.plots.picture import FilePath, picture
 from lgvi_warp.views.plots.read import quantity_of, selected, values_of, with_samples
 from lgvi_warp.views.plots.words import HINT, floors, is_depth, label_of, some_of
@@ -38,12 +39,15 @@ def paths(result: Result, most: int = MOST_PATHS, *, ax: Any = None, path: FileP
 
     Raises:
         NothingToDraw: No positions were kept, or no member has a finite start.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> fleet = lw.Ensemble(lw.Scene.named("remus_100"), members=8)
+        >>> result = lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=1.0))
+        >>> lw.plots.paths(result, most=3, path="paths.svg").get_title()
+        'Paths of 3 of 8 members'
     """
-    result = with_samples(result)
-    with panel(ax, path) as axes:
-        draw_paths(axes, result, most)
-        axes.set_title(_title(axes, axes.get_title(), result))
-    return axes
+    return _titled(draw_paths, with_samples(result), most, ax, path, (8.0, 5.0))
 
 
 def draw_paths(axes: Any, result: Result, most: int = MOST_PATHS) -> None:
@@ -72,14 +76,11 @@ def plan_view(result: Result, most: int = MOST_PATHS, *, ax: Any = None, path: F
     Raises:
         NothingToDraw: No positions were kept, or no member has a finite start.
     """
-    with panel(ax, path, (8.0, 6.5)) as axes:
-        draw_plan(axes, result, most)
-        axes.set_title(_title(axes, axes.get_title(), result))
-    return axes
+    return _titled(draw_plan, result, most, ax, path, (8.0, 6.5))
 
 
 def draw_plan(axes: Any, result: Result, most: int = MOST_PATHS) -> None:
-    """Draw paths from above."""
+    """Draw paths from above, north up, in the same scale both ways."""
     result, choice, some = selected(result, most, ("position",), "a view from above")
     _lines(axes, some, some.position[..., 1], some.position[..., 0], start=True)
     title = f"{some_of(result, len(choice.members))} from above"
@@ -131,9 +132,19 @@ def phase(
     return axes
 
 
+def _titled(
+    draw: Callable[..., None], result: Result, most: int, ax: Any, path: FilePath | None, size: tuple[float, float]
+) -> Any:
+    """Draw paths of some members, and hint in the title that start and end alone were kept where that is so."""
+    with panel(ax, path, size) as axes:
+        draw(axes, result, most)
+        axes.set_title(_title(axes, axes.get_title(), result))
+    return axes
+
+
 def _title(axes: Any, text: str, result: Result) -> str:
     """A title, with the hint that start and end alone were kept where that is so."""
-    return "\n".join(wrapped(line, axes.figure) for line in (text, *([HINT] if len(result.time) < 3 else [])))
+    return wrap_each((text, *([HINT] if len(result.time) < 3 else [])), axes.figure)
 
 
 def _lines(axes: Any, some: Result, x: np.ndarray, y: np.ndarray, start: bool = False) -> None:
@@ -177,9 +188,8 @@ def attitude(result: Result, most: int = MOST_AXES, *, ax: Any = None, path: Fil
     Raises:
         NothingToDraw: No attitudes were kept, or no member has a finite start.
     """
-    result, choice, some = selected(
-        result, max(whole_number("most", most, 1), MOST_PATHS), ("position", "attitude"), "attitudes"
-    )
+    candidates = max(whole_number("most", most, 1), MOST_PATHS)
+    result, choice, some = selected(result, candidates, ("position", "attitude"), "attitudes")
     # Of the choice those that are under way longest: one that fails at once has no path.
     longest = np.sort(np.argsort(-under_way(some).sum(axis=0), kind="stable")[:most])
     choice, some = replace(choice, members=choice.members[longest]), some.part(longest)
@@ -191,10 +201,10 @@ def attitude(result: Result, most: int = MOST_AXES, *, ax: Any = None, path: Fil
         for k, name in enumerate(BODY_AXES):
             for i in range(len(choice.members)):
                 line = points[:, i, :, k]
-                look = {"color": COLORS[k], "linestyle": STYLES[k], "linewidth": 1.4}
+                line_style = {"color": COLORS[k], "linestyle": STYLES[k], "linewidth": 1.4}
                 if _coarse(line):
-                    look |= {"linestyle": "", "marker": "osD"[k], "markersize": 3}
-                axes.plot(*line.T, label=name if i == 0 else None, **look)
+                    line_style |= {"linestyle": "", "marker": "osD"[k], "markersize": 3}
+                axes.plot(*line.T, label=name if i == 0 else None, **line_style)
                 axes.plot(*line[:1].T, "osD"[k], color=COLORS[k], markeredgecolor="black", markersize=8)
         axes.set_title(f"Where body axes of {some_of(result, len(choice.members))} point; marks: start")
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.04), ncols=3, frameon=False)
@@ -215,9 +225,8 @@ def _sphere(axes: Any) -> None:
         ring = np.cos(angle) * np.cos(turn), np.cos(angle) * np.sin(turn), np.full(len(turn), np.sin(angle))
         axes.plot(*ring, color="#BBBBBB", linewidth=wide)
     for angle in np.radians(np.arange(0.0, 180.0, 30.0)):
-        axes.plot(
-            np.cos(angle) * np.cos(turn), np.sin(angle) * np.cos(turn), np.sin(turn), color="#BBBBBB", linewidth=0.5
-        )
+        ring = np.cos(angle) * np.cos(turn), np.sin(angle) * np.cos(turn), np.sin(turn)
+        axes.plot(*ring, color="#BBBBBB", linewidth=0.5)
     for place, name in (((0, 1.2, 0), "north"), ((1.2, 0, 0), "east"), ((0, 0, 1.12), "up"), ((0, 0, -1.15), "down")):
         axes.text(*place, name, ha="center", va="center")
     axes.set_box_aspect((1, 1, 1), zoom=1.3)

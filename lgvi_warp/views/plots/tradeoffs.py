@@ -51,32 +51,36 @@ def tradeoff(found: Tradeoff, of: str | None = None, *, figure: Any = None, path
         costs, biases = grid[0]
         named: list[tuple[str, float, float, Any]] = []
         for (name, dtype), points in groups.items():
-            look = _look(name, dtype, best)
+            line = _line_style(name, dtype, best)
             errors, prices = _errors_and_costs([point for point in points if point in shown], of)
-            costs.plot(errors, prices, label=f"{name}, {dtype}", **look)
+            costs.plot(errors, prices, label=f"{name}, {dtype}", **line)
             biased = [point for point in points if point.biases]
             values = [point.biases.get(f"{of}_mean", np.nan) for point in biased]
-            biases.plot([point.setting.h for point in biased], values, label=f"{name}, {dtype}", **look)
+            biases.plot([point.setting.h for point in biased], values, label=f"{name}, {dtype}", **line)
             if name in best and errors:
-                named.append((name if dtype == "float64" else f"{name}, {dtype}", errors[0], prices[0], look["color"]))
+                named.append((name if dtype == "float64" else f"{name}, {dtype}", errors[0], prices[0], line["color"]))
         costs.plot(*_errors_and_costs(front, of), color="black", linewidth=6, alpha=0.2, solid_capstyle="round",
                    label="cheapest for each error", zorder=0)  # fmt: skip
         _words(costs, biases, found, of, bool(shown))
         _name(costs, named)
-        _legend(
-            costs.figure, {dtype for _, dtype in groups}, [name for name, _ in groups if name not in best], bool(front)
-        )
+        others = [name for name, _ in groups if name not in best]
+        _legend(costs.figure, {dtype for _, dtype in groups}, others, bool(front))
     return grid[0]
 
 
-def _look(name: str, dtype: str, best: list[str]) -> dict[str, Any]:
+def _line_style(name: str, dtype: str, best: list[str]) -> dict[str, Any]:
     """Colour and marker of a method, line style and fill of a precision."""
     line, fill = PRECISIONS.get(dtype, ("-.", "bottom"))
-    look: dict[str, Any] = {"linestyle": line, "fillstyle": fill, "linewidth": 1.0}
+    common: dict[str, Any] = {"linestyle": line, "fillstyle": fill, "linewidth": 1.0}
     if name not in best:
-        return look | {"color": GREY, "marker": ".", "markersize": 3, "zorder": 1, "alpha": 0.7}
+        return common | {"color": GREY, "marker": ".", "markersize": 3, "zorder": 1, "alpha": 0.7}
     i = best.index(name)
-    return look | {"color": COLORS[i % len(COLORS)], "marker": MARKERS[i % len(MARKERS)], "markersize": 6, "zorder": 2}
+    return common | {
+        "color": COLORS[i % len(COLORS)],
+        "marker": MARKERS[i % len(MARKERS)],
+        "markersize": 6,
+        "zorder": 2,
+    }
 
 
 def _errors_and_costs(points: list[Measurement], of: str) -> tuple[list[float], list[float]]:
@@ -109,9 +113,8 @@ def _words(costs: Any, biases: Any, tradeoff: Tradeoff, of: str, any_shown: bool
         biases.text(1.01, CHANCE, "chance", va="center", transform=biases.get_yaxis_transform())
     sample = f"{tradeoff.members} members, 0 to {tradeoff.t1:g} s"
     without = f"no reading of {', '.join(tradeoff.missing)}; " if tradeoff.missing else ""
-    figure.suptitle(
-        wrapped(f"{without}{sample}; reference {tradeoff.reference}; better is to the right and down", figure)
-    )
+    text = f"{without}{sample}; reference {tradeoff.reference}; better is to the right and down"
+    figure.suptitle(wrapped(text, figure))
 
 
 def _name(axes: Any, named: list[tuple[str, float, float, Any]]) -> None:

@@ -35,10 +35,7 @@ HINT = "start and end alone were kept: give SaveAt(every=...) for the motion bet
 
 
 def label_of(of: Quantity) -> str:
-    """Label of an axis: the quantity and its unit.
-
-    Returns: As "speed [m/s]"; depths say that they point down.
-    """
+    """Label of an axis, as "speed [m/s]"; depths say that they point down."""
     name = WORDS.get(of.name, of.name.replace("_", " "))
     unit = of.unit or "1"
     return f"{name} [{unit}], down" if is_depth(of) else f"{name} [{unit}]"
@@ -46,7 +43,7 @@ def label_of(of: Quantity) -> str:
 
 def in_words(text: str) -> str:
     """Say components by their names: "max(position[1])" is "max(east)"."""
-    return COMPONENT.sub(lambda found: WORDS.get(found[0], found[0]), text)
+    return COMPONENT.sub(lambda match: WORDS.get(match[0], match[0]), text)
 
 
 def is_depth(of: Quantity) -> bool:
@@ -63,9 +60,9 @@ def floors_of_each(results: Mapping[str, Result]) -> dict[str, list[float]]:
     """Depths of the floors of several scenes [m]; where these differ, by words that name the run."""
     each = {label: floors(result) for label, result in results.items()}
     first = next(iter(each.values()))
-    if all(one == first for one in each.values()):
+    if all(depths == first for depths in each.values()):
         return first
-    return {f"floor\nof {label}": one["floor"] for label, one in each.items()}
+    return {f"floor\nof {label}": depths["floor"] for label, depths in each.items()}
 
 
 def events(result: Result) -> list[dict[str, Any]]:

@@ -34,11 +34,8 @@ SPREAD = (0.025, 0.975)
 class Fan:
     """Quantiles of one number against time, over the members under way.
 
-    Attributes:
-        name: Name of its entity, as "height".
-        title: Name and unit in words.
-        unit: Unit.
-        levels: Values at LEVELS, shape (7, f); NaN at times when no member is under way.
+    name: Name of its entity, as "height"; title: name and unit in words.
+    levels: Values at LEVELS, shape (7, f); NaN at times when no member is under way.
     """
 
     name: str
@@ -51,11 +48,8 @@ class Fan:
 class Spread:
     """Ellipsoids that hold the members under way, on the axes of their covariance.
 
-    Attributes:
-        at: Indices of the frames that have one, shape (e,).
-        center: Centres, shape (e, 3) [m].
-        half: Half sizes along the axes, shape (e, 3) [m].
-        axes: Axes as columns, a rotation each, shape (e, 3, 3).
+    at: Indices of the frames that have one, shape (e,); center, half: centres and half sizes along the axes, shape (e, 3) [m].
+    axes: Axes as columns, a rotation each, shape (e, 3, 3).
     """
 
     at: np.ndarray
@@ -68,20 +62,13 @@ class Spread:
 class Drawn:
     """What is drawn of one run.
 
-    Attributes:
-        result: The whole result, whose outcomes are told.
-        source: The members whose samples were kept: the result itself, or its kept members.
-        choice: Which members of the source and which times are drawn.
-        few: The members drawn at the times drawn, in memory.
-        label: Name of the run among those that are compared; "" for a single one.
-        rgb: Colour of the run among those that are compared; None for colours by outcome.
-        counted: Which of the members drawn are under way at each time, shape (f, m).
-        shares: Share of all members by status at each time, shape (f,) each; OK for those under way.
-        fans: Curves of the members under way.
-        spread: Where they are.
-        bins: Edges of the depths' histogram [m], shape (b + 1,).
-        heights: Members under way in each bin at each time, of those that quantiles are taken of, shape (f, b).
-        above: Members that pass above depth 0, of all.
+    source: The members whose samples were kept: the result itself, or its kept members; choice: which of these are drawn.
+    few: The members drawn at the times drawn, in memory; counted: which of them are under way at each time, shape (f, m).
+    label, rgb: Name and colour of the run among those that are compared; "" and None, colours by outcome, for a single one.
+    shares: Share of all members by status at each time, shape (f,) each; OK for those under way.
+    bins: Edges of the depths' histogram [m], shape (b + 1,).
+    heights: Members under way in each bin at each time, of those that quantiles are taken of, shape (f, b).
+    above: Members that pass above depth 0, of all.
     """
 
     result: Result
@@ -134,10 +121,7 @@ class Drawn:
         return str(rr.new_entity_path([*head.split("/"), *([self.label] if self.label else []), *parts]))
 
     def groups(self) -> list[tuple[Status, np.ndarray]]:
-        """Divide the members drawn by what became of them until each time.
-
-        Returns: Pairs of a status and a mask (f, m); OK for those under way.
-        """
+        """Divide the members drawn by what became of them until each time: masks (f, m) by status, OK for those under way."""
         status = np.asarray(self.few.status)
         is_finite = finite_rows(self.few.position)
         ended = ((code, is_finite & ~self.counted & (status == code)) for code in outcomes(self.few) if code)
@@ -145,10 +129,7 @@ class Drawn:
 
 
 def drawn_of(result: Result, members: Any = None, label: str = "", rgb: tuple[int, int, int] | None = None) -> Drawn:
-    """Read what is drawn of a run.
-
-    rgb: Its colour among them; default None.
-    """
+    """Read what is drawn of a run, by itself or as one of several with labels and colours."""
     source = result.kept if not result.samples and result.kept is not None else result
     if missing := [name for name in NEEDED if source.samples and name not in source.samples]:
         names = ", ".join(missing)
@@ -183,9 +164,8 @@ def places_of(members: Any, total: int, kept: np.ndarray) -> np.ndarray:
         raise refusal("members", members, "is no list of members", "give indices: members=[3, 17]")
     for index in (indices.min(), indices.max()):
         if not 0 <= index < total:
-            raise refusal(
-                "members", int(index), f"is none of the {total:,} members", f"give indices from 0 to {total - 1}"
-            )
+            fault = f"is none of the {total:,} members"
+            raise refusal("members", int(index), fault, f"give indices from 0 to {total - 1}")
     if len(lost := np.setdiff1d(indices, kept)):
         raise refusal("members", int(lost[0]), "has no samples", f"keep them: keep={[int(index) for index in indices]}")
     return np.flatnonzero(np.isin(kept, indices))
@@ -214,11 +194,7 @@ def streamed(result: Result, fan: Fan, frames: np.ndarray) -> Fan:
 
 
 def roll_pitch_heading(attitude: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Compute angles of attitudes.
-
-    attitude: Rotations from body to inertial axes, shape (..., 3, 3).
-    Returns: Roll, pitch and heading [deg], float32, shape (...) each.
-    """
+    """Compute roll, pitch and heading [deg], float32, of rotations (..., 3, 3) from body to inertial axes."""
     part = {place: attitude[..., *place].astype(np.float32) for place in ((0, 0), (1, 0), (2, 0), (2, 1), (2, 2))}
     roll = np.degrees(np.arctan2(part[2, 1], part[2, 2]))
     pitch = np.degrees(np.arcsin(np.clip(-part[2, 0], -1.0, 1.0)))
@@ -234,10 +210,10 @@ def _directions(few: Result, counted: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return directions[0], directions[1]
 
 
-def _about(angle: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Angles [deg] within half a turn of a direction."""
+def about(angle: np.ndarray, direction: np.ndarray, turn: float) -> np.ndarray:
+    """Angles within half a turn of a direction; turn: 2 pi [rad] or 360 [deg]."""
     off = angle - direction
-    return np.asarray(direction + off - np.float32(360.0) * np.round(off / np.float32(360.0)))
+    return np.asarray(direction + off - turn * np.round(off / turn))
 
 
 # Name, title and unit of the curves of all members.
@@ -265,9 +241,10 @@ def _survey(
         counts_here = counted[:, members] & finite_rows(position)
         roll, pitch, heading = roll_pitch_heading(at["attitude"])
         speed = np.sqrt(sum(np.square(at["velocity"][..., axis], dtype=np.float32) for axis in range(3)))
-        values = (-position[..., 2], _about(roll, directions[0]), pitch, _about(heading, directions[1]), speed)
+        roll, heading = about(roll, directions[0], 360.0), about(heading, directions[1], 360.0)
+        values = (-position[..., 2], roll, pitch, heading, speed)
         above += int(np.count_nonzero(np.logical_or.reduce(counts_here & (position[..., 2] < 0.0), axis=0)))
-        ranked = choice.ranked[(choice.ranked >= members.start) & (choice.ranked < members.stop)] - members.start
+        ranked = choice.ranked_of(members)
         for i, value in enumerate(values):
             masked = np.where(counts_here, value, np.float32(np.nan))
             low[i] = np.fmin(low[i], np.fmin.reduce(masked, axis=1))
@@ -285,11 +262,9 @@ def _survey(
 
 
 def at_levels(values: np.ndarray, counted: np.ndarray, levels: Sequence[float]) -> np.ndarray:
-    """Quantiles over the members that count at each time, linear between neighbours.
+    """Quantiles (m, f) of values (f, n) over the members that count at each time, linear between neighbours.
 
-    values: Numbers of the members, shape (f, n).
-    counted: Mask (f, n) of the members that count; a value that is not finite never does.
-    Returns: Quantiles, float64, shape (m, f); NaN at times when no member counts.
+    A value that is not finite never counts; at times when no member does, they are NaN.
     """
     ranked = np.sort(np.where(counted & np.isfinite(values), values, np.inf), axis=1)
     counts = np.isfinite(ranked).sum(axis=1)
@@ -333,17 +308,10 @@ def _range(values: np.ndarray) -> tuple[float, float]:
 
 
 def first_ended(result: Result, code: Status) -> float:
-    """When the first member ended so.
-
-    Returns: Time [s].
-    """
+    """When the first member ended so [s]."""
     return float(stop_time(result)[np.asarray(result.status) == code].min())
 
 
 def quaternion_xyzw(attitude: np.ndarray) -> np.ndarray:
-    """Quaternions as the viewer takes them.
-
-    attitude: Rotations from body to inertial axes, shape (..., 3, 3).
-    Returns: float32, scalar last, shape (..., 4).
-    """
+    """Quaternions (..., 4) as the viewer takes them, scalar last, float32, of rotations (..., 3, 3)."""
     return notation.quaternion_from_matrix(attitude)[..., [1, 2, 3, 0]].astype(np.float32)

@@ -13,12 +13,7 @@ FIELD, ASPECT, HIGH = 0.9 * TANGENT, 1.3, 600.0
 
 
 def distance(low: np.ndarray, high: np.ndarray, aspect: float) -> float:
-    """How far from the middle of a box the eye must be to see all of it.
-
-    low: Smallest coordinates of the box [m], shape (3,).
-    high: Largest ones [m], shape (3,).
-    Returns: Distance [m].
-    """
+    """How far [m] from the middle of a box, from low to high (3,) [m], the eye must be to see all of it."""
     across = np.cross(SIGHT, (0.0, 0.0, -1.0))
     across /= np.linalg.norm(across)
     above = np.cross(across, SIGHT)
@@ -28,12 +23,7 @@ def distance(low: np.ndarray, high: np.ndarray, aspect: float) -> float:
 
 
 def far_pixel(low: np.ndarray, high: np.ndarray, aspect: float) -> float:
-    """How much one pixel covers at the far end of a box.
-
-    low: Smallest coordinates of the box [m], shape (3,).
-    high: Largest ones [m], shape (3,).
-    Returns: Length across the sight [m].
-    """
+    """How much one pixel covers across the sight [m] at the far end of a box from low to high (3,) [m]."""
     farthest = distance(low, high, aspect) + float((_corners(low, high) @ SIGHT).max())
     return 2.0 * TANGENT * farthest / HIGH
 

@@ -14,7 +14,7 @@ from lgvi_warp.views.choice import frames_of
 from lgvi_warp.views.commands import channels, faults
 from lgvi_warp.views.fleet import OUTCOME_STYLES
 from lgvi_warp.views.recording.drawn import LEVELS, Drawn, Fan, at_levels, first_ended
-from lgvi_warp.views.recording.world import TIMELINE
+from lgvi_warp.views.recording.world import TIMELINE, log_static, send_columns
 
 # Bands of a fan, outermost first: name, places of its levels, and opacity.
 BANDS = (("all", 0, 6, 60), ("90 %", 1, 5, 110), ("50 %", 2, 4, 170))
@@ -39,12 +39,6 @@ def log_graphs(recording: Any, run: Drawn) -> None:
     _histogram(recording, run)
 
 
-def _send(recording: Any, entity: str, time: np.ndarray, columns: Any) -> None:
-    import rerun as rr
-
-    recording.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=time)], columns, strict=True)
-
-
 def _fan(recording: Any, run: Drawn, fan: Fan) -> None:
     """Log the bands of a fan and its median; of one member, its curve."""
     import rerun as rr
@@ -54,9 +48,9 @@ def _fan(recording: Any, run: Drawn, fan: Fan) -> None:
     for name, low, high, opacity in () if single else bands:
         entity = run.path(f"curves/{fan.name}", name.replace(" %", "_percent"))
         style = rr.Measurements.from_fields(colors=[(*rgb, opacity)], widths=[0.0], names=[name], units=[fan.unit])
-        recording.log(entity, style, static=True, strict=True)
+        log_static(recording, entity, style)
         middle, half = 0.5 * (fan.levels[low] + fan.levels[high]), 0.5 * (fan.levels[high] - fan.levels[low])
-        _send(recording, entity, run.time, rr.Measurements.columns(values=middle, variances=half**2))
+        send_columns(recording, entity, run.time, rr.Measurements.columns(values=middle, variances=half**2))
     name = run.label or ("the member" if single else "median")
     color = run.color(Status.OK) if single or run.label else WHITE
     _series(recording, run.path(f"curves/{fan.name}", "median"), run.time, fan.levels[MEDIAN], name, color)
@@ -69,19 +63,19 @@ def _series(
     """Log one curve, broken where its values are not finite; with markers where there are few."""
     import rerun as rr
 
-    recording.log(entity, rr.SeriesLines(names=name, colors=color, widths=width), static=True, strict=True)
+    log_static(recording, entity, rr.SeriesLines(names=name, colors=color, widths=width))
     if len(time) < MARKED:
-        recording.log(entity, rr.SeriesPoints(names=name, colors=color, marker_sizes=4.0), static=True, strict=True)
-    _send(recording, entity, time, rr.Scalars.columns(scalars=np.asarray(values, np.float64)))
+        log_static(recording, entity, rr.SeriesPoints(names=name, colors=color, marker_sizes=4.0))
+    send_columns(recording, entity, time, rr.Scalars.columns(scalars=np.asarray(values, np.float64)))
 
 
 def log_member(recording: Any, run: Drawn, place: int, member: int) -> None:
     """Log height and speed of one member while it is under way."""
     speed = np.linalg.norm(run.few.velocity[:, place], axis=-1)
     for name, values in (("height", -run.position[:, place, 2]), ("speed", speed)):
-        seen_values = np.where(run.counted[:, place], values, np.nan)
+        under_way_values = np.where(run.counted[:, place], values, np.nan)
         entity = f"curves/{name}/{member}"
-        _series(recording, entity, run.time, seen_values, f"member {member:,}", OUTCOME_STYLES[Status.OK].rgb, 1.0)
+        _series(recording, entity, run.time, under_way_values, f"member {member:,}", OUTCOME_STYLES[Status.OK].rgb, 1.0)
 
 
 # Marks of outcomes on the curves of a run that is compared, which are all in its colour; failures have one together.
@@ -106,11 +100,10 @@ def _shares(recording: Any, run: Drawn) -> None:
         _series(recording, entity, run.time, 100.0 * share, label, run.color(code))
         if code and run.label:
             at, marks = frames_of(run.time, MOST_MARKS), f"{entity}/marks"
-            style = rr.SeriesPoints(
-                names=label, colors=run.color(code), markers=MARKERS.get(code, "cross"), marker_sizes=5.0
-            )
-            recording.log(marks, style, static=True, strict=True)
-            _send(recording, marks, run.time[at], rr.Scalars.columns(scalars=100.0 * share[at]))
+            marker = MARKERS.get(code, "cross")
+            style = rr.SeriesPoints(names=label, colors=run.color(code), markers=marker, marker_sizes=5.0)
+            log_static(recording, marks, style)
+            send_columns(recording, marks, run.time[at], rr.Scalars.columns(scalars=100.0 * share[at]))
 
 
 def _channels(recording: Any, run: Drawn) -> None:
@@ -136,9 +129,8 @@ def _log(recording: Any, run: Drawn) -> None:
 
     def say(when: float, text: str, level: str, color: tuple[int, int, int]) -> None:
         text = f"{run.label}: {text}" if run.label else text
-        _send(
-            recording, run.path("log"), np.array([when]), rr.TextLog.columns(text=[text], level=[level], color=[color])
-        )
+        columns = rr.TextLog.columns(text=[text], level=[level], color=[color])
+        send_columns(recording, run.path("log"), np.array([when]), columns)
 
     for fault in faults(run.result):
         say(max(fault.time, float(run.time[0])), fault.text, "WARN", FAULT)

@@ -38,19 +38,12 @@ class Hull(NamedTuple):
     parts: np.ndarray
 
     def colors(self, rgb: tuple[int, int, int]) -> np.ndarray:
-        """Colour the hull, with a light nose and a bright fin that show its attitude.
-
-        Returns: Colours of the corners, uint8, shape (p, 3).
-        """
+        """Colour the corners (p, 3), with a light nose and a bright fin that show the attitude."""
         return np.array([rgb, LIGHT, FIN], np.uint8)[self.parts]
 
 
 def hull_of(length: float, diameter: float) -> Hull:
-    """Build a hull along the body's x axis: a cylinder with round ends, a light nose, and a fin on its upper side.
-
-    length: From end to end [m].
-    diameter: Largest diameter [m].
-    """
+    """Build a hull [m] along the body's x axis: a cylinder with round ends, a light nose, and a fin on its upper side."""
     radius, end = 0.5 * diameter, min(0.5 * diameter, 0.5 * length)
     bend = np.linspace(0.0, 0.5 * np.pi, ALONG + 1)
     middle = 0.5 * length - end
@@ -82,11 +75,7 @@ def hull_of(length: float, diameter: float) -> Hull:
 
 
 def shape_of(scene: Mapping[str, Any], parameters: Mapping[str, np.ndarray]) -> tuple[Shape, str]:
-    """Find the shape of a run's vehicle.
-
-    parameters: Parameters of the members by name, each of shape (1, ...) or (n, ...).
-    Returns: The shape, and where it comes from in words; without a shape in the scene, a hull of the displaced volume.
-    """
+    """Find the shape of a run's vehicle, and where it comes from; without one in the scene, a hull of the displaced volume."""
     shape = shape_from(scene["vehicle"].get("shape"))
     if shape is not None:
         return shape, "mesh of the scene" if shape.mesh else f"{shape.length:g} m by {shape.diameter:g} m"
@@ -97,10 +86,7 @@ def shape_of(scene: Mapping[str, Any], parameters: Mapping[str, np.ndarray]) -> 
 
 
 class Mesh(NamedTuple):
-    """A user's mesh.
-
-    length: Its largest extent [m].
-    """
+    """A user's mesh, and its largest extent [m]."""
 
     content: bytes
     length: float

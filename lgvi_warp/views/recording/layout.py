@@ -28,7 +28,7 @@ def layout(runs: list[Drawn], box: WorldBox, scales: list[int]) -> Any:
     aspect = ASPECT / len(runs)
     worlds = [_world(run, name, box, scale, aspect) for run, name, scale in zip(runs, names, scales, strict=True)]
     below = rrb.Horizontal(
-        _curve("members", "Members by outcome [%]", _whole(runs[0].time), (0.0, 102.0), True),
+        _curve("members", "Members by outcome [%]", _all_times(runs[0].time), (0.0, 102.0), True),
         rrb.TextLogView(
             origin="/log",
             name="Outcomes: how many, and the first",
@@ -44,10 +44,8 @@ def live_layout(run: Drawn, box: WorldBox, scale: int) -> Any:
     import rerun.blueprint as rrb
 
     titles = {fan.name: fan.title for fan in run.fans}
-    curves = [
-        _curve(f"curves/{name}", f"{titles[name]}, of some members", _whole(run.time), None, False)
-        for name in ("height", "speed")
-    ]
+    curves = [_curve(f"curves/{name}", f"{titles[name]}, of some members", _all_times(run.time), None, False)
+              for name in ("height", "speed")]  # fmt: skip
     words = rrb.TextDocumentView(origin="run/summary", name="Run")
     right = rrb.Vertical(words, *curves, row_shares=[1, 3, 3])
     world = _world(run, "Members that are done", box, scale, ASPECT)
@@ -60,25 +58,23 @@ def _whole_window(views: Any, played: float) -> Any:
 
     panel = rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="playing", loop_mode="all",
                           playback_speed=played / PLAYED if played > 0.0 else 1.0)  # fmt: skip
-    return rrb.Blueprint(
-        views, panel, rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed"), auto_views=False
-    )
+    others = rrb.BlueprintPanel(state="collapsed"), rrb.SelectionPanel(state="collapsed")
+    return rrb.Blueprint(views, panel, *others, auto_views=False)
 
 
 def _right(runs: list[Drawn]) -> Any:
     """Curves, and the run's facts below them."""
     import rerun.blueprint as rrb
 
-    all_times = _whole(runs[0].time)
+    all_times = _all_times(runs[0].time)
     names = [fan.name for fan in runs[0].fans]
     fans = {name: [fan for run in runs for fan in run.fans if fan.name == name] for name in names}
     views = {}
     for name, group in fans.items():
         limits = _limits(np.concatenate([fan.levels for fan in group], axis=1))
         # All have the same legend; it would cover their curves.
-        views[name] = _curve(
-            f"curves/{name}", group[0].title, all_times, limits, name == "height", _high(group[0], limits)
-        )
+        below = _high(group[0], limits)
+        views[name] = _curve(f"curves/{name}", group[0].title, all_times, limits, name == "height", below)
     height = views.pop("height")
     energy = views.pop("energy", None)
     motion = rrb.Tabs(views["speed"], *([energy] if energy else []), active_tab=0)
@@ -135,7 +131,7 @@ def _limits(levels: np.ndarray) -> tuple[float, float] | None:
     return low - 0.05 * wide, high + 0.05 * wide
 
 
-def _whole(time: np.ndarray) -> Any:
+def _all_times(time: np.ndarray) -> Any:
     """An axis of time from the first to the last."""
     import rerun.blueprint as rrb
 

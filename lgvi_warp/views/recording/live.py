@@ -38,9 +38,6 @@ class Live:
     their index. Bodies and paths are coloured by outcome; curves are of single members, since quantiles need all of them.
 
     A viewer that is closed, or takes nothing for a while, ends the view and not the run.
-
-    Attributes:
-        closed: Whether the viewer was closed.
     """
 
     closed = False

@@ -38,8 +38,7 @@ def record(
 
     Hulls of the vehicle's shape are drawn for the members and times of `lgvi_warp.select_members`, each in the colour of its
     outcome from the moment it has it. Curves are of the members under way at each time. The same run always gives the
-    recording and
-    the application the same ids: the viewer keeps recordings and layouts apart by them.
+    recording and the application the same ids: the viewer keeps recordings and layouts apart by them.
 
     Args:
         result: A result with position, attitude and velocity, in memory or in a store; or several by name, which are shown
@@ -104,7 +103,7 @@ def show(result: Result | Mapping[str, Result], *, members: Any = None) -> None:
     """Show the fleet in the rerun viewer: a window of its own, or one that is open already.
 
     Args:
-        result: As for `log_rerun`.
+        result: As for `lw.record`.
         members: Indices of the members to draw; default those that `lgvi_warp.select_members` chooses.
 
     Raises:

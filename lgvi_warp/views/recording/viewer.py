@@ -32,7 +32,7 @@ EMPTY_ANSWER = bytes(5)
 
 
 def rerun() -> Any:
-    """Load rerun."""
+    """Load rerun. Raises ImportError with the remedy where it is not installed."""
     try:
         import rerun as module
     except ModuleNotFoundError as error:
@@ -86,10 +86,10 @@ def _greeted(address: str, started: float) -> bool:
              "content-type": "application/grpc", "te": "trailers"}  # fmt: skip
     # Each as it is, without a table of known ones (RFC 7541, section 6.2.2).
     head = b"".join(b"\0" + _text(name) + _text(value) for name, value in names.items())
-    asked = _frame(SETTINGS, 0, 0), _frame(HEADERS, END_HEADERS, 1, head), _frame(DATA, END_STREAM, 1)
+    frames = _frame(SETTINGS, 0, 0), _frame(HEADERS, END_HEADERS, 1, head), _frame(DATA, END_STREAM, 1)
     with socket.create_connection(place, PATIENCE) as connection:
         try:
-            connection.sendall(GREETING + b"".join(asked))
+            connection.sendall(GREETING + b"".join(frames))
             return any(content == EMPTY_ANSWER for kind, content in _frames(connection, started) if kind == DATA)
         except OSError:
             return False
@@ -108,8 +108,8 @@ def _frame(kind: int, flags: int, stream: int, content: bytes = b"") -> bytes:
 def _frames(connection: socket.socket, started: float) -> Iterator[tuple[int, bytes]]:
     """Types and contents of the frames of an answer, up to its end and for as long as a viewer takes to start [s]."""
     end, read = time.monotonic() + started, b""
-    while (left := end - time.monotonic()) > 0.0:
-        connection.settimeout(left)
+    while (seconds := end - time.monotonic()) > 0.0:
+        connection.settimeout(seconds)
         more = connection.recv(2**14)
         read += more
         while len(read) >= HEAD and len(read) >= (size := HEAD + int.from_bytes(read[:3], "big")):
@@ -162,10 +162,7 @@ def start(words: Sequence[str | Path], remedy: str, started: float = STARTED) ->
 
 
 def opened(address: str | None, home: str = ADDRESS, patience: float = PATIENCE) -> str:
-    """Find a viewer for what is sent while it is made, or start one.
-
-    address: Where it listens; None for one on this machine, at `home`, which is started where none is open.
-    """
+    """Find the viewer at an address, or one on this machine, at `home`, which is started where none is open."""
     rerun()
     if address is not None:
         reach(address)

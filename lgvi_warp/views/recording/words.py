@@ -35,6 +35,8 @@ def log_words(recording: Any, runs: list[Drawn], box: WorldBox, scales: list[int
 
 def lines(run: Drawn, box: WorldBox, scale: int) -> dict[str, str]:
     """Say of a run in ten lines what it is, what became of it, and what is drawn."""
+    import rerun as rr
+
     result, settings = run.result, run.result.provenance
     counts = ", ".join(f"{name} {number:,}" for name, number in result.status.counts().items())
     few = len(run.choice.members) < result.members
@@ -46,7 +48,7 @@ def lines(run: Drawn, box: WorldBox, scale: int) -> dict[str, str]:
         bands = f", quantiles of {of_members(len(run.choice.ranked), result.members)}"
     else:
         bands = ", all in the curves"
-    versions = {**settings.get("versions", {}), **{"rerun": _rerun_version()}}
+    versions = settings.get("versions", {}) | {"rerun": rr.__version__}
     method = settings["method"]["name"]
     times = f"{run.time[0]:g} to {run.time[-1]:g} s, {len(run.time)} of {len(result.time)} samples drawn"
     if len(result.time) < 3:
@@ -67,12 +69,6 @@ def lines(run: Drawn, box: WorldBox, scale: int) -> dict[str, str]:
         "arrows": f"forces on member {member}" + ("" if single else "; ellipsoid: 95 % of those under way"),
         "versions": ", ".join(f"{name} {versions[name]}" for name in TOLD if name in versions),
     }
-
-
-def _rerun_version() -> str:
-    import rerun as rr
-
-    return str(rr.__version__)
 
 
 def water_text(run: Drawn, box: WorldBox) -> str:

@@ -31,13 +31,7 @@ AXES = (("north", (230, 90, 90)), ("east", (90, 200, 90)), ("down", (110, 140, 2
 
 @dataclass(frozen=True, eq=False)
 class WorldBox:
-    """The part of the world that is in view.
-
-    Attributes:
-        low: Smallest coordinates [m], shape (3,).
-        high: Largest coordinates [m], shape (3,).
-        surface: Whether the surface is in view.
-    """
+    """The part of the world that is in view: smallest and largest coordinates (3,) [m], and whether the surface is in it."""
 
     low: np.ndarray
     high: np.ndarray
@@ -53,26 +47,16 @@ class WorldBox:
         """Distance between lines of the grid [m], a power of ten."""
         return float(10.0 ** np.floor(np.log10(max(self.high[:2] - self.low[:2]) / 2.0)))
 
-    def joined(self, other: WorldBox) -> WorldBox:
-        """Find the box around this one and another of the same water.
-
-        Args:
-            other: The other one.
-
-        Returns:
-            A box that holds both.
-        """
-        low, high = np.minimum(self.low, other.low), np.maximum(self.high, other.high)
-        return WorldBox(low, high, self.surface or other.surface)
+    def joined(self, box: WorldBox) -> WorldBox:
+        """Find the box around this one and another of the same water."""
+        return WorldBox(np.minimum(self.low, box.low), np.maximum(self.high, box.high), self.surface or box.surface)
 
 
 def box_of(runs: list[Drawn]) -> WorldBox:
     """Find the box around all paths, with all floors, and the surface where it is near."""
-    ends = [(run.position[mask].min(axis=0), run.position[mask].max(axis=0)) for run in runs for mask in [_whole(run)]]
-    low, high = (
-        np.min([end[0] for end in ends], axis=0).astype(float),
-        np.max([end[1] for end in ends], axis=0).astype(float),
-    )
+    paths = [run.position[finite_rows(run.position)] for run in runs]
+    low = np.min([path.min(axis=0) for path in paths], axis=0).astype(float)
+    high = np.max([path.max(axis=0) for path in paths], axis=0).astype(float)
     least = max(4.0 * _length(runs[0])[1], 0.05 * float((high - low).max()))
     narrow = np.maximum(least - (high - low), 0.0)
     low, high = low - 0.5 * narrow, high + 0.5 * narrow
@@ -82,11 +66,6 @@ def box_of(runs: list[Drawn]) -> WorldBox:
     if surface:
         low[2], high[2] = min(low[2], 0.0), max(high[2], 0.0)
     return WorldBox(low, high, surface)
-
-
-def _whole(run: Drawn) -> np.ndarray:
-    """Mask (f, m) of the finite positions."""
-    return finite_rows(run.position)
 
 
 def floors_of(run: Drawn) -> list[float]:
@@ -127,17 +106,19 @@ def log_frame(recording: Any, run: Drawn, box: WorldBox) -> None:
     """Log what stands around the members of one run: surface, floor, axes and current."""
     import rerun as rr
 
-    recording.log(run.path("world"), rr.ViewCoordinates.FRD, static=True, strict=True)
+    log_static(recording, run.path("world"), rr.ViewCoordinates.FRD)
     _planes(recording, run, box)
     _axes(recording, run, box)
     _current(recording, run, box)
 
 
-def _static(recording: Any, entity: str, archetype: Any) -> None:
+def log_static(recording: Any, entity: str, archetype: Any) -> None:
+    """Log what is the same at all times."""
     recording.log(entity, archetype, static=True, strict=True)
 
 
-def _columns(recording: Any, entity: str, time: np.ndarray, columns: Any) -> None:
+def send_columns(recording: Any, entity: str, time: np.ndarray, columns: Any) -> None:
+    """Log what changes with time [s]."""
     import rerun as rr
 
     recording.send_columns(entity, [rr.TimeColumn(TIMELINE, duration=time)], columns, strict=True)
@@ -155,12 +136,12 @@ def log_bodies(recording: Any, run: Drawn, scale: int) -> None:
         entity, color = run.path("world", "bodies", code.name.lower()), run.color(code)
         if isinstance(form, Mesh):
             asset = rr.Asset3D(contents=form.content, media_type="model/gltf-binary", albedo_factor=color)
-            _static(recording, entity, asset)
+            log_static(recording, entity, asset)
         else:
             hull = hull_of(scale * form[0], scale * form[1])
             body = rr.Mesh3D(vertex_positions=hull.points, triangle_indices=hull.triangles,
                              vertex_normals=hull.normals, vertex_colors=hull.colors(color))  # fmt: skip
-            _static(recording, entity, body)
+            log_static(recording, entity, body)
         size = float(scale) if isinstance(form, Mesh) else 1.0
         _poses(recording, entity, run.time, run.position, quaternion, visible, size)
 
@@ -186,7 +167,7 @@ def _poses(
             # Send scales at every time or never: one that is not sent again stays in force.
             scales=np.repeat(scales[:, None], 3, axis=1) if empty.any() or size != 1.0 else None,
         ).partition(at.sum(axis=1))
-        _columns(recording, entity, time[frames], columns)
+        send_columns(recording, entity, time[frames], columns)
 
 
 def _trails(recording: Any, run: Drawn) -> None:
@@ -199,10 +180,10 @@ def _trails(recording: Any, run: Drawn) -> None:
     path, entity = run.position[:, members], run.path("world", "trails")
     moving = run.counted[:-1, members] & finite_rows(path[:-1]) & finite_rows(path[1:])
     color = (*run.rgb, TRAIL[3]) if run.rgb else TRAIL
-    _static(recording, entity, rr.LineStrips3D.from_fields(colors=[color], radii=rr.Radius.ui_points(0.7)))
+    log_static(recording, entity, rr.LineStrips3D.from_fields(colors=[color], radii=rr.Radius.ui_points(0.7)))
     strips = np.stack([path[:-1], path[1:]], axis=2)[moving]
     columns = rr.LineStrips3D.columns(strips=list(strips)).partition(moving.sum(axis=1))
-    _columns(recording, entity, run.time[1:], columns)
+    send_columns(recording, entity, run.time[1:], columns)
 
 
 def log_paths(recording: Any, run: Drawn) -> None:
@@ -213,7 +194,7 @@ def log_paths(recording: Any, run: Drawn) -> None:
     ways = zip(run.position[:, members].swapaxes(0, 1), run.counted[:, members].T, strict=True)
     strips = [way[going & finite_rows(way)] for way, going in ways]
     lines = rr.LineStrips3D(strips, colors=[TRAIL], radii=rr.Radius.ui_points(0.7))
-    _static(recording, run.path("world", "paths"), lines)
+    log_static(recording, run.path("world", "paths"), lines)
 
 
 def _spread(recording: Any, run: Drawn) -> None:
@@ -225,13 +206,12 @@ def _spread(recording: Any, run: Drawn) -> None:
         return
     color = (*(run.rgb or (255, 255, 255)), 120)
     style = {"fill_mode": "majorwireframe", "line_radii": [rr.Radius.ui_points(0.8)]}
-    _static(recording, entity, rr.Ellipsoids3D.from_fields(colors=[color], **style))
+    log_static(recording, entity, rr.Ellipsoids3D.from_fields(colors=[color], **style))
     has_one = np.zeros(len(run.time), int)
     has_one[spread.at] = 1
-    columns = rr.Ellipsoids3D.columns(
-        centers=spread.center, half_sizes=spread.half, quaternions=quaternion_xyzw(spread.axes)
-    )
-    _columns(recording, entity, run.time, columns.partition(has_one))
+    turns = quaternion_xyzw(spread.axes)
+    columns = rr.Ellipsoids3D.columns(centers=spread.center, half_sizes=spread.half, quaternions=turns)
+    send_columns(recording, entity, run.time, columns.partition(has_one))
 
 
 def _planes(recording: Any, run: Drawn, box: WorldBox) -> None:
@@ -250,13 +230,13 @@ def _planes(recording: Any, run: Drawn, box: WorldBox) -> None:
             continue
         points = [(*corner, depth) for corner in corners]
         sheet = rr.Mesh3D(vertex_positions=points, triangle_indices=both_sides, albedo_factor=color)
-        _static(recording, run.path("world", "water", name), sheet)
+        log_static(recording, run.path("world", "water", name), sheet)
     # Without a floor, a grid below the fleet tells sizes.
     below = [] if floors else [("depth", high[2], TRAIL)]
     for name, depth, color in [*planes, *below]:
         lines = _grid(low[:2], high[:2], float(depth), box.grid)
         grid = rr.LineStrips3D(lines, colors=[(*color[:3], 120)], radii=rr.Radius.ui_points(0.5))
-        _static(recording, run.path("world", "water", f"{name}_grid"), grid)
+        log_static(recording, run.path("world", "water", f"{name}_grid"), grid)
 
 
 def _grid(low: np.ndarray, high: np.ndarray, depth: float, step: float) -> list[np.ndarray]:
@@ -279,14 +259,13 @@ def _axes(recording: Any, run: Drawn, box: WorldBox) -> None:
     labels, colors = zip(*AXES, strict=True)
     arrows = rr.Arrows3D(origins=[corner] * 3, vectors=0.12 * box.size * np.eye(3), colors=colors, labels=labels,
                          radii=rr.Radius.ui_points(1.5))  # fmt: skip
-    _static(recording, run.path("world", "axes"), arrows)
+    log_static(recording, run.path("world", "axes"), arrows)
 
 
 def water_at(run: Drawn, points: np.ndarray) -> np.ndarray:
-    """Compute how the water moves, by the numbers of the first member drawn.
+    """Compute how the water moves at points (g, 3) [m], by the numbers of the first member drawn: (f, g, 3) [m/s].
 
-    points: Places, shape (g, 3) [m].
-    Returns: Velocity in inertial axes, shape (f, g, 3) [m/s]; zero for water whose motion is not known after the run.
+    It is zero for water whose motion is not known after the run.
     """
     places = np.broadcast_to(points, (len(run.time), *points.shape))
     total = np.zeros(places.shape)
@@ -320,11 +299,11 @@ def _current(recording: Any, run: Drawn, box: WorldBox) -> None:
     style = {"colors": [CURRENT], "radii": rr.Radius.ui_points(1.5), "labels": labels}
     entity = run.path("world", "current")
     if (vectors == vectors[0]).all():
-        _static(recording, entity, rr.Arrows3D(origins=points, vectors=vectors[0], **style))
+        log_static(recording, entity, rr.Arrows3D(origins=points, vectors=vectors[0], **style))
         return
-    _static(recording, entity, rr.Arrows3D.from_fields(origins=points, **style))
+    log_static(recording, entity, rr.Arrows3D.from_fields(origins=points, **style))
     columns = rr.Arrows3D.columns(vectors=vectors.reshape(-1, 3)).partition([len(points)] * len(run.time))
-    _columns(recording, entity, run.time, columns)
+    send_columns(recording, entity, run.time, columns)
 
 
 def chosen_member(run: Drawn) -> int:
@@ -338,11 +317,10 @@ LITTLE = 1e-3
 
 
 def forces_on(run: Drawn) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the forces on the chosen member: weight, buoyancy, and all others together.
+    """Compute weight, buoyancy and all other forces on the chosen member, inertial axes (f, 3, 3) [N].
 
     The last follow from the balance of momentum, as means between the times drawn.
-
-    Returns: Forces in inertial axes, shape (f, 3, 3) [N], and where they act in body axes, shape (3, 3) [m].
+    Returns: The forces, and where they act in body axes, shape (3, 3) [m].
     """
     member = np.array([chosen_member(run)])
     few = run.few.part(member)
@@ -377,10 +355,9 @@ def _forces(recording: Any, run: Drawn, box: WorldBox, scale: int) -> None:
     labels = [f"{name} {value:.3g} N" for row in size[:, shown_ones] for name, value in zip(names, row, strict=True)]
     entity, many = run.path("world", "forces"), len(shown_ones)
     style = rr.Arrows3D.from_fields(colors=colors, radii=rr.Radius.ui_points(1.2), show_labels=False)
-    _static(recording, entity, style)
-    columns = rr.Arrows3D.columns(
-        vectors=vectors.reshape(-1, 3).astype(np.float32),
-        origins=origins.reshape(-1, 3).astype(np.float32),
-        labels=labels,
-    )
-    _columns(recording, entity, run.time, columns.partition([many] * len(run.time)))
+    log_static(recording, entity, style)
+    ends = {
+        name: values.reshape(-1, 3).astype(np.float32) for name, values in (("vectors", vectors), ("origins", origins))
+    }
+    columns = rr.Arrows3D.columns(**ends, labels=labels)
+    send_columns(recording, entity, run.time, columns.partition([many] * len(run.time)))

@@ -13,10 +13,8 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp import cli
 from lgvi_warp.cli.runs import all_failed
-from lgvi_warp.engine import widths
-from lgvi_warp.studies import packet_width as tuning
 from tests.conftest import ROOT
-from tests.support.verbs import Study, main
+from tests.support.verbs import Study
 
 PAPER = str(ROOT / "examples" / "paper.toml")
 SMALL = ["--members", "20", "--duration", "2", "--set", "run.save_every=0.5"]
@@ -157,29 +155,6 @@ def test_a_run_in_a_store(tmp_path, capsys):
     assert (out / "run.parquet").exists()
 
 
-@pytest.mark.kernel
-def test_a_run_in_parts(tmp_path, capsys):
-    """run --blocks into two folders, merge; what is in none of them is named and resumed."""
-    run = ["run", PAPER, "--members", "600", *SMALL[2:], "--store", "zarr", "--quiet"]
-    for name, part in (("a", "0:1"), ("b", "2:3"), ("c", "1:2")):
-        assert cli.main([*run, "--out", str(tmp_path / name), "--blocks", part]) == 0
-    parts = [str(tmp_path / name) for name in "abc"]
-    assert cli.main(["info", parts[0]]) == 1
-    assert "1 of 3 finished; not complete: lgvi-warp resume" in capsys.readouterr().out
-    assert cli.main(["merge", *parts[:2], "--out", str(tmp_path / "some")]) == 1
-    assert "1 of 3 blocks are in none of the folders" in capsys.readouterr().err
-    assert cli.main(["merge", *parts, "--out", str(tmp_path / "all")]) == 0
-    assert "complete" in capsys.readouterr().out
-
-
-def test_numbers_may_be_written_as_people_write_them():
-    chosen = cli.parser().parse_args(["run", PAPER, "--members", "1e6", "--seed", "7", "--keep", "3,17"])
-    assert cli.overrides(chosen) == {"run.keep": "[3,17]", "ensemble.members": "1000000", "ensemble.seed": "7"}
-    for text in ("1.5", "many", "nan"):
-        chosen = cli.parser().parse_args(["run", PAPER, "--members", text, "--keep", "failed"])
-        assert cli.overrides(chosen) == {"run.keep": "failed", "ensemble.members": text}
-
-
 def test_members_that_an_event_stopped_have_not_failed():
     for status, failed in (([16, 17], False), ([1, 0], False), ([1, 16], False), ([1, 3], True)):
         assert all_failed(SimpleNamespace(status=np.array(status))) == failed
@@ -233,22 +208,6 @@ def test_info(capsys):
     assert cli.main(["info"]) == 0
     out = capsys.readouterr().out
     assert all(word in out for word in ("cpu", "threads", "warp-lang 1.19", "chained float32 ", "GFMA/s"))
-
-
-def test_tune_keeps_what_it_measured(tuned_widths, capsys):
-    readings = [tuning.Reading("plain float64", {8: 2.0, 16: 1.5}, 8, 16),
-                tuning.Reading("plain float32", {16: 1.0}, 16, 16)]  # fmt: skip
-    assert main(["calibrate"], measure=lambda: readings) == 0
-    out = capsys.readouterr().out
-    assert "8: 2.00 ns, 16: 1.50 ns: 16, 8 by the table" in out
-    assert str(tuned_widths) in out
-    assert widths.tuned() == {"plain float64": 16, "plain float32": 16}
-    assert main(["info"], peak_of=lambda dtype: 1e9) == 0
-    tuned, table = (line for line in capsys.readouterr().out.splitlines() if line.startswith("packets"))
-    assert "tuned" in tuned
-    assert "plain float64 16" in tuned
-    assert "table: " in table
-    assert "dense float64" in table
 
 
 @pytest.mark.kernel

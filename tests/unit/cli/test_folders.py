@@ -171,17 +171,19 @@ def test_members_to_view_are_a_list():
 
 def test_a_viewed_run_says_its_file(tmp_path, capsys):
     told().save(tmp_path / "result.npz")
-    look, logged = Study(None), []
+    shown, logged = Study(None), []
     log = lambda result, out, members: (logged.append((result.members, members)), out.write_bytes(b"x" * 200_000))  # noqa: E731
     assert main(["view", str(tmp_path), "--out", str(tmp_path / "a.rrd"), "--members", "1,2"], log=log) == 0
     assert capsys.readouterr().out == f"file        {tmp_path}/a.rrd (0.2 MB)\n"
-    assert logged == [(4, [1, 2])]
-    assert main(["view", str(tmp_path), "--json"], look=look) == 0
-    assert main(["view", str(tmp_path), "-q", "--members", "0"], look=look) == 0
-    assert [(result.members, shown["members"]) for (result,), shown in look.calls] == [(4, None), (4, [0])]
+    assert logged.pop() == (4, [1, 2])
+    assert main(["view", str(tmp_path), "--out", str(tmp_path / "a.rrd"), "--json"], log=log) == 0
+    assert json.loads(capsys.readouterr().out)["files"] == [f"{tmp_path}/a.rrd"]
+    assert main(["view", str(tmp_path), "--json"], viewer=shown) == 0
+    assert main(["view", str(tmp_path), "-q", "--members", "0"], viewer=shown) == 0
+    assert [(result.members, named["members"]) for (result,), named in shown.calls] == [(4, None), (4, [0])]
     assert json.loads(capsys.readouterr().out)["files"] == []
     for error in (lw_error("no member"), OSError("no display")):
-        assert main(["view", str(tmp_path), "-q"], look=Study(error)) == (2 if "member" in str(error) else 1)
+        assert main(["view", str(tmp_path), "-q"], viewer=Study(error)) == (2 if "member" in str(error) else 1)
         assert capsys.readouterr().err == f"lgvi-warp: {error}\n"
 
 
@@ -233,10 +235,10 @@ def test_a_run_is_exported_and_reported(tmp_path, capsys):
     assert main(["export", "a", "--to", "netcdf", "--out", "b"], write=write) == 0
     assert capsys.readouterr().out == f"file        {tmp_path}/a.nc (0.1 MB)\n"
     assert write.calls == [((Path("a"), "netcdf", Path("b")), {})]
-    assert main(["report", "a"], write=page, look=opened.append) == 0
+    assert main(["report", "a"], write=page, browse=opened.append) == 0
     assert opened == []
     assert capsys.readouterr().out == f"file        {tmp_path}/report.html (0.1 MB)\n"
-    assert main(["report", "a", "--out", "b", "--open", "--json"], write=page, look=opened.append) == 0
+    assert main(["report", "a", "--out", "b", "--open", "--json"], write=page, browse=opened.append) == 0
     document = json.loads(capsys.readouterr().out)
     assert (document["file"], document["bytes"]) == (f"{tmp_path}/b.html", 100_000)
     assert opened == [f"file://{tmp_path}/b.html"]

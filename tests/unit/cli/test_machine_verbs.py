@@ -24,6 +24,7 @@ from lgvi_warp.common.phases import Phases
 from lgvi_warp.engine import widths
 from tests.conftest import ROOT
 from tests.support.verbs import Study, main
+from tests.unit.cli.test_terminal import document
 
 PAPER = str(ROOT / "examples" / "paper.toml")
 
@@ -31,29 +32,28 @@ PAPER = str(ROOT / "examples" / "paper.toml")
 def test_info_of_the_machine(tuned_widths, capsys):
     widths.keep({"plain float64": 8, "plain float32": 16})
     peak = {"float64": 1.25e10, "float32": 2.5e10}
-    assert main(["info", "--json"], peak_of=peak.get) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert document["machine"] == machine.describe()
-    assert document["memory"] == machine.memory_bytes()
-    assert document["versions"] == machine.versions()
-    assert document["peak"] == peak
-    assert document["packets"]["plain float32"] == {"vehicles": 16, "source": "tuned"}
+    content = document(["info"], capsys, peak_of=peak.get)
+    assert content["machine"] == machine.describe()
+    assert content["memory"] == machine.memory_bytes()
+    assert content["versions"] == machine.versions()
+    assert content["peak"] == peak
+    assert content["packets"]["plain float32"] == {"vehicles": 16, "source": "tuned"}
     assert main(["info"], peak_of=peak.get) == 0
     said = capsys.readouterr().out
     limits = container.cpu_quota(), machine.affinity(), machine.physical_memory()
-    assert said.split("\n")[:-1] == list(machine_lines(document, *limits))
+    assert said.split("\n")[:-1] == list(machine_lines(content, *limits))
     assert f"packets     vehicles, tuned ({tuned_widths}): plain float64 8, plain float32 16\n" in said
 
 
 def test_a_machine_in_words():
     sources = {"plain": "tuned", "dense": "table"}
-    document = {
+    content = {
         "machine": {"cpu": "a cpu", "simd": "avx2", "threads": 4}, "memory": 3 * 2**30,
         "versions": {"numpy": "2", "warp": "1"}, "peak": {"float64": 1.25e10, "float32": 2.5e10},
         "packets": {kernel: {"vehicles": 8, "source": sources[kernel.split()[0]]}
                     for kernel in ("plain float64", "plain float32", "dense float64")},
     }  # fmt: skip
-    assert list(machine_lines(document, 1.5, 4, 8 * 2**30)) == [
+    assert list(machine_lines(content, 1.5, 4, 8 * 2**30)) == [
         "cpu         a cpu, avx2, 4 threads (a quota of 1.5 CPUs; 4 cores)",
         "memory      3.0 GiB (the container's limit; 8.0 GiB in the machine)",
         "versions    numpy 2, warp 1",
@@ -63,12 +63,12 @@ def test_a_machine_in_words():
         "packets     vehicles, table: dense float64 8",
     ]
     for memory, physical in ((0, 1), (2**30, 2**30), (2**30, None)):
-        said = list(machine_lines(document | {"memory": memory}, None, 4, physical))
+        said = list(machine_lines(content | {"memory": memory}, None, 4, physical))
         assert said[0] == "cpu         a cpu, avx2, 4 threads"
         assert ("memory      1.0 GiB" in said) == bool(memory)
         assert any(line.startswith("memory") for line in said) == bool(memory)
     for quota in (4.0, None, 5.0):
-        assert next(machine_lines(document, quota, 4, None)) == "cpu         a cpu, avx2, 4 threads"
+        assert next(machine_lines(content, quota, 4, None)) == "cpu         a cpu, avx2, 4 threads"
 
 
 def test_bench_and_calibrate_in_full(tuned_widths, capsys):
@@ -76,8 +76,8 @@ def test_bench_and_calibrate_in_full(tuned_widths, capsys):
     measure = Study([lines, lines])
     assert main(["bench"], measure=measure) == 0
     assert capsys.readouterr().out == '{"a": 1}\n{"a": 2}\n'
-    assert main(["bench", "--members", "5", "--steps", "7", "--json"], measure=measure) == 0
-    assert json.loads(capsys.readouterr().out)["readings"] == [{"a": 1}, {"a": 2}]
+    given = ["bench", "--members", "5", "--steps", "7"]
+    assert document(given, capsys, measure=measure)["readings"] == [{"a": 1}, {"a": 2}]
     assert [values for values, _ in measure.calls] == [(4096, 1000), (5, 7)]
     readings = [("plain float64", {8: 2.0, 16: 1.525}, 8, 16), ("dense float64", {8: 1.0}, 8, 8)]
     assert main(["calibrate"], measure=lambda: readings) == 0
@@ -87,10 +87,9 @@ def test_bench_and_calibrate_in_full(tuned_widths, capsys):
         "dense float64       8: 1.00 ns: 8, as by the table\n"
         f"kept in {tuned_widths}, for runs from now on; without that file the table counts\n"
     )
-    assert main(["calibrate", "--json"], measure=lambda: readings) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert document["kernels"]["plain float64"] == {"ns": {"8": 2.0, "16": 1.525}, "table": 8, "best": 16}
-    assert document["file"] == str(tuned_widths)
+    content = document(["calibrate"], capsys, measure=lambda: readings)
+    assert content["kernels"]["plain float64"] == {"ns": {"8": 2.0, "16": 1.525}, "table": 8, "best": 16}
+    assert content["file"] == str(tuned_widths)
 
 
 def test_warm_in_full(capsys):
@@ -107,13 +106,12 @@ def test_warm_in_full(capsys):
     assert lines[2].startswith("kernels: 2, in ")
     assert lines[2].endswith(" s; one after another their phases take 3.50 s")
     assert 0.0 <= float(lines[2].split(" s;")[0].split()[-1]) < 60.0
-    more = [*two, "--dtypes", "float32,float64", "--threads", "3", "--json"]
-    assert main(["warm", PAPER, *more], compile_plans=compile_plans) == 0
+    more = [*two, "--dtypes", "float32,float64", "--threads", "3"]
+    kernels = document(["warm", PAPER, *more], capsys, compile_plans=compile_plans)["kernels"]
     plain, both = [("psi_s", "float64"), ("rk4", "float64")], {(a, b) for a in ("psi_s", "rk4") for b in machine.DTYPES}
     assert asked[0] == (plain, machine.thread_count())
     assert set(asked[1][0]) == {pair for pair in both if "compensated" not in pair[1]}
     assert asked[1][1] == 3
-    kernels = json.loads(capsys.readouterr().out)["kernels"]
     assert [kernel["seconds"] for kernel in kernels[:1]] == [{"source": 0.5, "clang": 2.0, "load": 0.25}]
     assert len(kernels) == 4
 
@@ -154,10 +152,12 @@ def test_lists_in_full(capsys):
     terms, laws = names["terms"], names["laws"]
     assert list(names["vehicles"]) == lw.vehicles.names()
     assert names["vehicles"]["sphere"]
-    assert list(terms) == sorted(terms)
+    assert list(terms) == sorted(set(lw.laws.Term.kinds) & set(terms))
+    assert "weight" not in terms
     assert terms["drag"] == inspect.getdoc(lw.terms.Drag).partition("\n")[0]
     sections = [text.partition(":")[0] for text in laws.values()]
     assert sections[0] == "laws"
+    assert laws["heading_pid"].startswith("laws: PID of the heading")
     assert len(dict.fromkeys(sections)) == sum(a != b for a, b in zip(sections, sections[1:])) + 1
     assert [name for name, text in laws.items() if text.startswith("laws:")] == sorted(
         name for name, text in laws.items() if text.startswith("laws:"))  # fmt: skip

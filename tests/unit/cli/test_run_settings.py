@@ -23,8 +23,9 @@ def test_every_option_of_a_run_replaces_its_key():
     options = [word for name, text in words.items() for word in (f"--{name.replace('_', '-')}", text)]
     expected = {f"run.{name}": text for name, text in words.items()}
     assert settings.overrides(chosen(*options)) == expected
-    named = settings.overrides(chosen("--members", "+12", "--seed", "-3", "--set", " vehicle.mass = a=b "))
-    assert named == {"ensemble.members": "+12", "ensemble.seed": "-3", "vehicle.mass": "a=b"}
+    plainly = ("--members", "1e6", "--seed", "-3", "--keep", "3,17", "--set", " vehicle.mass = a=b ")
+    assert settings.overrides(chosen(*plainly)) == {
+        "run.keep": "[3,17]", "ensemble.members": "1000000", "ensemble.seed": "-3", "vehicle.mass": "a=b"}  # fmt: skip
     with pytest.raises(lw.SceneError, match=r"^--set vehicle\.mass: has no value; write --set vehicle\.mass=120$"):
         settings.overrides(chosen("--set", "vehicle.mass"))
 

@@ -149,7 +149,9 @@ def test_a_live_run_needs_its_library_and_what_it_shows(tmp_path, capsys, option
     solve, viewer = Study(result_of()), Study(MissingExtra("recordings", "rerun-sdk", "viz"))
     verb = ["run", PAPER, "--out", str(tmp_path / "out"), "-q", *options]
     assert main(verb, simulate=solve, viewer=viewer) == 2
-    assert words in capsys.readouterr().err
+    fault = capsys.readouterr().err
+    assert words in fault
+    assert fault.count("\n") == 1
     assert solve.calls == []
     assert not (tmp_path / "out").exists()
 

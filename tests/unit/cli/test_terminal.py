@@ -17,8 +17,6 @@ import lgvi_warp as lw
 from lgvi_warp import cli
 from lgvi_warp.calls import predict as prediction
 from lgvi_warp.cli import arguments, command, output, signals
-from lgvi_warp.common.phases import Phases
-from lgvi_warp.studies import packet_width as tuning
 from lgvi_warp.studies.sensitivity.indices import Indices, MorrisEffects, SobolIndices
 from lgvi_warp.studies.stability.grid import Line
 from lgvi_warp.studies.stability.map import StabilityMap
@@ -160,17 +158,6 @@ def test_every_method_that_is_listed_is_one(capsys):
     assert {"psi_s", "kl8(psi_x)", "bm4(psi_x)", "rk4", "gauss6", "rkn6_14"} <= methods.keys()
     for name, text in methods.items():
         assert text.startswith(f"order {lw.Method(name).order}, ")
-
-
-def test_vehicles_terms_and_laws_are_those_of_the_tables(capsys):
-    assert list(listed("vehicles", capsys)) == lw.vehicles.names()
-    terms = listed("terms", capsys)
-    assert "drag" in terms
-    assert "weight" not in terms
-    assert set(terms) <= set(lw.laws.Term.kinds)
-    laws = listed("laws", capsys)
-    assert laws["heading_pid"].startswith("laws: PID of the heading")
-    assert laws["sensor"].startswith("sensors: ")
 
 
 @pytest.mark.parametrize("name", lw.vehicles.names())
@@ -344,19 +331,7 @@ def test_a_refused_verb_prints_no_document(capsys):
     assert capsys.readouterr().out == ""
 
 
-def test_documents_of_the_machine(tuned_widths, capsys):
-    assert document(["info"], capsys, peak_of=lambda dtype: 1e9)["peak"] == {"float64": 1e9, "float32": 1e9}
-    readings = [tuning.Reading("plain float64", {8: 2.0, 16: 1.5}, 8, 16)]
-    kept = document(["calibrate"], capsys, measure=lambda: readings)["kernels"]["plain float64"]
-    assert kept == {"ns": {"8": 2.0, "16": 1.5}, "table": 8, "best": 16}
-    record = json.dumps({"method": "psi_s", "ns_per_vehicle_step": 9.0})
-    assert len(document(["bench"], capsys, measure=lambda members, steps: [record, record])["readings"]) == 2
-
-
-def test_documents_of_kernels_and_predictions(capsys):
-    compiled = lambda plans, workers: ((plan, Phases(0.1, 0.0, 0.2)) for plan in plans)  # noqa: E731
-    content = document(["warm", PAPER, "--methods", "psi_s,rk4"], capsys, compile_plans=compiled)
-    assert [kernel["method"] for kernel in content["kernels"]] == ["psi_s", "rk4"]
+def test_the_document_of_a_prediction(capsys):
     study = Study(prediction.Prediction(5, 4, 3, 2, 0.1, 0.2, 0.3, 0.4, 5, 6, None, 7))
     assert document(["plan", PAPER], capsys, study=study)["seconds"] == 0.2 + 0.4
     assert main(["predict", PAPER, "-q"], study=study) == 0
@@ -513,9 +488,3 @@ def test_studies_print_a_document_and_info_and_plot_know_their_folders(verb, tmp
     (tmp_path / f"{verb}.json").write_text('{"name": 3}')
     assert cli.main(["info", out]) == 2
     assert f"{verb}.json: is damaged" in capsys.readouterr().err
-
-
-def test_a_folder_of_something_else_is_refused(tmp_path, capsys):
-    for verb in ("info", "plot"):
-        assert cli.main([verb, str(tmp_path)]) == 2
-        assert f"{tmp_path}: holds nothing that a verb wrote" in capsys.readouterr().err

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The verb view: a run that is there, in the viewer or as a recording."""
 
-import json
 import subprocess
 import sys
 
@@ -50,13 +49,6 @@ def test_a_folder_without_a_run_is_refused(tmp_path, capsys, name, words, code):
     said = capsys.readouterr().err
     assert words in said
     assert said.count("\n") == 1
-
-
-def test_json_names_the_file(folder, tmp_path, capsys):
-    path = tmp_path / "few.rrd"
-    assert main(["view", str(folder), "--out", str(path), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert (document["verb"], document["files"]) == ("view", [str(path)])
 
 
 @pytest.mark.slow

@@ -21,27 +21,21 @@ def turning(turns, end, k=61):
     return made(position, time, status=status, end=end, attitude=turned(heading)), heading[-1]
 
 
-@pytest.mark.parametrize("turns", [-2.2, 0.4, 3.0])
-def test_a_member_that_ended_is_marked_on_the_turn_on_which_it_ended(turns):
-    """The first go on, the last end one after another: a mark is where the line of its member ended."""
-    end = [*np.full(20, np.nan), *np.linspace(5.0, 55.0, 21)]
+# The first go on, the last end one after another; or all end: once the last has, there is no mean direction any more.
+ENDS = ([*np.full(20, np.nan), *np.linspace(5.0, 55.0, 21)], np.linspace(20.0, 50.0, 31))
+
+
+@pytest.mark.parametrize("end", ENDS, ids=["some end", "all end"])
+@pytest.mark.parametrize("turns", [-2.2, 0.4, 1.4, 3.0])
+def test_a_member_that_ended_is_marked_on_the_turn_on_which_it_ended(turns, end):
+    """A mark is where the line of its member ended."""
     result, heading = turning(turns, end)
     axes = lw.plots.fan(result, "euler[2]")
-    (marks,) = [one for one in axes.collections if one.get_label().startswith("floor")]
+    (marks,) = [drawn for drawn in axes.collections if drawn.get_label().startswith("floor")]
     when, angle = np.asarray(marks.get_offsets()).T
-    order = np.argsort(when)
-    np.testing.assert_allclose(when[order], end[20:])
-    np.testing.assert_allclose(angle[order], heading[20:], atol=1e-9)
-
-
-@pytest.mark.parametrize("turns", [-0.7, 1.4, 2.6])
-def test_marks_stay_where_members_ended_when_nobody_is_left(turns):
-    """Once the last has ended there is no mean direction any more."""
-    end = np.linspace(20.0, 50.0, 31)
-    result, heading = turning(turns, end)
-    (marks,) = [one for one in lw.plots.fan(result, "euler[2]").collections if one.get_label().startswith("floor")]
-    when, angle = np.asarray(marks.get_offsets()).T
-    np.testing.assert_allclose(angle[np.argsort(when)], heading, atol=1e-9)
+    order, ended = np.argsort(when), np.isfinite(end)
+    np.testing.assert_allclose(when[order], np.asarray(end)[ended])
+    np.testing.assert_allclose(angle[order], heading[ended], atol=1e-9)
 
 
 def test_a_direction_is_known_though_all_that_are_drawn_have_ended():

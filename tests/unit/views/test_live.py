@@ -33,17 +33,22 @@ def blocks(result, *sizes):
         stop += size
 
 
-@pytest.fixture(scope="module")
-def grown(tmp_path_factory):
-    """A fleet, and the recording of it that grew by blocks of 30, 30 and 20 members."""
-    result, path = fleet(80), tmp_path_factory.mktemp("live") / "live.rrd"
+def recorded(path, several):
+    """The recording of a run that goes on, of blocks that are finished one after another."""
     recording = rr.RecordingStream("live", recording_id="live")
     recording.save(path)
     live = Live(recording)
-    for block in blocks(result, 30, 30, 20):
+    for block in several:
         live.add(block)
     recording.disconnect()
-    return result, path
+    return path
+
+
+@pytest.fixture(scope="module")
+def grown(tmp_path_factory):
+    """A fleet, and the recording of it that grew by blocks of 30, 30 and 20 members."""
+    result = fleet(80)
+    return result, recorded(tmp_path_factory.mktemp("live") / "live.rrd", blocks(result, 30, 30, 20))
 
 
 def test_every_member_is_drawn_once_in_its_outcomes_colour(grown):
@@ -91,37 +96,22 @@ def test_the_view_is_laid_out_anew_when_it_is_outgrown(tmp_path):
     result = fleet(40)
     near, far = blocks(result, 20, 20)
     for offset, layouts in ((0.0, 1), (500.0, 2)):
-        moved = dataclasses.replace(
-            far, samples={**far.samples, "position": far.position + np.array([offset, 0.0, 0.0])}
-        )
-        path = tmp_path / f"{offset:g}.rrd"
-        recording = rr.RecordingStream("live", recording_id="live")
-        recording.save(path)
-        live = Live(recording)
-        for block in (near, moved):
-            live.add(block)
-        recording.disconnect()
+        position = far.position + np.array([offset, 0.0, 0.0])
+        moved = dataclasses.replace(far, samples={**far.samples, "position": position})
+        path = recorded(tmp_path / f"{offset:g}.rrd", (near, moved))
         assert len(RrdReader(path).blueprints()) == layouts
 
 
 def test_blocks_share_the_places_of_a_large_run(tmp_path):
     """Of 2,400 members a thousand are drawn: 500 of each half."""
-    recording = rr.RecordingStream("live", recording_id="live")
-    recording.save(tmp_path / "live.rrd")
-    live, large = Live(recording), made(np.zeros((2, 2400, 3)) + 5.0)
-    for block in blocks(large, 1200, 1200):
-        live.add(block)
-    recording.disconnect()
+    path = recorded(tmp_path / "live.rrd", blocks(made(np.zeros((2, 2400, 3)) + 5.0), 1200, 1200))
     for first in (0, 1200):
-        assert len(rows(tmp_path / "live.rrd", f"/world/from_{first}/bodies/ok", "translations")[0.0]) == 500
+        assert len(rows(path, f"/world/from_{first}/bodies/ok", "translations")[0.0]) == 500
 
 
 def test_members_without_paths_are_counted(tmp_path):
-    recording = rr.RecordingStream("live", recording_id="live")
-    recording.save(tmp_path / "live.rrd")
-    Live(recording).add(dataclasses.replace(fleet(8), samples={}))
-    recording.disconnect()
-    assert "8 members done" in text_of(tmp_path / "live.rrd", "/run/summary")
+    path = recorded(tmp_path / "live.rrd", [dataclasses.replace(fleet(8), samples={})])
+    assert "8 members done" in text_of(path, "/run/summary")
 
 
 def test_a_viewer_gets_what_the_file_gets(tmp_path):
@@ -249,18 +239,6 @@ def test_a_sending_goes_on_as_long_as_the_viewer_answers(words, goes_on):
 def test_an_address_without_a_port_has_that_of_viewers():
     assert not viewer.answers("rerun+http://127.0.0.1:x")
     assert not viewer.answers("rerun+http://127.0.0.1/proxy") or viewer.is_open()
-
-
-@pytest.mark.parametrize(("options", "words"), [
-    (["--viewer", "x"], "--viewer x: has no effect without --live"),
-    (["--live", "--keep", "none"], "--live: shows members as they are done, and the run keeps none; add --keep all"),
-])  # fmt: skip
-def test_live_is_refused_where_it_shows_nothing(options, words, tmp_path, capsys):
-    assert cli.main(["run", str(ROOT / "examples" / "paper.toml"), "--out", str(tmp_path / "run"), *options]) == 2
-    said = capsys.readouterr().err
-    assert words in said
-    assert said.count("\n") == 1
-    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize(("text", "words"), [

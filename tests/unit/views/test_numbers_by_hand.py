@@ -7,7 +7,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 import lgvi_warp as lw
@@ -16,7 +15,7 @@ from lgvi_warp.common.status import Status
 from lgvi_warp.statistics.estimates.estimate import Estimate, Estimates
 from lgvi_warp.views import fleet
 from lgvi_warp.views.pages import report
-from lgvi_warp.views.plots import canvas, fans
+from lgvi_warp.views.plots import canvas
 from tests.support.made import made
 
 N, K = 10, 5
@@ -65,36 +64,6 @@ def test_a_change_of_any_number_changes_the_identity():
     assert fleet.identity(result) == fleet.identity(sinking())
     assert fleet.identity(result) not in names
     assert len(names) == len(others)
-
-
-# Levels of statistics, by kind: what the picture calls each band, with its colour and edges; and each line, with its depth.
-LEVELS = np.array([0.05, 0.25, 0.5, 0.75, 0.95])
-OUTER, INNER = fans.TINTS[1:]
-BANDS = {
-    "quantiles": ({"level": LEVELS}, {"value": np.arange(10.0, 15.0)},
-                  [(OUTER, "90%", 10.0, 14.0), (INNER, "50%", 11.0, 13.0)], {"50% quantile": 12.0}),
-    "mean": ({}, {"value": 9.0, "lower": 8.0, "upper": 9.5}, [(OUTER, "its 95% interval", 8.0, 9.5)], {"mean": 9.0}),
-    "extremes": ({}, {"minimum": 8.0, "maximum": 9.5}, [(fans.TINTS[0], "all", 8.0, 9.5)], {}),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("kind", BANDS)
-def test_a_fan_of_statistics(kind):
-    coordinates, numbers, bands, lines = BANDS[kind]
-    arrays = {
-        name: np.stack([0.0 * np.asarray(x), x], axis=-1) * np.ones((K, *np.shape(x), 2)) for name, x in numbers.items()
-    }
-    axes = lw.plots.fan(bare(sinking(), statistic(kind, coordinates, **arrays)), "depth")
-    drawn = []
-    for area in axes.collections:
-        points = area.get_paths()[0].vertices
-        first = points[points[:, 0] == 0.0, 1]
-        drawn.append((to_hex(area.get_facecolor()[0]).upper(), area.get_label(), first.min(), first.max()))
-    assert drawn == bands
-    said = {line.get_label(): set(line.get_ydata()) for line in axes.lines if not line.get_label().startswith("_")}
-    assert said == {name: {depth} for name, depth in lines.items()}
-    assert axes.yaxis_inverted()
-    assert axes.get_legend().get_title().get_text() == "10 members, from statistics"
 
 
 def test_a_statistic_at_one_time_is_no_fan():

@@ -395,15 +395,11 @@ def test_a_recording_goes_to_a_stream(mixed, tmp_path):
     assert "| outcome |" in text_of(tmp_path / "mine.rrd", "/run/summary")
 
 
-def test_whole(tmp_path, mixed):
-    assert lw.record(mixed, tmp_path / "fleet.rrd") == tmp_path / "fleet.rrd"
-    assert [path.name for path in tmp_path.iterdir()] == ["fleet.rrd"]
-
-
 def test_a_disk_that_is_full(tmp_path, mixed, monkeypatch):
     # rerun says so by a RuntimeError when its writer has stopped. What was there before stays.
     old = tmp_path / "fleet.rrd"
-    old.write_bytes(b"before")
+    assert lw.record(mixed, old) == old
+    before = old.read_bytes()
 
     def flush(self):
         raise RuntimeError("File-writer thread shut down prematurely")
@@ -412,7 +408,7 @@ def test_a_disk_that_is_full(tmp_path, mixed, monkeypatch):
     with pytest.raises(OSError, match="is the disk full"):
         lw.record(mixed, old)
     assert [path.name for path in tmp_path.iterdir()] == ["fleet.rrd"]
-    assert old.read_bytes() == b"before"
+    assert old.read_bytes() == before
 
 
 @pytest.mark.parametrize(("arguments", "kind", "words"), [

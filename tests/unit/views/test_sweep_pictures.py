@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of sweeps beyond what is recorded: numbers against those of the sweep, what is refused, what is run again."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import lgvi_warp as lw
+from lgvi_warp.common.errors import NothingToDraw
+from lgvi_warp.studies.sweeps.output import against_baseline
+from lgvi_warp.views.plots import sweep_pictures as sweeps
+from tests.support.swept import ByHand, N, swept
+
+
+def half(i):
+    """Half of the members of every cell pass."""
+    return 0.5
+
+
+def bars(container):
+    """Values of error bars, and their ends (n, 2, 2)."""
+    line, _, (segments,) = container
+    return line, np.array(segments.get_segments())
+
+
+@pytest.mark.parametrize(("names", "turned"), [("abcdef", 0.0), ("abcdefg", 90.0)])
+def test_success_is_that_of_the_sweep_and_many_names_stand_upright(names, turned):
+    sweep = swept(lambda i: i / 8, cases=names)
+    (axes,) = sweeps.plot_success(sweep)
+    line, ends = bars(*axes.containers)
+    expected = 100.0 * np.array([sweep.success(name) for name in names])
+    np.testing.assert_allclose(line.get_ydata(), expected[:, 0])
+    np.testing.assert_allclose(ends[:, :, 1], expected[:, 1:])
+    assert axes.get_xticklabels()[0].get_rotation() == turned
+
+
+def test_differences_are_those_to_the_baseline():
+    sweep = swept((0.2, 0.95, 0.225).__getitem__, cases="abc")
+    (axes,) = sweeps.plot_differences(sweep)
+    rows = [row.difference for row in against_baseline(sweep) if row.of == "success"]
+    for container, row in zip(axes.containers, rows, strict=True):
+        line, ends = bars(container)
+        np.testing.assert_allclose(
+            (*line.get_xdata(), *ends[0, :, 0]), 100.0 * np.array([row.value, row.lower, row.upper])
+        )
+
+
+def test_boxes_are_quantiles_of_members_that_did_not_fail():
+    sweep = swept(half, {"delay": [1, 2]}, failed=3, refused=(3,))
+    (axes,) = sweeps.plot_metrics(sweep)
+    assert len(axes.patches) == 3
+    for i, box in enumerate(axes.patches):
+        numbers = np.arange(3, N) * (1.0 + i)
+        corners = box.get_path().vertices[:, 1]
+        np.testing.assert_allclose((corners.min(), corners.max()), np.quantile(numbers, (0.25, 0.75)))
+        whiskers = np.concatenate([line.get_ydata() for line in axes.lines[5 * i : 5 * i + 5]])
+        np.testing.assert_allclose((whiskers.min(), whiskers.max()), np.quantile(numbers, (0.05, 0.95)))
+
+
+def test_boxes_beyond_the_most_are_counted():
+    for count, words in ((20, "case, k"), (21, "case, k; 2 more are not shown")):
+        (axes,) = sweeps.plot_metrics(swept(half, {"k": list(range(count))}))
+        assert axes.get_xlabel() == words
+        assert len(axes.patches) == 40
+
+
+def test_values_that_are_no_finite_numbers_stand_evenly():
+    for values in (["p", 3.0], [3.0, float("inf")]):
+        (axes,) = sweeps.plot_success(swept(half, {"law": values}))
+        assert axes.get_xticks().tolist() == [0.0, 1.0]
+
+
+def without_causes(*explained):
+    """A sweep that so many inputs explain."""
+    sweep = swept((0.9, 0.4, 0.65).__getitem__, cases="abc")
+    sweep.__class__ = type("Explained", (ByHand,), {"explained": explained})
+    return sweep
+
+
+def test_one_cause_is_drawn_over_the_members():
+    (axes,) = sweeps.plot_causes(without_causes("delay"))
+    assert axes.get_ylabel() == "member"
+    assert axes.lines[0].get_ydata().tolist() == list(range(16))
+    assert axes.lines[0].get_xdata().tolist() == [i**2 for i in range(16)]
+
+
+ALIKE = "some members pass and some do not, or nothing varies"
+
+
+@pytest.mark.parametrize(("draw", "sweep", "words"), [
+    (sweeps.plot_causes, without_causes(), ALIKE), (sweeps.plot_causes, swept(lambda i: i % 2), ALIKE),
+    (sweeps.plot_metrics, swept(half, metrics=()), "there are no metrics"),
+    (sweeps.plot_differences, swept(half, refused=(1,)), "no other case that ran"),
+])  # fmt: skip
+def test_a_sweep_with_nothing_to_draw_says_why(draw, sweep, words):
+    with pytest.raises(NothingToDraw, match=words):
+        draw(sweep)
+
+
+def test_responses_are_run_again_at_every_tick_with_what_is_tracked():
+    sweep = swept(half, {"k": [1, 2]}, cases="abcd")
+    panels = sweeps.plot_responses(sweep, members=7)
+    save = lw.SaveAt(every=0.5, fields=("position", "reference_depth"))
+    assert sweep.asked == [(name, range(7), {"k": 1}, save) for name in "abcd"]
+    lines = {line.get_label(): line for line in panels[0].lines}
+    np.testing.assert_allclose(lines["median"].get_ydata(), np.arange(5.0) + 13.0)
+    np.testing.assert_allclose(lines["wanted"].get_ydata(), np.arange(5.0) + 15.0)
+
+
+def test_responses_are_drawn_where_cases_differ_and_of_what_differs():
+    """Passes of two cases at two points: 50 and 60 %, 90 and 10 %. Medians of depth are less apart than those of heading."""
+    sweep = swept([0.5, 0.9, 0.6, 0.1].__getitem__, {"k": [1, 2]})
+    sweep.setup.metrics["h"] = SimpleNamespace(unit="rad", quantity=SimpleNamespace(unit=""), of="heading")
+    for i, cell in enumerate(sweep.cells):
+        sweep.record(cell).numbers["h"] = 100.0 * i + np.arange(N)
+    panels = sweeps.plot_responses(sweep, members=3)
+    assert [asked[:3] for asked in sweep.asked] == [(name, range(3), {"k": 2}) for name in "ab"]
+    assert [panel.get_title() for panel in panels] == ["a at k = 2", "b at k = 2"]
+    assert panels[0].figure.get_supylabel() == "heading [rad]: 3 members"
+
+
+def test_responses_of_a_distance_and_their_times():
+    sweep = swept(half, cases="a")
+    sweep.setup.settings["t1"] = 400.0
+    (axes,) = sweeps.plot_responses(sweep, of="position")
+    # 800 ticks are too many: every fourth.
+    save = lw.SaveAt(every=2.0, fields=("position", "reference_position"))
+    assert [asked[1::2] for asked in sweep.asked] == [(range(N), save)]
+    assert axes.figure.get_supylabel() == "position from what is wanted [m]: 40 members"
+    assert not axes.yaxis_inverted()
+    lines = {line.get_label(): line for line in axes.lines}
+    assert "wanted" not in lines
+    assert set(lines["median"].get_ydata()) == {5.0}
+
+
+def test_pictures_have_their_files():
+    names = ["success.png", "metrics.png", "causes.png", "responses.png"]
+    assert list(sweeps.pictures(swept(half, cases="a"))) == names
+    assert list(sweeps.pictures(swept(half))) == [*names[:2], "differences.png", *names[2:]]

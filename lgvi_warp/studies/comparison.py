@@ -62,7 +62,7 @@ class Candidate:
 
     @property
     def plain(self) -> bool:
-        """Whether the solver of equation (24) is the default one."""
+        """True if the solver of equation (24) is the default one."""
         return (self.solver, self.iterations) == ("quartic", None)
 
     @property
@@ -78,15 +78,23 @@ class Candidate:
         return f"{self.name} {self.dtype}"
 
     def options(self) -> dict[str, Any]:
-        """Convert the setting to arguments for lw.solve.
+        """Convert the setting to arguments of `lw.solve`.
 
-        Returns: method, h [s] and dtype, for `lw.solve(fleet, **options)`.
+        Returns:
+            method, h [s] and dtype, for `lw.solve(fleet, **options)`.
         """
         method: Any = self.method if self.plain else self.resolved()
         return {"method": method, "h": self.h, "dtype": self.dtype}
 
     def resolved(self) -> Method:
-        """Build the method with its solver."""
+        """Build the method with its solver.
+
+        Returns:
+            The method, as `lw.solve` takes it.
+
+        Raises:
+            SceneError: for a method or a solver that does not exist.
+        """
         return Method(self.method, self.solver, self.iterations)
 
 
@@ -96,21 +104,14 @@ class Sample:
     Steps are spacing / m for whole m. The spacing is run.save_every of the scene where it divides t1, else t1 / samples.
     Where noise acts on a grid, m divides the number of its draws in the spacing, so that all runs see one path.
 
-    t1: end time [s]. Default: run.duration of the scene.
+    samples: largest number of times after 0.
     kernels: what compiles, runs and prices its plans.
-
-    Attributes:
-        whole: the whole ensemble.
-        ensemble: the sample of it.
-        members: size of the sample.
-        t1: end time [s].
-        samples: largest number of times after 0.
-        spacing: length that steps divide [s], a Fraction.
-        index: the times as multiples of the spacing (k,), int64.
-        times: the times (k,) [s].
-        rate: largest angular rate at the start, at least one turn in t1 [rad/s].
-        draws: number of draws of noise in the spacing; 0 for runs that draw once a step.
-        fixed_draws: the most that the noise_steps of the scene allow; 0 where no term has one.
+    whole, ensemble: all members, and those of the sample.
+    spacing: a Fraction [s].
+    index, times: the times as multiples of the spacing (k,), and in seconds (k,) [s].
+    rate: largest angular rate at the start, at least one turn in t1 [rad/s].
+    draws: number of draws of noise in the spacing; 0 for runs that draw once a step.
+    fixed_draws: the most that the noise_steps of the scene allow; 0 where no term has one.
     """
 
     def __init__(
@@ -143,11 +144,11 @@ class Sample:
         self.draws, self.fixed_draws = 0, self._fixed_draws()
 
     def more(self, members: int, times: int = 1) -> Sample:
-        """Make the same sample with more members, and so many times as many times."""
+        """The same sample with more members, and so many times as many times."""
         return Sample(self.whole, self.t1, members, self.samples * times, kernels=self.kernels)
 
     def on_grid(self, draws: int) -> Sample:
-        """Make the same sample with noise on a grid that all its runs share."""
+        """The same sample with noise on a grid that all its runs share."""
         sample = copy.copy(self)
         sample.draws = draws
         sample.ensemble = drawn_every(self._drawn_once_a_step, self.h(draws))
@@ -169,30 +170,21 @@ class Sample:
         return math.gcd(*counts)
 
     def allowed(self, m: int) -> int:
-        """Find a number of steps that noise on a grid allows."""
+        """The next number of steps that noise on a grid allows."""
         if not self.draws:
             return m
         return next((count for count in saveat.divisors(self.draws) if count >= m), self.draws)
 
     def coarsest(self, angle: float) -> int:
-        """Find the largest step in which no member turns by more than an angle at the start.
-
-        angle: largest turn of one step [rad].
-        """
+        """The fewest steps of which none turns a member by more than an angle at the start [rad]."""
         return self.allowed(max(1, math.ceil(float(self.spacing) * self.rate / angle)))
 
     def h(self, m: int) -> float:
-        """Compute a step from its number.
-
-        Returns: The step spacing / m [s].
-        """
+        """The step spacing / m [s]."""
         return float(self.spacing / m)
 
     def candidate(self, method: str, m: int, dtype: str = "float64", solver: Any = ("quartic", None)) -> Candidate:
-        """Make a setting with the step spacing / m.
-
-        solver: (name, iterations) of the solver of equation (24). Default: the quartic to its tolerance.
-        """
+        """A setting with the step spacing / m; solver: (name, iterations)."""
         return Candidate(method, self.h(m), dtype, *solver)
 
     def plan(self, candidate: Candidate, ensemble: Ensemble | None = None) -> Plan:
@@ -213,11 +205,7 @@ class Sample:
     def accepted(
         self, methods: Sequence[str], dtype: str = "float64", most: int | None = None
     ) -> tuple[list[str], dict[str, str]]:
-        """Sort methods into those that the scene takes and those that it refuses.
-
-        most: number of accepted methods after which no more are looked at. Default: all are.
-        Returns: (accepted, refused): names of the first, and name -> reason of the others.
-        """
+        """Sort methods into those that the scene takes, at most so many, and those that it refuses: name -> reason."""
         good: list[str] = []
         refused: dict[str, str] = {}
         tableaux: dict[Any, str] = {}
@@ -237,10 +225,7 @@ class Sample:
         return good, refused
 
     def noise(self, method: str) -> str:
-        """Tell whether random numbers act, and whether they can be drawn on a grid.
-
-        Returns: "none"; "grid"; or "free", for a term with NOISE that is no NoisyTerm: its path differs from step to step.
-        """
+        """Whether noise acts: "none"; "grid", where runs may share a path; or "free", whose path differs with the step."""
         laws = self.plan(self.candidate(method, 1)).kernel_choice.laws
         noisy = [term for term, module in laws if getattr(module, "NOISE", False)]
         if not noisy:
@@ -249,10 +234,7 @@ class Sample:
 
 
 def drawn_every(fleet: Ensemble, noise_step: float, own_grid: bool = True) -> Ensemble:
-    """Put the noise of an ensemble on a grid.
-
-    noise_step: time from one draw to the next [s].
-    """
+    """Put the noise of an ensemble on a grid, but for terms with a noise_step of their own where own_grid says so."""
     terms = [
         replace(term, noise_step=noise_step)
         if isinstance(term, NoisyTerm) and not (own_grid and term.noise_step is not None)
@@ -265,15 +247,12 @@ def drawn_every(fleet: Ensemble, noise_step: float, own_grid: bool = True) -> En
 
 
 def failed(result: Result) -> bool:
-    """Tell whether some member failed; those stopped by an event did not."""
+    """True if some member failed; those stopped by an event did not."""
     return bool(failed_members(result.status).any())
 
 
 def distances(result: Result, reference: Result, distance: Distance | None = None) -> dict[str, np.ndarray]:
-    """Measure how far two results are apart at each time.
-
-    Returns: Quantity -> distance (k, n) [its unit]; NaN from where an event stopped a member in either result.
-    """
+    """Quantity -> distance of two results at each time (k, n); NaN from where an event stopped a member in either."""
     apart = {name: getattr(result, name).astype(np.float64) - getattr(reference, name) for name in FIELDS}
     chord = np.linalg.norm(apart.pop("attitude"), axis=(-2, -1))
     lengths = {name: np.linalg.norm(difference, axis=-1) for name, difference in apart.items()}
@@ -287,10 +266,9 @@ def distances(result: Result, reference: Result, distance: Distance | None = Non
 
 
 def errors(apart: dict[str, np.ndarray], until: int) -> dict[str, dict[str, float]]:
-    """Reduce distances to norms over members and times, leaving out members that were stopped.
+    """Reduce distances to norms over members and times up to `until`, leaving out members that were stopped.
 
-    apart: quantity -> (k, n), as of `distances`.
-    Returns: Quantity -> {"end_max", "end_rms", "path_max", "path_rms"} [its unit].
+    Returns: Quantity -> {"end_max", "end_rms", "path_max", "path_rms"}.
     """
     norms = {}
     for name, values in apart.items():
@@ -307,15 +285,11 @@ def errors(apart: dict[str, np.ndarray], until: int) -> dict[str, dict[str, floa
 class Reference:
     """What errors are measured from: the finer of two runs that share no step and, at best, no method.
 
-    Attributes:
-        result: of the finer run.
-        text: the two methods and their steps, in words.
-        own: quantity -> (k,), largest difference of the two runs over the members and up to each time [its unit].
-        sample: members, times and noise of the two runs, on which others are compared with them.
-        asked: quantity of the errors, where it is none of QUANTITIES.
-        methods: names of the methods of the two runs.
-        more: where the time was over before the runs agreed, about how much would have done [s]; infinite where it cannot be
-            told. 0 where they agree no better however long they run.
+    text: the two methods and their steps, in words.
+    own: quantity -> (k,), largest difference of the two runs over the members and up to each time [its unit].
+    asked: quantity of the errors, where it is none of QUANTITIES.
+    more: where the time was over before the runs agreed, about how much would have done [s]; infinite where it cannot be
+        told. 0 where they agree no better however long they run.
     """
 
     result: Result
@@ -327,18 +301,11 @@ class Reference:
     more: float = 0.0
 
     def error(self, of: str, until: int = -1) -> float:
-        """Return the reference's own error.
-
-        until: index of the last sample that counts. Default: the last of all.
-        Returns: Largest difference of the two runs up to that sample [unit of `of`].
-        """
+        """The reference's own error: the largest difference of the two runs up to a sample."""
         return float(self.own[of][until])
 
     def reaches(self, of: str, error: float) -> int:
-        """Find how far the reference's own error stays below a bound.
-
-        error: the bound [unit of `of`].
-        """
+        """Index of the last sample up to which the reference's own error stays below a bound."""
         return int(np.searchsorted(self.own[of], error, side="right")) - 1
 
 
@@ -359,10 +326,7 @@ def extrapolated(sample: Sample, method: str, m: int) -> Result:
 
 
 def agreement(a: Result, b: Result, distance: Distance | None = None) -> dict[str, np.ndarray]:
-    """Measure how far two results agree up to each time, over all members.
-
-    Returns: Quantity -> largest distance up to each time (k,) [its unit]; infinite where a member failed.
-    """
+    """Quantity -> largest distance of two results up to each time (k,), over all members; infinite where a member failed."""
     if failed(a) or failed(b):
         names = dict.fromkeys([*QUANTITIES, *([distance.name] if distance else [])])
         return {name: np.where(a.time > 0.0, np.inf, 0.0) for name in names}
@@ -374,7 +338,7 @@ def agreement(a: Result, b: Result, distance: Distance | None = None) -> dict[st
 
 
 def paired(names: Sequence[str]) -> tuple[str, str]:
-    """Choose the two methods of a reference."""
+    """The two methods of a reference."""
     first, second = names[0], names[min(1, len(names) - 1)]
     return first, second if Method(second).order >= Method(first).order - 2 else first
 
@@ -390,12 +354,9 @@ def make_reference(
     """Refine two high-order runs together until they agree to a goal, agree no better, or the time is spent.
 
     Where noise acts, both see one path, drawn at each step of the finer run. Each refinement has a path of its own, and that
-    of the best one is the path of `Reference.sample`.
+    of the best one is the path of `Reference.sample`. How well the runs agree is for the caller to judge.
 
-    How well the runs agree is for the caller to judge.
-
-    goal: difference at which to stop [unit of `of`]. Default 0: as small as it gets.
-    seconds: processor time to spend, without compiling [s]. Default 15.
+    seconds: processor time to spend, without compiling [s].
     """
     compared = compared_in(of)
     of = compared.name
@@ -455,13 +416,10 @@ def make_reference(
 
 
 def more_seconds(error: float, goal: float, gain: float, last: float) -> float:
-    """Predict how long it takes to refine two runs to a goal.
+    """Predict the processor time of refining two runs to a goal, each refinement twice as long as the one before.
 
-    error: how far they are apart [any unit].
-    goal: how far they may be apart [same unit].
-    last: processor time of the last two runs [s].
-    Returns: Processor time of all refinements to come, each twice as long as the one before [s]; infinite where it cannot be
-        told.
+    last: that of the last two runs [s].
+    Returns: That of all refinements to come [s]; infinite where it cannot be told.
     """
     if not (math.isfinite(error) and goal > 0.0 and 1.5 < gain < math.inf):
         return math.inf
@@ -470,11 +428,9 @@ def more_seconds(error: float, goal: float, gain: float, last: float) -> float:
 
 
 def time_over(seconds: float, more: float, share: float) -> tuple[str, str]:
-    """Say that the time of a search was over, and how much would do.
+    """Say that the time of a search was over, and how much would do: (cause, remedy).
 
-    seconds: time that was given [s].
-    more: processor time that the reference needs [s]; infinite where it cannot be told.
-    Returns: (cause, remedy).
+    more: processor time that the reference needs [s], of which a search gives it a share.
     """
     cause = f"{seconds:g} s were over"
     if not math.isfinite(more):
@@ -532,12 +488,7 @@ def growth(sample: Sample, candidate: Candidate) -> Growth:
 
 
 def fitted(times: np.ndarray, curve: np.ndarray, t1: float) -> Growth:
-    """Fit an exponential and a power of time to the growth of a difference.
-
-    times: times (k,) [s].
-    curve: difference over that at the start (k,).
-    t1: end time [s].
-    """
+    """Fit an exponential and a power of time to the growth of a difference."""
     later = times > 0.0
     if later.sum() < 2:
         return Growth(np.nan, np.nan, None, np.nan, dict.fromkeys(ROUND_OFF, 0.0), times, curve)
@@ -556,17 +507,10 @@ def fitted(times: np.ndarray, curve: np.ndarray, t1: float) -> Growth:
     )
 
 
-def statistics(result: Result, asked: Distance | None = None) -> dict[str, np.ndarray]:
-    """Collect the quantities that means and spreads are taken of.
+def quantities_of(result: Result, asked: Distance | None = None) -> dict[str, np.ndarray]:
+    """Quantity -> (k, n, components) that means and spreads are taken of; of the attitude, the vertical in body axes.
 
-    The attitude is represented by the vertical in body axes.
-
-    Args:
-        result: of k times and n members.
-        asked: one more quantity; angles are left out, since they have no such mean.
-
-    Returns:
-        Quantity -> (k, n, components), float64 [its unit].
+    asked: one more quantity; angles are left out, since they have no such mean.
     """
     values = {name: getattr(result, name).astype(np.float64) for name in ("position", "velocity", "angular_velocity")}
     values["attitude"] = result.attitude[..., 2, :].astype(np.float64)
@@ -583,14 +527,13 @@ def biases(result: Result, reference: Result, distance: Distance | None = None) 
 
     Each difference is in standard errors of the sample, as root mean square over components and times after 0. Two
     independent samples of the same distribution differ by about 1.4.
-
-    Returns: "NAME_mean" and "NAME_std" -> difference [standard errors]; empty for one member or where one failed.
+    Returns: "NAME_mean" and "NAME_std" -> difference; empty for one member or where one failed.
     """
     n = result.members
     if n < 2 or failed(result):
         return {}
     deviations = {}
-    mine, theirs = statistics(result, distance), statistics(reference, distance)
+    mine, theirs = quantities_of(result, distance), quantities_of(reference, distance)
     for name, b in theirs.items():
         a, b = mine[name][1:], b[1:]
         spread = b.std(axis=1, ddof=1)
@@ -607,7 +550,7 @@ def biases(result: Result, reference: Result, distance: Distance | None = None) 
 
 
 def part(result: Result, members: Sequence[int]) -> Result:
-    """Select some members of a result, in memory or in a store."""
+    """Some members of a result, in memory or in a store."""
     at = np.asarray(members)
     if result.store is not None:
         from lgvi_warp.store.open import chosen

@@ -31,11 +31,8 @@ WORTH = 0.03
 class Reading(NamedTuple):
     """Speeds of one kind of kernel.
 
-    Attributes:
-        kernel: One of widths.KERNELS.
-        ns: Width -> time per vehicle and step [ns].
-        before: The width of the table.
-        best: The fastest; that of the table where it is as fast.
+    ns: width -> time per vehicle and step [ns].
+    before, best: the width of the table, and the fastest; that of the table where it is as fast.
     """
 
     kernel: str
@@ -48,16 +45,10 @@ def calibrate(
     rounds: int = ROUNDS, *, prepare: Callable[[Plan], Callable[[], None]] = speed.stepper,
     clock: Callable[[], float] = time.perf_counter, register_width: Callable[[str], int] = machine.register_width,
 ) -> Iterator[Reading]:  # fmt: skip
-    """Measure every kind of kernel at every width that may suit this machine.
+    """Measure every kind of kernel at every width that may suit this machine, and yield the speeds of each.
 
-    Args:
-        rounds: Number of readings of each, of which the least counts. Default 20, about a tenth of a second.
-        prepare: From a plan to a call that makes all its steps.
-        clock: The time now [s].
-        register_width: From a precision to the vehicles in a register.
-
-    Yields:
-        The speeds of one kind.
+    rounds: number of readings of each, of which the least counts: about a tenth of a second.
+    register_width: from a precision to the vehicles in a register.
     """
     for kernel in widths.KERNELS:
         kind, dtype = widths.parts(kernel)

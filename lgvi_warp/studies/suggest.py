@@ -216,47 +216,30 @@ def suggestion_on(
     if sample.noise(taken[0]) == "free":
         problem = f"error = {error:g}: noise acts, whose path differs from step to step, so members have no error"
         raise SceneError([f"{problem}; use lgvi-warp tradeoff, which compares statistics"])
-    reference = checked_reference(sample, compared, error, seconds, taken, make_reference=make_reference)
+
+    def reference_on(sample: Sample) -> Reference:
+        return checked_reference(sample, compared, error, seconds, taken, make_reference=make_reference)
+
+    reference = reference_on(sample)
     sample = reference.sample
     report(0.3)
-    budget = Budget((1.0 - SHARE) * seconds)
-    ladders = Ladders(sample, reference, compared, error / SAFETY, budget, named)
-    few = taken if named else short_list(sample, taken)
-    ladders.climb(few, lambda part: report(0.3 + 0.4 * part))
-    if not named:
-        stiff = [name for name in STIFFLY_DAMPED if name in taken and name not in few and ladders.limited_by_damping]
-        ladders.climb(stiff)
-        others = [name for name in taken if name not in (*few, *stiff)]
-        ladders.climb(others, lambda part: report(0.7 + 0.1 * part), new_kernels=not ladders.priced)
-    trials = ladders.cheapest()
-    if not trials:
-        problem = f"error = {error:g} {compared.unit} of {compared.name}: no step of {', '.join(taken)} kept it"
-        if budget.over:
-            cause = f"{seconds:g} s were over before a step was short enough; try seconds={rounded_up(4.0 * seconds):g}"
-            raise SceneError([f"{cause}. {problem}; or ask for a larger error or a shorter t1"])
-        raise SceneError([f"{problem}; ask for a larger error or a shorter t1"])
-    times = times_to_check(sample, [trial.candidate for trial in trials[:FINALISTS]])
-    more = sample.more(CHECKED, times) if times > 1 or sample.whole.members > sample.members else sample
-    if more is not sample:
-        reference = checked_reference(more, compared, error, seconds, taken, make_reference=make_reference)
-        more = reference.sample
-    goal = error / SAFETY**0.5
-    size = sample.whole.members
-
-    def checked(candidate: Candidate) -> tuple[Trial, float]:
-        return refined(more, candidate, reference, compared.name, goal, size)
-
-    final = [checked(trial.candidate) for trial in trials[:FINALISTS]]
-    # Where the sample did not show what float32 rounds off, no shorter step mends it.
-    missed = [trial.candidate for trial, (_, apart) in zip(trials, final, strict=False) if apart > error]
-    final += [checked(replace(candidate, dtype="float64")) for candidate in missed if candidate.dtype == "float32"]
-    final = [(trial, apart) for trial, apart in final if apart <= error] or final[:1]
-    priced = list(zip(final, more.kernels.costs([trial.plan for trial, _ in final], ROUNDS), strict=True))
-    text = cost.disagreement([(trial.candidate.text, price.spread) for (trial, _), price in priced])
-    priced.sort(key=lambda pair: pair[1].us_per_vehicle_second)
-    (best, expected), price = priced[0]
-    notes = [text] if text else []
-    notes += [noise_text(more)] if more.draws else []
+    ladders = Ladders(sample, reference, compared, error / SAFETY, Budget((1.0 - SHARE) * seconds), named)
+    candidates = searched(ladders, taken, compared, error, seconds, report)
+    times = times_to_check(sample, candidates)
+    if times > 1 or sample.whole.members > sample.members:
+        reference = reference_on(sample.more(CHECKED, times))
+    finalists = checked(candidates, reference, compared.name, error)
+    prices = reference.sample.kernels.costs([trial.plan for trial, _ in finalists], ROUNDS)
+    doubt = cost.disagreement(
+        [(trial.candidate.text, price.spread) for (trial, _), price in zip(finalists, prices, strict=True)]
+    )
+    priced = sorted(
+        ((trial, expected, price.us_per_vehicle_second)
+         for (trial, expected), price in zip(finalists, prices, strict=True)), key=lambda finalist: finalist[2],
+    )  # fmt: skip
+    best, expected, price = priced[0]
+    notes = [doubt] if doubt else []
+    notes += [noise_text(reference.sample)] if reference.sample.draws else []
     notes += [f"{name} is left out: {why}" for name, why in refused.items() if named]
     if expected > error:
         notes.append(f"no step was found that keeps {error:g} {compared.unit}: {expected:.1e} is expected of the best")
@@ -270,44 +253,75 @@ def suggestion_on(
         of=compared.name,
         unit=compared.unit,
         expected=expected,
-        us_per_vehicle_second=price.us_per_vehicle_second,
+        us_per_vehicle_second=price,
         run_seconds=seconds_of(ensemble, best.candidate, sample.t1, kernels=sample.kernels) / used,
         threads=used,
         memory_bytes=memory_of(ensemble, best.candidate, sample.t1),
-        members=more.members,
+        members=reference.sample.members,
         t1=sample.t1,
         reference=reference.text,
         reference_error=reference.error(compared.name),
-        rivals=tuple(
-            (rival.candidate, rival_price.us_per_vehicle_second, apart) for (rival, apart), rival_price in priced[1:]
-        ),
+        rivals=tuple((rival.candidate, its_price, apart) for rival, apart, its_price in priced[1:]),
         worst=worst_of(best, reference, compared.name),
         asked=compared,
         messages=tuple(notes),
     )
 
 
-def errors_of(trial: Trial, reference: Reference, of: str) -> np.ndarray:
-    """Largest error over the path of each member of a trial.
+def searched(
+    ladders: Ladders, taken: Sequence[str], compared: Distance, error: float, seconds: float,
+    report: Callable[[float], None],
+) -> list[Candidate]:  # fmt: skip
+    """The cheapest settings of a sample that keep the target: of the short list, and of all methods where these fail."""
+    few = list(taken) if ladders.named else short_list(ladders.sample, taken)
+    ladders.climb(few, lambda part: report(0.3 + 0.4 * part))
+    if not ladders.named:
+        stiff = [name for name in STIFFLY_DAMPED if name in taken and name not in few and ladders.limited_by_damping]
+        ladders.climb(stiff)
+        others = [name for name in taken if name not in (*few, *stiff)]
+        ladders.climb(others, lambda part: report(0.7 + 0.1 * part), new_kernels=not ladders.priced)
+    if ladders.priced:
+        return [trial.candidate for trial in ladders.cheapest()[:FINALISTS]]
+    problem = f"error = {error:g} {compared.unit} of {compared.name}: no step of {', '.join(taken)} kept it"
+    if ladders.budget.over:
+        cause = f"{seconds:g} s were over before a step was short enough; try seconds={rounded_up(4.0 * seconds):g}"
+        raise SceneError([f"{cause}. {problem}; or ask for a larger error or a shorter t1"])
+    raise SceneError([f"{problem}; ask for a larger error or a shorter t1"])
 
-    Returns: Errors (n,) [its unit].
+
+def checked(candidates: Sequence[Candidate], reference: Reference, of: str, error: float) -> list[tuple[Trial, float]]:
+    """Settings that keep the error on the reference's sample, their steps shortened for that, with the error expected.
+
+    Where none does, the first one.
     """
+    sample = reference.sample
+
+    def shortened(candidate: Candidate) -> tuple[Trial, float]:
+        return refined(sample, candidate, reference, of, error / SAFETY**0.5, sample.whole.members)
+
+    trials = [shortened(candidate) for candidate in candidates]
+    # Where the sample did not show what float32 rounds off, no shorter step mends it.
+    missed = [candidate for candidate, (_, apart) in zip(candidates, trials, strict=True) if apart > error]
+    trials += [shortened(replace(candidate, dtype="float64")) for candidate in missed if candidate.dtype == "float32"]
+    return [(trial, apart) for trial, apart in trials if apart <= error] or trials[:1]
+
+
+def errors_of(trial: Trial, reference: Reference, of: str) -> np.ndarray:
+    """Largest error over the path of each member of a trial (n,) [its unit]."""
     apart = comparison.distances(trial.result, reference.result, reference.asked)[of]
     return np.asarray(np.max(np.where(np.isnan(apart), 0.0, apart), axis=0))
 
 
 def worst_of(trial: Trial, reference: Reference, of: str, members: int = CONFIRMED // 2) -> tuple[int, ...]:
-    """Find the members of a trial that have the largest errors."""
+    """The members of a trial that have the largest errors."""
     return tuple(int(i) for i in np.argsort(-errors_of(trial, reference, of))[:members])
 
 
 def largest_in_fleet(errors: np.ndarray, members: int) -> float:
-    """Carry the largest error of some members on to a fleet.
+    """Carry the largest error of some members, drawn as those of the fleet are, on to a fleet.
 
     The largest ones fall off as a power of their rank (Hill 1975), which gives the error that a fleet exceeds with a chance of
     CHANCE (Weissman 1978). Tails that end are fallen off faster: for them it is too large, never too small.
-
-    errors: of the members that were checked, drawn as those of the fleet are (n,).
     """
     n = len(errors)
     falling = np.sort(errors)[::-1]
@@ -322,11 +336,7 @@ def checked_reference(
     sample: Sample, of: Distance, error: float, seconds: float, taken: Sequence[str], *,
     make_reference: Callable[..., Reference] = comparison.make_reference, grown: Callable[..., Growth] = growth_of,
 ) -> Reference:  # fmt: skip
-    """Make a reference that is ten times better than the error up to the end.
-
-    error: error asked for [unit of `of`].
-    seconds: processor time of the whole search, of which the reference gets a part [s].
-    """
+    """Make a reference that is ten times better than the error up to the end; SceneError where there is none."""
     reference = make_reference(sample, of, goal=error / 30.0, seconds=SHARE * seconds)
     apart = reference.error(of.name)
     if apart <= 0.1 * error:
@@ -345,7 +355,7 @@ def checked_reference(
 
 
 def short_list(sample: Sample, taken: Sequence[str]) -> list[str]:
-    """List the methods to try first, by what acts in the scene."""
+    """The methods to try first, by what acts in the scene."""
     if sample.noise(taken[0]) != "none":
         names = SHORT["noisy"]
     elif not is_damped(sample.ensemble):
@@ -364,11 +374,8 @@ class Ladders:
     lengthened by the slope of the errors. A method is given up where its steps cost twice what the cheapest setting so far
     does, and a precision where the other one is better.
 
-    target: largest error allowed [unit of `asked`].
-
-    Attributes:
-        priced: (microseconds of one core per vehicle and second, trial) of each setting that keeps the target.
-        looked_at: names of the methods that ran a step, or whose steps cost too much for one.
+    priced: (microseconds of one core per vehicle and second, trial) of each setting that keeps the target.
+    looked_at: names of the methods that ran a step, or whose steps cost too much for one.
     """
 
     def __init__(
@@ -433,8 +440,8 @@ class Ladders:
     def longest(self, method: str, dtype: str) -> Generator[Trial, None, float | None]:
         """Find the longest step that keeps the target.
 
-        Returns: Its cost [us of one core per vehicle and second]; infinite where steps that might keep the target are too
-            dear, and None where the errors cease to fall.
+        Returns: Its cost [us of one core per vehicle and second]; infinite where such steps are too dear, None where the
+            errors cease to fall.
         """
         sample, reference, of, target = self.sample, self.reference, self.of, self.target
         m, before, worse = sample.coarsest(2.0), math.inf, 0
@@ -463,7 +470,7 @@ class Ladders:
 
     @property
     def limited_by_damping(self) -> bool:
-        """Whether the cheapest setting's step is no longer small beside the fastest damping; True where there is none."""
+        """True if the cheapest setting's step is no longer small beside the fastest damping, or if there is none."""
         trials = self.cheapest()
         return not trials or h_rates(rates(self.sample.ensemble), trials[0].candidate.h)["drag"] > STIFF
 
@@ -474,18 +481,14 @@ class Ladders:
 
 
 def step_cost(plan: Plan, kernels: Kernels) -> float:
-    """Measure what one step of a plan costs."""
+    """What one step of a plan costs [us per vehicle]."""
     return kernels.costs([plan], ROUNDS)[0].us_per_vehicle_second * plan.grid.h
 
 
 def lengthened(
     sample: Sample, good: Trial, m: int, before: float, reference: Reference, of: str, target: float
 ) -> Trial:
-    """Lengthen a step towards twice its length as far as the target allows.
-
-    before: error of the step twice as long [unit of `of`].
-    target: largest error allowed [unit of `of`].
-    """
+    """Lengthen a step towards twice its length, whose error is `before`, as far as the target allows."""
     low, high, size = m // 2, m, good.error(of)
     if not math.isfinite(before) or before <= target or low < 1:
         return good
@@ -506,7 +509,7 @@ def lengthened(
 
 
 def times_to_check(sample: Sample, candidates: Sequence[Candidate]) -> int:
-    """Find by how much the times of comparison may grow in number for the steps of some settings: 1 where noise acts."""
+    """By how much the times of comparison may grow in number for the steps of some settings: 1 where noise acts."""
     steps = [round(float(sample.spacing) / candidate.h) for candidate in candidates]
     grid = sample.draws or sample.fixed_draws
     allowed = [n for n in range(1, DENSER + 1) if not grid and all(n * -(-m // n) <= SHORTER * m for m in steps)]
@@ -516,11 +519,9 @@ def times_to_check(sample: Sample, candidates: Sequence[Candidate]) -> int:
 def refined(
     sample: Sample, candidate: Candidate, reference: Reference, of: str, target: float, members: int
 ) -> tuple[Trial, float]:
-    """Run a setting on a sample and shorten its step until a whole fleet keeps the target.
+    """Run a setting on a sample and shorten its step until a whole fleet keeps the target, at most six times.
 
-    target: largest error allowed [unit of `of`].
-    Returns: The last trial, and the largest error expected in the fleet [unit of `of`]; after six shorter steps it may still
-        miss the target.
+    Returns: The last trial, and the largest error expected in the fleet.
     """
     m = sample.allowed(math.ceil(float(sample.spacing) / candidate.h * (1.0 - 1e-9)))
     order = 1 if sample.draws else Method(candidate.method).order
@@ -538,11 +539,7 @@ def seconds_of(
     fleet: Ensemble, candidate: Candidate, t1: float, members: int = 256, *, kernels: Kernels = KERNELS,
     timed: Callable[..., np.ndarray] = cost.timed,
 ) -> float:  # fmt: skip
-    """Predict the CPU time of a whole run from that of a few members.
-
-    t1: end time [s].
-    Returns: Time of all members on one core, the scene's samples included and compiling not [s].
-    """
+    """Predict the CPU time of a run of all members from that of a few, with the scene's samples and without compiling [s]."""
     n = min(members, fleet.members)
     plan = make_plan(fleet.subset(range(n)), candidate.resolved(), candidate.h, t1, dtype=candidate.dtype)
     kernels.compile(plan)
@@ -550,11 +547,7 @@ def seconds_of(
 
 
 def memory_of(fleet: Ensemble, candidate: Candidate, t1: float) -> int:
-    """Predict the memory of a run of all members, with the scene's samples.
-
-    t1: end time [s].
-    Returns: Memory of the run and its result [bytes].
-    """
+    """Predict the memory of a run of all members, with the scene's samples [bytes]."""
     grid = make_plan(fleet.subset([0]), candidate.resolved(), candidate.h, t1, dtype=candidate.dtype).grid
     a_sample = 18 * np.dtype(machine.DTYPES[candidate.dtype]).itemsize
     return fleet.members * (len(grid.times) * a_sample + BYTES_OF_A_MEMBER)
@@ -565,12 +558,11 @@ def verified(
 ) -> tuple[float, int]:
     """Measure the error of a finished run by running some of its members again with half the step.
 
-    The members are those with the largest errors in the search, then the first ones. A method of order p is 2^p times
-    better at half the step, so the difference between the runs is the error but for one part in 2^p. Where noise acts, the
-    members are run with both steps on one path, drawn at each of the shorter ones; errors are of order 1, and what each
-    halving changes is independent, so that squares add up.
+    The members are those with the largest errors in the search, then the first ones. At half the step a method of order p is
+    2^p times better, so the difference is the error but for one part in 2^p. In noise both steps see one path, drawn at
+    each shorter one; errors are of order 1, and what each halving changes is independent, so that squares add up.
 
-    Returns: (error, members): largest error over these members and all samples [found.unit], and how many members they are.
+    Returns: The largest error over these members and all samples, and how many members they are.
     """
     candidate = suggestion.setting
     chosen = list(dict.fromkeys((*suggestion.worst, *range(fleet.members))))[:CONFIRMED]

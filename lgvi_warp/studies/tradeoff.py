@@ -45,6 +45,8 @@ DECIDING = ("position", "attitude")
 TRUST = 10.0
 # Part of a trade-off's time that its reference gets.
 SHARE = 0.3
+# How errors of members are reduced to a number.
+KINDS = ("end_max", "end_rms", "path_max", "path_rms")
 # A series of halved steps ends where another setting is as accurate in this many times less time.
 HOPELESS = 10.0
 
@@ -77,9 +79,15 @@ class Measurement:
     cost_spread: float = 1.0
 
     def error(self, of: str = "position", kind: str = "path_max") -> float:
-        """Look up one error of this setting.
+        """Give one error of this setting.
 
-        Returns: The error [unit of `of`]; infinite where there is none.
+        Args:
+            of: name of the quantity. Default "position".
+            kind: "end_max", "end_rms", "path_max" or "path_rms": largest or root mean square of the members, at the end or
+                over the path. Default "path_max".
+
+        Returns:
+            The error, in the unit of the quantity; infinite where there is none.
         """
         return self.errors.get(of, {}).get(kind, math.inf)
 
@@ -160,47 +168,22 @@ class Tradeoff(Saved):
         return front
 
     def to_dict(self) -> dict[str, Any]:
-        """Convert the trade-off to plain types for JSON.
-
-        Returns:
-            All fields, and "front", the settings on the Pareto front; numbers that are not finite are None.
-        """
         return finite_or_none(asdict(self) | {"front": [asdict(measurement.setting) for measurement in self.front()]})
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Tradeoff:
-        """Build a trade-off from the content of a JSON file.
-
-        Args:
-            content: as `to_dict` returns it.
-
-        Returns:
-            The trade-off; errors and times that were not finite are infinite, other numbers NaN.
-        """
-        measured = []
-        for row in content["measurements"]:
-            ends = {name: with_missing_as(row[name], math.nan) for name in ("energy_drift", "biases")}
-            fields = (
-                row
-                | ends
-                | {"setting": Candidate(**row["setting"]), "errors": with_missing_as(row["errors"], math.inf)}
-            )
-            measured.append(Measurement(**fields))
+        # Errors and times that were not finite were infinite, other numbers NaN.
         growth = content["growth"]
         if growth is not None:
             times = {name: with_missing_as(growth[name], math.inf) for name in ("doubling", "predictable")}
             curves = {name: np.array(with_missing_as(growth[name], math.nan)) for name in ("times", "curve")}
             growth = Growth(**growth | times | curves | {"rate": with_missing_as(growth["rate"], math.nan)})
+        measured = tuple(_measurement(row) for row in content["measurements"])
         values = {name: entry for name, entry in content.items() if name != "front"}
-        values |= {"measurements": tuple(measured), "growth": growth, "messages": tuple(content["messages"])}
+        values |= {"measurements": measured, "growth": growth, "messages": tuple(content["messages"])}
         return cls(**values | {"reference_error": with_missing_as(content["reference_error"], math.inf)})
 
     def rows(self) -> list[dict[str, Any]]:
-        """Flatten the measurements to one record each, as the CSV file has them.
-
-        Returns:
-            Records of setting, order, front, cost, errors of every quantity and kind, energy drift and biases.
-        """
         on_front = {measurement.setting for measurement in self.front()}
         rows = []
         for measurement in self.measurements:
@@ -216,19 +199,19 @@ class Tradeoff(Saved):
         return rows
 
 
-KINDS = ("end_max", "end_rms", "path_max", "path_rms")
+def _measurement(row: dict[str, Any]) -> Measurement:
+    numbers = {name: with_missing_as(row[name], math.nan) for name in ("energy_drift", "biases")}
+    errors = with_missing_as(row["errors"], math.inf)
+    return Measurement(**row | numbers | {"setting": Candidate(**row["setting"]), "errors": errors})
 
 
 @dataclass(eq=False)
 class Trial:
     """A setting that was run on a sample.
 
-    Attributes:
-        candidate: method, step, precision and solver.
-        plan: its plan, by which its cost is measured: noise without a noise_step of the scene is drawn once a step.
-        result: the result at the sample's times.
-        errors: quantity -> kind -> error; empty where a member failed or there is no reference.
-        cpu_seconds: processor time of the run, without compiling [s].
+    plan: by which its cost is measured: noise without a noise_step of the scene is drawn once a step.
+    errors: quantity -> kind -> error; empty where a member failed or there is no reference.
+    cpu_seconds: processor time of the run, without compiling [s].
     """
 
     candidate: Candidate
@@ -254,9 +237,8 @@ def tried(
 ) -> Trial:
     """Run a setting on a sample and measure its errors.
 
-    reference: what errors are measured against; None for no errors.
-    until: index of the last sample that is compared. Default: the last of all.
-    budget: what compiling does not count in. Default: none.
+    reference, until: what errors are measured against, None for none; and the index of the last sample that is compared.
+    budget: what compiling does not count in.
     """
     plan = sample.plan(candidate)
     with budget.free() if budget else contextlib.nullcontext():
@@ -275,11 +257,7 @@ def tried(
 
 
 def chosen_methods(methods: Sequence[str] | None, default: Sequence[str] = CANDIDATES) -> tuple[str, ...]:
-    """Check the names of the methods to try.
-
-    methods: names; None for the default ones.
-    default: names used for None.
-    """
+    """The names of the methods to try: those given, if all are known, or the default ones."""
     if methods is None:
         return tuple(default)
     faults, names = Faults(), listed("methods", methods, "methods")
@@ -385,7 +363,7 @@ def tradeoff_on(
             text = f"errors of single members are up to {sample.times[until]:g} s, where the reference still agrees"
             messages.append(f"{text} with itself; beyond it only statistics are meaningful")
     budget = Budget(0.6 * seconds)
-    trials, skipped = sweep(
+    trials, skipped = trials_of(
         sample, taken, reference, until, budget, whole, lambda part: report(0.2 + 0.6 * part), named
     )
     if skipped:
@@ -420,10 +398,7 @@ def without_reading(
     refused: dict[str, str],
     seconds: float,
 ) -> dict[str, str]:
-    """Name the methods that were asked for and have no measurement.
-
-    seconds: processor time of the whole trade-off [s].
-    """
+    """The methods that were asked for and have no measurement, and why."""
     there = {measurement.setting.method for measurement in measured}
 
     def why(name: str) -> str:
@@ -446,20 +421,20 @@ def growth_of(
 
 
 def noise_text(sample: Sample) -> str:
-    """Say how the runs of a comparison share their noise."""
+    """How the runs of a comparison share their noise, in words."""
     every = f"{sample.h(sample.draws):.4g} s"
     return f"noise acts: all runs see one path of it, drawn every {every}; errors by paths are of order 1"
 
 
 def reaches_nothing(reference: Reference, of: Distance) -> bool:
-    """Tell whether a reference is too rough for errors of members even at the first time."""
+    """True if a reference is too rough for errors of members even at the first time."""
     return reference.reaches(of.name, comparison.LOST / (TRUST * TRUST)) < 1
 
 
 def trusted_until(reference: Reference, of: Distance, seconds: float) -> int:
-    """Find the last sample at which errors below 1e-2 can be measured.
+    """Index of the last sample at which errors below 1e-2 can be measured; SceneError without one.
 
-    seconds: time of the whole trade-off, for the message [s].
+    seconds: of the whole trade-off, for the message [s].
     """
     until = reference.reaches(of.name, comparison.LOST / (TRUST * TRUST))
     if reaches_nothing(reference, of):
@@ -477,14 +452,9 @@ def trusted_until(reference: Reference, of: Distance, seconds: float) -> int:
 class Series:
     """Steps of one setting, each half of the one before.
 
-    Attributes:
-        method: name of the method.
-        dtype: precision.
-        solver: (name, iterations) of the solver of equation (24).
-        m: number of steps in the sample's spacing.
-        best: least error of the steps so far, the larger of position [m] and attitude [rad].
-        worse: number of steps in a row that gained little.
-        rungs: number of steps tried.
+    m: number of steps in the sample's spacing.
+    best: least error of the steps so far, the larger of position [m] and attitude [rad].
+    worse: number of steps in a row that gained little.
     """
 
     method: str
@@ -495,61 +465,43 @@ class Series:
     worse: int = 0
     rungs: int = 0
 
+    def candidate(self, sample: Sample) -> Candidate:
+        """The next setting to run."""
+        return sample.candidate(self.method, self.m, self.dtype, self.solver)
 
-def sweep(
-    sample: Sample,
-    methods: Sequence[str],
-    reference: Reference | None,
-    until: int,
-    budget: Budget,
-    whole: Budget,
-    report: Callable[[float], None],
-    named: bool = False,
-    *,
-    solvers: Sequence[tuple[str, int | None]] | None = None,
-    compensated: Sequence[str] | None = None,
-) -> tuple[list[Trial], list[str]]:
+
+def trials_of(
+    sample: Sample, methods: Sequence[str], reference: Reference | None, until: int, budget: Budget, whole: Budget,
+    report: Callable[[float], None], named: bool = False, *,
+    solvers: Sequence[tuple[str, int | None]] = SOLVERS, compensated: Sequence[str] = COMPENSATED,
+) -> tuple[list[Trial], list[str]]:  # fmt: skip
     """Run every method, precision and solver: each at a coarse step first, then in turn at half the step before.
 
-    Args:
-        sample: members and times.
-        methods: names of the methods, in this order.
-        reference: what errors are measured against; None where noise acts.
-        until: index of the last sample that is compared.
-        budget: of the runs.
-        whole: of the whole study, compiling included: once it is over, nothing is compiled that is not asked for by name.
-        report: called with the fraction of the time or of the first settings that is done.
-        named: whether the methods were asked for by name: then each begins, however long its kernel compiles.
-        solvers: (name, iterations) of the solvers that are tried as well; default None, SOLVERS.
-        compensated: names of the methods that are tried in compensated float32 as well; default None, COMPENSATED.
-
-    Returns:
-        (trials, skipped): the trials, and the names of the settings that there was no time for.
+    whole: of the study, compiling included: once it is over, nothing is compiled that is not asked for by name.
+    named: whether the methods were asked for by name: then each begins, however long its kernel compiles.
+    Returns: The trials, and the names of the settings that there was no time for.
     """
-    solvers = SOLVERS if solvers is None else solvers
-    waiting = series_of(sample, methods, solvers, COMPENSATED if compensated is None else compensated)
-    trials: list[Trial] = []
-    skipped: list[str] = []
-    begun: set[str] = set()
+    waiting = series_of(sample, methods, solvers, compensated)
+    trials, skipped, begun = list[Trial](), list[str](), set[str]()
     count = len(waiting)
-    for i, one in enumerate(list(waiting)):
+    for i, series in enumerate(list(waiting)):
         report(0.5 * i / count)
-        asked = named and one.method not in begun
+        asked = named and series.method not in begun
         if trials and not asked and (whole.over or budget.over):
-            waiting.remove(one)
-            skipped.append(sample.candidate(one.method, one.m, one.dtype, one.solver).text)
+            waiting.remove(series)
+            skipped.append(series.candidate(sample).text)
             continue
-        begun.add(one.method)
-        if not halved(sample, one, trials, reference, until, budget):
-            waiting.remove(one)
+        begun.add(series.method)
+        if not halved(sample, series, trials, reference, until, budget):
+            waiting.remove(series)
     while waiting:
-        for one in list(waiting):
+        for series in list(waiting):
             report(0.5 + 0.5 * min(1.0, budget.spent / budget.seconds))
             if budget.over:
-                waiting.remove(one)
-                skipped.append(sample.candidate(one.method, one.m, one.dtype, one.solver).text + " at fine steps")
-            elif not halved(sample, one, trials, reference, until, budget):
-                waiting.remove(one)
+                waiting.remove(series)
+                skipped.append(series.candidate(sample).text + " at fine steps")
+            elif not halved(sample, series, trials, reference, until, budget):
+                waiting.remove(series)
     if reference is not None:
         between(sample, trials, reference, until, budget)
     return trials, skipped
@@ -558,7 +510,7 @@ def sweep(
 def series_of(
     sample: Sample, methods: Sequence[str], solvers: Sequence[tuple[str, int | None]], compensated: Sequence[str]
 ) -> list[Series]:
-    """List the series of settings, the default precision of every method first."""
+    """The series of settings, the default precision of every method first."""
     plain: tuple[str, int | None] = ("quartic", None)
     settings = [(name, dtype, plain) for dtype in PRECISIONS for name in methods]
     settings += [(SOLVED_BY, "float64", solved) for solved in solvers if SOLVED_BY in methods]
@@ -570,13 +522,8 @@ def series_of(
 def halved(
     sample: Sample, series: Series, trials: list[Trial], reference: Reference | None, until: int, budget: Budget
 ) -> bool:
-    """Run the next step of a series.
-
-    reference: what errors are measured against; None where noise acts.
-    """
-    trial = tried(
-        sample, sample.candidate(series.method, series.m, series.dtype, series.solver), reference, until, budget
-    )
+    """Run the next step of a series, and tell whether another is worth it."""
+    trial = tried(sample, series.candidate(sample), reference, until, budget)
     trials.append(trial)
     series.rungs += 1
     finer = sample.allowed(2 * series.m)
@@ -594,7 +541,7 @@ def halved(
 
 
 def is_dominated(trial: Trial, trials: Sequence[Trial]) -> bool:
-    """Tell whether another setting was more accurate in a tenth of the time."""
+    """True if another setting was more accurate in a tenth of the time."""
     error = max(trial.error(of) for of in DECIDING)
     rivals = (rival for rival in trials if HOPELESS * rival.cpu_seconds < trial.cpu_seconds)
     return math.isfinite(error) and any(max(rival.error(of) for of in DECIDING) < error for rival in rivals)
@@ -629,10 +576,7 @@ def measurements(
     until: int,
     distance: Distance | None = None,
 ) -> list[Measurement]:
-    """Measure the cost of the trials and collect their errors, drifts and biases.
-
-    reference: what errors are measured against; None where noise acts.
-    """
+    """Cost, errors, drifts and biases of the trials that did not fail; without a reference, no errors."""
     good = [trial for trial in trials if not comparison.failed(trial.result) and (trial.errors or reference is None)]
     compiled: dict[tuple[str, str], float] = {}
     for trial in trials:
@@ -662,7 +606,7 @@ def measurements(
 
 
 def report_text(tradeoff: Tradeoff) -> str:
-    """Write the trade-off as a text of several lines."""
+    """The trade-off as a text of several lines."""
     unit = tradeoff.units[tradeoff.of]
     lines = [f"missing     {name}: {why}" for name, why in tradeoff.missing.items()]
     lines += [f"note        {message}" for message in tradeoff.messages]
@@ -695,7 +639,7 @@ def report_text(tradeoff: Tradeoff) -> str:
 
 
 def growth_text(growth: Growth) -> str:
-    """Describe how errors grow, in words."""
+    """How errors grow, in words."""
     if not np.isfinite(growth.rate):
         return "unknown: a difference of 1e-8 rad grows beyond measure at once"
     if growth.power is not None:
@@ -707,9 +651,9 @@ def growth_text(growth: Growth) -> str:
 
 
 def bias_lines(tradeoff: Tradeoff) -> list[str]:
-    """Write a table of the statistics' biases against the step.
+    """A table of the statistics' biases against the step.
 
-    The table is of one method in float64 with the default solver: the first of order 2, or of the order nearest to it.
+    It is of one method in float64 with the default solver: the first of order 2, or of the order nearest to it.
     """
     double = [
         measurement

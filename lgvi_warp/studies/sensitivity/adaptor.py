@@ -164,7 +164,7 @@ class _Column:
 
 
 def entries_of(estimate: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarray]]]:
-    """List the distributions of the single entries of a variation."""
+    """The distributions of the single entries of a variation, with the base and the numbers of each."""
     (base,) = estimate.bases
     distribution = estimate.distribution
     numbers = {name: np.broadcast_to(value, base.shape).reshape(-1)
@@ -175,10 +175,7 @@ def entries_of(estimate: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarra
 
 
 def salib_distribution(distribution: Any, base: Any, numbers: Mapping[str, Any]) -> tuple[str, list[float]] | None:
-    """Translate a distribution to SALib's (name, bounds).
-
-    Returns: Name and bounds; None where SALib has none for it.
-    """
+    """Translate a distribution to SALib's (name, bounds); None where SALib has none for it."""
     base = float(base)
     mean = float(numbers.get("mean", base))
     if distribution.kind == "normal":

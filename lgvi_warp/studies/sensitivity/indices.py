@@ -87,11 +87,6 @@ class Indices(Saved):
         return []
 
     def to_dict(self) -> dict[str, Any]:
-        """Convert the result to plain types for JSON.
-
-        Returns:
-            All fields and rows; numbers that are not finite are None.
-        """
         names = ("name", "factors", "quantities", "samples", "members", "failed", "confidence", "messages")
         content = {name: getattr(self, name) for name in (*names, "mean", "std")}
         content["rows"] = list(self.rows())
@@ -173,7 +168,6 @@ class SobolIndices(Indices):
     intervals: ClassVar[dict[str, str]] = {"first": "first_confidence", "total": "total_confidence"}
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        """List the records of every analysis, then those of two factors together."""
         yield from super().rows()
         for q, j, k in self._pairs():
             assert self.second is not None

@@ -22,7 +22,7 @@ MOMENTS = {"munk": ("T", "Ap", "B"), "restoring": ("K", "B")}
 
 
 def _oscillator(method: Method, moments: tuple[str, ...]) -> list[tuple[bool, float]]:
-    """List the moves of one step in turn: (whether the angle or the rate is advanced, over how many steps)."""
+    """The moves of one step in turn: (whether the angle or the rate is advanced, over how many steps)."""
     if method.two_part:
         first = method.program[0][0]
         return [((first == "A") == (i % 2 == 0), g) for i, g in enumerate(method.stages)]
@@ -42,12 +42,10 @@ def _oscillator(method: Method, moments: tuple[str, ...]) -> list[tuple[bool, fl
 
 @functools.cache
 def oscillation_limit(name: str, kind: str = "munk") -> float:
-    """Compute the largest h w at which a small oscillation of frequency w stays small.
+    """The largest h w [rad] at which a small oscillation of frequency w stays small; NaN for gauss*.
 
     For sub-maps it follows from the product of shears that a step is, for explicit methods from the stability polynomial
     at i h w. Large amplitudes may tumble earlier.
-
-    Returns: The limit [rad]; infinite without one; NaN for gauss*, which end where their iteration does.
     """
     method, numbers = Method(name), np.arange(STEP, MOST, STEP)
     if method.gauss:
@@ -67,12 +65,10 @@ def oscillation_limit(name: str, kind: str = "munk") -> float:
 
 @functools.cache
 def rotation_limit(name: str) -> float:
-    """Compute the largest h |J^-1 pi| of a method.
+    """The largest h |J^-1 pi| of a method [rad]; NaN for gauss*.
 
     It is |J^-1 a| = 1 for equation (24), half an angle of 1 for turns about axes, and for rk* the step at which the
     numbers of R grow.
-
-    Returns: The limit [rad]; infinite for Runge-Kutta methods on the rotation group; NaN for gauss*.
     """
     method = Method(name)
     if method.tableau:

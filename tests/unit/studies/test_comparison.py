@@ -457,17 +457,17 @@ def test_statistics_are_of_vectors_energies_and_momenta():
     path = exact(np.arange(3.0), 2)
     turn = np.broadcast_to(notation.matrix_from_rotation_vector(np.array([0.1, 0.2, 0.3])), (3, 2, 3, 3))
     result = made(path, attitude=turn)
-    values = comparison.statistics(result)
+    values = comparison.quantities_of(result)
     names = ["position", "velocity", "angular_velocity", "attitude", "energy", "linear_momentum", "angular_momentum"]
     assert list(values) == names
     assert values["energy"].shape == (3, 2, 1)
     np.testing.assert_array_equal(values["attitude"], turn[..., 2, :])
     np.testing.assert_array_equal(values["linear_momentum"], invariants.linear_momentum(result))
     np.testing.assert_array_equal(values["angular_momentum"], invariants.angular_momentum(result))
-    assert "depth" in comparison.statistics(result, compared.compared_in("depth"))
-    angle = comparison.statistics(result, compared.Distance("heading", "rad", None))
+    assert "depth" in comparison.quantities_of(result, compared.compared_in("depth"))
+    angle = comparison.quantities_of(result, compared.Distance("heading", "rad", None))
     assert "heading" not in angle
-    assert len(comparison.statistics(result, compared.Distance("position", "m"))) == len(names)
+    assert len(comparison.quantities_of(result, compared.Distance("position", "m"))) == len(names)
 
 
 def test_part_of_a_result_in_memory():
@@ -707,7 +707,7 @@ def test_a_sweep_halves_steps_until_round_off(scene):
     reference = dataclasses.replace(reference_of(sample, {}), own={name: np.full(6, 1e-9) for name in NAMES})
     shares = []
     runs, budgets = Runs({"psi_s": 1e-2, "psi_x": 1e-2}), (Budget(ENOUGH), Budget(ENOUGH))
-    trials, skipped = tradeoffs.sweep(
+    trials, skipped = tradeoffs.trials_of(
         on(sample, runs), ["psi_s"], reference, 5, *budgets, shares.append, solvers=[("newton", None)]
     )
     assert skipped == []
@@ -739,7 +739,7 @@ def test_every_method_has_a_coarse_setting_before_any_step_is_halved(scene):
     reference = dataclasses.replace(reference_of(sample, {}), own={name: np.full(6, 1e-9) for name in NAMES})
     methods = ["psi_x", "psi_s", "rk4", "rk8"]
     runs = Runs(dict.fromkeys(methods, 1e-2))
-    tradeoffs.sweep(on(sample, runs), methods, reference, 5, Budget(ENOUGH), Budget(ENOUGH), lambda part: None)
+    tradeoffs.trials_of(on(sample, runs), methods, reference, 5, Budget(ENOUGH), Budget(ENOUGH), lambda part: None)
     coarsest = sample.h(sample.coarsest(1.0))
     firsts = [name for name, dtype, h in runs.settings[:4] if (dtype, h) == ("float64", coarsest)]
     assert firsts == methods
@@ -760,7 +760,7 @@ def test_a_sweep_without_time_tries_what_was_asked_for_by_name(scene):
     reference = reference_of(sample, {})
 
     def swept(runs, whole, **more):
-        trials, skipped = tradeoffs.sweep(
+        trials, skipped = tradeoffs.trials_of(
             sample, ["psi_x", "rk4"], reference, 5, runs, whole, lambda part: None, compensated=(), **more
         )
         return [trial.candidate.text for trial in trials], skipped
@@ -775,7 +775,7 @@ def test_a_sweep_without_time_tries_what_was_asked_for_by_name(scene):
         ["psi_x float64", "rk4 float64"],
         [*rest, "psi_x float64 at fine steps", "rk4 float64 at fine steps"],
     )
-    statistics, _ = tradeoffs.sweep(
+    statistics, _ = tradeoffs.trials_of(
         sample, ["psi_x"], None, 5, Budget(ENOUGH), Budget(ENOUGH), lambda part: None, compensated=()
     )
     assert len(statistics) == 2 * 5

@@ -52,6 +52,11 @@ class Candidate:
         dtype: precision, such as "float64" or "float32".
         solver: solver of equation (24): "quartic", "cayley", "newton" or "moser_veselov".
         iterations: its Newton steps; None for as many as its tolerance needs.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.studies.Candidate("rk4", 0.1).options()
+        {'method': 'rk4', 'h': 0.1, 'dtype': 'float64'}
     """
 
     method: str

@@ -62,7 +62,7 @@ class Measurement:
         errors: quantity -> {"end_max", "end_rms", "path_max", "path_rms"} over the members, in the units of
             Tradeoff.units; empty where a member failed or noise acts.
         energy_drift: largest |E(t) - E(0)| [J]; NaN where a force of the scene supplies or takes energy.
-        biases: difference of means and spreads in standard errors, see comparison.biases.
+        biases: difference of means and spreads in standard errors, by name, such as "position_mean".
         order: order of the method.
         trusted: quantity -> whether the error is at least ten times that of the reference.
         cost_spread: median of the cost's readings over the least, which is taken.

@@ -186,14 +186,10 @@ class SobolIndices(Indices):
             raise ValueError(f"has {len(rows):,} rows of pairs for {m:,} quantities and {d:,} factors")
         second, half = (np.full((m, d, d), np.nan) for _ in range(2))
         for row in rows:
-            q, pair = (
-                places["quantities"][row["quantity"]],
-                [places["factors"][row[name]] for name in ("factor", "other")],
-            )
-            for j, k in (pair, pair[::-1]):
-                second[q, j, k], half[q, j, k] = (
-                    with_missing_as(row[name], np.nan) for name in ("value", "confidence")
-                )
+            q = places["quantities"][row["quantity"]]
+            j, k = (places["factors"][row[name]] for name in ("factor", "other"))
+            second[q, j, k] = second[q, k, j] = with_missing_as(row["value"], np.nan)
+            half[q, j, k] = half[q, k, j] = with_missing_as(row["confidence"], np.nan)
         return {"second": second, "second_confidence": half}
 
     def _pairs(self) -> list[tuple[int, int, int]]:

@@ -48,6 +48,11 @@ class Axis:
         log: whether values rise by equal factors, else by equal steps. Default True.
         scaled: whether a parameter is multiplied by the value, or set to it. Default None: numbers are set, vectors and
             matrices multiplied.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.studies.Axis.parse("vehicle.mass=50:500:linear").values(4)
+        array([ 50., 200., 350., 500.])
     """
 
     name: str

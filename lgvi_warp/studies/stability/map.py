@@ -277,8 +277,8 @@ def stability_map(
     Args:
         scene: the scene.
         x: horizontal axis: "h", "angular_velocity", "speed", "added_mass_ratio", "drag_number" or a name of
-            scene.parameters(); as a text ("h=0.01:3", "vehicle.mass=50:500:linear"), as (name, low, high), or as an
-            Axis of studies.stability.grid. Default "h".
+            scene.parameters(); as a text ("h=0.01:3", "vehicle.mass=50:500:linear"), as (name, low, high), or as a
+            lw.studies.Axis. Default "h".
         y: vertical axis, in the same forms. Default "angular_velocity".
         methods: names. Default: psi, psi_s, psi_x and rk4.
         points: number of cells along x and y, one number or two. Default 24.

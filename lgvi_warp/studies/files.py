@@ -137,7 +137,7 @@ class Saved(ABC):
             content: as `to_dict` returns it.
 
         Returns:
-            What the study found.
+            What the study found; numbers that were not finite are infinite or NaN.
         """
 
     @classmethod

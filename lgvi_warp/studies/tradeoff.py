@@ -473,7 +473,7 @@ class Series:
 def trials_of(
     sample: Sample, methods: Sequence[str], reference: Reference | None, until: int, budget: Budget, whole: Budget,
     report: Callable[[float], None], named: bool = False, *,
-    solvers: Sequence[tuple[str, int | None]] = SOLVERS, compensated: Sequence[str] = COMPENSATED,
+    solvers: Sequence[tuple[str, int | None]] | None = None, compensated: Sequence[str] | None = None,
 ) -> tuple[list[Trial], list[str]]:  # fmt: skip
     """Run every method, precision and solver: each at a coarse step first, then in turn at half the step before.
 
@@ -481,7 +481,8 @@ def trials_of(
     named: whether the methods were asked for by name: then each begins, however long its kernel compiles.
     Returns: The trials, and the names of the settings that there was no time for.
     """
-    waiting = series_of(sample, methods, solvers, compensated)
+    solvers = SOLVERS if solvers is None else solvers
+    waiting = series_of(sample, methods, solvers, COMPENSATED if compensated is None else compensated)
     trials, skipped, begun = list[Trial](), list[str](), set[str]()
     count = len(waiting)
     for i, series in enumerate(list(waiting)):

@@ -294,7 +294,7 @@ def whole_groups(outputs: Outputs, group: int, failed: str) -> tuple[np.ndarray,
     if outputs.failed.any() and failed == "refuse":
         remedy = 'mend what fails (see result.status of lw.solve), or use the whole groups alone: failed="drop"'
         raise FailedMembers([outputs.text(remedy)])
-    whole = ~outputs.failed.reshape(-1, group).any(axis=1)
+    whole = np.asarray(~outputs.failed.reshape(-1, group).any(axis=1))
     count, messages = int(whole.sum()), list[str]()
     if count < 2:
         raise FailedMembers([outputs.text(f"{count} groups of the design are whole, too few for an estimate")])

@@ -167,9 +167,8 @@ class Sample:
                 count = self.spacing / saveat.exact(term.noise_step)
                 if count.denominator != 1:
                     problem = f"does not divide the {float(self.spacing):g} s between the times of the comparison"
-                    faults.add(
-                        f"{term.key}.noise_step", term.noise_step, problem, "give run.save_every a multiple of it"
-                    )
+                    remedy = "give run.save_every a multiple of it"
+                    faults.add(f"{term.key}.noise_step", term.noise_step, problem, remedy)
                 counts.append(int(count))
         faults.raise_if_any()
         return math.gcd(*counts)
@@ -211,9 +210,7 @@ class Sample:
         self, methods: Sequence[str], dtype: str = "float64", most: int | None = None
     ) -> tuple[list[str], dict[str, str]]:
         """Sort methods into those that the scene takes, at most so many, and those that it refuses: name -> reason."""
-        good: list[str] = []
-        refused: dict[str, str] = {}
-        tableaux: dict[Any, str] = {}
+        good, refused, tableaux = list[str](), dict[str, str](), dict[Any, str]()
         for name in methods:
             if len(good) == most:
                 break
@@ -240,14 +237,13 @@ class Sample:
 
 def drawn_every(fleet: Ensemble, noise_step: float, own_grid: bool = True) -> Ensemble:
     """Put the noise of an ensemble on a grid, but for terms with a noise_step of their own where own_grid says so."""
-    terms = [
-        replace(term, noise_step=noise_step)
-        if isinstance(term, NoisyTerm) and not (own_grid and term.noise_step is not None)
-        else term
-        for term in fleet.scene.terms
-    ]
+
+    def on_grid(term: Any) -> Any:
+        noisy = isinstance(term, NoisyTerm) and not (own_grid and term.noise_step is not None)
+        return replace(term, noise_step=noise_step) if noisy else term
+
     drawn, scene = copy.copy(fleet), cast(Scene, fleet.scene)
-    drawn.scene = replace(scene, terms=terms)
+    drawn.scene = replace(scene, terms=[on_grid(term) for term in scene.terms])
     return drawn
 
 
@@ -349,13 +345,9 @@ def paired(names: Sequence[str]) -> tuple[str, str]:
 
 
 def make_reference(
-    sample: Sample,
-    of: str | Distance = "position",
-    goal: float = 0.0,
-    seconds: float = 15.0,
-    methods: Sequence[str] | None = None,
-    report: Callable[[float], None] | None = None,
-) -> Reference:
+    sample: Sample, of: str | Distance = "position", goal: float = 0.0, seconds: float = 15.0,
+    methods: Sequence[str] | None = None, report: Callable[[float], None] | None = None,
+) -> Reference:  # fmt: skip
     """Refine two high-order runs together until they agree to a goal, agree no better, or the time is spent.
 
     Where noise acts, both see one path, drawn at each step of the finer run. Each refinement has a path of its own, and that

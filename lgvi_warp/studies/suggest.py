@@ -33,15 +33,7 @@ from lgvi_warp.studies.comparison import Candidate, Growth, Reference, Sample
 from lgvi_warp.studies.distance import Distance, compared_in
 from lgvi_warp.studies.kernels import KERNELS, Kernels
 from lgvi_warp.studies.speed import void
-from lgvi_warp.studies.tradeoff import (
-    PRECISIONS,
-    Trial,
-    chosen_methods,
-    growth_of,
-    growth_text,
-    noise_text,
-    tried,
-)
+from lgvi_warp.studies.tradeoff import PRECISIONS, Trial, chosen_methods, growth_of, growth_text, noise_text, tried
 
 # A setting is accepted where its error on the sample is below the error asked for by this factor.
 SAFETY = 1.15
@@ -230,14 +222,10 @@ def suggestion_on(
         reference = reference_on(sample.more(CHECKED, times))
     finalists = checked(candidates, reference, compared.name, error)
     prices = reference.sample.kernels.costs([trial.plan for trial, _ in finalists], ROUNDS)
-    doubt = cost.disagreement(
-        [(trial.candidate.text, price.spread) for (trial, _), price in zip(finalists, prices, strict=True)]
-    )
-    priced = sorted(
-        ((trial, expected, price.us_per_vehicle_second)
-         for (trial, expected), price in zip(finalists, prices, strict=True)), key=lambda finalist: finalist[2],
-    )  # fmt: skip
-    best, expected, price = priced[0]
+    priced = list(zip(finalists, prices, strict=True))
+    doubt = cost.disagreement([(trial.candidate.text, price.spread) for (trial, _), price in priced])
+    priced.sort(key=lambda pair: pair[1].us_per_vehicle_second)
+    (best, expected), price = priced[0]
     notes = [doubt] if doubt else []
     notes += [noise_text(reference.sample)] if reference.sample.draws else []
     notes += [f"{name} is left out: {why}" for name, why in refused.items() if named]
@@ -253,7 +241,7 @@ def suggestion_on(
         of=compared.name,
         unit=compared.unit,
         expected=expected,
-        us_per_vehicle_second=price,
+        us_per_vehicle_second=price.us_per_vehicle_second,
         run_seconds=seconds_of(ensemble, best.candidate, sample.t1, kernels=sample.kernels) / used,
         threads=used,
         memory_bytes=memory_of(ensemble, best.candidate, sample.t1),
@@ -261,7 +249,7 @@ def suggestion_on(
         t1=sample.t1,
         reference=reference.text,
         reference_error=reference.error(compared.name),
-        rivals=tuple((rival.candidate, its_price, apart) for rival, apart, its_price in priced[1:]),
+        rivals=tuple((rival.candidate, its.us_per_vehicle_second, apart) for (rival, apart), its in priced[1:]),
         worst=worst_of(best, reference, compared.name),
         asked=compared,
         messages=tuple(notes),
@@ -379,14 +367,8 @@ class Ladders:
     """
 
     def __init__(
-        self,
-        sample: Sample,
-        reference: Reference,
-        distance: Distance,
-        target: float,
-        budget: Budget,
-        named: bool = False,
-    ):
+        self, sample: Sample, reference: Reference, distance: Distance, target: float, budget: Budget, named: bool = False
+    ):  # fmt: skip
         self.sample, self.reference, self.of, self.target = sample, reference, distance.name, target
         self.budget, self.named = budget, named
         # A precision whose round-off is near the target is not tried.
@@ -399,16 +381,12 @@ class Ladders:
 
     def climb(self, methods: Sequence[str], report: Callable[[float], None] = void, new_kernels: bool = True) -> None:
         """Search some methods: a step of each in turn."""
-        specs = {
-            (method, dtype): self.sample.plan(self.sample.candidate(method, 1, dtype)).spec
-            for method in methods
-            for dtype in sorted(self.dtypes)
-        }
+        dtypes = sorted(self.dtypes)
+        specs = {(method, dtype): self.sample.plan(self.sample.candidate(method, 1, dtype)).spec
+                 for method in methods for dtype in dtypes}  # fmt: skip
         # What costs no compiling comes first, and last what the other precision of the method may spare.
-        order = {
-            method: sorted(sorted(self.dtypes), key=lambda dtype: specs[method, dtype] not in self._compiled)
-            for method in methods
-        }
+        order = {method: sorted(dtypes, key=lambda dtype: specs[method, dtype] not in self._compiled)
+                 for method in methods}  # fmt: skip
         first = sorted(methods, key=lambda method: specs[method, order[method][0]] not in self._compiled)
         climbing = {method: self._method(method, order[method], specs, new_kernels) for method in first}
         while climbing:
@@ -427,11 +405,10 @@ class Ladders:
             if known:
                 yield dtype
             new = specs[method, dtype] not in self._compiled
-            least = min((price for price, _ in self.priced), default=math.inf)
             # A step in float32 is cheaper, and its error is no smaller: float64 is for what round-off stopped.
             if known.get("float32") is not None or known.get("float64", 0.0) in (None, math.inf):
                 continue
-            if new and (not new_kernels or LEAST_FLOAT32 * (known.get("float64") or 0.0) > least):
+            if new and (not new_kernels or LEAST_FLOAT32 * (known.get("float64") or 0.0) > self.least):
                 continue
             self._compiled.add(specs[method, dtype])
             self.looked_at.add(method)
@@ -449,7 +426,7 @@ class Ladders:
         with self.budget.free():
             sample.kernels.compile(plan)
         per_step = step_cost(plan, sample.kernels)
-        while per_step / sample.h(m) < 2.0 * min((price for price, _ in self.priced), default=math.inf):
+        while per_step / sample.h(m) < 2.0 * self.least:
             trial = tried(sample, sample.candidate(method, m, dtype), reference, budget=self.budget)
             size = trial.error(of)
             if size <= target:
@@ -469,6 +446,11 @@ class Ladders:
         return math.inf
 
     @property
+    def least(self) -> float:
+        """The cheapest price so far."""
+        return min((price for price, _ in self.priced), default=math.inf)
+
+    @property
     def limited_by_damping(self) -> bool:
         """True if the cheapest setting's step is no longer small beside the fastest damping, or if there is none."""
         trials = self.cheapest()
@@ -476,8 +458,7 @@ class Ladders:
 
     def cheapest(self) -> list[Trial]:
         """The trials that keep the target, the cheapest first; those above 1.5 times the cheapest cost are left out."""
-        least = min((price for price, _ in self.priced), default=math.inf)
-        return [trial for price, trial in sorted(self.priced, key=lambda pair: pair[0]) if price < 1.5 * least]
+        return [trial for price, trial in sorted(self.priced, key=lambda pair: pair[0]) if price < 1.5 * self.least]
 
 
 def step_cost(plan: Plan, kernels: Kernels) -> float:

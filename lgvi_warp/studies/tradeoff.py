@@ -144,11 +144,7 @@ class Tradeoff(Saved):
         faults.choice("of", of, (self.of, *self.units))
         faults.choice("kind", kind, KINDS)
         faults.raise_if_any()
-        good = [
-            measurement
-            for measurement in self.measurements
-            if np.isfinite(measurement.error(of, kind)) and measurement.trusted.get(of)
-        ]
+        good = [entry for entry in self.measurements if np.isfinite(entry.error(of, kind)) and entry.trusted.get(of)]
         return sorted(good, key=lambda measurement: measurement.us_per_vehicle_second)
 
     def front(self, of: str | None = None, kind: str = "path_max") -> list[Measurement]:
@@ -229,11 +225,7 @@ class Trial:
 
 
 def tried(
-    sample: Sample,
-    candidate: Candidate,
-    reference: Reference | None,
-    until: int = -1,
-    budget: Budget | None = None,
+    sample: Sample, candidate: Candidate, reference: Reference | None, until: int = -1, budget: Budget | None = None
 ) -> Trial:
     """Run a setting on a sample and measure its errors.
 
@@ -345,16 +337,13 @@ def tradeoff_on(
         messages.append("noise acts, whose path differs from step to step: only statistics are compared")
         finest = tried(sample, sample.candidate(taken[0], 32 * sample.coarsest(0.5)), None).result
     else:
-        reference = make_reference(
-            sample, compared, seconds=SHARE * seconds, report=lambda fraction: report(0.2 * fraction)
-        )
+        reference = make_reference(sample, compared, seconds=SHARE * seconds, report=lambda part: report(0.2 * part))
         sample, finest = reference.sample, reference.result
         if noise == "grid":
             messages.append(noise_text(sample))
     if reference and noise == "grid" and reaches_nothing(reference, compared):
-        messages.append(
-            f"{reference.text} differ by {reference.error(compared.name):.1e}: only statistics are compared"
-        )
+        apart = reference.error(compared.name)
+        messages.append(f"{reference.text} differ by {apart:.1e}: only statistics are compared")
         reference = None
     if reference:
         until = trusted_until(reference, compared, seconds)
@@ -392,14 +381,10 @@ def tradeoff_on(
 
 
 def without_reading(
-    names: Sequence[str],
-    trials: Sequence[Trial],
-    measured: Sequence[Measurement],
-    refused: dict[str, str],
+    names: Sequence[str], trials: Sequence[Trial], measured: Sequence[Measurement], refused: dict[str, str],
     seconds: float,
-) -> dict[str, str]:
+) -> dict[str, str]:  # fmt: skip
     """The methods that were asked for and have no measurement, and why."""
-    there = {measurement.setting.method for measurement in measured}
 
     def why(name: str) -> str:
         least = min(trial.candidate.h for trial in trials if trial.candidate.method == name)
@@ -407,7 +392,8 @@ def without_reading(
             f"members failed at every step down to {least:.4g} s; for shorter ones give more seconds than {seconds:g}"
         )
 
-    return {name: refused.get(name) or why(name) for name in dict.fromkeys(names) if name not in there}
+    missing = set(names) - {measurement.setting.method for measurement in measured}
+    return {name: refused.get(name) or why(name) for name in names if name in missing}
 
 
 def growth_of(
@@ -570,13 +556,9 @@ def between(
 
 
 def measurements(
-    sample: Sample,
-    trials: Sequence[Trial],
-    reference: Reference | None,
-    finest: Result,
-    until: int,
+    sample: Sample, trials: Sequence[Trial], reference: Reference | None, finest: Result, until: int,
     distance: Distance | None = None,
-) -> list[Measurement]:
+) -> list[Measurement]:  # fmt: skip
     """Cost, errors, drifts and biases of the trials that did not fail; without a reference, no errors."""
     good = [trial for trial in trials if not comparison.failed(trial.result) and (trial.errors or reference is None)]
     compiled: dict[tuple[str, str], float] = {}
@@ -656,11 +638,8 @@ def bias_lines(tradeoff: Tradeoff) -> list[str]:
 
     It is of one method in float64 with the default solver: the first of order 2, or of the order nearest to it.
     """
-    double = [
-        measurement
-        for measurement in tradeoff.measurements
-        if measurement.biases and measurement.setting.dtype == "float64" and measurement.setting.plain
-    ]
+    double = [entry for entry in tradeoff.measurements
+              if entry.biases and entry.setting.dtype == "float64" and entry.setting.plain]  # fmt: skip
     if not double:
         return []
     name = min(double, key=lambda measurement: abs(measurement.order - 2)).setting.name

@@ -59,6 +59,13 @@ def scaling(
 
     Raises:
         SceneError: An argument is at fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> fleet = lw.Ensemble(lw.Scene.named("sphere"), members=8)
+        >>> rows = lw.bench.scaling(fleet, [1, 8], [1], method="psi_s", h=0.1, t1=1.0)
+        >>> [row["members"] for row in rows]
+        [1, 8]
     """
     fleet = ensemble_of(fleet)
     sizes, counts = members_and_threads(fleet, members, threads)
@@ -137,6 +144,13 @@ def term_cost(
 
     Raises:
         SceneError: The scene has no terms, or an argument is at fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("sphere", terms=[lw.terms.Drag(linear=[1.0] * 6)])
+        >>> rows = lw.bench.term_cost(scene, method="psi_s", h=0.1)
+        >>> [row["term"] for row in rows]
+        ['none', 'drag']
     """
     scene = scene_of(scene)
     faults = Faults()

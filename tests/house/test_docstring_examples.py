@@ -6,22 +6,25 @@ import inspect
 
 import pytest
 
+import lgvi_warp as lw
 from tests.support.public import NAMED
 
+SUBJECTS = NAMED | {name: getattr(lw.uq, name) for name in lw.uq.__all__}
 # Those whose kernels no other quick test needs, or that search.
-LONG = {"Until", "linearize", "lqr", "stability_map", "sweep", "tradeoff", "trim", "tune_gains", "worst_case"}
+LONG = {"Until", "linearize", "lqr", "stability_map", "sweep", "term_cost", "tradeoff", "trim", "tune_gains",
+        "worst_case"}  # fmt: skip
 
 
 def examples() -> dict[str, doctest.DocTest]:
     """Name -> the example of each public name that has one."""
     parser = doctest.DocTestParser()
-    texts = {name: inspect.getdoc(NAMED[name]) or "" for name in NAMED if "Examples:" in documented(name)}
+    texts = {name: inspect.getdoc(SUBJECTS[name]) or "" for name in SUBJECTS if "Examples:" in documented(name)}
     return {name: parser.get_doctest(text, {}, name, None, None) for name, text in texts.items()}
 
 
 def documented(name: str) -> str:
     """The docstring of the name itself, not that of a base."""
-    return vars(NAMED[name]).get("__doc__") or getattr(NAMED[name], "__doc__", "") or ""
+    return vars(SUBJECTS[name]).get("__doc__") or getattr(SUBJECTS[name], "__doc__", "") or ""
 
 
 EXAMPLES = examples()

@@ -219,5 +219,11 @@ def model(
     Raises:
         SceneError: for faulty arguments, all in one message.
         TypeError: for an argument that does not exist.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> depth = lw.uq.model(lw.Scene.named("sphere"), ["start.position[2]"], "depth", method="psi_s", h=0.1, t1=1.0)
+        >>> depth([[0.0], [2.0]])
+        array([0., 2.])
     """
     return ScalarModel(scene, vary, of, levels, failed, settings)

@@ -72,6 +72,15 @@ def sobol(
         SceneError: for faulty arguments, all in one message.
         TypeError: for an argument that does not exist.
         FailedMembers: where members failed and the indices cannot be computed from the others.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("sphere")
+        >>> normal = lw.distributions.Normal(std=0.1)
+        >>> vary = {"start.position[2]": normal, "start.velocity[0]": normal}
+        >>> indices = lw.uq.sobol(scene, "depth", vary=vary, samples=64, method="psi_s", h=0.1, t1=1.0)
+        >>> indices.factors[indices.total[0].argmax()]
+        'start.position[2]'
     """
     faults = Faults()
     with faults.including():
@@ -179,6 +188,15 @@ def morris(
     Raises:
         SceneError: for faulty arguments, all in one message.
         FailedMembers: where members failed and the effects cannot be computed from the others.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("sphere")
+        >>> normal = lw.distributions.Normal(std=0.1)
+        >>> vary = {"start.position[2]": normal, "start.velocity[0]": normal}
+        >>> effects = lw.uq.morris(scene, "depth", vary=vary, samples=8, method="psi_s", h=0.1, t1=1.0)
+        >>> effects.factors[effects.mu_star[0].argmax()]
+        'start.position[2]'
     """
     check_settings(samples, confidence, failed, resamples)
     fleet = designed(scene, vary, seed, Morris(levels), samples)

@@ -184,9 +184,9 @@ class StabilityGrid:
         for description in (x, y):
             with faults.including():
                 axes.append(axis_of(description))
-        for name, value, least in (("points", points, 1), ("directions", (directions,), 1)):
-            if any(isinstance(k, bool) or not isinstance(k, int) or k < least for k in value):
-                faults.add(name, value, "is not a whole number above 0", "give how many")
+        for name, counts in (("points", points), ("directions", (directions,))):
+            if any(isinstance(k, bool) or not isinstance(k, int) or k < 1 for k in counts):
+                faults.add(name, counts, "is not a whole number above 0", "give how many")
         if len(points) != 2:
             faults.add("points", points, "are not two numbers", "give how many along each axis")
         if not faults and (members := points[0] * points[1] * directions) > MOST_MEMBERS:

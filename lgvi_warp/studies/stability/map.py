@@ -322,10 +322,11 @@ def stability_map(
     with faults.including():
         compared = compared_in(of)
         unit_of_error = compared.unit
-    for name, value, unit in (("error", error, unit_of_error), ("energy_bound", energy_bound, "1"),
-                              *((name, value, "s") for name, value in (("t1", t1), ("error_time", error_time))
-                                if value is not None)):  # fmt: skip
-        faults.positive(name, value, unit)
+    faults.positive("error", error, unit_of_error)
+    faults.positive("energy_bound", energy_bound, "1")
+    for name, value in (("t1", t1), ("error_time", error_time)):
+        if value is not None:
+            faults.positive(name, value, "s")
     faults.choice("dtype", dtype, DTYPES)
     check_threads(faults, threads)
     grid = None

@@ -3,20 +3,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
 
 from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, SceneError
-from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.progress import callback, shows_progress
-from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import COMPOSITIONS, PROGRAMS, Method
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.results.result import Result
@@ -24,31 +21,21 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies import comparison, cost
 from lgvi_warp.studies.budget import Budget
-from lgvi_warp.studies.comparison import Candidate, Growth, Reference, Sample
+from lgvi_warp.studies.comparison import Candidate, Sample
 from lgvi_warp.studies.distance import QUANTITIES, Distance, compared_in
 from lgvi_warp.studies.files import Saved, finite_or_none, with_missing_as
+from lgvi_warp.studies.reference import LOST, Growth, Reference, make_reference, measured_growth, time_over
 from lgvi_warp.studies.speed import void
+from lgvi_warp.studies.trials import TRUST, Trial, trials_of, tried
 
 # Tried in this order; those that a scene refuses are left out.
 CANDIDATES = ("kl8(psi_x)", "psi_x", "psi_s", "su4(psi_x)", "kl6(psi_x)", "rk8", "su8_15(psi_x)", "ss6_13(psi_x)",
               "rkn6_11", "rkn6_14", "bm6(psi_x)", "bm4(psi_x)", "rk5", "rk4", "rkw3", "psi_1", "psi", "psi_w", "kl8(psi_s)",
               "kl6(psi_s)", "su4(psi_s)", "phi")  # fmt: skip
-# Solvers of equation (24) besides the default, tried for one method that solves it.
-SOLVERS: tuple[tuple[str, int | None], ...] = (("quartic", 1), ("cayley", None), ("newton", None))
-SOLVED_BY = "psi_s"
-PRECISIONS = tuple(name for name in DTYPES if name in ("float64", "float32"))
-# Methods tried last, with state sums of two float32 numbers.
-COMPENSATED = ("psi_x", "psi_s", "su4(psi_x)", "kl6(psi_x)")
-# Quantities whose errors decide when a series of halved steps has reached round-off.
-DECIDING = ("position", "attitude")
-# Errors shown are at least this many times the reference's own.
-TRUST = 10.0
 # Part of a trade-off's time that its reference gets.
 SHARE = 0.3
 # How errors of members are reduced to a number.
 KINDS = ("end_max", "end_rms", "path_max", "path_rms")
-# A series of halved steps ends where another setting is as accurate in this many times less time.
-HOPELESS = 10.0
 
 
 @dataclass(frozen=True)
@@ -201,53 +188,6 @@ def _measurement(row: dict[str, Any]) -> Measurement:
     return Measurement(**row | numbers | {"setting": Candidate(**row["setting"]), "errors": errors})
 
 
-@dataclass(eq=False)
-class Trial:
-    """A setting that was run on a sample.
-
-    plan: by which its cost is measured: noise without a noise_step of the scene is drawn once a step.
-    errors: quantity -> kind -> error; empty where a member failed or there is no reference.
-    cpu_seconds: processor time of the run, without compiling [s].
-    """
-
-    candidate: Candidate
-    plan: Plan
-    result: Result
-    errors: dict[str, dict[str, float]]
-    cpu_seconds: float
-
-    def error(self, of: str) -> float:
-        """Return the largest error over members and path.
-
-        Returns: The error [unit of `of`]; infinite where a member failed or there is no reference.
-        """
-        return self.errors[of]["path_max"] if self.errors else math.inf
-
-
-def tried(
-    sample: Sample, candidate: Candidate, reference: Reference | None, until: int = -1, budget: Budget | None = None
-) -> Trial:
-    """Run a setting on a sample and measure its errors.
-
-    reference, until: what errors are measured against, None for none; and the index of the last sample that is compared.
-    budget: what compiling does not count in.
-    """
-    plan = sample.plan(candidate)
-    with budget.free() if budget else contextlib.nullcontext():
-        compile_seconds = sample.kernels.compile(plan)
-    with np.errstate(all="ignore"):
-        begun = sample.kernels.clock()
-        result = replace(sample.kernels.run(plan), compile_seconds=compile_seconds)
-        cpu_seconds = sample.kernels.clock() - begun
-        errors: dict[str, dict[str, float]] = {}
-        if reference is not None and not comparison.failed(result):
-            until = until % len(sample.times)
-            errors = comparison.errors(comparison.distances(result, reference.result, reference.asked), until)
-            if not all(np.isfinite(norms["path_max"]) for norms in errors.values()):
-                errors = {}
-    return Trial(candidate, sample.plan_to_price(candidate), result, errors, cpu_seconds)
-
-
 def chosen_methods(methods: Sequence[str] | None, default: Sequence[str] = CANDIDATES) -> tuple[str, ...]:
     """The names of the methods to try: those given, if all are known, or the default ones."""
     if methods is None:
@@ -322,7 +262,7 @@ def tradeoff(
 
 def tradeoff_on(
     sample: Sample, compared: Distance, names: Sequence[str], seconds: float, report: Callable[[float], None],
-    named: bool, *, make_reference: Callable[..., Reference] = comparison.make_reference,
+    named: bool, *, make_reference: Callable[..., Reference] = make_reference,
     grown: Callable[..., Growth] | None = None,
 ) -> Tradeoff:  # fmt: skip
     """Measure methods on a sample, as `tradeoff` says; named: whether they were asked for by name."""
@@ -397,7 +337,7 @@ def without_reading(
 
 
 def growth_of(
-    sample: Sample, taken: Sequence[str], reference: Reference, *, measure: Callable[..., Growth] = comparison.growth
+    sample: Sample, taken: Sequence[str], reference: Reference, *, measure: Callable[..., Growth] = measured_growth
 ) -> Growth:
     """Measure how errors grow, by the method of highest order at about the reference's step."""
     method = max(taken, key=lambda name: Method(name).order)
@@ -414,7 +354,7 @@ def noise_text(sample: Sample) -> str:
 
 def reaches_nothing(reference: Reference, of: Distance) -> bool:
     """True if a reference is too rough for errors of members even at the first time."""
-    return reference.reaches(of.name, comparison.LOST / (TRUST * TRUST)) < 1
+    return reference.reaches(of.name, LOST / (TRUST * TRUST)) < 1
 
 
 def trusted_until(reference: Reference, of: Distance, seconds: float) -> int:
@@ -422,137 +362,16 @@ def trusted_until(reference: Reference, of: Distance, seconds: float) -> int:
 
     seconds: of the whole trade-off, for the message [s].
     """
-    until = reference.reaches(of.name, comparison.LOST / (TRUST * TRUST))
+    until = reference.reaches(of.name, LOST / (TRUST * TRUST))
     if reaches_nothing(reference, of):
         apart = reference.own[of.name][1]
         end = reference.result.time[1]
         problem = f"no reference: {reference.text} differ by {apart:.2g} {of.unit} after {end:g} s"
         if reference.more:
-            cause, remedy = comparison.time_over(seconds, reference.more, SHARE)
+            cause, remedy = time_over(seconds, reference.more, SHARE)
             raise SceneError([f"{cause}; {remedy}. There is {problem}; or give a shorter t1 (--duration)"])
         raise SceneError([f"{problem}, and agree no better with shorter steps; give a shorter t1 (--duration)"])
     return until
-
-
-@dataclass
-class Series:
-    """Steps of one setting, each half of the one before.
-
-    m: number of steps in the sample's spacing.
-    best: least error of the steps so far, the larger of position [m] and attitude [rad].
-    worse: number of steps in a row that gained little.
-    """
-
-    method: str
-    dtype: str
-    solver: tuple[str, int | None]
-    m: int
-    best: float = math.inf
-    worse: int = 0
-    rungs: int = 0
-
-    def candidate(self, sample: Sample) -> Candidate:
-        """The next setting to run."""
-        return sample.candidate(self.method, self.m, self.dtype, self.solver)
-
-
-def trials_of(
-    sample: Sample, methods: Sequence[str], reference: Reference | None, until: int, budget: Budget, whole: Budget,
-    report: Callable[[float], None], named: bool = False, *,
-    solvers: Sequence[tuple[str, int | None]] | None = None, compensated: Sequence[str] | None = None,
-) -> tuple[list[Trial], list[str]]:  # fmt: skip
-    """Run every method, precision and solver: each at a coarse step first, then in turn at half the step before.
-
-    whole: of the study, compiling included: once it is over, nothing is compiled that is not asked for by name.
-    named: whether the methods were asked for by name: then each begins, however long its kernel compiles.
-    Returns: The trials, and the names of the settings that there was no time for.
-    """
-    solvers = SOLVERS if solvers is None else solvers
-    waiting = series_of(sample, methods, solvers, COMPENSATED if compensated is None else compensated)
-    trials, skipped, begun = list[Trial](), list[str](), set[str]()
-    count = len(waiting)
-    for i, series in enumerate(list(waiting)):
-        report(0.5 * i / count)
-        asked = named and series.method not in begun
-        if trials and not asked and (whole.over or budget.over):
-            waiting.remove(series)
-            skipped.append(series.candidate(sample).text)
-            continue
-        begun.add(series.method)
-        if not halved(sample, series, trials, reference, until, budget):
-            waiting.remove(series)
-    while waiting:
-        for series in list(waiting):
-            report(0.5 + 0.5 * min(1.0, budget.spent / budget.seconds))
-            if budget.over:
-                waiting.remove(series)
-                skipped.append(series.candidate(sample).text + " at fine steps")
-            elif not halved(sample, series, trials, reference, until, budget):
-                waiting.remove(series)
-    if reference is not None:
-        between(sample, trials, reference, until, budget)
-    return trials, skipped
-
-
-def series_of(
-    sample: Sample, methods: Sequence[str], solvers: Sequence[tuple[str, int | None]], compensated: Sequence[str]
-) -> list[Series]:
-    """The series of settings, the default precision of every method first."""
-    plain: tuple[str, int | None] = ("quartic", None)
-    settings = [(name, dtype, plain) for dtype in PRECISIONS for name in methods]
-    settings += [(SOLVED_BY, "float64", solved) for solved in solvers if SOLVED_BY in methods]
-    summed, _ = sample.accepted([name for name in compensated if name in methods], "float32_compensated")
-    settings += [(name, "float32_compensated", plain) for name in summed]
-    return [Series(*setting, sample.coarsest(1.0)) for setting in settings]
-
-
-def halved(
-    sample: Sample, series: Series, trials: list[Trial], reference: Reference | None, until: int, budget: Budget
-) -> bool:
-    """Run the next step of a series, and tell whether another is worth it."""
-    trial = tried(sample, series.candidate(sample), reference, until, budget)
-    trials.append(trial)
-    series.rungs += 1
-    finer = sample.allowed(2 * series.m)
-    if finer == series.m or series.rungs == (20 if reference else 5):
-        return False
-    series.m = finer
-    if reference is None:
-        return True
-    error = max(trial.error(of) for of in DECIDING)
-    series.worse = series.worse + 1 if error > 0.8 * series.best and series.best < 0.1 else 0
-    series.best = min(series.best, error)
-    noise = TRUST * max(reference.error(of, until) for of in DECIDING)
-    longest = budget.seconds / 40.0
-    return not (series.worse >= 2 or error < noise or trial.cpu_seconds > longest or is_dominated(trial, trials))
-
-
-def is_dominated(trial: Trial, trials: Sequence[Trial]) -> bool:
-    """True if another setting was more accurate in a tenth of the time."""
-    error = max(trial.error(of) for of in DECIDING)
-    rivals = (rival for rival in trials if HOPELESS * rival.cpu_seconds < trial.cpu_seconds)
-    return math.isfinite(error) and any(max(rival.error(of) for of in DECIDING) < error for rival in rivals)
-
-
-def between(
-    sample: Sample, trials: list[Trial], reference: Reference, until: int, budget: Budget, *,
-    run: Callable[..., Trial] = tried,
-) -> None:  # fmt: skip
-    """Add trials near the Pareto front, at steps between those already tried."""
-    ranked = sorted((trial.cpu_seconds, trial.error(DECIDING[0]), i) for i, trial in enumerate(trials))
-    best, near = math.inf, list[Trial]()
-    for _, error, i in ranked:
-        if error < best:
-            best = error
-            near.append(trials[i])
-    tried_already = {trial.candidate for trial in trials}
-    for trial in near:
-        m = round(float(sample.spacing) / trial.candidate.h)
-        for step in {round(m / math.sqrt(2.0)), round(m * math.sqrt(2.0))} - {0}:
-            candidate = replace(trial.candidate, h=sample.h(sample.allowed(step)))
-            if candidate not in tried_already and not budget.over:
-                tried_already.add(candidate)
-                trials.append(run(sample, candidate, reference, until, budget))
 
 
 def measurements(
@@ -630,7 +449,7 @@ def growth_text(growth: Growth) -> str:
                 "trajectories are meaningful throughout")  # fmt: skip
     until = ", ".join(f"{dtype} to about {t:.3g} s" for dtype, t in growth.predictable.items())
     return (f"errors double every {growth.doubling:.3g} s (rate {growth.rate:.2g} /s, {growth.factor:.2g} times in this run). "
-            f"One round-off reaches {comparison.LOST:g}: {until}; beyond, compare statistics only")  # fmt: skip
+            f"One round-off reaches {LOST:g}: {until}; beyond, compare statistics only")  # fmt: skip
 
 
 def bias_lines(tradeoff: Tradeoff) -> list[str]:

@@ -22,8 +22,8 @@ from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.results.result import Result
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.studies import comparison
-from lgvi_warp.studies.comparison import PRECISE, paired
 from lgvi_warp.studies.distance import Distance, compared_in
+from lgvi_warp.studies.reference import PRECISE, paired
 from lgvi_warp.studies.stability.grid import StabilityGrid
 
 # Number of times at which errors are measured, and energies.

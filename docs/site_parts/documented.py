@@ -69,9 +69,7 @@ def described(subject: Any) -> dict[str, str]:
     """Name -> text of all parameters that a docstring describes: that of a class, together with those of its bases."""
     texts: dict[str, str] = {}
     for owner in reversed(inspect.getmro(subject)) if inspect.isclass(subject) else [subject]:
-        # A method that says nothing itself is described by that of its base.
-        said = owner.__doc__ if inspect.isclass(owner) else inspect.getdoc(owner)
-        _, found = sections(inspect.cleandoc(said or ""))
+        _, found = sections(inspect.cleandoc(owner.__doc__ or ""))
         for name, text in {**entries(found.get("Args", "")), **entries(found.get("Attributes", ""))}.items():
             of_base = AS_OF.match(text) if name in texts else None
             texts[name] = texts[name].rstrip(".") + text[of_base.end() :] if of_base else text

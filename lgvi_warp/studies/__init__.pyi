@@ -2,6 +2,7 @@
 # The public names of this door, one a line.
 
 from lgvi_warp.studies.comparison import Candidate as Candidate
+from lgvi_warp.studies.files import Saved as Saved
 from lgvi_warp.studies.reference import Growth as Growth
 from lgvi_warp.studies.search.tune import Tuned as Tuned
 from lgvi_warp.studies.search.worst_case import WorstCase as WorstCase

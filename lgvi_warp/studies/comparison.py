@@ -285,10 +285,7 @@ def agreement(a: Result, b: Result, distance: Distance | None = None) -> dict[st
 
 
 def quantities_of(result: Result, asked: Distance | None = None) -> dict[str, np.ndarray]:
-    """Quantity -> (k, n, components) that means and spreads are taken of; of the attitude, the vertical in body axes.
-
-    asked: one more quantity; angles are left out, since they have no such mean.
-    """
+    """Quantity -> (k, n, components) that means and spreads are taken of; attitude: the vertical in body axes."""
     values = {name: getattr(result, name).astype(np.float64) for name in ("position", "velocity", "angular_velocity")}
     values["attitude"] = result.attitude[..., 2, :].astype(np.float64)
     values["energy"] = result.energy[..., None]

@@ -29,21 +29,16 @@ MOST_TOLD = 6
 
 
 def thread_seconds() -> float:
-    """The CPU time of this thread [s], which other programs do not add to.
+    """The CPU time of this thread [s], which other programs do not add to, and in which kernels on the CPU run.
 
-    A kernel on the CPU runs in the thread that launches it, so its time is that thread's. Windows counts CPU time in
-    ticks of 16 ms, too coarse for a launch: there time.perf_counter is read.
+    Windows counts it in ticks of 16 ms, too coarse for a launch: there time.perf_counter is read.
     """
     return time.perf_counter() if os.name == "nt" else time.thread_time()
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Cost of a setting.
-
-    us_per_vehicle_second: microseconds of one core per vehicle and simulated second.
-    spread: median of the readings over the least, which is taken; near 1 on an idle machine.
-    """
+    """Cost of a setting; spread: median of the readings over the least, which is taken, near 1 on an idle machine."""
 
     us_per_vehicle_second: float
     spread: float
@@ -53,10 +48,7 @@ def costs(
     plans: Sequence[Plan], rounds: int = 5, *, make: Callable[..., Packets] = Packets,
     clock: Callable[[], float] = thread_seconds, grows: Callable[[Plan], bool] | None = None,
 ) -> list[Cost]:  # fmt: skip
-    """Measure the cost of plans, with one number for all plans that run the same kernel.
-
-    The readings are taken in interleaved rounds: what slows the machine for a while slows all plans alike.
-    """
+    """Measure the cost of plans, in turn, with one number for all that run the same kernel."""
     calls, steps = launches(plans, make=make, clock=clock)
     kinds = [Kind(plan.spec, plan.grid.h, (grows or work_grows)(plan)) for plan in plans]
     per_step = readings(kinds, lambda which: timed([calls[i] for i in which], rounds, clock=clock) / steps[which])
@@ -65,10 +57,9 @@ def costs(
 
 
 def readings(kinds: Sequence[Kind], read: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """Read the cost of a step of each kind, and of those again whose least reading no other is near.
+    """Read the cost of a step of each kind (kinds, rounds) [s], and again that of which no reading is near the least.
 
     read: from indices of kinds to readings of one step (indices, rounds) [s].
-    Returns: All readings (kinds, rounds) [s]; NaN where there is none.
     """
     seconds = read(np.arange(len(kinds)))
     rounds = seconds.shape[1]
@@ -165,7 +156,7 @@ def in_turn(calls: Sequence[Callable[[], object]], rounds: int, clock: Callable[
 def work_grows(plan: Plan) -> bool:
     """True if a longer step is more work.
 
-    It is where a step iterates to a tolerance (the quartic's few Newton steps aside), where each packet chooses its own
+    That is where a step iterates to a tolerance (the quartic's few Newton steps aside), where each packet chooses its own
     steps, and where a step takes several draws of noise.
     """
     spec, letters = plan.spec, {letter for letter, _ in plan.spec.maps}

@@ -87,10 +87,9 @@ class Ladders:
             known[dtype] = yield from self.longest(method, dtype)
 
     def longest(self, method: str, dtype: str) -> Generator[Trial, None, float | None]:
-        """Find the longest step that keeps the target.
+        """Find the longest step that keeps the target, and its cost [us of one core per vehicle and second].
 
-        Returns: Its cost [us of one core per vehicle and second]; infinite where such steps are too dear, None where the
-            errors cease to fall.
+        Infinite where such steps are too dear, None where the errors cease to fall.
         """
         sample, reference, of, target = self.sample, self.reference, self.of, self.target
         m, before, worse = sample.coarsest(2.0), math.inf, 0

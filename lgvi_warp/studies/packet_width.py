@@ -29,11 +29,7 @@ WORTH = 0.03
 
 
 class Reading(NamedTuple):
-    """Speeds of one kind of kernel.
-
-    ns: width -> time per vehicle and step [ns].
-    before, best: the width of the table, and the fastest; that of the table where it is as fast.
-    """
+    """Speeds of one kind of kernel: width -> time per vehicle and step [ns], the width of the table, and the fastest."""
 
     kernel: str
     ns: dict[int, float]
@@ -45,11 +41,7 @@ def calibrate(
     rounds: int = ROUNDS, *, prepare: Callable[[Plan], Callable[[], None]] = speed.stepper,
     clock: Callable[[], float] = time.perf_counter, register_width: Callable[[str], int] = machine.register_width,
 ) -> Iterator[Reading]:  # fmt: skip
-    """Measure every kind of kernel at every width that may suit this machine, and yield the speeds of each.
-
-    rounds: number of readings of each, of which the least counts: about a tenth of a second.
-    register_width: from a precision to the vehicles in a register.
-    """
+    """Measure every kind of kernel at every width that may suit this machine; of its readings the least counts."""
     for kernel in widths.KERNELS:
         kind, dtype = widths.parts(kernel)
         lanes = [n * register_width(dtype) for n in REGISTERS]

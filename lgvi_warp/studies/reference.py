@@ -153,10 +153,9 @@ def make_reference(
 
 
 def more_seconds(error: float, goal: float, gain: float, last: float) -> float:
-    """Predict the processor time of refining two runs to a goal, each refinement twice as long as the one before.
+    """Predict the processor time of refining two runs to a goal [s]; infinite where it cannot be told.
 
-    last: that of the last two runs [s].
-    Returns: That of all refinements to come [s]; infinite where it cannot be told.
+    last: that of the last two runs; each refinement takes twice as long as the one before.
     """
     if not (math.isfinite(error) and goal > 0.0 and 1.5 < gain < math.inf):
         return math.inf
@@ -165,10 +164,7 @@ def more_seconds(error: float, goal: float, gain: float, last: float) -> float:
 
 
 def time_over(seconds: float, more: float, share: float) -> tuple[str, str]:
-    """Say that the time of a search was over, and how much would do: (cause, remedy).
-
-    more: processor time that the reference needs [s], of which a search gives it a share.
-    """
+    """Say that the time of a search was over, and how much would do: (cause, remedy)."""
     cause = f"{seconds:g} s were over"
     if not math.isfinite(more):
         return cause, "give more seconds"

@@ -44,7 +44,7 @@ class Measurement:
 
     Attributes:
         setting: method, step, precision and solver.
-        us_per_vehicle_second: microseconds of one core per vehicle and simulated second, without compiling (see cost.py).
+        us_per_vehicle_second: microseconds of one core per vehicle and simulated second, without compiling.
         compile_seconds: time to load its kernel, once a process [s].
         errors: quantity -> {"end_max", "end_rms", "path_max", "path_rms"} over the members, in the units of
             Tradeoff.units; empty where a member failed or noise acts.

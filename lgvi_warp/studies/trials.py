@@ -48,21 +48,14 @@ class Trial:
     cpu_seconds: float
 
     def error(self, of: str) -> float:
-        """Return the largest error over members and path.
-
-        Returns: The error [unit of `of`]; infinite where a member failed or there is no reference.
-        """
+        """The largest error over members and path; infinite where a member failed or there is no reference."""
         return self.errors[of]["path_max"] if self.errors else math.inf
 
 
 def tried(
     sample: Sample, candidate: Candidate, reference: Reference | None, until: int = -1, budget: Budget | None = None
 ) -> Trial:
-    """Run a setting on a sample and measure its errors.
-
-    reference, until: what errors are measured against, None for none; and the index of the last sample that is compared.
-    budget: what compiling does not count in.
-    """
+    """Run a setting on a sample, compile outside the budget, and measure its errors against the reference, if any."""
     plan = sample.plan(candidate)
     with budget.free() if budget else contextlib.nullcontext():
         compile_seconds = sample.kernels.compile(plan)

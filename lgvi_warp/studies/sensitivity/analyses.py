@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from lgvi_warp.common.arguments import ensemble_of, of_kind
-from lgvi_warp.common.errors import Faults, MissingExtra, SceneError, refusal
+from lgvi_warp.common.errors import Faults, MissingExtra, refusal
 from lgvi_warp.common.status import Status
 from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.sampling.designs.base import Sampling
@@ -18,6 +18,7 @@ from lgvi_warp.scene.columns import as_given, columns_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.settings import EnsembleSettings
+from lgvi_warp.studies.members import scene_of
 from lgvi_warp.studies.sensitivity.estimates import sobol_estimates
 from lgvi_warp.studies.sensitivity.indices import MorrisEffects, SobolIndices
 from lgvi_warp.studies.sensitivity.outputs import FailedMembers, Outputs, evaluate, known_arguments
@@ -286,16 +287,11 @@ def check_settings(samples: Any, confidence: Any, failed: Any, resamples: Any = 
 
 def designed(scene: Any, vary: Any, seed: int | None, design: Sampling, samples: int) -> Ensemble:
     """The ensemble of a design with this number of groups; None for what the scene varies, and its seed."""
-    if isinstance(scene, Ensemble):
-        scene, known, known_seed = scene.scene, scene.vary, scene.seed
-    elif isinstance(scene, Scene):
-        settings = scene.ensemble_settings or EnsembleSettings()
-        known, known_seed = dict(settings.vary), settings.seed
-    else:
-        raise SceneError([f"scene = {scene!r}: is neither a Scene nor an Ensemble; give lw.Scene(...)"])
-    chosen = (known if vary is None else vary, known_seed if seed is None else seed)
-    first = Ensemble(scene, None, chosen[1], chosen[0], design)
-    return Ensemble(scene, samples * design.group_size(first.space), chosen[1], chosen[0], design)
+    settings: Any = scene if isinstance(scene, Ensemble) else scene_of(scene).ensemble_settings or EnsembleSettings()
+    scene = scene.scene if isinstance(scene, Ensemble) else scene
+    vary, seed = dict(settings.vary) if vary is None else vary, settings.seed if seed is None else seed
+    group = design.group_size(Ensemble(scene, None, seed, vary, design).space)
+    return Ensemble(scene, samples * group, seed, vary, design)
 
 
 def salib() -> Callable[..., Any]:

@@ -202,10 +202,8 @@ class SobolIndices(Indices):
             return []
         pairs = [(self.second[q, j, k], self.second_confidence[q, j, k], j, k) for p, j, k in self._pairs() if p == q]
         pairs = sorted((pair for pair in pairs if pair[0] > pair[1]), reverse=True)[:10]
-        return [
-            f"  {self.factors[j]} with {self.factors[k]}: second {value:.4g} +- {half:.2g}"
-            for value, half, j, k in pairs
-        ]
+        return [f"  {self.factors[j]} with {self.factors[k]}: second {value:.4g} +- {half:.2g}"
+                for value, half, j, k in pairs]  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -223,12 +223,8 @@ class StabilityGrid:
         low, high = low if axis.low is None else axis.low, high if axis.high is None else axis.high
         for value in (low, high):
             positive = axis.log or axis.key in SPECIAL
-            good = (
-                not isinstance(value, bool)
-                and isinstance(value, int | float | np.integer | np.floating)
-                and math.isfinite(value)
-            )
-            if not good or (positive and value <= 0.0):
+            number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+            if not number or not math.isfinite(value) or (positive and value <= 0.0):
                 faults.add(f"axis {axis.name}", value, "is not a finite number" + " above 0" * positive,
                            f"give a range: {FORM}")  # fmt: skip
                 return replace(axis, low=1.0, high=2.0)
@@ -303,9 +299,8 @@ class StabilityGrid:
         self.h = np.full(n, self.step or 0.0)
         cells = np.meshgrid(*self._values, np.zeros(d), indexing="ij")
         # Masses first: drag rates depend on them.
-        for axis, values in sorted(
-            zip((self.y, self.x), cells[:2], strict=True), key=lambda pair: pair[0].key in SPECIAL
-        ):
+        axes = zip((self.y, self.x), cells[:2], strict=True)
+        for axis, values in sorted(axes, key=lambda pair: pair[0].key in SPECIAL):
             self._apply(axis, values.ravel())
 
     def _apply(self, axis: Axis, values: np.ndarray) -> None:

@@ -30,11 +30,8 @@ def _oscillator(method: Method, moments: tuple[str, ...]) -> list[tuple[bool, fl
     if method.halved:
         lengths = [2.0 * g for g in method.stages]
         pairs = list(zip(lengths[0::2], lengths[1::2], strict=True))
-        maps = [
-            (letter, c * (a if i < n else b if i >= len(program) - n else 0.5 * (a + b)))
-            for a, b in pairs
-            for i, (letter, c) in enumerate(program)
-        ]
+        maps = [(letter, c * (a if i < n else b if i >= len(program) - n else 0.5 * (a + b)))
+                for a, b in pairs for i, (letter, c) in enumerate(program)]  # fmt: skip
     else:
         maps = [(letter, c * g) for g in method.stages for letter, c in program]
     return [(letter in TURNS, c) for letter, c in maps if letter in TURNS or letter in moments]

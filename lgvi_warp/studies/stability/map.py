@@ -183,9 +183,8 @@ class StabilityMap(Saved):
         Raises:
             SceneError: for a method that the map does not have.
         """
-        return [
-            (float(self.x.values[j]), float(self.y.values[i])) for i, j in np.argwhere(self._of(method) == Cell.SILENT)
-        ]
+        cells = np.argwhere(self._of(method) == Cell.SILENT)
+        return [(float(self.x.values[j]), float(self.y.values[i])) for i, j in cells]
 
     def _of(self, method: str) -> np.ndarray:
         faults = Faults()

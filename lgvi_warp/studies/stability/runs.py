@@ -114,11 +114,8 @@ def judged(grid: StabilityGrid, names: Sequence[str]) -> str:
         return "driven"
     if any(flow == "steady" for flow in flows) and not all(_carried(term, module) for term, module in laws):
         return "driven"
-    rest = [
-        (term, module)
-        for term, module in laws
-        if not getattr(module, "POTENTIAL", False) and not hasattr(module, "flow")
-    ]
+    rest = [(term, module) for term, module in laws
+            if not getattr(module, "POTENTIAL", False) and not hasattr(module, "flow")]  # fmt: skip
     if any(hasattr(module, "law") or not term.dissipative for term, module in rest):
         return "driven"
     return "dissipative" if rest else "conservative"

@@ -111,8 +111,8 @@ OTHERS = {
 }  # fmt: skip
 
 
-# What the two kinds of indices have in common, and what has a test of its own.
-APART = {"Indices", "Policy"}
+# What the two kinds of indices and all studies have in common, and what has a test of its own.
+APART = {"Indices", "Saved", "Policy"}
 # Classes of which a run makes one, and a study.
 OF_RUNS = {"Result", "Prepared", "Sweep", "Outputs", "ScalarModel"}
 OF_STUDIES = {"Trim", "LinearModel", "Regulator", "Margins", "WorstCase", "Tuned", "StabilityMap", "SobolIndices",

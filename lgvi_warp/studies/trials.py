@@ -106,19 +106,17 @@ def trials_of(
     Returns: The trials, and the names of the settings that there was no time for.
     """
     solvers = SOLVERS if solvers is None else solvers
-    waiting = series_of(sample, methods, solvers, COMPENSATED if compensated is None else compensated)
-    trials, skipped, begun = list[Trial](), list[str](), set[str]()
-    count = len(waiting)
-    for i, series in enumerate(list(waiting)):
-        report(0.5 * i / count)
+    every = series_of(sample, methods, solvers, COMPENSATED if compensated is None else compensated)
+    trials, skipped, begun, waiting = list[Trial](), list[str](), set[str](), list[Series]()
+    for i, series in enumerate(every):
+        report(0.5 * i / len(every))
         asked = named and series.method not in begun
         if trials and not asked and (whole.over or budget.over):
-            waiting.remove(series)
             skipped.append(series.candidate(sample).text)
             continue
         begun.add(series.method)
-        if not halved(sample, series, trials, reference, until, budget):
-            waiting.remove(series)
+        if halved(sample, series, trials, reference, until, budget):
+            waiting.append(series)
     while waiting:
         for series in list(waiting):
             report(0.5 + 0.5 * min(1.0, budget.spent / budget.seconds))
@@ -128,7 +126,7 @@ def trials_of(
             elif not halved(sample, series, trials, reference, until, budget):
                 waiting.remove(series)
     if reference is not None:
-        between(sample, trials, reference, until, budget)
+        trials += between(sample, trials, budget, lambda finer: tried(sample, finer, reference, until, budget))
     return trials, skipped
 
 
@@ -172,22 +170,20 @@ def is_dominated(trial: Trial, trials: Sequence[Trial]) -> bool:
     return math.isfinite(error) and any(max(rival.error(of) for of in DECIDING) < error for rival in rivals)
 
 
-def between(
-    sample: Sample, trials: list[Trial], reference: Reference, until: int, budget: Budget, *,
-    run: Callable[..., Trial] = tried,
-) -> None:  # fmt: skip
-    """Add trials near the Pareto front, at steps between those already tried."""
+def between(sample: Sample, trials: Sequence[Trial], budget: Budget, run: Callable[[Candidate], Trial]) -> list[Trial]:
+    """Run settings near the Pareto front of trials, at steps between those already tried."""
     ranked = sorted((trial.cpu_seconds, trial.error(DECIDING[0]), i) for i, trial in enumerate(trials))
     best, near = math.inf, list[Trial]()
     for _, error, i in ranked:
         if error < best:
             best = error
             near.append(trials[i])
-    tried_already = {trial.candidate for trial in trials}
+    tried_already, more = {trial.candidate for trial in trials}, list[Trial]()
     for trial in near:
         m = round(float(sample.spacing) / trial.candidate.h)
         for step in {round(m / math.sqrt(2.0)), round(m * math.sqrt(2.0))} - {0}:
             candidate = replace(trial.candidate, h=sample.h(sample.allowed(step)))
             if candidate not in tried_already and not budget.over:
                 tried_already.add(candidate)
-                trials.append(run(sample, candidate, reference, until, budget))
+                more.append(run(candidate))
+    return more

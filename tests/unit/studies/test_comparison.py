@@ -909,21 +909,13 @@ def test_a_setting_is_hopeless_where_a_tenth_of_its_time_does_better():
 def test_steps_between_are_tried_near_the_front(scene):
     sample = Sample(fleet_of(scene), 4.0, samples=5)
     trials = [trial(1.0, 1e-2, h=sample.h(1)), trial(2.0, 1e-3, h=sample.h(10)), trial(3.0, 1e-1, h=sample.h(20))]
-    reference, more = object(), []
 
-    def tried(one, candidate, against, until, budget):
-        assert one is sample
-        assert against is reference
-        assert until == 4
-        more.append(candidate)
+    def run(candidate):
         return trial(1.0, 1.0, h=candidate.h)
 
-    between(sample, trials, reference, 4, Budget(ENOUGH), run=tried)
-    assert sorted(one.h for one in more) == sorted(sample.h(m) for m in (7, 14))
-    assert len(trials) == 5
-    more.clear()
-    between(sample, trials[:2], reference, 4, Budget(-1.0), run=tried)
-    assert more == []
+    more = between(sample, trials, Budget(ENOUGH), run)
+    assert sorted(one.candidate.h for one in more) == sorted(sample.h(m) for m in (7, 14))
+    assert between(sample, trials[:2], Budget(-1.0), run) == []
 
 
 def test_measurements_are_of_trials_that_did_not_fail(scene):

@@ -13,12 +13,6 @@ class Budget:
     """Processor time of this thread from now on, without what is free, such as compiling.
 
     Searches run their members in the thread that asks, so its time is that of the run.
-
-    seconds: processor time to spend [s].
-    clock: reads the time [s]. Default: the processor time of this thread.
-
-    Attributes:
-        seconds: the same.
     """
 
     def __init__(self, seconds: float, clock: Callable[[], float] = time.thread_time):
@@ -45,10 +39,6 @@ class Budget:
 
 
 def rounded_up(seconds: float) -> float:
-    """The next length of a search that is easy to say: 1, 2, 3, 5 or 10 times a power of ten.
-
-    seconds: length [s], above 0.
-    Returns: The next one of these that is not below it [s].
-    """
+    """The next length of a search that is easy to say: 1, 2, 3, 5 or 10 times a power of ten [s]."""
     power = 10.0 ** math.floor(math.log10(seconds))
     return next(nice * power for nice in (1.0, 2.0, 3.0, 5.0, 10.0) if nice * power >= seconds * (1.0 - 1e-9))

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs of a sample of an ensemble with different settings, and how far apart they are: members, statistics, growth."""
+"""Runs of a sample of an ensemble with different settings, and how far apart they are: members and statistics."""
 
 from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, cast
@@ -20,26 +20,16 @@ from lgvi_warp.methods import saveat
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics import energy as invariants
-from lgvi_warp.physics import notation
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.results.result import Result
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.studies.budget import Budget, rounded_up
-from lgvi_warp.studies.distance import QUANTITIES, Distance, compared_in
+from lgvi_warp.studies.distance import QUANTITIES, Distance
 from lgvi_warp.studies.kernels import KERNELS, Kernels
 
-# Error at which a trajectory is no longer meaningful [m or rad].
-LOST = 1e-2
-ROUND_OFF = {"float64": 2.0**-53, "float32": 2.0**-24}
 # Number of times that runs are compared at.
 SAMPLES = 20
-# Methods for the reference, the best first; neighbours share as little as possible.
-PRECISE = ("kl8(psi_x)", "rk8", "kl8(psi_s)", "kl6(psi_x)", "kl6(psi_s)", "rk5", "su4(psi_x)", "su4(psi_s)", "rk4", "psi_x",
-           "psi_s", "psi_w", "psi_1", "psi")  # fmt: skip
-# The same where noise acts, which leaves nothing to a high order.
-PRECISE_IN_NOISE = ("rk4", "psi_x", "psi_s", "psi_w", "phi")
 
 
 @dataclass(frozen=True)
@@ -52,6 +42,11 @@ class Candidate:
         dtype: precision, such as "float64" or "float32".
         solver: solver of equation (24): "quartic", "cayley", "newton" or "moser_veselov".
         iterations: its Newton steps; None for as many as its tolerance needs.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.studies.Candidate("rk4", 0.1).options()
+        {'method': 'rk4', 'h': 0.1, 'dtype': 'float64'}
     """
 
     method: str
@@ -62,7 +57,7 @@ class Candidate:
 
     @property
     def plain(self) -> bool:
-        """Whether the solver of equation (24) is the default one."""
+        """True if the solver of equation (24) is the default one."""
         return (self.solver, self.iterations) == ("quartic", None)
 
     @property
@@ -78,15 +73,23 @@ class Candidate:
         return f"{self.name} {self.dtype}"
 
     def options(self) -> dict[str, Any]:
-        """Convert the setting to arguments for lw.solve.
+        """Convert the setting to arguments of `lw.solve`.
 
-        Returns: method, h [s] and dtype, for `lw.solve(fleet, **options)`.
+        Returns:
+            method, h [s] and dtype, for `lw.solve(fleet, **options)`.
         """
         method: Any = self.method if self.plain else self.resolved()
         return {"method": method, "h": self.h, "dtype": self.dtype}
 
     def resolved(self) -> Method:
-        """Build the method with its solver."""
+        """Build the method with its solver.
+
+        Returns:
+            The method, as `lw.solve` takes it.
+
+        Raises:
+            SceneError: for a method or a solver that does not exist.
+        """
         return Method(self.method, self.solver, self.iterations)
 
 
@@ -96,21 +99,14 @@ class Sample:
     Steps are spacing / m for whole m. The spacing is run.save_every of the scene where it divides t1, else t1 / samples.
     Where noise acts on a grid, m divides the number of its draws in the spacing, so that all runs see one path.
 
-    t1: end time [s]. Default: run.duration of the scene.
+    samples: largest number of times after 0.
     kernels: what compiles, runs and prices its plans.
-
-    Attributes:
-        whole: the whole ensemble.
-        ensemble: the sample of it.
-        members: size of the sample.
-        t1: end time [s].
-        samples: largest number of times after 0.
-        spacing: length that steps divide [s], a Fraction.
-        index: the times as multiples of the spacing (k,), int64.
-        times: the times (k,) [s].
-        rate: largest angular rate at the start, at least one turn in t1 [rad/s].
-        draws: number of draws of noise in the spacing; 0 for runs that draw once a step.
-        fixed_draws: the most that the noise_steps of the scene allow; 0 where no term has one.
+    whole, ensemble: all members, and those of the sample.
+    spacing: a Fraction [s].
+    index, times: the times as multiples of the spacing (k,), and in seconds (k,) [s].
+    rate: largest angular rate at the start, at least one turn in t1 [rad/s].
+    draws: number of draws of noise in the spacing; 0 for runs that draw once a step.
+    fixed_draws: the most that the noise_steps of the scene allow; 0 where no term has one.
     """
 
     def __init__(
@@ -143,11 +139,11 @@ class Sample:
         self.draws, self.fixed_draws = 0, self._fixed_draws()
 
     def more(self, members: int, times: int = 1) -> Sample:
-        """Make the same sample with more members, and so many times as many times."""
+        """The same sample with more members, and so many times as many times."""
         return Sample(self.whole, self.t1, members, self.samples * times, kernels=self.kernels)
 
     def on_grid(self, draws: int) -> Sample:
-        """Make the same sample with noise on a grid that all its runs share."""
+        """The same sample with noise on a grid that all its runs share."""
         sample = copy.copy(self)
         sample.draws = draws
         sample.ensemble = drawn_every(self._drawn_once_a_step, self.h(draws))
@@ -161,38 +157,28 @@ class Sample:
                 count = self.spacing / saveat.exact(term.noise_step)
                 if count.denominator != 1:
                     problem = f"does not divide the {float(self.spacing):g} s between the times of the comparison"
-                    faults.add(
-                        f"{term.key}.noise_step", term.noise_step, problem, "give run.save_every a multiple of it"
-                    )
+                    remedy = "give run.save_every a multiple of it"
+                    faults.add(f"{term.key}.noise_step", term.noise_step, problem, remedy)
                 counts.append(int(count))
         faults.raise_if_any()
         return math.gcd(*counts)
 
     def allowed(self, m: int) -> int:
-        """Find a number of steps that noise on a grid allows."""
+        """The next number of steps that noise on a grid allows."""
         if not self.draws:
             return m
         return next((count for count in saveat.divisors(self.draws) if count >= m), self.draws)
 
     def coarsest(self, angle: float) -> int:
-        """Find the largest step in which no member turns by more than an angle at the start.
-
-        angle: largest turn of one step [rad].
-        """
+        """The fewest steps of which none turns a member by more than an angle at the start [rad]."""
         return self.allowed(max(1, math.ceil(float(self.spacing) * self.rate / angle)))
 
     def h(self, m: int) -> float:
-        """Compute a step from its number.
-
-        Returns: The step spacing / m [s].
-        """
+        """The step spacing / m [s]."""
         return float(self.spacing / m)
 
     def candidate(self, method: str, m: int, dtype: str = "float64", solver: Any = ("quartic", None)) -> Candidate:
-        """Make a setting with the step spacing / m.
-
-        solver: (name, iterations) of the solver of equation (24). Default: the quartic to its tolerance.
-        """
+        """A setting with the step spacing / m; solver: (name, iterations)."""
         return Candidate(method, self.h(m), dtype, *solver)
 
     def plan(self, candidate: Candidate, ensemble: Ensemble | None = None) -> Plan:
@@ -213,14 +199,8 @@ class Sample:
     def accepted(
         self, methods: Sequence[str], dtype: str = "float64", most: int | None = None
     ) -> tuple[list[str], dict[str, str]]:
-        """Sort methods into those that the scene takes and those that it refuses.
-
-        most: number of accepted methods after which no more are looked at. Default: all are.
-        Returns: (accepted, refused): names of the first, and name -> reason of the others.
-        """
-        good: list[str] = []
-        refused: dict[str, str] = {}
-        tableaux: dict[Any, str] = {}
+        """Sort methods into those that the scene takes, at most so many, and those that it refuses: name -> reason."""
+        good, refused, tableaux = list[str](), dict[str, str](), dict[Any, str]()
         for name in methods:
             if len(good) == most:
                 break
@@ -237,10 +217,7 @@ class Sample:
         return good, refused
 
     def noise(self, method: str) -> str:
-        """Tell whether random numbers act, and whether they can be drawn on a grid.
-
-        Returns: "none"; "grid"; or "free", for a term with NOISE that is no NoisyTerm: its path differs from step to step.
-        """
+        """Whether noise acts: "none"; "grid", where runs may share a path; or "free", whose path differs with the step."""
         laws = self.plan(self.candidate(method, 1)).kernel_choice.laws
         noisy = [term for term, module in laws if getattr(module, "NOISE", False)]
         if not noisy:
@@ -249,31 +226,24 @@ class Sample:
 
 
 def drawn_every(fleet: Ensemble, noise_step: float, own_grid: bool = True) -> Ensemble:
-    """Put the noise of an ensemble on a grid.
+    """Put the noise of an ensemble on a grid, but for terms with a noise_step of their own where own_grid says so."""
 
-    noise_step: time from one draw to the next [s].
-    """
-    terms = [
-        replace(term, noise_step=noise_step)
-        if isinstance(term, NoisyTerm) and not (own_grid and term.noise_step is not None)
-        else term
-        for term in fleet.scene.terms
-    ]
+    def on_grid(term: Any) -> Any:
+        noisy = isinstance(term, NoisyTerm) and not (own_grid and term.noise_step is not None)
+        return replace(term, noise_step=noise_step) if noisy else term
+
     drawn, scene = copy.copy(fleet), cast(Scene, fleet.scene)
-    drawn.scene = replace(scene, terms=terms)
+    drawn.scene = replace(scene, terms=[on_grid(term) for term in scene.terms])
     return drawn
 
 
 def failed(result: Result) -> bool:
-    """Tell whether some member failed; those stopped by an event did not."""
+    """True if some member failed; those stopped by an event did not."""
     return bool(failed_members(result.status).any())
 
 
 def distances(result: Result, reference: Result, distance: Distance | None = None) -> dict[str, np.ndarray]:
-    """Measure how far two results are apart at each time.
-
-    Returns: Quantity -> distance (k, n) [its unit]; NaN from where an event stopped a member in either result.
-    """
+    """Quantity -> distance of two results at each time (k, n); NaN from where an event stopped a member in either."""
     apart = {name: getattr(result, name).astype(np.float64) - getattr(reference, name) for name in FIELDS}
     chord = np.linalg.norm(apart.pop("attitude"), axis=(-2, -1))
     lengths = {name: np.linalg.norm(difference, axis=-1) for name, difference in apart.items()}
@@ -287,10 +257,9 @@ def distances(result: Result, reference: Result, distance: Distance | None = Non
 
 
 def errors(apart: dict[str, np.ndarray], until: int) -> dict[str, dict[str, float]]:
-    """Reduce distances to norms over members and times, leaving out members that were stopped.
+    """Reduce distances to norms over members and times up to `until`, leaving out members that were stopped.
 
-    apart: quantity -> (k, n), as of `distances`.
-    Returns: Quantity -> {"end_max", "end_rms", "path_max", "path_rms"} [its unit].
+    Returns: Quantity -> {"end_max", "end_rms", "path_max", "path_rms"}.
     """
     norms = {}
     for name, values in apart.items():
@@ -303,66 +272,8 @@ def errors(apart: dict[str, np.ndarray], until: int) -> dict[str, dict[str, floa
     return norms
 
 
-@dataclass(frozen=True, eq=False)
-class Reference:
-    """What errors are measured from: the finer of two runs that share no step and, at best, no method.
-
-    Attributes:
-        result: of the finer run.
-        text: the two methods and their steps, in words.
-        own: quantity -> (k,), largest difference of the two runs over the members and up to each time [its unit].
-        sample: members, times and noise of the two runs, on which others are compared with them.
-        asked: quantity of the errors, where it is none of QUANTITIES.
-        methods: names of the methods of the two runs.
-        more: where the time was over before the runs agreed, about how much would have done [s]; infinite where it cannot be
-            told. 0 where they agree no better however long they run.
-    """
-
-    result: Result
-    text: str
-    own: dict[str, np.ndarray]
-    sample: Sample
-    asked: Distance | None = None
-    methods: tuple[str, ...] = ()
-    more: float = 0.0
-
-    def error(self, of: str, until: int = -1) -> float:
-        """Return the reference's own error.
-
-        until: index of the last sample that counts. Default: the last of all.
-        Returns: Largest difference of the two runs up to that sample [unit of `of`].
-        """
-        return float(self.own[of][until])
-
-    def reaches(self, of: str, error: float) -> int:
-        """Find how far the reference's own error stays below a bound.
-
-        error: the bound [unit of `of`].
-        """
-        return int(np.searchsorted(self.own[of], error, side="right")) - 1
-
-
-def extrapolated(sample: Sample, method: str, m: int) -> Result:
-    """Run a method; where its order is below four and no noise acts, extrapolate from three steps.
-
-    Richardson's extrapolation of the steps h, h/2 and h/4 takes out the terms in h^2 and h^3.
-    """
-    if Method(method).order >= 4 or sample.draws:
-        return sample.run(sample.candidate(method, m))
-    runs = [sample.run(sample.candidate(method, k * m)) for k in (1, 2, 4)]
-    samples = {}
-    for name in FIELDS:
-        a, b, c = (run.samples[name] for run in runs)
-        ab, bc = b + (b - a) / 3.0, c + (c - b) / 3.0
-        samples[name] = bc + (bc - ab) / 7.0
-    return replace(runs[-1], samples=samples, compile_seconds=sum(run.compile_seconds for run in runs))
-
-
 def agreement(a: Result, b: Result, distance: Distance | None = None) -> dict[str, np.ndarray]:
-    """Measure how far two results agree up to each time, over all members.
-
-    Returns: Quantity -> largest distance up to each time (k,) [its unit]; infinite where a member failed.
-    """
+    """Quantity -> largest distance of two results up to each time (k,), over all members; infinite where a member failed."""
     if failed(a) or failed(b):
         names = dict.fromkeys([*QUANTITIES, *([distance.name] if distance else [])])
         return {name: np.where(a.time > 0.0, np.inf, 0.0) for name in names}
@@ -373,201 +284,8 @@ def agreement(a: Result, b: Result, distance: Distance | None = None) -> dict[st
     return running_maxima
 
 
-def paired(names: Sequence[str]) -> tuple[str, str]:
-    """Choose the two methods of a reference."""
-    first, second = names[0], names[min(1, len(names) - 1)]
-    return first, second if Method(second).order >= Method(first).order - 2 else first
-
-
-def make_reference(
-    sample: Sample,
-    of: str | Distance = "position",
-    goal: float = 0.0,
-    seconds: float = 15.0,
-    methods: Sequence[str] | None = None,
-    report: Callable[[float], None] | None = None,
-) -> Reference:
-    """Refine two high-order runs together until they agree to a goal, agree no better, or the time is spent.
-
-    Where noise acts, both see one path, drawn at each step of the finer run. Each refinement has a path of its own, and that
-    of the best one is the path of `Reference.sample`.
-
-    How well the runs agree is for the caller to judge.
-
-    goal: difference at which to stop [unit of `of`]. Default 0: as small as it gets.
-    seconds: processor time to spend, without compiling [s]. Default 15.
-    """
-    compared = compared_in(of)
-    of = compared.name
-    fixed = sample.fixed_draws
-    if fixed:
-        sample = sample.on_grid(fixed)
-    names = list(methods or sample.accepted(PRECISE, most=2)[0])
-    if not names:
-        raise SceneError(
-            [f"method: the scene takes none of {', '.join(PRECISE)}; name one that it takes: methods=[...]"]
-        )
-    noisy = sample.noise(names[0]) == "grid"
-    if noisy and not methods:
-        names = sample.accepted(PRECISE_IN_NOISE, most=2)[0]
-    first, second = (names[0], names[-1]) if methods else paired(names)
-    budget = Budget(seconds)
-    best: Reference | None = None
-    worse, m, gain = 0, sample.coarsest(0.5), 1.0
-    # In noise half the step halves the difference, but for the chance of another path.
-    stalled = 0.9 if noisy else 0.5
-    if noisy:
-        # 3 2^k draws, which many steps divide; at first sixteen in the longest step that is tried.
-        m = 3 * 2 ** math.ceil(math.log2(max(8.0 * m / 3.0, 1.0)))
-    # In noise each halving of the step gains one of the error, without an end.
-    for _ in range(10 if noisy else 30):
-        finer = max(m + 1, round(1.5 * m))
-        if fixed:
-            m, finer = (*saveat.divisors(fixed)[-2:-1], fixed)[0], fixed
-        elif noisy:
-            finer = 2 * m
-            sample = sample.on_grid(finer)
-        for name, steps in ((first, m), (second, finer)):
-            with budget.free():
-                sample.kernels.compile(sample.plan(sample.candidate(name, steps)))
-        before = budget.spent
-        with np.errstate(all="ignore"):
-            runs = extrapolated(sample, first, m), extrapolated(sample, second, finer)
-            disagreement = agreement(*runs, compared)
-        end, last = disagreement[of][-1], budget.spent - before
-        if best is None or end < best.error(of):
-            worse = worse + 1 if best and end > stalled * best.error(of) and end < LOST else 0
-            gain = best.error(of) / max(end, 1e-300) if best else 1.0
-            text = f"{second} at h = {sample.h(finer):.4g} s against {first} at h = {sample.h(m):.4g} s"
-            best = Reference(runs[1], text, disagreement, sample, compared, (first, second))
-        else:
-            worse += best.error(of) < LOST
-        if report:
-            report(min(1.0, budget.spent / seconds))
-        if best.error(of) <= goal or worse >= 2 or fixed:
-            break
-        if budget.spent + 2.0 * last > seconds:
-            best = replace(best, more=budget.spent + more_seconds(best.error(of), goal, gain, last))
-            break
-        m *= 2
-    assert best is not None
-    return best
-
-
-def more_seconds(error: float, goal: float, gain: float, last: float) -> float:
-    """Predict how long it takes to refine two runs to a goal.
-
-    error: how far they are apart [any unit].
-    goal: how far they may be apart [same unit].
-    last: processor time of the last two runs [s].
-    Returns: Processor time of all refinements to come, each twice as long as the one before [s]; infinite where it cannot be
-        told.
-    """
-    if not (math.isfinite(error) and goal > 0.0 and 1.5 < gain < math.inf):
-        return math.inf
-    halvings = math.ceil(math.log(error / goal) / math.log(gain))
-    return 2.0 * last * (2.0**halvings - 1.0)
-
-
-def time_over(seconds: float, more: float, share: float) -> tuple[str, str]:
-    """Say that the time of a search was over, and how much would do.
-
-    seconds: time that was given [s].
-    more: processor time that the reference needs [s]; infinite where it cannot be told.
-    Returns: (cause, remedy).
-    """
-    cause = f"{seconds:g} s were over"
-    if not math.isfinite(more):
-        return cause, "give more seconds"
-    return cause, f"seconds={rounded_up(max(more / share, 2.0 * seconds)):g} would do"
-
-
-@dataclass(frozen=True)
-class Growth:
-    """How a small difference between two starts grows.
-
-    Attributes:
-        rate: growth rate of its logarithm, by least squares [1/s].
-        doubling: ln 2 / rate [s]; infinite where growth is no exponential.
-        power: exponent p of the fit t^p, where it fits better than an exponential; else None.
-        factor: growth over the whole run.
-        predictable: dtype -> time at which one round-off has grown to 1e-2, extrapolated beyond the run [s]; may be infinite.
-        times: times of the curve (k,) [s].
-        curve: growth (k,): root mean square over the members of position [m] and attitude [rad].
-    """
-
-    rate: float
-    doubling: float
-    power: float | None
-    factor: float
-    predictable: dict[str, float]
-    times: np.ndarray
-    curve: np.ndarray
-
-
-# Angle between the two starts [rad].
-NUDGE = 1e-8
-# A fitted power of time above this is an exponential sampled at few times.
-STEEPEST = 3.0
-
-
-def growth(sample: Sample, candidate: Candidate) -> Growth:
-    """Measure growth by two runs whose starts differ by 1e-8 rad in attitude."""
-    fleet = sample.ensemble
-    start = fleet.select(0, fleet.members)
-    turn = np.random.default_rng(0).normal(size=(fleet.members, 3))
-    turn *= NUDGE / np.linalg.norm(turn, axis=1, keepdims=True)
-    varied = {k: v for k, v in start.parameters.items() if len(v) == fleet.members and len(v) > 1}
-    runs = []
-    for R in (start.attitude, start.attitude @ notation.matrix_from_rotation_vector(turn)):
-        nudged = Ensemble.from_states(fleet.scene, start.position, R, start.velocity, start.angular_velocity, varied)
-        nudged.indices, nudged.seed = fleet.indices, fleet.seed
-        runs.append(sample.run(candidate, nudged))
-    apart = distances(runs[0], runs[1])
-    both = np.hypot(apart["position"], apart["attitude"]) / NUDGE
-    alive = np.isfinite(both)
-    curve = np.sqrt(np.sum(np.where(alive, both, 0.0) ** 2, axis=1) / np.maximum(alive.sum(axis=1), 1))
-    good = np.isfinite(curve) & (curve > 0.0) & (curve < 0.1 / NUDGE)
-    return fitted(sample.times[good], curve[good], sample.t1)
-
-
-def fitted(times: np.ndarray, curve: np.ndarray, t1: float) -> Growth:
-    """Fit an exponential and a power of time to the growth of a difference.
-
-    times: times (k,) [s].
-    curve: difference over that at the start (k,).
-    t1: end time [s].
-    """
-    later = times > 0.0
-    if later.sum() < 2:
-        return Growth(np.nan, np.nan, None, np.nan, dict.fromkeys(ROUND_OFF, 0.0), times, curve)
-    t, logs = times[later], np.log(curve[later])
-    (rate, at0), misfit = np.polyfit(t, logs, 1, full=True)[:2]
-    (power, _), misfit_power = np.polyfit(np.log(t), logs, 1, full=True)[:2]
-    algebraic = rate <= 0.0 or (power < STEEPEST and misfit_power.sum() <= misfit.sum())
-    predictable = {}
-    for dtype, size in ROUND_OFF.items():
-        beyond = np.flatnonzero(curve * size > LOST)
-        end = np.inf if algebraic else max(t[-1], (math.log(LOST / size) - at0) / rate)
-        predictable[dtype] = float(times[beyond[0]]) if len(beyond) else float(end)
-    doubling = np.inf if algebraic else math.log(2.0) / rate
-    return Growth(
-        float(rate), float(doubling), float(power) if algebraic else None, float(curve[-1]), predictable, times, curve
-    )
-
-
-def statistics(result: Result, asked: Distance | None = None) -> dict[str, np.ndarray]:
-    """Collect the quantities that means and spreads are taken of.
-
-    The attitude is represented by the vertical in body axes.
-
-    Args:
-        result: of k times and n members.
-        asked: one more quantity; angles are left out, since they have no such mean.
-
-    Returns:
-        Quantity -> (k, n, components), float64 [its unit].
-    """
+def quantities_of(result: Result, asked: Distance | None = None) -> dict[str, np.ndarray]:
+    """Quantity -> (k, n, components) that means and spreads are taken of; attitude: the vertical in body axes."""
     values = {name: getattr(result, name).astype(np.float64) for name in ("position", "velocity", "angular_velocity")}
     values["attitude"] = result.attitude[..., 2, :].astype(np.float64)
     values["energy"] = result.energy[..., None]
@@ -583,14 +301,13 @@ def biases(result: Result, reference: Result, distance: Distance | None = None) 
 
     Each difference is in standard errors of the sample, as root mean square over components and times after 0. Two
     independent samples of the same distribution differ by about 1.4.
-
-    Returns: "NAME_mean" and "NAME_std" -> difference [standard errors]; empty for one member or where one failed.
+    Returns: "NAME_mean" and "NAME_std" -> difference; empty for one member or where one failed.
     """
     n = result.members
     if n < 2 or failed(result):
         return {}
     deviations = {}
-    mine, theirs = statistics(result, distance), statistics(reference, distance)
+    mine, theirs = quantities_of(result, distance), quantities_of(reference, distance)
     for name, b in theirs.items():
         a, b = mine[name][1:], b[1:]
         spread = b.std(axis=1, ddof=1)
@@ -607,7 +324,7 @@ def biases(result: Result, reference: Result, distance: Distance | None = None) 
 
 
 def part(result: Result, members: Sequence[int]) -> Result:
-    """Select some members of a result, in memory or in a store."""
+    """Some members of a result, in memory or in a store."""
     at = np.asarray(members)
     if result.store is not None:
         from lgvi_warp.store.open import chosen

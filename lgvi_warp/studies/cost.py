@@ -29,24 +29,16 @@ MOST_TOLD = 6
 
 
 def thread_seconds() -> float:
-    """Read the CPU time of this thread, which other programs do not add to.
+    """The CPU time of this thread [s], which other programs do not add to, and in which kernels on the CPU run.
 
-    A kernel on the CPU runs in the thread that launches it, so its time is that thread's. Windows counts CPU time in
-    ticks of 16 ms, too coarse for a launch: there time.perf_counter is read.
-
-    Returns: Time since an arbitrary start [s].
+    Windows counts it in ticks of 16 ms, too coarse for a launch: there time.perf_counter is read.
     """
     return time.perf_counter() if os.name == "nt" else time.thread_time()
 
 
 @dataclass(frozen=True)
 class Cost:
-    """Cost of a setting.
-
-    Attributes:
-        us_per_vehicle_second: microseconds of one core per vehicle and simulated second.
-        spread: median of the readings over the least, which is taken; near 1 on an idle machine.
-    """
+    """Cost of a setting; spread: median of the readings over the least, which is taken, near 1 on an idle machine."""
 
     us_per_vehicle_second: float
     spread: float
@@ -56,10 +48,7 @@ def costs(
     plans: Sequence[Plan], rounds: int = 5, *, make: Callable[..., Packets] = Packets,
     clock: Callable[[], float] = thread_seconds, grows: Callable[[Plan], bool] | None = None,
 ) -> list[Cost]:  # fmt: skip
-    """Measure the cost of plans, with one number for all plans that run the same kernel.
-
-    The readings are taken in interleaved rounds: what slows the machine for a while slows all plans alike.
-    """
+    """Measure the cost of plans, in turn, with one number for all that run the same kernel."""
     calls, steps = launches(plans, make=make, clock=clock)
     kinds = [Kind(plan.spec, plan.grid.h, (grows or work_grows)(plan)) for plan in plans]
     per_step = readings(kinds, lambda which: timed([calls[i] for i in which], rounds, clock=clock) / steps[which])
@@ -68,10 +57,9 @@ def costs(
 
 
 def readings(kinds: Sequence[Kind], read: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """Read the cost of a step of each kind, and of those again whose least reading no other is near.
+    """Read the cost of a step of each kind (kinds, rounds) [s], and again that of which no reading is near the least.
 
     read: from indices of kinds to readings of one step (indices, rounds) [s].
-    Returns: All readings (kinds, rounds) [s]; NaN where there is none.
     """
     seconds = read(np.arange(len(kinds)))
     rounds = seconds.shape[1]
@@ -87,13 +75,7 @@ def readings(kinds: Sequence[Kind], read: Callable[[np.ndarray], np.ndarray]) ->
 
 @dataclass(frozen=True)
 class Kind:
-    """Which readings measure the same work.
-
-    Attributes:
-        kernel: identifies the kernel.
-        h: step [s].
-        grows: whether a longer step is more work.
-    """
+    """Which readings measure the same work: the kernel, the step [s], and whether a longer step is more work."""
 
     kernel: Hashable
     h: float
@@ -101,13 +83,10 @@ class Kind:
 
 
 def of_steps(kinds: Sequence[Kind], seconds: np.ndarray) -> list[tuple[float, float]]:
-    """Estimate the cost of a step of each kind from all readings.
+    """Estimate the cost of a step of each kind [s] from all readings (kinds, rounds), and their median over the least.
 
     A step of one kernel is the same work whatever its length, and costs the least of all its readings. Where a longer
     step is more work, it costs the least of the readings of steps as long or longer, each of which is at least its cost.
-
-    seconds: readings of one step (kinds, rounds) [s]; NaN where there is none.
-    Returns: (seconds of a step [s], median over least) of each kind.
     """
     prices = []
     for kind in kinds:
@@ -121,12 +100,7 @@ def of_steps(kinds: Sequence[Kind], seconds: np.ndarray) -> list[tuple[float, fl
 
 
 def confirmed(kinds: Sequence[Kind], seconds: np.ndarray) -> list[bool]:
-    """Tell for each kind whether a second reading came near the least one.
-
-    On a busy machine every reading may be disturbed; two that agree are taken as undisturbed.
-
-    seconds: readings of one step (kinds, rounds) [s]; NaN where there is none.
-    """
+    """True for each kind of which a second reading came near the least one: then both are taken as undisturbed."""
     met_again = []
     for kind in kinds:
         rising = np.sort(_bounding(kind, kinds, seconds), axis=None)  # NaN is last
@@ -143,10 +117,7 @@ def _bounding(kind: Kind, kinds: Sequence[Kind], seconds: np.ndarray) -> np.ndar
 def launches(
     plans: Sequence[Plan], *, make: Callable[..., Packets] = Packets, clock: Callable[[], float] = thread_seconds
 ) -> tuple[list[Callable[[], object]], np.ndarray]:
-    """Prepare one launch of each plan that is long enough to time.
-
-    Returns: (calls, steps): a call of each plan, and the steps times vehicles that it makes (plans, 1).
-    """
+    """Prepare one launch of each plan that is long enough to time, and the steps times vehicles that it makes (plans, 1)."""
     calls: list[Callable[[], object]] = []
     steps = np.empty((len(plans), 1))
     for i, plan in enumerate(plans):
@@ -165,26 +136,27 @@ def launches(
 def timed(
     calls: Sequence[Callable[[], object]], rounds: int, *, clock: Callable[[], float] = thread_seconds
 ) -> np.ndarray:
-    """Time calls in interleaved rounds, after one call of each to warm up.
+    """CPU time of calls in interleaved rounds (calls, rounds) [s], after one call of each to warm up."""
+    in_turn(calls, 1, clock)
+    # Nothing shorter than the clock's resolution can be measured.
+    return np.maximum(in_turn(calls, rounds, clock), time.get_clock_info("thread_time").resolution)
 
-    Returns: CPU time of each call in each round (calls, rounds) [s], at least the clock's resolution.
-    """
-    for call in calls:
-        call()
-    seconds = np.empty((len(calls), rounds))
-    for j in range(rounds):
-        for i, call in enumerate(calls):
+
+def in_turn(calls: Sequence[Callable[[], object]], rounds: int, clock: Callable[[], float]) -> list[list[float]]:
+    """Time calls in turn, so that a slow period of the machine slows all of them; the readings of each [s]."""
+    readings: list[list[float]] = [[] for _ in calls]
+    for _ in range(rounds):
+        for call, seconds in zip(calls, readings, strict=True):
             begun = clock()
             call()
-            seconds[i, j] = clock() - begun
-    # Nothing shorter than the clock's resolution can be measured.
-    return np.maximum(seconds, time.get_clock_info("thread_time").resolution)
+            seconds.append(clock() - begun)
+    return readings
 
 
 def work_grows(plan: Plan) -> bool:
-    """Tell whether a longer step is more work.
+    """True if a longer step is more work.
 
-    It is where a step iterates to a tolerance (the quartic's few Newton steps aside), where each packet chooses its own
+    That is where a step iterates to a tolerance (the quartic's few Newton steps aside), where each packet chooses its own
     steps, and where a step takes several draws of noise.
     """
     spec, letters = plan.spec, {letter for letter, _ in plan.spec.maps}
@@ -194,11 +166,7 @@ def work_grows(plan: Plan) -> bool:
 
 
 def disagreement(spreads: Sequence[tuple[str, float]]) -> str | None:
-    """Write the message about costs whose readings disagree.
-
-    spreads: (name of the setting, median of its readings over the least) of each.
-    Returns: The message; None where all readings agree.
-    """
+    """The message about settings, (name, median of the readings over the least), whose readings of cost disagree."""
     worst: dict[str, float] = {}
     for name, spread in spreads:
         if spread > DISAGREE:
@@ -213,6 +181,6 @@ def disagreement(spreads: Sequence[tuple[str, float]]) -> str | None:
 
 
 def agreement_text(spreads: Sequence[float]) -> str:
-    """Describe how costs were read and how well the readings agree."""
+    """How costs were read and how well the readings agree."""
     most = max((spread for spread in spreads if math.isfinite(spread)), default=1.0)
     return f"CPU time of one thread, the least of several readings; their median is at most {most:.2f} times that"

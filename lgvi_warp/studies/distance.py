@@ -22,11 +22,8 @@ QUANTITIES = {name: TABLE[name].unit for name in (*FIELDS, "energy")} | {"attitu
 class Distance:
     """Quantity that errors are measured in.
 
-    Attributes:
-        name: name of the quantity.
-        unit: its unit.
-        functional: computes its numbers at each time; None for those of QUANTITIES.
-        mean: whether the error is that of its mean over the members, in place of the largest of any member. Default False.
+    functional: computes its numbers at each time; None for those of QUANTITIES.
+    mean: whether the error is that of its mean over the members, in place of the largest of any member.
     """
 
     name: str
@@ -35,20 +32,17 @@ class Distance:
     mean: bool = False
 
     def values(self, result: Result) -> np.ndarray:
-        """Compute the quantity at each time.
-
-        Returns: Its numbers (k, n, components), float64 [unit].
-        """
+        """The quantity at each time (k, n, components), float64 [unit]."""
         if self.functional is None:
             values = np.asarray(getattr(result, self.name), dtype=np.float64)
             return values.reshape(len(result.time), result.members, -1)
         return self.functional(*samples_of(result))
 
     def distance(self, result: Result, reference: Result) -> np.ndarray:
-        """Measure the distance of two results in this quantity.
+        """Length of the difference of two results (k, n) [unit]; of angles [rad] the short way round.
 
-        Returns: Length of the difference (k, n) [unit]; of angles [rad] the short way round. Of a mean, for every member
-            alike, the upper end of the 95 % interval of the difference of the means, whose members are paired.
+        Of a mean, for every member alike, the upper end of the 95 % interval of the difference of the means, whose members are
+        paired.
         """
         with np.errstate(invalid="ignore"):
             apart = self.values(result) - self.values(reference)
@@ -59,10 +53,7 @@ class Distance:
         return np.linalg.norm(apart, axis=-1)
 
     def largest(self, result: Result) -> float:
-        """Return the largest size of the quantity.
-
-        Returns: Largest absolute value over times, members and components [unit].
-        """
+        """The largest size over times, members and components [unit]."""
         return float(np.nanmax(np.abs(self.values(result))))
 
 
@@ -78,11 +69,7 @@ MEAN = "mean "
 
 
 def compared_in(of: Any) -> Distance:
-    """Find the quantity that a name or a lw.statistics.Quantity means.
-
-    of: a name such as "position", "depth", "position[2]" or "norm(velocity)", a lw.statistics.Quantity, or a Compared; "mean
-        position[0]" for the mean over the members.
-    """
+    """The quantity that a name ("depth", "mean position[0]"), a lw.statistics.Quantity or a Distance means."""
     if isinstance(of, Distance):
         return of
     if isinstance(of, str) and of.strip() in QUANTITIES:
@@ -90,18 +77,15 @@ def compared_in(of: Any) -> Distance:
     if isinstance(of, str) and of.strip().startswith(MEAN):
         entry = compared_in(of.strip().removeprefix(MEAN))
         if entry.name == "attitude" or entry.mean:
-            raise SceneError(
-                [f"of = {of!r}: is no mean of numbers; give the mean of an entry, such as 'mean attitude[2,2]'"]
-            )
-        return replace(
-            entry, name=MEAN + entry.name, functional=entry.functional or functional("of", entry.name), mean=True
-        )
+            problem = "is no mean of numbers; give the mean of an entry, such as 'mean attitude[2,2]'"
+            raise SceneError([f"of = {of!r}: {problem}"])
+        inner = entry.functional or functional("of", entry.name)
+        return replace(entry, name=MEAN + entry.name, functional=inner, mean=True)
     if isinstance(of, list | tuple):
         raise SceneError([f"of = {of!r}: is several quantities; errors are of one of them: give its name"])
     parsed = functional("of", of)
     if parsed.over_path:
+        problem = "looks over the path, and errors are of a quantity at each time"
         remedy = f"give {parsed.inner.name!r}, whose largest error over the path is reported"
-        raise SceneError(
-            [f"of = {parsed.label!r}: looks over the path, and errors are of a quantity at each time; {remedy}"]
-        )
+        raise SceneError([f"of = {parsed.label!r}: {problem}; {remedy}"])
     return Distance(parsed.label, parsed.unit or "1", parsed)

@@ -30,10 +30,7 @@ STUDY_FILES = {
 
 
 def finite_or_none(value: Any) -> Any:
-    """Replace numbers that are not finite by None, so that JSON can hold the value.
-
-    value: a number, a text, None, or nested dicts, lists, tuples and arrays of them.
-    """
+    """Numbers, texts, and dicts, lists and arrays of them with None for what is not finite, as JSON can hold them."""
     if isinstance(value, dict):
         return {key: finite_or_none(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
@@ -46,12 +43,7 @@ def finite_or_none(value: Any) -> Any:
 
 
 def with_missing_as(value: Any, missing: float) -> Any:
-    """Undo `finite_or_none`.
-
-    value: None, numbers, texts, and nested tables and lists of them.
-    missing: what stands for None, infinite or NaN.
-    Returns: The same with this number in place of None.
-    """
+    """Undo `finite_or_none`: a number, infinite or NaN, in place of None."""
     if isinstance(value, dict):
         return {key: with_missing_as(item, missing) for key, item in value.items()}
     if isinstance(value, list):
@@ -145,7 +137,7 @@ class Saved(ABC):
             content: as `to_dict` returns it.
 
         Returns:
-            What the study found.
+            What the study found; numbers that were not finite are infinite or NaN.
         """
 
     @classmethod

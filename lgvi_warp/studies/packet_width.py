@@ -29,14 +29,7 @@ WORTH = 0.03
 
 
 class Reading(NamedTuple):
-    """Speeds of one kind of kernel.
-
-    Attributes:
-        kernel: One of widths.KERNELS.
-        ns: Width -> time per vehicle and step [ns].
-        before: The width of the table.
-        best: The fastest; that of the table where it is as fast.
-    """
+    """Speeds of one kind of kernel: width -> time per vehicle and step [ns], the width of the table, and the fastest."""
 
     kernel: str
     ns: dict[int, float]
@@ -48,17 +41,7 @@ def calibrate(
     rounds: int = ROUNDS, *, prepare: Callable[[Plan], Callable[[], None]] = speed.stepper,
     clock: Callable[[], float] = time.perf_counter, register_width: Callable[[str], int] = machine.register_width,
 ) -> Iterator[Reading]:  # fmt: skip
-    """Measure every kind of kernel at every width that may suit this machine.
-
-    Args:
-        rounds: Number of readings of each, of which the least counts. Default 20, about a tenth of a second.
-        prepare: From a plan to a call that makes all its steps.
-        clock: The time now [s].
-        register_width: From a precision to the vehicles in a register.
-
-    Yields:
-        The speeds of one kind.
-    """
+    """Measure every kind of kernel at every width that may suit this machine; of its readings the least counts."""
     for kernel in widths.KERNELS:
         kind, dtype = widths.parts(kernel)
         lanes = [n * register_width(dtype) for n in REGISTERS]

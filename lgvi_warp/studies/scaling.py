@@ -59,6 +59,13 @@ def scaling(
 
     Raises:
         SceneError: An argument is at fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> fleet = lw.Ensemble(lw.Scene.named("sphere"), members=8)
+        >>> rows = lw.bench.scaling(fleet, [1, 8], [1], method="psi_s", h=0.1, t1=1.0)
+        >>> [row["members"] for row in rows]
+        [1, 8]
     """
     fleet = ensemble_of(fleet)
     sizes, counts = members_and_threads(fleet, members, threads)
@@ -137,6 +144,13 @@ def term_cost(
 
     Raises:
         SceneError: The scene has no terms, or an argument is at fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("sphere", terms=[lw.terms.Drag(linear=[1.0] * 6)])
+        >>> rows = lw.bench.term_cost(scene, method="psi_s", h=0.1)
+        >>> [row["term"] for row in rows]
+        ['none', 'drag']
     """
     scene = scene_of(scene)
     faults = Faults()
@@ -155,12 +169,20 @@ def term_cost(
 def plans_of_terms(
     scene: Scene, members: int, method: str | Method | None, h: float | None, dtype: str | None
 ) -> dict[str, Plan]:
-    """Plan a scene without terms, with each alone and with all, by the method that the whole scene runs by."""
+    """Plan ten steps of a scene without terms, with each alone and with all, by the method that the whole scene runs by.
+
+    What steers the vehicle, and what ends a run, is left out.
+    """
+
+    def plan_of(terms: tuple[Term, ...], method: str | Method | None) -> Plan:
+        bare = dataclasses.replace(scene, terms=terms, controller=None, events=(), ensemble_settings=None)
+        return make_plan(Ensemble(bare, members, 1), method, h=h, t1=None if h is None else 10.0 * h, dtype=dtype)
+
     casts: dict[str, tuple[Term, ...]] = {NONE: ()} | {term.key: (term,) for term in scene.terms}
     if len(scene.terms) > 1:
         casts[ALL] = tuple(scene.terms)
-    chosen = plan_of(scene, tuple(scene.terms), members, method, h, dtype).method
-    return {name: plan_of(scene, terms, members, chosen, h, dtype) for name, terms in casts.items()}
+    chosen = plan_of(tuple(scene.terms), method).method
+    return {name: plan_of(terms, chosen) for name, terms in casts.items()}
 
 
 def priced(plans: Mapping[str, Plan], prices: Sequence[Cost]) -> list[dict[str, Any]]:
@@ -178,24 +200,6 @@ def priced(plans: Mapping[str, Plan], prices: Sequence[Cost]) -> list[dict[str, 
         }
         for (name, plan), price in zip(plans.items(), nanoseconds, strict=True)
     ]
-
-
-def plan_of(
-    scene: Scene,
-    terms: tuple[Term, ...],
-    members: int,
-    method: str | Method | None,
-    h: float | None,
-    dtype: str | None,
-) -> Plan:
-    """Plan ten steps of a scene with some terms, without what steers it and what ends it.
-
-    method: Name of the method, or a Method; None: that of the scene.
-    h: Step [s].
-    dtype: The precision; None: that of the scene.
-    """
-    bare = dataclasses.replace(scene, terms=terms, controller=None, events=(), ensemble_settings=None)
-    return make_plan(Ensemble(bare, members, 1), method, h=h, t1=None if h is None else 10.0 * h, dtype=dtype)
 
 
 def _numbers(key: str, values: Any) -> list[int]:

@@ -22,6 +22,7 @@ from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Environment, Start
+from lgvi_warp.studies.cost import in_turn
 
 # Operations (an addition, a multiplication or both fused) of one step for diagonal M and J, with weight and restoring
 # moment and the quartic's start value alone; each Newton step of each solve adds 8. Divisions are not counted.
@@ -31,18 +32,14 @@ NEWTON = 8
 
 
 def operations(method: str, iterations: int | None = None) -> int | None:
-    """Count the arithmetic operations of one step.
-
-    iterations: Newton steps of each solve of the quartic. Default: one.
-    Returns: Number of operations; None for methods that were not counted.
-    """
+    """Arithmetic operations of one step, with so many Newton steps a solve; None for methods that were not counted."""
     if method not in OPERATIONS:
         return None
     return OPERATIONS[method] + NEWTON * SOLVES[method] * (1 if iterations is None else iterations)
 
 
 def example() -> Scene:
-    """Build the example of Nordkvist & Sanyal (2010)."""
+    """The example of Nordkvist & Sanyal (2010)."""
     vehicle = Vehicle(
         123.8,
         inertia=[5.46, 5.29, 5.72],
@@ -56,7 +53,7 @@ def example() -> Scene:
 
 
 def fleet(members: int, *terms: Term) -> Ensemble:
-    """Build an ensemble around the example, whose angular velocities vary by 10 %."""
+    """Members around the example, whose angular velocities vary by 10 %."""
     from lgvi_warp.sampling.distributions.basic import Normal
 
     return Ensemble(
@@ -78,35 +75,16 @@ def void(_: Any) -> None:
 def interleaved(
     calls: Sequence[Callable[[], None]], rounds: int = 5, *, clock: Callable[[], float] = time.perf_counter
 ) -> list[float]:
-    """Time calls in turn, so that a slow period of the machine slows all of them.
-
-    Returns: Median wall time of each call [s].
-    """
-    times: list[list[float]] = [[] for _ in calls]
-    for call in calls:
-        call()
-    for _ in range(rounds):
-        for call, seconds in zip(calls, times, strict=True):
-            start = clock()
-            call()
-            seconds.append(clock() - start)
-    return [median(seconds) for seconds in times]
+    """Median wall time of calls in turn [s], after one call of each to warm up."""
+    in_turn(calls, 1, clock)
+    return [median(seconds) for seconds in in_turn(calls, rounds, clock)]
 
 
 def least(
     calls: Sequence[Callable[[], None]], rounds: int = 15, *, clock: Callable[[], float] = time.perf_counter
 ) -> list[float]:
-    """Time calls in turn; other work on the machine can only lengthen a reading, so the least of each counts.
-
-    Returns: Least wall time of each call [s].
-    """
-    best = [np.inf] * len(calls)
-    for _ in range(rounds):
-        for i, call in enumerate(calls):
-            start = clock()
-            call()
-            best[i] = min(best[i], clock() - start)
-    return best
+    """Least wall time of calls in turn [s]: other work on the machine can only lengthen a reading."""
+    return [min(seconds) for seconds in in_turn(calls, rounds, clock)]
 
 
 def measure(
@@ -122,12 +100,7 @@ def measure(
 
 
 def record(method: Method, dtype: str, width: int, seconds: float, peak: float) -> dict[str, Any]:
-    """Describe one measurement of a kernel next to the core's peak.
-
-    seconds: time per vehicle and step [s].
-    peak: fused multiply-adds of the core per second [1/s].
-    Returns: Record of the settings, ns per vehicle and step, operations, peak [1e9/s] and the part of the peak reached.
-    """
+    """Describe one measurement of a kernel, `seconds` a vehicle and step, next to the core's peak [1/s]."""
     count = operations(method.name, None if method.iterations is None else int(method.iterations))
     return {
         "method": method.name,

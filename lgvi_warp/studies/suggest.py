@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -20,28 +20,22 @@ from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics.terms.noisy import NoisyTerm
 from lgvi_warp.results.result import Result
-from lgvi_warp.runs.default_method import h_rates, is_damped
+from lgvi_warp.runs.default_method import is_damped
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.runs.step_error import rates
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies import comparison, cost
 from lgvi_warp.studies import tradeoff as tradeoffs
 from lgvi_warp.studies.budget import Budget, rounded_up
-from lgvi_warp.studies.comparison import Candidate, Growth, Reference, Sample
+from lgvi_warp.studies.comparison import Candidate, Sample
 from lgvi_warp.studies.distance import Distance, compared_in
 from lgvi_warp.studies.kernels import KERNELS, Kernels
+from lgvi_warp.studies.ladders import ROUNDS, Ladders
+from lgvi_warp.studies.reference import Growth, Reference, make_reference, time_over
 from lgvi_warp.studies.speed import void
-from lgvi_warp.studies.tradeoff import (
-    PRECISIONS,
-    Trial,
-    chosen_methods,
-    growth_of,
-    growth_text,
-    noise_text,
-    tried,
-)
+from lgvi_warp.studies.tradeoff import chosen_methods, growth_of, growth_text, noise_text
+from lgvi_warp.studies.trials import Trial, tried
 
 # A setting is accepted where its error on the sample is below the error asked for by this factor.
 SAFETY = 1.15
@@ -56,10 +50,8 @@ SHORT = {
     "damped": ("rk4", "rk8"),
     "noisy": ("psi_x", "psi_s", "rk4"),
 }
-# Tried as well for drag by its exact flow, and where the step times the fastest rate of damping is above this.
-STIFFLY_DAMPED, STIFF = ("psi_x", "rkw3"), 2.0
-# A step in float32 costs at least this part of one in float64.
-LEAST_FLOAT32 = 0.4
+# Tried as well for drag by its exact flow, and where damping limits the step.
+STIFFLY_DAMPED = ("psi_x", "rkw3")
 # Number of members that the choice is checked on, and how many times as many times, where steps become no shorter than this.
 CHECKED, DENSER, SHORTER = 1024, 4, 1.1
 # The largest errors that tell how errors fall off: a 64th of the members, at least 8; below 40 members none tell.
@@ -70,9 +62,8 @@ CHANCE = 0.1
 CONFIRMED = 64
 # Part of a search's time that a reference gets.
 SHARE = 0.4
-# Number of settings in the last comparison of costs, and of readings of each cost.
+# Number of settings in the last comparison of costs.
 FINALISTS = 4
-ROUNDS = 7
 # Bytes of a member besides its samples: state, parameters, status, and the arrays they are made from.
 BYTES_OF_A_MEMBER = 2000
 
@@ -207,7 +198,7 @@ def suggest(
 def suggestion_on(
     sample: Sample, compared: Distance, error: float, names: Sequence[str], seconds: float,
     report: Callable[[float], None], named: bool, *, threads: int | None = None,
-    make_reference: Callable[..., Reference] = comparison.make_reference,
+    make_reference: Callable[..., Reference] = make_reference,
 ) -> Suggestion:  # fmt: skip
     """Search a sample for the cheapest setting, as `suggest` says; named: whether the methods were asked for by name."""
     taken, refused = sample.accepted(names)
@@ -216,47 +207,26 @@ def suggestion_on(
     if sample.noise(taken[0]) == "free":
         problem = f"error = {error:g}: noise acts, whose path differs from step to step, so members have no error"
         raise SceneError([f"{problem}; use lgvi-warp tradeoff, which compares statistics"])
-    reference = checked_reference(sample, compared, error, seconds, taken, make_reference=make_reference)
+
+    def reference_on(sample: Sample) -> Reference:
+        return checked_reference(sample, compared, error, seconds, taken, make_reference=make_reference)
+
+    reference = reference_on(sample)
     sample = reference.sample
     report(0.3)
-    budget = Budget((1.0 - SHARE) * seconds)
-    ladders = Ladders(sample, reference, compared, error / SAFETY, budget, named)
-    few = taken if named else short_list(sample, taken)
-    ladders.climb(few, lambda part: report(0.3 + 0.4 * part))
-    if not named:
-        stiff = [name for name in STIFFLY_DAMPED if name in taken and name not in few and ladders.limited_by_damping]
-        ladders.climb(stiff)
-        others = [name for name in taken if name not in (*few, *stiff)]
-        ladders.climb(others, lambda part: report(0.7 + 0.1 * part), new_kernels=not ladders.priced)
-    trials = ladders.cheapest()
-    if not trials:
-        problem = f"error = {error:g} {compared.unit} of {compared.name}: no step of {', '.join(taken)} kept it"
-        if budget.over:
-            cause = f"{seconds:g} s were over before a step was short enough; try seconds={rounded_up(4.0 * seconds):g}"
-            raise SceneError([f"{cause}. {problem}; or ask for a larger error or a shorter t1"])
-        raise SceneError([f"{problem}; ask for a larger error or a shorter t1"])
-    times = times_to_check(sample, [trial.candidate for trial in trials[:FINALISTS]])
-    more = sample.more(CHECKED, times) if times > 1 or sample.whole.members > sample.members else sample
-    if more is not sample:
-        reference = checked_reference(more, compared, error, seconds, taken, make_reference=make_reference)
-        more = reference.sample
-    goal = error / SAFETY**0.5
-    size = sample.whole.members
-
-    def checked(candidate: Candidate) -> tuple[Trial, float]:
-        return refined(more, candidate, reference, compared.name, goal, size)
-
-    final = [checked(trial.candidate) for trial in trials[:FINALISTS]]
-    # Where the sample did not show what float32 rounds off, no shorter step mends it.
-    missed = [trial.candidate for trial, (_, apart) in zip(trials, final, strict=False) if apart > error]
-    final += [checked(replace(candidate, dtype="float64")) for candidate in missed if candidate.dtype == "float32"]
-    final = [(trial, apart) for trial, apart in final if apart <= error] or final[:1]
-    priced = list(zip(final, more.kernels.costs([trial.plan for trial, _ in final], ROUNDS), strict=True))
-    text = cost.disagreement([(trial.candidate.text, price.spread) for (trial, _), price in priced])
+    ladders = Ladders(sample, reference, compared, error / SAFETY, Budget((1.0 - SHARE) * seconds), named)
+    candidates = searched(ladders, taken, compared, error, seconds, report)
+    times = times_to_check(sample, candidates)
+    if times > 1 or sample.whole.members > sample.members:
+        reference = reference_on(sample.more(CHECKED, times))
+    finalists = checked(candidates, reference, compared.name, error)
+    prices = reference.sample.kernels.costs([trial.plan for trial, _ in finalists], ROUNDS)
+    priced = list(zip(finalists, prices, strict=True))
+    doubt = cost.disagreement([(trial.candidate.text, price.spread) for (trial, _), price in priced])
     priced.sort(key=lambda pair: pair[1].us_per_vehicle_second)
     (best, expected), price = priced[0]
-    notes = [text] if text else []
-    notes += [noise_text(more)] if more.draws else []
+    notes = [doubt] if doubt else []
+    notes += [noise_text(reference.sample)] if reference.sample.draws else []
     notes += [f"{name} is left out: {why}" for name, why in refused.items() if named]
     if expected > error:
         notes.append(f"no step was found that keeps {error:g} {compared.unit}: {expected:.1e} is expected of the best")
@@ -274,40 +244,71 @@ def suggestion_on(
         run_seconds=seconds_of(ensemble, best.candidate, sample.t1, kernels=sample.kernels) / used,
         threads=used,
         memory_bytes=memory_of(ensemble, best.candidate, sample.t1),
-        members=more.members,
+        members=reference.sample.members,
         t1=sample.t1,
         reference=reference.text,
         reference_error=reference.error(compared.name),
-        rivals=tuple(
-            (rival.candidate, rival_price.us_per_vehicle_second, apart) for (rival, apart), rival_price in priced[1:]
-        ),
+        rivals=tuple((rival.candidate, its.us_per_vehicle_second, apart) for (rival, apart), its in priced[1:]),
         worst=worst_of(best, reference, compared.name),
         asked=compared,
         messages=tuple(notes),
     )
 
 
-def errors_of(trial: Trial, reference: Reference, of: str) -> np.ndarray:
-    """Largest error over the path of each member of a trial.
+def searched(
+    ladders: Ladders, taken: Sequence[str], compared: Distance, error: float, seconds: float,
+    report: Callable[[float], None],
+) -> list[Candidate]:  # fmt: skip
+    """The cheapest settings of a sample that keep the target: of the short list, and of all methods where these fail."""
+    few = list(taken) if ladders.named else short_list(ladders.sample, taken)
+    ladders.climb(few, lambda part: report(0.3 + 0.4 * part))
+    if not ladders.named:
+        stiff = [name for name in STIFFLY_DAMPED if name in taken and name not in few and ladders.limited_by_damping]
+        ladders.climb(stiff)
+        others = [name for name in taken if name not in (*few, *stiff)]
+        ladders.climb(others, lambda part: report(0.7 + 0.1 * part), new_kernels=not ladders.priced)
+    if ladders.priced:
+        return [trial.candidate for trial in ladders.cheapest()[:FINALISTS]]
+    problem = f"error = {error:g} {compared.unit} of {compared.name}: no step of {', '.join(taken)} kept it"
+    if ladders.budget.over:
+        cause = f"{seconds:g} s were over before a step was short enough; try seconds={rounded_up(4.0 * seconds):g}"
+        raise SceneError([f"{cause}. {problem}; or ask for a larger error or a shorter t1"])
+    raise SceneError([f"{problem}; ask for a larger error or a shorter t1"])
 
-    Returns: Errors (n,) [its unit].
+
+def checked(candidates: Sequence[Candidate], reference: Reference, of: str, error: float) -> list[tuple[Trial, float]]:
+    """Settings that keep the error on the reference's sample, their steps shortened for that, with the error expected.
+
+    Where none does, the first one.
     """
+    sample = reference.sample
+
+    def shortened(candidate: Candidate) -> tuple[Trial, float]:
+        return refined(sample, candidate, reference, of, error / SAFETY**0.5, sample.whole.members)
+
+    trials = [shortened(candidate) for candidate in candidates]
+    # Where the sample did not show what float32 rounds off, no shorter step mends it.
+    missed = [candidate for candidate, (_, apart) in zip(candidates, trials, strict=True) if apart > error]
+    trials += [shortened(replace(candidate, dtype="float64")) for candidate in missed if candidate.dtype == "float32"]
+    return [(trial, apart) for trial, apart in trials if apart <= error] or trials[:1]
+
+
+def errors_of(trial: Trial, reference: Reference, of: str) -> np.ndarray:
+    """Largest error over the path of each member of a trial (n,) [its unit]."""
     apart = comparison.distances(trial.result, reference.result, reference.asked)[of]
     return np.asarray(np.max(np.where(np.isnan(apart), 0.0, apart), axis=0))
 
 
 def worst_of(trial: Trial, reference: Reference, of: str, members: int = CONFIRMED // 2) -> tuple[int, ...]:
-    """Find the members of a trial that have the largest errors."""
+    """The members of a trial that have the largest errors."""
     return tuple(int(i) for i in np.argsort(-errors_of(trial, reference, of))[:members])
 
 
 def largest_in_fleet(errors: np.ndarray, members: int) -> float:
-    """Carry the largest error of some members on to a fleet.
+    """Carry the largest error of some members, drawn as those of the fleet are, on to a fleet.
 
     The largest ones fall off as a power of their rank (Hill 1975), which gives the error that a fleet exceeds with a chance of
     CHANCE (Weissman 1978). Tails that end are fallen off faster: for them it is too large, never too small.
-
-    errors: of the members that were checked, drawn as those of the fleet are (n,).
     """
     n = len(errors)
     falling = np.sort(errors)[::-1]
@@ -320,13 +321,9 @@ def largest_in_fleet(errors: np.ndarray, members: int) -> float:
 
 def checked_reference(
     sample: Sample, of: Distance, error: float, seconds: float, taken: Sequence[str], *,
-    make_reference: Callable[..., Reference] = comparison.make_reference, grown: Callable[..., Growth] = growth_of,
+    make_reference: Callable[..., Reference] = make_reference, grown: Callable[..., Growth] = growth_of,
 ) -> Reference:  # fmt: skip
-    """Make a reference that is ten times better than the error up to the end.
-
-    error: error asked for [unit of `of`].
-    seconds: processor time of the whole search, of which the reference gets a part [s].
-    """
+    """Make a reference that is ten times better than the error up to the end; SceneError where there is none."""
     reference = make_reference(sample, of, goal=error / 30.0, seconds=SHARE * seconds)
     apart = reference.error(of.name)
     if apart <= 0.1 * error:
@@ -334,7 +331,7 @@ def checked_reference(
     problem = f"error = {error:g} {of.unit} of {of.name} up to {sample.t1:g} s cannot be checked"
     differ = f"{reference.text} differ by {apart:.1e} {of.unit}"
     if reference.more:
-        cause, remedy = comparison.time_over(seconds, reference.more, SHARE)
+        cause, remedy = time_over(seconds, reference.more, SHARE)
         raise SceneError([f"{cause}; {remedy}. {problem} yet: {differ}; or ask for a larger error or a shorter t1"])
     until = sample.times[reference.reaches(of.name, 0.1 * error)]
     remedy = f"ask for t1 (--duration) up to {until:g} s" if until > 0.0 else "ask for a shorter t1 (--duration)"
@@ -345,7 +342,7 @@ def checked_reference(
 
 
 def short_list(sample: Sample, taken: Sequence[str]) -> list[str]:
-    """List the methods to try first, by what acts in the scene."""
+    """The methods to try first, by what acts in the scene."""
     if sample.noise(taken[0]) != "none":
         names = SHORT["noisy"]
     elif not is_damped(sample.ensemble):
@@ -357,156 +354,8 @@ def short_list(sample: Sample, taken: Sequence[str]) -> list[str]:
     return [name for name in names if name in taken] or list(taken)
 
 
-class Ladders:
-    """A search for the longest step of each method and precision that keeps the target.
-
-    Each method runs one coarse step first. Then the steps are halved in turn until the error is below the target, and
-    lengthened by the slope of the errors. A method is given up where its steps cost twice what the cheapest setting so far
-    does, and a precision where the other one is better.
-
-    target: largest error allowed [unit of `asked`].
-
-    Attributes:
-        priced: (microseconds of one core per vehicle and second, trial) of each setting that keeps the target.
-        looked_at: names of the methods that ran a step, or whose steps cost too much for one.
-    """
-
-    def __init__(
-        self,
-        sample: Sample,
-        reference: Reference,
-        distance: Distance,
-        target: float,
-        budget: Budget,
-        named: bool = False,
-    ):
-        self.sample, self.reference, self.of, self.target = sample, reference, distance.name, target
-        self.budget, self.named = budget, named
-        # A precision whose round-off is near the target is not tried.
-        size = distance.largest(reference.result)
-        coarse = [name for name in PRECISIONS if target > 4.0 * comparison.ROUND_OFF[name] * size]
-        self.dtypes = coarse or ["float64"]
-        self.priced: list[tuple[float, Trial]] = []
-        self.looked_at: set[str] = set()
-        self._compiled = {sample.plan(sample.candidate(name, 1)).spec for name in reference.methods}
-
-    def climb(self, methods: Sequence[str], report: Callable[[float], None] = void, new_kernels: bool = True) -> None:
-        """Search some methods: a step of each in turn."""
-        specs = {
-            (method, dtype): self.sample.plan(self.sample.candidate(method, 1, dtype)).spec
-            for method in methods
-            for dtype in sorted(self.dtypes)
-        }
-        # What costs no compiling comes first, and last what the other precision of the method may spare.
-        order = {
-            method: sorted(sorted(self.dtypes), key=lambda dtype: specs[method, dtype] not in self._compiled)
-            for method in methods
-        }
-        first = sorted(methods, key=lambda method: specs[method, order[method][0]] not in self._compiled)
-        climbing = {method: self._method(method, order[method], specs, new_kernels) for method in first}
-        while climbing:
-            for method in list(climbing):
-                asked = self.named and method not in self.looked_at
-                if (self.budget.over and self.priced and not asked) or next(climbing[method], None) is None:
-                    climbing.pop(method).close()
-                report(1.0 - len(climbing) / len(methods))
-
-    def _method(
-        self, method: str, dtypes: Sequence[str], specs: dict[tuple[str, str], Any], new_kernels: bool
-    ) -> Generator[Trial | str, None, None]:
-        """Search the precisions of a method, one after the other; yields where the next method may take its turn."""
-        known: dict[str, float | None] = {}
-        for dtype in dtypes:
-            if known:
-                yield dtype
-            new = specs[method, dtype] not in self._compiled
-            least = min((price for price, _ in self.priced), default=math.inf)
-            # A step in float32 is cheaper, and its error is no smaller: float64 is for what round-off stopped.
-            if known.get("float32") is not None or known.get("float64", 0.0) in (None, math.inf):
-                continue
-            if new and (not new_kernels or LEAST_FLOAT32 * (known.get("float64") or 0.0) > least):
-                continue
-            self._compiled.add(specs[method, dtype])
-            self.looked_at.add(method)
-            known[dtype] = yield from self.longest(method, dtype)
-
-    def longest(self, method: str, dtype: str) -> Generator[Trial, None, float | None]:
-        """Find the longest step that keeps the target.
-
-        Returns: Its cost [us of one core per vehicle and second]; infinite where steps that might keep the target are too
-            dear, and None where the errors cease to fall.
-        """
-        sample, reference, of, target = self.sample, self.reference, self.of, self.target
-        m, before, worse = sample.coarsest(2.0), math.inf, 0
-        plan = sample.plan_to_price(sample.candidate(method, m, dtype))
-        with self.budget.free():
-            sample.kernels.compile(plan)
-        per_step = step_cost(plan, sample.kernels)
-        while per_step / sample.h(m) < 2.0 * min((price for price, _ in self.priced), default=math.inf):
-            trial = tried(sample, sample.candidate(method, m, dtype), reference, budget=self.budget)
-            size = trial.error(of)
-            if size <= target:
-                best = lengthened(sample, trial, m, before, reference, of, target)
-                # Price the step that was found: where a step iterates, its work depends on its length.
-                self.priced.append((step_cost(best.plan, sample.kernels) / best.candidate.h, best))
-                return self.priced[-1][0]
-            worse = worse + 1 if size > 0.8 * before and before < 0.1 else 0
-            if worse >= 2 or m > 10**7 or self.budget.over or m == sample.allowed(2 * m):
-                return None
-            before = size
-            m = sample.allowed(2 * m)
-            if cost.work_grows(plan):
-                plan = sample.plan_to_price(sample.candidate(method, m, dtype))
-                per_step = step_cost(plan, sample.kernels)
-            yield trial
-        return math.inf
-
-    @property
-    def limited_by_damping(self) -> bool:
-        """Whether the cheapest setting's step is no longer small beside the fastest damping; True where there is none."""
-        trials = self.cheapest()
-        return not trials or h_rates(rates(self.sample.ensemble), trials[0].candidate.h)["drag"] > STIFF
-
-    def cheapest(self) -> list[Trial]:
-        """The trials that keep the target, the cheapest first; those above 1.5 times the cheapest cost are left out."""
-        least = min((price for price, _ in self.priced), default=math.inf)
-        return [trial for price, trial in sorted(self.priced, key=lambda pair: pair[0]) if price < 1.5 * least]
-
-
-def step_cost(plan: Plan, kernels: Kernels) -> float:
-    """Measure what one step of a plan costs."""
-    return kernels.costs([plan], ROUNDS)[0].us_per_vehicle_second * plan.grid.h
-
-
-def lengthened(
-    sample: Sample, good: Trial, m: int, before: float, reference: Reference, of: str, target: float
-) -> Trial:
-    """Lengthen a step towards twice its length as far as the target allows.
-
-    before: error of the step twice as long [unit of `of`].
-    target: largest error allowed [unit of `of`].
-    """
-    low, high, size = m // 2, m, good.error(of)
-    if not math.isfinite(before) or before <= target or low < 1:
-        return good
-    for _ in range(3):
-        slope = math.log(before / max(size, 1e-300)) / math.log(high / low)
-        guess = round(low * (before / target) ** (1.0 / max(slope, 0.5)) + 0.5)
-        guess = sample.allowed(min(max(guess, low + 1), high - 1))
-        if guess <= low or guess >= high or high - low < 0.04 * high:
-            break
-        trial = tried(sample, sample.candidate(good.candidate.method, guess, good.candidate.dtype), reference)
-        if trial.error(of) <= target:
-            good, high, size = trial, guess, trial.error(of)
-        elif math.isfinite(trial.error(of)):
-            low, before = guess, trial.error(of)
-        else:
-            break
-    return good
-
-
 def times_to_check(sample: Sample, candidates: Sequence[Candidate]) -> int:
-    """Find by how much the times of comparison may grow in number for the steps of some settings: 1 where noise acts."""
+    """By how much the times of comparison may grow in number for the steps of some settings: 1 where noise acts."""
     steps = [round(float(sample.spacing) / candidate.h) for candidate in candidates]
     grid = sample.draws or sample.fixed_draws
     allowed = [n for n in range(1, DENSER + 1) if not grid and all(n * -(-m // n) <= SHORTER * m for m in steps)]
@@ -516,11 +365,9 @@ def times_to_check(sample: Sample, candidates: Sequence[Candidate]) -> int:
 def refined(
     sample: Sample, candidate: Candidate, reference: Reference, of: str, target: float, members: int
 ) -> tuple[Trial, float]:
-    """Run a setting on a sample and shorten its step until a whole fleet keeps the target.
+    """Run a setting on a sample and shorten its step until a whole fleet keeps the target, at most six times.
 
-    target: largest error allowed [unit of `of`].
-    Returns: The last trial, and the largest error expected in the fleet [unit of `of`]; after six shorter steps it may still
-        miss the target.
+    Returns: The last trial, and the largest error expected in the fleet.
     """
     m = sample.allowed(math.ceil(float(sample.spacing) / candidate.h * (1.0 - 1e-9)))
     order = 1 if sample.draws else Method(candidate.method).order
@@ -538,11 +385,7 @@ def seconds_of(
     fleet: Ensemble, candidate: Candidate, t1: float, members: int = 256, *, kernels: Kernels = KERNELS,
     timed: Callable[..., np.ndarray] = cost.timed,
 ) -> float:  # fmt: skip
-    """Predict the CPU time of a whole run from that of a few members.
-
-    t1: end time [s].
-    Returns: Time of all members on one core, the scene's samples included and compiling not [s].
-    """
+    """Predict the CPU time of a run of all members from that of a few, with the scene's samples and without compiling [s]."""
     n = min(members, fleet.members)
     plan = make_plan(fleet.subset(range(n)), candidate.resolved(), candidate.h, t1, dtype=candidate.dtype)
     kernels.compile(plan)
@@ -550,11 +393,7 @@ def seconds_of(
 
 
 def memory_of(fleet: Ensemble, candidate: Candidate, t1: float) -> int:
-    """Predict the memory of a run of all members, with the scene's samples.
-
-    t1: end time [s].
-    Returns: Memory of the run and its result [bytes].
-    """
+    """Predict the memory of a run of all members, with the scene's samples [bytes]."""
     grid = make_plan(fleet.subset([0]), candidate.resolved(), candidate.h, t1, dtype=candidate.dtype).grid
     a_sample = 18 * np.dtype(machine.DTYPES[candidate.dtype]).itemsize
     return fleet.members * (len(grid.times) * a_sample + BYTES_OF_A_MEMBER)
@@ -565,12 +404,11 @@ def verified(
 ) -> tuple[float, int]:
     """Measure the error of a finished run by running some of its members again with half the step.
 
-    The members are those with the largest errors in the search, then the first ones. A method of order p is 2^p times
-    better at half the step, so the difference between the runs is the error but for one part in 2^p. Where noise acts, the
-    members are run with both steps on one path, drawn at each of the shorter ones; errors are of order 1, and what each
-    halving changes is independent, so that squares add up.
+    The members are those with the largest errors in the search, then the first ones. At half the step a method of order p is
+    2^p times better, so the difference is the error but for one part in 2^p. In noise both steps see one path, drawn at
+    each shorter one; errors are of order 1, and what each halving changes is independent, so that squares add up.
 
-    Returns: (error, members): largest error over these members and all samples [found.unit], and how many members they are.
+    Returns: The largest error over these members and all samples, and how many members they are.
     """
     candidate = suggestion.setting
     chosen = list(dict.fromkeys((*suggestion.worst, *range(fleet.members))))[:CONFIRMED]

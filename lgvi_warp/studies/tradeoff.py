@@ -3,20 +3,17 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
 
 from lgvi_warp.common.arguments import listed
 from lgvi_warp.common.errors import Faults, SceneError
-from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.progress import callback, shows_progress
-from lgvi_warp.engine.plan import Plan
 from lgvi_warp.methods.method import COMPOSITIONS, PROGRAMS, Method
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.results.result import Result
@@ -24,29 +21,21 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies import comparison, cost
 from lgvi_warp.studies.budget import Budget
-from lgvi_warp.studies.comparison import Candidate, Growth, Reference, Sample
+from lgvi_warp.studies.comparison import Candidate, Sample
 from lgvi_warp.studies.distance import QUANTITIES, Distance, compared_in
 from lgvi_warp.studies.files import Saved, finite_or_none, with_missing_as
+from lgvi_warp.studies.reference import LOST, Growth, Reference, make_reference, measured_growth, time_over
 from lgvi_warp.studies.speed import void
+from lgvi_warp.studies.trials import TRUST, Trial, trials_of, tried
 
 # Tried in this order; those that a scene refuses are left out.
 CANDIDATES = ("kl8(psi_x)", "psi_x", "psi_s", "su4(psi_x)", "kl6(psi_x)", "rk8", "su8_15(psi_x)", "ss6_13(psi_x)",
               "rkn6_11", "rkn6_14", "bm6(psi_x)", "bm4(psi_x)", "rk5", "rk4", "rkw3", "psi_1", "psi", "psi_w", "kl8(psi_s)",
               "kl6(psi_s)", "su4(psi_s)", "phi")  # fmt: skip
-# Solvers of equation (24) besides the default, tried for one method that solves it.
-SOLVERS: tuple[tuple[str, int | None], ...] = (("quartic", 1), ("cayley", None), ("newton", None))
-SOLVED_BY = "psi_s"
-PRECISIONS = tuple(name for name in DTYPES if name in ("float64", "float32"))
-# Methods tried last, with state sums of two float32 numbers.
-COMPENSATED = ("psi_x", "psi_s", "su4(psi_x)", "kl6(psi_x)")
-# Quantities whose errors decide when a series of halved steps has reached round-off.
-DECIDING = ("position", "attitude")
-# Errors shown are at least this many times the reference's own.
-TRUST = 10.0
 # Part of a trade-off's time that its reference gets.
 SHARE = 0.3
-# A series of halved steps ends where another setting is as accurate in this many times less time.
-HOPELESS = 10.0
+# How errors of members are reduced to a number.
+KINDS = ("end_max", "end_rms", "path_max", "path_rms")
 
 
 @dataclass(frozen=True)
@@ -55,12 +44,12 @@ class Measurement:
 
     Attributes:
         setting: method, step, precision and solver.
-        us_per_vehicle_second: microseconds of one core per vehicle and simulated second, without compiling (see cost.py).
+        us_per_vehicle_second: microseconds of one core per vehicle and simulated second, without compiling.
         compile_seconds: time to load its kernel, once a process [s].
         errors: quantity -> {"end_max", "end_rms", "path_max", "path_rms"} over the members, in the units of
             Tradeoff.units; empty where a member failed or noise acts.
         energy_drift: largest |E(t) - E(0)| [J]; NaN where a force of the scene supplies or takes energy.
-        biases: difference of means and spreads in standard errors, see comparison.biases.
+        biases: difference of means and spreads in standard errors, by name, such as "position_mean".
         order: order of the method.
         trusted: quantity -> whether the error is at least ten times that of the reference.
         cost_spread: median of the cost's readings over the least, which is taken.
@@ -77,9 +66,15 @@ class Measurement:
     cost_spread: float = 1.0
 
     def error(self, of: str = "position", kind: str = "path_max") -> float:
-        """Look up one error of this setting.
+        """Give one error of this setting.
 
-        Returns: The error [unit of `of`]; infinite where there is none.
+        Args:
+            of: name of the quantity. Default "position".
+            kind: "end_max", "end_rms", "path_max" or "path_rms": largest or root mean square of the members, at the end or
+                over the path. Default "path_max".
+
+        Returns:
+            The error, in the unit of the quantity; infinite where there is none.
         """
         return self.errors.get(of, {}).get(kind, math.inf)
 
@@ -136,11 +131,7 @@ class Tradeoff(Saved):
         faults.choice("of", of, (self.of, *self.units))
         faults.choice("kind", kind, KINDS)
         faults.raise_if_any()
-        good = [
-            measurement
-            for measurement in self.measurements
-            if np.isfinite(measurement.error(of, kind)) and measurement.trusted.get(of)
-        ]
+        good = [entry for entry in self.measurements if np.isfinite(entry.error(of, kind)) and entry.trusted.get(of)]
         return sorted(good, key=lambda measurement: measurement.us_per_vehicle_second)
 
     def front(self, of: str | None = None, kind: str = "path_max") -> list[Measurement]:
@@ -160,47 +151,22 @@ class Tradeoff(Saved):
         return front
 
     def to_dict(self) -> dict[str, Any]:
-        """Convert the trade-off to plain types for JSON.
-
-        Returns:
-            All fields, and "front", the settings on the Pareto front; numbers that are not finite are None.
-        """
         return finite_or_none(asdict(self) | {"front": [asdict(measurement.setting) for measurement in self.front()]})
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Tradeoff:
-        """Build a trade-off from the content of a JSON file.
-
-        Args:
-            content: as `to_dict` returns it.
-
-        Returns:
-            The trade-off; errors and times that were not finite are infinite, other numbers NaN.
-        """
-        measured = []
-        for row in content["measurements"]:
-            ends = {name: with_missing_as(row[name], math.nan) for name in ("energy_drift", "biases")}
-            fields = (
-                row
-                | ends
-                | {"setting": Candidate(**row["setting"]), "errors": with_missing_as(row["errors"], math.inf)}
-            )
-            measured.append(Measurement(**fields))
+        # Errors and times that were not finite were infinite, other numbers NaN.
         growth = content["growth"]
         if growth is not None:
             times = {name: with_missing_as(growth[name], math.inf) for name in ("doubling", "predictable")}
             curves = {name: np.array(with_missing_as(growth[name], math.nan)) for name in ("times", "curve")}
             growth = Growth(**growth | times | curves | {"rate": with_missing_as(growth["rate"], math.nan)})
+        measured = tuple(_measurement(row) for row in content["measurements"])
         values = {name: entry for name, entry in content.items() if name != "front"}
-        values |= {"measurements": tuple(measured), "growth": growth, "messages": tuple(content["messages"])}
+        values |= {"measurements": measured, "growth": growth, "messages": tuple(content["messages"])}
         return cls(**values | {"reference_error": with_missing_as(content["reference_error"], math.inf)})
 
     def rows(self) -> list[dict[str, Any]]:
-        """Flatten the measurements to one record each, as the CSV file has them.
-
-        Returns:
-            Records of setting, order, front, cost, errors of every quantity and kind, energy drift and biases.
-        """
         on_front = {measurement.setting for measurement in self.front()}
         rows = []
         for measurement in self.measurements:
@@ -216,70 +182,14 @@ class Tradeoff(Saved):
         return rows
 
 
-KINDS = ("end_max", "end_rms", "path_max", "path_rms")
-
-
-@dataclass(eq=False)
-class Trial:
-    """A setting that was run on a sample.
-
-    Attributes:
-        candidate: method, step, precision and solver.
-        plan: its plan, by which its cost is measured: noise without a noise_step of the scene is drawn once a step.
-        result: the result at the sample's times.
-        errors: quantity -> kind -> error; empty where a member failed or there is no reference.
-        cpu_seconds: processor time of the run, without compiling [s].
-    """
-
-    candidate: Candidate
-    plan: Plan
-    result: Result
-    errors: dict[str, dict[str, float]]
-    cpu_seconds: float
-
-    def error(self, of: str) -> float:
-        """Return the largest error over members and path.
-
-        Returns: The error [unit of `of`]; infinite where a member failed or there is no reference.
-        """
-        return self.errors[of]["path_max"] if self.errors else math.inf
-
-
-def tried(
-    sample: Sample,
-    candidate: Candidate,
-    reference: Reference | None,
-    until: int = -1,
-    budget: Budget | None = None,
-) -> Trial:
-    """Run a setting on a sample and measure its errors.
-
-    reference: what errors are measured against; None for no errors.
-    until: index of the last sample that is compared. Default: the last of all.
-    budget: what compiling does not count in. Default: none.
-    """
-    plan = sample.plan(candidate)
-    with budget.free() if budget else contextlib.nullcontext():
-        compile_seconds = sample.kernels.compile(plan)
-    with np.errstate(all="ignore"):
-        begun = sample.kernels.clock()
-        result = replace(sample.kernels.run(plan), compile_seconds=compile_seconds)
-        cpu_seconds = sample.kernels.clock() - begun
-        errors: dict[str, dict[str, float]] = {}
-        if reference is not None and not comparison.failed(result):
-            until = until % len(sample.times)
-            errors = comparison.errors(comparison.distances(result, reference.result, reference.asked), until)
-            if not all(np.isfinite(norms["path_max"]) for norms in errors.values()):
-                errors = {}
-    return Trial(candidate, sample.plan_to_price(candidate), result, errors, cpu_seconds)
+def _measurement(row: dict[str, Any]) -> Measurement:
+    numbers = {name: with_missing_as(row[name], math.nan) for name in ("energy_drift", "biases")}
+    errors = with_missing_as(row["errors"], math.inf)
+    return Measurement(**row | numbers | {"setting": Candidate(**row["setting"]), "errors": errors})
 
 
 def chosen_methods(methods: Sequence[str] | None, default: Sequence[str] = CANDIDATES) -> tuple[str, ...]:
-    """Check the names of the methods to try.
-
-    methods: names; None for the default ones.
-    default: names used for None.
-    """
+    """The names of the methods to try: those given, if all are known, or the default ones."""
     if methods is None:
         return tuple(default)
     faults, names = Faults(), listed("methods", methods, "methods")
@@ -352,7 +262,7 @@ def tradeoff(
 
 def tradeoff_on(
     sample: Sample, compared: Distance, names: Sequence[str], seconds: float, report: Callable[[float], None],
-    named: bool, *, make_reference: Callable[..., Reference] = comparison.make_reference,
+    named: bool, *, make_reference: Callable[..., Reference] = make_reference,
     grown: Callable[..., Growth] | None = None,
 ) -> Tradeoff:  # fmt: skip
     """Measure methods on a sample, as `tradeoff` says; named: whether they were asked for by name."""
@@ -367,16 +277,13 @@ def tradeoff_on(
         messages.append("noise acts, whose path differs from step to step: only statistics are compared")
         finest = tried(sample, sample.candidate(taken[0], 32 * sample.coarsest(0.5)), None).result
     else:
-        reference = make_reference(
-            sample, compared, seconds=SHARE * seconds, report=lambda fraction: report(0.2 * fraction)
-        )
+        reference = make_reference(sample, compared, seconds=SHARE * seconds, report=lambda part: report(0.2 * part))
         sample, finest = reference.sample, reference.result
         if noise == "grid":
             messages.append(noise_text(sample))
     if reference and noise == "grid" and reaches_nothing(reference, compared):
-        messages.append(
-            f"{reference.text} differ by {reference.error(compared.name):.1e}: only statistics are compared"
-        )
+        apart = reference.error(compared.name)
+        messages.append(f"{reference.text} differ by {apart:.1e}: only statistics are compared")
         reference = None
     if reference:
         until = trusted_until(reference, compared, seconds)
@@ -385,7 +292,7 @@ def tradeoff_on(
             text = f"errors of single members are up to {sample.times[until]:g} s, where the reference still agrees"
             messages.append(f"{text} with itself; beyond it only statistics are meaningful")
     budget = Budget(0.6 * seconds)
-    trials, skipped = sweep(
+    trials, skipped = trials_of(
         sample, taken, reference, until, budget, whole, lambda part: report(0.2 + 0.6 * part), named
     )
     if skipped:
@@ -414,17 +321,10 @@ def tradeoff_on(
 
 
 def without_reading(
-    names: Sequence[str],
-    trials: Sequence[Trial],
-    measured: Sequence[Measurement],
-    refused: dict[str, str],
+    names: Sequence[str], trials: Sequence[Trial], measured: Sequence[Measurement], refused: dict[str, str],
     seconds: float,
-) -> dict[str, str]:
-    """Name the methods that were asked for and have no measurement.
-
-    seconds: processor time of the whole trade-off [s].
-    """
-    there = {measurement.setting.method for measurement in measured}
+) -> dict[str, str]:  # fmt: skip
+    """The methods that were asked for and have no measurement, and why."""
 
     def why(name: str) -> str:
         least = min(trial.candidate.h for trial in trials if trial.candidate.method == name)
@@ -432,11 +332,12 @@ def without_reading(
             f"members failed at every step down to {least:.4g} s; for shorter ones give more seconds than {seconds:g}"
         )
 
-    return {name: refused.get(name) or why(name) for name in dict.fromkeys(names) if name not in there}
+    missing = set(names) - {measurement.setting.method for measurement in measured}
+    return {name: refused.get(name) or why(name) for name in names if name in missing}
 
 
 def growth_of(
-    sample: Sample, taken: Sequence[str], reference: Reference, *, measure: Callable[..., Growth] = comparison.growth
+    sample: Sample, taken: Sequence[str], reference: Reference, *, measure: Callable[..., Growth] = measured_growth
 ) -> Growth:
     """Measure how errors grow, by the method of highest order at about the reference's step."""
     method = max(taken, key=lambda name: Method(name).order)
@@ -446,193 +347,38 @@ def growth_of(
 
 
 def noise_text(sample: Sample) -> str:
-    """Say how the runs of a comparison share their noise."""
+    """How the runs of a comparison share their noise, in words."""
     every = f"{sample.h(sample.draws):.4g} s"
     return f"noise acts: all runs see one path of it, drawn every {every}; errors by paths are of order 1"
 
 
 def reaches_nothing(reference: Reference, of: Distance) -> bool:
-    """Tell whether a reference is too rough for errors of members even at the first time."""
-    return reference.reaches(of.name, comparison.LOST / (TRUST * TRUST)) < 1
+    """True if a reference is too rough for errors of members even at the first time."""
+    return reference.reaches(of.name, LOST / (TRUST * TRUST)) < 1
 
 
 def trusted_until(reference: Reference, of: Distance, seconds: float) -> int:
-    """Find the last sample at which errors below 1e-2 can be measured.
+    """Index of the last sample at which errors below 1e-2 can be measured; SceneError without one.
 
-    seconds: time of the whole trade-off, for the message [s].
+    seconds: of the whole trade-off, for the message [s].
     """
-    until = reference.reaches(of.name, comparison.LOST / (TRUST * TRUST))
+    until = reference.reaches(of.name, LOST / (TRUST * TRUST))
     if reaches_nothing(reference, of):
         apart = reference.own[of.name][1]
         end = reference.result.time[1]
         problem = f"no reference: {reference.text} differ by {apart:.2g} {of.unit} after {end:g} s"
         if reference.more:
-            cause, remedy = comparison.time_over(seconds, reference.more, SHARE)
+            cause, remedy = time_over(seconds, reference.more, SHARE)
             raise SceneError([f"{cause}; {remedy}. There is {problem}; or give a shorter t1 (--duration)"])
         raise SceneError([f"{problem}, and agree no better with shorter steps; give a shorter t1 (--duration)"])
     return until
 
 
-@dataclass
-class Series:
-    """Steps of one setting, each half of the one before.
-
-    Attributes:
-        method: name of the method.
-        dtype: precision.
-        solver: (name, iterations) of the solver of equation (24).
-        m: number of steps in the sample's spacing.
-        best: least error of the steps so far, the larger of position [m] and attitude [rad].
-        worse: number of steps in a row that gained little.
-        rungs: number of steps tried.
-    """
-
-    method: str
-    dtype: str
-    solver: tuple[str, int | None]
-    m: int
-    best: float = math.inf
-    worse: int = 0
-    rungs: int = 0
-
-
-def sweep(
-    sample: Sample,
-    methods: Sequence[str],
-    reference: Reference | None,
-    until: int,
-    budget: Budget,
-    whole: Budget,
-    report: Callable[[float], None],
-    named: bool = False,
-    *,
-    solvers: Sequence[tuple[str, int | None]] | None = None,
-    compensated: Sequence[str] | None = None,
-) -> tuple[list[Trial], list[str]]:
-    """Run every method, precision and solver: each at a coarse step first, then in turn at half the step before.
-
-    Args:
-        sample: members and times.
-        methods: names of the methods, in this order.
-        reference: what errors are measured against; None where noise acts.
-        until: index of the last sample that is compared.
-        budget: of the runs.
-        whole: of the whole study, compiling included: once it is over, nothing is compiled that is not asked for by name.
-        report: called with the fraction of the time or of the first settings that is done.
-        named: whether the methods were asked for by name: then each begins, however long its kernel compiles.
-        solvers: (name, iterations) of the solvers that are tried as well; default None, SOLVERS.
-        compensated: names of the methods that are tried in compensated float32 as well; default None, COMPENSATED.
-
-    Returns:
-        (trials, skipped): the trials, and the names of the settings that there was no time for.
-    """
-    solvers = SOLVERS if solvers is None else solvers
-    waiting = series_of(sample, methods, solvers, COMPENSATED if compensated is None else compensated)
-    trials: list[Trial] = []
-    skipped: list[str] = []
-    begun: set[str] = set()
-    count = len(waiting)
-    for i, one in enumerate(list(waiting)):
-        report(0.5 * i / count)
-        asked = named and one.method not in begun
-        if trials and not asked and (whole.over or budget.over):
-            waiting.remove(one)
-            skipped.append(sample.candidate(one.method, one.m, one.dtype, one.solver).text)
-            continue
-        begun.add(one.method)
-        if not halved(sample, one, trials, reference, until, budget):
-            waiting.remove(one)
-    while waiting:
-        for one in list(waiting):
-            report(0.5 + 0.5 * min(1.0, budget.spent / budget.seconds))
-            if budget.over:
-                waiting.remove(one)
-                skipped.append(sample.candidate(one.method, one.m, one.dtype, one.solver).text + " at fine steps")
-            elif not halved(sample, one, trials, reference, until, budget):
-                waiting.remove(one)
-    if reference is not None:
-        between(sample, trials, reference, until, budget)
-    return trials, skipped
-
-
-def series_of(
-    sample: Sample, methods: Sequence[str], solvers: Sequence[tuple[str, int | None]], compensated: Sequence[str]
-) -> list[Series]:
-    """List the series of settings, the default precision of every method first."""
-    plain: tuple[str, int | None] = ("quartic", None)
-    settings = [(name, dtype, plain) for dtype in PRECISIONS for name in methods]
-    settings += [(SOLVED_BY, "float64", solved) for solved in solvers if SOLVED_BY in methods]
-    summed, _ = sample.accepted([name for name in compensated if name in methods], "float32_compensated")
-    settings += [(name, "float32_compensated", plain) for name in summed]
-    return [Series(*setting, sample.coarsest(1.0)) for setting in settings]
-
-
-def halved(
-    sample: Sample, series: Series, trials: list[Trial], reference: Reference | None, until: int, budget: Budget
-) -> bool:
-    """Run the next step of a series.
-
-    reference: what errors are measured against; None where noise acts.
-    """
-    trial = tried(
-        sample, sample.candidate(series.method, series.m, series.dtype, series.solver), reference, until, budget
-    )
-    trials.append(trial)
-    series.rungs += 1
-    finer = sample.allowed(2 * series.m)
-    if finer == series.m or series.rungs == (20 if reference else 5):
-        return False
-    series.m = finer
-    if reference is None:
-        return True
-    error = max(trial.error(of) for of in DECIDING)
-    series.worse = series.worse + 1 if error > 0.8 * series.best and series.best < 0.1 else 0
-    series.best = min(series.best, error)
-    noise = TRUST * max(reference.error(of, until) for of in DECIDING)
-    longest = budget.seconds / 40.0
-    return not (series.worse >= 2 or error < noise or trial.cpu_seconds > longest or is_dominated(trial, trials))
-
-
-def is_dominated(trial: Trial, trials: Sequence[Trial]) -> bool:
-    """Tell whether another setting was more accurate in a tenth of the time."""
-    error = max(trial.error(of) for of in DECIDING)
-    rivals = (rival for rival in trials if HOPELESS * rival.cpu_seconds < trial.cpu_seconds)
-    return math.isfinite(error) and any(max(rival.error(of) for of in DECIDING) < error for rival in rivals)
-
-
-def between(
-    sample: Sample, trials: list[Trial], reference: Reference, until: int, budget: Budget, *,
-    run: Callable[..., Trial] = tried,
-) -> None:  # fmt: skip
-    """Add trials near the Pareto front, at steps between those already tried."""
-    ranked = sorted((trial.cpu_seconds, trial.error(DECIDING[0]), i) for i, trial in enumerate(trials))
-    best, near = math.inf, list[Trial]()
-    for _, error, i in ranked:
-        if error < best:
-            best = error
-            near.append(trials[i])
-    tried_already = {trial.candidate for trial in trials}
-    for trial in near:
-        m = round(float(sample.spacing) / trial.candidate.h)
-        for step in {round(m / math.sqrt(2.0)), round(m * math.sqrt(2.0))} - {0}:
-            candidate = replace(trial.candidate, h=sample.h(sample.allowed(step)))
-            if candidate not in tried_already and not budget.over:
-                tried_already.add(candidate)
-                trials.append(run(sample, candidate, reference, until, budget))
-
-
 def measurements(
-    sample: Sample,
-    trials: Sequence[Trial],
-    reference: Reference | None,
-    finest: Result,
-    until: int,
+    sample: Sample, trials: Sequence[Trial], reference: Reference | None, finest: Result, until: int,
     distance: Distance | None = None,
-) -> list[Measurement]:
-    """Measure the cost of the trials and collect their errors, drifts and biases.
-
-    reference: what errors are measured against; None where noise acts.
-    """
+) -> list[Measurement]:  # fmt: skip
+    """Cost, errors, drifts and biases of the trials that did not fail; without a reference, no errors."""
     good = [trial for trial in trials if not comparison.failed(trial.result) and (trial.errors or reference is None)]
     compiled: dict[tuple[str, str], float] = {}
     for trial in trials:
@@ -662,7 +408,7 @@ def measurements(
 
 
 def report_text(tradeoff: Tradeoff) -> str:
-    """Write the trade-off as a text of several lines."""
+    """The trade-off as a text of several lines."""
     unit = tradeoff.units[tradeoff.of]
     lines = [f"missing     {name}: {why}" for name, why in tradeoff.missing.items()]
     lines += [f"note        {message}" for message in tradeoff.messages]
@@ -695,7 +441,7 @@ def report_text(tradeoff: Tradeoff) -> str:
 
 
 def growth_text(growth: Growth) -> str:
-    """Describe how errors grow, in words."""
+    """How errors grow, in words."""
     if not np.isfinite(growth.rate):
         return "unknown: a difference of 1e-8 rad grows beyond measure at once"
     if growth.power is not None:
@@ -703,19 +449,16 @@ def growth_text(growth: Growth) -> str:
                 "trajectories are meaningful throughout")  # fmt: skip
     until = ", ".join(f"{dtype} to about {t:.3g} s" for dtype, t in growth.predictable.items())
     return (f"errors double every {growth.doubling:.3g} s (rate {growth.rate:.2g} /s, {growth.factor:.2g} times in this run). "
-            f"One round-off reaches {comparison.LOST:g}: {until}; beyond, compare statistics only")  # fmt: skip
+            f"One round-off reaches {LOST:g}: {until}; beyond, compare statistics only")  # fmt: skip
 
 
 def bias_lines(tradeoff: Tradeoff) -> list[str]:
-    """Write a table of the statistics' biases against the step.
+    """A table of the statistics' biases against the step.
 
-    The table is of one method in float64 with the default solver: the first of order 2, or of the order nearest to it.
+    It is of one method in float64 with the default solver: the first of order 2, or of the order nearest to it.
     """
-    double = [
-        measurement
-        for measurement in tradeoff.measurements
-        if measurement.biases and measurement.setting.dtype == "float64" and measurement.setting.plain
-    ]
+    double = [entry for entry in tradeoff.measurements
+              if entry.biases and entry.setting.dtype == "float64" and entry.setting.plain]  # fmt: skip
     if not double:
         return []
     name = min(double, key=lambda measurement: abs(measurement.order - 2)).setting.name

@@ -9,9 +9,12 @@ import pytest
 import lgvi_warp as lw
 from tests.support.public import NAMED
 
-PUBLIC = NAMED | {f"plots.{name}": getattr(lw.plots, name) for name in lw.plots.__all__}
+PUBLIC = NAMED | {
+    f"{door}.{name}": getattr(getattr(lw, door), name) for door in ("plots", "uq") for name in getattr(lw, door).__all__
+}
 # Those whose kernels no other quick test needs, or that search.
-LONG = {"Until", "linearize", "lqr", "stability_map", "sweep", "tradeoff", "trim", "tune_gains", "worst_case"}
+LONG = {"Until", "linearize", "lqr", "stability_map", "sweep", "term_cost", "tradeoff", "trim", "tune_gains",
+        "worst_case"}  # fmt: skip
 
 
 def examples() -> dict[str, doctest.DocTest]:

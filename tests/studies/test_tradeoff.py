@@ -22,10 +22,14 @@ from lgvi_warp import cli
 from lgvi_warp.studies import comparison, cost
 from lgvi_warp.studies import suggest as suggestion
 from lgvi_warp.studies import tradeoff as tradeoffs
+from lgvi_warp.studies import trials as settings
 from lgvi_warp.studies.budget import Budget
 from lgvi_warp.studies.comparison import Sample
 from lgvi_warp.studies.distance import compared_in
+from lgvi_warp.studies.ladders import Ladders
+from lgvi_warp.studies.reference import fitted, make_reference, measured_growth
 from lgvi_warp.studies.speed import void
+from lgvi_warp.studies.trials import TRUST, tried
 from tests.conftest import ROOT
 from tests.support.random_scenes import judged, random_scene
 
@@ -41,7 +45,7 @@ ENOUGH = 1e4
 @pytest.fixture(scope="module", autouse=True)
 def kernels_of_other_tests():
     """No kernel that this file alone would load: psi_s compensated, with one solver."""
-    with mock.patch.multiple(tradeoffs, COMPENSATED=("psi_s",), SOLVERS=()):
+    with mock.patch.multiple(settings, COMPENSATED=("psi_s",), SOLVERS=()):
         yield
 
 
@@ -69,7 +73,7 @@ def test_the_front_is_monotone_and_nothing_beats_it(found, of, kind):
 def test_what_is_shown_is_ten_times_the_reference(found):
     for of in ("position", "attitude", "velocity"):
         least = min(one.error(of) for one in found.shown(of))
-        assert least >= tradeoffs.TRUST * found.reference_error[of] > 0.0
+        assert least >= TRUST * found.reference_error[of] > 0.0
 
 
 @pytest.mark.parametrize(("method", "order", "least"), [("psi_s", 2, 1e-9), ("su4(psi_x)", 4, 1e-9)])
@@ -83,7 +87,7 @@ def test_errors_scale_with_the_order(found, method, order, least):
 
 def test_the_reference_is_the_truth(found, scene):
     sample = Sample(scene, 4.0)
-    reference = comparison.make_reference(sample, seconds=ENOUGH)
+    reference = make_reference(sample, seconds=ENOUGH)
     other = sample.run(sample.candidate("kl6(psi_x)", 40))
     apart = comparison.errors(comparison.distances(other, reference.result), -1 + len(sample.times))
     assert apart["position"]["path_max"] < 1e-11
@@ -92,7 +96,7 @@ def test_the_reference_is_the_truth(found, scene):
 
 def test_a_bad_reference_is_refused(scene):
     def bad(sample, of="position", **_):
-        return comparison.make_reference(sample, of, goal=1e9, methods=("psi_s", "su4(psi_x)"))
+        return make_reference(sample, of, goal=1e9, methods=("psi_s", "su4(psi_x)"))
 
     sample, position = Sample(scene, 40.0), compared_in("position")
     with pytest.raises(lw.SceneError, match=r"no reference: su4\(psi_x\) at h = .* differ by .*shorter t1"):
@@ -103,9 +107,9 @@ def test_a_bad_reference_is_refused(scene):
 
 def test_a_reference_that_agrees_with_itself_less_hides_more(scene):
     sample = Sample(scene, 4.0)
-    reference = comparison.make_reference(sample, goal=1e-4, methods=METHODS, seconds=ENOUGH)
+    reference = make_reference(sample, goal=1e-4, methods=METHODS, seconds=ENOUGH)
     worse = dataclasses.replace(reference, own={name: own * 1e4 for name, own in reference.own.items()})
-    trials = [tradeoffs.tried(sample, sample.candidate("psi_s", m), reference) for m in (4, 8)]
+    trials = [tried(sample, sample.candidate("psi_s", m), reference) for m in (4, 8)]
     last = len(sample.times) - 1
     for one, shown in ((reference, True), (worse, False)):
         measured = tradeoffs.measurements(sample, trials, one, one.result, last)
@@ -118,7 +122,7 @@ def test_one_cost_a_step_for_each_kernel(found):
         by_kernel.setdefault((one.setting.name, one.setting.dtype), []).append(
             one.us_per_vehicle_second * one.setting.h
         )
-    assert len(by_kernel) == 2 * len(METHODS) + len(set(METHODS) & set(tradeoffs.COMPENSATED))
+    assert len(by_kernel) == 2 * len(METHODS) + len(set(METHODS) & set(settings.COMPENSATED))
     assert all(np.ptp(steps) <= 1e-12 * max(steps) for steps in by_kernel.values())
     assert any(len(steps) > 3 for steps in by_kernel.values())
     doubtful = [one for one in found.measurements if one.cost_spread > cost.DISAGREE]
@@ -129,9 +133,9 @@ def test_cpu_time_is_that_of_the_run(scene):
     """Also where the run is asked for by the main thread: a hundred thousand times the steps take longer."""
     sample = Sample(scene, 4.0, 8)
     few, many = (sample.candidate("psi_s", m) for m in (4, 400_000))
-    tried = [tradeoffs.tried(sample, one, None).cpu_seconds for one in (few, many)]
+    seconds = [tried(sample, one, None).cpu_seconds for one in (few, many)]
     predicted = [suggestion.seconds_of(sample.ensemble, one, 4.0) for one in (few, many)]
-    assert tried[1] > 5.0 * tried[0]
+    assert seconds[1] > 5.0 * seconds[0]
     assert predicted[1] > 5.0 * predicted[0]
 
 
@@ -173,13 +177,13 @@ def test_few_methods_are_tried_first_by_what_acts(vehicle, terms, names):
 def test_a_search_compiles_only_what_may_be_cheaper(scene, monkeypatch):
     """Costs are made up; of all kernels that of psi_s in float64 alone is there, from the reference."""
     sample = Sample(scene, 4.0, 8)
-    reference = comparison.make_reference(sample, methods=("psi_s", "psi_s"), seconds=ENOUGH, goal=1.0)
+    reference = make_reference(sample, methods=("psi_s", "psi_s"), seconds=ENOUGH, goal=1.0)
     asked = suggestion.compared_in("position")
 
     def climbed(prices, methods, **settings):
         climbs = []
 
-        class Priced(suggestion.Ladders):
+        class Priced(Ladders):
             def longest(self, method, dtype):
                 climbs.append((method, dtype[5:]))
                 price = prices[climbs[-1]]
@@ -212,7 +216,7 @@ def test_compositions_of_one_method_share_a_kernel(scene):
 def test_growth_begins_at_one(scene):
     """The two starts differ by the angle that the curve is divided by, and by nothing else."""
     sample = Sample(scene, 4.0, 8)
-    grown = comparison.growth(sample, sample.candidate("psi_s", 8))
+    grown = measured_growth(sample, sample.candidate("psi_s", 8))
     assert grown.curve[0] == pytest.approx(1.0, rel=1e-6)
 
 
@@ -227,12 +231,12 @@ def test_steps_near_the_front_are_between_those_tried_first(found):
 
 def test_growth_of_exponential_and_power():
     t = np.linspace(0.0, 50.0, 21)
-    grown = comparison.fitted(t, np.exp(0.3 * t), 50.0)
+    grown = fitted(t, np.exp(0.3 * t), 50.0)
     assert grown.power is None
     assert math.isclose(grown.doubling, math.log(2.0) / 0.3, rel_tol=1e-9)
     assert math.isclose(grown.predictable["float64"], math.log(1e-2 / 2.0**-53) / 0.3, rel_tol=1e-6)
     assert grown.predictable["float32"] <= 42.5  # within the run
-    slow = comparison.fitted(t, 1.0 + 2.0 * t, 50.0)
+    slow = fitted(t, 1.0 + 2.0 * t, 50.0)
     assert slow.power is not None
     assert slow.doubling == math.inf
     assert slow.predictable["float64"] == math.inf
@@ -388,7 +392,7 @@ def test_a_suggestion_keeps_the_error(seed):
     fleet, asked = random_scene(seed)
     found = lw.suggest(fleet, **asked, methods=METHODS, seconds=60.0)
     sample = Sample(fleet, asked["t1"], fleet.members)
-    reference = comparison.make_reference(sample, asked["of"], asked["error"] / 100.0)
+    reference = make_reference(sample, asked["of"], asked["error"] / 100.0)
     times = lw.SaveAt(at=list(sample.times[1:]))
     result = lw.solve(fleet, t1=asked["t1"], save=times, threads=1, **found.settings)
     apart = comparison.distances(result, reference.result)[asked["of"]]

@@ -4,10 +4,11 @@
 import numpy as np
 
 import lgvi_warp as lw
-from lgvi_warp.studies import comparison
 from lgvi_warp.studies import suggest as suggestion
-from lgvi_warp.studies import tradeoff as tradeoffs
+from lgvi_warp.studies.comparison import Sample
 from lgvi_warp.studies.cost import costs
+from lgvi_warp.studies.reference import make_reference
+from lgvi_warp.studies.trials import PRECISIONS, tried
 
 
 def random_scene(seed):
@@ -51,15 +52,15 @@ def judged(fleet, found, asked, rounds=5):
 
     The best is searched for in steps 1.2 times apart, for every method of the paper's family in both precisions.
     """
-    sample = comparison.Sample(fleet, asked["t1"], fleet.members, suggestion.TIMES)
-    reference = comparison.make_reference(sample, asked["of"], asked["error"] / 100.0)
-    own = tradeoffs.tried(sample, found.setting, reference)
+    sample = Sample(fleet, asked["t1"], fleet.members, suggestion.TIMES)
+    reference = make_reference(sample, asked["of"], asked["error"] / 100.0)
+    own = tried(sample, found.setting, reference)
     good = [own]
     for method in METHODS:
-        for dtype in tradeoffs.PRECISIONS:
+        for dtype in PRECISIONS:
             m, last = sample.coarsest(3.0), None
             while sample.h(m) > 0.5 * found.setting.h * len(lw.Method(method).stages) / len(own.plan.method.stages):
-                one = tradeoffs.tried(sample, sample.candidate(method, m, dtype), reference)
+                one = tried(sample, sample.candidate(method, m, dtype), reference)
                 if one.error(asked["of"]) <= asked["error"]:
                     last = one
                     break

@@ -164,7 +164,7 @@ class _Column:
 
 
 def entries_of(estimate: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarray]]]:
-    """List the distributions of the single entries of a variation."""
+    """The distributions of the single entries of a variation, with the base and the numbers of each."""
     (base,) = estimate.bases
     distribution = estimate.distribution
     numbers = {name: np.broadcast_to(value, base.shape).reshape(-1)
@@ -175,10 +175,7 @@ def entries_of(estimate: Any) -> list[tuple[Any, np.ndarray, dict[str, np.ndarra
 
 
 def salib_distribution(distribution: Any, base: Any, numbers: Mapping[str, Any]) -> tuple[str, list[float]] | None:
-    """Translate a distribution to SALib's (name, bounds).
-
-    Returns: Name and bounds; None where SALib has none for it.
-    """
+    """Translate a distribution to SALib's (name, bounds); None where SALib has none for it."""
     base = float(base)
     mean = float(numbers.get("mean", base))
     if distribution.kind == "normal":
@@ -222,5 +219,11 @@ def model(
     Raises:
         SceneError: for faulty arguments, all in one message.
         TypeError: for an argument that does not exist.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> depth = lw.uq.model(lw.Scene.named("sphere"), ["start.position[2]"], "depth", method="psi_s", h=0.1, t1=1.0)
+        >>> depth([[0.0], [2.0]])
+        array([0., 2.])
     """
     return ScalarModel(scene, vary, of, levels, failed, settings)

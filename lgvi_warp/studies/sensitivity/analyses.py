@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from lgvi_warp.common.arguments import ensemble_of, of_kind
-from lgvi_warp.common.errors import Faults, MissingExtra, SceneError, refusal
+from lgvi_warp.common.errors import Faults, MissingExtra, refusal
 from lgvi_warp.common.status import Status
 from lgvi_warp.results.quantities import OfInterest
 from lgvi_warp.sampling.designs.base import Sampling
@@ -18,6 +18,7 @@ from lgvi_warp.scene.columns import as_given, columns_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.settings import EnsembleSettings
+from lgvi_warp.studies.members import scene_of
 from lgvi_warp.studies.sensitivity.estimates import sobol_estimates
 from lgvi_warp.studies.sensitivity.indices import MorrisEffects, SobolIndices
 from lgvi_warp.studies.sensitivity.outputs import FailedMembers, Outputs, evaluate, known_arguments
@@ -72,6 +73,15 @@ def sobol(
         SceneError: for faulty arguments, all in one message.
         TypeError: for an argument that does not exist.
         FailedMembers: where members failed and the indices cannot be computed from the others.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("sphere")
+        >>> normal = lw.distributions.Normal(std=0.1)
+        >>> vary = {"start.position[2]": normal, "start.velocity[0]": normal}
+        >>> indices = lw.uq.sobol(scene, "depth", vary=vary, samples=64, method="psi_s", h=0.1, t1=1.0)
+        >>> indices.factors[indices.total[0].argmax()]
+        'start.position[2]'
     """
     faults = Faults()
     with faults.including():
@@ -106,17 +116,17 @@ def sobol_of(fleet: Ensemble, outputs: Outputs, *, confidence: float = 0.95, fai
     design = _design_of(fleet, outputs, Saltelli)
     factors, group = design.factors(fleet.space), design.group_size(fleet.space)
     order = _order(fleet, factors)
-    Y, messages = whole_groups(outputs, group, failed)
-    whole = np.flatnonzero(_good_rows(outputs, group, failed)[::group])
+    whole, messages = whole_groups(outputs, group, failed)
+    Y, replicates = outputs.values[np.repeat(whole, group)], design.replicate_of(np.flatnonzero(whole))
     m, d = Y.shape[1], len(factors)
     first, first_half, total, total_half = (np.full((m, d), np.nan) for _ in range(4))
     second, second_half = (np.full((m, d, d), np.nan) for _ in range(2))
     for q in varying(Y, outputs.labels, messages):
-        found = sobol_estimates(Y[:, q].reshape(-1, group), design.replicate_of(whole), design.second_order, confidence)
-        (first[q], first_half[q]), (total[q], total_half[q]) = ([part[order] for part in one] for one in found[:2])
+        found = sobol_estimates(Y[:, q].reshape(-1, group), replicates, design.second_order, confidence)
+        (first[q], first_half[q]), (total[q], total_half[q]) = ([part[order] for part in ratio] for ratio in found[:2])
         if found.second is not None:
             second[q], second_half[q] = (part[np.ix_(order, order)] for part in found.second)
-    if len(np.unique(design.replicate_of(whole))) < 2:
+    if len(np.unique(replicates)) < 2:
         messages.append("there are no intervals: they are of the spread of replicates, and there is one")
     return SobolIndices(
         **_common(tuple(factors[i][0] for i in order), outputs, Y, group, confidence, messages),
@@ -179,6 +189,15 @@ def morris(
     Raises:
         SceneError: for faulty arguments, all in one message.
         FailedMembers: where members failed and the effects cannot be computed from the others.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("sphere")
+        >>> normal = lw.distributions.Normal(std=0.1)
+        >>> vary = {"start.position[2]": normal, "start.velocity[0]": normal}
+        >>> effects = lw.uq.morris(scene, "depth", vary=vary, samples=8, method="psi_s", h=0.1, t1=1.0)
+        >>> effects.factors[effects.mu_star[0].argmax()]
+        'start.position[2]'
     """
     check_settings(samples, confidence, failed, resamples)
     fleet = designed(scene, vary, seed, Morris(levels), samples)
@@ -208,8 +227,9 @@ def morris_of(
     analyze = salib()
     design, space = _design_of(fleet, outputs, Morris), fleet.space
     group = design.group_size(space)
-    kept = _good_rows(outputs, group, failed)
-    Y, messages = whole_groups(outputs, group, failed)
+    whole, messages = whole_groups(outputs, group, failed)
+    kept = np.repeat(whole, group)
+    Y = outputs.values[kept]
     X = design.design(space, np.arange(fleet.members))[kept]
     # A step moves the level by p / 2 of the cube's p parts, where SALib divides by another length.
     scale = design.levels / (design.levels - 1.0)
@@ -237,7 +257,7 @@ def morris_of(
 def _common(
     factors: tuple[str, ...], outputs: Outputs, Y: np.ndarray, group: int, confidence: float, messages: list[str]
 ) -> dict[str, Any]:
-    """Collect the fields that every analysis has."""
+    """The fields that every analysis has."""
     return {
         "factors": factors,
         "quantities": outputs.labels,
@@ -253,10 +273,7 @@ def _common(
 
 
 def check_settings(samples: Any, confidence: Any, failed: Any, resamples: Any = 2) -> None:
-    """Refuse settings of an analysis that are at fault.
-
-    resamples: number of the bootstrap's resamples, at least 2; default: none are drawn.
-    """
+    """Refuse settings of an analysis that are at fault; by default no resamples are drawn."""
     faults = Faults()
     for name, value in (("samples", samples), ("resamples", resamples)):
         if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 2:
@@ -269,21 +286,12 @@ def check_settings(samples: Any, confidence: Any, failed: Any, resamples: Any = 
 
 
 def designed(scene: Any, vary: Any, seed: int | None, design: Sampling, samples: int) -> Ensemble:
-    """Build the ensemble of a design with this number of groups.
-
-    vary: name -> distribution; None for those of the scene.
-    seed: of the design; None for that of the scene.
-    """
-    if isinstance(scene, Ensemble):
-        scene, known, known_seed = scene.scene, scene.vary, scene.seed
-    elif isinstance(scene, Scene):
-        settings = scene.ensemble_settings or EnsembleSettings()
-        known, known_seed = dict(settings.vary), settings.seed
-    else:
-        raise SceneError([f"scene = {scene!r}: is neither a Scene nor an Ensemble; give lw.Scene(...)"])
-    chosen = (known if vary is None else vary, known_seed if seed is None else seed)
-    first = Ensemble(scene, None, chosen[1], chosen[0], design)
-    return Ensemble(scene, samples * design.group_size(first.space), chosen[1], chosen[0], design)
+    """The ensemble of a design with this number of groups; None for what the scene varies, and its seed."""
+    settings: Any = scene if isinstance(scene, Ensemble) else scene_of(scene).ensemble_settings or EnsembleSettings()
+    scene = scene.scene if isinstance(scene, Ensemble) else scene
+    vary, seed = dict(settings.vary) if vary is None else vary, settings.seed if seed is None else seed
+    group = design.group_size(Ensemble(scene, None, seed, vary, design).space)
+    return Ensemble(scene, samples * group, seed, vary, design)
 
 
 def salib() -> Callable[..., Any]:
@@ -295,42 +303,28 @@ def salib() -> Callable[..., Any]:
     return analyze
 
 
-def _good_rows(outputs: Outputs, group: int, failed: str) -> np.ndarray:
-    """Mask (n,) of the members whose group has no failure."""
+def whole_groups(outputs: Outputs, group: int, failed: str) -> tuple[np.ndarray, list[str]]:
+    """Which groups have no failure (N,), and messages about the others; FailedMembers where too few have none."""
     if outputs.failed.any() and failed == "refuse":
         remedy = 'mend what fails (see result.status of lw.solve), or use the whole groups alone: failed="drop"'
         raise FailedMembers([outputs.text(remedy)])
-    good = ~outputs.failed.reshape(-1, group).any(axis=1)
-    if good.sum() < 2:
-        raise FailedMembers(
-            [outputs.text(f"{int(good.sum())} groups of the design are whole, too few for an estimate")]
-        )
-    return np.repeat(good, group)
-
-
-def whole_groups(outputs: Outputs, group: int, failed: str) -> tuple[np.ndarray, list[str]]:
-    """Select the quantities of groups without a failure; write messages about the other groups.
-
-    Returns: (quantities, messages).
-    """
-    kept = _good_rows(outputs, group, failed)
-    messages = []
-    if not kept.all():
-        dropped = int((~kept).sum()) // group
-        messages.append(outputs.text(f"the {dropped} of {len(kept) // group} groups that they are in were left out, and "
+    whole = np.asarray(~outputs.failed.reshape(-1, group).any(axis=1))
+    count, messages = int(whole.sum()), list[str]()
+    if count < 2:
+        raise FailedMembers([outputs.text(f"{count} groups of the design are whole, too few for an estimate")])
+    if count < len(whole):
+        messages.append(outputs.text(f"the {len(whole) - count} of {len(whole)} groups that they are in were left out, and "
                                      "what remains may not be typical"))  # fmt: skip
     stopped = sum(number for name, number in outputs.counts.items() if name.upper() in Status.__members__
                   and Status[name.upper()].stopped)  # fmt: skip
     if stopped:
-        messages.append(f"{stopped} of {len(kept)} members were stopped by events: their numbers are those at the stop")
-    return outputs.values[kept], messages
+        messages.append(f"{stopped} of {len(outputs.failed)} members were stopped by events: their numbers are those at the "
+                        "stop")  # fmt: skip
+    return whole, messages
 
 
 def varying(Y: np.ndarray, labels: Sequence[str], messages: list[str]) -> list[int]:
-    """List the quantities that vary; write messages about those that do not.
-
-    Y: the quantities (n, m).
-    """
+    """The quantities that vary; write messages about those that do not."""
     constant = np.ptp(Y, axis=0) <= CONSTANT * np.abs(Y).max(axis=0)
     messages += [f"{labels[int(q)]} does not vary: it has no indices" for q in np.flatnonzero(constant)]
     return [int(q) for q in np.flatnonzero(~constant)]

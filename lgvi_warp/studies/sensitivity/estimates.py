@@ -30,7 +30,7 @@ def sobol_estimates(Y: np.ndarray, replicate: np.ndarray, second_order: bool, co
 
     Intervals are Student's t of the replicates' linearised ratios: points of one sequence are not independent, scrambles are.
 
-    Y: (N, group size), the quantity in the order of the design: A, A with each factor of B, B with each of A, and B.
+    Y: (N, group size), in the order of the design: A, A with each factor of B, B with each of A, and B.
     replicate: (N,), from which scramble each group is.
     """
     y = Y - Y.mean()

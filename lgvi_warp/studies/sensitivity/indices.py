@@ -87,11 +87,6 @@ class Indices(Saved):
         return []
 
     def to_dict(self) -> dict[str, Any]:
-        """Convert the result to plain types for JSON.
-
-        Returns:
-            All fields and rows; numbers that are not finite are None.
-        """
         names = ("name", "factors", "quantities", "samples", "members", "failed", "confidence", "messages")
         content = {name: getattr(self, name) for name in (*names, "mean", "std")}
         content["rows"] = list(self.rows())
@@ -173,7 +168,6 @@ class SobolIndices(Indices):
     intervals: ClassVar[dict[str, str]] = {"first": "first_confidence", "total": "total_confidence"}
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        """List the records of every analysis, then those of two factors together."""
         yield from super().rows()
         for q, j, k in self._pairs():
             assert self.second is not None
@@ -192,14 +186,10 @@ class SobolIndices(Indices):
             raise ValueError(f"has {len(rows):,} rows of pairs for {m:,} quantities and {d:,} factors")
         second, half = (np.full((m, d, d), np.nan) for _ in range(2))
         for row in rows:
-            q, pair = (
-                places["quantities"][row["quantity"]],
-                [places["factors"][row[name]] for name in ("factor", "other")],
-            )
-            for j, k in (pair, pair[::-1]):
-                second[q, j, k], half[q, j, k] = (
-                    with_missing_as(row[name], np.nan) for name in ("value", "confidence")
-                )
+            q = places["quantities"][row["quantity"]]
+            j, k = (places["factors"][row[name]] for name in ("factor", "other"))
+            second[q, j, k] = second[q, k, j] = with_missing_as(row["value"], np.nan)
+            half[q, j, k] = half[q, k, j] = with_missing_as(row["confidence"], np.nan)
         return {"second": second, "second_confidence": half}
 
     def _pairs(self) -> list[tuple[int, int, int]]:
@@ -212,10 +202,8 @@ class SobolIndices(Indices):
             return []
         pairs = [(self.second[q, j, k], self.second_confidence[q, j, k], j, k) for p, j, k in self._pairs() if p == q]
         pairs = sorted((pair for pair in pairs if pair[0] > pair[1]), reverse=True)[:10]
-        return [
-            f"  {self.factors[j]} with {self.factors[k]}: second {value:.4g} +- {half:.2g}"
-            for value, half, j, k in pairs
-        ]
+        return [f"  {self.factors[j]} with {self.factors[k]}: second {value:.4g} +- {half:.2g}"
+                for value, half, j, k in pairs]  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

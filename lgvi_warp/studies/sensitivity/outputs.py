@@ -77,6 +77,14 @@ def evaluate(
 
     Raises:
         SceneError: for faulty arguments, and where a path is needed and no sampling interval is known.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> vary = {"start.position[2]": lw.distributions.Normal(std=1.0)}
+        >>> fleet = lw.Ensemble(lw.Scene.named("sphere"), members=4, vary=vary)
+        >>> outputs = lw.uq.evaluate(fleet, "depth", method="psi_s", h=0.1, t1=1.0)
+        >>> outputs.values.shape
+        (4, 1)
     """
     interests, report = quantities(of), callback(progress)
     ensemble_of(fleet), flag("common_noise", common_noise)

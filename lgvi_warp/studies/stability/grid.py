@@ -48,6 +48,11 @@ class Axis:
         log: whether values rise by equal factors, else by equal steps. Default True.
         scaled: whether a parameter is multiplied by the value, or set to it. Default None: numbers are set, vectors and
             matrices multiplied.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.studies.Axis.parse("vehicle.mass=50:500:linear").values(4)
+        array([ 50., 200., 350., 500.])
     """
 
     name: str
@@ -58,7 +63,17 @@ class Axis:
 
     @classmethod
     def parse(cls, text: str) -> Axis:
-        """Read an axis from a text."""
+        """Read an axis from a text.
+
+        Args:
+            text: "NAME", "NAME=LOW:HIGH" or "NAME=LOW:HIGH:linear", with ":scale" or ":set" at the end for parameters.
+
+        Returns:
+            The axis; what the text leaves out has its default.
+
+        Raises:
+            SceneError: where the text is of another form.
+        """
         name, equals, rest = str(text).partition("=")
         faults, words = Faults(), rest.split(":") if equals else []
         low, high, log, scaled = None, None, True, None
@@ -83,9 +98,13 @@ class Axis:
         return ALIASES.get(self.name, self.name)
 
     def values(self, points: int) -> np.ndarray:
-        """Compute the values along the axis, whose range must be known.
+        """List the values along the axis, whose range must be known.
 
-        Returns: Values from low to high (points,), in the unit of the axis.
+        Args:
+            points: how many.
+
+        Returns:
+            Values from low to high (points,), in the unit of the axis.
         """
         assert self.low is not None
         assert self.high is not None
@@ -111,20 +130,28 @@ class Line:
     values: np.ndarray
 
     def to_dict(self) -> dict[str, Any]:
-        """Convert the axis to plain types for JSON."""
+        """Convert the axis to plain types for JSON.
+
+        Returns:
+            Its fields; the values as a list.
+        """
         return vars(self) | {"values": self.values.tolist()}
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> Line:
-        """Build an axis from the content of a JSON file."""
+        """Build an axis from the content of a JSON file.
+
+        Args:
+            content: as `to_dict` returns it.
+
+        Returns:
+            The axis.
+        """
         return cls(**content | {"values": np.asarray(content["values"], dtype=np.float64)})
 
 
 def axis_of(axis: Any) -> Axis:
-    """Convert a user's description to an Axis.
-
-    axis: an Axis, a text for Axis.parse, or (name, low, high).
-    """
+    """The axis that a user describes: an Axis, a text for Axis.parse, or (name, low, high)."""
     if isinstance(axis, Axis):
         return axis
     if isinstance(axis, tuple | list) and len(axis) == 3:
@@ -139,20 +166,14 @@ class StabilityGrid:
     turned at random. What the scene's ensemble varies is left out.
 
     points: number of cells (nx, ny).
-    h: the step, where it is on no axis [s]; None for run.step of the scene.
-
-    Attributes:
-        scene: the scene without its ensemble.
-        base: the scene's start as one member.
-        rate: fastest motion at the scene's start [rad/s].
-        x: horizontal axis, with its range.
-        y: vertical axis, with its range.
-        step: the step where it is on no axis [s].
-        shape: (ny, nx, directions).
-        state: position, attitude, velocity and angular velocity of every member, with leading dimension n.
-        varied: name -> values of the parameters that differ between members, with leading dimension n.
-        direction: name -> unit vectors (n, 3) of velocity and angular velocity, body axes.
-        h: step of every member (n,) [s].
+    base: the scene's start as one member.
+    rate: fastest motion at the scene's start [rad/s].
+    step: where it is on no axis; by default run.step of the scene [s].
+    shape: (ny, nx, directions).
+    state: position, attitude, velocity and angular velocity of every member (n, ...).
+    varied: name -> values of the parameters that differ between members (n, ...).
+    direction: name -> unit vectors (n, 3) of velocity and angular velocity, body axes.
+    h: step of every member (n,) [s].
     """
 
     def __init__(
@@ -163,9 +184,9 @@ class StabilityGrid:
         for description in (x, y):
             with faults.including():
                 axes.append(axis_of(description))
-        for name, value, least in (("points", points, 1), ("directions", (directions,), 1)):
-            if any(isinstance(k, bool) or not isinstance(k, int) or k < least for k in value):
-                faults.add(name, value, "is not a whole number above 0", "give how many")
+        for name, counts in (("points", points), ("directions", (directions,))):
+            if any(isinstance(k, bool) or not isinstance(k, int) or k < 1 for k in counts):
+                faults.add(name, counts, "is not a whole number above 0", "give how many")
         if len(points) != 2:
             faults.add("points", points, "are not two numbers", "give how many along each axis")
         if not faults and (members := points[0] * points[1] * directions) > MOST_MEMBERS:
@@ -202,12 +223,8 @@ class StabilityGrid:
         low, high = low if axis.low is None else axis.low, high if axis.high is None else axis.high
         for value in (low, high):
             positive = axis.log or axis.key in SPECIAL
-            good = (
-                not isinstance(value, bool)
-                and isinstance(value, int | float | np.integer | np.floating)
-                and math.isfinite(value)
-            )
-            if not good or (positive and value <= 0.0):
+            number = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+            if not number or not math.isfinite(value) or (positive and value <= 0.0):
                 faults.add(f"axis {axis.name}", value, "is not a finite number" + " above 0" * positive,
                            f"give a range: {FORM}")  # fmt: skip
                 return replace(axis, low=1.0, high=2.0)
@@ -223,7 +240,7 @@ class StabilityGrid:
         return replace(axis, low=float(low), high=float(high))
 
     def _default(self, axis: Axis) -> tuple[Any, Any]:
-        """Choose a range of an axis that fits the scene."""
+        """A range of an axis that fits the scene."""
         w, m = self.rate, self.base
         speed = float(np.linalg.norm(m.velocity)) or 1.0
         known = {
@@ -241,16 +258,13 @@ class StabilityGrid:
         return (0.1 * value, 10.0 * value) if value > 0.0 else (None, None)
 
     def scaled(self, axis: Axis) -> bool:
-        """Tell whether a parameter is multiplied by the values of an axis."""
+        """True if a parameter is multiplied by the values of an axis."""
         if axis.key in SPECIAL:
             return False
         return bool(self.base.parameters[axis.key][0].ndim) if axis.scaled is None else axis.scaled
 
     def line(self, axis: Axis, values: np.ndarray) -> Line:
-        """Describe an axis as a finished map has it.
-
-        values: its values (k,).
-        """
+        """An axis as a finished map has it."""
         if axis.key in SPECIAL:
             unit, label = SPECIAL[axis.key]
         elif self.scaled(axis):
@@ -285,9 +299,8 @@ class StabilityGrid:
         self.h = np.full(n, self.step or 0.0)
         cells = np.meshgrid(*self._values, np.zeros(d), indexing="ij")
         # Masses first: drag rates depend on them.
-        for axis, values in sorted(
-            zip((self.y, self.x), cells[:2], strict=True), key=lambda pair: pair[0].key in SPECIAL
-        ):
+        axes = zip((self.y, self.x), cells[:2], strict=True)
+        for axis, values in sorted(axes, key=lambda pair: pair[0].key in SPECIAL):
             self._apply(axis, values.ravel())
 
     def _apply(self, axis: Axis, values: np.ndarray) -> None:
@@ -327,45 +340,29 @@ class StabilityGrid:
             self.varied[key] = (values * mass)[:, None, None] * np.diag(([0.0, 1.0, 1.0, 0.0, 0.0, 0.0])[:size])
 
     def parameters(self, members: np.ndarray) -> dict[str, np.ndarray]:
-        """Collect all parameters of some members.
-
-        members: their indices (k,).
-        Returns: Name -> values with leading dimension k, or 1 where members share them [the scene's units].
-        """
+        """All parameters of some members: name -> values with leading dimension k, or 1 where members share them."""
         return {name: self.varied[name][members] if name in self.varied else value
                 for name, value in self.base.parameters.items()}  # fmt: skip
 
     def fleet(self, members: np.ndarray) -> Ensemble:
-        """Build an ensemble of some members.
-
-        members: their indices (k,).
-        """
+        """An ensemble of some members."""
         b, R, nu, Om = (self.state[name][members] for name in FIELDS)
         varied = {name: value[members] for name, value in self.varied.items()}
         return Ensemble.from_states(self.scene, b, R, nu, Om, varied)
 
     def rates(self) -> dict[str, np.ndarray]:
-        """Compute how fast every member moves at its start.
-
-        Returns: Names of studies.stability.limits.LIMITS -> rate (n,) [rad/s or 1/s].
-        """
+        """How fast every member moves at its start: names of studies.stability.limits.LIMITS -> rate (n,) [rad/s or 1/s]."""
         every = np.arange(len(self.h))
         return member_rates.rates(self.parameters(every), self.state["velocity"], self.state["angular_velocity"])
 
     def columns(self) -> list[tuple[float, np.ndarray]]:
-        """Group the members by their step.
-
-        Returns: (h [s], indices of the members that take it) of each step, the shortest first.
-        """
+        """Each step [s], the shortest first, and the indices of the members that take it."""
         steps, step_index = np.unique(self.h, return_inverse=True)
         return [(float(h), np.flatnonzero(step_index == i)) for i, h in enumerate(steps)]
 
 
 def rotation_vectors(rng: np.random.Generator, n: int) -> np.ndarray:
-    """Draw the rotation vectors of uniformly random attitudes; the first is zero.
-
-    Returns: Rotation vectors (n, 3) [rad].
-    """
+    """Rotation vectors of uniformly random attitudes (n, 3) [rad]; the first is zero."""
     q = rng.normal(size=(n, 4))
     q /= np.linalg.norm(q, axis=1, keepdims=True)
     angle = 2.0 * np.arctan2(np.linalg.norm(q[:, 1:], axis=1), q[:, 0])
@@ -375,7 +372,7 @@ def rotation_vectors(rng: np.random.Generator, n: int) -> np.ndarray:
 
 
 def _prepared(scene: Scene, names: Sequence[str]) -> Scene:
-    """Copy the scene without its ensemble; add drag on every axis where the map varies drag and there is none."""
+    """The scene without its ensemble; with drag on every axis where the map varies drag and there is none."""
     terms = list(scene.terms)
     parameters = {key: np.asarray(value)[None] for key, value in scene.parameters().items()}
     if "drag_number" in names and not member_rates.drag_keys(parameters):

@@ -22,7 +22,7 @@ MOMENTS = {"munk": ("T", "Ap", "B"), "restoring": ("K", "B")}
 
 
 def _oscillator(method: Method, moments: tuple[str, ...]) -> list[tuple[bool, float]]:
-    """List the moves of one step in turn: (whether the angle or the rate is advanced, over how many steps)."""
+    """The moves of one step in turn: (whether the angle or the rate is advanced, over how many steps)."""
     if method.two_part:
         first = method.program[0][0]
         return [((first == "A") == (i % 2 == 0), g) for i, g in enumerate(method.stages)]
@@ -30,11 +30,8 @@ def _oscillator(method: Method, moments: tuple[str, ...]) -> list[tuple[bool, fl
     if method.halved:
         lengths = [2.0 * g for g in method.stages]
         pairs = list(zip(lengths[0::2], lengths[1::2], strict=True))
-        maps = [
-            (letter, c * (a if i < n else b if i >= len(program) - n else 0.5 * (a + b)))
-            for a, b in pairs
-            for i, (letter, c) in enumerate(program)
-        ]
+        maps = [(letter, c * (a if i < n else b if i >= len(program) - n else 0.5 * (a + b)))
+                for a, b in pairs for i, (letter, c) in enumerate(program)]  # fmt: skip
     else:
         maps = [(letter, c * g) for g in method.stages for letter, c in program]
     return [(letter in TURNS, c) for letter, c in maps if letter in TURNS or letter in moments]
@@ -42,12 +39,10 @@ def _oscillator(method: Method, moments: tuple[str, ...]) -> list[tuple[bool, fl
 
 @functools.cache
 def oscillation_limit(name: str, kind: str = "munk") -> float:
-    """Compute the largest h w at which a small oscillation of frequency w stays small.
+    """The largest h w [rad] at which a small oscillation of frequency w stays small; NaN for gauss*.
 
     For sub-maps it follows from the product of shears that a step is, for explicit methods from the stability polynomial
     at i h w. Large amplitudes may tumble earlier.
-
-    Returns: The limit [rad]; infinite without one; NaN for gauss*, which end where their iteration does.
     """
     method, numbers = Method(name), np.arange(STEP, MOST, STEP)
     if method.gauss:
@@ -67,12 +62,10 @@ def oscillation_limit(name: str, kind: str = "munk") -> float:
 
 @functools.cache
 def rotation_limit(name: str) -> float:
-    """Compute the largest h |J^-1 pi| of a method.
+    """The largest h |J^-1 pi| of a method [rad]; NaN for gauss*.
 
     It is |J^-1 a| = 1 for equation (24), half an angle of 1 for turns about axes, and for rk* the step at which the
     numbers of R grow.
-
-    Returns: The limit [rad]; infinite for Runge-Kutta methods on the rotation group; NaN for gauss*.
     """
     method = Method(name)
     if method.tableau:

@@ -50,10 +50,14 @@ GRIDS = {"omega": ("h", "angular_velocity"), "mass": ("h", "added_mass_ratio"), 
 
 
 class Cell(IntEnum):
-    """Class of a cell of the map: the worst of its members.
+    """Class of a cell of a stability map: the worst of its members.
 
-    ACCURATE: the error is below its bound. BOUNDED: the error is not, energy and rotation are bounded. FLAGGED: bounded,
-    with a status or a warning. FAILED: unbounded or not finite, with a status or a warning. SILENT: unbounded without any.
+    Attributes:
+        ACCURATE: the error is below its bound.
+        BOUNDED: the error is not; energy and rotation are bounded.
+        FLAGGED: bounded, with a status or a warning.
+        FAILED: unbounded or not finite, with a status or a warning.
+        SILENT: unbounded without any.
     """
 
     ACCURATE = 0
@@ -179,9 +183,8 @@ class StabilityMap(Saved):
         Raises:
             SceneError: for a method that the map does not have.
         """
-        return [
-            (float(self.x.values[j]), float(self.y.values[i])) for i, j in np.argwhere(self._of(method) == Cell.SILENT)
-        ]
+        cells = np.argwhere(self._of(method) == Cell.SILENT)
+        return [(float(self.x.values[j]), float(self.y.values[i])) for i, j in cells]
 
     def _of(self, method: str) -> np.ndarray:
         faults = Faults()
@@ -190,11 +193,6 @@ class StabilityMap(Saved):
         return self.classes[method]
 
     def to_dict(self) -> dict[str, Any]:
-        """Convert the map to plain types for JSON.
-
-        Returns:
-            All fields, with "limits" and "legend"; numbers that are not finite are None.
-        """
         last = {"x": self.x.to_dict(), "y": self.y.to_dict()}
         last |= {name: getattr(self, name) for name in (*ARRAYS, "ratios")}
         content = {name: value for name, value in vars(self).items() if name not in last} | last
@@ -204,14 +202,6 @@ class StabilityMap(Saved):
 
     @classmethod
     def from_dict(cls, content: dict[str, Any]) -> StabilityMap:
-        """Build a map from the content of a JSON file.
-
-        Args:
-            content: as `to_dict` returns it.
-
-        Returns:
-            The map; what was not finite is infinite.
-        """
         kept = {name: value for name, value in content.items() if name not in ("limits", "legend")}
         kept |= {"x": Line.from_dict(content["x"]), "y": Line.from_dict(content["y"])}
         for name, kind in ARRAYS.items():
@@ -221,11 +211,6 @@ class StabilityMap(Saved):
         return cls(**kept | {"messages": tuple(content["messages"])})
 
     def rows(self) -> list[dict[str, Any]]:
-        """Flatten the map to one record for each method and cell, as the CSV file has them.
-
-        Returns:
-            Records of method, both axes, class, error, energy growth, status and ratios to the limits.
-        """
         rows = []
         for method in self.methods:
             for i, j in np.ndindex(self.classes[method].shape):
@@ -254,7 +239,7 @@ def _array(values: Any, kind: Any) -> np.ndarray:
 
 
 def status_name(code: int) -> str:
-    """Name a status code of the map."""
+    """A status code of the map as a word."""
     return "refused" if code == REFUSED else Status(code).name.lower()
 
 
@@ -291,8 +276,8 @@ def stability_map(
     Args:
         scene: the scene.
         x: horizontal axis: "h", "angular_velocity", "speed", "added_mass_ratio", "drag_number" or a name of
-            scene.parameters(); as a text ("h=0.01:3", "vehicle.mass=50:500:linear"), as (name, low, high), or as an
-            Axis of studies.stability.grid. Default "h".
+            scene.parameters(); as a text ("h=0.01:3", "vehicle.mass=50:500:linear"), as (name, low, high), or as a
+            lw.studies.Axis. Default "h".
         y: vertical axis, in the same forms. Default "angular_velocity".
         methods: names. Default: psi, psi_s, psi_x and rk4.
         points: number of cells along x and y, one number or two. Default 24.
@@ -336,10 +321,11 @@ def stability_map(
     with faults.including():
         compared = compared_in(of)
         unit_of_error = compared.unit
-    for name, value, unit in (("error", error, unit_of_error), ("energy_bound", energy_bound, "1"),
-                              *((name, value, "s") for name, value in (("t1", t1), ("error_time", error_time))
-                                if value is not None)):  # fmt: skip
-        faults.positive(name, value, unit)
+    faults.positive("error", error, unit_of_error)
+    faults.positive("energy_bound", energy_bound, "1")
+    for name, value in (("t1", t1), ("error_time", error_time)):
+        if value is not None:
+            faults.positive(name, value, "s")
     faults.choice("dtype", dtype, DTYPES)
     check_threads(faults, threads)
     grid = None
@@ -351,12 +337,12 @@ def stability_map(
     assert compared is not None
     error_time, t1 = (None if value is None else float(value) for value in (error_time, t1))
     return map_of(grid, names, compared, dtype, error=error, error_time=error_time, t1=t1, energy_bound=energy_bound,
-                  directions=directions, seed=seed, threads=threads, report=report)  # fmt: skip
+                  seed=seed, threads=threads, report=report)  # fmt: skip
 
 
 def map_of(
     grid: StabilityGrid, names: Sequence[str], compared: Distance, dtype: str, *, error: float, error_time: float | None,
-    t1: float | None, energy_bound: float, directions: int, seed: int, threads: int | None = None,
+    t1: float | None, energy_bound: float, seed: int, threads: int | None = None,
     report: Callable[[float], None] = void, run: Callable[..., Result] = run_plan,
     prepare: Callable[[Plan], Any] = Plan.compile,
 ) -> StabilityMap:  # fmt: skip
@@ -401,7 +387,7 @@ def map_of(
         error_bound=float(error),
         error_time=float(error_time),
         t1=float(t1),
-        directions=directions,
+        directions=grid.shape[2],
         judged=kind,
         reference=text,
         unverified=int(_worst(grid, ~verified).sum()),
@@ -415,29 +401,19 @@ def map_of(
 
 
 def _worst(grid: StabilityGrid, values: np.ndarray) -> np.ndarray:
-    """Take the largest value over the starts of each cell (ny, nx)."""
+    """The largest value over the starts of each cell (ny, nx)."""
     return np.max(values.reshape(grid.shape), axis=2)
 
 
 def worst_status(grid: StabilityGrid, status: np.ndarray) -> np.ndarray:
-    """Take the worst status over the starts of each cell (ny, nx).
-
-    Refusals by the program come first, then failures, events and OK.
-
-    status: Status of each start (members,).
-    Returns: Status of each cell (ny, nx).
-    """
+    """The worst status over the starts of each cell (ny, nx): refusals by the program, then failures, events and OK."""
     rank = np.where(stopped(status), status - 500, np.where(status == Status.OK, -1000, status)).reshape(grid.shape)
     chosen = np.argmax(rank, axis=2)[:, :, None]
     return np.take_along_axis(status.reshape(grid.shape), chosen, axis=2)[:, :, 0]
 
 
 def cells_of(runs: CellRuns, verified: np.ndarray, error: float, energy_bound: float) -> np.ndarray:
-    """Classify every member of a method's runs.
-
-    verified: whether each member's reference is good enough (n,).
-    Returns: Cell codes (n,).
-    """
+    """Classify every member of a method's runs (n,); verified: whether its reference is good enough (n,)."""
     unbounded = ~(runs.growth / energy_bound <= 1.0)
     flagged = runs.warned | failed(runs.status)
     masks = [unbounded & ~flagged, unbounded, flagged, verified & (runs.error <= error)]
@@ -445,9 +421,9 @@ def cells_of(runs: CellRuns, verified: np.ndarray, error: float, energy_bound: f
 
 
 def _ratios(grid: StabilityGrid, methods: Sequence[str]) -> dict[str, dict[str, np.ndarray]]:
-    """Compute the step over each analytic limit, of the fastest start of each cell.
+    """Method -> limit -> the step over it, of the fastest start of each cell (ny, nx) [1].
 
-    Returns method -> limit -> (ny, nx) [1]. Limits that a method does not have, or whose motion is absent, are left out.
+    Limits that a method does not have, or whose motion is absent, are left out.
     """
     numbers = {name: _worst(grid, grid.h * rate) for name, rate in grid.rates().items()}
     ratios: dict[str, dict[str, np.ndarray]] = {}
@@ -461,7 +437,7 @@ def _ratios(grid: StabilityGrid, methods: Sequence[str]) -> dict[str, dict[str, 
 def _provenance(
     grid: StabilityGrid, methods: Sequence[str], dtype: str, seed: int, energy_bound: float
 ) -> dict[str, Any]:
-    """Describe the scene, the settings, the versions and the machine of a map."""
+    """The scene, the settings, the versions and the machine of a map."""
     content = provenance(plan_of(grid, np.arange(1), methods[0], SHORTEST, "float64", "all"))
     content = {name: content[name] for name in ("scene", "versions", "machine", "checks")}
     content |= {"methods": list(methods), "dtype": dtype, "seed": seed, "energy_bound": energy_bound}
@@ -469,7 +445,7 @@ def _provenance(
 
 
 def report_text(stability: StabilityMap) -> str:
-    """Write the map as a text of several lines."""
+    """The map as a text of several lines."""
     unit = stability.unit
     lines = [f"note        {message}" for message in stability.messages]
     lines += [

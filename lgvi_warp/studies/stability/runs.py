@@ -22,8 +22,8 @@ from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.results.result import Result
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.studies import comparison
-from lgvi_warp.studies.comparison import PRECISE, paired
 from lgvi_warp.studies.distance import Distance, compared_in
+from lgvi_warp.studies.reference import PRECISE, paired
 from lgvi_warp.studies.stability.grid import StabilityGrid
 
 # Number of times at which errors are measured, and energies.
@@ -44,13 +44,11 @@ SHORTEST = TimeGrid(1e-9, np.array([0, 1]), np.array([0.0, 1e-9]))
 
 @dataclass
 class CellRuns:
-    """What a method's runs showed, for each member.
+    """What a method's runs showed, for each member (n,).
 
-    Attributes:
-        error: largest error up to the error time (n,) [unit of the quantity]; infinite where there is none.
-        growth: largest growth of energy over the energy available (n,) [1].
-        status: Status codes (n,); REFUSED where the program refused to run the member.
-        warned: whether the member got a warning (n,).
+    error: largest error up to the error time [unit of the quantity]; infinite where there is none.
+    growth: largest growth of energy over the energy available [1].
+    status: Status codes; REFUSED where the program refused to run the member.
     """
 
     error: np.ndarray
@@ -61,15 +59,10 @@ class CellRuns:
 
 @dataclass(eq=False)
 class Column:
-    """One step, the members that take it, and their reference.
+    """One step h [s], the members that take it (k,), and their reference.
 
-    Attributes:
-        h: the step [s].
-        members: indices of the members (k,).
-        error_steps: numbers of the steps at which errors are measured.
-        steps: numbers of the steps at which energies are measured, those of errors included.
-        reference: result at the error steps; None before it is made.
-        verified: whether each member's reference is good enough (k,).
+    error_steps, steps: numbers of the steps at which errors are measured, and energies, those of errors included.
+    verified: whether each member's reference is good enough (k,).
     """
 
     h: float
@@ -80,22 +73,13 @@ class Column:
     verified: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
 
     def grid(self, finer: int = 1, to_the_end: bool = True) -> TimeGrid:
-        """Make the steps and sample times of a run.
-
-        Returns: The steps and the times [s].
-        """
+        """The steps and sample times of a run, whose steps are shorter by a whole number."""
         steps = self.steps if to_the_end else self.error_steps
         return TimeGrid(self.h / finer, steps * finer, steps * self.h)
 
 
 def column(h: float, members: np.ndarray, error_time: float, t1: float, least: int = 1) -> Column:
-    """Make the column of the members that share a step, with both times rounded up to whole steps.
-
-    h: the step [s].
-    members: their indices (k,).
-    error_time: time up to which errors count [s].
-    t1: time up to which energies count [s].
-    """
+    """The column of the members that share a step, with both times [s] rounded up to whole steps."""
     short, long = (max(least, math.ceil(t / h * (1.0 - 1e-12))) for t in (error_time, t1))
     errors = np.unique(np.linspace(0, short, ERROR_SAMPLES + 1).round().astype(np.int64))
     more = np.linspace(0, max(long, short), ENERGY_SAMPLES + 1).round().astype(np.int64)
@@ -105,12 +89,12 @@ def column(h: float, members: np.ndarray, error_time: float, t1: float, least: i
 def plan_of(
     grid: StabilityGrid, members: np.ndarray, method: str, times: TimeGrid, dtype: str, checks: str = "safe"
 ) -> Plan:
-    """Make the plan of a run of some members."""
+    """The plan of a run of some members."""
     return choose_plan(grid.fleet(members), Method(method), times, FIELDS, dtype, checks=checks)
 
 
 def refusals(grid: StabilityGrid, names: Sequence[str], dtype: str) -> dict[str, str]:
-    """Find the methods that the scene does not take at any step."""
+    """The methods that the scene does not take at any step, and why."""
     refused = {}
     for name in names:
         try:
@@ -121,10 +105,7 @@ def refusals(grid: StabilityGrid, names: Sequence[str], dtype: str) -> dict[str,
 
 
 def judged(grid: StabilityGrid, names: Sequence[str]) -> str:
-    """Decide how energies are judged, by the forces that act.
-
-    Returns: "conservative" where energy is kept, "dissipative" where it is only lost, "driven" where a force may supply it.
-    """
+    """How energies are judged: "conservative" where kept, "dissipative" where lost, "driven" where a force may supply them."""
     laws = plan_of(grid, np.arange(1), names[0], SHORTEST, "float64").kernel_choice.laws
     if any(getattr(module, "NOISE", False) for _, module in laws):
         raise SceneError(["terms: noise acts, whose path differs from step to step; leave it out for a stability map"])
@@ -133,21 +114,15 @@ def judged(grid: StabilityGrid, names: Sequence[str]) -> str:
         return "driven"
     if any(flow == "steady" for flow in flows) and not all(_carried(term, module) for term, module in laws):
         return "driven"
-    rest = [
-        (term, module)
-        for term, module in laws
-        if not getattr(module, "POTENTIAL", False) and not hasattr(module, "flow")
-    ]
+    rest = [(term, module) for term, module in laws
+            if not getattr(module, "POTENTIAL", False) and not hasattr(module, "flow")]  # fmt: skip
     if any(hasattr(module, "law") or not term.dissipative for term, module in rest):
         return "driven"
     return "dissipative" if rest else "conservative"
 
 
 def _carried(term: Any, module: Any) -> bool:
-    """Tell whether a steady current supplies no energy through a law, relative to the water.
-
-    It supplies none if it is level and the law is weight, buoyancy or drag.
-    """
+    """True if a steady current supplies no energy through a law: if it is level and the law is weight, buoyancy or drag."""
     if getattr(module, "FLOW", "none") == "steady":
         return not np.any(np.asarray(term.velocity)[2:])
     return getattr(module, "SEPARABLE", False) or not hasattr(module, "law")
@@ -157,10 +132,7 @@ def make_references(
     grid: StabilityGrid, columns: Sequence[Column], of: Any, error: float, threads: int, report: Callable[[float], None],
     *, run: Callable[..., Result] = run_plan,
 ) -> str:  # fmt: skip
-    """Give every column its reference at the error times.
-
-    error: largest error of an accurate cell [unit of `of`]; references agree to a tenth of it.
-    """
+    """Give every column its reference at the error times, which is better than the error by TRUST."""
     compared = compared_in(of)
     first, second = precise_pair(grid)
     rates = np.max(list(grid.rates().values()), axis=0)
@@ -178,7 +150,7 @@ def make_references(
 
 
 def precise_pair(grid: StabilityGrid, *, refused: Callable[..., dict[str, str]] = refusals) -> tuple[str, str]:
-    """Choose the two best methods that the scene takes."""
+    """The two best methods that the scene takes."""
     names = list(itertools.islice((name for name in PRECISE if not refused(grid, [name], "float64")), 2))
     if not names:
         raise SceneError([f"method: the scene takes none of {', '.join(PRECISE)} for a reference"])
@@ -216,10 +188,7 @@ def _reference(
 
 
 def joined(result: Result | None, part: Result, at: np.ndarray) -> Result:
-    """Replace members of a result by those of another one.
-
-    result: the result, which is changed; None for none.
-    """
+    """Replace members of a result, if there is one, by those of another."""
     if result is None:
         return part
     for name, values in part.samples.items():
@@ -237,7 +206,7 @@ def run_method(
 ) -> tuple[CellRuns, str]:  # fmt: skip
     """Run a method over all columns.
 
-    Returns: (findings, reason): what the runs showed, and why the program refused some of them; "" where it refused none.
+    Returns: What the runs showed, and why the program refused some of them; "" where it refused none.
     """
     n = len(grid.h)
     findings = CellRuns(np.full(n, np.inf), np.zeros(n), np.full(n, REFUSED), np.zeros(n, bool))
@@ -276,7 +245,7 @@ def judge(result: Result, column: Column, at: np.ndarray, runs: CellRuns, of: Di
         runs.warned[members] = np.asarray(warnings) != 0
     early = np.searchsorted(column.steps, column.error_steps)
     if column.reference is not None:
-        reference = comparison.part(column.reference, at.tolist())
+        reference = column.reference.part(at)
         apart = comparison.distances(_at_times(result, early), reference, of)[of.name]
         # Distances end at an event; NaN without an event means that the member was lost.
         stopped = np.isfinite(np.minimum(stop_time(result), stop_time(reference)))
@@ -298,10 +267,7 @@ def _at_times(result: Result, rows: np.ndarray) -> Result:
 
 
 def _with_rotation(growth: np.ndarray, result: Result) -> np.ndarray:
-    """Return the larger of the growth of energy and the distance of R from a rotation over SKEWED (n,).
-
-    It is infinite where a number of the state is not finite.
-    """
+    """The larger of the growth of energy and the distance of R from a rotation over SKEWED (n,); infinite where not finite."""
     R = result.attitude.astype(np.float64)
     skewed = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(0, 2, 3)) / SKEWED
     worst = np.maximum(growth, skewed)

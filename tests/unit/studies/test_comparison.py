@@ -23,16 +23,30 @@ from lgvi_warp.studies import comparison, cost, suggest
 from lgvi_warp.studies import distance as compared
 from lgvi_warp.studies import tradeoff as tradeoffs
 from lgvi_warp.studies.budget import Budget
-from lgvi_warp.studies.comparison import Candidate, Growth, Reference, Sample
+from lgvi_warp.studies.comparison import Candidate, Sample
+from lgvi_warp.studies.ladders import Ladders, lengthened
+from lgvi_warp.studies.reference import (
+    PRECISE,
+    Growth,
+    Reference,
+    extrapolated,
+    fitted,
+    make_reference,
+    measured_growth,
+    more_seconds,
+    paired,
+    time_over,
+)
 from lgvi_warp.studies.speed import void
-from lgvi_warp.studies.tradeoff import Measurement, Tradeoff, Trial
+from lgvi_warp.studies.tradeoff import Measurement, Tradeoff
+from lgvi_warp.studies.trials import PRECISIONS, Trial, between, is_dominated, trials_of, tried
 from tests.conftest import ROOT
 from tests.support.made import made
 
 ENOUGH = 1e4
 CURRENT = lw.terms.GaussMarkovCurrent(standard_deviation=[0.2, 0.2, 0.05], time_constant=30.0)
 # No method on the front.
-BAD = dict.fromkeys((*suggest.CANDIDATES, *comparison.PRECISE), 1e12)
+BAD = dict.fromkeys((*suggest.CANDIDATES, *PRECISE), 1e12)
 NAMES = ["position", "attitude", "velocity", "angular_velocity", "energy"]
 
 
@@ -285,10 +299,10 @@ def test_a_reference_reaches_as_far_as_it_agrees():
 
 
 def test_two_methods_of_a_reference_are_of_like_order():
-    assert comparison.paired(["rk8", "kl8(psi_x)"]) == ("rk8", "kl8(psi_x)")
-    assert comparison.paired(["kl6(psi_x)", "rk4"]) == ("kl6(psi_x)", "rk4")
-    assert comparison.paired(["rk8", "rk5"]) == ("rk8", "rk8")
-    assert comparison.paired(["rk8"]) == ("rk8", "rk8")
+    assert paired(["rk8", "kl8(psi_x)"]) == ("rk8", "kl8(psi_x)")
+    assert paired(["kl6(psi_x)", "rk4"]) == ("kl6(psi_x)", "rk4")
+    assert paired(["rk8", "rk5"]) == ("rk8", "rk8")
+    assert paired(["rk8"]) == ("rk8", "rk8")
 
 
 def test_extrapolation_takes_out_two_orders(scene):
@@ -301,13 +315,13 @@ def test_extrapolation_takes_out_two_orders(scene):
         return dataclasses.replace(made(path, t), compile_seconds=h)
 
     sample = on(sample, SimpleNamespace(run=cubic))
-    found = comparison.extrapolated(sample, "psi_s", 2)
+    found = extrapolated(sample, "psi_s", 2)
     np.testing.assert_allclose(found.position, exact(sample.times, 4), atol=1e-13)
     assert found.compile_seconds == pytest.approx(0.4 + 0.2 + 0.1)
-    plain = comparison.extrapolated(sample, "rk4", 2)
+    plain = extrapolated(sample, "rk4", 2)
     assert plain.compile_seconds == 0.4
     assert np.abs(plain.position - exact(sample.times, 4)).max() > 1.0
-    noisy = comparison.extrapolated(sample.on_grid(8), "psi_s", 2)
+    noisy = extrapolated(sample.on_grid(8), "psi_s", 2)
     assert noisy.compile_seconds == 0.4
 
 
@@ -317,7 +331,7 @@ def test_a_reference_is_refined_until_it_agrees(scene):
     shares = []
     runs = Runs(sizes)
     sample = on(sample, runs)
-    coarse = comparison.make_reference(sample, goal=1e-3, seconds=ENOUGH, report=shares.append)
+    coarse = make_reference(sample, goal=1e-3, seconds=ENOUGH, report=shares.append)
     m = sample.coarsest(0.5)
     while True:
         finer = max(m + 1, round(1.5 * m))
@@ -334,16 +348,16 @@ def test_a_reference_is_refined_until_it_agrees(scene):
     assert len(shares) >= 1
     assert coarse.result.provenance["step"] == h
     assert coarse.sample is sample
-    best = comparison.make_reference(sample, "position[0]", seconds=ENOUGH, methods=["rk8", "rk4", "psi_s"])
+    best = make_reference(sample, "position[0]", seconds=ENOUGH, methods=["rk8", "rk4", "psi_s"])
     assert best.methods == ("rk8", "psi_s")
     assert best.asked.name == "position[0]"
     assert best.error("position") < 1e-12
     # No better twice, and it ends.
     runs = Runs({})
-    comparison.make_reference(on(sample, runs), seconds=ENOUGH, methods=["rk8", "rk5"], goal=-1.0)
+    make_reference(on(sample, runs), seconds=ENOUGH, methods=["rk8", "rk5"], goal=-1.0)
     assert len(runs.settings) == 2 * 3
     runs = Runs(sizes)
-    comparison.make_reference(on(sample, runs), seconds=0.0)
+    make_reference(on(sample, runs), seconds=0.0)
     assert len(runs.settings) == 2
 
 
@@ -351,7 +365,7 @@ def test_a_reference_in_noise_shares_its_draws(scene):
     noisy = lw.Ensemble(dataclasses.replace(scene, terms=[CURRENT]), 2)
     sample = Sample(noisy, 4.0, samples=5)
     runs = Runs({})
-    reference = comparison.make_reference(on(sample, runs), seconds=0.0)
+    reference = make_reference(on(sample, runs), seconds=0.0)
     m = 3 * 2 ** math.ceil(math.log2(8.0 * sample.coarsest(0.5) / 3.0))
     assert reference.methods == ("psi_x", "psi_s")
     assert reference.sample.draws == 2 * m
@@ -359,7 +373,7 @@ def test_a_reference_in_noise_shares_its_draws(scene):
     fixed = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[dataclasses.replace(CURRENT, noise_step=0.1)]), 2), 4.0,
                    samples=5)  # fmt: skip
     runs = Runs({})
-    reference = comparison.make_reference(on(fixed, runs), seconds=ENOUGH)
+    reference = make_reference(on(fixed, runs), seconds=ENOUGH)
     assert [h for _, _, h in runs.settings] == [fixed.h(4), fixed.h(8)]
     assert reference.sample.draws == 8
 
@@ -370,7 +384,7 @@ def test_a_scene_without_a_precise_method_has_no_reference(scene):
             return [], {}
 
     with pytest.raises(lw.SceneError) as caught:
-        comparison.make_reference(Refusing(fleet_of(scene), 4.0))
+        make_reference(Refusing(fleet_of(scene), 4.0))
     assert "method: the scene takes none of kl8(psi_x), rk8, " in str(caught.value)
     assert "name one that it takes: methods=[...]" in str(caught.value)
 
@@ -380,25 +394,25 @@ def test_a_scene_without_a_precise_method_has_no_reference(scene):
 
 def test_growth_needs_two_times_and_counts_only_those_later():
     t = np.array([0.0, 1.0])
-    few = comparison.fitted(t, np.array([1.0, 2.0]), 1.0)
+    few = fitted(t, np.array([1.0, 2.0]), 1.0)
     assert all(np.isnan(value) for value in (few.rate, few.doubling, few.factor))
     assert few.power is None
     assert few.predictable == {"float64": 0.0, "float32": 0.0}
     assert few.times is t
-    two = comparison.fitted(np.array([0.0, 1.0, 2.0]), np.array([7.0, 2.0, 4.0]), 2.0)
+    two = fitted(np.array([0.0, 1.0, 2.0]), np.array([7.0, 2.0, 4.0]), 2.0)
     assert two.rate == pytest.approx(math.log(2.0))
     assert two.factor == 4.0
     # Between an exponential and a power that fit alike the power is taken, but no steep one.
     assert two.power == pytest.approx(1.0)
     assert two.doubling == math.inf
-    steep = comparison.fitted(np.array([0.0, 1.0, 2.0]), np.array([1.0, 2.0, 20.0]), 2.0)
+    steep = fitted(np.array([0.0, 1.0, 2.0]), np.array([1.0, 2.0, 20.0]), 2.0)
     assert steep.power is None
     assert steep.doubling == pytest.approx(math.log(2.0) / math.log(10.0))
-    falling = comparison.fitted(np.array([0.0, 1.0, 2.0, 3.0]), np.array([1.0, 0.5, 0.3, 0.2]), 3.0)
+    falling = fitted(np.array([0.0, 1.0, 2.0, 3.0]), np.array([1.0, 0.5, 0.3, 0.2]), 3.0)
     assert falling.power < 0.0
     assert falling.predictable["float64"] == math.inf
     t = np.linspace(0.0, 10.0, 11)
-    fast = comparison.fitted(t, np.exp(3.0 * t), 10.0)
+    fast = fitted(t, np.exp(3.0 * t), 10.0)
     assert fast.predictable["float32"] == t[np.flatnonzero(np.exp(3.0 * t) * 2.0**-24 > 1e-2)[0]] == 5.0
     assert fast.predictable["float64"] == pytest.approx(max(10.0, math.log(1e-2 / 2.0**-53) / 3.0))
 
@@ -417,7 +431,7 @@ def test_growth_is_of_two_runs_whose_attitudes_differ(scene):
             path[..., 0] += 1e-8 * np.exp(0.5 * t)[:, None]
         return made(path, t, attitude=np.broadcast_to(state.attitude, (len(t), 3, 3, 3)))
 
-    grown = comparison.growth(on(sample, SimpleNamespace(run=run)), sample.candidate("rk4", 2))
+    grown = measured_growth(on(sample, SimpleNamespace(run=run)), sample.candidate("rk4", 2))
     assert np.hypot(np.exp(0.5 * grown.times), 1.0) == pytest.approx(grown.curve, rel=1e-6)
     turn = np.swapaxes(starts[0][1].attitude, 1, 2) @ starts[1][1].attitude
     angle = np.linalg.norm(turn - np.eye(3), axis=(1, 2)) / math.sqrt(2.0)
@@ -457,17 +471,17 @@ def test_statistics_are_of_vectors_energies_and_momenta():
     path = exact(np.arange(3.0), 2)
     turn = np.broadcast_to(notation.matrix_from_rotation_vector(np.array([0.1, 0.2, 0.3])), (3, 2, 3, 3))
     result = made(path, attitude=turn)
-    values = comparison.statistics(result)
+    values = comparison.quantities_of(result)
     names = ["position", "velocity", "angular_velocity", "attitude", "energy", "linear_momentum", "angular_momentum"]
     assert list(values) == names
     assert values["energy"].shape == (3, 2, 1)
     np.testing.assert_array_equal(values["attitude"], turn[..., 2, :])
     np.testing.assert_array_equal(values["linear_momentum"], invariants.linear_momentum(result))
     np.testing.assert_array_equal(values["angular_momentum"], invariants.angular_momentum(result))
-    assert "depth" in comparison.statistics(result, compared.compared_in("depth"))
-    angle = comparison.statistics(result, compared.Distance("heading", "rad", None))
+    assert "depth" in comparison.quantities_of(result, compared.compared_in("depth"))
+    angle = comparison.quantities_of(result, compared.Distance("heading", "rad", None))
     assert "heading" not in angle
-    assert len(comparison.statistics(result, compared.Distance("position", "m"))) == len(names)
+    assert len(comparison.quantities_of(result, compared.Distance("position", "m"))) == len(names)
 
 
 def test_part_of_a_result_in_memory():
@@ -678,16 +692,16 @@ def test_biases_in_words():
 
 
 def reference_of(sample, sizes, goal=0.0):
-    return comparison.make_reference(on(sample, sizes), goal=goal, seconds=ENOUGH)
+    return make_reference(on(sample, sizes), goal=goal, seconds=ENOUGH)
 
 
 def test_a_trial_has_the_errors_of_its_run(scene):
     sample = Sample(fleet_of(scene), 4.0, samples=5)
     reference = reference_of(sample, {})
     sample = on(sample, {"psi_s": 2.0})
-    trial = tradeoffs.tried(sample, sample.candidate("psi_s", 4), reference)
-    early = tradeoffs.tried(sample, sample.candidate("psi_s", 4), reference, 2)
-    blind = tradeoffs.tried(sample, sample.candidate("psi_s", 4), None)
+    trial = tried(sample, sample.candidate("psi_s", 4), reference)
+    early = tried(sample, sample.candidate("psi_s", 4), reference, 2)
+    blind = tried(sample, sample.candidate("psi_s", 4), None)
     size = 2.0 * sample.h(4) ** 2
     assert trial.error("position") == pytest.approx(4 * 4.0 * size)
     assert early.error("position") == pytest.approx(4 * 1.6 * size)
@@ -696,9 +710,9 @@ def test_a_trial_has_the_errors_of_its_run(scene):
     assert trial.candidate == sample.candidate("psi_s", 4)
     assert trial.plan.grid.h == sample.h(4)
     assert trial.plan.method.name == "psi_s"
-    assert tradeoffs.tried(on(sample, {"psi_s": math.inf}), sample.candidate("psi_s", 4), reference).errors == {}
+    assert tried(on(sample, {"psi_s": math.inf}), sample.candidate("psi_s", 4), reference).errors == {}
     noisy = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[CURRENT]), 2), 4.0, samples=5).on_grid(12)
-    plan = tradeoffs.tried(on(noisy, {}), noisy.candidate("psi_s", 4), None).plan
+    plan = tried(on(noisy, {}), noisy.candidate("psi_s", 4), None).plan
     assert plan.ensemble.scene.terms[0].noise_step == pytest.approx(noisy.h(4))
 
 
@@ -707,7 +721,7 @@ def test_a_sweep_halves_steps_until_round_off(scene):
     reference = dataclasses.replace(reference_of(sample, {}), own={name: np.full(6, 1e-9) for name in NAMES})
     shares = []
     runs, budgets = Runs({"psi_s": 1e-2, "psi_x": 1e-2}), (Budget(ENOUGH), Budget(ENOUGH))
-    trials, skipped = tradeoffs.sweep(
+    trials, skipped = trials_of(
         on(sample, runs), ["psi_s"], reference, 5, *budgets, shares.append, solvers=[("newton", None)]
     )
     assert skipped == []
@@ -739,7 +753,7 @@ def test_every_method_has_a_coarse_setting_before_any_step_is_halved(scene):
     reference = dataclasses.replace(reference_of(sample, {}), own={name: np.full(6, 1e-9) for name in NAMES})
     methods = ["psi_x", "psi_s", "rk4", "rk8"]
     runs = Runs(dict.fromkeys(methods, 1e-2))
-    tradeoffs.sweep(on(sample, runs), methods, reference, 5, Budget(ENOUGH), Budget(ENOUGH), lambda part: None)
+    trials_of(on(sample, runs), methods, reference, 5, Budget(ENOUGH), Budget(ENOUGH), lambda part: None)
     coarsest = sample.h(sample.coarsest(1.0))
     firsts = [name for name, dtype, h in runs.settings[:4] if (dtype, h) == ("float64", coarsest)]
     assert firsts == methods
@@ -760,7 +774,7 @@ def test_a_sweep_without_time_tries_what_was_asked_for_by_name(scene):
     reference = reference_of(sample, {})
 
     def swept(runs, whole, **more):
-        trials, skipped = tradeoffs.sweep(
+        trials, skipped = trials_of(
             sample, ["psi_x", "rk4"], reference, 5, runs, whole, lambda part: None, compensated=(), **more
         )
         return [trial.candidate.text for trial in trials], skipped
@@ -775,7 +789,7 @@ def test_a_sweep_without_time_tries_what_was_asked_for_by_name(scene):
         ["psi_x float64", "rk4 float64"],
         [*rest, "psi_x float64 at fine steps", "rk4 float64 at fine steps"],
     )
-    statistics, _ = tradeoffs.sweep(
+    statistics, _ = trials_of(
         sample, ["psi_x"], None, 5, Budget(ENOUGH), Budget(ENOUGH), lambda part: None, compensated=()
     )
     assert len(statistics) == 2 * 5
@@ -837,11 +851,11 @@ def test_a_reference_says_how_much_time_would_do(scene):
     sample = Sample(fleet_of(scene), 4.0, 128, 5)
     of = compared.compared_in("position")
     # Errors fall by 4 a halving, the last two runs took 1 s: from 1e-2 to 1e-4 four halvings, of 2, 4, 8 and 16 s.
-    assert comparison.more_seconds(1e-2, 1e-4, 4.0, 1.0) == 2.0 + 4.0 + 8.0 + 16.0
+    assert more_seconds(1e-2, 1e-4, 4.0, 1.0) == 2.0 + 4.0 + 8.0 + 16.0
     for unknown in ((math.inf, 1e-4, 4.0, 1.0), (1e-2, 1e-4, 1.0, 1.0), (1e-2, 0.0, 4.0, 1.0)):
-        assert comparison.more_seconds(*unknown) == math.inf
-    assert comparison.time_over(20.0, 20.0, 0.4) == ("20 s were over", "seconds=50 would do")
-    assert comparison.time_over(20.0, math.inf, 0.4) == ("20 s were over", "give more seconds")
+        assert more_seconds(*unknown) == math.inf
+    assert time_over(20.0, 20.0, 0.4) == ("20 s were over", "seconds=50 would do")
+    assert time_over(20.0, math.inf, 0.4) == ("20 s were over", "give more seconds")
     rough = dataclasses.replace(reference_of(sample, {}), own={"position": np.full(6, 1.0)}, text="a and b", more=20.0)
     with pytest.raises(lw.SceneError) as caught:
         suggest.checked_reference(sample, of, 1e-2, 20.0, ["rk4"], make_reference=lambda *_, **__: rough)
@@ -884,39 +898,31 @@ def trial(seconds, position, attitude=0.0, h=0.1, method="psi_s"):
 
 def test_a_setting_is_hopeless_where_a_tenth_of_its_time_does_better():
     slow = trial(10.0, 1e-3)
-    assert tradeoffs.is_dominated(slow, [slow, trial(0.9, 1e-4)])
-    assert not tradeoffs.is_dominated(slow, [slow, trial(1.0, 1e-4)])
-    assert not tradeoffs.is_dominated(slow, [trial(0.9, 1e-3)])
-    assert not tradeoffs.is_dominated(slow, [trial(0.9, 1e-4, 1e-2)])
-    assert tradeoffs.is_dominated(trial(10.0, 1e-6, 1e-3), [trial(0.9, 1e-4)])
-    assert not tradeoffs.is_dominated(trial(10.0, math.inf), [trial(0.9, 1e-4)])
+    assert is_dominated(slow, [slow, trial(0.9, 1e-4)])
+    assert not is_dominated(slow, [slow, trial(1.0, 1e-4)])
+    assert not is_dominated(slow, [trial(0.9, 1e-3)])
+    assert not is_dominated(slow, [trial(0.9, 1e-4, 1e-2)])
+    assert is_dominated(trial(10.0, 1e-6, 1e-3), [trial(0.9, 1e-4)])
+    assert not is_dominated(trial(10.0, math.inf), [trial(0.9, 1e-4)])
 
 
 def test_steps_between_are_tried_near_the_front(scene):
     sample = Sample(fleet_of(scene), 4.0, samples=5)
     trials = [trial(1.0, 1e-2, h=sample.h(1)), trial(2.0, 1e-3, h=sample.h(10)), trial(3.0, 1e-1, h=sample.h(20))]
-    reference, more = object(), []
 
-    def tried(one, candidate, against, until, budget):
-        assert one is sample
-        assert against is reference
-        assert until == 4
-        more.append(candidate)
+    def run(candidate):
         return trial(1.0, 1.0, h=candidate.h)
 
-    tradeoffs.between(sample, trials, reference, 4, Budget(ENOUGH), run=tried)
-    assert sorted(one.h for one in more) == sorted(sample.h(m) for m in (7, 14))
-    assert len(trials) == 5
-    more.clear()
-    tradeoffs.between(sample, trials[:2], reference, 4, Budget(-1.0), run=tried)
-    assert more == []
+    more = between(sample, trials, Budget(ENOUGH), run)
+    assert sorted(one.candidate.h for one in more) == sorted(sample.h(m) for m in (7, 14))
+    assert between(sample, trials[:2], Budget(-1.0), run) == []
 
 
 def test_measurements_are_of_trials_that_did_not_fail(scene):
     sample = Sample(fleet_of(scene), 4.0, samples=5)
     reference = dataclasses.replace(reference_of(sample, {}), own={name: np.full(6, 1e-3) for name in NAMES})
     sample = on(sample, Runs({"psi_s": 1.0}, {("psi_s", "float64"): 3.0}))
-    trials = [tradeoffs.tried(sample, sample.candidate("psi_s", m), reference) for m in (4, 40)]
+    trials = [tried(sample, sample.candidate("psi_s", m), reference) for m in (4, 40)]
     lost = dataclasses.replace(trials[0], errors={})
     slow = dataclasses.replace(trials[1], result=dataclasses.replace(trials[1].result, compile_seconds=7.0))
     both = tradeoffs.measurements(sample, [trials[0], slow, lost], reference, reference.result, 5)
@@ -1082,17 +1088,17 @@ def test_a_step_is_lengthened_as_far_as_the_target_allows(scene):
     sample = on(sample, {"psi_s": 0.1})
 
     def at(m):
-        return tradeoffs.tried(sample, sample.candidate("psi_s", m), reference)
+        return tried(sample, sample.candidate("psi_s", m), reference)
 
     target = 4.0 * 4.0 * 0.1 * sample.h(45) ** 2 * 1.0001
     low = at(32).error("position")
-    best = suggest.lengthened(sample, at(64), 64, low, reference, "position", target)
+    best = lengthened(sample, at(64), 64, low, reference, "position", target)
     assert best.candidate.h == sample.h(45)
     good = at(64)
     for before in (math.inf, 0.5 * target, math.nan):
-        assert suggest.lengthened(sample, good, 64, before, reference, "position", target) is good
+        assert lengthened(sample, good, 64, before, reference, "position", target) is good
     one = at(1)
-    assert suggest.lengthened(sample, one, 1, 1e9, reference, "position", 1e8) is one
+    assert lengthened(sample, one, 1, 1e9, reference, "position", 1e8) is one
     # A step that misses the target is shortened by its order, at most twice each time.
     short, size = suggest.refined(sample, sample.candidate("psi_s", 32), reference, "position", target, 4)
     assert size == short.error("position") <= target
@@ -1109,7 +1115,7 @@ def test_a_step_is_lengthened_as_far_as_the_target_allows(scene):
 def test_the_worst_members_are_named_first(scene):
     sample = Sample(fleet_of(scene), 4.0, samples=5)
     reference = reference_of(sample, {})
-    one = tradeoffs.tried(on(sample, {"psi_s": 1.0}), sample.candidate("psi_s", 4), reference)
+    one = tried(on(sample, {"psi_s": 1.0}), sample.candidate("psi_s", 4), reference)
     assert suggest.worst_of(one, reference, "position") == (3, 2, 1, 0)
     assert suggest.worst_of(one, reference, "position", 2) == (3, 2)
 
@@ -1184,7 +1190,7 @@ def test_ladders_give_up_what_is_dear_or_stalls(scene):
     of = compared.compared_in("position")
 
     def ladders(target, seconds=ENOUGH):
-        return suggest.Ladders(sample, reference, of, target, Budget(seconds))
+        return Ladders(sample, reference, of, target, Budget(seconds))
 
     def longest(one, method, dtype):
         steps = one.longest(method, dtype)
@@ -1194,7 +1200,7 @@ def test_ladders_give_up_what_is_dear_or_stalls(scene):
             except StopIteration as end:
                 return end.value
 
-    assert ladders(1e-3).dtypes == list(tradeoffs.PRECISIONS)
+    assert ladders(1e-3).dtypes == list(PRECISIONS)
     assert ladders(1e-12).dtypes == ["float64"]
     size = of.largest(reference.result)
     assert ladders(4.0 * 2.0**-24 * size).dtypes == ["float64"]
@@ -1218,6 +1224,6 @@ def test_ladders_give_up_what_is_dear_or_stalls(scene):
     damped = Sample(lw.Ensemble(dataclasses.replace(scene, terms=[lw.terms.Drag(linear=[1.0] * 6)]), 2), 4.0, samples=5)
     rate = h_rates(rates(damped.ensemble), 1.0)["drag"]
     for ratio, limited in ((1.99, False), (2.01, True)):
-        one = suggest.Ladders(damped, reference, of, 1e-3, Budget(ENOUGH))
+        one = Ladders(damped, reference, of, 1e-3, Budget(ENOUGH))
         one.priced = [(1.0, SimpleNamespace(candidate=Candidate("psi_s", ratio / rate)))]
         assert one.limited_by_damping is limited

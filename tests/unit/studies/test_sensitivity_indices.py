@@ -319,15 +319,15 @@ def test_groups_with_failures_are_refused_or_left_out():
     assert 'mend what fails (see result.status of lw.solve), or use the whole groups alone: failed="drop"' in str(
         caught.value
     )
-    Y, messages = analyses.whole_groups(made, 4, "drop")
-    assert Y[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0, 8.0, 9.0, 10.0, 11.0]
+    whole, messages = analyses.whole_groups(made, 4, "drop")
+    assert whole.tolist() == [True, False, True]
     assert "the 1 of 3 groups that they are in were left out, and what remains may not be typical" in messages[0]
     assert messages[1] == "2 of 12 members were stopped by events: their numbers are those at the stop"
     assert len(messages) == 2
     with pytest.raises(outputs.FailedMembers, match="1 groups of the design are whole, too few for an estimate"):
         analyses.whole_groups(outputs.Outputs(values, ("q",), lost, {}, {}), 6, "drop")
-    whole = outputs.Outputs(values, ("q",), np.zeros(12, bool), {"OK": 12}, {})
-    assert analyses.whole_groups(whole, 4, "refuse")[1] == []
+    good = outputs.Outputs(values, ("q",), np.zeros(12, bool), {"OK": 12}, {})
+    assert analyses.whole_groups(good, 4, "refuse")[1] == []
 
 
 @pytest.mark.parametrize(("arguments", "words"), [

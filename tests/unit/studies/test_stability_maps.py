@@ -626,7 +626,7 @@ def test_a_map_of_runs_made_by_hand(scene):
 
     grid = StabilityGrid(damped, ("h", 0.1, 0.4), ("angular_velocity", 0.5, 2.0), (3, 2), 2, 5, None)
     found = map_of(grid, ["psi_s", "gauss4", "rk4"], compared_in("position"), "float32", t1=3.0, error_time=1.0, error=0.1,
-                   energy_bound=4.0, directions=2, seed=5, threads=1, report=shares.append, run=run_plan,
+                   energy_bound=4.0, seed=5, threads=1, report=shares.append, run=run_plan,
                    prepare=lambda plan: 0.0)  # fmt: skip
     assert found.classes["psi_s"].tolist() == [[0, 1, 2]] * 2
     assert found.classes["rk4"].tolist() == [[0, 0, 3]] * 2
@@ -662,7 +662,7 @@ def test_times_of_a_map_follow_the_fastest_motion(scene):
     def of(one=scene, t1=None, error_time=None):
         grid = StabilityGrid(one, ("h", 0.1, 0.4), "angular_velocity", (1, 1), 1, 0, None)
         return map_of(grid, ["psi_s"], compared_in("attitude"), "float64", t1=t1, error_time=error_time, error=0.01,
-                      energy_bound=2.0, directions=1, seed=0, threads=1, run=lambda plan, threads: ran(plan),
+                      energy_bound=2.0, seed=0, threads=1, run=lambda plan, threads: ran(plan),
                       prepare=lambda plan: 0.0)  # fmt: skip
 
     period = 2.0 * math.pi / grid_of(scene).rate

@@ -41,12 +41,8 @@ Watch = Callable[[int, Mapping[str, np.ndarray]], None]
 
 @dataclass(frozen=True)
 class Motion:
-    """Motions of m members, and what they remember.
+    """Motions of m members, shaped as in `lw.Start`, and what they remember.
 
-    position: (m, 3) [m], inertial axes.
-    attitude: (m, 3, 3), body to inertial axes.
-    velocity: (m, 3) [m/s], body axes.
-    angular_velocity: (m, 3) [rad/s], body axes.
     memory: by key of a term or a part, (m, rows); under "" that of the controller's bus.
     """
 
@@ -62,13 +58,13 @@ class Motion:
         return len(self.position)
 
     def of(self, places: np.ndarray) -> Motion:
-        """Some of them.
-
-        places: (k,), which.
-        """
-        memory = {key: rows[places] for key, rows in self.memory.items()}
+        """The motions of some members (k,)."""
         states: Any = {name: getattr(self, name)[places] for name in FIELDS}
-        return Motion(**states, memory=memory)
+        return Motion(**states, memory={key: rows[places] for key, rows in self.memory.items()})
+
+    def copied_memory(self) -> dict[str, np.ndarray]:
+        """What the members remember, to be changed."""
+        return {key: rows.copy() for key, rows in self.memory.items()}
 
     def moved(self, by: np.ndarray) -> Motion:
         """The motions a little beside these.
@@ -82,10 +78,7 @@ class Motion:
             angular_velocity=self.angular_velocity + rate)  # fmt: skip
 
     def apart(self, others: Motion) -> np.ndarray:
-        """How far these are beside others, in the coordinates of `moved`.
-
-        Returns: (m, 12).
-        """
+        """How far these are beside others, in the coordinates of `moved` (m, 12)."""
         R = np.swapaxes(others.attitude, 1, 2) @ self.attitude
         skew = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
         sine = np.linalg.norm(skew, axis=1, keepdims=True)
@@ -100,14 +93,8 @@ class MotionBench:
 
     Its kernel has no merged lead: what lies in its state between two launches is the motion itself.
 
-    h: step [s]; None for the scene's.
-    t1: the longest run [s].
-    spacing: time between two samples [s].
-
-    Attributes:
-        fleet: the members.
-        plan: the plan.
-        every: steps between two ticks; 1 without a controller.
+    h: step [s]; None for the scene's. t1: the longest run [s]. spacing: time between two samples [s].
+    Its `every` is the number of steps between two ticks, 1 without a controller.
     """
 
     def __init__(
@@ -142,17 +129,26 @@ class MotionBench:
         return tuple(term.key for term, _ in (*choice.laws, *choice.parts_of_control, *choice.events))
 
     def start(self, places: np.ndarray, numbers: Mapping[str, np.ndarray] | None = None) -> Motion:
-        """The motions of members at t = 0, and what they remember before the first tick.
+        """The motions of members (m,) at t = 0, and what they remember before the first tick.
 
-        places: (m,), which members.
-        numbers: Values (m, ...) by name that replace those of the members; None for none (default).
+        numbers: values (m, ...) by name that replace those of the members.
         """
         packets = self._filled(places, None, numbers or {})
         start = packets.members
-        motion: Any = {name: getattr(start, name) for name in FIELDS}
+        states: Any = {name: getattr(start, name) for name in FIELDS}
         memory = self._memory(packets)
         packets.leave()
-        return Motion(**motion, memory=memory)
+        return Motion(**states, memory=memory)
+
+    def commanded(self, motion: Motion, commands: Mapping[str, np.ndarray]) -> Motion:
+        """The motions with actuators that are at these commands (m, channels), by key."""
+        memory = motion.copied_memory()
+        for key, (begin, count) in (self.bus.commands if self.bus else {}).items():
+            if key in commands:
+                memory[""][:, begin : begin + count] = commands[key]
+                if key in memory:
+                    memory[key][:, :count] = commands[key]
+        return replace(motion, memory=memory)
 
     def run(
         self,
@@ -163,13 +159,11 @@ class MotionBench:
         numbers: Mapping[str, np.ndarray] | None = None,
         watch: Watch | None = None,
     ) -> Motion:
-        """Make the steps from k0 to k1.
+        """Make the steps from k0 to k1 of members (m,); numbers as of `start`.
 
-        places: (m,), which members.
-        motion: their motions after the look at step k0; None for their own at t = 0, with k0 = 0.
-        numbers: Values (m, ...) by name that replace those of the members; None for none (default).
-        watch: called with the step of each sample and the sample; None for nobody (default).
-        Returns: The motions after k1 steps, and what is remembered after a tick at them. Where a member failed it is NaN.
+        motion: after the tick at step k0; None for their own at t = 0, with k0 = 0.
+        watch: called with the number of the first sample of a piece and its samples, piece by piece.
+        Returns: The motions after k1 steps and the tick at them; NaN where a member failed.
         """
         plan, m = self.plan, len(places)
         packets = self._filled(places, motion, numbers or {})
@@ -209,7 +203,7 @@ class MotionBench:
         return rows | ({"": slice(0, self.bus.rows)} if self.bus else {})
 
     def _memory(self, packets: Packets) -> dict[str, np.ndarray]:
-        """What the members remember."""
+        """What the members remember, as of `Motion`."""
         view, m = packets.laws.memory.view, packets.members.count
         return {
             key: view[:, rows].transpose(0, 2, 1).reshape(-1, rows.stop - rows.start)[:m].copy()
@@ -234,10 +228,7 @@ def calm(scene: Any, purpose: str) -> None:
 
 
 def plant(scene: Scene, period: float, extra: Sequence[Any] = ()) -> Scene:
-    """A scene whose actuators hold what they are commanded: no law acts on them.
-
-    period: time between two commands [s].
-    """
+    """A scene whose actuators hold what they are commanded for a period [s]: no law acts on them."""
     terms = [*scene.terms, *extra]
     able = [term for term in terms if term.channels and not term.own_commands]
     if not able:

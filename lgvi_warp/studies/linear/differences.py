@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,17 +35,16 @@ def differences(
     k0: int,
     steps: int,
     moved: Sequence[Row],
-    seen: Sequence[Row] = (),
+    derived: Sequence[Row] = (),
     *,
     motion: bool = True,
     numbers: Mapping[str, np.ndarray] | None = None,
     step: float = STEP,
 ) -> np.ndarray:
-    """Derivatives of the motion and the memory after some steps, by those before.
+    """Derivatives of the motion and of rows of members (n,) after some steps, by the motion and rows before.
 
-    places: (n,), which members.
-    numbers: values (n, ...) by name that replace those of the members; None for none (default).
-    Returns: (n, 12 + seen, 12 + moved), or (n, 12 + seen, moved) without the motion. NaN where a copy of a member failed.
+    numbers: values (n, ...) by name that replace those of the members.
+    Returns: (n, 12 + derived, 12 + moved), without the motion (n, 12 + derived, moved); NaN where a copy of a member failed.
     """
     count = 12 * motion + len(moved)
     parts = []
@@ -54,18 +53,18 @@ def differences(
         some = np.arange(first, min(first + most, len(places)))
         chosen_numbers = {name: values[some] for name, values in (numbers or {}).items()}
         parts.append(
-            _differences(bench, places[some], about.of(some), k0, steps, moved, seen, motion, chosen_numbers, step)
+            _differences(bench, places[some], about.of(some), k0, steps, moved, derived, motion, chosen_numbers, step)
         )
     return np.concatenate(parts)
 
 
 def _differences(
-    bench: MotionBench, places: np.ndarray, about: Motion, k0: int, steps: int, moved: Sequence[Row], seen: Sequence[Row],
+    bench: MotionBench, places: np.ndarray, about: Motion, k0: int, steps: int, moved: Sequence[Row], derived: Sequence[Row],
     motion: bool, numbers: Mapping[str, np.ndarray], step: float) -> np.ndarray:  # fmt: skip
     n, head = len(places), 12 * motion
     count = head + len(moved)
     if count == 0:
-        return np.zeros((n, 12 + len(seen), 0))
+        return np.zeros((n, 12 + len(derived), 0))
     ones = np.ones((n, 3))
     size = np.concatenate([about.position, ones, about.velocity, about.angular_velocity], axis=1)[:, :head]
     remembered = [about.memory[row.key][:, row.row, None] for row in moved]
@@ -77,15 +76,15 @@ def _differences(
     each_by[:, diagonal, 0, diagonal], each_by[:, diagonal, 1, diagonal] = delta, -delta
     by = each_by.reshape(-1, count)
     copies = about.of(each)
-    memory = {key: rows.copy() for key, rows in copies.memory.items()}
+    memory = copies.copied_memory()
     for j, row in enumerate(moved):
         memory[row.key][:, row.row] += by[:, head + j]
-    copies = Motion(copies.position, copies.attitude, copies.velocity, copies.angular_velocity, memory)
+    copies = replace(copies, memory=memory)
     if motion:
         copies = copies.moved(by[:, :12])
     after = bench.run(places[each], copies, k0, k0 + steps, {name: v[each] for name, v in numbers.items()})
     plus, minus = after.of(np.arange(0, len(each), 2)), after.of(np.arange(1, len(each), 2))
     changed = [plus.apart(minus)]
-    changed += [(plus.memory[row.key] - minus.memory[row.key])[:, row.row, None] for row in seen]
-    derived = np.concatenate(changed, axis=1).reshape(n, count, -1) / (2.0 * delta[:, :, None])
-    return np.swapaxes(derived, 1, 2)
+    changed += [(plus.memory[row.key] - minus.memory[row.key])[:, row.row, None] for row in derived]
+    derivatives = np.concatenate(changed, axis=1).reshape(n, count, -1) / (2.0 * delta[:, :, None])
+    return np.swapaxes(derivatives, 1, 2)

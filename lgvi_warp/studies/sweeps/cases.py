@@ -172,7 +172,7 @@ def known_names(scene: Scene) -> set[str]:
 def ensemble_of(
     scene: Scene, numbers: Mapping[str, Any], vary: Mapping[Any, Any], like: Ensemble
 ) -> tuple[Ensemble, list[str]]:
-    """The members of a case, like those of all as far as it has what varies and does not set it; and names of what does not."""
+    """The members of a case, those of all as far as it has what varies and does not set it; and names of what does not."""
     known = known_names(scene)
     fixed = {target.name for name in numbers for target in variations.targets(name)}
     dropped = [name for name in vary if any(t.name in fixed or t.name not in known for t in variations.targets(name))]

@@ -76,7 +76,7 @@ def _of_success(table: SweepTable, a: SweepCell, b: SweepCell) -> PairedComparis
 
 
 def corrected(rows: list[PairedComparison], confidence: float) -> list[PairedComparison]:
-    """Comparisons made together: p corrected for their number, and which are real by it, or without a test by their interval."""
+    """Comparisons made together, p corrected for their number; real by that, or by their interval where there is no test."""
     answers = []
     for row, p in zip(rows, paired.holm(np.array([row.difference.p for row in rows])), strict=True):
         d = row.difference

@@ -121,8 +121,8 @@ class SweepTable:
         """
         cells = self.cells_of(case, at)
         if len(cells) != 1:
-            point = {name: values[0] for name, values in self.setup.axes.items()}
-            raise refusal("at", at, f"leaves {len(cells)} cells of {case!r}", f"name one point of the grid: at={point}")
+            remedy = f"name one point of the grid: at={self.setup.first_point}"
+            raise refusal("at", at, f"leaves {len(cells)} cells of {case!r}", remedy)
         record = self.record(cells[0])
         if record.refused:
             raise refusal("case", cells[0].name, f"was refused: {record.refused}", "mend it, or ask for another one")

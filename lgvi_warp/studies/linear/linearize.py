@@ -18,7 +18,7 @@ from lgvi_warp.physics.terms.control_wrench import COMPONENTS, ControlWrench
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.linear.bench import COORDINATES, Motion, MotionBench, calm, plant
-from lgvi_warp.studies.linear.differences import STEP, Row, differences, names_of
+from lgvi_warp.studies.linear.differences import STEP, Differences, Row, names_of
 from lgvi_warp.studies.linear.trim import Trim, step_of
 from lgvi_warp.studies.members import scene_of
 
@@ -207,7 +207,7 @@ def _plant_model(
         if key in pushed
         for i in range(count)
     ]
-    derivatives = differences(bench, places, motion, every, every, [*rows, *held_rows], rows, step=step)[0]
+    derivatives = Differences(bench, every, every, [*rows, *held_rows], rows, step=step)(places, motion)[0]
     A, B = np.split(derivatives, [12 + len(rows)], axis=1)
     return _model(A, B, every * bench.plan.grid.h, names_of(rows), [row.name for row in held_rows], motion)
 
@@ -219,7 +219,7 @@ def _closed_model(scene: Scene, time: float, method: Any, h: float, step: float)
     places, begin = np.zeros(1, np.int64), k * bench.every
     motion = bench.run(places, None, 0, begin)
     rows, after = loop_rows(bench, motion.memory, k)
-    derivatives = differences(bench, places, motion, begin, bench.every, rows, after, step=step)[0]
+    derivatives = Differences(bench, begin, bench.every, rows, after, step=step)(places, motion)[0]
     names = names_of(rows)
     pushed, inputs = np.zeros((len(derivatives), 0)), list[str]()
     for key, (first, count) in bench.bus.commands.items():  # type: ignore[union-attr]

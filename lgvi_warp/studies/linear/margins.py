@@ -74,7 +74,7 @@ class Margins:
         return len(self.why)
 
     def to_dict(self) -> dict[str, Any]:
-        """The margins as plain values, for JSON.
+        """Convert the margins to plain values, for JSON.
 
         Returns:
             "loop", "step", "why", "messages", and under "eigenvalues" and "runs" lists by name: None for NaN, "inf" for
@@ -92,7 +92,7 @@ class Margins:
         return {"loop": self.loop, "step": self.step, "why": self.why.tolist(), "messages": list(self.messages), **ways}
 
     def percentiles(self, of: Sequence[float] = PERCENTILES) -> dict[str, np.ndarray]:
-        """How margins are distributed over the members that settle as they are.
+        """Find how margins are distributed over the members that settle as they are.
 
         Args:
             of: percentages (k,), in [0, 100].
@@ -110,7 +110,7 @@ class Margins:
         }
 
     def curve(self, name: str, by: str | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """The distribution of a margin for a picture: how many members have less.
+        """Find the distribution of a margin for a picture: how many members have less.
 
         Args:
             name: "gain_lower", "gain_upper" or "delay".
@@ -124,7 +124,7 @@ class Margins:
         return values, np.arange(1, len(values) + 1) / max(1, len(values))
 
     def worst(self, count: int = 10, name: str | None = None) -> np.ndarray:
-        """The members that bear least.
+        """Find the members that bear least.
 
         Args:
             count: how many (default 10).
@@ -208,6 +208,17 @@ def margins(
 
     Raises:
         SceneError: If an argument or the scene is at fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> law = lw.control.HeadingPID(kp=2.0, kd=4.0)
+        >>> controller = lw.Controller(period=0.1, guidance=[lw.control.SetPoint(heading=0.0)], laws=[law])
+        >>> vehicle = lw.Vehicle(50.0, inertia=[4.0, 5.0, 6.0], buoyancy=490.3325)
+        >>> drag = lw.terms.Drag(linear=[20.0, 20.0, 20.0, 8.0, 8.0, 8.0])
+        >>> scene = lw.Scene(vehicle, terms=[lw.terms.ControlWrench(), drag], controller=controller)
+        >>> bearable = lw.linear.margins(lw.Ensemble(scene, 2), "heading_pid", method="rk4", h=0.02)
+        >>> bearable.values["gain_upper"].round(1), bearable.values["delay"]
+        (array([30., 30.]), array([6.62, 6.62]))
     """
     ensemble = ensemble_of(fleet)
     scene: Any = ensemble.scene

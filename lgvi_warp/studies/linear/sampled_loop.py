@@ -10,7 +10,7 @@ import numpy as np
 
 from lgvi_warp.control.loop_gain import FACTOR
 from lgvi_warp.studies.linear.bench import Motion, MotionBench
-from lgvi_warp.studies.linear.differences import Row, differences
+from lgvi_warp.studies.linear.differences import Differences, Row
 from lgvi_warp.studies.linear.linearize import remembered
 
 DELAY = "controller.delay"
@@ -54,12 +54,9 @@ class SampledLoop:
         acting = [Row("", bus.acting + i, f"acting {i}") for i in range(C)]
         s = 12 + len(terms)
         ticks, self._bounded = [], np.ones(n, bool)
+        of_period = Differences(bench, k, bench.every, [*terms, *acting, *parts], [*terms, *commands, *parts])
         for factor in (0.0, 1.0):
-            numbers = {FACTOR: zero + factor, DELAY: zero}
-            derivatives = differences(
-                bench, places, still, k, bench.every, [*terms, *acting, *parts], [*terms, *commands, *parts],
-                numbers=numbers)  # fmt: skip
-            derivatives = self._without_failed(derivatives)
+            derivatives = self._without_failed(of_period(places, still, {FACTOR: zero + factor, DELAY: zero}))
             # A tick sees the motion alone: what it does of x is found behind the period that was between.
             of_motion = np.linalg.solve(
                 np.swapaxes(derivatives[:, :12, :12], 1, 2), np.swapaxes(derivatives[:, s:, :12], 1, 2)
@@ -69,11 +66,11 @@ class SampledLoop:
         # [u, parts] by [x, parts]: of the laws outside of the loop, and what the loop adds.
         self._tick, self._more = ticks[0], ticks[1] - ticks[0]
         self._late = [total]
+        of_late = Differences(bench, k, bench.every, acting, terms, motion=False)
         for steps in range(1, bench.every):
             later = delayed(bench, motion, k, np.full(n, steps))
             numbers = {FACTOR: zero + 1.0, DELAY: zero + steps * bench.plan.grid.h}
-            late = differences(bench, places, later, k, bench.every, acting, terms, motion=False, numbers=numbers)
-            self._late.append(self._without_failed(late))
+            self._late.append(self._without_failed(of_late(places, later, numbers)))
         self._C, self._s, self._m = C, s, len(parts)
         self.moves = np.abs(total @ self._more[:, :C]).max(axis=(1, 2)) > 0.0
         self._axes, self._ranks = self._decomposed()

@@ -98,14 +98,9 @@ class MotionBench:
     """
 
     def __init__(
-        self,
-        fleet: Ensemble,
-        method: str | Method | None,
-        h: float | None,
-        t1: float,
-        spacing: float,
+        self, fleet: Ensemble, method: str | Method | None, h: float | None, t1: float, spacing: float,
         fields: Sequence[str] = FIELDS,
-    ):
+    ):  # fmt: skip
         request = Request(fleet, method, h, t1, SaveAt(every=spacing, fields=tuple(fields)), "float64")
         plan = request.plan()
         if plan.launches.has_callback:
@@ -151,14 +146,9 @@ class MotionBench:
         return replace(motion, memory=memory)
 
     def run(
-        self,
-        places: np.ndarray,
-        motion: Motion | None,
-        k0: int,
-        k1: int,
-        numbers: Mapping[str, np.ndarray] | None = None,
-        watch: Watch | None = None,
-    ) -> Motion:
+        self, places: np.ndarray, motion: Motion | None, k0: int, k1: int,
+        numbers: Mapping[str, np.ndarray] | None = None, watch: Watch | None = None,
+    ) -> Motion:  # fmt: skip
         """Make the steps from k0 to k1 of members (m,); numbers as of `start`.
 
         motion: after the tick at step k0; None for their own at t = 0, with k0 = 0.

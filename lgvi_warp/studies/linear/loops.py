@@ -44,16 +44,9 @@ class Study:
     """
 
     def __init__(
-        self,
-        fleet: Ensemble,
-        loop: str | None,
-        about: float,
-        settle: float,
-        seconds: float,
-        tilt: float,
-        method: Any,
+        self, fleet: Ensemble, loop: str | None, about: float, settle: float, seconds: float, tilt: float, method: Any,
         h: float,
-    ):
+    ):  # fmt: skip
         scene: Any = fleet.scene
         controller, period = scene.controller, float(scene.controller.period)
         self.period = period
@@ -158,15 +151,9 @@ class Loops:
     """
 
     def __init__(
-        self,
-        study: Study,
-        places: np.ndarray,
-        delay: np.ndarray,
-        limits: np.ndarray,
-        motion: Motion,
-        repeating: np.ndarray,
-        begin: int,
-    ):
+        self, study: Study, places: np.ndarray, delay: np.ndarray, limits: np.ndarray, motion: Motion,
+        repeating: np.ndarray, begin: int,
+    ):  # fmt: skip
         self.study, self.places, self.delay = study, places, delay
         self.limits, self.motion, self.repeating, self.begin = np.maximum(limits, 1e-12), motion, repeating, begin
 

@@ -181,11 +181,10 @@ class _Problem:
         R = self.origin.attitude[0]
         self.heading = float(np.arctan2(R[1, 0], R[0, 0]))
         self.names = names
-        of_start = scene.start.given()
+        start = scene.start.given()
         # A start gives either velocity.
-        self.ahead = (
-            float(np.linalg.norm(of_start["velocity" if "velocity" in of_start else "velocity_inertial"])) or 1.0
-        )
+        velocity = start["velocity" if "velocity" in start else "velocity_inertial"]
+        self.ahead = float(np.linalg.norm(velocity)) or 1.0
 
     def guess(self, part: float) -> np.ndarray:
         """Where to begin: the speed of the start, and parts of the largest commands."""

@@ -24,6 +24,7 @@ class CVaR:
         SceneError: If the share is not in (0, 1].
 
     Examples:
+        >>> import numpy as np
         >>> import lgvi_warp as lw
         >>> risk = lw.metrics.CVaR(0.5)
         >>> risk(np.array([[4.0, 1.0, 3.0, 2.0]]))

@@ -41,9 +41,9 @@ class Case:
 
     Examples:
         >>> import lgvi_warp as lw
-        >>> case = lw.studies.Case("heavy", set={"vehicle.mass": 32.5})
-        >>> case.of(lw.Scene.named("remus_100")).vehicle.mass
-        32.5
+        >>> case = lw.studies.Case("light", set={"vehicle.buoyancy": 310.0})
+        >>> case.of(lw.Scene.named("remus_100")).vehicle.buoyancy
+        310.0
     """
 
     name: str

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files of a sweep: tables, its provenance, and a summary in words."""
+"""What a sweep tells its user: comparisons, ranks, the worst members and their causes, as tables, files and words."""
 
 from __future__ import annotations
 
@@ -115,9 +115,8 @@ class Sweep(SweepTable):
         by = by or next(iter([*limited, *self.metrics]))
         if by not in self.metrics:
             raise refusal("by", by, "is no metric of this sweep", closest(str(by), self.metrics))
-        cells = [cell for name in ((case,) if case else self.cases) for cell in self.cells_of(name)]
-        ordered: list[tuple[tuple[float, float, int, int], SweepCell]] = []
-        for cell in cells:
+        places: list[tuple[float, float, int, int]] = []
+        for cell in (cell for name in ((case,) if case else self.cases) for cell in self.cells_of(name)):
             record = self.record(cell)
             if record.refused:
                 continue
@@ -126,9 +125,8 @@ class Sweep(SweepTable):
             # Sorted by what comes first: earlier failures, then larger numbers; members in their order.
             group, rank = np.where(lost, 0.0, 1.0), np.where(lost, ends, -size)
             order = np.lexsort((np.arange(len(lost)), rank, group))[:count]
-            ordered += [((float(group[i]), float(rank[i]), cell.index, int(i)), cell) for i in order]
-        ordered.sort(key=lambda item: item[0])
-        return [self._member_row(cell, place[3]) for place, cell in ordered[:count]]
+            places += [(float(group[i]), float(rank[i]), cell.index, int(i)) for i in order]
+        return [self._member_row(self.cells[index], i) for _, _, index, i in sorted(places)[:count]]
 
     def _member_row(self, cell: SweepCell, i: int) -> dict[str, Any]:
         record, inputs = self.record(cell), self.inputs(cell, i, i + 1)
@@ -139,9 +137,9 @@ class Sweep(SweepTable):
     def causes(self, case: str, at: Mapping[str, Any] | None = None, of: str = SUCCESS) -> list[dict[str, Any]]:
         """Find which of the inputs that vary explain success or a metric, the most important first.
 
-        share: the part of the variance over members that the mean over this input explains, from the members at hand (by bins;
-        see `statistics.given_data`), with its interval and the F test's p, corrected for the number of inputs by Holm. slope:
-        the standardised coefficient of a linear regression on all inputs. Inputs are meant to be drawn independently.
+        share: the part of the variance over members that the mean over this input explains, from the members at hand (by
+        bins), with its interval and the F test's p, corrected for the number of inputs by Holm. slope: the standardised
+        coefficient of a linear regression on all inputs. Inputs are meant to be drawn independently.
 
         Args:
             case: name of the case.

@@ -52,11 +52,6 @@ class Motion:
     angular_velocity: np.ndarray
     memory: Mapping[str, np.ndarray]
 
-    @property
-    def count(self) -> int:
-        """The number of members, m."""
-        return len(self.position)
-
     def of(self, places: np.ndarray) -> Motion:
         """The motions of some members (k,)."""
         states: Any = {name: getattr(self, name)[places] for name in FIELDS}
@@ -123,12 +118,9 @@ class MotionBench:
         choice = self.plan.kernel_choice
         return tuple(term.key for term, _ in (*choice.laws, *choice.parts_of_control, *choice.events))
 
-    def start(self, places: np.ndarray, numbers: Mapping[str, np.ndarray] | None = None) -> Motion:
-        """The motions of members (m,) at t = 0, and what they remember before the first tick.
-
-        numbers: values (m, ...) by name that replace those of the members.
-        """
-        packets = self._filled(places, None, numbers or {})
+    def start(self, places: np.ndarray) -> Motion:
+        """The motions of members (m,) at t = 0, and what they remember before the first tick."""
+        packets = self._filled(places, None, {})
         start = packets.members
         states: Any = {name: getattr(start, name) for name in FIELDS}
         memory = self._memory(packets)
@@ -149,7 +141,7 @@ class MotionBench:
         self, places: np.ndarray, motion: Motion | None, k0: int, k1: int,
         numbers: Mapping[str, np.ndarray] | None = None, watch: Watch | None = None,
     ) -> Motion:  # fmt: skip
-        """Make the steps from k0 to k1 of members (m,); numbers as of `start`.
+        """Make the steps from k0 to k1 of members (m,), with numbers (m, ...) by name in place of theirs.
 
         motion: after the tick at step k0; None for their own at t = 0, with k0 = 0.
         watch: called with the number of the first sample of a piece and its samples, piece by piece.
@@ -212,9 +204,8 @@ def calm(scene: Any, purpose: str) -> None:
     """Refuse a scene in which something acts by chance or in waves: no motion of it is steady."""
     for term in scene.terms:
         if isinstance(term, NoisyTerm | Waves):
-            raise refusal(
-                "terms", term.key, f"lets no motion be steady, as {purpose} need it", "leave it out of this scene"
-            )
+            problem = f"lets no motion be steady, as {purpose} need it"
+            raise refusal("terms", term.key, problem, "leave it out of this scene")
 
 
 def plant(scene: Scene, period: float, extra: Sequence[Any] = ()) -> Scene:

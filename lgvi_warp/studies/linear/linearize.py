@@ -125,7 +125,7 @@ def linearize(
     h: float | None = None,
     step: float = STEP,
 ) -> LinearModel:
-    """Find the linear model of one period: of the plant from commands that are held, or of the closed loop.
+    """The linear model of one period: of the plant from commands that are held, or of the closed loop.
 
     Central differences of the run's own steps, all in one launch: the model holds the method, the lags of actuators and the
     hold as they are in a run. Its error is step^2 times a third derivative, and round-off / step: some 1e-10.

@@ -221,7 +221,7 @@ def sweep(chosen: argparse.Namespace, *, study: Part = None, drawings: Part = No
     Returns: The exit code: 1 if all cells were refused or a file failed, otherwise 0.
     """
     from lgvi_warp.studies.sweeps.file import arguments_of_file
-    from lgvi_warp.studies.sweeps.setup import made, plan_text
+    from lgvi_warp.studies.sweeps.setup import plan_text, setup_of
     from lgvi_warp.studies.sweeps.sweep import sweep as run_sweep
     from lgvi_warp.views.plots.sweep_pictures import pictures
 
@@ -237,7 +237,7 @@ def sweep(chosen: argparse.Namespace, *, study: Part = None, drawings: Part = No
             arguments.pop(name, None)
         closed_loop = {"scene": arguments.pop("scene"), "metrics": arguments.pop("metrics", ())}
         with progress_bar(chosen.quiet, "measuring"):
-            text = (plan or plan_text)(made(**closed_loop, **about, settings=arguments), chosen.threads)
+            text = (plan or plan_text)(setup_of(**closed_loop, **about, settings=arguments), chosen.threads)
         tell(chosen, lambda: {"plan": text.splitlines()}, lambda: text)
         return 0
     out = folder(chosen, "_sweep")

@@ -180,7 +180,7 @@ def test_edges_beside_known_ones():
     assert np.isnan(found[3]).all()
     counts = rng.integers(0, 100, 50).astype(float)
     inside = edges(
-        lambda v, i: v <= counts[i], np.zeros(50), np.full(50, 60.0), np.full(50, np.nan), 1.0, to_the_end=True
+        lambda v, i: v <= counts[i], np.zeros(50), np.full(50, 60.0), np.full(50, np.nan), 1.0, whole_numbers=True
     )
     np.testing.assert_array_equal(inside[:, 0], np.minimum(counts, 60.0))
     assert np.array_equal(np.isinf(inside[:, 1]), counts >= 60.0)

@@ -9,7 +9,7 @@ import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.studies.sweeps.file import arguments_of_file
-from lgvi_warp.studies.sweeps.setup import made
+from lgvi_warp.studies.sweeps.setup import setup_of
 from lgvi_warp.studies.sweeps.success import success_of
 from tests.conftest import ROOT
 
@@ -81,7 +81,7 @@ def test_mutated_files_are_refused_in_words(tmp_path):
                 name: arguments.pop(name, None) for name in ("cases", "grid", "vary", "members", "seed", "sampling")
             }
             success = arguments.pop("success", None)
-            setup = made(arguments["scene"], metrics=arguments.get("metrics", ()), settings={}, **about)
+            setup = setup_of(arguments["scene"], metrics=arguments.get("metrics", ()), settings={}, **about)
             success_of(success, tuple(setup.metrics))
             for case, point in setup.cells:
                 setup.fleet(case, point)

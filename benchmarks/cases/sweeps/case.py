@@ -26,10 +26,10 @@ def beside_runs(cases, members, t1):
         t1: end of the runs [s].
     """
     import lgvi_warp as lw
-    from lgvi_warp.studies.sweeps.setup import made
+    from lgvi_warp.studies.sweeps.setup import setup_of
 
     def runs(of, end):
-        setup = made(SCENE, None, gains(cases), None, of, None, None, METRICS, {})
+        setup = setup_of(SCENE, None, gains(cases), None, of, None, None, METRICS, {})
         for case, point in setup.cells:
             fleet, _ = setup.fleet(case, point)
             lw.solve(fleet, save=lw.SaveAt(fields=()), keep="none", statistics=[], t1=end)

@@ -41,12 +41,8 @@ Watch = Callable[[int, Mapping[str, np.ndarray]], None]
 
 @dataclass(frozen=True)
 class Motion:
-    """Motions of m members, and what they remember.
+    """Motions of m members, shaped as in `lw.Start`, and what they remember.
 
-    position: (m, 3) [m], inertial axes.
-    attitude: (m, 3, 3), body to inertial axes.
-    velocity: (m, 3) [m/s], body axes.
-    angular_velocity: (m, 3) [rad/s], body axes.
     memory: by key of a term or a part, (m, rows); under "" that of the controller's bus.
     """
 
@@ -56,19 +52,14 @@ class Motion:
     angular_velocity: np.ndarray
     memory: Mapping[str, np.ndarray]
 
-    @property
-    def count(self) -> int:
-        """The number of members, m."""
-        return len(self.position)
-
     def of(self, places: np.ndarray) -> Motion:
-        """Some of them.
-
-        places: (k,), which.
-        """
-        memory = {key: rows[places] for key, rows in self.memory.items()}
+        """The motions of some members (k,)."""
         states: Any = {name: getattr(self, name)[places] for name in FIELDS}
-        return Motion(**states, memory=memory)
+        return Motion(**states, memory={key: rows[places] for key, rows in self.memory.items()})
+
+    def copied_memory(self) -> dict[str, np.ndarray]:
+        """What the members remember, to be changed."""
+        return {key: rows.copy() for key, rows in self.memory.items()}
 
     def moved(self, by: np.ndarray) -> Motion:
         """The motions a little beside these.
@@ -82,10 +73,7 @@ class Motion:
             angular_velocity=self.angular_velocity + rate)  # fmt: skip
 
     def apart(self, others: Motion) -> np.ndarray:
-        """How far these are beside others, in the coordinates of `moved`.
-
-        Returns: (m, 12).
-        """
+        """How far these are beside others, in the coordinates of `moved` (m, 12)."""
         R = np.swapaxes(others.attitude, 1, 2) @ self.attitude
         skew = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
         sine = np.linalg.norm(skew, axis=1, keepdims=True)
@@ -100,25 +88,14 @@ class MotionBench:
 
     Its kernel has no merged lead: what lies in its state between two launches is the motion itself.
 
-    h: step [s]; None for the scene's.
-    t1: the longest run [s].
-    spacing: time between two samples [s].
-
-    Attributes:
-        fleet: the members.
-        plan: the plan.
-        every: steps between two ticks; 1 without a controller.
+    h: step [s]; None for the scene's. t1: the longest run [s]. spacing: time between two samples [s].
+    Its `every` is the number of steps between two ticks, 1 without a controller.
     """
 
     def __init__(
-        self,
-        fleet: Ensemble,
-        method: str | Method | None,
-        h: float | None,
-        t1: float,
-        spacing: float,
+        self, fleet: Ensemble, method: str | Method | None, h: float | None, t1: float, spacing: float,
         fields: Sequence[str] = FIELDS,
-    ):
+    ):  # fmt: skip
         request = Request(fleet, method, h, t1, SaveAt(every=spacing, fields=tuple(fields)), "float64")
         plan = request.plan()
         if plan.launches.has_callback:
@@ -141,35 +118,34 @@ class MotionBench:
         choice = self.plan.kernel_choice
         return tuple(term.key for term, _ in (*choice.laws, *choice.parts_of_control, *choice.events))
 
-    def start(self, places: np.ndarray, numbers: Mapping[str, np.ndarray] | None = None) -> Motion:
-        """The motions of members at t = 0, and what they remember before the first tick.
-
-        places: (m,), which members.
-        numbers: Values (m, ...) by name that replace those of the members; None for none (default).
-        """
-        packets = self._filled(places, None, numbers or {})
+    def start(self, places: np.ndarray) -> Motion:
+        """The motions of members (m,) at t = 0, and what they remember before the first tick."""
+        packets = self._filled(places, None, {})
         start = packets.members
-        motion: Any = {name: getattr(start, name) for name in FIELDS}
+        states: Any = {name: getattr(start, name) for name in FIELDS}
         memory = self._memory(packets)
         packets.leave()
-        return Motion(**motion, memory=memory)
+        return Motion(**states, memory=memory)
+
+    def commanded(self, motion: Motion, commands: Mapping[str, np.ndarray]) -> Motion:
+        """The motions with actuators that are at these commands (m, channels), by key."""
+        memory = motion.copied_memory()
+        for key, (begin, count) in (self.bus.commands if self.bus else {}).items():
+            if key in commands:
+                memory[""][:, begin : begin + count] = commands[key]
+                if key in memory:
+                    memory[key][:, :count] = commands[key]
+        return replace(motion, memory=memory)
 
     def run(
-        self,
-        places: np.ndarray,
-        motion: Motion | None,
-        k0: int,
-        k1: int,
-        numbers: Mapping[str, np.ndarray] | None = None,
-        watch: Watch | None = None,
-    ) -> Motion:
-        """Make the steps from k0 to k1.
+        self, places: np.ndarray, motion: Motion | None, k0: int, k1: int,
+        numbers: Mapping[str, np.ndarray] | None = None, watch: Watch | None = None,
+    ) -> Motion:  # fmt: skip
+        """Make the steps from k0 to k1 of members (m,), with numbers (m, ...) by name in place of theirs.
 
-        places: (m,), which members.
-        motion: their motions after the look at step k0; None for their own at t = 0, with k0 = 0.
-        numbers: Values (m, ...) by name that replace those of the members; None for none (default).
-        watch: called with the step of each sample and the sample; None for nobody (default).
-        Returns: The motions after k1 steps, and what is remembered after a tick at them. Where a member failed it is NaN.
+        motion: after the tick at step k0; None for their own at t = 0, with k0 = 0.
+        watch: called with the number of the first sample of a piece and its samples, piece by piece.
+        Returns: The motions after k1 steps and the tick at them; NaN where a member failed.
         """
         plan, m = self.plan, len(places)
         packets = self._filled(places, motion, numbers or {})
@@ -209,7 +185,7 @@ class MotionBench:
         return rows | ({"": slice(0, self.bus.rows)} if self.bus else {})
 
     def _memory(self, packets: Packets) -> dict[str, np.ndarray]:
-        """What the members remember."""
+        """What the members remember, as of `Motion`."""
         view, m = packets.laws.memory.view, packets.members.count
         return {
             key: view[:, rows].transpose(0, 2, 1).reshape(-1, rows.stop - rows.start)[:m].copy()
@@ -228,16 +204,12 @@ def calm(scene: Any, purpose: str) -> None:
     """Refuse a scene in which something acts by chance or in waves: no motion of it is steady."""
     for term in scene.terms:
         if isinstance(term, NoisyTerm | Waves):
-            raise refusal(
-                "terms", term.key, f"lets no motion be steady, as {purpose} need it", "leave it out of this scene"
-            )
+            problem = f"lets no motion be steady, as {purpose} need it"
+            raise refusal("terms", term.key, problem, "leave it out of this scene")
 
 
 def plant(scene: Scene, period: float, extra: Sequence[Any] = ()) -> Scene:
-    """A scene whose actuators hold what they are commanded: no law acts on them.
-
-    period: time between two commands [s].
-    """
+    """A scene whose actuators hold what they are commanded for a period [s]: no law acts on them."""
     terms = [*scene.terms, *extra]
     able = [term for term in terms if term.channels and not term.own_commands]
     if not able:

@@ -12,21 +12,16 @@ Holds = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 def edges(
-    holds: Holds, start: np.ndarray, last: np.ndarray, guess: np.ndarray, narrow: float, to_the_end: bool = False
+    holds: Holds, start: np.ndarray, last: np.ndarray, guess: np.ndarray, narrow: float, whole_numbers: bool = False
 ) -> np.ndarray:
-    """Find, for each member, where an answer that holds at the start ceases to.
+    """Find, for each member (n,), where an answer that holds at the start ceases to, between there and the last value.
 
-    Brackets grow from the guess by steps that double, and are then halved: both in the distance from the start for whole
-    numbers, in the logarithm else.
-
-    start: (n,), where it holds; NaN for members that are not asked.
-    last: (n,), the farthest values asked, above or below the start.
-    guess: (n,), where the edge may be; NaN or infinite where nobody knows.
-    Returns: (n, 2): the value nearest to the edge where it holds, and where it does not; infinite or 0 (as `last` is above or
-        below) where it holds at the last one.
+    Brackets grow from the guess by steps that double, and are then halved, in the logarithm; whole numbers as they are.
+    start, guess: NaN for members that are not asked, and (or infinite) where nobody knows.
+    Returns: (n, 2): the values nearest to the edge where it holds, and where it does not; infinite or 0 without an edge.
     """
-    forward, backward = (lambda v: v, lambda v: v) if to_the_end else (np.log, np.exp)
-    n, least = len(start), 1.0 if to_the_end else narrow
+    forward, backward = (lambda v: v, lambda v: v) if whole_numbers else (np.log, np.exp)
+    n, least = len(start), 1.0 if whole_numbers else narrow
     with np.errstate(invalid="ignore", divide="ignore"):
         begin = forward(np.asarray(start, float))
         far, near = np.abs(forward(np.asarray(last, float)) - begin), np.abs(forward(guess) - begin)
@@ -43,9 +38,9 @@ def edges(
         bad[members] = np.where(well, bad[members], np.minimum(bad[members], distance))
 
     def rounded(values: np.ndarray) -> np.ndarray:
-        return np.round(values) if to_the_end else values
+        return np.round(values) if whole_numbers else values
 
-    width = np.where(known, np.maximum(0.02 * near, least), np.where(to_the_end, 1.0, 0.2))
+    width = np.where(known, np.maximum(0.02 * near, least), 1.0 if whole_numbers else 0.2)
     centre = np.where(known, near, 0.0)
     while True:
         # Those whose bracket is open above, then those whose guess lay beyond the edge.

@@ -18,7 +18,7 @@ from lgvi_warp.physics.terms.control_wrench import COMPONENTS, ControlWrench
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.linear.bench import COORDINATES, Motion, MotionBench, calm, plant
-from lgvi_warp.studies.linear.differences import STEP, Row, differences, names_of
+from lgvi_warp.studies.linear.differences import STEP, Differences, Row, names_of
 from lgvi_warp.studies.linear.trim import Trim, step_of
 from lgvi_warp.studies.members import scene_of
 
@@ -54,7 +54,7 @@ class LinearModel:
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """Names of the outputs (12,)."""
+        """Names of the outputs (12,): the coordinates of the motion."""
         return COORDINATES
 
     @property
@@ -133,8 +133,7 @@ def linearize(
     Args:
         scene: The scene, without waves and noise; of an Ensemble, its scene.
         about: The motion: what `lw.linear.trim` returns; for a closed loop also the time [s] after which the run has it. None,
-            the
-            default: the start of the scene, with commands of 0; a closed loop after its first period.
+            the default: the start of the scene, with commands of 0; a closed loop after its first period.
         inputs: "commands" of the actuators, the default; or "wrench": X, Y, Z [N], K, M, N [N m], body axes about its origin,
             held for a period beside actuators that keep their commands. Of a plant only.
         closed: Whether the controller is part of the model. Its inputs then are added to the commands. Default False.
@@ -195,16 +194,9 @@ def _plant_model(
     bench = MotionBench(Ensemble(held, 1), method, h, 2.0 * length, length)
     every = bench.every if bench.bus else round(length / bench.plan.grid.h)
     places = np.zeros(1, np.int64)
-    motion = bench.start(places)
-    memory = {key: rows.copy() for key, rows in motion.memory.items()}
+    motion = bench.commanded(bench.start(places), about.commands if about else {})
     commands = dict(bench.bus.commands) if bench.bus else {}
-    for key, values in (about.commands if about else {}).items():
-        if key in commands:
-            begin, count = commands[key]
-            memory[""][0, begin : begin + count] = values
-            if key in memory:
-                memory[key][0, :count] = values
-    rows = remembered(bench, memory, terms=True)
+    rows = remembered(bench, motion.memory, terms=True)
     if inputs == "wrench":
         # Actuators stay where they are: of what they remember nothing moves.
         rows = [row for row in rows if row.key not in commands]
@@ -215,17 +207,9 @@ def _plant_model(
         if key in pushed
         for i in range(count)
     ]
-    motion = replace(motion, memory=memory)
-    derivatives = differences(bench, places, motion, every, every, [*rows, *held_rows], rows, step=step)[0]
-    n = 12 + len(rows)
-    return _model(
-        derivatives[:, :n],
-        derivatives[:, n:],
-        every * bench.plan.grid.h,
-        names_of(rows),
-        [r.name for r in held_rows],
-        motion,
-    )
+    derivatives = Differences(bench, every, every, [*rows, *held_rows], rows, step=step)(places, motion)[0]
+    A, B = np.split(derivatives, [12 + len(rows)], axis=1)
+    return _model(A, B, every * bench.plan.grid.h, names_of(rows), [row.name for row in held_rows], motion)
 
 
 def _closed_model(scene: Scene, time: float, method: Any, h: float, step: float) -> LinearModel:
@@ -235,7 +219,7 @@ def _closed_model(scene: Scene, time: float, method: Any, h: float, step: float)
     places, begin = np.zeros(1, np.int64), k * bench.every
     motion = bench.run(places, None, 0, begin)
     rows, after = loop_rows(bench, motion.memory, k)
-    derivatives = differences(bench, places, motion, begin, bench.every, rows, after, step=step)[0]
+    derivatives = Differences(bench, begin, bench.every, rows, after, step=step)(places, motion)[0]
     names = names_of(rows)
     pushed, inputs = np.zeros((len(derivatives), 0)), list[str]()
     for key, (first, count) in bench.bus.commands.items():  # type: ignore[union-attr]
@@ -243,9 +227,8 @@ def _closed_model(scene: Scene, time: float, method: Any, h: float, step: float)
             acting = [j for j, row in enumerate(rows) if row.key == "" and row.row in command_rows(bench, first + i)]
             pushed = np.column_stack([pushed, derivatives[:, [12 + j for j in acting]].sum(axis=1)])
             inputs.append(f"{key}[{i}]")
-    keep = read(derivatives)
-    model = _model(derivatives[np.ix_(keep, keep)], pushed[keep], period, tuple(names[i] for i in keep), inputs, motion)
-    return model
+    keep = states_in_use(derivatives)
+    return _model(derivatives[np.ix_(keep, keep)], pushed[keep], period, tuple(names[i] for i in keep), inputs, motion)
 
 
 def command_rows(bench: MotionBench, row: int) -> tuple[int, ...]:
@@ -255,11 +238,9 @@ def command_rows(bench: MotionBench, row: int) -> tuple[int, ...]:
 
 
 def loop_rows(bench: MotionBench, memory: Mapping[str, np.ndarray], tick: int) -> tuple[list[Row], list[Row]]:
-    """What a closed loop remembers after a tick, and after the next one.
+    """What a closed loop remembers after a tick, and after the next one, in the same order.
 
     What ticks note of themselves is left out, and what was not delivered: only its sign counts, for integrals that wait.
-
-    Returns: (rows, rows a tick later), in the same order.
     """
     bus: Any = bench.bus
     names = [f"{key}.command[{i}]" for key, (_, count) in bus.commands.items() for i in range(count)]
@@ -297,15 +278,10 @@ RANDOM = ("noise", "drift")
 
 
 def check_parts(controller: Any, purpose: str, refused: Collection[str] | None = None) -> None:
-    """Refuse parts of a controller that no linear model of one period has, or that let no motion be steady.
-
-    refused: numbers of sensors that are refused; None (default) for all but the bias, of which there is no linear model.
-    """
-    problem = (
-        f"lets no motion be steady, as {purpose} need it"
-        if refused
-        else (f"has no linear model of one period, which {purpose} needs")
-    )
+    """Refuse sensors whose numbers `refused` let no motion be steady; None: those no linear model has, all but the bias."""
+    problem = f"has no linear model of one period, which {purpose} needs"
+    if refused:
+        problem = f"lets no motion be steady, as {purpose} need it"
     faults = Faults()
     for part in controller.sensors:
         if isinstance(part, Sensor):
@@ -316,11 +292,8 @@ def check_parts(controller: Any, purpose: str, refused: Collection[str] | None =
     faults.raise_if_any()
 
 
-def read(A: np.ndarray) -> np.ndarray:
-    """States that something depends on, those of the motion always; the others decay within a tick.
-
-    A: (n, n).
-    """
+def states_in_use(A: np.ndarray) -> np.ndarray:
+    """States of A (n, n) that something depends on, those of the motion always; the others decay within a tick."""
     keep = np.arange(len(A))
     while True:
         some = keep[(keep < 12) | np.any(A[np.ix_(keep, keep)] != 0.0, axis=0)]

@@ -38,34 +38,15 @@ LEAST_TICKS = 30
 
 
 class Study:
-    """Members whose factor and delay are their own.
+    """Members whose factor and delay are their own; its arguments are those of `margins`.
 
-    loop: key of the law; None for all laws.
-    about: time after which loops are looked at [s].
-    settle: longest time after which those are that settle later [s].
-    seconds: length of the runs [s].
-    tilt: angle by which runs begin aside [rad].
-    h: step [s].
-
-    Attributes:
-        period: time between two ticks [s].
-        bench: what makes the steps.
-        begin: steps until loops are looked at.
-        last: steps until they are looked at last.
-        ticks: ticks of a run.
+    Loops are looked at after `begin` steps, and at last after `last`; a run has `ticks` ticks.
     """
 
     def __init__(
-        self,
-        fleet: Ensemble,
-        loop: str | None,
-        about: float,
-        settle: float,
-        seconds: float,
-        tilt: float,
-        method: Any,
+        self, fleet: Ensemble, loop: str | None, about: float, settle: float, seconds: float, tilt: float, method: Any,
         h: float,
-    ):
+    ):  # fmt: skip
         scene: Any = fleet.scene
         controller, period = scene.controller, float(scene.controller.period)
         self.period = period
@@ -83,21 +64,18 @@ class Study:
         self.channels = {key: term.channels for key, term in controller.actuators.items()}
 
     def loops(self, places: np.ndarray) -> tuple[list[Loops], np.ndarray]:
-        """The loops of some members, at their steady motions.
+        """The loops of members (n,) at their steady motions, together those after the same time; why others have none (n,).
 
         Those whose motion does not repeat after `about`, or that are at a limit, go on for twice the time, and again.
-
-        places: (n,), which members.
-        Returns: Loops of the members that settle, those after the same time together; and (n,), why others do not, "" for
-            these.
         """
-        bench, n, found = self.bench, len(places), list[Loops]()
-        own = self.fleet.subset(places).parameters(0, n)
+        bench, n, groups = self.bench, len(places), list[Loops]()
+        parameters = self.fleet.subset(places).parameters(0, n)
         h = bench.plan.grid.h
-        delay = np.broadcast_to(np.rint(np.asarray(own.get(DELAY, self.nominal)) / h).astype(np.int64), (n,))
-        limits = np.concatenate([np.broadcast_to(own[f"{key}.limit"], (n, c)) for key, c in self.channels.items()], 1)
+        delay = np.broadcast_to(np.rint(np.asarray(parameters.get(DELAY, self.nominal)) / h).astype(np.int64), (n,))
+        each_limit = [np.broadcast_to(parameters[f"{key}.limit"], (n, c)) for key, c in self.channels.items()]
+        limits = np.concatenate(each_limit, axis=1)
         why: np.ndarray = np.full(n, UNSETTLED, dtype=object)
-        left, due = np.arange(n), self.begin
+        pending, due = np.arange(n), self.begin
         latest: deque[np.ndarray] = deque(maxlen=2)
 
         def keep(_: int, values: Mapping[str, np.ndarray]) -> None:
@@ -106,21 +84,22 @@ class Study:
         while True:
             latest.clear()
             # Each time from the start: of commands that are on their way, members remember as many as those beside them.
-            numbers = {FACTOR: np.ones(len(left)), DELAY: delay[left] * h}
+            numbers = {FACTOR: np.ones(len(pending)), DELAY: delay[pending] * h}
             end = due + bench.every
-            motion = bench.run(places[left], None, 0, end, numbers, keep)
-            steady = np.all(_apart(latest[1], latest[0], limits[left]) <= REPEATS, axis=1).tolist()
-            limited = at_limit(_commands(latest[1], limits), limits[left])
+            motion = bench.run(places[pending], None, 0, end, numbers, keep)
+            steady = np.all(_apart(latest[1], latest[0], limits[pending]) <= REPEATS, axis=1).tolist()
+            limited = at_limit(_commands(latest[1], limits), limits[pending])
             alive = np.isfinite(motion.position).all(axis=1)
-            why[left] = [self._reason(*each) for each in zip(alive, steady, limited, strict=True)]
-            well = why[left] == ""
+            why[pending] = [self._reason(*each) for each in zip(alive, steady, limited, strict=True)]
+            well = why[pending] == ""
             if well.any():
-                some = left[well]
-                those = places[some], delay[some], limits[some], motion.of(well), latest[1][well]
-                found.append(Loops(self, *those, end))
-            left = left[~well & alive]
-            if due == self.last or not len(left):
-                return found, why
+                some = pending[well]
+                groups.append(
+                    Loops(self, places[some], delay[some], limits[some], motion.of(well), latest[1][well], end)
+                )
+            pending = pending[~well & alive]
+            if due == self.last or not len(pending):
+                return groups, why
             due = min(2 * due, self.last)
 
     def _reason(self, alive: bool, steady: bool, limited: np.ndarray) -> str:
@@ -133,24 +112,17 @@ class Study:
 
 def held(controller: Any) -> frozenset[str]:
     """What laws follow and a set-point holds: where it runs away beyond a limit of a law, all else may repeat."""
-    given = {wish: part for part in controller.guidance for wish in part.gives}
-    wishes = {wish for law in controller.laws for wish in law.needs if isinstance(given.get(wish), SetPoint)}
+    guides = {wish: part for part in controller.guidance for wish in part.gives}
+    wishes = {wish for law in controller.laws for wish in law.needs if isinstance(guides.get(wish), SetPoint)}
     return frozenset(wishes & {"depth", "heading", "position"} | ({"heading"} if "attitude" in wishes else set()))
 
 
-def _what_repeats(values: Mapping[str, np.ndarray], of: Collection[str]) -> np.ndarray:
+def _what_repeats(values: Mapping[str, np.ndarray], wishes: Collection[str]) -> np.ndarray:
     """What must repeat, of samples (k, m, ...): velocities, rates, down, commands; and what is held."""
-    ahead, place = values["attitude"][..., :2, 0], values["position"]
-    others = {"depth": place[..., 2:], "position": place, "heading": ahead}
-    down = values["attitude"][..., 2, :]
-    told = [
-        values["velocity"],
-        values["angular_velocity"],
-        down,
-        values["command"],
-        *(others[name] for name in sorted(of)),
-    ]
-    return np.concatenate(told, axis=-1)
+    place, attitude = values["position"], values["attitude"]
+    wished = {"depth": place[..., 2:], "position": place, "heading": attitude[..., :2, 0]}
+    always = values["velocity"], values["angular_velocity"], attitude[..., 2, :], values["command"]
+    return np.concatenate([*always, *(wished[name] for name in sorted(wishes))], axis=-1)
 
 
 def _commands(repeating: np.ndarray, limits: np.ndarray) -> np.ndarray:
@@ -159,66 +131,45 @@ def _commands(repeating: np.ndarray, limits: np.ndarray) -> np.ndarray:
 
 
 def at_limit(command: np.ndarray, limits: np.ndarray) -> np.ndarray:
-    """Which commands (m, channels) are at their limits: not those that can be nothing but 0.
-
-    Returns: (m, channels).
-    """
+    """Which commands (m, channels) are at their limits: not those that can be nothing but 0."""
     return np.asarray((limits > 0.0) & (np.abs(command) >= limits * (1.0 - AT_LIMIT)))
 
 
-def _apart(repeating: np.ndarray, other: np.ndarray, limits: np.ndarray) -> np.ndarray:
-    """How far what must repeat is apart (m, ...): of what is large, as a part of its size."""
-    size = np.maximum(1.0, np.abs(other))
+def _apart(repeating: np.ndarray, before: np.ndarray, limits: np.ndarray) -> np.ndarray:
+    """How far what must repeat is from before (m, ...): of what is large, as a part of its size."""
+    size = np.maximum(1.0, np.abs(before))
     of_commands = _commands(size, limits)
     of_commands[:] = np.minimum(of_commands, np.maximum(limits, np.finfo(float).tiny))
     with np.errstate(invalid="ignore"):
-        return np.asarray(np.abs(repeating - other) / size)
+        return np.asarray(np.abs(repeating - before) / size)
 
 
 class Loops:
-    """Loops at their steady motions, to be asked whether they settle with other numbers.
+    """Loops of members (n,) at their steady motions, to be asked whether they settle with other numbers.
 
-    places: (n,), which of them.
-    delay: (n,), their own delays, in steps.
-    limits: (n, channels), the largest commands.
-    told: (n, ...), what repeats of these, as `_told` has it.
+    delay: their own, in steps. limits: (n, channels), the largest commands. repeating: as of `_what_repeats`.
     """
 
     def __init__(
-        self,
-        study: Study,
-        places: np.ndarray,
-        delay: np.ndarray,
-        limits: np.ndarray,
-        motion: Motion,
-        repeating: np.ndarray,
-        begin: int,
-    ):
+        self, study: Study, places: np.ndarray, delay: np.ndarray, limits: np.ndarray, motion: Motion,
+        repeating: np.ndarray, begin: int,
+    ):  # fmt: skip
         self.study, self.places, self.delay = study, places, delay
-        self.limits, self.motion, self.told, self.begin = np.maximum(limits, 1e-12), motion, repeating, begin
+        self.limits, self.motion, self.repeating, self.begin = np.maximum(limits, 1e-12), motion, repeating, begin
 
     def return_to_it(self) -> np.ndarray:
-        """Whether loops as they are come back to their motions, by a run.
-
-        Returns: (n,).
-        """
+        """Whether loops as they are come back to their motions (n,), by a run."""
         every = np.arange(len(self.places))
         well, last = self._judged(np.ones(len(every)), self.delay, every)
-        near = _apart(last, self.told, self.limits)[:, : 9 + self.limits.shape[1]] <= TILTS * self.study.tilt
+        near = _apart(last, self.repeating, self.limits)[:, : 9 + self.limits.shape[1]] <= TILTS * self.study.tilt
         return np.asarray(well & near.all(axis=1))
 
     def settle(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> np.ndarray:
-        """Whether loops settle, by a run.
-
-        factor: (m,), factors on the demand.
-        steps: (m,), delays in steps.
-        some: (m,), which of the members.
-        Returns: (m,).
-        """
+        """Whether loops of some members (m,) settle, by a run, with factors on the demand and delays in steps of their own."""
         return self._judged(factor, steps, some)[0]
 
     def _judged(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Whether loops settle, and what `_told` tells after the run."""
+        """Whether loops settle, and what must repeat, after the run."""
         ticks = self.study.ticks
         settled, near, last = self._run(factor, steps, some, ticks)
         again = np.flatnonzero(near)
@@ -229,14 +180,14 @@ class Loops:
     def _run(
         self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray, ticks: int
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Whether loops settle in so many ticks, whether a longer run may tell more, and what `_told` tells at the end."""
+        """Whether loops settle in so many ticks, whether a longer run may tell more, and what must repeat, at the end."""
         bench, tilt, limits, m = self.study.bench, self.study.tilt, self.limits[some], len(some)
         k0, k1 = self.begin, self.begin + ticks * bench.every
         by = np.zeros((m, 12))
         by[:, 3:6] = tilt
         motion = delayed(bench, self.motion.of(some), k0, steps).moved(by)
         highest, first = np.full((3, m, 3 + limits.shape[1]), -np.inf), bench.plan.launches.samples_due(k0, k0)[1]
-        lowest, last, within = -highest, np.zeros_like(self.told[some]), np.ones(m, bool)
+        lowest, last, within = -highest, np.zeros_like(self.repeating[some]), np.ones(m, bool)
         begun = self.motion.attitude[some]
 
         def watch(sample: int, values: Mapping[str, np.ndarray]) -> None:
@@ -262,19 +213,17 @@ class Loops:
         return settled, near & within, last
 
 
-def _aside(attitude: np.ndarray, other: np.ndarray, heading: bool) -> np.ndarray:
-    """How far the vertical, and the heading where it is held, are aside (k, m) [rad]."""
-    apart = np.abs(attitude - other)
+def _aside(attitude: np.ndarray, begun: np.ndarray, heading: bool) -> np.ndarray:
+    """How far the vertical, and the heading where it is held, are aside of where they began (k, m) [rad]."""
+    apart = np.abs(attitude - begun)
     down = apart[..., 2, :].max(axis=-1)
     return np.maximum(down, apart[..., :2, 0].max(axis=-1)) if heading else down
 
 
 def shrinks(swing: np.ndarray, tilt: float) -> tuple[np.ndarray, np.ndarray]:
-    """Whether what swings settles.
+    """Whether what swings settles (m,), and whether a longer run tells more: near the edge, or where slower modes are left.
 
-    swing: (3, m), how far in each third of a run.
-    tilt: the angle by which the run began aside [rad].
-    Returns: ((m,) whether it settles, (m,) whether a longer run tells more: near the edge, or where slower modes are left).
+    swing: (3, m), how far in each third of a run that began aside by a tilt [rad].
     """
     first, second, last = swing
     still = last <= SETTLED * tilt

@@ -22,7 +22,7 @@ class Regulator:
     """The linear quadratic regulator u = -K x of a model.
 
     Attributes:
-        K: (m, n).
+        K: the gains (m, n), of each state for each input.
         P: (n, n), the least cost from x is x^T P x: the sum over ticks of x^T Q x + u^T R u.
         poles: eigenvalues of A - B K (n,), the largest first.
         model: the model.
@@ -47,7 +47,7 @@ class Regulator:
         """
         faults, model = Faults(), self.model
         for key, names, known in (("inputs", model.inputs, COMPONENTS), ("states", model.states, COORDINATES)):
-            wrong = [each for each in names if each not in known]
+            wrong = [name for name in names if name not in known]
             if wrong:
                 remedy = (
                     'give lw.linear.linearize(scene, inputs="wrench"), and .part(...) without what actuators remember'
@@ -55,11 +55,8 @@ class Regulator:
                 faults.add(f"model.{key}", ", ".join(wrong), "is nothing that a state feedback knows", remedy)
         faults.raise_if_any()
         gains = np.zeros((6, 12))
-        rows, columns = (
-            [COMPONENTS.index(each) for each in model.inputs],
-            [COORDINATES.index(each) for each in model.states],
-        )
-        gains[np.ix_(rows, columns)] = self.K
+        rows, columns = map(COMPONENTS.index, model.inputs), map(COORDINATES.index, model.states)
+        gains[np.ix_(list(rows), list(columns))] = self.K
         # The law's error of velocity is nu - R^T v_d = d nu - v x d rotation, to first order: K x is the same with this.
         gains[:, 3:6] += gains[:, 6:9] @ notation.hat(model.about["velocity"])
         return StateFeedback(K=gains, name=name)
@@ -120,7 +117,7 @@ def _weights(faults: Faults, key: str, value: Any, size: int, least: float) -> n
 
 
 def _not_held(model: LinearModel) -> SceneError:
-    """Which poles no gain moves (Hautus): the rows of [A - z, B] are dependent there."""
+    """The refusal of a model, with the poles that no gain moves (Hautus): the rows of [A - z, B] are dependent there."""
     n = len(model.A)
     stuck = [
         z for z in model.poles if abs(z) >= 1.0 - 1e-9
@@ -128,9 +125,5 @@ def _not_held(model: LinearModel) -> SceneError:
     ]  # fmt: skip
     which = ", ".join(f"{z:.4g}" for z in stuck) or "none far from the edge"
     problem = f"has no gains that hold every state: poles that no input moves are {which}"
-    return refusal(
-        "model",
-        ", ".join(model.inputs),
-        problem,
-        "give other inputs, leave states out by .part(...), or weigh them in Q",
-    )
+    remedy = "give other inputs, leave states out by .part(...), or weigh them in Q"
+    return refusal("model", ", ".join(model.inputs), problem, remedy)

@@ -74,7 +74,7 @@ class Margins:
         return len(self.why)
 
     def to_dict(self) -> dict[str, Any]:
-        """The margins as plain values, for JSON.
+        """Convert the margins to plain values, for JSON.
 
         Returns:
             "loop", "step", "why", "messages", and under "eigenvalues" and "runs" lists by name: None for NaN, "inf" for
@@ -92,7 +92,7 @@ class Margins:
         return {"loop": self.loop, "step": self.step, "why": self.why.tolist(), "messages": list(self.messages), **ways}
 
     def percentiles(self, of: Sequence[float] = PERCENTILES) -> dict[str, np.ndarray]:
-        """How margins are distributed over the members that settle as they are.
+        """Find how margins are distributed over the members that settle as they are.
 
         Args:
             of: percentages (k,), in [0, 100].
@@ -110,7 +110,7 @@ class Margins:
         }
 
     def curve(self, name: str, by: str | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """The distribution of a margin for a picture: how many members have less.
+        """Find the distribution of a margin for a picture: how many members have less.
 
         Args:
             name: "gain_lower", "gain_upper" or "delay".
@@ -124,7 +124,7 @@ class Margins:
         return values, np.arange(1, len(values) + 1) / max(1, len(values))
 
     def worst(self, count: int = 10, name: str | None = None) -> np.ndarray:
-        """The members that bear least.
+        """Find the members that bear least.
 
         Args:
             count: how many (default 10).
@@ -208,10 +208,21 @@ def margins(
 
     Raises:
         SceneError: If an argument or the scene is at fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> law = lw.control.HeadingPID(kp=2.0, kd=4.0)
+        >>> controller = lw.Controller(period=0.1, guidance=[lw.control.SetPoint(heading=0.0)], laws=[law])
+        >>> vehicle = lw.Vehicle(50.0, inertia=[4.0, 5.0, 6.0], buoyancy=490.3325)
+        >>> drag = lw.terms.Drag(linear=[20.0, 20.0, 20.0, 8.0, 8.0, 8.0])
+        >>> scene = lw.Scene(vehicle, terms=[lw.terms.ControlWrench(), drag], controller=controller)
+        >>> bearable = lw.linear.margins(lw.Ensemble(scene, 2), "heading_pid", method="rk4", h=0.02)
+        >>> bearable.values["gain_upper"].round(1), bearable.values["delay"]
+        (array([30., 30.]), array([6.62, 6.62]))
     """
     ensemble = ensemble_of(fleet)
     scene: Any = ensemble.scene
-    of, by = (tuple(listed(key, each, "names")) for key, each in (("of", of), ("by", by)))
+    of, by = tuple(listed("of", of, "names")), tuple(listed("by", by, "names"))
     faults = Faults()
     for word in of:
         faults.choice("of", word, OF)
@@ -220,15 +231,7 @@ def margins(
     for name, value in {"about": about, "settle": settle, "seconds": seconds, "longest": longest, "tilt": tilt}.items():
         faults.positive(name, value)
     faults.number("most", most, "", 1.0)
-    if scene.controller is None:
-        faults.add("fleet", "the scene", "has no controller", "give [controller]")
-    elif loop is not None and loop not in (keys := [law.key for law in scene.controller.laws]):
-        faults.add("loop", loop, "is no law of the controller", closest(loop, keys))
-    elif not faults and seconds < LEAST_TICKS * scene.controller.period:
-        least = LEAST_TICKS * scene.controller.period
-        faults.add(
-            "seconds", seconds, f"is less than {LEAST_TICKS} ticks", f"give {least:g} or more, to see an envelope"
-        )
+    _check_loop(faults, scene.controller, loop, seconds)
     faults.raise_if_any()
     calm(scene, "margins")
     if "eigenvalues" in by:
@@ -242,13 +245,26 @@ def margins(
     why: np.ndarray = np.full(n, "", dtype=object)
     for first in range(0, n, GROUP):
         places = np.arange(first, min(first + GROUP, n))
-        some, why[places] = study.loops(places)
-        for loops in some:
-            why[loops.places], found = _group(loops, of, by, most, longest)
+        groups, why[places] = study.loops(places)
+        for loops in groups:
+            why[loops.places], of_loops = _group(loops, of, by, most, longest)
             for way, name in ((way, name) for way in by for name in names):
-                answers[way][name][loops.places] = found[way][name]
+                answers[way][name][loops.places] = of_loops[way][name]
     grid = study.bench.plan.grid
     return Margins(loop or "all laws", answers["eigenvalues"], answers["runs"], why, grid.h, grid.messages)
+
+
+def _check_loop(faults: Faults, controller: Any, loop: str | None, seconds: float) -> None:
+    """Check that a controller has the law, and enough ticks in a run."""
+    if controller is None:
+        faults.add("fleet", "the scene", "has no controller", "give [controller]")
+    elif loop is not None and loop not in (keys := [law.key for law in controller.laws]):
+        faults.add("loop", loop, "is no law of the controller", closest(loop, keys))
+    elif not faults and seconds < LEAST_TICKS * controller.period:
+        least = LEAST_TICKS * controller.period
+        faults.add(
+            "seconds", seconds, f"is less than {LEAST_TICKS} ticks", f"give {least:g} or more, to see an envelope"
+        )
 
 
 # Margins (n,) by name, by way.
@@ -258,7 +274,7 @@ Answers = dict[str, dict[str, np.ndarray]]
 def _group(
     loops: Loops, of: Sequence[str], by: Sequence[str], most: float, longest: float
 ) -> tuple[np.ndarray, Answers]:
-    """(why a loop has no margins, margins by way and by name)."""
+    """Why loops have no margins (n,), and margins by way and by name."""
     bench, n, delays_now = loops.study.bench, len(loops.places), loops.delay
     every, unity, h = np.arange(n), np.ones(n), bench.plan.grid.h
     last = np.minimum(round(longest / h), (MOST_PERIODS - 1) * bench.every - delays_now)
@@ -290,7 +306,7 @@ def _group(
                 return np.asarray(holds(unity[some], delays_now[some] + values.astype(np.int64), some))
 
             guess = np.rint(known["delay"] / h) if "delay" in known else np.full(n, np.nan)
-            brackets = edges(delays, start - 1.0, last.astype(float), guess, 1.0, to_the_end=True)
+            brackets = edges(delays, start - 1.0, last.astype(float), guess, 1.0, whole_numbers=True)
             held = np.where(np.isinf(brackets[:, 1]), np.inf, brackets[:, 0])
             answers[way]["delay"] = np.where(why == "", held * h, np.nan)
     return why, answers

@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from lgvi_warp.control.loop_gain import FACTOR
 from lgvi_warp.studies.linear.bench import Motion, MotionBench
-from lgvi_warp.studies.linear.differences import Row, differences
+from lgvi_warp.studies.linear.differences import Differences, Row
 from lgvi_warp.studies.linear.linearize import remembered
 
 DELAY = "controller.delay"
@@ -24,30 +25,22 @@ NEUTRAL = 1e-3
 
 
 def delayed(bench: MotionBench, motion: Motion, k: int, steps: np.ndarray) -> Motion:
-    """The motions as after a tick at a steady motion, with a delay.
-
-    steps: (m,) delay, in steps.
-    """
+    """The motions as after a tick at a steady motion, with delays (m,) in steps."""
     bus: Any = bench.bus
-    memory = {key: rows.copy() for key, rows in motion.memory.items()}
+    memory = motion.copied_memory()
     of_bus, count = memory[""], bus.channels
     commands = of_bus[:, :count]
     of_bus[:, bus.acting : bus.acting + 2 * count] = np.tile(commands, 2)
     of_bus[:, bus.acting + 2 * count] = k + steps % bench.every
     memory["controller"] = np.tile(commands, int((steps // bench.every).max()) + 2)
-    return Motion(motion.position, motion.attitude, motion.velocity, motion.angular_velocity, memory)
+    return replace(motion, memory=memory)
 
 
 class SampledLoop:
     """x' = P x + Q1 u of q ticks ago + Q0 u of the tick before that; u' and what parts remember follow from x' at the tick.
 
     u' is affine in the factor. P, Q1, Q0 for each delay within a period, and what the tick does, are differences in lanes.
-
-    places: (n,), which members.
-
-    Attributes:
-        every: steps between two ticks.
-        moves: (n,), whether the demand of the loop moves anything.
+    Its `moves` (n,) is whether the demand of the loop moves anything.
     """
 
     def __init__(self, bench: MotionBench, places: np.ndarray, motion: Motion, k: int):
@@ -60,13 +53,10 @@ class SampledLoop:
         commands = [Row("", i, f"command {i}") for i in range(C)]
         acting = [Row("", bus.acting + i, f"acting {i}") for i in range(C)]
         s = 12 + len(terms)
-        ticks, self._whole = [], np.ones(n, bool)
+        ticks, self._bounded = [], np.ones(n, bool)
+        of_period = Differences(bench, k, bench.every, [*terms, *acting, *parts], [*terms, *commands, *parts])
         for factor in (0.0, 1.0):
-            numbers = {FACTOR: zero + factor, DELAY: zero}
-            derivatives = differences(
-                bench, places, still, k, bench.every, [*terms, *acting, *parts], [*terms, *commands, *parts],
-                numbers=numbers)  # fmt: skip
-            derivatives = self._without_failed(derivatives)
+            derivatives = self._without_failed(of_period(places, still, {FACTOR: zero + factor, DELAY: zero}))
             # A tick sees the motion alone: what it does of x is found behind the period that was between.
             of_motion = np.linalg.solve(
                 np.swapaxes(derivatives[:, :12, :12], 1, 2), np.swapaxes(derivatives[:, s:, :12], 1, 2)
@@ -76,14 +66,14 @@ class SampledLoop:
         # [u, parts] by [x, parts]: of the laws outside of the loop, and what the loop adds.
         self._tick, self._more = ticks[0], ticks[1] - ticks[0]
         self._late = [total]
+        of_late = Differences(bench, k, bench.every, acting, terms, motion=False)
         for steps in range(1, bench.every):
             later = delayed(bench, motion, k, np.full(n, steps))
             numbers = {FACTOR: zero + 1.0, DELAY: zero + steps * bench.plan.grid.h}
-            late = differences(bench, places, later, k, bench.every, acting, terms, motion=False, numbers=numbers)
-            self._late.append(self._without_failed(late))
+            self._late.append(self._without_failed(of_late(places, later, numbers)))
         self._C, self._s, self._m = C, s, len(parts)
         self.moves = np.abs(total @ self._more[:, :C]).max(axis=(1, 2)) > 0.0
-        self._axes, self._seen = self._decomposed()
+        self._axes, self._ranks = self._decomposed()
 
     def _decomposed(self) -> tuple[np.ndarray, np.ndarray]:
         """Axes of motion and parts (n, s + m, s + m), those first that laws see, by singular values; and how many they see.
@@ -92,8 +82,8 @@ class SampledLoop:
         """
         s, m, C = self._s, self._m, self._C
         size = s + m
-        axes, seen = np.tile(np.eye(size), (len(self._P), 1, 1)), np.full(len(self._P), size)
-        for i in np.flatnonzero(self._whole):
+        axes, ranks = np.tile(np.eye(size), (len(self._P), 1, 1)), np.full(len(self._P), size)
+        for i in np.flatnonzero(self._bounded):
             steps = np.zeros((size, size))
             steps[:s, :s] = self._P[i]
             now, more = (_of_states(tick, self._P[i]) for tick in (self._tick[i], self._more[i]))
@@ -110,27 +100,23 @@ class SampledLoop:
                 rows = across[sizes > SEES]
                 basis = np.concatenate([basis, rows])
                 rows = rows @ steps
-            seen[i] = len(basis)
+            ranks[i] = len(basis)
             others = np.linalg.svd(basis)[2][len(basis) :] if len(basis) else np.eye(size)
             axes[i] = np.concatenate([basis, others])
             free = np.abs(np.linalg.eigvals(others @ steps @ others.T)).max(initial=0.0)
-            self._whole[i] &= free <= 1.0 + NEUTRAL
-        return axes, seen
+            self._bounded[i] &= free <= 1.0 + NEUTRAL
+        return axes, ranks
 
-    def _without_failed(self, derived: np.ndarray) -> np.ndarray:
+    def _without_failed(self, derivatives: np.ndarray) -> np.ndarray:
         """The same, with other numbers for members of which a copy failed: their loops do not settle."""
-        well = np.isfinite(derived).all(axis=(1, 2))
-        self._whole &= well
-        return np.where(well[:, None, None], derived, np.eye(*derived.shape[1:]))
+        well = np.isfinite(derivatives).all(axis=(1, 2))
+        self._bounded &= well
+        return np.where(well[:, None, None], derivatives, np.eye(*derivatives.shape[1:]))
 
     def stable(self, factor: np.ndarray, steps: np.ndarray, some: np.ndarray) -> np.ndarray:
-        """Whether loops settle.
+        """Whether loops of some members (m,) settle, with factors on the demand and delays in steps of their own.
 
-        factor: (m,), factors on the demand.
-        steps: (m,), delays in steps.
-        some: (m,), which of the members.
-        Returns: (m,): whether all eigenvalues are within the unit circle, of what laws see; and what they do not see does not
-            grow.
+        All eigenvalues of what laws see are within the unit circle then, and what they do not see does not grow.
         """
         answer = np.zeros(len(some), bool)
         for q in np.unique(steps // self.every):
@@ -138,10 +124,10 @@ class SampledLoop:
             size = self._s + self._m + self._C * (q + 2)
             for each in np.array_split(at, max(1, len(at) * size**2 // ENTRIES)):
                 A = self._matrices(factor[each], int(q), steps[each] % self.every, some[each])
-                for count in np.unique(self._seen[some[each]]):
-                    alike = self._seen[some[each]] == count
+                for count in np.unique(self._ranks[some[each]]):
+                    alike = self._ranks[some[each]] == count
                     answer[each[alike]] = _settles(self._of_seen(A[alike], some[each][alike], int(count)))
-        return answer & self._whole[some]
+        return answer & self._bounded[some]
 
     def _of_seen(self, A: np.ndarray, some: np.ndarray, count: int) -> np.ndarray:
         """The loops' matrices of what laws see, and of commands."""

@@ -15,7 +15,7 @@ from lgvi_warp.physics import notation
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Start
-from lgvi_warp.studies.linear.bench import Motion, MotionBench, calm, plant
+from lgvi_warp.studies.linear.bench import COORDINATES, Motion, MotionBench, calm, plant
 from lgvi_warp.studies.members import scene_of
 
 # Largest acceleration of a steady motion [m/s2, rad/s2]: far above round-off over a step, some 1e-12.
@@ -25,7 +25,6 @@ STEP = 1e-6
 # Commands to begin with, as parts of their limits: where thrust goes with n |n|, it has no derivative at 0.
 GUESSES = (0.0, 0.05, 0.5)
 ANGLES = ("roll", "pitch", "drift")
-COMPONENTS = tuple(f"{name}[{i}]" for name in ("velocity", "angular_velocity") for i in range(3))
 
 
 @dataclass(frozen=True)
@@ -126,18 +125,16 @@ def trim(
     if not np.abs(accelerations).max() < STEADY:
         worst = int(np.argmax(np.abs(accelerations)))
         problem_text = f"has no steady motion with {', '.join(problem.free) or 'nothing'} free: "
-        problem_text += f"{accelerations[worst]:.3g} of the rate of {COMPONENTS[worst]} is left at the best of them"
+        problem_text += (
+            f"{accelerations[worst]:.3g} of the rate of {COORDINATES[6 + worst]} is left at the best of them"
+        )
         remedy = "let more be free (speed=None), give actuators that can, or other ballast"
         raise refusal("trim", "" if speed is None else f"speed {speed:g} m/s", problem_text, remedy)
     return problem.answer(x, accelerations)
 
 
 def step_of(scene: Any, h: float | None) -> float:
-    """The step of a study.
-
-    h: the step that is asked for [s]; None for the scene's.
-    Returns: The step [s].
-    """
+    """The step of a study [s]; h: None for the scene's."""
     faults, step = Faults(), scene.run.step if h is None else h
     if step is None:
         faults.add("h", h, "is missing", "give the step in seconds: h=0.01 or [run] step")
@@ -184,11 +181,10 @@ class _Problem:
         R = self.origin.attitude[0]
         self.heading = float(np.arctan2(R[1, 0], R[0, 0]))
         self.names = names
-        of_start = scene.start.given()
+        start = scene.start.given()
         # A start gives either velocity.
-        self.ahead = (
-            float(np.linalg.norm(of_start["velocity" if "velocity" in of_start else "velocity_inertial"])) or 1.0
-        )
+        velocity = start["velocity" if "velocity" in start else "velocity_inertial"]
+        self.ahead = float(np.linalg.norm(velocity)) or 1.0
 
     def guess(self, part: float) -> np.ndarray:
         """Where to begin: the speed of the start, and parts of the largest commands."""
@@ -202,24 +198,13 @@ class _Problem:
         value |= dict(zip(self.free, x.T, strict=True))
         zero = np.zeros(m)
         yaw = np.full(m, self.heading)
-        turns = [
-            np.stack(axis, axis=1)
-            for axis in ((zero, zero, yaw), (zero, value["pitch"], zero), (value["roll"], zero, zero))
-        ]
         R = np.eye(3)
-        for turn in turns:
-            R = R @ notation.matrix_from_rotation_vector(turn)
+        for turn in ((zero, zero, yaw), (zero, value["pitch"], zero), (value["roll"], zero, zero)):
+            R = R @ notation.matrix_from_rotation_vector(np.stack(turn, axis=1))
         course = yaw + value["drift"]
         over = np.stack([value["speed"] * np.cos(course), value["speed"] * np.sin(course), zero], axis=1)
-        first = self.origin.of(np.zeros(m, np.int64))
-        memory = {key: rows.copy() for key, rows in first.memory.items()}
-        rows = self.bench.bus.commands if self.bench.bus else {}
-        for key, commands in self.commands(value).items():
-            begin, count = rows[key]
-            memory[""][:, begin : begin + count] = commands
-            if key in memory:
-                memory[key][:, :count] = commands
-        return Motion(first.position, R, notation.rotate_into(R, over), np.zeros((m, 3)), memory)
+        origin = self.bench.commanded(self.origin.of(np.zeros(m, np.int64)), self.commands(value))
+        return Motion(origin.position, R, notation.rotate_into(R, over), np.zeros((m, 3)), origin.memory)
 
     def commands(self, value: Mapping[str, Any]) -> dict[str, np.ndarray]:
         """Commands by actuator, (..., channels)."""
@@ -237,7 +222,7 @@ class _Problem:
         return np.where(np.isfinite(rates), rates, 1e6)
 
     def residual(self, x: np.ndarray) -> np.ndarray:
-        """Return the accelerations that are left (6,) with these numbers."""
+        """The accelerations that are left (6,) with these numbers."""
         return self._rates(x[None])[0]
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
@@ -252,6 +237,5 @@ class _Problem:
         motion, plan = self.motions(x[None]), self.bench.plan
         start = Start(position=motion.position[0], attitude=motion.attitude[0], velocity=motion.velocity[0])
         values = dict(zip(self.free, map(float, x), strict=True))
-        commands = {key: each for key, each in self.commands(self.values | values).items()}
         fixed = {name: self.values[name] for name in self.names if name not in values}
-        return Trim(start, commands, values, fixed, accelerations, plan.method, plan.grid.h)
+        return Trim(start, self.commands(self.values | values), values, fixed, accelerations, plan.method, plan.grid.h)

@@ -27,14 +27,7 @@ Cost = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class SearchBox:
-    """Bounds of numbers of a scene.
-
-    Attributes:
-        names: their names (d,).
-        low: (d,).
-        high: (d,).
-        log: (d,), whether the search goes by the logarithm.
-    """
+    """Bounds of numbers of a scene (d,); log: whether the search goes by the logarithm."""
 
     names: tuple[str, ...]
     low: np.ndarray
@@ -43,19 +36,7 @@ class SearchBox:
 
     @classmethod
     def of(cls, key: str, bounds: Any, scene: Any) -> SearchBox:
-        """Read bounds.
-
-        Args:
-            key: the argument's name, for messages.
-            bounds: (low, high) or (low, high, "log") by name.
-            scene: the scene, which has these numbers.
-
-        Returns:
-            The box.
-
-        Raises:
-            SceneError: where bounds are at fault, or the scene has no such number; all of them are named.
-        """
+        """Read bounds of numbers of a scene, (low, high) or (low, high, "log") by name; key: of the argument, for messages."""
         faults, rows = Faults(), []
         example = '{"heading_pid.kp": (0.5, 5.0)}'
         if not isinstance(bounds, Mapping) or not bounds:
@@ -78,14 +59,7 @@ class SearchBox:
         return cls(names, np.array(low), np.array(high), np.array(logs, bool))
 
     def values(self, inside: np.ndarray) -> np.ndarray:
-        """Numbers at places of the unit cube.
-
-        Args:
-            inside: (k, d), in [0, 1].
-
-        Returns:
-            (k, d); at 0 and 1 the bounds, to the last digit.
-        """
+        """Numbers (k, d) at places of the unit cube (k, d): at 0 and 1 the bounds, to the last digit."""
         low, high = (np.log(np.where(self.log, end, 1.0)) for end in (self.low, self.high))
         curved, straight = np.exp(low + inside * (high - low)), self.low + inside * (self.high - self.low)
         within = np.clip(np.where(self.log, curved, straight), self.low, self.high)
@@ -94,14 +68,7 @@ class SearchBox:
 
 @dataclass(frozen=True)
 class BestCandidate:
-    """The best candidate of a search.
-
-    Attributes:
-        at: (d,), place in the unit cube.
-        cost: its cost.
-        restarts: (r,), the least cost of each evolution.
-        runs: number of candidates that were tried.
-    """
+    """The best candidate of a search; at: (d,), in the unit cube; restarts: the least cost of each evolution."""
 
     at: np.ndarray
     cost: float
@@ -109,44 +76,46 @@ class BestCandidate:
     runs: int
 
 
-class _Asked:
+class _CountedCost:
     """Counts candidates, and remembers the best."""
 
-    def __init__(self, cost: Cost, most: int, good_enough: float):
-        self.cost, self.most, self.good_enough, self.count = cost, most, good_enough, 0
+    def __init__(self, cost: Cost, most: int, good_enough: float, report: Callable[[int], None]):
+        self.cost, self.most, self.good_enough, self.report, self.count = cost, most, good_enough, report, 0
         self.best: np.ndarray | None = None
         self.least = math.inf
 
     @property
-    def left(self) -> int:
+    def remaining(self) -> int:
         return 0 if self.least <= self.good_enough else self.most - self.count
 
     def __call__(self, places: np.ndarray) -> np.ndarray:
         costs = np.where(np.isnan(values := self.cost(places)), np.inf, values)
         self.count += len(places)
+        self.report(self.count)
         first = int(np.argmin(costs))
         if self.best is None or costs[first] < self.least:
             self.best, self.least = places[first].copy(), float(costs[first])
         return costs
 
 
-def search(cost: Cost, d: int, most: int, seed: int, restarts: int, good_enough: float = -math.inf) -> BestCandidate:
-    """Find the least cost in the unit cube.
+def search(
+    cost: Cost, d: int, most: int, seed: int, restarts: int, good_enough: float = -math.inf,
+    report: Callable[[int], None] = lambda count: None) -> BestCandidate:  # fmt: skip
+    """Find the least cost in the unit cube of d dimensions, or one that is good enough.
 
     Evolution (Storn & Price 1997) several times, each from other places; then all corners where they are few; then a walk
     along the axes from the best place, with steps that shrink where none is better.
-
-    good_enough: cost at which the search ends (default: never).
+    report: called with the number of candidates tried.
     """
     from scipy.optimize import differential_evolution
     from scipy.stats import qmc
 
-    ask = _Asked(cost, most, good_enough)
+    ask = _CountedCost(cost, most, good_enough, report)
     size = max(LEAST, POPULATION * d)
     restarts = max(1, min(restarts, int(EVOLUTION * most / (4 * size))))
     each, least = int(EVOLUTION * most / restarts), []
     for i in range(restarts):
-        generations = min(each, ask.left) // size - 1
+        generations = min(each, ask.remaining) // size - 1
         if generations < 0:
             break
         start = qmc.LatinHypercube(d, rng=np.random.default_rng((seed, i))).random(size)
@@ -154,15 +123,15 @@ def search(cost: Cost, d: int, most: int, seed: int, restarts: int, good_enough:
             answer = differential_evolution(
                 lambda x: ask(x.T), [(0.0, 1.0)] * d, init=start, maxiter=generations, vectorized=True, updating="deferred",
                 polish=False, tol=1e-6, atol=0.0, rng=np.random.default_rng((seed, restarts + i)),
-                callback=lambda intermediate_result: ask.left == 0)  # fmt: skip
+                callback=lambda intermediate_result: ask.remaining == 0)  # fmt: skip
         except RuntimeError as error:
             # SciPy hides a ValueError of the cost behind one of its own.
             raise error.__cause__ or error from None
         least.append(answer.fun)
-    if ask.left and 2**d <= max(ask.left // 2, 1):
+    if ask.remaining and 2**d <= max(ask.remaining // 2, 1):
         ask(np.array(list(itertools.product((0.0, 1.0), repeat=d))))
     step = FIRST_STEP
-    while ask.best is not None and step > LAST_STEP and ask.left >= 2 * d:
+    while ask.best is not None and step > LAST_STEP and ask.remaining >= 2 * d:
         before = ask.least
         ask(np.clip(ask.best + step * np.concatenate([np.eye(d), -np.eye(d)]), 0.0, 1.0))
         step = step if ask.least < before else 0.5 * step

@@ -20,11 +20,7 @@ from lgvi_warp.studies.sweeps.setup import metric_of
 class Numbers:
     """A prepared run that returns one number of each member: NaN for those that fail, and where a quantity is not finite.
 
-    names: names of the columns of a call; None where members are given as states.
-
-    Attributes:
-        label: what the number is called.
-        of_metric: whether it is a metric.
+    names: of the columns of a call; None where members are given as states.
     """
 
     def __init__(self, scene: Scene, names: list[str] | None, key: str, of: Any, settings: Mapping[str, Any]):
@@ -39,10 +35,7 @@ class Numbers:
             self.run = prepare(scene, names, of, failed="nan", **settings)
 
     def __call__(self, call: Callable[[Prepared], Any]) -> np.ndarray:
-        """Run members.
-
-        Returns: (n,); a metric may be infinite, as a settling time is where a member never settles.
-        """
+        """The numbers of members (n,); a metric may be infinite, as a settling time is where a member never settles."""
         answer = call(self.run)
         if self.of_metric:
             return np.where(failed(answer.status), np.nan, answer.statistics[f"each {self.label}"].value[0, 0])

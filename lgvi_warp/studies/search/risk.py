@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,6 +22,13 @@ class CVaR:
 
     Raises:
         SceneError: If the share is not in (0, 1].
+
+    Examples:
+        >>> import numpy as np
+        >>> import lgvi_warp as lw
+        >>> risk = lw.metrics.CVaR(0.5)
+        >>> risk(np.array([[4.0, 1.0, 3.0, 2.0]]))
+        array([3.5])
     """
 
     share: float = 0.05
@@ -32,11 +41,7 @@ class CVaR:
         faults.raise_if_any()
 
     def __call__(self, costs: np.ndarray) -> np.ndarray:
-        """The risk.
-
-        costs: (k, members).
-        Returns: (k,); infinite where a member of the worst part has an infinite cost.
-        """
+        """The risk (k,) of costs (k, members); infinite where a member of the worst part has an infinite cost."""
         n = costs.shape[1]
         worst = -np.sort(-costs, axis=1)
         weights = np.clip(self.share * n - np.arange(n), 0.0, 1.0)
@@ -48,35 +53,24 @@ class CVaR:
 
 
 @dataclass(frozen=True)
-class _Mean:
-    def __call__(self, costs: np.ndarray) -> np.ndarray:
-        return np.asarray(costs.mean(axis=1))
-
-    def __str__(self) -> str:
-        return "mean"
-
-
-@dataclass(frozen=True)
-class _Quantile:
-    level: float
+class _Risk:
+    name: str
+    of: Callable[[np.ndarray], Any]
 
     def __call__(self, costs: np.ndarray) -> np.ndarray:
-        return np.asarray(np.quantile(costs, self.level, axis=1, method="inverted_cdf"))
+        return np.asarray(self.of(costs))
 
     def __str__(self) -> str:
-        return f"{100.0 * self.level:g} % quantile"
+        return self.name
 
 
 def risk_of(faults: Faults, risk: Any) -> Any:
-    """Read a risk.
-
-    risk: "mean", the level of a quantile in (0, 1), or a `CVaR`.
-    Returns: The risk, a function of costs (k, members); the mean where it is at fault.
-    """
+    """Read a risk, "mean", the level of a quantile, or a `CVaR`: a function of costs (k, members); the mean after a fault."""
     if isinstance(risk, CVaR):
         return risk
     if isinstance(risk, float) and 0.0 < risk < 1.0:
-        return _Quantile(risk)
+        quantile = functools.partial(np.quantile, q=risk, axis=1, method="inverted_cdf")
+        return _Risk(f"{100.0 * risk:g} % quantile", quantile)
     if not (isinstance(risk, str) and risk == "mean"):
         faults.add("risk", brief(risk), "is no risk", 'give "mean", a level such as 0.95, or lw.metrics.CVaR(0.05)')
-    return _Mean()
+    return _Risk("mean", lambda costs: costs.mean(axis=1))

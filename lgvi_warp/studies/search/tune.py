@@ -130,46 +130,28 @@ def tune_gains(
     ensemble = ensemble_of(fleet)
     scene: Any = ensemble.scene
     n, faults = ensemble.members, Faults()
-    measure, box = risk_of(faults, risk), None
-    with faults.including():
-        box = SearchBox.of("over", over, scene)
-    varied = {name.split("[")[0] for name in ensemble.varied_names}
-    for name in box.names if box else ():
-        if name.split("[")[0] in varied:
-            faults.add(f'over."{name}"', over[name], "varies by member too", "leave it out of one of them")
-    least = n * max(LEAST, POPULATION * (len(box.names) if box else 1))
-    if not isinstance(budget, int) or budget < least:
-        faults.add("budget", budget, "is less than a generation of all members", f"give {least} or more")
+    measure = risk_of(faults, risk)
+    box = _checked_box(faults, ensemble, over, budget)
     if fresh is not None and (not isinstance(fresh, int) or fresh < 0):
         faults.add("fresh", fresh, "is no number of members", "give a whole number, 0 for none")
     faults.raise_if_any()
     assert box is not None
     numbers_of = Numbers(scene, None, "minimise", minimise, settings)
-    costs, runs, report = _Costs(numbers_of, ensemble, box), 0, callback(progress)
-
-    def cost(inside: np.ndarray) -> np.ndarray:
-        nonlocal runs
-        answer = measure(costs(box.values(inside)))
-        runs += n * len(inside)
-        if report:
-            report(min(1.0, runs / budget))
-        return np.asarray(answer)
-
-    optimum = search(cost, len(box.names), budget // n, seed, restarts)
+    costs, report = _Costs(numbers_of, ensemble, box), callback(progress) or (lambda share: None)
+    optimum = search(
+        lambda inside: np.asarray(measure(costs(box.values(inside)))), len(box.names), budget // n, seed, restarts,
+        report=lambda count: report(min(1.0, n * count / budget)))  # fmt: skip
     best = box.values(optimum.at[None])
     before = np.array([[float(scene_value(scene, name)) for name in box.names]])
-    count = 4 * n if fresh is None else fresh
     drawn = ensemble.sampling.kind == "random" and bool(ensemble.vary) and not ensemble.explicit()
+    count = (4 * n if fresh is None else fresh) if drawn else 0
     fresh_costs = np.full(2, np.nan)
-    if drawn and count:
-        others = _Costs(numbers_of, ensemble.with_seed(ensemble.seed + 1, count), box)
-        fresh_costs = np.array([float(measure(others(numbers))[0]) for numbers in (best, before)])
-    values = dict(zip(box.names, map(float, best[0]), strict=True))
-    at_bounds = tuple(
-        name for name, v, low, high in zip(box.names, best[0], box.low, box.high, strict=True) if v in (low, high)
-    )
+    if count:
+        strangers = _Costs(numbers_of, ensemble.with_seed(ensemble.seed + 1, count), box)
+        fresh_costs = np.array([float(measure(strangers(numbers))[0]) for numbers in (best, before)])
+    edges = zip(box.names, best[0], box.low, box.high, strict=True)
     return Tuned(
-        parameters=values,
+        parameters=dict(zip(box.names, map(float, best[0]), strict=True)),
         before=dict(zip(box.names, map(float, before[0]), strict=True)),
         cost=optimum.cost,
         fresh_cost=float(fresh_costs[0]),
@@ -177,30 +159,43 @@ def tune_gains(
         of=numbers_of.label,
         risk=str(measure),
         members=n,
-        fresh=count if drawn else 0,
-        at_bounds=at_bounds,
+        fresh=count,
+        at_bounds=tuple(name for name, value, low, high in edges if value in (low, high)),
         restarts=optimum.restarts,
-        runs=runs + (2 * count if drawn else 0),
+        runs=n * optimum.runs + 2 * count,
     )
+
+
+def _checked_box(faults: Faults, ensemble: Ensemble, over: Any, budget: Any) -> SearchBox | None:
+    """The numbers to be searched, of which none may vary; None after a fault of theirs."""
+    box = None
+    with faults.including():
+        box = SearchBox.of("over", over, ensemble.scene)
+    varied = {name.split("[")[0] for name in ensemble.varied_names}
+    for name in box.names if box else ():
+        if name.split("[")[0] in varied:
+            faults.add(f'over."{name}"', over[name], "varies by member too", "leave it out of one of them")
+    least = ensemble.members * max(LEAST, POPULATION * (len(box.names) if box else 1))
+    if not isinstance(budget, int) or budget < least:
+        faults.add("budget", budget, "is less than a generation of all members", f"give {least} or more")
+    return box
 
 
 class _Costs:
     """Costs of candidates (k, d), of each member: (k, members)."""
 
     def __init__(self, numbers_of: Numbers, fleet: Ensemble, box: SearchBox):
-        self._numbers_of, self._box, self._members, n = numbers_of, box, fleet.select(0, fleet.members), fleet.members
-        self._own = {
-            name: np.broadcast_to(v, (n, *v.shape[1:]))
-            for name in fleet.varied()
-            for v in (self._members.parameters[name],)
-        }
+        n = fleet.members
+        self._numbers_of, self._box, self._members = numbers_of, box, fleet.select(0, n)
+        varied = {name: self._members.parameters[name] for name in fleet.varied()}
+        self._varied = {name: np.broadcast_to(v, (n, *v.shape[1:])) for name, v in varied.items()}
 
     def __call__(self, candidates: np.ndarray) -> np.ndarray:
         members, k = self._members, len(candidates)
         n = members.count
         every = np.tile(np.arange(n), k)
         states: Any = {name: getattr(members, name)[every] for name in FIELDS}
-        parameters = {name: v[every] for name, v in self._own.items()}
+        parameters = {name: v[every] for name, v in self._varied.items()}
         parameters |= dict(zip(self._box.names, np.repeat(candidates, n, axis=0).T, strict=True))
 
         def called(run: Prepared) -> Any:

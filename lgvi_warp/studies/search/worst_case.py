@@ -59,8 +59,8 @@ class WorstCase:
             event = f"{self.of} is infinite, or a member fails" if self.of_metric else "a member fails"
             return f"{event}: {where}; found in {self.runs} runs"
         bound = "a lower bound of the largest" if self.worst == "largest" else "an upper bound of the smallest"
-        each = ", ".join(f"{value:.6g}" for value in self.restarts)
-        return f"{self.of} = {self.value:.6g} at {where}: {bound}, after {self.runs} runs; restarts: {each}"
+        restarts = ", ".join(f"{value:.6g}" for value in self.restarts)
+        return f"{self.of} = {self.value:.6g} at {where}: {bound}, after {self.runs} runs; restarts: {restarts}"
 
 
 @shows_progress
@@ -121,17 +121,15 @@ def worst_case(
     faults.raise_if_any()
     assert box is not None
     numbers_of = Numbers(scene, list(box.names), "of", of, {**settings, "common_noise": True})
-    sign, runs, report = (-1.0 if worst == "largest" else 1.0), 0, callback(progress)
+    sign, report = -1.0 if worst == "largest" else 1.0, callback(progress) or (lambda share: None)
 
     def cost(inside: np.ndarray) -> np.ndarray:
-        nonlocal runs
         values = numbers_of(lambda run: run(box.values(inside)))
-        runs += len(inside)
-        if report:
-            report(min(1.0, runs / budget))
         return np.where(np.isnan(values), -np.inf, sign * values)
 
-    best = search(cost, len(box.names), budget, seed, restarts, good_enough=-np.finfo(float).max)
+    best = search(
+        cost, len(box.names), budget, seed, restarts, good_enough=-np.finfo(float).max,
+        report=lambda count: report(min(1.0, count / budget)))  # fmt: skip
     numbers = box.values(best.at[None])[0]
     sides = {
         name: "low" if value == low else "high" if value == high else ""

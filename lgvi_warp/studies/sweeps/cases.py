@@ -38,6 +38,12 @@ class Case:
 
     Raises:
         SceneError: something is of the wrong kind.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> case = lw.studies.Case("light", set={"vehicle.buoyancy": 310.0})
+        >>> case.of(lw.Scene.named("remus_100")).vehicle.buoyancy
+        310.0
     """
 
     name: str
@@ -64,6 +70,9 @@ class Case:
         Args:
             scene: the sweep's scene.
 
+        Returns:
+            That scene, or the case's own, with its vehicle, its lists and its numbers.
+
         Raises:
             SceneError: the case does not fit the scene.
         """
@@ -77,25 +86,24 @@ class Case:
         return with_lists(scene, self.replace).with_numbers(self.set)
 
 
-def cases_of(given: Any) -> tuple[Case, ...]:
-    """Return the cases of a sweep.
+def cases_of(tables: Any) -> tuple[Case, ...]:
+    """The cases of a sweep; of None the scene itself.
 
-    given: a list of `Case` and of tables with its arguments; a mapping of names to these tables, or to the numbers that a case
-        sets; None for one case, the scene itself.
+    tables: `Case` and tables with its arguments; or a mapping of names to these tables, or to the numbers that a case sets.
     """
-    if given is None:
+    if tables is None:
         return (Case("scene"),)
     faults, cases = Faults(), list[Case]()
     entries: list[Any]
-    if isinstance(given, Mapping):
+    if isinstance(tables, Mapping):
         arguments = set(Case.__dataclass_fields__) - {"name"}
         entries = [{"name": name, **(table if isinstance(table, Mapping) and table.keys() <= arguments else {"set": table})}
-                   for name, table in given.items()]  # fmt: skip
-    elif isinstance(given, str) or not isinstance(given, Sequence) or not given:
+                   for name, table in tables.items()]  # fmt: skip
+    elif isinstance(tables, str) or not isinstance(tables, Sequence) or not tables:
         example = 'give [{"name": "pid"}, {"name": "stiff", "set": {"heading_pid.kp": 2.0}}]'
-        raise refusal("cases", given, "is no list of cases", example)
+        raise refusal("cases", tables, "is no list of cases", example)
     else:
-        entries = list(given)
+        entries = list(tables)
     for i, entry in enumerate(entries):
         if isinstance(entry, Case):
             cases.append(entry)
@@ -114,10 +122,7 @@ def cases_of(given: Any) -> tuple[Case, ...]:
 
 
 def grid_of(grid: Any) -> dict[str, list[Any]]:
-    """Return the axes of a sweep's grid.
-
-    grid: name of a number -> its values; None for no grid.
-    """
+    """The axes of a sweep's grid, name of a number -> its values; of None no axes."""
     if grid is None:
         return {}
     if not isinstance(grid, Mapping):
@@ -134,12 +139,12 @@ def grid_of(grid: Any) -> dict[str, list[Any]]:
 
 
 def points_of(axes: Mapping[str, Sequence[Any]]) -> list[dict[str, Any]]:
-    """Return all combinations of the values of a grid, the last axis fastest; one without numbers where there is no axis."""
+    """All combinations of the values of a grid, the last axis fastest; one without numbers where there is no axis."""
     return [dict(zip(axes, values, strict=True)) for values in itertools.product(*axes.values())]
 
 
 def with_lists(scene: Scene, lists: Mapping[str, Any]) -> Scene:
-    """Return a scene with other parts."""
+    """The scene with other parts; terms replace those of the same name, and are added otherwise."""
     known = (*SECTIONS, *LISTS)
     faults = Faults("replace.")
     for name in lists:
@@ -160,17 +165,14 @@ def with_lists(scene: Scene, lists: Mapping[str, Any]) -> Scene:
 
 
 def known_names(scene: Scene) -> set[str]:
-    """Return the names of all that may vary in a scene."""
+    """The names of all that may vary in a scene."""
     return {*scene.parameters(), *(f"start.{name}" for name in NAMES)}
 
 
 def ensemble_of(
     scene: Scene, numbers: Mapping[str, Any], vary: Mapping[Any, Any], like: Ensemble
 ) -> tuple[Ensemble, list[str]]:
-    """Return the members of a case: those of all cases, as far as it has what varies and does not set it.
-
-    Returns: (members, names of what does not vary in this case).
-    """
+    """The members of a case, those of all as far as it has what varies and does not set it; and names of what does not."""
     known = known_names(scene)
     fixed = {target.name for name in numbers for target in variations.targets(name)}
     dropped = [name for name in vary if any(t.name in fixed or t.name not in known for t in variations.targets(name))]

@@ -65,17 +65,17 @@ def _case(entry: Any, folder: Path, scene_path: Path) -> Any:
     if not isinstance(entry, Mapping):
         raise refusal("cases", entry, "is no table", 'write [[cases]] and name = "pid" below')
     case = dict(entry)
-    own = case.get("scene")
-    if own is not None and not isinstance(own, str):
-        raise refusal("cases.scene", own, "is no path of a scene file", 'write scene = "other.toml"')
-    path = scene_path if own is None else folder / own
+    scene = case.get("scene")
+    if scene is not None and not isinstance(scene, str):
+        raise refusal("cases.scene", scene, "is no path of a scene file", 'write scene = "other.toml"')
+    path = scene_path if scene is None else folder / scene
     vehicle = case.get("vehicle")
     try:
         if isinstance(vehicle, Mapping) and "name" in vehicle:
             # A vehicle by its name brings terms of its own.
             case["scene"] = Scene.from_dict({**tables_of_file(path), "vehicle": vehicle})
             del case["vehicle"]
-        elif own is not None:
+        elif scene is not None:
             case["scene"] = Scene.load(path)
     except SceneError as error:
         raise error.prefixed(f"case {case.get('name')!r}: ") from None

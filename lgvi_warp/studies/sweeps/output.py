@@ -1,23 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files of a sweep: tables, its provenance, and a summary in words."""
+"""What a sweep tells its user: comparisons, ranks, the worst members and their causes, as tables, files and words."""
 
 from __future__ import annotations
 
 import json
 import os
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lgvi_warp.common import machine
+from lgvi_warp.common.errors import closest, refusal
 from lgvi_warp.common.files import write_text
-from lgvi_warp.common.status import Status
+from lgvi_warp.common.status import Status, failed
 from lgvi_warp.common.tables import write_csv
+from lgvi_warp.methods.saveat import SaveAt
+from lgvi_warp.results.result import Result
+from lgvi_warp.statistics.estimates import paired
+from lgvi_warp.statistics.estimates.given_data import explained
 from lgvi_warp.studies.files import finite_or_none
-from lgvi_warp.studies.sweeps.setup import END
+from lgvi_warp.studies.sweeps.comparisons import PairedComparison, compared, corrected, ranks
+from lgvi_warp.studies.sweeps.setup import END, SweepCell, rerun_members_of
 from lgvi_warp.studies.sweeps.success import none_text
-from lgvi_warp.studies.sweeps.sweep_table import SUCCESS, PairedComparison, SweepTable
+from lgvi_warp.studies.sweeps.sweep_table import SUCCESS, SweepTable
 
 # Worst members that are listed.
 LISTED = 20
@@ -36,6 +43,152 @@ class Sweep(SweepTable):
         interval: how intervals of probabilities are formed.
     """
 
+    def compare(
+        self, first: str, second: str, at: Mapping[str, Any] | None = None, quantile: float | None = None
+    ) -> list[PairedComparison]:
+        """Compare two cases on the same members: their success and each metric, at each point of the grid.
+
+        Success: difference of proportions of the members that differ, Tango's interval, McNemar's exact test. Metrics:
+        paired t of members that failed in neither case and whose numbers are finite; or of a quantile, by the bootstrap of
+        members. p is corrected for all of these comparisons by Holm. docs/guide/is_my_controller_robust.md says how to read
+        it.
+
+        Args:
+            first: name of a case.
+            second: name of another case; differences are second less first.
+            at: values of the grid by name; None (default) for all points.
+            quantile: level of the quantile to compare in place of means; None (default) for means.
+
+        Returns:
+            The comparisons, success first at each point; `row()` of one is a record of a table.
+
+        Raises:
+            SceneError: there is no such case or point.
+        """
+        pairs = [(a, b) for a in self.cells_of(first, at) for b in self.cells_of(second, at) if a.point == b.point]
+        return self.corrected_for_number([row for a, b in pairs for row in compared(self, a, b, quantile)])
+
+    def corrected_for_number(self, rows: list[PairedComparison]) -> list[PairedComparison]:
+        """Correct p of comparisons that were made together for their number, by Holm.
+
+        Args:
+            rows: the comparisons, as of `compare`.
+
+        Returns:
+            The same with `p` corrected, and `real` by that and the sweep's confidence.
+        """
+        return corrected(rows, self.confidence)
+
+    def ranking(self, at: Mapping[str, Any] | None = None) -> list[dict[str, Any]]:
+        """Rank the cases by success, and say of which others each is better than chance explains, and by how much.
+
+        With a grid a case's success is the mean over its points, of each member's share of points passed; a case that was
+        refused at a point is left out. All pairs of cases are tested, McNemar's exact test or with a grid a paired t of
+        shares, and p is corrected for all pairs by Holm.
+
+        Args:
+            at: values of the grid by name; None (default) for all points.
+
+        Returns:
+            Records with rank, case, value, lower, upper, better_than and better_by, the best first.
+
+        Raises:
+            SceneError: there is no such point.
+        """
+        return ranks(self, at)
+
+    def worst(self, count: int = 20, by: str | None = None, case: str | None = None) -> list[dict[str, Any]]:
+        """Find the worst members of all cells: those that failed, the earliest first, then by a metric, the largest first.
+
+        Args:
+            count: how many; by default 20.
+            by: name of the metric; default the first one that success limits from above, else the first one.
+            case: name of the case; None (default) for all.
+
+        Returns:
+            Records with case, point, member, status, whether it passed, the metrics and what varies.
+
+        Raises:
+            SceneError: there is no such metric or case.
+        """
+        limited = [name for name, (_, below) in self.conditions.limits.items() if np.isfinite(below)]
+        by = by or next(iter([*limited, *self.metrics]))
+        if by not in self.metrics:
+            raise refusal("by", by, "is no metric of this sweep", closest(str(by), self.metrics))
+        places: list[tuple[float, float, int, int]] = []
+        for cell in (cell for name in ((case,) if case else self.cases) for cell in self.cells_of(name)):
+            record = self.record(cell)
+            if record.refused:
+                continue
+            lost, ends = failed(record.status), record.numbers[END]
+            size = np.nan_to_num(record.numbers[by], nan=np.inf)
+            # Sorted by what comes first: earlier failures, then larger numbers; members in their order.
+            group, rank = np.where(lost, 0.0, 1.0), np.where(lost, ends, -size)
+            order = np.lexsort((np.arange(len(lost)), rank, group))[:count]
+            places += [(float(group[i]), float(rank[i]), cell.index, int(i)) for i in order]
+        return [self._member_row(self.cells[index], i) for _, _, index, i in sorted(places)[:count]]
+
+    def _member_row(self, cell: SweepCell, i: int) -> dict[str, Any]:
+        record, inputs = self.record(cell), self.inputs(cell, i, i + 1)
+        return {"case": cell.case.name, **cell.point, "member": i, "status": int(record.status[i]),
+                "passed": bool(self.passed(cell)[i]), **{name: float(x[i]) for name, x in record.numbers.items()},
+                **{name: float(x[0]) for name, x in inputs.items()}}  # fmt: skip
+
+    def causes(self, case: str, at: Mapping[str, Any] | None = None, of: str = SUCCESS) -> list[dict[str, Any]]:
+        """Find which of the inputs that vary explain success or a metric, the most important first.
+
+        share: the part of the variance over members that the mean over this input explains, from the members at hand (by
+        bins), with its interval and the F test's p, corrected for the number of inputs by Holm. slope: the standardised
+        coefficient of a linear regression on all inputs. Inputs are meant to be drawn independently.
+
+        Args:
+            case: name of the case.
+            at: values of the grid by name; may be left out where there is no grid.
+            of: "success" (default), or the name of a metric, over members that did not fail.
+
+        Returns:
+            Records with input, share, lower, upper, p, slope, and the input's median where members pass and where they do not.
+
+        Raises:
+            SceneError: there is no such case, point or metric, or it was refused.
+        """
+        cell = self.cell(case, at)
+        passed, inputs = self.passed(cell), self.inputs(cell)
+        y = passed.astype(np.float64)
+        if of != SUCCESS:
+            y = np.where(failed(self.record(cell).status), np.nan, self.values(case, of, at))
+        effects = explained(inputs, y, self.confidence)
+        p = paired.holm(np.array([effect.p for effect in effects.values()]))
+        rows = [{"input": name, **effect._asdict(), "p": float(level), "median_passed": _median(inputs[name][passed]),
+                 "median_failed": _median(inputs[name][~passed])}
+                for (name, effect), level in zip(effects.items(), p, strict=True)]  # fmt: skip
+        return sorted(rows, key=lambda row: -np.nan_to_num(row["share"], nan=-1.0))
+
+    def again(
+        self,
+        case: str,
+        members: Sequence[int],
+        at: Mapping[str, Any] | None = None,
+        save: SaveAt | None = None,
+        threads: int | None = None,
+    ) -> Result:
+        """Run members again alone, with the bits that they had, and save their samples.
+
+        Args:
+            case: name of the case.
+            members: their indices.
+            at: values of the grid by name; may be left out where there is no grid.
+            save: which samples, and when; default as the scene says.
+            threads: number of threads; default all cores.
+
+        Returns:
+            Their result.
+
+        Raises:
+            SceneError: there is no such case, point or member.
+        """
+        return rerun_members_of(self.setup, self.cell(case, at), members, save, threads)
+
     def save(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write table.csv, comparison.csv, ranking.csv, worst.csv, causes.csv, sweep.json and summary.md into a folder.
 
@@ -50,34 +203,31 @@ class Sweep(SweepTable):
         """
         target = Path(folder)
         target.mkdir(parents=True, exist_ok=True)
-        comparison = [row.row() for row in against_baseline(self)]
-        tables = {
-            "table": self.rows(),
-            "comparison": comparison,
-            "ranking": self.ranking(),
-            "worst": self.worst(LISTED),
-        }
+        tables = {"table": self.rows(), "comparison": [row.row() for row in against_baseline(self)],
+                  "ranking": self.ranking(), "worst": self.worst(LISTED)}  # fmt: skip
         tables["causes"] = [{"case": cell.case.name, **cell.point, "of": of, **row} for cell in self.cells
                             if not self.record(cell).refused for of in (SUCCESS, *self.metrics) if of != END
                             for row in self.causes(cell.case.name, cell.point, of)]  # fmt: skip
         files = [write_csv(rows, target / f"{name}.csv", target) for name, rows in tables.items()]
-        texts = {"sweep.json": json.dumps(finite_or_none(provenance(self)), indent=1), "summary.md": summary(self)}
+        texts = {"sweep.json": json.dumps(finite_or_none(provenance(self)), indent=1), "summary.md": str(self)}
         return files + [write_text(target / name, text, target) for name, text in texts.items()]
 
     def __str__(self) -> str:
-        """Return the sweep in words."""
-        return summary(self)
+        return _summary(self)
 
 
-def against_baseline(table: SweepTable) -> list[PairedComparison]:
-    """Return the comparisons of all other cases with the baseline."""
-    others = [case for case in table.cases if case != table.baseline]
-    rows = [row for case in others for row in table.compare(table.baseline, case)]
-    return table.corrected_for_number(rows)
+def _median(x: np.ndarray) -> float:
+    return float(np.median(x)) if len(x) else np.nan
+
+
+def against_baseline(sweep: Sweep) -> list[PairedComparison]:
+    """The comparisons of all other cases with the baseline."""
+    rivals = [case for case in sweep.cases if case != sweep.baseline]
+    return sweep.corrected_for_number([row for case in rivals for row in sweep.compare(sweep.baseline, case)])
 
 
 def provenance(table: SweepTable) -> dict[str, Any]:
-    """Return all that the sweep follows from, of plain types."""
+    """All that the sweep follows from, of plain types."""
     setup = table.setup
     cells = [{"case": cell.case.name, "at": {name: as_json(value) for name, value in cell.point.items()}, "key": cell.key,
               "fixed": list(cell.fixed), "refused": table.record(cell).refused, "messages": list(table.record(cell).messages)}
@@ -92,7 +242,7 @@ def provenance(table: SweepTable) -> dict[str, Any]:
 
 
 def as_json(value: Any) -> Any:
-    """Return a value as JSON can hold it: plain types, others as text."""
+    """A value as JSON can hold it: plain types, others as text."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, float) and not np.isfinite(value):
@@ -101,57 +251,45 @@ def as_json(value: Any) -> Any:
 
 
 def percent(value: float) -> str:
-    """Return a fraction in percent, as text."""
+    """A fraction in percent, as text."""
     return f"{100.0 * value:.4g}"
 
 
-def summary(found: SweepTable) -> str:
-    """Return the sweep in words, as Markdown.
-
-    Args:
-        found: the sweep.
-    """
-    count, level = found.members_count, f"{found.confidence:.0%}"
-    lines = [
-        "# Sweep",
-        "",
-        f"{count:,} members, the same in {len(found.cells)} cells; intervals at {level}.",
-        "",
-        "## Success",
-        "",
-    ]
-    kind = found.setup.members.sampling.kind
+def _summary(sweep: Sweep) -> str:
+    """The sweep in words, as Markdown."""
+    size = f"{sweep.members_count:,} members, the same in {len(sweep.cells)} cells"
+    lines = ["# Sweep", "", f"{size}; intervals at {sweep.confidence:.0%}.", "", "## Success", ""]
+    kind = sweep.setup.members.sampling.kind
     if kind != "random":
         lines += [f"Intervals are those of independent members, which a {kind} does not give: they need not fit.", ""]
-    lines += [f"- {_cell_text(found, cell)}" for cell in found.cells]
-    if len(found.cases) > 1:
+    lines += [f"- {_cell_text(sweep, cell)}" for cell in sweep.cells]
+    if len(sweep.cases) > 1:
         lines += ["", "## Rank", ""]
-        for row in found.ranking():
+        for row in sweep.ranking():
             better = f"; better than {row['better_by']}" if row["better_by"] else ""
             lines.append(f"{row['rank']}. {row['case']}: {percent(row['value'])} % "
                          f"({percent(row['lower'])} to {percent(row['upper'])}){better}")  # fmt: skip
-        lines += ["", f"## Against {found.baseline}", ""]
+        lines += ["", f"## Against {sweep.baseline}", ""]
         # With a grid metrics would be too many for a page.
-        real = [row for row in against_baseline(found) if row.real and (row.of == SUCCESS or not found.setup.axes)]
-        lines += [f"- {_compared_text(found, row)}" for row in real] or ["- No difference of success is real."]
+        real = [row for row in against_baseline(sweep) if row.real and (row.of == SUCCESS or not sweep.setup.axes)]
+        lines += [f"- {_compared_text(sweep, row)}" for row in real] or ["- No difference of success is real."]
         lines += ["", "comparison.csv has the differences of all metrics."]
     lines += ["", "## What failures go with", ""]
-    lines += [text for cell in found.cells if (text := _causes_text(found, cell))] or [
-        "- With nothing that varies, as far as seen."
-    ]
+    causes = [text for cell in sweep.cells if (text := _causes_text(sweep, cell))]
+    lines += causes or ["- With nothing that varies, as far as seen."]
     lines += ["", "## Worst members", ""]
-    for row in found.worst(5):
-        at = ", ".join(f"{name} = {row[name]}" for name in found.setup.axes)
+    for row in sweep.worst(5):
+        at = ", ".join(f"{name} = {row[name]}" for name in sweep.setup.axes)
         status = Status(row["status"]).name.lower()
         lines.append(f"- member {row['member']} of {row['case']}{' at ' + at if at else ''}, status {status}")
     return "\n".join(lines) + "\n"
 
 
-def _causes_text(table: SweepTable, cell: Any) -> str:
+def _causes_text(sweep: Sweep, cell: SweepCell) -> str:
     """The inputs that really explain success in a cell; "" for none."""
-    if table.record(cell).refused:
+    if sweep.record(cell).refused:
         return ""
-    rows = [row for row in table.causes(cell.case.name, cell.point) if row["p"] < 1.0 - table.confidence]
+    rows = [row for row in sweep.causes(cell.case.name, cell.point) if row["p"] < 1.0 - sweep.confidence]
     texts = []
     for row in rows[:3]:
         medians = f"median {row['median_failed']:.4g} where it fails, {row['median_passed']:.4g} where it passes"
@@ -159,7 +297,7 @@ def _causes_text(table: SweepTable, cell: Any) -> str:
     return f"- {cell.name}: {'; '.join(texts)}" if texts else ""
 
 
-def _cell_text(table: SweepTable, cell: Any) -> str:
+def _cell_text(table: SweepTable, cell: SweepCell) -> str:
     record = table.record(cell)
     if record.refused:
         return f"{cell.name}: refused: {record.refused}"
@@ -177,8 +315,8 @@ def _compared_text(table: SweepTable, row: PairedComparison) -> str:
     if row.of == SUCCESS:
         word = "better" if d.value > 0.0 else "worse"
         ends = sorted((abs(d.lower), abs(d.upper)))
-        seen = f"{row.only[1]:,} pass only there, {row.only[0]:,} only with {row.first}" if row.only else ""
+        counts = f"{row.only[1]:,} pass only there, {row.only[0]:,} only with {row.first}" if row.only else ""
         points = f"{percent(ends[0])} to {percent(ends[1])} points"
-        return f"{row.second}{where}: {word} by {points}, seen on the same members ({seen})"
+        return f"{row.second}{where}: {word} by {points}, seen on the same members ({counts})"
     unit = "" if table.unit(row.of) == "1" else f" {table.unit(row.of)}"
     return f"{row.second}{where}: {row.of} {d.value:+.4g}{unit} ({d.lower:+.4g} to {d.upper:+.4g}), from {row.values[0]:.4g}"

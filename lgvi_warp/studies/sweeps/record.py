@@ -25,11 +25,7 @@ FOLDER = "cells"
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """What the members of a cell showed.
-
-    status: (n,), of `Status`.
-    numbers: metrics by name, (n,).
-    """
+    """What the members of a cell showed: status (n,) of `Status`, and metrics (n,) by name; or why it was refused."""
 
     status: np.ndarray
     numbers: Mapping[str, np.ndarray]
@@ -38,7 +34,7 @@ class Record:
 
     @classmethod
     def of_refusal(cls, text: str) -> Record:
-        """Return the record of a cell that did not run."""
+        """The record of a cell that did not run."""
         return cls(np.zeros(0, np.uint8), {}, (), text)
 
     def save(self, path: Path, root: Path) -> None:
@@ -47,18 +43,18 @@ class Record:
         names = list(self.numbers)
         table = np.array([self.numbers[name] for name in names], np.float64).reshape(len(names), len(self.status))
         crc = _checksum(path, names, self.messages, self.status, table)
-        said = {"metrics": names, "messages": self.messages, "crc32": crc}
-        words = np.frombuffer(json.dumps(said).encode(), np.uint8)
+        content = json.dumps({"metrics": names, "messages": self.messages, "crc32": crc})
+        words = np.frombuffer(content.encode(), np.uint8)
         write_npz(path, {"words": words, "status": self.status, "numbers": table}, root)
 
     @classmethod
     def load(cls, path: Path, metrics: Sequence[str], members: int) -> Record | None:
-        """Return the record of a file; None where there is none, or none that is whole and of this cell."""
+        """The record of a file; None where there is none, or none that is whole and of this cell."""
         try:
             arrays = of_npz(path)
             words = parsed(arrays["words"].tobytes())
             table, status, messages = arrays["numbers"], arrays["status"], words["messages"]
-            whole = (
+            of_this_cell = (
                 (table.dtype, table.shape) == (np.float64, (len(metrics), members))
                 and (status.dtype, status.shape) == (np.uint8, (members,))
                 and bool(np.isin(status, [*Status]).all())
@@ -66,9 +62,7 @@ class Record:
                 and all(isinstance(text, str) for text in messages)
                 and words["crc32"] == _checksum(path, metrics, messages, status, table)
             )
-            if not whole:
-                return None
-            return cls(status, dict(zip(metrics, table, strict=True)), tuple(messages))
+            return cls(status, dict(zip(metrics, table, strict=True)), tuple(messages)) if of_this_cell else None
         except (OSError, ValueError, KeyError, TypeError):
             return None
 
@@ -77,16 +71,13 @@ def _checksum(
     path: Path, metrics: Sequence[str], messages: Sequence[str], status: np.ndarray, table: np.ndarray
 ) -> int:
     """The checksum of a record, and of the cell that it is of."""
-    said = json.dumps([path.name, list(metrics), list(messages)]).encode()
-    return zlib.crc32(table.tobytes(), zlib.crc32(status.tobytes(), zlib.crc32(said)))
+    words = json.dumps([path.name, list(metrics), list(messages)]).encode()
+    return zlib.crc32(table.tobytes(), zlib.crc32(status.tobytes(), zlib.crc32(words)))
 
 
 @dataclass
 class Records:
-    """The records of all cells.
-
-    folder: folder of the sweep; None (default): they are kept in memory.
-    """
+    """The records of all cells, in the folder of a sweep; None: in memory."""
 
     folder: Path | None = None
     metrics: Sequence[str] = ()
@@ -100,13 +91,13 @@ class Records:
                 place_of(self.folder / FOLDER / name, self.folder)
 
     def __getitem__(self, key: str) -> Record:
-        """Return the record of a key, which there must be."""
+        """The record of a key, which there must be."""
         record = self.get(key)
         assert record is not None
         return record
 
     def get(self, key: str) -> Record | None:
-        """Return the record of a key; None where there is none."""
+        """The record of a key; None where there is none."""
         if key in self._kept or self.folder is None:
             return self._kept.get(key)
         return Record.load(self.path(key), self.metrics, self.members)
@@ -119,13 +110,13 @@ class Records:
             record.save(self.path(key), self.folder)
 
     def path(self, key: str) -> Path:
-        """Return the file of a record."""
+        """The file of a record."""
         assert self.folder is not None
         return self.folder / FOLDER / f"{key}.npz"
 
 
 def key_of(content: Mapping[str, Any]) -> str:
-    """Return a key for what decides a cell's numbers: 32 hexadecimal digits."""
+    """A key for what decides a cell's numbers: 32 hexadecimal digits."""
     text = json.dumps(content, sort_keys=True, default=_plain)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 

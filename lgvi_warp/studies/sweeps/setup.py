@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -48,18 +49,20 @@ class Setup:
     metrics: dict[str, Statistic]
     settings: dict[str, Any]
     vary: dict[Any, Any]
-    told: ToldApart = field(default_factory=ToldApart)
+    identities: ToldApart = field(default_factory=ToldApart)
 
     @property
     def cells(self) -> list[tuple[Case, dict[str, Any]]]:
         """Cases and points of the grid, in the order in which they are run."""
         return [(case, point) for case in self.cases for point in points_of(self.axes)]
 
-    def fleet(self, case: Case, point: Mapping[str, Any]) -> tuple[Ensemble, list[str]]:
-        """Return the members of a cell.
+    @property
+    def first_point(self) -> dict[str, Any]:
+        """The first point of the grid."""
+        return {name: values[0] for name, values in self.axes.items()}
 
-        Returns: (members, names of what does not vary in this cell).
-        """
+    def fleet(self, case: Case, point: Mapping[str, Any]) -> tuple[Ensemble, list[str]]:
+        """The members of a cell, and names of what does not vary in it."""
         scene = case.of(self.scene).with_numbers(point)
         numbers = {**case.set, **point}
         if isinstance(case.vehicle, Mapping):
@@ -67,32 +70,32 @@ class Setup:
         return ensemble_of(scene, numbers, self.vary, self.members)
 
     def key(self, fleet: Ensemble) -> str:
-        """Return the key of a cell's record."""
+        """The key of a cell's record."""
         scene = fleet.scene.to_dict()
         scene.pop("ensemble", None)
         tables = [metric.to_dict() for metric in self.metrics.values()]
-        functions = {place: self.told.name(own) for place, own in self.functions(fleet).items()}
+        functions = {place: self.identities.name(function) for place, function in self.functions(fleet).items()}
         versions = machine.versions()
         return key_of({"scene": scene, "ensemble": fleet.to_dict(), "metrics": tables, "functions": functions,
                        "settings": self.settings, "versions": versions})  # fmt: skip
 
     def functions(self, fleet: Ensemble) -> dict[str, Own]:
-        """Return the user's functions that a cell's numbers depend on, by their place."""
+        """The user's functions that a cell's numbers depend on, by their place."""
         return functions_of(fleet, self.metrics.values())
 
     def unknown(self, fleet: Ensemble) -> list[str]:
-        """Return the places of functions that another call cannot tell from others."""
-        return [place for place, own in self.functions(fleet).items() if self.told.name(own)[0] == UNKNOWN]
+        """The places of functions that another call cannot tell from others."""
+        functions = self.functions(fleet).items()
+        return [place for place, function in functions if self.identities.name(function)[0] == UNKNOWN]
 
     def note_functions(self) -> None:
         """Look at the functions of all cases before any of them runs, since what they hold may change as they run."""
         for case in self.cases:
             with contextlib.suppress(SceneError):  # the case will say so itself
-                fleet, _ = self.fleet(case, {name: values[0] for name, values in self.axes.items()})
-                self.key(fleet)
+                self.key(self.fleet(case, self.first_point)[0])
 
     def kept(self, fleet: Ensemble) -> dict[str, Any]:
-        """Return the arguments of `solve` for what a run keeps: metrics alone, all of them at ticks."""
+        """The arguments of `solve` for what a run keeps: metrics alone, all of them at ticks."""
         metrics, controller = list(self.metrics.values()), fleet.scene.controller
         # Metrics come to ticks by themselves; expressions over the path are of the samples.
         by_samples = controller is not None and not all(metric.ticks for metric in metrics)
@@ -100,7 +103,7 @@ class Setup:
         return {"save": save, "statistics": metrics, "keep": "none"}
 
     def run(self, fleet: Ensemble, *, simulate: Callable[..., Any] = solve, **more: Any) -> Record:
-        """Run a cell."""
+        """Run a cell, by `solve` or what stands for it, with further arguments of it."""
         faults = Faults()
         check_wanted(faults, "metrics", self.metrics, fleet.scene.controller)
         faults.raise_if_any()
@@ -111,10 +114,7 @@ class Setup:
 
 @dataclass(frozen=True, eq=False)
 class SweepCell:
-    """A case at a point of the grid.
-
-    fleet: its members; None where it was refused before there were any.
-    """
+    """A case at a point of the grid, and its members: None where it was refused before there were any."""
 
     index: int
     case: Case
@@ -130,22 +130,12 @@ class SweepCell:
         return f"{self.case.name} at {at}" if at else self.case.name
 
 
-def made(
-    scene: Any,
-    cases: Any,
-    grid: Any,
-    vary: Any,
-    members: Any,
-    seed: Any,
-    sampling: Any,
-    metrics: Any,
-    settings: Mapping[str, Any],
-    *,
-    predict: Callable[..., Prediction] = predict,
-) -> Setup:
-    """Return what a sweep would run; `settings` are those of solve, all before them as of `sweep`."""
+def setup_of(
+    scene: Any, cases: Any, grid: Any, vary: Any, members: Any, seed: Any, sampling: Any, metrics: Any,
+    settings: Mapping[str, Any], *, predict: Callable[..., Prediction] = predict) -> Setup:  # fmt: skip
+    """What a sweep would run; `settings` are those of solve, all before them as of `sweep`."""
     faults = Faults()
-    base, together = _given(scene, vary)
+    base, together = _base(scene, vary)
     parts: dict[str, Any] = {"cases": (), "axes": {}, "metrics": {}}
     for name, read, value in (("cases", cases_of, cases), ("axes", grid_of, grid), ("metrics", metrics_of, metrics)):
         with faults.including():
@@ -157,19 +147,15 @@ def made(
     assert isinstance(base.scene, Scene)
     fleet = _fleet(base, members, seed, sampling, together, parts["cases"])
     setup = Setup(base.scene, members=fleet, settings=dict(settings), vary=together, **parts)
-    count = len(setup.cases) * int(np.prod([len(values) for values in setup.axes.values()], dtype=object))
+    count = len(setup.cases) * math.prod(len(values) for values in setup.axes.values())
     if count > MOST_CELLS:
-        raise refusal(
-            "grid",
-            f"{count:,} cells",
-            too_many_text(setup, count, predict=predict),
-            f"give at most {MOST_CELLS:,} cells, or vary a number",
-        )
+        problem = too_many_text(setup, count, predict=predict)
+        raise refusal("grid", f"{count:,} cells", problem, f"give at most {MOST_CELLS:,} cells, or vary a number")
     return setup
 
 
 def too_many_text(setup: Setup, count: int, *, predict: Callable[..., Prediction] = predict) -> str:
-    """Say what is wrong with so many cells: the time that they would take."""
+    """What is wrong with so many cells: the time that they would take."""
     try:
         prediction = _prediction(setup, None, predict)
     except SceneError:
@@ -180,15 +166,12 @@ def too_many_text(setup: Setup, count: int, *, predict: Callable[..., Prediction
 
 def _prediction(setup: Setup, threads: int | None, predict: Callable[..., Prediction]) -> Prediction:
     """What the first cell would take."""
-    fleet, _ = setup.fleet(setup.cases[0], {name: values[0] for name, values in setup.axes.items()})
+    fleet, _ = setup.fleet(setup.cases[0], setup.first_point)
     return predict(fleet, threads=threads, **setup.kept(fleet), **setup.settings)
 
 
 def duration_text(seconds: float) -> str:
-    """Return a time in words.
-
-    seconds: the time [s].
-    """
+    """A time [s] in words."""
     for unit, size in (("years", 3.15e7), ("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
         if seconds >= 2.0 * size:
             return f"{seconds / size:.2g} {unit}"
@@ -196,10 +179,7 @@ def duration_text(seconds: float) -> str:
 
 
 def plan_text(setup: Setup, threads: int | None = None, *, predict: Callable[..., Prediction] = predict) -> str:
-    """Return what a sweep would take, as lines of text, from a trial of its first cell.
-
-    threads: number of threads; None (default) for all cores.
-    """
+    """What a sweep would take, as lines of text, from a trial of its first cell."""
     prediction, count = _prediction(setup, threads, predict), len(setup.cells)
     points, duration = count // len(setup.cases), duration_text((prediction.advance + prediction.set_up) * count)
     lines = [f"cells       {count:,}: {len(setup.cases)} cases at {points:,} points of the grid",
@@ -217,22 +197,18 @@ def _fleet(
     base, known = scene.scene, known_names(scene.scene)
     elsewhere = [name for name in vary if any(target.name not in known for target in variations.targets(name))]
     if elsewhere:
-        others = set[str]()
+        of_cases = set[str]()
         for case in cases:
             with contextlib.suppress(SceneError):  # the case will say so itself
-                others |= known_names(case.of(base))
-        elsewhere = [name for name in elsewhere if all(target.name in others for target in variations.targets(name))]
+                of_cases |= known_names(case.of(base))
+        elsewhere = [name for name in elsewhere if all(target.name in of_cases for target in variations.targets(name))]
     here = {name: distribution for name, distribution in vary.items() if name not in elsewhere}
     return Ensemble(
-        base,
-        scene.members if members is None else members,
-        scene.seed if seed is None else seed,
-        here,
-        scene.sampling if sampling is None else sampling,
-    )
+        base, scene.members if members is None else members, scene.seed if seed is None else seed, here,
+        scene.sampling if sampling is None else sampling)  # fmt: skip
 
 
-def _given(scene: Any, vary: Any) -> tuple[Ensemble, dict[Any, Any]]:
+def _base(scene: Any, vary: Any) -> tuple[Ensemble, dict[Any, Any]]:
     """The ensemble that a sweep starts from, and all that varies."""
     if isinstance(scene, str | os.PathLike):
         scene = Scene.load(scene)
@@ -244,14 +220,13 @@ def _given(scene: Any, vary: Any) -> tuple[Ensemble, dict[Any, Any]]:
         problem = "has members that were given or chosen one by one"
         raise refusal("scene", "...", problem, "give an Ensemble that draws its members, or a table as its sampling")
     if vary is not None and not isinstance(vary, Mapping):
-        raise refusal(
-            "vary", vary, "does not map names to distributions", 'give {"vehicle.mass": lw.distributions.Normal(...)}'
-        )
+        remedy = 'give {"vehicle.mass": lw.distributions.Normal(...)}'
+        raise refusal("vary", vary, "does not map names to distributions", remedy)
     return scene, {**scene.vary, **(vary or {})}
 
 
 def metrics_of(entries: Any) -> dict[str, Statistic]:
-    """Return metrics by name, each with the number of every member; "time_to_failure" is added."""
+    """Metrics by name, each with the number of every member; "time_to_failure" is added."""
     if isinstance(entries, str | Mapping) or not isinstance(entries, Sequence):
         raise refusal("metrics", entries, "is no list", 'give ["overshoot depth", lw.metrics.IAE("heading")]')
     faults, metrics = Faults(), dict[str, Statistic]()
@@ -259,23 +234,21 @@ def metrics_of(entries: Any) -> dict[str, Statistic]:
         with faults.including():
             name, metric = metric_of(f"metrics[{i}]", entry)
             if name in metrics and name != END:
-                faults.add(
-                    f"metrics[{i}]", name, "is the name of another metric", 'give it a name of its own: name="..."'
-                )
+                remedy = 'give it a name of its own: name="..."'
+                faults.add(f"metrics[{i}]", name, "is the name of another metric", remedy)
             metrics.setdefault(name, metric)
     faults.raise_if_any()
     return metrics
 
 
 def metric_of(key: str, entry: Any) -> tuple[str, Statistic]:
-    """Return the name and the statistic of one metric."""
+    """The name and the statistic of one metric."""
     if isinstance(entry, str):
         word, _, of = entry.partition(" ")
         if word in TYPES:
             entry = {"type": word, **({"of": of} if of else {})}
-        elif functional(key, entry).over_path:
-            label = functional(key, entry).label
-            return label, MemberValues(label)
+        elif (quantity := functional(key, entry)).over_path:
+            return quantity.label, MemberValues(quantity.label)
         else:
             remedy = 'give "overshoot depth", "iae heading" or "max(depth)"'
             raise refusal(key, entry, "is not one number of each member", remedy)
@@ -284,20 +257,16 @@ def metric_of(key: str, entry: Any) -> tuple[str, Statistic]:
         remedy = 'give a metric such as lw.metrics.Overshoot("depth"), or "max(depth)"'
         raise refusal(key, statistic.type, "is no metric: it is not one number of each member", remedy)
     if getattr(statistic, "of", None) is not None:
-        quantity = statistic.quantity
-        if quantity.size != 1 and len(statistic.then_of(np.array([0.0, 1.0]))[0].quantity.labels) != 1:
-            raise refusal(key, statistic.key, f"is {quantity.size} numbers of each member", "give one component")
+        size = statistic.quantity.size
+        if size != 1 and len(statistic.then_of(np.array([0.0, 1.0]))[0].quantity.labels) != 1:
+            raise refusal(key, statistic.key, f"is {size} numbers of each member", "give one component")
     return statistic.key, replace(statistic, then=(MemberValues(),))
 
 
 def rerun_members_of(
     setup: Setup, cell: SweepCell, indices: Sequence[int], save: SaveAt | None, threads: int | None
 ) -> Result:
-    """Run some members of a cell alone, with the bits that they had in it.
-
-    save: what to save of them, and when; None: as the scene says.
-    threads: number of threads; None for all cores.
-    """
+    """Run some members of a cell alone, with the bits that they had in it; save: None for what the scene says."""
     from lgvi_warp.engine.keepers.observation import Observation
     from lgvi_warp.runs.request import Request
 
@@ -305,8 +274,8 @@ def rerun_members_of(
         raise refusal("case", cell.name, "was refused", "run a member of another one")
     # The plan of a run that keeps all samples, of which these members alone are run.
     observed = Observation(tuple(setup.metrics.values()))
-    whole = Request(cell.fleet, save=save, **setup.settings, observed=observed, threads=threads)
-    some = replace(whole, observed=replace(observed, keep=tuple(int(i) for i in indices)))
-    _, result = some.again(whole.plan(), np.zeros(cell.fleet.members, np.uint8))
+    of_all = Request(cell.fleet, save=save, **setup.settings, observed=observed, threads=threads)
+    of_some = replace(of_all, observed=replace(observed, keep=tuple(int(i) for i in indices)))
+    _, result = of_some.again(of_all.plan(), np.zeros(cell.fleet.members, np.uint8))
     assert result is not None
     return result

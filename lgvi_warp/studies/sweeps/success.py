@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lgvi_warp.common.errors import Faults, SceneError, closest, refusal
+from lgvi_warp.common.errors import Faults, closest, refusal
 from lgvi_warp.common.status import Status, failed
 from lgvi_warp.statistics.estimates import intervals
 
@@ -20,13 +20,7 @@ INTERVALS = ("wilson", "clopper_pearson")
 
 
 class Probability(NamedTuple):
-    """A probability with its interval.
-
-    Args:
-        value: the fraction of the members.
-        lower: lower end of the interval.
-        upper: upper end of the interval.
-    """
+    """A probability, the fraction of the members, with its interval."""
 
     value: float
     lower: float
@@ -34,14 +28,7 @@ class Probability(NamedTuple):
 
 
 def probability(hits: int, count: int, confidence: float, interval: str) -> Probability:
-    """Return the probability that some of the members show.
-
-    Args:
-        hits: number of members that do.
-        count: number of all members.
-        confidence: confidence level, between 0 and 1.
-        interval: one of `INTERVALS`.
-    """
+    """The probability of what so many of `count` members do; interval: one of `INTERVALS`."""
     if interval == "wilson":
         ends = intervals.wilson(np.array(hits / max(count, 1)), np.array(count), confidence)
     else:
@@ -50,50 +37,36 @@ def probability(hits: int, count: int, confidence: float, interval: str) -> Prob
 
 
 def none_text(hits: int, count: int, confidence: float) -> str:
-    """Return what is known where all members passed, or none: a one-sided limit. "" where some did.
-
-    Args:
-        hits: number of members that passed.
-        count: number of all members.
-        confidence: confidence level, between 0 and 1.
-    """
+    """What is known where all of `count` members passed, or none: a one-sided limit; "" where some did."""
     if not count or 0 < hits < count:
         return ""
-    what = "fails" if hits else "passes"
-    return f"none of {count:,} {what}: at most {100.0 * intervals.none_of(count, confidence):.3g} % do, at {confidence:.0%}"
+    verb = "fails" if hits else "passes"
+    return f"none of {count:,} {verb}: at most {100.0 * intervals.none_of(count, confidence):.3g} % do, at {confidence:.0%}"
 
 
 @dataclass(frozen=True)
 class Success:
     """Conditions that a member must fulfil, all of them. A number that is NaN fulfils none; one that failed never passes.
 
-    Args:
-        status: how a member must end: "ok" (the default: neither failed nor stopped), "not_failed", or the name of a status
-            such as "floor"; or several of these, of which one must hold.
-        limits: name of a metric -> (above, below): the metric lies above the one and below the other.
+    status: how it must end: "ok" (neither failed nor stopped), "not_failed", or a status such as "floor"; one of these.
+    limits: name of a metric -> (above, below), between which it lies.
     """
 
     status: tuple[str, ...] = (OK,)
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def passed(self, status: np.ndarray, numbers: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Return which members pass, (n,).
-
-        Args:
-            status: (n,), of `Status`.
-            numbers: metrics by name, (n,).
-        """
+        """Which members pass (n,), of their status (n,) and their metrics (n,) by name."""
         ended = np.zeros(len(status), bool)
+        known = {OK: status == 0, NOT_FAILED: ~failed(status)}
         for word in self.status:
-            ended |= {OK: status == 0, NOT_FAILED: ~failed(status)}.get(
-                word, status == Status.__members__.get(word.upper(), 0)
-            )
+            ended |= known.get(word, status == Status.__members__.get(word.upper(), 0))
         for name, (above, below) in self.limits.items():
             ended &= (numbers[name] > above) & (numbers[name] < below)
         return ended & ~failed(status)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the table of a sweep file that gives these conditions."""
+        """The table of a sweep file that gives these conditions."""
         limits = {
             name: {word: value for word, value in zip(("above", "below"), ends, strict=True) if np.isfinite(value)}
             for name, ends in self.limits.items()
@@ -102,23 +75,17 @@ class Success:
 
 
 def success_of(conditions: Any, metrics: Sequence[str]) -> Success:
-    """Return the conditions of a table.
+    """Read conditions: a `Success`, or {"status": "ok", "overshoot depth": {"below": 1.0}}; None for "ok" alone.
 
-    Args:
-        conditions: a `Success`, or {"status": "ok", "overshoot depth": {"below": 1.0}}; None for "ok" alone.
-        metrics: names of the sweep's metrics.
-
-    Raises:
-        SceneError: with every fault.
+    metrics: names of the sweep's metrics.
     """
     if conditions is None:
         return Success()
     if isinstance(conditions, Success):
         conditions = conditions.to_dict()
     if not isinstance(conditions, Mapping):
-        raise refusal(
-            "success", conditions, "is no table", 'write [success] and "overshoot depth" = { below = 1.0 } below'
-        )
+        remedy = 'write [success] and "overshoot depth" = { below = 1.0 } below'
+        raise refusal("success", conditions, "is no table", remedy)
     faults = Faults("success.")
     words = conditions.get("status", OK)
     statuses = (words,) if isinstance(words, str) else tuple(words) if isinstance(words, list | tuple) else (words,)
@@ -141,6 +108,3 @@ def success_of(conditions: Any, metrics: Sequence[str]) -> Success:
                 limits[name] = (float(ends[0]), float(ends[1]))  # type: ignore[arg-type]
     faults.raise_if_any()
     return Success(statuses, limits)
-
-
-__all__ = ["INTERVALS", "Probability", "SceneError", "Success", "none_text", "probability", "success_of"]

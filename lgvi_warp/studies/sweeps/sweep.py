@@ -15,7 +15,7 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.studies.sweeps.output import Sweep
 from lgvi_warp.studies.sweeps.record import Record, Records
-from lgvi_warp.studies.sweeps.setup import Setup, SweepCell, made
+from lgvi_warp.studies.sweeps.setup import Setup, SweepCell, setup_of
 from lgvi_warp.studies.sweeps.success import INTERVALS, success_of
 
 # Said of a cell whose function holds what cannot be compared.
@@ -70,14 +70,14 @@ def sweep(
         out: Folder. What is finished is kept there, so that the same call goes on after a stop, with the same bytes; cells
             whose numbers, metrics, functions or settings have changed run anew. Functions of yours are told apart by their
             code and what that leads to; by `version` where lw.control.Callback and lw.metrics.CustomMetric have one.
-        threads: As of solve.
-        executor: As of solve.
-        scheduler: As of solve.
-        progress: As of solve.
+        threads: As of solve; default all cores.
+        executor: As of solve; default "threads".
+        scheduler: As of solve; default None.
+        progress: As of solve, of all cells together; None, the default, for nobody.
         **settings: Further arguments of solve, such as method, h, t1, dtype.
 
     Returns:
-        What was found.
+        The sweep: success, comparisons, ranks, the worst members and their causes, as tables, files and words.
 
     Raises:
         SceneError: If arguments are at fault; the message names every fault.
@@ -104,16 +104,16 @@ def sweep(
         >>> table.cases, table.members_count
         (('slow', 'quick'), 16)
     """
-    setup = made(scene, cases, grid, vary, members, seed, sampling, metrics, settings)
-    report = callback(progress)
-    return swept(setup, success, baseline, confidence, interval, out, threads, executor, scheduler, report)
+    setup = setup_of(scene, cases, grid, vary, members, seed, sampling, metrics, settings)
+    execution = {"threads": threads, "executor": executor, "scheduler": scheduler}
+    return swept(setup, success, baseline, confidence, interval, out, callback(progress), execution)
 
 
 def swept(
     setup: Setup, success: Any, baseline: str | None, confidence: float, interval: str,
-    out: str | os.PathLike[str] | None, threads: int | None, executor: Any, scheduler: str | None, progress: Any,
+    out: str | os.PathLike[str] | None, progress: Any, execution: Mapping[str, Any],
 ) -> Sweep:  # fmt: skip
-    """Run the cells of a setup, as `sweep` says."""
+    """Run the cells of a setup, as `sweep` says; execution: threads, executor and scheduler."""
     faults = Faults()
     level = faults.number("confidence", confidence, "1")
     if level is not None and not 0.0 < level < 1.0:
@@ -128,13 +128,11 @@ def swept(
     assert conditions is not None
     records = Records(None if out is None else path_of("out", out), list(setup.metrics), setup.members.members)
     records.check()
-    cells = list(_run(setup, records, threads, executor, scheduler, progress))
+    cells = list(_run(setup, records, progress, execution))
     return Sweep(setup, cells, records, conditions, baseline, float(confidence), interval)
 
 
-def _run(
-    setup: Setup, records: Records, threads: int | None, executor: Any, scheduler: str | None, progress: Any
-) -> Iterator[SweepCell]:
+def _run(setup: Setup, records: Records, progress: Any, execution: Mapping[str, Any]) -> Iterator[SweepCell]:
     """Run the cells that are not recorded yet, and note those that are refused."""
     total = len(setup.cells)
     setup.note_functions()
@@ -145,7 +143,7 @@ def _run(
             fleet, fixed = setup.fleet(case, point)
             key = setup.key(fleet)
             if records.get(key) is None:
-                record = setup.run(fleet, threads=threads, executor=executor, scheduler=scheduler, progress=share)
+                record = setup.run(fleet, **execution, progress=share)
                 unknown = setup.unknown(fleet) if records.folder is not None else []
                 messages = *record.messages, *(f"{place}: {NOT_KEPT}" for place in unknown)
                 records.put(key, replace(record, messages=messages), lasting=not unknown)

@@ -343,7 +343,7 @@ def test_edges_are_found_from_any_guess(guess):
         np.array([100.0, 5.0]),
         np.full(2, guess),
         1.0,
-        to_the_end=True,
+        whole_numbers=True,
     )
     assert whole.tolist() == [[7.0, 8.0], [5.0, np.inf]]
     nobody = edges(holds, np.full(4, np.nan), last, np.full(4, guess), 1e-3)

@@ -80,9 +80,10 @@ def swept_by(run, names=CASES, *, success=None, baseline=None, confidence=0.95, 
 
     asked = {"grid": None, "vary": VARY, "members": N, "seed": 3, "sampling": None, "metrics": METRICS}
     asked |= {name: more.pop(name) for name in asked.keys() & more.keys()}
-    one = setup.made(SCENE, names, settings=more, **asked)
+    one = setup.setup_of(SCENE, names, settings=more, **asked)
     one = Made(**{field.name: getattr(one, field.name) for field in fields(one)})
-    return sweep.swept(one, success, baseline, confidence, interval, out, threads, "threads", None, progress)
+    execution = {"threads": threads, "executor": "threads", "scheduler": None}
+    return sweep.swept(one, success, baseline, confidence, interval, out, progress, execution)
 
 
 @pytest.fixture(scope="module")
@@ -379,7 +380,7 @@ comparison.csv has the differences of all metrics.
 
 def test_the_summary_in_words(found):
     # The numbers are those of the tests above.
-    assert str(found) == output.summary(found) == SUMMARY
+    assert str(found) == SUMMARY
 
 
 def test_the_summary_of_a_grid(gridded):
@@ -667,7 +668,7 @@ def test_a_sweep_asks_solve_for_its_metrics_alone():
         return mock.Mock(status=np.zeros(N, np.uint8), messages=("slow",),
                          statistics={f"each {name}": one for name, one in each.items()})  # fmt: skip
 
-    one = setup.made(SCENE, None, None, VARY, N, 3, None, METRICS, {"h": 0.01})
+    one = setup.setup_of(SCENE, None, None, VARY, N, 3, None, METRICS, {"h": 0.01})
     fleet, _ = one.fleet(one.cases[0], {})
     record = one.run(fleet, simulate=solve, threads=2, executor="processes", scheduler="steal")
     assert [values.tolist() for values in record.numbers.values()] == [[i] * N for i in range(3)]
@@ -750,14 +751,14 @@ def test_progress_is_that_of_all_cells():
 
 def test_the_sweep_keeps_what_the_ensemble_says_unless_it_is_asked():
     base = lw.Ensemble(SCENE, 6, 7, VARY, "sobol")
-    one = setup.made(
+    one = setup.setup_of(
         base, None, None, {"vehicle.mass": lw.distributions.Uniform(low=1.0, high=2.0)}, None, None, None, [], {}
     )
     assert (one.members.members, one.members.seed, one.members.sampling.kind) == (6, 7, "sobol")
     assert set(one.vary) == set(VARY)
     assert one.members.vary["vehicle.mass"].high == 2.0
     assert list(one.metrics) == [setup.END]
-    other = setup.made(base, None, None, None, 8, 9, "random", ["max(depth)"], {"h": 0.01})
+    other = setup.setup_of(base, None, None, None, 8, 9, "random", ["max(depth)"], {"h": 0.01})
     assert (other.members.members, other.members.seed, other.members.sampling.kind) == (8, 9, "random")
     assert other.settings == {"h": 0.01}
     assert list(other.metrics) == ["max(depth)", "time_to_failure"]
@@ -787,13 +788,13 @@ def test_ten_thousand_cells_are_not_too_many():
     refused = mock.Mock(side_effect=lw.SceneError(["no"]))
     told = r"10,200 cells': are 40 members each; give at most 10,000 cells, or vary a number"
     with pytest.raises(lw.SceneError, match=told):
-        setup.made(SCENE, None, grid, None, N, None, None, [], {}, predict=refused)
+        setup.setup_of(SCENE, None, grid, None, N, None, None, [], {}, predict=refused)
     grid["run.duration"] = list(range(1, 101))
-    assert len(setup.made(SCENE, None, grid, None, 1, None, None, [], {}).cells) == 10_000
+    assert len(setup.setup_of(SCENE, None, grid, None, 1, None, None, [], {}).cells) == 10_000
 
 
 def test_a_plan_in_words():
-    one = setup.made(
+    one = setup.setup_of(
         SCENE, CASES[:2], {"controller.delay": [0.02, 0.04, 0.06]}, VARY, 2000, 3, None, METRICS, {"h": 0.01}
     )
     prediction = mock.Mock(advance=4.0, set_up=1.0, compile=2.5, memory=3e6)

@@ -236,8 +236,8 @@ def test_info(capsys):
 
 
 def test_tune_keeps_what_it_measured(tuned_widths, capsys):
-    readings = [tuning.Reading("plain float64", {8: 2.0, 16: 1.5}, 8, 16),
-                tuning.Reading("plain float32", {16: 1.0}, 16, 16)]  # fmt: skip
+    readings = [tuning.WidthSpeeds("plain float64", {8: 2.0, 16: 1.5}, 8, 16),
+                tuning.WidthSpeeds("plain float32", {16: 1.0}, 16, 16)]  # fmt: skip
     assert main(["calibrate"], measure=lambda: readings) == 0
     out = capsys.readouterr().out
     assert "8: 2.00 ns, 16: 1.50 ns: 16, 8 by the table" in out

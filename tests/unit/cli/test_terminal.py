@@ -346,7 +346,7 @@ def test_a_refused_verb_prints_no_document(capsys):
 
 def test_documents_of_the_machine(tuned_widths, capsys):
     assert document(["info"], capsys, peak_of=lambda dtype: 1e9)["peak"] == {"float64": 1e9, "float32": 1e9}
-    readings = [tuning.Reading("plain float64", {8: 2.0, 16: 1.5}, 8, 16)]
+    readings = [tuning.WidthSpeeds("plain float64", {8: 2.0, 16: 1.5}, 8, 16)]
     kept = document(["calibrate"], capsys, measure=lambda: readings)["kernels"]["plain float64"]
     assert kept == {"ns": {"8": 2.0, "16": 1.5}, "table": 8, "best": 16}
     record = json.dumps({"method": "psi_s", "ns_per_vehicle_step": 9.0})

@@ -231,8 +231,8 @@ def place_of(path: str | os.PathLike[str], root: str | os.PathLike[str] | None =
     path = path_of("path", path)
     target = Path(os.path.realpath(path)) if root is None else safe_files.inside(root, path.absolute())
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
-        if there := safe_files.kind(os.lstat(target).st_mode):
-            raise SceneError([f"{path}: {there}, which is not replaced; give the name of a file"])
+        if problem := safe_files.kind(os.lstat(target).st_mode):
+            raise SceneError([f"{path}: {problem}, which is not replaced; give the name of a file"])
     return target
 
 

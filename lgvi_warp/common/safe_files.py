@@ -49,7 +49,7 @@ def kind(mode: int) -> str:
 
 def inside(root: str | os.PathLike[str], name: str | os.PathLike[str]) -> Path:
     """Find a file that lies in a folder, or will, where its links lead; one that leads out of the folder is refused."""
-    home, path = (Path(os.path.realpath(one)) for one in (root, Path(root) / name))
+    home, path = (Path(os.path.realpath(place)) for place in (root, Path(root) / name))
     if not path.is_relative_to(home):
         remedy = "put a copy in its place, or name that file yourself"
         raise SceneError([f"{Path(root) / name}: leads out of its folder, to {path}; {remedy}"])

@@ -318,12 +318,12 @@ class Allocation(Part):
         object.__setattr__(part, "actuator", others[self.to])
         return part
 
-    def informed(self, faults: Sequence[Any], asked: np.ndarray) -> Any:
+    def informed(self, faults: Sequence[Any], components: np.ndarray) -> Any:
         """The same part, knowing which channels are lost from some time on, and which components count.
 
         Args:
             faults: Faults of actuators.
-            asked: 1 for each of X Y Z K M N that laws ask for, else 0, (6,).
+            components: 1 for each of X Y Z K M N that laws ask for, else 0, (6,).
 
         Returns:
             A copy.
@@ -331,7 +331,7 @@ class Allocation(Part):
         part = copy.copy(self)
         known = tuple(fault for fault in faults if fault.of == self.to and fault.known)
         object.__setattr__(part, "losses", known)
-        object.__setattr__(part, "asked", asked)
+        object.__setattr__(part, "asked", components)
         return part
 
     @property

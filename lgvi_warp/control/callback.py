@@ -63,8 +63,10 @@ class Callback(ControlLaw):
     def to_dict(self) -> dict[str, Any]:
         """Its type and the name of its function, which a scene file cannot hold."""
         name = getattr(self.function, "__qualname__", repr(self.function))
-        given = {"to": self.to or None, "version": self.version}
-        return {"type": self.type, "function": name} | {key: value for key, value in given.items() if value is not None}
+        options = {"to": self.to or None, "version": self.version}
+        return {"type": self.type, "function": name} | {
+            key: value for key, value in options.items() if value is not None
+        }
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         """The place of the host's answer in the memory."""

@@ -51,11 +51,11 @@ class Draws:
 
     A member's numbers follow from its position in the whole ensemble alone.
 
-    explicit: arrays (whole, ...) by name; those of the start begin with "start.".
-    columns: what a table sets, with its values (whole, ...).
+    explicit: arrays (total, ...) by name; those of the start begin with "start.".
+    columns: what a table sets, with its values (total, ...).
     variations: what distributions draw.
     space: the cube that the sampling fills.
-    whole: number of members of the whole ensemble.
+    total: number of members of the whole ensemble.
     places: (members,), positions of these members in it; None for all, in order.
     """
 
@@ -65,7 +65,7 @@ class Draws:
     variations: Sequence[Variation]
     sampling: Sampling
     space: Space
-    whole: int
+    total: int
     places: np.ndarray | None = None
 
     def __getstate__(self) -> dict[str, Any]:
@@ -75,7 +75,7 @@ class Draws:
     @property
     def members(self) -> int:
         """Number of these members."""
-        return self.whole if self.places is None else len(self.places)
+        return self.total if self.places is None else len(self.places)
 
     @functools.cached_property
     def drawn_names(self) -> set[str]:
@@ -173,19 +173,19 @@ def draws_of(scene: SceneLike, settings: EnsembleSettings, explicit: Mapping[str
         faults.add(f'"{key}"', settings.vary[key], fault, "drop one of them")
     distributions = {**designed, **settings.vary}
     described = [variations.variation(faults, *item, known) for item in sorted(distributions.items())]
-    found = [variation for variation in described if variation]
+    drawing = [variation for variation in described if variation]
     tables = Faults("ensemble.sampling.table.")
     in_table = {key: _column(tables, key, column, known) for key, column in columns.items()}
-    named = [(variation.key, variation.targets) for variation in found]
+    named = [(variation.key, variation.targets) for variation in drawing]
     variations.clashes(faults, [*named, *((key, (pair[0],)) for key, pair in in_table.items() if pair)])
     with faults.including():
         tables.raise_if_any()
     faults.raise_if_any()
     seed = int(settings.seed)
-    space = variations.space(seed, found)
-    whole = counted(sampling, space, settings.members)
+    space = variations.space(seed, drawing)
+    total = counted(sampling, space, settings.members)
     numbers = SceneNumbers(base, start)
-    return Draws(numbers, explicit, [pair for pair in in_table.values() if pair], found, sampling, space, whole)
+    return Draws(numbers, explicit, [pair for pair in in_table.values() if pair], drawing, sampling, space, total)
 
 
 def _turned_by_matrix(faults: Faults, start: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
@@ -227,11 +227,11 @@ def counted(sampling: Sampling, space: Space, members: int | None) -> int:
     """
     faults = Faults("ensemble.")
     designed, group = sampling.own_members(space), sampling.group_size(space)
-    whole = int(members or designed or group)
-    if whole > MOST_MEMBERS:
+    total = int(members or designed or group)
+    if total > MOST_MEMBERS:
         problem = f"are more members than the {MOST_MEMBERS} that there can be"
-        faults.add(f"sampling.{sampling.kind}", whole, problem, "give fewer values, of fewer names")
+        faults.add(f"sampling.{sampling.kind}", total, problem, "give fewer values, of fewer names")
     else:
-        sampling.check(faults, space, whole)
+        sampling.check(faults, space, total)
     faults.raise_if_any()
-    return whole
+    return total

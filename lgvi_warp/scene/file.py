@@ -38,8 +38,8 @@ def tables_of_text(
     folder: Folder that relative paths in the text refer to; None for the current one (default).
     """
     content = parsed(text, name)
-    given = {} if overrides is None else mapping_of("overrides", overrides, "dotted keys to values")
-    for key, value in given.items():
+    replaced = {} if overrides is None else mapping_of("overrides", overrides, "dotted keys to values")
+    for key, value in replaced.items():
         override(content, key, value)
     return _files_in(folder, content) if folder else content
 

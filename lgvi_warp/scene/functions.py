@@ -31,17 +31,17 @@ def functions_of(fleet: Ensemble | None, statistics: Iterable[Statistic] = ()) -
 
     fleet: the members; None for statistics alone.
     """
-    found = {} if fleet is None else dict(_of_fleet(fleet))
+    functions = {} if fleet is None else dict(_of_fleet(fleet))
     for i, statistic in enumerate(statistics):
         version = getattr(statistic, "version", None)
         place = f"statistics[{i}] {statistic.key}"
-        found |= {f"{place}{part}": Own(function, version) for part, function in _of_statistic(statistic)}
-    return found
+        functions |= {f"{place}{part}": Own(function, version) for part, function in _of_statistic(statistic)}
+    return functions
 
 
 def identities(functions: dict[str, Own]) -> dict[str, str]:
     """Return which functions these are, by place."""
-    return {place: identity(*own) for place, own in functions.items()}
+    return {place: identity(*function) for place, function in functions.items()}
 
 
 class ToldApart:
@@ -57,9 +57,9 @@ class ToldApart:
         parts = (function.__self__, function.__func__) if isinstance(function, MethodType) else (function,)
         key = (*map(id, parts), own_function.version)
         if key not in self._names:
-            what = identity(*own_function)
-            number = sum(known == what for _, (known, _) in self._names.values())
-            self._names[key] = own_function, (what, number)
+            text = identity(*own_function)
+            number = sum(known == text for _, (known, _) in self._names.values())
+            self._names[key] = own_function, (text, number)
         return self._names[key][1]
 
 

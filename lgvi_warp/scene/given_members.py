@@ -74,17 +74,17 @@ def _numbers(faults: Faults, key: str, value: Any) -> np.ndarray:
     return np.empty(0) if array is None else array
 
 
-def _given_parameters(faults: Faults, base: Mapping[str, np.ndarray], given: Any, n: int) -> dict[str, np.ndarray]:
+def _given_parameters(faults: Faults, base: Mapping[str, np.ndarray], arrays: Any, n: int) -> dict[str, np.ndarray]:
     """Return arrays (n, *shape) by name, from parameters given whole or by their entries."""
-    if given is None or (isinstance(given, Mapping) and not given):
+    if arrays is None or (isinstance(arrays, Mapping) and not arrays):
         return {}
-    if not is_labelled(given):
+    if not is_labelled(arrays):
         remedy = 'give {"vehicle.mass": array, ...} or a DataFrame with such names'
-        faults.add("parameters", given, "has no names", remedy)
+        faults.add("parameters", arrays, "has no names", remedy)
         return {}
     parameters: dict[str, np.ndarray] = {}
     named = []
-    for key, column in columns_by_name(faults, "parameters", given).items():
+    for key, column in columns_by_name(faults, "parameters", arrays).items():
         (target, *more) = variations.targets(key)
         if more or target.name not in base:
             faults.keys("", {key: column}, base)

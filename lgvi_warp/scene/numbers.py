@@ -42,15 +42,15 @@ def with_numbers(scene: SceneT, numbers: Mapping[str, Any]) -> SceneT:
             place[attribute] = value
             continue
         start = scene.start.given().get(attribute) if key == "start" else base[target.name]
-        whole = np.array(place.get(attribute, start), dtype=np.float64)
+        array = np.array(place.get(attribute, start), dtype=np.float64)
         try:
-            whole[target.index] = value
+            array[target.index] = value
         except (IndexError, ValueError, TypeError):
             faults.add(
-                f'"{name}"', value, f"is no number of {target.name}, of shape {whole.shape}", "give one that there is"
+                f'"{name}"', value, f"is no number of {target.name}, of shape {array.shape}", "give one that there is"
             )
             continue
-        place[attribute] = whole
+        place[attribute] = array
     faults.raise_if_any()
     return _changed(scene, changes)
 

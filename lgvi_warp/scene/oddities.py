@@ -23,11 +23,11 @@ class Odd:
 class Oddities:
     """Odd values by quantity; `a | b` joins those of members `a` with those of members `b` after them."""
 
-    found: Mapping[str, Odd]
+    by_name: Mapping[str, Odd]
 
-    def __or__(self, other: Oddities) -> Oddities:
-        joined = dict(self.found)
-        for key, odd in other.found.items():
+    def __or__(self, later: Oddities) -> Oddities:
+        joined = dict(self.by_name)
+        for key, odd in later.by_name.items():
             earlier = joined.get(key)
             joined[key] = odd if earlier is None else replace(earlier, count=earlier.count + odd.count)
         return Oddities(joined)
@@ -37,7 +37,7 @@ class Oddities:
 
         most: Number of members that were looked at; None for all (default).
         """
-        return tuple(f"{key}: {odd.text}{_whose(odd, members, most)}" for key, odd in self.found.items())
+        return tuple(f"{key}: {odd.text}{_whose(odd, members, most)}" for key, odd in self.by_name.items())
 
 
 def _whose(odd: Odd, members: int, most: int | None) -> str:

@@ -187,8 +187,8 @@ class Term:
             faults.add("name" if self.name else "type", self.key, *wrong)
         lengths: dict[str, int] = {}
         for item in self.number_fields():
-            value, told = getattr(self, item.name), Faults() if item.name in self.following else faults
-            object.__setattr__(self, item.name, _checked(told, item, value, lengths, self.shape_of(item)))
+            value, field_faults = getattr(self, item.name), Faults() if item.name in self.following else faults
+            object.__setattr__(self, item.name, _checked(field_faults, item, value, lengths, self.shape_of(item)))
         if not faults:
             read(self, faults)
             self.check(faults)

@@ -104,11 +104,11 @@ class StopTime(Event):
 TYPES = Event.kinds
 
 
-def from_list(given: Any) -> tuple[Event, ...]:
+def from_list(entries: Any) -> tuple[Event, ...]:
     """Build the events of a scene."""
-    check_list("events", given, "write [[events]] and type = ... below, or events=[lw.events.Surface()]")
+    check_list("events", entries, "write [[events]] and type = ... below, or events=[lw.events.Surface()]")
     faults, events = Faults(), list[Event]()
-    for i, entry in enumerate(given):
+    for i, entry in enumerate(entries):
         with faults.including():
             if isinstance(entry, Event):
                 events.append(entry)

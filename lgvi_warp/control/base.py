@@ -36,8 +36,7 @@ class Bus(NamedTuple):
     """The first rows of the memory, by which parts hand numbers on: {actuator: (first row, channels)} and single rows.
 
     acting: First row of the commands that act, where commands are delayed. As many rows of the commands before follow, and the
-        row of the step from which the former act.
-    period: Time between two ticks [s].
+        row of the step from which the former act. period: Time between two ticks [s].
     """
 
     commands: Mapping[str, tuple[int, int]]
@@ -56,10 +55,7 @@ class Bus(NamedTuple):
 
     @classmethod
     def of(cls, channels: Mapping[str, int], period: float = 1.0, answers: int = 0) -> Bus:
-        """The bus of some actuators.
-
-        period: Time between two ticks [s]; 1 by default.
-        """
+        """The bus of some actuators, with a time between two ticks [s]."""
         commands, row = {}, 0
         for key, count in channels.items():
             commands[key] = (row, count)
@@ -108,46 +104,24 @@ class Part(Term):
         return 0
 
     def features(self, numbers: Numbers) -> tuple[str, ...]:
-        """What its device code must have for some members; by default nothing beyond what it always has.
-
-        Args:
-            numbers: The part's numbers by field, each of shape (n, ...).
-
-        Returns:
-            Words that the part knows.
-        """
+        """What its device code must have by members' numbers (n, ...), in words that the part knows; by default nothing."""
         return ()
 
     def with_features(self, known: frozenset[str]) -> Any:
-        """The same part, with the device code for what some member of a run needs.
-
-        Args:
-            known: Words "key.feature" of all parts.
-
-        Returns:
-            A copy.
-        """
+        """A copy with the device code for what some member of a run needs, in words "key.feature" of all parts."""
         part = copy.copy(self)
         chosen = tuple(word for word in self.every_feature if f"{self.key}.{word}" in known)
         object.__setattr__(part, "chosen", chosen)
         return part
 
     def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
-        """The same part, knowing where it finds what others write.
-
-        Args:
-            bus: Rows of the memory.
-            others: Terms that take commands, and sensors, by key.
-
-        Returns:
-            A copy.
-        """
+        """A copy that knows where it finds what others write: the bus, and terms that take commands and sensors by key."""
         part = copy.copy(self)
         object.__setattr__(part, "bus", bus)
         return part
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers as they are: a controller works in the user's axes."""
+        # The numbers as they are: a controller works in the user's axes.
         if self.lanes() is None:
             name = type(self).__name__
             raise NotImplementedError(
@@ -222,7 +196,7 @@ class IntegralLaw(ControlLaw):
     anti_windup: str = word("conditional", known=ANTI_WINDUP)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers, the memory of the integrals, and where the law finds what was not delivered."""
+        # The numbers, the memory of the integrals, and where the law finds what was not delivered.
         assert self.bus is not None
         words = {"unmet": self.bus.unmet, "conditional": int(self.anti_windup == "conditional")}
         return Packed(dict(numbers) | words, memory=np.zeros((1, 2 * self.integrals)))
@@ -248,7 +222,7 @@ class PoseLaw(IntegralLaw):
     feedforward: str = word("none", known=FEEDFORWARD)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """In addition, each limit by itself, and the nominal weight less buoyancy with the moment of both."""
+        # In addition, each limit by itself, and the nominal weight less buoyancy with the moment of both.
         limits = numbers["integral_limit"]
         values = {name: value for name, value in numbers.items() if name != "integral_limit"}
         net, moment = np.zeros(1), np.zeros((1, 3))
@@ -259,11 +233,9 @@ class PoseLaw(IntegralLaw):
 
 
 def restoring(nominal: Numbers) -> tuple[np.ndarray, np.ndarray]:
-    """What weight and buoyancy do to a vehicle.
+    """Weight less buoyancy (1,) [N], downward, and the sum of both times their points (1, 3) [N m], body axes, of a scene.
 
-    nominal: Parameters of a scene by name, each of the shape that the scene has.
-    Returns: Weight less buoyancy (1,) [N], which acts downward; and the sum of both times their points (1, 3) [N m] in body
-        axes, whose cross product with the direction downward is the moment.
+    The cross product of the latter with the direction downward is the moment.
     """
     numbers = {name: np.asarray(value)[None] for name, value in nominal.items()}
     weight, buoyancy = vehicle.weight(numbers), numbers["vehicle.buoyancy"]
@@ -277,12 +249,7 @@ NEVER, SAME_TIME = 1e30, 1e-6
 
 
 def first_step(time: np.ndarray, h: float) -> np.ndarray:
-    """The first step at or after a time.
-
-    time: Times [s], of any shape; inf for never.
-    h: Step of the run [s].
-    Returns: Numbers of steps, in the same shape; `NEVER` for never.
-    """
+    """The first step at or after times [s] of any shape; `NEVER` for never."""
     return np.ceil(np.minimum(time / h, NEVER) - SAME_TIME)
 
 
@@ -305,15 +272,7 @@ class Allocation(Part):
     to: str = ""
 
     def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
-        """The same part, knowing its actuator as well.
-
-        Args:
-            bus: Rows of the memory.
-            others: Terms that take commands, and sensors, by key.
-
-        Returns:
-            A copy.
-        """
+        # The same part, knowing its actuator as well.
         part = super().wired(bus, others)
         object.__setattr__(part, "actuator", others[self.to])
         return part
@@ -377,11 +336,7 @@ ROUND_OFF = 1e-12
 
 
 def rest_rows(reached: np.ndarray) -> np.ndarray:
-    """Rows by which the device code finds what actuators cannot make of a demand.
-
-    reached: Projector (n, 6, 6) onto the demands that they can make.
-    Returns: The projector onto the others, line by line, (n, 36), without round-off.
-    """
+    """The projector onto the demands beside those reached (n, 6, 6), line by line (n, 36), without round-off."""
     others = np.eye(6) - reached
     return np.where(np.abs(others) < ROUND_OFF, 0.0, others).reshape(len(others), -1)
 

@@ -55,13 +55,12 @@ class Callback(ControlLaw):
         super().__post_init__()
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where there is no function."""
         if not callable(self.function):
             faults.add("function", self.function, PROBLEM if self.function is None else "is no function", REMEDY)
         check_version(faults, self.version)
 
     def to_dict(self) -> dict[str, Any]:
-        """Its type and the name of its function, which a scene file cannot hold."""
+        # Its type and the name of its function, which a scene file cannot hold.
         name = getattr(self.function, "__qualname__", repr(self.function))
         options = {"to": self.to or None, "version": self.version}
         return {"type": self.type, "function": name} | {
@@ -69,7 +68,6 @@ class Callback(ControlLaw):
         }
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The place of the host's answer in the memory."""
         assert self.bus is not None
         return Packed({"answer": self.bus.answer})
 
@@ -81,11 +79,11 @@ class CallbackCommands(Allocation):
     device: ClassVar[str] = "callback_commands"
 
     def reach(self) -> np.ndarray:
-        """Everything: no law asks it for a demand."""
+        # Everything: no law asks it for a demand.
         return np.eye(6)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """Where the answer is, and the limits of the commands."""
+        # Where the answer is, and the limits of the commands.
         assert self.bus is not None
         first, count = self.bus.commands[self.to]
         limit = context.own(self.actuator)["limit"]

@@ -311,11 +311,7 @@ class Controller:
 
 
 def from_table(table: Any) -> Controller | None:
-    """A controller from the section of a scene file.
-
-    table: A Controller, a table, or None.
-    Returns: The controller; None for None.
-    """
+    """A controller from a Controller, the section of a scene file, or None for None."""
     if table is None:
         return None
     example = "write [controller] and its keys below, or give lw.Controller(...)"

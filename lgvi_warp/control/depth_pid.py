@@ -45,7 +45,7 @@ class DepthPID(IntegralLaw):
     integral_limit: Any = number((2,), "m s, rad s", (1e6, 1e6), least=0.0)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers, each limit by itself, and a row more for what the wanted pitch has beyond its limit."""
+        # The numbers, each limit by itself, and a row more for what the wanted pitch has beyond its limit.
         limits = numbers["integral_limit"]
         values = {name: value for name, value in numbers.items() if name != "integral_limit"}
         packed = super().packed(values | {"depth_limit": limits[:, 0], "angle_limit": limits[:, 1]}, context)

@@ -42,6 +42,6 @@ class HeadingSMC(IntegralLaw):
     integral_limit: Any = number((), "rad s", 1e6, least=0.0)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers, with a word for lambda that Python allows."""
+        # The numbers, with a word for lambda that Python allows.
         values = {"rate" if name == "lambda" else name: value for name, value in numbers.items()}
         return super().packed(values, context)

@@ -30,7 +30,6 @@ class AllocationMatrix(Allocation):
     matrix: Any = number(("n", 6), "unit/N, unit/(N m)")
 
     def check_actuator(self, faults: Faults) -> None:
-        """Adds a fault where the matrix has another number of rows than its actuator has commands."""
         rows, count = len(self.matrix), self.actuator.channels
         if rows != count:
             faults.add(
@@ -41,15 +40,15 @@ class AllocationMatrix(Allocation):
             )
 
     def device_in(self, aligned: bool) -> str:
-        """The code that leaves channels out only where some may be lost."""
+        # The code that leaves channels out only where some may be lost.
         return f"matrix:{'lost' if self.losses else 'all'}"
 
     def reach(self) -> np.ndarray:
-        """The pseudo-inverse of the matrix, a column for each axis."""
+        # The pseudo-inverse of the matrix, a column for each axis.
         return np.asarray(np.linalg.pinv(self.matrix))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """For each command its line of A, its column of A^+ and its limit."""
+        # For each command its line of A, its column of A^+ and its limit.
         A = numbers["matrix"]
         limit = context.own(self.actuator)["limit"]
         inverse = np.linalg.pinv(A)

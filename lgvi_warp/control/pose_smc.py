@@ -45,6 +45,6 @@ class PoseSMC(PoseLaw):
     integral_limit: Any = number((2,), "m s, s", (1e6, 1e6), least=0.0)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers, with a word for lambda that Python allows."""
+        # The numbers, with a word for lambda that Python allows.
         values = {"rate" if name == "lambda" else name: value for name, value in numbers.items()}
         return super().packed(values, context)

@@ -38,7 +38,6 @@ class PseudoInverse(Allocation):
     speed: Any = number((), "m/s", 1.0, above=0.0)
 
     def check_actuator(self, faults: Faults) -> None:
-        """Adds a fault where there are other weights than channels."""
         count = self.actuator.channels
         if self.weights is not None and len(self.weights) != count:
             fault = f"has {len(self.weights)} numbers"
@@ -65,17 +64,15 @@ class PseudoInverse(Allocation):
         return str(getattr(self.actuator, "shape", "linear"))
 
     def device_in(self, aligned: bool) -> str:
-        """The code for the curve of the actuator."""
         return f"pseudo_inverse:{self.shape}{',lost' if self.losses else ''}"
 
     def reach(self) -> np.ndarray:
-        """The wrench of a unit of effort of each channel."""
         numbers = {name: value[None] for name, value in self.actuator.parameters().items()}
         effect = self.actuator.effect(numbers, {"environment.water_density": np.ones(1)}, np.reshape(self.speed, 1))
         return np.asarray(effect[0])
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """For each set of losses the lines of the pseudo-inverse; each channel's wrench and numbers; curves and inverses."""
+        # For each set of losses the lines of the pseudo-inverse; each channel's wrench and numbers; curves and inverses.
         actuator_numbers = context.own(self.actuator)
         B = self.asked[:, None] * self.actuator.effect(actuator_numbers, context.parameters, numbers["speed"])
         weights = numbers.get("weights", np.ones((1, B.shape[2])))
@@ -157,11 +154,7 @@ def _lines(B: np.ndarray, weights: np.ndarray, lost: Sequence[int]) -> np.ndarra
 
 
 def rising_knots(at: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """As `knots`, where several knots may be at one place: those change nothing.
-
-    at: Places of the knots (n, k), rising or equal.
-    values: Values at the knots (n, k), equal where the places are.
-    """
+    """As `knots` of values (n, k), where several knots may be at one place, with one value: those change nothing."""
     width = np.diff(at, axis=1)
     inverse = np.divide(1.0, width, out=np.zeros_like(width), where=width > 0.0)
     steps = np.stack([at[:, :-1], inverse, np.diff(values, axis=1)], axis=-1)
@@ -177,13 +170,11 @@ TO_COEFFICIENTS = np.linalg.inv(np.polynomial.polynomial.polyvander(POINTS_OF_ST
 
 
 def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
-    """The start of the inverse of polynomials f without a constant, from 0 to where they turn, or to their reach.
+    """The start of the inverse of polynomials f (1 or n, powers), from 0 to where they turn, or to their reach (1 or n,).
 
     It is a polynomial in 2 s - 1, f = (largest f) (1 - (1 - s^2)^2), in which the inverse is smooth where f begins as a square
     and where it turns (lgvi_kernels.laws.thrust_curves).
 
-    polynomial: Coefficients (1 or n, powers) from the first power up.
-    reach: Largest arguments (1 or n,).
     Returns: Rows (1 or n, 20): 1 / largest value, that value, its argument, least slope, and the coefficients.
     """
     polynomial, reach = repeated(polynomial, reach)
@@ -198,12 +189,7 @@ def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
 
 
 def highest(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
-    """Where polynomials without a constant cease to rise.
-
-    polynomial: Coefficients (1 or n, powers) from the first power up.
-    reach: Largest arguments (1 or n,).
-    Returns: Where each turns first (1 or n,), or its reach.
-    """
+    """Where polynomials (1 or n, powers) from the first power up cease to rise first, (1 or n,), or their reach."""
     polynomial, reach = repeated(polynomial, reach)
     points = reach[:, None] * np.linspace(0.0, 1.0, POINTS)
     values = _values(polynomial, points)

@@ -35,7 +35,6 @@ class SetPoint(Guidance):
     speed: Any = number((), "m/s", None, optional=True)
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where nothing is wanted, or the depth twice."""
         if not self.parameters():
             faults.add("", "", "wants nothing", "give position, depth, heading or speed")
         if self.position is not None and self.depth is not None:
@@ -43,7 +42,6 @@ class SetPoint(Guidance):
 
     @property
     def gives(self) -> tuple[str, ...]:
-        """What it wants, among `WISHES`."""
         position = ("position", "depth", "velocity") if self.position is not None else ()
         depth = ("depth",) if self.depth is not None else ()
         upright = self.heading is not None or self.position is not None
@@ -51,7 +49,7 @@ class SetPoint(Guidance):
         return (*position, *depth, *heading, *(("speed",) if self.speed is not None else ()))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """All numbers, and which of them are wanted; what is not stays as guidance before it wants it."""
+        # All numbers, and which of them are wanted; what is not stays as guidance before it wants it.
         position = numbers.get("position", np.zeros((1, 3)))
         zero = np.zeros(1)
         depth = numbers.get("depth", position[:, 2])

@@ -50,17 +50,7 @@ def register(kind: type[AnyTerm]) -> type[AnyTerm]:
 
 
 def from_list(entries: Any) -> tuple[Term, ...]:
-    """Build the terms of a scene.
-
-    Args:
-        entries: A list of tables of a scene file, of `Term` objects, or of both.
-
-    Returns:
-        The terms, in the same order.
-
-    Raises:
-        SceneError: Where an entry is no term, is an event, or shares its name with another. The message lists every fault.
-    """
+    """Build the terms of a scene from tables of a scene file, `Term` objects, or both, in their order."""
     check_list("terms", entries, "write [[terms]] and type = ... below, or terms=[lw.terms.Drag(...)]")
     faults, terms = Faults(), list[Term]()
     for i, entry in enumerate(entries):

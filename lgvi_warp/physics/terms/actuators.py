@@ -16,10 +16,7 @@ FAST, UNLIMITED = 1e20, 1e6
 
 
 def motion(term: Any) -> dict[str, bool]:
-    """How the channels of an actuator that a controller drives follow their commands, by the scene's own numbers.
-
-    term: The term, with `time_constant` and `rate_limit`, each None or (channels,).
-    """
+    """How the channels of a driven actuator follow their commands, by the scene's own numbers."""
     lag, rate = term.time_constant, term.rate_limit
     return {
         "lag": lag is not None and bool(np.any(lag > 0.0)),
@@ -28,10 +25,7 @@ def motion(term: Any) -> dict[str, bool]:
 
 
 def refuse_unread(term: Any, numbers: Numbers) -> None:
-    """Refuse members' lags and limits of rates of a driven actuator where the scene has none: its kernel reads none.
-
-    numbers: Members' numbers by field, each (n, channels).
-    """
+    """Refuse members' lags and rate limits (n, channels) of a driven actuator where the scene has none."""
     faults, features = Faults(f"{term.key}."), motion(term)
     acting = {"lag": ("time_constant", lambda x: x > 0.0), "rate": ("rate_limit", lambda x: x < UNLIMITED)}
     for feature, (name, acts) in acting.items():
@@ -49,11 +43,8 @@ def packed_following(
 ) -> Packed:
     """Pack an actuator whose device code is made by lgvi_kernels.laws.driven or .scheduled.
 
-    term: The term. Its numbers are `limit`, where it has them `time_constant` and `rate_limit`, each (n, channels), and its
-        schedule where no controller drives it.
-    numbers: Its numbers by field, (m, ...).
-    blocks: Other rows of each channel, (m, channels, rows).
-    shared: Rows behind those of all channels, (m, rows); None, the default, for none.
+    numbers: (m, ...) by field: `limit`, where it has them `time_constant` and `rate_limit`, and if not driven the schedule.
+    blocks: Other rows of each channel, (m, channels, rows). shared: Rows behind those of all channels, (m, rows).
     Returns: Rows of each channel: the blocks, limit, 1 / lag and limit of the rate; its schedule; the shared rows; and the
         memory of places, where they move: 0 of a driven actuator, else the command at the start.
     """

@@ -540,12 +540,9 @@ def _falling(field: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
 
 
 def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray:
-    """Rows of a table for the device: the first value, then for each interval its place, 1 / length and change of the value.
+    """Rows of tables for the device: the first value, then for each interval its place, 1 / length and change of the value.
 
-    Between knots the table is linear, outside it is constant.
-
-    at: Places of the knots (n, k), rising, in any unit.
-    values: Values at the knots (n, k, d).
+    Between the knots `at` (n, k), rising, a table of values (n, k, d) is linear, outside it is constant.
     """
     at, values = repeated(at, values)
     inverse = np.full((len(at), at.shape[1] - 1), STEEP) if steps else 1.0 / np.diff(at, axis=1)

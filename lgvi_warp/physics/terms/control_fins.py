@@ -95,7 +95,6 @@ class ControlFins(Fins):
         super().__post_init__()
 
     def check(self, faults: Faults) -> None:
-        """In addition, adds a fault where the command is given twice."""
         super().check(faults)
         if self.__dict__["_both"]:
             faults.add("command", self.command, "is given beside command_schedule", "keep one of them")
@@ -107,22 +106,21 @@ class ControlFins(Fins):
             faults.add("lift_angles", first, "does not begin with no lift at 0", "let both tables begin with 0")
 
     def with_fields(self, fields: Mapping[str, Any]) -> Any:
-        """In addition, leaves out the commands in whose place others stand."""
+        # In addition, leaves out the commands in whose place others stand.
         return super().with_fields(fields_anew(self, fields))
 
     def to_dict(self) -> dict[str, Any]:
-        """The fins as a table of a scene file: of their commands what acts; `flow_angle` only where it is false."""
+        # The fins as a table of a scene file: of their commands what acts; `flow_angle` only where it is false.
         left_out = (*idle_fields(self), *(("flow_angle",) if self.flow_angle else ()))
         return {key: value for key, value in super().to_dict().items() if key not in left_out}
 
     @property
     def channels(self) -> int:
-        """Number of commands, one for each fin."""
         return len(self.limit)
 
     @property
     def own_commands(self) -> bool:
-        """Whether it has a schedule, or a command other than 0."""
+        # Whether it has a schedule, or a command other than 0.
         return len(self.command_schedule) > 1 or bool(np.any(self.command))
 
     def effect(self, numbers: Numbers, parameters: Numbers, speed: np.ndarray) -> np.ndarray:
@@ -149,7 +147,6 @@ class ControlFins(Fins):
         return np.swapaxes(np.concatenate([lift, np.cross(position, lift)], axis=-1), -1, -2)
 
     def device_in(self, aligned: bool) -> str:
-        """The code for what these fins have."""
         driven = self.driver is not None
         features = (
             {"driven": driven}
@@ -163,7 +160,7 @@ class ControlFins(Fins):
         return f"control_fins_with:{','.join(chosen)}" if chosen else "control_fins"
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, raises SceneError for members' numbers that would have no effect."""
+        # In addition, raises SceneError for members' numbers that would have no effect.
         remedy = f"give {self.key}.rate_limit below {UNLIMITED:g} rad/s in the scene as well"
         refuse_idle(self, numbers, "rate_limit", numbers["rate_limit"] < UNLIMITED, remedy)
         if self.driver is not None:
@@ -176,11 +173,11 @@ class ControlFins(Fins):
 
     @property
     def memory(self) -> bool:
-        """Whether fins lag, or the rate of one is limited."""
+        # Whether fins lag, or the rate of one is limited.
         return bool(self.time_constant is not None or np.any(self.rate_limit < UNLIMITED))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The device rows: those of each fin, then the command table of each fin."""
+        # The device rows: those of each fin, then the command table of each fin.
         if self.device_in(context.aligned) != "control_fins":
             blocks = fin_rows(numbers, context)
             blocks = blocks if self.flow_angle else blocks[..., :STRAIGHT_ROWS]

@@ -47,7 +47,6 @@ class CurrentProfile(Term):
     velocities: Any = number(("k", 3), "m/s")
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The table as device rows, knot by knot."""
         return Packed({"count": numbers["depths"].shape[1] - 1}, knots(numbers["depths"], numbers["velocities"]))
 
     def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:

@@ -74,13 +74,12 @@ class Box(Event):
     upper: Any = number((3,), "m")
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, refuses members whose corners span no box."""
+        # In addition, refuses members whose corners span no box.
         bad = super().unphysical(numbers)
         crossed = np.any(numbers["upper"] <= numbers["lower"], axis=1)
         return {"lower": bad["lower"] | crossed, "upper": bad["upper"] | crossed}
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where the corners span no box."""
         if np.any(self.upper <= self.lower):
             fault = f"is not above lower = {self.lower.tolist()}"
             faults.add("upper", self.upper, fault, "give upper > lower on each axis")

@@ -154,12 +154,11 @@ class Thrusters(Term):
 
     @property
     def channels(self) -> int:
-        """Number of commands, one for each thruster."""
         return len(self.coefficient)
 
     @property
     def own_commands(self) -> bool:
-        """Whether it has a schedule, or a command other than 0."""
+        # Whether it has a schedule, or a command other than 0.
         return len(self.command_schedule) > 1 or bool(np.any(self.command))
 
     def effect(self, numbers: Numbers, parameters: Numbers, speed: np.ndarray) -> np.ndarray:
@@ -179,7 +178,6 @@ class Thrusters(Term):
         return np.swapaxes(wrench, -1, -2)
 
     def device_in(self, aligned: bool) -> str:
-        """The code for what these thrusters have."""
         driven = self.driver is not None
         features = (
             {"driven": driven}
@@ -195,11 +193,11 @@ class Thrusters(Term):
         return f"thrusters_with:{','.join(chosen)}"
 
     def with_fields(self, fields: Mapping[str, Any]) -> Any:
-        """In addition, leaves out the commands in whose place others stand."""
+        # In addition, leaves out the commands in whose place others stand.
         return super().with_fields(fields_anew(self, fields))
 
     def to_dict(self) -> dict[str, Any]:
-        """The term as a table of a scene file: of its commands what acts; polynomials only where they are not w^2."""
+        # The term as a table of a scene file: of its commands what acts; polynomials only where they are not w^2.
         left_out = (*idle_fields(self), *(("polynomial", "polynomial_astern") if self.is_square else ()))
         return {key: value for key, value in super().to_dict().items() if key not in left_out}
 
@@ -223,7 +221,7 @@ class Thrusters(Term):
         return np.asarray(self.coefficient * ahead - self.coefficient_astern * astern)
 
     def drive(self) -> np.ndarray:
-        """The largest force and torque of all thrusters together, over the times of the schedule."""
+        # The largest force and torque of all thrusters together, over the times of the schedule.
         along = self.direction / np.linalg.norm(self.direction, axis=1, keepdims=True)
         wrenches = np.concatenate([along, np.cross(self.position, along)], axis=1)
         return np.asarray(np.abs(self.thrust(self.command_schedule) @ wrenches).max(axis=0))
@@ -253,7 +251,6 @@ class Thrusters(Term):
         return np.clip(least_commands, -self.limit, self.limit)
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where a direction has no length, or the command is given twice."""
         zero = np.flatnonzero(np.linalg.norm(self.direction, axis=1) == 0.0)
         if len(zero):
             remedy = "give the direction that the thrust pushes the vehicle, such as [1, 0, 0]"
@@ -275,10 +272,7 @@ class Thrusters(Term):
             faults.add("command", self.command, "differs from the first of command_schedule", "keep one of them")
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, refuses directions without length.
-
-        Raises SceneError for members' numbers that would have no effect.
-        """
+        # In addition, refuses directions without length; raises SceneError for members' numbers that would have no effect.
         bad = super().unphysical(numbers)
         bad["direction"] = bad["direction"] | np.any(~np.any(numbers["direction"], axis=-1), axis=-1)
         remedy = f"give {self.key}.time_constant above 0 [s] in the scene as well"
@@ -301,13 +295,13 @@ class Thrusters(Term):
 
     @property
     def memory(self) -> bool:
-        """Whether thrusters have a limited rate, or one of them a lag."""
+        # Whether thrusters have a limited rate, or one of them a lag.
         if self.driver is not None:
             return any(motion(self).values())
         return bool(self.rate_limit is not None or np.any(self.time_constant > 0.0))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The device rows: those of each thruster, then the command table of each thruster."""
+        # The device rows: those of each thruster, then the command table of each thruster.
         direction = numbers["direction"] / np.linalg.norm(numbers["direction"], axis=-1, keepdims=True)
         arms = np.cross(numbers["position"] + 0.0 * direction, direction + 0.0 * numbers["position"])
         force, torque = context.frame.vector(direction), context.frame.torque(arms, direction + 0.0 * arms)
@@ -375,10 +369,8 @@ def _unfit(at: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def side_of_table(at: np.ndarray, values: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
-    """One side of tables of thrust, by size: from the command at which thrust begins on.
+    """One side of tables of thrust (n, t) at commands (n, t), by size: from the command at which thrust begins on.
 
-    at: Commands (n, t), rising.
-    values: Thrusts (n, t), rising.
     Returns: Sizes of commands (n, t) and of thrusts (n, t), from (begin, 0) up; points of the other side are at the begin.
     """
     if side < 0.0:

@@ -33,11 +33,11 @@ class Wrench(Term):
     torque: Any = number((3,), "N m", (0.0, 0.0, 0.0))
 
     def drive(self) -> np.ndarray:
-        """The sizes of force and torque."""
+        # The sizes of force and torque.
         return np.abs(np.concatenate([self.force, self.torque]))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """Force and torque about the origin of the forces, in the kernel's axes."""
+        # Force and torque about the origin of the forces, in the kernel's axes.
         force, torque = numbers["force"], numbers["torque"]
         return Packed({"force": context.frame.vector(force), "torque": context.frame.torque(torque, force)})
 
@@ -72,11 +72,11 @@ class WrenchSchedule(Term):
         super().__post_init__()
 
     def drive(self) -> np.ndarray:
-        """The largest sizes of force and torque in the schedule."""
+        # The largest sizes of force and torque in the schedule.
         return np.abs(np.concatenate([self.force, self.torque], axis=1)).max(axis=0)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """Two tables: the force, and the torque about the origin of the forces."""
+        # Two tables: the force, and the torque about the origin of the forces.
         force = context.frame.vector(numbers["force"])
         torque = context.frame.torque(*repeated(numbers["torque"], numbers["force"]))
         tables = [knots(numbers["times"], values, self.interpolation == "steps") for values in (force, torque)]
@@ -84,11 +84,7 @@ class WrenchSchedule(Term):
 
 
 def first_row(schedule: Any) -> Any:
-    """The commands at the first time of a schedule.
-
-    schedule: Commands (k, units), as the user gave them, or None.
-    Returns: Commands (units,); 0.0 where there is no schedule, or none that can be read.
-    """
+    """Commands (units,) at the first time of a schedule (k, units); 0.0 where there is none, or none that can be read."""
     try:
         return np.atleast_2d(np.array(schedule, dtype=np.float64))[0] if schedule is not None else 0.0
     except (TypeError, ValueError, IndexError, OverflowError):
@@ -110,43 +106,28 @@ def idle_fields(term: Any) -> tuple[str, ...]:
 
 
 def fields_anew(term: Any, fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Fields with which a term is built anew: of its commands those that follow from the others are left out.
-
-    Returns: These, and None for each that follows from them.
-    """
+    """Fields with which a term is built anew: those of its commands that follow from the others are None."""
     left_out = ("command",) if fields.keys() & set(SCHEDULE) else idle_fields(term)
     return dict.fromkeys(left_out) | dict(fields)
 
 
 def commands(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
-    """Times and commands of a term; a command that is held is the only row of the schedule.
-
-    numbers: The term's numbers by field, each of shape (n, ...).
-    Returns: Times (n, k) [s] and commands (n, k, units).
-    """
+    """Times (n, k) [s] and commands (n, k, units) of a term; a command that is held is the only row of the schedule."""
     schedule = numbers["command_schedule"]
     return numbers["times"], numbers["command"][:, None, :] if schedule.shape[1] == 1 else schedule
 
 
 def at_start(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:
-    """Commands at t = 0.
-
-    times: Times of the schedule (1 or n, k) [s].
-    schedule: Commands (1 or n, k, columns).
-    Returns: Commands (n, columns).
-    """
+    """Commands (n, columns) at t = 0 of schedules (1 or n, k, columns) with times (1 or n, k) [s]."""
     members = zip(*repeated(times, schedule), strict=True)
     return np.array([[np.interp(0.0, at, column) for column in commands.T] for at, commands in members])
 
 
 def refuse_idle(term: Any, numbers: Numbers, rate: str, remembers: np.ndarray, remedy: str) -> None:
-    """Refuse members' numbers that would have no effect, since the scene's kernel does not read them.
+    """Refuse members' numbers (n, ...) that would have no effect, since the scene's kernel does not read them.
 
-    That is `command` in a scene with a schedule and the reverse, and the numbers of a memory that the scene does not have. No
-    controller drives the term, or the former do not exist.
-
-    numbers: Members' numbers by field, each of shape (n, ...).
-    remembers: Whether each member's number in that field needs the memory, (n, units).
+    That is `command` in a scene with a schedule and the reverse, unless a controller drives the term; and numbers of a memory
+    that the scene does not have, where those of a member need it (`remembers`, (n, units)).
     """
     faults = Faults(f"{term.key}.")
     unread = {}

@@ -126,10 +126,7 @@ def _check_file(mode: int, path: Path) -> None:
 
 
 def read(root: Path, key: str, most: int) -> bytes:
-    """Read a plain file below a root.
-
-    most: Largest size allowed [bytes].
-    """
+    """Read a plain file below a root of at most so many bytes."""
     with opened(root, key) as file:
         size = os.fstat(file.fileno()).st_size
         if size > most:
@@ -182,10 +179,7 @@ MOST_DEEP = 8
 
 
 def entries(root: Path, below: str = "") -> Iterator[tuple[str, os.DirEntry[str]]]:
-    """List everything below a root, in order of names; links are not followed.
-
-    Yields: (path from the root, directory entry).
-    """
+    """(path from the root, directory entry) of everything below a root, in order of names; links are not followed."""
     if below.count("/") > MOST_DEEP:
         raise SceneError([f"{root / below}: lies deeper than the folders of a run do; remove it"])
     with os.scandir(root / below) as listing:
@@ -206,10 +200,7 @@ def names(root: Path, key: str) -> set[str]:
 
 
 def size_below(root: Path) -> int:
-    """Add up the plain files below a folder.
-
-    Returns: Their size [bytes].
-    """
+    """Size of the plain files below a folder [bytes]."""
     plain = (entry for _, entry in entries(root) if entry.is_file(follow_symlinks=False))
     return sum(entry.stat(follow_symlinks=False).st_size for entry in plain)
 

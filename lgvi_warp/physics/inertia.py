@@ -181,7 +181,10 @@ def in_axes(Q: np.ndarray, A: np.ndarray) -> np.ndarray:
 
 
 def uncoupled_frame(body: Blocks) -> tuple[Frame, np.ndarray]:
-    """The frame with J diagonal at the origin where M and J are uncoupled: fully if and only if E, returned too, is skew."""
+    """The frame with J diagonal at the origin where M and J are uncoupled, and the coupling norm (n,) that remains there.
+
+    The coupling vanishes there if and only if E is skew.
+    """
     M, E, Js = schur(body)
     origin = -vee(E)
     Q, J = notation.principal_axes(Js)

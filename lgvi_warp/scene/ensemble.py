@@ -235,10 +235,7 @@ class Ensemble(Summarized):
         return PhysicalChecks(self.scene, varied, self._draws.drawn_names, self.members)
 
     def _check_physical(self, before: bool = False) -> None:
-        """Refuse unphysical members, unless that was done before.
-
-        Members that are drawn are looked at up to SURVEYED; a run looks at the others as it comes to them.
-        """
+        """Refuse unphysical members up to SURVEYED of those that are drawn; a run looks at the others as it comes to them."""
         checks, draws = self._checks(), self._draws
         all_of_them = draws.explicit or draws.columns or not checks.varied
         self.checked = self.members if all_of_them else min(self.members, SURVEYED)

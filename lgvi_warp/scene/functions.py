@@ -17,20 +17,14 @@ from lgvi_warp.statistics.values.quantity import Quantity
 
 
 class Own(NamedTuple):
-    """A function or a class of the user's.
-
-    version: what the user says it is; None where nothing is said.
-    """
+    """A function or a class of the user's, and its version by the user; None where nothing is said."""
 
     function: Any
     version: Any
 
 
 def functions_of(fleet: Ensemble | None, statistics: Iterable[Statistic] = ()) -> dict[str, Own]:
-    """List the user's functions and classes that a run depends on, which no table can hold.
-
-    fleet: the members; None for statistics alone.
-    """
+    """List the user's functions and classes that a run, or statistics alone, depends on, which no table can hold."""
     functions = {} if fleet is None else dict(_of_fleet(fleet))
     for i, statistic in enumerate(statistics):
         version = getattr(statistic, "version", None)

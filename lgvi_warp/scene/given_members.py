@@ -25,11 +25,7 @@ def given_members(
     angular_velocity: Any,
     parameters: Any,
 ) -> tuple[int, dict[str, np.ndarray]]:
-    """The arguments of `Ensemble.from_states`, read and checked.
-
-    base: parameters of the scene by name.
-    Returns: The number n of members, and by name, with "start." before those of the states, arrays (n, ...).
-    """
+    """The arguments of `Ensemble.from_states` as the number n of members and arrays (n, ...) by name; states as "start."."""
     faults = Faults()
     states = dict(zip(FIELDS, (position, attitude, velocity, angular_velocity), strict=True))
     explicit = {f"start.{key}": _state(faults, key, value) for key, value in states.items()}
@@ -53,7 +49,7 @@ def given_members(
 
 
 def _state(faults: Faults, key: str, value: Any) -> np.ndarray:
-    """Return a copy of a state in float64, which may hold NaN; later changes of the argument do not reach the ensemble.
+    """A copy of a state in float64, which may hold NaN; later changes of the argument do not reach the ensemble.
 
     A data frame's columns may be called position[0], position[1], position[2], in any order.
     """

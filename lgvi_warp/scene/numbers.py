@@ -22,11 +22,7 @@ SETTINGS = ("controller.period", "run.step", "run.duration")
 
 
 def with_numbers(scene: SceneT, numbers: Mapping[str, Any]) -> SceneT:
-    """Return a scene with other numbers.
-
-    numbers: values by name, as scene.parameters() lists them; also "start.position", "controller.period", "run.step" and
-        "run.duration", and single entries, "drag.quadratic[0]".
-    """
+    """Return a scene with other numbers, by names as `Scene.with_numbers` has them."""
     base, faults = scene.parameters(), Faults()
     changes: dict[str, dict[str, Any]] = {}
     for name, value in mapping_of("numbers", numbers, "names to numbers").items():

@@ -33,10 +33,7 @@ class Oddities:
         return Oddities(joined)
 
     def messages(self, members: int, most: int | None = None) -> tuple[str, ...]:
-        """Return one sentence for each odd quantity.
-
-        most: Number of members that were looked at; None for all (default).
-        """
+        """Return one sentence for each odd quantity; `most` members were looked at, None for all."""
         return tuple(f"{key}: {odd.text}{_whose(odd, members, most)}" for key, odd in self.by_name.items())
 
 
@@ -56,8 +53,7 @@ OddityCheck = tuple[str, np.ndarray, Callable[[int], str]]
 def gathered(checked: Iterable[OddityCheck], first: int, stop: int) -> Oddities:
     """Count the odd values of the members first to stop - 1.
 
-    checked: For each check the name of a quantity, the members that are odd (1,) or (n,), and the text about one member. Where
-        several checks bear one name, the first that finds an odd member counts.
+    Where several checks bear one name, the first that finds an odd member counts.
     """
     odd_by_name: dict[str, Odd] = {}
     for key, odd, text in checked:

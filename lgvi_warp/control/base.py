@@ -91,7 +91,7 @@ class Part(Term):
     every_feature: ClassVar[tuple[str, ...]] = ()
     chosen: ClassVar[tuple[str, ...]] = ()
     # Where it finds the numbers of others; set for a part of a scene.
-    bus: ClassVar[Bus | None] = None
+    bus: ClassVar[Bus]
 
     @property
     def gives(self) -> tuple[str, ...]:
@@ -191,15 +191,19 @@ class IntegralLaw(ControlLaw):
             its error would make this worse; or "none".
     """
 
-    integrals: ClassVar[int] = 1
+    # Rows of the memory, two of each integral's number; and what the device code calls several limits of integrals.
+    memory_rows: ClassVar[int] = 2
+    limits: ClassVar[tuple[str, ...]] = ()
 
     anti_windup: str = word("conditional", known=ANTI_WINDUP)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        # The numbers, the memory of the integrals, and where the law finds what was not delivered.
-        assert self.bus is not None
+        # The numbers, each limit by itself, the memory of the integrals, and where the law finds what was not delivered.
+        values = {"rate" if name == "lambda" else name: value for name, value in numbers.items()}
+        if self.limits:
+            values |= zip(self.limits, values.pop("integral_limit").T, strict=True)
         words = {"unmet": self.bus.unmet, "conditional": int(self.anti_windup == "conditional")}
-        return Packed(dict(numbers) | words, memory=np.zeros((1, 2 * self.integrals)))
+        return Packed(values | words, memory=np.zeros((1, self.memory_rows)))
 
 
 # What a law of the pose adds to its demand.
@@ -217,19 +221,17 @@ class PoseLaw(IntegralLaw):
 
     needs: ClassVar[tuple[str, ...]] = ("position", "velocity", "attitude", "angular_velocity")
     demands: ClassVar[tuple[str, ...]] = ("X", "Y", "Z", "K", "M", "N")
-    integrals: ClassVar[int] = 6
+    memory_rows: ClassVar[int] = 12
+    limits: ClassVar[tuple[str, ...]] = ("position_limit", "attitude_limit")
 
     feedforward: str = word("none", known=FEEDFORWARD)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        # In addition, each limit by itself, and the nominal weight less buoyancy with the moment of both.
-        limits = numbers["integral_limit"]
-        values = {name: value for name, value in numbers.items() if name != "integral_limit"}
+        # In addition, the nominal weight less buoyancy with the moment of both.
         net, moment = np.zeros(1), np.zeros((1, 3))
         if self.feedforward == "restoring":
             net, moment = restoring(self.nominal)
-        more = {"position_limit": limits[:, 0], "attitude_limit": limits[:, 1], "net_weight": net, "moment": moment}
-        return super().packed(values | more, context)
+        return super().packed({**numbers, "net_weight": net, "moment": moment}, context)
 
 
 def restoring(nominal: Numbers) -> tuple[np.ndarray, np.ndarray]:

@@ -68,7 +68,6 @@ class Callback(ControlLaw):
         }
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        assert self.bus is not None
         return Packed({"answer": self.bus.answer})
 
 
@@ -84,7 +83,6 @@ class CallbackCommands(Allocation):
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # Where the answer is, and the limits of the commands.
-        assert self.bus is not None
         first, count = self.bus.commands[self.to]
         limit = context.own(self.actuator)["limit"]
         return Packed({"answer": self.bus.answer, "commands": first, "count": count}, limit)

@@ -36,7 +36,6 @@ class Delay(Part):
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # A ring of as many sets of commands as some member needs. A delay that varies is that of the nearest whole step.
-        assert self.bus is not None
         bus, every = self.bus, round(self.period / context.h)
         steps = np.rint(numbers["delay"] / context.h)
         periods = steps // every

@@ -59,7 +59,6 @@ class Fault(Sending):
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # The numbers, and the rows of the command or the channel of the reading.
-        assert self.bus is not None
         begin = first_step(numbers["time"], context.h)
         members_numbers = {"begin": begin, "gain": numbers["gain"], "offset": numbers["offset"]}
         if self.sensor is not None:

@@ -31,7 +31,6 @@ class LoopBegin(ControlLaw):
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # The rows that both share.
-        assert self.bus is not None
         return Packed(dict(numbers) | {"demand": self.bus.answer})
 
 

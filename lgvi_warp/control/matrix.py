@@ -53,7 +53,6 @@ class AllocationMatrix(Allocation):
         limit = context.own(self.actuator)["limit"]
         inverse = np.linalg.pinv(A)
         rows = side_by_side(A, np.swapaxes(inverse, -1, -2), limit[..., None], self.steps_of_loss(context)[..., None])
-        assert self.bus is not None
         first, count = self.bus.commands[self.to]
         return Packed(
             {"commands": first, "count": count}, side_by_side(rest_rows(inverse @ A), rows.reshape(len(rows), -1))

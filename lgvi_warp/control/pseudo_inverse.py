@@ -95,7 +95,6 @@ class PseudoInverse(Allocation):
         channels = side_by_side(np.swapaxes(B, -1, -2), *(column[..., None] for column in columns))
         rows.append(channels.reshape(len(channels), -1))
         curves, size = self._curves(actuator_numbers)
-        assert self.bus is not None
         first, count = self.bus.commands[self.to]
         words = {
             "commands": first,

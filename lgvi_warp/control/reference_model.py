@@ -53,7 +53,6 @@ class ReferenceModel(Guidance):
         zeta = numbers.get("damping_ratio", np.ones_like(omega))
         limit = numbers.get("rate_limit", np.full_like(omega, 1e30))
         omega, zeta, limit = repeated(omega, zeta, limit)
-        assert self.bus is not None
         maps = _maps(omega, zeta, self.bus.period)
         count = omega.shape[1]
         rows = np.concatenate([maps.reshape(*omega.shape, 9), limit[..., None]], axis=2).reshape(len(omega), -1)

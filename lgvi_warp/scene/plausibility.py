@@ -19,7 +19,6 @@ from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.physics.terms.base import Term, own
 from lgvi_warp.physics.terms.control_fins import ControlFins
 from lgvi_warp.physics.terms.cross_flow import CrossFlow
-from lgvi_warp.physics.terms.wrench import holds
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.like import SceneLike
@@ -111,7 +110,7 @@ def fin_angles(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
             continue
         angles = {"limit": p[f"{term.key}.limit"]}
         if not term.driver:
-            field = "command" if holds(term) else "command_schedule"
+            field = "command" if term.holds else "command_schedule"
             angles[field] = p[f"{term.key}.{field}"]
         for field, values in angles.items():
             angle = np.abs(values).reshape(len(values), -1).max(axis=1)

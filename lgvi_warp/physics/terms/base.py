@@ -432,6 +432,22 @@ class Term:
         """
         raise NotImplementedError(f"{type(self).__name__} does not tell how strongly it brakes")
 
+    def effect(self, numbers: Numbers, parameters: Numbers, speed: Array) -> Array:
+        """What a unit of effort of each channel makes: thrust of thrusters, the angle of fins.
+
+        Args:
+            numbers: The term's numbers by field, each of shape (1 or n, ...).
+            parameters: All parameters of the scene, by name.
+            speed: Speed ahead (1 or n,) [m/s].
+
+        Returns:
+            Wrenches (1 or n, 6, channels) about the body's origin [N, N m per unit of effort].
+
+        Raises:
+            NotImplementedError: Where the term does not define it, as an actuator must for `PseudoInverse`.
+        """
+        raise NotImplementedError(f"{type(self).__name__} does not tell what its channels make")
+
     def drive(self) -> Array:
         """Largest force and torque with which the term drives the vehicle, whatever its motion, by the scene's numbers.
 

@@ -68,14 +68,5 @@ class ControlWrench(Term):
         return packed_following(self, numbers, np.concatenate(np.broadcast_arrays(*blocks), axis=-1))
 
     def effect(self, numbers: Numbers, parameters: Numbers, speed: np.ndarray) -> np.ndarray:
-        """The wrench of a unit of effort of each channel, about the body's origin.
-
-        Args:
-            numbers: The term's numbers by field.
-            parameters: All parameters of the scene.
-            speed: Speed ahead (1 or n,) [m/s].
-
-        Returns:
-            (1 or n, 6, channels).
-        """
+        # The wrench of a unit of effort of each channel, about the body's origin.
         return np.eye(6)[None]

@@ -33,6 +33,14 @@ class Callback(ControlLaw):
             acts on them. None, the default, for demands.
         version: What tells the function from others in sweeps and stores, a text or a number, changed whenever the function
             does. None, the default: what its code says. Give one where it reads files, or holds what cannot be compared.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> import numpy as np
+        >>> def heave(t, y, r, members):
+        ...     return np.outer(20.0 * (5.0 - y.depth), [0, 0, 1, 0, 0, 0])
+        >>> lw.control.Callback(heave).to_dict()
+        {'type': 'callback', 'function': 'heave'}
     """
 
     type: ClassVar[str] = "callback"

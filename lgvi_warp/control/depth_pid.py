@@ -27,6 +27,12 @@ class DepthPID(IntegralLaw):
         k_heave: Gain of the heave velocity w [N s]; 0 by default.
         integral_limit: Largest sizes of both integrals, (2,) [m s, rad s]; 1e6 by default.
         anti_windup: As of `IntegralLaw`; the depth's integral waits while the wanted pitch is at its limit.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> law = lw.control.DepthPID(kp=0.1, kp_pitch=10.0, kd_pitch=8.0, pitch_limit=0.4)
+        >>> law.needs, law.demands
+        (('depth',), ('M',))
     """
 
     type: ClassVar[str] = "depth_pid"

@@ -34,6 +34,12 @@ class Fault(Sending):
 
     Raises:
         SceneError: Where `of` is no text, `channel` no whole number, or `known` neither true nor false; and as `Term`.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> dead = lw.control.Fault(of="thrusters", channel=1, time=20.0, known=True)
+        >>> float(dead.gain), dead.known
+        (0.0, True)
     """
 
     type: ClassVar[str] = "fault"

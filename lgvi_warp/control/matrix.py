@@ -23,6 +23,12 @@ class AllocationMatrix(Allocation):
     Args:
         to: Key of the term that takes the commands.
         matrix: A, (channels, 6) [command's unit per N, per N m].
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> rudder_and_stern = [[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 1, 0]]
+        >>> lw.control.AllocationMatrix(to="control_fins", matrix=rudder_and_stern).reach().shape
+        (6, 2)
     """
 
     type: ClassVar[str] = "matrix"

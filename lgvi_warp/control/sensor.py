@@ -43,6 +43,11 @@ class Sensor(MeasuringPart):
 
     Raises:
         SceneError: Where `of` is not known, or `every` or `latency` is no whole number; and as `Term`.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.control.Sensor(of="position", noise=0.5, every=10).noise
+        array([0.5, 0.5, 0.5])
     """
 
     type: ClassVar[str] = "sensor"

@@ -25,6 +25,11 @@ class SetPoint(Guidance):
 
     Raises:
         SceneError: Where nothing is given, or position and depth both; and as `Term`.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.control.SetPoint(depth=10.0, heading=0.5).gives
+        ('depth', 'heading', 'attitude', 'angular_velocity')
     """
 
     type: ClassVar[str] = "set_point"

@@ -32,6 +32,11 @@ class Trajectory(Guidance):
         speed: Wanted speeds ahead through the water (k,) [m/s]; by default the size of the wanted velocity.
         interpolation: "linear", the default: straight from place to place; or "cubic": by natural cubic splines, whose
             velocities have no jumps within the times.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.control.Trajectory(times=[0.0, 10.0], positions=[[0.0, 0.0, 5.0], [15.0, 0.0, 5.0]]).gives
+        ('position', 'depth', 'velocity', 'speed')
     """
 
     type: ClassVar[str] = "trajectory"

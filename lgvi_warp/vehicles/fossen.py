@@ -42,6 +42,11 @@ def vehicle_names() -> list[str]:
 
     Returns:
         Names in alphabetical order.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.vehicles.names()
+        ['bluerov2_heavy', 'nordkvist_sanyal', 'remus_100', 'sphere', 'torpedo']
     """
     folder = resources.files("lgvi_warp.vehicles")
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
@@ -270,6 +275,13 @@ def from_fossen(
 
     Raises:
         SceneError: If anything is wrong; the message lists every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> derivatives = {"X_udot": -1.0, "Y_vdot": -35.0, "Z_wdot": -35.0, "X_uu": -1.6}
+        >>> tables = lw.vehicles.from_fossen(derivatives, mass=30.0, inertia=[0.2, 3.5, 3.5])
+        >>> float(lw.Scene.from_dict(tables).vehicle.mass_matrix[0, 0])
+        31.0
     """
     faults = Faults()
     body = rigid_body(faults, mass, inertia, center_of_gravity, center_of_buoyancy, weight, buoyancy, gravity)

@@ -74,6 +74,12 @@ def from_yaml(
     Raises:
         SceneError: If anything is wrong; the message lists every fault.
         ImportError: If PyYAML is not installed.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> text = "{mass: 30.0, inertia: [0.2, 3.5, 3.5], linear_damping: [-4, -20, -20, -1, -10, -10]}"
+        >>> lw.vehicles.from_yaml(text)["terms"][0]["linear"]
+        [4.0, 20.0, 20.0, 1.0, 10.0, 10.0]
     """
     faults = Faults()
     faults.choice("quadratic", quadratic, ("diagonal", "full"))

@@ -17,6 +17,13 @@ class Current(Term):
 
     Args:
         velocity: Velocity of the water, (3,) [m/s], in inertial axes.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", terms=[lw.terms.Current(velocity=[0.5, 0.0, 0.0])])
+        >>> fleet = lw.Ensemble(scene, members=100, vary={"current.velocity[1]": lw.distributions.Normal(std=0.1)})
+        >>> fleet.parameters(0, 100)["current.velocity"].shape
+        (100, 3)
     """
 
     type: ClassVar[str] = "current"

@@ -36,6 +36,11 @@ class Surface(Event):
 
     Args:
         depth: Depth [m]; 0 by default, the surface.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.Scene.named("remus_100", events=[lw.events.Surface(depth=0.5)]).parameters()["surface.depth"]
+        array(0.5)
     """
 
     type: ClassVar[str] = "surface"
@@ -50,6 +55,11 @@ class Floor(Event):
 
     Args:
         depth: Depth of the floor [m].
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.Scene.named("remus_100", events=[lw.events.Floor(depth=40.0)]).parameters()["floor.depth"]
+        array(40.)
     """
 
     type: ClassVar[str] = "floor"
@@ -65,6 +75,11 @@ class Box(Event):
     Args:
         lower: Lower corner, shape (3,) [m], in inertial axes.
         upper: Upper corner, shape (3,) [m], in inertial axes; above `lower` on each axis.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.events.Box(lower=[-50.0, -50.0, 0.0], upper=[50.0, 50.0, 30.0]).upper
+        array([50., 50., 30.])
     """
 
     type: ClassVar[str] = "box"
@@ -91,6 +106,11 @@ class StopTime(Event):
 
     Args:
         at: Time [s], from 0.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> [event.key for event in lw.Scene.named("remus_100", events=[lw.events.StopTime(at=60.0)]).events]
+        ['time']
     """
 
     type: ClassVar[str] = "time"

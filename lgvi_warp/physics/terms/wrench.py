@@ -23,6 +23,12 @@ class Wrench(Term):
     Args:
         force: Force, (3,) [N]; 0 by default.
         torque: Torque, (3,) [N m]; 0 by default.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("torpedo", terms=[lw.terms.Wrench(force=[5.0, 0.0, 0.0])])
+        >>> scene.parameters()["wrench.force"]
+        array([5., 0., 0.])
     """
 
     type: ClassVar[str] = "wrench"

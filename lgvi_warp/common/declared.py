@@ -63,10 +63,10 @@ def read(settings: Any, faults: Faults, *names: str) -> dict[str, Any]:
     return values
 
 
-Made = TypeVar("Made")
+Settings = TypeVar("Settings")
 
 
-def from_table(kind: type[Made], key: str, table: Any, example: str, **needed: str) -> Made:
+def from_table(kind: type[Settings], key: str, table: Any, example: str, **needed: str) -> Settings:
     """Build settings from a table of a scene file, which needs some keys (with remedies); settings themselves are kept."""
     if isinstance(table, kind):
         return table

@@ -30,7 +30,7 @@ ROUND_OFF, LITTLE = 1e-6, 0.15
 SYMMETRIC = ("added_mass", "inertia", "rigid_body_mass_matrix", "added_mass_matrix")
 
 
-class Seen(str):
+class RepeatedWarning(str):
     """A warning that a vehicle raises about its own numbers, and raises again when it is rebuilt from another's fields."""
 
 
@@ -102,9 +102,9 @@ class Vehicle(Summarized):
         faults = Faults("vehicle.")
         values = read(self, faults, "buoyancy", "center_of_buoyancy", "warnings", "inertia_tolerance")
         object.__setattr__(self, "inertia_tolerance", values["inertia_tolerance"] or 0.0)
-        user_warnings = (warning for warning in values["warnings"] or () if not isinstance(warning, Seen))
+        user_warnings = (warning for warning in values["warnings"] or () if not isinstance(warning, RepeatedWarning))
         values |= self._full(faults) if self.full else self._simple(faults)
-        values["warnings"] = (*user_warnings, *map(Seen, values["warnings"]))
+        values["warnings"] = (*user_warnings, *map(RepeatedWarning, values["warnings"]))
         with faults.including():
             values["shape"] = shape_from(self.shape)
         values |= read(self, faults, "title")
@@ -232,7 +232,7 @@ class Vehicle(Summarized):
         for name, value in self.parameters().items():
             full = name in ("rigid_body_mass_matrix", "added_mass_matrix")
             content[name] = compact(value) if value.shape == (3, 3) and not full else value.tolist()
-        user_warnings = [text for text in self.warnings if not isinstance(text, Seen)]
+        user_warnings = [text for text in self.warnings if not isinstance(text, RepeatedWarning)]
         content |= {"inertia_tolerance": self.inertia_tolerance} if self.inertia_tolerance else {}
         content |= {"warnings": user_warnings} if user_warnings else {}
         content |= {"shape": self.shape.to_dict()} if self.shape else {}

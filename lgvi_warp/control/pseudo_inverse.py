@@ -42,8 +42,9 @@ class PseudoInverse(Allocation):
         if self.weights is not None and len(self.weights) != count:
             fault = f"has {len(self.weights)} numbers"
             faults.add(f"{self.key}.weights", self.weights, fault, f"give {count}, one for each channel of {self.to}")
-
-        self._check_curve(faults)
+        if self.shape == "polynomial" and np.any(self.actuator.limit >= UNLIMITED):
+            fault = "does not end: the inverse of a polynomial needs the range of the commands"
+            faults.add(f"{self.to}.limit", self.actuator.limit, fault, "give the largest command")
         lost = self.lost_channels
         if len(lost) > MOST_LOST:
             faults.add(
@@ -52,11 +53,6 @@ class PseudoInverse(Allocation):
                 f"has {len(lost)} channels with known faults",
                 f"let at most {MOST_LOST} be known",
             )
-
-    def _check_curve(self, faults: Faults) -> None:
-        if self.shape == "polynomial" and np.any(self.actuator.limit >= UNLIMITED):
-            fault = "does not end: the inverse of a polynomial needs the range of the commands"
-            faults.add(f"{self.to}.limit", self.actuator.limit, fault, "give the largest command")
 
     @property
     def shape(self) -> str:
@@ -101,15 +97,10 @@ class PseudoInverse(Allocation):
             "count": count,
             "sets": 1 << len(lost),
             "size": size,
-            "sided": self._sided(actuator_numbers),
+            # Whether the polynomials of some member differ ahead and astern.
+            "sided": int(self.shape == "polynomial" and not np.array_equal(*_polynomials(actuator_numbers))),
         }
         return Packed(words | {"shared": sum(block.shape[1] for block in rows)}, side_by_side(*rows, curves))
-
-    def _sided(self, numbers: Numbers) -> int:
-        """1 where the thrusters have polynomials, and some of those astern are others than those ahead; else 0."""
-        return int(
-            self.shape == "polynomial" and not np.array_equal(numbers["polynomial"], numbers["polynomial_astern"])
-        )
 
     def _largest(self, numbers: Numbers, reach: np.ndarray) -> tuple[np.ndarray, ...]:
         """The largest efforts (1 or n, channels) ahead and astern, without the coefficient; reach: of commands."""
@@ -118,7 +109,7 @@ class PseudoInverse(Allocation):
             at, values = numbers["table_commands"], numbers["table_thrusts"]
             return tuple(side * _at(at, values, side * reach) for side in (1.0, -1.0))
         if self.shape == "polynomial":
-            curves = [numbers[key] for key in ("polynomial", "polynomial_astern")]
+            curves = _polynomials(numbers)
             turns = (highest(curve, np.max(reach, axis=-1))[:, None] for curve in curves)
             return tuple(_values(curve, np.minimum(reach, turn)) for curve, turn in zip(curves, turns, strict=True))
         return (reach if self.shape == "linear" else reach**2,) * 2
@@ -135,7 +126,7 @@ class PseudoInverse(Allocation):
             )
             return side_by_side(curves, *(rising_knots(thrusts, commands) for commands, thrusts in each)), size
         reach = np.max(np.maximum(numbers["limit"] - numbers["dead_band"], 0.0), axis=-1)
-        sides = (inverse_rows(numbers[key], reach) for key in ("polynomial", "polynomial_astern"))
+        sides = (inverse_rows(polynomial, reach) for polynomial in _polynomials(numbers))
         return side_by_side(curves, *sides), size
 
 
@@ -143,6 +134,11 @@ class PseudoInverse(Allocation):
 MOST_LOST = 4
 # Singular values below this part of the largest count as zero.
 RANK = 1e-10
+
+
+def _polynomials(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
+    """Those of thrusters, ahead and astern."""
+    return numbers["polynomial"], numbers["polynomial_astern"]
 
 
 def _lines(B: np.ndarray, weights: np.ndarray, lost: Sequence[int]) -> np.ndarray:

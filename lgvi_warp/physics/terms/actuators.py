@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import Numbers, Packed, Term, knots, side_by_side
+from lgvi_warp.physics.terms.wrench import at_start, commands
 
 # 1 / time constant of a channel without lag: faster than any step, and within float32. A limit of a rate that counts as none.
 FAST, UNLIMITED = 1e20, 1e6
@@ -128,18 +128,6 @@ def first_row(schedule: Any) -> Any:
         return np.atleast_2d(np.array(schedule, dtype=np.float64))[0] if schedule is not None else 0.0
     except (TypeError, ValueError, IndexError, OverflowError):
         return 0.0
-
-
-def commands(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
-    """Times (n, k) [s] and commands (n, k, units) of a term; a command that is held is the only row of the schedule."""
-    schedule = numbers["command_schedule"]
-    return numbers["times"], numbers["command"][:, None, :] if schedule.shape[1] == 1 else schedule
-
-
-def at_start(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:
-    """Commands (n, columns) at t = 0 of schedules (1 or n, k, columns) with times (1 or n, k) [s]."""
-    members = zip(*repeated(times, schedule), strict=True)
-    return np.array([[np.interp(0.0, at, column) for column in commands.T] for at, commands in members])
 
 
 def refuse_idle(term: Any, numbers: Numbers, rate: str, remembers: np.ndarray, remedy: str) -> None:

@@ -15,8 +15,6 @@ from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.actuators import (
     UNLIMITED,
     Commanded,
-    at_start,
-    commands,
     motion,
     packed_following,
     refuse_idle,
@@ -24,6 +22,7 @@ from lgvi_warp.physics.terms.actuators import (
 )
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, rows_of, side_by_side
 from lgvi_warp.physics.terms.fins import Fins, fin_rows
+from lgvi_warp.physics.terms.wrench import at_start, commands
 
 # Rows of one fin that its forces need where the flow has no angle: those before the matrices of `fin_rows`.
 STRAIGHT_ROWS = 15

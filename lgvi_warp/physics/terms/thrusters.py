@@ -13,14 +13,13 @@ from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.actuators import (
     FAST,
     Commanded,
-    at_start,
-    commands,
     motion,
     packed_following,
     refuse_idle,
     refuse_unread,
 )
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, rows_of, side_by_side
+from lgvi_warp.physics.terms.wrench import at_start, commands
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

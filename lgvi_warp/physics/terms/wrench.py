@@ -86,3 +86,15 @@ class WrenchSchedule(Term):
         torque = context.frame.torque(*repeated(numbers["torque"], numbers["force"]))
         tables = [knots(numbers["times"], values, self.interpolation == "steps") for values in (force, torque)]
         return Packed({"count": numbers["times"].shape[1] - 1}, side_by_side(*tables))
+
+
+def commands(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
+    """Times (n, k) [s] and commands (n, k, units) of a term; a command that is held is the only row of the schedule."""
+    schedule = numbers["command_schedule"]
+    return numbers["times"], numbers["command"][:, None, :] if schedule.shape[1] == 1 else schedule
+
+
+def at_start(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:
+    """Commands (n, columns) at t = 0 of schedules (1 or n, k, columns) with times (1 or n, k) [s]."""
+    members = zip(*repeated(times, schedule), strict=True)
+    return np.array([[np.interp(0.0, at, column) for column in commands.T] for at, commands in members])

@@ -16,7 +16,7 @@ from lgvi_warp.physics.notation import matrix_from_rotation_vector
 from lgvi_warp.sampling.designs import sampling_of
 from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.statistics.estimates.tree import Tree
-from lgvi_warp.statistics.until import Watch
+from lgvi_warp.statistics.until import StoppingRule
 from lgvi_warp.statistics.values.values import Values, dealt
 
 BLOCK = 256
@@ -132,7 +132,7 @@ def kinds(repetitions, members):
 def stopped(repetitions, until, blocks, truth, replicates=1):
     """Coverage of a mean where each repetition stops by itself, and the members it took on average."""
     statistic = lw.statistics.Mean(quantity())
-    watch = Watch(until, statistic, statistic.key, {}, np.zeros(1, int), doubling=replicates > 1)
+    watch = StoppingRule(until, statistic, statistic.key, {}, np.zeros(1, int), doubling=replicates > 1)
     good, members = np.zeros(repetitions, bool), np.zeros(repetitions)
     for i, tree in enumerate(parts(statistic, blocks, replicates), 1):
         if not watch.due(i * BLOCK):

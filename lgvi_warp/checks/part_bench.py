@@ -115,7 +115,6 @@ class PartBench(TermBench):
 
     def __init__(self, part: Part, scene: Scene, samples: int, seed: int):
         module, width = kernel_choice.device_module(part, part.device_in(False), built_in), register_width("float64")
-        assert part.bus is not None
         self.part, self.bus, self.period = part, part.bus, float(scene.controller.period)
         count = -(-samples // width) * width
         self.ticks = random_ticks(count, self.bus.rows, seed, scene.start.given()["position"])

@@ -18,10 +18,7 @@ ROOT, OWN = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
 
 
 def cpu_quota(root: Path = ROOT, group_file: Path = OWN) -> float | None:
-    """CPU time that this process may use.
-
-    Returns: The smallest quota of its groups [CPUs], as 1.5 for 150 ms in each 100 ms; None without a quota.
-    """
+    """The smallest quota of CPU time [CPUs] of this process's groups, as 1.5 for 150 ms in each 100 ms; None without one."""
     return _cpu_quota(root, group_file, int(time.monotonic()))
 
 
@@ -34,10 +31,9 @@ def _cpu_quota(root: Path, group_file: Path, second: int) -> float | None:
 
 
 def memory_limit(root: Path = ROOT, group_file: Path = OWN) -> int | None:
-    """Memory that this process may use together with the others in its groups.
+    """The smallest limit of memory [bytes] of this process's groups; None without one.
 
-    Returns: The smallest limit of its groups [bytes]; None without one. Version 1 expresses "none" by a number that no machine
-        has.
+    Version 1 expresses "none" by a number that no machine has.
     """
     limits = [_number(folder / "memory.max") for folder in _folders(root, group_file, "")]
     for folder in _folders(root, group_file, "memory"):

@@ -13,10 +13,9 @@ from lgvi_warp.common.real_numbers import is_whole
 
 
 def declared(reader: Callable[..., Any], default: Any = dataclasses.MISSING, **arguments: Any) -> Any:
-    """Declare a field by how it is read; where None is its default, None is not read.
+    """Declare a field by how it is read, with more arguments of the reader; where None is its default, None is not read.
 
     reader: Notes what is wrong with the value of a key, and returns what it means, as methods of `Faults` do.
-    arguments: More arguments of the reader, such as unit and least.
     """
     return dataclasses.field(default=default, metadata={"reader": reader, "arguments": arguments})
 
@@ -55,10 +54,7 @@ def _declared_fields(kind: Any) -> dict[str, dataclasses.Field[Any]]:
 
 
 def read(settings: Any, faults: Faults, *names: str) -> dict[str, Any]:
-    """Read declared fields of an object, all or those that are named; note what is wrong.
-
-    Returns: What was read, by name: None after a fault, and for None where that is the default.
-    """
+    """Read declared fields of an object, all or those that are named, and note what is wrong; None after a fault."""
     values, known = {}, _declared_fields(type(settings))  # type: ignore[arg-type]  # a class is hashable
     for name in names or known:
         value, item = getattr(settings, name), known[name]
@@ -67,14 +63,11 @@ def read(settings: Any, faults: Faults, *names: str) -> dict[str, Any]:
     return values
 
 
-Made = TypeVar("Made")
+Settings = TypeVar("Settings")
 
 
-def from_table(kind: type[Made], key: str, table: Any, example: str, **needed: str) -> Made:
-    """Build settings from a table of a scene file; settings themselves are kept.
-
-    needed: Keys that the table must have, each with the remedy where it is missing.
-    """
+def from_table(kind: type[Settings], key: str, table: Any, example: str, **needed: str) -> Settings:
+    """Build settings from a table of a scene file, which needs some keys (with remedies); settings themselves are kept."""
     if isinstance(table, kind):
         return table
     if not isinstance(table, Mapping):

@@ -182,14 +182,7 @@ _brief = _Brief()
 
 
 def brief(value: Any) -> str:
-    """Show a value on one line of a message.
-
-    Args:
-        value: Any value, an array too.
-
-    Returns:
-        Its repr, cut after 80 characters.
-    """
+    """Show a value, an array too, on one line of a message: its repr, cut after 80 characters."""
     if isinstance(value, np.ndarray):
         value = value[tuple(slice(LONGEST_VALUE) for _ in value.shape)].tolist()
     elif isinstance(value, np.generic):
@@ -273,10 +266,7 @@ class Faults:
                 self.add(f"{key}.{name}" if key else name, value, "is an unknown key", remedy)
 
     def real(self, key: str, value: Any, remedy: str = "give numbers") -> np.ndarray | None:
-        """Read real numbers; note a fault where the value holds anything else.
-
-        Returns: A new float64 array of the value's shape, which may hold NaN; None after a fault.
-        """
+        """Read real numbers, which may be NaN, as a new float64 array; None after noting a fault."""
         try:
             return real_numbers(value)
         except NotReal as error:
@@ -284,11 +274,7 @@ class Faults:
             return None
 
     def finite(self, key: str, value: Any, shape: tuple[int, ...] | None = None, unit: str = "") -> np.ndarray | None:
-        """Read finite numbers; note a fault where one is not finite or the shape differs.
-
-        shape: The shape asked for, () for one number; default None, any shape.
-        Returns: A read-only float64 array; None after a fault.
-        """
+        """Read finite numbers of a shape, or of any, as a read-only float64 array; None after noting a fault."""
         wanted = "a number" if shape == () else f"numbers of shape {shape}" if shape else "numbers"
         remedy = f"give {wanted}" + (f" [{unit}]" if unit else "")
         array = self.real(key, value, remedy)
@@ -304,10 +290,7 @@ class Faults:
         return None
 
     def number(self, key: str, value: Any, unit: str = "", least: float = -np.inf) -> float | None:
-        """Read one finite number; note a fault where it is too small.
-
-        Returns: The number; None after a fault.
-        """
+        """Read one finite number from `least` on; None after noting a fault."""
         array = self.finite(key, value, (), unit)
         if array is None:
             return None
@@ -317,10 +300,7 @@ class Faults:
         return float(array)
 
     def positive(self, key: str, value: Any, unit: str = "s") -> float | None:
-        """Read one finite number above 0; note a fault where it is not.
-
-        Returns: The number; None after a fault.
-        """
+        """Read one finite number above 0; None after noting a fault."""
         if type(value) is float and 0.0 < value < math.inf:
             return value
         array = self.finite(key, value, (), unit)
@@ -330,10 +310,7 @@ class Faults:
         return None if array is None else float(array)
 
     def symmetric(self, key: str, value: Any, unit: str, size: int = 3) -> np.ndarray | None:
-        """Read a symmetric matrix, or the diagonal of a diagonal one.
-
-        Returns: The matrix, float64, shape (size, size), exactly symmetric; None after a fault.
-        """
+        """Read a symmetric matrix, exactly so in float64, or the diagonal of a diagonal one; None after noting a fault."""
         if holds_words(value):
             self.finite(key, value, (size,), unit)  # notes the fault
             return None

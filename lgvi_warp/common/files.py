@@ -94,12 +94,9 @@ def sync_folder(folder: Path) -> None:
 
 
 class Files:
-    """Files that appear together: `write` each, then `finish` all.
+    """Files that appear together: `write` each, then `finish` all. `sums`: key of each file written -> [bytes, CRC-32C].
 
     Until then they lie beside their places under temporary names, so that existing files stay whole.
-
-    Attributes:
-        sums: Key of each file written -> [bytes, CRC-32C].
     """
 
     def __init__(self, root: Path):
@@ -109,10 +106,7 @@ class Files:
         self.sums: dict[str, list[int]] = {}
 
     def write(self, key: str, data: Any, *, checked: bool = False) -> None:
-        """Write one file, and note its size and checksum.
-
-        Waits while many large files have not reached the disk.
-        """
+        """Write one file, and note its size and checksum; wait while many large files have not reached the disk."""
         target = self._root / key
         beside = scratch.beside(target)
         view = memoryview(data).cast("B")
@@ -158,10 +152,7 @@ class Files:
 
 
 def finish_together(several: Sequence[Files]) -> list[OSError | None]:
-    """Finish several sets of files; each folder is synced once.
-
-    Returns: For each set, None or the error for which it is not in its place.
-    """
+    """Finish several sets of files, and sync each folder once: for each set None, or why it is not in its place."""
     # Concurrent syncs share the file system's commits.
     for files in several:
         files.sync()
@@ -201,11 +192,7 @@ def write_whole(path: Path, data: bytes) -> None:
 
 
 def fault(root: Path, key: str, size: int, crc: int) -> str | None:
-    """Compare a file with the size and checksum noted for it.
-
-    size: Its size [bytes].
-    Returns: "is missing", "is torn" or "has changed"; None for a file in order.
-    """
+    """What a file is by its size [bytes] and checksum: "is missing", "is torn" or "has changed"; None for one in order."""
     try:
         with safe_files.opened(root, key) as file:
             if os.fstat(file.fileno()).st_size != size:
@@ -231,8 +218,8 @@ def place_of(path: str | os.PathLike[str], root: str | os.PathLike[str] | None =
     path = path_of("path", path)
     target = Path(os.path.realpath(path)) if root is None else safe_files.inside(root, path.absolute())
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
-        if there := safe_files.kind(os.lstat(target).st_mode):
-            raise SceneError([f"{path}: {there}, which is not replaced; give the name of a file"])
+        if problem := safe_files.kind(os.lstat(target).st_mode):
+            raise SceneError([f"{path}: {problem}, which is not replaced; give the name of a file"])
     return target
 
 
@@ -270,12 +257,7 @@ def write_text(path: str | os.PathLike[str], text: str, root: str | os.PathLike[
 
 
 class PlacedFiles:
-    """How many files this process has put in their places, and the last of them, for a process that is ended.
-
-    Attributes:
-        count: number of files.
-        last: path of the last one; None before the first.
-    """
+    """How many files this process has put in their places, and the last of them, for a process that is ended."""
 
     def __init__(self) -> None:
         self.count = 0

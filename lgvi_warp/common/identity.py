@@ -148,7 +148,7 @@ class _Reader:
         self._value(function.__defaults__)
         self._value(function.__kwdefaults__)
         self._value(function.__dict__)
-        names, asked, imported = _names(code)
+        names, global_names, imported = _names(code)
         for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
             try:
                 content = cell.cell_contents
@@ -156,7 +156,7 @@ class _Reader:
                 self._word(name, "empty")
                 continue
             self._named(name, content, names)
-        for name in sorted(asked):
+        for name in sorted(global_names):
             if name in function.__globals__:
                 self._named(name, function.__globals__[name], names)
             elif name in HIDDEN:
@@ -246,17 +246,17 @@ def _number(value: float | complex) -> str:
 
 def _names(code: types.CodeType) -> tuple[set[str], set[str], set[str]]:
     """All names in code and in what it defines; those of them that are globals; and the modules that it imports."""
-    names, asked, imported = set(code.co_names), set[str](), set[str]()
+    names, global_names, imported = set(code.co_names), set[str](), set[str]()
     for step in dis.get_instructions(code):
         if step.opname == "IMPORT_NAME":
             imported.add(step.argval)
         elif "GLOBAL" in step.opname or step.opname.endswith("_NAME"):
-            asked.add(step.argval)
+            global_names.add(step.argval)
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
-            for found, more in zip((names, asked, imported), _names(constant), strict=True):
-                found |= more
-    return names, asked, imported
+            for collected, more in zip((names, global_names, imported), _names(constant), strict=True):
+                collected |= more
+    return names, global_names, imported
 
 
 def _place(value: Any) -> tuple[str, str, str] | None:
@@ -268,10 +268,10 @@ def _place(value: Any) -> tuple[str, str, str] | None:
         module = next(owners, None)
     if not (isinstance(module, str) and isinstance(name, str) and is_library(module)):
         return None
-    found: Any = sys.modules.get(module)
+    reached: Any = sys.modules.get(module)
     for part in name.split("."):
-        found = getattr(found, part, None)
-    return (module, name, _edition(module)) if found is value else None
+        reached = getattr(reached, part, None)
+    return (module, name, _edition(module)) if reached is value else None
 
 
 def is_library(module: str) -> bool:

@@ -63,10 +63,7 @@ def cpu_name() -> str:
 
 
 def physical_memory() -> int | None:
-    """Memory of the machine.
-
-    Returns: Its size [bytes]; None where the system does not tell.
-    """
+    """Memory of the machine [bytes]; None where the system does not tell."""
     try:
         return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, ValueError, OSError):
@@ -74,10 +71,7 @@ def physical_memory() -> int | None:
 
 
 def memory_bytes() -> int | None:
-    """Memory available to this process: the machine's, or the limit of its container.
-
-    Returns: Its size [bytes]; None if neither is known.
-    """
+    """Memory available to this process [bytes]: the machine's, or the limit of its container; None if neither is known."""
     return least_known(physical_memory(), container.memory_limit())
 
 
@@ -87,10 +81,7 @@ def least_known(*sizes: int | None) -> int | None:
 
 
 def resident() -> int:
-    """Memory of this process.
-
-    Returns: Resident memory [bytes]; 0 where the system does not tell.
-    """
+    """Resident memory of this process [bytes]; 0 where the system does not tell."""
     try:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError):

@@ -15,10 +15,7 @@ RULE = "give letters, digits, _, - and points"
 
 
 def wrong_with(name: str) -> tuple[str, str] | None:
-    """Check a name of a term or an event.
-
-    Returns: (what is wrong, the remedy); None for a good name.
-    """
+    """(what is wrong, the remedy) with a name of a term or an event; None for a good one."""
     if not name:
         return "is empty", RULE
     bad = next((character for character in name if not (character.isalnum() or character in BESIDE)), None)
@@ -48,10 +45,7 @@ def folded(name: str) -> str:
 
 
 def alike(names: Iterable[str]) -> list[tuple[str, str]]:
-    """Find different names that some file system cannot tell apart.
-
-    Returns: Pairs (earlier name, later name), in the order of the names.
-    """
+    """Pairs (earlier, later), in their order, of different names that some file system cannot tell apart."""
     first: dict[str, str] = {}
     pairs: list[tuple[str, str]] = []
     for name in names:

@@ -31,11 +31,9 @@ def _philox_key(seed: int, name: str) -> np.ndarray:
 
 
 def uniforms(seed: int, name: str, first: int, count: int, components: int) -> np.ndarray:
-    """Uniform random numbers of neighbouring members.
+    """Uniform random numbers of neighbouring members in (0, 1), float64, (count, components).
 
     They depend on the seed, the member's index and the name only: Philox counters, a fixed number for each member.
-
-    Returns: Numbers in (0, 1), float64, shape (count, components).
     """
     counters = -(-components // 4)
     generator = np.random.Philox(key=_philox_key(int(seed), name))
@@ -45,11 +43,7 @@ def uniforms(seed: int, name: str, first: int, count: int, components: int) -> n
 
 
 def uniforms_of(seed: int, name: str, members: np.ndarray, components: int) -> np.ndarray:
-    """Uniform random numbers of any members; neighbours are drawn together.
-
-    members: Indices in any order, shape (n,).
-    Returns: Numbers in (0, 1), float64, shape (n, components), the same as `uniforms` gives for these members.
-    """
+    """As `uniforms`, (n, components), of members (n,) in any order; neighbours are drawn together."""
     first, count = int(members[0]), len(members)
     if count == 1 or np.all(np.diff(members) == 1):
         return uniforms(seed, name, first, count, components)

@@ -12,10 +12,7 @@ import numpy as np
 
 
 class NotReal(ValueError):  # noqa: N818
-    """A value is no array of real numbers.
-
-    remedy: How to mend it; default None, "give numbers".
-    """
+    """A value is no array of real numbers; the remedy is by default "give numbers"."""
 
     def __init__(self, problem: str, remedy: str | None = None):
         super().__init__(problem)
@@ -23,10 +20,7 @@ class NotReal(ValueError):  # noqa: N818
 
 
 def real_numbers(value: Any) -> np.ndarray:
-    """Read real numbers into a new array; they may be NaN or infinite.
-
-    Returns: float64, of the value's shape.
-    """
+    """Read real numbers into a new float64 array of their shape; they may be NaN or infinite."""
     for leaf in _parts(value):
         _check(leaf)
     if isinstance(value, np.ma.MaskedArray):
@@ -84,10 +78,7 @@ def is_whole(value: Any, least: int, most: float = math.inf) -> bool:
 
 
 def column_names(value: Any) -> list[Any] | None:
-    """Column names of a table such as pandas.DataFrame or polars.DataFrame.
-
-    Returns: The names; None for a value without them.
-    """
+    """Column names of a table such as pandas.DataFrame or polars.DataFrame; None for a value without them."""
     for name in ("column_names", "columns"):  # pyarrow's `columns` are the columns themselves
         names = getattr(value, name, None)
         if names is not None and not callable(names) and not isinstance(names, str):

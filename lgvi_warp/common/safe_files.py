@@ -49,7 +49,7 @@ def kind(mode: int) -> str:
 
 def inside(root: str | os.PathLike[str], name: str | os.PathLike[str]) -> Path:
     """Find a file that lies in a folder, or will, where its links lead; one that leads out of the folder is refused."""
-    home, path = (Path(os.path.realpath(one)) for one in (root, Path(root) / name))
+    home, path = (Path(os.path.realpath(place)) for place in (root, Path(root) / name))
     if not path.is_relative_to(home):
         remedy = "put a copy in its place, or name that file yourself"
         raise SceneError([f"{Path(root) / name}: leads out of its folder, to {path}; {remedy}"])
@@ -126,10 +126,7 @@ def _check_file(mode: int, path: Path) -> None:
 
 
 def read(root: Path, key: str, most: int) -> bytes:
-    """Read a plain file below a root.
-
-    most: Largest size allowed [bytes].
-    """
+    """Read a plain file below a root of at most so many bytes."""
     with opened(root, key) as file:
         size = os.fstat(file.fileno()).st_size
         if size > most:
@@ -182,10 +179,7 @@ MOST_DEEP = 8
 
 
 def entries(root: Path, below: str = "") -> Iterator[tuple[str, os.DirEntry[str]]]:
-    """List everything below a root, in order of names; links are not followed.
-
-    Yields: (path from the root, directory entry).
-    """
+    """(path from the root, directory entry) of everything below a root, in order of names; links are not followed."""
     if below.count("/") > MOST_DEEP:
         raise SceneError([f"{root / below}: lies deeper than the folders of a run do; remove it"])
     with os.scandir(root / below) as listing:
@@ -206,10 +200,7 @@ def names(root: Path, key: str) -> set[str]:
 
 
 def size_below(root: Path) -> int:
-    """Add up the plain files below a folder.
-
-    Returns: Their size [bytes].
-    """
+    """Size of the plain files below a folder [bytes]."""
     plain = (entry for _, entry in entries(root) if entry.is_file(follow_symlinks=False))
     return sum(entry.stat(follow_symlinks=False).st_size for entry in plain)
 

@@ -46,10 +46,7 @@ def is_alive(pid: int) -> bool:
 
 
 def of_target(name: str, target: str) -> re.Match[str] | None:
-    """Read the writer from a temporary name.
-
-    Returns: A match with "host", "space" and "pid"; None for any other name.
-    """
+    """A match with "host", "space" and "pid" of the writer in a temporary name; None for any other name."""
     head, ending = f"{target}.", os.path.splitext(name)[1]
     if not name.startswith(head) or ending not in (UNFINISHED, NEW, OLD):
         return None

@@ -200,21 +200,13 @@ OK, FIRST_EVENT, LAST_EVENT = int(Status.OK), int(Status.SURFACE), int(max(Statu
 
 
 def stopped(status: Any) -> np.ndarray:
-    """Mask of the members that an event of the scene stopped, which is no failure.
-
-    status: Codes of `Status`, shape (n,).
-    Returns: bool, shape (n,).
-    """
+    """Mask (n,) of the members that an event of the scene stopped, which is no failure, by codes of `Status` (n,)."""
     codes = np.asarray(status)
     return np.asarray((codes >= FIRST_EVENT) & (codes <= LAST_EVENT))
 
 
 def failed(status: Any) -> np.ndarray:
-    """Mask of the members that neither reached the end nor were stopped by an event.
-
-    status: Codes of `Status`, shape (n,).
-    Returns: bool, shape (n,).
-    """
+    """Mask (n,) of the members that neither reached the end nor were stopped by an event, by codes of `Status` (n,)."""
     codes = np.asarray(status)
     return np.asarray((codes != OK) & ~stopped(codes))
 
@@ -254,18 +246,12 @@ class WarningArray(np.ndarray):
 
 
 def under_way(result: Any) -> np.ndarray:
-    """Mask of the members under way at each sample: neither stopped by an event nor failed.
-
-    Returns: bool, shape (k, n).
-    """
+    """Mask (k, n) of the members under way at each sample: neither stopped by an event nor failed."""
     return np.asarray(result.time[:, None] <= stop_time(result) * (1.0 + ROUNDING))
 
 
 def stop_time(result: Any) -> np.ndarray:
-    """When each member stopped: the time of its event, or of its last good state where it failed.
-
-    Returns: Times [s], shape (n,); infinite for a member that ran to the end.
-    """
+    """When each member stopped (n,) [s]: at its event, or its last good state where it failed; inf if it ran to the end."""
     return np.where(np.asarray(result.status) != Status.OK, np.asarray(result.failure_time), np.inf)
 
 

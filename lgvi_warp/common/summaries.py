@@ -19,19 +19,11 @@ class Summarized:
     """An object that shows itself as a title and rows of (label, text)."""
 
     def summary_rows(self) -> tuple[str, Rows]:
-        """Describe the object.
-
-        Returns:
-            The title, and rows of (label, text).
-        """
+        """The title, and rows of (label, text), that describe the object."""
         raise NotImplementedError
 
     def summary_picture(self) -> str:
-        """Draw the object, for notebooks.
-
-        Returns:
-            SVG; "" for no picture, the default.
-        """
+        """The object as SVG, for notebooks; "" for no picture, the default."""
         return ""
 
     def __repr__(self) -> str:
@@ -76,11 +68,7 @@ def counted(counts: dict[str, int]) -> str:
 
 
 def few_digits(value: Any, unit: str = "") -> str:
-    """Write a number or an array.
-
-    value: A number, or an array of any shape.
-    Returns: A few digits of each entry; of a matrix its diagonal or its shape.
-    """
+    """Write a number or an array in a few digits of each entry; a matrix by its diagonal or its shape."""
     array = np.asarray(value, dtype=np.float64)
     after = f" {unit}" if unit not in ("", "1") else ""
     if array.ndim == 2 and array.shape[0] == array.shape[1] and not np.any(array - np.diag(np.diag(array))):
@@ -93,12 +81,7 @@ def few_digits(value: Any, unit: str = "") -> str:
 
 
 def curves(time: np.ndarray, values: np.ndarray, marked: np.ndarray, label: str) -> str:
-    """Draw a few curves as SVG; larger values stand lower.
-
-    time: Times (k,).
-    values: Values (k, n); what is not finite is left out.
-    marked: Curves in the second colour (n,).
-    """
+    """Draw curves (k, n) over times (k,) as SVG, those marked (n,) in a second colour; larger values stand lower."""
     width, height, margin = 260.0, 90.0, 6.0
     finite = np.isfinite(values)
     if len(time) < 2 or not finite.any():

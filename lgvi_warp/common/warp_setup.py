@@ -98,10 +98,7 @@ def header_folders() -> dict[int, Any]:
 
 
 def header_folder() -> Path | None:
-    """The folder of this thread's precompiled header.
-
-    Returns: A folder that is there; None where Warp keeps it elsewhere.
-    """
+    """The folder of this thread's precompiled header; None where Warp keeps it elsewhere."""
     folder = getattr(context.runtime, "get_clang_pch_dir", lambda: None)()
     return None if folder is None else Path(folder)
 

@@ -61,10 +61,7 @@ def write_lock(target: Path, wait: bool = False) -> Iterator[None]:
 
 
 def writer_of(target: Path) -> str | None:
-    """Name who is writing into a file or folder, as its lock says; nothing is locked by asking.
-
-    Returns: The process in words; None where nobody is, or who held the lock has ended without taking it away.
-    """
+    """Name who is writing into a file or folder, as its lock says; None where nobody is. Nothing is locked by asking."""
     try:
         flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
         descriptor = os.open(lock_file(target), flags | getattr(os, "O_CLOEXEC", 0))

@@ -36,8 +36,7 @@ class Bus(NamedTuple):
     """The first rows of the memory, by which parts hand numbers on: {actuator: (first row, channels)} and single rows.
 
     acting: First row of the commands that act, where commands are delayed. As many rows of the commands before follow, and the
-        row of the step from which the former act.
-    period: Time between two ticks [s].
+        row of the step from which the former act. period: Time between two ticks [s].
     """
 
     commands: Mapping[str, tuple[int, int]]
@@ -56,10 +55,7 @@ class Bus(NamedTuple):
 
     @classmethod
     def of(cls, channels: Mapping[str, int], period: float = 1.0, answers: int = 0) -> Bus:
-        """The bus of some actuators.
-
-        period: Time between two ticks [s]; 1 by default.
-        """
+        """The bus of some actuators, with a time between two ticks [s]."""
         commands, row = {}, 0
         for key, count in channels.items():
             commands[key] = (row, count)
@@ -95,7 +91,7 @@ class Part(Term):
     every_feature: ClassVar[tuple[str, ...]] = ()
     chosen: ClassVar[tuple[str, ...]] = ()
     # Where it finds the numbers of others; set for a part of a scene.
-    bus: ClassVar[Bus | None] = None
+    bus: ClassVar[Bus]
 
     @property
     def gives(self) -> tuple[str, ...]:
@@ -108,46 +104,24 @@ class Part(Term):
         return 0
 
     def features(self, numbers: Numbers) -> tuple[str, ...]:
-        """What its device code must have for some members; by default nothing beyond what it always has.
-
-        Args:
-            numbers: The part's numbers by field, each of shape (n, ...).
-
-        Returns:
-            Words that the part knows.
-        """
+        """What its device code must have by members' numbers (n, ...), in words that the part knows; by default nothing."""
         return ()
 
     def with_features(self, known: frozenset[str]) -> Any:
-        """The same part, with the device code for what some member of a run needs.
-
-        Args:
-            known: Words "key.feature" of all parts.
-
-        Returns:
-            A copy.
-        """
+        """A copy with the device code for what some member of a run needs, in words "key.feature" of all parts."""
         part = copy.copy(self)
         chosen = tuple(word for word in self.every_feature if f"{self.key}.{word}" in known)
         object.__setattr__(part, "chosen", chosen)
         return part
 
     def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
-        """The same part, knowing where it finds what others write.
-
-        Args:
-            bus: Rows of the memory.
-            others: Terms that take commands, and sensors, by key.
-
-        Returns:
-            A copy.
-        """
+        """A copy that knows where it finds what others write: the bus, and terms that take commands and sensors by key."""
         part = copy.copy(self)
         object.__setattr__(part, "bus", bus)
         return part
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers as they are: a controller works in the user's axes."""
+        # The numbers as they are: a controller works in the user's axes.
         if self.lanes() is None:
             name = type(self).__name__
             raise NotImplementedError(
@@ -217,15 +191,19 @@ class IntegralLaw(ControlLaw):
             its error would make this worse; or "none".
     """
 
-    integrals: ClassVar[int] = 1
+    # Rows of the memory, two of each integral's number; and what the device code calls several limits of integrals.
+    memory_rows: ClassVar[int] = 2
+    limits: ClassVar[tuple[str, ...]] = ()
 
     anti_windup: str = word("conditional", known=ANTI_WINDUP)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers, the memory of the integrals, and where the law finds what was not delivered."""
-        assert self.bus is not None
+        # The numbers, each limit by itself, the memory of the integrals, and where the law finds what was not delivered.
+        values = {"rate" if name == "lambda" else name: value for name, value in numbers.items()}
+        if self.limits:
+            values |= zip(self.limits, values.pop("integral_limit").T, strict=True)
         words = {"unmet": self.bus.unmet, "conditional": int(self.anti_windup == "conditional")}
-        return Packed(dict(numbers) | words, memory=np.zeros((1, 2 * self.integrals)))
+        return Packed(values | words, memory=np.zeros((1, self.memory_rows)))
 
 
 # What a law of the pose adds to its demand.
@@ -243,27 +221,23 @@ class PoseLaw(IntegralLaw):
 
     needs: ClassVar[tuple[str, ...]] = ("position", "velocity", "attitude", "angular_velocity")
     demands: ClassVar[tuple[str, ...]] = ("X", "Y", "Z", "K", "M", "N")
-    integrals: ClassVar[int] = 6
+    memory_rows: ClassVar[int] = 12
+    limits: ClassVar[tuple[str, ...]] = ("position_limit", "attitude_limit")
 
     feedforward: str = word("none", known=FEEDFORWARD)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """In addition, each limit by itself, and the nominal weight less buoyancy with the moment of both."""
-        limits = numbers["integral_limit"]
-        values = {name: value for name, value in numbers.items() if name != "integral_limit"}
+        # In addition, the nominal weight less buoyancy with the moment of both.
         net, moment = np.zeros(1), np.zeros((1, 3))
         if self.feedforward == "restoring":
             net, moment = restoring(self.nominal)
-        more = {"position_limit": limits[:, 0], "attitude_limit": limits[:, 1], "net_weight": net, "moment": moment}
-        return super().packed(values | more, context)
+        return super().packed({**numbers, "net_weight": net, "moment": moment}, context)
 
 
 def restoring(nominal: Numbers) -> tuple[np.ndarray, np.ndarray]:
-    """What weight and buoyancy do to a vehicle.
+    """Weight less buoyancy (1,) [N], downward, and the sum of both times their points (1, 3) [N m], body axes, of a scene.
 
-    nominal: Parameters of a scene by name, each of the shape that the scene has.
-    Returns: Weight less buoyancy (1,) [N], which acts downward; and the sum of both times their points (1, 3) [N m] in body
-        axes, whose cross product with the direction downward is the moment.
+    The cross product of the latter with the direction downward is the moment.
     """
     numbers = {name: np.asarray(value)[None] for name, value in nominal.items()}
     weight, buoyancy = vehicle.weight(numbers), numbers["vehicle.buoyancy"]
@@ -277,12 +251,7 @@ NEVER, SAME_TIME = 1e30, 1e-6
 
 
 def first_step(time: np.ndarray, h: float) -> np.ndarray:
-    """The first step at or after a time.
-
-    time: Times [s], of any shape; inf for never.
-    h: Step of the run [s].
-    Returns: Numbers of steps, in the same shape; `NEVER` for never.
-    """
+    """The first step at or after times [s] of any shape; `NEVER` for never."""
     return np.ceil(np.minimum(time / h, NEVER) - SAME_TIME)
 
 
@@ -305,25 +274,17 @@ class Allocation(Part):
     to: str = ""
 
     def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
-        """The same part, knowing its actuator as well.
-
-        Args:
-            bus: Rows of the memory.
-            others: Terms that take commands, and sensors, by key.
-
-        Returns:
-            A copy.
-        """
+        # The same part, knowing its actuator as well.
         part = super().wired(bus, others)
         object.__setattr__(part, "actuator", others[self.to])
         return part
 
-    def informed(self, faults: Sequence[Any], asked: np.ndarray) -> Any:
+    def informed(self, faults: Sequence[Any], components: np.ndarray) -> Any:
         """The same part, knowing which channels are lost from some time on, and which components count.
 
         Args:
             faults: Faults of actuators.
-            asked: 1 for each of X Y Z K M N that laws ask for, else 0, (6,).
+            components: 1 for each of X Y Z K M N that laws ask for, else 0, (6,).
 
         Returns:
             A copy.
@@ -331,7 +292,7 @@ class Allocation(Part):
         part = copy.copy(self)
         known = tuple(fault for fault in faults if fault.of == self.to and fault.known)
         object.__setattr__(part, "losses", known)
-        object.__setattr__(part, "asked", asked)
+        object.__setattr__(part, "asked", components)
         return part
 
     @property
@@ -377,11 +338,7 @@ ROUND_OFF = 1e-12
 
 
 def rest_rows(reached: np.ndarray) -> np.ndarray:
-    """Rows by which the device code finds what actuators cannot make of a demand.
-
-    reached: Projector (n, 6, 6) onto the demands that they can make.
-    Returns: The projector onto the others, line by line, (n, 36), without round-off.
-    """
+    """The projector onto the demands beside those reached (n, 6, 6), line by line (n, 36), without round-off."""
     others = np.eye(6) - reached
     return np.where(np.abs(others) < ROUND_OFF, 0.0, others).reshape(len(others), -1)
 

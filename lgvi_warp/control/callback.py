@@ -33,6 +33,14 @@ class Callback(ControlLaw):
             acts on them. None, the default, for demands.
         version: What tells the function from others in sweeps and stores, a text or a number, changed whenever the function
             does. None, the default: what its code says. Give one where it reads files, or holds what cannot be compared.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> import numpy as np
+        >>> def heave(t, y, r, members):
+        ...     return np.outer(20.0 * (5.0 - y.depth), [0, 0, 1, 0, 0, 0])
+        >>> lw.control.Callback(heave).to_dict()
+        {'type': 'callback', 'function': 'heave'}
     """
 
     type: ClassVar[str] = "callback"
@@ -55,20 +63,19 @@ class Callback(ControlLaw):
         super().__post_init__()
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where there is no function."""
         if not callable(self.function):
             faults.add("function", self.function, PROBLEM if self.function is None else "is no function", REMEDY)
         check_version(faults, self.version)
 
     def to_dict(self) -> dict[str, Any]:
-        """Its type and the name of its function, which a scene file cannot hold."""
+        # Its type and the name of its function, which a scene file cannot hold.
         name = getattr(self.function, "__qualname__", repr(self.function))
-        given = {"to": self.to or None, "version": self.version}
-        return {"type": self.type, "function": name} | {key: value for key, value in given.items() if value is not None}
+        options = {"to": self.to or None, "version": self.version}
+        return {"type": self.type, "function": name} | {
+            key: value for key, value in options.items() if value is not None
+        }
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The place of the host's answer in the memory."""
-        assert self.bus is not None
         return Packed({"answer": self.bus.answer})
 
 
@@ -79,12 +86,11 @@ class CallbackCommands(Allocation):
     device: ClassVar[str] = "callback_commands"
 
     def reach(self) -> np.ndarray:
-        """Everything: no law asks it for a demand."""
+        # Everything: no law asks it for a demand.
         return np.eye(6)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """Where the answer is, and the limits of the commands."""
-        assert self.bus is not None
+        # Where the answer is, and the limits of the commands.
         first, count = self.bus.commands[self.to]
         limit = context.own(self.actuator)["limit"]
         return Packed({"answer": self.bus.answer, "commands": first, "count": count}, limit)

@@ -32,5 +32,4 @@ class ComplementaryFilter(MeasuringPart):
     time_constant: Any = number((), "s", least=0.0)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The time constant, and the rows of attitude and angular velocity."""
         return Packed(dict(numbers), memory=np.zeros((1, 12)))

@@ -119,7 +119,6 @@ class Controller:
     @property
     def acting_parts(self) -> tuple[Part, ...]:
         """The parts in the order in which the kernel has them: faults of a sensor right after it, others after the delay."""
-        assert self.bus is not None
         callback, parts = self.callback, list[Part]()
         # The commands of a callback reach their actuator by an allocation of their own.
         idle = callback if callback is not None and callback.to else None
@@ -311,11 +310,7 @@ class Controller:
 
 
 def from_table(table: Any) -> Controller | None:
-    """A controller from the section of a scene file.
-
-    table: A Controller, a table, or None.
-    Returns: The controller; None for None.
-    """
+    """A controller from a Controller, the section of a scene file, or None for None."""
     if table is None:
         return None
     example = "write [controller] and its keys below, or give lw.Controller(...)"

@@ -43,7 +43,7 @@ class DeadReckoning(MeasuringPart):
     start_error: Any = number((3,), "m", (0.0, 0.0, 0.0))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The weights of the rule, what it takes, the start's error, and the rows of position and velocity."""
+        # The weights of the rule, what it takes, the start's error, and the rows of position and velocity.
         last, now = RULES[self.rule]
         words = {
             "through_water": int(self.velocity == "water_velocity"),

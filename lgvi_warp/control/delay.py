@@ -30,16 +30,12 @@ class Delay(Part):
     delay: Any = number((), "s", 0.0, least=0.0)
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, members whose delay is longer than so many commands are kept."""
+        # In addition, members whose delay is longer than so many commands are kept.
         outside = super().unphysical(numbers)
         return {"delay": outside["delay"] | (numbers["delay"] > MOST_PERIODS * self.period)}
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """Whole periods and whole steps of each member; a ring of as many sets of commands as some member needs.
-
-        A delay that varies is that of the nearest whole step.
-        """
-        assert self.bus is not None
+        # A ring of as many sets of commands as some member needs. A delay that varies is that of the nearest whole step.
         bus, every = self.bus, round(self.period / context.h)
         steps = np.rint(numbers["delay"] / context.h)
         periods = steps // every

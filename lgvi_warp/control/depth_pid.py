@@ -6,10 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-import numpy as np
-
 from lgvi_warp.control.base import IntegralLaw
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number
+from lgvi_warp.physics.terms.base import number
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -29,11 +27,20 @@ class DepthPID(IntegralLaw):
         k_heave: Gain of the heave velocity w [N s]; 0 by default.
         integral_limit: Largest sizes of both integrals, (2,) [m s, rad s]; 1e6 by default.
         anti_windup: As of `IntegralLaw`; the depth's integral waits while the wanted pitch is at its limit.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> law = lw.control.DepthPID(kp=0.1, kp_pitch=10.0, kd_pitch=8.0, pitch_limit=0.4)
+        >>> law.needs, law.demands
+        (('depth',), ('M',))
     """
 
     type: ClassVar[str] = "depth_pid"
     needs: ClassVar[tuple[str, ...]] = ("depth",)
     demands: ClassVar[tuple[str, ...]] = ("M",)
+    # The last row is for what the wanted pitch has beyond its limit.
+    memory_rows: ClassVar[int] = 5
+    limits: ClassVar[tuple[str, ...]] = ("depth_limit", "angle_limit")
 
     kp: Any = number((), "rad/m")
     ki: Any = number((), "rad/(m s)", 0.0)
@@ -43,10 +50,3 @@ class DepthPID(IntegralLaw):
     kd_pitch: Any = number((), "N m s/rad", 0.0)
     k_heave: Any = number((), "N s", 0.0)
     integral_limit: Any = number((2,), "m s, rad s", (1e6, 1e6), least=0.0)
-
-    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers, each limit by itself, and a row more for what the wanted pitch has beyond its limit."""
-        limits = numbers["integral_limit"]
-        values = {name: value for name, value in numbers.items() if name != "integral_limit"}
-        packed = super().packed(values | {"depth_limit": limits[:, 0], "angle_limit": limits[:, 1]}, context)
-        return packed._replace(memory=np.zeros((1, 5)))

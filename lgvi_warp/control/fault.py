@@ -34,6 +34,12 @@ class Fault(Sending):
 
     Raises:
         SceneError: Where `of` is no text, `channel` no whole number, or `known` neither true nor false; and as `Term`.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> dead = lw.control.Fault(of="thrusters", channel=1, time=20.0, known=True)
+        >>> float(dead.gain), dead.known
+        (0.0, True)
     """
 
     type: ClassVar[str] = "fault"
@@ -49,18 +55,16 @@ class Fault(Sending):
     sensor: ClassVar[Any] = None
 
     def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
-        """In addition, knows its sensor."""
         part, measuring = super().wired(bus, others), others[self.of]
         object.__setattr__(part, "sensor", measuring if isinstance(measuring, Sensor) else None)
         return part
 
     def device_in(self, aligned: bool) -> Any:
-        """The device code for a command, or for what the sensor reads."""
+        # The device code for a command, or for what the sensor reads.
         return "fault" if self.sensor is None else f"sensor_fault:{self.sensor.of}"
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers, and the rows of the command or the channel of the reading."""
-        assert self.bus is not None
+        # The numbers, and the rows of the command or the channel of the reading.
         begin = first_step(numbers["time"], context.h)
         members_numbers = {"begin": begin, "gain": numbers["gain"], "offset": numbers["offset"]}
         if self.sensor is not None:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from lgvi_warp.control.base import IntegralLaw, Numbers, Packed, PackingContext
+from lgvi_warp.control.base import IntegralLaw
 from lgvi_warp.physics.terms.base import number
 
 
@@ -40,8 +40,3 @@ class HeadingSMC(IntegralLaw):
     nomoto_gain: Any = number((), "rad/(s N m)", above=0.0)
     nomoto_time: Any = number((), "s", 0.0, least=0.0)
     integral_limit: Any = number((), "rad s", 1e6, least=0.0)
-
-    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers, with a word for lambda that Python allows."""
-        values = {"rate" if name == "lambda" else name: value for name, value in numbers.items()}
-        return super().packed(values, context)

@@ -26,12 +26,11 @@ class LoopBegin(ControlLaw):
 
     @property
     def demands(self) -> tuple[str, ...]:  # type: ignore[override]
-        """What the laws demand, whose gain is measured."""
+        # What the laws demand, whose gain is measured.
         return tuple(self.asks)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The rows that both share."""
-        assert self.bus is not None
+        # The rows that both share.
         return Packed(dict(numbers) | {"demand": self.bus.answer})
 
 
@@ -45,10 +44,7 @@ class LoopGain(LoopBegin):
 
 
 def with_factor(laws: Sequence[ControlLaw], loop: str | None) -> list[ControlLaw]:
-    """The laws of a controller, with a factor on the demand of one of them.
-
-    loop: Key of the law; None for all laws.
-    """
+    """The laws of a controller, with a factor on the demand of one of them by key, or of all for None."""
     chosen = [law for law in laws if loop in (None, law.key)]
     asks = tuple(name for name in COMPONENTS if any(name in (law.demands or COMPONENTS) for law in chosen))
     first, last = laws.index(chosen[0]), laws.index(chosen[-1])

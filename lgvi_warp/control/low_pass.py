@@ -34,9 +34,7 @@ class LowPass(MeasuringPart):
     time_constant: Any = number((), "s", least=0.0)
 
     def device_in(self, aligned: bool) -> Any:
-        """The device code for what it filters."""
         return f"low_pass:{self.of}"
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The time constant, and the rows of the estimate."""
         return Packed(dict(numbers), memory=np.zeros((1, 9 if self.of == "attitude" else READINGS[self.of])))

@@ -23,6 +23,12 @@ class AllocationMatrix(Allocation):
     Args:
         to: Key of the term that takes the commands.
         matrix: A, (channels, 6) [command's unit per N, per N m].
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> rudder_and_stern = [[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 1, 0]]
+        >>> lw.control.AllocationMatrix(to="control_fins", matrix=rudder_and_stern).reach().shape
+        (6, 2)
     """
 
     type: ClassVar[str] = "matrix"
@@ -30,7 +36,6 @@ class AllocationMatrix(Allocation):
     matrix: Any = number(("n", 6), "unit/N, unit/(N m)")
 
     def check_actuator(self, faults: Faults) -> None:
-        """Adds a fault where the matrix has another number of rows than its actuator has commands."""
         rows, count = len(self.matrix), self.actuator.channels
         if rows != count:
             faults.add(
@@ -41,20 +46,19 @@ class AllocationMatrix(Allocation):
             )
 
     def device_in(self, aligned: bool) -> str:
-        """The code that leaves channels out only where some may be lost."""
+        # The code that leaves channels out only where some may be lost.
         return f"matrix:{'lost' if self.losses else 'all'}"
 
     def reach(self) -> np.ndarray:
-        """The pseudo-inverse of the matrix, a column for each axis."""
+        # The pseudo-inverse of the matrix, a column for each axis.
         return np.asarray(np.linalg.pinv(self.matrix))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """For each command its line of A, its column of A^+ and its limit."""
+        # For each command its line of A, its column of A^+ and its limit.
         A = numbers["matrix"]
         limit = context.own(self.actuator)["limit"]
         inverse = np.linalg.pinv(A)
         rows = side_by_side(A, np.swapaxes(inverse, -1, -2), limit[..., None], self.steps_of_loss(context)[..., None])
-        assert self.bus is not None
         first, count = self.bus.commands[self.to]
         return Packed(
             {"commands": first, "count": count}, side_by_side(rest_rows(inverse @ A), rows.reshape(len(rows), -1))

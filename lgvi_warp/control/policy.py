@@ -83,7 +83,6 @@ class Policy(ControlLaw):
     checksum: int | None = None
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where a name is unknown, and where the file does not fit."""
         places = _named(faults, "inputs", self.inputs, {name: name for name in (*INPUTS, *PLACES)})
         outputs = _named(faults, "outputs", self.outputs, dict.fromkeys(OUTPUTS))
         if self.scale is not None and len(self.scale) != len(outputs):
@@ -121,11 +120,10 @@ class Policy(ControlLaw):
             object.__setattr__(self, name, value)
 
     def to_dict(self) -> dict[str, Any]:
-        """In addition, names as lists."""
         return super().to_dict() | {"inputs": list(self.inputs), "outputs": list(self.outputs)}
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """Places of the inputs; of each layer its sizes, W line by line and b; then places of the outputs."""
+        # Places of the inputs; of each layer its sizes, W line by line and b; then places of the outputs.
         layers, places = vars(self)["layers"], vars(self)["places"]
         outputs = [OUTPUTS.index(name) for name in self.outputs]
         each = [np.concatenate([[W.shape[1], len(b)], W.ravel(), b]) for W, b in layers]

@@ -27,6 +27,14 @@ class PosePID(PoseLaw):
         integral_limit: Largest sizes of each number of I and of I_R, (2,) [m s, s]; 1e6 by default.
         feedforward: As of `PoseLaw`.
         anti_windup: As of `IntegralLaw`; the error of the position waits along the body's axes, along which actuators push.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> law = lw.control.PosePID(kp=[50.0] * 3, kd=[80.0] * 3, kr=[10.0] * 3, kw=[8.0] * 3, feedforward="restoring")
+        >>> hold = lw.control.SetPoint(position=[0.0, 0.0, 5.0], heading=0.0)
+        >>> scene = lw.Scene.named("bluerov2_heavy", controller=lw.Controller(period=0.1, guidance=[hold], laws=[law]))
+        >>> [part.key for part in scene.controller.parts]
+        ['set_point', 'pose_pid', 'pseudo_inverse']
     """
 
     type: ClassVar[str] = "pose_pid"

@@ -6,7 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from lgvi_warp.control.base import Numbers, Packed, PackingContext, PoseLaw
+from lgvi_warp.control.base import PoseLaw
 from lgvi_warp.physics.terms.base import number
 
 
@@ -43,8 +43,3 @@ class PoseSMC(PoseLaw):
     k_sigma_r: Any = number((3,), "N m", least=0.0)
     k_d_r: Any = number((3,), "N m s", least=0.0)
     integral_limit: Any = number((2,), "m s, s", (1e6, 1e6), least=0.0)
-
-    def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers, with a word for lambda that Python allows."""
-        values = {"rate" if name == "lambda" else name: value for name, value in numbers.items()}
-        return super().packed(values, context)

@@ -38,13 +38,13 @@ class PseudoInverse(Allocation):
     speed: Any = number((), "m/s", 1.0, above=0.0)
 
     def check_actuator(self, faults: Faults) -> None:
-        """Adds a fault where there are other weights than channels."""
         count = self.actuator.channels
         if self.weights is not None and len(self.weights) != count:
             fault = f"has {len(self.weights)} numbers"
             faults.add(f"{self.key}.weights", self.weights, fault, f"give {count}, one for each channel of {self.to}")
-
-        self._check_curve(faults)
+        if self.shape == "polynomial" and np.any(self.actuator.limit >= UNLIMITED):
+            fault = "does not end: the inverse of a polynomial needs the range of the commands"
+            faults.add(f"{self.to}.limit", self.actuator.limit, fault, "give the largest command")
         lost = self.lost_channels
         if len(lost) > MOST_LOST:
             faults.add(
@@ -54,28 +54,21 @@ class PseudoInverse(Allocation):
                 f"let at most {MOST_LOST} be known",
             )
 
-    def _check_curve(self, faults: Faults) -> None:
-        if self.shape == "polynomial" and np.any(self.actuator.limit >= UNLIMITED):
-            fault = "does not end: the inverse of a polynomial needs the range of the commands"
-            faults.add(f"{self.to}.limit", self.actuator.limit, fault, "give the largest command")
-
     @property
     def shape(self) -> str:
         """How effort follows from the command: "square", "polynomial" or "table" of thrusters, else "linear"."""
         return str(getattr(self.actuator, "shape", "linear"))
 
     def device_in(self, aligned: bool) -> str:
-        """The code for the curve of the actuator."""
         return f"pseudo_inverse:{self.shape}{',lost' if self.losses else ''}"
 
     def reach(self) -> np.ndarray:
-        """The wrench of a unit of effort of each channel."""
         numbers = {name: value[None] for name, value in self.actuator.parameters().items()}
         effect = self.actuator.effect(numbers, {"environment.water_density": np.ones(1)}, np.reshape(self.speed, 1))
         return np.asarray(effect[0])
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """For each set of losses the lines of the pseudo-inverse; each channel's wrench and numbers; curves and inverses."""
+        # For each set of losses the lines of the pseudo-inverse; each channel's wrench and numbers; curves and inverses.
         actuator_numbers = context.own(self.actuator)
         B = self.asked[:, None] * self.actuator.effect(actuator_numbers, context.parameters, numbers["speed"])
         weights = numbers.get("weights", np.ones((1, B.shape[2])))
@@ -98,22 +91,16 @@ class PseudoInverse(Allocation):
         channels = side_by_side(np.swapaxes(B, -1, -2), *(column[..., None] for column in columns))
         rows.append(channels.reshape(len(channels), -1))
         curves, size = self._curves(actuator_numbers)
-        assert self.bus is not None
         first, count = self.bus.commands[self.to]
         words = {
             "commands": first,
             "count": count,
             "sets": 1 << len(lost),
             "size": size,
-            "sided": self._sided(actuator_numbers),
+            # Whether the polynomials of some member differ ahead and astern.
+            "sided": int(self.shape == "polynomial" and not np.array_equal(*_polynomials(actuator_numbers))),
         }
         return Packed(words | {"shared": sum(block.shape[1] for block in rows)}, side_by_side(*rows, curves))
-
-    def _sided(self, numbers: Numbers) -> int:
-        """1 where the thrusters have polynomials, and some of those astern are others than those ahead; else 0."""
-        return int(
-            self.shape == "polynomial" and not np.array_equal(numbers["polynomial"], numbers["polynomial_astern"])
-        )
 
     def _largest(self, numbers: Numbers, reach: np.ndarray) -> tuple[np.ndarray, ...]:
         """The largest efforts (1 or n, channels) ahead and astern, without the coefficient; reach: of commands."""
@@ -122,7 +109,7 @@ class PseudoInverse(Allocation):
             at, values = numbers["table_commands"], numbers["table_thrusts"]
             return tuple(side * _at(at, values, side * reach) for side in (1.0, -1.0))
         if self.shape == "polynomial":
-            curves = [numbers[key] for key in ("polynomial", "polynomial_astern")]
+            curves = _polynomials(numbers)
             turns = (highest(curve, np.max(reach, axis=-1))[:, None] for curve in curves)
             return tuple(_values(curve, np.minimum(reach, turn)) for curve, turn in zip(curves, turns, strict=True))
         return (reach if self.shape == "linear" else reach**2,) * 2
@@ -139,7 +126,7 @@ class PseudoInverse(Allocation):
             )
             return side_by_side(curves, *(rising_knots(thrusts, commands) for commands, thrusts in each)), size
         reach = np.max(np.maximum(numbers["limit"] - numbers["dead_band"], 0.0), axis=-1)
-        sides = (inverse_rows(numbers[key], reach) for key in ("polynomial", "polynomial_astern"))
+        sides = (inverse_rows(polynomial, reach) for polynomial in _polynomials(numbers))
         return side_by_side(curves, *sides), size
 
 
@@ -147,6 +134,11 @@ class PseudoInverse(Allocation):
 MOST_LOST = 4
 # Singular values below this part of the largest count as zero.
 RANK = 1e-10
+
+
+def _polynomials(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
+    """Those of thrusters, ahead and astern."""
+    return numbers["polynomial"], numbers["polynomial_astern"]
 
 
 def _lines(B: np.ndarray, weights: np.ndarray, lost: Sequence[int]) -> np.ndarray:
@@ -157,11 +149,7 @@ def _lines(B: np.ndarray, weights: np.ndarray, lost: Sequence[int]) -> np.ndarra
 
 
 def rising_knots(at: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """As `knots`, where several knots may be at one place: those change nothing.
-
-    at: Places of the knots (n, k), rising or equal.
-    values: Values at the knots (n, k), equal where the places are.
-    """
+    """As `knots` of values (n, k), where several knots may be at one place, with one value: those change nothing."""
     width = np.diff(at, axis=1)
     inverse = np.divide(1.0, width, out=np.zeros_like(width), where=width > 0.0)
     steps = np.stack([at[:, :-1], inverse, np.diff(values, axis=1)], axis=-1)
@@ -177,13 +165,11 @@ TO_COEFFICIENTS = np.linalg.inv(np.polynomial.polynomial.polyvander(POINTS_OF_ST
 
 
 def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
-    """The start of the inverse of polynomials f without a constant, from 0 to where they turn, or to their reach.
+    """The start of the inverse of polynomials f (1 or n, powers), from 0 to where they turn, or to their reach (1 or n,).
 
     It is a polynomial in 2 s - 1, f = (largest f) (1 - (1 - s^2)^2), in which the inverse is smooth where f begins as a square
     and where it turns (lgvi_kernels.laws.thrust_curves).
 
-    polynomial: Coefficients (1 or n, powers) from the first power up.
-    reach: Largest arguments (1 or n,).
     Returns: Rows (1 or n, 20): 1 / largest value, that value, its argument, least slope, and the coefficients.
     """
     polynomial, reach = repeated(polynomial, reach)
@@ -198,12 +184,7 @@ def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
 
 
 def highest(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
-    """Where polynomials without a constant cease to rise.
-
-    polynomial: Coefficients (1 or n, powers) from the first power up.
-    reach: Largest arguments (1 or n,).
-    Returns: Where each turns first (1 or n,), or its reach.
-    """
+    """Where polynomials (1 or n, powers) from the first power up cease to rise first, (1 or n,), or their reach."""
     polynomial, reach = repeated(polynomial, reach)
     points = reach[:, None] * np.linspace(0.0, 1.0, POINTS)
     values = _values(polynomial, points)

@@ -42,19 +42,17 @@ class ReferenceModel(Guidance):
     rate_limit: Any = number(("n",), "m/s, rad/s", None, above=0.0, optional=True)
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where there are neither two frequencies nor four."""
         count = len(self.natural_frequency)
         if count not in FILTERED:
             which = " or ".join(f"{n} numbers, of {names}" for n, names in FILTERED.items())
             faults.add("natural_frequency", self.natural_frequency, f"has {count} numbers", f"give {which}")
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """For each number its map over a period, (3, 3), line by line, and its limit; x, x' and x'' in the memory."""
+        # For each number its map over a period, (3, 3), line by line, and its limit; x, x' and x'' in the memory.
         omega = numbers["natural_frequency"]
         zeta = numbers.get("damping_ratio", np.ones_like(omega))
         limit = numbers.get("rate_limit", np.full_like(omega, 1e30))
         omega, zeta, limit = repeated(omega, zeta, limit)
-        assert self.bus is not None
         maps = _maps(omega, zeta, self.bus.period)
         count = omega.shape[1]
         rows = np.concatenate([maps.reshape(*omega.shape, 9), limit[..., None]], axis=2).reshape(len(omega), -1)

@@ -43,6 +43,11 @@ class Sensor(MeasuringPart):
 
     Raises:
         SceneError: Where `of` is not known, or `every` or `latency` is no whole number; and as `Term`.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.control.Sensor(of="position", noise=0.5, every=10).noise
+        array([0.5, 0.5, 0.5])
     """
 
     type: ClassVar[str] = "sensor"
@@ -66,11 +71,10 @@ class Sensor(MeasuringPart):
         super().__post_init__()
 
     def shape_of(self, item: Field[Any]) -> tuple[Any, ...]:
-        """One number for each that it reads; a sensor of a scalar has scalars."""
+        # One number for each that it reads; a sensor of a scalar has scalars.
         return () if READINGS[self.of] == 1 else super().shape_of(item)
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault for each number of ticks that is not whole."""
         for name in ("every", "latency"):
             value = float(getattr(self, name))
             if value != round(value):
@@ -79,20 +83,19 @@ class Sensor(MeasuringPart):
 
     @property
     def ticks_before(self) -> int:
-        """Those until a reading arrives, and the one at which it does."""
+        # Those until a reading arrives, and the one at which it does.
         late = int(np.max(self.latency))
         return late + 1 if late else 0
 
     def features(self, numbers: Numbers) -> tuple[str, ...]:
-        """The names of the numbers that matter for some member."""
+        # The names of the numbers that matter for some member.
         return tuple(name for name, idle in IDLE.items() if np.any(_whole(name, numbers[name]) != idle))
 
     def device_in(self, aligned: bool) -> Any:
-        """The device code for what it reads and for the numbers that matter."""
         return f"sensor:{','.join((self.of, *self.chosen))}"
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers that matter, the key of the random numbers, and the rows of what it keeps."""
+        # The numbers that matter, the key of the random numbers, and the rows of what it keeps.
         from scipy.special import ndtri
 
         chosen, count = set(self.chosen), READINGS[self.of]

@@ -25,6 +25,11 @@ class SetPoint(Guidance):
 
     Raises:
         SceneError: Where nothing is given, or position and depth both; and as `Term`.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.control.SetPoint(depth=10.0, heading=0.5).gives
+        ('depth', 'heading', 'attitude', 'angular_velocity')
     """
 
     type: ClassVar[str] = "set_point"
@@ -35,7 +40,6 @@ class SetPoint(Guidance):
     speed: Any = number((), "m/s", None, optional=True)
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where nothing is wanted, or the depth twice."""
         if not self.parameters():
             faults.add("", "", "wants nothing", "give position, depth, heading or speed")
         if self.position is not None and self.depth is not None:
@@ -43,7 +47,6 @@ class SetPoint(Guidance):
 
     @property
     def gives(self) -> tuple[str, ...]:
-        """What it wants, among `WISHES`."""
         position = ("position", "depth", "velocity") if self.position is not None else ()
         depth = ("depth",) if self.depth is not None else ()
         upright = self.heading is not None or self.position is not None
@@ -51,7 +54,7 @@ class SetPoint(Guidance):
         return (*position, *depth, *heading, *(("speed",) if self.speed is not None else ()))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """All numbers, and which of them are wanted; what is not stays as guidance before it wants it."""
+        # All numbers, and which of them are wanted; what is not stays as guidance before it wants it.
         position = numbers.get("position", np.zeros((1, 3)))
         zero = np.zeros(1)
         depth = numbers.get("depth", position[:, 2])

@@ -16,10 +16,7 @@ if TYPE_CHECKING:
 
 
 class Signal(NamedTuple):
-    """A signal, and where the kernel has it.
-
-    field: Its name, shape, unit and meaning; where it has as many numbers as the scene has commands, the shape is (1,).
-    """
+    """A signal, and where the kernel has it; the shape of its field is (1,) where the scene's commands tell the size."""
 
     field: Field
     group: str
@@ -80,10 +77,7 @@ def ordered(names: Iterable[str]) -> tuple[str, ...]:
 
 
 def saved_fields(controller: Controller | None) -> dict[str, Field]:
-    """The fields that runs of a scene may save.
-
-    controller: Its controller, wired; None for none.
-    """
+    """The fields that runs of a scene with this controller, wired, may save."""
     fields = {name: TABLE[name] for name in FIELDS}
     if controller is None or controller.bus is None:
         return fields
@@ -93,10 +87,7 @@ def saved_fields(controller: Controller | None) -> dict[str, Field]:
 
 
 def has_shape(name: str, shape: tuple[int, ...]) -> bool:
-    """Whether numbers of one vehicle at one time may have this shape, in some scene.
-
-    shape: The shape.
-    """
+    """Whether numbers of one vehicle at one time may have this shape, in some scene."""
     if name in CHANNELS:
         return len(shape) == 1 and shape[0] > 0
     return shape == (TABLE[name] if name in TABLE else SIGNALS[name].field).shape
@@ -119,10 +110,7 @@ def check_names(faults: Faults, key: str, names: Any) -> None:
 
 
 def check_signals(faults: Faults, key: str, names: Iterable[str], controller: Controller | None) -> None:
-    """Add a fault for each signal that a scene does not have.
-
-    controller: The controller of the scene; None for none.
-    """
+    """Add a fault for each signal that a scene with this controller does not have."""
     problem = "is a signal of a controller, which this scene has not"
     for name in ordered(names) if controller is None else ():
         if name in SIGNALS:

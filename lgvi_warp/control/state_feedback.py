@@ -28,6 +28,5 @@ class StateFeedback(ControlLaw):
     K: Any = number((6, 12), "N, N m per m, 1, m/s, rad/s")
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """K line by line in the table."""
         K = numbers["K"]
         return Packed({}, K.reshape(len(K), -1))

@@ -32,6 +32,11 @@ class Trajectory(Guidance):
         speed: Wanted speeds ahead through the water (k,) [m/s]; by default the size of the wanted velocity.
         interpolation: "linear", the default: straight from place to place; or "cubic": by natural cubic splines, whose
             velocities have no jumps within the times.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.control.Trajectory(times=[0.0, 10.0], positions=[[0.0, 0.0, 5.0], [15.0, 0.0, 5.0]]).gives
+        ('position', 'depth', 'velocity', 'speed')
     """
 
     type: ClassVar[str] = "trajectory"
@@ -44,11 +49,10 @@ class Trajectory(Guidance):
 
     @property
     def ticks_before(self) -> int:
-        """One: what is wanted depends on the time."""
+        # One: what is wanted depends on the time.
         return 1
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where times are too few, or something changes too fast."""
         if len(self.times) < 2:
             faults.add("times", self.times, "are less than two", "give when the trajectory begins and when it ends")
         spans = np.diff(self.times)
@@ -63,12 +67,12 @@ class Trajectory(Guidance):
 
     @property
     def gives(self) -> tuple[str, ...]:
-        """Position, depth, velocity and speed; with headings the attitude and its rate."""
+        # Position, depth, velocity and speed; with headings the attitude and its rate.
         heading = () if self.headings is None else ("heading", "attitude", "angular_velocity")
         return ("position", "depth", "velocity", "speed", *heading)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """For each piece its time and the coefficients of its polynomials, of position, heading and speed; then the end."""
+        # For each piece its time and the coefficients of its polynomials, of position, heading and speed; then the end.
         times, positions = numbers["times"], numbers["positions"]
         zero = np.zeros_like(times)
         columns = [positions, numbers.get("headings", zero)[..., None], numbers.get("speed", zero)[..., None]]

@@ -60,7 +60,6 @@ class Waypoints(Guidance):
     at_end: str = word("stop", known=AT_END)
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where points are too few or the same twice."""
         if len(self.points) < 2:
             faults.add("points", self.points, "are less than two", "give where the way begins and where it ends")
         same = np.flatnonzero(np.all(np.diff(self.points[:, :2], axis=0) == 0.0, axis=1))
@@ -70,11 +69,11 @@ class Waypoints(Guidance):
 
     @property
     def gives(self) -> tuple[str, ...]:
-        """All that a reference can have."""
+        # All that a reference can have.
         return ("depth", "position", "velocity", "heading", "attitude", "angular_velocity", "speed")
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The points in the table; memory of the leg, and of J or beta."""
+        # The points in the table; memory of the leg, and of J or beta.
         points = numbers["points"]
         values = {name: value for name, value in numbers.items() if name != "points"}
         words = {"legs": points.shape[1] - 1, "method": METHODS.index(self.method), "stops": int(self.at_end == "stop")}

@@ -14,12 +14,10 @@ Gauss = tuple[Matrix, tuple[float, ...], tuple[float, ...], Matrix]
 
 @functools.cache
 def gauss(s: int) -> Gauss:
-    """Coefficients of Gauss collocation, and the matrix that extrapolates a step's slopes to the next step.
+    """Gauss collocation with s stages: a (s, s), b (s,), c (s,), and the matrix (s, s) that extrapolates its slopes.
 
     With l_j = b_j sum_k (2k + 1) P_k(x_j) P_k, x = 2c - 1, of the Legendre polynomials P_k, a_ij is the integral of l_j
     up to c_i, and the extrapolation its value at 1 + c_i. Source: Hairer, Lubich & Wanner, II.1.3.
-
-    Returns: (a, b, c, extrapolation) of shapes (s, s), (s,), (s,), (s, s).
     """
     x, w = legendre.leggauss(s)
     b, c, P = 0.5 * w, 0.5 * (x + 1.0), legendre.legvander(x, s)

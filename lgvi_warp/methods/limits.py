@@ -44,10 +44,9 @@ def longest_stage(method: Method) -> float:
 
 
 def oscillation_limit(method: Method, table: Mapping[str, float]) -> float:
-    """Largest stable h w of a method for an oscillation of angular frequency w.
+    """Largest stable h w [rad] of a method for an oscillation of angular frequency w; inf where a status reports the failure.
 
-    Returns: The limit [rad]: measured, or for a composition that was not measured, that of its base divided by the longest
-        stage. Infinite where a status reports the failure instead.
+    It is measured; of a composition that was not, it is that of its base divided by the longest stage.
     """
     if method.gauss or method.adaptive:
         # A status reports where the iteration of the stages, or the step control, fails.
@@ -60,10 +59,7 @@ def oscillation_limit(method: Method, table: Mapping[str, float]) -> float:
 
 @functools.cache
 def imaginary_limit(name: str) -> float:
-    """Largest y with |R(iy)| <= 1, R the stability function of an explicit method: h |Omega| of a steady spin.
-
-    Returns: The limit [rad].
-    """
+    """Largest y [rad] with |R(iy)| <= 1, R the stability function of an explicit method: h |Omega| of a steady spin."""
     tableau = Method(name).tableau
     assert tableau is not None
     n = len(tableau.b)
@@ -74,10 +70,7 @@ def imaginary_limit(name: str) -> float:
 
 
 def rotation_limit(method: Method) -> float:
-    """Largest h |Omega| of a method that has no status for it.
-
-    Returns: The limit [rad]; infinite for a method whose status reports a step that is too large.
-    """
+    """Largest h |Omega| [rad] of a method; inf for one whose status reports a step that is too large."""
     if method.adaptive:
         return np.inf
     if method.turns:
@@ -98,11 +91,7 @@ def too_large(method: Method) -> str:
 
 
 def stability_polynomial(tableau: Tableau, z: np.ndarray) -> np.ndarray:
-    """Evaluate the stability polynomial R(z) of an explicit method: one step of y' = (z/h) y from y = 1.
-
-    z: complex or real numbers (n,).
-    Returns: R(z) (n,).
-    """
+    """R(z) (n,) of an explicit method at numbers z (n,): one step of y' = (z/h) y from y = 1."""
     s = len(tableau.b)
     slopes: list[np.ndarray] = []
     for i in range(s):
@@ -111,18 +100,14 @@ def stability_polynomial(tableau: Tableau, z: np.ndarray) -> np.ndarray:
 
 
 def first_unstable(numbers: np.ndarray, growth: np.ndarray) -> float:
-    """Find the largest number up to which a small motion stays small.
-
-    numbers: numbers h w (n,), rising by STEP [rad].
-    growth: growth of the motion in one step (n,).
-    """
+    """The largest number h w (n,), rising by STEP [rad], up to which a motion with this growth (n,) in a step stays small."""
     beyond = growth > 1.0 + GROWTH
     return float(numbers[np.argmax(beyond)] - STEP) if beyond.any() else math.inf
 
 
 @functools.cache
 def drag_limit(name: str) -> float:
-    """Compute the largest h (l + 2 q |v|) / I, beyond which explicit drag grows.
+    """The largest h (l + 2 q |v|) / I, beyond which explicit drag grows.
 
     A composition is refused where a stage that goes backward would meet a drag number above 0.5.
     """

@@ -374,19 +374,13 @@ class Method(Summarized):
 
 @functools.cache
 def parted(name: str) -> tuple[str, str | None]:
-    """Divide the name of a method.
-
-    Returns: The method that is composed, and the composition; None where there is none.
-    """
+    """Divide the name of a method into that which is composed, and the composition; None where there is none."""
     match = re.fullmatch(r"(\w+)\((\w+)\)", name)
     return (match[2], match[1]) if match else (name, None)
 
 
 def merged(program: Program) -> tuple[tuple[str, float] | None, Program]:
-    """Join a flow that both opens and closes the program with that of the next step.
-
-    Returns: (lead, maps): the lead is the half of that flow, None where there is none; maps is the rest of the program.
-    """
+    """(lead, maps): half the flow that both opens and closes the program, joined with that of the next step; and the rest."""
     first, last = program[0], program[-1]
     if len(program) > 1 and first == last and first[0] in FLOWS:
         return first, program[1:-1]
@@ -394,10 +388,7 @@ def merged(program: Program) -> tuple[tuple[str, float] | None, Program]:
 
 
 def palindrome_of_parts(printed: tuple[float, ...]) -> tuple[float, ...]:
-    """Complete the printed coefficients of a splitting into two parts.
-
-    The numbers of each part sum to one, which gives the last two.
-    """
+    """Complete the printed coefficients of a splitting into two parts, of which each sums to one."""
     c, n = list(printed), len(printed)
     c.append(0.5 - sum(c[n % 2 :: 2]))
     c.append(1.0 - 2.0 * sum(c[(n + 1) % 2 :: 2]))
@@ -419,10 +410,7 @@ def divided(program: Program) -> Program:
 
 
 def with_hops(program: Program) -> Program:
-    """Insert the translations between the three axes' origins.
-
-    They are needed when inertia is coupled, since each turn is then made about its own origin.
-    """
+    """Insert the translations between the three axes' origins: with coupled inertia each turn is made about its own."""
     hopped: list[tuple[str, float]] = []
     current_axis = 1
     for letter, coefficient in program:

@@ -13,11 +13,7 @@ import numpy as np
 
 
 def fields(J: np.ndarray) -> dict[str, Any]:
-    """The numbers of the modified inertia that the kernel needs.
-
-    J: Principal moments of inertia [kg m^2], shape (n, 3).
-    Returns: "inverse_J" (n, 3), and the series "shrink" and "shift" as {"c1": (n,), ...}.
-    """
+    """The kernel's "inverse_J" (n, 3), and series "shrink" and "shift" {"c1": (n,), ...}, of moments J (n, 3) [kg m^2]."""
     shrink, shift = series(J)
     return {
         "inverse_J": 1.0 / J,
@@ -27,10 +23,9 @@ def fields(J: np.ndarray) -> dict[str, Any]:
 
 
 def series(J: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Coefficients of the polynomials s and d, by Hairer & Vilmart (2006).
+    """Coefficients of the polynomials s and d of principal moments J (n, 3) [kg m^2], by Hairer & Vilmart (2006).
 
-    J: Principal moments of inertia [kg m^2], shape (n, 3).
-    Returns: (coefficients of s, of d), nine arrays (n,) each, of N, H; N^2, N H, H^2; N^3, N^2 H, N H^2, H^3.
+    Returns: (those of s, of d), nine arrays (n,) each, of N, H; N^2, N H, H^2; N^3, N^2 H, N H^2, H^3.
     """
     e = J.prod(axis=1)
 

@@ -64,11 +64,9 @@ class SaveAt:
 
 @dataclass(frozen=True)
 class TimeGrid:
-    """Uniform steps from 0 to the end of a run, and those after which a sample is kept.
+    """Uniform steps of h [s] from 0 to the end of a run, and those after which a sample is kept.
 
-    h: Length of a step [s].
-    sample_steps: Numbers of steps before each sample, int64, shape (k,); the first is 0.
-    times: Times of the samples [s], shape (k,); the first is 0.
+    sample_steps: Numbers of steps before each sample, int64, (k,), from 0. times: Those of the samples, (k,) [s], from 0.
     """
 
     h: float
@@ -99,13 +97,7 @@ def exact(x: float) -> Fraction:
 
 
 def time_grid(h: float, t1: float, save: SaveAt) -> TimeGrid:
-    """Choose the steps and samples of a run.
-
-    The step is shortened until it divides every sample time and the end.
-
-    h: The step asked for [s].
-    t1: End of the run [s].
-    """
+    """The steps and samples of a run to t1 [s]: steps of h [s], shortened until they divide every sample time and t1."""
     faults = Faults()
     faults.positive("step", h)
     faults.positive("duration", t1)

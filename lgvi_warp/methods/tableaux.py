@@ -12,13 +12,10 @@ Row = tuple[float, ...]
 
 @dataclass(frozen=True)
 class Tableau:
-    """Coefficients of a Runge-Kutta method with s stages.
+    """Coefficients of a Runge-Kutta method with s stages: weights b (s,), nodes c (s,).
 
-    b: Weights, shape (s,).
-    c: Nodes, shape (s,).
-    errors: Rows e of error estimates, shape (s,), or (s + 1,) with the slope at the new state last; default none.
-    implicit: Matrix g of a linearly implicit method; row i holds its i + 1 numbers, the last of which is the same in all rows;
-        default none, an explicit method.
+    errors: Rows e of error estimates, (s,), or (s + 1,) with the slope at the new state last; default none.
+    implicit: Matrix g of a linearly implicit method; row i holds its i + 1 numbers, the last of which is the same in all rows.
     """
 
     order: int

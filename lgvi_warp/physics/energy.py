@@ -57,10 +57,7 @@ class Sampled(Protocol):
         """The terms of the scene, without weight and restoring moment."""
 
     def own(self, term: Term) -> dict[str, np.ndarray]:
-        """The numbers of one term.
-
-        Returns: Its numbers by field, each of shape (1, ...) or (n, ...).
-        """
+        """The numbers of one term by field, each of shape (1, ...) or (n, ...)."""
 
 
 def _times(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
@@ -93,18 +90,12 @@ def _broadcast(matrices: np.ndarray, vectors: np.ndarray) -> tuple[np.ndarray, n
 
 
 def kinetic_energy(result: Sampled) -> np.ndarray:
-    """Kinetic energy relative to the water, (nu, Om).I6 (nu, Om) / 2.
-
-    Returns: Energy (k, n) [J].
-    """
+    """Kinetic energy relative to the water, (nu, Om).I6 (nu, Om) / 2, as (k, n) [J]."""
     return np.asarray(0.5 * np.sum(_relative(result) * _momenta(result), axis=-1))
 
 
 def energy(result: Sampled) -> np.ndarray:
-    """Total energy: the kinetic energy relative to the water, and the potential of every term.
-
-    Returns: Energy (k, n) [J].
-    """
+    """Total energy (k, n) [J]: the kinetic one relative to the water, and the potential of every term."""
     total = kinetic_energy(result)
     position, attitude = result.position.astype(np.float64), result.attitude.astype(np.float64)
     for term in (*terms.IMPLIED, *result.terms):
@@ -113,18 +104,12 @@ def energy(result: Sampled) -> np.ndarray:
 
 
 def linear_momentum(result: Sampled) -> np.ndarray:
-    """Linear momentum R p in inertial axes. Without a potential it is conserved.
-
-    Returns: Momentum (k, n, 3) [N s].
-    """
+    """Linear momentum R p in inertial axes, (k, n, 3) [N s]. Without a potential it is conserved."""
     return _times(result.attitude.astype(np.float64), _momenta(result)[..., :3])
 
 
 def angular_momentum(result: Sampled) -> np.ndarray:
-    """Angular momentum R pi + b x R p about the inertial origin. Without a potential it is conserved.
-
-    Returns: Momentum (k, n, 3) [N m s].
-    """
+    """Angular momentum R pi + b x R p about the inertial origin, (k, n, 3) [N m s]; conserved without a potential."""
     spin = _momenta(result)[..., 3:]
     b, P = (np.moveaxis(x, -1, 0) for x in (result.position.astype(np.float64), linear_momentum(result)))
     orbit = np.stack([b[1] * P[2] - b[2] * P[1], b[2] * P[0] - b[0] * P[2], b[0] * P[1] - b[1] * P[0]], axis=-1)
@@ -132,13 +117,10 @@ def angular_momentum(result: Sampled) -> np.ndarray:
 
 
 def energy_growth(result: Sampled, *, dissipative: bool = False) -> np.ndarray:
-    """Largest change of energy of each member, relative to the energy that it could hold.
+    """Largest change of energy of each member (n,), relative to the energy that it could hold; inf where one is not finite.
 
-    The latter is |p|^2 / (2 M_min) + |pi|^2 / (2 J_min) at the start and, up to each time, the largest change of
-    the potential.
-    A bounded motion stays below about 1, however it exchanges energy.
-
-    Returns: Ratios (n,); infinite where the energy is not finite at some time.
+    The latter is |p|^2 / (2 M_min) + |pi|^2 / (2 J_min) at the start and, up to each time, the largest change of the
+    potential. A bounded motion stays below about 1, however it exchanges energy.
     """
     kinetic, total = kinetic_energy(result), result.energy
     potential = total - kinetic
@@ -158,10 +140,7 @@ def _present(result: Sampled) -> tuple[Term, ...]:
 
 
 def conserved(result: Sampled) -> frozenset[str]:
-    """What the laws of a result's scene conserve, as each term says itself (`Term.conserves`).
-
-    Returns: The names among "energy", "horizontal_momentum" and "vertical_angular_momentum" that every acting term conserves.
-    """
+    """The names of `CONSERVED` that every acting law of a result's scene conserves, as each says itself (`Term.conserves`)."""
     return CONSERVED.intersection(*(term.conserves for term in _present(result)))
 
 

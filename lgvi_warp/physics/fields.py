@@ -10,10 +10,7 @@ from numpy import ndindex
 
 @dataclass(frozen=True)
 class Field:
-    """Numbers of one vehicle at one time.
-
-    shape: shape of the numbers; () for one number.
-    """
+    """Numbers of one vehicle at one time, of a shape: () for one number."""
 
     name: str
     shape: tuple[int, ...]

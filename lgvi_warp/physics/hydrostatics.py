@@ -13,20 +13,12 @@ Numbers = Mapping[str, np.ndarray]
 
 
 def net(p: Numbers) -> np.ndarray:
-    """Weight less buoyancy, the net force downward.
-
-    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-    Returns: Force (n,) [N], negative where buoyancy is the larger.
-    """
+    """Weight less buoyancy, the net force downward (n,) [N], from the parameters by name."""
     return vehicle.weight(p) - p["vehicle.buoyancy"]
 
 
 def moment(p: Numbers) -> np.ndarray:
-    """The vector B r_b - W r_g about the user's origin, from which the restoring moment follows.
-
-    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-    Returns: Vectors (n, 3) [N m] in body axes.
-    """
+    """The vector B r_b - W r_g about the user's origin, (n, 3) [N m] in body axes, from which the restoring moment follows."""
     lift = p["vehicle.buoyancy"][:, None] * p["vehicle.center_of_buoyancy"]
     if "vehicle.center_of_gravity" not in p:
         return lift

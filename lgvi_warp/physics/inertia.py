@@ -23,21 +23,12 @@ DIAGONAL = 1e-12
 
 
 def vee(A: np.ndarray) -> np.ndarray:
-    """Vectors of the skew part of matrices, the inverse of `hat`.
-
-    A: Matrices (..., 3, 3).
-    Returns: Vectors (..., 3).
-    """
+    """Vectors (..., 3) of the skew part of matrices (..., 3, 3), the inverse of `hat`."""
     return 0.5 * np.stack([A[..., i, j] - A[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=-1)
 
 
 class Blocks(NamedTuple):
-    """The blocks of mass matrices. Each has a leading dimension of 1 or n of its own.
-
-    M: Mass, (., 3, 3) [kg].
-    C: Coupling, (., 3, 3) [kg m].
-    J: Inertia, (., 3, 3) [kg m2].
-    """
+    """Blocks of mass matrices: mass M [kg], coupling C [kg m], inertia J [kg m2], (., 3, 3), each with 1 or n members."""
 
     M: np.ndarray
     C: np.ndarray
@@ -45,32 +36,21 @@ class Blocks(NamedTuple):
 
 
 def blocks(I6: np.ndarray) -> Blocks:
-    """The blocks M, C and J of mass matrices.
-
-    I6: Mass matrices (n, 6, 6), linear part first.
-    """
+    """The blocks M, C and J of mass matrices (n, 6, 6), linear part first."""
     return Blocks(I6[:, :3, :3], I6[:, :3, 3:], I6[:, 3:, 3:])
 
 
 def joined(M: np.ndarray, C: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """Mass matrices made of their blocks.
-
-    M: Mass, (n, 3, 3) [kg].
-    C: Coupling, (n, 3, 3) [kg m].
-    J: Inertia, (n, 3, 3) [kg m2].
-    Returns: I6 (n, 6, 6), linear part first.
-    """
+    """Mass matrices (n, 6, 6), linear part first, made of their blocks M [kg], C [kg m] and J [kg m2], (n, 3, 3) each."""
     I6 = np.empty((max(len(M), len(C), len(J)), 6, 6))
     I6[:, :3, :3], I6[:, :3, 3:], I6[:, 3:, :3], I6[:, 3:, 3:] = M, C, np.swapaxes(C, -1, -2), J
     return I6
 
 
 def motion_from(origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
-    """Matrices that turn velocities at another origin and in axes Q into those of the same motion at the user's, in his axes.
+    """Matrices X (n, 6, 6) that turn (nu, Om) at another origin and in axes Q into those of the same motion at the user's.
 
-    origin: The other origin, (n, 3) [m], from the user's in his axes.
-    Q: The other axes in the user's, (n, 3, 3).
-    Returns: X (n, 6, 6), which act on (nu, Om).
+    origin: (n, 3) [m], from the user's in his axes. Q: (n, 3, 3), the other axes in the user's.
     """
     X = np.zeros((max(len(Q), len(origin)), 6, 6))
     X[:, :3, :3] = X[:, 3:, 3:] = Q + 0.0  # without negative zeros
@@ -79,22 +59,18 @@ def motion_from(origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
 
 
 def moved(I6: np.ndarray, origin: np.ndarray, Q: np.ndarray) -> np.ndarray:
-    """Mass matrices about another origin and in other axes.
+    """Mass matrices (n, 6, 6) about another origin and in other axes.
 
-    I6: Mass matrices (n, 6, 6) about the user's origin, in the user's axes.
-    origin: The other origin, (n, 3) [m], from the user's in his axes.
-    Q: The other axes in the user's, (n, 3, 3).
-    Returns: I6 (n, 6, 6) there.
+    I6: (n, 6, 6) about the user's origin, in his axes. origin: (n, 3) [m]. Q: (n, 3, 3), as of `motion_from`.
     """
     X = motion_from(origin, Q)
     return np.swapaxes(X, -1, -2) @ I6 @ X
 
 
 def coupling(I6: np.ndarray) -> np.ndarray:
-    """The coupling norm: the largest singular value of M^-1/2 C J^-1/2.
+    """The coupling norm (n,) of mass matrices (n, 6, 6), from 0 to 1: the largest singular value of M^-1/2 C J^-1/2.
 
-    I6: Mass matrices (n, 6, 6).
-    Returns: Norms (n,), from 0 to 1; infinite where round-off or overflow leaves no positive definite matrix.
+    It is infinite where round-off or overflow leaves no positive definite matrix.
     """
     M, C, J = blocks(I6)
     try:
@@ -111,12 +87,9 @@ def coupling(I6: np.ndarray) -> np.ndarray:
 class Frame:
     """The axes and origins in which a kernel keeps a vehicle. Leading dimensions are 1 or n.
 
-    origin: Origin of the state, (., 3) [m], from the user's in his axes.
-    forces: Origin of the forces, (., 3) [m], from the user's in his axes.
-    M: Mass matrix in the axes Q, (., 3, 3) [kg].
-    J: Diagonal (Schur) inertia in the axes Q, (., 3) [kg m2].
-    E: M^-1 C at the origin of the state, (., 3, 3) [m]; 0 without coupling.
-    E_forces: M^-1 C at the origin of the forces, (., 3, 3) [m]; 0 without coupling.
+    origin, forces: Origins of the state and of the forces, (., 3) [m], from the user's in his axes.
+    M, J: Mass matrix (., 3, 3) [kg] and diagonal (Schur) inertia (., 3) [kg m2] in the axes Q.
+    E, E_forces: M^-1 C at the origin of the state and at that of the forces, (., 3, 3) [m]; 0 without coupling.
     """
 
     Q: np.ndarray
@@ -161,11 +134,7 @@ class Frame:
         return bool(np.any(self.E) or np.any(self.E_forces))
 
     def inertia_at(self, E: np.ndarray) -> np.ndarray:
-        """Mass matrix in these axes, at the origin where M^-1 C is E: J = Js + E^T M E.
-
-        E: M^-1 C at that origin, (n, 3, 3) [m].
-        Returns: I6 (n, 6, 6).
-        """
+        """Mass matrix (n, 6, 6) in these axes, where M^-1 C is E (n, 3, 3) [m]: J = Js + E^T M E."""
         J = self.J[:, :, None] * np.eye(3)
         return joined(self.M + 0.0 * E, self.M @ E, J + np.swapaxes(E, -1, -2) @ self.M @ E)
 
@@ -174,21 +143,13 @@ class Frame:
         return np.einsum("nji,n...j->n...i", *notation.repeated(self.Q, v))
 
     def point(self, r: np.ndarray) -> np.ndarray:
-        """Points relative to the origin of the forces, in these axes.
-
-        r: Points (n, ..., 3) [m] from the user's origin, in the user's axes.
-        Returns: Points (n, ..., 3) [m].
-        """
+        """Points (n, ..., 3) [m] from the user's origin in his axes, from the origin of the forces in these."""
         return self.vector(r - _expanded(self.forces, r))
 
     def torque(self, torque: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Torques about the origin of the forces, in these axes.
+        """Torques (n, ..., 3) [N m] about the user's origin, of wrenches with these forces, about the origin of the forces.
 
         The angular part of a twist that measures a velocity transforms in the same way.
-
-        torque: Torques (n, ..., 3) [N m] about the user's origin, in the user's axes.
-        force: Forces (n, ..., 3) [N] of the same wrenches.
-        Returns: Torques (n, ..., 3) [N m].
         """
         arm, torque, force = np.broadcast_arrays(_expanded(self.forces, force), torque, force)
         return self.vector(torque - notation.cross(arm, force))
@@ -200,10 +161,7 @@ def _expanded(origin: np.ndarray, like: np.ndarray) -> np.ndarray:
 
 
 def schur(body: Blocks) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The mass, E and the Schur complement of mass matrices.
-
-    Returns: M [kg], E = M^-1 C [m] and Js = J - C^T E [kg m2], each (., 3, 3).
-    """
+    """Mass M [kg], E = M^-1 C [m] and the Schur complement Js = J - C^T E [kg m2] of mass matrices, (., 3, 3) each."""
     coupled = np.any(body.C, axis=(-2, -1))
     if not coupled.any():
         return body.M, np.zeros_like(body.C), body.J
@@ -223,7 +181,7 @@ def in_axes(Q: np.ndarray, A: np.ndarray) -> np.ndarray:
 
 
 def uncoupled_frame(body: Blocks) -> tuple[Frame, np.ndarray]:
-    """The frame at the origin where M and J are uncoupled, with J diagonal.
+    """The frame with J diagonal at the origin where M and J are uncoupled, and the coupling norm (n,) that remains there.
 
     The coupling vanishes there if and only if E is skew.
     """
@@ -239,12 +197,7 @@ def uncoupled_frame(body: Blocks) -> tuple[Frame, np.ndarray]:
 
 
 def ascending(Q: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Principal axes in the order of rising inertia, still right-handed.
-
-    Q: Axes (n, 3, 3).
-    J: Principal inertias (n, 3) [kg m2].
-    Returns: Axes (n, 3, 3) and inertias (n, 3) in that order.
-    """
+    """Principal axes (n, 3, 3) and inertias (n, 3) [kg m2] in the order of rising inertia, still right-handed."""
     order = np.argsort(J, axis=1, kind="stable")
     Q = np.take_along_axis(Q, order[:, None, :], axis=2)
     Q = Q * np.where(np.arange(3) == 2, np.sign(np.linalg.det(Q))[:, None], 1.0)[:, None, :]

@@ -17,13 +17,9 @@ from lgvi_warp.physics import inertia, vehicle
 def rates(
     parameters: Mapping[str, np.ndarray], velocity: np.ndarray, angular_velocity: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Compute how fast members move at their start.
+    """How fast members move at their start, by the names of LIMITS, (n,) [rad/s; drag 1/s] (Mathematics, section 7).
 
-    Mathematics, section 7: w_Munk^2 = |p|^2 (1/M_min - 1/M_max) / J_min, w_restoring^2 = B |r| / J_min.
-
-    velocity: of the members (n, 3) [m/s], body axes.
-    angular_velocity: of the members (n, 3) [rad/s], body axes.
-    Returns: Names of LIMITS -> rate (n,) [rad/s; drag 1/s].
+    w_Munk^2 = |p|^2 (1/M_min - 1/M_max) / J_min, w_restoring^2 = B |r| / J_min. Velocities (n, 3) are in body axes.
     """
     n = len(velocity)
     I6 = np.broadcast_to(vehicle.inertia6(parameters), (n, 6, 6))
@@ -46,13 +42,7 @@ def rates(
 def drag_rate(
     parameters: Mapping[str, np.ndarray], I6: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray
 ) -> np.ndarray:
-    """Compute the largest (l_ii + 2 q_ii |v_i|) / I_ii over the six axes, summed over all drag terms.
-
-    I6: inertia with added mass (n, 6, 6) [kg, kg m, kg m^2].
-    velocity: of the members (n, 3) [m/s], body axes.
-    angular_velocity: of the members (n, 3) [rad/s], body axes.
-    Returns: Rate (n,) [1/s]; 0 without drag.
-    """
+    """The largest (l_ii + 2 q_ii |v_i|) / I_ii over the six axes, summed over all drag terms, (n,) [1/s]; 0 without drag."""
     speeds = np.abs(np.concatenate([velocity, angular_velocity], axis=1))
     total = np.zeros_like(speeds)
     for key in drag_keys(parameters):

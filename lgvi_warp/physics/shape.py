@@ -46,18 +46,10 @@ class Shape:
         faults.raise_if_any()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the table [vehicle.shape] of a scene file.
-
-        Returns:
-            What is given, by name.
-        """
+        """What is given, as the table [vehicle.shape] of a scene file."""
         return {key: value for key, value in vars(self).items() if value is not None}
 
 
 def shape_from(value: Any) -> Shape | None:
-    """Read the shape of a vehicle.
-
-    value: A table as in a scene file, a Shape, or None for none.
-    Returns: The shape.
-    """
+    """Read the shape of a vehicle: a table as in a scene file, a Shape, or None for none."""
     return None if value is None else from_table(Shape, "vehicle.shape", value, REMEDY)

@@ -30,7 +30,7 @@ ROUND_OFF, LITTLE = 1e-6, 0.15
 SYMMETRIC = ("added_mass", "inertia", "rigid_body_mass_matrix", "added_mass_matrix")
 
 
-class Seen(str):
+class RepeatedWarning(str):
     """A warning that a vehicle raises about its own numbers, and raises again when it is rebuilt from another's fields."""
 
 
@@ -102,9 +102,9 @@ class Vehicle(Summarized):
         faults = Faults("vehicle.")
         values = read(self, faults, "buoyancy", "center_of_buoyancy", "warnings", "inertia_tolerance")
         object.__setattr__(self, "inertia_tolerance", values["inertia_tolerance"] or 0.0)
-        user_warnings = (warning for warning in values["warnings"] or () if not isinstance(warning, Seen))
+        user_warnings = (warning for warning in values["warnings"] or () if not isinstance(warning, RepeatedWarning))
         values |= self._full(faults) if self.full else self._simple(faults)
-        values["warnings"] = (*user_warnings, *map(Seen, values["warnings"]))
+        values["warnings"] = (*user_warnings, *map(RepeatedWarning, values["warnings"]))
         with faults.including():
             values["shape"] = shape_from(self.shape)
         values |= read(self, faults, "title")
@@ -115,7 +115,7 @@ class Vehicle(Summarized):
             object.__setattr__(self, name, value)
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
-        """The numbers with their units, and the warnings."""
+        # The numbers with their units, and the warnings.
         rows = [("title", self.title)] if self.title else []
         rows += [(name, summaries.few_digits(value, UNITS[name])) for name, value in self.parameters().items()]
         rows += [("warning", str(text)) for text in self.warnings]
@@ -232,7 +232,7 @@ class Vehicle(Summarized):
         for name, value in self.parameters().items():
             full = name in ("rigid_body_mass_matrix", "added_mass_matrix")
             content[name] = compact(value) if value.shape == (3, 3) and not full else value.tolist()
-        user_warnings = [text for text in self.warnings if not isinstance(text, Seen)]
+        user_warnings = [text for text in self.warnings if not isinstance(text, RepeatedWarning)]
         content |= {"inertia_tolerance": self.inertia_tolerance} if self.inertia_tolerance else {}
         content |= {"warnings": user_warnings} if user_warnings else {}
         content |= {"shape": self.shape.to_dict()} if self.shape else {}
@@ -258,10 +258,7 @@ def compact(matrix: np.ndarray) -> list[Any]:
 
 
 def unusual(name: str, inertia: Any) -> tuple[str, ...]:
-    """Warn about principal inertias that no rigid body has (J_i + J_j < J_k), though a body with added inertia may have them.
-
-    inertia: Inertia (3, 3) [kg m2].
-    """
+    """Warn about principal inertias [kg m2] that no rigid body has (J_i + J_j < J_k), though added inertia may bring them."""
     small, middle, large = np.linalg.eigvalsh(inertia)
     if small >= large * (1.0 - 1e-12) - middle:
         return ()
@@ -270,102 +267,63 @@ def unusual(name: str, inertia: Any) -> tuple[str, ...]:
 
 
 def about_center(rigid: np.ndarray) -> np.ndarray:
-    """Inertia about the centre of gravity.
-
-    rigid: Rigid bodies' mass matrices (n, 6, 6) [kg, kg m, kg m2] about any origin.
-    Returns: Inertia (n, 3, 3) [kg m2].
-    """
+    """Inertia (n, 3, 3) [kg m2] about the centre of gravity, of rigid bodies' mass matrices (n, 6, 6) about any origin."""
     m = rigid[:, :1, :1]
     H = notation.hat(-inertias.vee(rigid[:, :3, 3:]) / m[:, 0])
     return np.asarray(rigid[:, 3:, 3:] + m * (H @ H))
 
 
 def shortage(rigid: np.ndarray) -> np.ndarray:
-    """The fraction of the largest principal inertia by which the other two sum to less than it.
-
-    rigid: Rigid bodies' mass matrices (n, 6, 6) [kg, kg m, kg m2].
-    Returns: Fractions (n,); 0 or below for what a rigid body can have.
-    """
+    """The part (n,) of the largest principal inertia by which the others sum to less than it; above 0 no rigid body has it."""
     small, middle, large = np.linalg.eigvalsh(about_center(rigid)).T
     return np.asarray(1.0 - (small + middle) / large)
 
 
 def impossible(rigid: np.ndarray, tolerance: float = 0.0) -> np.ndarray:
-    """Which mass matrices no rigid body has: two principal inertias sum to less than the third.
-
-    rigid: Mass matrices (n, 6, 6) [kg, kg m, kg m2].
-    Returns: Mask (n,), True for an impossible matrix.
-    """
+    """Mask (n,) of the mass matrices (n, 6, 6) that no rigid body has: two principal inertias sum to less than the third."""
     return shortage(rigid) > max(tolerance, ROUND_OFF)
 
 
 def inertia_blocks(p: Numbers) -> inertias.Blocks:
-    """Blocks of the mass matrix of body and added mass about the user's origin, each with a member for what varies in it.
-
-    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-    """
+    """Blocks of the mass matrix of body and added mass about the user's origin, each with a member for what varies in it."""
     if "vehicle.rigid_body_mass_matrix" in p:
         return inertias.blocks(p["vehicle.rigid_body_mass_matrix"] + p["vehicle.added_mass_matrix"])
     return inertias.Blocks(mass_matrix(p), np.zeros((1, 3, 3)), p["vehicle.inertia"])
 
 
 def mass_matrix(p: Numbers) -> np.ndarray:
-    """Mass and added mass of a vehicle whose mass matrix has no coupling.
-
-    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-    Returns: M (n, 3, 3) [kg].
-    """
+    """Mass and added mass (n, 3, 3) [kg] of a vehicle whose mass matrix has no coupling."""
     return np.asarray(p["vehicle.mass"][:, None, None] * np.eye(3) + p["vehicle.added_mass"])
 
 
 def inertia6(p: Numbers) -> np.ndarray:
-    """Mass matrix of body and added mass about the user's origin.
-
-    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-    Returns: I6 (n, 6, 6) [kg, kg m, kg m2], linear part first.
-    """
+    """Mass matrix (n, 6, 6) [kg, kg m, kg m2] of body and added mass about the user's origin, linear part first."""
     return inertias.joined(*inertia_blocks(p))
 
 
 def dry_mass(p: Numbers) -> np.ndarray:
-    """Mass of the rigid body.
-
-    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-    Returns: Mass (n,) [kg].
-    """
+    """Mass (n,) [kg] of the rigid body."""
     if "vehicle.rigid_body_mass_matrix" in p:
         return np.asarray(p["vehicle.rigid_body_mass_matrix"][:, 0, 0])
     return np.asarray(p["vehicle.mass"])
 
 
 def weight(p: Numbers) -> np.ndarray:
-    """Weight of the vehicle: as given, or mass times gravity.
-
-    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-    Returns: Weight (n,) [N].
-    """
+    """Weight (n,) [N] of the vehicle: as given, or mass times gravity."""
     if "vehicle.weight" in p:
         return np.asarray(p["vehicle.weight"])
     return dry_mass(p) * p["environment.gravity"]
 
 
 def displaced_mass(p: Numbers) -> np.ndarray:
-    """Mass of the displaced water: buoyancy over gravity, or without gravity the mass of a neutral vehicle.
-
-    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-    Returns: Mass (n,) [kg].
-    """
+    """Mass (n,) [kg] of the displaced water: buoyancy over gravity, or without gravity the mass of a neutral vehicle."""
     g = p["environment.gravity"]
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(g > 0.0, p["vehicle.buoyancy"] / g, dry_mass(p))
 
 
 def center_of_mass(p: Numbers) -> np.ndarray:
-    """Centre of the rigid body's mass, from the user's origin.
-
-    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-    Returns: Points (n, 3) [m] in body axes; zero, shape (1, 3), for a vehicle in the simple form.
-    """
+    """Centre of the rigid body's mass (n, 3) [m] from the user's origin; zero, (1, 3), for a vehicle in the simple form."""
     if "vehicle.rigid_body_mass_matrix" in p:
         rigid = p["vehicle.rigid_body_mass_matrix"]
         return np.asarray(-inertias.vee(rigid[:, :3, 3:]) / rigid[:, 0, 0, None])
@@ -373,10 +331,9 @@ def center_of_mass(p: Numbers) -> np.ndarray:
 
 
 def added_blocks(p: Numbers) -> inertias.Blocks:
-    """Added mass about the user's origin.
+    """Added mass about the user's origin, blocks of (1 or n, 3, 3) each.
 
-    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-    Returns: Its blocks, (1 or n, 3, 3) each; those of the coupling and of the rates are zero for a vehicle in the simple form.
+    Those of the coupling and of the rates are zero for a vehicle in the simple form.
     """
     if "vehicle.rigid_body_mass_matrix" in p:
         return inertias.blocks(p["vehicle.added_mass_matrix"])
@@ -384,8 +341,5 @@ def added_blocks(p: Numbers) -> inertias.Blocks:
 
 
 def lopsided(p: Numbers) -> bool:
-    """Whether some member's centre of mass is not the user's origin, or added mass couples velocities and rates there.
-
-    p: Parameters of the scene by name, each of shape (1, ...) or (n, ...).
-    """
+    """Whether some member's centre of mass is not the user's origin, or added mass couples velocities and rates there."""
     return bool(np.any(center_of_mass(p)) or np.any(added_blocks(p).C))

@@ -47,10 +47,9 @@ def columns_of(space: Space, key: str) -> range:
 def whole_columns(
     faults: Faults, names: Sequence[str], scene: Mapping[str, np.ndarray], by_label: Mapping[str, Any]
 ) -> dict[str, np.ndarray]:
-    """Select one column for each name from data given by label.
+    """Select one column (n,) for each name from data given by label; none after a fault.
 
     by_label: label -> (n,), or (n, *shape) of a whole number that the names hold the entries of.
-    Returns: Name -> column (n,); empty after a fault.
     """
     columns: dict[str, np.ndarray] = {}
     labels: list[str] = []
@@ -101,11 +100,7 @@ def _entries(
 
 
 def stacked(faults: Faults, key: str, names: Sequence[str], columns: Mapping[str, np.ndarray]) -> np.ndarray | None:
-    """Put the columns side by side in the order of the names.
-
-    columns: name -> column (n,).
-    Returns: Array (n, d); None after a fault.
-    """
+    """Put columns (n,) side by side in the order of the names, (n, d); None after a fault."""
     shapes = {name: columns[name].shape for name in names}
     if all(len(shape) == 1 for shape in shapes.values()) and len(set(shapes.values())) == 1:
         return np.column_stack([columns[name] for name in names])

@@ -51,12 +51,8 @@ class Draws:
 
     A member's numbers follow from its position in the whole ensemble alone.
 
-    explicit: arrays (whole, ...) by name; those of the start begin with "start.".
-    columns: what a table sets, with its values (whole, ...).
-    variations: what distributions draw.
-    space: the cube that the sampling fills.
-    whole: number of members of the whole ensemble.
-    places: (members,), positions of these members in it; None for all, in order.
+    explicit: arrays (total, ...) by name; those of the start begin with "start.". columns: what a table sets, (total, ...).
+    total: number of members of the whole ensemble. places: (members,), where these members are in it; None for all in order.
     """
 
     scene: SceneNumbers
@@ -65,7 +61,7 @@ class Draws:
     variations: Sequence[Variation]
     sampling: Sampling
     space: Space
-    whole: int
+    total: int
     places: np.ndarray | None = None
 
     def __getstate__(self) -> dict[str, Any]:
@@ -75,7 +71,7 @@ class Draws:
     @property
     def members(self) -> int:
         """Number of these members."""
-        return self.whole if self.places is None else len(self.places)
+        return self.total if self.places is None else len(self.places)
 
     @functools.cached_property
     def drawn_names(self) -> set[str]:
@@ -88,10 +84,9 @@ class Draws:
         return self.drawn_names | {target.name for target, _ in self.columns} | self.explicit.keys()
 
     def values(self, first: int, stop: int, start: bool = True) -> dict[str, np.ndarray]:
-        """The numbers of the members first to stop - 1 by name, with those of the start or without.
+        """The numbers of the members first to stop - 1 by name, with those of the start or without; shared ones are (1, ...).
 
-        Values that all members share have a leading dimension of 1. Those of few members are drawn once and kept: a run
-        reads them several times.
+        Those of few members are drawn once and kept: a run reads them several times.
         """
         if self.members > KEPT:
             return self._drawn(first, stop, start)
@@ -157,10 +152,7 @@ def _of_each(values: np.ndarray, members: int) -> np.ndarray:
 
 
 def draws_of(scene: SceneLike, settings: EnsembleSettings, explicit: Mapping[str, np.ndarray]) -> Draws:
-    """The draws that settings describe, or of members whose states are given; refuse what does not fit the scene.
-
-    explicit: arrays by name; empty where no states are given.
-    """
+    """The draws that settings describe, or of members whose states are given; refuse what does not fit the scene."""
     faults = Faults("ensemble.vary.")
     base, sampling = scene.parameters(), settings.sampling
     columns, designed = sampling.own_values(), sampling.distributions()
@@ -173,26 +165,23 @@ def draws_of(scene: SceneLike, settings: EnsembleSettings, explicit: Mapping[str
         faults.add(f'"{key}"', settings.vary[key], fault, "drop one of them")
     distributions = {**designed, **settings.vary}
     described = [variations.variation(faults, *item, known) for item in sorted(distributions.items())]
-    found = [variation for variation in described if variation]
+    drawing = [variation for variation in described if variation]
     tables = Faults("ensemble.sampling.table.")
     in_table = {key: _column(tables, key, column, known) for key, column in columns.items()}
-    named = [(variation.key, variation.targets) for variation in found]
+    named = [(variation.key, variation.targets) for variation in drawing]
     variations.clashes(faults, [*named, *((key, (pair[0],)) for key, pair in in_table.items() if pair)])
     with faults.including():
         tables.raise_if_any()
     faults.raise_if_any()
     seed = int(settings.seed)
-    space = variations.space(seed, found)
-    whole = counted(sampling, space, settings.members)
+    space = variations.space(seed, drawing)
+    total = counted(sampling, space, settings.members)
     numbers = SceneNumbers(base, start)
-    return Draws(numbers, explicit, [pair for pair in in_table.values() if pair], found, sampling, space, whole)
+    return Draws(numbers, explicit, [pair for pair in in_table.values() if pair], drawing, sampling, space, total)
 
 
 def _turned_by_matrix(faults: Faults, start: dict[str, Any], keys: Sequence[str]) -> dict[str, Any]:
-    """The start with its attitude as a matrix, whatever form it has, if the attitude itself varies.
-
-    keys: names of all that varies.
-    """
+    """The start with its attitude as a matrix, whatever form it has, if the attitude itself is among what varies."""
     names = {target.name for key in keys for target in variations.targets(key)}
     if variations.ATTITUDE not in names:
         return start
@@ -221,17 +210,14 @@ def _column(tables: Faults, key: str, column: Any, known: Mapping[str, np.ndarra
 
 
 def counted(sampling: Sampling, space: Space, members: int | None) -> int:
-    """The number of members; raise SceneError for a number that the sampling cannot have.
-
-    members: as asked for; None for what the sampling has.
-    """
+    """The number of members: as asked for, or None for what the sampling has; raise SceneError where it cannot have it."""
     faults = Faults("ensemble.")
     designed, group = sampling.own_members(space), sampling.group_size(space)
-    whole = int(members or designed or group)
-    if whole > MOST_MEMBERS:
+    total = int(members or designed or group)
+    if total > MOST_MEMBERS:
         problem = f"are more members than the {MOST_MEMBERS} that there can be"
-        faults.add(f"sampling.{sampling.kind}", whole, problem, "give fewer values, of fewer names")
+        faults.add(f"sampling.{sampling.kind}", total, problem, "give fewer values, of fewer names")
     else:
-        sampling.check(faults, space, whole)
+        sampling.check(faults, space, total)
     faults.raise_if_any()
-    return whole
+    return total

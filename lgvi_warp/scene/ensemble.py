@@ -235,10 +235,7 @@ class Ensemble(Summarized):
         return PhysicalChecks(self.scene, varied, self._draws.drawn_names, self.members)
 
     def _check_physical(self, before: bool = False) -> None:
-        """Refuse unphysical members, unless that was done before.
-
-        Members that are drawn are looked at up to SURVEYED; a run looks at the others as it comes to them.
-        """
+        """Refuse unphysical members up to SURVEYED of those that are drawn; a run looks at the others as it comes to them."""
         checks, draws = self._checks(), self._draws
         all_of_them = draws.explicit or draws.columns or not checks.varied
         self.checked = self.members if all_of_them else min(self.members, SURVEYED)
@@ -368,7 +365,7 @@ class Ensemble(Summarized):
             SceneError: If a member is unphysical.
         """
         pairs = [(target, columns[target.label]) for target, _ in self._draws.columns]
-        ensemble = self._drawing(columns=pairs, whole=len(pairs[0][1]), places=None)
+        ensemble = self._drawing(columns=pairs, total=len(pairs[0][1]), places=None)
         ensemble._indices = None
         ensemble._check_physical()
         return ensemble
@@ -385,8 +382,8 @@ class Ensemble(Summarized):
         """
         numbers = SceneNumbers(scene.parameters(), self._draws.scene.start)
         shared = ((name, numbers.parameters[name]) for name in by_member)
-        whole = self._draws.whole
-        columns = [(Target(name), np.broadcast_to(value, (whole, *np.shape(value)))) for name, value in shared]
+        total = self._draws.total
+        columns = [(Target(name), np.broadcast_to(value, (total, *np.shape(value)))) for name, value in shared]
         ensemble = self._drawing(scene=numbers, columns=[*self._draws.columns, *columns])
         ensemble.scene = scene
         return ensemble
@@ -410,11 +407,11 @@ class Ensemble(Summarized):
         if members is None:
             ensemble = self._drawing(space=space)
         else:
-            if draws.explicit and members != draws.whole:
-                fault = f"are drawn, where the states of {draws.whole} are given"
+            if draws.explicit and members != draws.total:
+                fault = f"are drawn, where the states of {draws.total} are given"
                 raise refusal("members", members, fault, "leave members out")
-            whole = counted(draws.sampling, space, settings.members)
-            ensemble = self._drawing(space=space, whole=whole, places=None)
+            total = counted(draws.sampling, space, settings.members)
+            ensemble = self._drawing(space=space, total=total, places=None)
             ensemble._indices = None
         ensemble.seed = new_seed
         ensemble._check_physical()
@@ -451,7 +448,7 @@ class Ensemble(Summarized):
             holds, and "indices" if they were set. Empty if there are none of these.
         """
         indices = {} if self._indices is None else {"indices": np.asarray(self._indices, dtype=np.int64)}
-        sampled = {name: values[: self._draws.whole] for name, values in self.sampling.arrays().items()}
+        sampled = {name: values[: self._draws.total] for name, values in self.sampling.arrays().items()}
         return dict(self._draws.explicit) | sampled | indices
 
     def to_dict(self) -> dict[str, Any]:
@@ -462,7 +459,7 @@ class Ensemble(Summarized):
             that were given as arrays.
         """
         explicit = self._draws.explicit
-        content = section(self._draws.whole, self.seed, self.vary, self.sampling, self._draws.places)
+        content = section(self._draws.total, self.seed, self.vary, self.sampling, self._draws.places)
         return content | ({"explicit": sorted(explicit)} if explicit else {})
 
 

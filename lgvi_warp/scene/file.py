@@ -33,22 +33,16 @@ def tables_and_text(
 def tables_of_text(
     text: str, overrides: Mapping[str, Any] | None = None, name: str = "scene", folder: Path | None = None
 ) -> dict[str, Any]:
-    """Read the tables of the text of a scene file (TOML).
-
-    folder: Folder that relative paths in the text refer to; None for the current one (default).
-    """
+    """Read the tables of the text of a scene file (TOML), whose relative paths refer to a folder."""
     content = parsed(text, name)
-    given = {} if overrides is None else mapping_of("overrides", overrides, "dotted keys to values")
-    for key, value in given.items():
+    replaced = {} if overrides is None else mapping_of("overrides", overrides, "dotted keys to values")
+    for key, value in replaced.items():
         override(content, key, value)
     return _files_in(folder, content) if folder else content
 
 
 def _files_in(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
-    """Return the content with the paths of files that it names, where they are relative, put below the folder.
-
-    These are a table of members, the policies of a controller, and the mesh of a vehicle.
-    """
+    """Put relative paths of files that the content names below the folder: a table of members, policies, and a mesh."""
     try:
         ensemble = content["ensemble"]
         sampling = ensemble["sampling"]

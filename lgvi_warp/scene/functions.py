@@ -17,31 +17,25 @@ from lgvi_warp.statistics.values.quantity import Quantity
 
 
 class Own(NamedTuple):
-    """A function or a class of the user's.
-
-    version: what the user says it is; None where nothing is said.
-    """
+    """A function or a class of the user's, and its version by the user; None where nothing is said."""
 
     function: Any
     version: Any
 
 
 def functions_of(fleet: Ensemble | None, statistics: Iterable[Statistic] = ()) -> dict[str, Own]:
-    """List the user's functions and classes that a run depends on, which no table can hold.
-
-    fleet: the members; None for statistics alone.
-    """
-    found = {} if fleet is None else dict(_of_fleet(fleet))
+    """List the user's functions and classes that a run, or statistics alone, depends on, which no table can hold."""
+    functions = {} if fleet is None else dict(_of_fleet(fleet))
     for i, statistic in enumerate(statistics):
         version = getattr(statistic, "version", None)
         place = f"statistics[{i}] {statistic.key}"
-        found |= {f"{place}{part}": Own(function, version) for part, function in _of_statistic(statistic)}
-    return found
+        functions |= {f"{place}{part}": Own(function, version) for part, function in _of_statistic(statistic)}
+    return functions
 
 
 def identities(functions: dict[str, Own]) -> dict[str, str]:
     """Return which functions these are, by place."""
-    return {place: identity(*own) for place, own in functions.items()}
+    return {place: identity(*function) for place, function in functions.items()}
 
 
 class ToldApart:
@@ -57,9 +51,9 @@ class ToldApart:
         parts = (function.__self__, function.__func__) if isinstance(function, MethodType) else (function,)
         key = (*map(id, parts), own_function.version)
         if key not in self._names:
-            what = identity(*own_function)
-            number = sum(known == what for _, (known, _) in self._names.values())
-            self._names[key] = own_function, (what, number)
+            text = identity(*own_function)
+            number = sum(known == text for _, (known, _) in self._names.values())
+            self._names[key] = own_function, (text, number)
         return self._names[key][1]
 
 

@@ -25,11 +25,7 @@ def given_members(
     angular_velocity: Any,
     parameters: Any,
 ) -> tuple[int, dict[str, np.ndarray]]:
-    """The arguments of `Ensemble.from_states`, read and checked.
-
-    base: parameters of the scene by name.
-    Returns: The number n of members, and by name, with "start." before those of the states, arrays (n, ...).
-    """
+    """The arguments of `Ensemble.from_states` as the number n of members and arrays (n, ...) by name; states as "start."."""
     faults = Faults()
     states = dict(zip(FIELDS, (position, attitude, velocity, angular_velocity), strict=True))
     explicit = {f"start.{key}": _state(faults, key, value) for key, value in states.items()}
@@ -53,7 +49,7 @@ def given_members(
 
 
 def _state(faults: Faults, key: str, value: Any) -> np.ndarray:
-    """Return a copy of a state in float64, which may hold NaN; later changes of the argument do not reach the ensemble.
+    """A copy of a state in float64, which may hold NaN; later changes of the argument do not reach the ensemble.
 
     A data frame's columns may be called position[0], position[1], position[2], in any order.
     """
@@ -74,17 +70,17 @@ def _numbers(faults: Faults, key: str, value: Any) -> np.ndarray:
     return np.empty(0) if array is None else array
 
 
-def _given_parameters(faults: Faults, base: Mapping[str, np.ndarray], given: Any, n: int) -> dict[str, np.ndarray]:
+def _given_parameters(faults: Faults, base: Mapping[str, np.ndarray], arrays: Any, n: int) -> dict[str, np.ndarray]:
     """Return arrays (n, *shape) by name, from parameters given whole or by their entries."""
-    if given is None or (isinstance(given, Mapping) and not given):
+    if arrays is None or (isinstance(arrays, Mapping) and not arrays):
         return {}
-    if not is_labelled(given):
+    if not is_labelled(arrays):
         remedy = 'give {"vehicle.mass": array, ...} or a DataFrame with such names'
-        faults.add("parameters", given, "has no names", remedy)
+        faults.add("parameters", arrays, "has no names", remedy)
         return {}
     parameters: dict[str, np.ndarray] = {}
     named = []
-    for key, column in columns_by_name(faults, "parameters", given).items():
+    for key, column in columns_by_name(faults, "parameters", arrays).items():
         (target, *more) = variations.targets(key)
         if more or target.name not in base:
             faults.keys("", {key: column}, base)

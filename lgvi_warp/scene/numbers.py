@@ -22,11 +22,7 @@ SETTINGS = ("controller.period", "run.step", "run.duration")
 
 
 def with_numbers(scene: SceneT, numbers: Mapping[str, Any]) -> SceneT:
-    """Return a scene with other numbers.
-
-    numbers: values by name, as scene.parameters() lists them; also "start.position", "controller.period", "run.step" and
-        "run.duration", and single entries, "drag.quadratic[0]".
-    """
+    """Return a scene with other numbers, by names as `Scene.with_numbers` has them."""
     base, faults = scene.parameters(), Faults()
     changes: dict[str, dict[str, Any]] = {}
     for name, value in mapping_of("numbers", numbers, "names to numbers").items():
@@ -42,15 +38,15 @@ def with_numbers(scene: SceneT, numbers: Mapping[str, Any]) -> SceneT:
             place[attribute] = value
             continue
         start = scene.start.given().get(attribute) if key == "start" else base[target.name]
-        whole = np.array(place.get(attribute, start), dtype=np.float64)
+        array = np.array(place.get(attribute, start), dtype=np.float64)
         try:
-            whole[target.index] = value
+            array[target.index] = value
         except (IndexError, ValueError, TypeError):
             faults.add(
-                f'"{name}"', value, f"is no number of {target.name}, of shape {whole.shape}", "give one that there is"
+                f'"{name}"', value, f"is no number of {target.name}, of shape {array.shape}", "give one that there is"
             )
             continue
-        place[attribute] = whole
+        place[attribute] = array
     faults.raise_if_any()
     return _changed(scene, changes)
 

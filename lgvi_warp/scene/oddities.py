@@ -23,21 +23,18 @@ class Odd:
 class Oddities:
     """Odd values by quantity; `a | b` joins those of members `a` with those of members `b` after them."""
 
-    found: Mapping[str, Odd]
+    by_name: Mapping[str, Odd]
 
-    def __or__(self, other: Oddities) -> Oddities:
-        joined = dict(self.found)
-        for key, odd in other.found.items():
+    def __or__(self, later: Oddities) -> Oddities:
+        joined = dict(self.by_name)
+        for key, odd in later.by_name.items():
             earlier = joined.get(key)
             joined[key] = odd if earlier is None else replace(earlier, count=earlier.count + odd.count)
         return Oddities(joined)
 
     def messages(self, members: int, most: int | None = None) -> tuple[str, ...]:
-        """Return one sentence for each odd quantity.
-
-        most: Number of members that were looked at; None for all (default).
-        """
-        return tuple(f"{key}: {odd.text}{_whose(odd, members, most)}" for key, odd in self.found.items())
+        """Return one sentence for each odd quantity; `most` members were looked at, None for all."""
+        return tuple(f"{key}: {odd.text}{_whose(odd, members, most)}" for key, odd in self.by_name.items())
 
 
 def _whose(odd: Odd, members: int, most: int | None) -> str:
@@ -56,8 +53,7 @@ OddityCheck = tuple[str, np.ndarray, Callable[[int], str]]
 def gathered(checked: Iterable[OddityCheck], first: int, stop: int) -> Oddities:
     """Count the odd values of the members first to stop - 1.
 
-    checked: For each check the name of a quantity, the members that are odd (1,) or (n,), and the text about one member. Where
-        several checks bear one name, the first that finds an odd member counts.
+    Where several checks bear one name, the first that finds an odd member counts.
     """
     odd_by_name: dict[str, Odd] = {}
     for key, odd, text in checked:

@@ -42,9 +42,7 @@ def _odd_entry(value: Any) -> tuple[str, Any]:
 class PhysicalChecks:
     """The checks of an ensemble, which raise SceneError where a member is unphysical, and name the first such member.
 
-    varied: names of the parameters that vary, which alone are looked at.
-    drawn: names of what distributions draw.
-    members: number of all members.
+    Only parameters that vary are looked at; a fault of those that are drawn says so.
     """
 
     scene: SceneLike
@@ -53,10 +51,7 @@ class PhysicalChecks:
     members: int
 
     def of_members(self, parameters: Callable[[int, int], Mapping[str, np.ndarray]], count: int) -> None:
-        """Look at the first members, at so few at a time that memory stays small.
-
-        parameters: of the members from first to stop - 1.
-        """
+        """Look at the first members by the parameters from first to stop - 1, at so few at a time that memory stays small."""
 
         def look(first: int, stop: int) -> dict[str, Unphysical]:
             with np.errstate(over="ignore", invalid="ignore"):

@@ -19,7 +19,6 @@ from lgvi_warp.physics import vehicle as vehicles
 from lgvi_warp.physics.terms.base import Term, own
 from lgvi_warp.physics.terms.control_fins import ControlFins
 from lgvi_warp.physics.terms.cross_flow import CrossFlow
-from lgvi_warp.physics.terms.wrench import holds
 from lgvi_warp.sampling.members import Members
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.like import SceneLike
@@ -74,10 +73,7 @@ def _text(template: str, *numbers: np.ndarray) -> Callable[[int], str]:
 
 
 def net_weight(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for a net weight that hardly any vehicle has.
-
-    p: Parameters by name, (1, ...) or (n, ...).
-    """
+    """Look for a net weight that hardly any vehicle has."""
     weight, buoyancy = np.broadcast_arrays(vehicles.weight(p), p["vehicle.buoyancy"])
     net = weight - buoyancy
 
@@ -90,20 +86,14 @@ def net_weight(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
 
 
 def density(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for a density that water cannot have.
-
-    p: Parameters by name, (1, ...) or (n, ...).
-    """
+    """Look for a density that water cannot have."""
     rho = p["environment.water_density"]
     odd = (rho < LIMITS["light water"].value) | (rho > LIMITS["heavy water"].value)
     yield "environment.water_density", odd, _text("{:.6g} kg/m3 is not water, which has 1,000 or more: a unit?", rho)
 
 
 def currents(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for currents that are faster than any tide.
-
-    p: Parameters by name, (1, ...) or (n, ...).
-    """
+    """Look for currents that are faster than any tide."""
     for term in scene.terms:
         field = CURRENTS.get(term.type)
         if field is None:
@@ -114,16 +104,13 @@ def currents(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
 
 
 def fin_angles(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for fins that turn beyond 90 degrees, by their limit or by their command.
-
-    p: Parameters by name, (1, ...) or (n, ...).
-    """
+    """Look for fins that turn beyond 90 degrees, by their limit or by their command."""
     for term in scene.terms:
         if not isinstance(term, ControlFins):
             continue
         angles = {"limit": p[f"{term.key}.limit"]}
         if not term.driver:
-            field = "command" if holds(term) else "command_schedule"
+            field = "command" if term.holds else "command_schedule"
             angles[field] = p[f"{term.key}.{field}"]
         for field, values in angles.items():
             angle = np.abs(values).reshape(len(values), -1).max(axis=1)
@@ -133,9 +120,7 @@ def fin_angles(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
 def depths(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     """Look for depths above the surface: most likely they are heights.
 
-    p: Parameters by name, (1, ...) or (n, ...).
-    Yields: Name of the quantity, mask of the odd members, and the text about one of them. A table of depths is odd if it
-        begins above the surface and holds no depth below it.
+    A table of depths is odd if it begins above the surface and holds no depth below it.
     """
     for term in scene.parts:
         field = DEPTHS.get(term.type)
@@ -152,8 +137,6 @@ def inertia(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
     The length is that of the stations of a cross flow. Within a length L along x and a breadth D, the variance of a
     coordinate is at most a quarter of its range squared (Popoviciu 1935), so that the rigid body's inertia is at most
     m (L^2 + D^2)/4. Added inertia is that of strips: at most the added mass times the largest distance squared.
-
-    p: Parameters by name, (1, ...) or (n, ...).
     """
     for term in scene.terms:
         if isinstance(term, CrossFlow):
@@ -183,10 +166,7 @@ def _diagonal(matrices: np.ndarray) -> np.ndarray:
 
 
 def actuators(scene: SceneLike, p: Numbers) -> Iterator[OddityCheck]:
-    """Look for components of a force or a moment that a controller asks for, and its actuators cannot make.
-
-    p: Parameters by name, (1, ...) or (n, ...).
-    """
+    """Look for components of a force or a moment that a controller asks for, and its actuators cannot make."""
     missing = () if scene.controller is None else scene.controller.unspanned
     text = f"actuators cannot make {', '.join(missing)} as the laws ask: what is left is told back to them as not delivered"
     yield "controller.allocation", np.array([bool(missing)]), lambda i: text
@@ -203,11 +183,7 @@ def of_numbers(
     stop: int,
     once: Callable[[Any, Any, Callable[[Any], Any]], Any] = lambda key, numbers, compute: compute(numbers),
 ) -> Oddities:
-    """Return the odd parameters of some members.
-
-    once: Function of a key, numbers and a computation of them, which may remember what all members share; by default it
-        computes each time.
-    """
+    """Return the odd parameters of some members; `once` may remember computations of what all members share."""
     with np.errstate(all="ignore"):
         checked = [once(check, p, functools.partial(_checked, check, scene)) for check in OF_NUMBERS]
         return gathered(itertools.chain(*checked), first, stop)
@@ -250,10 +226,7 @@ def _of_start(scene: SceneLike, members: Members) -> Iterator[OddityCheck]:
 
 
 def own_flows(scene: SceneLike) -> list[Term]:
-    """Return the user-defined terms that move the water.
-
-    Waves are left out, too: in waves, water may be faster than in any current.
-    """
+    """The user-defined terms that move the water. Waves are left out, too: in them water may be faster than in any current."""
     known = (*CURRENTS, "waves")
     return [term for term in scene.terms if term.type not in known and type(term).water is not Term.water]
 
@@ -265,7 +238,7 @@ def ends_at_the_surface(scene: SceneLike) -> bool:
 
 
 def on_the_way(scene: SceneLike, samples: Mapping[str, np.ndarray]) -> Oddities:
-    """Return what became odd of members that began well, by samples that are in memory anyway.
+    """What became odd of members that began well, by samples that are in memory anyway.
 
     samples: "position" and "velocity", (k, n, 3) [m, m/s], of which the first is the start.
     """

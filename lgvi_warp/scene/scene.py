@@ -148,18 +148,16 @@ class Scene(Summarized):
         parts = () if self.controller is None else self.controller.parts
         keys = [term.key for term in (*self.terms, *self.events, *parts)]
         counts = Counter(keys)
-        for key in sorted({part.key for part in parts}):
-            if folded(key) in (*terms.RESERVED, "controller"):
-                faults.add("controller", key, "is the name of a section of the scene", f'write name = "{key}_part"')
-            elif counts[key] > 1:
-                faults.add("controller", key, "is the name of two parts or of a term too",
-                           f'give each a name of its own: name = "{key}_2"')  # fmt: skip
-        for key in sorted({event.key for event in self.events}):
-            if folded(key) in terms.RESERVED:
-                faults.add("events", key, "is the name of a section of the scene", f'write name = "{key}_event"')
-            elif counts[key] > 1:
-                faults.add("events", key, "is the name of two events or of a term too",
-                           f'give each a name of its own: name = "{key}_2"')  # fmt: skip
+        for place, word, named, reserved in (
+            ("controller", "part", parts, (*terms.RESERVED, "controller")),
+            ("events", "event", self.events, terms.RESERVED),
+        ):
+            for key in sorted({thing.key for thing in named}):
+                if folded(key) in reserved:
+                    faults.add(place, key, "is the name of a section of the scene", f'write name = "{key}_{word}"')
+                elif counts[key] > 1:
+                    faults.add(place, key, f"is the name of two {word}s or of a term too",
+                               f'give each a name of its own: name = "{key}_2"')  # fmt: skip
         for first, second in alike(keys):
             problem = f"is the same folder as {first!r} on file systems that do not tell capitals apart"
             faults.add("terms and events", second, problem, f'give each a name of its own: name = "{second}_2"')

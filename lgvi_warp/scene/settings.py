@@ -27,11 +27,7 @@ KEEP = ("all", "none", "failed")
 
 
 def check_keep(faults: Faults, key: str, keep: Any, members: int | None = None) -> None:
-    """Check which members' samples are to be kept, and note what is wrong.
-
-    keep: "all", "none", "failed" (members that failed, not those that an event stopped), or indices of members.
-    members: Number of members, which every index must be below; None if it is not known yet (default).
-    """
+    """Check which members' samples are to be kept, some of KEEP or indices below the members; note what is wrong."""
     if isinstance(keep, str):
         faults.choice(key, keep, KEEP)
         return
@@ -116,18 +112,7 @@ class RunSettings:
         faults.raise_if_any()
 
     def method_of(self, name: str | None = None) -> Method:
-        """Return the integration method of this section, or another one by name.
-
-        Args:
-            name: Name of a method. None (default), or the name in this section, "psi_s" if it has none, gives the method with
-                the options in this section; any other name gives that method with its defaults.
-
-        Returns:
-            The method.
-
-        Raises:
-            SceneError: If the name is not known or an option does not fit the method.
-        """
+        """The method of this section, "psi_s" if it has none, with the options here; of another name, with its defaults."""
         set_here = Method.name if self.method is None else self.method
         if name is not None and not among(name, (set_here,)):
             return Method(name)
@@ -140,11 +125,7 @@ class RunSettings:
         return {key: value for key, value in options.items() if value is not None}
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the section [run] of a scene file.
-
-        Returns:
-            dtype and every setting that differs from its default, by name.
-        """
+        """The section [run] of a scene file: dtype and every setting that differs from its default, by name."""
         names = {"dtype"}
         for setting in fields(self):
             value = getattr(self, setting.name)
@@ -199,22 +180,14 @@ class EnsembleSettings:
         faults.raise_if_any()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the section [ensemble] of a scene file.
-
-        Returns:
-            The seed and every setting that differs from its default, by name.
-        """
+        """The section [ensemble] of a scene file: the seed and every setting that differs from its default, by name."""
         return section(self.members, self.seed, self.vary, self.sampling, self.indices)
 
 
 def section(
     members: int | None, seed: int, vary: Mapping[str, Any], sampling: Sampling, indices: Any
 ) -> dict[str, Any]:
-    """Write the section [ensemble] of a scene file from settings that were checked.
-
-    members: Number of members; None where the sampling says it.
-    indices: Indices of the members; None for all.
-    """
+    """Write the section [ensemble] of a scene file from settings that were checked."""
     content: dict[str, Any] = {} if members is None else {"members": int(members)}
     content["seed"] = int(seed)
     if vary:

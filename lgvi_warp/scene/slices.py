@@ -11,10 +11,10 @@ from lgvi_warp.common import machine
 
 # Members that are checked together: some tens of megabytes per thread.
 AT_ONCE = 16_384
-Found = TypeVar("Found")
+Finding = TypeVar("Finding")
 
 
-def over_members(look: Callable[[int, int], Found], members: int) -> list[Found]:
+def over_members(look: Callable[[int, int], Finding], members: int) -> list[Finding]:
     """Apply a function to all members, some at a time so that memory stays small, on all cores."""
     firsts = range(0, members, AT_ONCE)
     if len(firsts) < 2:

@@ -141,12 +141,7 @@ class Start:
 
 
 def resolve_attitude(values: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Return the attitude as matrices, from whichever form is given.
-
-    values: Start values by name, one attitude among them: "attitude" (n, 3, 3), "quaternion_wxyz" (n, 4), "euler_deg" (n, 3)
-        [deg] or "rotation_vector" (n, 3) [rad].
-    Returns: R (n, 3, 3), body to inertial.
-    """
+    """R (n, 3, 3), body to inertial, from start values (n, ...) by name, of which one is an attitude in any form."""
     if "attitude" in values:
         return np.asarray(values["attitude"])
     if "quaternion_wxyz" in values:

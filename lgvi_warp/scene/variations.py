@@ -34,10 +34,7 @@ RIGID = ("vehicle.inertia", "vehicle.rigid_body_mass_matrix")
 
 @dataclass(frozen=True)
 class Target:
-    """A number of the scene, or one entry of it.
-
-    index: Index of the entry; None for the whole number (default).
-    """
+    """A number of the scene, or the entry of it that has an index."""
 
     name: str
     index: tuple[int, ...] | None = None
@@ -109,11 +106,7 @@ class Variation:
         return [Target(target.name, tuple(int(i) for i in entry)).label for entry in entries]
 
     def values(self, u: np.ndarray) -> list[tuple[Target, np.ndarray]]:
-        """Return the values of the targets at points of the unit cube.
-
-        u: Levels in (0, 1), (n, size).
-        Returns: For each target the target and its values (n, *shape).
-        """
+        """The targets, each with its values (n, *shape) at points (n, size) of the unit cube."""
         bases = self.bases
         if self.distribution.joint:
             drawn = self.distribution.draw(u, bases)
@@ -126,28 +119,19 @@ class Variation:
 
 
 def diagonal(matrix: np.ndarray) -> bool:
-    """Return whether all entries off a matrix's diagonal are zero.
-
-    matrix: A square matrix (d, d).
-    """
+    """Return whether all entries off a square matrix's diagonal are zero."""
     return not np.any(matrix - np.diag(np.diag(matrix)))
 
 
 def drawn_entries(matrix: np.ndarray) -> np.ndarray:
-    """Return the entries of a symmetric matrix that vary.
-
-    matrix: A symmetric matrix (d, d).
-    Returns: The diagonal (d,) of a diagonal matrix; else the upper triangle (d (d + 1)/2,), row by row.
-    """
+    """The entries of a symmetric matrix (d, d) that vary: its diagonal if it is diagonal, else the upper triangle by rows."""
     return np.diag(matrix) if diagonal(matrix) else matrix[np.triu_indices(len(matrix))]
 
 
 def symmetric(drawn: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Build symmetric matrices from the entries that vary.
+    """Symmetric matrices (n, d, d) from entries (n, k) in the order of `drawn_entries`.
 
-    drawn: Entries (n, k), in the order of `drawn_entries`.
     matrix: The scene's matrix (d, d), which decides whether they are diagonal.
-    Returns: Matrices (n, d, d).
     """
     size = len(matrix)
     if diagonal(matrix):
@@ -159,11 +143,7 @@ def symmetric(drawn: np.ndarray, matrix: np.ndarray) -> np.ndarray:
 
 
 def put(values: dict[str, np.ndarray], target: Target, drawn: np.ndarray) -> None:
-    """Set the values of a target among the numbers by name, in place.
-
-    values: Arrays by name, (1, ...) or (n, ...); changed in place.
-    drawn: Values (n, ...).
-    """
+    """Set the values (n, ...) of a target among the numbers (1 or n, ...) by name, in place."""
     if target.index is None:
         values[target.name] = drawn
         return
@@ -213,10 +193,7 @@ ROTATIONS = (
 
 
 def variation(faults: Faults, key: str, distribution: Any, known: Mapping[str, np.ndarray]) -> Variation | None:
-    """Match a key of `vary` and its distribution with a scene, and note what is wrong.
-
-    Returns: The variation; None if anything is wrong.
-    """
+    """Match a key of `vary` and its distribution with a scene; None after noting what is wrong."""
     if not isinstance(distribution, Distribution):
         remedy = (
             "give lw.distributions.Normal(std=...) or another, or an object with ppf(u), such as scipy.stats.gamma(2.0)"

@@ -83,7 +83,7 @@ def from_dict(table: Any) -> Until:
 
 
 @dataclass
-class Watch:
+class StoppingRule:
     """A stopping rule bound to the statistics of a run.
 
     doubling: whether to look at powers of two of members only; by default False. With replicates a design is balanced there,
@@ -132,7 +132,7 @@ class Watch:
         return float(np.max(np.where(np.isnan(half), np.inf, half)))
 
 
-def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> Watch:
+def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> StoppingRule:
     """Bind a stopping rule to the statistics of a run; a mean that is not among them is added.
 
     times: (k,) [s], the sample times of the run.
@@ -152,7 +152,7 @@ def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> W
     assert target is not None
     if target[0].type in ("extremes", "each"):
         raise refusal("until.statistic", until.statistic, "has no interval", "watch a quantile")
-    return Watch(until, *target, rows)
+    return StoppingRule(until, *target, rows)
 
 
 Named = tuple[Statistic, str, dict[str, int]]

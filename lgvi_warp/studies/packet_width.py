@@ -28,7 +28,7 @@ H, STEPS, MEMBERS, ROUNDS = 0.01, 128, 512, 20
 WORTH = 0.03
 
 
-class Reading(NamedTuple):
+class WidthSpeeds(NamedTuple):
     """Speeds of one kind of kernel: width -> time per vehicle and step [ns], the width of the table, and the fastest."""
 
     kernel: str
@@ -40,7 +40,7 @@ class Reading(NamedTuple):
 def calibrate(
     rounds: int = ROUNDS, *, prepare: Callable[[Plan], Callable[[], None]] = speed.stepper,
     clock: Callable[[], float] = time.perf_counter, register_width: Callable[[str], int] = machine.register_width,
-) -> Iterator[Reading]:  # fmt: skip
+) -> Iterator[WidthSpeeds]:  # fmt: skip
     """Measure every kind of kernel at every width that may suit this machine; of its readings the least counts."""
     for kernel in widths.KERNELS:
         kind, dtype = widths.parts(kernel)
@@ -56,4 +56,4 @@ def calibrate(
         before = widths.of_table(kind, dtype).lanes
         fastest = min(ns, key=lambda width: ns[width])
         better = ns[fastest] < (1.0 - WORTH) * ns[before]
-        yield Reading(kernel, ns, before, fastest if better else before)
+        yield WidthSpeeds(kernel, ns, before, fastest if better else before)

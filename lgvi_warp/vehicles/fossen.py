@@ -42,16 +42,18 @@ def vehicle_names() -> list[str]:
 
     Returns:
         Names in alphabetical order.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.vehicles.names()
+        ['bluerov2_heavy', 'nordkvist_sanyal', 'remus_100', 'sphere', 'torpedo']
     """
     folder = resources.files("lgvi_warp.vehicles")
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
 def vehicle_file(name: str) -> Path:
-    """Return the path of a vehicle's file.
-
-    Returns: Path of a TOML file in the scene file's form, with a table [source].
-    """
+    """Return the path of a vehicle's TOML file in the scene file's form, with a table [source]."""
     if name not in (known := vehicle_names()):
         raise SceneError([f"vehicle file {name!r}: is not known; {closest(name, known)}"])
     return Path(str(resources.files("lgvi_warp.vehicles") / f"{name}.toml"))
@@ -71,19 +73,11 @@ class Coefficients:
 
     Drag is force_i = -(l_ij + q_ij |v_j|) v_j - u f_ij v_j, with u the speed ahead.
 
-    mass: Mass [kg].
-    inertia: Inertia (3, 3) [kg m2] about the centre of gravity.
-    center_of_gravity: Position (3,) [m] from the body origin.
-    center_of_buoyancy: Position (3,) [m] from the body origin.
-    weight: Weight [N].
-    buoyancy: Buoyancy [N].
-    added_mass: Added mass (6, 6) [kg, kg m, kg m2], positive; by default zero.
-    linear: Linear drag l (6, 6) [N s/m, N s, N m s]; by default zero.
-    quadratic: Quadratic drag q (6, 6) [N s2/m2, N s2/m, N s2, N m s2]; by default zero.
-    forward: Drag in proportion to the speed ahead, f (6, 6), in the units of `quadratic`; by default zero.
-    current: Velocity (3,) [m/s] of the water, north, east, down; by default zero.
-    gravity: Acceleration of free fall [m/s2] that the forces were found with; None if unknown (default).
-    water_density: Density of the water [kg/m3]; None if unknown (default).
+    mass [kg]; inertia (3, 3) [kg m2] about the centre of gravity; both centres (3,) [m] from the body origin; both forces [N].
+    added_mass: (6, 6) [kg, kg m, kg m2], positive; zero by default, as are drag and current.
+    linear: l (6, 6) [N s/m, N s, N m s]. quadratic, forward: q and f (6, 6) [N s2/m2, N s2/m, N s2, N m s2].
+    current: Velocity (3,) [m/s] of the water, north, east, down.
+    gravity: Acceleration of free fall [m/s2] that the forces were found with. water_density: [kg/m3]. None if unknown.
     """
 
     mass: float | None
@@ -139,10 +133,7 @@ class Coefficients:
         return [f"{problem}: the vehicle turns upside down; check both, and that z is down"]
 
     def terms(self) -> list[dict[str, Any]]:
-        """Return the terms of drag, lift and current, without those that are zero.
-
-        Drag is a term "drag" where its matrices are diagonal, else a term "drag_matrix".
-        """
+        """The terms that are not zero: "drag" of diagonal matrices, else "drag_matrix"; lift and current."""
         terms: list[dict[str, Any]] = []
         pair = (self.linear, self.quadratic)
         if any(np.any(matrix) for matrix in pair):
@@ -158,21 +149,12 @@ class Coefficients:
 
 
 def as_lists(value: Any) -> Any:
-    """Convert an array to lists of floats, with 0.0 in place of -0.0.
-
-    Returns: A float, or nested lists of the same shape.
-    """
+    """Convert an array to nested lists of floats, with 0.0 in place of -0.0."""
     return (np.asarray(value) + 0.0).tolist()
 
 
 def rigid_body_matrix(mass: float, inertia: np.ndarray, center: np.ndarray) -> np.ndarray:
-    """Return the rigid body's mass matrix about the body origin.
-
-    mass: Mass [kg].
-    inertia: Inertia (3, 3) [kg m2] about the centre of gravity.
-    center: Centre of gravity (3,) [m] from the body origin.
-    Returns: M_RB (6, 6) [kg, kg m, kg m2].
-    """
+    """M_RB (6, 6) [kg, kg m, kg m2] about the body origin; inertia is about the centre (3,) [m]."""
     S = hat(center)
     return np.block([[mass * np.eye(3), -mass * S], [mass * S, inertia - mass * S @ S]])
 
@@ -195,15 +177,9 @@ def rigid_body(
     buoyancy: Any,
     gravity: Any,
 ) -> Coefficients:
-    """Check mass, inertia, centres and forces of a body, and note what is wrong.
+    """Check mass [kg], inertia (3,) or (3, 3) [kg m2] about the centre of gravity, centres (3,) [m] and forces [N] of a body.
 
-    mass: Mass [kg].
-    inertia: Inertia (3,) or (3, 3) [kg m2] about the centre of gravity.
-    center_of_gravity: Position (3,) [m] from the body origin.
-    center_of_buoyancy: Position (3,) [m] from the body origin.
-    weight: Weight [N]; None for mass times gravity.
-    buoyancy: Buoyancy [N]; None for the weight.
-    gravity: Acceleration of free fall [m/s2].
+    weight: None for mass times gravity. buoyancy: None for the weight.
     Returns: The body without added mass and drag; None in place of what is wrong.
     """
     mass, gravity = faults.positive("mass", mass, "kg"), faults.number("gravity", gravity, "m/s2", least=0.0)
@@ -235,11 +211,7 @@ class Name:
 
 
 def read_name(name: str) -> Name | None:
-    """Read the name of a hydrodynamic derivative, in any of the usual spellings.
-
-    name: A name, such as "X_udot", "Xuu" or "X_{u|u|}".
-    Returns: What the name says; None if it is no such name.
-    """
+    """What the name of a hydrodynamic derivative says, as usually spelt ("X_udot", "Xuu", "X_{u|u|}"); None for another."""
     text = re.sub(r"[\s_{}\\$,()*]", "", str(name))
     if len(text) < 2 or text[0] not in FORCES:
         return None
@@ -303,6 +275,13 @@ def from_fossen(
 
     Raises:
         SceneError: If anything is wrong; the message lists every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> derivatives = {"X_udot": -1.0, "Y_vdot": -35.0, "Z_wdot": -35.0, "X_uu": -1.6}
+        >>> tables = lw.vehicles.from_fossen(derivatives, mass=30.0, inertia=[0.2, 3.5, 3.5])
+        >>> float(lw.Scene.from_dict(tables).vehicle.mass_matrix[0, 0])
+        31.0
     """
     faults = Faults()
     body = rigid_body(faults, mass, inertia, center_of_gravity, center_of_buoyancy, weight, buoyancy, gravity)
@@ -349,10 +328,7 @@ def add_derivatives(faults: Faults, body: Coefficients, values: Mapping[str, Any
 
 
 def refuse_name(faults: Faults, key: str, value: Any, name: Name | None) -> None:
-    """Note why a coefficient cannot be taken.
-
-    name: What the name says; None if it is not a coefficient's name.
-    """
+    """Note why a coefficient cannot be taken; its name is None if it is not a coefficient's."""
     if name is None:
         faults.add(key, value, "is not a coefficient's name", f"known: {_NAMES}")
     elif name.kind == "even":
@@ -379,11 +355,7 @@ def refuse_sign(faults: Faults, key: str, number: float, name: Name) -> None:
 def with_partners(
     faults: Faults, matrix: np.ndarray, keys: Mapping[tuple[str, int, int], str], coefficients: Mapping[str, Any]
 ) -> np.ndarray:
-    """Fill in the missing one of each pair of added masses, and note pairs that differ.
-
-    matrix: Added mass (6, 6) of the coefficients that are given.
-    Returns: The added mass matrix (6, 6), symmetric if no fault was noted.
-    """
+    """Added mass (6, 6) with the missing one of each pair of entries filled in; pairs that differ are noted."""
     full = matrix.copy()
     for row, column in combinations(range(6), 2):
         upper, lower = keys.get(("dot", row, column)), keys.get(("dot", column, row))
@@ -417,22 +389,13 @@ PAIRS = ("xx", "xy", "xz", "yy", "yz", "zz")
 
 
 def inertia_from_names(named: Mapping[str, Any]) -> np.ndarray:
-    """Build an inertia matrix from its six named entries.
-
-    named: ixx, ixy, ixz, iyy, iyz, izz [kg m2]; 0 where one is missing.
-    Returns: The matrix (3, 3) [kg m2].
-    """
+    """An inertia matrix (3, 3) [kg m2] of ixx, ixy, ixz, iyy, iyz, izz; 0 where one is missing."""
     xx, xy, xz, yy, yz, zz = (named.get(f"i{pair}", 0.0) for pair in PAIRS)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def turned(value: Any, axes: np.ndarray) -> Any:
-    """Turn a vector into other axes.
-
-    value: A vector (3,); anything else is returned as it is, to be refused by a later check.
-    axes: Sign of each axis (3,).
-    Returns: The vector (3,) in the other axes.
-    """
+    """Turn a vector (3,) by the sign of each axis; anything else is returned as it is, to be refused by a later check."""
     checked = Faults().finite("", value, (3,))
     return value if checked is None else axes * checked
 

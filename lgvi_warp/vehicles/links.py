@@ -22,15 +22,10 @@ def _zeros() -> np.ndarray:
 
 @dataclass
 class Link:
-    """One link of a robot description, in its own axes (x ahead, y to port, z up) from its own origin.
+    """One link of a robot description, in its own axes (x ahead, y to port, z up) from its own origin; zero by default.
 
-    mass: Mass [kg]; by default 0.
-    center: Centre of mass (3,) [m]; by default the origin.
-    inertia: Inertia (3, 3) [kg m2] about the centre of mass; by default zero.
-    volume: Displaced volume [m3]; by default 0.
-    volume_center: Centre of that volume (3,) [m]; by default the origin.
-    added_mass: Added mass (6, 6) about the origin; by default zero.
-    shapeless: Names of collision shapes whose volume the file does not hold; by default none.
+    mass: [kg]. center: of mass (3,) [m]. inertia: (3, 3) [kg m2] about it. added_mass: (6, 6) about the origin.
+    volume: displaced [m3]. volume_center: (3,) [m]. shapeless: Names of collision shapes whose volume the file does not hold.
     """
 
     name: str
@@ -56,15 +51,7 @@ class Joint:
 
 @dataclass
 class Lump:
-    """Several links as one rigid body, in the axes of its main link.
-
-    mass: Mass [kg].
-    center: Centre of mass (3,) [m].
-    inertia: Inertia (3, 3) [kg m2] about the centre of mass.
-    volume: Displaced volume [m3].
-    volume_center: Centre of that volume (3,) [m].
-    added_mass: Added mass (6, 6) about the main link's origin.
-    """
+    """Several links as one rigid body, in the axes of its main link and about its origin; units as of `Link`."""
 
     mass: float
     center: np.ndarray
@@ -92,10 +79,7 @@ FLAT = ("plane", "empty")
 
 
 def volume_of(faults: Faults, where: str, collision: Element) -> float | None:
-    """Return the volume of a collision's shape.
-
-    Returns: Volume [m3]; 0 for a plane; None for a mesh and the like, whose volume the file does not hold.
-    """
+    """Volume [m3] of a collision's shape: 0 of a plane; None of a mesh and the like, which the file does not hold."""
     geometry = collision.find("geometry")
     if geometry is None:
         if text_of(collision):
@@ -116,11 +100,7 @@ def volume_of(faults: Faults, where: str, collision: Element) -> float | None:
 
 
 def size_of(faults: Faults, where: str, shape: Element, key: str, default: str) -> np.ndarray:
-    """Return one size of a shape, which is an element in SDF and an attribute in URDF.
-
-    shape: The element of the shape.
-    Returns: As many numbers [m] as the default holds.
-    """
+    """Sizes [m] of a shape, as many as the default has: an element in SDF and an attribute in URDF."""
     attribute = shape.get(key)
     if attribute is not None:
         return numbers_in(faults, f"{where}{key}", attribute, len(default.split()))
@@ -144,11 +124,7 @@ def add_volumes(link: Link, shapes: Iterable[tuple[str, float | None, np.ndarray
 
 
 def read_inertia(faults: Faults, where: str, element: Element | None, default: str = "1") -> np.ndarray:
-    """Read an inertia matrix from its six names, which are elements in SDF and attributes in URDF.
-
-    element: The element <inertia>; None if there is none.
-    Returns: The matrix (3, 3) [kg m2].
-    """
+    """An inertia matrix (3, 3) [kg m2] from its six names in <inertia>: elements in SDF and attributes in URDF."""
     named = {}
     for pair in PAIRS:
         key, fallback = f"i{pair}", default if pair[0] == pair[1] else "0"
@@ -164,10 +140,7 @@ def read_inertia(faults: Faults, where: str, element: Element | None, default: s
 
 
 def beside(joints: Iterable[Joint], types: tuple[str, ...] | None = None) -> dict[str, list[str]]:
-    """Return the neighbours of each link across joints.
-
-    types: Types of joints to follow; None for any (default).
-    """
+    """Return the neighbours of each link across joints of some types, or of any."""
     neighbours: dict[str, list[str]] = {}
     for joint in joints:
         if types is None or joint.type in types:
@@ -201,10 +174,7 @@ def main_link(links: Mapping[str, Link], joints: Sequence[Joint]) -> str:
 
 
 def carried(pose: Pose) -> np.ndarray:
-    """Return the matrix that carries a velocity from the body's frame to a link's.
-
-    Returns: X (6, 6): the link has the velocity X v, in its own axes, where the body has v.
-    """
+    """X (6, 6): a link has the velocity X v, in its own axes, where the body has v."""
     R, p = pose.rotation, pose.position
     return np.block([[R.T, -R.T @ hat(p)], [np.zeros((3, 3)), R.T]])
 

@@ -30,10 +30,8 @@ UNREAD = {
 class Hydrodynamics:
     """Hydrodynamic coefficients of one link, in axes x ahead, y to starboard, z down, about its origin.
 
-    density: Density of the water [kg/m3]; None if the plugin does not give it (default).
-    volume: Displaced volume [m3] that uuv_simulator gives and does not take from shapes; None for gz-sim (default).
-    volume_center: Centre of that volume (3,) [m], in the link's own axes (z up).
-    current: Velocity (3,) [m/s] of the water, north, east, down.
+    density: [kg/m3]; None if the plugin does not give it. current: Velocity (3,) [m/s] of the water, north, east, down.
+    volume: Displaced [m3], as uuv_simulator gives it; None for gz-sim. volume_center: (3,) [m], in the link's own axes (z up).
     """
 
     link: str
@@ -49,10 +47,9 @@ class Hydrodynamics:
 
 
 def is_hydrodynamics(plugin: Element) -> bool:
-    """Return whether a plugin is Gazebo's Hydrodynamics.
+    """Return whether a plugin is Gazebo's Hydrodynamics: holds a coefficient, or bears the name and has a link.
 
-    It is if it holds a coefficient, or bears the name and has a link. Other plugins bear that name, too, and a
-    controller's gain may be called kP as a drag coefficient is.
+    Other plugins bear that name, too, and a controller's gain may be called kP as a drag coefficient is.
     """
     named = "hydrodynamics" in plugin_name(plugin) and plugin.find("link_name") is not None
     return named or any(_TERM.match(child.tag) and child.tag[0] in "xyz" for child in plugin)
@@ -125,10 +122,7 @@ def read_hydrodynamics(faults: Faults, warnings: list[str], plugin: Element, lin
 
 
 def plugin_density(faults: Faults, plugin: Element) -> float | None:
-    """Return the water density that a plugin gives.
-
-    Returns: Density [kg/m3]; None if the plugin does not give it.
-    """
+    """Return the water density [kg/m3] that a plugin gives, or None."""
     for tag in ("water_density", "waterDensity", "fluid_density"):
         if text_of(plugin.find(tag)):
             return faults.positive(f"<{tag}>", number(faults, "", plugin, tag, "1"), "kg/m3")
@@ -146,10 +140,7 @@ def read_underwater_object(faults: Faults, warnings: list[str], plugin: Element)
 
 
 def read_underwater_link(faults: Faults, warnings: list[str], link: Element, density: float) -> Hydrodynamics:
-    """Read volume, centre and matrices of one link of uuv_simulator's plugin.
-
-    density: Density of the water [kg/m3].
-    """
+    """Read volume, centre and matrices of one link of uuv_simulator's plugin."""
     name = link.get("name", "")
     hydrodynamics = Hydrodynamics(name, density=density, neutral=is_true(link.findtext("neutrally_buoyant")))
     hydrodynamics.volume = number(faults, f"{name} ", link, "volume", "0")
@@ -174,10 +165,7 @@ def read_underwater_link(faults: Faults, warnings: list[str], link: Element, den
 
 
 def block_matrix(faults: Faults, key: str, text: str) -> np.ndarray:
-    """Read a matrix from 36 numbers, or from the 6 of its diagonal.
-
-    Returns: The matrix (6, 6); zeros if the text is empty.
-    """
+    """Read a matrix (6, 6) from 36 numbers, or from the 6 of its diagonal; zeros of an empty text."""
     if not text:
         return np.zeros((6, 6))
     values = floats(text)
@@ -187,11 +175,7 @@ def block_matrix(faults: Faults, key: str, text: str) -> np.ndarray:
 
 
 def by_diagonal(warnings: list[str], quadratic: np.ndarray) -> np.ndarray:
-    """Return the diagonal part of a quadratic damping matrix; uuv_simulator does not use the other entries.
-
-    quadratic: Quadratic damping (6, 6).
-    Returns: The diagonal matrix (6, 6).
-    """
+    """Return the diagonal part of a quadratic damping matrix (6, 6): uuv_simulator does not use the other entries."""
     diagonal = np.diag(np.diag(quadratic))
     if not np.array_equal(quadratic, diagonal):
         warnings.append("quadratic damping: read by its diagonal, as uuv_simulator does; what is beside it is left out")

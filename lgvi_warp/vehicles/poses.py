@@ -19,11 +19,7 @@ LONGEST_CHAIN = 200
 
 
 class Pose(NamedTuple):
-    """Where a frame lies in another one.
-
-    position: Position of its origin (3,) [m].
-    rotation: Rotation matrix (3, 3).
-    """
+    """Where a frame lies in another one: position (3,) [m] of its origin, and rotation matrix (3, 3)."""
 
     position: np.ndarray
     rotation: np.ndarray
@@ -41,11 +37,7 @@ HERE = Pose(np.zeros(3), np.eye(3))
 
 
 def rotation_from_rpy(angles: np.ndarray) -> np.ndarray:
-    """Return the rotation matrix of roll, pitch and yaw.
-
-    angles: Roll, pitch, yaw (3,) [rad].
-    Returns: Rz(yaw) Ry(pitch) Rx(roll), (3, 3).
-    """
+    """Rz(yaw) Ry(pitch) Rx(roll), (3, 3), of roll, pitch, yaw (3,) [rad]."""
     (sr, sp, sy), (cr, cp, cy) = np.sin(angles), np.cos(angles)
     first = [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr]
     second = [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr]
@@ -53,21 +45,14 @@ def rotation_from_rpy(angles: np.ndarray) -> np.ndarray:
 
 
 def rotation_from_xyzw(quaternion: np.ndarray) -> np.ndarray:
-    """Return the rotation matrix of a quaternion.
-
-    quaternion: x, y, z, w (4,), scalar last, of any length but 0.
-    Returns: The matrix (3, 3).
-    """
+    """The rotation matrix of a quaternion (4,), scalar last, of any length but 0."""
     *v, w = quaternion / (np.linalg.norm(quaternion) or 1.0)
     S = hat(np.array(v))
     return np.asarray(np.eye(3) + 2.0 * w * S + 2.0 * S @ S)
 
 
 def read_pose(faults: Faults, where: str, pose: Element | None) -> Pose:
-    """Read the pose in an element <pose> of SDF.
-
-    pose: The element, with x y z roll pitch yaw, or x y z and a quaternion; None if there is none.
-    """
+    """Read an element <pose> of SDF: x y z roll pitch yaw, or x y z and a quaternion."""
     if pose is None or not text_of(pose):
         return HERE
     if pose.get("rotation_format") == "quat_xyzw":
@@ -79,10 +64,7 @@ def read_pose(faults: Faults, where: str, pose: Element | None) -> Pose:
 
 
 def read_origin(faults: Faults, where: str, parent: Element | None) -> Pose:
-    """Read the pose in an element <origin> of URDF, from its xyz and rpy.
-
-    parent: The element that holds <origin>; None if there is none.
-    """
+    """Read the pose in an element <origin> of URDF, from its xyz and rpy."""
     origin = child_of(parent, "origin")
     if origin is None:
         return HERE
@@ -92,10 +74,7 @@ def read_origin(faults: Faults, where: str, parent: Element | None) -> Pose:
 
 @dataclass
 class Scope:
-    """The names of one <model> of an SDF file: its links, joints, frames and nested models.
-
-    parent: Scope of the model that this one is nested in; None for the root (default).
-    """
+    """The names of one <model> of an SDF file: its links, joints, frames and nested models."""
 
     model: Element
     prefix: str = ""
@@ -128,10 +107,7 @@ class Scope:
         return scope, rest
 
     def link_of(self, name: str) -> str | None:
-        """Return the full name of the link that a name stands for.
-
-        Returns: Full name of the link; None if there is none.
-        """
+        """Return the full name of the link that a name stands for; None if there is none."""
         scope, rest = self, name
         for _ in range(LONGEST_CHAIN):
             try:

@@ -31,11 +31,7 @@ GAZEBO_DENSITY = 1000.0  # kg/m3: of Gazebo's Buoyancy system, if none is given
 
 @dataclass
 class Water:
-    """What the <world> of a file says about the water.
-
-    gravity: Acceleration of free fall [m/s2]; None if the file does not give it (default).
-    density: Density of the water [kg/m3]; None if the file does not give it (default).
-    """
+    """What the <world> of a file says about the water: gravity [m/s2] and density [kg/m3]."""
 
     gravity: float | None = None
     density: float | None = None
@@ -71,11 +67,7 @@ def refuse_crowd(elements: Sequence[Element]) -> None:
 
 
 def read_model(faults: Faults, root: Element, name: str | None, link: str | None) -> RobotModel:
-    """Read the model of a file: that of a URDF, or the chosen one of an SDF file.
-
-    name: Name of the model; None where the file holds one only.
-    link: Name of a link of the model; None if none is named.
-    """
+    """Read the model of a file: that of a URDF, or the one of an SDF file that is named or alone."""
     return model_of_urdf(faults, root) if root.tag == "robot" else model_of_sdf(faults, root, name, link)
 
 
@@ -93,11 +85,7 @@ def model_of_urdf(faults: Faults, root: Element) -> RobotModel:
 
 
 def model_of_sdf(faults: Faults, root: Element, name: str | None, link: str | None) -> RobotModel:
-    """Read one model of an SDF file.
-
-    name: Name of the model; None for the only one, or the only one with hydrodynamics.
-    link: Name of a link of the model; None if none is named.
-    """
+    """Read one model of an SDF file: that of a name, the only one, or the only one with hydrodynamics."""
     element, world = chosen_model(root, name, link)
     for tag in ("link", "joint", "plugin", "collision", "frame", "model"):
         refuse_crowd(list(element.iter(tag)))
@@ -128,12 +116,7 @@ def world_of(root: Element) -> Element:
 
 
 def chosen_model(root: Element, name: str | None, link: str | None) -> tuple[Element, Element | None]:
-    """Choose a top-level <model> of an SDF file.
-
-    name: Name of the model; None for the only one, or the only one with hydrodynamics.
-    link: Name of a link of the model; None if none is named.
-    Returns: The element <model>, and the <world> that holds it or None.
-    """
+    """Choose a top-level <model> of an SDF file, as `model_of_sdf` does, with the <world> that holds it or None."""
     known: list[tuple[Element, Element | None]] = []
     known += [(child, world) for world in root.iter("world") for child in world.findall("model")]
     known += [(child, None) for child in ([root] if root.tag == "model" else root.findall("model"))]
@@ -240,11 +223,7 @@ def joints_of(root: Scope, scope: Scope) -> list[Joint]:
 
 
 def read_fluid_added_mass(faults: Faults, where: str, element: Element | None) -> np.ndarray:
-    """Read the added mass in an element <fluid_added_mass>: xx, xy ... rr.
-
-    element: The element; None if there is none.
-    Returns: The matrix (6, 6) in the link's axes about its origin; 0 where an entry is missing.
-    """
+    """Read <fluid_added_mass>, xx, xy ... rr, as (6, 6) in the link's axes about its origin; 0 where an entry is missing."""
     matrix = np.zeros((6, 6))
     for row, column in combinations_with_replacement(range(6), 2):
         value = number(faults, f"{where}<fluid_added_mass> ", element, "xyzpqr"[row] + "xyzpqr"[column], "0")

@@ -97,35 +97,22 @@ def read_bytes(source: Any, format_name: str) -> bytes:
 
 
 def text_of(element: Element | None) -> str:
-    """Return the text of an element, without spaces around it.
-
-    element: The element; None if there is none.
-    """
+    """Return the text of an element, or of none, without spaces around it."""
     return (element.text or "").strip() if element is not None else ""
 
 
 def child_of(parent: Element | None, tag: str) -> Element | None:
-    """The first child of an element that may be missing.
-
-    parent: The element, or None.
-    Returns: The child; None where either is missing.
-    """
+    """The first child of an element; None where either is missing."""
     return None if parent is None else parent.find(tag)
 
 
 def is_true(text: str | None) -> bool:
-    """Return the truth value that a text stands for in SDF.
-
-    text: The text; None if there is none.
-    """
+    """Return the truth value that a text stands for in SDF."""
     return (text or "").strip().lower() in ("1", "true")
 
 
 def floats(text: str) -> np.ndarray | None:
-    """Return the numbers in a text, separated by spaces.
-
-    Returns: Numbers (n,); None if the text holds anything else.
-    """
+    """Return the numbers in a text, separated by spaces; None if it holds anything else."""
     try:
         return np.array([float(word) for word in text.split()]) if text.isascii() and "_" not in text else None
     except ValueError:
@@ -133,10 +120,7 @@ def floats(text: str) -> np.ndarray | None:
 
 
 def numbers_in(faults: Faults, key: str, text: str, count: int) -> np.ndarray:
-    """Return the numbers in a text that must hold a fixed count of finite ones.
-
-    Returns: Numbers (count,); zeros after noting a fault.
-    """
+    """Return the numbers in a text that must hold a fixed count of finite ones; zeros after noting a fault."""
     values = floats(text)
     if values is not None and values.shape == (count,) and np.all(np.isfinite(values)):
         return values
@@ -151,26 +135,12 @@ def numbers_in(faults: Faults, key: str, text: str, count: int) -> np.ndarray:
 
 
 def read_floats(faults: Faults, where: str, parent: Element | None, tag: str, default: str) -> np.ndarray:
-    """Return the numbers in a child element.
-
-    parent: The element that holds the child; None if there is none.
-    """
+    """Return the numbers in a child of an element, or the default."""
     return numbers_in(faults, f"{where}<{tag}>", text_of(child_of(parent, tag)) or default, len(default.split()))
 
 
 def number(faults: Faults, where: str, parent: Element | None, tag: str, default: str) -> float:
-    """Return the number in a child element.
-
-    Args:
-        faults: Collects what is wrong.
-        where: Beginning of the names in messages.
-        parent: The element that holds the child; None if there is none.
-        tag: Name of the child element.
-        default: Number to take if the child is missing or empty, as a text.
-
-    Returns:
-        The number; 0 after noting a fault.
-    """
+    """Return the number in a child of an element, or the default; 0 after noting a fault."""
     return float(read_floats(faults, where, parent, tag, default)[0])
 
 

@@ -115,11 +115,9 @@ def refuse_unweighed(read: RobotModel, main: Link, parts: Sequence[Link]) -> Non
 
 
 def weight_of(read: RobotModel, volume: float | None) -> float | None:
-    """Return the weight of the displaced water.
+    """Return the weight [N] of the displaced water; warn if no shape displaces any.
 
-    read: The model as read; its warnings are extended if no shape displaces water.
-    volume: Displaced volume [m3].
-    Returns: Weight [N]; None if it is unknown, or nothing is displaced though buoyancy is not restricted to some models.
+    It is None if it is unknown, or nothing is displaced though buoyancy is not restricted to some models.
     """
     water = read.water
     if not volume and not water.enabled:
@@ -131,9 +129,7 @@ def weight_of(read: RobotModel, volume: float | None) -> float | None:
 def body_of(faults: Faults, lump: Lump, buoyancy: float | None, at: Any, gravity: float | None) -> Coefficients:
     """Build the rigid body of lumped links, in axes x ahead, y to starboard, z down.
 
-    buoyancy: Buoyancy [N]; None for the weight.
-    at: Centre of buoyancy (3,) [m], z down.
-    gravity: Acceleration of free fall [m/s2]; None if it is at fault.
+    buoyancy: [N]; None for the weight. at: Centre of buoyancy (3,) [m], z down. gravity: [m/s2]; None if it is at fault.
     """
     inertia = HALF_TURN[:, None] * lump.inertia * HALF_TURN
     gravity = 0.0 if gravity is None else gravity  # a fault by then
@@ -143,10 +139,7 @@ def body_of(faults: Faults, lump: Lump, buoyancy: float | None, at: Any, gravity
 
 
 def chosen_link(read: RobotModel, link: str | None) -> str:
-    """Return the full name of the main link.
-
-    link: Name of the link; None for that of the plugin, else the first of the heaviest joined links.
-    """
+    """The full name of the main link: that of a name, that of the plugin, or the first of the heaviest joined links."""
     if link is not None:
         return link_named(read.links, link)
     if read.hydrodynamics:
@@ -169,11 +162,7 @@ def together(read: RobotModel, main: Link) -> list[str]:
 
 
 def set_water(faults: Faults, read: RobotModel, density: float | None, gravity: float | None) -> None:
-    """Set density and gravity of the model: as given, else the world's, else a plugin's, else the default.
-
-    density: Density of the water [kg/m3]; None if not given.
-    gravity: Acceleration of free fall [m/s2]; None if not given.
-    """
+    """Set density [kg/m3] and gravity [m/s2] of the model: as given, else the world's, else a plugin's, else the default."""
     named = [each.density for each in read.hydrodynamics if each.density is not None]
     density = next(x for x in (density, read.water.density, *named, GAZEBO_DENSITY) if x is not None)
     gravity = next(x for x in (gravity, read.water.gravity, STANDARD_GRAVITY) if x is not None)
@@ -184,10 +173,7 @@ def set_water(faults: Faults, read: RobotModel, density: float | None, gravity: 
 def displaced_by(
     read: RobotModel, parts: Sequence[Link], main: Link, plugins: Sequence[Hydrodynamics]
 ) -> tuple[float, np.ndarray]:
-    """Return displaced volume and its centre, of the shapes or as uuv_simulator's plugin gives it.
-
-    Returns: Volume [m3] and its centre (3,) [m] in the main link's axes (z up).
-    """
+    """Displaced volume [m3] and its centre (3,) [m] in the main link's axes (z up), of shapes or as uuv_simulator gives it."""
     by_plugin = [hydrodynamics for hydrodynamics in plugins if hydrodynamics.volume is not None]
     for hydrodynamics in by_plugin:
         body_link = read.links[hydrodynamics.link]
@@ -209,10 +195,7 @@ def has_buoyancy(read: RobotModel, name: str) -> bool:
 
 
 def refuse_shapeless(faults: Faults, read: RobotModel, parts: Sequence[Link], plugins: Sequence[Hydrodynamics]) -> None:
-    """Note shapes whose volume lies in another file: without them the vehicle would sink.
-
-    plugins: Coefficients of the links of the body; one with a volume makes shapes superfluous.
-    """
+    """Note shapes whose volume lies in another file, and no plugin has: without them the vehicle would sink."""
     if any(hydrodynamics.volume is not None for hydrodynamics in plugins):
         return
     for body_link in parts:

@@ -74,6 +74,12 @@ def from_yaml(
     Raises:
         SceneError: If anything is wrong; the message lists every fault.
         ImportError: If PyYAML is not installed.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> text = "{mass: 30.0, inertia: [0.2, 3.5, 3.5], linear_damping: [-4, -20, -20, -1, -10, -10]}"
+        >>> lw.vehicles.from_yaml(text)["terms"][0]["linear"]
+        [4.0, 20.0, 20.0, 1.0, 10.0, 10.0]
     """
     faults = Faults()
     faults.choice("quadratic", quadratic, ("diagonal", "full"))
@@ -171,13 +177,7 @@ def is_neutral(faults: Faults, read: Mapping[str, Any]) -> bool:
 
 
 def displaced_weight(faults: Faults, volume: Any, density: Any, gravity: Any, is_given: bool) -> float | None:
-    """Return the weight of the displaced water.
-
-    volume: Displaced volume [m3].
-    density: Density of the water [kg/m3].
-    gravity: Acceleration of free fall [m/s2].
-    Returns: Weight [N]; None after noting a fault.
-    """
+    """Return the weight [N] of the displaced water of a volume [m3]; None after noting a fault."""
     if not is_given:
         faults.positive("density", "not given", "kg/m3 (with volume)")
     values = [faults.positive("volume", volume, "m3"), density, Faults().number("gravity", gravity, least=0.0)]
@@ -185,11 +185,7 @@ def displaced_weight(faults: Faults, volume: Any, density: Any, gravity: Any, is
 
 
 def matrix_6(faults: Faults, key: str, value: Any) -> np.ndarray:
-    """Return a matrix of added mass or damping, positive on its diagonal, from either sign convention.
-
-    value: 6x6 or 36 numbers, or the 6 of a diagonal; None if not given.
-    Returns: The matrix (6, 6); zeros if it is not given or at fault.
-    """
+    """A matrix (6, 6) of added mass or damping, positive on its diagonal, from either sign convention; zeros for none."""
     array = None if value is None else faults.finite(key, value)
     if array is None:
         return np.zeros((6, 6))

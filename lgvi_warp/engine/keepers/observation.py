@@ -20,7 +20,7 @@ from lgvi_warp.statistics.base import Statistic, from_list
 from lgvi_warp.statistics.ends import check_outcomes, outcomes
 from lgvi_warp.statistics.estimates.estimate import Estimate, Estimates
 from lgvi_warp.statistics.metrics.tracking_metrics import check_wanted
-from lgvi_warp.statistics.until import Until, Watch, from_dict, watch
+from lgvi_warp.statistics.until import StoppingRule, Until, from_dict, watch
 from lgvi_warp.statistics.values.quantity import Quantity
 
 # Samplings whose means are at least as close as those of independent members.
@@ -80,7 +80,7 @@ class Observation:
             wanted |= set(names) & SIGNALS.keys()
         return ordered(wanted)
 
-    def watch(self, times: np.ndarray) -> tuple[tuple[Statistic, ...], Watch | None]:
+    def watch(self, times: np.ndarray) -> tuple[tuple[Statistic, ...], StoppingRule | None]:
         """The statistics to gather, and the watch of the stopping condition.
 
         times: (k,) [s], sample times.

@@ -49,21 +49,11 @@ def register(kind: type[AnyTerm]) -> type[AnyTerm]:
     return kind
 
 
-def from_list(given: Any) -> tuple[Term, ...]:
-    """Build the terms of a scene.
-
-    Args:
-        given: A list of tables of a scene file, of `Term` objects, or of both.
-
-    Returns:
-        The terms, in the same order.
-
-    Raises:
-        SceneError: Where an entry is no term, is an event, or shares its name with another. The message lists every fault.
-    """
-    check_list("terms", given, "write [[terms]] and type = ... below, or terms=[lw.terms.Drag(...)]")
+def from_list(entries: Any) -> tuple[Term, ...]:
+    """Build the terms of a scene from tables of a scene file, `Term` objects, or both, in their order."""
+    check_list("terms", entries, "write [[terms]] and type = ... below, or terms=[lw.terms.Drag(...)]")
     faults, terms = Faults(), list[Term]()
-    for i, entry in enumerate(given):
+    for i, entry in enumerate(entries):
         with faults.including():
             build_entry = _allowed if isinstance(entry, Term) else _from_table
             terms.append(build_entry(f"terms[{i}]", entry))

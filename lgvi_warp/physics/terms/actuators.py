@@ -3,23 +3,69 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.terms.base import Numbers, Packed, knots, side_by_side
+from lgvi_warp.physics.terms.base import Numbers, Packed, Term, knots, side_by_side
 from lgvi_warp.physics.terms.wrench import at_start, commands
 
 # 1 / time constant of a channel without lag: faster than any step, and within float32. A limit of a rate that counts as none.
 FAST, UNLIMITED = 1e20, 1e6
+# Fields of a schedule of commands, which stands in place of `command`.
+SCHEDULE = ("times", "command_schedule")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Commanded(Term):
+    """A term of n units whose `command` (n,) is held, or follows `command_schedule` (k, n) at `times` (k,). Abstract."""
+
+    timed: ClassVar[bool] = True
+    driven_fields: ClassVar[tuple[str, ...]] = ("command", *SCHEDULE)
+
+    def settle_commands(self: Any, count: int) -> None:
+        """Let the schedule follow from commands that are held, and the reverse; for use before the fields are checked."""
+        first = first_row(self.command_schedule)
+        both = self.command is not None and self.command_schedule is not None
+        object.__setattr__(self, "commanded_twice", both and not np.array_equal(first, self.command))
+        if self.command is None:
+            object.__setattr__(self, "command", first)
+        self.repeat(count, "command")
+        if self.command_schedule is None:
+            object.__setattr__(self, "following", SCHEDULE if self.times is None else ())
+            object.__setattr__(self, "command_schedule", [self.command])
+            object.__setattr__(self, "times", [0.0] if self.times is None else self.times)
+
+    @property
+    def holds(self: Any) -> bool:
+        """Whether its commands are held, so that of its fields `command` acts, and else the schedule."""
+        return len(self.command_schedule) == 1
+
+    @property
+    def idle_fields(self) -> tuple[str, ...]:
+        """The fields of its commands that follow from the others."""
+        return SCHEDULE if self.holds else ("command",)
+
+    @property
+    def own_commands(self: Any) -> bool:
+        # Whether it has a schedule, or a command other than 0.
+        return not self.holds or bool(np.any(self.command))
+
+    def with_fields(self, fields: Mapping[str, Any]) -> Any:
+        # Of its commands those that follow from the others are left out.
+        left_out = ("command",) if fields.keys() & set(SCHEDULE) else self.idle_fields
+        return super().with_fields(dict.fromkeys(left_out) | dict(fields))
+
+    def to_dict(self) -> dict[str, Any]:
+        # Of its commands what acts.
+        return {key: value for key, value in super().to_dict().items() if key not in self.idle_fields}
 
 
 def motion(term: Any) -> dict[str, bool]:
-    """How the channels of an actuator that a controller drives follow their commands, by the scene's own numbers.
-
-    term: The term, with `time_constant` and `rate_limit`, each None or (channels,).
-    """
+    """How the channels of a driven actuator follow their commands, by the scene's own numbers."""
     lag, rate = term.time_constant, term.rate_limit
     return {
         "lag": lag is not None and bool(np.any(lag > 0.0)),
@@ -28,10 +74,7 @@ def motion(term: Any) -> dict[str, bool]:
 
 
 def refuse_unread(term: Any, numbers: Numbers) -> None:
-    """Refuse members' lags and limits of rates of a driven actuator where the scene has none: its kernel reads none.
-
-    numbers: Members' numbers by field, each (n, channels).
-    """
+    """Refuse members' lags and rate limits (n, channels) of a driven actuator where the scene has none."""
     faults, features = Faults(f"{term.key}."), motion(term)
     acting = {"lag": ("time_constant", lambda x: x > 0.0), "rate": ("rate_limit", lambda x: x < UNLIMITED)}
     for feature, (name, acts) in acting.items():
@@ -49,11 +92,8 @@ def packed_following(
 ) -> Packed:
     """Pack an actuator whose device code is made by lgvi_kernels.laws.driven or .scheduled.
 
-    term: The term. Its numbers are `limit`, where it has them `time_constant` and `rate_limit`, each (n, channels), and its
-        schedule where no controller drives it.
-    numbers: Its numbers by field, (m, ...).
-    blocks: Other rows of each channel, (m, channels, rows).
-    shared: Rows behind those of all channels, (m, rows); None, the default, for none.
+    numbers: (m, ...) by field: `limit`, where it has them `time_constant` and `rate_limit`, and if not driven the schedule.
+    blocks: Other rows of each channel, (m, channels, rows). shared: Rows behind those of all channels, (m, rows).
     Returns: Rows of each channel: the blocks, limit, 1 / lag and limit of the rate; its schedule; the shared rows; and the
         memory of places, where they move: 0 of a driven actuator, else the command at the start.
     """
@@ -80,3 +120,33 @@ def packed_following(
     if not term.memory:
         return Packed(values | {"memory": 0}, side_by_side(*rows), work=work)
     return Packed(values, side_by_side(*rows), start, work)
+
+
+def first_row(schedule: Any) -> Any:
+    """Commands (units,) at the first time of a schedule (k, units); 0.0 where there is none, or none that can be read."""
+    try:
+        return np.atleast_2d(np.array(schedule, dtype=np.float64))[0] if schedule is not None else 0.0
+    except (TypeError, ValueError, IndexError, OverflowError):
+        return 0.0
+
+
+def refuse_idle(term: Any, numbers: Numbers, rate: str, remembers: np.ndarray, remedy: str) -> None:
+    """Refuse members' numbers (n, ...) that would have no effect, since the scene's kernel does not read them.
+
+    That is `command` in a scene with a schedule and the reverse, unless a controller drives the term; and numbers of a memory
+    that the scene does not have, where those of a member need it (`remembers`, (n, units)).
+    """
+    faults = Faults(f"{term.key}.")
+    unread = {}
+    if term.driver is None:
+        acts = "command" if term.holds else "command_schedule"
+        unread = {name: (numbers[name] != getattr(term, name), f"a {acts}", f"vary {term.key}.{acts}")
+                  for name in term.idle_fields}  # fmt: skip
+    if not term.memory:
+        unread[rate] = (remembers, "none", remedy)
+    for name, (bad, alternative, what_to_do) in unread.items():
+        if np.any(bad):
+            i = int(bad.reshape(len(bad), -1).any(axis=1).argmax())
+            fault = f"does not act: the scene has {alternative}"
+            faults.add(f"{name} of member {i}", numbers[name][i], fault, what_to_do)
+    faults.raise_if_any()

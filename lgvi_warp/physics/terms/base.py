@@ -187,8 +187,8 @@ class Term:
             faults.add("name" if self.name else "type", self.key, *wrong)
         lengths: dict[str, int] = {}
         for item in self.number_fields():
-            value, told = getattr(self, item.name), Faults() if item.name in self.following else faults
-            object.__setattr__(self, item.name, _checked(told, item, value, lengths, self.shape_of(item)))
+            value, field_faults = getattr(self, item.name), Faults() if item.name in self.following else faults
+            object.__setattr__(self, item.name, _checked(field_faults, item, value, lengths, self.shape_of(item)))
         if not faults:
             read(self, faults)
             self.check(faults)
@@ -432,6 +432,22 @@ class Term:
         """
         raise NotImplementedError(f"{type(self).__name__} does not tell how strongly it brakes")
 
+    def effect(self, numbers: Numbers, parameters: Numbers, speed: Array) -> Array:
+        """What a unit of effort of each channel makes: thrust of thrusters, the angle of fins.
+
+        Args:
+            numbers: The term's numbers by field, each of shape (1 or n, ...).
+            parameters: All parameters of the scene, by name.
+            speed: Speed ahead (1 or n,) [m/s].
+
+        Returns:
+            Wrenches (1 or n, 6, channels) about the body's origin [N, N m per unit of effort].
+
+        Raises:
+            NotImplementedError: Where the term does not define it, as an actuator must for `PseudoInverse`.
+        """
+        raise NotImplementedError(f"{type(self).__name__} does not tell what its channels make")
+
     def drive(self) -> Array:
         """Largest force and torque with which the term drives the vehicle, whatever its motion, by the scene's numbers.
 
@@ -540,12 +556,9 @@ def _falling(field: dataclasses.Field[Any], values: np.ndarray) -> np.ndarray:
 
 
 def knots(at: np.ndarray, values: np.ndarray, steps: bool = False) -> np.ndarray:
-    """Rows of a table for the device: the first value, then for each interval its place, 1 / length and change of the value.
+    """Rows of tables for the device: the first value, then for each interval its place, 1 / length and change of the value.
 
-    Between knots the table is linear, outside it is constant.
-
-    at: Places of the knots (n, k), rising, in any unit.
-    values: Values at the knots (n, k, d).
+    Between the knots `at` (n, k), rising, a table of values (n, k, d) is linear, outside it is constant.
     """
     at, values = repeated(at, values)
     inverse = np.full((len(at), at.shape[1] - 1), STEEP) if steps else 1.0 / np.diff(at, axis=1)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -13,25 +12,24 @@ from lgvi_warp.common import declared
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.physics.notation import repeated
-from lgvi_warp.physics.terms.actuators import UNLIMITED, motion, packed_following, refuse_unread
+from lgvi_warp.physics.terms.actuators import (
+    UNLIMITED,
+    Commanded,
+    motion,
+    packed_following,
+    refuse_idle,
+    refuse_unread,
+)
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, rows_of, side_by_side
 from lgvi_warp.physics.terms.fins import Fins, fin_rows
-from lgvi_warp.physics.terms.wrench import (
-    SCHEDULE,
-    at_start,
-    commands,
-    fields_anew,
-    first_row,
-    idle_fields,
-    refuse_idle,
-)
+from lgvi_warp.physics.terms.wrench import at_start, commands
 
 # Rows of one fin that its forces need where the flow has no angle: those before the matrices of `fin_rows`.
 STRAIGHT_ROWS = 15
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class ControlFins(Fins):
+class ControlFins(Commanded, Fins):
     """Fins that are turned about their span by a deflection, which follows a command.
 
     A positive deflection lifts along +normal where the flow comes from ahead. It is the command within `limit`, followed no
@@ -60,8 +58,6 @@ class ControlFins(Fins):
 
     type: ClassVar[str] = "control_fins"
     device: ClassVar[str] = "control_fins"
-    timed: ClassVar[bool] = True
-    driven_fields: ClassVar[tuple[str, ...]] = ("command", "times", "command_schedule")
 
     lift_slope: Any = number(("n",), "1/rad", None, least=0.0)
     lift_angles: Any = number(("a",), "rad", None, least=0.0, rising=True, optional=True)
@@ -82,22 +78,14 @@ class ControlFins(Fins):
         if not flag(f"{self.key}.flow_angle", self.flow_angle):
             # Lift then does work.
             object.__setattr__(self, "dissipative", False)
-        first = first_row(self.command_schedule)
-        twice = self.command is not None and self.command_schedule is not None
-        object.__setattr__(self, "_both", twice and not np.array_equal(first, self.command))
-        if self.command is None:
-            object.__setattr__(self, "command", first)
-        self.repeat(rows_of(self.position), "limit", "rate_limit", "time_constant", "command")
-        if self.command_schedule is None:
-            object.__setattr__(self, "following", SCHEDULE if self.times is None else ())
-            object.__setattr__(self, "command_schedule", [self.command])
-            object.__setattr__(self, "times", [0.0] if self.times is None else self.times)
+        count = rows_of(self.position)
+        self.settle_commands(count)
+        self.repeat(count, "limit", "rate_limit", "time_constant")
         super().__post_init__()
 
     def check(self, faults: Faults) -> None:
-        """In addition, adds a fault where the command is given twice."""
         super().check(faults)
-        if self.__dict__["_both"]:
+        if vars(self)["commanded_twice"]:
             faults.add("command", self.command, "is given beside command_schedule", "keep one of them")
         if (self.lift_angles is None) != (self.lift_coefficients is None):
             alone = "lift_angles" if self.lift_coefficients is None else "lift_coefficients"
@@ -106,36 +94,16 @@ class ControlFins(Fins):
             first = (self.lift_angles[0], self.lift_coefficients[0])
             faults.add("lift_angles", first, "does not begin with no lift at 0", "let both tables begin with 0")
 
-    def with_fields(self, fields: Mapping[str, Any]) -> Any:
-        """In addition, leaves out the commands in whose place others stand."""
-        return super().with_fields(fields_anew(self, fields))
-
     def to_dict(self) -> dict[str, Any]:
-        """The fins as a table of a scene file: of their commands what acts; `flow_angle` only where it is false."""
-        left_out = (*idle_fields(self), *(("flow_angle",) if self.flow_angle else ()))
-        return {key: value for key, value in super().to_dict().items() if key not in left_out}
+        # In addition, `flow_angle` only where it is false.
+        return {key: value for key, value in super().to_dict().items() if key != "flow_angle" or not value}
 
     @property
     def channels(self) -> int:
-        """Number of commands, one for each fin."""
         return len(self.limit)
 
-    @property
-    def own_commands(self) -> bool:
-        """Whether it has a schedule, or a command other than 0."""
-        return len(self.command_schedule) > 1 or bool(np.any(self.command))
-
     def effect(self, numbers: Numbers, parameters: Numbers, speed: np.ndarray) -> np.ndarray:
-        """The wrench of each fin's lift by its deflection [1/rad] at a speed ahead, about the body's origin.
-
-        Args:
-            numbers: The term's numbers by field.
-            parameters: All parameters of the scene.
-            speed: Speed ahead (1 or n,) [m/s].
-
-        Returns:
-            (1 or n, 6, channels).
-        """
+        # The wrench of each fin's lift by its deflection [1/rad] at a speed ahead, about the body's origin.
         position, chord, normal = repeated(numbers["position"], numbers["chord"], numbers["normal"])
         chord = chord / np.linalg.norm(chord, axis=-1, keepdims=True)
         normal = normal - np.sum(normal * chord, axis=-1, keepdims=True) * chord
@@ -149,7 +117,6 @@ class ControlFins(Fins):
         return np.swapaxes(np.concatenate([lift, np.cross(position, lift)], axis=-1), -1, -2)
 
     def device_in(self, aligned: bool) -> str:
-        """The code for what these fins have."""
         driven = self.driver is not None
         features = (
             {"driven": driven}
@@ -163,7 +130,7 @@ class ControlFins(Fins):
         return f"control_fins_with:{','.join(chosen)}" if chosen else "control_fins"
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, raises SceneError for members' numbers that would have no effect."""
+        # In addition, raises SceneError for members' numbers that would have no effect.
         remedy = f"give {self.key}.rate_limit below {UNLIMITED:g} rad/s in the scene as well"
         refuse_idle(self, numbers, "rate_limit", numbers["rate_limit"] < UNLIMITED, remedy)
         if self.driver is not None:
@@ -176,11 +143,11 @@ class ControlFins(Fins):
 
     @property
     def memory(self) -> bool:
-        """Whether fins lag, or the rate of one is limited."""
+        # Whether fins lag, or the rate of one is limited.
         return bool(self.time_constant is not None or np.any(self.rate_limit < UNLIMITED))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The device rows: those of each fin, then the command table of each fin."""
+        # The device rows: those of each fin, then the command table of each fin.
         if self.device_in(context.aligned) != "control_fins":
             blocks = fin_rows(numbers, context)
             blocks = blocks if self.flow_angle else blocks[..., :STRAIGHT_ROWS]

@@ -42,43 +42,31 @@ class ControlWrench(Term):
 
     @property
     def channels(self) -> int:
-        """Number of commands, one for each component."""
         return 6
 
     @property
     def memory(self) -> bool:
-        """Whether it follows its commands with a lag or at a limited rate."""
+        # Whether it follows its commands with a lag or at a limited rate.
         return any(motion(self).values())
 
     def device_in(self, aligned: bool) -> str:
-        """The code for how it follows its commands."""
         return f"control_wrench:{','.join(['driven', *(name for name, acts in motion(self).items() if acts)])}"
 
     def present(self, numbers: Numbers) -> bool:
-        """Whether a controller drives it."""
         return self.driver is not None
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, raises SceneError for members' numbers that would have no effect."""
+        # In addition, raises SceneError for members' numbers that would have no effect.
         if self.driver is not None:
             refuse_unread(self, numbers)
         return super().unphysical(numbers)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The wrench of each channel in the kernel's axes, and its limits."""
+        # The wrench of each channel in the kernel's axes, and its limits.
         force, torque = (np.eye(6)[None, :, i : i + 3] for i in (0, 3))
         blocks = [context.frame.vector(force), context.frame.torque(torque, force)]
         return packed_following(self, numbers, np.concatenate(np.broadcast_arrays(*blocks), axis=-1))
 
     def effect(self, numbers: Numbers, parameters: Numbers, speed: np.ndarray) -> np.ndarray:
-        """The wrench of a unit of effort of each channel, about the body's origin.
-
-        Args:
-            numbers: The term's numbers by field.
-            parameters: All parameters of the scene.
-            speed: Speed ahead (1 or n,) [m/s].
-
-        Returns:
-            (1 or n, 6, channels).
-        """
+        # The wrench of a unit of effort of each channel, about the body's origin.
         return np.eye(6)[None]

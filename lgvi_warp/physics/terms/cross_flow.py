@@ -43,25 +43,15 @@ class CrossFlow(Term):
         super().__post_init__()
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where stations are fewer than two."""
         if len(self.stations) < 2:
             faults.add("stations", self.stations, "has one station", "give two or more, from stern to bow")
 
     def present(self, numbers: Numbers) -> bool:
-        """Whether some member has a diameter and a drag coefficient above 0."""
+        # Whether some member has a diameter and a drag coefficient above 0.
         return bool(np.any(numbers["diameters"]) and np.any(numbers["drag_coefficient"]))
 
     def braking(self, numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
-        """The derivative across the hull, strip by strip, at the whole speed and all rates together.
-
-        Args:
-            numbers: The term's numbers by field, each of shape (n, ...).
-            speeds: Sizes of velocity and angular velocity along and about the body's axes, (n, 6) [m/s, rad/s].
-            water_density: Density of the water, (n,) [kg/m3].
-
-        Returns:
-            Matrices (n, 6, 6) [N s/m, N s, N m s].
-        """
+        # The derivative across the hull, strip by strip, at the whole speed and all rates together.
         strength = numbers["drag_coefficient"] * numbers["diameters"]
         stations, breadth = (0.5 * (table[:, 1:] + table[:, :-1]) for table in (numbers["stations"], strength))
         size = water_density[:, None] * breadth * np.diff(numbers["stations"])
@@ -75,7 +65,7 @@ class CrossFlow(Term):
         return total
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The two directions across the hull, and two strips per segment: station, and rho/2 Cd D times its length."""
+        # The two directions across the hull, and two strips per segment: station, and rho/2 Cd D times its length.
         a, b = (twist(context.frame, np.zeros((1, 3)), direction) for direction in ACROSS)
         values: dict[str, Any] = {"a": a[:, :3], "a_arm": a[:, 3:], "b": b[:, :3], "b_arm": b[:, 3:]}
         stations, strength = numbers["stations"], numbers["drag_coefficient"] * numbers["diameters"]

@@ -17,6 +17,13 @@ class Current(Term):
 
     Args:
         velocity: Velocity of the water, (3,) [m/s], in inertial axes.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", terms=[lw.terms.Current(velocity=[0.5, 0.0, 0.0])])
+        >>> fleet = lw.Ensemble(scene, members=100, vary={"current.velocity[1]": lw.distributions.Normal(std=0.1)})
+        >>> fleet.parameters(0, 100)["current.velocity"].shape
+        (100, 3)
     """
 
     type: ClassVar[str] = "current"
@@ -47,7 +54,6 @@ class CurrentProfile(Term):
     velocities: Any = number(("k", 3), "m/s")
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The table as device rows, knot by knot."""
         return Packed({"count": numbers["depths"].shape[1] - 1}, knots(numbers["depths"], numbers["velocities"]))
 
     def water(self, numbers: Numbers, position: np.ndarray, time: np.ndarray, parameters: Numbers) -> np.ndarray:

@@ -51,7 +51,7 @@ class CurrentHarmonics(Harmonics):
     amplitudes: Any = number(("k", 3), "m/s")
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """Device rows of each harmonic: amplitude, angular frequency [rad/s], phase."""
+        # Device rows of each harmonic: amplitude, angular frequency [rad/s], phase.
         columns = [numbers["amplitudes"], 2.0 * np.pi / numbers["periods"][..., None], numbers["phases"][..., None]]
         rows = side_by_side(*columns)
         return Packed({"count": rows.shape[1]}, rows.reshape(len(rows), -1))

@@ -104,7 +104,7 @@ class Drag(Term):
         return Packed(values)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The coefficients as diagonal matrices, packed as those of `DragMatrix`."""
+        # The coefficients as diagonal matrices, packed as those of `DragMatrix`.
         matrices = {kind: numbers[kind][:, :, None] * np.eye(6) for kind in ("linear", "quadratic")}
         return packed_matrix(matrices["linear"], matrices["quadratic"], context)
 
@@ -121,21 +121,12 @@ class Drag(Term):
         return np.asarray(numbers["linear"] + numbers["quadratic"] * speeds)
 
     def braking(self, numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
-        """The derivatives on the diagonal.
-
-        Args:
-            numbers: The term's numbers by field, each of shape (n, ...).
-            speeds: Sizes of velocity and angular velocity along and about the body's axes, (n, 6) [m/s, rad/s].
-            water_density: Density of the water, (n,) [kg/m3].
-
-        Returns:
-            Matrices (n, 6, 6) [N s/m, N s, N m s].
-        """
+        # The derivatives on the diagonal.
         diagonal = numbers["linear"] + 2.0 * numbers["quadratic"] * speeds
         return np.asarray(diagonal[:, :, None] * np.eye(6))
 
     def device_in(self, aligned: bool) -> str:
-        """The device code of `DragMatrix`, in the form for these axes."""
+        # The device code of `DragMatrix`, in the form for these axes.
         return "drag_matrix" if aligned else "drag_matrix_turned"
 
 
@@ -168,7 +159,6 @@ class DragMatrix(Term):
     quadratic: Any = number((6, 6), "N s2/m2, N s2, N m s2", ((0.0,) * 6,) * 6)
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where a matrix creates energy."""
         remedy = "drag opposes motion: positive on the diagonal (minus Fossen's X_u, X_u|u| ...), small beside it"
         for kind in ("linear", "quadratic"):
             matrix = getattr(self, kind)
@@ -177,7 +167,7 @@ class DragMatrix(Term):
                 faults.add(kind, matrix, f"creates energy at the velocity {np.round(velocity, 3).tolist()}", remedy)
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, refuses members whose matrix creates energy."""
+        # In addition, refuses members whose matrix creates energy.
         bad = super().unphysical(numbers)
         for kind in ("linear", "quadratic"):
             if np.array_equal(numbers[kind], getattr(self, kind)[None]):
@@ -187,24 +177,15 @@ class DragMatrix(Term):
         return bad
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The matrices in the axes and about the origin of the forces."""
+        # The matrices in the axes and about the origin of the forces.
         return packed_matrix(numbers["linear"], numbers["quadratic"], context)
 
     def braking(self, numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
-        """The derivatives, column by column.
-
-        Args:
-            numbers: The term's numbers by field, each of shape (n, ...).
-            speeds: Sizes of velocity and angular velocity along and about the body's axes, (n, 6) [m/s, rad/s].
-            water_density: Density of the water, (n,) [kg/m3].
-
-        Returns:
-            Matrices (n, 6, 6) [N s/m, N s, N m s].
-        """
+        # The derivatives, column by column.
         return np.asarray(numbers["linear"] + 2.0 * numbers["quadratic"] * speeds[:, None, :])
 
     def device_in(self, aligned: bool) -> str:
-        """The code that reads matrices directly, or for turned axes the code that first finds the user's velocities."""
+        # The code that reads matrices directly, or for turned axes the code that first finds the user's velocities.
         return "drag_matrix" if aligned else "drag_matrix_turned"
 
 
@@ -272,13 +253,10 @@ def _searched(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.nda
 
 
 def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, context: PackingContext) -> Packed:
-    """Device rows of drag matrices: the linear matrix, then the quadratic one.
+    """Device rows of drag matrices (n, 6, 6), user's axes and origin: the linear matrix, then the quadratic one.
 
     Where the kernel's axes are turned, the quadratic part is given for each velocity that has a column: its twist (6), which
     measures the velocity, and its wrench (6).
-
-    linear: Linear coefficients (n, 6, 6), user's axes and origin.
-    quadratic: Quadratic coefficients (n, 6, 6), user's axes and origin.
     """
     # X gives the user's velocities from those at the origin of the forces in the kernel's axes.
     X = context.frame.from_forces

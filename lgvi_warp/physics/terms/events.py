@@ -36,6 +36,11 @@ class Surface(Event):
 
     Args:
         depth: Depth [m]; 0 by default, the surface.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.Scene.named("remus_100", events=[lw.events.Surface(depth=0.5)]).parameters()["surface.depth"]
+        array(0.5)
     """
 
     type: ClassVar[str] = "surface"
@@ -50,6 +55,11 @@ class Floor(Event):
 
     Args:
         depth: Depth of the floor [m].
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.Scene.named("remus_100", events=[lw.events.Floor(depth=40.0)]).parameters()["floor.depth"]
+        array(40.)
     """
 
     type: ClassVar[str] = "floor"
@@ -65,6 +75,11 @@ class Box(Event):
     Args:
         lower: Lower corner, shape (3,) [m], in inertial axes.
         upper: Upper corner, shape (3,) [m], in inertial axes; above `lower` on each axis.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> lw.events.Box(lower=[-50.0, -50.0, 0.0], upper=[50.0, 50.0, 30.0]).upper
+        array([50., 50., 30.])
     """
 
     type: ClassVar[str] = "box"
@@ -74,13 +89,12 @@ class Box(Event):
     upper: Any = number((3,), "m")
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, refuses members whose corners span no box."""
+        # In addition, refuses members whose corners span no box.
         bad = super().unphysical(numbers)
         crossed = np.any(numbers["upper"] <= numbers["lower"], axis=1)
         return {"lower": bad["lower"] | crossed, "upper": bad["upper"] | crossed}
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where the corners span no box."""
         if np.any(self.upper <= self.lower):
             fault = f"is not above lower = {self.lower.tolist()}"
             faults.add("upper", self.upper, fault, "give upper > lower on each axis")
@@ -92,6 +106,11 @@ class StopTime(Event):
 
     Args:
         at: Time [s], from 0.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> [event.key for event in lw.Scene.named("remus_100", events=[lw.events.StopTime(at=60.0)]).events]
+        ['time']
     """
 
     type: ClassVar[str] = "time"
@@ -104,11 +123,11 @@ class StopTime(Event):
 TYPES = Event.kinds
 
 
-def from_list(given: Any) -> tuple[Event, ...]:
+def from_list(entries: Any) -> tuple[Event, ...]:
     """Build the events of a scene."""
-    check_list("events", given, "write [[events]] and type = ... below, or events=[lw.events.Surface()]")
+    check_list("events", entries, "write [[events]] and type = ... below, or events=[lw.events.Surface()]")
     faults, events = Faults(), list[Event]()
-    for i, entry in enumerate(given):
+    for i, entry in enumerate(entries):
         with faults.including():
             if isinstance(entry, Event):
                 events.append(entry)

@@ -51,7 +51,6 @@ class Fins(Term):
         super().__post_init__()
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where chord and normal of a fin span no plane."""
         for i, (chord, normal) in enumerate(zip(self.chord, self.normal, strict=True)):
             if not np.any(chord):
                 remedy = "give the direction from trailing to leading edge, such as [1, 0, 0]"
@@ -62,7 +61,7 @@ class Fins(Term):
                 faults.add(f"normal[{i}]", normal, "is along the chord", "give a direction across the fin's plane")
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, refuses members whose chord and normal span no plane."""
+        # In addition, refuses members whose chord and normal span no plane.
         bad = super().unphysical(numbers)
         chord, normal = np.nan_to_num(numbers["chord"]), np.nan_to_num(numbers["normal"])
         bad["chord"] = bad["chord"] | ~np.all(np.any(chord, axis=-1), axis=-1)
@@ -70,16 +69,7 @@ class Fins(Term):
         return bad
 
     def braking(self, numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
-        """The derivative along each normal, at the whole speed, as if lift and both kinds of drag acted at once.
-
-        Args:
-            numbers: The term's numbers by field, each of shape (n, ...).
-            speeds: Sizes of velocity and angular velocity along and about the body's axes, (n, 6) [m/s, rad/s].
-            water_density: Density of the water, (n,) [kg/m3].
-
-        Returns:
-            Matrices (n, 6, 6) [N s/m, N s, N m s].
-        """
+        # The derivative along each normal, at the whole speed, as if lift and both kinds of drag acted at once.
         slope = numbers["lift_slope"] + 2.0 * (numbers["drag"] + numbers["drag_normal"])
         size = 0.5 * water_density[:, None] * numbers["area"] * slope * np.linalg.norm(speeds[:, :3], axis=1)[:, None]
         normal = numbers["normal"] / np.linalg.norm(numbers["normal"], axis=-1, keepdims=True)
@@ -88,7 +78,6 @@ class Fins(Term):
         return np.asarray(np.einsum("nk,nki,nkj->nij", size, rows, rows))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """Device rows of each fin, see `fin_rows`."""
         rows = fin_rows(numbers, context)
         count = rows.shape[1]
         return Packed({"count": count}, rows.reshape(len(rows), -1), work=2 * count)
@@ -101,12 +90,9 @@ def _degenerate(chord: np.ndarray, normal: np.ndarray) -> Any:
 
 
 def fin_rows(numbers: Numbers, context: PackingContext) -> np.ndarray:
-    """Device rows of fins: the twists c and n along chord and normal, rho A/2 times the three coefficients, and S and W.
+    """Device rows (members, fins, 51) of fins: their twists c and n, rho A/2 times the three coefficients, and S and W.
 
     S = c c^T + n n^T and W = n c^T - c n^T, block by block (lgvi_kernels/laws/fins.py).
-
-    numbers: The term's numbers by field, each of shape (members, fins, ...).
-    Returns: Rows (members, fins, 51).
     """
     chord = numbers["chord"] / np.linalg.norm(numbers["chord"], axis=-1, keepdims=True)
     normal = numbers["normal"] - np.sum(numbers["normal"] * chord, axis=-1, keepdims=True) * chord
@@ -126,9 +112,6 @@ def fin_rows(numbers: Numbers, context: PackingContext) -> np.ndarray:
 
 
 def twist(frame: Frame, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Rows that measure the velocity of a point along a unit vector, which are also the wrench of a unit force there.
-
-    point: Points (n, ..., 3) [m] from the user's origin, user's axes.
-    """
+    """Rows that measure the velocity of a point (n, ..., 3) [m] along a unit vector: also the wrench of a unit force there."""
     *_, point, direction = repeated(frame.Q, frame.forces, point, direction)
     return np.concatenate([frame.vector(direction), frame.torque(np.cross(point, direction), direction)], axis=-1)

@@ -38,11 +38,11 @@ class GaussMarkovCurrent(NoisyTerm):
 
     @property
     def memory(self) -> bool:
-        """Always true: the current itself is remembered."""
+        # Always true: the current itself is remembered.
         return True
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """Decay and spread of the process over one draw, exact; the memory holds u twice and du/dt."""
+        # Decay and spread of the process over one draw, exact; the memory holds u twice and du/dt.
         steps = context.h / self.draws(context.h) / numbers["time_constant"]
         spread = numbers["standard_deviation"] * np.sqrt(-np.expm1(-2.0 * steps))[:, None]
         first = self._first(numbers, context)

@@ -20,11 +20,11 @@ class Weight(Term):
 
     @property
     def conserves(self) -> frozenset[str]:
-        """All three: its potential depends on depth alone."""
+        # All three: its potential depends on depth alone.
         return CONSERVED
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The net force (m - rho V) g, formed here in float64 since it cancels, whatever the kernel's precision."""
+        # The net force (m - rho V) g, formed here in float64 since it cancels, whatever the kernel's precision.
         return Packed({"net": net(context.parameters)})
 
     def potential(self, numbers: Numbers, position: Array, attitude: Array, parameters: Numbers) -> Array:
@@ -40,11 +40,11 @@ class Restoring(Term):
 
     @property
     def conserves(self) -> frozenset[str]:
-        """All three: its potential depends only on the attitude relative to the vertical."""
+        # All three: its potential depends only on the attitude relative to the vertical.
         return CONSERVED
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The vector B r_b - W r_g [N m] about the origin of the forces, in the kernel's axes."""
+        # The vector B r_b - W r_g [N m] about the origin of the forces, in the kernel's axes.
         p, origin = context.parameters, context.frame.forces
         about = moment(p) + net(p)[:, None] * origin if np.any(origin) else moment(p)
         return Packed({"moment": context.frame.vector(about)})

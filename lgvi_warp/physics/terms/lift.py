@@ -30,21 +30,12 @@ class BodyLift(Term):
     matrix: Any = number((6, 6), "kg/m, kg, kg m")
 
     def braking(self, numbers: Numbers, speeds: np.ndarray, water_density: np.ndarray) -> np.ndarray:
-        """The matrix at the speed ahead; and by that speed itself the sizes of what it multiplies.
-
-        Args:
-            numbers: The term's numbers by field, each of shape (n, ...).
-            speeds: Sizes of velocity and angular velocity along and about the body's axes, (n, 6) [m/s, rad/s].
-            water_density: Density of the water, (n,) [kg/m3].
-
-        Returns:
-            Matrices (n, 6, 6) [N s/m, N s, N m s].
-        """
+        # The matrix at the speed ahead; and by that speed itself the sizes of what it multiplies.
         ahead = np.eye(6)[0] * (np.abs(numbers["matrix"]) @ speeds[:, :, None])
         return np.asarray(numbers["matrix"] * speeds[:, :1, None] + ahead)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """Rows that measure u (6), and the matrix (36), in the axes and about the origin of the forces."""
+        # Rows that measure u (6), and the matrix (36), in the axes and about the origin of the forces.
         X = context.frame.from_forces
         matrix = np.swapaxes(X, 1, 2) @ numbers["matrix"] @ X
         ahead = np.broadcast_to(X[:, 0, :], (len(matrix), 6))

@@ -14,10 +14,7 @@ from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term
 
 
 def channel(key: str) -> int:
-    """The first of a term's two channels of random numbers: twice a hash of its name, so that no two overlap.
-
-    Two names of one scene have the same channel with a probability of 2^-31.
-    """
+    """The first of a term's two channels of random numbers: twice a hash of its name (two names share one by 2^-31)."""
     return _signed(2 * zlib.crc32(key.encode()))
 
 
@@ -79,5 +76,5 @@ class NoisyTerm(Term):
         return {"key": key if self.noise_step is None else key | {"draws": self.draws(context.h)}}
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The numbers as `Term.packed` has them, with the key of the random numbers."""
+        # The numbers as `Term.packed` has them, with the key of the random numbers.
         return Packed(super().packed(numbers, context).values | self.noise_key(context))

@@ -31,11 +31,11 @@ class Stratification(Term):
 
     @property
     def conserves(self) -> frozenset[str]:
-        """All three: its potential depends on the depth of the centre of buoyancy alone."""
+        # All three: its potential depends on the depth of the centre of buoyancy alone.
         return CONSERVED
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """Only the deviation from B, since B itself is part of `Weight`."""
+        # Only the deviation from B, since B itself is part of `Weight`.
         center = context.frame.point(context.parameters["vehicle.center_of_buoyancy"])
         stiffness = context.parameters["vehicle.buoyancy"] * numbers["gradient"]
         return Packed({"stiffness": stiffness, "center": center, "reference_depth": numbers["reference_depth"]})

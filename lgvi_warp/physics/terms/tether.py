@@ -32,7 +32,7 @@ class Tether(Term):
 
     @property
     def conserves(self) -> frozenset[str]:
-        """Energy only: the anchor takes up momentum."""
+        # Energy only: the anchor takes up momentum.
         return frozenset({"energy"})
 
     def potential(self, numbers: Numbers, position: Array, attitude: Array, parameters: Numbers) -> Array:

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -11,21 +10,20 @@ import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.physics.notation import repeated
-from lgvi_warp.physics.terms.actuators import FAST, motion, packed_following, refuse_unread
-from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number, rows_of, side_by_side
-from lgvi_warp.physics.terms.wrench import (
-    SCHEDULE,
-    at_start,
-    commands,
-    fields_anew,
-    first_row,
-    idle_fields,
+from lgvi_warp.physics.terms.actuators import (
+    FAST,
+    Commanded,
+    motion,
+    packed_following,
     refuse_idle,
+    refuse_unread,
 )
+from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, rows_of, side_by_side
+from lgvi_warp.physics.terms.wrench import at_start, commands
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Thrusters(Term):
+class Thrusters(Commanded):
     """n thrusters, each with thrust = c+ f+(max(u - band, 0)) - c- f-(max(-u - band, 0)) along its direction (Fossen 2021, 9).
 
     f(w) = polynomial_1 w + polynomial_2 w^2 + ..., by default w^2, or a table. u is the command within its limit, after the
@@ -73,8 +71,6 @@ class Thrusters(Term):
     """
 
     type: ClassVar[str] = "thrusters"
-    timed: ClassVar[bool] = True
-    driven_fields: ClassVar[tuple[str, ...]] = ("command", "times", "command_schedule")
 
     position: Any = number(("n", 3), "m")
     direction: Any = number(("n", 3), "1")
@@ -115,21 +111,13 @@ class Thrusters(Term):
         self.repeat(n, *OPTIONAL)
         defaults = {"coefficient_astern": self.coefficient, "dead_band": np.zeros(n), "limit": np.full(n, 1e6),
                     "time_constant": np.zeros(n)}  # fmt: skip
-        scheduled = self.command_schedule is not None
-        first = first_row(self.command_schedule)
-        both = scheduled and self.command is not None and not np.array_equal(self.command, first)
-        if scheduled:
-            defaults["command"] = first
-        else:
-            held = 0.0 if self.command is None else self.command
-            held = np.full(n, held) if np.ndim(np.asarray(held, dtype=object)) == 0 else held
-            defaults |= {"command": held, "times": [0.0], "command_schedule": [held]}
-            object.__setattr__(self, "following", SCHEDULE if self.times is None else ())
+        if self.command_schedule is None:
+            self.repeat(n, "times")
+        self.settle_commands(n)
         for name, value in defaults.items():
             if getattr(self, name) is None:
                 object.__setattr__(self, name, value)
-        self.repeat(n, *(defaults.keys() - {"command_schedule"}))
-        object.__setattr__(self, "_both", both)
+        self.repeat(n, *defaults)
         if self.torque_loss is not None:
             # The torque is not along the velocity that it falls with.
             object.__setattr__(self, "dissipative", False)
@@ -154,32 +142,16 @@ class Thrusters(Term):
 
     @property
     def channels(self) -> int:
-        """Number of commands, one for each thruster."""
         return len(self.coefficient)
 
-    @property
-    def own_commands(self) -> bool:
-        """Whether it has a schedule, or a command other than 0."""
-        return len(self.command_schedule) > 1 or bool(np.any(self.command))
-
     def effect(self, numbers: Numbers, parameters: Numbers, speed: np.ndarray) -> np.ndarray:
-        """The wrench of a unit of thrust of each thruster, about the body's origin.
-
-        Args:
-            numbers: The term's numbers by field.
-            parameters: All parameters of the scene.
-            speed: Speed ahead (1 or n,) [m/s].
-
-        Returns:
-            (1 or n, 6, channels).
-        """
+        # The wrench of a unit of thrust of each thruster, about the body's origin.
         position, direction = repeated(numbers["position"], numbers["direction"])
         direction = direction / np.linalg.norm(direction, axis=-1, keepdims=True)
         wrench = np.concatenate([direction, np.cross(position, direction)], axis=-1)
         return np.swapaxes(wrench, -1, -2)
 
     def device_in(self, aligned: bool) -> str:
-        """The code for what these thrusters have."""
         driven = self.driver is not None
         features = (
             {"driven": driven}
@@ -194,13 +166,9 @@ class Thrusters(Term):
             return "thrusters_polynomial" if chosen else "thrusters"
         return f"thrusters_with:{','.join(chosen)}"
 
-    def with_fields(self, fields: Mapping[str, Any]) -> Any:
-        """In addition, leaves out the commands in whose place others stand."""
-        return super().with_fields(fields_anew(self, fields))
-
     def to_dict(self) -> dict[str, Any]:
-        """The term as a table of a scene file: of its commands what acts; polynomials only where they are not w^2."""
-        left_out = (*idle_fields(self), *(("polynomial", "polynomial_astern") if self.is_square else ()))
+        # The term as a table of a scene file: of its commands what acts; polynomials only where they are not w^2.
+        left_out = ("polynomial", "polynomial_astern") if self.is_square else ()
         return {key: value for key, value in super().to_dict().items() if key not in left_out}
 
     def thrust(self, command: Any) -> np.ndarray:
@@ -223,7 +191,7 @@ class Thrusters(Term):
         return np.asarray(self.coefficient * ahead - self.coefficient_astern * astern)
 
     def drive(self) -> np.ndarray:
-        """The largest force and torque of all thrusters together, over the times of the schedule."""
+        # The largest force and torque of all thrusters together, over the times of the schedule.
         along = self.direction / np.linalg.norm(self.direction, axis=1, keepdims=True)
         wrenches = np.concatenate([along, np.cross(self.position, along)], axis=1)
         return np.asarray(np.abs(self.thrust(self.command_schedule) @ wrenches).max(axis=0))
@@ -253,7 +221,6 @@ class Thrusters(Term):
         return np.clip(least_commands, -self.limit, self.limit)
 
     def check(self, faults: Faults) -> None:
-        """Adds a fault where a direction has no length, or the command is given twice."""
         zero = np.flatnonzero(np.linalg.norm(self.direction, axis=1) == 0.0)
         if len(zero):
             remedy = "give the direction that the thrust pushes the vehicle, such as [1, 0, 0]"
@@ -271,14 +238,11 @@ class Thrusters(Term):
                 )
         if self.torque_loss is not None and self.torque_coefficient is None:
             faults.add("torque_loss", self.torque_loss, "is given without torque_coefficient", "give both")
-        if self.__dict__["_both"]:
+        if vars(self)["commanded_twice"]:
             faults.add("command", self.command, "differs from the first of command_schedule", "keep one of them")
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
-        """In addition, refuses directions without length.
-
-        Raises SceneError for members' numbers that would have no effect.
-        """
+        # In addition, refuses directions without length; raises SceneError for members' numbers that would have no effect.
         bad = super().unphysical(numbers)
         bad["direction"] = bad["direction"] | np.any(~np.any(numbers["direction"], axis=-1), axis=-1)
         remedy = f"give {self.key}.time_constant above 0 [s] in the scene as well"
@@ -301,13 +265,13 @@ class Thrusters(Term):
 
     @property
     def memory(self) -> bool:
-        """Whether thrusters have a limited rate, or one of them a lag."""
+        # Whether thrusters have a limited rate, or one of them a lag.
         if self.driver is not None:
             return any(motion(self).values())
         return bool(self.rate_limit is not None or np.any(self.time_constant > 0.0))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The device rows: those of each thruster, then the command table of each thruster."""
+        # The device rows: those of each thruster, then the command table of each thruster.
         direction = numbers["direction"] / np.linalg.norm(numbers["direction"], axis=-1, keepdims=True)
         arms = np.cross(numbers["position"] + 0.0 * direction, direction + 0.0 * numbers["position"])
         force, torque = context.frame.vector(direction), context.frame.torque(arms, direction + 0.0 * arms)
@@ -375,10 +339,8 @@ def _unfit(at: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def side_of_table(at: np.ndarray, values: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
-    """One side of tables of thrust, by size: from the command at which thrust begins on.
+    """One side of tables of thrust (n, t) at commands (n, t), by size: from the command at which thrust begins on.
 
-    at: Commands (n, t), rising.
-    values: Thrusts (n, t), rising.
     Returns: Sizes of commands (n, t) and of thrusts (n, t), from (begin, 0) up; points of the other side are at the begin.
     """
     if side < 0.0:

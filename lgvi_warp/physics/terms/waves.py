@@ -32,7 +32,7 @@ class Waves(Harmonics):
     headings_deg: Any = number(("k",), "deg")
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """Device rows of each component; raises SceneError where there is no gravity, hence no wavenumber."""
+        # Device rows of each component; raises SceneError where there is no gravity, hence no wavenumber.
         g = context.parameters["environment.gravity"]
         if np.any(g <= 0.0):
             fault = f"leaves the length of {self.key} unknown (wavenumber = omega^2 / gravity)"

@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 from lgvi_warp.common.declared import word
-from lgvi_warp.common.errors import Faults, ragged
+from lgvi_warp.common.errors import ragged
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, knots, number, side_by_side
 
@@ -24,6 +23,12 @@ class Wrench(Term):
     Args:
         force: Force, (3,) [N]; 0 by default.
         torque: Torque, (3,) [N m]; 0 by default.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("torpedo", terms=[lw.terms.Wrench(force=[5.0, 0.0, 0.0])])
+        >>> scene.parameters()["wrench.force"]
+        array([5., 0., 0.])
     """
 
     type: ClassVar[str] = "wrench"
@@ -33,11 +38,11 @@ class Wrench(Term):
     torque: Any = number((3,), "N m", (0.0, 0.0, 0.0))
 
     def drive(self) -> np.ndarray:
-        """The sizes of force and torque."""
+        # The sizes of force and torque.
         return np.abs(np.concatenate([self.force, self.torque]))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """Force and torque about the origin of the forces, in the kernel's axes."""
+        # Force and torque about the origin of the forces, in the kernel's axes.
         force, torque = numbers["force"], numbers["torque"]
         return Packed({"force": context.frame.vector(force), "torque": context.frame.torque(torque, force)})
 
@@ -72,93 +77,24 @@ class WrenchSchedule(Term):
         super().__post_init__()
 
     def drive(self) -> np.ndarray:
-        """The largest sizes of force and torque in the schedule."""
+        # The largest sizes of force and torque in the schedule.
         return np.abs(np.concatenate([self.force, self.torque], axis=1)).max(axis=0)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """Two tables: the force, and the torque about the origin of the forces."""
+        # Two tables: the force, and the torque about the origin of the forces.
         force = context.frame.vector(numbers["force"])
         torque = context.frame.torque(*repeated(numbers["torque"], numbers["force"]))
         tables = [knots(numbers["times"], values, self.interpolation == "steps") for values in (force, torque)]
         return Packed({"count": numbers["times"].shape[1] - 1}, side_by_side(*tables))
 
 
-def first_row(schedule: Any) -> Any:
-    """The commands at the first time of a schedule.
-
-    schedule: Commands (k, units), as the user gave them, or None.
-    Returns: Commands (units,); 0.0 where there is no schedule, or none that can be read.
-    """
-    try:
-        return np.atleast_2d(np.array(schedule, dtype=np.float64))[0] if schedule is not None else 0.0
-    except (TypeError, ValueError, IndexError, OverflowError):
-        return 0.0
-
-
-# Fields of a schedule of commands, which stands in place of `command`.
-SCHEDULE = ("times", "command_schedule")
-
-
-def holds(term: Any) -> bool:
-    """Whether a term has commands that are held, so that of its fields `command` acts, and else the schedule."""
-    return len(term.command_schedule) == 1
-
-
-def idle_fields(term: Any) -> tuple[str, ...]:
-    """The fields of a term's commands that follow from the others."""
-    return SCHEDULE if holds(term) else ("command",)
-
-
-def fields_anew(term: Any, fields: Mapping[str, Any]) -> dict[str, Any]:
-    """Fields with which a term is built anew: of its commands those that follow from the others are left out.
-
-    Returns: These, and None for each that follows from them.
-    """
-    left_out = ("command",) if fields.keys() & set(SCHEDULE) else idle_fields(term)
-    return dict.fromkeys(left_out) | dict(fields)
-
-
 def commands(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
-    """Times and commands of a term; a command that is held is the only row of the schedule.
-
-    numbers: The term's numbers by field, each of shape (n, ...).
-    Returns: Times (n, k) [s] and commands (n, k, units).
-    """
+    """Times (n, k) [s] and commands (n, k, units) of a term; a command that is held is the only row of the schedule."""
     schedule = numbers["command_schedule"]
     return numbers["times"], numbers["command"][:, None, :] if schedule.shape[1] == 1 else schedule
 
 
 def at_start(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:
-    """Commands at t = 0.
-
-    times: Times of the schedule (1 or n, k) [s].
-    schedule: Commands (1 or n, k, columns).
-    Returns: Commands (n, columns).
-    """
+    """Commands (n, columns) at t = 0 of schedules (1 or n, k, columns) with times (1 or n, k) [s]."""
     members = zip(*repeated(times, schedule), strict=True)
     return np.array([[np.interp(0.0, at, column) for column in commands.T] for at, commands in members])
-
-
-def refuse_idle(term: Any, numbers: Numbers, rate: str, remembers: np.ndarray, remedy: str) -> None:
-    """Refuse members' numbers that would have no effect, since the scene's kernel does not read them.
-
-    That is `command` in a scene with a schedule and the reverse, and the numbers of a memory that the scene does not have. No
-    controller drives the term, or the former do not exist.
-
-    numbers: Members' numbers by field, each of shape (n, ...).
-    remembers: Whether each member's number in that field needs the memory, (n, units).
-    """
-    faults = Faults(f"{term.key}.")
-    unread = {}
-    if term.driver is None:
-        acts = "command" if holds(term) else "command_schedule"
-        unread = {name: (numbers[name] != getattr(term, name), f"a {acts}", f"vary {term.key}.{acts}")
-                  for name in idle_fields(term)}  # fmt: skip
-    if not term.memory:
-        unread[rate] = (remembers, "none", remedy)
-    for name, (bad, alternative, what_to_do) in unread.items():
-        if np.any(bad):
-            i = int(bad.reshape(len(bad), -1).any(axis=1).argmax())
-            fault = f"does not act: the scene has {alternative}"
-            faults.add(f"{name} of member {i}", numbers[name][i], fault, what_to_do)
-    faults.raise_if_any()

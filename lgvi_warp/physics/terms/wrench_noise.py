@@ -30,7 +30,7 @@ class WrenchNoise(NoisyTerm):
     torque: Any = number((3,), "N m s^1/2", (0.0, 0.0, 0.0), least=0.0)
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        """The force and moment of each of the user's axes: drawn there, the numbers do not depend on the kernel's axes."""
+        # The force and moment of each of the user's axes: drawn there, the numbers do not depend on the kernel's axes.
         frame, none = context.frame, np.zeros((1, 3))
         values = self.noise_key(context)
         for i, axis in enumerate("xyz"):

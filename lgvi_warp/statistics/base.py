@@ -29,7 +29,23 @@ from lgvi_warp.statistics.values.values import Values
 STOPPED = ("held", "left_out")
 
 # Statistics by their type in a scene file; each class adds itself.
-TYPES: dict[str, type[Statistic]] = {}
+TYPES = registry.Kinds(
+    "lgvi_warp.statistics",
+    {
+        "moments": ("mean", "covariance"),
+        "angles": ("circular_mean", "mean_attitude"),
+        "counts": ("histogram", "exceedance", "first_passage"),
+        "paths.member_values": ("each",),
+        "metrics.tracking_metrics": (
+            *("overshoot", "undershoot", "peak_time", "peak", "rise_time", "settling_time", "steady_state_error"),
+            *("max_error", "cross_track", "iae", "ise", "itae", "rms"),
+        ),
+        "metrics.actuator_metrics": ("effort", "travel", "saturation_share", "energy", "time_to_failure", "own_metric"),
+        "order": ("extremes", "quantiles"),
+        "outcomes": ("outcome", "end_time"),
+        "paths.path": ("path_maximum", "path_minimum", "path_range", "path_mean", "path_rms", "path_time"),
+    },
+)
 
 
 class Gatherer:
@@ -109,6 +125,8 @@ class Statistic:
     of_ends: ClassVar[bool] = False
     # Whether it takes the samples at all ticks of a controller, and not only those that are kept.
     ticks: ClassVar[bool] = False
+    # Whether it is of what a controller tracks, which some guidance has to want.
+    tracks: ClassVar[bool] = False
 
     of: Any = None
     name: str | None = field(default=None, kw_only=True)

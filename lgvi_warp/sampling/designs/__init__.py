@@ -8,19 +8,15 @@ the cube's levels into values (sampling/distributions). The cube's columns are i
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from lgvi_warp.common import registry
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.sampling.designs.base import Sampling
 
-# Classes of samplings by their kind in a scene file, each also an attribute of this package.
-registry.load_modules(sys.modules[__name__])
+# Classes of samplings by their kind in a scene file.
 KINDS = Sampling.kinds
-globals().update({kind.__name__: kind for kind in KINDS.values()})
 
 
 def sampling_of(content: Any) -> Sampling:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, MutableMapping
 from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar
 
@@ -33,7 +33,18 @@ class Sampling:
 
     kind: ClassVar[str] = ""
     # Classes by their kind in a scene file.
-    kinds: ClassVar[dict[str, Any]] = {}
+    kinds: ClassVar[MutableMapping[str, Any]] = registry.Kinds(
+        "lgvi_warp.sampling.designs",
+        {
+            "sequences": ("sobol", "halton"),
+            "designs": ("saltelli", "morris"),
+            "random": ("random",),
+            "grid": ("grid",),
+            "hypercube": ("latin_hypercube",),
+            "levels": ("levels",),
+            "table": ("table",),
+        },
+    )
     # Whether a run may take only the first of the members that the sampling has.
     fewer: ClassVar[bool] = False
 

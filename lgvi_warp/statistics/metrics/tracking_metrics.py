@@ -9,7 +9,7 @@ number, r what is wanted at each tick, e = r - y.
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
@@ -18,7 +18,6 @@ import numpy as np
 from lgvi_warp.common.arguments import flag
 from lgvi_warp.common.errors import Faults, among
 from lgvi_warp.common.status import failed
-from lgvi_warp.control.controller import Controller
 from lgvi_warp.statistics.base import Gatherer, Statistic
 from lgvi_warp.statistics.ends import Ends
 from lgvi_warp.statistics.estimates.tree import Part
@@ -249,6 +248,8 @@ class OfTracking(Metric):
             "east"; or a distance from what is wanted: "position", "attitude" (angle), "cross_track".
     """
 
+    tracks: ClassVar[bool] = True
+
     def meant(self) -> Quantity:
         """Return the error."""
         return tracking.error(
@@ -268,6 +269,8 @@ class OfCourse(Metric):
     Args:
         of: "depth", "heading", "speed", "north" or "east".
     """
+
+    tracks: ClassVar[bool] = True
 
     def meant(self) -> Quantity:
         """Return the number and its goal."""
@@ -653,18 +656,3 @@ class RMSError(ISE):
 
     def finish(self, state: State) -> np.ndarray:
         return np.where(state["until"] > 0.0, np.sqrt(state["sum"] / state["until"]), state["first"])
-
-
-def check_wanted(faults: Faults, key: str, metrics: Mapping[str, Statistic], controller: Controller | None) -> None:
-    """Add a fault for each metric of what no guidance wants: its errors would be those from zero.
-
-    controller: the controller of the scene; None for none, which is a fault of its own.
-    """
-    if controller is None:
-        return
-    wishes = {wish for part in controller.guidance for wish in part.gives}
-    for name, metric in metrics.items():
-        tracked = metric.quantity.name if isinstance(metric, OfTracking | OfCourse) else None
-        if tracked is not None and tracking.NEEDED[tracked] not in wishes:
-            problem = f"is of the {tracked}, and no guidance of the scene wants a {tracking.NEEDED[tracked]}"
-            faults.add(key, name, problem, "give guidance that wants it, or another metric")

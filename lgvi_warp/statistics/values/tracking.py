@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import among, closest, refusal
+from lgvi_warp.common.errors import Faults, among, closest, refusal
 from lgvi_warp.control.signals import ordered
 from lgvi_warp.statistics.values.quantity import Function, Quantity
 
 if TYPE_CHECKING:
+    from lgvi_warp.control.controller import Controller
     from lgvi_warp.sampling.members import Members
+    from lgvi_warp.statistics.base import Statistic
     from lgvi_warp.statistics.values.samples import Fields
 
 Numbers = Callable[[Mapping[str, np.ndarray]], np.ndarray]
@@ -205,3 +207,18 @@ def tracked_name(key: str, of: Any, known: tuple[str, ...]) -> str:
         return of
     why = "is a distance, which has no goal beyond" if among(of, _DISTANCES) else "is nothing that is tracked"
     raise refusal(key, of, why, closest(str(of), known))
+
+
+def check_wanted(faults: Faults, key: str, metrics: Mapping[str, Statistic], controller: Controller | None) -> None:
+    """Add a fault for each metric of what no guidance wants: its errors would be those from zero.
+
+    controller: the controller of the scene; None for none, which is a fault of its own.
+    """
+    if controller is None:
+        return
+    wishes = {wish for part in controller.guidance for wish in part.gives}
+    for name, metric in metrics.items():
+        tracked = metric.quantity.name if metric.tracks else None
+        if tracked is not None and NEEDED[tracked] not in wishes:
+            problem = f"is of the {tracked}, and no guidance of the scene wants a {NEEDED[tracked]}"
+            faults.add(key, name, problem, "give guidance that wants it, or another metric")

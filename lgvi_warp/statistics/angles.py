@@ -45,7 +45,6 @@ class CircularMean(Statistic):
     type: ClassVar[str] = "circular_mean"
 
     def rows(self, values: Values) -> Part:
-        """Return the moments of cosines and sines."""
         d = values.x.shape[1]
         both = Values(np.concatenate([np.cos(values.x), np.sin(values.x)], axis=1), values.good)
         c, s = both.centred[:, :d], both.centred[:, d:]
@@ -66,7 +65,7 @@ class CircularMean(Statistic):
         return both
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return atan2 of the mean sine and cosine; its error follows from their covariance about that direction."""
+        # Atan2 of the mean sine and cosine; its error follows from their covariance about that direction.
         count, d = part["count"], part["cc"].shape[1]
         n = count[:, None]
         C, S = empty_as_nan(part["mean"], count)[:, :d], empty_as_nan(part["mean"], count)[:, d:]
@@ -94,10 +93,8 @@ class CircularMean(Statistic):
         factor: np.ndarray,
         factor_of_length: np.ndarray,
     ) -> dict[str, np.ndarray]:
-        """Intervals of the mean direction and of the resultant length.
+        """Intervals of the mean direction (k, d) [rad] and of the resultant length (k, d).
 
-        value: (k, d) [rad], the mean direction.
-        length: (k, d), the resultant length.
         errors: standard errors (k, d) of the mean of (cosine, sine) across and along its direction, and of its length.
         """
         across, along, wide = errors
@@ -109,7 +106,7 @@ class CircularMean(Statistic):
         return arrays | {"resultant_length_lower": np.fmax(low, 0.0), "resultant_length_upper": np.fmin(high, 1.0)}
 
     def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
-        """Apply the delta method with the covariance of the mean that follows from the replicates' means."""
+        # Apply the delta method with the covariance of the mean that follows from the replicates' means.
         turned = np.stack([replicate.value for replicate in each]) - whole.value
         length = np.stack([replicate["resultant_length"] for replicate in each])
         across, along = (
@@ -141,17 +138,14 @@ class MeanAttitude(Statistic):
     default: ClassVar[str] = "attitude"
 
     def check(self, faults: Faults) -> None:
-        """Note a fault if `of` is not the attitude."""
         if not among(self.of, ("attitude",)):
             faults.add("of", self.of, "is no attitude", 'leave it out, or give "attitude"')
 
     @property
     def key(self) -> str:
-        """The name that was given, or "mean_attitude"."""
         return self.name or self.type
 
     def rows(self, values: Values) -> Part:
-        """Return mean and covariance of the nine entries of the matrix."""
         return {"count": values.count, "mean": values.mean, "m11": sums(values.centred, values.centred)}
 
     def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
@@ -162,7 +156,7 @@ class MeanAttitude(Statistic):
         return both | {"m11": shifted[0] + shifted[1]}
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return the polar part R of the mean M = R S; a change dM turns R by (tr(S) I - S)^-1 vee(R^T dM - dM^T R)."""
+        # The polar part R of the mean M = R S; a change dM turns R by (tr(S) I - S)^-1 vee(R^T dM - dM^T R).
         count = part["count"]
         few = (count < 1)[:, None, None]
         M = np.where(few, np.eye(3), part["mean"].reshape(-1, 3, 3))
@@ -205,7 +199,7 @@ class MeanAttitude(Statistic):
         return arrays | {"rotation_half_width": np.minimum(half, np.pi), "standard_error": error}
 
     def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
-        """Form the intervals from the turns of the replicates' means relative to the mean of all members."""
+        # Form the intervals from the turns of the replicates' means relative to the mean of all members.
         X = np.swapaxes(whole.value, 1, 2) @ np.stack([replicate.value for replicate in each])
         # v of X = exp(hat(v)), with an error of third order in its length.
         v = 0.5 * np.stack([X[..., j, i] - X[..., i, j] for i, j in ((1, 2), (2, 0), (0, 1))], axis=-1)

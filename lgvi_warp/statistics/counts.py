@@ -29,7 +29,7 @@ class Counted(Statistic):
         return {key: left[key] + right[key] for key in left}
 
     def spread(self, pooled: Estimate, each: Sequence[Estimate]) -> Estimate:
-        """Form Wilson's interval with the variance of the replicates' fractions."""
+        # Form Wilson's interval with the variance of the replicates' fractions.
         count = pooled.count.reshape(-1, *[1] * (pooled.value.ndim - 1))
         fractions = np.stack([replicate.value for replicate in each])
         lower, upper = intervals.probability_of_replicates(pooled.value, fractions, count, self.confidence)
@@ -69,7 +69,6 @@ class Histogram(Counted):
     limits: Any = None
 
     def check(self, faults: Faults) -> None:
-        """Note faults of edges, bins and limits."""
         if self.edges is not None and self.bins is not None:
             faults.add("edges", self.edges, "and bins are both given", "keep one of them")
             return
@@ -96,13 +95,11 @@ class Histogram(Counted):
         object.__setattr__(self, "_edges", edges)
 
     def over(self, time: np.ndarray) -> Histogram:
-        """Return the histogram with edges, where its limits are those of the run."""
         if not isinstance(self.limits, str):
             return self
         return replace(self, edges=np.linspace(time[0], time[-1], (self.bins or 0) + 1), bins=None, limits=None)
 
     def rows(self, values: Values) -> Part:
-        """Count the block's members in each bin."""
         edges: np.ndarray = self._edges  # type: ignore[attr-defined]
         k, d, _ = values.x.shape
         # 0: below; 1 to B: bins; B + 1: above. The last edge belongs to the last bin.
@@ -115,7 +112,6 @@ class Histogram(Counted):
         return {"count": values.count, "counts": counts}
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return the fractions of the members that count, with their intervals."""
         edges: np.ndarray = self._edges  # type: ignore[attr-defined]
         count, counts = part["count"], part["counts"]
         n = count[:, None, None]
@@ -144,7 +140,6 @@ class Condition(Statistic):
     below: Any = None
 
     def check(self, faults: Faults) -> None:
-        """Note limits that are no numbers, are missing, or have nothing between them."""
         super().check(faults)
         quantity = getattr(self, "_quantity", None)
         fits, limits = (1,) if quantity is None else (1, quantity.size), list[np.ndarray]()
@@ -165,7 +160,7 @@ class Condition(Statistic):
 
     @property
     def key(self) -> str:
-        """The name in the result: "exceedance depth above 50", "exceedance depth above 1 below 2"."""
+        # The name in the result: "exceedance depth above 50", "exceedance depth above 1 below 2".
         return self.name or f"{self.type} {self.quantity.name}{self.limits_text}{self.at_text}"
 
     @property
@@ -175,27 +170,13 @@ class Condition(Statistic):
         return "".join(f" {word} {spelled(limit)}" for word, limit in bounds if limit is not None)
 
     def limits(self, d: int) -> tuple[np.ndarray | None, np.ndarray | None]:
-        """Return the limits as arrays.
-
-        Args:
-            d: number of components.
-
-        Returns:
-            above and below, (d, 1) each; None where there is no limit.
-        """
+        """Return above and below as (d, 1) arrays, d the number of components; None where there is no limit."""
         bounds = (None if bound is None else np.asarray(bound, np.float64) for bound in (self.above, self.below))
         above, below = (None if bound is None else np.broadcast_to(bound.reshape(-1, 1), (d, 1)) for bound in bounds)
         return above, below
 
     def holds(self, values: Values) -> np.ndarray:
-        """Return where the condition holds.
-
-        Args:
-            values: numbers of n members at k times.
-
-        Returns:
-            (k, d, n); false where a member does not count.
-        """
+        """Return where the condition holds, (k, d, n); false where a member does not count."""
         above, below = self.limits(values.x.shape[1])
         if below is None:
             mask = values.x != 0.0 if above is None else values.x > above
@@ -217,11 +198,9 @@ class Exceedance(Condition, Counted):
     type: ClassVar[str] = "exceedance"
 
     def rows(self, values: Values) -> Part:
-        """Count the block's members for which the condition holds."""
         return {"count": values.count, "hits": self.holds(values).sum(axis=2)}
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return the fraction of members for which the condition holds."""
         count = part["count"]
         n = count[:, None]
         fraction = part["hits"] / np.maximum(n, 1)
@@ -238,10 +217,7 @@ PIECES = 8
 
 
 class _Passages(Gatherer):
-    """Follows a block: for each member the first sample at which the condition holds, or the last sample that is known.
-
-    Members are ordered by replicate: those of the first replicate, then of the next.
-    """
+    """Follows a block, its members by replicate: the first sample that shows the condition, or the last known."""
 
     def __init__(self, statistic: FirstPassage, time: np.ndarray, count: int):
         self._statistic, self._time, self._times = statistic, time, len(time)
@@ -254,7 +230,6 @@ class _Passages(Gatherer):
         self._replicates = 1
 
     def take(self, values: Values, when: slice) -> None:
-        """Note the passages at these sample times."""
         k = when.stop - when.start
         self._replicates = values.replicates
         x = values.x.reshape(k, -1)
@@ -286,10 +261,7 @@ class _Passages(Gatherer):
         self._share[now] = (limit - before) / (x[at, now] - before)
 
     def end(self, ends: Ends, replicates: int) -> None:
-        """Correct passages of stopped members, which reached their last state before the second sample; note the others.
-
-        Those that count with the state that they stopped in, and had not passed in it, never will.
-        """
+        """Correct passages of stopped members, whose last state came before the second sample; the others never pass."""
         end = ends.time.reshape(-1, replicates).T.ravel()
         stopped = ends.are(STOPPED).reshape(-1, replicates).T.ravel()
         never = stopped & (self._passed == self._times) & (self._known == self._times)
@@ -299,7 +271,6 @@ class _Passages(Gatherer):
         self._share[now] *= np.clip((end[now] - before) / (at - before), 0.0, 1.0)
 
     def close(self) -> Part:
-        """Return how many members pass in each piece of time, are lost before passing, and are stopped before passing."""
         R, length = self._replicates, self._times + 1
         row = np.repeat(np.arange(R), len(self._passed) // R) * length
         piece = np.clip(np.floor(self._share * PIECES), 0, PIECES - 1).astype(np.int64)
@@ -351,18 +322,16 @@ class FirstPassage(Condition, Counted):
     levels: Any = (0.05, 0.5, 0.95)
 
     def check(self, faults: Faults) -> None:
-        """Note faults of the levels, and a quantity of several components."""
         super().check(faults)
         check_levels(faults, self.levels)
         if self.of is not None and getattr(self, "_quantity", None) is not None and self.quantity.size != 1:
             faults.add("of", self.of, f"has {self.quantity.size} components", f"give one: {self.quantity.labels[0]!r}")
 
     def open(self, time: np.ndarray, count: int) -> _Passages:
-        """Return the object that follows the members of a block."""
         return _Passages(self, time, count)
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return the estimate of Aalen & Johansen (1978)."""
+        # The estimate of Aalen & Johansen (1978).
         curve = PassageCurve.of(part)
         lower, upper = curve.ends(*intervals.wilson(curve.value, curve.members, self.confidence))
         passed, lost, stopped = part["passed"][0, :-1].sum(axis=1), part["lost"][0], part["stopped"][0, :-1]
@@ -492,12 +461,9 @@ class PassageCurve:
         return np.asarray(np.maximum(F * (1.0 - F) / var_F - 2.0, 0.0))
 
     def ends(self, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return an interval that contains the value, widened where nothing is known.
+        """Return an interval (k, pieces) that contains the value, widened where nothing is known.
 
         After the last member at risk all that were lost may pass at once; without any member the interval is 0 to 1.
-
-        lower: (k, pieces), lower end.
-        upper: (k, pieces), upper end.
         """
         nobody = not self.risk[0]
         most = np.minimum(1.0, 1.0 - self._otherwise + (upper - self.value))

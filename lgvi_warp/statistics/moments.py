@@ -17,12 +17,7 @@ from lgvi_warp.statistics.values.values import Values
 
 
 def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the sums over members of a_i b_j.
-
-    a: (k, d, n).
-    b: (k, d, n).
-    Returns: (k, d, d).
-    """
+    """Return the sums (k, d, d) over members of a_i b_j, of two arrays (k, d, n)."""
     # BLAS pays only for more than a few rows; pieces keep each product too small for BLAS to start threads of its own.
     if a.shape[1] <= 4:
         return np.einsum("kin,kjn->kij", a, b)
@@ -31,11 +26,7 @@ def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def joined_means(left: Part, right: Part) -> tuple[Part, np.ndarray, np.ndarray]:
-    """Return the common mean of two sets of members.
-
-    left: part of the first set: count (k,), mean (k, d).
-    Returns: count and mean of both sets; and how far the mean of each set lies above the common mean, (k, d) each.
-    """
+    """Return count (k,) and mean (k, d) of two sets of members, and how far the mean of each lies above it, (k, d) each."""
     n = left["count"] + right["count"]
     share = (right["count"] / np.maximum(n, 1))[:, None]
     delta = right["mean"] - left["mean"]
@@ -45,24 +36,15 @@ def joined_means(left: Part, right: Part) -> tuple[Part, np.ndarray, np.ndarray]
 
 
 def outer(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the products a_i b_j at each time.
-
-    a: (k, d).
-    b: (k, d).
-    Returns: (k, d, d).
-    """
+    """Return the products a_i b_j (k, d, d) at each time, of two arrays (k, d)."""
     return np.asarray(a[:, :, None] * b[:, None, :])
 
 
 def moved(part: Part, a: np.ndarray) -> Part:
-    """Return second to fourth moments about a point that lies `a` below the mean.
+    """Return second to fourth moments about a point that lies `a` (k, d) below the mean, (k, d, d) each.
 
-    With x less its mean: m11[i, j] is the sum of x_i x_j, m21 of x_i^2 x_j, m22 of x_i^2 x_j^2. About the point these
-    are the sums of (x_i + a_i) (x_j + a_j) and so on.
-
-    part: count (k,), m11 (k, d, d), and m21, m22 (k, d, d) where fourth moments are kept.
-    a: (k, d), the mean less the point.
-    Returns: m11, and m21 and m22 where the part has them, (k, d, d) each.
+    With x less its mean: m11[i, j] is the sum of x_i x_j, m21 of x_i^2 x_j, m22 of x_i^2 x_j^2 (where the part has these).
+    About the point they are the sums of (x_i + a_i) (x_j + a_j) and so on.
     """
     n, m11, aa = part["count"][:, None, None], part["m11"], outer(a, a)
     moments = {"m11": m11 + n * aa}
@@ -85,12 +67,7 @@ def joined(left: Part, right: Part) -> Part:
 
 
 def empty_as_nan(values: np.ndarray, count: np.ndarray, least: int = 1) -> np.ndarray:
-    """Return the values with NaN at times that have too few members.
-
-    values: (k, ...).
-    count: (k,), members at each time.
-    Returns: (k, ...), as values.
-    """
+    """Return values (k, ...) with NaN at times that have fewer members (k,) than `least`."""
     few = (count < least).reshape(-1, *[1] * (values.ndim - 1))
     return np.asarray(np.where(few, np.nan, values))
 
@@ -125,7 +102,6 @@ class Mean(Statistic):
     type: ClassVar[str] = "mean"
 
     def rows(self, values: Values) -> Part:
-        """Return count, mean, and the sum of squares about the mean."""
         c = values.centred
         return {"count": values.count, "mean": values.mean, "m2": np.einsum("kdn,kdn->kd", c, c)}
 
@@ -136,7 +112,7 @@ class Mean(Statistic):
         return both | {"m2": left["m2"] + n * a**2 + (right["m2"] + m * b**2)}
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return the mean with the interval mean -+ t s / sqrt(n)."""
+        # The mean with the interval mean -+ t s / sqrt(n).
         count = part["count"]
         n = count[:, None]
         mean = empty_as_nan(part["mean"], count)
@@ -172,7 +148,6 @@ class Covariance(Statistic):
     type: ClassVar[str] = "covariance"
 
     def rows(self, values: Values) -> Part:
-        """Return count, mean, and second to fourth moments about the mean."""
         c = values.centred
         square = c * c
         moments = {"count": values.count, "mean": values.mean, "m11": sums(c, c)}
@@ -219,7 +194,7 @@ class Covariance(Statistic):
         return lower, upper
 
     def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
-        """Form the same intervals with the standard errors of the replicates' estimates."""
+        # Form the same intervals with the standard errors of the replicates' estimates.
         error, _ = intervals.of_replicates(np.stack([replicate.value for replicate in each]), self.confidence)
         factor = intervals.student(np.array(len(each)), self.confidence)
         ends = dict(zip(("lower", "upper"), self._ends(whole.value, error, factor), strict=True))
@@ -237,10 +212,7 @@ def estimate(
     unit: str | None = None,
     labels: Sequence[str] | None = None,
 ) -> Estimate:
-    """Return the Estimate of a statistic.
-
-    time: (k,) [s], the sample times.
-    """
+    """Return the Estimate of a statistic at the sample times (k,) [s]."""
     components = np.array(statistic.quantity.labels if labels is None else labels)
     return Estimate(
         statistic.key,

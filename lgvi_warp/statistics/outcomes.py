@@ -45,11 +45,7 @@ class OfEnds(Statistic):
     of_ends: ClassVar[bool] = True
 
     def meant(self) -> Quantity:
-        """Return a quantity with the outcome's name; it needs no samples.
-
-        Raises:
-            SceneError: `of` is no name of an outcome.
-        """
+        """Return a quantity with the outcome's name, which needs no samples; SceneError where `of` is no name."""
         if not isinstance(self.of, str) or not self.of:
             remedy = 'give "floor", the name of an event of the scene, "stopped" or "failed"'
             raise refusal(f"{self.type}.of", self.of, "is no outcome", remedy)
@@ -57,7 +53,6 @@ class OfEnds(Statistic):
 
     @property
     def outcomes(self) -> tuple[str, ...]:
-        """The one outcome that the statistic is of."""
         return (self.quantity.name,)
 
 
@@ -65,7 +60,7 @@ class _Endings(Gatherer):
     """Gathers the times of a block's members that ended before the run did, by the outcome asked for or otherwise."""
 
     def take(self, values: Values, when: slice) -> None:
-        """Take in the ends: x (replicates, 2, members), time [s] and kind of each end."""
+        # Take in the ends: x (replicates, 2, members), time [s] and kind of each end.
         time, kind = values.x[:, 0], values.x[:, 1]
         replicate, member = np.nonzero(kind != NOT)
         self._part = {
@@ -76,7 +71,6 @@ class _Endings(Gatherer):
         }
 
     def close(self) -> Part:
-        """Return the part that summarises the block."""
         return self._part
 
 
@@ -124,15 +118,12 @@ class Outcome(OfEnds):
     levels: Any = (0.05, 0.5, 0.95)
 
     def check(self, faults: Faults) -> None:
-        """Note levels that are no fractions between 0 and 1."""
         check_levels(faults, self.levels)
 
     def open(self, time: np.ndarray, count: int) -> _Endings:
-        """Return the object that takes in the ends of a block's members."""
         return _Endings()
 
     def at_ends(self, ends: Ends, last: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
-        """Return time [s] and kind of each end."""
         kind = np.select([ends.are(self.quantity.name), ends.are(FAILED), ends.status != 0], [SO, LOST, OTHERWISE], NOT)
         return np.stack([ends.time, kind])[None], None
 
@@ -148,7 +139,7 @@ class Outcome(OfEnds):
         return {"members": part["members"][replicate : replicate + 1]} | ends
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return the estimate of Aalen & Johansen (1978), from the times of all ends."""
+        # The estimate of Aalen & Johansen (1978), from the times of all ends.
         at = np.union1d(time, _steps_of(part))
         curves = _curves(part, at)
         ends = [intervals.wilson(curve.value, curve.members, self.confidence) for curve in curves]
@@ -209,10 +200,7 @@ def _steps_of(part: Part) -> np.ndarray:
 
 
 def _curves(part: Part, at: np.ndarray) -> tuple[PassageCurve, PassageCurve]:
-    """Aalen & Johansen's curve at rising times `at` [s], and Kaplan & Meier's, in which other events censor too.
-
-    An end between two of the times counts at the second one.
-    """
+    """Aalen & Johansen's curve at rising times `at` [s], and Kaplan & Meier's, in which other events censor too."""
     so, others = (_counted(at, part["time"][part["kind"] == kind], "left")[:, None] for kind in (SO, OTHERWISE))
     # A member that is censored at one of the times is at risk at that time, and at no later one.
     lost, not_so = (_counted(at, part["time"][which], "right") for which in (part["kind"] == LOST, part["kind"] != SO))
@@ -240,11 +228,9 @@ class _EndTimes(Gatherer):
         self._statistic, self._time = statistic, time
 
     def take(self, values: Values, when: slice) -> None:
-        """Take in the times of the ends."""
         self._part = self._statistic.gather(values, self._time)
 
     def close(self) -> Part:
-        """Return the part that summarises the block."""
         return self._part
 
 
@@ -264,13 +250,10 @@ class EndTime(OfEnds, MemberStatistic):
     type: ClassVar[str] = "end_time"
 
     def then_default(self) -> Sequence[Statistic]:
-        """Return a mean, quantiles, and a histogram over the run."""
         return [Mean(), Quantiles(), Histogram(bins=20, limits="run")]
 
     def open(self, time: np.ndarray, count: int) -> _EndTimes:
-        """Return the object that takes in the ends of a block's members."""
         return _EndTimes(self, time)
 
     def at_ends(self, ends: Ends, last: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
-        """Return the time [s] of each end."""
         return ends.time[None, None], ends.are(self.quantity.name)[None]

@@ -20,10 +20,7 @@ KINDS = Sampling.kinds
 
 
 def sampling_of(content: Any) -> Sampling:
-    """Build a sampling from what a scene file or a user gives.
-
-    content: A `Sampling`, its name, or { name = { ... } } as in a scene file.
-    """
+    """Build a sampling from a `Sampling`, its name, or { name = { ... } } as in a scene file."""
     if isinstance(content, Sampling):
         return content
     if isinstance(content, str):

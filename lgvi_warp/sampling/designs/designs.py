@@ -64,7 +64,6 @@ class Saltelli(Sampling):
         object.__setattr__(self, "groups", tuple((name, tuple(members)) for name, members in pairs) or None)
 
     def to_dict(self) -> Any:
-        """The sampling as a scene file has it."""
         content = super().to_dict()
         if self.groups:
             content[self.kind]["groups"] = {name: list(members) for name, members in self.groups}
@@ -86,7 +85,7 @@ class Saltelli(Sampling):
         return tuple(joined.items())
 
     def group_size(self, space: Space) -> int:
-        """Members in a group: 2 d + 2, or d + 2 without second-order indices."""
+        # Members in a group: 2 d + 2, or d + 2 without second-order indices.
         return (2 if self.second_order else 1) * len(self.factors(space)) + 2
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
@@ -115,7 +114,7 @@ class Saltelli(Sampling):
         return groups % self.replicates
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Levels of point A where the member has the factor of A, else of point B."""
+        # Levels of point A where the member has the factor of A, else of point B.
         group, row = np.divmod(members, self.group_size(space))
         chosen, place = np.unique(group, return_inverse=True)
         replicate, D = self.replicate_of(chosen), space.dimensions
@@ -173,7 +172,7 @@ class Morris(Sampling):
         object.__setattr__(self, "levels", int(levels))
 
     def group_size(self, space: Space) -> int:
-        """Members on a path, d + 1, d the number of factors."""
+        # Members on a path, d + 1, d the number of factors.
         return len(space.factors) + 1
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
@@ -185,7 +184,7 @@ class Morris(Sampling):
         super().check(faults, space, members)
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Levels in the middle of each part."""
+        # Levels in the middle of each part.
         x = self.design(space, members)
         return space.split((x * (self.levels - 1) + 0.5) / self.levels)
 

@@ -50,7 +50,7 @@ class Grid(Sampling):
         faults.raise_if_any()
 
     def distributions(self) -> dict[str, Any]:
-        """A `Choice` among the values, for each name that has a list of them."""
+        # A `Choice` among the values, for each name that has a list of them.
         return {name: Choice(axis) for name, axis in self.axes.items() if not isinstance(axis, int | np.integer)}
 
     def _radices(self, space: Space) -> tuple[Space, list[int]]:
@@ -63,7 +63,6 @@ class Grid(Sampling):
         return inner, numbers
 
     def own_members(self, space: Space) -> int:
-        """The number of combinations of all axes."""
         return math.prod(self._radices(space)[1])
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
@@ -76,7 +75,7 @@ class Grid(Sampling):
         super().check(faults, space, members)
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Levels from the digits of the member's index, written with the axes' lengths as radices."""
+        # Levels from the digits of the member's index, written with the axes' lengths as radices.
         inner, numbers = self._radices(space)
         radices = np.array(numbers, dtype=np.int64)
         places = np.ones(len(radices), dtype=np.int64)
@@ -86,5 +85,4 @@ class Grid(Sampling):
         return inner.split((digits + 0.5) / radices) | Random().draw(space.of(others), members)
 
     def to_dict(self) -> Any:
-        """The grid as a scene file has it: lists and numbers of levels by name."""
         return {self.kind: {name: np.asarray(axis).tolist() for name, axis in self.axes.items()}}

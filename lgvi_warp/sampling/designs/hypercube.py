@@ -36,7 +36,6 @@ class LatinHypercube(Replicated):
     kind: ClassVar[str] = "latin_hypercube"
 
     def check_own(self, faults: Faults) -> None:
-        """Adds a fault where the group is missing or out of bounds."""
         group, example = self.group, "give how many members make a hypercube: group = 256"
         if group is None:
             faults.add("group", group, "is missing", example)
@@ -46,11 +45,11 @@ class LatinHypercube(Replicated):
             object.__setattr__(self, "group", int(group))
 
     def group_size(self, space: Space) -> int:
-        """Members in one hypercube of each replicate."""
+        # Members in one hypercube of each replicate.
         return self.group * self.replicates
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Levels from the hypercube of each member's group; each name is drawn by itself, and so may be added."""
+        # Levels from the hypercube of each member's group; each name is drawn by itself, and so may be added.
         R = self.replicates
         group, place = np.divmod(members, self.group * R)
         levels = {}

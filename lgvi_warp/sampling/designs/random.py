@@ -20,6 +20,6 @@ class Random(Sampling):
     kind: ClassVar[str] = "random"
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Levels from Philox counters keyed by seed and name, at the member's place."""
+        # Levels from Philox counters keyed by seed and name, at the member's place.
         sizes = zip(space.keys, space.sizes, strict=True)
         return {key: uniforms_of(space.seed, key, members, size) for key, size in sizes}

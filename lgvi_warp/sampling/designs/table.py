@@ -156,23 +156,20 @@ class Table(Sampling):
             return {}
 
     def own_values(self) -> dict[str, np.ndarray]:
-        """The table's columns by name, as read."""
         return dict(self._own)  # type: ignore[attr-defined]
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The columns, also those of a file, since that may be moved or changed."""
+        # The columns, also those of a file, since that may be moved or changed.
         return self.own_values()
 
     def own_members(self, space: Space) -> int:
-        """The number of lines of the table."""
         return len(next(iter(self.own_values().values())))
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Random levels for the names that the table does not contain."""
+        # Random levels for the names that the table does not contain.
         return Random().draw(space, members)
 
     def to_dict(self) -> Any:
-        """The table as a scene file has it: the file with its checksum, or the values as lists."""
         if self.file is None:
             return {self.kind: {"values": {name: column.tolist() for name, column in self.own_values().items()}}}
         chosen = {name: getattr(self, name) for name in ("columns", "ignore") if getattr(self, name) is not None}
@@ -180,11 +177,7 @@ class Table(Sampling):
 
 
 def moved(file: str, sha256: str | None, beside: Path) -> str:
-    """Where a table is now, if it was moved together with a store.
-
-    sha256: Checksum of the file; None where it is unknown.
-    Returns: The last parts of the path below a folder above the store, where a file with that checksum is there; else `file`.
-    """
+    """Where a table is now, if it moved with a store: the file of its checksum, by the last parts of its path."""
     parts = Path(file).parts[1:]
     if sha256 is None or Path(file).exists():
         return file

@@ -35,14 +35,10 @@ ROUND_OFF = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Ticks:
-    """Some ticks in turn at n members, of d numbers, with the tick before each.
+    """Some ticks in turn: times t (k,) [s], steps dt (k,) [s] before each, and d numbers of n members, x (k, d, n).
 
-    Args:
-        t: their times (k,) [s].
-        dt: times since the tick before each (k,) [s].
-        start: numbers at the tick before the first of them (d, n).
-        x: numbers (k, d, n).
-        alive: which members were still under way (k, n); None if all were.
+    start: (d, n), the numbers at the tick before the first.
+    alive: (k, n), which members were still under way; None if all were.
     """
 
     t: np.ndarray
@@ -57,21 +53,12 @@ class Ticks:
         return np.concatenate([self.start[None], self.x[:-1]])
 
     def rows(self, *arrays: np.ndarray) -> Iterator[tuple[Any, ...]]:
-        """Yield for each tick its time, its numbers in these arrays, and which members were under way.
-
-        Args:
-            *arrays: (k, ...).
-        """
+        """Yield for each tick its time, its row of each array (k, ...), and which members were under way."""
         everyone: Any = [True] * len(self.t) if self.alive is None else self.alive
         yield from zip(self.t, *arrays, everyone, strict=True)
 
     def of_living(self, values: np.ndarray, otherwise: float) -> np.ndarray:
-        """Return values, with another number where a member was no longer under way.
-
-        Args:
-            values: (k, n).
-            otherwise: that number.
-        """
+        """Return values (k, n), with another number where a member was no longer under way."""
         return values if self.alive is None else np.where(self.alive, values, otherwise)
 
 
@@ -85,7 +72,6 @@ class _Follow(Gatherer):
         self._place = (0, 0, 0, 1)
 
     def take(self, values: Values, when: slice) -> None:
-        """Take in these ticks."""
         R = values.replicates
         k, d, n = len(values.x) // R, *values.x.shape[1:]
         # Members of the replicates one after the other.
@@ -110,7 +96,6 @@ class _Follow(Gatherer):
         self._place = (values.first, values.block, values.size, R)
 
     def end(self, ends: Ends, replicates: int) -> None:
-        """Note how the members ended."""
 
         def in_order(values: np.ndarray) -> np.ndarray:
             return values.reshape(-1, replicates).T.ravel()
@@ -119,7 +104,6 @@ class _Follow(Gatherer):
         self._state["failed"] = in_order(failed(ends.status))
 
     def close(self) -> Part:
-        """Return the parts of all statistics of the members' numbers."""
         state = self._state
         with np.errstate(invalid="ignore", divide="ignore"):
             x = np.where(state["begun"], self._metric.finish(state), np.nan)
@@ -151,45 +135,30 @@ class Metric(MemberStatistic):
     measured: bool = False
 
     def check(self, faults: Faults) -> None:
-        """Note faults of `then`, and of `stopped`, which is not to be chosen."""
         super().check(faults)
         if not among(self.stopped, ("left_out",)):
             faults.add("stopped", self.stopped, "has no meaning for a metric", "leave it out")
 
     def begin(self, x: np.ndarray) -> State:
-        """Return the state after the first tick.
-
-        Args:
-            x: numbers at the first tick (d, n).
-        """
+        """Return the state after the first tick, of its numbers (d, n)."""
         return {}
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        """Return what changes of the state by some more ticks.
-
-        Args:
-            state: the state before them.
-            ticks: the ticks.
-        """
+        """Return what changes of the state by some more ticks."""
         return {}
 
     def finish(self, state: State) -> np.ndarray:
-        """Return the members' numbers (n,).
+        """Return the members' numbers (n,) from the state after the last tick.
 
-        Args:
-            state: the state after the last tick, with "until" (n,) [s], the time of each member's last tick under way,
-                "ended" (n,) [s], when it stopped or failed, else infinite, "failed" (n,), and "end" [s], that of the run.
+        It also has "until" (n,) [s], each member's last tick under way, "ended" (n,) [s], when it stopped or failed, else
+        infinite, "failed" (n,), and "end" [s], that of the run.
         """
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def gathered(self, x: np.ndarray, lost: np.ndarray, place: tuple[int, int, int, int], time: np.ndarray) -> Part:
-        """Return the part of a block: the parts of all statistics of `then`.
+        """Return the part of a block: the parts of all statistics of `then`, of the numbers (replicates, 1, members).
 
-        Args:
-            x: the numbers (replicates, 1, members).
-            lost: which members failed (replicates, members).
-            place: first member, block, its size, and number of replicates.
-            time: times of all ticks [s].
+        place: first member, block, its size, and number of replicates.
         """
         left = Values(x, ~lost, *place)
         parts: Part = {}
@@ -204,18 +173,16 @@ class Metric(MemberStatistic):
         return parts
 
     def then_of(self, time: np.ndarray) -> tuple[Statistic, ...]:
-        """Return the statistics of `then`, each of this metric's number."""
         return tuple(replace(statistic, stopped="held") for statistic in super().then_of(time))
 
     @property
     def unit(self) -> str:
-        """The unit of the number."""
         unit = self.quantity.unit
         return self.form.format(unit) if unit != "1" else self.form.format("").strip() or "1"
 
     @property
     def key(self) -> str:
-        """The name of the number: "overshoot depth", or "effort" where what it is of needs no word."""
+        # The name of the number: "overshoot depth", or "effort" where what it is of needs no word.
         return self.name or (self.type if self.of == self.default else f"{self.type} {self.quantity.name}")
 
     @property
@@ -223,16 +190,11 @@ class Metric(MemberStatistic):
         return (self.key,)
 
     def open(self, time: np.ndarray, count: int) -> _Follow:
-        """Return the object that follows the members of a block."""
         return _Follow(self, time)
 
 
 def accumulated(total: np.ndarray, ticks: Ticks, parts: np.ndarray) -> np.ndarray:
-    """Return a sum with the parts of some ticks added in turn, so that its bits do not depend on how many come at once.
-
-    total: the sum so far (n,).
-    parts: what each adds (k, n).
-    """
+    """Return a sum (n,) with parts (k, n) added tick by tick, so that its bits do not depend on how many come at once."""
     total = total.copy()
     for addend in ticks.of_living(parts, 0.0):
         total += addend
@@ -251,7 +213,6 @@ class OfTracking(Metric):
     tracks: ClassVar[bool] = True
 
     def meant(self) -> Quantity:
-        """Return the error."""
         return tracking.error(
             tracking.tracked_name(f"{self.type}.of", self.of, tracking.ERRORS),
             flag(f"{self.type}.measured", self.measured),
@@ -273,23 +234,16 @@ class OfCourse(Metric):
     tracks: ClassVar[bool] = True
 
     def meant(self) -> Quantity:
-        """Return the number and its goal."""
         known = tuple(tracking.CHANNELS[False])
         return tracking.course(tracking.tracked_name(f"{self.type}.of", self.of, known), bool(self.measured))
 
     def begin(self, x: np.ndarray) -> State:
-        """Return goal, step and direction, and the way left at first."""
         goal = x[1].copy()
         step = self._difference(goal, x[0])
         return {"goal": goal, "step": np.abs(step), "sign": np.where(step < 0.0, -1.0, 1.0)}
 
     def left(self, state: State, ticks: Ticks) -> np.ndarray:
-        """Return the way left to the goal in the direction of the step, (k, n): below 0 beyond the goal.
-
-        Args:
-            state: the state.
-            ticks: the ticks.
-        """
+        """Return the way to the goal (k, n) in the direction of the step: below 0 beyond the goal."""
         return state["sign"] * self._difference(state["goal"], ticks.x[:, 0])
 
     def _difference(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -309,16 +263,10 @@ class OfStep(OfCourse):
 
     @property
     def unit(self) -> str:
-        """The unit of the number."""
         return "%" if self.percent else super().unit
 
     def percent_of_step(self, state: State, size: np.ndarray) -> np.ndarray:
-        """Return a size, in percent of the step where that is asked for.
-
-        Args:
-            state: the state.
-            size: (n,).
-        """
+        """Return a size (n,), in percent of the step where that is asked for."""
         return np.where(state["step"] > 0.0, 100.0 * size / state["step"], np.nan) if self.percent else size
 
 
@@ -571,12 +519,7 @@ class OverTime(OfTracking):
     """A metric that is an integral over time, by the trapezoidal rule between ticks. Abstract."""
 
     def integrand(self, t: np.ndarray, e: np.ndarray) -> np.ndarray:
-        """Return what is integrated over time.
-
-        Args:
-            t: times (k, 1) [s].
-            e: errors (k, n).
-        """
+        """Return what is integrated over time, of times (k, 1) [s] and errors (k, n)."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def begin(self, x: np.ndarray) -> State:

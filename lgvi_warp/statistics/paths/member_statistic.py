@@ -31,7 +31,6 @@ class MemberStatistic(Statistic):
     then: Any = None
 
     def check(self, faults: Faults) -> None:
-        """Note what in `then` is no statistic over members, or says what it is of."""
         super().check(faults)
 
         entries = self.then_default() if self.then is None else self.then
@@ -54,11 +53,7 @@ class MemberStatistic(Statistic):
         return [Mean()]
 
     def then_of(self, time: np.ndarray) -> tuple[Statistic, ...]:
-        """Return the statistics of `then`, each of this class's number.
-
-        Args:
-            time: (k,) [s], all sample times of the run.
-        """
+        """Return the statistics of `then`, each of this class's number, over the run's sample times (k,) [s]."""
         inner = self.quantity
         derived = Quantity(self.key, inner.function, self.unit, inner.fields, self._labels, self.needs_limit)
         return tuple(replace(statistic.over(time), of=derived, stopped=self.stopped) for statistic in self.then)
@@ -78,16 +73,10 @@ class MemberStatistic(Statistic):
         return tuple(f"{self.type} {label}" for label in self.quantity.labels)
 
     def parts(self) -> tuple[Statistic, ...]:
-        """Return the statistics of `then`, each of this class's number."""
         return self.then_of(np.array([0.0, 1.0]))
 
     def gather(self, values: Values, time: np.ndarray) -> Part:
-        """Return the part of a block: the parts of all statistics of `then`, their keys numbered.
-
-        Args:
-            values: the numbers of the block's members, as of one time.
-            time: (k,) [s], all sample times of the run.
-        """
+        """Return the part of a block, of its members' numbers at one time: the parts of all of `then`, keys numbered."""
         gatherers = [statistic.open(time[-1:], values.x.shape[2]) for statistic in self.then_of(time)]
         for gatherer in gatherers:
             gatherer.take(values, slice(0, 1))
@@ -98,7 +87,6 @@ class MemberStatistic(Statistic):
         return _numbered(statistic.join(*pair, place) for statistic, pair in zip(self.then, pairs, strict=True))
 
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
-        """Return the estimates of each statistic, at the end."""
         estimates: list[Estimate] = []
         for i, statistic in enumerate(self.then_of(time)):
             estimates += statistic.estimates([arrays_under(part, f"{i}/") for part in parts], time[-1:])

@@ -36,7 +36,6 @@ class MemberValues(Statistic):
     type: ClassVar[str] = "each"
 
     def rows(self, values: Values) -> Part:
-        """Return the numbers of a block, (k, d, n), in the order of its members."""
         return self.rows_of(values.filled(np.nan), values.replicates)
 
     def rows_of(self, x: np.ndarray, replicates: int) -> Part:
@@ -55,7 +54,6 @@ class MemberValues(Statistic):
         return {"x": np.concatenate([left["x"], right["x"]], axis=2)}
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return the numbers."""
         x = part["x"]
         arrays = {"value": x, "count": (~np.isnan(x)).all(axis=1).sum(axis=1)}
         dims = {"value": ("time", "component", "member"), "count": ("time",)}

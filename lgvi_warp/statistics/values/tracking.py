@@ -24,11 +24,7 @@ Numbers = Callable[[Mapping[str, np.ndarray]], np.ndarray]
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:
-    """Angles within [-pi, pi].
-
-    angle: (...,) [rad].
-    Returns: (...,) [rad].
-    """
+    """Angles (...,) [rad] within [-pi, pi]."""
     turns = np.asarray(angle / (2.0 * np.pi))
     np.rint(turns, out=turns)
     turns *= 2.0 * np.pi
@@ -56,11 +52,7 @@ class Channel:
     entries: tuple[int, ...] = ()
 
     def difference(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Return a - b, wrapped where these are angles.
-
-        a: (k, n) [unit].
-        b: (k, n) [unit].
-        """
+        """Return a - b (k, n) [unit], wrapped where these are angles."""
         return wrapped(a - b) if self.angle else a - b
 
     def reference(self, samples: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -73,10 +65,7 @@ class Channel:
         return self.difference(self.reference(samples), self.actual(samples))
 
     def course(self, samples: Fields, members: Members) -> np.ndarray:
-        """Return what is and its goal, (k, n, 2) [unit].
-
-        The goal is the set point, where the guidance that says it is one, before any reference model; else what is wanted.
-        """
+        """Return what is and its goal, (k, n, 2) [unit]: the set point before any reference model; else what is wanted."""
         y, goal = self.actual(samples), self._set_point(samples.controller, members)
         goal = self.reference(samples) if goal is None else np.broadcast_to(goal, y.shape)
         # Side by side in memory as they are used: components before members.
@@ -145,10 +134,7 @@ def _distance(samples: Fields, members: Members, place: str) -> np.ndarray:
 
 
 def _cross_track(samples: Fields, members: Members, place: str) -> np.ndarray:
-    """Horizontal distance (k, n) [m] from the line through the wanted place along the wanted velocity.
-
-    Where no velocity is wanted, it is the horizontal distance from the wanted place.
-    """
+    """Horizontal distance (k, n) [m] from the wanted place, or from the line through it along the wanted velocity, if any."""
     e, v = _away(samples, place), samples["reference_velocity"].astype(np.float64, copy=False)
     pace = np.hypot(v[..., 0], v[..., 1])
     moves = pace > 0.0
@@ -210,10 +196,7 @@ def tracked_name(key: str, of: Any, known: tuple[str, ...]) -> str:
 
 
 def check_wanted(faults: Faults, key: str, metrics: Mapping[str, Statistic], controller: Controller | None) -> None:
-    """Add a fault for each metric of what no guidance wants: its errors would be those from zero.
-
-    controller: the controller of the scene; None for none, which is a fault of its own.
-    """
+    """Add a fault for each metric of what no guidance wants: its errors would be those from zero."""
     if controller is None:
         return
     wishes = {wish for part in controller.guidance for wish in part.gives}

@@ -232,8 +232,8 @@ class Statistic:
         """Return the part of a block at some sample times: arrays with one row for each time."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        """Return the part of two neighbouring sets of members together, those of `left` first.
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
+        """Return the part of two neighbouring sets of members together.
 
         place: (level, index) of the joined part in the tree of blocks; (-1, 0) outside the tree.
         """
@@ -241,7 +241,7 @@ class Statistic:
 
     def whole(self, parts: Sequence[Part]) -> Part:
         """Return the part of all members from parts in the order of the blocks, the later ones of fewer members."""
-        return reduce(lambda right, left: self.join(left, right, (-1, 0)), reversed(parts))
+        return reduce(lambda second, first: self.join(first, second, (-1, 0)), reversed(parts))
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         """Return the statistic with its interval at each sample time (k,) [s], from the part of all members."""
@@ -303,16 +303,16 @@ def as_toml(value: Any) -> Any:
     return getattr(value, "__name__", type(value).__name__) if callable(value) else value
 
 
-def from_list(given: Any, key: str = "statistics", *, whole: bool = True) -> tuple[Statistic, ...]:
+def from_list(entries: Any, key: str = "statistics", *, unique_names: bool = True) -> tuple[Statistic, ...]:
     """Return statistics from tables of a scene file, from `Statistic` objects, or from a mix of both."""
-    if isinstance(given, str | Mapping | Statistic) or not isinstance(given, Sequence):
+    if isinstance(entries, str | Mapping | Statistic) or not isinstance(entries, Sequence):
         example = 'write [[run.statistics]] and type = "mean" below, or statistics=[lw.statistics.Mean("position")]'
-        raise refusal(key, given, "is no list", example)
+        raise refusal(key, entries, "is no list", example)
     faults, statistics = Faults(), list[Statistic]()
-    for i, entry in enumerate(given):
+    for i, entry in enumerate(entries):
         with faults.including():
             statistics.append(_from_table(f"{key}[{i}]", entry))
-    if whole and not faults:
+    if unique_names and not faults:
         names: list[str] = []
         for statistic in statistics:
             with faults.including():

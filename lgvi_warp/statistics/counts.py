@@ -25,8 +25,8 @@ from lgvi_warp.statistics.values.values import Values
 class Counted(Statistic):
     """A statistic whose part is whole numbers: these add up to the same in any order."""
 
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        return {key: left[key] + right[key] for key in left}
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
+        return {key: first[key] + second[key] for key in first}
 
     def spread(self, pooled: Estimate, each: Sequence[Estimate]) -> Estimate:
         # Form Wilson's interval with the variance of the replicates' fractions.
@@ -417,10 +417,10 @@ class PassageCurve:
         stay = 1.0 - so_far / np.maximum(n, 1)
         under_way = np.concatenate([[1.0], np.cumprod(stay[:, -1])[:-1]])[:, None]
         # As long as none is lost, the sum is the fraction of all members, but for round-off.
-        whole = np.cumsum(lost)[:, None] == 0
+        none_lost = np.cumsum(lost)[:, None] == 0
         fraction, value = _added(passed) / max(total, 1), _added(under_way * passed / np.maximum(n, 1))
-        self.value = np.where(self.risk[0] > 0, np.where(whole, fraction, value), np.nan)
-        self.members = np.where(whole, float(total), self._members(n, now, so_far))
+        self.value = np.where(self.risk[0] > 0, np.where(none_lost, fraction, value), np.nan)
+        self.members = np.where(none_lost, float(total), self._members(n, now, so_far))
         self._otherwise = np.maximum(1.0 - under_way * stay - self.value, 0.0)
 
     @staticmethod
@@ -428,7 +428,7 @@ class PassageCurve:
         """Number of members whose fraction has the variance of a sum over Dirichlet variables, one for each time.
 
         Where x of n members pass and o end otherwise, the shares of those that pass, end otherwise and stay are
-        Dirichlet(x, o, n - x - o + 1), and of the last ones Beta(1/2, left + 1/2) pass. If none ends otherwise, this is
+        Dirichlet(x, o, n - x - o + 1), and of the last ones Beta(1/2, staying + 1/2) pass. If none ends otherwise, this is
         between the two beta products of Fay, Brittain & Proschan (2013, Biostatistics 14), as Jeffreys' interval is between
         Clopper & Pearson's limits; if none is lost, it is Jeffreys' Beta(m + 1/2, n - m + 1/2), and the number is that of
         all members. Where few are at risk the variance of Greenwood's kind is far too small.
@@ -452,10 +452,10 @@ class PassageCurve:
         F, var_F = (_before(step[:, -1])[:, None] + step for step in (S * q, var_step))
         cov_FS, S2 = cov_FS * p + cov_step, S2 * (p * p + var_p)
         S, var_S = S * p, var_S * p * p + (var_S + S * S) * var_p
-        # The last step, of those that are left.
-        left = n - so_far
-        r = 0.5 / (left + 1.0)
-        var_F = var_F + 2.0 * cov_FS * r + S2 * r * (1.0 - r) / (left + 2.0) + var_S * r * r
+        # The last step, of those that stay.
+        staying = n - so_far
+        r = 0.5 / (staying + 1.0)
+        var_F = var_F + 2.0 * cov_FS * r + S2 * r * (1.0 - r) / (staying + 2.0) + var_S * r * r
         F = F + S * r
         # For a Beta(a, b) mean (1 - mean) / variance is a + b + 1, which is the number of members plus two.
         return np.asarray(np.maximum(F * (1.0 - F) / var_F - 2.0, 0.0))

@@ -25,13 +25,13 @@ def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.asarray(sum(parts))
 
 
-def joined_means(left: Part, right: Part) -> tuple[Part, np.ndarray, np.ndarray]:
+def joined_means(first: Part, second: Part) -> tuple[Part, np.ndarray, np.ndarray]:
     """Return count (k,) and mean (k, d) of two sets of members, and how far the mean of each lies above it, (k, d) each."""
-    n = left["count"] + right["count"]
-    share = (right["count"] / np.maximum(n, 1))[:, None]
-    delta = right["mean"] - left["mean"]
-    none = (left["count"] == 0)[:, None]
-    mean = np.where(none, right["mean"], left["mean"] + share * delta)
+    n = first["count"] + second["count"]
+    share = (second["count"] / np.maximum(n, 1))[:, None]
+    delta = second["mean"] - first["mean"]
+    none = (first["count"] == 0)[:, None]
+    mean = np.where(none, second["mean"], first["mean"] + share * delta)
     return {"count": n, "mean": mean}, -share * delta, (1.0 - share) * delta
 
 
@@ -59,11 +59,11 @@ def moved(part: Part, a: np.ndarray) -> Part:
     return moments
 
 
-def joined(left: Part, right: Part) -> Part:
+def joined(first: Part, second: Part) -> Part:
     """Return the moments of two sets of members together, about their common mean."""
-    both, a, b = joined_means(left, right)
-    first, second = moved(left, a), moved(right, b)
-    return both | {key: first[key] + second[key] for key in first}
+    both, a, b = joined_means(first, second)
+    moments, more = moved(first, a), moved(second, b)
+    return both | {key: moments[key] + more[key] for key in moments}
 
 
 def empty_as_nan(values: np.ndarray, count: np.ndarray, least: int = 1) -> np.ndarray:
@@ -105,11 +105,11 @@ class Mean(Statistic):
         c = values.centred
         return {"count": values.count, "mean": values.mean, "m2": np.einsum("kdn,kdn->kd", c, c)}
 
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # Join as Chan, Golub & LeVeque (1979).
-        both, a, b = joined_means(left, right)
-        n, m = left["count"][:, None], right["count"][:, None]
-        return both | {"m2": left["m2"] + n * a**2 + (right["m2"] + m * b**2)}
+        both, a, b = joined_means(first, second)
+        n, m = first["count"][:, None], second["count"][:, None]
+        return both | {"m2": first["m2"] + n * a**2 + (second["m2"] + m * b**2)}
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         # The mean with the interval mean -+ t s / sqrt(n).
@@ -153,9 +153,9 @@ class Covariance(Statistic):
         moments = {"count": values.count, "mean": values.mean, "m11": sums(c, c)}
         return moments | {"m21": sums(square, c), "m22": sums(square, square)}
 
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # Join the moments about the common mean.
-        return joined(left, right)
+        return joined(first, second)
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         """Return the covariance matrix with its interval.
@@ -193,13 +193,13 @@ class Covariance(Statistic):
         lower, upper = (np.where(diagonal, variance, covariance) for variance, covariance in both)
         return lower, upper
 
-    def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
+    def spread(self, pooled: Estimate, each: Sequence[Estimate]) -> Estimate:
         # Form the same intervals with the standard errors of the replicates' estimates.
         error, _ = intervals.of_replicates(np.stack([replicate.value for replicate in each]), self.confidence)
         factor = intervals.student(np.array(len(each)), self.confidence)
-        ends = dict(zip(("lower", "upper"), self._ends(whole.value, error, factor), strict=True))
+        ends = dict(zip(("lower", "upper"), self._ends(pooled.value, error, factor), strict=True))
         text = f"Student's t of {len(each)} replicates; of the logarithm for variances"
-        return whole.with_interval(text, ends | {"standard_error": error})
+        return pooled.with_interval(text, ends | {"standard_error": error})
 
 
 def estimate(

@@ -54,15 +54,15 @@ class Extremes(Statistic):
             part[f"{name}_member"] = np.where(values.count[:, None] > 0, values.members(at), -1)
         return part
 
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # Keep the more extreme value; of equal ones, that of the first member.
-        both: Part = {"count": left["count"] + right["count"]}
+        both: Part = {"count": first["count"] + second["count"]}
         for name, beats in (("minimum", np.less), ("maximum", np.greater)):
             member = f"{name}_member"
-            better = beats(right[name], left[name])
-            better |= (right[name] == left[name]) & (right[member] < left[member])
+            better = beats(second[name], first[name])
+            better |= (second[name] == first[name]) & (second[member] < first[member])
             for key in (name, member):
-                both[key] = np.where(better, right[key], left[key])
+                both[key] = np.where(better, second[key], first[key])
         return both
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
@@ -75,9 +75,9 @@ class Extremes(Statistic):
         arrays = {"value": arrays["maximum"]} | arrays | {"beyond": beyond, "count": count}
         return estimate(self, "none: beyond bounds what lies outside", dims, arrays, time)
 
-    def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
+    def spread(self, pooled: Estimate, each: Sequence[Estimate]) -> Estimate:
         # The estimate as it is: extremes have no interval.
-        return whole
+        return pooled
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,8 +133,8 @@ class Quantiles(Statistic):
         x = x.astype(np.float32) if values.single else x
         return {"count": values.count} | sketch.sketch_of(x, values.size, self.size, values.block)
 
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        return {"count": left["count"] + right["count"]} | sketch.join(left, right, self.size, place)
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
+        return {"count": first["count"] + second["count"]} | sketch.join(first, second, self.size, place)
 
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
         # The quantiles of all members, a few sample times at once to bound memory.

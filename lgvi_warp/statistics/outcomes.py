@@ -127,10 +127,10 @@ class Outcome(OfEnds):
         kind = np.select([ends.are(self.quantity.name), ends.are(FAILED), ends.status != 0], [SO, LOST, OTHERWISE], NOT)
         return np.stack([ends.time, kind])[None], None
 
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # Join the ends of both sets of members, one after the other.
-        ends = {name: np.concatenate([left[name], right[name]]) for name in ("time", "kind", "replicate")}
-        return {"members": left["members"] + right["members"]} | ends
+        ends = {name: np.concatenate([first[name], second[name]]) for name in ("time", "kind", "replicate")}
+        return {"members": first["members"] + second["members"]} | ends
 
     def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
         # The ends of the members of one replicate.
@@ -152,11 +152,10 @@ class Outcome(OfEnds):
         at = np.union1d(time, steps[:: 1 + len(steps) // MOST_TIMES])
         curves = _curves(overall, at)
         each = [_curves(self.of_replicate(overall, r, replicates), at) for r in range(replicates)]
+        values = [np.stack([replicate_curves[i].value for replicate_curves in each]) for i in range(len(curves))]
         ends = [
-            intervals.probability_of_replicates(
-                curve.value, np.stack([one[i].value for one in each]), curve.members, self.confidence
-            )
-            for i, curve in enumerate(curves)
+            intervals.probability_of_replicates(curve.value, of_each, curve.members, self.confidence)
+            for curve, of_each in zip(curves, values, strict=True)
         ]
         result = self._estimate(overall, at, curves, ends, time)
         return [result.with_interval(by_replicates(replicates), {})]

@@ -46,15 +46,15 @@ class Saltelli(Sampling):
         faults = Faults("ensemble.sampling.saltelli.")
         faults.choice("second_order", self.second_order, (True, False))
         check_replicates(faults, self.replicates)
-        given, example = (
+        groups, example = (
             () if self.groups is None else self.groups,
             'give {"start": ["start.position", "start.velocity"]}',
         )
         pairs = list(
-            given.items() if isinstance(given, Mapping) else given if isinstance(given, list | tuple) else [given]
+            groups.items() if isinstance(groups, Mapping) else groups if isinstance(groups, list | tuple) else [groups]
         )
         if not all(isinstance(pair, list | tuple) and len(pair) == 2 and isinstance(pair[0], str) for pair in pairs):
-            faults.add("groups", given, "is no mapping of names to lists of factors", example)
+            faults.add("groups", groups, "is no mapping of names to lists of factors", example)
             pairs = []
         for name, members in pairs:
             if not isinstance(members, list | tuple) or not members or not all(isinstance(m, str) for m in members):

@@ -73,11 +73,11 @@ class Table(Sampling):
         object.__setattr__(self, "_own", read)
 
     @classmethod
-    def kept(cls, told: Mapping[str, Any], values: Mapping[str, np.ndarray]) -> Table:
+    def kept(cls, settings: Mapping[str, Any], values: Mapping[str, np.ndarray]) -> Table:
         """A table whose file was read when a store was made of it: the store has its numbers.
 
         Args:
-            told: What `to_dict` says of the file, by key.
+            settings: What `to_dict` says of the file, by key.
             values: Columns by name, (n,) or (n, *shape).
 
         Returns:
@@ -88,7 +88,7 @@ class Table(Sampling):
         """
         table = cls(values=values)
         for item in fields(cls):
-            object.__setattr__(table, item.name, told.get(item.name))
+            object.__setattr__(table, item.name, settings.get(item.name))
         return table
 
     def _check_options(self, faults: Faults) -> None:

@@ -202,8 +202,8 @@ class UserDistribution(Distribution):
     @property
     def own(self) -> Any:
         # The object, unless it is a library's whose text tells which it is.
-        told = is_library(type(self.distribution).__module__) and not ADDRESS.search(str(self.distribution))
-        return None if told else self.distribution
+        told_by_text = is_library(type(self.distribution).__module__) and not ADDRESS.search(str(self.distribution))
+        return None if told_by_text else self.distribution
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
         return self._quantiles(u)

@@ -146,8 +146,8 @@ class Estimates(Summarized, Mapping[str, Estimate]):
         if name not in self._found and isinstance(name, str):
             name = self._spelled.get(canonical(name), name)
         if name not in self._found:
-            there = closest(name, self._found) if self._found else "none were asked for: give statistics=[...]"
-            raise KeyError(f"{brief(name)} is no statistic of this run; {there}")
+            hint = closest(name, self._found) if self._found else "none were asked for: give statistics=[...]"
+            raise KeyError(f"{brief(name)} is no statistic of this run; {hint}")
         return self._found[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -157,9 +157,9 @@ class Estimates(Summarized, Mapping[str, Estimate]):
         return len(self._found)
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
-        end = max((one.time[-1] for one in self.values()), default=0.0)
+        end = max((estimate.time[-1] for estimate in self.values()), default=0.0)
         return f"Estimates of {len(self)} statistics at {end:g} s", [
-            row for one in self.values() for row in _shown(one)
+            row for estimate in self.values() for row in _shown(estimate)
         ]
 
     @functools.cached_property

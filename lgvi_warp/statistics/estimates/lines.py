@@ -12,7 +12,7 @@ import numpy as np
 def entries_of(estimate: Any) -> Iterator[tuple[str, str, float, float, float, int]]:
     """List the numbers of an estimate at its end."""
     unit = "" if estimate.unit == "1" or estimate.unit.startswith("products") else estimate.unit
-    members = _MEMBERS.get(estimate.settings["type"], lambda one: one.count[-1])(estimate)
+    members = _MEMBERS.get(estimate.settings["type"], lambda estimate: estimate.count[-1])(estimate)
     for label, value, lower, upper in _LINES.get(estimate.settings["type"], _entries)(estimate):
         yield label, unit, float(value), float(lower), float(upper), int(members)
 
@@ -114,11 +114,11 @@ _LINES: dict[str, Callable[[Any], Iterator[Line]]] = {
     "mean_attitude": _attitude,
     "histogram": _histogram,
     # As many as there are members.
-    "each": lambda one: iter(()),
+    "each": lambda estimate: iter(()),
 }
 
 # Number of members behind an estimate, for types where it is not the count at the end.
 _MEMBERS: dict[str, Callable[[Any], int]] = {
-    "first_passage": lambda one: int(one.count[0]),
-    "outcome": lambda one: int(one.count[0] + one["ended"][0] + one["otherwise"][0]),
+    "first_passage": lambda estimate: int(estimate.count[0]),
+    "outcome": lambda estimate: int(estimate.count[0] + estimate["ended"][0] + estimate["otherwise"][0]),
 }

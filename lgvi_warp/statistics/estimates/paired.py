@@ -102,15 +102,15 @@ def quantiles(
     size, axes = np.linalg.eigh(np.cov(x))
     width = KERNEL * n**-0.2 * (4.0 * level * (1.0 - level)) ** -0.25
     root = width * axes * np.sqrt(np.maximum(size, 0.0))
-    found: list[np.ndarray] = []
+    differences: list[np.ndarray] = []
     at_once = max(1, DRAWN_AT_ONCE // n)
     for begin in range(0, resamples, at_once):
         chosen = rng.integers(0, n, (min(at_once, resamples - begin), n))
         moved = x[:, chosen] + np.einsum("ij,jrn->irn", root, rng.standard_normal((2, *chosen.shape)))
         ends = np.quantile(moved, level, axis=2)
-        found.append(ends[1] - ends[0])
+        differences.append(ends[1] - ends[0])
     value = float(np.subtract(*np.quantile(x, level, axis=1)[::-1]))
-    tail, drawn = 0.5 * (1.0 - confidence), np.concatenate(found)
+    tail, drawn = 0.5 * (1.0 - confidence), np.concatenate(differences)
     # What the kernel adds to the difference itself is taken off.
     lower, upper = np.quantile(drawn - drawn.mean() + value, [tail, 1.0 - tail])
     return Difference(value, float(lower), float(upper), np.nan, n)

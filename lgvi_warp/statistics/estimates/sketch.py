@@ -60,14 +60,14 @@ def merged(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return both
 
 
-def join(left: Part, right: Part, size: int, place: tuple[int, int]) -> Part:
+def join(first_part: Part, second_part: Part, size: int, place: tuple[int, int]) -> Part:
     """Return the sketch of two of equal weight and length; place: (level, index) of the result in the tree of blocks."""
-    a, b = left["values"].shape[2], right["values"].shape[2]
-    error, variance, shift = (float(left[key][0] + right[key][0]) for key in ("error", "variance", "shift"))
-    weight = int(left["weights"][0])
-    if a != b or weight != right["weights"][0]:
+    a, b = first_part["values"].shape[2], second_part["values"].shape[2]
+    error, variance, shift = (float(first_part[key][0] + second_part[key][0]) for key in ("error", "variance", "shift"))
+    weight = int(first_part["weights"][0])
+    if a != b or weight != second_part["weights"][0]:
         raise ValueError(f"sketches of {a} and {b} values are no neighbours")
-    values = merged(left["values"], right["values"])
+    values = merged(first_part["values"], second_part["values"])
     if a + b > size:
         first, half = coin(*place, 2), 0.5 * weight
         values = np.ascontiguousarray(values[..., first::2])

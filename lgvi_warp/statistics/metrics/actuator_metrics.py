@@ -276,25 +276,25 @@ class CustomMetric(Metric):
         return {"own": self._asked(None, x, 0.0, 0.0)}
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        own = state["own"]
+        values = state["own"]
         for (t, x, alive), dt in zip(ticks.rows(ticks.x), ticks.dt, strict=True):
-            own = np.where(alive, self._asked(own, x, float(t), float(dt)), own)
-        return {"own": own}
+            values = np.where(alive, self._asked(values, x, float(t), float(dt)), values)
+        return {"own": values}
 
     def finish(self, state: State) -> np.ndarray:
-        own = state["own"] if self.last is None else self._real(self.last(state["own"]))
-        if own.shape != state["begun"].shape:
+        values = state["own"] if self.last is None else self._real(self.last(state["own"]))
+        if values.shape != state["begun"].shape:
             wanted = f"({len(state['begun'])},) is wanted, a number for each member"
-            raise ValueError(f"metric {self.key}: ended with shape {own.shape}; {wanted}")
-        return own
+            raise ValueError(f"metric {self.key}: ended with shape {values.shape}; {wanted}")
+        return values
 
     def _asked(self, state: np.ndarray | None, x: np.ndarray, t: float, dt: float) -> np.ndarray:
         """What the function returns at a tick; x: (d, n)."""
-        own = self._real(self.of(state, TickSamples(dict(self._divided(x)), t, dt)))
-        if own.shape[-1:] != x.shape[1:] or (state is not None and own.shape != state.shape):
+        values = self._real(self.of(state, TickSamples(dict(self._divided(x)), t, dt)))
+        if values.shape[-1:] != x.shape[1:] or (state is not None and values.shape != state.shape):
             wanted = f"(..., {x.shape[1]})" if state is None else f"{state.shape}"
-            raise ValueError(f"metric {self.key}: gave shape {own.shape}; {wanted} is wanted, members last")
-        return own
+            raise ValueError(f"metric {self.key}: gave shape {values.shape}; {wanted} is wanted, members last")
+        return values
 
     def _real(self, values: Any) -> np.ndarray:
         try:

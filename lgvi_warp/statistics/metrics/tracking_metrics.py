@@ -21,7 +21,7 @@ from lgvi_warp.common.status import failed
 from lgvi_warp.statistics.base import Gatherer, Statistic
 from lgvi_warp.statistics.ends import Ends
 from lgvi_warp.statistics.estimates.tree import Part
-from lgvi_warp.statistics.paths.member_statistic import MemberStatistic
+from lgvi_warp.statistics.paths.member_statistic import MemberStatistic, numbered, part_of
 from lgvi_warp.statistics.paths.member_values import MemberValues
 from lgvi_warp.statistics.values import tracking
 from lgvi_warp.statistics.values.quantity import Quantity
@@ -160,17 +160,13 @@ class Metric(MemberStatistic):
 
         place: first member, block, its size, and number of replicates.
         """
-        left = Values(x, ~lost, *place)
-        parts: Part = {}
-        for i, statistic in enumerate(self.then_of(time)):
-            if isinstance(statistic, MemberValues):
-                part = statistic.rows_of(x, place[3])
-            else:
-                gatherer = statistic.open(time[-1:], x.shape[2])
-                gatherer.take(left, slice(0, 1))
-                part = gatherer.close()
-            parts |= {f"{i}/{key}": array for key, array in part.items()}
-        return parts
+        surviving = Values(x, ~lost, *place)
+        return numbered(
+            statistic.rows_of(x, place[3])
+            if isinstance(statistic, MemberValues)
+            else part_of(statistic, surviving, time)
+            for statistic in self.then_of(time)
+        )
 
     def then_of(self, time: np.ndarray) -> tuple[Statistic, ...]:
         return tuple(replace(statistic, stopped="held") for statistic in super().then_of(time))
@@ -287,8 +283,8 @@ class Overshoot(OfStep):
         return state | {"least": state["step"]}
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        left = ticks.of_living(self.left(state, ticks), np.inf)
-        return {"least": np.minimum(state["least"], left.min(axis=0))}
+        distance = ticks.of_living(self.left(state, ticks), np.inf)
+        return {"least": np.minimum(state["least"], distance.min(axis=0))}
 
     def finish(self, state: State) -> np.ndarray:
         return self.percent_of_step(state, np.maximum(0.0, -state["least"]))
@@ -311,8 +307,8 @@ class Undershoot(OfStep):
         return state | {"most": state["step"]}
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        left = ticks.of_living(self.left(state, ticks), -np.inf)
-        return {"most": np.maximum(state["most"], left.max(axis=0))}
+        distance = ticks.of_living(self.left(state, ticks), -np.inf)
+        return {"most": np.maximum(state["most"], distance.max(axis=0))}
 
     def finish(self, state: State) -> np.ndarray:
         return self.percent_of_step(state, state["most"] - state["step"])
@@ -335,9 +331,9 @@ class PeakTime(OfCourse):
         return state | {"least": state["step"], "at": np.zeros(len(state["step"]))}
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        left = ticks.of_living(self.left(state, ticks), np.inf)
-        i = left.argmin(axis=0)
-        least = np.take_along_axis(left, i[None], axis=0)[0]
+        distance = ticks.of_living(self.left(state, ticks), np.inf)
+        i = distance.argmin(axis=0)
+        least = np.take_along_axis(distance, i[None], axis=0)[0]
         farther = least < state["least"]
         return {"least": np.where(farther, least, state["least"]), "at": np.where(farther, ticks.t[i], state["at"])}
 
@@ -392,13 +388,13 @@ class RiseTime(OfCourse):
         return state | {"low": np.where(self.limits[0] == 0.0, 0.0, done), "high": done}
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        left = ticks.of_living(self.left(state, ticks), np.inf)
-        found = {}
+        distance = ticks.of_living(self.left(state, ticks), np.inf)
+        times = {}
         for name, part in zip(("low", "high"), self.limits, strict=True):
-            done = state["step"] - left >= part * state["step"]
+            done = state["step"] - distance >= part * state["step"]
             first = np.where(done.any(axis=0), ticks.t[done.argmax(axis=0)], np.inf)
-            found[name] = np.minimum(state[name], first)
-        return found
+            times[name] = np.minimum(state[name], first)
+        return times
 
     def finish(self, state: State) -> np.ndarray:
         return np.where(np.isinf(state["high"]), np.inf, state["high"] - state["low"])

@@ -49,9 +49,9 @@ class MemberValues(Statistic):
         k, d, n = len(x) // R, x.shape[1], x.shape[2] * R
         return {"x": np.ascontiguousarray(np.moveaxis(x.reshape(k, R, d, n // R), 1, 3).reshape(k, d, n))}
 
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # The numbers of both sets of members, one after the other.
-        return {"x": np.concatenate([left["x"], right["x"]], axis=2)}
+        return {"x": np.concatenate([first["x"], second["x"]], axis=2)}
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         x = part["x"]

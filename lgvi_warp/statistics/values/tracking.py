@@ -79,13 +79,13 @@ class Channel:
         parts = [part for part in controller.guidance if wish in part.gives and part.type != "reference_model"]
         if not parts or parts[-1].type != "set_point":
             return None
-        own = {name: members.parameters[f"{parts[-1].key}.{name}"] for name in parts[-1].parameters()}
-        if wish == "depth" and "depth" not in own:
+        numbers = {name: members.parameters[f"{parts[-1].key}.{name}"] for name in parts[-1].parameters()}
+        if wish == "depth" and "depth" not in numbers:
             wish, entry = "position", 2
-        if wish not in own:
+        if wish not in numbers:
             # A place without a heading is wanted heading north.
             return np.zeros(1)
-        return own[wish] if entry is None else own[wish][:, entry]
+        return numbers[wish] if entry is None else numbers[wish][:, entry]
 
 
 def _entry(name: str, i: int | None = None) -> Numbers:

@@ -279,7 +279,7 @@ def metric_of(key: str, entry: Any) -> tuple[str, Statistic]:
         else:
             remedy = 'give "overshoot depth", "iae heading" or "max(depth)"'
             raise refusal(key, entry, "is not one number of each member", remedy)
-    (statistic,) = from_list([entry], key, whole=False)
+    (statistic,) = from_list([entry], key, unique_names=False)
     if not isinstance(statistic, MemberStatistic):
         remedy = 'give a metric such as lw.metrics.Overshoot("depth"), or "max(depth)"'
         raise refusal(key, statistic.type, "is no metric: it is not one number of each member", remedy)

@@ -193,6 +193,14 @@ class Exceedance(Condition, Counted):
         of: a quantity; see `Statistic`, also for name, confidence, stopped and at.
         above: one number, or one for each component, in the quantity's unit.
         below: the same for the upper limit; with both, the quantity lies between them.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0})
+        >>> fleet = lw.Ensemble(scene, members=64, vary={"vehicle.buoyancy": lw.distributions.Normal(std=2.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=20.0, statistics=[lw.statistics.Exceedance("depth", above=1.0)])
+        >>> print(f"{result.statistics['exceedance depth above 1'].value[-1, 0]:.2f}")
+        0.25
     """
 
     type: ClassVar[str] = "exceedance"

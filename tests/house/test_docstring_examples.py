@@ -9,7 +9,9 @@ import pytest
 from tests.support.public import NAMED
 
 # Those whose kernels no other quick test needs, or that search.
-LONG = {"Until", "linearize", "lqr", "stability_map", "sweep", "tradeoff", "trim", "tune_gains", "worst_case"}
+LONG = {
+    "IAE", "Overshoot", "Until", "linearize", "lqr", "stability_map", "sweep", "tradeoff", "trim", "tune_gains", "worst_case",
+}  # fmt: skip
 
 
 def examples() -> dict[str, doctest.DocTest]:

@@ -29,6 +29,14 @@ class Grid(Sampling):
 
     Raises:
         SceneError: Where an axis is neither. The message lists every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> grid = lw.designs.Grid({"start.velocity[0]": [1.0, 1.5, 2.0], "vehicle.buoyancy": [307.0, 308.0]})
+        >>> fleet = lw.Ensemble(scene, sampling=grid)
+        >>> fleet.members, fleet.select(0, 6).velocity[:, 0].tolist()
+        (6, [1.0, 1.0, 1.5, 1.5, 2.0, 2.0])
     """
 
     axes: Mapping[str, Any] = field(default_factory=dict)

@@ -30,6 +30,14 @@ class LatinHypercube(Replicated):
 
     Raises:
         SceneError: Where a setting is wrong. The message lists every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> vary = {"vehicle.buoyancy": lw.distributions.Uniform(low=306.0, high=310.0)}
+        >>> fleet = lw.Ensemble(scene, 4, vary=vary, sampling=lw.designs.LatinHypercube(group=4))
+        >>> sorted(fleet.parameters(0, 4)["vehicle.buoyancy"].astype(int).tolist())
+        [306, 307, 308, 309]
     """
 
     group: int = None  # type: ignore[assignment]  # it has no default, but replicates of every design have one

@@ -45,6 +45,13 @@ class Table(Sampling):
 
     Raises:
         SceneError: Where the file cannot be read, or a cell is no number. The message lists every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> table = lw.designs.Table({"vehicle.buoyancy": [306.0, 307.5, 309.0]})
+        >>> lw.Ensemble(scene, sampling=table).parameters(0, 3)["vehicle.buoyancy"]
+        array([306. , 307.5, 309. ])
     """
 
     file: str | os.PathLike[str] | None = None

@@ -167,6 +167,13 @@ class Uniform(Distribution):
         high: Upper end, with `low`.
         half_width: Largest distance from the scene's value; instead of `low` and `high`.
         relative: That distance as a fraction of the scene's value; instead of `half_width`.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=4, vary={"vehicle.buoyancy": lw.distributions.Uniform(half_width=1.0)})
+        >>> fleet.parameters(0, 4)["vehicle.buoyancy"].round(1)
+        array([308.3, 307.1, 308.5, 308.9])
     """
 
     low: Spread | None = None
@@ -275,6 +282,14 @@ class Choice(Distribution):
         values: (k,): every entry of the quantity gets one of these numbers, each entry by itself; (k, *shape): the quantity
             gets one of these as a whole.
         weights: Weights (k,), from 0; equal by default.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> speed = lw.distributions.Choice([1.0, 1.5], weights=[1, 3])
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"start.velocity[0]": speed})
+        >>> fleet.select(0, 8).velocity[:, 0]
+        array([1.5, 1. , 1.5, 1.5, 1.5, 1.5, 1.5, 1.5])
     """
 
     values: Any = ()

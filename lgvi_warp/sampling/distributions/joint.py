@@ -142,6 +142,16 @@ class CorrelatedNormal(JointLaw):
 
     Raises:
         SceneError: Where the matrix is not positive semidefinite or the numbers do not fit. The message lists every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> import numpy as np
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> law = lw.distributions.CorrelatedNormal(std=[1.0, 0.1], correlation=[[1.0, 0.9], [0.9, 1.0]])
+        >>> fleet = lw.Ensemble(scene, members=1000, vary={"start.position[2], start.velocity[0]": law})
+        >>> members = fleet.select(0, 1000)
+        >>> print(f"{np.corrcoef(members.position[:, 2], members.velocity[:, 0])[0, 1]:.2f}")
+        0.90
     """
 
     covariance: Any = None
@@ -328,6 +338,14 @@ class PhysicalInertia(PositiveDefinite):
         sigma: Standard deviation of the logarithm of the principal second moments, one or (3,).
         off_diagonal: As of `PositiveDefinite`, for S; 0 by default.
         mass_sigma: Standard deviation of the logarithm of the mass, for a 6x6 matrix; 0 by default.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> law = lw.distributions.PhysicalInertia(sigma=0.1, mass_sigma=0.01)
+        >>> fleet = lw.Ensemble(scene, members=4, vary={"vehicle.rigid_body_mass_matrix": law})
+        >>> fleet.parameters(0, 4)["vehicle.rigid_body_mass_matrix"][:, 0, 0].round(1)
+        array([30.6, 30.7, 30.8, 30.7])
     """
 
     mass_sigma: float | None = None

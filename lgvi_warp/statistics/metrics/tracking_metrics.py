@@ -274,6 +274,19 @@ class Overshoot(OfStep):
         of: "depth", "heading", "speed", "north" or "east"; see `OfCourse` for goal and step.
         then: see `Metric`, also for measured.
         percent: whether in percent of the step; by default False.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> controller = lw.Controller(
+        ...     period=0.1,
+        ...     guidance=[lw.control.SetPoint(heading=0.5)],
+        ...     laws=[lw.control.HeadingPID(kp=1.0, ki=0.02, kd=2.0)],
+        ...     allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
+        ... )
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]}, controller=controller)
+        >>> result = lw.solve(scene, h=0.05, t1=60.0, statistics=[lw.metrics.Overshoot("heading")])
+        >>> print(f"{result.statistics['mean overshoot heading'].value[-1, 0]:.2f} rad")
+        0.04 rad
     """
 
     type: ClassVar[str] = "overshoot"
@@ -537,6 +550,19 @@ class IAE(OverTime):
     Args:
         of: see `OfTracking`.
         then: see `Metric`, also for measured.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> controller = lw.Controller(
+        ...     period=0.1,
+        ...     guidance=[lw.control.SetPoint(heading=0.5)],
+        ...     laws=[lw.control.HeadingPID(kp=1.0, ki=0.02, kd=2.0)],
+        ...     allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
+        ... )
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]}, controller=controller)
+        >>> result = lw.solve(scene, h=0.05, t1=60.0, statistics=[lw.metrics.IAE("heading")])
+        >>> print(f"{result.statistics['mean iae heading'].value[-1, 0]:.1f} rad s")
+        4.6 rad s
     """
 
     type: ClassVar[str] = "iae"

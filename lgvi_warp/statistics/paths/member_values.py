@@ -31,6 +31,15 @@ class MemberValues(Statistic):
 
     Args:
         of: a quantity; see `Statistic`, also for name and stopped.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0})
+        >>> fleet = lw.Ensemble(scene, members=64, vary={"vehicle.buoyancy": lw.distributions.Normal(std=2.0)})
+        >>> deepest = lw.statistics.PathMaximum("depth", then=lw.statistics.MemberValues())
+        >>> result = lw.solve(fleet, h=0.1, t1=20.0, statistics=[deepest])
+        >>> result.statistics["each path_maximum depth"].value.shape
+        (1, 1, 64)
     """
 
     type: ClassVar[str] = "each"

@@ -92,6 +92,14 @@ class PathMaximum(OfPath):
         of: a quantity; see `Statistic`, also for name, confidence and stopped.
         then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5,
             0.99)), lw.statistics.Exceedance(above=2.0).
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0})
+        >>> fleet = lw.Ensemble(scene, members=64, vary={"vehicle.buoyancy": lw.distributions.Normal(std=2.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=20.0, statistics=[lw.statistics.PathMaximum("speed")])
+        >>> print(f"{result.statistics['mean path_maximum speed'].value[-1, 0]:.2f} m/s")
+        1.32 m/s
     """
 
     type: ClassVar[str] = "path_maximum"

@@ -34,7 +34,8 @@ TYPES = registry.Kinds(
     {
         "moments": ("mean", "covariance"),
         "angles": ("circular_mean", "mean_attitude"),
-        "counts": ("histogram", "exceedance", "first_passage"),
+        "counts": ("histogram", "exceedance"),
+        "passages": ("first_passage",),
         "paths.member_values": ("each",),
         "metrics.tracking_metrics": (
             *("overshoot", "undershoot", "peak_time", "peak", "rise_time", "settling_time", "steady_state_error"),

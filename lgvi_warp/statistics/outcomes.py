@@ -3,21 +3,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.statistics.base import Gatherer, Statistic
-from lgvi_warp.statistics.counts import DIRICHLET, Histogram, PassageCurve, by_replicates, check_levels
+from lgvi_warp.statistics.counts import Histogram, by_replicates
 from lgvi_warp.statistics.ends import FAILED, Ends
 from lgvi_warp.statistics.estimates import intervals
 from lgvi_warp.statistics.estimates.estimate import Estimate, along
 from lgvi_warp.statistics.estimates.tree import Part
 from lgvi_warp.statistics.moments import Mean, estimate
 from lgvi_warp.statistics.order import Quantiles
+from lgvi_warp.statistics.passages import DIRICHLET, PassageCurve, check_levels
 from lgvi_warp.statistics.paths.member_statistic import MemberStatistic
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.statistics.values.values import Values
@@ -56,22 +58,29 @@ class OfEnds(Statistic):
         return (self.quantity.name,)
 
 
-class _Endings(Gatherer):
-    """Gathers the times of a block's members that ended before the run did, by the outcome asked for or otherwise."""
+class _AtEnd(Gatherer):
+    """Gathers the ends of a block's members, which come at once."""
+
+    def __init__(self, part_of: Callable[[Values], Part]):
+        self._part_of = part_of
 
     def take(self, values: Values, when: slice) -> None:
-        # Take in the ends: x (replicates, 2, members), time [s] and kind of each end.
-        time, kind = values.x[:, 0], values.x[:, 1]
-        replicate, member = np.nonzero(kind != NOT)
-        self._part = {
-            "members": np.full(len(time), time.shape[1], np.int64),
-            "time": time[replicate, member],
-            "kind": kind[replicate, member].astype(np.uint8),
-            "replicate": replicate.astype(np.int32),
-        }
+        self._part = self._part_of(values)
 
     def close(self) -> Part:
         return self._part
+
+
+def _endings(values: Values) -> Part:
+    """Members that ended before the run did, from x (replicates, 2, members), time [s] and kind of each end."""
+    time, kind = values.x[:, 0], values.x[:, 1]
+    replicate, member = np.nonzero(kind != NOT)
+    return {
+        "members": np.full(len(time), time.shape[1], np.int64),
+        "time": time[replicate, member],
+        "kind": kind[replicate, member].astype(np.uint8),
+        "replicate": replicate.astype(np.int32),
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,8 +129,8 @@ class Outcome(OfEnds):
     def check(self, faults: Faults) -> None:
         check_levels(faults, self.levels)
 
-    def open(self, time: np.ndarray, count: int) -> _Endings:
-        return _Endings()
+    def open(self, time: np.ndarray, count: int) -> _AtEnd:
+        return _AtEnd(_endings)
 
     def at_ends(self, ends: Ends, last: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
         kind = np.select([ends.are(self.quantity.name), ends.are(FAILED), ends.status != 0], [SO, LOST, OTHERWISE], NOT)
@@ -220,19 +229,6 @@ def _reached(curve: np.ndarray, levels: np.ndarray, at: np.ndarray) -> np.ndarra
     return np.append(at, np.inf)[places]
 
 
-class _EndTimes(Gatherer):
-    """Gathers the times of a block's members that ended by the outcome."""
-
-    def __init__(self, statistic: EndTime, time: np.ndarray):
-        self._statistic, self._time = statistic, time
-
-    def take(self, values: Values, when: slice) -> None:
-        self._part = self._statistic.gather(values, self._time)
-
-    def close(self) -> Part:
-        return self._part
-
-
 @dataclass(frozen=True, eq=False)
 class EndTime(OfEnds, MemberStatistic):
     """Statistics of the time [s] at which members ended by an outcome, over the members that did.
@@ -251,8 +247,8 @@ class EndTime(OfEnds, MemberStatistic):
     def then_default(self) -> Sequence[Statistic]:
         return [Mean(), Quantiles(), Histogram(bins=20, limits="run")]
 
-    def open(self, time: np.ndarray, count: int) -> _EndTimes:
-        return _EndTimes(self, time)
+    def open(self, time: np.ndarray, count: int) -> _AtEnd:
+        return _AtEnd(partial(self.gather, time=time))
 
     def at_ends(self, ends: Ends, last: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
         return ends.time[None, None], ends.are(self.quantity.name)[None]

@@ -46,13 +46,12 @@ class Saltelli(Sampling):
         faults = Faults("ensemble.sampling.saltelli.")
         faults.choice("second_order", self.second_order, (True, False))
         check_replicates(faults, self.replicates)
-        groups, example = (
-            () if self.groups is None else self.groups,
-            'give {"start": ["start.position", "start.velocity"]}',
-        )
-        pairs = list(
-            groups.items() if isinstance(groups, Mapping) else groups if isinstance(groups, list | tuple) else [groups]
-        )
+        groups = () if self.groups is None else self.groups
+        example = 'give {"start": ["start.position", "start.velocity"]}'
+        if isinstance(groups, Mapping):
+            pairs = list(groups.items())
+        else:
+            pairs = list(groups) if isinstance(groups, list | tuple) else [groups]
         if not all(isinstance(pair, list | tuple) and len(pair) == 2 and isinstance(pair[0], str) for pair in pairs):
             faults.add("groups", groups, "is no mapping of names to lists of factors", example)
             pairs = []

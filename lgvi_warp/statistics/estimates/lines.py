@@ -31,18 +31,13 @@ Line = tuple[str, float, float, float]
 
 def _labels(estimate: Any) -> list[str]:
     """Label of each component, preceded by the type of the statistic unless it was given a name."""
-    kind, at = estimate.settings["type"], f" at {estimate.settings['at']}" if "at" in estimate.settings else ""
-    if (
-        estimate.name != f"{kind} {', '.join(estimate.name.split(' ', 1)[1:])}"
-        or len(estimate.coordinates["component"]) == 1
-    ):
-        names = (
-            [estimate.name]
-            if len(estimate.coordinates["component"]) == 1
-            else estimate.coordinates["component"].tolist()
-        )
-        return names if len(names) == 1 else [f"{estimate.name}: {name}" for name in names]
-    return [f"{kind} {name}{at}" for name in estimate.coordinates["component"]]
+    kind, components = estimate.settings["type"], estimate.coordinates["component"].tolist()
+    if len(components) == 1:
+        return [estimate.name]
+    if not estimate.name.startswith(f"{kind} "):
+        return [f"{estimate.name}: {component}" for component in components]
+    at = f" at {estimate.settings['at']}" if "at" in estimate.settings else ""
+    return [f"{kind} {component}{at}" for component in components]
 
 
 def _entries(estimate: Any) -> Iterator[Line]:

@@ -15,7 +15,7 @@ from lgvi_warp.common.identity import check_version
 from lgvi_warp.common.real_numbers import NotReal, real_results
 from lgvi_warp.control.signals import CHANNELS, SAVED, SIGNALS, ordered
 from lgvi_warp.physics.fields import TABLE
-from lgvi_warp.statistics.metrics.tracking_metrics import Metric, State, Ticks, accumulated
+from lgvi_warp.statistics.metrics.metric import Metric, State, Ticks, accumulated
 from lgvi_warp.statistics.values.quantity import Quantity, named
 
 if TYPE_CHECKING:

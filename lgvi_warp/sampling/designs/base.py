@@ -45,7 +45,6 @@ class Sampling:
             "table": ("table",),
         },
     )
-    # Whether a run may take only the first of the members that the sampling has.
     fewer: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:

@@ -34,7 +34,6 @@ class Distribution:
     kind: ClassVar[str] = ""
     # Classes by their kind in a scene file.
     kinds: ClassVar[dict[str, Any]] = {}
-    # Arguments of which exactly one sets the width.
     widths: ClassVar[tuple[str, ...]] = ()
     # Whether its numbers may be one for each component of what it varies.
     by_component: ClassVar[bool] = True

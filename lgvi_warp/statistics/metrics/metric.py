@@ -73,12 +73,8 @@ class _Follow(Gatherer):
         t, first = self._time[when], 0
         if self._last is None:
             begun = np.ones(R * n, bool) if alive is None else alive[0]
-            self._state = {
-                "begun": begun,
-                "until": np.full(R * n, t[0]),
-                "end": self._time[-1],
-                **self._metric.begin(x[0]),
-            }
+            self._state = {"begun": begun, "until": np.full(R * n, t[0]), "end": self._time[-1]}
+            self._state |= self._metric.begin(x[0])
             self._last, first = x[0], 1
         if k > first:
             step = np.diff(self._time[max(when.start - 1, 0) : when.stop])

@@ -33,10 +33,8 @@ class OfTracking(Metric):
     tracks: ClassVar[bool] = True
 
     def meant(self) -> Quantity:
-        return tracking.error(
-            tracking.tracked_name(f"{self.type}.of", self.of, tracking.ERRORS),
-            flag(f"{self.type}.measured", self.measured),
-        )
+        name = tracking.tracked_name(f"{self.type}.of", self.of, tracking.ERRORS)
+        return tracking.error(name, flag(f"{self.type}.measured", self.measured))
 
 
 @dataclass(frozen=True, eq=False)

@@ -25,12 +25,7 @@ if TYPE_CHECKING:
     from lgvi_warp.sampling.members import Members
     from lgvi_warp.statistics.values.samples import Fields
 
-OVER_TIME = {
-    "max": reductions.MAXIMUM,
-    "min": reductions.MINIMUM,
-    "mean": reductions.MEAN,
-    "range": reductions.RANGE,
-}
+OVER_TIME = {"max": reductions.MAXIMUM, "min": reductions.MINIMUM, "mean": reductions.MEAN, "range": reductions.RANGE}
 FUNCTIONS = (*OVER_TIME, "norm")
 
 

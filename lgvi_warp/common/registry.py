@@ -3,13 +3,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from importlib import import_module
 from pkgutil import walk_packages
 from types import ModuleType
 from typing import Any
 
 
-def add(known: dict[str, Any], kind: type, attribute: str = "type") -> bool:
+class Kinds(MutableMapping[str, Any]):
+    """Classes by their word. Those of a package are imported when their word is looked up: a scene names few of them.
+
+    modules: the package's modules, and the words of the classes that each defines.
+    """
+
+    def __init__(self, package: str, modules: Mapping[str, Sequence[str]]):
+        self.homes = {word: f"{package}.{module}" for module, words in modules.items() for word in words}
+        self._classes = dict[str, Any]()
+
+    def __getitem__(self, word: str) -> Any:
+        if word not in self._classes and word in self.homes:
+            import_module(self.homes[word])
+        return self._classes[word]
+
+    def __setitem__(self, word: str, kind: Any) -> None:
+        self._classes[word] = kind
+
+    def __delitem__(self, word: str) -> None:
+        del self._classes[word]
+
+    def __contains__(self, word: object) -> bool:
+        return word in self.homes or word in self._classes
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.homes | self._classes)
+
+    def __len__(self) -> int:
+        return len(self.homes | self._classes)
+
+
+def add(known: MutableMapping[str, Any], kind: type, attribute: str = "type") -> bool:
     """Make a class known by its word, unless another class has that word.
 
     A class of the same module and name replaces the former one: it is the same class, made again in a notebook.

@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import copy
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
+from lgvi_warp.common import registry
 from lgvi_warp.common.declared import word
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.physics import vehicle
@@ -133,12 +134,19 @@ class Part(Term):
 AnyPart = TypeVar("AnyPart", bound=Part)
 
 
+def _built_in(*words: str) -> registry.Kinds:
+    """The parts of these types, each in the file of its name."""
+    return registry.Kinds("lgvi_warp.control", {word: [word] for word in words})
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MeasuringPart(Part):
     """A sensor or an estimator: changes what the controller takes for the motion."""
 
     section: ClassVar[str] = "sensors"
-    kinds: ClassVar[dict[str, Any]] = {}
+    kinds: ClassVar[MutableMapping[str, Any]] = _built_in(
+        "complementary_filter", "sensor", "dead_reckoning", "low_pass"
+    )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -146,7 +154,7 @@ class Guidance(Part):
     """A part that says which motion is wanted."""
 
     section: ClassVar[str] = "guidance"
-    kinds: ClassVar[dict[str, Any]] = {}
+    kinds: ClassVar[MutableMapping[str, Any]] = _built_in("reference_model", "set_point", "trajectory", "waypoints")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -157,7 +165,18 @@ class ControlLaw(Part):
     """
 
     section: ClassVar[str] = "laws"
-    kinds: ClassVar[dict[str, Any]] = {}
+    kinds: ClassVar[MutableMapping[str, Any]] = _built_in(
+        "callback",
+        "depth_pid",
+        "heading_pid",
+        "heading_smc",
+        "heave_pid",
+        "policy",
+        "pose_pid",
+        "pose_smc",
+        "speed_pid",
+        "state_feedback",
+    )
     demands: ClassVar[tuple[str, ...]] = ()
     # Rows of the memory, from `Bus.answer` on, by which laws hand numbers on within a tick.
     shared_rows: ClassVar[int] = 0
@@ -264,7 +283,7 @@ class Allocation(Part):
     """
 
     section: ClassVar[str] = "allocation"
-    kinds: ClassVar[dict[str, Any]] = {}
+    kinds: ClassVar[MutableMapping[str, Any]] = _built_in("pseudo_inverse", "matrix")
     # The term that takes the commands, the faults of its channels that are known, and which of X Y Z K M N laws ask for (6,);
     # set for a part of a scene.
     actuator: ClassVar[Any] = None
@@ -348,7 +367,7 @@ class Sending(Part):
     """A part that changes commands on their way to the actuators."""
 
     section: ClassVar[str] = "faults"
-    kinds: ClassVar[dict[str, Any]] = {}
+    kinds: ClassVar[MutableMapping[str, Any]] = _built_in("fault")
 
 
 # The bases of parts by the list that they stand in, in the order in which their roles act.

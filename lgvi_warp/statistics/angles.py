@@ -45,7 +45,6 @@ class CircularMean(Statistic):
     type: ClassVar[str] = "circular_mean"
 
     def rows(self, values: Values) -> Part:
-        """Return the moments of cosines and sines."""
         d = values.x.shape[1]
         both = Values(np.concatenate([np.cos(values.x), np.sin(values.x)], axis=1), values.good)
         c, s = both.centred[:, :d], both.centred[:, d:]
@@ -53,20 +52,20 @@ class CircularMean(Statistic):
         pairs = {"cc": (c, c), "cs": (c, s), "ss": (s, s)}
         return moments | {key: np.einsum("kdn,kdn->kd", *pair) for key, pair in pairs.items()}
 
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # Join the moments about the common mean.
-        both, *shifts = joined_means(left, right)
-        d = left["cc"].shape[1]
+        both, *shifts = joined_means(first, second)
+        d = first["cc"].shape[1]
         for key, i, j in (("cc", 0, 0), ("cs", 0, d), ("ss", d, d)):
             moments = (
                 part[key] + part["count"][:, None] * a[:, i : i + d] * a[:, j : j + d]
-                for part, a in zip((left, right), shifts, strict=True)
+                for part, a in zip((first, second), shifts, strict=True)
             )
             both[key] = np.asarray(sum(moments))
         return both
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return atan2 of the mean sine and cosine; its error follows from their covariance about that direction."""
+        # Atan2 of the mean sine and cosine; its error follows from their covariance about that direction.
         count, d = part["count"], part["cc"].shape[1]
         n = count[:, None]
         C, S = empty_as_nan(part["mean"], count)[:, :d], empty_as_nan(part["mean"], count)[:, d:]
@@ -94,10 +93,8 @@ class CircularMean(Statistic):
         factor: np.ndarray,
         factor_of_length: np.ndarray,
     ) -> dict[str, np.ndarray]:
-        """Intervals of the mean direction and of the resultant length.
+        """Intervals of the mean direction (k, d) [rad] and of the resultant length (k, d).
 
-        value: (k, d) [rad], the mean direction.
-        length: (k, d), the resultant length.
         errors: standard errors (k, d) of the mean of (cosine, sine) across and along its direction, and of its length.
         """
         across, along, wide = errors
@@ -108,17 +105,17 @@ class CircularMean(Statistic):
         arrays = {"lower": value - half, "upper": value + half, "standard_error": error}
         return arrays | {"resultant_length_lower": np.fmax(low, 0.0), "resultant_length_upper": np.fmin(high, 1.0)}
 
-    def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
-        """Apply the delta method with the covariance of the mean that follows from the replicates' means."""
-        turned = np.stack([replicate.value for replicate in each]) - whole.value
+    def spread(self, pooled: Estimate, each: Sequence[Estimate]) -> Estimate:
+        # Apply the delta method with the covariance of the mean that follows from the replicates' means.
+        turned = np.stack([replicate.value for replicate in each]) - pooled.value
         length = np.stack([replicate["resultant_length"] for replicate in each])
         across, along = (
             intervals.of_replicates(length * projection, self.confidence)[0]
             for projection in (np.sin(turned), np.cos(turned))
         )
         factor = intervals.student(np.array(len(each)), self.confidence)
-        arrays = self._ends(whole.value, whole["resultant_length"], (across, along, along), factor, factor)
-        return whole.with_interval(f"delta method on the circle, Student's t of {len(each)} replicates", arrays)
+        arrays = self._ends(pooled.value, pooled["resultant_length"], (across, along, along), factor, factor)
+        return pooled.with_interval(f"delta method on the circle, Student's t of {len(each)} replicates", arrays)
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,28 +138,25 @@ class MeanAttitude(Statistic):
     default: ClassVar[str] = "attitude"
 
     def check(self, faults: Faults) -> None:
-        """Note a fault if `of` is not the attitude."""
         if not among(self.of, ("attitude",)):
             faults.add("of", self.of, "is no attitude", 'leave it out, or give "attitude"')
 
     @property
     def key(self) -> str:
-        """The name that was given, or "mean_attitude"."""
         return self.name or self.type
 
     def rows(self, values: Values) -> Part:
-        """Return mean and covariance of the nine entries of the matrix."""
         return {"count": values.count, "mean": values.mean, "m11": sums(values.centred, values.centred)}
 
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # Join the moments about the common mean.
-        both, a, b = joined_means(left, right)
-        n, m = left["count"][:, None, None], right["count"][:, None, None]
-        shifted = (left["m11"] + n * a[:, :, None] * a[:, None], right["m11"] + m * b[:, :, None] * b[:, None])
+        both, a, b = joined_means(first, second)
+        n, m = first["count"][:, None, None], second["count"][:, None, None]
+        shifted = (first["m11"] + n * a[:, :, None] * a[:, None], second["m11"] + m * b[:, :, None] * b[:, None])
         return both | {"m11": shifted[0] + shifted[1]}
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return the polar part R of the mean M = R S; a change dM turns R by (tr(S) I - S)^-1 vee(R^T dM - dM^T R)."""
+        # The polar part R of the mean M = R S; a change dM turns R by (tr(S) I - S)^-1 vee(R^T dM - dM^T R).
         count = part["count"]
         few = (count < 1)[:, None, None]
         M = np.where(few, np.eye(3), part["mean"].reshape(-1, 3, 3))
@@ -204,18 +198,18 @@ class MeanAttitude(Statistic):
         arrays = {"lower": R - reach, "upper": R + reach}
         return arrays | {"rotation_half_width": np.minimum(half, np.pi), "standard_error": error}
 
-    def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
-        """Form the intervals from the turns of the replicates' means relative to the mean of all members."""
-        X = np.swapaxes(whole.value, 1, 2) @ np.stack([replicate.value for replicate in each])
+    def spread(self, pooled: Estimate, each: Sequence[Estimate]) -> Estimate:
+        # Form the intervals from the turns of the replicates' means relative to the mean of all members.
+        X = np.swapaxes(pooled.value, 1, 2) @ np.stack([replicate.value for replicate in each])
         # v of X = exp(hat(v)), with an error of third order in its length.
         v = 0.5 * np.stack([X[..., j, i] - X[..., i, j] for i, j in ((1, 2), (2, 0), (0, 1))], axis=-1)
         v = v - v.mean(axis=0)
         n = len(each)
         turn = np.einsum("rki,rkj->kij", v, v) / (n * (n - 1))
-        known = np.isfinite(whole["standard_error"]).all(axis=1) & np.isfinite(turn).all(axis=(1, 2))
+        known = np.isfinite(pooled["standard_error"]).all(axis=1) & np.isfinite(turn).all(axis=(1, 2))
         factor = np.full(len(turn), intervals.student(np.array(n), self.confidence))
-        arrays = self._ends(whole.value, np.where(known[:, None, None], turn, 0.0), known, factor)
-        return whole.with_interval(f"rotations' Student's t of {n} replicates", arrays)
+        arrays = self._ends(pooled.value, np.where(known[:, None, None], turn, 0.0), known, factor)
+        return pooled.with_interval(f"rotations' Student's t of {n} replicates", arrays)
 
     @staticmethod
     def _entries(R: np.ndarray, turn: np.ndarray) -> np.ndarray:

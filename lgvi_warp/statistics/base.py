@@ -29,28 +29,35 @@ from lgvi_warp.statistics.values.values import Values
 STOPPED = ("held", "left_out")
 
 # Statistics by their type in a scene file; each class adds itself.
-TYPES: dict[str, type[Statistic]] = {}
+TYPES = registry.Kinds(
+    "lgvi_warp.statistics",
+    {
+        "moments": ("mean", "covariance"),
+        "angles": ("circular_mean", "mean_attitude"),
+        "counts": ("histogram", "exceedance"),
+        "passages": ("first_passage",),
+        "paths.member_values": ("each",),
+        "metrics.tracking_metrics": (
+            *("overshoot", "undershoot", "peak_time", "peak", "rise_time", "settling_time", "steady_state_error"),
+            *("max_error", "cross_track", "iae", "ise", "itae", "rms"),
+        ),
+        "metrics.actuator_metrics": ("effort", "travel", "saturation_share", "energy", "time_to_failure", "own_metric"),
+        "order": ("extremes", "quantiles"),
+        "outcomes": ("outcome", "end_time"),
+        "paths.path": ("path_maximum", "path_minimum", "path_range", "path_mean", "path_rms", "path_time"),
+    },
+)
 
 
 class Gatherer:
     """Reduces the samples of one block of members to a part. Abstract."""
 
     def take(self, values: Values, when: slice) -> None:
-        """Take in the values at some sample times.
-
-        Args:
-            values: the quantity of the block's members at these times.
-            when: slice of the run's sample times. Each time is taken once, in order.
-        """
+        """Take in a quantity of the block's members at some of the run's sample times; each time is taken once, in order."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def end(self, ends: Ends, replicates: int) -> None:
-        """Take in how and when the block's members ended, after the last sample.
-
-        Args:
-            ends: the ends of the block's members.
-            replicates: number R of replicates; member i belongs to replicate i mod R.
-        """
+        """Take in how and when the block's members ended, after the last sample; member i belongs to replicate i mod R."""
 
     def close(self) -> Part:
         """Return the part that summarises the block."""
@@ -64,11 +71,9 @@ class RowGatherer(Gatherer):
         self._statistic, self._rows = statistic, list[Part]()
 
     def take(self, values: Values, when: slice) -> None:
-        """Make the rows of these sample times."""
         self._rows.append(self._statistic.rows(values))
 
     def close(self) -> Part:
-        """Return the rows of all sample times, joined along the first axis."""
         first = self._rows[0]
         shared = self._statistic.shared
         joined = {key: np.concatenate([rows[key] for rows in self._rows]) for key in first.keys() - shared}
@@ -109,6 +114,8 @@ class Statistic:
     of_ends: ClassVar[bool] = False
     # Whether it takes the samples at all ticks of a controller, and not only those that are kept.
     ticks: ClassVar[bool] = False
+    # Whether it is of what a controller tracks, which some guidance has to want.
+    tracks: ClassVar[bool] = False
 
     of: Any = None
     name: str | None = field(default=None, kw_only=True)
@@ -148,27 +155,15 @@ class Statistic:
         return partial(type(self), **{argument.name: getattr(self, argument.name) for argument in fields(self)}), ()
 
     def check(self, faults: Faults) -> None:
-        """Note faults in the arguments that the class adds to these.
-
-        Args:
-            faults: the list that faults are added to.
-        """
+        """Note faults in the arguments that the class adds to these."""
 
     def meant(self) -> Quantity:
-        """Return the quantity that `of` names.
-
-        Raises:
-            SceneError: `of` names no quantity.
-        """
+        """Return the quantity that `of` names; SceneError where it names none."""
         return quantity(f"{self.type}.of", self.of)
 
     @property
     def quantity(self) -> Quantity:
-        """The quantity that the statistic is of.
-
-        Raises:
-            SceneError: `of` was not given.
-        """
+        """The quantity that the statistic is of; SceneError where `of` was not given."""
         meaning: Quantity | None = getattr(self, "_quantity", None)
         if meaning is None:
             door = "metrics" if self.ticks else "statistics"
@@ -184,10 +179,8 @@ class Statistic:
     def check_one_number(self, faults: Faults, where: str, number: str) -> None:
         """Note a fault if it cannot be of one number of each member.
 
-        Args:
-            faults: the list that faults are added to.
-            where: where the statistic stands, such as "then[0].".
-            number: what the number is: "a path_maximum".
+        where: where the statistic stands, such as "then[0].".
+        number: what the number is, "a path_maximum".
         """
         if not self.of_numbers:
             remark = f"is of samples in time, and {number} is one number of each member"
@@ -216,26 +209,16 @@ class Statistic:
         return () if self.at is None else (self.at,)
 
     def at_ends(self, ends: Ends, last: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
-        """Return the numbers that the statistic takes from the members' ends.
+        """Return the numbers (1, d, n) that it takes from the members' ends, and which count (1, n); None if all do.
 
-        Args:
-            ends: the ends of n members.
-            last: (1, d, n), the quantity at the last sample time, where a stopped member holds the state that it
-                stopped in; None where the statistic needs no samples.
-
-        Returns:
-            Numbers (1, d, n), and which members count (1, n); None in place of the latter if all do.
+        last: (1, d, n), the quantity at the last sample time, where a stopped member holds its state; None if not needed.
         """
         assert self.at is not None
         assert last is not None
         return last, ends.are(self.at)[None]
 
     def over(self, time: np.ndarray) -> Statistic:
-        """Return the statistic with all settings that depend on the run's sample times filled in.
-
-        Args:
-            time: (k,) [s], the run's sample times.
-        """
+        """Return the statistic with all settings that depend on the run's sample times (k,) [s] filled in."""
         return self
 
     def parts(self) -> tuple[Statistic, ...]:
@@ -243,114 +226,57 @@ class Statistic:
         return (self,)
 
     def open(self, time: np.ndarray, count: int) -> Gatherer:
-        """Return the object that gathers one block of members.
-
-        Args:
-            time: (k,) [s], all sample times of the run.
-            count: number of members of the block.
-        """
+        """Return the object that gathers one block of `count` members over all sample times (k,) [s] of the run."""
         return RowGatherer(self)
 
     def rows(self, values: Values) -> Part:
-        """Return the part of a block at some sample times: arrays with one row for each time.
-
-        Args:
-            values: the quantity of the block's members at these times.
-        """
+        """Return the part of a block at some sample times: arrays with one row for each time."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         """Return the part of two neighbouring sets of members together.
 
-        Args:
-            left: part of the members that come first.
-            right: part of the members that follow.
-            place: (level, index) of the joined part in the tree of blocks; (-1, 0) outside the tree.
+        place: (level, index) of the joined part in the tree of blocks; (-1, 0) outside the tree.
         """
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def whole(self, parts: Sequence[Part]) -> Part:
-        """Return the part of all members.
-
-        Args:
-            parts: parts in the order of the blocks, the later ones of fewer members.
-        """
-        return reduce(lambda right, left: self.join(left, right, (-1, 0)), reversed(parts))
+        """Return the part of all members from parts in the order of the blocks, the later ones of fewer members."""
+        return reduce(lambda second, first: self.join(first, second, (-1, 0)), reversed(parts))
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return the statistic with its interval at each sample time.
-
-        Args:
-            part: the part of all members.
-            time: (k,) [s], the sample times.
-        """
+        """Return the statistic with its interval at each sample time (k,) [s], from the part of all members."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
-        """Return the estimates of a run whose members are independent.
-
-        Args:
-            parts: parts in the order of the blocks.
-            time: (k,) [s], the sample times.
-
-        Returns:
-            One estimate for each statistic of `self.parts()`.
-        """
+        """Return the estimates of `self.parts()` where members are independent, from parts in the order of the blocks."""
         return [self.read(self.whole(parts), time)]
 
     # With R replicates each array of a part has R rows for each sample time, side by side.
 
     def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
-        """Return the part of the members of one replicate.
-
-        Args:
-            part: a part with R rows for each sample time, one for each replicate.
-            replicate: index of the replicate, from 0.
-            replicates: number R of replicates.
-        """
+        """Return the part of the members of one replicate, counted from 0."""
         return {key: a if key in self.shared else a[replicate::replicates] for key, a in part.items()}
 
     def each_replicate(self, parts: Sequence[Part], replicates: int) -> list[list[Part]]:
-        """Return, for each replicate, the parts of its members.
-
-        Args:
-            parts: parts in the order of the blocks, with R rows for each sample time.
-            replicates: number R of replicates.
-        """
+        """Return, for each replicate, the parts of its members."""
         return [[self.of_replicate(part, r, replicates) for part in parts] for r in range(replicates)]
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
-        """Return the estimates of a run of independent replicates: their intervals are from the replicates' spread.
-
-        Args:
-            parts: parts in the order of the blocks, with R rows for each sample time.
-            time: (k,) [s], the sample times.
-            replicates: number R of replicates.
-
-        Returns:
-            One estimate for each statistic of `self.parts()`.
-        """
+        """Return the estimates of a run of independent replicates: their intervals are from the replicates' spread."""
         each = self.each_replicate(parts, replicates)
         (overall,) = self.estimates(together(each), time)
         return [self.spread(overall, [self.estimates(replicate_parts, time)[0] for replicate_parts in each])]
 
     def spread(self, pooled: Estimate, each: Sequence[Estimate]) -> Estimate:
-        """Return the estimate of all members with Student's t interval from the replicates' estimates.
-
-        Args:
-            pooled: the estimate of all members.
-            each: the estimate of each replicate.
-        """
+        """Return the estimate of all members with Student's t interval from the estimate of each replicate."""
         error, half = intervals.of_replicates(np.stack([replicate.value for replicate in each]), self.confidence)
         arrays = {"lower": pooled.value - half, "upper": pooled.value + half}
         arrays |= {"standard_error": error} if "standard_error" in pooled.arrays else {}
         return pooled.with_interval(f"Student's t of {len(each)} replicates", arrays)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the scene file's table of this statistic: its type, `of`, and what differs from the defaults.
-
-        A function is given by its name.
-        """
+        """Return the scene file's table: its type, `of`, and what differs from the defaults; a function by its name."""
         content: dict[str, Any] = {"type": self.type}
         for argument in fields(self):
             value = getattr(self, argument.name)
@@ -378,16 +304,16 @@ def as_toml(value: Any) -> Any:
     return getattr(value, "__name__", type(value).__name__) if callable(value) else value
 
 
-def from_list(given: Any, key: str = "statistics", *, whole: bool = True) -> tuple[Statistic, ...]:
+def from_list(entries: Any, key: str = "statistics", *, unique_names: bool = True) -> tuple[Statistic, ...]:
     """Return statistics from tables of a scene file, from `Statistic` objects, or from a mix of both."""
-    if isinstance(given, str | Mapping | Statistic) or not isinstance(given, Sequence):
+    if isinstance(entries, str | Mapping | Statistic) or not isinstance(entries, Sequence):
         example = 'write [[run.statistics]] and type = "mean" below, or statistics=[lw.statistics.Mean("position")]'
-        raise refusal(key, given, "is no list", example)
+        raise refusal(key, entries, "is no list", example)
     faults, statistics = Faults(), list[Statistic]()
-    for i, entry in enumerate(given):
+    for i, entry in enumerate(entries):
         with faults.including():
             statistics.append(_from_table(f"{key}[{i}]", entry))
-    if whole and not faults:
+    if unique_names and not faults:
         names: list[str] = []
         for statistic in statistics:
             with faults.including():

@@ -17,11 +17,9 @@ STOPPED, FAILED = "stopped", "failed"
 
 @dataclass(frozen=True)
 class Ends:
-    """The ends of n members.
+    """The ends of n members: `Status` (n,), number of the event that stopped each, from 1, or 0 (n,), and time (n,) [s].
 
-    status: (n,), of `Status`.
-    event: (n,), number of the event that stopped each member, counted from 1; 0 for none.
-    time: (n,) [s], of the event or of the failure; the end of the run for the others.
+    The time is that of the event or of the failure; the end of the run for the others.
     """
 
     status: np.ndarray
@@ -30,10 +28,7 @@ class Ends:
     events: tuple[str, ...] = ()
 
     def are(self, outcome: str) -> np.ndarray:
-        """Which members had this outcome.
-
-        Returns: (n,), true or false.
-        """
+        """Which members (n,) had this outcome."""
         if outcome in self.events:
             return np.asarray(self.event == 1 + self.events.index(outcome))
         if outcome == STOPPED:

@@ -17,12 +17,7 @@ from lgvi_warp.statistics.values.values import Values
 
 
 def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the sums over members of a_i b_j.
-
-    a: (k, d, n).
-    b: (k, d, n).
-    Returns: (k, d, d).
-    """
+    """Return the sums (k, d, d) over members of a_i b_j, of two arrays (k, d, n)."""
     # BLAS pays only for more than a few rows; pieces keep each product too small for BLAS to start threads of its own.
     if a.shape[1] <= 4:
         return np.einsum("kin,kjn->kij", a, b)
@@ -30,39 +25,26 @@ def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.asarray(sum(parts))
 
 
-def joined_means(left: Part, right: Part) -> tuple[Part, np.ndarray, np.ndarray]:
-    """Return the common mean of two sets of members.
-
-    left: part of the first set: count (k,), mean (k, d).
-    Returns: count and mean of both sets; and how far the mean of each set lies above the common mean, (k, d) each.
-    """
-    n = left["count"] + right["count"]
-    share = (right["count"] / np.maximum(n, 1))[:, None]
-    delta = right["mean"] - left["mean"]
-    none = (left["count"] == 0)[:, None]
-    mean = np.where(none, right["mean"], left["mean"] + share * delta)
+def joined_means(first: Part, second: Part) -> tuple[Part, np.ndarray, np.ndarray]:
+    """Return count (k,) and mean (k, d) of two sets of members, and how far the mean of each lies above it, (k, d) each."""
+    n = first["count"] + second["count"]
+    share = (second["count"] / np.maximum(n, 1))[:, None]
+    delta = second["mean"] - first["mean"]
+    none = (first["count"] == 0)[:, None]
+    mean = np.where(none, second["mean"], first["mean"] + share * delta)
     return {"count": n, "mean": mean}, -share * delta, (1.0 - share) * delta
 
 
 def outer(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the products a_i b_j at each time.
-
-    a: (k, d).
-    b: (k, d).
-    Returns: (k, d, d).
-    """
+    """Return the products a_i b_j (k, d, d) at each time, of two arrays (k, d)."""
     return np.asarray(a[:, :, None] * b[:, None, :])
 
 
 def moved(part: Part, a: np.ndarray) -> Part:
-    """Return second to fourth moments about a point that lies `a` below the mean.
+    """Return second to fourth moments about a point that lies `a` (k, d) below the mean, (k, d, d) each.
 
-    With x less its mean: m11[i, j] is the sum of x_i x_j, m21 of x_i^2 x_j, m22 of x_i^2 x_j^2. About the point these
-    are the sums of (x_i + a_i) (x_j + a_j) and so on.
-
-    part: count (k,), m11 (k, d, d), and m21, m22 (k, d, d) where fourth moments are kept.
-    a: (k, d), the mean less the point.
-    Returns: m11, and m21 and m22 where the part has them, (k, d, d) each.
+    With x less its mean: m11[i, j] is the sum of x_i x_j, m21 of x_i^2 x_j, m22 of x_i^2 x_j^2 (where the part has these).
+    About the point they are the sums of (x_i + a_i) (x_j + a_j) and so on.
     """
     n, m11, aa = part["count"][:, None, None], part["m11"], outer(a, a)
     moments = {"m11": m11 + n * aa}
@@ -77,20 +59,15 @@ def moved(part: Part, a: np.ndarray) -> Part:
     return moments
 
 
-def joined(left: Part, right: Part) -> Part:
+def joined(first: Part, second: Part) -> Part:
     """Return the moments of two sets of members together, about their common mean."""
-    both, a, b = joined_means(left, right)
-    first, second = moved(left, a), moved(right, b)
-    return both | {key: first[key] + second[key] for key in first}
+    both, a, b = joined_means(first, second)
+    moments, more = moved(first, a), moved(second, b)
+    return both | {key: moments[key] + more[key] for key in moments}
 
 
 def empty_as_nan(values: np.ndarray, count: np.ndarray, least: int = 1) -> np.ndarray:
-    """Return the values with NaN at times that have too few members.
-
-    values: (k, ...).
-    count: (k,), members at each time.
-    Returns: (k, ...), as values.
-    """
+    """Return values (k, ...) with NaN at times that have fewer members (k,) than `least`."""
     few = (count < least).reshape(-1, *[1] * (values.ndim - 1))
     return np.asarray(np.where(few, np.nan, values))
 
@@ -125,18 +102,17 @@ class Mean(Statistic):
     type: ClassVar[str] = "mean"
 
     def rows(self, values: Values) -> Part:
-        """Return count, mean, and the sum of squares about the mean."""
         c = values.centred
         return {"count": values.count, "mean": values.mean, "m2": np.einsum("kdn,kdn->kd", c, c)}
 
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # Join as Chan, Golub & LeVeque (1979).
-        both, a, b = joined_means(left, right)
-        n, m = left["count"][:, None], right["count"][:, None]
-        return both | {"m2": left["m2"] + n * a**2 + (right["m2"] + m * b**2)}
+        both, a, b = joined_means(first, second)
+        n, m = first["count"][:, None], second["count"][:, None]
+        return both | {"m2": first["m2"] + n * a**2 + (second["m2"] + m * b**2)}
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return the mean with the interval mean -+ t s / sqrt(n)."""
+        # The mean with the interval mean -+ t s / sqrt(n).
         count = part["count"]
         n = count[:, None]
         mean = empty_as_nan(part["mean"], count)
@@ -172,15 +148,14 @@ class Covariance(Statistic):
     type: ClassVar[str] = "covariance"
 
     def rows(self, values: Values) -> Part:
-        """Return count, mean, and second to fourth moments about the mean."""
         c = values.centred
         square = c * c
         moments = {"count": values.count, "mean": values.mean, "m11": sums(c, c)}
         return moments | {"m21": sums(square, c), "m22": sums(square, square)}
 
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # Join the moments about the common mean.
-        return joined(left, right)
+        return joined(first, second)
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
         """Return the covariance matrix with its interval.
@@ -218,13 +193,13 @@ class Covariance(Statistic):
         lower, upper = (np.where(diagonal, variance, covariance) for variance, covariance in both)
         return lower, upper
 
-    def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
-        """Form the same intervals with the standard errors of the replicates' estimates."""
+    def spread(self, pooled: Estimate, each: Sequence[Estimate]) -> Estimate:
+        # Form the same intervals with the standard errors of the replicates' estimates.
         error, _ = intervals.of_replicates(np.stack([replicate.value for replicate in each]), self.confidence)
         factor = intervals.student(np.array(len(each)), self.confidence)
-        ends = dict(zip(("lower", "upper"), self._ends(whole.value, error, factor), strict=True))
+        ends = dict(zip(("lower", "upper"), self._ends(pooled.value, error, factor), strict=True))
         text = f"Student's t of {len(each)} replicates; of the logarithm for variances"
-        return whole.with_interval(text, ends | {"standard_error": error})
+        return pooled.with_interval(text, ends | {"standard_error": error})
 
 
 def estimate(
@@ -237,10 +212,7 @@ def estimate(
     unit: str | None = None,
     labels: Sequence[str] | None = None,
 ) -> Estimate:
-    """Return the Estimate of a statistic.
-
-    time: (k,) [s], the sample times.
-    """
+    """Return the Estimate of a statistic at the sample times (k,) [s]."""
     components = np.array(statistic.quantity.labels if labels is None else labels)
     return Estimate(
         statistic.key,

@@ -46,7 +46,6 @@ class Extremes(Statistic):
     type: ClassVar[str] = "extremes"
 
     def rows(self, values: Values) -> Part:
-        """Return the extremes of the block, and whose they are."""
         part: Part = {"count": values.count}
         for name, best, beyond in (("minimum", np.argmin, np.inf), ("maximum", np.argmax, -np.inf)):
             x = values.filled(beyond)
@@ -55,19 +54,19 @@ class Extremes(Statistic):
             part[f"{name}_member"] = np.where(values.count[:, None] > 0, values.members(at), -1)
         return part
 
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # Keep the more extreme value; of equal ones, that of the first member.
-        both: Part = {"count": left["count"] + right["count"]}
+        both: Part = {"count": first["count"] + second["count"]}
         for name, beats in (("minimum", np.less), ("maximum", np.greater)):
             member = f"{name}_member"
-            better = beats(right[name], left[name])
-            better |= (right[name] == left[name]) & (right[member] < left[member])
+            better = beats(second[name], first[name])
+            better |= (second[name] == first[name]) & (second[member] < first[member])
             for key in (name, member):
-                both[key] = np.where(better, right[key], left[key])
+                both[key] = np.where(better, second[key], first[key])
         return both
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return the extremes; `beyond` = b follows from P(a fraction above the maximum > b) = (1 - b)^n."""
+        # The extremes; `beyond` = b follows from P(a fraction above the maximum > b) = (1 - b)^n.
         count = part["count"]
         arrays = {name: empty_as_nan(part[name], count) for name in ("minimum", "maximum")}
         arrays |= {name: part[name] for name in ("minimum_member", "maximum_member")}
@@ -76,9 +75,9 @@ class Extremes(Statistic):
         arrays = {"value": arrays["maximum"]} | arrays | {"beyond": beyond, "count": count}
         return estimate(self, "none: beyond bounds what lies outside", dims, arrays, time)
 
-    def spread(self, whole: Estimate, each: Sequence[Estimate]) -> Estimate:
-        """Return the estimate as it is: extremes have no interval."""
-        return whole
+    def spread(self, pooled: Estimate, each: Sequence[Estimate]) -> Estimate:
+        # The estimate as it is: extremes have no interval.
+        return pooled
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +115,6 @@ class Quantiles(Statistic):
     size: int = 2048
 
     def check(self, faults: Faults) -> None:
-        """Note faults of the levels and of the size."""
         levels = faults.finite("levels", self.levels)
         if levels is not None:
             if levels.ndim > 1 or levels.size == 0 or np.any(levels <= 0.0) or np.any(levels >= 1.0):
@@ -129,17 +127,17 @@ class Quantiles(Statistic):
             object.__setattr__(self, "size", int(n))
 
     def rows(self, values: Values) -> Part:
-        """Return the sketch of the block: its values sorted, and thinned to `size` values where there are more."""
+        # The sketch of the block: its values sorted, and thinned to `size` values where there are more.
         x = values.filled(np.inf)
         # Sorting is most of the work, and takes half as long in float32.
         x = x.astype(np.float32) if values.single else x
         return {"count": values.count} | sketch.sketch_of(x, values.size, self.size, values.block)
 
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        return {"count": left["count"] + right["count"]} | sketch.join(left, right, self.size, place)
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
+        return {"count": first["count"] + second["count"]} | sketch.join(first, second, self.size, place)
 
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
-        """Return the quantiles of all members, a few sample times at once to bound memory."""
+        # The quantiles of all members, a few sample times at once to bound memory.
         return self._in_pieces(parts, time, 1, lambda some, when: self.read(self.whole(some), when))
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
@@ -164,11 +162,10 @@ class Quantiles(Statistic):
         return [replace(pieces[0], arrays=arrays, coordinates=pieces[0].coordinates | {"time": time})]
 
     def whole(self, parts: Sequence[Part]) -> Part:
-        """Return all sketches side by side."""
         return {"count": np.sum([part["count"] for part in parts], axis=0)} | sketch.together(parts)
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return quantiles, linear between sorted values as np.quantile, with intervals by ranks."""
+        # Quantiles, linear between sorted values as np.quantile, with intervals by ranks.
         n, level = part["count"][:, None], np.array(self.levels)[None, :]
         low, high = intervals.ranks(n, level, self.confidence)
         # The variance of the sketch's error adds to that of the ranks.
@@ -178,10 +175,7 @@ class Quantiles(Statistic):
         return self._read(part, time, lambda value: ends, "order statistics: binomial ranks")
 
     def _read_replicates(self, each: Sequence[Sequence[Part]], time: np.ndarray) -> Estimate:
-        """Take ranks from the spread of the replicates' fractions of members up to the quantile of all (Woodruff 1952).
-
-        The fractions contain the errors of their sketches.
-        """
+        """Take ranks from the spread of the replicates' fractions up to the quantile of all (Woodruff 1952)."""
         overall = self.whole(together(each))
         n, level = overall["count"][:, None, None], np.array(self.levels)[None, :, None]
 
@@ -196,7 +190,6 @@ class Quantiles(Statistic):
     def _read(self, part: Part, time: np.ndarray, ends: EndsOf, interval: str) -> Estimate:
         """Return the quantiles, with the interval between two ranks.
 
-        time: (k,) [s], the sample times.
         ends: function from the value (k, levels, d) to the ranks, counted from 1, of the interval's ends.
         """
         count = part["count"]

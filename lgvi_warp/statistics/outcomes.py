@@ -3,21 +3,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.statistics.base import Gatherer, Statistic
-from lgvi_warp.statistics.counts import DIRICHLET, Histogram, PassageCurve, by_replicates, check_levels
+from lgvi_warp.statistics.counts import Histogram, by_replicates
 from lgvi_warp.statistics.ends import FAILED, Ends
 from lgvi_warp.statistics.estimates import intervals
 from lgvi_warp.statistics.estimates.estimate import Estimate, along
 from lgvi_warp.statistics.estimates.tree import Part
 from lgvi_warp.statistics.moments import Mean, estimate
 from lgvi_warp.statistics.order import Quantiles
+from lgvi_warp.statistics.passages import DIRICHLET, PassageCurve, check_levels
 from lgvi_warp.statistics.paths.member_statistic import MemberStatistic
 from lgvi_warp.statistics.values.quantity import Quantity
 from lgvi_warp.statistics.values.values import Values
@@ -45,11 +47,7 @@ class OfEnds(Statistic):
     of_ends: ClassVar[bool] = True
 
     def meant(self) -> Quantity:
-        """Return a quantity with the outcome's name; it needs no samples.
-
-        Raises:
-            SceneError: `of` is no name of an outcome.
-        """
+        """Return a quantity with the outcome's name, which needs no samples; SceneError where `of` is no name."""
         if not isinstance(self.of, str) or not self.of:
             remedy = 'give "floor", the name of an event of the scene, "stopped" or "failed"'
             raise refusal(f"{self.type}.of", self.of, "is no outcome", remedy)
@@ -57,27 +55,32 @@ class OfEnds(Statistic):
 
     @property
     def outcomes(self) -> tuple[str, ...]:
-        """The one outcome that the statistic is of."""
         return (self.quantity.name,)
 
 
-class _Endings(Gatherer):
-    """Gathers the times of a block's members that ended before the run did, by the outcome asked for or otherwise."""
+class _AtEnd(Gatherer):
+    """Gathers the ends of a block's members, which come at once."""
+
+    def __init__(self, part_of: Callable[[Values], Part]):
+        self._part_of = part_of
 
     def take(self, values: Values, when: slice) -> None:
-        """Take in the ends: x (replicates, 2, members), time [s] and kind of each end."""
-        time, kind = values.x[:, 0], values.x[:, 1]
-        replicate, member = np.nonzero(kind != NOT)
-        self._part = {
-            "members": np.full(len(time), time.shape[1], np.int64),
-            "time": time[replicate, member],
-            "kind": kind[replicate, member].astype(np.uint8),
-            "replicate": replicate.astype(np.int32),
-        }
+        self._part = self._part_of(values)
 
     def close(self) -> Part:
-        """Return the part that summarises the block."""
         return self._part
+
+
+def _endings(values: Values) -> Part:
+    """Members that ended before the run did, from x (replicates, 2, members), time [s] and kind of each end."""
+    time, kind = values.x[:, 0], values.x[:, 1]
+    replicate, member = np.nonzero(kind != NOT)
+    return {
+        "members": np.full(len(time), time.shape[1], np.int64),
+        "time": time[replicate, member],
+        "kind": kind[replicate, member].astype(np.uint8),
+        "replicate": replicate.astype(np.int32),
+    }
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,22 +127,19 @@ class Outcome(OfEnds):
     levels: Any = (0.05, 0.5, 0.95)
 
     def check(self, faults: Faults) -> None:
-        """Note levels that are no fractions between 0 and 1."""
         check_levels(faults, self.levels)
 
-    def open(self, time: np.ndarray, count: int) -> _Endings:
-        """Return the object that takes in the ends of a block's members."""
-        return _Endings()
+    def open(self, time: np.ndarray, count: int) -> _AtEnd:
+        return _AtEnd(_endings)
 
     def at_ends(self, ends: Ends, last: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
-        """Return time [s] and kind of each end."""
         kind = np.select([ends.are(self.quantity.name), ends.are(FAILED), ends.status != 0], [SO, LOST, OTHERWISE], NOT)
         return np.stack([ends.time, kind])[None], None
 
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # Join the ends of both sets of members, one after the other.
-        ends = {name: np.concatenate([left[name], right[name]]) for name in ("time", "kind", "replicate")}
-        return {"members": left["members"] + right["members"]} | ends
+        ends = {name: np.concatenate([first[name], second[name]]) for name in ("time", "kind", "replicate")}
+        return {"members": first["members"] + second["members"]} | ends
 
     def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
         # The ends of the members of one replicate.
@@ -148,7 +148,7 @@ class Outcome(OfEnds):
         return {"members": part["members"][replicate : replicate + 1]} | ends
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return the estimate of Aalen & Johansen (1978), from the times of all ends."""
+        # The estimate of Aalen & Johansen (1978), from the times of all ends.
         at = np.union1d(time, _steps_of(part))
         curves = _curves(part, at)
         ends = [intervals.wilson(curve.value, curve.members, self.confidence) for curve in curves]
@@ -161,11 +161,10 @@ class Outcome(OfEnds):
         at = np.union1d(time, steps[:: 1 + len(steps) // MOST_TIMES])
         curves = _curves(overall, at)
         each = [_curves(self.of_replicate(overall, r, replicates), at) for r in range(replicates)]
+        values = [np.stack([replicate_curves[i].value for replicate_curves in each]) for i in range(len(curves))]
         ends = [
-            intervals.probability_of_replicates(
-                curve.value, np.stack([one[i].value for one in each]), curve.members, self.confidence
-            )
-            for i, curve in enumerate(curves)
+            intervals.probability_of_replicates(curve.value, of_each, curve.members, self.confidence)
+            for curve, of_each in zip(curves, values, strict=True)
         ]
         result = self._estimate(overall, at, curves, ends, time)
         return [result.with_interval(by_replicates(replicates), {})]
@@ -209,10 +208,7 @@ def _steps_of(part: Part) -> np.ndarray:
 
 
 def _curves(part: Part, at: np.ndarray) -> tuple[PassageCurve, PassageCurve]:
-    """Aalen & Johansen's curve at rising times `at` [s], and Kaplan & Meier's, in which other events censor too.
-
-    An end between two of the times counts at the second one.
-    """
+    """Aalen & Johansen's curve at rising times `at` [s], and Kaplan & Meier's, in which other events censor too."""
     so, others = (_counted(at, part["time"][part["kind"] == kind], "left")[:, None] for kind in (SO, OTHERWISE))
     # A member that is censored at one of the times is at risk at that time, and at no later one.
     lost, not_so = (_counted(at, part["time"][which], "right") for which in (part["kind"] == LOST, part["kind"] != SO))
@@ -233,21 +229,6 @@ def _reached(curve: np.ndarray, levels: np.ndarray, at: np.ndarray) -> np.ndarra
     return np.append(at, np.inf)[places]
 
 
-class _EndTimes(Gatherer):
-    """Gathers the times of a block's members that ended by the outcome."""
-
-    def __init__(self, statistic: EndTime, time: np.ndarray):
-        self._statistic, self._time = statistic, time
-
-    def take(self, values: Values, when: slice) -> None:
-        """Take in the times of the ends."""
-        self._part = self._statistic.gather(values, self._time)
-
-    def close(self) -> Part:
-        """Return the part that summarises the block."""
-        return self._part
-
-
 @dataclass(frozen=True, eq=False)
 class EndTime(OfEnds, MemberStatistic):
     """Statistics of the time [s] at which members ended by an outcome, over the members that did.
@@ -264,13 +245,10 @@ class EndTime(OfEnds, MemberStatistic):
     type: ClassVar[str] = "end_time"
 
     def then_default(self) -> Sequence[Statistic]:
-        """Return a mean, quantiles, and a histogram over the run."""
         return [Mean(), Quantiles(), Histogram(bins=20, limits="run")]
 
-    def open(self, time: np.ndarray, count: int) -> _EndTimes:
-        """Return the object that takes in the ends of a block's members."""
-        return _EndTimes(self, time)
+    def open(self, time: np.ndarray, count: int) -> _AtEnd:
+        return _AtEnd(partial(self.gather, time=time))
 
     def at_ends(self, ends: Ends, last: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
-        """Return the time [s] of each end."""
         return ends.time[None, None], ends.are(self.quantity.name)[None]

@@ -86,8 +86,8 @@ def from_dict(table: Any) -> Until:
 class StoppingRule:
     """A stopping rule bound to the statistics of a run.
 
-    doubling: whether to look at powers of two of members only; by default False. With replicates a design is balanced there,
-        and the spread of a few estimates comes out small by chance too often for many looks.
+    doubling: look at powers of two of members only, where a design of replicates is balanced: the spread of a few estimates
+        comes out small by chance too often for many looks.
     """
 
     until: Until
@@ -133,10 +133,7 @@ class StoppingRule:
 
 
 def watch(until: Until, statistics: Sequence[Statistic], times: np.ndarray) -> StoppingRule:
-    """Bind a stopping rule to the statistics of a run; a mean that is not among them is added.
-
-    times: (k,) [s], the sample times of the run.
-    """
+    """Bind a stopping rule to the statistics of a run with sample times (k,) [s]; a mean that is not among them is added."""
     faults = Faults("until.")
     rows = np.array([len(times) - 1])
     if until.at == "all":

@@ -7,7 +7,7 @@ import copy
 import dataclasses
 import functools
 import keyword
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
@@ -153,7 +153,7 @@ class Term:
 
     type: ClassVar[str] = ""
     # Classes by their type in a scene file; events have a table of their own.
-    kinds: ClassVar[dict[str, Any]] = {}
+    kinds: ClassVar[MutableMapping[str, Any]] = {}
     # Whether it acts on the motion: an event does not.
     acts: ClassVar[bool] = True
     device: ClassVar[Any] = ""

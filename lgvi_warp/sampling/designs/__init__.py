@@ -8,26 +8,19 @@ the cube's levels into values (sampling/distributions). The cube's columns are i
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
-from lgvi_warp.common import registry
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.sampling.designs.base import Sampling
 
-# Classes of samplings by their kind in a scene file, each also an attribute of this package.
-registry.load_modules(sys.modules[__name__])
+# Classes of samplings by their kind in a scene file.
 KINDS = Sampling.kinds
-globals().update({kind.__name__: kind for kind in KINDS.values()})
 
 
 def sampling_of(content: Any) -> Sampling:
-    """Build a sampling from what a scene file or a user gives.
-
-    content: A `Sampling`, its name, or { name = { ... } } as in a scene file.
-    """
+    """Build a sampling from a `Sampling`, its name, or { name = { ... } } as in a scene file."""
     if isinstance(content, Sampling):
         return content
     if isinstance(content, str):

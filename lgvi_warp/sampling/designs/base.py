@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, MutableMapping
 from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar
 
@@ -33,8 +33,18 @@ class Sampling:
 
     kind: ClassVar[str] = ""
     # Classes by their kind in a scene file.
-    kinds: ClassVar[dict[str, Any]] = {}
-    # Whether a run may take only the first of the members that the sampling has.
+    kinds: ClassVar[MutableMapping[str, Any]] = registry.Kinds(
+        "lgvi_warp.sampling.designs",
+        {
+            "sequences": ("sobol", "halton"),
+            "designs": ("saltelli", "morris"),
+            "random": ("random",),
+            "grid": ("grid",),
+            "hypercube": ("latin_hypercube",),
+            "levels": ("levels",),
+            "table": ("table",),
+        },
+    )
     fewer: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
@@ -42,82 +52,35 @@ class Sampling:
         registry.add(cls.kinds, cls, "kind")
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Levels of members in the unit cube. Every sampling must define this.
-
-        Args:
-            space: The cube: which names vary, with how many columns each.
-            members: Indices of the members, (n,).
-
-        Returns:
-            Levels in (0, 1) by key, each (n, size).
-
-        Raises:
-            TypeError: Where the sampling does not define it.
-        """
+        """Levels in (0, 1) of members (n,) by key, each (n, size). Every sampling must define this."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def distributions(self) -> dict[str, Any]:
-        """Distributions that the sampling itself brings.
-
-        Returns:
-            Distributions by the name of what they vary.
-        """
+        """Distributions that the sampling itself brings, by the name of what they vary."""
         return {}
 
     def own_values(self) -> dict[str, np.ndarray]:
-        """Values of all members that the sampling itself brings.
-
-        Returns:
-            Values (members, ...) by the name of what they set.
-        """
+        """Values (members, ...) that the sampling itself brings, by the name of what they set."""
         return {}
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The arrays that the sampling was given, which a store keeps as arrays.
-
-        Returns:
-            Arrays by name, with a row for each member.
-        """
+        """The arrays that the sampling was given, with a row for each member, which a store keeps as arrays."""
         return {}
 
     def own_members(self, space: Space) -> int | None:
-        """The number of members that the sampling itself fixes.
-
-        Args:
-            space: The cube: which names vary, with how many columns each.
-
-        Returns:
-            The number, or None where the user chooses it.
-        """
+        """The number of members that the sampling itself fixes; None where the user chooses it."""
         return None
 
     def group_size(self, space: Space) -> int:
-        """The size of the groups in which members come; their number must be a multiple of it.
-
-        Args:
-            space: The cube: which names vary, with how many columns each.
-
-        Returns:
-            Members in a group; 1 where any number is allowed.
-        """
+        """The size of the groups in which members come; their number must be a multiple of it."""
         return 1
 
     def replicates_of_members(self) -> int:
-        """The number R of independent replicates of the design: member i is point i // R of replicate i mod R.
-
-        Returns:
-            R; 1 for a design without replicates.
-        """
+        """The number R of independent replicates of the design: member i is point i // R of replicate i mod R."""
         return 1
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
-        """Add a fault where the number of members, or what varies, does not suit the sampling.
-
-        Args:
-            faults: Collects the faults.
-            space: The cube: which names vary, with how many columns each.
-            members: The number of members.
-        """
+        """Add a fault where the number of members, or what varies, does not suit the sampling."""
         fixed, group = self.own_members(space), self.group_size(space)
         if fixed is not None and self.fewer and members > fixed:
             fault = f"are more than the {fixed} of the {self.kind}"
@@ -132,22 +95,14 @@ class Sampling:
             faults.add("members", members, fault, f"give {near}")
 
     def to_dict(self) -> Any:
-        """The sampling as a scene file has it.
-
-        Returns:
-            The name, or { name: settings } where a setting differs from its default.
-        """
+        """The sampling as a scene file has it: its name, or { name: settings } where a setting differs from its default."""
         values = {item.name: (getattr(self, item.name), item.default) for item in fields(self)}
         changed = {name: value for name, (value, default) in values.items() if value != default}
         return {self.kind: changed} if changed else self.kind
 
 
 def inside(cube: np.ndarray) -> np.ndarray:
-    """Levels clipped to the open interval (0, 1), where quantiles are finite.
-
-    cube: Levels in [0, 1], of any shape.
-    Returns: A read-only array of the same shape.
-    """
+    """Levels clipped to the open interval (0, 1), where quantiles are finite; read-only."""
     cube = np.clip(cube, 2.0**-54, 1.0 - 2.0**-53)
     cube.setflags(write=False)
     return np.asarray(cube)
@@ -185,29 +140,17 @@ class Replicated(Sampling):
         object.__setattr__(self, "replicates", int(R))
 
     def check_own(self, faults: Faults) -> None:
-        """Add a fault for each of the design's further settings that is wrong; by default there are none.
-
-        Args:
-            faults: Collects the faults.
-        """
+        """Add a fault for each of the design's further settings that is wrong; by default there are none."""
 
     def replicates_of_members(self) -> int:
-        """The number of replicates R that was given."""
         return self.replicates
 
     def group_size(self, space: Space) -> int:
-        """One point of each replicate, R members."""
+        # One point of each replicate, R members.
         return self.replicates
 
     def dealt(self, members: np.ndarray) -> Iterator[tuple[int, np.ndarray | slice, np.ndarray]]:
-        """Deal members to their replicates.
-
-        Args:
-            members: Indices of the members, (n,).
-
-        Yields:
-            For each replicate that has any: its number, which of the members are its own, and the indices of their points.
-        """
+        """Deal members (n,) to replicates: each one's number, which members are its own, and the indices of their points."""
         if self.replicates == 1:
             yield 0, slice(None), members
             return
@@ -217,32 +160,15 @@ class Replicated(Sampling):
             yield int(r), mask, point[mask]
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Levels from the points of each replicate."""
         levels = np.empty((len(members), space.dimensions))
         for replicate, mask, indices in self.dealt(members):
             levels[mask] = self.points(space, replicate, indices)
         return space.split(levels)
 
     def points(self, space: Space, replicate: int, indices: np.ndarray) -> np.ndarray:
-        """Points of one replicate's sequence; a design without sequences overrides `draw`.
-
-        Args:
-            space: The cube.
-            replicate: Number of the replicate.
-            indices: Indices (n,) in its sequence.
-
-        Returns:
-            Levels (n, dimensions).
-        """
+        """Points (n, dimensions) of one replicate's sequence; a design without sequences overrides `draw`."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def name(self, replicate: int) -> str:
-        """The name of a replicate's stream of random numbers.
-
-        Args:
-            replicate: Number of the replicate, from 0.
-
-        Returns:
-            The kind and that number; with R = 1 the kind alone, as of the design without replicates.
-        """
+        """The name of a replicate's stream of random numbers: the kind and its number, from 0; with R = 1 the kind alone."""
         return self.kind if self.replicates == 1 else f"{self.kind} {replicate}"

@@ -29,12 +29,10 @@ Choose = Callable[[Faults, Sequence[str]], list[str]]
 
 
 def columns_of(faults: Faults, path: str, content: bytes, choose: Choose) -> dict[str, np.ndarray]:
-    """Columns of a CSV file by name.
+    """Columns (lines,) of a CSV file by name; {} where there is a fault.
 
     The names are in the first line that is neither empty nor a comment (#); every other line holds one number for each.
     Commas, semicolons or tabs separate cells, as in the first line.
-
-    Returns: Columns (lines,) by name; {} where there is a fault.
     """
     rows: Any = csv.reader(())
     try:

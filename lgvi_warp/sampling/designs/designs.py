@@ -46,15 +46,14 @@ class Saltelli(Sampling):
         faults = Faults("ensemble.sampling.saltelli.")
         faults.choice("second_order", self.second_order, (True, False))
         check_replicates(faults, self.replicates)
-        given, example = (
-            () if self.groups is None else self.groups,
-            'give {"start": ["start.position", "start.velocity"]}',
-        )
-        pairs = list(
-            given.items() if isinstance(given, Mapping) else given if isinstance(given, list | tuple) else [given]
-        )
+        groups = () if self.groups is None else self.groups
+        example = 'give {"start": ["start.position", "start.velocity"]}'
+        if isinstance(groups, Mapping):
+            pairs = list(groups.items())
+        else:
+            pairs = list(groups) if isinstance(groups, list | tuple) else [groups]
         if not all(isinstance(pair, list | tuple) and len(pair) == 2 and isinstance(pair[0], str) for pair in pairs):
-            faults.add("groups", given, "is no mapping of names to lists of factors", example)
+            faults.add("groups", groups, "is no mapping of names to lists of factors", example)
             pairs = []
         for name, members in pairs:
             if not isinstance(members, list | tuple) or not members or not all(isinstance(m, str) for m in members):
@@ -64,7 +63,6 @@ class Saltelli(Sampling):
         object.__setattr__(self, "groups", tuple((name, tuple(members)) for name, members in pairs) or None)
 
     def to_dict(self) -> Any:
-        """The sampling as a scene file has it."""
         content = super().to_dict()
         if self.groups:
             content[self.kind]["groups"] = {name: list(members) for name, members in self.groups}
@@ -86,7 +84,7 @@ class Saltelli(Sampling):
         return tuple(joined.items())
 
     def group_size(self, space: Space) -> int:
-        """Members in a group: 2 d + 2, or d + 2 without second-order indices."""
+        # Members in a group: 2 d + 2, or d + 2 without second-order indices.
         return (2 if self.second_order else 1) * len(self.factors(space)) + 2
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
@@ -115,7 +113,7 @@ class Saltelli(Sampling):
         return groups % self.replicates
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Levels of point A where the member has the factor of A, else of point B."""
+        # Levels of point A where the member has the factor of A, else of point B.
         group, row = np.divmod(members, self.group_size(space))
         chosen, place = np.unique(group, return_inverse=True)
         replicate, D = self.replicate_of(chosen), space.dimensions
@@ -173,7 +171,7 @@ class Morris(Sampling):
         object.__setattr__(self, "levels", int(levels))
 
     def group_size(self, space: Space) -> int:
-        """Members on a path, d + 1, d the number of factors."""
+        # Members on a path, d + 1, d the number of factors.
         return len(space.factors) + 1
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
@@ -185,7 +183,7 @@ class Morris(Sampling):
         super().check(faults, space, members)
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Levels in the middle of each part."""
+        # Levels in the middle of each part.
         x = self.design(space, members)
         return space.split((x * (self.levels - 1) + 0.5) / self.levels)
 

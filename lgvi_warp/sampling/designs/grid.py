@@ -29,6 +29,14 @@ class Grid(Sampling):
 
     Raises:
         SceneError: Where an axis is neither. The message lists every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> grid = lw.designs.Grid({"start.velocity[0]": [1.0, 1.5, 2.0], "vehicle.buoyancy": [307.0, 308.0]})
+        >>> fleet = lw.Ensemble(scene, sampling=grid)
+        >>> fleet.members, fleet.select(0, 6).velocity[:, 0].tolist()
+        (6, [1.0, 1.0, 1.5, 1.5, 2.0, 2.0])
     """
 
     axes: Mapping[str, Any] = field(default_factory=dict)
@@ -50,7 +58,7 @@ class Grid(Sampling):
         faults.raise_if_any()
 
     def distributions(self) -> dict[str, Any]:
-        """A `Choice` among the values, for each name that has a list of them."""
+        # A `Choice` among the values, for each name that has a list of them.
         return {name: Choice(axis) for name, axis in self.axes.items() if not isinstance(axis, int | np.integer)}
 
     def _radices(self, space: Space) -> tuple[Space, list[int]]:
@@ -63,7 +71,6 @@ class Grid(Sampling):
         return inner, numbers
 
     def own_members(self, space: Space) -> int:
-        """The number of combinations of all axes."""
         return math.prod(self._radices(space)[1])
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
@@ -76,7 +83,7 @@ class Grid(Sampling):
         super().check(faults, space, members)
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Levels from the digits of the member's index, written with the axes' lengths as radices."""
+        # Levels from the digits of the member's index, written with the axes' lengths as radices.
         inner, numbers = self._radices(space)
         radices = np.array(numbers, dtype=np.int64)
         places = np.ones(len(radices), dtype=np.int64)
@@ -86,5 +93,4 @@ class Grid(Sampling):
         return inner.split((digits + 0.5) / radices) | Random().draw(space.of(others), members)
 
     def to_dict(self) -> Any:
-        """The grid as a scene file has it: lists and numbers of levels by name."""
         return {self.kind: {name: np.asarray(axis).tolist() for name, axis in self.axes.items()}}

@@ -30,13 +30,20 @@ class LatinHypercube(Replicated):
 
     Raises:
         SceneError: Where a setting is wrong. The message lists every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> vary = {"vehicle.buoyancy": lw.distributions.Uniform(low=306.0, high=310.0)}
+        >>> fleet = lw.Ensemble(scene, 4, vary=vary, sampling=lw.designs.LatinHypercube(group=4))
+        >>> sorted(fleet.parameters(0, 4)["vehicle.buoyancy"].astype(int).tolist())
+        [306, 307, 308, 309]
     """
 
     group: int = None  # type: ignore[assignment]  # it has no default, but replicates of every design have one
     kind: ClassVar[str] = "latin_hypercube"
 
     def check_own(self, faults: Faults) -> None:
-        """Adds a fault where the group is missing or out of bounds."""
         group, example = self.group, "give how many members make a hypercube: group = 256"
         if group is None:
             faults.add("group", group, "is missing", example)
@@ -46,11 +53,11 @@ class LatinHypercube(Replicated):
             object.__setattr__(self, "group", int(group))
 
     def group_size(self, space: Space) -> int:
-        """Members in one hypercube of each replicate."""
+        # Members in one hypercube of each replicate.
         return self.group * self.replicates
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Levels from the hypercube of each member's group; each name is drawn by itself, and so may be added."""
+        # Levels from the hypercube of each member's group; each name is drawn by itself, and so may be added.
         R = self.replicates
         group, place = np.divmod(members, self.group * R)
         levels = {}

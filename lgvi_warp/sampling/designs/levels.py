@@ -70,11 +70,10 @@ class UnitCubePoints(Sampling):
         return np.column_stack(arrays)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The points, by the name "points"."""
+        # The points, by the name "points".
         return {"points": self.points}
 
     def own_members(self, space: Space) -> int:
-        """The number of points that were given."""
         return len(self.points)
 
     def check(self, faults: Faults, space: Space, members: int) -> None:
@@ -87,13 +86,13 @@ class UnitCubePoints(Sampling):
         super().check(faults, space, members)
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """The points as given, with columns in the order of the cube."""
+        # The points as given, with columns in the order of the cube.
         if self.names is None:
             return space.split(self.points[members])
         order = [list(self.names).index(name) for name in salib_problem(space)["names"]]
         return space.split(self.points[members][:, order])
 
     def to_dict(self) -> Any:
-        """The points as a scene file has them, as nested lists, with their names where given."""
+        # The points as a scene file has them, as nested lists, with their names where given.
         names = {} if self.names is None else {"names": list(self.names)}
         return {self.kind: {"points": self.points.tolist(), **names}}

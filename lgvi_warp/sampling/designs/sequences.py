@@ -45,12 +45,9 @@ class Sobol(Replicated):
 
 
 def sobol_points(seed: int, name: str, dimensions: int, indices: np.ndarray, scramble: bool = True) -> np.ndarray:
-    """Points of a Sobol sequence by their indices.
+    """Points (n, dimensions) in (0, 1) of a Sobol sequence by their indices (n,).
 
     A point is the exclusive or of point 0 and of one number for each bit of its index, so that any point is found directly.
-
-    indices: Indices of the points, (n,).
-    Returns: Points (n, dimensions) in (0, 1).
     """
     if not dimensions:
         return np.empty((len(indices), 0))

@@ -24,11 +24,7 @@ class Space:
         return sum(self.sizes)
 
     def split(self, cube: np.ndarray) -> dict[str, np.ndarray]:
-        """Split points into the columns of each key.
-
-        cube: Points (n, dimensions).
-        Returns: Levels (n, size) by key.
-        """
+        """Split points (n, dimensions) into the columns (n, size) of each key."""
         parts = np.split(cube, np.cumsum(self.sizes)[:-1], axis=1) if self.keys else []
         return dict(zip(self.keys, parts, strict=True))
 

@@ -45,6 +45,13 @@ class Table(Sampling):
 
     Raises:
         SceneError: Where the file cannot be read, or a cell is no number. The message lists every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> table = lw.designs.Table({"vehicle.buoyancy": [306.0, 307.5, 309.0]})
+        >>> lw.Ensemble(scene, sampling=table).parameters(0, 3)["vehicle.buoyancy"]
+        array([306. , 307.5, 309. ])
     """
 
     file: str | os.PathLike[str] | None = None
@@ -73,11 +80,11 @@ class Table(Sampling):
         object.__setattr__(self, "_own", read)
 
     @classmethod
-    def kept(cls, told: Mapping[str, Any], values: Mapping[str, np.ndarray]) -> Table:
+    def kept(cls, settings: Mapping[str, Any], values: Mapping[str, np.ndarray]) -> Table:
         """A table whose file was read when a store was made of it: the store has its numbers.
 
         Args:
-            told: What `to_dict` says of the file, by key.
+            settings: What `to_dict` says of the file, by key.
             values: Columns by name, (n,) or (n, *shape).
 
         Returns:
@@ -88,7 +95,7 @@ class Table(Sampling):
         """
         table = cls(values=values)
         for item in fields(cls):
-            object.__setattr__(table, item.name, told.get(item.name))
+            object.__setattr__(table, item.name, settings.get(item.name))
         return table
 
     def _check_options(self, faults: Faults) -> None:
@@ -156,23 +163,20 @@ class Table(Sampling):
             return {}
 
     def own_values(self) -> dict[str, np.ndarray]:
-        """The table's columns by name, as read."""
         return dict(self._own)  # type: ignore[attr-defined]
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The columns, also those of a file, since that may be moved or changed."""
+        # The columns, also those of a file, since that may be moved or changed.
         return self.own_values()
 
     def own_members(self, space: Space) -> int:
-        """The number of lines of the table."""
         return len(next(iter(self.own_values().values())))
 
     def draw(self, space: Space, members: np.ndarray) -> Drawn:
-        """Random levels for the names that the table does not contain."""
+        # Random levels for the names that the table does not contain.
         return Random().draw(space, members)
 
     def to_dict(self) -> Any:
-        """The table as a scene file has it: the file with its checksum, or the values as lists."""
         if self.file is None:
             return {self.kind: {"values": {name: column.tolist() for name, column in self.own_values().items()}}}
         chosen = {name: getattr(self, name) for name in ("columns", "ignore") if getattr(self, name) is not None}
@@ -180,11 +184,7 @@ class Table(Sampling):
 
 
 def moved(file: str, sha256: str | None, beside: Path) -> str:
-    """Where a table is now, if it was moved together with a store.
-
-    sha256: Checksum of the file; None where it is unknown.
-    Returns: The last parts of the path below a folder above the store, where a file with that checksum is there; else `file`.
-    """
+    """Where a table is now, if it moved with a store: the file of its checksum, by the last parts of its path."""
     parts = Path(file).parts[1:]
     if sha256 is None or Path(file).exists():
         return file

@@ -34,7 +34,6 @@ class Distribution:
     kind: ClassVar[str] = ""
     # Classes by their kind in a scene file.
     kinds: ClassVar[dict[str, Any]] = {}
-    # Arguments of which exactly one sets the width.
     widths: ClassVar[tuple[str, ...]] = ()
     # Whether its numbers may be one for each component of what it varies.
     by_component: ClassVar[bool] = True
@@ -77,14 +76,7 @@ class Distribution:
         return None
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
-        """What prevents it from drawing quantities of these shapes.
-
-        Args:
-            shapes: The shape of each quantity.
-
-        Returns:
-            The fault and its remedy; None where it fits.
-        """
+        """What prevents it from drawing quantities of these shapes, and the remedy; None where it fits."""
         (shape,) = shapes
         try:
             numbers = self.numbers_by_name().values() if self.by_component else ()
@@ -97,34 +89,16 @@ class Distribution:
         return f"does not fit a quantity of shape {shape}", f"give {wanted}"
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """Values at given levels. Every distribution of single numbers must define this.
-
-        Args:
-            u: Levels in (0, 1), (n, *shape).
-            base: The scene's value of the quantity, of that shape.
-
-        Returns:
-            Values (n, *shape), in the unit of the quantity.
-
-        Raises:
-            TypeError: Where the distribution does not define it.
-        """
+        """Values (n, *shape) at levels u in (0, 1), (n, *shape). Every distribution of single numbers must define this."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def to_dict(self) -> dict[str, Any]:
-        """The distribution as a scene file has it, { normal = { std = ... } }.
-
-        Returns:
-            The kind, with the numbers that were given, arrays as lists.
-        """
+        """The distribution as a scene file has it, { normal = { std = ... } }, with the numbers that were given."""
         return {self.kind: {key: np.asarray(value).tolist() for key, value in self.numbers_by_name().items()}}
 
 
 def ordered(low: np.ndarray, high: np.ndarray) -> bool:
-    """Whether low < high in every component.
-
-    Returns: False also where the shapes do not fit each other.
-    """
+    """Whether low < high in every component; False also where the shapes do not fit each other."""
     try:
         return bool(np.all(low < high))
     except ValueError:
@@ -132,10 +106,7 @@ def ordered(low: np.ndarray, high: np.ndarray) -> bool:
 
 
 def varies_nothing(distribution: Distribution, bases: Sequence[np.ndarray]) -> str | None:
-    """Find a distribution that is relative to the scene's value where that is 0, so that nothing would vary.
-
-    Returns: The name of its width, "relative" or "sigma"; None where it does vary the quantity.
-    """
+    """The width, relative to a scene's value of 0, by which a distribution varies nothing; None where it does vary it."""
     if any(np.any(base) for base in bases):
         return None
     relative = getattr(distribution, "relative", None)
@@ -146,10 +117,7 @@ def varies_nothing(distribution: Distribution, bases: Sequence[np.ndarray]) -> s
 
 
 def floats(values: Any) -> np.ndarray:
-    """Read numbers that were checked as float64: whole ones of any size among them.
-
-    Returns: An array of their shape.
-    """
+    """Read numbers that were checked as float64: whole ones of any size among them."""
     return np.asarray(values, dtype=np.float64)
 
 
@@ -182,7 +150,7 @@ class Normal(Distribution):
     widths: ClassVar[tuple[str, ...]] = ("std", "relative")
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """Values mean + std * Phi^-1(u)."""
+        # Values mean + std * Phi^-1(u).
         from scipy.special import ndtri
 
         mean = base if self.mean is None else floats(self.mean)
@@ -198,6 +166,13 @@ class Uniform(Distribution):
         high: Upper end, with `low`.
         half_width: Largest distance from the scene's value; instead of `low` and `high`.
         relative: That distance as a fraction of the scene's value; instead of `half_width`.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> fleet = lw.Ensemble(scene, members=4, vary={"vehicle.buoyancy": lw.distributions.Uniform(half_width=1.0)})
+        >>> fleet.parameters(0, 4)["vehicle.buoyancy"].round(1)
+        array([308.3, 307.1, 308.5, 308.9])
     """
 
     low: Spread | None = None
@@ -214,7 +189,7 @@ class Uniform(Distribution):
             faults.add("high", self.high, "is given without low", "give both, or half_width, or relative")
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """Values low + (high - low) u, or the same about the scene's value."""
+        # Values low + (high - low) u, or the same about the scene's value.
         if self.high is not None:
             return floats(self.low) + (floats(self.high) - floats(self.low)) * u
         return base + _width(self.half_width, self.relative, base) * (2.0 * u - 1.0)
@@ -235,7 +210,7 @@ class LogNormal(Distribution):
     widths: ClassVar[tuple[str, ...]] = ("sigma",)
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """Values median * exp(sigma * Phi^-1(u))."""
+        # Values median * exp(sigma * Phi^-1(u)).
         from scipy.special import ndtri
 
         median = base if self.median is None else floats(self.median)
@@ -266,7 +241,7 @@ class TruncatedNormal(Distribution):
     widths: ClassVar[tuple[str, ...]] = ("std", "relative")
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """Normal quantiles at levels between those of the bounds; upper tails by symmetry, which keeps their digits."""
+        # Normal quantiles at levels between those of the bounds; upper tails by symmetry, which keeps their digits.
         from scipy.special import log_ndtr, ndtr, ndtri, ndtri_exp
 
         mean = base if self.mean is None else floats(self.mean)
@@ -306,6 +281,14 @@ class Choice(Distribution):
         values: (k,): every entry of the quantity gets one of these numbers, each entry by itself; (k, *shape): the quantity
             gets one of these as a whole.
         weights: Weights (k,), from 0; equal by default.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> speed = lw.distributions.Choice([1.0, 1.5], weights=[1, 3])
+        >>> fleet = lw.Ensemble(scene, members=8, vary={"start.velocity[0]": speed})
+        >>> fleet.select(0, 8).velocity[:, 0]
+        array([1.5, 1. , 1.5, 1.5, 1.5, 1.5, 1.5, 1.5])
     """
 
     values: Any = ()
@@ -327,11 +310,9 @@ class Choice(Distribution):
 
     @property
     def joint(self) -> bool:
-        """Whether the values are of the whole quantity."""
         return np.ndim(self.values) > 1
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
-        """What prevents it from drawing quantities of these shapes: a whole value must have the quantity's shape."""
         if not self.joint:
             return super().fault(shapes)
         shape = np.shape(self.values)[1:]
@@ -363,7 +344,7 @@ class Choice(Distribution):
         return [self.quantile(u[:, 0], bases[0])]
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """The value whose part of (0, 1), in proportion to its weight, contains u."""
+        # The value whose part of (0, 1), in proportion to its weight, contains u.
         values = floats(self.values)
         weights = np.ones(len(values)) if self.weights is None else floats(self.weights)
         ends = np.cumsum(weights)[:-1] / weights.sum()

@@ -20,24 +20,16 @@ SIX_DIGITS = 1e-5
 
 
 def normals(u: np.ndarray) -> np.ndarray:
-    """Standard normal numbers at given levels.
-
-    u: Levels in (0, 1), of any shape.
-    Returns: Numbers of the same shape.
-    """
+    """Standard normal numbers at given levels in (0, 1), of any shape."""
     from scipy.special import ndtri
 
     return np.asarray(ndtri(u))
 
 
 def combined(matrix: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """A matrix times each row of numbers.
+    """A matrix (d, d) times each row of numbers (n, d).
 
     The sum is written out: its order, and so its bits, must not depend on the number of rows.
-
-    matrix: Matrix (d, d).
-    z: Rows (n, d).
-    Returns: Products (n, d).
     """
     total = z[:, :1] * matrix[:, 0]
     for k in range(1, z.shape[1]):
@@ -46,12 +38,9 @@ def combined(matrix: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def correlation(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Standard deviations and correlation of a covariance.
+    """Standard deviations (d,) and correlation (d, d) of a covariance, with 1 on the diagonal where the variance is 0.
 
     Units and sizes of the entries play no part in the correlation: metres beside newtons are judged alike.
-
-    covariance: Covariance (d, d).
-    Returns: Standard deviations (d,) and correlation (d, d), with 1 on the diagonal where the variance is 0.
     """
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     scale = np.where(std > 0.0, std, 1.0)
@@ -59,21 +48,13 @@ def correlation(covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def root_of_covariance(covariance: np.ndarray) -> np.ndarray:
-    """L with L L^T = covariance, found from the correlation.
-
-    covariance: Covariance (d, d), positive semidefinite.
-    Returns: L (d, d).
-    """
+    """L with L L^T = covariance (d, d), positive semidefinite, found from the correlation."""
     std, C = correlation(covariance)
     return np.asarray(std[:, None] * root(C))
 
 
 def root(matrix: np.ndarray) -> np.ndarray:
-    """L with L L^T = matrix: Cholesky's factor, or the symmetric root where the matrix is singular.
-
-    matrix: Matrix (d, d), positive semidefinite.
-    Returns: L (d, d).
-    """
+    """L with L L^T = matrix (d, d): Cholesky's factor, or the symmetric root where the matrix is singular."""
     try:
         return np.linalg.cholesky(matrix)
     except np.linalg.LinAlgError:
@@ -126,10 +107,7 @@ def _covariance(faults: Faults, distribution: Any, size: int | None) -> np.ndarr
 
 
 def components(shapes: Sequence[tuple[int, ...]]) -> int:
-    """The number of entries in quantities of these shapes.
-
-    shapes: The shape of each quantity.
-    """
+    """The number of entries in quantities of these shapes."""
     return sum(int(np.prod(shape)) for shape in shapes)
 
 
@@ -139,36 +117,14 @@ class JointLaw(Distribution):
 
     @property
     def joint(self) -> bool:
-        """Always True: it draws whole quantities."""
         return True
 
     def size(self, bases: Sequence[np.ndarray]) -> int:
-        """The number of uniform numbers for one draw. Every joint distribution must define this.
-
-        Args:
-            bases: The scene's value of each quantity.
-
-        Returns:
-            Columns of the unit cube.
-
-        Raises:
-            TypeError: Where the distribution does not define it.
-        """
+        """The number of uniform numbers for one draw. Every joint distribution must define this."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Draw values of the quantities. Every joint distribution must define this.
-
-        Args:
-            u: Levels (n, size) in (0, 1).
-            bases: The scene's value of each quantity.
-
-        Returns:
-            Values (n, *shape) of each quantity.
-
-        Raises:
-            TypeError: Where the distribution does not define it.
-        """
+        """Draw values (n, *shape) of each quantity from levels (n, size). Every joint distribution must define this."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
 
@@ -186,6 +142,16 @@ class CorrelatedNormal(JointLaw):
 
     Raises:
         SceneError: Where the matrix is not positive semidefinite or the numbers do not fit. The message lists every fault.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> import numpy as np
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> law = lw.distributions.CorrelatedNormal(std=[1.0, 0.1], correlation=[[1.0, 0.9], [0.9, 1.0]])
+        >>> fleet = lw.Ensemble(scene, members=1000, vary={"start.position[2], start.velocity[0]": law})
+        >>> members = fleet.select(0, 1000)
+        >>> print(f"{np.corrcoef(members.position[:, 2], members.velocity[:, 0])[0, 1]:.2f}")
+        0.90
     """
 
     covariance: Any = None
@@ -204,7 +170,6 @@ class CorrelatedNormal(JointLaw):
         object.__setattr__(self, "_root", root_of_covariance(matrix))
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
-        """What prevents it from drawing quantities of these shapes: a matrix needs one row per entry."""
         d, rows = components(shapes), len(self._root)  # type: ignore[attr-defined]
         if rows != d and not (rows == 1 and self.covariance is None and self.correlation is None):
             return f"is of {rows} components, {d} are named", f"give {d} x {d} numbers, in the order of the names"
@@ -213,11 +178,11 @@ class CorrelatedNormal(JointLaw):
         return None
 
     def size(self, bases: Sequence[np.ndarray]) -> int:
-        """One uniform number for each entry."""
+        # One uniform number for each entry.
         return components([base.shape for base in bases])
 
     def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Values mean + L Phi^-1(u), L L^T the covariance."""
+        # Values mean + L Phi^-1(u), L L^T the covariance.
         L: np.ndarray = self._root  # type: ignore[attr-defined]
         if len(L) != u.shape[1]:
             L = L[0, 0] * np.eye(u.shape[1])
@@ -232,11 +197,10 @@ class AttitudeDistribution(JointLaw):
     """A distribution of attitudes; abstract. The ensemble gives it attitudes only."""
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
-        """Always None: the ensemble gives it attitudes only."""
         return None
 
     def size(self, bases: Sequence[np.ndarray]) -> int:
-        """Always 3: one uniform number for each degree of freedom."""
+        # Always 3: one uniform number for each degree of freedom.
         return 3
 
 
@@ -269,7 +233,7 @@ class RotationNormal(AttitudeDistribution):
         object.__setattr__(self, "_root", root_of_covariance(matrix))
 
     def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Attitudes R0 exp(hat(L Phi^-1(u))), L L^T the covariance."""
+        # Attitudes R0 exp(hat(L Phi^-1(u))), L L^T the covariance.
         v = combined(self._root, normals(u))  # type: ignore[attr-defined]
         return [bases[0] @ notation.matrix_from_rotation_vector(v)]
 
@@ -284,7 +248,7 @@ class UniformRotation(AttitudeDistribution):
     kind: ClassVar[str] = "uniform_rotation"
 
     def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Attitudes of unit quaternions that are uniform on their sphere."""
+        # Attitudes of unit quaternions that are uniform on their sphere.
         a, b = np.sqrt(1.0 - u[:, 0]), np.sqrt(u[:, 0])
         s, t = 2.0 * np.pi * u[:, 1], 2.0 * np.pi * u[:, 2]
         q = np.stack([a * np.sin(s), a * np.cos(s), b * np.sin(t), b * np.cos(t)], axis=1)
@@ -317,7 +281,7 @@ class PositiveDefinite(JointLaw):
             faults.add("sigma", self.sigma, "is a matrix", "give one number, or one for each axis")
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
-        """What prevents it from drawing a matrix of this shape: there must be one sigma, or one for each row."""
+        # What prevents it from drawing a matrix of this shape: there must be one sigma, or one for each row.
         d = shapes[0][0]
         if np.asarray(self.sigma).size in (1, d):
             return None
@@ -337,12 +301,12 @@ class PositiveDefinite(JointLaw):
         return "varies a matrix that is not positive in the scene", "give the scene a positive semidefinite matrix"
 
     def size(self, bases: Sequence[np.ndarray]) -> int:
-        """One uniform number for each entry on the diagonal of T, and for those below it where they vary."""
+        # One uniform number for each entry on the diagonal of T, and for those below it where they vary.
         d = len(bases[0])
         return d + (d * (d - 1) // 2 if self.off_diagonal else 0)
 
     def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Matrices L T T^T L^T."""
+        # Matrices L T T^T L^T.
         return [self._around(bases[0], u)]
 
     def _around(self, base: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -374,19 +338,27 @@ class PhysicalInertia(PositiveDefinite):
         sigma: Standard deviation of the logarithm of the principal second moments, one or (3,).
         off_diagonal: As of `PositiveDefinite`, for S; 0 by default.
         mass_sigma: Standard deviation of the logarithm of the mass, for a 6x6 matrix; 0 by default.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]})
+        >>> law = lw.distributions.PhysicalInertia(sigma=0.1, mass_sigma=0.01)
+        >>> fleet = lw.Ensemble(scene, members=4, vary={"vehicle.rigid_body_mass_matrix": law})
+        >>> fleet.parameters(0, 4)["vehicle.rigid_body_mass_matrix"][:, 0, 0].round(1)
+        array([30.6, 30.7, 30.8, 30.7])
     """
 
     mass_sigma: float | None = None
     kind: ClassVar[str] = "physical_inertia"
 
     def fault(self, shapes: Sequence[tuple[int, ...]]) -> tuple[str, str] | None:
-        """What prevents it from drawing a matrix of this shape; mass_sigma needs a matrix that contains the mass."""
+        # What prevents it from drawing a matrix of this shape; mass_sigma needs a matrix that contains the mass.
         if shapes[0] == (3, 3) and self.mass_sigma is not None:
             return "gives mass_sigma to a matrix without mass", 'vary "vehicle.mass"'
         return super().fault([(3, 3)])
 
     def unusable(self, base: np.ndarray) -> tuple[str, str] | None:
-        """What prevents it from starting at the scene's matrix: the second moments must be positive."""
+        # What prevents it from starting at the scene's matrix: the second moments must be positive.
         S = second_moments(_about_center(base)[0])
         if np.linalg.eigvalsh(S)[0] > ROUND_OFF * np.trace(S):
             return None
@@ -394,11 +366,11 @@ class PhysicalInertia(PositiveDefinite):
                 "use PositiveDefinite, which keeps it positive")  # fmt: skip
 
     def size(self, bases: Sequence[np.ndarray]) -> int:
-        """The uniform numbers of S, and one for the mass of a 6x6 matrix."""
+        # The uniform numbers of S, and one for the mass of a 6x6 matrix.
         return 3 + 3 * bool(self.off_diagonal) + (len(bases[0]) == 6)
 
     def draw(self, u: np.ndarray, bases: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Inertia tr(S) - S; a 6x6 matrix is moved back to the scene's origin, with its mass."""
+        # Inertia tr(S) - S; a 6x6 matrix is moved back to the scene's origin, with its mass.
         J, mass, center = _about_center(bases[0])
         moments = 3 + 3 * bool(self.off_diagonal)
         S = self._around(second_moments(J), u[:, :moments])
@@ -417,11 +389,7 @@ def _trace(matrices: np.ndarray) -> np.ndarray:
 
 
 def second_moments(J: np.ndarray) -> np.ndarray:
-    """Second moments of mass, S = tr(J) / 2 - J: the integral of r r^T over the mass.
-
-    J: Inertia (..., 3, 3) [kg m2].
-    Returns: S (..., 3, 3) [kg m2].
-    """
+    """Second moments of mass (..., 3, 3) [kg m2], S = tr(J) / 2 - J: the integral of r r^T over the mass."""
     return np.asarray(0.5 * _trace(J) * np.eye(3) - J)
 
 

@@ -74,7 +74,7 @@ class ScipyDistribution(Distribution):
         return str(getattr(self.distribution.dist, "name", None) or type(self.distribution.dist).__name__)
 
     def numbers_by_name(self) -> dict[str, Any]:
-        """The parameters by their names in scipy.stats, as they were given."""
+        # The parameters by their names in scipy.stats, as they were given.
         known = [*_shapes(self.distribution.dist), "loc", "scale"]
         return dict(zip(known, self.distribution.args, strict=False)) | dict(self.distribution.kwds)
 
@@ -85,15 +85,14 @@ class ScipyDistribution(Distribution):
 
     @property
     def own(self) -> Any:
-        """The frozen distribution, unless it is one of scipy's, which its name and numbers tell."""
+        # The frozen distribution, unless it is one of scipy's, which its name and numbers tell.
         return None if is_library(type(self.distribution.dist).__module__) else self.distribution
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """Values of the distribution's ppf."""
         return np.asarray(self.distribution.ppf(u), dtype=np.float64)
 
     def to_dict(self) -> dict[str, Any]:
-        """{ gamma = { a = 2.0, scale = 3.0 } }, or { scipy = { name = "...", ... } } where a scene file has no name for it."""
+        # { gamma = { a = 2.0, scale = 3.0 } }, or { scipy = { name = "...", ... } } where a scene file has no name for it.
         file_names = {name: kind for kind, name in SCIPY.items()}
         if self.name in file_names:
             return {file_names[self.name]: self._numbers()}
@@ -166,7 +165,7 @@ class BinnedDistribution(Distribution):
             faults.add("edges", self.edges, f"do not bound {len(counts)} bins", "give one more than counts, rising")
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """Values linear in the level within each bin."""
+        # Values linear in the level within each bin.
         counts = np.asarray(self.counts, dtype=np.float64)
         levels = np.concatenate([[0.0], np.cumsum(counts)]) / counts.sum()
         return np.interp(u, levels, np.asarray(self.edges, dtype=np.float64))
@@ -202,27 +201,23 @@ class UserDistribution(Distribution):
 
     @property
     def own(self) -> Any:
-        """The object, unless it is a library's whose text tells which it is."""
-        told = is_library(type(self.distribution).__module__) and not ADDRESS.search(str(self.distribution))
-        return None if told else self.distribution
+        # The object, unless it is a library's whose text tells which it is.
+        told_by_text = is_library(type(self.distribution).__module__) and not ADDRESS.search(str(self.distribution))
+        return None if told_by_text else self.distribution
 
     def quantile(self, u: np.ndarray, base: np.ndarray) -> np.ndarray:
-        """Values of the object's own quantile function."""
         return self._quantiles(u)
 
     def _quantiles(self, u: np.ndarray) -> np.ndarray:
         return real_results(quantiles_of(self.distribution)(u)).astype(np.float64)
 
     def to_dict(self) -> dict[str, Any]:
-        """Its text without the memory address, so that the same distribution always gives the same provenance."""
+        # Its text without the memory address, so that the same distribution always gives the same provenance.
         return {self.kind: {"law": ADDRESS.sub("", str(self.distribution))}}
 
 
 def quantiles_of(distribution: Any) -> Any:
-    """The quantile function of an object.
-
-    Returns: Its method ppf or icdf; None where it has neither.
-    """
+    """The quantile function of an object, its method ppf or icdf; None where it has neither."""
     function = getattr(distribution, "ppf", None) or getattr(distribution, "icdf", None)
     return function if callable(function) else None
 
@@ -236,10 +231,7 @@ def is_frozen(value: Any) -> bool:
 
 
 def name_of_unfrozen(value: Any) -> str | None:
-    """The name of a distribution of scipy.stats that was given without numbers, such as scipy.stats.norm.
-
-    Returns: The name; None for anything else.
-    """
+    """The name of a distribution of scipy.stats that was given without numbers, such as scipy.stats.norm; else None."""
     known = sys.modules.get("scipy.stats")
     name = getattr(value, "name", None)
     return name if isinstance(name, str) and known is not None and getattr(known, name, None) is value else None

@@ -109,28 +109,18 @@ class Estimate(Summarized):
         return self.coordinates["time"]
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
-        """Its numbers at the last sample time, and what its arrays are."""
         return f"Estimate {self.name!r} at {self.time[-1]:g} s", [
             *_shown(self),
             ("arrays", summaries.listed(self.arrays, 30)),
         ]
 
     def with_interval(self, interval: str, arrays: Mapping[str, np.ndarray]) -> Estimate:
-        """Return the same estimate with another interval.
-
-        Args:
-            interval: how the interval was formed.
-            arrays: arrays that replace those of the same names.
-        """
+        """Return the same estimate with another interval: how it was formed, and the arrays that it replaces."""
         return replace(self, interval=interval, arrays=self.arrays | dict(arrays))
 
     @functools.cached_property
     def dataset(self) -> xarray.Dataset:
-        """The arrays as an xarray Dataset.
-
-        Raises:
-            ImportError: xarray is not installed (extra: store).
-        """
+        """The arrays as an xarray Dataset; ImportError where xarray is not installed (extra: store)."""
         try:
             import xarray as xr
         except ImportError as error:
@@ -156,8 +146,8 @@ class Estimates(Summarized, Mapping[str, Estimate]):
         if name not in self._found and isinstance(name, str):
             name = self._spelled.get(canonical(name), name)
         if name not in self._found:
-            there = closest(name, self._found) if self._found else "none were asked for: give statistics=[...]"
-            raise KeyError(f"{brief(name)} is no statistic of this run; {there}")
+            hint = closest(name, self._found) if self._found else "none were asked for: give statistics=[...]"
+            raise KeyError(f"{brief(name)} is no statistic of this run; {hint}")
         return self._found[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -167,10 +157,9 @@ class Estimates(Summarized, Mapping[str, Estimate]):
         return len(self._found)
 
     def summary_rows(self) -> tuple[str, summaries.Rows]:
-        """The numbers of each at the last sample time."""
-        end = max((one.time[-1] for one in self.values()), default=0.0)
+        end = max((estimate.time[-1] for estimate in self.values()), default=0.0)
         return f"Estimates of {len(self)} statistics at {end:g} s", [
-            row for one in self.values() for row in _shown(one)
+            row for estimate in self.values() for row in _shown(estimate)
         ]
 
     @functools.cached_property

@@ -13,11 +13,7 @@ FEWEST_BINS, MOST_BINS = 4, 64
 
 
 class Explained(NamedTuple):
-    """What of an output one input explains.
-
-    share: first-order index, the share of the output's variance that the mean over this input explains: 0 to 1. The estimate
-        may be a little below 0.
-    """
+    """What of an output one input explains: the share of its variance (first-order index), which may come out just below 0."""
 
     share: float
     lower: float
@@ -27,14 +23,11 @@ class Explained(NamedTuple):
 
 
 def explained(inputs: Mapping[str, np.ndarray], y: np.ndarray, confidence: float) -> dict[str, Explained]:
-    """Return what each input explains of an output.
+    """Return what each input (n,) explains of an output (n,); members with a number that is not finite are left out.
 
     The members are divided into bins of each input, of about as many members. The share is the variance between bins over
     that of all, less what chance alone puts between them (Kelley's epsilon squared, 1935); its interval is of the
     noncentral F distribution. Inputs are meant to be independent of one another.
-
-    inputs: numbers by name, (n,); members with one that is not finite are left out.
-    y: the output (n,), numbers or true and false.
     """
     names, y = list(inputs), np.asarray(y, np.float64)
     X = np.stack([np.asarray(inputs[name], np.float64) for name in names]) if names else np.zeros((0, len(y)))

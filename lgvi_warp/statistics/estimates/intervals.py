@@ -16,10 +16,7 @@ def normal(confidence: float) -> float:
 
 
 def student(count: np.ndarray, confidence: float) -> np.ndarray:
-    """Return half the width of a mean's interval in standard errors: Student's t of count - 1 degrees of freedom.
-
-    count: number of members, any shape.
-    """
+    """Return half the width of a mean's interval in standard errors: Student's t of count - 1 degrees of freedom."""
     from scipy.special import stdtrit
 
     wide = np.where(count > 1, stdtrit(np.maximum(count - 1, 1), 0.5 + 0.5 * confidence), np.inf)
@@ -44,10 +41,7 @@ def of_logarithm(value: np.ndarray, standard_error: np.ndarray, factor: np.ndarr
 def wilson(
     probability: np.ndarray, count: np.ndarray, confidence: float, factor: float | np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the interval of a probability p0 that n trials estimated as p.
-
-    It is where |p - p0| <= z sqrt(p0 (1 - p0) / n) (Wilson 1927).
-    """
+    """Return where |p - p0| <= z sqrt(p0 (1 - p0) / n), the interval of p0 that n trials estimated as p (Wilson 1927)."""
     z2 = np.square(normal(confidence) if factor is None else factor)
     n = np.where(count > 0, count, 1.0)
     centre = (probability + 0.5 * z2 / n) / (1.0 + z2 / n)
@@ -61,10 +55,7 @@ def wilson(
 
 
 def clopper_pearson(hits: np.ndarray, count: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the interval of a probability whose two tails are below half of 1 - confidence each (Clopper & Pearson 1934).
-
-    It covers at least as often as it says, for any probability; so it is wider than Wilson's.
-    """
+    """Return a probability's interval with tails below half of 1 - confidence (Clopper & Pearson 1934): never too narrow."""
     from scipy.special import betaincinv
 
     k, n = np.broadcast_arrays(np.asarray(hits, np.float64), np.asarray(count, np.float64))
@@ -80,13 +71,10 @@ def none_of(count: int, confidence: float) -> float:
 
 
 def of_replicates(each: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return standard error and half width of the mean of R independent estimates, by Student's t with R - 1.
+    """Return standard error and half width (...) of the mean of R independent estimates (R, ...), by Student's t with R - 1.
 
-    L'Ecuyer, Nakayama, Owen & Tuffin (2023): among the intervals for randomized quasi-Monte Carlo that they compare,
-    none is more reliable.
-
-    each: (R, ...), the estimates.
-    Returns: Standard error and half width (...); infinite where an estimate is missing.
+    Infinite where an estimate is missing. L'Ecuyer, Nakayama, Owen & Tuffin (2023): none is more reliable among those that
+    they compare for randomized quasi-Monte Carlo.
     """
     R = len(each)
     with np.errstate(invalid="ignore"):
@@ -98,13 +86,10 @@ def of_replicates(each: np.ndarray, confidence: float) -> tuple[np.ndarray, np.n
 def probability_of_replicates(
     probability: np.ndarray, each: np.ndarray, count: np.ndarray, confidence: float, least: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return Wilson's interval with the variance of R independent estimates, and Student's t factor.
+    """Return Wilson's interval with the variance of the fractions (R, ...) of R replicates, and Student's t factor.
 
-    The standard error of `least` members among `count` is added in squares: counts are whole numbers, and replicates
-    may agree by chance. Where none or all of the members were counted there is no spread: the interval is that of
-    `count` independent members.
-
-    each: (R, ...), the fraction of each replicate.
+    The standard error of `least` members among `count` is added in squares: counts are whole numbers, and replicates may
+    agree by chance. Where none or all members were counted there is no spread: it is that of `count` independent members.
     """
     error, _ = of_replicates(each, confidence)
     error = np.hypot(error, least / np.maximum(count, 1))
@@ -116,10 +101,7 @@ def probability_of_replicates(
 
 
 def binomial_quantile(p: float | np.ndarray, n: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Return a quantile of the binomial distribution: the least k with P(B <= k) >= p.
-
-    Returns: k as float64, in the common shape of the arguments.
-    """
+    """Return a quantile of the binomial distribution as float64: the least k with P(B <= k) >= p."""
     from scipy.special import bdtr, bdtrik
 
     n = np.asarray(n, dtype=np.float64)
@@ -131,9 +113,6 @@ def binomial_quantile(p: float | np.ndarray, n: np.ndarray, q: np.ndarray) -> np
 
 
 def ranks(count: np.ndarray, level: np.ndarray, confidence: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the ranks l < u of the sorted values that hold a quantile between them: P(l <= B < u) >= confidence.
-
-    B is the number of values below the quantile, which is binomial.
-    """
+    """Return ranks l < u with P(l <= B < u) >= confidence, B the binomial number of values below the quantile."""
     tail = 0.5 * (1.0 - confidence)
     return binomial_quantile(tail, count, level), binomial_quantile(1.0 - tail, count, level) + 1.0

@@ -12,7 +12,7 @@ import numpy as np
 def entries_of(estimate: Any) -> Iterator[tuple[str, str, float, float, float, int]]:
     """List the numbers of an estimate at its end."""
     unit = "" if estimate.unit == "1" or estimate.unit.startswith("products") else estimate.unit
-    members = _MEMBERS.get(estimate.settings["type"], lambda one: one.count[-1])(estimate)
+    members = _MEMBERS.get(estimate.settings["type"], lambda estimate: estimate.count[-1])(estimate)
     for label, value, lower, upper in _LINES.get(estimate.settings["type"], _entries)(estimate):
         yield label, unit, float(value), float(lower), float(upper), int(members)
 
@@ -31,18 +31,13 @@ Line = tuple[str, float, float, float]
 
 def _labels(estimate: Any) -> list[str]:
     """Label of each component, preceded by the type of the statistic unless it was given a name."""
-    kind, at = estimate.settings["type"], f" at {estimate.settings['at']}" if "at" in estimate.settings else ""
-    if (
-        estimate.name != f"{kind} {', '.join(estimate.name.split(' ', 1)[1:])}"
-        or len(estimate.coordinates["component"]) == 1
-    ):
-        names = (
-            [estimate.name]
-            if len(estimate.coordinates["component"]) == 1
-            else estimate.coordinates["component"].tolist()
-        )
-        return names if len(names) == 1 else [f"{estimate.name}: {name}" for name in names]
-    return [f"{kind} {name}{at}" for name in estimate.coordinates["component"]]
+    kind, components = estimate.settings["type"], estimate.coordinates["component"].tolist()
+    if len(components) == 1:
+        return [estimate.name]
+    if not estimate.name.startswith(f"{kind} "):
+        return [f"{estimate.name}: {component}" for component in components]
+    at = f" at {estimate.settings['at']}" if "at" in estimate.settings else ""
+    return [f"{kind} {component}{at}" for component in components]
 
 
 def _entries(estimate: Any) -> Iterator[Line]:
@@ -114,11 +109,11 @@ _LINES: dict[str, Callable[[Any], Iterator[Line]]] = {
     "mean_attitude": _attitude,
     "histogram": _histogram,
     # As many as there are members.
-    "each": lambda one: iter(()),
+    "each": lambda estimate: iter(()),
 }
 
 # Number of members behind an estimate, for types where it is not the count at the end.
 _MEMBERS: dict[str, Callable[[Any], int]] = {
-    "first_passage": lambda one: int(one.count[0]),
-    "outcome": lambda one: int(one.count[0] + one["ended"][0] + one["otherwise"][0]),
+    "first_passage": lambda estimate: int(estimate.count[0]),
+    "outcome": lambda estimate: int(estimate.count[0] + estimate["ended"][0] + estimate["otherwise"][0]),
 }

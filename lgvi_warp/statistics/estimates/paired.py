@@ -30,8 +30,7 @@ class Difference(NamedTuple):
 def proportions(only_first: int, only_second: int, pairs: int, confidence: float) -> Difference:
     """Return the difference of two proportions of the same members, from the members that differ.
 
-    Interval: Tango's score interval (1998, Statistics in Medicine 17): all differences that a score test does not refuse.
-    Test: McNemar's exact one, of the members that differ, half of which would be of each kind.
+    Tango's score interval (1998, Statistics in Medicine 17); McNemar's exact test of the members that differ.
     """
     from scipy.special import bdtr
 
@@ -68,11 +67,7 @@ def _score(delta: float, more: int, less: int, n: int) -> float:
 
 
 def means(first: np.ndarray, second: np.ndarray, confidence: float) -> Difference:
-    """Return the difference of two means over the same members: Student's t of the differences.
-
-    first: numbers in the first case (n,); pairs with a number that is not finite are left out.
-    second: numbers in the second case (n,).
-    """
+    """Return the difference of two means (n,) over the pairs that are finite: Student's t of the differences."""
     from scipy.special import stdtr
 
     both = np.isfinite(first) & np.isfinite(second)
@@ -90,15 +85,12 @@ def means(first: np.ndarray, second: np.ndarray, confidence: float) -> Differenc
 def quantiles(
     first: np.ndarray, second: np.ndarray, level: float, confidence: float, resamples: int = 999, seed: int = 0
 ) -> Difference:
-    """Return the difference of two quantiles over the same members: the smoothed bootstrap of members, percentile interval.
+    """Return the difference of two quantiles over the pairs (n,) that are finite: percentiles of a smoothed bootstrap.
 
-    A resample draws members with both their numbers, and moves them by a normal kernel whose covariance is that of the numbers
+    A resample draws members with both numbers, and moves them by a normal kernel whose covariance is that of the numbers
     times the square of KERNEL n^(-1/5) (4 level (1 - level))^(-1/4), wider where values are scarce: without it a resample's
     quantiles are among few values, and the interval is too wide by up to a half (Hall, DiCiccio & Romano 1989, Annals of
     Statistics 17).
-
-    first: numbers in the first case (n,); pairs with a number that is not finite are left out.
-    second: numbers in the second case (n,).
     """
     both = np.isfinite(first) & np.isfinite(second)
     x = np.stack([first[both], second[both]])
@@ -110,26 +102,22 @@ def quantiles(
     size, axes = np.linalg.eigh(np.cov(x))
     width = KERNEL * n**-0.2 * (4.0 * level * (1.0 - level)) ** -0.25
     root = width * axes * np.sqrt(np.maximum(size, 0.0))
-    found: list[np.ndarray] = []
+    differences: list[np.ndarray] = []
     at_once = max(1, DRAWN_AT_ONCE // n)
     for begin in range(0, resamples, at_once):
         chosen = rng.integers(0, n, (min(at_once, resamples - begin), n))
         moved = x[:, chosen] + np.einsum("ij,jrn->irn", root, rng.standard_normal((2, *chosen.shape)))
         ends = np.quantile(moved, level, axis=2)
-        found.append(ends[1] - ends[0])
+        differences.append(ends[1] - ends[0])
     value = float(np.subtract(*np.quantile(x, level, axis=1)[::-1]))
-    tail, drawn = 0.5 * (1.0 - confidence), np.concatenate(found)
+    tail, drawn = 0.5 * (1.0 - confidence), np.concatenate(differences)
     # What the kernel adds to the difference itself is taken off.
     lower, upper = np.quantile(drawn - drawn.mean() + value, [tail, 1.0 - tail])
     return Difference(value, float(lower), float(upper), np.nan, n)
 
 
 def holm(p: np.ndarray) -> np.ndarray:
-    """Return p-values corrected for their number (Holm 1979): the chance of any false one stays below the level.
-
-    p: p-values (m,); NaN where no test was made, which stays so and does not count.
-    Returns: Corrected p-values (m,), at most 1, in the order given.
-    """
+    """Return p-values (m,) corrected for their number (Holm 1979), at most 1; NaN, no test made, does not count."""
     corrected = np.full(len(p), np.nan)
     order = np.argsort(p)[: np.count_nonzero(~np.isnan(p))]
     factors = np.arange(len(order), 0, -1)

@@ -30,9 +30,8 @@ def coin(level: int, place: int, sides: int) -> int:
 
 
 def sketch_of(x: np.ndarray, members: int, size: int, block: int) -> Part:
-    """Return the sketch of one block.
+    """Return the sketch of one block of values (k, d, n), +inf where a member does not count.
 
-    x: (k, d, n), the values; +inf where a member does not count.
     Returns: values (k, d, m) in order, their weights (m,), and error, variance and shift of the rank, (1,) each.
     """
     k, d, n = x.shape
@@ -55,28 +54,20 @@ def _part(values: np.ndarray, weights: np.ndarray, error: float, variance: float
 
 
 def merged(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Merge sorted rows of two arrays: NumPy's stable sort detects the two runs and merges them.
-
-    first: (k, d, a), sorted along the last axis.
-    second: (k, d, b), sorted along the last axis.
-    Returns: (k, d, a + b), sorted along the last axis.
-    """
+    """Merge rows of two arrays sorted along the last axis: NumPy's stable sort detects the two runs and merges them."""
     both = np.concatenate([first, second], axis=2)
     both.sort(axis=2, kind="stable")
     return both
 
 
-def join(left: Part, right: Part, size: int, place: tuple[int, int]) -> Part:
-    """Return the sketch of two sketches of equal weight and length.
-
-    place: (level, index) of the result in the tree of blocks.
-    """
-    a, b = left["values"].shape[2], right["values"].shape[2]
-    error, variance, shift = (float(left[key][0] + right[key][0]) for key in ("error", "variance", "shift"))
-    weight = int(left["weights"][0])
-    if a != b or weight != right["weights"][0]:
+def join(first_part: Part, second_part: Part, size: int, place: tuple[int, int]) -> Part:
+    """Return the sketch of two of equal weight and length; place: (level, index) of the result in the tree of blocks."""
+    a, b = first_part["values"].shape[2], second_part["values"].shape[2]
+    error, variance, shift = (float(first_part[key][0] + second_part[key][0]) for key in ("error", "variance", "shift"))
+    weight = int(first_part["weights"][0])
+    if a != b or weight != second_part["weights"][0]:
         raise ValueError(f"sketches of {a} and {b} values are no neighbours")
-    values = merged(left["values"], right["values"])
+    values = merged(first_part["values"], second_part["values"])
     if a + b > size:
         first, half = coin(*place, 2), 0.5 * weight
         values = np.ascontiguousarray(values[..., first::2])
@@ -93,10 +84,9 @@ def together(parts: Sequence[Part]) -> Part:
 
 
 def sorted_values(part: Part) -> tuple[np.ndarray, np.ndarray]:
-    """Return the values of a sketch in order, with their ranks.
+    """Return the values of a sketch in order, and their ranks from 0, both (k, d, m).
 
-    Returns: Values (k, d, m) in order, and their ranks (k, d, m), counted from 0: each is the middle of the ranks that the
-        value represents, corrected by the shift.
+    A rank is the middle of those that the value represents, corrected by the shift.
     """
     values, weights = part["values"], part["weights"]
     if np.all(weights == 1):
@@ -109,11 +99,7 @@ def sorted_values(part: Part) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fraction(parts: Sequence[Part], x: np.ndarray) -> np.ndarray:
-    """Return the fraction of the members whose values do not exceed a number.
-
-    x: (k, q, d), the numbers.
-    Returns: (k, q, d); NaN where no member counts.
-    """
+    """Return the fraction of the members whose values do not exceed numbers (k, q, d); NaN where no member counts."""
     below = sum(
         part["weights"][0] * np.count_nonzero(part["values"][:, None] <= x[..., None], axis=3) - part["shift"][0]
         for part in parts
@@ -123,13 +109,9 @@ def fraction(parts: Sequence[Part], x: np.ndarray) -> np.ndarray:
 
 
 def at_rank(values: np.ndarray, middles: np.ndarray, finite: np.ndarray, rank: np.ndarray) -> np.ndarray:
-    """Return values at given ranks: linear between the values kept, never beyond the finite ones.
+    """Return values (k, q, d) at given ranks from 0, linear between the finite values kept; NaN where none is finite.
 
-    values: (k, d, m), in order.
-    middles: (k, d, m), their ranks, counted from 0.
-    finite: (k, d, m), which values are finite.
-    rank: (k, q, d), the ranks asked for, counted from 0.
-    Returns: (k, q, d); NaN where no value is finite.
+    values, middles, finite: (k, d, m), in order, with their ranks, and which are finite.
     """
     k, d = values.shape[:2]
     interpolated = np.full(rank.shape, np.nan)

@@ -21,9 +21,7 @@ class Tree:
     """The parts of the blocks so far, joined pairwise: at most one part for each level, of 2^level blocks.
 
     The part (level, i) covers the blocks from i 2^level on. It is joined from its two halves as soon as both have come,
-    so that it does not depend on the order in which blocks come. Of b blocks log2(b) parts are kept.
-
-    join: function (left, right, place) that returns the part of both, see `Statistic.join`.
+    so that it does not depend on the order in which blocks come.
     """
 
     def __init__(self, join: Join):

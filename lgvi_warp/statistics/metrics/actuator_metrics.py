@@ -15,7 +15,7 @@ from lgvi_warp.common.identity import check_version
 from lgvi_warp.common.real_numbers import NotReal, real_results
 from lgvi_warp.control.signals import CHANNELS, SAVED, SIGNALS, ordered
 from lgvi_warp.physics.fields import TABLE
-from lgvi_warp.statistics.metrics.tracking_metrics import Metric, State, Ticks, accumulated
+from lgvi_warp.statistics.metrics.metric import Metric, State, Ticks, accumulated
 from lgvi_warp.statistics.values.quantity import Quantity, named
 
 if TYPE_CHECKING:
@@ -30,7 +30,6 @@ class _AllOf(Quantity):
     """Numbers of the samples side by side, as many as the scene has: (k, d, n) with d not known before the run."""
 
     def __call__(self, samples: Fields, members: Members) -> np.ndarray:
-        """Return the numbers of all fields, (k, d, n)."""
         k, n = len(samples.time), members.count
         columns = [np.moveaxis(samples[name].reshape(k, n, -1), 2, 1) for name in self.fields]
         return np.concatenate(columns, axis=1, dtype=np.float64)
@@ -57,7 +56,6 @@ class OfChannels(Metric):
     """
 
     def meant(self) -> Quantity:
-        """Return the channels."""
         if among(self.of, CHANNELS):
             return _ALL[self.of]
         names = [*CHANNELS, *(f"{name}[0]" for name in CHANNELS)]
@@ -66,11 +64,9 @@ class OfChannels(Metric):
         return named(f"{self.type}.of", self.of, self.of)
 
     def begin(self, x: np.ndarray) -> State:
-        """Return a sum of 0."""
         return {"sum": np.zeros(x.shape[1])}
 
     def finish(self, state: State) -> np.ndarray:
-        """Return the sum."""
         return state["sum"]
 
 
@@ -139,7 +135,6 @@ class SaturationShare(OfChannels):
     default: ClassVar[str | None] = "command"
 
     def meant(self) -> Quantity:
-        """Return whether some command is at its limit."""
         if not among(self.of, ("command",)):
             raise refusal("saturation_share.of", self.of, "is not the command", "leave it out")
         return _SATURATED
@@ -180,7 +175,6 @@ class ActuatorEnergy(OfChannels):
     default: ClassVar[str | None] = "demand"
 
     def meant(self) -> Quantity:
-        """Return the power."""
         if not among(self.of, ("demand",)):
             raise refusal("energy.of", self.of, "is not the demand", "leave it out")
         return _POWER
@@ -210,13 +204,11 @@ class TimeToFailure(Metric):
     default: ClassVar[str | None] = "end"
 
     def then_default(self) -> Sequence[Any]:
-        """Return the number of each member."""
         from lgvi_warp.statistics.paths.member_values import MemberValues
 
         return [MemberValues()]
 
     def meant(self) -> Quantity:
-        """Return a quantity that needs no samples."""
         if not among(self.of, ("end",)):
             raise refusal("time_to_failure.of", self.of, "is not the end", "leave it out")
         return _END
@@ -229,12 +221,7 @@ _END = Quantity("end", _nothing, "s", ())
 
 
 class TickSamples(dict[str, np.ndarray]):
-    """What a metric of the user's own is told of one tick: samples (n, ...) by name.
-
-    Attributes:
-        t: time [s].
-        dt: time since the tick before [s]; 0 at the first one.
-    """
+    """What a user's metric is told of one tick: samples (n, ...) by name, the time t [s], and dt [s] since the tick before."""
 
     def __init__(self, samples: Mapping[str, np.ndarray], t: float, dt: float):
         super().__init__(samples)
@@ -267,14 +254,12 @@ class CustomMetric(Metric):
     version: Any = None
 
     def check(self, faults: Faults) -> None:
-        """Note fields that there are not."""
         super().check(faults)
         for name in listed("fields", self.fields, "names of fields"):
             faults.choice("fields", name, SAVED)
         check_version(faults, self.version)
 
     def meant(self) -> Quantity:
-        """Return the samples that the function reads."""
         if not callable(self.of):
             remedy = "give a function of (state, tick), such as def heel(state, tick): ..."
             raise refusal("own_metric.of", self.of, "is no function", remedy)
@@ -285,32 +270,31 @@ class CustomMetric(Metric):
 
     @property
     def key(self) -> str:
-        """The name of the function."""
         return self.name or self.quantity.name
 
     def begin(self, x: np.ndarray) -> State:
         return {"own": self._asked(None, x, 0.0, 0.0)}
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        own = state["own"]
+        values = state["own"]
         for (t, x, alive), dt in zip(ticks.rows(ticks.x), ticks.dt, strict=True):
-            own = np.where(alive, self._asked(own, x, float(t), float(dt)), own)
-        return {"own": own}
+            values = np.where(alive, self._asked(values, x, float(t), float(dt)), values)
+        return {"own": values}
 
     def finish(self, state: State) -> np.ndarray:
-        own = state["own"] if self.last is None else self._real(self.last(state["own"]))
-        if own.shape != state["begun"].shape:
+        values = state["own"] if self.last is None else self._real(self.last(state["own"]))
+        if values.shape != state["begun"].shape:
             wanted = f"({len(state['begun'])},) is wanted, a number for each member"
-            raise ValueError(f"metric {self.key}: ended with shape {own.shape}; {wanted}")
-        return own
+            raise ValueError(f"metric {self.key}: ended with shape {values.shape}; {wanted}")
+        return values
 
     def _asked(self, state: np.ndarray | None, x: np.ndarray, t: float, dt: float) -> np.ndarray:
         """What the function returns at a tick; x: (d, n)."""
-        own = self._real(self.of(state, TickSamples(dict(self._divided(x)), t, dt)))
-        if own.shape[-1:] != x.shape[1:] or (state is not None and own.shape != state.shape):
+        values = self._real(self.of(state, TickSamples(dict(self._divided(x)), t, dt)))
+        if values.shape[-1:] != x.shape[1:] or (state is not None and values.shape != state.shape):
             wanted = f"(..., {x.shape[1]})" if state is None else f"{state.shape}"
-            raise ValueError(f"metric {self.key}: gave shape {own.shape}; {wanted} is wanted, members last")
-        return own
+            raise ValueError(f"metric {self.key}: gave shape {values.shape}; {wanted} is wanted, members last")
+        return values
 
     def _real(self, values: Any) -> np.ndarray:
         try:

@@ -1,243 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Metrics of a control loop: one number of each member, gathered tick by tick; definitions are those of control theory.
+"""Metrics of how well a controller tracks what is wanted; definitions are those of control theory.
 
-A tick is a sample at a controller's period. With looks at t_0 = 0, t_1, ... a member counts from the first tick to the last
-one at which it was still under way: a member that stops or fails has the numbers of its time under way. y is the actual
-number, r what is wanted at each tick, e = r - y.
+y is the actual number, r what is wanted at each tick, e = r - y.
 """
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
 from lgvi_warp.common.arguments import flag
-from lgvi_warp.common.errors import Faults, among
-from lgvi_warp.common.status import failed
-from lgvi_warp.control.controller import Controller
-from lgvi_warp.statistics.base import Gatherer, Statistic
-from lgvi_warp.statistics.ends import Ends
-from lgvi_warp.statistics.estimates.tree import Part
-from lgvi_warp.statistics.paths.member_statistic import MemberStatistic
-from lgvi_warp.statistics.paths.member_values import MemberValues
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.statistics.metrics.metric import Metric, State, Ticks, accumulated
 from lgvi_warp.statistics.values import tracking
 from lgvi_warp.statistics.values.quantity import Quantity
-from lgvi_warp.statistics.values.values import Values
-
-State = dict[str, np.ndarray]
 
 # Times that differ by less than this part of the run are the same.
 ROUND_OFF = 1e-9
-
-
-@dataclass(frozen=True, eq=False)
-class Ticks:
-    """Some ticks in turn at n members, of d numbers, with the tick before each.
-
-    Args:
-        t: their times (k,) [s].
-        dt: times since the tick before each (k,) [s].
-        start: numbers at the tick before the first of them (d, n).
-        x: numbers (k, d, n).
-        alive: which members were still under way (k, n); None if all were.
-    """
-
-    t: np.ndarray
-    dt: np.ndarray
-    start: np.ndarray
-    x: np.ndarray
-    alive: np.ndarray | None
-
-    @functools.cached_property
-    def before(self) -> np.ndarray:
-        """Numbers at the tick before each, (k, d, n)."""
-        return np.concatenate([self.start[None], self.x[:-1]])
-
-    def rows(self, *arrays: np.ndarray) -> Iterator[tuple[Any, ...]]:
-        """Yield for each tick its time, its numbers in these arrays, and which members were under way.
-
-        Args:
-            *arrays: (k, ...).
-        """
-        everyone: Any = [True] * len(self.t) if self.alive is None else self.alive
-        yield from zip(self.t, *arrays, everyone, strict=True)
-
-    def of_living(self, values: np.ndarray, otherwise: float) -> np.ndarray:
-        """Return values, with another number where a member was no longer under way.
-
-        Args:
-            values: (k, n).
-            otherwise: that number.
-        """
-        return values if self.alive is None else np.where(self.alive, values, otherwise)
-
-
-class _Follow(Gatherer):
-    """Follows a block's members from tick to tick."""
-
-    def __init__(self, metric: Metric, time: np.ndarray):
-        self._metric, self._time = metric, time
-        self._state: State = {}
-        self._last: np.ndarray | None = None
-        self._place = (0, 0, 0, 1)
-
-    def take(self, values: Values, when: slice) -> None:
-        """Take in these ticks."""
-        R = values.replicates
-        k, d, n = len(values.x) // R, *values.x.shape[1:]
-        # Members of the replicates one after the other.
-        x = values.x if R == 1 else np.swapaxes(values.x.reshape(k, R, d, n), 1, 2).reshape(k, d, R * n)
-        alive = None if values.good is None else values.good.reshape(k, R * n)
-        t, first = self._time[when], 0
-        if self._last is None:
-            begun = np.ones(R * n, bool) if alive is None else alive[0]
-            self._state = {
-                "begun": begun,
-                "until": np.full(R * n, t[0]),
-                "end": self._time[-1],
-                **self._metric.begin(x[0]),
-            }
-            self._last, first = x[0], 1
-        if k > first:
-            step = np.diff(self._time[max(when.start - 1, 0) : when.stop])
-            ticks = Ticks(t[first:], step, self._last, x[first:], None if alive is None else alive[first:])
-            self._state |= self._metric.follow(self._state, ticks)
-            self._state["until"] = np.maximum(self._state["until"], ticks.of_living(ticks.t[:, None], 0.0).max(axis=0))
-        self._last = x[-1].copy()
-        self._place = (values.first, values.block, values.size, R)
-
-    def end(self, ends: Ends, replicates: int) -> None:
-        """Note how the members ended."""
-
-        def in_order(values: np.ndarray) -> np.ndarray:
-            return values.reshape(-1, replicates).T.ravel()
-
-        self._state["ended"] = in_order(np.where(ends.status != 0, ends.time, np.inf))
-        self._state["failed"] = in_order(failed(ends.status))
-
-    def close(self) -> Part:
-        """Return the parts of all statistics of the members' numbers."""
-        state = self._state
-        with np.errstate(invalid="ignore", divide="ignore"):
-            x = np.where(state["begun"], self._metric.finish(state), np.nan)
-        R = self._place[3]
-        return self._metric.gathered(x.reshape(R, 1, -1), state["failed"].reshape(R, -1), self._place, self._time)
-
-
-@dataclass(frozen=True, eq=False)
-class Metric(MemberStatistic):
-    """One number of each member over all ticks of a controller, then statistics of it. Abstract.
-
-    It takes the samples at every tick, whatever the run keeps; in a scene without a controller, at the times of samples. A
-    member that stops or fails has the number of its time under way, up to its last tick. Statistics leave out members that
-    failed, and those whose number is not finite; lw.statistics.MemberValues() has all of them.
-
-    Args:
-        of: what is tracked; see the classes derived from it.
-        then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5,
-            0.99)), lw.statistics.MemberValues().
-        measured: whether the actual number is what sensors measure, in place of the truth; by default False.
-    """
-
-    of_numbers: ClassVar[bool] = False
-    ticks: ClassVar[bool] = True
-    # The unit of the number, with {0} for that of what it is of.
-    form: ClassVar[str] = "{0}"
-
-    stopped: str = "left_out"
-    measured: bool = False
-
-    def check(self, faults: Faults) -> None:
-        """Note faults of `then`, and of `stopped`, which is not to be chosen."""
-        super().check(faults)
-        if not among(self.stopped, ("left_out",)):
-            faults.add("stopped", self.stopped, "has no meaning for a metric", "leave it out")
-
-    def begin(self, x: np.ndarray) -> State:
-        """Return the state after the first tick.
-
-        Args:
-            x: numbers at the first tick (d, n).
-        """
-        return {}
-
-    def follow(self, state: State, ticks: Ticks) -> State:
-        """Return what changes of the state by some more ticks.
-
-        Args:
-            state: the state before them.
-            ticks: the ticks.
-        """
-        return {}
-
-    def finish(self, state: State) -> np.ndarray:
-        """Return the members' numbers (n,).
-
-        Args:
-            state: the state after the last tick, with "until" (n,) [s], the time of each member's last tick under way,
-                "ended" (n,) [s], when it stopped or failed, else infinite, "failed" (n,), and "end" [s], that of the run.
-        """
-        raise TypeError(f"{type(self).__name__} is abstract")
-
-    def gathered(self, x: np.ndarray, lost: np.ndarray, place: tuple[int, int, int, int], time: np.ndarray) -> Part:
-        """Return the part of a block: the parts of all statistics of `then`.
-
-        Args:
-            x: the numbers (replicates, 1, members).
-            lost: which members failed (replicates, members).
-            place: first member, block, its size, and number of replicates.
-            time: times of all ticks [s].
-        """
-        left = Values(x, ~lost, *place)
-        parts: Part = {}
-        for i, statistic in enumerate(self.then_of(time)):
-            if isinstance(statistic, MemberValues):
-                part = statistic.rows_of(x, place[3])
-            else:
-                gatherer = statistic.open(time[-1:], x.shape[2])
-                gatherer.take(left, slice(0, 1))
-                part = gatherer.close()
-            parts |= {f"{i}/{key}": array for key, array in part.items()}
-        return parts
-
-    def then_of(self, time: np.ndarray) -> tuple[Statistic, ...]:
-        """Return the statistics of `then`, each of this metric's number."""
-        return tuple(replace(statistic, stopped="held") for statistic in super().then_of(time))
-
-    @property
-    def unit(self) -> str:
-        """The unit of the number."""
-        unit = self.quantity.unit
-        return self.form.format(unit) if unit != "1" else self.form.format("").strip() or "1"
-
-    @property
-    def key(self) -> str:
-        """The name of the number: "overshoot depth", or "effort" where what it is of needs no word."""
-        return self.name or (self.type if self.of == self.default else f"{self.type} {self.quantity.name}")
-
-    @property
-    def _labels(self) -> tuple[str, ...]:
-        return (self.key,)
-
-    def open(self, time: np.ndarray, count: int) -> _Follow:
-        """Return the object that follows the members of a block."""
-        return _Follow(self, time)
-
-
-def accumulated(total: np.ndarray, ticks: Ticks, parts: np.ndarray) -> np.ndarray:
-    """Return a sum with the parts of some ticks added in turn, so that its bits do not depend on how many come at once.
-
-    total: the sum so far (n,).
-    parts: what each adds (k, n).
-    """
-    total = total.copy()
-    for addend in ticks.of_living(parts, 0.0):
-        total += addend
-    return total
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,12 +30,11 @@ class OfTracking(Metric):
             "east"; or a distance from what is wanted: "position", "attitude" (angle), "cross_track".
     """
 
+    tracks: ClassVar[bool] = True
+
     def meant(self) -> Quantity:
-        """Return the error."""
-        return tracking.error(
-            tracking.tracked_name(f"{self.type}.of", self.of, tracking.ERRORS),
-            flag(f"{self.type}.measured", self.measured),
-        )
+        name = tracking.tracked_name(f"{self.type}.of", self.of, tracking.ERRORS)
+        return tracking.error(name, flag(f"{self.type}.measured", self.measured))
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,24 +49,19 @@ class OfCourse(Metric):
         of: "depth", "heading", "speed", "north" or "east".
     """
 
+    tracks: ClassVar[bool] = True
+
     def meant(self) -> Quantity:
-        """Return the number and its goal."""
         known = tuple(tracking.CHANNELS[False])
         return tracking.course(tracking.tracked_name(f"{self.type}.of", self.of, known), bool(self.measured))
 
     def begin(self, x: np.ndarray) -> State:
-        """Return goal, step and direction, and the way left at first."""
         goal = x[1].copy()
         step = self._difference(goal, x[0])
         return {"goal": goal, "step": np.abs(step), "sign": np.where(step < 0.0, -1.0, 1.0)}
 
     def left(self, state: State, ticks: Ticks) -> np.ndarray:
-        """Return the way left to the goal in the direction of the step, (k, n): below 0 beyond the goal.
-
-        Args:
-            state: the state.
-            ticks: the ticks.
-        """
+        """Return the way to the goal (k, n) in the direction of the step: below 0 beyond the goal."""
         return state["sign"] * self._difference(state["goal"], ticks.x[:, 0])
 
     def _difference(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -306,16 +81,10 @@ class OfStep(OfCourse):
 
     @property
     def unit(self) -> str:
-        """The unit of the number."""
         return "%" if self.percent else super().unit
 
     def percent_of_step(self, state: State, size: np.ndarray) -> np.ndarray:
-        """Return a size, in percent of the step where that is asked for.
-
-        Args:
-            state: the state.
-            size: (n,).
-        """
+        """Return a size (n,), in percent of the step where that is asked for."""
         return np.where(state["step"] > 0.0, 100.0 * size / state["step"], np.nan) if self.percent else size
 
 
@@ -327,6 +96,19 @@ class Overshoot(OfStep):
         of: "depth", "heading", "speed", "north" or "east"; see `OfCourse` for goal and step.
         then: see `Metric`, also for measured.
         percent: whether in percent of the step; by default False.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> controller = lw.Controller(
+        ...     period=0.1,
+        ...     guidance=[lw.control.SetPoint(heading=0.5)],
+        ...     laws=[lw.control.HeadingPID(kp=1.0, ki=0.02, kd=2.0)],
+        ...     allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
+        ... )
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]}, controller=controller)
+        >>> result = lw.solve(scene, h=0.05, t1=60.0, statistics=[lw.metrics.Overshoot("heading")])
+        >>> print(f"{result.statistics['mean overshoot heading'].value[-1, 0]:.2f} rad")
+        0.04 rad
     """
 
     type: ClassVar[str] = "overshoot"
@@ -336,8 +118,8 @@ class Overshoot(OfStep):
         return state | {"least": state["step"]}
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        left = ticks.of_living(self.left(state, ticks), np.inf)
-        return {"least": np.minimum(state["least"], left.min(axis=0))}
+        distance = ticks.of_living(self.left(state, ticks), np.inf)
+        return {"least": np.minimum(state["least"], distance.min(axis=0))}
 
     def finish(self, state: State) -> np.ndarray:
         return self.percent_of_step(state, np.maximum(0.0, -state["least"]))
@@ -360,8 +142,8 @@ class Undershoot(OfStep):
         return state | {"most": state["step"]}
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        left = ticks.of_living(self.left(state, ticks), -np.inf)
-        return {"most": np.maximum(state["most"], left.max(axis=0))}
+        distance = ticks.of_living(self.left(state, ticks), -np.inf)
+        return {"most": np.maximum(state["most"], distance.max(axis=0))}
 
     def finish(self, state: State) -> np.ndarray:
         return self.percent_of_step(state, state["most"] - state["step"])
@@ -384,9 +166,9 @@ class PeakTime(OfCourse):
         return state | {"least": state["step"], "at": np.zeros(len(state["step"]))}
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        left = ticks.of_living(self.left(state, ticks), np.inf)
-        i = left.argmin(axis=0)
-        least = np.take_along_axis(left, i[None], axis=0)[0]
+        distance = ticks.of_living(self.left(state, ticks), np.inf)
+        i = distance.argmin(axis=0)
+        least = np.take_along_axis(distance, i[None], axis=0)[0]
         farther = least < state["least"]
         return {"least": np.where(farther, least, state["least"]), "at": np.where(farther, ticks.t[i], state["at"])}
 
@@ -441,13 +223,13 @@ class RiseTime(OfCourse):
         return state | {"low": np.where(self.limits[0] == 0.0, 0.0, done), "high": done}
 
     def follow(self, state: State, ticks: Ticks) -> State:
-        left = ticks.of_living(self.left(state, ticks), np.inf)
-        found = {}
+        distance = ticks.of_living(self.left(state, ticks), np.inf)
+        times = {}
         for name, part in zip(("low", "high"), self.limits, strict=True):
-            done = state["step"] - left >= part * state["step"]
+            done = state["step"] - distance >= part * state["step"]
             first = np.where(done.any(axis=0), ticks.t[done.argmax(axis=0)], np.inf)
-            found[name] = np.minimum(state[name], first)
-        return found
+            times[name] = np.minimum(state[name], first)
+        return times
 
     def finish(self, state: State) -> np.ndarray:
         return np.where(np.isinf(state["high"]), np.inf, state["high"] - state["low"])
@@ -568,12 +350,7 @@ class OverTime(OfTracking):
     """A metric that is an integral over time, by the trapezoidal rule between ticks. Abstract."""
 
     def integrand(self, t: np.ndarray, e: np.ndarray) -> np.ndarray:
-        """Return what is integrated over time.
-
-        Args:
-            t: times (k, 1) [s].
-            e: errors (k, n).
-        """
+        """Return what is integrated over time, of times (k, 1) [s] and errors (k, n)."""
         raise TypeError(f"{type(self).__name__} is abstract")
 
     def begin(self, x: np.ndarray) -> State:
@@ -595,6 +372,19 @@ class IAE(OverTime):
     Args:
         of: see `OfTracking`.
         then: see `Metric`, also for measured.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> controller = lw.Controller(
+        ...     period=0.1,
+        ...     guidance=[lw.control.SetPoint(heading=0.5)],
+        ...     laws=[lw.control.HeadingPID(kp=1.0, ki=0.02, kd=2.0)],
+        ...     allocation=[lw.control.AllocationMatrix(to="control_fins", matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, 0, 0]])],
+        ... )
+        >>> scene = lw.Scene.named("remus_100", start={"velocity": [1.5, 0.0, 0.0]}, controller=controller)
+        >>> result = lw.solve(scene, h=0.05, t1=60.0, statistics=[lw.metrics.IAE("heading")])
+        >>> print(f"{result.statistics['mean iae heading'].value[-1, 0]:.1f} rad s")
+        4.6 rad s
     """
 
     type: ClassVar[str] = "iae"
@@ -653,18 +443,3 @@ class RMSError(ISE):
 
     def finish(self, state: State) -> np.ndarray:
         return np.where(state["until"] > 0.0, np.sqrt(state["sum"] / state["until"]), state["first"])
-
-
-def check_wanted(faults: Faults, key: str, metrics: Mapping[str, Statistic], controller: Controller | None) -> None:
-    """Add a fault for each metric of what no guidance wants: its errors would be those from zero.
-
-    controller: the controller of the scene; None for none, which is a fault of its own.
-    """
-    if controller is None:
-        return
-    wishes = {wish for part in controller.guidance for wish in part.gives}
-    for name, metric in metrics.items():
-        tracked = metric.quantity.name if isinstance(metric, OfTracking | OfCourse) else None
-        if tracked is not None and tracking.NEEDED[tracked] not in wishes:
-            problem = f"is of the {tracked}, and no guidance of the scene wants a {tracking.NEEDED[tracked]}"
-            faults.add(key, name, problem, "give guidance that wants it, or another metric")

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,14 +31,13 @@ class MemberStatistic(Statistic):
     then: Any = None
 
     def check(self, faults: Faults) -> None:
-        """Note what in `then` is no statistic over members, or says what it is of."""
         super().check(faults)
 
         entries = self.then_default() if self.then is None else self.then
         entries = entries if isinstance(entries, list | tuple) else [entries]
         statistics: list[Statistic] = []
         with faults.including():
-            statistics = list(from_list(entries, f"{self.type}.then", whole=False))
+            statistics = list(from_list(entries, f"{self.type}.then", unique_names=False))
         for i, statistic in enumerate(statistics):
             if statistic.of_numbers and statistic.of is not None:
                 faults.add(f"then[{i}].of", statistic.of, "is given already", f"leave it out: it is of the {self.type}")
@@ -54,11 +53,7 @@ class MemberStatistic(Statistic):
         return [Mean()]
 
     def then_of(self, time: np.ndarray) -> tuple[Statistic, ...]:
-        """Return the statistics of `then`, each of this class's number.
-
-        Args:
-            time: (k,) [s], all sample times of the run.
-        """
+        """Return the statistics of `then`, each of this class's number, over the run's sample times (k,) [s]."""
         inner = self.quantity
         derived = Quantity(self.key, inner.function, self.unit, inner.fields, self._labels, self.needs_limit)
         return tuple(replace(statistic.over(time), of=derived, stopped=self.stopped) for statistic in self.then)
@@ -78,47 +73,47 @@ class MemberStatistic(Statistic):
         return tuple(f"{self.type} {label}" for label in self.quantity.labels)
 
     def parts(self) -> tuple[Statistic, ...]:
-        """Return the statistics of `then`, each of this class's number."""
         return self.then_of(np.array([0.0, 1.0]))
 
     def gather(self, values: Values, time: np.ndarray) -> Part:
-        """Return the part of a block: the parts of all statistics of `then`, their keys numbered.
+        """Return the part of a block, of its members' numbers at one time: the parts of all of `then`, keys numbered."""
+        return numbered(part_of(statistic, values, time) for statistic in self.then_of(time))
 
-        Args:
-            values: the numbers of the block's members, as of one time.
-            time: (k,) [s], all sample times of the run.
-        """
-        gatherers = [statistic.open(time[-1:], values.x.shape[2]) for statistic in self.then_of(time)]
-        for gatherer in gatherers:
-            gatherer.take(values, slice(0, 1))
-        return _numbered(gatherer.close() for gatherer in gatherers)
-
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
-        pairs = ((arrays_under(left, f"{i}/"), arrays_under(right, f"{i}/")) for i in range(len(self.then)))
-        return _numbered(statistic.join(*pair, place) for statistic, pair in zip(self.then, pairs, strict=True))
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
+        pairs = ((arrays_under(first, f"{i}/"), arrays_under(second, f"{i}/")) for i in range(len(self.then)))
+        return numbered(statistic.join(*pair, place) for statistic, pair in zip(self.then, pairs, strict=True))
 
     def estimates(self, parts: Sequence[Part], time: np.ndarray) -> list[Estimate]:
-        """Return the estimates of each statistic, at the end."""
         estimates: list[Estimate] = []
-        for i, statistic in enumerate(self.then_of(time)):
-            estimates += statistic.estimates([arrays_under(part, f"{i}/") for part in parts], time[-1:])
+        for statistic, inner in self._inner(parts, time):
+            estimates += statistic.estimates(inner, time[-1:])
         return estimates
 
     def of_replicate(self, part: Part, replicate: int, replicates: int) -> Part:
         each = enumerate(self.then)
-        return _numbered(
+        return numbered(
             statistic.of_replicate(arrays_under(part, f"{i}/"), replicate, replicates) for i, statistic in each
         )
 
     def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
-        # The estimates of each statistic from its replicates, at the end.
         estimates: list[Estimate] = []
-        for i, statistic in enumerate(self.then_of(time)):
-            inner = [arrays_under(part, f"{i}/") for part in parts]
+        for statistic, inner in self._inner(parts, time):
             estimates += statistic.estimates_of_replicates(inner, time[-1:], replicates)
         return estimates
 
+    def _inner(self, parts: Sequence[Part], time: np.ndarray) -> Iterator[tuple[Statistic, list[Part]]]:
+        """Each statistic of `then` with its own parts."""
+        for i, statistic in enumerate(self.then_of(time)):
+            yield statistic, [arrays_under(part, f"{i}/") for part in parts]
 
-def _numbered(parts: Iterable[Part]) -> Part:
+
+def part_of(statistic: Statistic, values: Values, time: np.ndarray) -> Part:
+    """The part of a statistic of numbers that are known at the end of the run alone."""
+    gatherer = statistic.open(time[-1:], values.x.shape[2])
+    gatherer.take(values, slice(0, 1))
+    return gatherer.close()
+
+
+def numbered(parts: Iterable[Part]) -> Part:
     """Parts of several statistics as one: the number of the statistic stands before each name."""
     return {f"{i}/{key}": array for i, part in enumerate(parts) for key, array in part.items()}

@@ -31,12 +31,20 @@ class MemberValues(Statistic):
 
     Args:
         of: a quantity; see `Statistic`, also for name and stopped.
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0})
+        >>> fleet = lw.Ensemble(scene, members=64, vary={"vehicle.buoyancy": lw.distributions.Normal(std=2.0)})
+        >>> deepest = lw.statistics.PathMaximum("depth", then=lw.statistics.MemberValues())
+        >>> result = lw.solve(fleet, h=0.1, t1=20.0, statistics=[deepest])
+        >>> result.statistics["each path_maximum depth"].value.shape
+        (1, 1, 64)
     """
 
     type: ClassVar[str] = "each"
 
     def rows(self, values: Values) -> Part:
-        """Return the numbers of a block, (k, d, n), in the order of its members."""
         return self.rows_of(values.filled(np.nan), values.replicates)
 
     def rows_of(self, x: np.ndarray, replicates: int) -> Part:
@@ -50,12 +58,11 @@ class MemberValues(Statistic):
         k, d, n = len(x) // R, x.shape[1], x.shape[2] * R
         return {"x": np.ascontiguousarray(np.moveaxis(x.reshape(k, R, d, n // R), 1, 3).reshape(k, d, n))}
 
-    def join(self, left: Part, right: Part, place: tuple[int, int]) -> Part:
+    def join(self, first: Part, second: Part, place: tuple[int, int]) -> Part:
         # The numbers of both sets of members, one after the other.
-        return {"x": np.concatenate([left["x"], right["x"]], axis=2)}
+        return {"x": np.concatenate([first["x"], second["x"]], axis=2)}
 
     def read(self, part: Part, time: np.ndarray) -> Estimate:
-        """Return the numbers."""
         x = part["x"]
         arrays = {"value": x, "count": (~np.isnan(x)).all(axis=1).sum(axis=1)}
         dims = {"value": ("time", "component", "member"), "count": ("time",)}

@@ -31,7 +31,6 @@ class _Walk(Gatherer):
         self._place, self._single = (0, 0, 0, 1), False
 
     def take(self, values: Values, when: slice) -> None:
-        """Take in the samples at these times."""
         rows = (-1, values.replicates)
         samples = values.x.reshape(*rows, *values.x.shape[1:])
         # Samples are taken one by one, so that the bits do not depend on how many come at once.
@@ -50,7 +49,6 @@ class _Walk(Gatherer):
         return self._reduction.step(state, self._last, x, dt, dt / float(self._time[t] - self._time[0]))
 
     def close(self) -> Part:
-        """Return the parts of all statistics of the paths' numbers."""
         assert self._state is not None
         x = self._reduction.finish(self._state)
         good = None if self._whole is None or self._whole.all() else self._whole
@@ -80,7 +78,6 @@ class OfPath(MemberStatistic):
         return self._reduction
 
     def open(self, time: np.ndarray, count: int) -> _Walk:
-        """Return the object that follows the members of a block."""
         return _Walk(self, time)
 
 
@@ -95,6 +92,14 @@ class PathMaximum(OfPath):
         of: a quantity; see `Statistic`, also for name, confidence and stopped.
         then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5,
             0.99)), lw.statistics.Exceedance(above=2.0).
+
+    Examples:
+        >>> import lgvi_warp as lw
+        >>> scene = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0})
+        >>> fleet = lw.Ensemble(scene, members=64, vary={"vehicle.buoyancy": lw.distributions.Normal(std=2.0)})
+        >>> result = lw.solve(fleet, h=0.1, t1=20.0, statistics=[lw.statistics.PathMaximum("speed")])
+        >>> print(f"{result.statistics['mean path_maximum speed'].value[-1, 0]:.2f} m/s")
+        1.32 m/s
     """
 
     type: ClassVar[str] = "path_maximum"
@@ -177,12 +182,11 @@ class PathTime(OfPath, Condition):
 
     @property
     def unit(self) -> str:
-        """The unit of the number, seconds."""
         return "s"
 
     @property
     def needs_limit(self) -> bool:
-        """Whether a condition on the time needs a limit: without one, the question is whether it ever holds."""
+        # Whether a condition on the time needs a limit: without one, the question is whether it ever holds.
         return False
 
     @property
@@ -191,7 +195,6 @@ class PathTime(OfPath, Condition):
 
     @property
     def reduction(self) -> Reduction:
-        """The sum of the parts of time for which the condition holds."""
         return Reduction(self._step, lambda x: np.zeros(x.shape))
 
     def _step(self, state: np.ndarray, before: np.ndarray, x: np.ndarray, dt: float, share: float) -> np.ndarray:
@@ -221,7 +224,6 @@ class OfExpression(OfPath):
     """
 
     def meant(self) -> Quantity:
-        """Return the quantity at each time, of which the path's number is made."""
         return self._functional.inner
 
     @property
@@ -230,12 +232,10 @@ class OfExpression(OfPath):
 
     @property
     def key(self) -> str:
-        """The name of the number: the expression."""
         return self._functional.label
 
     @property
     def reduction(self) -> Reduction:
-        """How the expression reduces a member's samples to a number."""
         return self._functional.reduction
 
     @property

@@ -25,21 +25,13 @@ if TYPE_CHECKING:
     from lgvi_warp.sampling.members import Members
     from lgvi_warp.statistics.values.samples import Fields
 
-OVER_TIME = {
-    "max": reductions.MAXIMUM,
-    "min": reductions.MINIMUM,
-    "mean": reductions.MEAN,
-    "range": reductions.RANGE,
-}
+OVER_TIME = {"max": reductions.MAXIMUM, "min": reductions.MINIMUM, "mean": reductions.MEAN, "range": reductions.RANGE}
 FUNCTIONS = (*OVER_TIME, "norm")
 
 
 @dataclass(frozen=True)
 class Functional:
-    """A quantity with the functions applied to it.
-
-    entry: index of the component that is taken of the result; None (the default): all.
-    """
+    """A quantity with the functions applied to it, and the index of the component taken of the result; None: all."""
 
     label: str
     quantity: Quantity
@@ -105,10 +97,7 @@ class Functional:
         return tuple(f"{self.label}[{i}]" for i in range(self.quantity.size))
 
     def __call__(self, samples: Fields, members: Members) -> np.ndarray:
-        """Evaluate the expression.
-
-        Returns: float64: (k, n, size), or (n, size) if it reduces the path.
-        """
+        """Evaluate the expression: float64 (k, n, size), or (n, size) if it reduces the path."""
         if self.over_path:
             values = self.inner(samples, members).astype(np.float64, copy=False)
             return self.reduction.over(values, samples.time).T
@@ -161,10 +150,7 @@ def _nested(text: str) -> tuple[list[str], str]:
 
 
 def quantity(key: str, of: Any) -> Quantity:
-    """Return the quantity that `of` gives.
-
-    of: a name, a name with an index, a Quantity, a function of (samples, members), or a list of these, taken as one quantity.
-    """
+    """Return the quantity of a name, a name with an index, a function of (samples, members), or a list of these as one."""
     if isinstance(of, Quantity):
         return of
     if isinstance(of, str):

@@ -27,11 +27,7 @@ class Reduction:
     of_samples: bool = False
 
     def over(self, samples: np.ndarray, time: np.ndarray) -> np.ndarray:
-        """Return the numbers of whole paths.
-
-        samples: (k, ...), the samples at k times.
-        time: (k,) [s], their times.
-        """
+        """Return the numbers of whole paths from samples (k, ...) at times (k,) [s]."""
         state = self.start(samples[0])
         for t in range(1, len(samples)):
             dt = float(time[t] - time[t - 1])

@@ -40,10 +40,7 @@ class Fields(dict[str, np.ndarray]):
         return self.at(np.array([len(self.time) - 1]))
 
     def at(self, places: np.ndarray) -> Fields:
-        """Return the samples at some of these times.
-
-        places: indices of the times (m,).
-        """
+        """Return the samples at some of these times, by their indices (m,)."""
         values = {name: values[places] for name, values in self.items()}
         return Fields(values, self.time[places], self._steps[places], self.terms, self._when_ended, self.controller)
 
@@ -54,10 +51,7 @@ class Fields(dict[str, np.ndarray]):
         return (status, step) if np.any(status) else None
 
     def good(self, held: bool = True) -> np.ndarray | None:
-        """Return which members are valid at each time.
-
-        Returns: (k, n), or None if all members are valid at all times.
-        """
+        """Return which members are valid at each time, (k, n); None if all are at all times."""
         if self._ends is None:
             return None
         status, step = self._ends

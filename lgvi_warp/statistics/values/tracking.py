@@ -10,23 +10,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from lgvi_warp.common.errors import among, closest, refusal
+from lgvi_warp.common.errors import Faults, among, closest, refusal
 from lgvi_warp.control.signals import ordered
 from lgvi_warp.statistics.values.quantity import Function, Quantity
 
 if TYPE_CHECKING:
+    from lgvi_warp.control.controller import Controller
     from lgvi_warp.sampling.members import Members
+    from lgvi_warp.statistics.base import Statistic
     from lgvi_warp.statistics.values.samples import Fields
 
 Numbers = Callable[[Mapping[str, np.ndarray]], np.ndarray]
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:
-    """Angles within [-pi, pi].
-
-    angle: (...,) [rad].
-    Returns: (...,) [rad].
-    """
+    """Angles (...,) [rad] within [-pi, pi]."""
     turns = np.asarray(angle / (2.0 * np.pi))
     np.rint(turns, out=turns)
     turns *= 2.0 * np.pi
@@ -54,11 +52,7 @@ class Channel:
     entries: tuple[int, ...] = ()
 
     def difference(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Return a - b, wrapped where these are angles.
-
-        a: (k, n) [unit].
-        b: (k, n) [unit].
-        """
+        """Return a - b (k, n) [unit], wrapped where these are angles."""
         return wrapped(a - b) if self.angle else a - b
 
     def reference(self, samples: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -71,10 +65,7 @@ class Channel:
         return self.difference(self.reference(samples), self.actual(samples))
 
     def course(self, samples: Fields, members: Members) -> np.ndarray:
-        """Return what is and its goal, (k, n, 2) [unit].
-
-        The goal is the set point, where the guidance that says it is one, before any reference model; else what is wanted.
-        """
+        """Return what is and its goal, (k, n, 2) [unit]: the set point before any reference model; else what is wanted."""
         y, goal = self.actual(samples), self._set_point(samples.controller, members)
         goal = self.reference(samples) if goal is None else np.broadcast_to(goal, y.shape)
         # Side by side in memory as they are used: components before members.
@@ -88,13 +79,13 @@ class Channel:
         parts = [part for part in controller.guidance if wish in part.gives and part.type != "reference_model"]
         if not parts or parts[-1].type != "set_point":
             return None
-        own = {name: members.parameters[f"{parts[-1].key}.{name}"] for name in parts[-1].parameters()}
-        if wish == "depth" and "depth" not in own:
+        numbers = {name: members.parameters[f"{parts[-1].key}.{name}"] for name in parts[-1].parameters()}
+        if wish == "depth" and "depth" not in numbers:
             wish, entry = "position", 2
-        if wish not in own:
+        if wish not in numbers:
             # A place without a heading is wanted heading north.
             return np.zeros(1)
-        return own[wish] if entry is None else own[wish][:, entry]
+        return numbers[wish] if entry is None else numbers[wish][:, entry]
 
 
 def _entry(name: str, i: int | None = None) -> Numbers:
@@ -143,10 +134,7 @@ def _distance(samples: Fields, members: Members, place: str) -> np.ndarray:
 
 
 def _cross_track(samples: Fields, members: Members, place: str) -> np.ndarray:
-    """Horizontal distance (k, n) [m] from the line through the wanted place along the wanted velocity.
-
-    Where no velocity is wanted, it is the horizontal distance from the wanted place.
-    """
+    """Horizontal distance (k, n) [m] from the wanted place, or from the line through it along the wanted velocity, if any."""
     e, v = _away(samples, place), samples["reference_velocity"].astype(np.float64, copy=False)
     pace = np.hypot(v[..., 0], v[..., 1])
     moves = pace > 0.0
@@ -205,3 +193,15 @@ def tracked_name(key: str, of: Any, known: tuple[str, ...]) -> str:
         return of
     why = "is a distance, which has no goal beyond" if among(of, _DISTANCES) else "is nothing that is tracked"
     raise refusal(key, of, why, closest(str(of), known))
+
+
+def check_wanted(faults: Faults, key: str, metrics: Mapping[str, Statistic], controller: Controller | None) -> None:
+    """Add a fault for each metric of what no guidance wants: its errors would be those from zero."""
+    if controller is None:
+        return
+    wishes = {wish for part in controller.guidance for wish in part.gives}
+    for name, metric in metrics.items():
+        tracked = metric.quantity.name if metric.tracks else None
+        if tracked is not None and NEEDED[tracked] not in wishes:
+            problem = f"is of the {tracked}, and no guidance of the scene wants a {NEEDED[tracked]}"
+            faults.add(key, name, problem, "give guidance that wants it, or another metric")

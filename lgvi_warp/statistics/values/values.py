@@ -47,18 +47,11 @@ class Values:
             self.count = self.good.sum(axis=1)
 
     def members(self, at: np.ndarray) -> np.ndarray:
-        """Return the indices in the run of some of these members.
-
-        at: (k, d), places along the last axis of `x`.
-        Returns: (k, d), indices of members of the run.
-        """
+        """Return the indices in the run of members at places (k, d) along the last axis of `x`."""
         return self.first + at * self.replicates + (np.arange(len(at)) % self.replicates)[:, None]
 
     def filled(self, value: float) -> np.ndarray:
-        """Return x with a given number where a member does not count.
-
-        Returns: (k, d, n), in the quantity's unit.
-        """
+        """Return x (k, d, n) with a given number where a member does not count."""
         return self.x if self.good is None else np.where(self.good[:, None], self.x, value)
 
     @functools.cached_property
@@ -75,11 +68,7 @@ class Values:
 
 
 def dealt(x: np.ndarray, good: np.ndarray | None, first: int, block: int, size: int, replicates: int) -> Values:
-    """Return values with one row for each time and replicate; member i belongs to replicate i mod R.
-
-    x: (k, d, n), numbers of all members, n a multiple of R.
-    good: (k, n), which members had not failed; None if none had.
-    """
+    """Return values with one row for each time and replicate; member i of n, a multiple of R, belongs to replicate i mod R."""
     k, d, n = x.shape
     R = replicates
     rows = np.moveaxis(x.reshape(k, d, n // R, R), 3, 1).reshape(k * R, d, n // R)

@@ -25,10 +25,10 @@ from lgvi_warp.scene.functions import Own, ToldApart, functions_of
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.statistics.base import TYPES, Statistic, from_list
 from lgvi_warp.statistics.metrics.actuator_metrics import TimeToFailure
-from lgvi_warp.statistics.metrics.tracking_metrics import check_wanted
 from lgvi_warp.statistics.paths.member_statistic import MemberStatistic
 from lgvi_warp.statistics.paths.member_values import MemberValues
 from lgvi_warp.statistics.values.functional import functional
+from lgvi_warp.statistics.values.tracking import check_wanted
 from lgvi_warp.studies.sweeps.cases import Case, cases_of, ensemble_of, grid_of, known_names, points_of
 from lgvi_warp.studies.sweeps.record import Record, key_of
 
@@ -252,7 +252,7 @@ def metric_of(key: str, entry: Any) -> tuple[str, Statistic]:
         else:
             remedy = 'give "overshoot depth", "iae heading" or "max(depth)"'
             raise refusal(key, entry, "is not one number of each member", remedy)
-    (statistic,) = from_list([entry], key, whole=False)
+    (statistic,) = from_list([entry], key, unique_names=False)
     if not isinstance(statistic, MemberStatistic):
         remedy = 'give a metric such as lw.metrics.Overshoot("depth"), or "max(depth)"'
         raise refusal(key, statistic.type, "is no metric: it is not one number of each member", remedy)

@@ -2,16 +2,21 @@
 """Classes add themselves to the table of their kind, under the word of their own body."""
 
 import sys
+from importlib import import_module
 from types import SimpleNamespace
 
 import pytest
 
 import lgvi_warp as lw
 from lgvi_warp.common import registry
+from lgvi_warp.control.base import SECTIONS
 from lgvi_warp.physics.terms import events
 from lgvi_warp.sampling.designs import KINDS as SAMPLINGS
 from lgvi_warp.sampling.distributions.named import KINDS as DISTRIBUTIONS
 from lgvi_warp.statistics.base import TYPES as STATISTICS
+from tests.house.test_start import modules_after
+
+TABLES = [(STATISTICS, "type"), (SAMPLINGS, "kind"), *((base.kinds, "type") for base in SECTIONS.values())]
 
 
 def kind(name, word=None, module=__name__):
@@ -54,6 +59,23 @@ def test_each_family_knows_its_classes():
         lw.distributions.PhysicalInertia,
     )
     assert all(one in known.values() for known, one in zip(tables, some, strict=True))
+
+
+def test_a_built_in_class_is_imported_when_its_word_is_looked_up():
+    modules = modules_after("from lgvi_warp.statistics.base import TYPES; list(TYPES), TYPES['each']")
+    assert "lgvi_warp.statistics.paths.member_values" in modules
+    assert "lgvi_warp.statistics.metrics.tracking_metrics" not in modules
+
+
+def test_the_tables_of_built_in_words_are_true():
+    for table, attribute in TABLES:
+        assert isinstance(table, registry.Kinds)
+        assert all(vars(kind)[attribute] == word for word, kind in table.items())
+    for room in ("statistics", "control", "sampling.designs"):
+        registry.load_modules(import_module(f"lgvi_warp.{room}"))
+    for table, _ in TABLES:
+        ours = {word for word, kind in table.items() if kind.__module__.startswith("lgvi_warp.")}
+        assert ours == set(table.homes)
 
 
 def test_all_modules_of_a_package_are_imported(tmp_path, monkeypatch):

@@ -269,7 +269,7 @@ def test_saltellis_design_is_that_of_salib(second_order):
     d, N = 3, 16
     problem = {"num_vars": d, "names": ["x", "y", "z"], "bounds": [[0.0, 1.0]] * d}
     expected = sobol.sample(problem, N, calc_second_order=second_order, scramble=False)
-    design = sampling.Saltelli(second_order)
+    design = lw.designs.Saltelli(second_order)
     AB = sobol_points(0, "x", 2 * d, np.arange(N), scramble=False)
     rows = design.rows(SPACE)
     got = np.concatenate([np.where(rows, one[d:], one[:d]) for one in AB])

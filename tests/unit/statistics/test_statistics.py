@@ -979,4 +979,4 @@ def test_two_statistics_have_two_names():
         from_list(twice)
     assert len(from_list([lw.statistics.Mean("depth"), {"type": "mean", "of": "depth", "name": "other"}])) == 2
     # What is not of anything yet has no name to differ by.
-    assert len(from_list(twice, whole=False)) == 2
+    assert len(from_list(twice, unique_names=False)) == 2

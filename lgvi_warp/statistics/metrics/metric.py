@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The base of metrics: one number of each member, gathered tick by tick.
+
+A tick is a sample at a controller's period. With ticks at t_0 = 0, t_1, ... a member counts from the first tick to the last
+one at which it was still under way: a member that stops or fails has the numbers of its time under way.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults, among
+from lgvi_warp.common.status import failed
+from lgvi_warp.statistics.base import Gatherer, Statistic
+from lgvi_warp.statistics.ends import Ends
+from lgvi_warp.statistics.estimates.tree import Part
+from lgvi_warp.statistics.paths.member_statistic import MemberStatistic, numbered, part_of
+from lgvi_warp.statistics.paths.member_values import MemberValues
+from lgvi_warp.statistics.values.values import Values
+
+State = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class Ticks:
+    """Some ticks in turn: times t (k,) [s], steps dt (k,) [s] before each, and d numbers of n members, x (k, d, n).
+
+    start: (d, n), the numbers at the tick before the first.
+    alive: (k, n), which members were still under way; None if all were.
+    """
+
+    t: np.ndarray
+    dt: np.ndarray
+    start: np.ndarray
+    x: np.ndarray
+    alive: np.ndarray | None
+
+    @functools.cached_property
+    def before(self) -> np.ndarray:
+        """Numbers at the tick before each, (k, d, n)."""
+        return np.concatenate([self.start[None], self.x[:-1]])
+
+    def rows(self, *arrays: np.ndarray) -> Iterator[tuple[Any, ...]]:
+        """Yield for each tick its time, its row of each array (k, ...), and which members were under way."""
+        everyone: Any = [True] * len(self.t) if self.alive is None else self.alive
+        yield from zip(self.t, *arrays, everyone, strict=True)
+
+    def of_living(self, values: np.ndarray, otherwise: float) -> np.ndarray:
+        """Return values (k, n), with another number where a member was no longer under way."""
+        return values if self.alive is None else np.where(self.alive, values, otherwise)
+
+
+class _Follow(Gatherer):
+    """Follows a block's members from tick to tick."""
+
+    def __init__(self, metric: Metric, time: np.ndarray):
+        self._metric, self._time = metric, time
+        self._state: State = {}
+        self._last: np.ndarray | None = None
+        self._place = (0, 0, 0, 1)
+
+    def take(self, values: Values, when: slice) -> None:
+        R = values.replicates
+        k, d, n = len(values.x) // R, *values.x.shape[1:]
+        # Members of the replicates one after the other.
+        x = values.x if R == 1 else np.swapaxes(values.x.reshape(k, R, d, n), 1, 2).reshape(k, d, R * n)
+        alive = None if values.good is None else values.good.reshape(k, R * n)
+        t, first = self._time[when], 0
+        if self._last is None:
+            begun = np.ones(R * n, bool) if alive is None else alive[0]
+            self._state = {"begun": begun, "until": np.full(R * n, t[0]), "end": self._time[-1]}
+            self._state |= self._metric.begin(x[0])
+            self._last, first = x[0], 1
+        if k > first:
+            step = np.diff(self._time[max(when.start - 1, 0) : when.stop])
+            ticks = Ticks(t[first:], step, self._last, x[first:], None if alive is None else alive[first:])
+            self._state |= self._metric.follow(self._state, ticks)
+            self._state["until"] = np.maximum(self._state["until"], ticks.of_living(ticks.t[:, None], 0.0).max(axis=0))
+        self._last = x[-1].copy()
+        self._place = (values.first, values.block, values.size, R)
+
+    def end(self, ends: Ends, replicates: int) -> None:
+
+        def in_order(values: np.ndarray) -> np.ndarray:
+            return values.reshape(-1, replicates).T.ravel()
+
+        self._state["ended"] = in_order(np.where(ends.status != 0, ends.time, np.inf))
+        self._state["failed"] = in_order(failed(ends.status))
+
+    def close(self) -> Part:
+        state = self._state
+        with np.errstate(invalid="ignore", divide="ignore"):
+            x = np.where(state["begun"], self._metric.finish(state), np.nan)
+        R = self._place[3]
+        return self._metric.gathered(x.reshape(R, 1, -1), state["failed"].reshape(R, -1), self._place, self._time)
+
+
+@dataclass(frozen=True, eq=False)
+class Metric(MemberStatistic):
+    """One number of each member over all ticks of a controller, then statistics of it. Abstract.
+
+    It takes the samples at every tick, whatever the run keeps; in a scene without a controller, at the times of samples. A
+    member that stops or fails has the number of its time under way, up to its last tick. Statistics leave out members that
+    failed, and those whose number is not finite; lw.statistics.MemberValues() has all of them.
+
+    Args:
+        of: what is tracked; see the classes derived from it.
+        then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5,
+            0.99)), lw.statistics.MemberValues().
+        measured: whether the actual number is what sensors measure, in place of the truth; by default False.
+    """
+
+    of_numbers: ClassVar[bool] = False
+    ticks: ClassVar[bool] = True
+    # The unit of the number, with {0} for that of what it is of.
+    form: ClassVar[str] = "{0}"
+
+    stopped: str = "left_out"
+    measured: bool = False
+
+    def check(self, faults: Faults) -> None:
+        super().check(faults)
+        if not among(self.stopped, ("left_out",)):
+            faults.add("stopped", self.stopped, "has no meaning for a metric", "leave it out")
+
+    def begin(self, x: np.ndarray) -> State:
+        """Return the state after the first tick, of its numbers (d, n)."""
+        return {}
+
+    def follow(self, state: State, ticks: Ticks) -> State:
+        """Return what changes of the state by some more ticks."""
+        return {}
+
+    def finish(self, state: State) -> np.ndarray:
+        """Return the members' numbers (n,) from the state after the last tick.
+
+        It also has "until" (n,) [s], each member's last tick under way, "ended" (n,) [s], when it stopped or failed, else
+        infinite, "failed" (n,), and "end" [s], that of the run.
+        """
+        raise TypeError(f"{type(self).__name__} is abstract")
+
+    def gathered(self, x: np.ndarray, lost: np.ndarray, place: tuple[int, int, int, int], time: np.ndarray) -> Part:
+        """Return the part of a block: the parts of all statistics of `then`, of the numbers (replicates, 1, members).
+
+        place: first member, block, its size, and number of replicates.
+        """
+        surviving = Values(x, ~lost, *place)
+        return numbered(
+            statistic.rows_of(x, place[3])
+            if isinstance(statistic, MemberValues)
+            else part_of(statistic, surviving, time)
+            for statistic in self.then_of(time)
+        )
+
+    def then_of(self, time: np.ndarray) -> tuple[Statistic, ...]:
+        return tuple(replace(statistic, stopped="held") for statistic in super().then_of(time))
+
+    @property
+    def unit(self) -> str:
+        unit = self.quantity.unit
+        return self.form.format(unit) if unit != "1" else self.form.format("").strip() or "1"
+
+    @property
+    def key(self) -> str:
+        # The name of the number: "overshoot depth", or "effort" where what it is of needs no word.
+        return self.name or (self.type if self.of == self.default else f"{self.type} {self.quantity.name}")
+
+    @property
+    def _labels(self) -> tuple[str, ...]:
+        return (self.key,)
+
+    def open(self, time: np.ndarray, count: int) -> _Follow:
+        return _Follow(self, time)
+
+
+def accumulated(total: np.ndarray, ticks: Ticks, parts: np.ndarray) -> np.ndarray:
+    """Return a sum (n,) with parts (k, n) added tick by tick, so that its bits do not depend on how many come at once."""
+    total = total.copy()
+    for addend in ticks.of_living(parts, 0.0):
+        total += addend
+    return total

@@ -1,0 +1,292 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Times at which a condition first holds, and the curve of the probability to have passed by each time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, ClassVar
+
+import numpy as np
+
+from lgvi_warp.common.errors import Faults
+from lgvi_warp.statistics.base import Gatherer, together
+from lgvi_warp.statistics.counts import Condition, Counted, by_replicates
+from lgvi_warp.statistics.ends import STOPPED, Ends
+from lgvi_warp.statistics.estimates import intervals
+from lgvi_warp.statistics.estimates.estimate import Estimate, along
+from lgvi_warp.statistics.estimates.tree import Part
+from lgvi_warp.statistics.moments import estimate
+from lgvi_warp.statistics.values.values import Values
+
+# How intervals of probabilities by time are formed.
+DIRICHLET = "Wilson with the variance of the Dirichlet product"
+
+# Number of equal pieces of the time between two samples, in which passages are counted.
+PIECES = 8
+
+
+class _Passages(Gatherer):
+    """Follows a block, its members by replicate: the first sample that shows the condition, or the last known."""
+
+    def __init__(self, statistic: FirstPassage, time: np.ndarray, count: int):
+        self._statistic, self._time, self._times = statistic, time, len(time)
+        self._passed = np.full(count, len(time), np.int64)
+        # Fraction of the time from the sample before to the sample that shows the passage.
+        self._share = np.ones(count)
+        self._stopped = np.full(count, len(time), np.int64)
+        self._known = np.zeros(count, np.int64)
+        self._before: np.ndarray | None = None
+        self._replicates = 1
+
+    def take(self, values: Values, when: slice) -> None:
+        k = when.stop - when.start
+        self._replicates = values.replicates
+        x = values.x.reshape(k, -1)
+        holds = self._statistic.holds(values)[:, 0].reshape(k, -1)
+        first = np.where(holds.any(axis=0), when.start + holds.argmax(axis=0), self._times)
+        open_ = (self._passed == self._times) & (self._known == when.start)
+        if values.good is None:
+            self._known[open_] = when.stop
+        else:
+            # A member that is lost stays lost: its later samples are ignored.
+            lost = ~values.good.reshape(k, -1)
+            good = np.where(lost.any(axis=0), lost.argmax(axis=0), len(lost))
+            self._known = np.where(open_, when.start + good, self._known)
+            first = np.where(first < when.start + good, first, self._times)
+        self._passed = np.where(open_, first, self._passed)
+        self._place(x, when, np.flatnonzero(open_ & (first < self._times)))
+        self._before = x[-1]
+
+    def _place(self, x: np.ndarray, when: slice, now: np.ndarray) -> None:
+        """Set when, between the previous sample and this one, these members passed: linear between the two."""
+        above, below = self._statistic.limits(1)
+        if self._before is None or (above is None and below is None):
+            return
+        at = self._passed[now] - when.start
+        before = np.where(at > 0, x[at - 1, now], self._before[now])
+        # A band is entered over its nearer end.
+        limit = below if above is None else above if below is None else np.where(before <= above, above, below)
+        limit = np.asarray(limit).ravel()
+        self._share[now] = (limit - before) / (x[at, now] - before)
+
+    def end(self, ends: Ends, replicates: int) -> None:
+        """Correct passages of stopped members, whose last state came before the second sample; the others never pass."""
+        end = ends.time.reshape(-1, replicates).T.ravel()
+        stopped = ends.are(STOPPED).reshape(-1, replicates).T.ravel()
+        never = stopped & (self._passed == self._times) & (self._known == self._times)
+        self._stopped[never] = np.searchsorted(self._time, end[never])
+        now = np.flatnonzero((self._passed > 0) & (self._passed < self._times) & stopped)
+        before, at = self._time[self._passed[now] - 1], self._time[self._passed[now]]
+        self._share[now] *= np.clip((end[now] - before) / (at - before), 0.0, 1.0)
+
+    def close(self) -> Part:
+        R, length = self._replicates, self._times + 1
+        row = np.repeat(np.arange(R), len(self._passed) // R) * length
+        piece = np.clip(np.floor(self._share * PIECES), 0, PIECES - 1).astype(np.int64)
+        passed = np.bincount((row + self._passed) * PIECES + piece, minlength=R * length * PIECES)
+        stopped = self._stopped < self._times
+        open_ = (self._passed == self._times) & ~stopped
+        lost, over = (np.bincount((row + at)[which], minlength=R * length).reshape(R, length)
+                      for at, which in ((self._known, open_), (self._stopped, stopped)))  # fmt: skip
+        return {"passed": passed.reshape(R, length, PIECES), "lost": lost, "stopped": over}
+
+
+@dataclass(frozen=True, eq=False)
+class FirstPassage(Condition, Counted):
+    """Time until a condition first holds, as the samples show it.
+
+    The probability is Aalen & Johansen's estimate. A member that an event stopped in a state in which the condition does
+    not hold never passes; with stopped="left_out" it is taken for lost, as if it would have passed like the others. A
+    member that fails before it passes counts until its last good sample; NaN where no member is known at any time. If
+    none fails, the probability is the fraction of all members. Interval: Wilson's with the number of members whose
+    fraction has the variance of a beta product (Fay, Brittain & Proschan 2013), which accounts for few members at risk;
+    its upper end reaches up to what is not known where none is.
+
+    A member passes between the sample before and the sample that shows it, where the line between the two crosses the
+    limit; a quantity without a limit, which is true or false, passes at the sample that shows it. A passage that comes
+    and goes between two samples is not seen (an event of the scene looks at every step).
+
+    Arrays of the estimate, beside lower and upper:
+
+    * value (k,): probability to have passed by each time; survival is 1 - value.
+    * passed (k,): number of members that pass at each time.
+    * lost (k,): number of members that failed before each time without having passed.
+    * stopped (k,): number of members that an event stopped at each time, or since the one before, without having passed.
+    * count (k,): number of members at risk of passing at each time.
+    * censored: number of members that were under way to the end and did not pass.
+    * passage_time (levels,) [s]: time by which that fraction has passed, infinite if it never has; passage_time_lower,
+      passage_time_upper from the interval of value.
+
+    Args:
+        of: a quantity of one component; see `Statistic`, also for name, confidence and stopped.
+        above: the lower limit, in the quantity's unit.
+        below: the upper limit; with both, the quantity lies between them.
+        levels: fractions of members between 0 and 1; by default (0.05, 0.5, 0.95).
+    """
+
+    type: ClassVar[str] = "first_passage"
+    since: ClassVar[frozenset[str]] = frozenset({"stopped"})
+    of_numbers: ClassVar[bool] = False
+
+    levels: Any = (0.05, 0.5, 0.95)
+
+    def check(self, faults: Faults) -> None:
+        super().check(faults)
+        check_levels(faults, self.levels)
+        if self.of is not None and getattr(self, "_quantity", None) is not None and self.quantity.size != 1:
+            faults.add("of", self.of, f"has {self.quantity.size} components", f"give one: {self.quantity.labels[0]!r}")
+
+    def open(self, time: np.ndarray, count: int) -> _Passages:
+        return _Passages(self, time, count)
+
+    def read(self, part: Part, time: np.ndarray) -> Estimate:
+        # The estimate of Aalen & Johansen (1978).
+        curve = PassageCurve.of(part)
+        lower, upper = curve.ends(*intervals.wilson(curve.value, curve.members, self.confidence))
+        passed, lost, stopped = part["passed"][0, :-1].sum(axis=1), part["lost"][0], part["stopped"][0, :-1]
+        arrays = {"value": curve.value[:, -1], "lower": lower[:, -1], "upper": upper[:, -1]}
+        arrays |= {"survival": 1.0 - curve.value[:, -1], "passed": passed, "lost": lost[:-1], "stopped": stopped}
+        arrays |= {"count": curve.risk}
+        dims = along(arrays, "time")
+        arrays |= {"censored": lost[-1]}
+        dims["censored"] = ()
+        levels = {"level": np.asarray(self.levels, dtype=np.float64)}
+        text = DIRICHLET
+        arrays |= (times := self._times(curve.value, lower, upper, time))
+        return estimate(self, text, dims | along(times, "level"), arrays, time, levels, "1", labels=())
+
+    def estimates_of_replicates(self, parts: Sequence[Part], time: np.ndarray, replicates: int) -> list[Estimate]:
+        # Probabilities with intervals from the spread of the replicates' curves.
+        each = self.each_replicate(parts, replicates)
+        overall = self.whole(together(each))
+        curve = PassageCurve.of(overall)
+        curves = np.stack([PassageCurve.of(self.whole(replicate_parts)).value for replicate_parts in each])
+        ends = curve.ends(*intervals.probability_of_replicates(curve.value, curves, curve.members, self.confidence))
+        arrays = {"lower": ends[0][:, -1], "upper": ends[1][:, -1]} | self._times(curve.value, *ends, time)
+        return [self.read(overall, time).with_interval(by_replicates(replicates), arrays)]
+
+    def _times(self, value: np.ndarray, lower: np.ndarray, upper: np.ndarray, time: np.ndarray) -> Part:
+        """Times at which the curves (k, pieces) reach each level."""
+        curves = {"passage_time": value, "passage_time_lower": upper, "passage_time_upper": lower}
+        reached = partial(self._reached, time=time)
+        return {name: np.array([reached(curve, level) for level in self.levels]) for name, curve in curves.items()}
+
+    def _reached(self, curve: np.ndarray, level: float, time: np.ndarray) -> float:
+        """Time [s] at which a rising curve reaches a level: linear within a piece; without limits a sample time."""
+        if np.isnan(curve).all():
+            return np.nan
+        reached = np.flatnonzero(curve.ravel() >= level)
+        if not len(reached):
+            return np.inf
+        i, piece = divmod(int(reached[0]), PIECES)
+        if i == 0 or (self.above is None and self.below is None):
+            return float(time[i])
+        low, high = curve.ravel()[reached[0] - 1], curve[i, piece]
+        return float(time[i - 1] + (time[i] - time[i - 1]) * (piece + (level - low) / (high - low)) / PIECES)
+
+
+def check_levels(faults: Faults, levels: Any) -> None:
+    """Note a fault if levels are no fractions between 0 and 1."""
+    numbers = faults.finite("levels", levels)
+    if numbers is not None and (numbers.ndim != 1 or np.any(numbers <= 0.0) or np.any(numbers >= 1.0)):
+        faults.add("levels", levels, "are no numbers between 0 and 1", "give (0.05, 0.5, 0.95)")
+
+
+class PassageCurve:
+    """Probability to have passed, by Aalen & Johansen (1978), at the end of each piece of the times before the samples.
+
+    A member that ends otherwise passes no more; if none does, this is Kaplan & Meier's curve (1958). A member that is lost
+    is known up to the sample before, and is at risk in no later piece.
+
+    passed: (k, pieces), number of members that pass in each piece.
+    others: (k, pieces), number of members that end otherwise in each piece.
+    lost: (k,), number of members that are lost before each time.
+
+    Attributes:
+        value: (k, pieces), estimated probability to have passed; the fraction of all members as long as none is lost.
+        risk: (k,), number of members at risk of passing at each sample time.
+        left: (k, pieces), number of members still at risk at the end of each piece.
+        members: (k, pieces), number of independent members that would give the same variance.
+    """
+
+    @classmethod
+    def of(cls, part: Part) -> PassageCurve:
+        """Return the curve of first passages."""
+        passed = part["passed"][0, :-1]
+        others = np.zeros_like(passed)
+        # They stop within the time before a sample: the last of its pieces counts them.
+        others[:, -1] = part["stopped"][0, :-1]
+        return cls(passed, others, part["lost"][0, :-1], int(part["passed"][0].sum()))
+
+    def __init__(self, passed: np.ndarray, others: np.ndarray, lost: np.ndarray, total: int):
+        now, so_far = (np.cumsum(counts, axis=1) for counts in (passed, passed + others))
+        self.risk = total - np.cumsum(lost) - _before(so_far[:, -1])
+        n = self.risk[:, None]
+        self.left = n - so_far
+        stay = 1.0 - so_far / np.maximum(n, 1)
+        under_way = np.concatenate([[1.0], np.cumprod(stay[:, -1])[:-1]])[:, None]
+        # As long as none is lost, the sum is the fraction of all members, but for round-off.
+        none_lost = np.cumsum(lost)[:, None] == 0
+        fraction, value = _added(passed) / max(total, 1), _added(under_way * passed / np.maximum(n, 1))
+        self.value = np.where(self.risk[0] > 0, np.where(none_lost, fraction, value), np.nan)
+        self.members = np.where(none_lost, float(total), self._members(n, now, so_far))
+        self._otherwise = np.maximum(1.0 - under_way * stay - self.value, 0.0)
+
+    @staticmethod
+    def _members(n: np.ndarray, now: np.ndarray, so_far: np.ndarray) -> np.ndarray:
+        """Number of members whose fraction has the variance of a sum over Dirichlet variables, one for each time.
+
+        Where x of n members pass and o end otherwise, the shares of those that pass, end otherwise and stay are
+        Dirichlet(x, o, n - x - o + 1), and of the last ones Beta(1/2, staying + 1/2) pass. If none ends otherwise, this is
+        between the two beta products of Fay, Brittain & Proschan (2013, Biostatistics 14), as Jeffreys' interval is between
+        Clopper & Pearson's limits; if none is lost, it is Jeffreys' Beta(m + 1/2, n - m + 1/2), and the number is that of
+        all members. Where few are at risk the variance of Greenwood's kind is far too small.
+
+        n: (k, 1), members at risk at each time.
+        now: (k, pieces), members that passed since the time before.
+        so_far: (k, pieces), members that passed or ended otherwise since the time before.
+        """
+        # Means, variances and covariance of S, the probability to be under way, and of F, to have passed.
+        size = n + 1.0
+        q, p = now / size, (size - so_far) / size
+        var_q, cov, var_p = (c / (size + 1.0) for c in (q * (1.0 - q), -q * p, p * (1.0 - p)))
+        spread = np.log1p(var_p / (p * p))
+        S = np.concatenate([[1.0], np.cumprod(p[:, -1])[:-1]])[:, None]
+        var_S = S * S * np.expm1(_before(spread[:, -1]))[:, None]
+        S2 = var_S + S * S
+        cov_step = S2 * cov + var_S * q * p
+        cov_FS = S * _before((cov_step / (S * p))[:, -1])[:, None]
+        var_step = 2.0 * cov_FS * q + S2 * var_q + var_S * q * q
+        # At the end of each piece.
+        F, var_F = (_before(step[:, -1])[:, None] + step for step in (S * q, var_step))
+        cov_FS, S2 = cov_FS * p + cov_step, S2 * (p * p + var_p)
+        S, var_S = S * p, var_S * p * p + (var_S + S * S) * var_p
+        # The last step, of those that stay.
+        staying = n - so_far
+        r = 0.5 / (staying + 1.0)
+        var_F = var_F + 2.0 * cov_FS * r + S2 * r * (1.0 - r) / (staying + 2.0) + var_S * r * r
+        F = F + S * r
+        # For a Beta(a, b) mean (1 - mean) / variance is a + b + 1, which is the number of members plus two.
+        return np.asarray(np.maximum(F * (1.0 - F) / var_F - 2.0, 0.0))
+
+    def ends(self, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return an interval (k, pieces) that contains the value, widened where nothing is known.
+
+        After the last member at risk all that were lost may pass at once; without any member the interval is 0 to 1.
+        """
+        nobody = not self.risk[0]
+        most = np.minimum(1.0, 1.0 - self._otherwise + (upper - self.value))
+        upper = np.where(nobody, 1.0, np.where(self.left <= 0, most, upper))
+        return np.fmin(np.where(nobody, 0.0, lower), self.value), np.fmax(upper, self.value)
+
+
+def _added(steps: np.ndarray) -> np.ndarray:
+    """Sum of all steps (k, pieces) up to the end of each piece."""
+    return np.asarray(_before(steps.sum(axis=1))[:, None] + np.cumsum(steps, axis=1))
+
+
+def _before(steps: np.ndarray) -> np.ndarray:
+    """Sum of the steps (k,) before each time."""
+    return np.concatenate([np.zeros(1, steps.dtype), np.cumsum(steps)[:-1]])

@@ -17,8 +17,7 @@ from lgvi_warp.physics.terms.base import Packed
 def put(target: np.ndarray, column: Any) -> None:
     """Write one number of each member into lanes; lanes beyond the last member get the last member's.
 
-    target: (packets, width), or (1, width) for a number that members share; written in place.
-    column: a number, or an array (1,) or (m,).
+    target: (packets, width), or (1, width) for a number that members share. column: a number, or an array (1,) or (m,).
     """
     if np.ndim(column) == 0 or len(column) == 1:
         target[...] = column
@@ -31,11 +30,7 @@ def put(target: np.ndarray, column: Any) -> None:
 
 
 def put_rows(target: np.ndarray, rows: np.ndarray) -> None:
-    """Write rows of members into lanes; lanes beyond the last member get the last member's.
-
-    target: (packets or 1, d, width), written in place.
-    rows: (1 or m, d).
-    """
+    """Write rows (1 or m, d) of members into lanes (packets or 1, d, width); those beyond the last member get its rows."""
     packets, d, width = target.shape
     if len(rows) == 1:
         target[...] = rows[:, :, None]
@@ -48,9 +43,8 @@ def put_rows(target: np.ndarray, rows: np.ndarray) -> None:
 
 
 def fill(target: np.ndarray, value: Any) -> None:
-    """Write the numbers of members into a field of a structured array.
+    """Write the numbers of members into a field (packets or 1,) of a structured array.
 
-    target: (packets or 1,), the field; written in place.
     value: a number, whole numbers (m,), numbers (1 or m,), vectors (1 or m, 3), matrices (1 or m, 3, 3), a pair of diagonal
         and off-diagonal of symmetric matrices, or a mapping of these by name.
     """
@@ -83,9 +77,7 @@ def longest(value: Any) -> int:
 class Structs:
     """A Warp array of structs whose fields are written through NumPy, those that all members share only once.
 
-    Attributes:
-        array: the Warp array, of one struct, or of one a packet where a number varies; None before `write`.
-        view: the same memory in NumPy.
+    array: of one struct, or of one a packet where a number varies; None before `write`. view: the same memory in NumPy.
     """
 
     def __init__(self, struct: Any, dtype: np.dtype):
@@ -130,12 +122,7 @@ def _at(target: np.ndarray, path: tuple[str, ...]) -> np.ndarray:
 
 
 class Lanes:
-    """A Warp array of lanes, or of single numbers, rows of them a packet, written through NumPy.
-
-    Attributes:
-        array: the Warp array, (packets, rows).
-        view: the same memory, (packets, rows, width), or (packets, rows, 1) of numbers.
-    """
+    """A Warp array (packets, rows) of lanes, or of single numbers, written through its view (packets, rows, width or 1)."""
 
     def __init__(self, packets: int, rows: int, Lane: Any):
         self.array: Any = wp.zeros((packets, rows), dtype=Lane, device="cpu")
@@ -148,12 +135,7 @@ FIELDS = ("own", "bounds")
 
 
 class Group(NamedTuple):
-    """What several terms packed: those of one of the kernel's structs, which nests their numbers.
-
-    Attributes:
-        packed: what each term packed.
-        shared: for each, whether all members share it, and earlier calls brought the same.
-    """
+    """What each of several terms packed, and whether all members share it, and earlier calls brought the same."""
 
     packed: Sequence[Packed]
     shared: Sequence[bool]
@@ -162,15 +144,10 @@ class Group(NamedTuple):
 class LawArrays:
     """The numbers of a kernel's laws: their structs, their rows of a table, and what they remember.
 
-    kinds: for each group of laws, such as the terms, a controller's parts, and the events, Warp's struct of its numbers and
-        the struct's NumPy type.
-
-    Attributes:
-        structs: the structs of each group.
-        table: rows that the laws read.
-        memory: what laws and method remember from step to step; the second half is a backup.
-        places: where in table and memory each law's rows lie, and how many there are; None before `write`.
-        remembered: rows of the memory that each law has, without scratch rows.
+    kinds: for each group of laws (terms, a controller's parts, events) Warp's struct of its numbers, and its NumPy type.
+    memory: what laws and method remember from step to step; the second half is a backup.
+    places: where in table and memory each law's rows lie, and how many there are; None before `write`.
+    remembered: rows of the memory that each law has, without scratch rows.
     """
 
     table: Lanes

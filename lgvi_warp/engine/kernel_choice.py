@@ -27,49 +27,27 @@ from lgvi_warp.scene.slices import over_members
 
 @dataclass(frozen=True)
 class KernelChoice:
-    """What the kernel of a run must contain.
+    """What the kernel of a run must contain."""
 
-    Attributes:
-        aligned: whether the kernel's axes are the user's but for order and sense (see `PackingContext`).
-        moved: whether the state's origin differs from the user's.
-        laws: terms with the modules of their device code; drag by its exact flow comes first.
-        events: events with the modules of their device code.
-        mass: shape of the mass matrix: "isotropic", "diagonal" or "full".
-        drag: parts of drag that are treated by its exact flow; empty for none.
-        flow: how the water moves: "none", "steady", "uniform" or "varying".
-        parts: what the inertia holds besides mass and moments of inertia.
-        coupling: (6,), which of U12, U13, U23 and of the three pitches some member has.
-        timed: whether a law or an event depends on the time.
-        memory: whether a law or the method remembers numbers from step to step.
-        program: sub-maps of one stage, as (letter, coefficient).
-        lead: sub-map that opens a step and merges with the end of the previous one; None for none.
-        averages: alpha and beta of equations (15) and (16); None for conservative sub-maps.
-        conservative: whether no force creates energy and the kernel knows the potential of every force.
-        steady: whether forces are constant in inertial axes.
-        odd: what the user should know about the members' numbers.
-        controller: the scene's controller, as it is for these members; None for none.
-        parts_of_control: its parts with the modules of their device code, in the order in which they act.
-    """
-
-    aligned: bool
-    moved: bool
-    laws: tuple[tuple[Term, Any], ...]
-    events: tuple[tuple[Any, Any], ...]
-    mass: str
-    drag: tuple[str, ...]
-    flow: str
-    parts: tuple[str, ...]
-    coupling: tuple[bool, ...]
-    timed: bool
-    memory: bool
-    program: Program
-    lead: tuple[str, float] | None
-    averages: tuple[float, float] | None
-    conservative: bool
-    steady: bool
-    odd: Oddities
-    controller: Controller | None = None
-    parts_of_control: tuple[tuple[Part, Any], ...] = ()
+    aligned: bool  # the kernel's axes are the user's but for order and sense (see `PackingContext`)
+    moved: bool  # the state's origin differs from the user's
+    laws: tuple[tuple[Term, Any], ...]  # with their device code; drag by its exact flow comes first
+    events: tuple[tuple[Any, Any], ...]  # with their device code
+    mass: str  # shape of the mass matrix, one of SHAPES_OF_MASS
+    drag: tuple[str, ...]  # parts of drag that are treated by its exact flow
+    flow: str  # how the water moves, one of FLOWS
+    parts: tuple[str, ...]  # what the inertia holds besides mass and moments of inertia
+    coupling: tuple[bool, ...]  # (6,), which of U12, U13, U23 and of the three pitches some member has
+    timed: bool  # a law or an event depends on the time
+    memory: bool  # a law or the method remembers numbers from step to step
+    program: Program  # sub-maps of one stage, as (letter, coefficient)
+    lead: tuple[str, float] | None  # sub-map that opens a step and merges with the end of the previous one
+    averages: tuple[float, float] | None  # alpha and beta of equations (15) and (16); None for conservative sub-maps
+    conservative: bool  # no force creates energy and the kernel knows the potential of every force
+    steady: bool  # forces are constant in inertial axes
+    odd: Oddities  # what the user should know about the members' numbers
+    controller: Controller | None = None  # as it is for these members
+    parts_of_control: tuple[tuple[Part, Any], ...] = ()  # with their device code, as they act
 
     @property
     def has_callback(self) -> bool:
@@ -209,10 +187,7 @@ MOST_BACKWARD_DRAG = 0.5
 
 
 def check_backward_drag(ensemble: Ensemble, choice: KernelChoice, method: Method, h: float) -> None:
-    """Refuse drag that is too strong for a composition's backward stages, judged by the members' starts.
-
-    h: step [s].
-    """
+    """Refuse drag too strong for the backward stages of a composition with steps h [s], judged by the members' starts."""
     back = -h * min(0.0, *method.stages)
     if back == 0.0 or not choice.drag:
         return
@@ -240,10 +215,7 @@ suitable: set[tuple[type, str]] = set()
 
 
 def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) -> Any:
-    """The module of a term's device code, checked for what a kernel needs of it.
-
-    built_in: (folder, name) -> module of built-in device code, None where there is none.
-    """
+    """The module of a term's device code, checked for what a kernel needs of it; built_in: as of `choose_kernel`."""
     folder, roles = _folder_and_roles(term)
     page = f"see docs/develop/add_a_{'controller' if isinstance(term, Part) else 'force'}.md"
     module = built_in(folder, device) if isinstance(device, str) else device
@@ -285,10 +257,9 @@ def is_built_in(module: Any) -> bool:
 
 
 def declared(term: Term, module: Any) -> tuple[tuple[str, Any], ...]:
-    """The fields of the device struct of a term that do not follow from its module.
+    """The fields (name, kind) of a term's device struct that do not follow from its module.
 
-    Returns: (name, kind) of each number, unless the module defines `params`, and of a noisy term's key (see
-        lgvi_kernels.maps.compose).
+    Its numbers, unless the module defines `params`, and a noisy term's key (see lgvi_kernels.maps.compose).
     """
     numbers = (getattr(module, "params", None) is None and term.lanes()) or ()
     if term.driver is not None:

@@ -35,10 +35,8 @@ Plan = Any
 class Packing:
     """What the kernel needs of some members, in its frame and its units.
 
-    Attributes:
-        frame: axes and origins that the kernel works in.
-        U: (1 or m, 3, 3), matrix of the turns of psi_x; zero for other methods.
-        scale: (1 or m,) [kg m^2], number that momenta are divided by in the kernel; 1 for methods that need none.
+    U: (1 or m, 3, 3), matrix of the turns of psi_x; zero for other methods.
+    scale: (1 or m,) [kg m^2], what momenta are divided by in the kernel; 1 for methods that need none.
     """
 
     def __init__(self, plan: Plan, members: Members):
@@ -155,10 +153,7 @@ class Packing:
         return 2 * len(spec.gauss[1]) * SLOPE_FIELDS if spec.gauss else 0
 
     def state(self, rows: np.ndarray) -> None:
-        """Write the members' states.
-
-        rows: (m, fields of a state), written in place.
-        """
+        """Write the members' states into rows (m, fields of a state)."""
         m, frame, spec = self.members, self.frame, self.plan.spec
         attitude, velocity, rate = (_once(x) for x in (m.attitude, m.velocity, m.angular_velocity))
         turned, shifted = self.numbers[AXES][0].turned, self.numbers[AXES][0].shifted
@@ -267,10 +262,6 @@ def _shear(numbers: Any, frame: Frame, full: bool, lever: bool) -> Fields:
 
 
 def symmetric(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The entries of symmetric matrices as the kernel takes them.
-
-    matrix: (n, 3, 3).
-    Returns: Diagonal (n, 3), and off-diagonal entries 23, 31, 12 (n, 3).
-    """
+    """Symmetric matrices (n, 3, 3) as the kernel takes them: diagonal (n, 3), and entries 23, 31, 12 (n, 3)."""
     off = np.stack([matrix[:, 1, 2], matrix[:, 2, 0], matrix[:, 0, 1]], axis=1)
     return np.einsum("nii->ni", matrix), off

@@ -36,10 +36,7 @@ COUPLINGS = ((0, 1), (0, 2), (1, 2), (0, 0), (1, 1), (2, 2))
 
 
 def shape_of_mass(M: np.ndarray) -> str:
-    """The simplest shape that fits every mass matrix.
-
-    M: (n, 3, 3) [kg], mass matrices.
-    """
+    """The simplest shape that fits every mass matrix (n, 3, 3) [kg]."""
     off, diagonal = notation.off_diagonal(M), np.einsum("nii->ni", M)
     if off.any() and (np.abs(off).max(axis=1) > DIAGONAL * np.abs(diagonal).max(axis=1)).any():
         return "full"
@@ -49,8 +46,8 @@ def shape_of_mass(M: np.ndarray) -> str:
 def frame_of(method: Method, parameters: Parameters) -> tuple[Frame, np.ndarray, np.ndarray]:
     """The axes and origins that a method works in.
 
-    Returns: (frame, U, coupling): the frame; U (n, 3, 3) of the turns of psi_x, zero for other methods; and the coupling norm
-        (n,) that is left in this frame and that the method cannot treat.
+    Returns: (frame, U, coupling): U (n, 3, 3) of the turns of psi_x, zero for other methods; and the coupling norm (n,)
+        that is left in this frame and that the method cannot treat.
     """
     return _frame_of(method, vehicle.inertia_blocks(parameters))
 
@@ -78,49 +75,27 @@ def _explicit_frame(body: inertia.Blocks) -> Frame:
 
 @dataclass(frozen=True)
 class Survey:
-    """What holds for at least one member, and the largest values.
+    """What holds for at least one member, and the largest values."""
 
-    Attributes:
-        turned: axes other than the user's, or forces about another origin (see `PackingContext.aligned`).
-        bent: drag acts and has no exact flow along the kernel's axes.
-        mass: rank of the mass matrix among SHAPES_OF_MASS.
-        coupled: velocities and angular velocities are coupled.
-        moved: the origin of the state is not the user's.
-        forces_moved: the origin of the forces is not the user's.
-        apart: the two origins differ.
-        couplings: indices among COUPLINGS of the non-zero entries of U.
-        left: largest coupling norm that the method cannot treat.
-        felt: keys of the terms that act.
-        drag: parts of the exact flow of drag.
-        rising: keys of currents with a vertical velocity.
-        weightless: gravity is zero.
-        buoyant: buoyancy is not zero.
-        odd: what is odd about the members' numbers.
-        delayed: the commands of a controller are delayed.
-        features: what the device code of a controller's parts must have, as "key.feature".
-        turned_axes: axes other than the user's, even if only in their order or sense.
-        lever: the rigid body's centre is not at the user's origin, or added mass couples velocities and rates there.
-    """
-
-    turned: bool
-    bent: bool
-    mass: int
-    coupled: bool
-    moved: bool
-    forces_moved: bool
-    apart: bool
-    couplings: frozenset[int]
-    left: float
-    felt: frozenset[str]
-    drag: frozenset[str]
-    rising: frozenset[str]
-    weightless: bool
-    buoyant: bool
-    odd: Oddities
-    delayed: bool = False
-    turned_axes: bool = False
-    features: frozenset[str] = frozenset()
-    lever: bool = False
+    turned: bool  # axes other than the user's, or forces about another origin (see `PackingContext.aligned`)
+    bent: bool  # drag acts and has no exact flow along the kernel's axes
+    mass: int  # rank of the mass matrix among SHAPES_OF_MASS
+    coupled: bool  # velocities and angular velocities are coupled
+    moved: bool  # the origin of the state is not the user's
+    forces_moved: bool  # the origin of the forces is not the user's
+    apart: bool  # the two origins differ
+    couplings: frozenset[int]  # indices among COUPLINGS of the non-zero entries of U
+    left: float  # largest coupling norm that the method cannot treat
+    felt: frozenset[str]  # keys of the terms that act
+    drag: frozenset[str]  # parts of the exact flow of drag
+    rising: frozenset[str]  # keys of currents with a vertical velocity
+    weightless: bool  # gravity is zero
+    buoyant: bool  # buoyancy is not zero
+    odd: Oddities  # what is odd about the members' numbers
+    delayed: bool = False  # the commands of a controller are delayed
+    turned_axes: bool = False  # axes other than the user's, even if only in their order or sense
+    features: frozenset[str] = frozenset()  # what the device code of a controller's parts must have, as "key.feature"
+    lever: bool = False  # the dry body's centre is off the user's origin, or added mass couples there
 
     @property
     def decisive(self) -> tuple[Any, ...]:
@@ -145,10 +120,7 @@ def survey(
     odd: bool = True,
     most: int | None = None,
 ) -> Survey:
-    """Look at members, or at one alone where no number of the vehicle, the water or the laws varies.
-
-    most: number of the first members to look at; None (default) for all.
-    """
+    """Look at the first `most` members (None: all), or at one where no number of vehicle, water or laws varies."""
     known = SharedResultsCache({*ensemble.varied_names, MEMBERS}) if shared is None else shared
 
     def look(first: int, stop: int) -> Survey:
@@ -168,10 +140,7 @@ def survey_of(
 
 
 def framed(method: Method, parameters: Parameters, shared: SharedResultsCache) -> dict[str, Any]:
-    """Parameters with the frame that follows from them, under the name FRAME.
-
-    Returns: The parameters and, under FRAME, what `frame_of` returns; under AXES the same, but any mass matrix in it.
-    """
+    """Parameters with the frame of `frame_of` under the name FRAME, and under AXES the same but any mass matrix in it."""
     completed: dict[str, Any] | None = shared.completed(parameters)
     if completed is not None:
         return completed

@@ -128,8 +128,8 @@ def packed_numbers(term: Term, Params: np.dtype, pack: Callable[[], Any]) -> tup
         )
         return None, [Check("packed", 1.0, 0.0, False, f"{text}; {remedy}")]
     places = {"first": packed.rows is not None, "memory": packed.memory is not None, "work": packed.work}
-    own = Params["own"]
-    fields = (own["own"] if own.names == FIELDS else own).names
+    first_law = Params["own"]
+    fields = (first_law["own"] if first_law.names == FIELDS else first_law).names
     filled = set(packed.values) | {name for name, present in places.items() if present}
     wanted = set(fields or ()) - {"unused"}
     wrong = [f"{name} is not in packed().values" for name in sorted(wanted - filled)]

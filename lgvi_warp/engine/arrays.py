@@ -35,11 +35,11 @@ def put_rows(target: np.ndarray, rows: np.ndarray) -> None:
     if len(rows) == 1:
         target[...] = rows[:, :, None]
         return
-    whole = len(rows) // width
-    target[:whole] = rows[: whole * width].reshape(whole, width, d).transpose(0, 2, 1)
-    if whole < packets:
-        target[whole, :, : len(rows) - whole * width] = rows[whole * width :].T
-        target[whole, :, len(rows) - whole * width :] = rows[-1][:, None]
+    full_packets = len(rows) // width
+    target[:full_packets] = rows[: full_packets * width].reshape(full_packets, width, d).transpose(0, 2, 1)
+    if full_packets < packets:
+        target[full_packets, :, : len(rows) - full_packets * width] = rows[full_packets * width :].T
+        target[full_packets, :, len(rows) - full_packets * width :] = rows[-1][:, None]
 
 
 def fill(target: np.ndarray, value: Any) -> None:
@@ -170,11 +170,11 @@ class LawArrays:
         for law, part in zip(laws, rows, strict=True):
             work, end = memory + memory_rows(law) - law.work, memory + memory_rows(law)
             wanted = ("first", row, law.rows), ("memory", memory, law.memory), ("work", work, law.work or None)
-            own = {name: place for name, place, part in wanted if part is not None}
+            row_fields = {name: place for name, place, part in wanted if part is not None}
             # The table's first row is none's: it is 0, and what a law without rows reads.
             size = part.shape[1]
             ends = (row, row + size - 1) if size else (0, 0)
-            places.append((own, (*ends, memory, end - 1, bus)))
+            places.append((row_fields, (*ends, memory, end - 1, bus)))
             self.remembered.append(slice(memory, work))
             row, memory = row + size, end
         moved = self.places != (places, row, memory)
@@ -183,9 +183,11 @@ class LawArrays:
             for structs in self.structs:
                 structs.forget()
             self.places = places, row, memory
-        left = iter(places)
+        next_places = iter(places)
         for structs, bounded, group in zip(self.structs, self._bounded, groups, strict=True):
-            structs.write(self._packets, _nested(group, bounded, list(itertools.islice(left, len(group.packed)))))
+            structs.write(
+                self._packets, _nested(group, bounded, list(itertools.islice(next_places, len(group.packed))))
+            )
         self._write_table(rows, [known for group in groups for known in group.shared], row, moved)
         self._write_memory(starts, bus, memory + scratch, moved)
 
@@ -214,12 +216,12 @@ class LawArrays:
 
 def _bounded(dtype: np.dtype) -> list[tuple[str, ...]]:
     """Of each law of a struct, the names of the bounds that stand beside its numbers, in their order; none for none."""
-    found: list[tuple[str, ...]] = []
+    names: list[tuple[str, ...]] = []
     while "own" in (dtype.names or ()):
-        own = dtype["own"]
-        found.append((own["bounds"].names or ()) if own.names == FIELDS else ())
+        first_law = dtype["own"]
+        names.append((first_law["bounds"].names or ()) if first_law.names == FIELDS else ())
         dtype = dtype["rest"]
-    return found
+    return names
 
 
 def memory_rows(law: Packed) -> int:
@@ -240,9 +242,9 @@ def _nested(
     """
     parts: list[tuple[tuple[str, ...], Any, bool]] = []
     each = zip(group.packed, group.shared, bounded, places, strict=True)
-    for i, (packed, known, names, (own, bounds)) in enumerate(each):
+    for i, (packed, known, names, (row_fields, bounds)) in enumerate(each):
         path = (*("rest",) * i, "own")
-        parts.append((path + FIELDS[:1] * bool(names), {**packed.values, **own}, known))
+        parts.append((path + FIELDS[:1] * bool(names), {**packed.values, **row_fields}, known))
         if names:
             parts.append((path + FIELDS[1:], dict(zip(names, bounds, strict=True)), known))
     return parts

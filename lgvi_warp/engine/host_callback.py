@@ -88,11 +88,11 @@ def call_host(packets: Packets, t: float) -> None:
     members = packets.members.indices
     where = f"callback {callback.key!r} at t = {t:.9g} s, members {members[0]} to {members[-1]}"
     try:
-        given = callback.function(t, measured, wanted, members)
+        returned = callback.function(t, measured, wanted, members)
     except Exception as error:
         error.add_note(where)
         raise
-    values, shape = answered(where, given), (packets.members.count, controller.bus.rows - controller.bus.answer)
+    values, shape = answered(where, returned), (packets.members.count, controller.bus.rows - controller.bus.answer)
     if values.shape != shape:
         raise ValueError(f"{where}: returned shape {values.shape}; return {shape}, a row for each member")
     write_answer(packets, values)

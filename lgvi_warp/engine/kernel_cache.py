@@ -241,9 +241,9 @@ def seek_room(
     system: what tells of files, as the module os does.
     """
     if hasattr(system, "statvfs"):
-        left = system.statvfs(folder)
+        room = system.statvfs(folder)
         # A system that has no fixed number of files says 0.
-        if left.f_files and left.f_favail < ROOM_FILES:
+        if room.f_files and room.f_favail < ROOM_FILES:
             raise OSError(errno.ENOSPC, "No files left on device")
     with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
         try:

@@ -68,15 +68,12 @@ def choose_kernel(
     """
     explicit = method.tableau is not None
     controller = _controller(ensemble, facts)
-    acting_parts = _parts(controller, facts) if controller else ()
-    modules = (device_module(part, part.device_in(not facts.turned), built_in) for part in acting_parts)
-    control = tuple(zip(acting_parts, modules, strict=True))
-    # The host looks at states between launches, which must not be those in the middle of a lead.
-    asks_host = controller is not None and controller.callback is not None
+    parts = [part.with_features(facts.features) for part in controller.acting_parts] if controller else []
+    control = tuple((part, device_module(part, part.device_in(not facts.turned), built_in)) for part in parts)
     acting = _acting(ensemble, facts, built_in, controller)
     events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
     damping = any(hasattr(module, "damping") for term, module in acting if not term.exact_flow)
-    flow = max((getattr(module, "FLOW", "none") for _, module in acting), key=FLOWS.index, default="none")
+    flow = _flow(acting)
     drags = [term for term, _ in acting if term.exact_flow]
     others = [module for term, module in acting if not term.carries]
     forced = method.base in FORCED and not all(getattr(module, "POTENTIAL", False) for module in others)
@@ -96,22 +93,10 @@ def choose_kernel(
     _check(method, facts, dense=dense, flow=flow, memory=memory, acting=acting)
     mass, coupled = SHAPES_OF_MASS[facts.mass], facts.coupled
     program = FORCED[method.base] if forced else simplified(method.program, mass == "isotropic" and not coupled)
-    if not acting:
-        program = tuple((letter, coefficient) for letter, coefficient in program if letter != "K")
-    if method.turns and coupled:
-        program = with_hops(program)
-    if method.halved and (drag or flow != "none"):
-        program = divided(program)  # K with drag or water is symmetric but no flow: each half has its own
-    lead, maps = merged(program) if program else (None, ())
-    # A kick that is no flow must not be split between two steps, nor the state at which events are evaluated.
-    undone = all(getattr(module, "POTENTIAL", False) for _, module in acting)
-    if method.two_part:
-        # B merges with that of the next step exactly, A up to the order of the method.
-        lead, maps = method.program[0], method.program[1:]
-        if events or asks_host:
-            lead, maps = None, method.program
-    elif events or asks_host or (lead is not None and lead[0] == "K" and not undone):
-        lead, maps = None, program
+    # Events, and the host between launches, read states, which must not be those in the middle of a lead.
+    states_read = bool(events) or (controller is not None and controller.callback is not None)
+    halved = method.halved and (bool(drag) or flow != "none")
+    lead, maps = _merged_program(method, program, acting, coupled, halved, states_read)
     conservative = checked and _conservative(facts, acting)
     # Events, water and the potential are evaluated at the user's origin, or at that of the forces.
     elsewhere = controller is not None or bool(events) or flow != "none" or (conservative and facts.apart)
@@ -144,17 +129,36 @@ def choose_kernel(
     )
 
 
+def _merged_program(
+    method: Method, program: Program, acting: list[tuple[Term, Any]], coupled: bool, halved: bool, states_read: bool
+) -> tuple[tuple[str, float] | None, Program]:
+    """The sub-map that opens a step and merges with the end of the previous one, None for none, and those of a stage.
+
+    halved: K, with drag or water, is symmetric but no flow: each half has its own. states_read: those between two steps.
+    """
+    if method.two_part:
+        # B merges with that of the next step exactly, A up to the order of the method.
+        return (None, method.program) if states_read else (method.program[0], method.program[1:])
+    if not acting:
+        program = tuple((letter, coefficient) for letter, coefficient in program if letter != "K")
+    if method.turns and coupled:
+        program = with_hops(program)
+    if halved:
+        program = divided(program)
+    lead, maps = merged(program) if program else (None, ())
+    # A kick that is no flow must not be split between two steps, nor the state at which events are evaluated.
+    undone = all(getattr(module, "POTENTIAL", False) for _, module in acting)
+    if states_read or (lead is not None and lead[0] == "K" and not undone):
+        return None, program
+    return lead, maps
+
+
 def _controller(ensemble: Ensemble, facts: Survey) -> Controller | None:
     """The scene's controller, with a delay where some member has one."""
     controller: Controller | None = ensemble.scene.controller
     if controller is None or controller.bus is None:
         return None
     return controller.on(controller.bus._replace(delayed=facts.delayed))
-
-
-def _parts(controller: Controller, facts: Survey) -> tuple[Part, ...]:
-    """The parts of a controller as they act, each with what some member needs of its device code."""
-    return tuple(part.with_features(facts.features) for part in controller.acting_parts)
 
 
 def _steady(module: Any) -> bool:
@@ -301,9 +305,9 @@ def _acting(
     return [(term, module) for term, module in acting if term.key in facts.felt]
 
 
-def _flow(modules: list[Any]) -> str:
+def _flow(acting: list[tuple[Term, Any]]) -> str:
     """How the water moves: the most general FLOW of the laws."""
-    return max((getattr(module, "FLOW", "none") for module in modules), key=FLOWS.index, default="none")
+    return max((getattr(module, "FLOW", "none") for _, module in acting), key=FLOWS.index, default="none")
 
 
 def _check(
@@ -311,8 +315,8 @@ def _check(
 ) -> None:
     """Raise SceneError, with the reason, where the method cannot do what the scene asks."""
     faults = Faults()
-    if facts.left > UNCOUPLED:
-        k = f"coupling norm up to {facts.left:.3g} at the best origin"
+    if facts.residual_coupling > UNCOUPLED:
+        k = f"coupling norm up to {facts.residual_coupling:.3g} at the best origin"
         remedy = "use psi_x, psi_x8 or psi_w, which take any 6x6 inertia"
         faults.add("method", method.name, f"cannot advance an inertia that couples velocities and rates ({k})", remedy)
     composed = len(method.stages) > 1

@@ -311,8 +311,8 @@ class Packets:
         warning = np.uint16(Warnings.ORTHOGONALITY)
         over = size > orthogonality_limit(self.plan)
         first = over & (warning > bits)
-        made = np.where(self._status[: len(bits)] == 0, self._launched[1], self._failed_step[: len(bits)])
-        return bits | warning * over, np.where(first, made, step), np.where(first, size, value)
+        steps_made = np.where(self._status[: len(bits)] == 0, self._launched[1], self._failed_step[: len(bits)])
+        return bits | warning * over, np.where(first, steps_made, step), np.where(first, size, value)
 
 
 def columns_of(sizes: Mapping[str, int]) -> Any:

@@ -7,7 +7,7 @@ What all members share is computed and written once for a run; each block, or ca
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -126,23 +126,17 @@ class Packing:
 
     def control(self) -> list[Packed]:
         """The numbers of each part of the controller."""
-
-        def pack(part: Any, numbers: Any) -> Packed:
-            packed: Packed = part.packed(Ensemble.own(part, numbers), self._context(numbers))
-            return packed
-
-        each = enumerate(part for part, _ in self.plan.kernel_choice.parts_of_control)
-        return [self._shared(("part", i), functools.partial(pack, part)) for i, part in each]
+        return self._packed("part", (part for part, _ in self.plan.kernel_choice.parts_of_control))
 
     def events(self) -> list[Packed]:
         """The numbers of each event."""
+        return self._packed("event", (event for event, _ in self.plan.kernel_choice.events))
 
-        def pack(event: Any, numbers: Any) -> Packed:
-            packed: Packed = event.packed(Ensemble.own(event, numbers), self._context(numbers))
-            return packed
+    def _packed(self, kind: str, terms: Iterable[Term]) -> list[Packed]:
+        def pack(term: Term, numbers: Any) -> Packed:
+            return term.packed(Ensemble.own(term, numbers), self._context(numbers))
 
-        each = enumerate(event for event, _ in self.plan.kernel_choice.events)
-        return [self._shared(("event", i), functools.partial(pack, event)) for i, event in each]
+        return [self._shared((kind, i), functools.partial(pack, term)) for i, term in enumerate(terms)]
 
     def scratch(self, laws: Sequence[Packed], bus: int = 0) -> int:
         """Rows of the memory that the method keeps for itself."""

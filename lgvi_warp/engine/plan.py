@@ -82,8 +82,8 @@ class Plan:
     def _settings(self) -> dict[str, Any]:
         named = ("ensemble", "method", "grid", "fields", "dtype", "checks", "on_failure")
         of_ticks = {"ticks": self.launches.ticks, "read_at_ticks": self.layout.read_at_ticks}
-        own = {name: getattr(self, name) for name in named} | of_ticks
-        return own | {"width": self.spec.width, "survey_all": self.surveyed_all}
+        settings = {name: getattr(self, name) for name in named} | of_ticks
+        return settings | {"width": self.spec.width, "survey_all": self.surveyed_all}
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the settings alone: a kernel cannot be pickled, and the other process finds it in Warp's cache."""

@@ -85,7 +85,7 @@ class Survey:
     forces_moved: bool  # the origin of the forces is not the user's
     apart: bool  # the two origins differ
     couplings: frozenset[int]  # indices among COUPLINGS of the non-zero entries of U
-    left: float  # largest coupling norm that the method cannot treat
+    residual_coupling: float  # largest coupling norm that the method cannot treat
     felt: frozenset[str]  # keys of the terms that act
     drag: frozenset[str]  # parts of the exact flow of drag
     rising: frozenset[str]  # keys of currents with a vertical velocity
@@ -100,7 +100,7 @@ class Survey:
     @property
     def decisive(self) -> tuple[Any, ...]:
         """All that decides what a kernel must contain: surveys that agree in it lead to one kernel."""
-        facts = vars(self) | {"odd": None, "left": self.left > UNCOUPLED}
+        facts = vars(self) | {"odd": None, "residual_coupling": self.residual_coupling > UNCOUPLED}
         return tuple(facts.values())
 
     def covers(self, other: Survey) -> bool:
@@ -126,7 +126,7 @@ def survey(
     def look(first: int, stop: int) -> Survey:
         # Members that overflow get their status, or their fault, elsewhere: no warning from NumPy.
         with np.errstate(over="ignore", invalid="ignore"):
-            return _seen(ensemble.parameters(first, stop), ensemble, method, known, odd, first, stop)
+            return _survey_of_slice(ensemble.parameters(first, stop), ensemble, method, known, odd, first, stop)
 
     count = min(ensemble.members, most or ensemble.members) if ensemble.varied() else 1
     return functools.reduce(Survey.joined, over_members(look, count))
@@ -136,7 +136,7 @@ def survey_of(
     parameters: Parameters, ensemble: Ensemble, method: Method, shared: SharedResultsCache, block: Block
 ) -> Survey:
     """Look at the members of one block, whose parameters are drawn already."""
-    return _seen(parameters, ensemble, method, shared, False, block.first, block.stop)
+    return _survey_of_slice(parameters, ensemble, method, shared, False, block.first, block.stop)
 
 
 def framed(method: Method, parameters: Parameters, shared: SharedResultsCache) -> dict[str, Any]:
@@ -163,7 +163,7 @@ def framed(method: Method, parameters: Parameters, shared: SharedResultsCache) -
     return p
 
 
-def _seen(
+def _survey_of_slice(
     parameters: Parameters,
     ensemble: Ensemble,
     method: Method,
@@ -187,9 +187,9 @@ def _seen(
         return frozenset(term.parts(numbers_of(term, numbers)))
 
     def rises(term: Term, numbers: Any) -> bool:
-        own = numbers_of(term, numbers)
-        count = max(map(len, own.values()))
-        water = term.water(own, np.zeros((1, count, 3)), np.zeros(1), numbers)
+        term_numbers = numbers_of(term, numbers)
+        count = max(map(len, term_numbers.values()))
+        water = term.water(term_numbers, np.zeros((1, count, 3)), np.zeros(1), numbers)
         return water is not None and bool(np.any(water[..., 2]))
 
     def of_each(name: str, compute: Any, those: Iterable[Term]) -> dict[str, Any]:
@@ -229,5 +229,5 @@ def _facts(frame: Frame, U: np.ndarray, coupling: np.ndarray) -> dict[str, Any]:
         "forces_moved": bool(np.any(frame.forces)),
         "apart": bool(np.any(frame.origin != frame.forces)),
         "couplings": frozenset(i for i, at in enumerate(COUPLINGS) if np.any(U[:, *at])),
-        "left": float(coupling.max()),
+        "residual_coupling": float(coupling.max()),
     }

@@ -170,7 +170,7 @@ def watch_fields(until: Until, statistics: Sequence[Statistic]) -> tuple[str, ..
     return watch(Until(until.statistic, until.half_width), statistics, np.zeros(1)).statistic.quantity.fields
 
 
-def observe(fleet: Ensemble, given: Any = None, keep: Any = None, until: Any = None) -> Observation:
+def observe(fleet: Ensemble, statistics: Any = None, keep: Any = None, until: Any = None) -> Observation:
     """The observation that the arguments of solve describe; those that are None come from the scene's [run]."""
     faults, scene = Faults(), fleet.scene
     settings, events = scene.run, scene.events
@@ -178,7 +178,7 @@ def observe(fleet: Ensemble, given: Any = None, keep: Any = None, until: Any = N
     stop: Until | None = None
     keep = settings.keep if keep is None else keep
     with faults.including():
-        gathered = from_list(settings.statistics if given is None else given)
+        gathered = from_list(settings.statistics if statistics is None else statistics)
     known = outcomes([event.key for event in events], [event.status for event in events])
     for statistic in gathered:
         with faults.including():

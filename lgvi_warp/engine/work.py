@@ -39,10 +39,8 @@ Ends = Callable[[], tuple[np.ndarray, np.ndarray]]
 class Work:
     """What an executor does with each block: advance it, and write it to the store if there is one.
 
-    It can be pickled. Calling it with a block returns what each keeper closed with, or None if the block was halted. A
-    block that the store already holds is not run again. A copy in another process returns once its block is durable; in
-    the run's own process the run waits at its end for blocks that are not durable yet.
-
+    It can be pickled. Calling it with a block returns what each keeper closed with, or None if the block was halted; one that
+    the store holds is not run again. A copy in another process returns once its block is durable; the run waits for its own.
     What is wrong with a block's members is returned as an exception, which the run raises when that block's turn comes: with
     `until` it may end before, and how far threads are ahead must not matter.
     """

@@ -20,21 +20,13 @@ VARIED_NUMBERS = "packed() must give n entries where its numbers have n"
 
 
 class Check(NamedTuple):
-    """The result of one check.
+    """The result of one check."""
 
-    Attributes:
-        name: what was checked, such as "law: torque = -dU/dR".
-        worst: the worst deviation found, in the unit of what was checked.
-        allowed: the largest deviation allowed at that view, in the same unit.
-        ok: whether the check passed.
-        text: where it failed and the remedy, or a note; "" for none.
-    """
-
-    name: str
-    worst: float
-    allowed: float
+    name: str  # what was checked, such as "law: torque = -dU/dR"
+    worst: float  # the worst deviation found, in the unit of what was checked
+    allowed: float  # the largest deviation allowed at that view, in the same unit
     ok: bool
-    text: str
+    text: str  # where it failed and the remedy, or a note; "" for none
 
 
 @dataclass(frozen=True)

@@ -191,14 +191,14 @@ class LawArrays:
         self._write_table(rows, [known for group in groups for known in group.shared], row, moved)
         self._write_memory(starts, bus, memory + scratch, moved)
 
-    def _write_table(self, each: list[np.ndarray], shared: Sequence[bool], size: int, moved: bool) -> None:
+    def _write_table(self, rows_of_laws: list[np.ndarray], shared: Sequence[bool], size: int, moved: bool) -> None:
         """Write the laws' rows; the first row of the table is none's."""
-        count = self._packets if any(len(rows) > 1 for rows in each) else 1
+        count = self._packets if any(len(rows) > 1 for rows in rows_of_laws) else 1
         new = moved or len(self.table.view) != count
         if new:
             self.table = Lanes(count, size, self._Number)
         first = 1
-        for rows, known in zip(each, shared, strict=True):
+        for rows, known in zip(rows_of_laws, shared, strict=True):
             if new or not known:
                 put_rows(self.table.view[:, first : first + rows.shape[1]], rows)
             first += rows.shape[1]

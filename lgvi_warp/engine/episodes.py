@@ -126,11 +126,13 @@ class Episodes:
         last = self.steps // self.every
         return range(max(1, last + 1 - ticks) * self.every, self.steps + 1, self.every)
 
-    def _copy(self, source: list[np.ndarray], of: np.ndarray, target: list[np.ndarray], to: np.ndarray) -> None:
+    def _copy(
+        self, source: list[np.ndarray], source_lanes: np.ndarray, target: list[np.ndarray], target_lanes: np.ndarray
+    ) -> None:
         """Copy lanes with all that belongs to them."""
         width = self.plan.spec.width
-        p, i = np.divmod(of, width)
-        q, j = np.divmod(to, width)
+        p, i = np.divmod(source_lanes, width)
+        q, j = np.divmod(target_lanes, width)
         for old, new, varied in zip(source, target, self._varied, strict=True):
             if varied:
                 new[q, ..., j] = old[p, ..., i]

@@ -192,8 +192,8 @@ def _survey_of_slice(
         water = term.water(term_numbers, np.zeros((1, count, 3)), np.zeros(1), numbers)
         return water is not None and bool(np.any(water[..., 2]))
 
-    def of_each(name: str, compute: Any, those: Iterable[Term]) -> dict[str, Any]:
-        return {t.key: shared((name, t.key), p, functools.partial(compute, t)) for t in those}
+    def of_each(name: str, compute: Any, laws: Iterable[Term]) -> dict[str, Any]:
+        return {t.key: shared((name, t.key), p, functools.partial(compute, t)) for t in laws}
 
     felt = of_each("felt", is_felt, (*terms.IMPLIED, *scene.terms))
     drags = of_each("drag", parts, (term for term in scene.terms if term.exact_flow))

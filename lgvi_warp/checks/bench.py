@@ -135,9 +135,9 @@ class Device:
         self.laws.write([Group([packed], [False])], scratch, bus)
         self.out = wp.zeros((self.packets, fields), dtype=self.kernel.Lane, device="cpu")
 
-    def launch(self, *given: Any, repeats: int = 1) -> None:
+    def launch(self, *arguments: Any, repeats: int = 1) -> None:
         """Launch the kernel for all packets, some times over."""
-        inputs = [self.laws.structs[0].array, self.laws.table.array, *given, self.laws.memory.array, self.out]
+        inputs = [self.laws.structs[0].array, self.laws.table.array, *arguments, self.laws.memory.array, self.out]
         with build_lock:
             wp.launch(self.kernel.kernel, self.packets * repeats, inputs, device="cpu")
 

@@ -80,7 +80,7 @@ def check_law(
     packets = -(-whole_number("samples", samples, 1, MOST_SAMPLES) // register_width("float64"))
     bench = Bench(term, module, of_scene(scene), packets, whole_number("seed", seed, 0))
     checks: list[Check] = []
-    for examine in (_numbers, _finite, _whole, _potential, _damping, _flow, _follow):
+    for examine in (_numbers, _finite, _of_every_law, _potential, _damping, _flow, _follow):
         with np.errstate(all="ignore"):  # what is not finite is found by its check
             checks += examine(bench, step)
         if examine in (_numbers, _finite) and not all(check.ok for check in checks):
@@ -121,7 +121,7 @@ def _all_finite(name: str, values: dict[str, np.ndarray], views: Views) -> Check
     return finite(name, np.concatenate([*values.values()], axis=1), views)
 
 
-def _whole(bench: Bench, step: float) -> Iterator[Check]:
+def _of_every_law(bench: Bench, step: float) -> Iterator[Check]:
     """What holds for every law: blind to what it must not look at, lanes apart, varied as shared."""
     views, kind, here = bench.views, type(bench.term).__name__, bench.at(bench.views)
     faster = bench.at(replace(views, velocity=2.0 * views.velocity + 1.0, rate=1.0 - views.rate))

@@ -69,7 +69,7 @@ class RandomTicks:
         return np.stack([self.vector(group, name) for name in ("north", "east", "down")], axis=-2)
 
     def elsewhere(self) -> RandomTicks:
-        """The same looks at another true position, which only sensors before the part may know."""
+        """The same ticks at another true position, which only sensors before the part may know."""
         rows = self.rows.copy()
         rows[..., examine_part.TRUE_POSITION :] += 17.0
         return replace(self, rows=rows)

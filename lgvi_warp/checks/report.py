@@ -20,21 +20,13 @@ VARIED_NUMBERS = "packed() must give n entries where its numbers have n"
 
 
 class Check(NamedTuple):
-    """The result of one check.
+    """The result of one check."""
 
-    Attributes:
-        name: what was checked, such as "law: torque = -dU/dR".
-        worst: the worst deviation found, in the unit of what was checked.
-        allowed: the largest deviation allowed at that view, in the same unit.
-        ok: whether the check passed.
-        text: where it failed and the remedy, or a note; "" for none.
-    """
-
-    name: str
-    worst: float
-    allowed: float
+    name: str  # what was checked, such as "law: torque = -dU/dR"
+    worst: float  # the worst deviation found, in the unit of what was checked
+    allowed: float  # the largest deviation allowed at that view, in the same unit
     ok: bool
-    text: str
+    text: str  # where it failed and the remedy, or a note; "" for none
 
 
 @dataclass(frozen=True)
@@ -128,8 +120,8 @@ def packed_numbers(term: Term, Params: np.dtype, pack: Callable[[], Any]) -> tup
         )
         return None, [Check("packed", 1.0, 0.0, False, f"{text}; {remedy}")]
     places = {"first": packed.rows is not None, "memory": packed.memory is not None, "work": packed.work}
-    own = Params["own"]
-    fields = (own["own"] if own.names == FIELDS else own).names
+    first_law = Params["own"]
+    fields = (first_law["own"] if first_law.names == FIELDS else first_law).names
     filled = set(packed.values) | {name for name, present in places.items() if present}
     wanted = set(fields or ()) - {"unused"}
     wrong = [f"{name} is not in packed().values" for name in sorted(wanted - filled)]

@@ -17,8 +17,7 @@ from lgvi_warp.physics.terms.base import Packed
 def put(target: np.ndarray, column: Any) -> None:
     """Write one number of each member into lanes; lanes beyond the last member get the last member's.
 
-    target: (packets, width), or (1, width) for a number that members share; written in place.
-    column: a number, or an array (1,) or (m,).
+    target: (packets, width), or (1, width) for a number that members share. column: a number, or an array (1,) or (m,).
     """
     if np.ndim(column) == 0 or len(column) == 1:
         target[...] = column
@@ -31,26 +30,21 @@ def put(target: np.ndarray, column: Any) -> None:
 
 
 def put_rows(target: np.ndarray, rows: np.ndarray) -> None:
-    """Write rows of members into lanes; lanes beyond the last member get the last member's.
-
-    target: (packets or 1, d, width), written in place.
-    rows: (1 or m, d).
-    """
+    """Write rows (1 or m, d) of members into lanes (packets or 1, d, width); those beyond the last member get its rows."""
     packets, d, width = target.shape
     if len(rows) == 1:
         target[...] = rows[:, :, None]
         return
-    whole = len(rows) // width
-    target[:whole] = rows[: whole * width].reshape(whole, width, d).transpose(0, 2, 1)
-    if whole < packets:
-        target[whole, :, : len(rows) - whole * width] = rows[whole * width :].T
-        target[whole, :, len(rows) - whole * width :] = rows[-1][:, None]
+    full_packets = len(rows) // width
+    target[:full_packets] = rows[: full_packets * width].reshape(full_packets, width, d).transpose(0, 2, 1)
+    if full_packets < packets:
+        target[full_packets, :, : len(rows) - full_packets * width] = rows[full_packets * width :].T
+        target[full_packets, :, len(rows) - full_packets * width :] = rows[-1][:, None]
 
 
 def fill(target: np.ndarray, value: Any) -> None:
-    """Write the numbers of members into a field of a structured array.
+    """Write the numbers of members into a field (packets or 1,) of a structured array.
 
-    target: (packets or 1,), the field; written in place.
     value: a number, whole numbers (m,), numbers (1 or m,), vectors (1 or m, 3), matrices (1 or m, 3, 3), a pair of diagonal
         and off-diagonal of symmetric matrices, or a mapping of these by name.
     """
@@ -83,9 +77,7 @@ def longest(value: Any) -> int:
 class Structs:
     """A Warp array of structs whose fields are written through NumPy, those that all members share only once.
 
-    Attributes:
-        array: the Warp array, of one struct, or of one a packet where a number varies; None before `write`.
-        view: the same memory in NumPy.
+    array: of one struct, or of one a packet where a number varies; None before `write`. view: the same memory in NumPy.
     """
 
     def __init__(self, struct: Any, dtype: np.dtype):
@@ -130,12 +122,7 @@ def _at(target: np.ndarray, path: tuple[str, ...]) -> np.ndarray:
 
 
 class Lanes:
-    """A Warp array of lanes, or of single numbers, rows of them a packet, written through NumPy.
-
-    Attributes:
-        array: the Warp array, (packets, rows).
-        view: the same memory, (packets, rows, width), or (packets, rows, 1) of numbers.
-    """
+    """A Warp array (packets, rows) of lanes, or of single numbers, written through its view (packets, rows, width or 1)."""
 
     def __init__(self, packets: int, rows: int, Lane: Any):
         self.array: Any = wp.zeros((packets, rows), dtype=Lane, device="cpu")
@@ -148,12 +135,7 @@ FIELDS = ("own", "bounds")
 
 
 class Group(NamedTuple):
-    """What several terms packed: those of one of the kernel's structs, which nests their numbers.
-
-    Attributes:
-        packed: what each term packed.
-        shared: for each, whether all members share it, and earlier calls brought the same.
-    """
+    """What each of several terms packed, and whether all members share it, and earlier calls brought the same."""
 
     packed: Sequence[Packed]
     shared: Sequence[bool]
@@ -162,15 +144,10 @@ class Group(NamedTuple):
 class LawArrays:
     """The numbers of a kernel's laws: their structs, their rows of a table, and what they remember.
 
-    kinds: for each group of laws, such as the terms, a controller's parts, and the events, Warp's struct of its numbers and
-        the struct's NumPy type.
-
-    Attributes:
-        structs: the structs of each group.
-        table: rows that the laws read.
-        memory: what laws and method remember from step to step; the second half is a backup.
-        places: where in table and memory each law's rows lie, and how many there are; None before `write`.
-        remembered: rows of the memory that each law has, without scratch rows.
+    kinds: for each group of laws (terms, a controller's parts, events) Warp's struct of its numbers, and its NumPy type.
+    memory: what laws and method remember from step to step; the second half is a backup.
+    places: where in table and memory each law's rows lie, and how many there are; None before `write`.
+    remembered: rows of the memory that each law has, without scratch rows.
     """
 
     table: Lanes
@@ -193,11 +170,11 @@ class LawArrays:
         for law, part in zip(laws, rows, strict=True):
             work, end = memory + memory_rows(law) - law.work, memory + memory_rows(law)
             wanted = ("first", row, law.rows), ("memory", memory, law.memory), ("work", work, law.work or None)
-            own = {name: place for name, place, part in wanted if part is not None}
+            row_fields = {name: place for name, place, part in wanted if part is not None}
             # The table's first row is none's: it is 0, and what a law without rows reads.
             size = part.shape[1]
             ends = (row, row + size - 1) if size else (0, 0)
-            places.append((own, (*ends, memory, end - 1, bus)))
+            places.append((row_fields, (*ends, memory, end - 1, bus)))
             self.remembered.append(slice(memory, work))
             row, memory = row + size, end
         moved = self.places != (places, row, memory)
@@ -206,20 +183,22 @@ class LawArrays:
             for structs in self.structs:
                 structs.forget()
             self.places = places, row, memory
-        left = iter(places)
+        next_places = iter(places)
         for structs, bounded, group in zip(self.structs, self._bounded, groups, strict=True):
-            structs.write(self._packets, _nested(group, bounded, list(itertools.islice(left, len(group.packed)))))
+            structs.write(
+                self._packets, _nested(group, bounded, list(itertools.islice(next_places, len(group.packed))))
+            )
         self._write_table(rows, [known for group in groups for known in group.shared], row, moved)
         self._write_memory(starts, bus, memory + scratch, moved)
 
-    def _write_table(self, each: list[np.ndarray], shared: Sequence[bool], size: int, moved: bool) -> None:
+    def _write_table(self, rows_of_laws: list[np.ndarray], shared: Sequence[bool], size: int, moved: bool) -> None:
         """Write the laws' rows; the first row of the table is none's."""
-        count = self._packets if any(len(rows) > 1 for rows in each) else 1
+        count = self._packets if any(len(rows) > 1 for rows in rows_of_laws) else 1
         new = moved or len(self.table.view) != count
         if new:
             self.table = Lanes(count, size, self._Number)
         first = 1
-        for rows, known in zip(each, shared, strict=True):
+        for rows, known in zip(rows_of_laws, shared, strict=True):
             if new or not known:
                 put_rows(self.table.view[:, first : first + rows.shape[1]], rows)
             first += rows.shape[1]
@@ -237,12 +216,12 @@ class LawArrays:
 
 def _bounded(dtype: np.dtype) -> list[tuple[str, ...]]:
     """Of each law of a struct, the names of the bounds that stand beside its numbers, in their order; none for none."""
-    found: list[tuple[str, ...]] = []
+    names: list[tuple[str, ...]] = []
     while "own" in (dtype.names or ()):
-        own = dtype["own"]
-        found.append((own["bounds"].names or ()) if own.names == FIELDS else ())
+        first_law = dtype["own"]
+        names.append((first_law["bounds"].names or ()) if first_law.names == FIELDS else ())
         dtype = dtype["rest"]
-    return found
+    return names
 
 
 def memory_rows(law: Packed) -> int:
@@ -263,9 +242,9 @@ def _nested(
     """
     parts: list[tuple[tuple[str, ...], Any, bool]] = []
     each = zip(group.packed, group.shared, bounded, places, strict=True)
-    for i, (packed, known, names, (own, bounds)) in enumerate(each):
+    for i, (packed, known, names, (row_fields, bounds)) in enumerate(each):
         path = (*("rest",) * i, "own")
-        parts.append((path + FIELDS[:1] * bool(names), {**packed.values, **own}, known))
+        parts.append((path + FIELDS[:1] * bool(names), {**packed.values, **row_fields}, known))
         if names:
             parts.append((path + FIELDS[1:], dict(zip(names, bounds, strict=True)), known))
     return parts

@@ -8,12 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Block:
-    """A run of consecutive members, the unit of work.
-
-    Attributes:
-        first: index of its first member.
-        stop: index after its last member.
-    """
+    """A run of consecutive members, the unit of work: from `first` to before `stop`."""
 
     first: int
     stop: int
@@ -25,10 +20,7 @@ class Block:
 
 
 def block_size(members: int) -> int:
-    """Number of members of a block: a power of two from 256 to 4096.
-
-    It depends on the number of members only, so that bits and files do not depend on the machine.
-    """
+    """Members of a block, a power of two from 256 to 4096, by their number alone: no bit or file depends on the machine."""
     size = 256
     while size < 4096 and size * 64 <= members:
         size *= 2

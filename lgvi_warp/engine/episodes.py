@@ -16,14 +16,10 @@ from lgvi_warp.sampling.members import Members
 
 
 class Episodes:
-    """One block of members, of which any may be replaced after a tick.
+    """One block of members, of which any may be replaced after a tick; `steps` counts the steps made.
 
     Those that come next are packed and looked at ahead, many at once, in packets of their own. When one starts, its lane is
     copied. So a start costs little, and no bit of the others changes.
-
-    Attributes:
-        packets: the members' packets.
-        steps: number of steps made.
     """
 
     def __init__(self, plan: Plan, members: Members):
@@ -49,26 +45,17 @@ class Episodes:
         self._next_lanes: list[np.ndarray] = []
 
     def advance(self, values: np.ndarray) -> None:
-        """Answer the last tick, and go on to the next one.
-
-        values: demands (m, 6), or commands (m, channels).
-        """
+        """Answer the last tick by demands (m, 6), or commands (m, channels), and go on to the next one."""
         write_answer(self.packets, values)
         self.packets.launch(self.steps, self.steps + self.every)
         self.steps += self.every
 
     def signals(self) -> tuple[CallbackInput, CallbackInput]:
-        """What is measured and what is wanted now.
-
-        Returns: (measured, wanted).
-        """
+        """What is measured and what is wanted now: (measured, wanted)."""
         return last_tick(self.packets)
 
     def status(self) -> np.ndarray:
-        """The status of each member.
-
-        Returns: (m,), 0 for those that go on.
-        """
+        """The status of each member (m,), 0 for those that go on."""
         if not self.packets.status.numpy().any():
             return np.zeros(self.packets.members.count, np.uint8)
         return self.packets.ended()[0]
@@ -79,10 +66,7 @@ class Episodes:
         return width << (-(-count // width) - 1).bit_length()
 
     def prepare(self, lanes: np.ndarray, members: Members) -> None:
-        """Prepare the members that are to start next in some lanes.
-
-        lanes: (r,), which of the m lanes.
-        """
+        """Prepare the members that are to start next in some lanes (r,) of the m."""
         aside = self._aside_for(members.count, lambda count: members)
         aside.refill(members)
         if aside.laws.places != self.packets.laws.places:
@@ -97,8 +81,7 @@ class Episodes:
     def restart(self, lanes: np.ndarray) -> tuple[CallbackInput, CallbackInput]:
         """Start the prepared members.
 
-        lanes: (r,), which of the m lanes.
-        Returns: What is measured of them and wanted, (r, ...).
+        lanes: (r,), which of the m lanes. Returns: (measured, wanted) of them, (r, ...).
         """
         assert self._next is not None
         rehearsals = self._rehearsals()
@@ -116,8 +99,7 @@ class Episodes:
     def signals_of(self, lanes: np.ndarray) -> tuple[CallbackInput, CallbackInput]:
         """What members that have ended measure and want in their last state; in the block itself they rest meanwhile.
 
-        lanes: (r,), which of the m lanes.
-        Returns: What is measured of them and wanted, (r, ...).
+        lanes: (r,), which of the m lanes. Returns: (measured, wanted), (r, ...).
         """
         places = np.arange(len(lanes))
         aside = self._aside_for(self.room_for(len(lanes)), self._any)
@@ -144,11 +126,13 @@ class Episodes:
         last = self.steps // self.every
         return range(max(1, last + 1 - ticks) * self.every, self.steps + 1, self.every)
 
-    def _copy(self, source: list[np.ndarray], of: np.ndarray, target: list[np.ndarray], to: np.ndarray) -> None:
+    def _copy(
+        self, source: list[np.ndarray], source_lanes: np.ndarray, target: list[np.ndarray], target_lanes: np.ndarray
+    ) -> None:
         """Copy lanes with all that belongs to them."""
         width = self.plan.spec.width
-        p, i = np.divmod(of, width)
-        q, j = np.divmod(to, width)
+        p, i = np.divmod(source_lanes, width)
+        q, j = np.divmod(target_lanes, width)
         for old, new, varied in zip(source, target, self._varied, strict=True):
             if varied:
                 new[q, ..., j] = old[p, ..., i]

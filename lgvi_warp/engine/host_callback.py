@@ -44,10 +44,9 @@ class CallbackInput:
 
 
 def last_tick(packets: Packets, members: np.ndarray | None = None) -> tuple[CallbackInput, CallbackInput]:
-    """What was measured and what was wanted at the last tick.
+    """What was measured and what was wanted at the last tick: (measured, wanted), copies.
 
-    members: which of their members (m,); default None for all.
-    Returns: (measured, wanted), copies.
+    members: which of their members (m,); None (default) for all.
     """
     y, r = (_numbers(packets, packets.plan.layout.noted_rows[name], members) for name in ("measured", "reference"))
     measured_attitude, wanted_attitude = (rows[:, 3:12].reshape(-1, 3, 3) for rows in (y, r))
@@ -70,10 +69,7 @@ def _numbers(packets: Packets, places: range, members: np.ndarray | None) -> np.
 
 
 def write_answer(packets: Packets, values: np.ndarray) -> None:
-    """Write the host's answer to the last tick.
-
-    values: demands (m, 6), or commands (m, channels).
-    """
+    """Write the host's answer to the last tick: demands (m, 6), or commands (m, channels)."""
     controller = packets.plan.kernel_choice.controller
     assert controller is not None
     view, first = packets.laws.memory.view, controller.bus.answer
@@ -84,10 +80,7 @@ def write_answer(packets: Packets, values: np.ndarray) -> None:
 
 
 def call_host(packets: Packets, t: float) -> None:
-    """Call the function of a plan's controller with the last tick, and write its answer.
-
-    t: time of the tick [s].
-    """
+    """Call the function of a plan's controller with the last tick, at t [s], and write its answer."""
     controller = packets.plan.kernel_choice.controller
     assert controller is not None
     callback: Any = controller.callback
@@ -95,11 +88,11 @@ def call_host(packets: Packets, t: float) -> None:
     members = packets.members.indices
     where = f"callback {callback.key!r} at t = {t:.9g} s, members {members[0]} to {members[-1]}"
     try:
-        given = callback.function(t, measured, wanted, members)
+        returned = callback.function(t, measured, wanted, members)
     except Exception as error:
         error.add_note(where)
         raise
-    values, shape = answered(where, given), (packets.members.count, controller.bus.rows - controller.bus.answer)
+    values, shape = answered(where, returned), (packets.members.count, controller.bus.rows - controller.bus.answer)
     if values.shape != shape:
         raise ValueError(f"{where}: returned shape {values.shape}; return {shape}, a row for each member")
     write_answer(packets, values)

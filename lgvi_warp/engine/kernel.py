@@ -21,11 +21,7 @@ from lgvi_warp.engine.kernel_choice import KernelChoice, is_built_in
 
 
 class Kernel:
-    """A kernel and its types.
-
-    Attributes:
-        phases: how long `load` took, by phase; zeros where this process had loaded the kernel.
-    """
+    """A kernel and its types; phases: how long `load` took, zeros where this process had loaded the kernel."""
 
     def __init__(self, spec: Spec, choice: KernelChoice):
         self._spec, self._choice = spec, choice

@@ -238,13 +238,12 @@ def seek_room(
 ) -> None:
     """Check by trial that a folder has room for some bytes and files: nothing else reveals quotas and limits.
 
-    wanted: room needed [bytes].
     system: what tells of files, as the module os does.
     """
     if hasattr(system, "statvfs"):
-        left = system.statvfs(folder)
+        room = system.statvfs(folder)
         # A system that has no fixed number of files says 0.
-        if left.f_files and left.f_favail < ROOM_FILES:
+        if room.f_files and room.f_favail < ROOM_FILES:
             raise OSError(errno.ENOSPC, "No files left on device")
     with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
         try:
@@ -258,11 +257,7 @@ def seek_room(
 def sweep(cache: Path, folder: Path) -> None:
     """Remove what killed processes left in the cache: their scratch folders, and Warp's unfinished folders.
 
-    The latter are removed if they are of this kernel, or old.
-
-    Args:
-        cache: Warp's kernel cache.
-        folder: folder of a kernel which this process alone may compile.
+    The latter if they are old, or of the kernel whose folder is given, which this process alone may compile.
     """
     with one_at_a_time(SCRATCH):
         for path in cache.glob(f"{SCRATCH}*"):

@@ -27,49 +27,27 @@ from lgvi_warp.scene.slices import over_members
 
 @dataclass(frozen=True)
 class KernelChoice:
-    """What the kernel of a run must contain.
+    """What the kernel of a run must contain."""
 
-    Attributes:
-        aligned: whether the kernel's axes are the user's but for order and sense (see `PackingContext`).
-        moved: whether the state's origin differs from the user's.
-        laws: terms with the modules of their device code; drag by its exact flow comes first.
-        events: events with the modules of their device code.
-        mass: shape of the mass matrix: "isotropic", "diagonal" or "full".
-        drag: parts of drag that are treated by its exact flow; empty for none.
-        flow: how the water moves: "none", "steady", "uniform" or "varying".
-        parts: what the inertia holds besides mass and moments of inertia.
-        coupling: (6,), which of U12, U13, U23 and of the three pitches some member has.
-        timed: whether a law or an event depends on the time.
-        memory: whether a law or the method remembers numbers from step to step.
-        program: sub-maps of one stage, as (letter, coefficient).
-        lead: sub-map that opens a step and merges with the end of the previous one; None for none.
-        averages: alpha and beta of equations (15) and (16); None for conservative sub-maps.
-        conservative: whether no force creates energy and the kernel knows the potential of every force.
-        steady: whether forces are constant in inertial axes.
-        odd: what the user should know about the members' numbers.
-        controller: the scene's controller, as it is for these members; None for none.
-        parts_of_control: its parts with the modules of their device code, in the order in which they act.
-    """
-
-    aligned: bool
-    moved: bool
-    laws: tuple[tuple[Term, Any], ...]
-    events: tuple[tuple[Any, Any], ...]
-    mass: str
-    drag: tuple[str, ...]
-    flow: str
-    parts: tuple[str, ...]
-    coupling: tuple[bool, ...]
-    timed: bool
-    memory: bool
-    program: Program
-    lead: tuple[str, float] | None
-    averages: tuple[float, float] | None
-    conservative: bool
-    steady: bool
-    odd: Oddities
-    controller: Controller | None = None
-    parts_of_control: tuple[tuple[Part, Any], ...] = ()
+    aligned: bool  # the kernel's axes are the user's but for order and sense (see `PackingContext`)
+    moved: bool  # the state's origin differs from the user's
+    laws: tuple[tuple[Term, Any], ...]  # with their device code; drag by its exact flow comes first
+    events: tuple[tuple[Any, Any], ...]  # with their device code
+    mass: str  # shape of the mass matrix, one of SHAPES_OF_MASS
+    drag: tuple[str, ...]  # parts of drag that are treated by its exact flow
+    flow: str  # how the water moves, one of FLOWS
+    parts: tuple[str, ...]  # what the inertia holds besides mass and moments of inertia
+    coupling: tuple[bool, ...]  # (6,), which of U12, U13, U23 and of the three pitches some member has
+    timed: bool  # a law or an event depends on the time
+    memory: bool  # a law or the method remembers numbers from step to step
+    program: Program  # sub-maps of one stage, as (letter, coefficient)
+    lead: tuple[str, float] | None  # sub-map that opens a step and merges with the end of the previous one
+    averages: tuple[float, float] | None  # alpha and beta of equations (15) and (16); None for conservative sub-maps
+    conservative: bool  # no force creates energy and the kernel knows the potential of every force
+    steady: bool  # forces are constant in inertial axes
+    odd: Oddities  # what the user should know about the members' numbers
+    controller: Controller | None = None  # as it is for these members
+    parts_of_control: tuple[tuple[Part, Any], ...] = ()  # with their device code, as they act
 
     @property
     def has_callback(self) -> bool:
@@ -90,15 +68,12 @@ def choose_kernel(
     """
     explicit = method.tableau is not None
     controller = _controller(ensemble, facts)
-    acting_parts = _parts(controller, facts) if controller else ()
-    modules = (device_module(part, part.device_in(not facts.turned), built_in) for part in acting_parts)
-    control = tuple(zip(acting_parts, modules, strict=True))
-    # The host looks at states between launches, which must not be those in the middle of a lead.
-    asks_host = controller is not None and controller.callback is not None
+    parts = [part.with_features(facts.features) for part in controller.acting_parts] if controller else []
+    control = tuple((part, device_module(part, part.device_in(not facts.turned), built_in)) for part in parts)
     acting = _acting(ensemble, facts, built_in, controller)
     events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
     damping = any(hasattr(module, "damping") for term, module in acting if not term.exact_flow)
-    flow = max((getattr(module, "FLOW", "none") for _, module in acting), key=FLOWS.index, default="none")
+    flow = _flow(acting)
     drags = [term for term, _ in acting if term.exact_flow]
     others = [module for term, module in acting if not term.carries]
     forced = method.base in FORCED and not all(getattr(module, "POTENTIAL", False) for module in others)
@@ -118,22 +93,10 @@ def choose_kernel(
     _check(method, facts, dense=dense, flow=flow, memory=memory, acting=acting)
     mass, coupled = SHAPES_OF_MASS[facts.mass], facts.coupled
     program = FORCED[method.base] if forced else simplified(method.program, mass == "isotropic" and not coupled)
-    if not acting:
-        program = tuple((letter, coefficient) for letter, coefficient in program if letter != "K")
-    if method.turns and coupled:
-        program = with_hops(program)
-    if method.halved and (drag or flow != "none"):
-        program = divided(program)  # K with drag or water is symmetric but no flow: each half has its own
-    lead, maps = merged(program) if program else (None, ())
-    # A kick that is no flow must not be split between two steps, nor the state at which events are evaluated.
-    undone = all(getattr(module, "POTENTIAL", False) for _, module in acting)
-    if method.two_part:
-        # B merges with that of the next step exactly, A up to the order of the method.
-        lead, maps = method.program[0], method.program[1:]
-        if events or asks_host:
-            lead, maps = None, method.program
-    elif events or asks_host or (lead is not None and lead[0] == "K" and not undone):
-        lead, maps = None, program
+    # Events, and the host between launches, read states, which must not be those in the middle of a lead.
+    states_read = bool(events) or (controller is not None and controller.callback is not None)
+    halved = method.halved and (bool(drag) or flow != "none")
+    lead, maps = _merged_program(method, program, acting, coupled, halved, states_read)
     conservative = checked and _conservative(facts, acting)
     # Events, water and the potential are evaluated at the user's origin, or at that of the forces.
     elsewhere = controller is not None or bool(events) or flow != "none" or (conservative and facts.apart)
@@ -166,17 +129,36 @@ def choose_kernel(
     )
 
 
+def _merged_program(
+    method: Method, program: Program, acting: list[tuple[Term, Any]], coupled: bool, halved: bool, states_read: bool
+) -> tuple[tuple[str, float] | None, Program]:
+    """The sub-map that opens a step and merges with the end of the previous one, None for none, and those of a stage.
+
+    halved: K, with drag or water, is symmetric but no flow: each half has its own. states_read: those between two steps.
+    """
+    if method.two_part:
+        # B merges with that of the next step exactly, A up to the order of the method.
+        return (None, method.program) if states_read else (method.program[0], method.program[1:])
+    if not acting:
+        program = tuple((letter, coefficient) for letter, coefficient in program if letter != "K")
+    if method.turns and coupled:
+        program = with_hops(program)
+    if halved:
+        program = divided(program)
+    lead, maps = merged(program) if program else (None, ())
+    # A kick that is no flow must not be split between two steps, nor the state at which events are evaluated.
+    undone = all(getattr(module, "POTENTIAL", False) for _, module in acting)
+    if states_read or (lead is not None and lead[0] == "K" and not undone):
+        return None, program
+    return lead, maps
+
+
 def _controller(ensemble: Ensemble, facts: Survey) -> Controller | None:
     """The scene's controller, with a delay where some member has one."""
     controller: Controller | None = ensemble.scene.controller
     if controller is None or controller.bus is None:
         return None
     return controller.on(controller.bus._replace(delayed=facts.delayed))
-
-
-def _parts(controller: Controller, facts: Survey) -> tuple[Part, ...]:
-    """The parts of a controller as they act, each with what some member needs of its device code."""
-    return tuple(part.with_features(facts.features) for part in controller.acting_parts)
 
 
 def _steady(module: Any) -> bool:
@@ -209,10 +191,7 @@ MOST_BACKWARD_DRAG = 0.5
 
 
 def check_backward_drag(ensemble: Ensemble, choice: KernelChoice, method: Method, h: float) -> None:
-    """Refuse drag that is too strong for a composition's backward stages, judged by the members' starts.
-
-    h: step [s].
-    """
+    """Refuse drag too strong for the backward stages of a composition with steps h [s], judged by the members' starts."""
     back = -h * min(0.0, *method.stages)
     if back == 0.0 or not choice.drag:
         return
@@ -240,10 +219,7 @@ suitable: set[tuple[type, str]] = set()
 
 
 def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) -> Any:
-    """The module of a term's device code, checked for what a kernel needs of it.
-
-    built_in: (folder, name) -> module of built-in device code, None where there is none.
-    """
+    """The module of a term's device code, checked for what a kernel needs of it; built_in: as of `choose_kernel`."""
     folder, roles = _folder_and_roles(term)
     page = f"see docs/develop/add_a_{'controller' if isinstance(term, Part) else 'force'}.md"
     module = built_in(folder, device) if isinstance(device, str) else device
@@ -285,10 +261,9 @@ def is_built_in(module: Any) -> bool:
 
 
 def declared(term: Term, module: Any) -> tuple[tuple[str, Any], ...]:
-    """The fields of the device struct of a term that do not follow from its module.
+    """The fields (name, kind) of a term's device struct that do not follow from its module.
 
-    Returns: (name, kind) of each number, unless the module defines `params`, and of a noisy term's key (see
-        lgvi_kernels.maps.compose).
+    Its numbers, unless the module defines `params`, and a noisy term's key (see lgvi_kernels.maps.compose).
     """
     numbers = (getattr(module, "params", None) is None and term.lanes()) or ()
     if term.driver is not None:
@@ -330,9 +305,9 @@ def _acting(
     return [(term, module) for term, module in acting if term.key in facts.felt]
 
 
-def _flow(modules: list[Any]) -> str:
+def _flow(acting: list[tuple[Term, Any]]) -> str:
     """How the water moves: the most general FLOW of the laws."""
-    return max((getattr(module, "FLOW", "none") for module in modules), key=FLOWS.index, default="none")
+    return max((getattr(module, "FLOW", "none") for _, module in acting), key=FLOWS.index, default="none")
 
 
 def _check(
@@ -340,8 +315,8 @@ def _check(
 ) -> None:
     """Raise SceneError, with the reason, where the method cannot do what the scene asks."""
     faults = Faults()
-    if facts.left > UNCOUPLED:
-        k = f"coupling norm up to {facts.left:.3g} at the best origin"
+    if facts.residual_coupling > UNCOUPLED:
+        k = f"coupling norm up to {facts.residual_coupling:.3g} at the best origin"
         remedy = "use psi_x, psi_x8 or psi_w, which take any 6x6 inertia"
         faults.add("method", method.name, f"cannot advance an inertia that couples velocities and rates ({k})", remedy)
     composed = len(method.stages) > 1

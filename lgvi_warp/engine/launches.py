@@ -23,24 +23,16 @@ GATHERED_BYTES = 8_000_000
 
 @dataclass(frozen=True, eq=False)
 class Launches:
-    """How the steps of a run are divided into launches.
-
-    lengths: of the stages and of the leads, in units of the step h [1].
-    real: Warp's type of the kernel's numbers.
-    sample_bytes, bytes_at_tick: memory of what the kernel writes of one member, of a sample and at a tick [bytes].
-    every: steps between two ticks of the controller; None without one.
-    has_callback: whether a function of the host answers each tick.
-    ticks: whether samples are gathered at all ticks.
-    """
+    """How the steps of a run are divided into launches."""
 
     grid: TimeGrid
-    lengths: tuple[tuple[float, ...], tuple[float, ...]]
-    real: Any
-    sample_bytes: int
-    bytes_at_tick: int
-    every: int | None
-    has_callback: bool
-    ticks: bool
+    lengths: tuple[tuple[float, ...], tuple[float, ...]]  # of stages and leads, in units of the step h [1]
+    real: Any  # Warp's type of the kernel's numbers
+    sample_bytes: int  # what the kernel writes of a sample of one member [bytes]
+    bytes_at_tick: int  # the same at a tick
+    every: int | None  # steps between two ticks; None without a controller
+    has_callback: bool  # a function of the host answers each tick
+    ticks: bool  # samples are gathered at all ticks
 
     @functools.cached_property
     def gathered(self) -> TimeGrid | None:
@@ -49,10 +41,9 @@ class Launches:
 
     @functools.cached_property
     def times(self) -> tuple[Any, Any, Any]:
-        """Kernel arguments that all blocks share.
+        """Kernel arguments that all blocks share: (stage_h, lead_h, sample_step).
 
-        Returns: (stage_h, lead_h, sample_step): lengths of stages and leads [s], and the numbers of steps after which samples
-            are due.
+        Lengths of stages and leads [s], and the numbers of steps after which samples are due.
         """
         stages, leads = (np.array(fractions) * self.grid.h for fractions in self.lengths)
         due = np.append(self.grid.sample_steps, 2**31 - 1).astype(np.int32)
@@ -63,10 +54,7 @@ class Launches:
         )
 
     def samples_due(self, k0: int, k1: int) -> tuple[int, int]:
-        """Which samples fall due in the launch of steps k0 to k1.
-
-        Returns: (s0, s1): samples s0 to s1 - 1 are due after step k0 and no later than step k1.
-        """
+        """Which samples fall due in the launch of steps k0 to k1: s0 to s1 - 1, after step k0 and no later than step k1."""
         steps = self.grid.sample_steps
         return int(steps.searchsorted(k0, side="right")), int(steps.searchsorted(k1, side="right"))
 
@@ -83,8 +71,8 @@ class Launches:
     def ticks_of(self, k0: int, k1: int) -> slice:
         """Which ticks are gathered once the launch of steps k0 to k1 has ended.
 
-        Returns: Those after step k0, with that of the start, and no later than step k1. Where a function of the host answers,
-            a tick ends in the next launch: those from step k0 on and before step k1, with that of the end.
+        Those after step k0, with that of the start, and no later than k1. Where a function of the host answers, a tick ends in
+        the next launch: those from step k0 on and before step k1, with that of the end.
         """
         assert self.gathered is not None
         bounds = np.array([k0 + 1 if k0 else 0, k1 + 1])
@@ -94,10 +82,7 @@ class Launches:
         return slice(int(first), int(stop))
 
     def segments(self, count: int) -> Iterator[tuple[int, int]]:
-        """The launches of a block of so many members, each short enough to be interrupted, with samples in a small buffer.
-
-        Yields: (k0, k1): a launch makes the steps from k0 to k1.
-        """
+        """The launches (k0, k1) of a block of so many members, each short enough to be interrupted, with few samples."""
         if self.has_callback:
             yield from self._periods()
             return

@@ -15,10 +15,7 @@ from lgvi_warp.engine.work import Work, in_order
 
 
 class RunProgress:
-    """The fraction of a run's vehicle-steps made so far, reported from any thread.
-
-    report: called with the fraction [1] at each advance; None for no report.
-    """
+    """The fraction [1] of a run's vehicle-steps made so far, reported from any thread at each advance."""
 
     def __init__(self, total: int, report: Callable[[float], None] | None):
         self._total, self._report, self._lock = total, report, threading.Lock()
@@ -37,12 +34,7 @@ class RunProgress:
 
 @dataclass
 class Merged:
-    """How many members the keepers have received.
-
-    Attributes:
-        begun: index after the last member whose merge has begun.
-        done: index after the last member whose merge is complete.
-    """
+    """How many members the keepers have received: up to where merging has begun, and where it is complete."""
 
     begun: int = 0
     done: int = 0
@@ -58,12 +50,11 @@ def run_blocks(
     merged: Merged | None = None,
     after: Callable[[Block], None] | None = None,
 ) -> int:
-    """Run blocks and merge their results into the keepers, in block order.
+    """Run blocks and merge their results into the keepers, in block order; returns how many members were merged.
 
     remaining: blocks that the store does not hold yet; None (default) for all.
-    enough: asked after each block, with the number of members so far, whether the run may end (default: never); later blocks
-        are then dropped.
-    after: called with each block when it is merged; None (default) for nothing.
+    enough: asked after each block, with the members so far, whether the run may end; later blocks are then dropped.
+    after: called with each block when it is merged.
     """
     fresh = set(remaining or ())
     merged = merged or Merged()

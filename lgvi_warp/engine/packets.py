@@ -36,12 +36,9 @@ from lgvi_warp.sampling.members import Members
 class Packets:
     """The members of one block packed into lanes, ready to launch.
 
-    Attributes:
-        count: number of packets.
-        frame: axes and origins that the kernel works in.
-        scale: (1 or m,) [kg m^2], number that momenta are divided by in the kernel; 1 for methods that need none.
-        inertia, laws: numbers of the vehicle; of its laws, of a controller's parts and of the events.
-        state_lanes: states, (packets, fields of a state).
+    count: number of packets. frame: axes and origins that the kernel works in.
+    scale: (1 or m,) [kg m^2], what momenta are divided by in the kernel; 1 for methods that need none.
+    state_lanes: states, (packets, fields of a state). laws: numbers of laws, of a controller's parts and of events.
     """
 
     def __init__(self, plan: Plan, members: Members):
@@ -187,19 +184,15 @@ class Packets:
         return fields
 
     def advance(self, k0: int, k1: int) -> np.ndarray:
-        """Make the steps from k0 to k1, and return the samples by member.
-
-        Returns: Samples due after step k0 and no later than step k1: (samples, count * width, numbers of a sample), a copy.
-        """
+        """Make the steps k0 to k1; a copy of the samples due in them, (samples, count * width, numbers of a sample)."""
         packed = self.launch(k0, k1)
         packets, samples, numbers, width = packed.shape
         return packed.transpose(1, 0, 3, 2).copy().reshape(samples, packets * width, numbers)
 
     def launch(self, k0: int, k1: int) -> np.ndarray:
-        """Make the steps from k0 to k1, and return the samples as the kernel wrote them.
+        """Make the steps k0 to k1, and return the samples due after k0 and no later than k1.
 
-        Returns: Samples due after step k0 and no later than step k1: (count, samples, numbers of a sample, width), in memory
-            that the next launch overwrites.
+        Returns: (count, samples, numbers of a sample, width), in memory that the next launch overwrites.
         """
         plan = self.plan
         s0, s1 = plan.launches.samples_due(k0, k1)
@@ -234,9 +227,9 @@ class Packets:
             return wp.launch(plan.kernel.advance.kernel, dim=self.count, inputs=inputs, device="cpu", record_cmd=True)
 
     def gathered(self, when: slice) -> np.ndarray:
-        """What the last launch gathered at ticks.
+        """What the last launch gathered at ticks, in the user's axes.
 
-        Returns: (ticks, members, numbers of a sample), in memory that the next launch overwrites, in the user's axes.
+        Returns: (ticks, members, numbers of a sample), in memory that the next launch overwrites.
         """
         slots, numbers = self.monitor.slots, self.monitor.numbers
         first = when.start % slots
@@ -245,10 +238,7 @@ class Packets:
         return by_tick.transpose(0, 2, 1)
 
     def first_signals(self) -> np.ndarray:
-        """The signals at t = 0, once the first launch has made them.
-
-        Returns: (1, count * width, numbers of the signals), a copy.
-        """
+        """The signals at t = 0 once the first launch has made them, (1, count * width, numbers of the signals), a copy."""
         rows = self.monitor.first_signals.numpy()[:, : len(self.plan.layout.signal_rows)]
         packets, numbers, width = rows.shape
         return rows.transpose(0, 2, 1).reshape(1, packets * width, numbers).copy()
@@ -276,9 +266,9 @@ class Packets:
         )
 
     def ended(self) -> tuple[np.ndarray, np.ndarray]:
-        """Status of each member, and the last step of those it made itself.
+        """Status (m,) of each member, and the last step (m,) of those it made itself.
 
-        Returns: (status, step): both (m,); after that step a member that ended keeps its state.
+        After that step a member that ended keeps its state.
         """
         outcome = self.outcome(warned=False)
         return outcome.status, outcome.failed_step
@@ -321,8 +311,8 @@ class Packets:
         warning = np.uint16(Warnings.ORTHOGONALITY)
         over = size > orthogonality_limit(self.plan)
         first = over & (warning > bits)
-        made = np.where(self._status[: len(bits)] == 0, self._launched[1], self._failed_step[: len(bits)])
-        return bits | warning * over, np.where(first, made, step), np.where(first, size, value)
+        steps_made = np.where(self._status[: len(bits)] == 0, self._launched[1], self._failed_step[: len(bits)])
+        return bits | warning * over, np.where(first, steps_made, step), np.where(first, size, value)
 
 
 def columns_of(sizes: Mapping[str, int]) -> Any:

@@ -7,7 +7,7 @@ What all members share is computed and written once for a run; each block, or ca
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -35,10 +35,8 @@ Plan = Any
 class Packing:
     """What the kernel needs of some members, in its frame and its units.
 
-    Attributes:
-        frame: axes and origins that the kernel works in.
-        U: (1 or m, 3, 3), matrix of the turns of psi_x; zero for other methods.
-        scale: (1 or m,) [kg m^2], number that momenta are divided by in the kernel; 1 for methods that need none.
+    U: (1 or m, 3, 3), matrix of the turns of psi_x; zero for other methods.
+    scale: (1 or m,) [kg m^2], what momenta are divided by in the kernel; 1 for methods that need none.
     """
 
     def __init__(self, plan: Plan, members: Members):
@@ -128,23 +126,17 @@ class Packing:
 
     def control(self) -> list[Packed]:
         """The numbers of each part of the controller."""
-
-        def pack(part: Any, numbers: Any) -> Packed:
-            packed: Packed = part.packed(Ensemble.own(part, numbers), self._context(numbers))
-            return packed
-
-        each = enumerate(part for part, _ in self.plan.kernel_choice.parts_of_control)
-        return [self._shared(("part", i), functools.partial(pack, part)) for i, part in each]
+        return self._packed("part", (part for part, _ in self.plan.kernel_choice.parts_of_control))
 
     def events(self) -> list[Packed]:
         """The numbers of each event."""
+        return self._packed("event", (event for event, _ in self.plan.kernel_choice.events))
 
-        def pack(event: Any, numbers: Any) -> Packed:
-            packed: Packed = event.packed(Ensemble.own(event, numbers), self._context(numbers))
-            return packed
+    def _packed(self, kind: str, terms: Iterable[Term]) -> list[Packed]:
+        def pack(term: Term, numbers: Any) -> Packed:
+            return term.packed(Ensemble.own(term, numbers), self._context(numbers))
 
-        each = enumerate(event for event, _ in self.plan.kernel_choice.events)
-        return [self._shared(("event", i), functools.partial(pack, event)) for i, event in each]
+        return [self._shared((kind, i), functools.partial(pack, term)) for i, term in enumerate(terms)]
 
     def scratch(self, laws: Sequence[Packed], bus: int = 0) -> int:
         """Rows of the memory that the method keeps for itself."""
@@ -155,10 +147,7 @@ class Packing:
         return 2 * len(spec.gauss[1]) * SLOPE_FIELDS if spec.gauss else 0
 
     def state(self, rows: np.ndarray) -> None:
-        """Write the members' states.
-
-        rows: (m, fields of a state), written in place.
-        """
+        """Write the members' states into rows (m, fields of a state)."""
         m, frame, spec = self.members, self.frame, self.plan.spec
         attitude, velocity, rate = (_once(x) for x in (m.attitude, m.velocity, m.angular_velocity))
         turned, shifted = self.numbers[AXES][0].turned, self.numbers[AXES][0].shifted
@@ -267,10 +256,6 @@ def _shear(numbers: Any, frame: Frame, full: bool, lever: bool) -> Fields:
 
 
 def symmetric(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The entries of symmetric matrices as the kernel takes them.
-
-    matrix: (n, 3, 3).
-    Returns: Diagonal (n, 3), and off-diagonal entries 23, 31, 12 (n, 3).
-    """
+    """Symmetric matrices (n, 3, 3) as the kernel takes them: diagonal (n, 3), and entries 23, 31, 12 (n, 3)."""
     off = np.stack([matrix[:, 1, 2], matrix[:, 2, 0], matrix[:, 0, 1]], axis=1)
     return np.einsum("nii->ni", matrix), off

@@ -41,33 +41,26 @@ class NotSurveyed(Exception):  # noqa: N818  (what happened, and no fault of the
 
 @dataclass(frozen=True)
 class Plan:
-    """All that is decided before a run; `choose_plan` makes it.
-
-    fields: names of the samples to keep, in the order in which they are saved.
-    surveyed_all: whether the kernel was chosen by all members, or by the first SURVEYED.
-    width_source: what chose the width (see widths.Width).
-    facts: what the members that were looked at require of a kernel.
-    idle: packets of finished blocks, to be used again.
-    whole: of a plan made by `subplan`, the whole plan, the members and the fields; else None.
-    """
+    """All that is decided before a run; `choose_plan` makes it."""
 
     ensemble: Ensemble
     method: Method
     grid: TimeGrid
-    fields: tuple[str, ...]
+    fields: tuple[str, ...]  # the samples to keep, in the order in which they are saved
     dtype: str
     checks: str
     on_failure: str
-    surveyed_all: bool
+    surveyed_all: bool  # the kernel was chosen by all members, or by the first SURVEYED
     kernel_choice: KernelChoice
     spec: Spec
-    width_source: str = field(compare=False)
+    width_source: str = field(compare=False)  # see widths.Width
     kernel: Kernel = field(compare=False, repr=False)
     layout: SampleLayout = field(compare=False, repr=False)
     launches: Launches = field(compare=False, repr=False)
-    facts: Survey = field(compare=False, repr=False)
+    facts: Survey = field(compare=False, repr=False)  # what the members that were looked at require of a kernel
     shared: SharedResultsCache = field(compare=False, repr=False)
-    free_packets: list[Any] = field(default_factory=list, compare=False, repr=False)
+    free_packets: list[Any] = field(default_factory=list, compare=False, repr=False)  # of finished blocks
+    # Of a plan made by `subplan`: the plan of all, the members and the fields.
     parent: tuple[Plan, Sequence[int], Sequence[str]] | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -76,10 +69,7 @@ class Plan:
         return self.kernel.phases
 
     def compile(self) -> float:
-        """Load the kernel, and compile it first if Warp's cache has none.
-
-        Returns: How long it took [s].
-        """
+        """Load the kernel, and compile it first if Warp's cache has none; how long it took [s]."""
         start = time.perf_counter()
         self.kernel.load()
         _ = self.kernel.dtypes, self.launches.times  # made here, before threads ask for them
@@ -92,8 +82,8 @@ class Plan:
     def _settings(self) -> dict[str, Any]:
         named = ("ensemble", "method", "grid", "fields", "dtype", "checks", "on_failure")
         of_ticks = {"ticks": self.launches.ticks, "read_at_ticks": self.layout.read_at_ticks}
-        own = {name: getattr(self, name) for name in named} | of_ticks
-        return own | {"width": self.spec.width, "survey_all": self.surveyed_all}
+        settings = {name: getattr(self, name) for name in named} | of_ticks
+        return settings | {"width": self.spec.width, "survey_all": self.surveyed_all}
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the settings alone: a kernel cannot be pickled, and the other process finds it in Warp's cache."""

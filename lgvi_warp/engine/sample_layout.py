@@ -20,10 +20,8 @@ from lgvi_warp.physics.fields import Field
 class SampleLayout:
     """Where each number of a sample is.
 
-    fields: names of the samples to keep, in the order in which they are saved.
-    compensated: whether a position is two sums.
-    read_at_ticks: field of the motion -> which of its numbers statistics read at ticks, () for all; None for all numbers of
-        all fields.
+    fields: in the order in which they are saved. compensated: a position is two sums.
+    read_at_ticks: field of the motion -> which of its numbers statistics read at ticks, () for all; None: all of all fields.
     """
 
     choice: KernelChoice
@@ -45,8 +43,7 @@ class SampleLayout:
     def sizes(self) -> dict[str, int]:
         """What the kernel writes of a sample: the fields kept, and those needed to move them back to the user's origin.
 
-        Returns: Field -> numbers per sample, in the order in which they are written; a compensated position is b, then b_low.
-            Signals of the controller come last.
+        Returns: Field -> numbers per sample, as written; a compensated position is b, then b_low. Signals come last.
         """
         needed = set(self.fields)
         if self.choice.moved:

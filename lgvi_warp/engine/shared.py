@@ -20,11 +20,7 @@ FRAME, AXES, MEMBERS, SEED = "frame", "axes", "members", "seed"
 
 
 class TrackedParameters(dict[str, np.ndarray]):
-    """Numbers by name, which note the names that were read.
-
-    Attributes:
-        names: the names so far.
-    """
+    """Numbers by name, which note the `names` that were read."""
 
     def __init__(self, numbers: Mapping[str, np.ndarray]):
         super().__init__(numbers)
@@ -131,10 +127,7 @@ class SharedResultsCache:
         return value
 
     def completed(self, numbers: Mapping[str, np.ndarray]) -> Any:
-        """The numbers that `remember` was given for these members.
-
-        Returns: The completed numbers; None for other members.
-        """
+        """The completed numbers that `remember` was given for these members; None for other members."""
         last = self._last
         if last is None or any(numbers.get(name) is not last.given.get(name) for name in self.varied):
             return None

@@ -72,10 +72,9 @@ ENERGY = 0.5
 
 
 def watched(method: Method, choice: Any, dtype: str, checks: str) -> tuple[str, ...]:
-    """The warnings that the kernel looks for.
+    """The warnings that the kernel looks for, as names of rows of lgvi_kernels.advance.monitor, the least serious first.
 
-    Returns: Names of rows of lgvi_kernels.advance.monitor, the least serious first: with checks="all" those that method and
-        scene can give; with "safe" that of the attitude, where the method lets it depart.
+    With checks="all" those that method and scene can give; with "safe" that of the attitude, where the method lets it depart.
     """
     if checks != "all":
         return ("orthogonality",) * (checks == "safe" and leaves_rotations(method))
@@ -119,11 +118,7 @@ def leaves_rotations(method: Method) -> bool:
 
 
 def departure(rows: np.ndarray) -> np.ndarray:
-    """How far matrices are from rotations.
-
-    rows: (packets, 9, width), entries of R row by row.
-    Returns: (packets * width,), the largest entry of |R R^T - I|.
-    """
+    """How far matrices, rows (packets, 9, width), are from rotations: the largest entry of |R R^T - I|, (packets * width,)."""
     R = rows.reshape(len(rows), 3, 3, -1)
     pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
     entries = [np.abs((R[:, i] * R[:, j]).sum(axis=1, dtype=np.float64) - (i == j)) for i, j in pairs]
@@ -153,10 +148,7 @@ def row_limits(plan: Watched) -> dict[str, float]:
 
 
 def munk_factor(frame: Frame) -> np.ndarray:
-    """Squared frequency of the fastest oscillation that the Munk moment causes, per |p|^2.
-
-    Returns: (1 or n,) [1/(kg^2 m^2)].
-    """
+    """Squared frequency of the fastest oscillation that the Munk moment causes, per |p|^2, (1 or n,) [1/(kg^2 m^2)]."""
     M = np.linalg.eigvalsh(frame.M) if np.any(frame.M[:, ~np.eye(3, dtype=bool)]) else np.einsum("nii->ni", frame.M)
     return np.asarray((1.0 / M.min(axis=1) - 1.0 / M.max(axis=1)) / frame.J.min(axis=1))
 
@@ -166,8 +158,7 @@ def at_start(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The warnings that follow from the members' numbers and starts.
 
-    momentum: (m, 3) [N s], linear momentum relative to the water.
-    water: (m, 3) [m/s], velocity of the water in body axes; None where it rests.
+    momentum: (m, 3) [N s], relative to the water. water: (m, 3) [m/s], its velocity in body axes; None where it rests.
     Returns: (bits, value), both (m,): bits of `Warnings`, and the value of the most serious one; NaN for none.
     """
     m, h, method = members.count, plan.grid.h, plan.method

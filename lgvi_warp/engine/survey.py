@@ -36,10 +36,7 @@ COUPLINGS = ((0, 1), (0, 2), (1, 2), (0, 0), (1, 1), (2, 2))
 
 
 def shape_of_mass(M: np.ndarray) -> str:
-    """The simplest shape that fits every mass matrix.
-
-    M: (n, 3, 3) [kg], mass matrices.
-    """
+    """The simplest shape that fits every mass matrix (n, 3, 3) [kg]."""
     off, diagonal = notation.off_diagonal(M), np.einsum("nii->ni", M)
     if off.any() and (np.abs(off).max(axis=1) > DIAGONAL * np.abs(diagonal).max(axis=1)).any():
         return "full"
@@ -49,8 +46,8 @@ def shape_of_mass(M: np.ndarray) -> str:
 def frame_of(method: Method, parameters: Parameters) -> tuple[Frame, np.ndarray, np.ndarray]:
     """The axes and origins that a method works in.
 
-    Returns: (frame, U, coupling): the frame; U (n, 3, 3) of the turns of psi_x, zero for other methods; and the coupling norm
-        (n,) that is left in this frame and that the method cannot treat.
+    Returns: (frame, U, coupling): U (n, 3, 3) of the turns of psi_x, zero for other methods; and the coupling norm (n,)
+        that is left in this frame and that the method cannot treat.
     """
     return _frame_of(method, vehicle.inertia_blocks(parameters))
 
@@ -78,54 +75,32 @@ def _explicit_frame(body: inertia.Blocks) -> Frame:
 
 @dataclass(frozen=True)
 class Survey:
-    """What holds for at least one member, and the largest values.
+    """What holds for at least one member, and the largest values."""
 
-    Attributes:
-        turned: axes other than the user's, or forces about another origin (see `PackingContext.aligned`).
-        bent: drag acts and has no exact flow along the kernel's axes.
-        mass: rank of the mass matrix among SHAPES_OF_MASS.
-        coupled: velocities and angular velocities are coupled.
-        moved: the origin of the state is not the user's.
-        forces_moved: the origin of the forces is not the user's.
-        apart: the two origins differ.
-        couplings: indices among COUPLINGS of the non-zero entries of U.
-        left: largest coupling norm that the method cannot treat.
-        felt: keys of the terms that act.
-        drag: parts of the exact flow of drag.
-        rising: keys of currents with a vertical velocity.
-        weightless: gravity is zero.
-        buoyant: buoyancy is not zero.
-        odd: what is odd about the members' numbers.
-        delayed: the commands of a controller are delayed.
-        features: what the device code of a controller's parts must have, as "key.feature".
-        turned_axes: axes other than the user's, even if only in their order or sense.
-        lever: the rigid body's centre is not at the user's origin, or added mass couples velocities and rates there.
-    """
-
-    turned: bool
-    bent: bool
-    mass: int
-    coupled: bool
-    moved: bool
-    forces_moved: bool
-    apart: bool
-    couplings: frozenset[int]
-    left: float
-    felt: frozenset[str]
-    drag: frozenset[str]
-    rising: frozenset[str]
-    weightless: bool
-    buoyant: bool
-    odd: Oddities
-    delayed: bool = False
-    turned_axes: bool = False
-    features: frozenset[str] = frozenset()
-    lever: bool = False
+    turned: bool  # axes other than the user's, or forces about another origin (see `PackingContext.aligned`)
+    bent: bool  # drag acts and has no exact flow along the kernel's axes
+    mass: int  # rank of the mass matrix among SHAPES_OF_MASS
+    coupled: bool  # velocities and angular velocities are coupled
+    moved: bool  # the origin of the state is not the user's
+    forces_moved: bool  # the origin of the forces is not the user's
+    apart: bool  # the two origins differ
+    couplings: frozenset[int]  # indices among COUPLINGS of the non-zero entries of U
+    residual_coupling: float  # largest coupling norm that the method cannot treat
+    felt: frozenset[str]  # keys of the terms that act
+    drag: frozenset[str]  # parts of the exact flow of drag
+    rising: frozenset[str]  # keys of currents with a vertical velocity
+    weightless: bool  # gravity is zero
+    buoyant: bool  # buoyancy is not zero
+    odd: Oddities  # what is odd about the members' numbers
+    delayed: bool = False  # the commands of a controller are delayed
+    turned_axes: bool = False  # axes other than the user's, even if only in their order or sense
+    features: frozenset[str] = frozenset()  # what the device code of a controller's parts must have, as "key.feature"
+    lever: bool = False  # the dry body's centre is off the user's origin, or added mass couples there
 
     @property
     def decisive(self) -> tuple[Any, ...]:
         """All that decides what a kernel must contain: surveys that agree in it lead to one kernel."""
-        facts = vars(self) | {"odd": None, "left": self.left > UNCOUPLED}
+        facts = vars(self) | {"odd": None, "residual_coupling": self.residual_coupling > UNCOUPLED}
         return tuple(facts.values())
 
     def covers(self, other: Survey) -> bool:
@@ -145,16 +120,13 @@ def survey(
     odd: bool = True,
     most: int | None = None,
 ) -> Survey:
-    """Look at members, or at one alone where no number of the vehicle, the water or the laws varies.
-
-    most: number of the first members to look at; None (default) for all.
-    """
+    """Look at the first `most` members (None: all), or at one where no number of vehicle, water or laws varies."""
     known = SharedResultsCache({*ensemble.varied_names, MEMBERS}) if shared is None else shared
 
     def look(first: int, stop: int) -> Survey:
         # Members that overflow get their status, or their fault, elsewhere: no warning from NumPy.
         with np.errstate(over="ignore", invalid="ignore"):
-            return _seen(ensemble.parameters(first, stop), ensemble, method, known, odd, first, stop)
+            return _survey_of_slice(ensemble.parameters(first, stop), ensemble, method, known, odd, first, stop)
 
     count = min(ensemble.members, most or ensemble.members) if ensemble.varied() else 1
     return functools.reduce(Survey.joined, over_members(look, count))
@@ -164,14 +136,11 @@ def survey_of(
     parameters: Parameters, ensemble: Ensemble, method: Method, shared: SharedResultsCache, block: Block
 ) -> Survey:
     """Look at the members of one block, whose parameters are drawn already."""
-    return _seen(parameters, ensemble, method, shared, False, block.first, block.stop)
+    return _survey_of_slice(parameters, ensemble, method, shared, False, block.first, block.stop)
 
 
 def framed(method: Method, parameters: Parameters, shared: SharedResultsCache) -> dict[str, Any]:
-    """Parameters with the frame that follows from them, under the name FRAME.
-
-    Returns: The parameters and, under FRAME, what `frame_of` returns; under AXES the same, but any mass matrix in it.
-    """
+    """Parameters with the frame of `frame_of` under the name FRAME, and under AXES the same but any mass matrix in it."""
     completed: dict[str, Any] | None = shared.completed(parameters)
     if completed is not None:
         return completed
@@ -194,7 +163,7 @@ def framed(method: Method, parameters: Parameters, shared: SharedResultsCache) -
     return p
 
 
-def _seen(
+def _survey_of_slice(
     parameters: Parameters,
     ensemble: Ensemble,
     method: Method,
@@ -218,13 +187,13 @@ def _seen(
         return frozenset(term.parts(numbers_of(term, numbers)))
 
     def rises(term: Term, numbers: Any) -> bool:
-        own = numbers_of(term, numbers)
-        count = max(map(len, own.values()))
-        water = term.water(own, np.zeros((1, count, 3)), np.zeros(1), numbers)
+        term_numbers = numbers_of(term, numbers)
+        count = max(map(len, term_numbers.values()))
+        water = term.water(term_numbers, np.zeros((1, count, 3)), np.zeros(1), numbers)
         return water is not None and bool(np.any(water[..., 2]))
 
-    def of_each(name: str, compute: Any, those: Iterable[Term]) -> dict[str, Any]:
-        return {t.key: shared((name, t.key), p, functools.partial(compute, t)) for t in those}
+    def of_each(name: str, compute: Any, laws: Iterable[Term]) -> dict[str, Any]:
+        return {t.key: shared((name, t.key), p, functools.partial(compute, t)) for t in laws}
 
     felt = of_each("felt", is_felt, (*terms.IMPLIED, *scene.terms))
     drags = of_each("drag", parts, (term for term in scene.terms if term.exact_flow))
@@ -260,5 +229,5 @@ def _facts(frame: Frame, U: np.ndarray, coupling: np.ndarray) -> dict[str, Any]:
         "forces_moved": bool(np.any(frame.forces)),
         "apart": bool(np.any(frame.origin != frame.forces)),
         "couplings": frozenset(i for i, at in enumerate(COUPLINGS) if np.any(U[:, *at])),
-        "left": float(coupling.max()),
+        "residual_coupling": float(coupling.max()),
     }

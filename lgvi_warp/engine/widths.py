@@ -37,22 +37,14 @@ FILE, MOST_BYTES = "lgvi_warp_widths.json", 1_000_000
 
 
 class Width(NamedTuple):
-    """Vehicles in a packet, and what says so.
-
-    Attributes:
-        lanes: The number of vehicles.
-        source: "asked for", "tuned", or "table" and the kind of processor.
-    """
+    """Vehicles in a packet, and what says so: "asked for", "tuned", or "table" and the kind of processor."""
 
     lanes: int
     source: str
 
 
 def parts(kernel: str) -> tuple[str, str]:
-    """Split one of KERNELS.
-
-    Returns: (kind, dtype); "plain" where the kind makes no difference.
-    """
+    """Split one of KERNELS into kind, "plain" where it makes no difference, and dtype."""
     kind, _, dtype = kernel.rpartition(" ")
     return kind or "plain", dtype
 

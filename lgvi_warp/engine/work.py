@@ -39,14 +39,10 @@ Ends = Callable[[], tuple[np.ndarray, np.ndarray]]
 class Work:
     """What an executor does with each block: advance it, and write it to the store if there is one.
 
-    It can be pickled. Calling it with a block returns what each keeper closed with, or None if the block was halted. A
-    block that the store already holds is not run again. A copy in another process returns once its block is durable; in
-    the run's own process the run waits at its end for blocks that are not durable yet.
-
+    It can be pickled. Calling it with a block returns what each keeper closed with, or None if the block was halted; one that
+    the store holds is not run again. A copy in another process returns once its block is durable; the run waits for its own.
     What is wrong with a block's members is returned as an exception, which the run raises when that block's turn comes: with
     `until` it may end before, and how far threads are ahead must not matter.
-
-    store: the store; None (default) for none.
     """
 
     plan: Plan
@@ -60,12 +56,9 @@ class Work:
         halted: Callable[[], bool] = lambda: False,
         advanced: Callable[[int], None] = lambda vehicle_steps: None,
     ) -> tuple[Any, ...] | Exception | None:
-        """Advance one block, or take it from the store.
+        """Advance one block, or take it from the store: what `Work` says, or a SceneError or NotSurveyed of its members.
 
-        halted: asked before each launch whether to give up (default: never).
-        advanced: called with the vehicle-steps made of this block so far (default: nothing).
-        Returns: What each keeper closed with; None if the block was halted; a SceneError or NotSurveyed because of its
-            members.
+        halted: asked before each launch whether to give up. advanced: called with the vehicle-steps of this block so far.
         """
         from lgvi_warp.engine.plan import NotSurveyed
 
@@ -105,11 +98,9 @@ def run_block(
     advanced: Callable[[int], None] = lambda vehicle_steps: None,
     warned: bool = True,
 ) -> tuple[Any, ...] | None:
-    """Advance a block through all steps.
+    """Advance a block through all steps; what each keeper closed with, None if the block was halted before the end.
 
-    halted: asked before each launch whether to give up (default: never).
-    advanced: called with the vehicle-steps made since the last call (default: nothing).
-    Returns: What each keeper closed with; None if the block was halted before the end.
+    halted: asked before each launch whether to give up. advanced: called with the vehicle-steps since the last call.
     """
     from lgvi_warp.engine.host_callback import call_host
     from lgvi_warp.engine.packets import Packets
@@ -172,10 +163,7 @@ def run_block(
 
 
 def at_start(plan: Plan, members: Members, packets: Packets) -> dict[str, np.ndarray]:
-    """The samples at t = 0, in the dtype of those that follow.
-
-    Returns: By field: (1, m, ...), in the field's unit.
-    """
+    """The samples (1, m, ...) at t = 0 by field, in the dtype of those that follow."""
     real = np.dtype(DTYPES[plan.dtype])
     types = {"position": np.dtype(np.float64)} if plan.spec.compensated else {}
     motion = (name for name in plan.fields if name not in SIGNALS)
@@ -200,10 +188,9 @@ def in_order(runs: Sequence[Block], done: Iterable[tuple[Block, Any]]) -> Iterat
 def unpacked(
     fields: Mapping[str, int], raw: np.ndarray, frame: Frame, table: Mapping[str, Field] = TABLE
 ) -> dict[str, np.ndarray]:
-    """Convert the kernel's raw samples to fields, from the kernel's origin and axes to the user's.
+    """Convert the kernel's raw samples to fields (samples, members, ...), from its origin and axes to the user's.
 
     raw: (samples, members, numbers), as `Packets.advance` returns them.
-    Returns: By field: (samples, members, ...), in the field's unit.
     """
     samples = divided(fields, raw, table)
     if frame.turned:
@@ -228,11 +215,7 @@ def divided(
     table: Mapping[str, Field],
     entries: Mapping[str, Sequence[int]] = MappingProxyType({}),
 ) -> dict[str, np.ndarray]:
-    """Raw samples by field, in the axes that they are in.
-
-    raw: (samples, members, numbers).
-    Returns: By field: (samples, members, ...), views where no pairs are summed.
-    """
+    """Raw samples (samples, members, numbers) by field, in the axes that they are in; views where no pairs are summed."""
     samples: dict[str, np.ndarray] = {}
     column = 0
     for name, size in fields.items():
@@ -251,9 +234,6 @@ def divided(
 
 
 def samples_of(plan: Plan, grid: TimeGrid, when: slice, fields: Mapping[str, np.ndarray], ends: Ends) -> Fields:
-    """Fields of a block with the times, steps and terms that belong to them.
-
-    fields: values by field, (times, members, ...).
-    """
+    """Fields (times, members, ...) of a block with the times, steps and terms that belong to them."""
     scene = plan.ensemble.scene
     return Fields(fields, grid.times[when], grid.sample_steps[when], scene.terms, ends, scene.controller)

@@ -15,10 +15,7 @@ Program = Sequence[tuple[str, float]]
 def step(
     x: State, body: Body, program: Program, h: float, stages: Sequence[float] = (1.0,), solve: Solver = newton
 ) -> State:
-    """One step of h [s]: the program with g h for each stage coefficient g.
-
-    program, h: (letter, coefficient) of each sub-map; step [s].
-    """
+    """One step of h [s]: the program with g h for each stage coefficient g."""
     for g in stages:
         for letter, coefficient in program:
             x = (SUBMAPS | FORCED)[letter](x, body, coefficient * g * h, solve)
@@ -34,10 +31,7 @@ def advance(
     stages: Sequence[float] = (1.0,),
     solve: Solver = newton,
 ) -> State:
-    """The state after so many steps.
-
-    program, h: (letter, coefficient) of each sub-map; step [s].
-    """
+    """The state after so many steps."""
     for _ in range(steps):
         x = step(replace(x, t=x.step * h), body, program, h, stages, solve)
         x = replace(x, step=x.step + 1)
@@ -54,10 +48,7 @@ def trajectory(
     stages: Sequence[float] = (1.0,),
     solve: Solver = newton,
 ) -> list[State]:
-    """The states after 0, every, 2 every, ..., steps steps. Raises ValueError if `every` does not divide `steps`.
-
-    program, h: (letter, coefficient) of each sub-map; step [s].
-    """
+    """The states after 0, every, 2 every, ..., steps steps. Raises ValueError if `every` does not divide `steps`."""
     if steps % every:
         raise ValueError(f"every = {every} does not divide steps = {steps}")
     states = [x]
@@ -75,12 +66,7 @@ def arrival(
     stages: Sequence[float] = (1.0,),
     solve: Solver = newton,
 ) -> tuple[State, float]:
-    """The state where a step from x comes to a distance of 0, and the part of h [s] until then.
-
-    distance: positive at x, zero or below after the whole step.
-
-    program, h: (letter, coefficient) of each sub-map; step [s].
-    """
+    """The state where a step from x comes to a distance of 0, and the part of h until then; distance: positive at x alone."""
     start = replace(x, t=x.step * h)
 
     def after(part: float) -> State:

@@ -15,11 +15,7 @@ Stage = tuple[Array, Array, Array, Array]
 
 
 def rates(b: Array, R: Array, nu: Array, Om: Array, body: Body) -> tuple[Array, Array, Array]:
-    """Eq. (1) and (3): db/dt in inertial axes, then dnu/dt and dOm/dt in body axes.
-
-    b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular velocity
-        (3,) [rad/s], body axes.
-    """
+    """Eq. (1) and (3): db/dt in inertial axes, then dnu/dt and dOm/dt in body axes."""
     force, torque = body.wrench(b, R)
     p, pi = body.M @ nu, body.J @ Om
     nu_rate = np.linalg.solve(body.M, cross(p, Om) + force)
@@ -28,12 +24,7 @@ def rates(b: Array, R: Array, nu: Array, Om: Array, body: Body) -> tuple[Array, 
 
 
 def along_screw(b: Array, R: Array, d: Array, theta: Array) -> tuple[Array, Array]:
-    """(b, R) exp of the twist (d, theta) in SE(3): b + R V d and R exp(hat(theta)), V the integral of exp.
-
-    b, R: Position (3,) [m]; attitude (3, 3), body to inertial axes.
-    d: Translation (3,) [m] of the twist.
-    theta: Rotation vector (3,) of the twist.
-    """
+    """(b, R) exp of the twist (d [m], theta) in SE(3): b + R V d and R exp(hat(theta)), V the integral of exp."""
     n, H = norm(theta), hat(theta)
     third = (n - math.sin(n)) / n**3 if n > 1e-2 else 1.0 / 6.0 - n**2 / 120.0 + n**4 / 5040.0
     V = np.eye(3) + 0.5 * sinc(0.5 * n) ** 2 * H + third * H @ H
@@ -49,10 +40,6 @@ def cg3(b: Array, R: Array, nu: Array, Om: Array, body: Body, h: float) -> Motio
     """Crouch-Grossman, order 3, on SE(3) x R6: R <- R exp(h b1 Om1) exp(h b2 Om2) exp(h b3 Om3).
 
     b moves by the same screws. Returns b, R, nu, Om at k + 1.
-
-    b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular velocity
-        (3,) [rad/s], body axes.
-    body, h: Inertia and laws; step [s].
     """
     stages: list[Stage] = []
     for row in CG3_A:
@@ -65,13 +52,7 @@ def cg3(b: Array, R: Array, nu: Array, Om: Array, body: Body, h: float) -> Motio
 def crouch_grossman_row(
     b: Array, R: Array, nu: Array, Om: Array, h: float, row: Sequence[float], stages: list[Stage]
 ) -> Motion:
-    """From the state at k along the frozen twists of the stages so far, with the weights of one row of the tableau.
-
-    b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular velocity
-        (3,) [rad/s], body axes.
-    h: Step [s].
-    row: Weights of the stages, a row of the tableau.
-    """
+    """From the state at k along the frozen twists of the stages so far, with the weights of one row of the tableau."""
     for weight, (nui, Omi, nu_rate, Om_rate) in zip(row, stages, strict=True):
         b, R = along_screw(b, R, h * weight * nui, h * weight * Omi)
         nu, Om = nu + h * weight * nu_rate, Om + h * weight * Om_rate
@@ -89,12 +70,7 @@ def inverse_dexp(theta: Array, Om: Array) -> Array:
 
 
 def rkmk4(b: Array, R: Array, nu: Array, Om: Array, body: Body, h: float) -> Motion:
-    """Runge-Kutta-Munthe-Kaas, order 4 (HLW IV.8.2): RK4 for the rotation vector. Returns b, R, nu, Om at k + 1.
-
-    b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular velocity
-        (3,) [rad/s], body axes.
-    body, h: Inertia and laws; step [s].
-    """
+    """Runge-Kutta-Munthe-Kaas, order 4 (HLW IV.8.2): RK4 for the rotation vector. Returns b, R, nu, Om at k + 1."""
     theta = np.zeros(3)
     rate: tuple[Array, ...] = (np.zeros(3),) * 4
     total = rate

@@ -55,30 +55,20 @@ def pack(x: State) -> Array:
 
 
 def unpack(y: Array, x: State, t: float) -> State:
-    """The state with y (18,) at t [s], the rest as in x.
-
-    y: Vector (18,), see `pack`.
-    t: Time [s].
-    """
+    """The state with y (18,), see `pack`, at t, the rest as in x."""
     return replace(x, b=y[:3], R=y[3:12].reshape(3, 3), p=y[12:15], pi=y[15:], t=t)
 
 
 def rates(x: State, body: Body, h: float) -> Array:
-    """Rate of the vector of `pack`, dy/dt (18,).
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    """
+    """Rate of the vector of `pack`, dy/dt (18,)."""
     b, R, p, pi = derivatives(x, body, h)
     return np.concatenate([b, R.ravel(), p, pi])
 
 
 def solve_stages(x: State, body: Body, h: float, method: Gauss, K: Array) -> tuple[Array, int]:
-    """K_i = f(y + h sum_j a_ij K_j), (s, 18), by fixed-point iteration from a guess K, and the number of iterations.
+    """K_i = f(y + h sum_j a_ij K_j), (s, 18), by fixed-point iteration from a guess K (s, 18), and the number of iterations.
 
     The iteration ends where the change is round-off or no longer falls. Raises NotConverged.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    K: Guess of the rates (s, 18).
     """
     y, smallest = pack(x), np.inf
     for iteration in range(1, MOST_ITERATIONS + 1):
@@ -95,8 +85,6 @@ def advance(x: State, body: Body, h: float, steps: int, s: int = 3) -> tuple[Sta
     """The state after so many steps of h [s], and the evaluations of the right-hand side. Raises NotConverged.
 
     Each step starts from the stages of the one before, extrapolated; the sum y + h sum b_i K_i is compensated.
-
-    x, body, h: State at the start; inertia and laws; step [s].
     """
     method, evaluations = gauss(s), 0
     K: Array = np.zeros((s, 18))

@@ -74,11 +74,7 @@ class Reduced:
         return self.A @ p - self.E @ Om, Om
 
     def to_reduced(self, b: Array, R: Array, nu: Array, Om: Array) -> CoupledState:
-        """The state of the user's b (3,) [m], R (3, 3), nu (3,) [m/s], Om (3,) [rad/s].
-
-        b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular
-            velocity (3,) [rad/s], body axes.
-        """
+        """The state of the user's b (3,) [m], R (3, 3), nu (3,) [m/s], Om (3,) [rad/s]."""
         Om_1, nu_1 = self.Q.T @ Om, self.Q.T @ (nu + cross(Om, self.o[0]))
         p = self.M @ (nu_1 + self.E @ Om_1)
         return CoupledState(b + R @ self.o[0], R @ self.Q, p, self.Js * Om_1 + self.E.T @ p)
@@ -203,10 +199,7 @@ def slide(x: CoupledState, n: Array) -> CoupledState:
 
 
 def shears(V: Array, j: int, k: int, t: float) -> Array:
-    """The rows of V (n, 3) turned by F = cay(t e_i), V F: x += t z, z -= s x, x += t z on columns j, k (cyclic).
-
-    V: Rows (n, 3) to turn.
-    """
+    """The rows of V (n, 3) turned by F = cay(t e_i), V F: x += t z, z -= s x, x += t z on columns j, k (cyclic)."""
     V, s = V.copy(), 2.0 * t / (1.0 + t * t)
     V[:, j] += t * V[:, k]
     V[:, k] -= s * V[:, j]
@@ -215,10 +208,7 @@ def shears(V: Array, j: int, k: int, t: float) -> Array:
 
 
 def T(x: CoupledState, body: Reduced, h: float) -> CoupledState:
-    """The exact flow of p.A p / 2: n = h A p, b += R n, pi += p x n. The same at every origin.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    """
+    """The exact flow of p.A p / 2: n = h A p, b += R n, pi += p x n. The same at every origin."""
     return slide(x, h * body.A @ x.p)
 
 
@@ -227,8 +217,6 @@ def R_i(x: CoupledState, body: ReducedX, i: int, h: float) -> CoupledState:
 
     y^3/3 makes t1 = tan(y) to order 4. Symplectic, since the angle 2 atan(t1) + 2 atan(t2) and the slide are the
     derivatives of one function of (p_i, pi_i). Infinite where t1 t2 = 1: a turn by pi in one step.
-
-    h: Step [s].
     """
     i, j, k = i - 1, i % 3, (i + 1) % 3
     g, pitch = 0.5 * h / body.Js[i], body.E[i, i]
@@ -246,24 +234,14 @@ def hop(x: CoupledState, body: ReducedX, i: int, j: int) -> CoupledState:
 
 
 def K(x: CoupledState, body: Reduced, h: float, wrench: Wrench, i: int = 1) -> CoupledState:
-    """The potential's kick, standing at o_i: p += h f', pi += h m' with f' = Q^T f, m' = Q^T (m - o_i x f).
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    wrench: Function (b, R) -> force [N], torque [N m] in the user's frame.
-    """
+    """The potential's kick, standing at o_i: p += h f', pi += h m' with f' = Q^T f, m' = Q^T (m - o_i x f)."""
     R = x.R @ body.Q.T
     f, m = wrench(x.b - R @ body.o[i - 1], R)
     return replace(x, p=x.p + h * body.Q.T @ f, pi=x.pi + h * body.Q.T @ (m - cross(body.o[i - 1], f)))
 
 
 def w_matrix(D: Array, c: Array, al: Array, sg: Array) -> Array:
-    """diag(D - s) - k^ with k = al - 2 sg, s = al.c.
-
-    D: Twice the moments Js (3,).
-    c: The parameter (3,).
-    al: The right-hand side (3,).
-    sg: S's modified inertia times P (3,).
-    """
+    """diag(D - s) - k^ with k = al - 2 sg, s = al.c; D: twice the moments Js (3,); sg: S's modified inertia times P (3,)."""
     return np.diag(D - al @ c) - hat(al - 2.0 * sg)
 
 
@@ -273,11 +251,7 @@ def w_turning(c: Array, S: Array) -> float:
 
 
 def w_guess(a: Array, P: Array, Js: Array, S: Array, sg: Array) -> Array:
-    """The initial guess of section 2 (a): r of c = a / D, then the root s0 of the quartic's linear part.
-
-    a, P, Js, S, sg: h pi - S P (3,); h p (3,); moments (3,) [kg m2]; the gauge S (3, 3) [m]; S's modified inertia times P
-        (3,).
-    """
+    """The initial guess of section 2 (a): r of c = a / D, then the root s0 of the quartic's linear part (see below)."""
     D = 2.0 * Js
     D_jk, D_sum = np.array([D[1] * D[2], D[2] * D[0], D[0] * D[1]]), D.sum() - D
     al = a + w_turning(a / D, S) * P
@@ -289,10 +263,9 @@ def w_guess(a: Array, P: Array, Js: Array, S: Array, sg: Array) -> Array:
 
 
 def w_parameter(a: Array, P: Array, Js: Array, S: Array, newtons: int | None) -> Array:
-    """c with [diag(D - s) - k^] c = al: F = cay(c) of W. a = h pi - S P, P = h p. Raises NoSolution (a ValueError).
+    """c with [diag(D - s) - k^] c = al: F = cay(c) of W. Raises NoSolution (a ValueError).
 
-    a, P, Js, S: h pi - S P (3,); h p (3,); moments (3,) [kg m2]; the gauge S (3, 3) [m].
-    newtons: Number of Newton steps; None: until round-off.
+    a = h pi - S P and P = h p, (3,); Js (3,) [kg m2]; S (3, 3) [m], the gauge.
     """
     D, sg = 2.0 * Js, modified_inertia(S) @ P
 
@@ -315,10 +288,7 @@ def w_parameter(a: Array, P: Array, Js: Array, S: Array, newtons: int | None) ->
 
 
 def settled(value: Callable[[Array], Array], newton: Callable[[Array], Array], c: Array, scale: float) -> Array:
-    """Newton steps until |value| is below SETTLED scale or stagnates; raises NoSolution if it stays above RESIDUAL.
-
-    c: Guess of the root (3,).
-    """
+    """Newton steps from c until |value| is below SETTLED scale or stagnates; raises NoSolution if it stays above RESIDUAL."""
     rho = norm(value(c))
     for _ in range(MOST_ITERATIONS):
         if rho <= SETTLED * scale:
@@ -338,9 +308,6 @@ def W(x: CoupledState, body: ReducedW, h: float, newtons: int | None = None) -> 
 
     Y = -vee(F Sd - Sd F^T); b += R Y, pi -= Y x p; R <- R F, p <- F^T p, pi <- F^T pi. newtons: so many Newton steps
     from the guess, or None for round-off. Raises NoSolution (a ValueError).
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    newtons: Number of Newton steps; default None, until round-off.
     """
     P = h * x.p
     F, Sd = cay(w_parameter(h * x.pi - body.S @ P, P, body.Js, body.S, newtons)), modified_inertia(body.S)
@@ -349,10 +316,7 @@ def W(x: CoupledState, body: ReducedW, h: float, newtons: int | None = None) -> 
 
 
 def drag(x: CoupledState, body: Reduced, h: float, z: Direction) -> CoupledState:
-    """The exact flow of one direction: w+ = w e^-y / (1 + h L q |w| (1 - e^-y)/y), y = h L l, L = z.I^-1 z.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    """
+    """The exact flow of one direction: w+ = w e^-y / (1 + h L q |w| (1 - e^-y)/y), y = h L l, L = z.I^-1 z."""
     v, w = z.twist[:3], z.twist[3:]
     v, w = body.Q.T @ v, body.Q.T @ (w - cross(body.o[0], v))
     g_v, g_w = body.velocity(v, w)
@@ -366,20 +330,14 @@ def drag(x: CoupledState, body: Reduced, h: float, z: Direction) -> CoupledState
 
 
 def E(x: CoupledState, body: Reduced, h: float, directions: Sequence[Direction]) -> CoupledState:
-    """Drag along the directions, one after another, each exactly: the half before the step.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    """
+    """Drag along the directions, one after another, each exactly: the half before the step."""
     for z in directions:
         x = drag(x, body, h, z)
     return x
 
 
 def E_adjoint(x: CoupledState, body: Reduced, h: float, directions: Sequence[Direction]) -> CoupledState:
-    """E with the directions in reversed order: the half after the step.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    """
+    """E with the directions in reversed order: the half after the step."""
     return E(x, body, h, directions[::-1])
 
 
@@ -412,16 +370,7 @@ def step(
     newtons: int | None = None,
     kick: Kick | None = None,
 ) -> CoupledState:
-    """One step of h [s] from o_1 to o_1: a turn R_i is entered by the hop to o_i. newtons: see W.
-
-    kick: what happens instead of K by the wrench, told in the user's frame.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    program: (letter, coefficient) of each sub-map.
-    wrench: Function (b, R) -> force [N], torque [N m] in the user's frame.
-    newtons: Number of Newton steps; default None, until round-off.
-    kick: What happens in place of K, in the user's frame; default None.
-    """
+    """One step of h from o_1 to o_1: a turn R_i is entered by the hop to o_i; kick: instead of K, user's frame."""
     at = 1
     for letter, coefficient in program:
         if letter == "T":
@@ -441,12 +390,6 @@ def step(
 def energy(
     b: Array, R: Array, nu: Array, Om: Array, I6: Array, potential: Callable[[Array, Array], float] | None = None
 ) -> float:
-    """(nu, Om).I6 (nu, Om)/2 + U(b, R) [J], user's origin and axes.
-
-    b, R, nu, Om: Position (3,) [m]; attitude (3, 3), body to inertial axes; velocity (3,) [m/s], body axes; angular velocity
-        (3,) [rad/s], body axes.
-    I6: Inertia (6, 6).
-    potential: U(b, R) [J]; default None, no potential.
-    """
+    """(nu, Om).I6 (nu, Om)/2 + U(b, R) [J], user's origin and axes; potential: U, None for none."""
     xi = np.concatenate([nu, Om])
     return float(0.5 * xi @ I6 @ xi) + (potential(b, R) if potential else 0.0)

@@ -63,21 +63,13 @@ def pack(x: State) -> Array:
 
 
 def unpack(y: Array, x: State, t: float) -> State:
-    """The state with y (15,) at t [s], the rest as in x.
-
-    y: Vector (15,), see `pack`.
-    t: Time [s].
-    """
+    """The state with y (15,), see `pack`, at t, the rest as in x."""
     first, last = y[3:6], y[6:9]
     return replace(x, b=y[:3], R=np.array([first, cross(last, first), last]), p=y[9:12], pi=y[12:], t=t)
 
 
 def wrench(x: State, body: Body, h: float, nu: Array, Om: Array) -> tuple[Array, Array, Array]:
-    """Force (3,) [N], torque (3,) [N m] of all laws, body axes, and the water's velocity (3,) [m/s], inertial.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    nu, Om: Velocity (3,) [m/s], body axes; angular velocity (3,) [rad/s], body axes.
-    """
+    """Force (3,) [N], torque (3,) [N m] of all laws, body axes, and the water's velocity (3,) [m/s], inertial."""
     views = look(x, body, h)
     flow = water(views, body)
     force, torque = body.wrench(x.b, x.R, views)
@@ -94,11 +86,7 @@ def at(x: State, origin: Array) -> State:
 def derivatives(x: State, body: Body, h: float, origin: Array = USER) -> tuple[Array, Array, Array, Array]:
     """b' (3,), R' (3, 3), p' (3,), pi' (3,), eq. (1) and (3) of Nordkvist & Sanyal 2010 with all laws.
 
-    b' = R nu + u, R' = R hat(Om), p' = p x Om + f, pi' = pi x Om + p x nu + m; h [s] is the step, which some laws look at.
-    origin (3,) [m]: where x has its b and pi, from the user's origin.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    origin: Point (3,) [m] of the body, from the user's origin; default that origin.
+    b' = R nu + u, R' = R hat(Om), p' = p x Om + f, pi' = pi x Om + p x nu + m; some laws look at the step h.
     """
     x = at(x, -origin)
     nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
@@ -109,11 +97,7 @@ def derivatives(x: State, body: Body, h: float, origin: Array = USER) -> tuple[A
 
 
 def rates(x: State, body: Body, h: float, origin: Array = USER) -> Array:
-    """Rate of the vector of `pack`, dy/dt (15,).
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    origin: Point (3,) [m] of the body, from the user's origin; default that origin.
-    """
+    """Rate of the vector of `pack`, dy/dt (15,)."""
     b, R, p, pi = derivatives(x, body, h, origin)
     return np.concatenate([b, R[0], R[2], p, pi])
 
@@ -122,8 +106,6 @@ def remembered_half(x: State, body: Body, h: float, second: bool) -> State:
     """What laws remember, half a step of h [s] later; x.t is the step's start, or its end in the second half.
 
     That of laws whose memory is known at every stage stays as it is: see `followed`.
-
-    x, body, h: State at the start; inertia and laws; step [s].
     """
     if not any(memory.size for memory in x.memory):
         return x
@@ -138,11 +120,9 @@ def follows(law: Law) -> bool:
 
 
 def followed(x: State, body: Body, h: float) -> State:
-    """The same state with what laws remember at x.t, from what they remembered h [s] before.
+    """The same state with what laws remember at x.t, from what they remembered h before.
 
     Raises ValueError for h < 0, which a stage of cg3 asks for: what a law remembers does not say how it came about.
-
-    x, body, h: State with the memory of h before; inertia and laws; length of that time [s].
     """
     if h == 0.0 or not any(memory.size for memory in x.memory):
         return x
@@ -153,11 +133,7 @@ def followed(x: State, body: Body, h: float) -> State:
 
 
 def stages(x: State, body: Body, h: float, tableau: Tableau, origin: Array = USER) -> Array:
-    """k_i = f(t + c_i h, y + h sum_j a_ij k_j), (stages, 15).
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    origin: Point (3,) [m] of the body, from the user's origin; default that origin.
-    """
+    """k_i = f(t + c_i h, y + h sum_j a_ij k_j), (stages, 15)."""
     y, K = pack(x), np.zeros((len(tableau.b), 15))
     for i, (row, c) in enumerate(zip(tableau.a, tableau.c, strict=True)):
         K[i] = rates(followed(unpack(y + h * np.array(row) @ K[:i], x, x.t + c * h), body, c * h), body, h, origin)
@@ -176,11 +152,7 @@ def stepper(tableau: Tableau, origin: Array = USER) -> Step:
 
 
 def advance(step: Step, x: State, body: Body, h: float, steps: int) -> State:
-    """The state after so many steps of h [s].
-
-    step: Function (x, body, h) that makes one step.
-    x, body, h: State at the start; inertia and laws; step [s].
-    """
+    """The state after so many steps, each made by step(x, body, h)."""
     for _ in range(steps):
         x = step(replace(x, t=x.step * h), body, h)
         x = replace(x, step=x.step + 1, t=(x.step + 1) * h)
@@ -191,9 +163,6 @@ def advance_steady(tableau: Tableau, x: State, body: Body, h: float, steps: int,
     """The state after so many steps of h [s] where forces never change in inertial axes: then R p = P + t F is known.
 
     y = (b, two rows of R, pi), (12,), of which p = R^T (R p) at every stage.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    origin: Point (3,) [m] of the body, from the user's origin; default that origin.
     """
     x = at(x, origin)
     nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, at(x, -origin).pi])), 2)
@@ -220,7 +189,6 @@ def error_norm(tableau: Tableau, K: Array, h: float, scale: Array) -> float:
     """The error of a step over the tolerance, HNW (4.11); with two estimates, HNW II.10: e5^2 / sqrt(e5^2 + e3^2 / 100).
 
     K: Rates (stages, 15), with the rate at the end where the tableau asks for it.
-    h: Step [s].
     """
     norms = [float(np.mean((h * np.array(e) @ K / scale) ** 2)) for e in tableau.errors]
     if len(norms) == 1:
@@ -237,11 +205,7 @@ def next_factor(tableau: Tableau, error: float, before: float) -> float:
 
 
 def attempt(x: State, body: Body, h: float, tableau: Tableau, rtol: float, atol: float | Array) -> tuple[State, float]:
-    """The state h [s] later and its error over the tolerance atol + rtol max(|y_k|, |y_k+1|).
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    rtol, atol: Relative tolerance; absolute tolerance, one number or (15,).
-    """
+    """The state h [s] later and its error over the tolerance atol + rtol max(|y_k|, |y_k+1|)."""
     x = remembered_half(x, body, h, second=False)
     K, y = stages(x, body, h, tableau), pack(x)
     y_k1 = y + h * np.array(tableau.b) @ K
@@ -253,10 +217,7 @@ def attempt(x: State, body: Body, h: float, tableau: Tableau, rtol: float, atol:
 
 
 def first_step(x: State, body: Body, tableau: Tableau, rtol: float, atol: float | Array) -> float:
-    """HNW II.4, a starting step: an explicit Euler step of h0 = 0.01 |y| / |f| estimates the second derivative.
-
-    rtol, atol: Relative tolerance; absolute tolerance, one number or (15,).
-    """
+    """HNW II.4, a starting step: an explicit Euler step of h0 = 0.01 |y| / |f| estimates the second derivative."""
     y, f = pack(x), rates(x, body, 1.0)
     scale = atol + rtol * np.abs(y)
     d0, d1 = (math.sqrt(np.mean((v / scale) ** 2)) for v in (y, f))
@@ -275,13 +236,9 @@ def adaptive(
     tableau: Tableau,
     h: float | None = None,
 ) -> list[State]:
-    """The states at the times [s], rising; steps are shortened to end on them. atol: for all of y, or (15,).
+    """The states at rising times, on which steps are shortened to end; h: the first step, None (default) for `first_step`.
 
     Every state's `step` counts the accepted steps. Raises ValueError where the step becomes too small.
-
-    times: Times [s], rising.
-    rtol, atol: Relative tolerance; absolute tolerance, one number or (15,).
-    h: First step [s]; default None, chosen by `first_step`.
     """
     h = first_step(x, body, tableau, rtol, atol) if h is None else h
     states, before = [], 1e-4

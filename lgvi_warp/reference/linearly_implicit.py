@@ -23,10 +23,7 @@ class Implicit(Tableau, Protocol):
 
 
 def slope(x: State, body: Body, h: float) -> Array:
-    """D(s nu) (6, 6), near the derivative of D(nu) nu: s = 1 + q^2 / (1 + q^2), q = h tr I6^-1 D.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    """
+    """D(s nu) (6, 6), near the derivative of D(nu) nu: s = 1 + q^2 / (1 + q^2), q = h tr I6^-1 D."""
     nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
     flow = water(look(x, body, h), body)
     q = h * float(np.trace(np.linalg.solve(body.I6, damping(x, body, h, nu, Om, flow))))
@@ -35,12 +32,9 @@ def slope(x: State, body: Body, h: float) -> Array:
 
 
 def stages(x: State, body: Body, h: float, tableau: Implicit, origin: Array = USER) -> Array:
-    """k_i (stages, 15) of y = pack(x).
+    """k_i (stages, 15) of y = pack(x), x with b and pi at `origin`.
 
     With s_i = sum_j<i g_ij / g k_j, the equation of k_i is (1 - h g A) (k_i + s_i) = f + s_i.
-
-    x, body, h: State at the start, with b and pi at `origin`; inertia and laws; step [s].
-    origin: Point (3,) [m] of the body, from the user's origin; default that origin.
     """
     y, K = pack(x), np.zeros((len(tableau.b), 15))
     g = tableau.implicit[0][0]

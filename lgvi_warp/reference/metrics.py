@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Metrics of one member's whole path in plain NumPy, twins of lgvi_warp/statistics/metrics/tracking_metrics.py: same names.
 
-t: times of the ticks under way (k,) [s]; y: actual numbers (k,), goal: one number; e: errors (k,), wanted less actual.
+t: times of the ticks under way (k,) [s]; y: actual numbers (k,), goal: one number; e: errors (k,), wanted less actual; end of
+the run [s]; command, limit: commands (k, channels), and the limit of each channel (channels,).
 """
 
 import numpy as np
@@ -13,47 +14,27 @@ def direction(y: np.ndarray, goal: float) -> float:
 
 
 def overshoot(t: np.ndarray, y: np.ndarray, goal: float) -> float:
-    """How far y goes beyond the goal.
-
-    t: times of the ticks under way (k,) [s].
-    y: actual numbers at these ticks (k,).
-    """
+    """How far y goes beyond the goal."""
     return max(0.0, float(np.max(direction(y, goal) * (y - goal))))
 
 
 def undershoot(t: np.ndarray, y: np.ndarray, goal: float) -> float:
-    """How far y goes the wrong way.
-
-    t: times of the ticks under way (k,) [s].
-    y: actual numbers at these ticks (k,).
-    """
+    """How far y goes the wrong way."""
     return max(0.0, float(np.max(direction(y, goal) * (y[0] - y))))
 
 
 def peak(t: np.ndarray, y: np.ndarray, goal: float) -> float:
-    """y where it is farthest in the direction of the step.
-
-    t: times of the ticks under way (k,) [s].
-    y: actual numbers at these ticks (k,).
-    """
+    """y where it is farthest in the direction of the step."""
     return float(y[np.argmax(direction(y, goal) * y)])
 
 
 def peak_time(t: np.ndarray, y: np.ndarray, goal: float) -> float:
-    """The time at which y is farthest in the direction of the step [s].
-
-    t: times of the ticks under way (k,) [s].
-    y: actual numbers at these ticks (k,).
-    """
+    """The time at which y is farthest in the direction of the step [s]."""
     return float(t[np.argmax(direction(y, goal) * y)])
 
 
 def rise_time(t: np.ndarray, y: np.ndarray, goal: float) -> float:
-    """From the first tick with 10 % of the step done to the first one with 90 %.
-
-    t: times of the ticks under way (k,) [s].
-    y: actual numbers at these ticks (k,).
-    """
+    """From the first tick with 10 % of the step done to the first one with 90 %."""
     if goal == y[0]:
         return 0.0
     done = (y - y[0]) / (goal - y[0])
@@ -63,11 +44,7 @@ def rise_time(t: np.ndarray, y: np.ndarray, goal: float) -> float:
 
 
 def settling_time(t: np.ndarray, y: np.ndarray, goal: float, within: float) -> float:
-    """The first tick from which on y is within the band.
-
-    t: times of the ticks under way (k,) [s].
-    y: actual numbers at these ticks (k,).
-    """
+    """The first tick from which on y is within the band."""
     outside = np.flatnonzero(np.abs(y - goal) > within)
     if not len(outside):
         return float(t[0])
@@ -75,12 +52,7 @@ def settling_time(t: np.ndarray, y: np.ndarray, goal: float, within: float) -> f
 
 
 def steady_state_error(t: np.ndarray, e: np.ndarray, end: float, share: float = 0.1) -> float:
-    """The mean error over the last part of the run.
-
-    t: times of the ticks under way (k,) [s].
-    e: errors at these ticks (k,), wanted less actual.
-    end: the end of the run [s].
-    """
+    """The mean error over the last part of the run."""
     if t[-1] < end:
         return np.nan
     return float(np.mean(e[t >= end * (1.0 - share) - 1e-9 * end]))
@@ -122,23 +94,12 @@ def travel(t: np.ndarray, actuator: np.ndarray) -> float:
 
 
 def saturation_share(t: np.ndarray, command: np.ndarray, limit: np.ndarray) -> float:
-    """The share of time with a command at its limit or beyond.
-
-    t: times of the ticks under way (k,) [s].
-    command: commands at these ticks (k, channels).
-    limit: the limit of each channel (channels,).
-    """
+    """The share of time with a command at its limit or beyond."""
     held = np.any(np.abs(command[:-1]) >= limit * (1.0 - 1e-6), axis=1)
     return float(np.sum(held * np.diff(t)) / (t[-1] - t[0]))
 
 
 def energy(t: np.ndarray, wrench: np.ndarray, velocity: np.ndarray, angular_velocity: np.ndarray) -> float:
-    """The integral of |power| of a delivered wrench [J].
-
-    t: times of the ticks under way (k,) [s].
-    wrench: delivered forces and torques at these ticks (k, 6) [N, N m], body axes.
-    velocity: velocities (k, 3) [m/s], body axes.
-    angular_velocity: (k, 3) [rad/s], body axes.
-    """
+    """The integral of |power| [J] of a delivered wrench (k, 6) [N, N m]; velocities (k, 3) [m/s], [rad/s]; body axes."""
     power = np.sum(wrench[:, :3] * velocity, axis=1) + np.sum(wrench[:, 3:] * angular_velocity, axis=1)
     return float(np.trapezoid(np.abs(power), t))

@@ -12,11 +12,7 @@ from lgvi_warp.reference.submaps import Body, State
 
 
 def algebra_rates(x: State, body: Body, h: float, origin: Array = USER) -> Array:
-    """(Om; b', p', pi') (12,), an element of so(3) x R^9: R' = R hat(Om); x has its b and pi at origin.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    origin: Point (3,) [m] of the body, from the user's origin; default that origin.
-    """
+    """(Om; b', p', pi') (12,), an element of so(3) x R^9: R' = R hat(Om); x has its b and pi at origin."""
     Om = np.linalg.solve(body.I6, np.concatenate([x.p, at(x, -origin).pi]))[3:]
     b, _, p, pi = derivatives(x, body, h, origin)
     return np.concatenate([Om, b, p, pi])
@@ -28,22 +24,14 @@ def bracket(u: Array, v: Array) -> Array:
 
 
 def act(x: State, u: Array, t: float) -> State:
-    """R exp(hat(u[:3])) and (b, p, pi) + u[3:], at t [s].
-
-    u: Element (12,) of the algebra so(3) x R^9.
-    t: Time of the new state [s].
-    """
+    """R exp(hat(u[:3])) and (b, p, pi) + u[3:], at t; u (12,): an element of the algebra so(3) x R^9."""
     return replace(x, R=x.R @ exp(u[:3]), b=x.b + u[3:6], p=x.p + u[6:9], pi=x.pi + u[9:], t=t)
 
 
 def rkmk4(x: State, body: Body, h: float, origin: Array = USER) -> State:
-    """Munthe-Kaas & Owren (1999): order 4 with two commutators.
+    """Munthe-Kaas & Owren (1999): order 4 with two commutators; R turns about origin.
 
-    As in Hairer, Lubich & Wanner, IV.8, but in body axes, where the commutators have opposite signs. origin (3,) [m]: the
-    point of the body that R turns about.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    origin: Point (3,) [m] of the body, from the user's origin; default that origin.
+    As in Hairer, Lubich & Wanner, IV.8, but in body axes, where the commutators have opposite signs.
     """
     x = at(remembered_half(x, body, h, second=False), origin)
 
@@ -59,11 +47,7 @@ def rkmk4(x: State, body: Body, h: float, origin: Array = USER) -> State:
 
 
 def cg3(x: State, body: Body, h: float, origin: Array = USER) -> State:
-    """Crouch & Grossman (1993), order 3, with any laws: classical.cg3 is the paper's, on SE(3) x R^6. origin: as above.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    origin: Point (3,) [m] of the body, from the user's origin; default that origin.
-    """
+    """Crouch & Grossman (1993), order 3, with any laws: classical.cg3 is the paper's, on SE(3) x R^6. origin: as above."""
     x = at(remembered_half(x, body, h, second=False), origin)
     stages: list[Array] = []
     for row in (*CG3_A, CG3_B):

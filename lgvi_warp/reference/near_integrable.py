@@ -22,10 +22,7 @@ Program = Sequence[tuple[str, float]]
 
 
 def splitting(first: str, *half: float) -> Program:
-    """A palindrome that begins with `first`, from the printed coefficients of its half.
-
-    The last but one of the half and the middle one follow, since those of each part sum to one.
-    """
+    """A palindrome that begins with `first`; the printed coefficients of its half lack the last but one and the middle one."""
     parts, c = (first, "A" if first == "B" else "B"), list(half)
     n = len(c)
     c.append(0.5 - sum(c[n % 2 :: 2]))
@@ -61,10 +58,6 @@ def modified_inertia(pi: Array, J: Array, h: float, order: int = 10) -> Array:
 
     Hairer & Vilmart (2006), J. Phys. A 39, 13225, whose coefficients are symmetric functions of the moments J. Since J~
     depends on pi, the rotation is symplectic to that order only, where D of equation (24) is so exactly. Raises NoSolution.
-
-    pi: Angular momentum (3,) [N m s], body axes.
-    J: Inertia (3, 3) [kg m2].
-    h: Step [s].
     """
     moments, axes = np.linalg.eigh(J)
     N, H = 0.5 * h * h * pi @ pi, 0.5 * h * h * pi @ np.linalg.solve(J, pi)
@@ -132,38 +125,26 @@ def coefficients(moments: Array) -> list[tuple[list[float], list[float]]]:
 
 
 def D(x: State, body: Body, h: float, order: int = 10, solve: Solver = quartic) -> State:
-    """The free rotation to that order: equation (24) with J~ instead of J, then R <- R F, p <- F^T p, pi <- F^T pi.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    """
+    """The free rotation to that order: equation (24) with J~ instead of J, then R <- R F, p <- F^T p, pi <- F^T pi."""
     F = solve(h * x.pi, modified_inertia(x.pi, body.J, h, order))
     return replace(x, R=x.R @ F, p=F.T @ x.p, pi=F.T @ x.pi)
 
 
 def A(x: State, body: Body, h: float, order: int = 10, solve: Solver = quartic) -> State:
-    """The flow of pi.J^-1 pi / 2 + U_b(b): the free rotation and p <- p + h f, in either order.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    """
+    """The flow of pi.J^-1 pi / 2 + U_b(b): the free rotation and p <- p + h f, in either order."""
     x = D(x, body, h, order, solve)
     force, _ = body.wrench(x.b, x.R, potential=True)
     return kicked(x, h, (force, np.zeros(3)))
 
 
 def B(x: State, body: Body, h: float) -> State:
-    """The flow of p.M^-1 p / 2 + U_R(R): T and pi <- pi + h m, in either order.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    """
+    """The flow of p.M^-1 p / 2 + U_R(R): T and pi <- pi + h m, in either order."""
     _, torque = body.wrench(x.b, x.R, potential=True)
     return kicked(T(x, body, h), h, (np.zeros(3), torque))
 
 
 def step(x: State, body: Body, program: Program, h: float, order: int = 10, solve: Solver = quartic) -> State:
-    """One step of h [s].
-
-    program, h: (letter, coefficient) of each sub-map; step [s].
-    """
+    """One step of h [s]."""
     for part, coefficient in program:
         x = A(x, body, coefficient * h, order, solve) if part == "A" else B(x, body, coefficient * h)
     return x

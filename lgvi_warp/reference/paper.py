@@ -19,11 +19,7 @@ Motion = tuple[Array, Array, Array, Array]
 
 
 def equation_10(Om_k: Array, body: Body, h: float, solve: Solver = newton) -> Array:
-    """Eq. (10): F_k with h hat(J Om_k) = F_k Jd - Jd F_k^T.
-
-    Om_k: Angular velocity (3,) [rad/s] at k.
-    body, h, solve: Inertia and laws; step [s]; solver of equation (24).
-    """
+    """Eq. (10): F_k with h hat(J Om_k) = F_k Jd - Jd F_k^T."""
     return solve(h * body.J @ Om_k, body.J)
 
 
@@ -33,41 +29,25 @@ def equation_11(R_k: Array, F_k: Array) -> Array:
 
 
 def equation_12(b_k: Array, R_k: Array, nu_k: Array, h: float) -> Array:
-    """Eq. (12): b_{k+1} = h R_k nu_k + b_k, with the old R and the old nu.
-
-    h: Step [s].
-    """
+    """Eq. (12): b_{k+1} = h R_k nu_k + b_k, with the old R and the old nu."""
     return b_k + h * R_k @ nu_k
 
 
 def equation_13(nu_k: Array, F_k: Array, b_k1: Array, R_k1: Array, body: Body, h: float) -> Array:
-    """Eq. (13): M nu_{k+1} = F_k^T M nu_k + h U_{k+1}. Returns nu_{k+1}.
-
-    nu_k: Velocity (3,) [m/s] at k.
-    F_k: Rotation (3, 3) of equation (10).
-    body, h: Inertia and laws; step [s].
-    """
+    """Eq. (13): M nu_{k+1} = F_k^T M nu_k + h U_{k+1}. Returns nu_{k+1}."""
     force, _ = body.wrench(b_k1, R_k1)
     return np.linalg.solve(body.M, F_k.T @ body.M @ nu_k + h * force)
 
 
 def equation_14(Om_k: Array, F_k: Array, nu_k1: Array, b_k1: Array, R_k1: Array, body: Body, h: float) -> Array:
-    """Eq. (14): J Om_{k+1} = F_k^T J Om_k + h M nu_{k+1} x nu_{k+1} + h M_{k+1}, with the new nu. Returns Om_{k+1}.
-
-    Om_k: Angular velocity (3,) [rad/s] at k.
-    F_k: Rotation (3, 3) of equation (10).
-    body, h: Inertia and laws; step [s].
-    """
+    """Eq. (14): J Om_{k+1} = F_k^T J Om_k + h M nu_{k+1} x nu_{k+1} + h M_{k+1}, with the new nu. Returns Om_{k+1}."""
     _, torque = body.wrench(b_k1, R_k1)
     munk = cross(body.M @ nu_k1, nu_k1)
     return np.linalg.solve(body.J, F_k.T @ body.J @ Om_k + h * munk + h * torque)
 
 
 def phi(b_k: Array, R_k: Array, nu_k: Array, Om_k: Array, body: Body, h: float, solve: Solver = newton) -> Motion:
-    """Phi_h, eq. (10)-(14), in the order they are printed. Returns b, R, nu, Om at k + 1.
-
-    body, h, solve: Inertia and laws; step [s]; solver of equation (24).
-    """
+    """Phi_h, eq. (10)-(14), in the order they are printed. Returns b, R, nu, Om at k + 1."""
     F_k = equation_10(Om_k, body, h, solve)
     R_k1 = equation_11(R_k, F_k)
     b_k1 = equation_12(b_k, R_k, nu_k, h)
@@ -77,40 +57,24 @@ def phi(b_k: Array, R_k: Array, nu_k: Array, Om_k: Array, body: Body, h: float, 
 
 
 def kicked_momentum(b_k: Array, R_k: Array, nu_k: Array, Om_k: Array, body: Body, h: float) -> Array:
-    """The bracket of eq. (19) and (21): J Om_k + h M nu_k x nu_k + h M_k, with the old nu.
-
-    body, h: Inertia and laws; step [s].
-    """
+    """The bracket of eq. (19) and (21): J Om_k + h M nu_k x nu_k + h M_k, with the old nu."""
     _, torque = body.wrench(b_k, R_k)
     return body.J @ Om_k + h * cross(body.M @ nu_k, nu_k) + h * torque
 
 
 def equation_19(q: Array, body: Body, h: float, solve: Solver = newton) -> Array:
-    """Eq. (19): F_{k+1} with F_{k+1}^T Jd - Jd F_{k+1} = h hat(q), q the kicked momentum.
-
-    q: The kicked momentum (3,).
-    body, h, solve: Inertia and laws; step [s]; solver of equation (24).
-    """
+    """Eq. (19): F_{k+1} with F_{k+1}^T Jd - Jd F_{k+1} = h hat(q), q the kicked momentum."""
     return solve(h * q, body.J).T
 
 
 def equation_20(nu_k: Array, F_k1: Array, b_k: Array, R_k: Array, body: Body, h: float) -> Array:
-    """Eq. (20): M nu_{k+1} = F_{k+1} (M nu_k + h U_k). Returns nu_{k+1}.
-
-    nu_k: Velocity (3,) [m/s] at k.
-    F_k1: Rotation (3, 3) of equation (19).
-    body, h: Inertia and laws; step [s].
-    """
+    """Eq. (20): M nu_{k+1} = F_{k+1} (M nu_k + h U_k). Returns nu_{k+1}."""
     force, _ = body.wrench(b_k, R_k)
     return np.linalg.solve(body.M, F_k1 @ (body.M @ nu_k + h * force))
 
 
 def equation_21(q: Array, F_k1: Array, body: Body) -> Array:
-    """Eq. (21): J Om_{k+1} = F_{k+1} q. Returns Om_{k+1}.
-
-    q: The kicked momentum (3,).
-    F_k1: Rotation (3, 3) of equation (19).
-    """
+    """Eq. (21): J Om_{k+1} = F_{k+1} q, q the kicked momentum. Returns Om_{k+1}."""
     return np.linalg.solve(body.J, F_k1 @ q)
 
 
@@ -120,21 +84,14 @@ def equation_22(R_k: Array, F_k1: Array) -> Array:
 
 
 def equation_23(b_k: Array, R_k1: Array, nu_k1: Array, h: float) -> Array:
-    """Eq. (23): b_{k+1} = h R_{k+1} nu_{k+1} + b_k, with the new R and the new nu.
-
-    b_k: Position (3,) [m] at k.
-    h: Step [s].
-    """
+    """Eq. (23): b_{k+1} = h R_{k+1} nu_{k+1} + b_k, with the new R and the new nu."""
     return b_k + h * R_k1 @ nu_k1
 
 
 def phi_adjoint(
     b_k: Array, R_k: Array, nu_k: Array, Om_k: Array, body: Body, h: float, solve: Solver = newton
 ) -> Motion:
-    """Phi*_h, eq. (19)-(23), in the order they are printed. Returns b, R, nu, Om at k + 1.
-
-    body, h, solve: Inertia and laws; step [s]; solver of equation (24).
-    """
+    """Phi*_h, eq. (19)-(23), in the order they are printed. Returns b, R, nu, Om at k + 1."""
     q = kicked_momentum(b_k, R_k, nu_k, Om_k, body, h)
     F_k1 = equation_19(q, body, h, solve)
     nu_k1 = equation_20(nu_k, F_k1, b_k, R_k, body, h)
@@ -145,10 +102,7 @@ def phi_adjoint(
 
 
 def psi(b_k: Array, R_k: Array, nu_k: Array, Om_k: Array, body: Body, h: float, solve: Solver = newton) -> Motion:
-    """Psi_h = Phi*_{h/2} o Phi_{h/2}, section III-F: Phi first, each over half the step.
-
-    body, h, solve: Inertia and laws; step [s]; solver of equation (24).
-    """
+    """Psi_h = Phi*_{h/2} o Phi_{h/2}, section III-F: Phi first, each over half the step."""
     return phi_adjoint(*phi(b_k, R_k, nu_k, Om_k, body, 0.5 * h, solve), body, 0.5 * h, solve)
 
 
@@ -157,11 +111,7 @@ Wrench = tuple[Array, Array]
 
 
 def forces(x: State, body: Body, h: float, nu: Array, Om: Array) -> Wrench:
-    """phi(b, nu, R, Om) and tau(b, nu, R, Om): all laws that do not follow from a potential.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    nu, Om: Velocity (3,) [m/s], body axes; angular velocity (3,) [rad/s], body axes.
-    """
+    """phi(b, nu, R, Om) and tau(b, nu, R, Om): all laws that do not follow from a potential."""
     views = look(x, body, h)
     flow = water(views, body)
     force, torque = body.wrench(x.b, x.R, views, potential=False)
@@ -171,18 +121,12 @@ def forces(x: State, body: Body, h: float, nu: Array, Om: Array) -> Wrench:
 
 
 def equation_15(old: Wrench, new: Wrench, alpha: float) -> Array:
-    """Eq. (15): phi_k = alpha phi(b_k, nu_k, R_k, Om_k) + (1 - alpha) phi(b_{k+1}, nu_k, R_{k+1}, Om_k).
-
-    old, new: Force [N] and torque [N m] at k; force [N] and torque [N m] at k + 1, with the velocities at k.
-    """
+    """Eq. (15): phi_k = alpha phi(b_k, nu_k, R_k, Om_k) + (1 - alpha) phi(b_{k+1}, nu_k, R_{k+1}, Om_k)."""
     return alpha * old[0] + (1.0 - alpha) * new[0]
 
 
 def equation_16(old: Wrench, new: Wrench, beta: float) -> Array:
-    """Eq. (16): tau_k = beta tau(b_k, nu_k, R_k, Om_k) + (1 - beta) tau(b_{k+1}, nu_k, R_{k+1}, Om_k).
-
-    old, new: Force [N] and torque [N m] at k; force [N] and torque [N m] at k + 1, with the velocities at k.
-    """
+    """Eq. (16): tau_k = beta tau(b_k, nu_k, R_k, Om_k) + (1 - beta) tau(b_{k+1}, nu_k, R_{k+1}, Om_k)."""
     return beta * old[1] + (1.0 - beta) * new[1]
 
 
@@ -192,19 +136,12 @@ def velocities(x: State, body: Body) -> tuple[Array, Array]:
 
 
 def drift(x: State, body: Body, h: float) -> Array:
-    """h u: how far the water carries the vehicle.
-
-    Args:
-        x, body, h: State at the start; inertia and laws; step [s].
-    """
+    """h u: how far the water carries the vehicle."""
     return h * water(look(x, body, h), body).velocity
 
 
 def Phi(x: State, body: Body, h: float, solve: Solver = newton, alpha: float = 0.5, beta: float = 0.5) -> State:
-    """Phi_h with (15), (16): (10)-(14) in the order they appear. What laws remember is advanced first.
-
-    x, body, h, solve: State at the start; inertia and laws; step [s]; solver of equation (24).
-    """
+    """Phi_h with (15), (16): (10)-(14) in the order they appear. What laws remember is advanced first."""
     x = at_time(remembered_over(at_time(x, x.t + 0.5 * h), body, h), x.t)
     nu, Om = velocities(x, body)
     old = forces(x, body, h, nu, Om)
@@ -221,8 +158,6 @@ def Phi_adjoint(x: State, body: Body, h: float, solve: Solver = newton, alpha: f
     """Phi*_h: (19)-(23) with phi*_k, tau*_k, which are (15), (16) with k and k + 1 interchanged; by iteration.
 
     Raises NoSolution where it does not settle.
-
-    x, body, h, solve: State at the start; inertia and laws; step [s]; solver of equation (24).
     """
     nu, Om = velocities(x, body)
     f, m = body.wrench(x.b, x.R, look(x, body, h), potential=True)
@@ -252,10 +187,7 @@ def at_time(x: State, t: float) -> State:
 
 
 def remembered_over(x: State, body: Body, h: float) -> State:
-    """What laws remember, over all of h; x.t is the middle of it.
-
-    x, body, h: State in the middle of the step; inertia and laws; step [s].
-    """
+    """What laws remember, over all of h; x.t is the middle of it."""
     return remembered(remembered(x, body, h, second=False), body, h, second=True)
 
 

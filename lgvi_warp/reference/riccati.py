@@ -36,8 +36,6 @@ def sign(a: Array, J: Array, iterations: int | None = None) -> Array:
     """F = (A + S) Jd^-1, where I + sign(H) spans the invariant subspace (I; S) of the eigenvalues with positive real part.
 
     a (3,), J (3, 3) [kg m2]. iterations means nothing here. Raises NoSolution where the step is too large or Jd singular.
-
-    a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2]; has no meaning here.
     """
     Jd = modified_inertia(J)
     if not np.linalg.cond(Jd) < 1.0 / SINGULAR:
@@ -48,9 +46,5 @@ def sign(a: Array, J: Array, iterations: int | None = None) -> Array:
 
 
 def quality(F: Array, a: Array, J: Array) -> tuple[float, float]:
-    """Relative residual of equation (24), and the largest entry of F^T F - I.
-
-    F: Rotation (3, 3).
-    a, J: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2].
-    """
+    """Relative residual of equation (24), and the largest entry of F^T F - I."""
     return residual(F, a, J), float(np.abs(F.T @ F - np.eye(3)).max())

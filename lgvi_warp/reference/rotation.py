@@ -79,11 +79,7 @@ def modified_inertia(J: Array) -> Array:
 
 
 def residual(F: Array, a: Array, J: Array) -> float:
-    """|F Jd - Jd F^T - hat(a)| / |a|, equation (24) as a number; not divided where a = 0.
-
-    F: Rotation (3, 3).
-    a, J: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2].
-    """
+    """|F Jd - Jd F^T - hat(a)| / |a|, equation (24) as a number; not divided where a = 0."""
     Jd = modified_inertia(J)
     return norm(vee(F @ Jd - Jd @ F.T) - a) / (norm(a) or 1.0)
 
@@ -104,13 +100,10 @@ def in_principal_axes(solve: Callable[[Array, Array, int | None], Array]) -> Cal
 
 
 def iterate(value: Function, differential: Function, x: Array, a: Array, iterations: int | None) -> Array:
-    """Newton steps on value(x) = 0: so many, or until the residual no longer shrinks.
+    """Newton steps on value(x) = 0: so many, or until the residual, scaled by |a|, no longer shrinks.
 
     A test against round-off alone would never end: near |J^-1 a| = 1 the residual stagnates above it. Raises NoSolution
     if it stays large; LinAlgError (a ValueError) if a fixed count meets a singular differential, beyond that bound.
-
-    x: Guess of the root (3,).
-    a, iterations: Right-hand side (3,), whose size scales the residual; number of Newton steps; None: until round-off.
     """
     if iterations is not None:
         for _ in range(iterations):
@@ -135,9 +128,6 @@ def newton(a: Array, J: Array, iterations: int | None = None) -> Array:
     """Section III-G: Newton-Raphson on a = sin|f|/|f| J f + (1 - cos|f|)/|f|^2 f x J f, F = exp(hat(f)).
 
     iterations: that many steps from J^-1 a, or None for round-off. Raises NoSolution.
-
-    a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2]; number of Newton steps;
-        default None, until round-off.
     """
     if not np.any(a):
         return np.eye(3)
@@ -171,11 +161,7 @@ def newton_differential(f: Array, J: Array) -> Array:
 
 
 def cayley_value(c: Array, a: Array, J: Array) -> Array:
-    """G(c) = a + a x c + c (a.c) - 2 J c, equation (24) for F = cay(c).
-
-    c: Parameter (3,) of the rotation.
-    a, J: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2].
-    """
+    """G(c) = a + a x c + c (a.c) - 2 J c, equation (24) for F = cay(c)."""
     return a + cross(a, c) + c * (a @ c) - 2.0 * J @ c
 
 
@@ -183,9 +169,6 @@ def cayley(a: Array, J: Array, iterations: int | None = None) -> Array:
     """Newton on G(c) = a + a x c + c (a.c) - 2 J c = 0, F = cay(c); dG = hat(a) + (a.c) I + c a^T - 2 J.
 
     iterations: that many steps from (2 J)^-1 a, or None for round-off. Raises NoSolution.
-
-    a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2]; number of Newton steps;
-        default None, until round-off.
     """
     if not np.any(a):
         return np.eye(3)
@@ -213,9 +196,6 @@ def quartic_root(a: Array, J: Array, iterations: int | None) -> float:
     """The smallest root by Newton steps from q0 / q1, the root of q's linear part; None: until they no longer climb.
 
     q is convex and falls up to that root, so every step from its near side stays there, until round-off.
-
-    a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); moments of inertia (3,) [kg m2]; number of
-        Newton steps; None: until they no longer climb.
     """
     q0, q1, q2, d1 = quartic_coefficients(a, J)
     s = q0 / q1
@@ -229,10 +209,7 @@ def quartic_root(a: Array, J: Array, iterations: int | None) -> float:
 
 
 def quartic_parameter(a: Array, J: Array, s: float) -> Array:
-    """c = n / det for the diagonal J (3,) and the root s; for any s, G(c) = (a.c - s) c: the residual for free.
-
-    a, J: h pi (3,) [N m s2], the right-hand side of equation (24); moments of inertia (3,) [kg m2].
-    """
+    """c = n / det for the diagonal J (3,) and the root s; for any s, G(c) = (a.c - s) c: the residual for free."""
     b = 2.0 * J - s
     b1, b2, b3 = b.tolist()
     n = (np.array([b2 * b3, b3 * b1, b1 * b2]) + a @ a) * a + cross(b * a, a)
@@ -244,9 +221,6 @@ def quartic(a: Array, J: Array, iterations: int | None = None) -> Array:
     """The scalar reduction: s = a.c is the smallest root of a quartic, then c is rational in s and F = cay(c).
 
     iterations: Newton steps on the quartic, or None for round-off. F is a rotation whatever s is. Raises NoSolution.
-
-    a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2]; number of Newton steps;
-        default None, until round-off.
     """
     s = quartic_root(a, J, iterations)
     c = quartic_parameter(a, J, s)
@@ -283,8 +257,6 @@ def moser_veselov(a: Array, J: Array, iterations: int | None = None) -> Array:
     v_i spans the kernel of I - lambda_i hat(a) - lambda_i^2 Jd^2, and F = (Jd psi Lambda psi^-1)^T (every J of the
     printed text is Jd). Explicit: iterations means nothing here. Raises NoSolution where roots coincide (near a sphere,
     a = 0), where none has a positive real part, where Jd is singular, and where the answer is no rotation.
-
-    a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2]; has no meaning here.
     """
     Jd = np.diag(modified_inertia(np.diag(J)))
     lambdas = moser_veselov_roots(a, Jd**2)
@@ -303,8 +275,6 @@ def riccati(a: Array, J: Array, iterations: int | None = None) -> Array:
     The columns of (I, S) span an invariant subspace of H, on which H acts as A + S = F Jd: the one of the three
     eigenvalues with positive real part. Explicit: iterations means nothing here. Raises NoSolution where that subspace
     does not give an S or F is no rotation, and where Jd is singular (plates).
-
-    a, J, iterations: h pi (3,) [N m s2], the right-hand side of equation (24); inertia (3, 3) [kg m2]; has no meaning here.
     """
     A, Jd = 0.5 * hat(a), modified_inertia(J)
     if not np.linalg.cond(Jd) < 1.0 / SINGULAR:

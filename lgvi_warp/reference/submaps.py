@@ -59,11 +59,7 @@ class Body:
     def wrench(
         self, b: Array, R: Array, views: tuple[View, ...] = (), potential: bool | None = None
     ) -> tuple[Array, Array]:
-        """Sum of the laws' wrenches; only those that follow from a potential, or only the others, if so asked.
-
-        b, R: Position (3,) [m]; attitude (3, 3), body to inertial axes.
-        potential: True: only laws that follow from a potential; False: only the others; default None, all.
-        """
+        """Sum of the laws' wrenches; potential: True: only those that follow from a potential; False: only the others."""
         force, torque = np.zeros(3), np.zeros(3)
         views = views or tuple(View(R, b, np.zeros(3), np.zeros(3)) for _ in self.terms)
         for term, view in zip(self.terms, views, strict=True):
@@ -78,11 +74,7 @@ class Body:
 
 
 def start(body: Body, b: Array, R: Array, p: Array, pi: Array) -> State:
-    """The state at t = 0, with what the laws remember.
-
-    b, R: Position (3,) [m]; attitude (3, 3), body to inertial axes.
-    p, pi: Momentum (3,) [N s], body axes; angular momentum (3,) [N m s], body axes.
-    """
+    """The state at t = 0, with what the laws remember."""
     return State(b, R, p, pi, memory=tuple(term.start() for term in body.terms))
 
 
@@ -97,44 +89,29 @@ def velocity(body: Body, p: Array) -> Array:
 
 
 def look(x: State, body: Body, h: float) -> tuple[View, ...]:
-    """What each law sees of the state: attitude, position, velocities, time and its memory.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    """
+    """What each law sees of the state: attitude, position, velocities, time and its memory."""
     nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
     memory = x.memory or (np.zeros(0),) * len(body.terms)
     return tuple(View(x.R, x.b, nu, Om, x.t, h, x.step, body.member, remembered) for remembered in memory)
 
 
 def Ab(x: State, body: Body, h: float, solve: Solver = newton) -> State:
-    """Eq. (12) and (23), Nordkvist & Sanyal 2010: b <- b + h R nu.
-
-    x, body, h, solve: State at the start; inertia and laws; step [s]; not used: every sub-map takes the same arguments.
-    """
+    """Eq. (12) and (23), Nordkvist & Sanyal 2010: b <- b + h R nu."""
     return replace(x, b=x.b + h * x.R @ velocity(body, x.p), t=x.t + h)
 
 
 def Ap(x: State, body: Body, h: float, solve: Solver = newton) -> State:
-    """The Munk moment of eq. (14) and (19): pi <- pi + h p x nu.
-
-    x, body, h, solve: State at the start; inertia and laws; step [s]; not used: every sub-map takes the same arguments.
-    """
+    """The Munk moment of eq. (14) and (19): pi <- pi + h p x nu."""
     return replace(x, pi=x.pi + h * cross(x.p, velocity(body, x.p)))
 
 
 def T(x: State, body: Body, h: float, solve: Solver = newton) -> State:
-    """Ab and Ap together: the exact flow of the kinetic energy p.M^-1 p / 2.
-
-    x, body, h, solve: State at the start; inertia and laws; step [s]; not used: every sub-map takes the same arguments.
-    """
+    """Ab and Ap together: the exact flow of the kinetic energy p.M^-1 p / 2."""
     return Ap(Ab(x, body, h), body, h)
 
 
 def D(x: State, body: Body, h: float, solve: Solver = newton) -> State:
-    """Eq. (10), (11): F = S(h pi), R <- R F; of (13), (14): p <- F^T p, pi <- F^T pi. Adjoint: (19)-(22).
-
-    x, body, h, solve: State at the start; inertia and laws; step [s]; solver of equation (24).
-    """
+    """Eq. (10), (11): F = S(h pi), R <- R F; of (13), (14): p <- F^T p, pi <- F^T pi. Adjoint: (19)-(22)."""
     F = solve(h * x.pi, body.J)
     return replace(x, R=x.R @ F, p=F.T @ x.p, pi=F.T @ x.pi)
 
@@ -145,30 +122,21 @@ def water(views: tuple[View, ...], body: Body) -> Flow:
 
 
 def acceleration_wrench(R: Array, body: Body, flow: Flow) -> tuple[Array, Array]:
-    """(rho V - m) R^T Du/Dt at the centres of buoyancy and gravity: the push of water that accelerates.
-
-    R: Attitude (3, 3), body to inertial axes.
-    """
+    """(rho V - m) R^T Du/Dt at the centres of buoyancy and gravity: the push of water that accelerates."""
     a = R.T @ (flow.rate + flow.gradient @ flow.velocity)
     return body.excess * a, cross(body.excess_lever, a)
 
 
 def remembered(x: State, body: Body, h: float, second: bool) -> State:
-    """What the laws remember, half a kick later.
-
-    x, body, h: State in the middle of the kick; inertia and laws; length of the kick [s].
-    """
+    """What the laws remember, half a kick later."""
     views = look(x, body, h)
     return replace(x, memory=tuple(term.evolve(view, second) for term, view in zip(body.terms, views, strict=True)))
 
 
 def damping(x: State, body: Body, h: float, nu: Array, Om: Array, flow: Flow) -> Array:
-    """D (6, 6): the sum of the damping laws, and what water that varies in space does.
+    """D (6, 6) at nu, Om: the sum of the damping laws, and what water that varies in space does.
 
     With X = R^T G R: force -m X nu - X^T (A11 nu + A12 Om), torque -m r_g x X nu (Lamb 1932, art. 137; Galper & Miloh 1994).
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    nu, Om: Velocity (3,) [m/s] at which damping is taken; angular velocity (3,) [rad/s] at which damping is taken.
     """
     views = tuple(replace(view, nu=nu, Om=Om) for view in look(x, body, h))
     total = sum((term.damping(view) for term, view in zip(body.terms, views, strict=True)), np.zeros((6, 6)))
@@ -180,10 +148,7 @@ def damping(x: State, body: Body, h: float, nu: Array, Om: Array, flow: Flow) ->
 
 
 def V(x: State, body: Body, h: float, flow: Flow) -> State:
-    """Velocity-dependent laws, -D(nu) nu, by the linearly implicit step of order 2 with D frozen at the predicted middle.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    """
+    """Velocity-dependent laws, -D(nu) nu, by the linearly implicit step of order 2 with D frozen at the predicted middle."""
     I6, P = body.I6, np.concatenate([x.p, x.pi])
     start = np.linalg.solve(I6, P)
     half = np.linalg.solve(I6 + 0.5 * h * damping(x, body, h, start[:3], start[3:], flow), P)
@@ -195,10 +160,7 @@ def V(x: State, body: Body, h: float, flow: Flow) -> State:
 
 
 def E(x: State, body: Body, h: float, flow: Flow) -> State:
-    """Drag by its exact flow; where the inertia is not diagonal, by that of one axis after the other.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    """
+    """Drag by its exact flow; where the inertia is not diagonal, by that of one axis after the other."""
     (drag,) = (term for term in body.terms if isinstance(term, Drag))
     P = np.concatenate([x.p, x.pi])
     if np.array_equal(body.I6, np.diag(np.diag(body.I6))):
@@ -210,10 +172,7 @@ def E(x: State, body: Body, h: float, flow: Flow) -> State:
 
 
 def dissipated(x: State, body: Body, h: float, flow: Flow) -> State:
-    """E where drag is the only velocity-dependent law, V otherwise.
-
-    x, body, h: State at the start; inertia and laws; step [s].
-    """
+    """E where drag is the only velocity-dependent law, V otherwise."""
     damped = [term for term in body.terms if type(term).damping is not Law.damping]
     alone = len(damped) == 1 and isinstance(damped[0], Drag) and not np.any(flow.gradient)
     if alone:
@@ -222,11 +181,7 @@ def dissipated(x: State, body: Body, h: float, flow: Flow) -> State:
 
 
 def kicked(x: State, h: float, wrench: tuple[Array, Array]) -> State:
-    """p <- p + h f, pi <- pi + h m.
-
-    x, h: State at the start; step [s].
-    wrench: Force [N] and torque [N m].
-    """
+    """p <- p + h f, pi <- pi + h m, of a wrench (f, m) [N, N m]."""
     return replace(x, p=x.p + h * wrench[0], pi=x.pi + h * wrench[1])
 
 
@@ -234,8 +189,6 @@ def K(x: State, body: Body, h: float, solve: Solver = newton) -> State:
     """The potential's part of eq. (13), (14), (19), (20), p <- p + h f(b, R), pi <- pi + h mU(b, R), and the other laws.
 
     Half of what the laws remember and of the water's drift, half the kick, drag, and the other halves: order 2.
-
-    x, body, h, solve: State at the start; inertia and laws; step [s]; not used: every sub-map takes the same arguments.
     """
     x = remembered(x, body, h, second=False)
     b = x.b

@@ -4,6 +4,10 @@
 An event is a module of stops with `distance(view, p)`, positive while the member goes on. A step whose end has a distance of
 zero or below is made again in part: a root search finds the part of the step that ends at the event. It makes that part with
 the method itself, not by interpolation, so that the state there has the method's order.
+
+The search keeps a part before the event, `low`, and one beyond it, `high`: false position with halved weights (Dowell &
+Jarratt 1971, Illinois), then halving. It ends one to three margins beyond the event, so that samples, whose round-off is less
+than a margin, lie beyond it too. Each lane is searched for by itself: no result depends on neighbours that stop as well.
 """
 
 import functools
@@ -166,23 +170,15 @@ def make_water_around(water_velocity, part_step, real):
 def make_arrival(watch, part_step, choose, water_velocity, real, width, most_parts):
     """The function that makes the last step of members that reach an event: the part of it that ends there.
 
-    watch: see Watch; part_step: (x, c, k, h, part, parts, ...) -> the state after `parts` equal steps of part h from step
-    k on; choose: see sums; water_velocity: (x, c, h) -> R^T u, or None where a sample can compute it later; most_parts: into
-    how many parts one without a solution may be divided.
+    part_step: (x, c, k, h, part, parts, ...) -> the state after `parts` equal steps of part h from step k on; water_velocity:
+    (x, c, h) -> R^T u, or None where a sample can compute it later; most_parts: how many parts one without a solution gets.
     """
-    spacing, moving = SPACINGS * EPSILON[real], water_velocity is not None
-    spacing_of, nearest = watch.spacing, watch.nearest
+    spacing, spacing_of, nearest = SPACINGS * EPSILON[real], watch.spacing, watch.nearest
     trial_between, water_around = make_trial(real), make_water_around(water_velocity, part_step, real)
 
     @wp.func(inline=False)
     def arrival(good: Any, x: Any, code: Any, c: Any, k: int, h: wp.float64, stage_h: Any, lead_h: Any, opening: real):
-        """(state, code, part, R^T u) of the lanes whose code is that of an event: where each stops, why, the part of step k.
-
-        good: the state before the step; x: after it. The search keeps a part before the event, `low`, and one beyond it,
-        `high`: false position with halved weights (Dowell & Jarratt 1971, Illinois), then halving. It ends one to
-        three margins beyond the event, so that samples, whose round-off is less than a margin, lie beyond it too.
-        Each lane is searched for by itself: a result does not depend on the neighbours that stop in the same step.
-        """
+        """(state, code, part, R^T u) where each lane stops, and why: `part` of the step k from good, before it, to x."""
         stopped = good
         between = spacing_of(good, x, c, real(h))
         begin, begin_margin, begin_code = nearest(good, c, real(h), between)
@@ -201,8 +197,7 @@ def make_arrival(watch, part_step, choose, water_velocity, real, width, most_par
                 if not high_distance == high_distance:
                     code[j] = real(wp.static(float(NON_FINITE)))
                 elif low_distance <= begin_margin[j]:
-                    # The step starts beyond the event.
-                    part = real(0.0)
+                    part = real(0.0)  # the step starts beyond the event
                     high = real(0.0)
                     code[j] = begin_code[j]
                 else:
@@ -241,7 +236,7 @@ def make_arrival(watch, part_step, choose, water_velocity, real, width, most_par
                             high_distance = distance[j]
                             code[j] = status[j]
                             stopped = choose(lane, y, stopped)
-                            if wp.static(moving):
+                            if wp.static(water_velocity is not None):
                                 still = positive(lane, water_velocity(y, c, real(h)), still)
                             if high_distance >= -margin[j]:
                                 low = high

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A kernel that evaluates one law alone at chosen views: lgvi_warp.law_check compares the values with finite differences."""
+"""A kernel that evaluates one law alone at chosen views: lgvi_warp.checks compares the values with finite differences."""
 
 import functools
 from typing import Any, NamedTuple
@@ -11,9 +11,6 @@ from lgvi_kernels.lanes.packet import put
 from lgvi_kernels.lanes.state import damping_struct, flow_struct, view_struct, wrench_struct
 from lgvi_kernels.maps.bounded import bounded_law
 from lgvi_kernels.maps.compose import params_of, plays, superpose
-
-# Numbers of a view in `views[packet, field]`: R row by row, b, nu, Om.
-VIEW_FIELDS = 18
 
 # Role of the law -> its columns of `out`, as (first, count); a role that the law does not have leaves zeros.
 COLUMNS = {"law": (0, 6), "damping": (6, 36), "flow": (42, 15), "distance": (57, 1), "energy": (58, 1)}

@@ -16,9 +16,10 @@ from lgvi_kernels.maps.collocation import make_G
 from lgvi_kernels.maps.compose import superpose
 from lgvi_kernels.maps.coupled import make_W
 from lgvi_kernels.maps.dissipation import make_V
-from lgvi_kernels.maps.explicit import in_body, make_explicit
+from lgvi_kernels.maps.explicit import make_explicit
 from lgvi_kernels.maps.forces import make_forces
 from lgvi_kernels.maps.paper import make_phi
+from lgvi_kernels.maps.rates import in_body
 from lgvi_kernels.maps.solve import make_solve
 from lgvi_kernels.maps.submaps import (
     Ap,

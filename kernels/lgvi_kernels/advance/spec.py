@@ -18,88 +18,52 @@ CHUNK = 128
 
 
 class Control(NamedTuple):
-    """What a scene's controller puts into its kernel.
+    """What a scene's controller puts into its kernel."""
 
-    parts: modules of its parts, sensors first, then guidance, laws, allocation, and what commands pass on their way.
-    numbers: the declared numbers of each part (see params_of).
-    reports: whether samples show where actuators are.
-    headings: whether the headings among what is noted are computed: others read attitudes.
-    asked: whether a function of the host answers each tick: a tick then ends with the measurement and the wanted motion, and
-        the next launch begins with the commands. Such a kernel has no lead.
-    """
-
-    parts: tuple
-    numbers: tuple
-    reports: bool = False
-    asked: bool = False
-    headings: bool = False
+    parts: tuple  # modules: sensors, guidance, laws, allocation, then what commands pass on their way
+    numbers: tuple  # the declared numbers of each part (see params_of)
+    reports: bool = False  # samples show where actuators are
+    asked: bool = False  # a function of the host answers each tick, between launches; such a kernel has no lead
+    headings: bool = False  # the headings among what is noted are computed: others read attitudes
 
 
 class Spec(NamedTuple):
     """Everything that decides the code of a kernel, and nothing else: it is the key by which kernels are cached.
 
     Two scenes with equal Specs share a compiled kernel, so numbers that may differ between them are arguments, not here.
-
-    width, real: lanes of a packet, and the type of its numbers.
-    maps: the sub-maps after the leading one, as (letter, coefficient).
-    lead: the sub-map that opens a step and merges with the end of the step before, or None.
-    laws: modules of laws; drag along the axes comes first if a scene has it.
-    numbers: the declared numbers of each law, then of each event (see params_of).
-    mass: shape of M, "isotropic", "diagonal" or "full".
-    solver, iterations, adaptive, checked: of equation (24) (see make_solve); unchecked kernels have no alarms at all.
-    events: modules of events.
-    drag: the parts of drag along the axes (by its exact flow, or as rates) that some member has, or none.
-    parts: optional fields of the inertia (see inertia_struct).
-    coupling: which of U12, U13, U23 and of the three pitches some member has.
-    flow: "none", "steady" (uniform, the same for ever), "uniform" or "varying".
-    timed: whether a law looks at the time.
-    memory: whether a law or the method remembers numbers from step to step.
-    averages: alpha and beta of (15), (16), or None for conservative maps.
-    composed: several stages a step; False for one, whose constants are made once for all steps.
-    paired: a stage is two halves, each with a length of its own.
-    gauss: numbers of a collocation method, or none.
-    lead_time: the part of a step for which the lead drifts.
-    explicit: an explicit method, which has no maps.
-    compensated: sums of two float32 (see sums).
-    warning_rows: rows of warnings (see monitor).
-    energy: whether its growth is a failure.
-    backward: whether drag is checked for stages that go backward.
-    substep: whether a step that has no solution is divided.
-    control: of a scene with a controller, else None.
-    shared_rows: whether all members share the rows of the laws' table (see table_number).
     """
 
-    width: int
-    real: Any
-    maps: tuple
-    lead: tuple | None
-    laws: tuple
-    numbers: tuple
-    mass: str
-    solver: str
+    width: int  # lanes of a packet
+    real: Any  # the type of its numbers
+    maps: tuple  # the sub-maps after the leading one, as (letter, coefficient)
+    lead: tuple | None  # the sub-map that opens a step and merges with the end of the step before
+    laws: tuple  # modules; drag along the axes comes first if a scene has it
+    numbers: tuple  # the declared numbers of each law, then of each event (see params_of)
+    mass: str  # shape of M, "isotropic", "diagonal" or "full"
+    solver: str  # of equation (24), as the next three (see make_solve)
     iterations: int
     adaptive: bool
-    checked: bool
-    events: tuple = ()
-    drag: tuple = ()
-    parts: tuple = ()
-    coupling: tuple = (False,) * 6
-    flow: str = "none"
-    timed: bool = False
-    memory: bool = False
-    averages: tuple | None = None
-    composed: bool = False
-    paired: bool = False
-    gauss: tuple = ()
-    lead_time: float = 0.0
-    explicit: Any = None
-    compensated: bool = False
-    warning_rows: tuple = ()
-    energy: bool = False
-    backward: bool = False
-    substep: bool = False
+    checked: bool  # unchecked kernels have no alarms at all
+    events: tuple = ()  # modules
+    drag: tuple = ()  # parts of drag along the axes (by its exact flow, or as rates) that some member has
+    parts: tuple = ()  # optional fields of the inertia (see inertia_struct)
+    coupling: tuple = (False,) * 6  # which of U12, U13, U23 and of the three pitches some member has
+    flow: str = "none"  # or "steady" (uniform, the same for ever), "uniform", "varying"
+    timed: bool = False  # a law looks at the time
+    memory: bool = False  # a law or the method remembers numbers from step to step
+    averages: tuple | None = None  # alpha and beta of (15), (16); None for conservative maps
+    composed: bool = False  # several stages a step; False for one, whose constants are made once for all steps
+    paired: bool = False  # a stage is two halves, each with a length of its own
+    gauss: tuple = ()  # numbers of a collocation method
+    lead_time: float = 0.0  # the part of a step for which the lead drifts
+    explicit: Any = None  # an explicit method, which has no maps
+    compensated: bool = False  # sums of two float32 (see sums)
+    warning_rows: tuple = ()  # see monitor
+    energy: bool = False  # its growth is a failure
+    backward: bool = False  # drag is checked for stages that go backward
+    substep: bool = False  # a step that has no solution is divided
     control: Control | None = None
-    shared_rows: bool = False
+    shared_rows: bool = False  # all members share the rows of the laws' table (see table_number)
 
     @property
     def watched(self) -> bool:

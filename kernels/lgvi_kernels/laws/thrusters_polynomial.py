@@ -17,15 +17,8 @@ def params(width, real):
 
     Rows: those of thrusters.py, then the polynomial ahead and the one astern, from the first power up.
     """
-    return struct(
-        "ThrustersPolynomial",
-        first=wp.int32,
-        memory=wp.int32,
-        count=wp.int32,
-        knots=wp.int32,
-        lagged=wp.int32,
-        powers=wp.int32,
-    )
+    words = ("first", "memory", "count", "knots", "lagged", "powers")
+    return struct("ThrustersPolynomial", **dict.fromkeys(words, wp.int32))
 
 
 @wp.func

@@ -12,20 +12,18 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
-from lgvi_kernels.lanes.arithmetic import add, cross, div, dot, lane3, mul, ones, sub, vec3  # noqa: F401
-from lgvi_kernels.lanes.functions import root, sine
+from lgvi_kernels.lanes.arithmetic import add, cross, mul  # noqa: F401
 from lgvi_kernels.lanes.matrix3 import factor_struct
-from lgvi_kernels.lanes.rotations import rodrigues, rotation_struct, transpose_apply
+from lgvi_kernels.lanes.rotations import rotation_struct
 from lgvi_kernels.lanes.state import damping_struct, struct, view_struct, wrench_struct
 from lgvi_kernels.laws.drag import make_resistance
 from lgvi_kernels.maps.compose import superpose
 from lgvi_kernels.maps.dissipation import make_implicit
 from lgvi_kernels.maps.linearly_implicit import make_damped, make_damped_stages, make_factor
+from lgvi_kernels.maps.munthe_kaas import make_act, make_munthe_kaas, make_turned
+from lgvi_kernels.maps.rates import make_rates, rates_struct
 from lgvi_kernels.maps.step_control import make_adaptive, make_errors
-from lgvi_kernels.maps.submaps import look, rotate
-
-# Added under a root that is divided by: the least that keeps 0/0 away.
-TINY = {wp.float64: 1e-300, wp.float32: 1e-36}
+from lgvi_kernels.maps.submaps import look
 
 
 class Explicit(NamedTuple):
@@ -55,96 +53,9 @@ class Explicit(NamedTuple):
 
 
 @functools.cache
-def rates_struct(width, real, kind):
-    """b', pi', p' unless it is known, and the first and last row of R' = R hat(Om); on the group, Om instead of them."""
-    Lane3 = lane3(width, real)
-    turning = {"R0": Lane3, "R2": Lane3} if kind in ("vector", "inertial") else {"Om": Lane3}
-    pushing = {} if kind == "inertial" else {"p": Lane3}
-    return struct("Rates", b=Lane3, **turning, **pushing, pi=Lane3)
-
-
-@functools.cache
 def slopes_struct(Rates, count):
     """k_1 to k_count, as k0, k1, ..."""
     return struct("Slopes", **{f"k{i}": Rates for i in range(count)})
-
-
-def make_rates(Rates, Wrench, everything, velocities, kind, mass, coupled, drifts, scaled, drag):
-    """The right-hand side, eq. (1) and (3) of Nordkvist & Sanyal 2010 with all laws of a scene.
-
-    scaled: momenta are divided by max J; drag: the function that adds drag along the axes, where it is not among
-    `everything`, or None.
-    """
-    isotropic, munk = mass == "isotropic", make_munk(mass == "diagonal")
-    group, inertial = kind not in ("vector", "inertial"), kind == "inertial"
-
-    @wp.func
-    def turning(w: Any, x: Any, c: Any, nu: Any, Om: Any):
-        """p x Om and pi x Om + p x nu: the rates of the momenta in body axes without any force."""
-        w.force = w.force + cross(x.p, Om)
-        w.torque = w.torque + cross(x.pi, Om)
-        if wp.static(coupled):
-            w.torque = w.torque + cross(x.p, nu)
-        elif wp.static(not isotropic):
-            # p x M^-1 p without the mean of M^-1, of which it is zero.
-            w.torque = munk(w.torque, x.p, c.inertia.anisotropy)
-        return w
-
-    @wp.func
-    def rates(x: Any, c: Any, h: Any):
-        """b' = R nu + u, R' = R hat(Om), p' = p x Om + f, pi' = pi x Om + p x nu + m."""
-        k = Rates()
-        if wp.static(inertial):
-            x.p = in_body(x)
-        nu, Om = velocities(c.inertia, x.p, x.pi)
-        w = Wrench()
-        if wp.static(not scaled):
-            # Laws add to w: begun with these terms, it saves the addition of two wrenches.
-            w = turning(w, x, c, nu, Om)
-        w, u = everything(w, x, c, h, nu, Om)
-        if wp.static(scaled):
-            w.force = c.inertia.inverse_scale * w.force
-            w.torque = c.inertia.inverse_scale * w.torque
-            w = turning(w, x, c, nu, Om)
-        k.b = rotate(x, nu)
-        if wp.static(drifts):
-            k.b = k.b + u
-        if wp.static(group):
-            k.Om = Om
-        else:
-            k.R0 = cross(x.R0, Om)
-            k.R2 = cross(x.R2, Om)
-        if wp.static(not inertial):
-            k.p = w.force
-        k.pi = w.torque
-        if wp.static(drag is not None):
-            k = drag(k, x, c.params.own)
-        return k
-
-    return rates
-
-
-@wp.func
-def in_body(x: Any):
-    """R^T P, with P in place of p."""
-    return x.p.x * x.R0 + x.p.y * x.R1 + x.p.z * x.R2
-
-
-def make_munk(diagonal):
-    """pi' + p x A p, where A is M^-1 less its mean."""
-
-    @wp.func
-    def munk(turned: Any, p: Any, A: Any):
-        if wp.static(diagonal):
-            # The differences of A are the same in all steps: the compiler forms them before the loop.
-            turned.x = turned.x + (A.z - A.y) * (p.y * p.z)
-            turned.y = turned.y + (A.x - A.z) * (p.z * p.x)
-            turned.z = turned.z + (A.y - A.x) * (p.x * p.y)
-        else:
-            turned = turned + cross(p, A * p)
-        return turned
-
-    return munk
 
 
 @wp.func
@@ -173,40 +84,6 @@ def completed(x: Any):
     """The middle row of R from the others."""
     x.R1 = cross(x.R2, x.R0)
     return x
-
-
-def make_turned(Rotation, real):
-    """R exp(hat(v)) of a rotation vector v."""
-
-    @wp.func
-    def turned(x: Any, v: Any):
-        """Rodrigues' formula: exp = I + sin n / n hat(v) + 1/2 (sin(n/2) / (n/2))^2 hat(v)^2, n = |v|."""
-        square = dot(v, v)
-        half = real(0.5)
-        # n of v = 0 is not 0 but so small that the quotients of sines are 1.
-        n = root(square + real(wp.static(TINY[real])) * ones(square))
-        sinc_half = sine(half * n) / (half * n)
-        F = rodrigues(Rotation(), v, sine(n) / n, half * sinc_half * sinc_half)
-        x.R0 = transpose_apply(F, x.R0)
-        x.R1 = transpose_apply(F, x.R1)
-        x.R2 = transpose_apply(F, x.R2)
-        return x
-
-    return turned
-
-
-def make_act(turned):
-    """How the group moves a state."""
-
-    @wp.func
-    def act(x: Any, k: Any, s: Any):
-        """R exp(s hat(Om)), and (b, p, pi) + s k."""
-        x.b = x.b + s * k.b
-        x.p = x.p + s * k.p
-        x.pi = x.pi + s * k.pi
-        return turned(x, s * k.Om)
-
-    return act
 
 
 # The two functions that follow are written out for MOST_STAGES stages: a loop or a recursion over them would copy all the
@@ -376,50 +253,6 @@ def make_fixed(stages, finish, push, timed, recall):
         if wp.static(recall is not None):
             x = recall(x, c, h)
         return x
-
-    return step
-
-
-def make_munthe_kaas(rates, act, turned, timed, recall):
-    """Munthe-Kaas & Owren (1999): order 4 with two commutators. recall: of half a step, see make_recall."""
-
-    @wp.func
-    def later(y: Any, x: Any, h: Any):
-        if wp.static(timed):
-            y.time = x.time + wp.float64(h)
-        return y
-
-    @wp.func
-    def moved(x: Any, k: Any, s: Any, bracket: Any):
-        """(b, p, pi) + s k, R exp(s hat(Om) + hat(bracket))."""
-        x.b = x.b + s * k.b
-        x.p = x.p + s * k.p
-        x.pi = x.pi + s * k.pi
-        return turned(x, s * k.Om + bracket)
-
-    @wp.func
-    def step(x: Any, c: Any, h: Any):
-        """Hairer, Lubich & Wanner, IV.8, in body axes, so that the signs of the commutators are opposite."""
-        half = h.dtype(0.5) * h
-        k1 = rates(x, c, h)
-        y = later(act(x, k1, half), x, half)
-        if wp.static(recall is not None):
-            y = recall(y, c, h)
-        k2 = rates(y, c, h)
-        k3 = rates(later(moved(x, k2, half, (h.dtype(0.125) * h * h) * cross(k1.Om, k2.Om)), x, half), c, h)
-        y = later(act(x, k3, h), x, h)
-        if wp.static(recall is not None):
-            y = recall(y, c, h)
-        k4 = rates(y, c, h)
-        two = h.dtype(2.0)
-        k = k1
-        k.b = k1.b + two * (k2.b + k3.b) + k4.b
-        k.p = k1.p + two * (k2.p + k3.p) + k4.p
-        k.pi = k1.pi + two * (k2.pi + k3.pi) + k4.pi
-        k.Om = k1.Om + two * (k2.Om + k3.Om) + k4.Om
-        sixth = h / h.dtype(6.0)
-        y = moved(x, k, sixth, (half * sixth) * cross(k1.Om, k4.Om))
-        return later(y, x, h)
 
     return step
 

@@ -18,10 +18,7 @@ MOST_THREADS = 100_000
 
 
 def check_threads(faults: Faults, threads: Any) -> None:
-    """Add a fault where a number of threads is not a whole number from 1 to MOST_THREADS.
-
-    threads: the number to check; None stands for all cores.
-    """
+    """Add a fault where a number of threads is neither None, for all cores, nor a whole number from 1 to MOST_THREADS."""
     if threads is None:
         return
     remedy = "give 1 or more, or leave it out for all cores"

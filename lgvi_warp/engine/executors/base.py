@@ -65,11 +65,11 @@ def received(data: bytes, name: str) -> Work:
     return work
 
 
-def _refusal(name: str, what: str, error: Exception) -> str:
+def _refusal(name: str, problem: str, error: Exception) -> str:
     remedy = (
         'define laws and functions at the top level of a module that the workers can import, or use executor="threads"'
     )
-    return f"executor = {name!r}: the run {what} ({type(error).__name__}: {error}); {remedy}"
+    return f"executor = {name!r}: the run {problem} ({type(error).__name__}: {error}); {remedy}"
 
 
 def finished_blocks(futures: Mapping[Future[Any], Block]) -> Iterator[tuple[Block, Any]]:

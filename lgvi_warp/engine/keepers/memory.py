@@ -19,13 +19,7 @@ from lgvi_warp.statistics.values.samples import Fields
 
 
 class Outcomes:
-    """Keeps the outcome of every member.
-
-    It is pickled without its contents: what it gathers stays in the run's own process.
-
-    Attributes:
-        all: the outcome of all n members.
-    """
+    """Keeps the outcome of every member, in the run's own process: it is pickled without its contents."""
 
     def __init__(self, plan: Plan):
         self.all = MemberStatus.clear(plan.ensemble.members, 2 if plan.method.adaptive else 0)
@@ -60,15 +54,9 @@ class _BlockOutcome:
 
 
 class Samples:
-    """Keeps every sample of every member; threads of this process write into it directly.
+    """Keeps every sample of every member, by name (k times, n members, ...); threads of this process write into it directly.
 
-    From other processes a block's samples come as its result.
-
-    fields: names of the fields to keep; None (default) for those of the plan.
-
-    Attributes:
-        names: names of the fields.
-        fields: by name, (k times, n members, ...); None in another process.
+    From other processes a block's samples come as its result; there `fields` is None. names: None for those of the plan.
     """
 
     fields: dict[str, np.ndarray] | None = None
@@ -94,10 +82,7 @@ class Samples:
         return _BlockSamples({name: values[:, block.first : block.stop] for name, values in self.fields.items()})
 
     def merge(self, block: Block, part: dict[str, np.ndarray] | None) -> None:
-        """Copy samples that came from another process; others are in their places already.
-
-        part: samples by field, (k, members of the block, ...); None if they are in their places.
-        """
+        """Copy samples (k, members of the block, ...) that came from another process; None where they are in their places."""
         assert self.fields is not None
         for name, values in (part or {}).items():
             self.fields[name][:, block.first : block.stop] = values

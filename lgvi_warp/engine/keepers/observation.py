@@ -37,10 +37,7 @@ def replicates_of(ensemble: Mapping[str, Any]) -> int:
 
 @dataclass(frozen=True)
 class Observation:
-    """What is to be kept of a run, and when it stops.
-
-    until: condition that ends the run before the last member; None (default) for no such condition.
-    """
+    """What is to be kept of a run, and the condition `until` that ends it before the last member; None for none."""
 
     statistics: tuple[Statistic, ...] = ()
     keep: Any = "all"
@@ -81,11 +78,9 @@ class Observation:
         return ordered(wanted)
 
     def watch(self, times: np.ndarray) -> tuple[tuple[Statistic, ...], StoppingRule | None]:
-        """The statistics to gather, and the watch of the stopping condition.
+        """The statistics to gather at times (k,) [s], and the watch of the stopping condition, None without one.
 
-        times: (k,) [s], sample times.
-        Returns: (statistics, watch): the watched statistic is added where it is not among them; without a condition the watch
-            is None.
+        The watched statistic is added where it is not among them.
         """
         if self.until is None:
             return self.statistics, None
@@ -94,10 +89,7 @@ class Observation:
         return (*self.statistics, *added), watching
 
     def again(self, status: np.ndarray) -> np.ndarray:
-        """The members to run again in order to store their samples.
-
-        status: (n,), status of the members.
-        """
+        """The members to run again in order to store their samples, by the status (n,) of all."""
         if isinstance(self.keep, str):
             return np.flatnonzero(failed(status)) if self.keep == "failed" else np.empty(0, np.int64)
         return np.array([i for i in self.keep if i < len(status)], dtype=np.int64)
@@ -122,10 +114,9 @@ def _of_functions(value: Any) -> bool:
 
 
 def observation_of(saved: Mapping[str, Any] | None, statistics: Any = None) -> Observation:
-    """Restore an observation from its table.
+    """Restore an observation from its table; None: of a run that kept nothing but samples.
 
-    saved: what `to_dict` returned; None for a run that kept nothing but samples.
-    statistics: the run's statistics; needed where they depend on functions (default None).
+    statistics: the run's statistics; needed where they depend on functions.
     """
     if saved is None:
         if statistics:
@@ -146,10 +137,7 @@ def observation_of(saved: Mapping[str, Any] | None, statistics: Any = None) -> O
 
 
 class Observing:
-    """An observation during a run: gathers the statistics, and decides whether the run may stop.
-
-    time: (k,) [s], sample times.
-    """
+    """An observation during a run: gathers the statistics at times (k,) [s], and decides whether the run may stop."""
 
     def __init__(self, observed: Observation, time: np.ndarray, members: int, replicates: int = 1):
         statistics, self._watch = observed.watch(time)
@@ -171,11 +159,7 @@ class Observing:
         return self._gathered.estimates(self._watch.statistic) if self._gathered and self._watch else []
 
     def read(self, ensemble: Mapping[str, Any], status: np.ndarray) -> tuple[Estimates, tuple[str, ...]]:
-        """The statistics, and messages about them.
-
-        status: (m,), status of the members that ran.
-        Returns: (estimates, messages): the estimates by name, and what the user should know about them.
-        """
+        """The statistics by name, and what the user should know about them; status: (m,), of the members that ran."""
         estimates, members = self._gathered.result() if self._gathered else Estimates(), len(status)
         messages = messages_about(estimates, ensemble, status, self._gathered.apart if self._gathered else ())
         return estimates, messages + ((self._watch.report(members, self._watched()),) if self._watch else ())
@@ -186,7 +170,7 @@ def watch_fields(until: Until, statistics: Sequence[Statistic]) -> tuple[str, ..
     return watch(Until(until.statistic, until.half_width), statistics, np.zeros(1)).statistic.quantity.fields
 
 
-def observe(fleet: Ensemble, given: Any = None, keep: Any = None, until: Any = None) -> Observation:
+def observe(fleet: Ensemble, statistics: Any = None, keep: Any = None, until: Any = None) -> Observation:
     """The observation that the arguments of solve describe; those that are None come from the scene's [run]."""
     faults, scene = Faults(), fleet.scene
     settings, events = scene.run, scene.events
@@ -194,7 +178,7 @@ def observe(fleet: Ensemble, given: Any = None, keep: Any = None, until: Any = N
     stop: Until | None = None
     keep = settings.keep if keep is None else keep
     with faults.including():
-        gathered = from_list(settings.statistics if given is None else given)
+        gathered = from_list(settings.statistics if statistics is None else statistics)
     known = outcomes([event.key for event in events], [event.status for event in events])
     for statistic in gathered:
         with faults.including():
@@ -215,10 +199,7 @@ def observe(fleet: Ensemble, given: Any = None, keep: Any = None, until: Any = N
 def messages_about(
     estimates: Mapping[str, Estimate], ensemble: Mapping[str, Any], status: np.ndarray, apart: Collection[str] = ()
 ) -> tuple[str, ...]:
-    """Messages about statistics: members left out, and intervals that do not fit the sampling.
-
-    status: (m,), status of the members that ran.
-    """
+    """Messages about statistics: members left out by status (m,), and intervals that do not fit the sampling."""
     if not estimates:
         return ()
     members, messages = len(status), _left_out(estimates, status, apart)
@@ -242,10 +223,7 @@ def messages_about(
 
 
 def _left_out(estimates: Mapping[str, Estimate], status: np.ndarray, apart: Collection[str]) -> tuple[str, ...]:
-    """A message that some members do not count, and why; first passages report theirs as lost.
-
-    apart: names of estimates that leave members out on purpose.
-    """
+    """A message that some members do not count, and why; first passages report theirs as lost, and those `apart` mean to."""
     members = len(status)
     count = {
         estimate: int(estimate.count.min())

@@ -22,10 +22,7 @@ class BlockKeeper(Protocol):
     """What keeps something of one block, in the thread or process that runs the block."""
 
     def take(self, when: slice, samples: Fields) -> None:
-        """Receive samples of the block; each time comes once, in order.
-
-        samples: by field, (times, members of the block, ...).
-        """
+        """Receive samples of the block (times, members, ...) by field; each time comes once, in order."""
 
     # One that has `take_ticks(when, samples)` as well receives with that the samples at all ticks, before those to keep.
 
@@ -52,10 +49,7 @@ class PartKeeper(Keeper, Protocol):
         """Name of its results in the store, unique among the keepers of a run."""
 
     def to_arrays(self, part: Any) -> tuple[dict[str, np.ndarray], Any]:
-        """Split a block's result into what a store can hold.
-
-        Returns: (arrays, content): arrays by name, and what JSON can hold.
-        """
+        """Split a block's result into what a store can hold: arrays by name, and what JSON can hold."""
 
     def from_arrays(self, arrays: dict[str, np.ndarray], content: Any) -> Any:
         """Restore a block's result, with the same bits."""
@@ -65,10 +59,7 @@ class BlockStore(Keeper, Protocol):
     """A keeper that writes blocks to disk, where they outlive the run, and knows which it already holds."""
 
     def parts(self, block: Block, keepers: Sequence[Keeper]) -> tuple[Any, ...] | None:
-        """The results that the store holds for a block.
-
-        Returns: What each keeper closed with; None if the store does not hold the block.
-        """
+        """What each keeper closed with for a block; None if the store does not hold it."""
 
     def finish(self, block: Block, arrays: Any, keepers: Sequence[Keeper], parts: Sequence[Any]) -> None:
         """Make a block durable."""

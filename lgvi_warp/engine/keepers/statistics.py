@@ -23,16 +23,9 @@ if TYPE_CHECKING:
 
 
 class Gathered:
-    """The statistics of a run so far: for each, a tree of parts.
+    """The statistics of a run so far: for each, a tree of parts; of paths, where one looks over them. time: (k,) [s].
 
-    With replicates, member i belongs to replicate i mod R, and parts hold the numbers of each replicate separately.
-
-    time: (k,) [s], sample times.
-
-    Attributes:
-        statistics: those that blocks gather: of paths, where one looks over them.
-        time: (k,) [s], sample times.
-        replicates: R, number of independent replicates.
+    With R replicates, member i belongs to replicate i mod R, and parts hold the numbers of each replicate separately.
     """
 
     # Name of its results in a store.
@@ -60,10 +53,7 @@ class Gathered:
                 tree.add(block.first // self._size, statistic_part)
 
     def estimates(self, chosen: Statistic | None = None) -> list[Estimate]:
-        """Estimates from the blocks so far.
-
-        chosen: the statistic wanted; None (default) for all.
-        """
+        """Estimates from the blocks so far, of one statistic or (None, the default) of all."""
         estimates: list[Estimate] = []
         for requested, statistic, tree in zip(self._asked, self.statistics, self.trees, strict=True):
             if chosen is None or requested is chosen:
@@ -79,10 +69,7 @@ class Gathered:
         return statistic.estimates(parts, time)
 
     def times_of(self, statistic: Statistic) -> np.ndarray:
-        """The times of a statistic's values: all sample times, or the end alone.
-
-        Returns: (k,) or (1,) [s].
-        """
+        """The times of a statistic's values: all sample times (k,), or the end alone (1,) [s]."""
         return self.time if statistic.at is None else self.time[-1:]
 
     def result(self) -> Estimates:
@@ -100,10 +87,7 @@ class Gathered:
 
     @staticmethod
     def to_arrays(part: Sequence[Part]) -> tuple[dict[str, np.ndarray], Any]:
-        """A block's parts as arrays for a file.
-
-        Returns: (arrays, number): arrays by name, and the number of statistics.
-        """
+        """A block's parts as arrays for a file, by name, and the number of statistics."""
         arrays = {f"{i}/{name}": array for i, entry in enumerate(part) for name, array in entry.items()}
         return arrays, len(part)
 

@@ -73,11 +73,7 @@ class Part:
         return r
 
     def control(self, w: Array, r: Reference, y: Measurement, unmet: Array) -> Array:
-        """The demand plus that of this law.
-
-        w: Demand of the laws before it (6,) = (X, Y, Z, K, M, N) [N, N m].
-        unmet: Part of the last tick's demand that was not delivered (6,) [N, N m].
-        """
+        """The demand of the laws before w (6,) [N, N m] plus that of this law; unmet (6,): of the last one, not delivered."""
         return w
 
     def allocate(self, w: Array, actuators: dict[str, Any]) -> Array:
@@ -110,11 +106,7 @@ def pose_errors(r: Reference, y: Measurement) -> tuple[Array, Array, Array, Arra
 
 
 def unhindered(error: Array, unmet: Array, conditional: bool) -> Array:
-    """An error without the entries that would demand more of what is not delivered already.
-
-    error: Errors (3,).
-    unmet: Part of the demand that was not delivered (3,).
-    """
+    """An error (3,) without the entries that would demand more of what is not delivered already, the part `unmet` (3,)."""
     return np.where(conditional & (unmet * error > 0.0), 0.0, error)
 
 
@@ -154,10 +146,7 @@ def balance(law: Any, y: Measurement) -> Array:
 
 
 def cannot(reached: Array) -> Array:
-    """The projector (6, 6) onto the demands that actuators cannot make, without round-off.
-
-    reached: Projector (6, 6) onto those that they can.
-    """
+    """The projector (6, 6) onto the demands that actuators cannot make, from that onto those they can, without round-off."""
     others = np.eye(6) - reached
     return np.where(np.abs(others) < 1e-12, 0.0, others)
 

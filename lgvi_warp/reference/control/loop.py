@@ -52,10 +52,7 @@ class Loop:
         self.sent, self.unmet = [], np.zeros(6)
 
     def tick(self, x: State, body: Body, h: float) -> None:
-        """Measure, guide, control and allocate at the start of step x.step.
-
-        h: Step [s].
-        """
+        """Measure, guide, control and allocate at the start of step x.step."""
         view = look(x, body, h)
         nu, Om = np.split(np.linalg.solve(body.I6, np.concatenate([x.p, x.pi])), 2)
         u = x.R.T @ water(view, body).velocity

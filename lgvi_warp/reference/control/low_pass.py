@@ -12,10 +12,7 @@ from lgvi_warp.reference.rotation import exp
 
 
 def share(period: float, time_constant: float) -> float:
-    """1 - exp(-T / time constant): how far a filter goes towards its input over a period.
-
-    period, time_constant: T [s]; the constant [s], 0 for no filter.
-    """
+    """1 - exp(-T / time constant): how far a filter goes towards its input over a period T [s]; 1 where the constant is 0."""
     return -math.expm1(-period / time_constant) if time_constant > 0.0 else 1.0
 
 

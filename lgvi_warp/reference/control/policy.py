@@ -23,13 +23,7 @@ class Policy(Part):
     activation, output_activation = "tanh", "linear"
 
     def seen(self, name: str, r: Reference, y: Measurement) -> Array:
-        """The numbers (1,) or (3,) of an input.
-
-        Args:
-            name: Name of the input, such as depth_error or velocity[0].
-            r: Wanted motion.
-            y: Measured motion.
-        """
+        """The numbers (1,) or (3,) of an input, such as depth_error or velocity[0]."""
         e, e_R, _, _ = pose_errors(r, y)
         values = {
             "depth_error": r.position[2] - y.position[2],

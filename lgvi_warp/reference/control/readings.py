@@ -26,13 +26,7 @@ def angles(R: Array) -> Array:
 
 
 def attitude(roll: float, pitch: float, yaw: float) -> Array:
-    """The attitude R (3, 3) of three Euler angles.
-
-    Args:
-        roll: Angle about the forward axis [rad].
-        pitch: Angle about the axis to starboard [rad].
-        yaw: Angle about the axis down [rad].
-    """
+    """The attitude R (3, 3) of three Euler angles [rad], about the forward axis, that to starboard and that down."""
     about = [np.array(axis) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))]
     return exp(yaw * about[2]) @ exp(pitch * about[1]) @ exp(roll * about[0])
 
@@ -55,10 +49,7 @@ def values(y: Measurement, of: str) -> Array:
 
 
 def with_values(y: Measurement, of: str, v: Array) -> Measurement:
-    """The measurement that reads v.
-
-    y, of, v: The measurement; what is read; its numbers (1,) or (3,).
-    """
+    """The measurement y that reads the numbers v, (1,) or (3,), of what is measured."""
     if of == "depth":
         return replace(y, position=np.array([*y.position[:2], v[0]]))
     if of == "heading":

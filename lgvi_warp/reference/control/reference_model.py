@@ -29,13 +29,7 @@ class ReferenceModel(Part):
         self.z: Array | None = None
 
     def moved(self, i: int, target: float, period: float) -> Array:
-        """x, x' and x'' of a number after one period with its target held.
-
-        Args:
-            i: Index of the number.
-            target: Its target.
-            period: Duration [s].
-        """
+        """x, x' and x'' of number i after one period [s] with its target held."""
         assert self.z is not None
         omega, zeta = self.natural_frequency[i], 1.0 if self.damping_ratio is None else self.damping_ratio[i]
         b = 2.0 * zeta + 1.0

@@ -27,12 +27,7 @@ class Trajectory(Part):
         return np.linalg.solve(A, b)
 
     def at(self, values: Array, t: float, h: float) -> tuple[float, float, float]:
-        """A number and its first two derivatives at a time.
-
-        Args:
-            values: The number at the times (k,).
-            t, h: Time [s]; step [s]: half of one early counts as in time.
-        """
+        """A number, with values (k,) at the times, and its two derivatives at t; half a step h early counts as in time."""
         i = int(np.searchsorted(self.times, t + 0.5 * h)) - 1
         if i < 0 or i == len(self.times) - 1:
             return float(values[max(i, 0)]), 0.0, 0.0

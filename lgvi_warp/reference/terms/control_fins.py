@@ -24,14 +24,7 @@ class ControlFins(Following, Fins):
         return self.place(view)
 
     def lift_coefficient(self, i: int, uc: float, un: float, V: float) -> float:
-        """The coefficient of `Fins`, or of the table, which is odd in the angle of attack.
-
-        Args:
-            i: Number of the fin, from 0.
-            uc: Speed along its chord [m/s].
-            un: Speed along its normal [m/s].
-            V: Size of both [m/s].
-        """
+        """The coefficient of `Fins`, or of the table, which is odd in the angle of attack."""
         if self.lift_angles is None:
             return super().lift_coefficient(i, uc, un, V)
         return float(self.lift_slope[i] * self.table(math.atan2(un, uc)))
@@ -41,13 +34,7 @@ class ControlFins(Following, Fins):
         return math.copysign(float(np.interp(abs(angle), self.lift_angles, self.lift_coefficients)), angle)
 
     def fin_damping(self, i: int, angle: float, view: View) -> Array:
-        """D of `Fins`; without the angle of the flow lift is slope d u u, and drag (drag + drag_normal d^2) |u| u.
-
-        Args:
-            i: Number of the fin, from 0.
-            angle: Angle of deflection d [rad].
-            view: The state that the law reads.
-        """
+        """D of `Fins`; without the angle of the flow: lift slope d u u, drag (drag + drag_normal d^2) |u| u, d the angle."""
         if self.flow_angle:
             return super().fin_damping(i, angle, view)
         c, n = orthonormal(self.chord[i], self.normal[i])

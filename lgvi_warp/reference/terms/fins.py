@@ -22,24 +22,11 @@ class Fins(Law):
         return np.asarray(sum((self.fin_damping(i, angle, view) for i, angle in enumerate(angles)), np.zeros((6, 6))))
 
     def lift_coefficient(self, i: int, uc: float, un: float, V: float) -> float:
-        """slope sin a cos a, with the angle of attack a.
-
-        Args:
-            i: Number of the fin, from 0.
-            uc: Speed along its chord [m/s].
-            un: Speed along its normal [m/s].
-            V: Size of both [m/s].
-        """
+        """slope sin a cos a of fin i, a the angle of attack; uc, un: speed along chord and normal, V: size of both [m/s]."""
         return float(self.lift_slope[i] * uc * un / V**2)
 
     def fin_damping(self, i: int, angle: float, view: View) -> Array:
-        """D (6, 6) of a fin: -l (uc n - un c) - d (uc c + un n), l = kl uc un / V, d = kd V + kn un^2 / V.
-
-        Args:
-            i: Number of the fin, from 0.
-            angle: Angle of deflection [rad].
-            view: What the law sees.
-        """
+        """D (6, 6) of fin i at an angle: -l (uc n - un c) - d (uc c + un n), l = kl uc un / V, d = kd V + kn un^2 / V."""
         c, n = turned(*orthonormal(self.chord[i], self.normal[i]), angle)
         chord, normal = (np.concatenate([e, cross(self.position[i], e)]) for e in (c, n))
         twist = np.concatenate([view.nu, view.Om])
@@ -65,9 +52,5 @@ def orthonormal(chord: Array, normal: Array) -> tuple[Array, Array]:
 
 
 def turned(c: Array, n: Array, angle: float) -> tuple[Array, Array]:
-    """c' = cos c + sin n, n' = cos n - sin c.
-
-    c, n: Unit vector (3,) along the chord; unit vector (3,) along the normal.
-    angle: Angle of deflection [rad].
-    """
+    """c' = cos c + sin n, n' = cos n - sin c of the unit vectors along chord and normal, turned by an angle [rad]."""
     return math.cos(angle) * c + math.sin(angle) * n, math.cos(angle) * n - math.sin(angle) * c

@@ -62,11 +62,7 @@ class Following(Law):
 
 
 def chased(n: float, first: float, last: float, lag: float, rate: float, s: float) -> float:
-    """n after s [s] in which the command u goes straight from first to last: n' = (u - n) / lag, no faster than rate.
-
-    lag, rate: Time constant [s], 0 for none; largest rate, inf for none.
-    s: Duration [s].
-    """
+    """n after s [s] in which the command u goes straight from first to last: n' = (u - n) / lag, no faster than rate."""
     if s <= 0.0:
         return n
     slope, gap, remaining = (last - first) / s, first - n, s

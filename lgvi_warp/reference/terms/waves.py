@@ -17,15 +17,7 @@ class Waves(Law):
         return sum((self.component(view, *numbers) for numbers in components), STILL)
 
     def component(self, view: View, a: float, period: float, heading_deg: float, phase: float) -> Flow:
-        """One wave: u = Re (heading, -i down)^T a omega e^(-k depth) e^(-i theta), and its derivatives.
-
-        Args:
-            view: What the law sees.
-            a: Amplitude [m].
-            period: Period [s].
-            heading_deg: Direction of travel, from north [degrees].
-            phase: Phase [rad].
-        """
+        """One wave: u = Re (heading, -i down)^T a omega e^(-k depth) e^(-i theta), and its derivatives."""
         omega, heading = 2.0 * math.pi / period, math.radians(heading_deg)
         k = omega**2 / self.gravity
         along = np.array([math.cos(heading), math.sin(heading), 0.0])

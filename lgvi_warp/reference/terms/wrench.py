@@ -28,25 +28,14 @@ class WrenchSchedule(Law):
 
 
 def at_time(t: float, times: Array, values: Array, steps: bool) -> Array:
-    """A table's row at t: linear between the times, or held from each to the next; constant outside.
-
-    t: Time [s].
-    times: Times [s], rising.
-    values: Values (k, 3) at the times.
-    """
+    """A table's row (3,) at t: linear between the times, or held from each to the next; constant outside."""
     if steps:
         return np.asarray(np.asarray(values)[max(int(np.searchsorted(times, t, side="left")) - 1, 0)])
     return np.array([np.interp(t, times, column) for column in np.transpose(values)])
 
 
 def pieces(t: float, h: float, times: Array, values: Array, limit: Array) -> Iterator[tuple[float, Array, Array]]:
-    """The straight pieces of a limited table within the h [s] before t, the first first: (duration [s], first, last value).
-
-    t, h: End and length of the interval [s].
-    times: Times [s], rising.
-    values: Values (k, n) at the times.
-    limit: Largest sizes (n,) of a value.
-    """
+    """The straight pieces of a limited table (k, n) within the h before t, in order: (duration [s], first, last value)."""
     changes = np.diff(values, axis=0)
     with np.errstate(divide="ignore", invalid="ignore"):
         crossings = [(sign * limit - values[:-1]) / changes for sign in (-1.0, 1.0)]

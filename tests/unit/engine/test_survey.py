@@ -76,7 +76,7 @@ def test_one_odd_member_is_coupled(at_once):
     others, odd = seen(fleet(scene), "psi_x"), seen(fleet(scene, vehicle__added_mass_matrix=added), "psi_x")
     assert others.couplings < odd.couplings <= set(range(len(COUPLINGS)))
     # What psi_s cannot have is told by its size.
-    assert seen(fleet(scene, vehicle__added_mass_matrix=added)).left > 1e-3
+    assert seen(fleet(scene, vehicle__added_mass_matrix=added)).residual_coupling > 1e-3
 
 
 @pytest.mark.parametrize(("i", "j"), list(np.ndindex(3, 3)))

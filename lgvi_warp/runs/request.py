@@ -40,6 +40,7 @@ class Request:
     observed: statistics, members whose samples are kept, and when the run stops.
     threads: None for all cores.
     executor: None for threads.
+    settled: steps and sample times of a run that goes on; None where h, t1 and save say them.
     """
 
     fleet: Ensemble
@@ -55,6 +56,7 @@ class Request:
     observed: Observation = ALL_SAMPLES
     threads: int | None = None
     executor: Executor | None = None
+    settled: TimeGrid | None = None
 
     @classmethod
     def of(
@@ -93,6 +95,8 @@ class Request:
 
     def grid(self) -> TimeGrid:
         """Choose the steps and the sample times."""
+        if self.settled is not None:
+            return self.settled
         run, faults = self.fleet.scene.run, Faults()
         h = _seconds(faults, "h", self.h, run.step, "give the step in seconds: solve(..., h=0.01) or [run] step")
         end = "give the end in seconds: solve(..., t1=150.0) or [run] duration"

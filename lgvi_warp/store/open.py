@@ -165,25 +165,10 @@ def open_run(
     return result_of(folder, None, (*messages, *noted), observing=gathered(folder, observed))
 
 
-def times_of(folder: Folder) -> np.ndarray:
-    """Read the times of a run's samples.
-
-    Returns: Times [s], shape (k,).
-    """
-    try:
-        time = np.asarray(folder.group()["time"][:])
-        if np.isfinite(time).all():
-            return time
-    except (ValueError, KeyError):
-        pass
-    remedy = "run the same scene again with --store zarr --resume, which mends it"
-    raise SceneError([f"{folder.path}: {'; '.join(folder.damage()) or 'times are lost'}; {remedy}"])
-
-
 def gathered(folder: Folder, observed: Observation) -> Observing:
     """Read the statistics of a complete run from the parts of its blocks."""
     replicates = replicates_of(folder.provenance["ensemble"])
-    observing = Observing(observed, times_of(folder), int(folder.recipe["members"]), replicates)
+    observing = Observing(observed, folder.times(), int(folder.recipe["members"]), replicates)
     block_files = folder.block_files
     for block in folder.runs:
         _check_parts(folder, block_files.sums(block), block)
@@ -219,8 +204,7 @@ def result_of(
     observing: Keepers of its statistics, with all blocks merged; None: no statistics.
     """
     folder.refuse_too_large()
-    group, time = folder.group(), times_of(folder)
-    n = folder.members
+    group, time, n = folder.group(), folder.times(), folder.members
     at = _places(members, n)
     arrays = {name: array for name, array in group.arrays()}
     fields = tuple(name for name in arrays if name in IN_FILES)

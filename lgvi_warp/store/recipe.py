@@ -15,8 +15,6 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.identity import UNKNOWN, comparable
 from lgvi_warp.common.safe_files import parsed
-from lgvi_warp.methods.method import Method
-from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.sampling.designs.table import Table, moved
 from lgvi_warp.scene.ensemble import Ensemble
@@ -39,22 +37,6 @@ def recipe(plan: Plan) -> dict[str, Any]:
         "checks": plan.checks,
         "on_failure": plan.on_failure,
     }
-
-
-def plan_of(
-    recipe: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarray, times: np.ndarray, ticks: bool = False
-) -> Plan:
-    """Build the plan of a recipe.
-
-    sample_steps: Number of steps made until each sample, shape (k,).
-    times: Times of the samples [s], shape (k,).
-    """
-    from lgvi_warp.engine.plan import choose_plan
-
-    grid = TimeGrid(recipe["step"], sample_steps, times, tuple(recipe["messages"]))
-    method, fields = Method(**recipe["method"]), tuple(recipe["fields"])
-    settings = {name: recipe[name] for name in ("dtype", "width", "checks", "on_failure")}
-    return choose_plan(ensemble, method, grid, fields, **settings, ticks=ticks)
 
 
 # Key in the stored provenance of an ensemble: SHA-256 of the arrays that it was given, which lie in the group "explicit".
@@ -85,14 +67,10 @@ def _checksum(arrays: Mapping[str, np.ndarray]) -> str:
     return digest.hexdigest()
 
 
-def ensemble_of(
-    scene: Mapping[str, Any],
-    settings: Mapping[str, Any],
-    explicit: Mapping[str, np.ndarray],
-    noise: np.ndarray | None,
-    store: Path,
-) -> Ensemble:
-    """Build the ensemble that provenance describes."""
+def stored_ensemble(provenance: Mapping[str, Any], arrays: Mapping[str, np.ndarray], store: Path) -> Ensemble:
+    """Build the ensemble that provenance describes, with the arrays that it was given."""
+    scene, settings = provenance["scene"], provenance["ensemble"]
+    explicit = {name: values for name, values in arrays.items() if name != "indices"}
     _check_table(_table_in(settings))
     settings = {key: value for key, value in settings.items() if key != ARRAYS}
     table = _table(settings, explicit, store)
@@ -114,8 +92,8 @@ def ensemble_of(
             settings["sampling"] = {kind: {"values": explicit} if kind == "table" else {**arguments, **explicit}}
         ensemble = Ensemble.from_scene(Scene.from_dict({**scene, "ensemble": settings}))
         ensemble.scene = bare_scene
-    if noise is not None:
-        ensemble.indices = noise
+    if "indices" in arrays:
+        ensemble.indices = arrays["indices"]
     return ensemble
 
 

@@ -113,10 +113,10 @@ class Request:
         if run.save_every is None or run.save_every <= t1:
             return time_grid(h, t1, SaveAt(every=run.save_every))
         # The scene's save_every is meant for its own duration; a shorter run ignores it.
-        told = (
+        remark = (
             f"run.save_every = {run.save_every} s is longer than the run, {t1} s: only the start and the end are kept"
         )
-        return time_grid(h, t1, SaveAt()).telling(told)
+        return time_grid(h, t1, SaveAt()).telling(remark)
 
     def plan(self, survey_all: bool = True) -> Plan:
         """Settle the run: its steps, its method and its kernel.
@@ -199,9 +199,9 @@ def enough_iterations(fleet: Ensemble, method: Method, h: float, dtype: str) -> 
     return None
 
 
-def _seconds(faults: Faults, key: str, given: Any, of_scene: float | None, remedy: str) -> float:
-    """A time of the run [s], as given or of the scene."""
-    seconds = of_scene if given is None else given
+def _seconds(faults: Faults, key: str, argument: Any, of_scene: float | None, remedy: str) -> float:
+    """A time of the run [s]: the argument, else the scene's."""
+    seconds = of_scene if argument is None else argument
     if seconds is None:
         faults.add(key, seconds, "is missing", remedy)
         return 0.0

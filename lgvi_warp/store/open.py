@@ -45,18 +45,18 @@ class Arrays(Mapping[str, np.ndarray]):
         names: Names of the arrays.
         axis: Axis of the members.
         members: Slice with start, stop and step, or indices, of the members to read.
-        whole: Further arrays by name, which are in memory.
+        in_memory: Further arrays by name, which are in memory.
     """
 
     group: Any
     names: tuple[str, ...]
     axis: int
     members: Any
-    whole: Mapping[str, np.ndarray] | None = None
+    in_memory: Mapping[str, np.ndarray] | None = None
 
     def __getitem__(self, name: str) -> np.ndarray:
-        if self.whole is not None and name in self.whole:
-            return self.whole[name]
+        if self.in_memory is not None and name in self.in_memory:
+            return self.in_memory[name]
         if name not in self.names:
             raise KeyError(name)
         at = (*(slice(None),) * self.axis, self.members)
@@ -78,13 +78,13 @@ class Arrays(Mapping[str, np.ndarray]):
         return dataset(path)
 
     def __contains__(self, name: object) -> bool:
-        return name in self.names or name in (self.whole or {})
+        return name in self.names or name in (self.in_memory or {})
 
     def __iter__(self) -> Iterator[str]:
-        return iter((*self.names, *(self.whole or {})))
+        return iter((*self.names, *(self.in_memory or {})))
 
     def __len__(self) -> int:
-        return len(self.names) + len(self.whole or {})
+        return len(self.names) + len(self.in_memory or {})
 
 
 def folder_of(path: str | os.PathLike[str]) -> Path:

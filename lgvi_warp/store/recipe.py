@@ -126,10 +126,10 @@ def same_run(
     stored: Mapping[str, Any], now: Mapping[str, Any], name: str = "the store", other_name: str | None = None
 ) -> list[str]:
     """List the differences between two provenances that the bits of a run depend on."""
-    found = [*differences(_comparable(stored), _comparable(now)), *_functions(stored, now)[0]]
+    leaves = [*differences(_comparable(stored), _comparable(now)), *_functions(stored, now)[0]]
     return [
         f"{key} is {first!r} in {name} and {second!r} {f'in {other_name}' if other_name else 'here'}"
-        for key, first, second in found
+        for key, first, second in leaves
     ]
 
 
@@ -141,14 +141,14 @@ UNTOLD = (
 
 def _functions(stored: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[list[tuple[str, str, str]], list[str]]:
     """The user's functions that differ between two provenances, as of `differences`; and those that cannot be compared."""
-    there, here = stored.get("functions", {}), now.get("functions", {})
+    before, current = stored.get("functions", {}), now.get("functions", {})
     differ, untold = list[tuple[str, str, str]](), list[str]()
-    for name in dict.fromkeys([*there, *here]):
-        one, other = there.get(name, UNKNOWN), here.get(name, UNKNOWN)
-        if not comparable(one, other):
+    for name in dict.fromkeys([*before, *current]):
+        first, second = before.get(name, UNKNOWN), current.get(name, UNKNOWN)
+        if not comparable(first, second):
             untold.append(name)
-        elif one != other:
-            differ.append((f"functions.{name}", one, other))
+        elif first != second:
+            differ.append((f"functions.{name}", first, second))
     return differ, untold
 
 
@@ -176,16 +176,16 @@ def _without_place(ensemble: Mapping[str, Any]) -> dict[str, Any]:
     return {**ensemble, "sampling": {"table": {key: value for key, value in table.items() if key != "file"}}}
 
 
-def differences(there: Any, here: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
+def differences(before: Any, now: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
     """Find the leaves that differ between two nested tables.
 
     Yields: Tuples (dotted key, one value, other value).
     """
-    if isinstance(there, Mapping) and isinstance(here, Mapping):
-        for name in [*there, *(name for name in here if name not in there)]:
-            yield from differences(there.get(name), here.get(name), f"{key}.{name}" if key else name)
-    elif there != here:
-        yield key, there, here
+    if isinstance(before, Mapping) and isinstance(now, Mapping):
+        for name in [*before, *(name for name in now if name not in before)]:
+            yield from differences(before.get(name), now.get(name), f"{key}.{name}" if key else name)
+    elif before != now:
+        yield key, before, now
 
 
 def refuse_another(path: Any, stored: Mapping[str, Any], now: Mapping[str, Any], force: bool) -> tuple[str, ...]:
@@ -209,9 +209,9 @@ def refuse_another(path: Any, stored: Mapping[str, Any], now: Mapping[str, Any],
 
 def noted_functions(stored: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[str, ...]:
     """Say which functions of a finished run's statistics are others than those that it was given."""
-    here = now["functions"]
-    there = {name: text for name, text in stored.get("functions", {}).items() if name in here}
-    differ, untold = _functions({"functions": there}, now)
+    current = now["functions"]
+    before = {name: text for name, text in stored.get("functions", {}).items() if name in current}
+    differ, untold = _functions({"functions": before}, now)
     return tuple(f"{name} is another function than the run had" for name, _, _ in differ) + tuple(
         f"{name} {UNTOLD}" for name in untold
     )

@@ -225,10 +225,9 @@ def _seconds(plan: Plan, steps: int, chosen: Sequence[Block], threads: int, obse
 
 
 def result_bytes(plan: Plan, fields: Sequence[str] | None = None) -> int:
-    """Size of a result in memory, and about that of its file.
+    """Size of a result in memory, and about that of its file [bytes].
 
-    fields: Fields of the samples that the result holds; default None, all of the plan.
-    Returns: The size [bytes].
+    fields: of the samples that it holds; None: all of the plan.
     """
     k, n = len(plan.grid.times), plan.ensemble.members
     real = np.dtype(machine.DTYPES[plan.dtype]).itemsize
@@ -249,11 +248,9 @@ NO_STATISTICS = Sizes()
 class Sized:
     """A run whose size in memory and on disk is computed.
 
-    Attributes:
-        plan: Plan of the run.
-        store: Where it is written; None: kept in memory.
-        fields: Names of the fields whose samples are kept; None: all of the plan.
-        statistics: Sizes of its statistics.
+    store: Where it is written; None: kept in memory.
+    fields: Names of the fields whose samples are kept; None: all of the plan.
+    statistics: Sizes of its statistics.
     """
 
     plan: Plan
@@ -286,10 +283,7 @@ class Sized:
         return held + member_fields.size(self.plan) * self.plan.ensemble.members
 
     def working(self, threads: int) -> int:
-        """Compute the memory of the blocks at work.
-
-        Returns: Memory [bytes].
-        """
+        """Compute the memory of the blocks at work [bytes]."""
         plan = self.plan
         joined = self.store is not None or self.statistics.part > 0
         runs = parts(plan.ensemble.members, plan.grid.steps, threads, joined)
@@ -307,10 +301,7 @@ class Sized:
 
 
 def memory(runs: Sequence[Sized], threads: int) -> int:
-    """Compute the memory that several runs, one after the other, add to the process.
-
-    Returns: The peak [bytes].
-    """
+    """Compute the most memory [bytes] that several runs, one after the other, add to the process."""
     peaks = [
         sum(earlier.held for earlier in runs[: i + 1]) + max(run.working(threads), run.statistics.reading)
         for i, run in enumerate(runs)
@@ -359,10 +350,7 @@ def writing(runs: Sequence[Sized], folder: Path, threads: int) -> tuple[float, i
 
 
 def disk_speed(folder: Path, threads: int) -> float:
-    """Measure the speed of a disk with files that are written, synced and removed again.
-
-    Returns: Speed of all threads together [bytes/s].
-    """
+    """Measure how fast all threads together write files that are synced and removed again [bytes/s]."""
     data = np.random.default_rng(0).bytes(PROBE_BYTES // threads)
 
     def write(i: int) -> None:

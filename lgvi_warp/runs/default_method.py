@@ -38,10 +38,7 @@ OTHERWISE = ("psi_x", "psi_s")
 
 
 def planned(ensemble: Ensemble, grid: TimeGrid, others: tuple[Any, ...]) -> Plan:
-    """Plan a run with the first method that takes it.
-
-    others: the arguments of `choose_plan` after the grid.
-    """
+    """Plan a run with the first method that takes it; `others` are the arguments of `choose_plan` after the grid."""
     known_rates = rates(ensemble)
     for method in choices(ensemble, grid.h, known_rates):
         remarks = messages(method, known_rates, grid.h, max(AHEAD, grid.h * grid.steps))

@@ -47,10 +47,9 @@ SPLITTING = {"conservative": 0.01, "damped": 0.03}
 class Rates:
     """How fast the motion of the first members changes.
 
-    Attributes:
-        modes: rates of the modes of each member (n, 10), complex [1/s]; infinite where damping is beyond float64.
-        drag: fastest rate of damping alone [1/s]; None where a term does not tell how it brakes.
-        rotation: largest angular rate at the start [rad/s].
+    modes: rates of the modes of each member (n, 10), complex [1/s]; infinite where damping is beyond float64.
+    drag: fastest rate of damping alone [1/s]; None where a term does not tell how it brakes.
+    rotation: largest angular rate at the start [rad/s].
     """
 
     modes: np.ndarray

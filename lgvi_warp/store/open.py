@@ -40,12 +40,10 @@ if TYPE_CHECKING:
 class Arrays(Mapping[str, np.ndarray]):
     """Arrays of a store by name, read from disk at each access.
 
-    Attributes:
-        group: zarr group of the store.
-        names: Names of the arrays.
-        axis: Axis of the members.
-        members: Slice with start, stop and step, or indices, of the members to read.
-        in_memory: Further arrays by name, which are in memory.
+    group: zarr group of the store.
+    axis: Axis of the members.
+    members: Slice with start, stop and step, or indices, of the members to read.
+    in_memory: Further arrays by name, which are in memory.
     """
 
     group: Any
@@ -238,10 +236,7 @@ def result_of(
 
 
 def kept_of(folder: Folder, terms: Sequence[Term]) -> tuple[np.ndarray, Result | None]:
-    """Read the members that a complete run keeps.
-
-    Returns: Indices of the members, shape (m,), and their result; None if there are none.
-    """
+    """Read the members that a complete run keeps: their indices (m,), and their result, None if there are none."""
     wanted = members_kept(keep_of(folder.provenance), folder) if folder.complete else np.empty(0, np.int64)
     if not len(wanted):
         return wanted, None

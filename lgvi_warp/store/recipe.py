@@ -177,10 +177,7 @@ def _without_place(ensemble: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def differences(before: Any, now: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Find the leaves that differ between two nested tables.
-
-    Yields: Tuples (dotted key, one value, other value).
-    """
+    """Yield (dotted key, value before, value now) of each leaf that differs between two nested tables."""
     if isinstance(before, Mapping) and isinstance(now, Mapping):
         for name in [*before, *(name for name in now if name not in before)]:
             yield from differences(before.get(name), now.get(name), f"{key}.{name}" if key else name)

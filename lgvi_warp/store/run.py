@@ -35,17 +35,13 @@ class StoredRun:
 
     It is complete when every block is there, or as many as `enough` asks for, and `last` is done.
 
-    Attributes:
-        plan: Plan of the run.
-        store: Folder and settings of the store.
-        provenance: Provenance as the store keeps it.
-        messages: What the user should know.
-        keepers: Further keepers, whose parts lie in the store.
-        only: Indices of the blocks to run; None: all.
-        enough: Tells whether this many members are enough (see run_blocks).
-        last: Last stage of the run; called with this run, its members, the executor and the progress, it returns how many
-            blocks it ran.
-        after: Called with each block as soon as it is in the store, in order; default nothing.
+    provenance: Provenance as the store keeps it.
+    keepers: Further keepers, whose parts lie in the store.
+    only: Indices of the blocks to run; None: all.
+    enough: Tells whether this many members are enough (see run_blocks).
+    last: Last stage of the run; called with this run, its members, the executor and the progress, it returns how many
+        blocks it ran.
+    after: Called with each block as soon as it is in the store, in order; default nothing.
     """
 
     plan: Plan

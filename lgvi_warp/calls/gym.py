@@ -133,7 +133,7 @@ class Vehicles:
         self._periods = _whole_periods(duration, controller.every(self._plan.grid.h) * self._plan.grid.h)
         # Whose episode has ended, and how many periods each has lasted.
         self._begun, self._done = False, np.zeros(self.num_envs, bool)
-        self._made = np.zeros(self.num_envs, np.int64)
+        self._periods_made = np.zeros(self.num_envs, np.int64)
         self._columns = None if to else [COMPONENTS.index(name) for name in outputs]
         self._spaces(gymnasium, to, scale)
         self.metadata = {"render_modes": [], "autoreset_mode": modes[mode]}
@@ -151,8 +151,8 @@ class Vehicles:
         members = max(self.num_envs, self._fleet.members) if self._random else self._fleet.members
         planned = self._fleet.with_seed(self._fleet.seed, members) if self._random else self._fleet
         save = SaveAt(fields=("position",))
-        asked = Request(planned, method, h, t1, save, dtype, width=width, checks="safe", on_failure="freeze")
-        plan = asked.plan()
+        request = Request(planned, method, h, t1, save, dtype, width=width, checks="safe", on_failure="freeze")
+        plan = request.plan()
         plan.compile()
         return plan
 
@@ -241,16 +241,16 @@ class Vehicles:
             raise TypeError(f"seed = {brief(seed)}: is no whole number; give one for all environments")
         super().reset(seed=seed)  # type: ignore[misc]  # of gymnasium.vector.VectorEnv
         mask = _mask(options, self.num_envs)
-        whole = mask.all() or not self._begun
+        all_begin = mask.all() or not self._begun
         if seed is not None:
             self._seed(int(seed))
             self._prepared[:] = -1
             self._numbers[mask] = 0
         elif self._begun:
             self._numbers[mask] += 1
-        self._made[mask] = 0
+        self._periods_made[mask] = 0
         self._done[mask] = False
-        if whole:
+        if all_begin:
             if seed is not None:
                 self._noise_seed = int(seed)
             self._done[:] = False
@@ -292,7 +292,7 @@ class Vehicles:
         else:
             self._answer[:, self._columns] = scaled
         episodes.advance(self._answer)
-        self._made += 1
+        self._periods_made += 1
         y, r = episodes.signals()
         status = episodes.status()
         ended = status != 0
@@ -301,7 +301,7 @@ class Vehicles:
         observed = self._seen(y, r)
         rewards = self._rewarded(y, r, actions)
         terminations = ended if self._terminated is None else ended | self._truth(self._terminated(self.time, y, r))
-        truncations = self._made >= self._periods
+        truncations = self._periods_made >= self._periods
         infos: dict[str, Any] = {"status": status, "_status": ended.copy()} if ended.any() else {}
         if self._mode == "NextStep" and last.any():
             again = np.flatnonzero(last)
@@ -329,7 +329,7 @@ class Vehicles:
 
     def _begin_next(self, envs: np.ndarray) -> None:
         self._numbers[envs] += 1
-        self._made[envs] = 0
+        self._periods_made[envs] = 0
 
     def _restarted(self, envs: np.ndarray) -> np.ndarray:
         """Start the present episodes of some environments; their first observations."""
@@ -346,10 +346,10 @@ class Vehicles:
 
     def _tick_at_ends(self, envs: np.ndarray, y: CallbackInput, r: CallbackInput) -> None:
         """Put what is seen in the states in which vehicles ended in place of what is seen of them at rest."""
-        for whole, part in zip((y, r), self._episodes.signals_of(envs), strict=True):
+        for signals, part in zip((y, r), self._episodes.signals_of(envs), strict=True):
             for name, value in vars(part).items():
                 if value is not None:
-                    getattr(whole, name)[envs] = value
+                    getattr(signals, name)[envs] = value
 
     def _seen(self, y: CallbackInput, r: CallbackInput) -> np.ndarray:
         """Observations of some environments."""
@@ -368,8 +368,8 @@ class Vehicles:
         return rewards
 
     def _truth(self, values: Any) -> np.ndarray:
-        whole = not isinstance(values, np.ma.MaskedArray) and not ragged(values)
-        terminated = np.asarray(values) if whole else None
+        regular = not isinstance(values, np.ma.MaskedArray) and not ragged(values)
+        terminated = np.asarray(values) if regular else None
         if terminated is None or terminated.dtype.kind != "b":
             terminated = answered("terminated", values) != 0.0
         if terminated.shape != (self.num_envs,):

@@ -22,26 +22,17 @@ def heading_error(y: CallbackInput, r: CallbackInput) -> np.ndarray:
 
 
 def attitude_error(y: CallbackInput, r: CallbackInput) -> np.ndarray:
-    """e_R = vee(R_d^T R - R^T R_d) / 2, as of `lw.control.PosePID`.
-
-    Returns: (m, 3) [1], body axes.
-    """
+    """e_R = vee(R_d^T R - R^T R_d) / 2, as of `lw.control.PosePID`: (m, 3) [1], body axes."""
     return 0.5 * np.cross(y.attitude, r.attitude).sum(axis=1)
 
 
 def position_error(y: CallbackInput, r: CallbackInput) -> np.ndarray:
-    """The wanted position less the measured one.
-
-    Returns: (m, 3) [m], body axes.
-    """
+    """The wanted position less the measured one, (m, 3) [m], body axes."""
     return np.einsum("nji,nj->ni", y.attitude, r.position - y.position)
 
 
 def water_velocity(y: CallbackInput) -> np.ndarray:
-    """The measured velocity through the water.
-
-    Returns: (m, 3) [m/s], body axes.
-    """
+    """The measured velocity through the water, (m, 3) [m/s], body axes."""
     assert y.water_velocity is not None
     return y.water_velocity
 
@@ -89,10 +80,7 @@ OBSERVATIONS |= {
 def observer(
     faults: Faults, names: Any, wishes: Sequence[str]
 ) -> Callable[[float, CallbackInput, CallbackInput], np.ndarray]:
-    """The function that gathers named numbers.
-
-    Returns: Function of the time and of the measured and wanted motion of m members that returns (m, k).
-    """
+    """A function of the time and of the measured and wanted motion of m members that gathers named numbers (m, k)."""
     chosen: list[tuple[ObservedNumber, int | None]] = []
     known: Mapping[str, tuple[str, int | None]] = {
         (name if i is None else f"{name}[{i}]"): (name, i)

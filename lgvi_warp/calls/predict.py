@@ -20,17 +20,16 @@ from lgvi_warp.common import files as durable
 from lgvi_warp.common import machine
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.engine.block import Block, blocks, parts
-from lgvi_warp.engine.executors import check_threads
 from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.engine.keepers.memory import Samples
-from lgvi_warp.engine.keepers.observation import Observation, Observing, observe
+from lgvi_warp.engine.keepers.observation import Observation, Observing
 from lgvi_warp.engine.keepers.protocol import Keeper
 from lgvi_warp.engine.launches import SEGMENT_SAMPLE_BYTES
 from lgvi_warp.engine.plan import NotSurveyed, Plan
 from lgvi_warp.engine.work import Work
 from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.results import member_fields
-from lgvi_warp.runs.request import Request
+from lgvi_warp.runs.request import Request, ensemble_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.store.block_files import BlockFiles, marker
@@ -51,7 +50,8 @@ PROBE_BYTES, SYNCS = 64_000_000, 4
 class Prediction:
     """Time, memory and disk space that a run will take.
 
-    Blocks are written while others advance: the slower of the two decides how long a run takes.
+    Blocks are written while others advance: the slower of the two decides how long a run takes. Its text, `str(prediction)`,
+    says it in lines.
 
     Attributes:
         members: Number of members.
@@ -85,7 +85,7 @@ class Prediction:
 
     @property
     def seconds(self) -> float:
-        """Time of the run without compilation [s]."""
+        """Time of the run without compilation [s]: set-up, then the slower of steps and writing."""
         return self.set_up + max(self.advance, self.write)
 
     def __str__(self) -> str:
@@ -146,15 +146,13 @@ def predict(
         (8, 20, True)
     """
     faults = Faults()
-    check_threads(faults, threads)
+    request = Request.of(faults, ensemble_of(fleet), threads=threads, **settings)
     faults.raise_if_any()
-    ensemble = fleet if isinstance(fleet, Ensemble) else Ensemble.from_scene(fleet)
-    observed = observe(ensemble, *(settings.pop(name, None) for name in ("statistics", "keep", "until")))
-    request = Request(ensemble, **settings, observed=observed, threads=threads)
-    plan, count = request.plan(survey_all=False), request.count
+    observed, count = request.observed, request.count
+    plan = request.plan(survey_all=False)
     into, fields = (None, request.saved) if store is None else with_saved_fields(store, request)
     joined = into is not None or bool(observed.watch(plan.grid.times)[0])
-    blocks_of_run = parts(ensemble.members, plan.grid.steps, count, joined)
+    blocks_of_run = parts(plan.ensemble.members, plan.grid.steps, count, joined)
     compile_seconds = plan.compile()
     try:
         set_up, step = costs(plan, blocks_of_run, count, observed)
@@ -166,7 +164,7 @@ def predict(
     runs = [Sized(plan, into, fields if observed.samples else (), sizes(plan, observed.watch(plan.grid.times)[0]))]
     runs += size_of_rerun(plan, observed, into, fields)
     write, metadata = writing(runs, place, count) if into else (0.0, 0)
-    n, steps = ensemble.members, plan.grid.steps
+    n, steps = plan.ensemble.members, plan.grid.steps
     more = sum(sized.plan.ensemble.members for sized in runs) / n
     return Prediction(
         members=n,
@@ -227,10 +225,9 @@ def _seconds(plan: Plan, steps: int, chosen: Sequence[Block], threads: int, obse
 
 
 def result_bytes(plan: Plan, fields: Sequence[str] | None = None) -> int:
-    """Size of a result in memory, and about that of its file.
+    """Size of a result in memory, and about that of its file [bytes].
 
-    fields: Fields of the samples that the result holds; default None, all of the plan.
-    Returns: The size [bytes].
+    fields: of the samples that it holds; None: all of the plan.
     """
     k, n = len(plan.grid.times), plan.ensemble.members
     real = np.dtype(machine.DTYPES[plan.dtype]).itemsize
@@ -251,11 +248,9 @@ NO_STATISTICS = Sizes()
 class Sized:
     """A run whose size in memory and on disk is computed.
 
-    Attributes:
-        plan: Plan of the run.
-        store: Where it is written; None: kept in memory.
-        fields: Names of the fields whose samples are kept; None: all of the plan.
-        statistics: Sizes of its statistics.
+    store: Where it is written; None: kept in memory.
+    fields: Names of the fields whose samples are kept; None: all of the plan.
+    statistics: Sizes of its statistics.
     """
 
     plan: Plan
@@ -288,10 +283,7 @@ class Sized:
         return held + member_fields.size(self.plan) * self.plan.ensemble.members
 
     def working(self, threads: int) -> int:
-        """Compute the memory of the blocks at work.
-
-        Returns: Memory [bytes].
-        """
+        """Compute the memory of the blocks at work [bytes]."""
         plan = self.plan
         joined = self.store is not None or self.statistics.part > 0
         runs = parts(plan.ensemble.members, plan.grid.steps, threads, joined)
@@ -309,10 +301,7 @@ class Sized:
 
 
 def memory(runs: Sequence[Sized], threads: int) -> int:
-    """Compute the memory that several runs, one after the other, add to the process.
-
-    Returns: The peak [bytes].
-    """
+    """Compute the most memory [bytes] that several runs, one after the other, add to the process."""
     peaks = [
         sum(earlier.held for earlier in runs[: i + 1]) + max(run.working(threads), run.statistics.reading)
         for i, run in enumerate(runs)
@@ -361,10 +350,7 @@ def writing(runs: Sequence[Sized], folder: Path, threads: int) -> tuple[float, i
 
 
 def disk_speed(folder: Path, threads: int) -> float:
-    """Measure the speed of a disk with files that are written, synced and removed again.
-
-    Returns: Speed of all threads together [bytes/s].
-    """
+    """Measure how fast all threads together write files that are synced and removed again [bytes/s]."""
     data = np.random.default_rng(0).bytes(PROBE_BYTES // threads)
 
     def write(i: int) -> None:

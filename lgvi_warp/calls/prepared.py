@@ -132,8 +132,7 @@ class Prepared:
                 finite are taken: their members fail.
             FailedMembers: if members failed, unless failed="nan".
         """
-        given = position, attitude, velocity, angular_velocity, parameters
-        fleet = Ensemble.from_states(self._fleet.scene, *given)
+        fleet = Ensemble.from_states(self._fleet.scene, position, attitude, velocity, angular_velocity, parameters)
         fleet.seed = int(EnsembleSettings(fleet.members, seed).seed)
         return self._answer(self._with_noise(fleet, None, indices), None)
 
@@ -154,8 +153,8 @@ class Prepared:
         if indices is None:
             return fleet
         keys = np.asarray(indices)
-        whole = keys.shape == (fleet.members,) and keys.dtype.kind in "iu"
-        if not whole or keys.min() < 0 or keys.max() >= MOST_MEMBERS:
+        one_each = keys.shape == (fleet.members,) and keys.dtype.kind in "iu"
+        if not one_each or keys.min() < 0 or keys.max() >= MOST_MEMBERS:
             problem = "are not one whole number from 0 for each member"
             remedy = f"give an array of shape ({fleet.members},), of numbers below {MOST_MEMBERS}"
             raise refusal("indices", indices, problem, remedy)
@@ -213,14 +212,14 @@ class Prepared:
         if not self._of:
             return self._runner.run(fleet, progress)
         large = any(each.over_path or each.is_function for each in self._of)
-        found = self._runner.evaluate(
+        outputs = self._runner.evaluate(
             fleet, self._of, PATHS_AT_ONCE if large else fleet.members, progress, warned=False
         )
-        values = found.values
-        if found.failed.any():
+        values = outputs.values
+        if outputs.failed.any():
             if self._refuse:
-                raise FailedMembers([found.text('mend what fails, or take NaN for them: failed="nan"')])
-            values = np.where(found.failed[:, None], np.nan, values)
+                raise FailedMembers([outputs.text('mend what fails, or take NaN for them: failed="nan"')])
+            values = np.where(outputs.failed[:, None], np.nan, values)
         return values[:, 0] if values.shape[1] == 1 else values
 
 
@@ -322,25 +321,25 @@ def prepare(
         faults.add("vary", vary, "has no distributions, which levels=True needs", "map names to distributions")
     faults.raise_if_any()
     if vary is None:
-        whole = ensemble_of(fleet)
+        full = ensemble_of(fleet)
     elif distributions:
-        whole = Ensemble(scene, 1, 0, vary)  # type: ignore[arg-type]
+        full = Ensemble(scene, 1, 0, vary)  # type: ignore[arg-type]
     else:
-        whole = Ensemble(scene, 1)
-    names, table, columns = _columns(whole, listed, levels)
+        full = Ensemble(scene, 1)
+    names, table, columns = _columns(full, listed, levels)
     gathered = statistics_for(scene, interests)
     save = samples_for(scene, interests, save)
     settings = dict(
         method=method, h=h, t1=t1, save=save, dtype=dtype, width=width, checks=checks, on_failure=on_failure
     )
-    first = whole if isinstance(table, str) else table
+    first = full if isinstance(table, str) else table
     how = dict(threads=threads, executor=executor, scheduler=scheduler)
     runner = Runner(first, [*statistics, *gathered] if gathered else statistics, **settings, **how)
     known = settings | how | dict(statistics=statistics, levels=levels, failed=failed, common_noise=common_noise)
     made_of = (fleet, vary, of), known
     runner.plan(first)
     first.select(0, 1)  # which keeps what all members share
-    return Prepared(whole, table, names, interests, runner, columns, failed == "refuse", common_noise, made_of)
+    return Prepared(full, table, names, interests, runner, columns, failed == "refuse", common_noise, made_of)
 
 
 def _prepared_again(arguments: tuple[Any, ...], settings: dict[str, Any]) -> Prepared:

@@ -10,21 +10,13 @@ from typing import Any
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.engine.executors import executor_of
 from lgvi_warp.engine.executors.base import Executor
-from lgvi_warp.engine.keepers.observation import Observing, observation_of
 from lgvi_warp.engine.keepers.protocol import Keeper
-from lgvi_warp.results.provenance import provenance
 from lgvi_warp.results.result import Result
-from lgvi_warp.runs.run import refuse_failed
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
-from lgvi_warp.store.folder import ROOT, Folder
-from lgvi_warp.store.kept import KeptRun
-from lgvi_warp.store.layout_check import corrupt_store_as_scene_error
-from lgvi_warp.store.open import folder_of, result_of
-from lgvi_warp.store.recipe import of_store, refuse_another
-from lgvi_warp.store.run import StoredRun
-from lgvi_warp.store.solve import resume_message
-from lgvi_warp.store.state import store_of
+from lgvi_warp.store.folder import Folder
+from lgvi_warp.store.open import folder_of
+from lgvi_warp.store.solve import request_of, resume_stored
 
 
 @shows_progress
@@ -72,23 +64,5 @@ def resume(
         8
     """
     folder = Folder(folder_of(path))
-    ensemble = Ensemble.from_scene(fleet) if isinstance(fleet, Scene) else fleet
-    plan = folder.plan(ensemble)
-    observed_content = folder.provenance.get("observed")
-    with corrupt_store_as_scene_error(folder.path / ROOT):
-        observed = observation_of(observed_content, statistics)
-    observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
-    now = of_store(provenance(plan, observed), plan.ensemble)
-    now |= {} if observed_content is None else {"observed": observed_content}
-    messages = refuse_another(folder.path, folder.provenance, now, force)
-    last = KeptRun(observed, tuple((observed_content or {}).get("fields", ())))
-    runner = executor_of(executor, threads, scheduler)
-    # Provenance and messages stay those of the start of the run, on whatever machine it goes on.
-    run = StoredRun(
-        plan, store_of(folder, force), folder.provenance, folder.messages, (*keepers, *observing.keepers), None,
-        observing.enough, last,
-    )  # fmt: skip
-    finished_folder = run.run(runner, callback(progress))
-    remarks = messages + resume_message(finished_folder)
-    result = result_of(finished_folder, None, folder.messages + remarks, plan.ensemble.scene.terms, observing)
-    return refuse_failed(result, plan)
+    request = request_of(folder, fleet, statistics, executor_of(executor, threads, scheduler))
+    return resume_stored(folder, request, callback(progress), force, keepers)

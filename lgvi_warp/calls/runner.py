@@ -168,8 +168,8 @@ def samples_for(scene: SceneLike, of: Sequence[OfResult], save: SaveAt | None) -
 
 def statistics_for(scene: SceneLike, of: Sequence[OfResult]) -> list[Statistic]:
     """The statistics that quantities need, beside samples."""
-    found = dict[str, Statistic]()
+    gathered = dict[str, Statistic]()
     for each in of:
         if isinstance(each, EndQuantity):
-            found |= each.gathered(scene.events)
-    return list(found.values())
+            gathered |= each.gathered(scene.events)
+    return list(gathered.values())

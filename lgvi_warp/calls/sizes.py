@@ -29,13 +29,12 @@ FEW, MORE = 2, 4
 class Sizes:
     """Sizes of a run's statistics [bytes].
 
-    Attributes:
-        file: A block's parts in a file.
-        part: A block's parts in memory.
-        joined: All parts that a run has joined, at their largest.
-        estimates: The estimates that are read from these.
-        taking: Further memory of a block while it gathers.
-        reading: Further memory while estimates are read.
+    file: A block's parts in a file.
+    part: A block's parts in memory.
+    joined: All parts that a run has joined, at their largest.
+    estimates: The estimates that are read from these.
+    taking: Further memory of a block while it gathers.
+    reading: Further memory while estimates are read.
     """
 
     file: int = 0

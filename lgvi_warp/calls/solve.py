@@ -15,7 +15,6 @@ from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.result import Result
 from lgvi_warp.runs.request import Request, ensemble_of
-from lgvi_warp.runs.run import refuse_failed
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.store.settings import Store
@@ -120,8 +119,7 @@ def solve(
     try:
         if store is None:
             return request.run(plan, progress=callback(progress), partial=True, on_block=on_block)
-        result = run_stored(request, plan, store, callback(progress), only, on_block)
-        return result if only is not None else refuse_failed(result, plan)
+        return run_stored(request, plan, store, callback(progress), only, on_block)
     finally:
         # Packets and their plan refer to each other: their arrays would stay until Python looks for such circles.
         plan.free_packets.clear()

@@ -20,12 +20,10 @@ if TYPE_CHECKING:
 class MemberField:
     """One number of each member: its name, type and attributes, and the function that computes it.
 
-    Attributes:
-        name: Name of the field.
-        dtype: NumPy's type string.
-        attributes: CF attributes.
-        of: Function of a plan and an outcome that gives the values, shape (n,).
-        when: Function of a plan that tells whether its runs have the field; default always.
+    dtype: NumPy's type string.
+    attributes: CF attributes.
+    of: Function of a plan and an outcome that gives the values, shape (n,).
+    when: Function of a plan that tells whether its runs have the field; default always.
     """
 
     name: str
@@ -102,16 +100,10 @@ def present(plan: Plan) -> tuple[MemberField, ...]:
 
 
 def size(plan: Plan) -> int:
-    """Compute the size of a member's fields.
-
-    Returns: Size [bytes].
-    """
+    """Compute the size of a member's fields [bytes]."""
     return sum(np.dtype(item.dtype).itemsize for item in present(plan))
 
 
 def member_fields(plan: Plan, outcome: MemberStatus) -> dict[str, np.ndarray]:
-    """Compute the fields of an outcome's members.
-
-    Returns: Arrays of shape (n,), by name.
-    """
+    """Compute the fields of an outcome's members: arrays (n,) by name."""
     return {item.name: item.of(plan, outcome).astype(item.dtype, copy=False) for item in present(plan)}

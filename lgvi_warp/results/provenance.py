@@ -47,8 +47,8 @@ def provenance(plan: Plan, observed: Observation | None = None, fields: Sequence
         "versions": machine.versions(),
         "machine": machine.describe() | {"width_source": plan.width_source},
     }
-    own = identities(functions_of(plan.ensemble, observed.statistics if observed is not None else ()))
-    content |= {"functions": own} if own else {}
+    functions = identities(functions_of(plan.ensemble, observed.statistics if observed is not None else ()))
+    content |= {"functions": functions} if functions else {}
     if plan.ensemble.scene.source:
         content["source"] = dict(plan.ensemble.scene.source)
     if observed is not None and observed != Observation():

@@ -37,10 +37,8 @@ class OfResult:
     "position[2]" is the value at the end; max(...), min(...), mean(...) and range(...) are over the path, as its
     samples were kept; norm(...) is the length of a vector.
 
-    Attributes:
-        label: Its name.
-        of: The functional or function.
-        looks_at_members: Whether it may use more of the members than their parameters.
+    of: The functional or function.
+    looks_at_members: Whether it may use more of the members than their parameters.
     """
 
     label: str
@@ -103,10 +101,9 @@ class EndQuantity(OfResult):
     "outcome floor" is 1 for members that ended so, else 0; "end_time floor" says when, and "depth at floor" gives the depth
     there, NaN for members that ended otherwise; "depth at 30" is the depth after 30 s.
 
-    Attributes:
-        kind: "outcome", "end_time" or "at".
-        outcome: Name of the outcome; "" for a time.
-        when: The time [s].
+    kind: "outcome", "end_time" or "at".
+    outcome: Name of the outcome; "" for a time.
+    when: The time [s].
     """
 
     kind: str = "at"
@@ -135,10 +132,7 @@ class EndQuantity(OfResult):
         return {} if alone else {f"each end_time {self.outcome}": EndTime(self.outcome, then=MemberValues())}
 
     def values(self, result: Result, members: Any = None) -> np.ndarray:
-        """Compute its numbers for each member.
-
-        Returns: float64 array, shape (n, m).
-        """
+        """Compute its numbers for each member, float64, (n, m)."""
         if self.when is not None:
             rows = np.flatnonzero(np.abs(result.time - self.when) <= 1e-9 * max(1.0, result.time[-1]))
             if not len(rows):
@@ -208,10 +202,7 @@ class _Samples(dict[str, np.ndarray]):
 
 
 def samples_of(result: Result, when: slice = slice(None), members: Any = None) -> tuple[Any, Any]:
-    """Give the samples and members of a result in the form that a Quantity's function takes.
-
-    Returns: The pair (samples, members).
-    """
+    """The (samples, members) of a result in the form that a Quantity's function takes."""
     fields = {name: result.samples[name][when] for name in SAVED if name in result.samples}
     start = {name: result.samples[name][0] for name in fields}
     known = SimpleNamespace(parameters=result.parameters, count=result.members, **start)

@@ -38,15 +38,12 @@ OTHERWISE = ("psi_x", "psi_s")
 
 
 def planned(ensemble: Ensemble, grid: TimeGrid, others: tuple[Any, ...]) -> Plan:
-    """Plan a run with the first method that takes it.
-
-    others: the arguments of `choose_plan` after the grid.
-    """
-    found = rates(ensemble)
-    for method in choices(ensemble, grid.h, found):
-        told = messages(method, found, grid.h, max(AHEAD, grid.h * grid.steps))
+    """Plan a run with the first method that takes it; `others` are the arguments of `choose_plan` after the grid."""
+    known_rates = rates(ensemble)
+    for method in choices(ensemble, grid.h, known_rates):
+        remarks = messages(method, known_rates, grid.h, max(AHEAD, grid.h * grid.steps))
         try:
-            return choose_plan(ensemble, method, grid.telling(*told), *others)
+            return choose_plan(ensemble, method, grid.telling(*remarks), *others)
         except SceneError as error:
             fault = error
     raise fault
@@ -114,7 +111,7 @@ def best_error(method: Method, rates: Rates, h: float, t1: float) -> float:
     """
     numbers = h_rates(rates, h)
     others = [Method(name) for name in DAMPED] if rates.drag != 0.0 else [method]
-    return min((path_error(one, rates, h, t1) for one in others if stable(one, numbers)), default=math.inf)
+    return min((path_error(each, rates, h, t1) for each in others if stable(each, numbers)), default=math.inf)
 
 
 def stable(method: Method, numbers: dict[str, float], share: float = SHARES["drag"]) -> bool:

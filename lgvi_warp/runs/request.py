@@ -40,6 +40,7 @@ class Request:
     observed: statistics, members whose samples are kept, and when the run stops.
     threads: None for all cores.
     executor: None for threads.
+    settled: steps and sample times of a run that goes on; None where h, t1 and save say them.
     """
 
     fleet: Ensemble
@@ -55,6 +56,7 @@ class Request:
     observed: Observation = ALL_SAMPLES
     threads: int | None = None
     executor: Executor | None = None
+    settled: TimeGrid | None = None
 
     @classmethod
     def of(
@@ -93,6 +95,8 @@ class Request:
 
     def grid(self) -> TimeGrid:
         """Choose the steps and the sample times."""
+        if self.settled is not None:
+            return self.settled
         run, faults = self.fleet.scene.run, Faults()
         h = _seconds(faults, "h", self.h, run.step, "give the step in seconds: solve(..., h=0.01) or [run] step")
         end = "give the end in seconds: solve(..., t1=150.0) or [run] duration"
@@ -109,10 +113,10 @@ class Request:
         if run.save_every is None or run.save_every <= t1:
             return time_grid(h, t1, SaveAt(every=run.save_every))
         # The scene's save_every is meant for its own duration; a shorter run ignores it.
-        told = (
+        remark = (
             f"run.save_every = {run.save_every} s is longer than the run, {t1} s: only the start and the end are kept"
         )
-        return time_grid(h, t1, SaveAt()).telling(told)
+        return time_grid(h, t1, SaveAt()).telling(remark)
 
     def plan(self, survey_all: bool = True) -> Plan:
         """Settle the run: its steps, its method and its kernel.
@@ -195,9 +199,9 @@ def enough_iterations(fleet: Ensemble, method: Method, h: float, dtype: str) -> 
     return None
 
 
-def _seconds(faults: Faults, key: str, given: Any, of_scene: float | None, remedy: str) -> float:
-    """A time of the run [s], as given or of the scene."""
-    seconds = of_scene if given is None else given
+def _seconds(faults: Faults, key: str, argument: Any, of_scene: float | None, remedy: str) -> float:
+    """A time of the run [s]: the argument, else the scene's."""
+    seconds = of_scene if argument is None else argument
     if seconds is None:
         faults.add(key, seconds, "is missing", remedy)
         return 0.0

@@ -120,8 +120,8 @@ class _Gathered:
             terms=tuple(plan.ensemble.scene.terms),
         )
 
-    def result(self, n: int, whole: bool, compile_seconds: float, run_seconds: float) -> Result:
-        """The result of the first n members; statistics are left out where they include other members (not `whole`)."""
+    def result(self, n: int, complete: bool, compile_seconds: float, run_seconds: float) -> Result:
+        """The result of the first n members; statistics are left out where they include other members (not `complete`)."""
         plan = self.plan
         if self.known is None:
             content, texts = provenance(plan, self.observed, self.fields), messages(plan)
@@ -129,7 +129,7 @@ class _Gathered:
             content, texts = self.known(plan)
         of_members = {name: values[:n] for name, values in member_fields.member_fields(plan, self.outcomes.all).items()}
         estimates, remarks = Estimates(), tuple[str, ...]()
-        if whole:
+        if complete:
             estimates, remarks = self.observing.read(content["ensemble"], of_members["status"])
         # The arrays have room for all members; beyond the last one that ran nothing was written.
         histories, scene = self.histories(slice(n)), plan.ensemble.scene

@@ -47,10 +47,9 @@ SPLITTING = {"conservative": 0.01, "damped": 0.03}
 class Rates:
     """How fast the motion of the first members changes.
 
-    Attributes:
-        modes: rates of the modes of each member (n, 10), complex [1/s]; infinite where damping is beyond float64.
-        drag: fastest rate of damping alone [1/s]; None where a term does not tell how it brakes.
-        rotation: largest angular rate at the start [rad/s].
+    modes: rates of the modes of each member (n, 10), complex [1/s]; infinite where damping is beyond float64.
+    drag: fastest rate of damping alone [1/s]; None where a term does not tell how it brakes.
+    rotation: largest angular rate at the start [rad/s].
     """
 
     modes: np.ndarray
@@ -148,15 +147,15 @@ def modes(inertia: np.ndarray, damping: np.ndarray, members: Members) -> np.ndar
     change[:, 3:, 3:] += hat(momentum[:, 3:])
     stiffness = np.zeros((n, 6, 3))
     stiffness[:, 3, 0] = stiffness[:, 4, 1] = np.linalg.norm(moment(members.parameters), axis=1)
-    whole = np.zeros((n, 9, 9))
-    whole[:, :6, :6] = np.linalg.solve(inertia, change - damping)
-    whole[:, :6, 6:] = -np.linalg.solve(inertia, stiffness)
-    whole[:, 6:, 3:6] = np.eye(3)
-    whole[:, 6:, 6:] = -hat(w)
-    if not np.isfinite(whole).all():
+    system = np.zeros((n, 9, 9))
+    system[:, :6, :6] = np.linalg.solve(inertia, change - damping)
+    system[:, :6, 6:] = -np.linalg.solve(inertia, stiffness)
+    system[:, 6:, 3:6] = np.eye(3)
+    system[:, 6:, 6:] = -hat(w)
+    if not np.isfinite(system).all():
         return np.full((n, 10), -np.inf + 0.0j)
     turning = 1j * np.linalg.norm(w, axis=1)[:, None]
-    return np.concatenate([np.linalg.eigvals(whole), turning], axis=1)
+    return np.concatenate([np.linalg.eigvals(system), turning], axis=1)
 
 
 @np.errstate(all="ignore")
@@ -175,8 +174,8 @@ def path_error(method: Method, rates: Rates, h: float, t1: float) -> float:
     # What grows is bounded by the rest of the motion, which turns it over at the same rate.
     z = np.where(z.real > 0.0, 1j * np.abs(z), z)
     explicit = 1j * z.imag if method.linearly_implicit else z
-    made = stability_polynomial(RK4 if method.linearly_implicit else method.tableau, explicit)
-    wrong, size = np.abs(made - np.exp(explicit)), np.abs(made)
+    factor = stability_polynomial(RK4 if method.linearly_implicit else method.tableau, explicit)
+    wrong, size = np.abs(factor - np.exp(explicit)), np.abs(factor)
     if method.linearly_implicit:
         # Damping by an implicit stage: of order 3, and of its first step alone where it is stiff.
         x = -z.real
@@ -184,7 +183,7 @@ def path_error(method: Method, rates: Rates, h: float, t1: float) -> float:
         size *= np.exp(-x)
     steps = max(t1 / h, 1.0)
     unstable = size > 1.0 + LEAST_GROWTH + SHIFT / steps
-    left = np.maximum(np.minimum(size, 1.0), np.exp(z.real))
-    added = np.minimum(steps, 1.0 / np.maximum(1.0 - left, 1.0 / steps))
+    kept = np.maximum(np.minimum(size, 1.0), np.exp(z.real))
+    added = np.minimum(steps, 1.0 / np.maximum(1.0 - kept, 1.0 / steps))
     share = np.minimum(1.0, SHIFT / np.maximum(-rates.modes.real * t1, 1e-300))
     return math.inf if unstable.any() else float((wrong * added * share).max())

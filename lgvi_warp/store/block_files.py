@@ -38,11 +38,9 @@ def name_of(block: Block) -> str:
 class BlockFiles:
     """Keeper that writes blocks into a store, from threads, processes or other machines that see its folder.
 
-    Attributes:
-        root: Folder of the store.
-        columns: The arrays that are written block by block.
-        room: Memory for chunks.
-        commits: Queue of the blocks that are not durable yet.
+    columns: The arrays that are written block by block.
+    room: Memory for chunks.
+    commits: Queue of the blocks that are not durable yet.
     """
 
     root: Path
@@ -73,10 +71,7 @@ class BlockFiles:
         return f"parts/{name_of(block)}.npy"
 
     def sums(self, block: Block) -> dict[str, list[int]] | None:
-        """Read the sizes and checksums in a block's marker.
-
-        Returns: [size, checksum] by path of the file; None if the block is not finished.
-        """
+        """Read a block's marker: [size, checksum] by path of the file; None if the block is not finished."""
         return read_marker(self.root, f"blocks/{name_of(block)}.json")
 
     def marker(self, block: Block) -> Path:
@@ -84,10 +79,7 @@ class BlockFiles:
         return self.root / "blocks" / f"{name_of(block)}.json"
 
     def parts(self, block: Block, keepers: Sequence[Keeper]) -> tuple[Any, ...] | None:
-        """Read the parts of the keepers for a block.
-
-        Returns: A part for each keeper; None if the block is not finished.
-        """
+        """Read the parts of a block, one for each keeper; None if the block is not finished."""
         if self.sums(block) is None:
             return None
         if not keepers:
@@ -172,10 +164,7 @@ def damaged(root: Path, sums: Mapping[str, Sequence[int]]) -> dict[str, str]:
 
 
 def read_marker(root: Path, key: str) -> dict[str, list[int]] | None:
-    """Read a marker.
-
-    Returns: [size, checksum] by path of the file; None if there is no marker, or a damaged one.
-    """
+    """Read a marker: [size, checksum] by path of the file; None if there is none, or a damaged one."""
     try:
         content = safe_files.read(root, key, safe_files.MOST_JSON)
         text, _, last = content.rstrip(b"\n").rpartition(b"\n")
@@ -192,10 +181,7 @@ def read_marker(root: Path, key: str) -> dict[str, list[int]] | None:
 def check_blocks(
     block_files: BlockFiles, runs: Sequence[Block], samples: int, keepers: Sequence[Any] = ()
 ) -> Iterator[tuple[Block, list[str]]]:
-    """Compare the files of blocks with their markers, reading every file.
-
-    Yields: Tuples (block, its faults), in order; see BlockFiles.faults.
-    """
+    """Yield each block with its faults (see BlockFiles.faults), in order; every file is read."""
     with ThreadPoolExecutor(machine.thread_count()) as pool:
         faults = pool.map(lambda block: block_files.faults(block, samples, keepers), runs)
         yield from zip(runs, faults, strict=True)

@@ -20,11 +20,9 @@ PERIOD, MOST = 0.1, 64
 class Commit:
     """The files of one block, and its marker, which says that all of them are safe.
 
-    Attributes:
-        files: The files, written and not synced.
-        path: Path of the marker.
-        marker: Content of the marker.
-        done: Done when the block is durable, or failed.
+    files: The files, written and not synced.
+    path: Path of the marker.
+    done: Done when the block is durable, or failed.
     """
 
     files: Files

@@ -61,10 +61,7 @@ def nearest_folder(path: Path) -> Path:
 
 
 def free_enough(path: Path, wanted: int) -> None:
-    """Raise SceneError if a disk has less room than a run needs.
-
-    wanted: Size of the run [bytes].
-    """
+    """Raise SceneError if a disk has less room than a run needs: its size `wanted` [bytes]."""
     free = shutil.disk_usage(nearest_folder(path)).free
     if wanted + SPARE_BYTES > free:
         shortage = f"needs {wanted / 1e9:.2f} GB, and the disk has {free / 1e9:.2f} GB left"

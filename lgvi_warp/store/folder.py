@@ -17,7 +17,7 @@ import json
 import os
 from collections.abc import Container, Iterator, Sequence
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,18 +27,13 @@ from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.common.write_lock import write_lock
 from lgvi_warp.engine.block import Block, blocks
-from lgvi_warp.statistics.base import TYPES
+from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.store import layout_check as store_check
 from lgvi_warp.store import texts as store_texts
 from lgvi_warp.store.block_files import BlockFiles, damaged, name_of, read_marker
 from lgvi_warp.store.layout import StoreArray
 from lgvi_warp.store.layout_check import corrupt_store_as_scene_error
-from lgvi_warp.store.recipe import ensemble_of, plan_of
 from lgvi_warp.store.settings import needed
-
-if TYPE_CHECKING:
-    from lgvi_warp.engine.plan import Plan
-    from lgvi_warp.scene.ensemble import Ensemble
 
 FORMAT = 2
 ROOT, CREATED, KEPT = "zarr.json", "created.json", "kept"
@@ -155,26 +150,33 @@ class Folder:
         present = {f"{folder}/{name}" for folder in folders for name in safe_files.names(self.path, folder)}
         return [key for key in wanted if key not in present]
 
-    def plan(self, ensemble: Ensemble | None = None) -> Plan:
-        """Build the plan of the run again."""
+    def times(self) -> np.ndarray:
+        """Read the times of the samples, (k,) [s]."""
+        try:
+            times = np.asarray(self.group()["time"][:])
+            if np.isfinite(times).all():
+                return times
+        except (ValueError, KeyError):
+            pass
+        raise self._cannot_go_on("times are lost")
+
+    def steps_and_arrays(self) -> tuple[TimeGrid, dict[str, np.ndarray]]:
+        """Read the steps with the sample times, and by name the arrays that the ensemble was given."""
         try:
             # A missing chunk raises no error: it reads as NaN or 0.
             lost = [text for text in self.damage() if text.startswith(("time/", "step/", "explicit/"))]
             group = self.group()
             steps, times = group["step"][:].astype(np.int64), group["time"][:]
-            explicit = {name: np.asarray(array[:]) for name, array in group["explicit"].arrays()}
+            arrays = {name: np.asarray(array[:]) for name, array in group["explicit"].arrays()}
             if lost or not np.isfinite(times).all():
                 raise ValueError("times are missing")
         except (ValueError, OSError, KeyError) as error:
-            remedy = "run the same scene again with --store zarr --resume, which mends it"
-            raise SceneError([f"{self.path}: {'; '.join(self.damage()) or error}; {remedy}"]) from error
-        with corrupt_store_as_scene_error(self.path / ROOT):
-            if ensemble is None:
-                noise, content = explicit.pop("indices", None), self.provenance
-                ensemble = ensemble_of(content["scene"], content["ensemble"], explicit, noise, self.path)
-            gathered = (self.provenance.get("observed") or {}).get("statistics", ())
-            ticks = any(TYPES[table["type"]].ticks for table in gathered if table.get("type") in TYPES)
-            return plan_of(self.recipe, ensemble, steps, times, ticks)
+            raise self._cannot_go_on(error) from error
+        return TimeGrid(self.recipe["step"], steps, times, tuple(self.recipe["messages"])), arrays
+
+    def _cannot_go_on(self, reason: object) -> SceneError:
+        remedy = "run the same scene again with --store zarr --resume, which mends it"
+        return SceneError([f"{self.path}: {'; '.join(self.damage()) or reason}; {remedy}"])
 
     def damage(self) -> list[str]:
         """List what is wrong with the files that belong to no block."""

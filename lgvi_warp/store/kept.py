@@ -41,9 +41,8 @@ CHOSEN = {
 class KeptStore(Store):
     """The group of a store that holds the samples of kept members.
 
-    Attributes:
-        members: Indices of the members that it holds, shape (m,).
-        chosen: Which of them are kept, shape (m,); the others share a packet with a kept one, so they run too.
+    members: Indices of the members that it holds, shape (m,).
+    chosen: Which of them are kept, shape (m,); the others share a packet with a kept one, so they run too.
     """
 
     members: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64), compare=False)
@@ -77,9 +76,7 @@ class KeptStore(Store):
 class KeptRun:
     """Last stage of a stored run: runs the members selected by `keep` again, this time storing their samples.
 
-    Attributes:
-        observed: What the run keeps.
-        fields: Names of the fields whose samples are kept.
+    fields: Names of the fields whose samples are kept.
     """
 
     observed: Observation
@@ -105,10 +102,7 @@ class KeptRun:
 
 
 def group_of(store: Store, plan: Plan, wanted: np.ndarray) -> KeptStore:
-    """Build the group of a store for kept members.
-
-    wanted: Indices of the kept members, shape (m,).
-    """
+    """Build the group of a store for the members wanted, by their indices (m,)."""
     beside = plan.with_neighbours(wanted)
     chosen = np.isin(beside, wanted)
     return KeptStore(store.folder / KEPT, store.dtype, None, "resume", store.force, store.chunk_bytes, beside, chosen)
@@ -120,10 +114,7 @@ def _after(progress: Callable[[float], None], before: int, more: int) -> Callabl
 
 
 def members_kept(keep: Any, folder: Folder, members: int | None = None) -> np.ndarray:
-    """Find the members whose samples are kept, where those of all members are not.
-
-    Returns: Indices of the members, shape (m,).
-    """
+    """Indices (m,) of the members whose samples are kept, where those of all members are not."""
     if isinstance(keep, str) and keep in ("all", "none"):
         return np.empty(0, np.int64)
     status = folder.group()["status"][: folder.members if members is None else members]

@@ -46,14 +46,11 @@ class Chunking(Protocol):
 class StoreArray:
     """One array of a store, of shape (k, n, *tail), or (n, *tail) without times.
 
-    Attributes:
-        name: Name of the array.
-        tail: Shape of one member's value at one time.
-        dtype: NumPy's type string.
-        length: Members in a chunk: those of a block.
-        times: Samples in a chunk; 0 for an array without times.
-        attributes: CF attributes.
-        along: Name of the dimension of members.
+    tail: Shape of one member's value at one time.
+    dtype: NumPy's type string.
+    length: Members in a chunk: those of a block.
+    times: Samples in a chunk; 0 for an array without times.
+    along: Name of the dimension of members.
     """
 
     name: str
@@ -80,10 +77,7 @@ class StoreArray:
         return np.nan if np.dtype(self.dtype).kind == "f" else 0
 
     def shape(self, samples: int, members: int) -> tuple[int, ...]:
-        """Return the shape of the whole array.
-
-        Returns: (k, n, *tail), or (n, *tail) without times.
-        """
+        """Return the shape of the whole array: (k, n, *tail), or (n, *tail) without times."""
         return (*((samples,) if self.times else ()), members, *self.tail)
 
     def key(self, block: Block, time: int = 0) -> str:
@@ -154,10 +148,7 @@ def parameter_units(scene: Any) -> dict[str, str]:
 
 
 def size(plan: Plan, store: Chunking) -> int:
-    """Compute the size of all chunks of a run.
-
-    Returns: Size [bytes].
-    """
+    """Compute the size of all chunks of a run [bytes]."""
     k, runs = len(plan.grid.times), len(blocks(plan.ensemble.members))
     each = sum(column.bytes * len(column.keys(Block(0, column.length), k)) for column in columns(plan, store))
     return each * runs

@@ -68,12 +68,8 @@ def is_file_of_store(name: str) -> bool:
 class StoredArray:
     """An array of a store, as its checked metadata describes it.
 
-    Attributes:
-        shape: Shape of the array.
-        chunk: Shape of a chunk.
-        dtype: NumPy's type string.
-        dims: Names of the dimensions.
-        attributes: Its attributes.
+    dtype: NumPy's type string.
+    dims: Names of the dimensions.
     """
 
     shape: tuple[int, ...]
@@ -116,11 +112,9 @@ class StoredArray:
 class Layout:
     """The arrays of a store.
 
-    Attributes:
-        arrays: Arrays of the run by name, without those of its kept members.
-        groups: Names of its groups.
-        columns: Those of the arrays that are written block by block.
-        times: Number of sample times.
+    arrays: Arrays of the run by name, without those of its kept members.
+    columns: Those of the arrays that are written block by block.
+    times: Number of sample times.
     """
 
     arrays: dict[str, StoredArray]
@@ -129,10 +123,7 @@ class Layout:
     times: int
 
     def frame(self) -> dict[str, int | None]:
-        """List the files that belong to no block.
-
-        Returns: Sizes [bytes] by path below the root; None where the size is not known.
-        """
+        """Sizes [bytes] of the files that belong to no block, by path below the root; None where not known."""
         files: dict[str, int | None] = {f"{name}/zarr.json": None for name in (*self.arrays, *self.groups)}
         block_names = {column.name for column in self.columns}
         for name, array in self.arrays.items():
@@ -141,10 +132,7 @@ class Layout:
         return files
 
     def chunk_bytes(self, key: str) -> int | None:
-        """Look up the size of a chunk's file.
-
-        Returns: Size [bytes]; None if the layout has no such file.
-        """
+        """Look up the size of a chunk's file [bytes]; None if the layout has no such file."""
         name, _, last = key.rpartition("/")
         array = self.arrays.get(name)
         if array is None or not re.fullmatch(r"c(\.\d{1,12})*", last):

@@ -40,23 +40,21 @@ if TYPE_CHECKING:
 class Arrays(Mapping[str, np.ndarray]):
     """Arrays of a store by name, read from disk at each access.
 
-    Attributes:
-        group: zarr group of the store.
-        names: Names of the arrays.
-        axis: Axis of the members.
-        members: Slice with start, stop and step, or indices, of the members to read.
-        whole: Further arrays by name, which are in memory.
+    group: zarr group of the store.
+    axis: Axis of the members.
+    members: Slice with start, stop and step, or indices, of the members to read.
+    in_memory: Further arrays by name, which are in memory.
     """
 
     group: Any
     names: tuple[str, ...]
     axis: int
     members: Any
-    whole: Mapping[str, np.ndarray] | None = None
+    in_memory: Mapping[str, np.ndarray] | None = None
 
     def __getitem__(self, name: str) -> np.ndarray:
-        if self.whole is not None and name in self.whole:
-            return self.whole[name]
+        if self.in_memory is not None and name in self.in_memory:
+            return self.in_memory[name]
         if name not in self.names:
             raise KeyError(name)
         at = (*(slice(None),) * self.axis, self.members)
@@ -78,13 +76,13 @@ class Arrays(Mapping[str, np.ndarray]):
         return dataset(path)
 
     def __contains__(self, name: object) -> bool:
-        return name in self.names or name in (self.whole or {})
+        return name in self.names or name in (self.in_memory or {})
 
     def __iter__(self) -> Iterator[str]:
-        return iter((*self.names, *(self.whole or {})))
+        return iter((*self.names, *(self.in_memory or {})))
 
     def __len__(self) -> int:
-        return len(self.names) + len(self.whole or {})
+        return len(self.names) + len(self.in_memory or {})
 
 
 def folder_of(path: str | os.PathLike[str]) -> Path:
@@ -165,25 +163,10 @@ def open_run(
     return result_of(folder, None, (*messages, *noted), observing=gathered(folder, observed))
 
 
-def times_of(folder: Folder) -> np.ndarray:
-    """Read the times of a run's samples.
-
-    Returns: Times [s], shape (k,).
-    """
-    try:
-        time = np.asarray(folder.group()["time"][:])
-        if np.isfinite(time).all():
-            return time
-    except (ValueError, KeyError):
-        pass
-    remedy = "run the same scene again with --store zarr --resume, which mends it"
-    raise SceneError([f"{folder.path}: {'; '.join(folder.damage()) or 'times are lost'}; {remedy}"])
-
-
 def gathered(folder: Folder, observed: Observation) -> Observing:
     """Read the statistics of a complete run from the parts of its blocks."""
     replicates = replicates_of(folder.provenance["ensemble"])
-    observing = Observing(observed, times_of(folder), int(folder.recipe["members"]), replicates)
+    observing = Observing(observed, folder.times(), int(folder.recipe["members"]), replicates)
     block_files = folder.block_files
     for block in folder.runs:
         _check_parts(folder, block_files.sums(block), block)
@@ -219,8 +202,7 @@ def result_of(
     observing: Keepers of its statistics, with all blocks merged; None: no statistics.
     """
     folder.refuse_too_large()
-    group, time = folder.group(), times_of(folder)
-    n = folder.members
+    group, time, n = folder.group(), folder.times(), folder.members
     at = _places(members, n)
     arrays = {name: array for name, array in group.arrays()}
     fields = tuple(name for name in arrays if name in IN_FILES)
@@ -254,10 +236,7 @@ def result_of(
 
 
 def kept_of(folder: Folder, terms: Sequence[Term]) -> tuple[np.ndarray, Result | None]:
-    """Read the members that a complete run keeps.
-
-    Returns: Indices of the members, shape (m,), and their result; None if there are none.
-    """
+    """Read the members that a complete run keeps: their indices (m,), and their result, None if there are none."""
     wanted = members_kept(keep_of(folder.provenance), folder) if folder.complete else np.empty(0, np.int64)
     if not len(wanted):
         return wanted, None

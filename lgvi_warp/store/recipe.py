@@ -15,8 +15,6 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, SceneError
 from lgvi_warp.common.identity import UNKNOWN, comparable
 from lgvi_warp.common.safe_files import parsed
-from lgvi_warp.methods.method import Method
-from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.sampling.designs.table import Table, moved
 from lgvi_warp.scene.ensemble import Ensemble
@@ -39,22 +37,6 @@ def recipe(plan: Plan) -> dict[str, Any]:
         "checks": plan.checks,
         "on_failure": plan.on_failure,
     }
-
-
-def plan_of(
-    recipe: Mapping[str, Any], ensemble: Ensemble, sample_steps: np.ndarray, times: np.ndarray, ticks: bool = False
-) -> Plan:
-    """Build the plan of a recipe.
-
-    sample_steps: Number of steps made until each sample, shape (k,).
-    times: Times of the samples [s], shape (k,).
-    """
-    from lgvi_warp.engine.plan import choose_plan
-
-    grid = TimeGrid(recipe["step"], sample_steps, times, tuple(recipe["messages"]))
-    method, fields = Method(**recipe["method"]), tuple(recipe["fields"])
-    settings = {name: recipe[name] for name in ("dtype", "width", "checks", "on_failure")}
-    return choose_plan(ensemble, method, grid, fields, **settings, ticks=ticks)
 
 
 # Key in the stored provenance of an ensemble: SHA-256 of the arrays that it was given, which lie in the group "explicit".
@@ -85,14 +67,10 @@ def _checksum(arrays: Mapping[str, np.ndarray]) -> str:
     return digest.hexdigest()
 
 
-def ensemble_of(
-    scene: Mapping[str, Any],
-    settings: Mapping[str, Any],
-    explicit: Mapping[str, np.ndarray],
-    noise: np.ndarray | None,
-    store: Path,
-) -> Ensemble:
-    """Build the ensemble that provenance describes."""
+def stored_ensemble(provenance: Mapping[str, Any], arrays: Mapping[str, np.ndarray], store: Path) -> Ensemble:
+    """Build the ensemble that provenance describes, with the arrays that it was given."""
+    scene, settings = provenance["scene"], provenance["ensemble"]
+    explicit = {name: values for name, values in arrays.items() if name != "indices"}
     _check_table(_table_in(settings))
     settings = {key: value for key, value in settings.items() if key != ARRAYS}
     table = _table(settings, explicit, store)
@@ -114,8 +92,8 @@ def ensemble_of(
             settings["sampling"] = {kind: {"values": explicit} if kind == "table" else {**arguments, **explicit}}
         ensemble = Ensemble.from_scene(Scene.from_dict({**scene, "ensemble": settings}))
         ensemble.scene = bare_scene
-    if noise is not None:
-        ensemble.indices = noise
+    if "indices" in arrays:
+        ensemble.indices = arrays["indices"]
     return ensemble
 
 
@@ -148,10 +126,10 @@ def same_run(
     stored: Mapping[str, Any], now: Mapping[str, Any], name: str = "the store", other_name: str | None = None
 ) -> list[str]:
     """List the differences between two provenances that the bits of a run depend on."""
-    found = [*differences(_comparable(stored), _comparable(now)), *_functions(stored, now)[0]]
+    leaves = [*differences(_comparable(stored), _comparable(now)), *_functions(stored, now)[0]]
     return [
         f"{key} is {first!r} in {name} and {second!r} {f'in {other_name}' if other_name else 'here'}"
-        for key, first, second in found
+        for key, first, second in leaves
     ]
 
 
@@ -163,14 +141,14 @@ UNTOLD = (
 
 def _functions(stored: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[list[tuple[str, str, str]], list[str]]:
     """The user's functions that differ between two provenances, as of `differences`; and those that cannot be compared."""
-    there, here = stored.get("functions", {}), now.get("functions", {})
+    before, current = stored.get("functions", {}), now.get("functions", {})
     differ, untold = list[tuple[str, str, str]](), list[str]()
-    for name in dict.fromkeys([*there, *here]):
-        one, other = there.get(name, UNKNOWN), here.get(name, UNKNOWN)
-        if not comparable(one, other):
+    for name in dict.fromkeys([*before, *current]):
+        first, second = before.get(name, UNKNOWN), current.get(name, UNKNOWN)
+        if not comparable(first, second):
             untold.append(name)
-        elif one != other:
-            differ.append((f"functions.{name}", one, other))
+        elif first != second:
+            differ.append((f"functions.{name}", first, second))
     return differ, untold
 
 
@@ -198,16 +176,13 @@ def _without_place(ensemble: Mapping[str, Any]) -> dict[str, Any]:
     return {**ensemble, "sampling": {"table": {key: value for key, value in table.items() if key != "file"}}}
 
 
-def differences(there: Any, here: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Find the leaves that differ between two nested tables.
-
-    Yields: Tuples (dotted key, one value, other value).
-    """
-    if isinstance(there, Mapping) and isinstance(here, Mapping):
-        for name in [*there, *(name for name in here if name not in there)]:
-            yield from differences(there.get(name), here.get(name), f"{key}.{name}" if key else name)
-    elif there != here:
-        yield key, there, here
+def differences(before: Any, now: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
+    """Yield (dotted key, value before, value now) of each leaf that differs between two nested tables."""
+    if isinstance(before, Mapping) and isinstance(now, Mapping):
+        for name in [*before, *(name for name in now if name not in before)]:
+            yield from differences(before.get(name), now.get(name), f"{key}.{name}" if key else name)
+    elif before != now:
+        yield key, before, now
 
 
 def refuse_another(path: Any, stored: Mapping[str, Any], now: Mapping[str, Any], force: bool) -> tuple[str, ...]:
@@ -231,9 +206,9 @@ def refuse_another(path: Any, stored: Mapping[str, Any], now: Mapping[str, Any],
 
 def noted_functions(stored: Mapping[str, Any], now: Mapping[str, Any]) -> tuple[str, ...]:
     """Say which functions of a finished run's statistics are others than those that it was given."""
-    here = now["functions"]
-    there = {name: text for name, text in stored.get("functions", {}).items() if name in here}
-    differ, untold = _functions({"functions": there}, now)
+    current = now["functions"]
+    before = {name: text for name, text in stored.get("functions", {}).items() if name in current}
+    differ, untold = _functions({"functions": before}, now)
     return tuple(f"{name} is another function than the run had" for name, _, _ in differ) + tuple(
         f"{name} {UNTOLD}" for name in untold
     )

@@ -35,17 +35,13 @@ class StoredRun:
 
     It is complete when every block is there, or as many as `enough` asks for, and `last` is done.
 
-    Attributes:
-        plan: Plan of the run.
-        store: Folder and settings of the store.
-        provenance: Provenance as the store keeps it.
-        messages: What the user should know.
-        keepers: Further keepers, whose parts lie in the store.
-        only: Indices of the blocks to run; None: all.
-        enough: Tells whether this many members are enough (see run_blocks).
-        last: Last stage of the run; called with this run, its members, the executor and the progress, it returns how many
-            blocks it ran.
-        after: Called with each block as soon as it is in the store, in order; default nothing.
+    provenance: Provenance as the store keeps it.
+    keepers: Further keepers, whose parts lie in the store.
+    only: Indices of the blocks to run; None: all.
+    enough: Tells whether this many members are enough (see run_blocks).
+    last: Last stage of the run; called with this run, its members, the executor and the progress, it returns how many
+        blocks it ran.
+    after: Called with each block as soon as it is in the store, in order; default nothing.
     """
 
     plan: Plan
@@ -76,8 +72,8 @@ class StoredRun:
             folder = Folder(path, self.store.whole)
             folder.noted = noted
             folder.ran = sum(block.first < members for block in missing)
-            folder.found = sum(block.first < members for block in self._runs()) - folder.ran
-            beyond = [] if self.only else [block for block in self._runs() if block.first >= members]
+            folder.found = sum(block.first < members for block in self.blocks) - folder.ran
+            beyond = [] if self.only else [block for block in self.blocks if block.first >= members]
             if beyond:
                 # How many blocks ran beyond the last one depends on the number of threads: the store keeps none of them.
                 block_files.remove(beyond, len(self.plan.grid.times))
@@ -97,7 +93,8 @@ class StoredRun:
                 stack.enter_context(held(self.store.folder))
             yield
 
-    def _runs(self) -> list[Block]:
+    @property
+    def blocks(self) -> list[Block]:
         """The blocks of this run, in order."""
         runs = blocks(self.plan.ensemble.members)
         return runs if self.only is None else [runs[i] for i in self.only]
@@ -148,7 +145,7 @@ class StoredRun:
     def _left(self, block_files: BlockFiles) -> list[Block]:
         """Blocks that are not finished or not whole; a damaged one loses its marker."""
         missing = []
-        for block, faults in check_blocks(block_files, self._runs(), len(self.plan.grid.times), self.keepers):
+        for block, faults in check_blocks(block_files, self.blocks, len(self.plan.grid.times), self.keepers):
             if faults:
                 block_files.marker(block).unlink(missing_ok=True)
                 missing.append(block)
@@ -162,7 +159,7 @@ class StoredRun:
         progress: Callable[[float], None] | None,
     ) -> int:
         """Run the blocks left, and merge the parts of all in order. Returns where their members end."""
-        runs, n, steps = self._runs(), self.plan.ensemble.members, self.plan.grid.steps
+        runs, n, steps = self.blocks, self.plan.ensemble.members, self.plan.grid.steps
         overall = RunProgress(n * steps, progress)
         for block in set(runs) - set(remaining):
             overall.at(block, block.count * steps)

@@ -5,23 +5,33 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.control.signals import ordered
 from lgvi_warp.engine.block import Block, blocks
-from lgvi_warp.engine.keepers.observation import Observing
+from lgvi_warp.engine.executors.base import Executor
+from lgvi_warp.engine.keepers.observation import Observing, observation_of
+from lgvi_warp.engine.keepers.protocol import Keeper
 from lgvi_warp.engine.plan import Plan
+from lgvi_warp.methods.method import Method
+from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.provenance import messages, provenance
 from lgvi_warp.results.result import Result
-from lgvi_warp.runs.request import Request
-from lgvi_warp.store.folder import Folder
+from lgvi_warp.runs.request import Request, ensemble_of
+from lgvi_warp.runs.run import refuse_failed
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.scene.scene import Scene
+from lgvi_warp.store.folder import ROOT, Folder
 from lgvi_warp.store.kept import KeptRun
+from lgvi_warp.store.layout_check import corrupt_store_as_scene_error
 from lgvi_warp.store.open import result_of
-from lgvi_warp.store.recipe import of_store
+from lgvi_warp.store.recipe import of_store, refuse_another, stored_ensemble
 from lgvi_warp.store.run import StoredRun
 from lgvi_warp.store.settings import Store
+from lgvi_warp.store.state import store_of
 
 
 def run_stored(
@@ -34,31 +44,86 @@ def run_stored(
 ) -> Result:
     """Run the blocks of a request's plan into a store."""
     only = blocks_there(only, plan)
-    into, kept = with_saved_fields(store, request)
-    observed, terms = request.observed, plan.ensemble.scene.terms
+    into, kept_fields = with_saved_fields(store, request)
     compile_seconds = plan.compile()
     start = time.perf_counter()
-    observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
-    content = of_store(provenance(plan, observed, kept), plan.ensemble)
 
     def after(block: Block) -> None:
         assert on_block is not None
-        on_block(result_of(Folder(into.folder), slice(block.first, block.stop), terms=terms))
+        members = slice(block.first, block.stop)
+        on_block(result_of(Folder(into.folder), members, terms=plan.ensemble.scene.terms))
 
-    last = KeptRun(observed, kept)
-    run = StoredRun(
-        plan, into, content, messages(plan), observing.keepers, only, observing.enough, last, on_block and after
-    )
+    content = of_store(provenance(plan, request.observed, kept_fields), plan.ensemble)
+    run = StoredRun(plan, into, content, messages(plan), only=only, after=on_block and after)
+    result, remarks = _observed(run, request, kept_fields, progress)
+    if not remarks:  # else what was measured is not the whole run
+        seconds = time.perf_counter() - start
+        result = replace(result, compile_seconds=compile_seconds, compile_phases=plan.phases, run_seconds=seconds)
+    return result if only is not None else refuse_failed(result, plan)
+
+
+def request_of(
+    folder: Folder, fleet: Ensemble | Scene | None = None, statistics: Any = None, executor: Executor | None = None
+) -> Request:
+    """The request of a run in a store, with the steps and settings that it began with.
+
+    fleet, statistics: needed where a store cannot hold them.
+    """
+    recipe = folder.recipe
+    grid, arrays = folder.steps_and_arrays()
+    with corrupt_store_as_scene_error(folder.path / ROOT):
+        return Request(
+            stored_ensemble(folder.provenance, arrays, folder.path) if fleet is None else ensemble_of(fleet),
+            Method(**recipe["method"]),
+            save=SaveAt(fields=tuple(recipe["fields"])),
+            **{name: recipe[name] for name in ("dtype", "width", "checks", "on_failure")},
+            observed=observation_of(folder.provenance.get("observed"), statistics),
+            executor=executor,
+            settled=grid,
+        )
+
+
+def resume_stored(
+    folder: Folder,
+    request: Request,
+    progress: Callable[[float], None] | None = None,
+    force: bool = False,
+    keepers: Sequence[Keeper] = (),
+) -> Result:
+    """Run what is missing of the run in a folder; provenance and messages stay those of its start, wherever it goes on."""
+    observed_before = folder.provenance.get("observed")
+    with corrupt_store_as_scene_error(folder.path / ROOT):
+        plan = request.plan()
+    now = of_store(provenance(plan, request.observed), plan.ensemble)
+    now |= {} if observed_before is None else {"observed": observed_before}
+    noted = refuse_another(folder.path, folder.provenance, now, force)
+    run = StoredRun(plan, store_of(folder, force), folder.provenance, folder.messages, tuple(keepers))
+    kept_fields = tuple((observed_before or {}).get("fields", ()))
+    return refuse_failed(_observed(run, request, kept_fields, progress, noted)[0], plan)
+
+
+def _observed(
+    run: StoredRun,
+    request: Request,
+    kept_fields: tuple[str, ...],
+    progress: Callable[[float], None] | None,
+    noted: tuple[str, ...] = (),
+) -> tuple[Result, tuple[str, ...]]:
+    """Run with what a request observes; the result, and remarks on what was in the store before."""
+    plan, observed = run.plan, request.observed
+    observing = Observing(observed, plan.grid.times, plan.ensemble.members, plan.ensemble.replicates)
     assert request.executor is not None
+    run = replace(
+        run,
+        keepers=(*run.keepers, *observing.keepers),
+        enough=observing.enough,
+        last=KeptRun(observed, kept_fields),
+    )
     folder = run.run(request.executor, progress)
-    runs = blocks(plan.ensemble.members)
-    members = None if only is None else slice(runs[only[0]].first, runs[only[-1]].stop)
-    remarks = folder.noted + resume_message(folder)
-    result = result_of(folder, members, messages(plan) + remarks, terms, observing)
-    if remarks:
-        return result  # what was measured is not the whole run
-    seconds = time.perf_counter() - start
-    return replace(result, compile_seconds=compile_seconds, compile_phases=plan.phases, run_seconds=seconds)
+    remarks = noted + folder.noted + resume_message(folder)
+    runs, terms = run.blocks, plan.ensemble.scene.terms
+    members = None if run.only is None else slice(runs[0].first, runs[-1].stop)
+    return result_of(folder, members, run.messages + remarks, terms, observing), remarks
 
 
 def blocks_there(only: range | None, plan: Plan) -> range | None:

@@ -48,10 +48,7 @@ class BlockWriter:
                 self._chunks[column.name][:, block.count :] = column.fill
 
     def take(self, when: slice, samples: dict[str, np.ndarray]) -> None:
-        """Put samples into their chunks, and write the chunks that are full.
-
-        samples: Arrays (times, members of the block, ...), by name.
-        """
+        """Put samples (times, members of the block, ...) into their chunks, and write the chunks that are full."""
         for column in self._timed:
             self._take(column, when, samples[column.name])
 

@@ -28,10 +28,8 @@ def checked_store(root: Path, layout: Layout, metadata: bytes) -> Any:
 class CheckedFolder:
     """What zarr reads of a store's folder, without zarr.
 
-    Attributes:
-        root: the folder.
-        layout: the arrays and chunks that it may hold.
-        metadata: content of its zarr.json.
+    layout: the arrays and chunks that it may hold.
+    metadata: content of its zarr.json.
     """
 
     supports_writes = supports_deletes = supports_partial_writes = False
@@ -60,10 +58,7 @@ class CheckedFolder:
         return self
 
     def content(self, key: str) -> bytes | None:
-        """Read the content of a file.
-
-        Returns: Its bytes; None if it is missing, or no file of the layout.
-        """
+        """Read the bytes of a file; None if it is missing, or no file of the layout."""
         if key == ROOT:
             return self.metadata
         size = self.layout.chunk_bytes(key)
@@ -80,11 +75,7 @@ class CheckedFolder:
     async def get(
         self, key: str, prototype: BufferPrototype | None = None, byte_range: ByteRequest | None = None
     ) -> Buffer | None:
-        """Read a file, or a range of its bytes.
-
-        byte_range: First and last byte; None: the whole file.
-        Returns: The bytes; None if the file is missing.
-        """
+        """Read a file, or the range from a first to a last byte of it; None if the file is missing."""
         from zarr.abc.store import RangeByteRequest
         from zarr.core.buffer.core import default_buffer_prototype
 
@@ -100,10 +91,7 @@ class CheckedFolder:
     async def get_partial_values(
         self, prototype: BufferPrototype, key_ranges: Iterable[tuple[str, ByteRequest | None]]
     ) -> list[Buffer | None]:
-        """Read several files, or ranges of their bytes.
-
-        Returns: The bytes of each; None for a missing file.
-        """
+        """Read several files, or ranges of their bytes; None for a missing file."""
         return [await self.get(key, prototype, part) for key, part in key_ranges]
 
     async def exists(self, key: str) -> bool:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # The public names of this door, one a line.
 
+from lgvi_warp.calls.predict import Prediction as Prediction
 from lgvi_warp.studies.comparison import Candidate as Candidate
 from lgvi_warp.studies.files import Saved as Saved
 from lgvi_warp.studies.reference import Growth as Growth

@@ -10,11 +10,13 @@ import lgvi_warp as lw
 from lgvi_warp.cli.report import members_line
 from lgvi_warp.methods import limits
 from lgvi_warp.reference.terms import View
-from lgvi_warp.results.provenance import provenance
+from lgvi_warp.results.provenance import messages, provenance
 from lgvi_warp.runs import default_method, step_error
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.settings import RunSettings
-from lgvi_warp.store import recipe
+from lgvi_warp.store.create import create
+from lgvi_warp.store.folder import Folder
+from lgvi_warp.store.solve import request_of
 from tests.laws.cases import CASES
 
 DRAG = lw.terms.Drag(linear=[5.0, 10.0, 10.0, 0.5, 2.0, 2.0])
@@ -161,21 +163,21 @@ def test_a_drive_brings_speed_where_a_start_has_none():
     assert pushed == ["rk4", "rk8", "rkw3"]
 
 
-def test_it_is_told_and_kept():
+def test_it_is_told_and_kept(tmp_path):
     plan = planned(torpedo(DRAG))
     told = provenance(plan)
     assert told["method"]["name"] == "rk4"
     assert "method" not in told["scene"]["run"]
     assert members_line(2, told).endswith("\nmethod      rk4, chosen since the scene is damped")
     assert "chosen" not in provenance(planned(torpedo(DRAG), method="rk4"))["method"]
-    written = recipe.recipe(plan)
-    grid = plan.grid
-    again = recipe.plan_of(written, plan.ensemble, grid.sample_steps, grid.times)
+    create(lw.Store(tmp_path / "run.zarr"), plan, told, messages(plan))
+    folder = Folder(tmp_path / "run.zarr")
+    again = request_of(folder).plan()
     assert again.method == plan.method
     assert again.method.reason == plan.method.reason
     # A store from before has no reason in its recipe.
-    del written["method"]["reason"]
-    assert recipe.plan_of(written, plan.ensemble, grid.sample_steps, grid.times).method == lw.Method("rk4")
+    del folder.recipe["method"]["reason"]
+    assert request_of(folder).plan().method == lw.Method("rk4")
 
 
 def test_a_prepared_run_chooses_once():

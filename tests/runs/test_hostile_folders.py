@@ -18,6 +18,7 @@ import lgvi_warp as lw
 from lgvi_warp import cli
 from lgvi_warp.common import files, machine, safe_files
 from lgvi_warp.store import folder as store
+from lgvi_warp.store.solve import request_of
 from lgvi_warp.store.state import state
 from lgvi_warp.studies.sensitivity.indices import Indices
 from lgvi_warp.studies.stability.map import StabilityMap
@@ -314,7 +315,7 @@ def test_any_value_of_its_metadata_may_be_another(seed, theirs, home):
             if not isinstance(content["attributes"], dict):
                 continue
             hostile.say(path, content)
-            for look in (lw.open_run, state, lambda path: store.Folder(path).plan()):
+            for look in (lw.open_run, state, lambda path: request_of(store.Folder(path)).plan()):
                 with contextlib.suppress(lw.SceneError, OSError):
                     look(path)
 

@@ -15,6 +15,7 @@ from lgvi_warp.results.provenance import messages, provenance
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.store.create import create
 from lgvi_warp.store.folder import Folder
+from lgvi_warp.store.solve import request_of
 from lgvi_warp.store.state import state
 from tests.conftest import ROOT
 from tests.support.stores import SETTINGS, STATISTICS, UNTIL, bits, differing, fleet, forked, markers, tree
@@ -282,7 +283,7 @@ def test_the_plan_of_a_store_is_the_plan_of_the_run(vary, sampling, chosen, tmp_
     method = lw.Method("psi_s", solver="newton", iterations=3, tolerance=1e-9)
     plan = make_plan(members, method, h=0.1, t1=1.0, checks="all", on_failure="substep")
     create(lw.Store(tmp_path / "run.zarr"), plan, provenance(plan), messages(plan))
-    for again in (Folder(tmp_path / "run.zarr").plan(), pickle.loads(pickle.dumps(plan))):
+    for again in (request_of(Folder(tmp_path / "run.zarr")).plan(), pickle.loads(pickle.dumps(plan))):
         assert known(again) == known(plan)
         assert again.method == plan.method
         assert again.spec == plan.spec

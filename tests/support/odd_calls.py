@@ -22,7 +22,7 @@ POINT, AHEAD, DOWN = [[0.0, 0.0, 0.0]], [[1.0, 0.0, 0.0]], [[0.0, 0.0, 1.0]]
 UNCALLED = {
     "Interrupted", "MembersFailed", "Status", "Warnings", "CallbackInput", "Allocation", "ControlLaw", "Guidance",
     "MeasuringPart", "Packed", "PackingContext", "Term", "Event", "NoisyTerm", "Prepared", "Result", "LinearModel",
-    "Regulator", "Margins", "Trim", "Tuned", "WorstCase", "StabilityMap", "Sweep", "SceneError", "show",
+    "Regulator", "Margins", "Trim", "Tuned", "WorstCase", "StabilityMap", "Sweep", "Prediction", "SceneError", "show",
     "register", "number",
 }  # fmt: skip
 

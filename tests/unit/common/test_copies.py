@@ -104,6 +104,7 @@ OTHERS = {
     "Ticks": lambda: lw.control.CallbackInput(np.ones((1, 3)), np.eye(3)[None], np.ones((1, 3)), np.ones((1, 3)), np.ones(1)),
     "Status": lambda: lw.Status.OK, "Warnings": lambda: lw.Warnings(3), "Store": lambda: lw.Store("run.zarr"),
     "PackingContext": lambda: lw.laws.PackingContext({"a.b": np.ones(2)}, None, np.arange(2), 1, 0.1),
+    "Prediction": lambda: lw.studies.Prediction(8, 20, 1, 2, 0.0, 0.1, 0.2, 0.0, 10**6, 10**4, None, None),
     "Candidate": lambda: lw.studies.Candidate("psi_s", 0.1), "Axis": lambda: lw.studies.Axis("h", 0.1, 1.0),
     "Line": lambda: lw.studies.Line("h", "step h", "s", True, np.ones(2)), "Cell": lambda: lw.studies.Cell.SILENT,
     "Growth": lambda: lw.studies.Growth(1.0, 0.7, None, 2.7, {"float64": 30.0}, np.arange(2.0), np.ones(2)),

@@ -15,6 +15,7 @@ from scipy import stats
 import lgvi_warp as lw
 from lgvi_warp.cli.command import main
 from lgvi_warp.common.status import failed
+from lgvi_warp.distributions import Choice, Normal, Uniform
 from lgvi_warp.runs.settle import make_plan
 from tests.support.json_page import differing
 
@@ -62,8 +63,8 @@ def scene(tmp_path_factory):
     return lw.Scene.load(path)
 
 
-VARY = {"start.position[0]": lw.distributions.Normal(std=0.8), "vehicle.mass": lw.distributions.Uniform(low=45.0, high=55.0),
-        "heading_pid.kp": lw.distributions.Uniform(low=2.0, high=4.0)}  # fmt: skip
+VARY = {"start.position[0]": Normal(std=0.8), "vehicle.mass": Uniform(low=45.0, high=55.0),
+        "heading_pid.kp": Uniform(low=2.0, high=4.0)}  # fmt: skip
 
 
 def swept(scene, out=None, **more):
@@ -267,12 +268,7 @@ def test_a_metric_of_what_a_case_does_not_want_refuses_the_case(scene):
 
 
 def test_members_that_fail_do_not_pass_and_come_first(scene):
-    bad = swept(
-        scene,
-        grid=None,
-        cases=None,
-        vary={**VARY, "start.velocity[0]": lw.distributions.Choice([0.0, 1e307], [0.9, 0.1])},
-    )
+    bad = swept(scene, grid=None, cases=None, vary={**VARY, "start.velocity[0]": Choice([0.0, 1e307], [0.9, 0.1])})
     record = bad.record(bad.cells[0])
     lost = failed(record.status)
     assert 0 < lost.sum() < MEMBERS

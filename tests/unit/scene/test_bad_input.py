@@ -18,6 +18,7 @@ from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene import scene as scenes
 from lgvi_warp.scene.scene import from_dict
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
+from lgvi_warp.terms import Current, Drag, Weight
 from tests.support.refusals import faults
 
 NAN, INF = float("nan"), float("inf")
@@ -143,18 +144,13 @@ def test_an_event(table, words):
 
 
 LISTS = [
-    ([lw.terms.Drag(), lw.terms.Drag()], "terms = 'drag'", "name of 2 terms", 'name = "drag_2"'),
-    (
-        [lw.terms.Drag(name="current"), lw.terms.Current(velocity=[1, 0, 0])],
-        "terms = 'current'",
-        "name of 2 terms",
-        "current_2",
-    ),
-    ([lw.terms.Current(velocity=[1, 0, 0], name="environment")], "terms = 'environment'", "environment_term"),
+    ([Drag(), Drag()], "terms = 'drag'", "name of 2 terms", 'name = "drag_2"'),
+    ([Drag(name="current"), Current(velocity=[1, 0, 0])], "terms = 'current'", "name of 2 terms", "current_2"),
+    ([Current(velocity=[1, 0, 0], name="environment")], "terms = 'environment'", "environment_term"),
     ([lw.events.Surface()], "terms[0] = 'surface'", "is an event", "events=[...]"),
-    ([lw.terms.Weight()], "terms[0] = 'weight'", "acts already", "leave it out"),
-    ([lw.terms.Drag], "terms[0] = <class", "is no term", "lw.terms.Drag(quadratic=...)"),
-    (lw.terms.Drag(), "terms = Drag", "is no list", "terms=[lw.terms.Drag(...)]"),
+    ([Weight()], "terms[0] = 'weight'", "acts already", "leave it out"),
+    ([Drag], "terms[0] = <class", "is no term", "lw.terms.Drag(quadratic=...)"),
+    (Drag(), "terms = Drag", "is no list", "terms=[lw.terms.Drag(...)]"),
 ]
 
 

@@ -12,6 +12,7 @@ from scipy import stats
 
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
+from lgvi_warp.distributions import Normal, Uniform
 from lgvi_warp.statistics.estimates import paired
 from lgvi_warp.statistics.estimates.given_data import explained
 from lgvi_warp.studies.sweeps import cases, output, setup, success, sweep
@@ -36,10 +37,7 @@ TABLES = {
 }
 SCENE = lw.Scene.from_dict(TABLES)
 BARE = replace(SCENE, controller=None)
-VARY = {
-    "start.position": lw.distributions.Normal(std=0.8),
-    "vehicle.mass": lw.distributions.Uniform(low=45.0, high=55.0),
-}
+VARY = {"start.position": Normal(std=0.8), "vehicle.mass": Uniform(low=45.0, high=55.0)}
 METRICS = ["overshoot heading", "iae heading"]
 CASES = [{"name": "soft"}, {"name": "stiff", "set": {"heading_pid.kp": 8.0}},
          {"name": "unknown", "set": {"heading_pid.kq": 1.0}}]  # fmt: skip
@@ -576,7 +574,7 @@ def test_points_go_through_the_last_axis_first():
 
 
 def test_what_a_case_sets_does_not_vary_in_it():
-    vary = VARY | {"heading_pid.kp": lw.distributions.Uniform(low=1.0, high=2.0)}
+    vary = VARY | {"heading_pid.kp": Uniform(low=1.0, high=2.0)}
     like = lw.Ensemble(SCENE, 5, 3, vary)
     fleet, dropped = cases.ensemble_of(SCENE, {"heading_pid.kp": 2.0}, vary, like)
     assert dropped == ["heading_pid.kp"]
@@ -596,13 +594,13 @@ def test_numbers_that_only_a_case_has_vary_in_it():
     law = {"type": "heave_pid", "kp": 2.0}
     names = [{"name": "plain"},
              {"name": "deep", "replace": {"laws": [law], "guidance": [{"type": "set_point", "depth": 1.0}]}}]  # fmt: skip
-    found = swept([record(), record()], names, vary=VARY | {"heave_pid.kp": lw.distributions.Uniform(low=1.0, high=3.0)},
+    found = swept([record(), record()], names, vary=VARY | {"heave_pid.kp": Uniform(low=1.0, high=3.0)},
                   metrics=METRICS)  # fmt: skip
     assert [cell.fixed for cell in found.cells] == [("heave_pid.kp",), ()]
     assert "heave_pid.kp" in found.inputs(found.cells[1])
     assert "heave_pid.kp" not in found.setup.members.vary
     with pytest.raises(lw.SceneError, match=r"heave_pid\.kq"):
-        swept([], names, vary={"heave_pid.kq": lw.distributions.Uniform(low=1.0, high=3.0)})
+        swept([], names, vary={"heave_pid.kq": Uniform(low=1.0, high=3.0)})
 
 
 # Success
@@ -750,9 +748,7 @@ def test_progress_is_that_of_all_cells():
 
 def test_the_sweep_keeps_what_the_ensemble_says_unless_it_is_asked():
     base = lw.Ensemble(SCENE, 6, 7, VARY, "sobol")
-    one = setup.made(
-        base, None, None, {"vehicle.mass": lw.distributions.Uniform(low=1.0, high=2.0)}, None, None, None, [], {}
-    )
+    one = setup.made(base, None, None, {"vehicle.mass": Uniform(low=1.0, high=2.0)}, None, None, None, [], {})
     assert (one.members.members, one.members.seed, one.members.sampling.kind) == (6, 7, "sobol")
     assert set(one.vary) == set(VARY)
     assert one.members.vary["vehicle.mass"].high == 2.0

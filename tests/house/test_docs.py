@@ -66,11 +66,9 @@ laws = [{ type = "heading_pid", kp = 1.0 }]
 """
 # Page -> what stands before each of its snippets in a scene file.
 BEFORE = {
-    "controllers/README.md": [REMUS],
-    "controllers/actuators.md": [REMUS],
-    "controllers/allocation.md": [REMUS + LAW, ROV + LAW],
-    "guide/events.md": [REMUS],
-}
+    "controllers/README.md": [REMUS], "controllers/actuators.md": [REMUS],
+    "controllers/allocation.md": [REMUS + LAW, ROV + LAW], "guide/events.md": [REMUS],
+}  # fmt: skip
 
 
 def blocks(page, language):

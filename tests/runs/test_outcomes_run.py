@@ -16,10 +16,8 @@ from tests.conftest import ROOT
 from tests.support.stops import FarAway, stops
 
 STATISTICS = [
-    Outcome("floor"), EndTime("floor"), Exceedance("depth", above=26.0),
-    FirstPassage("depth", above=26.0),
-    Mean("position", at="floor"), Extremes("depth", at="floor"),
-    PathMaximum("depth", Exceedance(above=26.0)),
+    Outcome("floor"), EndTime("floor"), Exceedance("depth", above=26.0), FirstPassage("depth", above=26.0),
+    Mean("position", at="floor"), Extremes("depth", at="floor"), PathMaximum("depth", Exceedance(above=26.0)),
 ]  # fmt: skip
 SETTINGS = {"method": "psi_s", "h": 0.04, "t1": 40.0, "save": lw.SaveAt(every=4.0), "statistics": STATISTICS}
 

@@ -48,21 +48,13 @@ from tests.support.stops import stops
 from tests.support.tools import one, random_states, scene_of
 
 EVERY = [
-    Mean("position"), Covariance(["position", "speed"]),
-    Quantiles("depth", (0.05, 0.5, 0.95), size=64),
-    Extremes("velocity"), Histogram("depth", bins=10, limits=(-3.0, 3.0)),
-    Exceedance("depth", above=0.5),
-    FirstPassage("depth", above=1.0), CircularMean("euler[2]"),
-    MeanAttitude(), Mean("energy"),
-    PathMaximum("speed", then=[Mean(), Quantiles(levels=(0.5, 0.99), size=64)]),
-    PathMinimum("depth"),
-    PathMean("depth", then=[Mean(), Extremes()]),
-    PathRms("speed"),
-    PathRange("position"),
-    PathTime("depth", above=-0.5, below=0.5),
-    PathTime("depth", above=0.25, then=[Exceedance(above=0.3)]),
-    Outcome("failed"), EndTime("failed"), Mean("depth", at="failed"),
-    MemberValues("depth"),
+    Mean("position"), Covariance(["position", "speed"]), Quantiles("depth", (0.05, 0.5, 0.95), size=64),
+    Extremes("velocity"), Histogram("depth", bins=10, limits=(-3.0, 3.0)), Exceedance("depth", above=0.5),
+    FirstPassage("depth", above=1.0), CircularMean("euler[2]"), MeanAttitude(), Mean("energy"),
+    PathMaximum("speed", then=[Mean(), Quantiles(levels=(0.5, 0.99), size=64)]), PathMinimum("depth"),
+    PathMean("depth", then=[Mean(), Extremes()]), PathRms("speed"), PathRange("position"),
+    PathTime("depth", above=-0.5, below=0.5), PathTime("depth", above=0.25, then=[Exceedance(above=0.3)]),
+    Outcome("failed"), EndTime("failed"), Mean("depth", at="failed"), MemberValues("depth"),
 ]  # fmt: skip
 
 
@@ -510,12 +502,9 @@ def test_a_run_says_when_it_does_not_know_enough():
 
 
 REPLICATED = [
-    Mean("position"), Quantiles("depth", (0.05, 0.5, 0.95), size=64),
-    Extremes("depth"), MeanAttitude(),
-    Exceedance("depth", above=12.0), FirstPassage("depth", above=12.0),
-    CircularMean("euler"),
-    PathMaximum("speed", then=[Mean(), Quantiles(levels=(0.5,), size=64)]),
-    PathMean("depth"),
+    Mean("position"), Quantiles("depth", (0.05, 0.5, 0.95), size=64), Extremes("depth"), MeanAttitude(),
+    Exceedance("depth", above=12.0), FirstPassage("depth", above=12.0), CircularMean("euler"),
+    PathMaximum("speed", then=[Mean(), Quantiles(levels=(0.5,), size=64)]), PathMean("depth"),
     Mean("angular_velocity"),
 ]  # fmt: skip
 STARTS = {"start.position": Normal(std=0.1), "start.velocity_inertial": Normal(std=0.02),
@@ -631,9 +620,7 @@ def test_a_function_of_ones_own(fleet, whole):
 
 
 def test_float32_is_summed_up_in_float64(fleet):
-    ask = [Mean("position"), Covariance("position"),
-           Quantiles("position", (0.1, 0.9)),
-           Quantiles("speed", (0.5,))]  # fmt: skip
+    ask = [Mean("position"), Covariance("position"), Quantiles("position", (0.1, 0.9)), Quantiles("speed", (0.5,))]
     found = lw.solve(
         fleet, **SETTINGS, dtype="float32", statistics=[*ask, PathMaximum("depth", Quantiles(levels=(0.5,)))]
     )

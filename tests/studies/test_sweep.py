@@ -349,20 +349,15 @@ baseline = "stiff"
 
 @pytest.mark.parametrize(("more", "text"), [
     ({"success": {"overshot": {"below": 1.0}}}, "is no metric of this sweep"),
-    ({"success": {"way": {"under": 1.0}}}, "is no condition"),
-    ({"success": {"status": "fine"}}, "success.status"),
+    ({"success": {"way": {"under": 1.0}}}, "is no condition"), ({"success": {"status": "fine"}}, "success.status"),
     ({"metrics": ["overshoot headin"]}, "did you mean 'heading'"),
     ({"metrics": ["depth"]}, "not one number of each member"),
     ({"metrics": [lw.statistics.Mean("depth")]}, "is no metric"),
     ({"metrics": ["iae heading", "iae heading"]}, "name of another metric"),
-    ({"cases": [{"set": {}}]}, "has no name"),
-    ({"cases": [{"name": "a"}, {"name": "a"}]}, "name of 2 cases"),
-    ({"cases": [{"name": "a", "sets": {}}]}, "sets"),
-    ({"grid": {"controller.delay": []}}, "no list of values"),
-    ({"grid": {"controller.delay": [0.0, 0.0]}}, "value twice"),
-    ({"baseline": "hard"}, "baseline"),
-    ({"confidence": 1.5}, "between 0 and 1"),
-    ({"interval": "wald"}, "interval"),
+    ({"cases": [{"set": {}}]}, "has no name"), ({"cases": [{"name": "a"}, {"name": "a"}]}, "name of 2 cases"),
+    ({"cases": [{"name": "a", "sets": {}}]}, "sets"), ({"grid": {"controller.delay": []}}, "no list of values"),
+    ({"grid": {"controller.delay": [0.0, 0.0]}}, "value twice"), ({"baseline": "hard"}, "baseline"),
+    ({"confidence": 1.5}, "between 0 and 1"), ({"interval": "wald"}, "interval"),
     ({"keep": "all"}, "is what a sweep decides"),
 ])  # fmt: skip
 def test_what_is_asked_wrongly_gets_one_sentence(scene, more, text):

@@ -224,21 +224,16 @@ def steered():
 
 
 RECORDINGS = {
-    "followed": followed,
-    "steered": steered,
-    "a fleet": fleet,
-    "one vehicle": lambda: fleet(1, 12),
+    "followed": followed, "steered": steered, "a fleet": fleet, "one vehicle": lambda: fleet(1, 12),
     "two runs": lambda: {"a": fleet(9, 7), "b": fleet(12, 7, seed=2)},
-}
+}  # fmt: skip
 PICTURES = (*OF_A_RUN, "drift", "summary of members kept", "statistics", "margins", "fan of the energy", "one vehicle",
             "compare", "tradeoff", "stability", "sensitivity", "scaling", "term cost")  # fmt: skip
 
 
 PROVENANCE = {
-    "checks": "safe",
-    "machine": {"threads": 2, "cpu": "a processor", "simd": "avx2"},
-    "versions": {"numpy": "2"},
-}
+    "checks": "safe", "machine": {"threads": 2, "cpu": "a processor", "simd": "avx2"}, "versions": {"numpy": "2"},
+}  # fmt: skip
 
 
 def ran(result, provenance=None, **values):

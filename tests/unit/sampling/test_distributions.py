@@ -83,10 +83,8 @@ def test_uniforms_are_uniform_and_their_components_independent():
 
 @pytest.mark.parametrize("law, exact", [
     (Normal(std=0.5), stats.norm(10.0, 0.5)), (Normal(relative=0.02), stats.norm(10.0, 0.2)),
-    (Normal(mean=-1.0, std=2.0), stats.norm(-1.0, 2.0)),
-    (Uniform(low=-1.0, high=3.0), stats.uniform(-1.0, 4.0)),
-    (Uniform(half_width=2.0), stats.uniform(8.0, 4.0)),
-    (Uniform(relative=0.1), stats.uniform(9.0, 2.0)),
+    (Normal(mean=-1.0, std=2.0), stats.norm(-1.0, 2.0)), (Uniform(low=-1.0, high=3.0), stats.uniform(-1.0, 4.0)),
+    (Uniform(half_width=2.0), stats.uniform(8.0, 4.0)), (Uniform(relative=0.1), stats.uniform(9.0, 2.0)),
     (LogNormal(sigma=0.3), stats.lognorm(0.3, scale=10.0)),
     (LogNormal(sigma=0.3, median=2.0), stats.lognorm(0.3, scale=2.0)),
     (TruncatedNormal(std=2.0), stats.truncnorm(-3.0, 3.0, 10.0, 2.0)),

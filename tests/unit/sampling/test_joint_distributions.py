@@ -106,13 +106,10 @@ def test_entries_of_any_sizes_have_their_covariance():
 R0 = notation.matrix_from_rotation_vector(np.array([0.4, -0.7, 1.2]))
 
 
-@pytest.mark.parametrize(
-    "law",
-    [
-        lw.distributions.RotationNormal(std=(0.3, 0.1, 0.2)),
-        lw.distributions.RotationNormal(covariance=0.02 * COVARIANCE),
-    ],
-)
+@pytest.mark.parametrize("law", [
+    lw.distributions.RotationNormal(std=(0.3, 0.1, 0.2)),
+    lw.distributions.RotationNormal(covariance=0.02 * COVARIANCE),
+])  # fmt: skip
 def test_turns_about_the_body_have_their_covariance(law):
     (R,) = drawn(law, R0)
     covariance = np.diag(np.square(law.std)) if law.std else 0.02 * COVARIANCE

@@ -291,10 +291,8 @@ def test_a_full_matrix_varies_and_stays_symmetric(scene):
 
 
 @pytest.mark.parametrize("name, law", [
-    ("vehicle.mass", Normal(std=(1.0, 2.0, 3.0))),
-    ("start.position", Normal(std=(1.0, 2.0))),
-    ("start.position", Normal(std=np.ones((3, 3)))),
-    ("vehicle.inertia", Uniform(low=np.ones((3, 3)), high=2.0)),
+    ("vehicle.mass", Normal(std=(1.0, 2.0, 3.0))), ("start.position", Normal(std=(1.0, 2.0))),
+    ("start.position", Normal(std=np.ones((3, 3)))), ("vehicle.inertia", Uniform(low=np.ones((3, 3)), high=2.0)),
 ])  # fmt: skip
 def test_laws_of_the_wrong_shape(scene, name, law):
     assert "does not fit a quantity of shape" in faults(lw.Ensemble, scene, 4, 0, {name: law})[0]

@@ -157,18 +157,15 @@ def test_bytes_that_are_no_text(tmp_path):
         lw.Scene.load(path)
 
 
-@pytest.mark.parametrize(
-    "line, start",
-    [
-        ("[ensemble]\nvary = 3", "ensemble.vary = 3"),
-        ('[ensemble.vary]\n"vehicle.mass" = 3', 'ensemble.vary."vehicle.mass" = 3'),
-        ('[ensemble.vary]\n"vehicle.mass" = { normal = 3 }', 'ensemble.vary."vehicle.mass".normal = 3'),
-        ('[ensemble.vary]\n"vehicle.mass" = { normal = { std = -1.0 } }', 'ensemble.vary."vehicle.mass": normal.std'),
-        ('[ensemble.vary]\n"vehicle.mass" = { normal = { std = 20.0 } }', "vehicle.mass of member"),
-        ('[[terms]]\ntype = "drga"', "terms[0].type = 'drga'"),
-        ('[controller]\nkind = "pid"\nperiod = 0.1', "controller.kind = "),
-    ],
-)
+@pytest.mark.parametrize("line, start", [
+    ("[ensemble]\nvary = 3", "ensemble.vary = 3"),
+    ('[ensemble.vary]\n"vehicle.mass" = 3', 'ensemble.vary."vehicle.mass" = 3'),
+    ('[ensemble.vary]\n"vehicle.mass" = { normal = 3 }', 'ensemble.vary."vehicle.mass".normal = 3'),
+    ('[ensemble.vary]\n"vehicle.mass" = { normal = { std = -1.0 } }', 'ensemble.vary."vehicle.mass": normal.std'),
+    ('[ensemble.vary]\n"vehicle.mass" = { normal = { std = 20.0 } }', "vehicle.mass of member"),
+    ('[[terms]]\ntype = "drga"', "terms[0].type = 'drga'"),
+    ('[controller]\nkind = "pid"\nperiod = 0.1', "controller.kind = "),
+])  # fmt: skip
 def test_one_bad_line_is_one_fault(line, start):
     # Twenty members about a mass of 10 with a spread of 20: some are negative whatever the seed (31 % each).
     text = SMALL + line + "\n"

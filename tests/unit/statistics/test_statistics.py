@@ -299,10 +299,8 @@ def test_paths_come_to_what_numpy_says(replicates):
     time, x = paths()
     span = time[-1] - time[0]
     expected = {
-        PathMaximum: x.max(axis=0), PathMinimum: x.min(axis=0),
-        PathRange: np.ptp(x, axis=0),
-        PathMean: np.trapezoid(x, time, axis=0) / span,
-        PathRms: np.sqrt(np.trapezoid(x**2, time, axis=0) / span),
+        PathMaximum: x.max(axis=0), PathMinimum: x.min(axis=0), PathRange: np.ptp(x, axis=0),
+        PathMean: np.trapezoid(x, time, axis=0) / span, PathRms: np.sqrt(np.trapezoid(x**2, time, axis=0) / span),
     }  # fmt: skip
     for kind, truth in expected.items():
         mean, least = gathered(kind(scalar(2), [Mean(), Extremes()]), x, replicates, time=time, block=128)
@@ -527,13 +525,10 @@ def test_coverage_of_first_passage():
 # Replicates of a design ------------------------------------------------------------------------------------------------
 
 EVERY = [
-    (Mean, {}), (Covariance, {}), (Extremes, {}),
-    (Quantiles, {"size": 64}), (Exceedance, {"above": 0.5}),
-    (Histogram, {"bins": 4, "limits": (-2.0, 2.0)}), (CircularMean, {}),
-    (FirstPassage, {"above": 1.0}),
-    (PathMaximum, {"then": [Mean(), Quantiles(levels=(0.5,), size=64),
-                                          Extremes()]}),
-    (PathRms, {}), (PathRange, {}), (PathTime, {"above": 0.2}),
+    (Mean, {}), (Covariance, {}), (Extremes, {}), (Quantiles, {"size": 64}), (Exceedance, {"above": 0.5}),
+    (Histogram, {"bins": 4, "limits": (-2.0, 2.0)}), (CircularMean, {}), (FirstPassage, {"above": 1.0}),
+    (PathMaximum, {"then": [Mean(), Quantiles(levels=(0.5,), size=64), Extremes()]}), (PathRms, {}), (PathRange, {}),
+    (PathTime, {"above": 0.2}),
 ]  # fmt: skip
 
 
@@ -669,13 +664,10 @@ def test_coverage_of_sobol_sequences():
 
 
 WATCHED = [
-    Mean("position"), Quantiles("depth", (0.05, 0.5, 0.95)),
-    Quantiles("position", (0.5, 0.975)),
-    Covariance(["position", "speed"]),
-    PathMaximum("speed", [Quantiles(levels=(0.5, 0.99))]),
+    Mean("position"), Quantiles("depth", (0.05, 0.5, 0.95)), Quantiles("position", (0.5, 0.975)),
+    Covariance(["position", "speed"]), PathMaximum("speed", [Quantiles(levels=(0.5, 0.99))]),
     Quantiles("speed", (0.123456789, 0.5), name="fast"), Exceedance("depth", above=10),
-    Exceedance("velocity", above=[0.5, -1, 2.0]),
-    PathTime("position", above=2.0, below=np.int64(3)),
+    Exceedance("velocity", above=[0.5, -1, 2.0]), PathTime("position", above=2.0, below=np.int64(3)),
 ]  # fmt: skip
 
 
@@ -853,25 +845,20 @@ def test_coins_are_fair_and_fixed():
 
 
 @pytest.mark.parametrize(("make", "text"), [
-    (lambda: Mean("positon"), "did you mean 'position'"),
-    (lambda: Mean("position[3]"), "components position"),
+    (lambda: Mean("positon"), "did you mean 'position'"), (lambda: Mean("position[3]"), "components position"),
     (lambda: Mean("depth[0]"), "has one component"), (lambda: Mean(3.0), "is no quantity"),
-    (lambda: Mean("depth", confidence=1.5), "between 0 and 1"),
-    (lambda: Mean("depth", stopped="no"), "held"),
+    (lambda: Mean("depth", confidence=1.5), "between 0 and 1"), (lambda: Mean("depth", stopped="no"), "held"),
     (lambda: Quantiles("depth", (0.0, 0.5)), "between 0 and 1"),
-    (lambda: Quantiles("depth", size=1000), "power of two"),
-    (lambda: Histogram("depth"), "edges"), (lambda: Histogram("depth", (1.0, 0.0)), "rise"),
+    (lambda: Quantiles("depth", size=1000), "power of two"), (lambda: Histogram("depth"), "edges"),
+    (lambda: Histogram("depth", (1.0, 0.0)), "rise"),
     (lambda: Exceedance("position", (1.0, 2.0)), "one for each component"),
     (lambda: Exceedance("depth", 2.0, 1.0), "have nothing between"),
-    (lambda: FirstPassage("position", 1.0), "3 components"),
-    (lambda: MeanAttitude("depth"), "no attitude"),
+    (lambda: FirstPassage("position", 1.0), "3 components"), (lambda: MeanAttitude("depth"), "no attitude"),
     (lambda: PathMaximum("depth", Mean("speed")), "leave it out"),
     (lambda: lw.Until("mean depth", -1.0), "half_width"), (lambda: lw.Until(3, 1.0), "no name"),
     (lambda: Mean(name=3, of="depht"), "did you mean 'depth'"),
-    (lambda: PathMaximum("depth", FirstPassage(above=1.0)),
-     "ask for its mean, quantiles, or an exceedance"),
-    (lambda: PathMean("depth", PathTime(above=1.0)),
-     "ask for its mean, quantiles, or an exceedance"),
+    (lambda: PathMaximum("depth", FirstPassage(above=1.0)), "ask for its mean, quantiles, or an exceedance"),
+    (lambda: PathMean("depth", PathTime(above=1.0)), "ask for its mean, quantiles, or an exceedance"),
     (lambda: PathTime("depth", above="x"), "is not numeric"),
     (lambda: Histogram("depth", bins=True, limits=(0, 1)), "bins"),
     (lambda: Quantiles("depth", size=True), "power of two"),

@@ -156,7 +156,7 @@ def indexed_wildly(draws, shared, dtype, seed):
 
 @pytest.mark.parametrize(("shared", "dtype"), [(False, "float64"), (True, "float32")])
 def test_laws_that_index_wildly_see_their_own_rows(shared, dtype):
-    indexed_wildly(40, shared, dtype, 3)
+    indexed_wildly(16, shared, dtype, 3)
 
 
 @pytest.mark.slow

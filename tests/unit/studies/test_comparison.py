@@ -788,7 +788,7 @@ def test_time_that_other_programs_take_does_not_end_a_search(scene, study):
 
     class Waiting(Runs):
         def run(self, plan):
-            time.sleep(0.1)
+            time.sleep(0.03)
             return super().run(plan)
 
     sizes = dict.fromkeys(("rk8", "rk4", "psi_x", "psi_s"), 1e-2)

@@ -197,6 +197,7 @@ EXACT = {linear: (PARTS, PARTS),
          ishigami: tuple(np.array(parts) / (V1 + V2 + V13) for parts in ((V1, V2, 0.0), (V1 + V13, V2, V13)))}  # fmt: skip
 
 
+@pytest.mark.slow_but("*-64-8")
 @pytest.mark.parametrize(("samples", "replicates"), [(64, 8), (512, 8), (256, 16)])
 @pytest.mark.parametrize("function", EXACT)
 def test_intervals_of_indices_hold_and_are_no_wider_than_they_need(function, samples, replicates):

@@ -524,21 +524,31 @@ def test_coverage_of_first_passage():
 
 # Replicates of a design ------------------------------------------------------------------------------------------------
 
-EVERY = [
-    (Mean, {}), (Covariance, {}), (Extremes, {}), (Quantiles, {"size": 64}), (Exceedance, {"above": 0.5}),
-    (Histogram, {"bins": 4, "limits": (-2.0, 2.0)}), (CircularMean, {}), (FirstPassage, {"above": 1.0}),
-    (PathMaximum, {"then": [Mean(), Quantiles(levels=(0.5,), size=64), Extremes()]}), (PathRms, {}), (PathRange, {}),
-    (PathTime, {"above": 0.2}),
-]  # fmt: skip
+# Those of ends have no samples: tests/unit/statistics/test_outcomes.py. Those of ticks: test_metrics.py.
+OF_EVERY_KIND = {one.type: one for one in (
+    Mean(scalar(3)), Covariance(scalar(3)), Extremes(scalar(3)), Quantiles(scalar(3), size=64),
+    Histogram(scalar(3), bins=30, limits=(-10.0, 1010.0)), Exceedance(scalar(3), above=(1000.0, 0.0, -5.0)),
+    FirstPassage(scalar(), above=1002.0), CircularMean(scalar(3)), MeanAttitude(),
+    PathMaximum(scalar(3), [Mean(), Quantiles(size=64)]), PathMinimum(scalar(3), [Covariance(), Extremes()]),
+    PathRange(scalar(3)), PathMean(scalar(3), [Mean(), Quantiles(size=64)]), PathRms(scalar(3)),
+    MemberValues(scalar(3)), PathTime(scalar(3), above=(999.0, -1.0, -6.0), below=(1001.0, 1.0, -4.0)),
+)}  # fmt: skip
+of_every_kind = pytest.mark.parametrize("kind", [name for name, one in TYPES.items() if not (one.of_ends or one.ticks)])
 
 
-@pytest.mark.parametrize(("kind", "settings"), EVERY, ids=lambda one: getattr(one, "__name__", ""))
-def test_parts_of_replicates_are_those_of_each_alone(kind, settings):
+def fitting(kind, x):
+    """Values (k, n, 3) as a kind takes them: one component, or rotations."""
+    turned = rotations(x - x.mean(axis=1, keepdims=True)).reshape(*x.shape[:2], 9)
+    return {"first_passage": x[..., :1], "mean_attitude": turned}.get(kind, x)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in OF_EVERY_KIND if kind != "each"])
+def test_parts_of_replicates_are_those_of_each_alone(kind):
     rng = np.random.default_rng(20)
-    R, n, d = 8, 8 * 520, 1 if kind is FirstPassage else 2
-    x = rng.normal(size=(4, n, d))
+    R, n = 8, 8 * 520
+    x = fitting(kind, rng.normal(size=(4, n, 3)) + np.array([1000.0, 0.0, -5.0]))
     good = np.arange(4)[:, None] < rng.integers(0, 20, n)
-    statistic = kind(scalar(d), **settings)
+    statistic = OF_EVERY_KIND[kind]
     time = np.arange(4.0)
     both = trees(statistic, x, good, 1024, replicates=R)
     for r, parts in enumerate(statistic.each_replicate(both.parts(), R)):
@@ -767,35 +777,10 @@ def test_the_sketchs_error_is_as_often_up_as_down():
     assert abs(error.mean()) < 5.0 * proven / np.sqrt(streams)
 
 
-OF_EVERY_KIND = {"mean": lambda x: Mean(x), "covariance": lambda x: Covariance(x),
-                 "extremes": lambda x: Extremes(x), "quantiles": lambda x: Quantiles(x, size=64),
-                 "histogram": lambda x: Histogram(x, bins=30, limits=(-10.0, 1010.0)),
-                 "exceedance": lambda x: Exceedance(x, above=(1000.0, 0.0, -5.0)),
-                 "first_passage": lambda x: FirstPassage(scalar(), above=1002.0),
-                 "circular_mean": lambda x: CircularMean(x),
-                 "mean_attitude": lambda x: MeanAttitude(),
-                 "path_maximum": lambda x: PathMaximum(x,
-                                                                     [Mean(),
-                                                                      Quantiles(size=64)]),
-                 "path_minimum": lambda x: PathMinimum(x,
-                                                                     [Covariance(),
-                                                                      Extremes()]),
-                 "path_range": lambda x: PathRange(x),
-                 "path_mean": lambda x: PathMean(x, [Mean(), Quantiles(size=64)]),
-                 "path_rms": lambda x: PathRms(x), "each": lambda x: MemberValues(x),
-                 "path_time": lambda x: PathTime(x, above=(999.0, -1.0, -6.0),
-                                                               below=(1001.0, 1.0, -4.0))}  # fmt: skip
-
-
-# Those of ends have no samples: tests/unit/statistics/test_outcomes.py. Those of ticks: test_metrics.py.
-@pytest.mark.parametrize("kind", [name for name, one in TYPES.items() if not (one.of_ends or one.ticks)])
+@of_every_kind
 def test_blocks_in_any_order_give_the_same_bits(kind, values):
-    x, good = values
-    x = {
-        "first_passage": x[..., :1],
-        "mean_attitude": rotations(x - x.mean(axis=1, keepdims=True)).reshape(4, 1500, 9),
-    }.get(kind, x)
-    statistic = OF_EVERY_KIND[kind](scalar(3))
+    x, good = fitting(kind, values[0]), values[1]
+    statistic = OF_EVERY_KIND[kind]
     times = np.arange(4.0)
     first = statistic.estimates(trees(statistic, x, good=good).parts(), times)
     for seed in range(3):
@@ -830,11 +815,10 @@ def check_as_files_hold_it(found):
 
 
 @pytest.mark.parametrize("replicates", [1, 4])
-@pytest.mark.parametrize("kind", [name for name, one in TYPES.items() if not (one.of_ends or one.ticks)])
+@of_every_kind
 def test_every_kind_is_the_same_from_a_file(kind, replicates, values):
     x, good = (array[:, :400] for array in values)
-    x = {"first_passage": x[..., :1], "mean_attitude": rotations(0.1 * x).reshape(4, 400, 9)}.get(kind, x)
-    check_as_files_hold_it(gathered(OF_EVERY_KIND[kind](scalar(3)), x, good=good, replicates=replicates))
+    check_as_files_hold_it(gathered(OF_EVERY_KIND[kind], fitting(kind, x), good=good, replicates=replicates))
 
 
 def test_coins_are_fair_and_fixed():

@@ -319,6 +319,7 @@ def sampled(limit=49.85, heading=0.0, most=1e6, **gains):
     return dataclasses.replace(one, controller=controller, terms=[ControlWrench(limit=[most] * 6)])
 
 
+@pytest.mark.slow_for("240.0-1e-05-*", "900.0-*")
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(("seconds", "tilt", "heading", "most"), [
     (60.0, 1e-3, 0.0, 1e6), (240.0, 1e-3, 0.8, 5.0), (240.0, 1e-5, 0.0, 1e6), (900.0, 1e-3, 0.8, 1e6),
@@ -347,6 +348,7 @@ def test_runs_judge_swings_by_angles_and_not_by_parts_of_limits():
         assert found.by_runs["gain_upper"][0] == pytest.approx(expected, rel=3e-3 if seconds == 240.0 else 1e-2)
 
 
+@pytest.mark.slow_for("0.3076565-*")
 @pytest.mark.parametrize(("kp", "ki", "kd", "drag", "steps", "most", "tilt"), [
     # Beyond the limit a swing that starts from 1e-5 rad wraps around, where its last third is by chance below its second.
     (5.1206017, 0.0, 1.5507809, 1.4798703, 13, 7920.0, 1e-5),

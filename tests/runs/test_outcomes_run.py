@@ -13,6 +13,7 @@ from lgvi_warp.physics.terms import events
 from lgvi_warp.results.quantities import quantities
 from lgvi_warp.statistics import EndTime, Exceedance, Extremes, FirstPassage, Mean, Outcome, PathMaximum
 from tests.conftest import ROOT
+from tests.support.refusals import says
 from tests.support.stops import FarAway, stops
 
 STATISTICS = [
@@ -276,7 +277,7 @@ def test_quantities_of_two_events_of_one_status():
     share = lw.uq.sobol(scene, of[:2], vary=vary, samples=256, second_order=False, **how).mean
     assert share == pytest.approx([1.0 / 6.0, 1.0 / 3.0], abs=0.02)
     result = lw.solve(lw.Ensemble(scene, 4, 1, vary), **how)
-    with pytest.raises(lw.SceneError, match=r"is one of several events of the status box; .*lw\.Outcome"):
+    with pytest.raises(lw.SceneError, match=r"is one of several events of the status box; .*lw\.statistics\.Outcome"):
         quantities("outcome north")[0].values(result)
 
 
@@ -285,8 +286,7 @@ def test_an_outcome_that_no_member_can_have_is_refused():
         lw.solve(fleet(10, [Floor(depth=26.0)]), "psi_s", h=0.04, t1=1.0,
                  statistics=[Outcome("surface"), Mean("depth", at="flor")])  # fmt: skip
     text = str(error.value)
-    assert "outcome.of = 'surface': is no outcome of this scene" in text
-    assert "did you mean 'floor'" in text
+    says(text, "outcome.of = 'surface': is no outcome of this scene", "did you mean 'floor'")
 
 
 def test_until_an_outcome_is_sure_enough():

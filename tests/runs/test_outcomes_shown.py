@@ -19,6 +19,8 @@ from lgvi_warp.physics import energy as invariants
 from lgvi_warp.results import outcomes
 from lgvi_warp.views import fleet as looks
 from tests.laws import cases
+from tests.support.refusals import says
+from tests.unit.views.test_recording import rows, text_of
 
 GRAVITY = 10.0
 # Neutrally buoyant with M = m I: each goes straight on at its speed, as in test_events, whose kernel this is.
@@ -273,18 +275,6 @@ def entry_of(path):
     return RrdReader(path).recordings()[0]
 
 
-def rows(path, entity, ending):
-    """Time -> value of a component of an entity, frame by frame."""
-    found = {}
-    for chunk in RrdReader(path).stream().filter(content=entity):
-        batch = chunk.to_record_batch()
-        column = next((name for name in batch.schema.names if name.endswith(ending)), None)
-        if column and "sim_time" in batch.schema.names:
-            times = batch.column("sim_time").cast("int64").to_numpy() / 1e9
-            found |= dict(zip(times.tolist(), batch.column(column).to_pylist(), strict=True))
-    return found
-
-
 def test_every_run_has_ids_of_its_own(mixed, sunk, tmp_path):
     again = lw.solve(divers(SPEEDS), h=0.1, t1=20.0, save=lw.SaveAt(every=1.0))
     part = mixed.part(np.array([0, 1]))
@@ -335,8 +325,7 @@ def test_the_curves_of_a_recording_are_of_those_under_way(sunk, mixed, tmp_path)
     assert middle - np.sqrt(variance) == pytest.approx(-7.0)
     assert middle + np.sqrt(variance) == pytest.approx(-5.6)
     shares = [rows(path, f"/members/{name}", "scalars") for name in ("floor", "under_way")]
-    assert shares[0][20.0] == [100.0]
-    assert shares[1][0.0] == [100.0]
+    assert (shares[0][20.0], shares[1][0.0]) == ([100.0], [100.0])
     assert rows(path, "/curves/energy/median", "scalars")
     driven = lw.record(acted_on(mixed, ACTING["thrust"][0]), tmp_path / "driven.rrd")
     said = [text_of(one, "/run/summary") for one in (path, driven)]
@@ -374,19 +363,8 @@ def test_statistics_of_all_make_the_fan_where_few_members_were_kept(mixed):
     np.testing.assert_allclose(run.fans[0].levels[[0, -1]], expected[[0, -1]], rtol=1e-6)
     between = (run.fans[0].levels[1:-1] >= expected[0] - 1e-6) & (run.fans[0].levels[1:-1] <= expected[-1] + 1e-6)
     assert between.all()
-    assert run.text == "2 of 7 members"
-    assert run.members.tolist() == [0, 3]
+    assert (run.text, run.members.tolist()) == ("2 of 7 members", [0, 3])
     assert run.shares[Status.FLOOR][-1] == pytest.approx(3 / 7)
-
-
-def text_of(path, entity):
-    """All text of an entity."""
-    return " ".join(
-        str(text)
-        for chunk in RrdReader(path).stream().filter(content=entity)
-        for column in chunk.to_record_batch().columns
-        for text in column.to_pylist()
-    )
 
 
 def test_a_recording_says_what_became_of_the_members(mixed, tmp_path):
@@ -446,9 +424,7 @@ def test_a_run_that_all_sink_exits_with_0_and_has_its_pictures(scene_file, capsy
     assert "not written" not in errors
     files = sorted(path.name for path in (scene_file.parent / "out").iterdir())
     assert files == ["fleet.png", "fleet.rrd", "result.npz"]
-    assert "status      floor 4" in said
-    assert "drift       energy " in said
-    assert "floor, 4 of 4 members (first: member" in said
+    says(said, "status      floor 4", "drift       energy ", "floor, 4 of 4 members (first: member")
 
 
 def test_members_that_are_kept_since_they_failed_are_drawn(mixed, tmp_path):

@@ -100,32 +100,6 @@ def test_statistics_are_those_of_the_samples(whole):
     np.testing.assert_allclose(ranks, (0.05, 0.5, 0.95), atol=s["quantiles depth"]["rank_error"][-1] + 1 / 1003)
 
 
-def test_statistics_of_paths_are_those_of_the_samples(whole):
-    s, t, depth = whole.statistics, whole.time, whole.position[..., 2]
-    speed = np.linalg.norm(whole.velocity, axis=-1)
-    average = np.trapezoid(depth, t, axis=0) / t[-1]
-    assert s["mean path_mean depth"].value[0, 0] == pytest.approx(average.mean(), rel=1e-12)
-    assert s["extremes path_mean depth"]["maximum"][0, 0] == pytest.approx(average.max(), rel=1e-14)
-    rms = np.sqrt(np.trapezoid(speed**2, t, axis=0) / t[-1])
-    assert s["mean path_rms speed"].value[0, 0] == pytest.approx(rms.mean(), rel=1e-12)
-    np.testing.assert_allclose(
-        s["mean path_range position"].value[0], np.ptp(whole.position, axis=0).mean(axis=0), rtol=1e-12
-    )
-    # By 20,000 points of each line, of which one or two crossings miss one each.
-    share = ((np.arange(20_000) + 0.5) / 20_000)[:, None]
-    inside, over = np.zeros(1003), np.zeros(1003)
-    for dt, a, b in zip(np.diff(t), depth[:-1], depth[1:], strict=True):
-        line = a + share * (b - a)
-        inside += dt * (np.abs(line) < 0.5).mean(axis=0)
-        over += dt * (line > 0.25).mean(axis=0)
-    found = s["mean path_time depth above -0.5 below 0.5"]
-    assert found.value[0, 0] == pytest.approx(inside.mean(), abs=1e-4)
-    assert found.unit == "s"
-    assert s["exceedance path_time depth above 0.25 above 0.3"].value[0, 0] == (over > 0.3).mean()
-    assert found.time.tolist() == [t[-1]]
-    assert found.count.tolist() == [1003]
-
-
 def test_quantities_are_those_of_the_result(fleet, whole):
     inertial = np.einsum("knij,knj->kni", whole.attitude, whole.velocity)
     names = ("velocity_inertial", "attitude", "angular_velocity", "speed")
@@ -166,8 +140,7 @@ def test_every_statistic_is_among_them():
 def test_threads_change_no_bit(fleet, whole, threads):
     alone = lw.solve(fleet, **SETTINGS, statistics=EVERY, keep="none", threads=threads)
     assert same(alone.statistics, whole.statistics)
-    assert alone.samples == {}
-    assert alone.members == 1003
+    assert (alone.samples, alone.members) == ({}, 1003)
     with pytest.raises(AttributeError, match="keep='all'"):
         _ = alone.position
 
@@ -257,17 +230,6 @@ def test_kept_members_of_a_method_that_chooses_its_steps(fleet):
     kept = lw.solve(fleet.subset(range(40)), method, **SETTINGS, keep=[5, 38]).kept
     assert all(kept.samples[f].tobytes() == every.samples[f][:, [5, 38]].tobytes() for f in FIELDS)
     assert kept.members == 2
-
-
-def test_dataset(whole):
-    data = whole.statistics.dataset
-    assert data["mean_position"].dims[0] == "time"
-    assert data["mean_position"].shape == (4, 3)
-    np.testing.assert_array_equal(
-        data["covariance_position_speed_upper"], whole.statistics["covariance position, speed"].upper
-    )
-    assert data["mean_path_maximum_speed"].shape == (1, 1)
-    assert data["mean_position"].attrs["units"] == "m"
 
 
 @pytest.fixture(scope="module")
@@ -651,8 +613,7 @@ def test_what_a_moved_origin_needs_is_written_too():
     assert plan.fields == ("position",)
     assert plan.layout.sizes == {"position": 3, "attitude": 9}
     plan = make_plan(fleet, "psi_x", 0.01, 0.1, lw.SaveAt(fields=("velocity", "position")))
-    assert plan.fields == ("position", "velocity")
-    assert tuple(plan.layout.sizes) == FIELDS
+    assert (plan.fields, tuple(plan.layout.sizes)) == (("position", "velocity"), FIELDS)
     plan = make_plan(one(scene_of(net=1.0)), "psi_s", 0.01, 0.1, lw.SaveAt(fields=("position",)))
     assert plan.fields == tuple(plan.layout.sizes) == ("position",)
 

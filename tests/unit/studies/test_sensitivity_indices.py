@@ -79,8 +79,7 @@ def test_records_of_every_index():
     assert [row["quantity"] for row in rows[8:]] == ["depth", "energy"]
     rows = list(effects().rows())
     assert [row["index"] for row in rows[:3]] == ["mu_star", "mu", "sigma"]
-    assert rows[1]["value"] == -0.5
-    assert rows[0]["confidence"] == 0.05
+    assert (rows[1]["value"], rows[0]["confidence"]) == (-0.5, 0.05)
     assert np.isnan(rows[1]["confidence"])
     assert len(rows) == 12
 
@@ -100,8 +99,7 @@ def test_an_analysis_comes_back_from_its_files(made, tmp_path):
         one, other = getattr(found, field.name), getattr(again, field.name)
         assert np.array_equal(one, other, equal_nan=True) if isinstance(one, np.ndarray) else one == other, field.name
     content = json.loads(paths[2].read_text())
-    assert content["mean"] == [1.23456789, None]
-    assert content["provenance"] == {"seed": 3}
+    assert (content["mean"], content["provenance"]) == ([1.23456789, None], {"seed": 3})
     assert content["name"] == found.name
     (tmp_path / "x.json").write_text(json.dumps(content | {"name": "heat"}))
     with pytest.raises(ValueError, match=r"x\.json: .*'heat' is no analysis"):
@@ -118,8 +116,7 @@ def test_ten_pairs_are_named_those_above_their_interval():
         name: np.zeros((1, d)) for name in ("first", "total", "first_confidence", "total_confidence")})  # fmt: skip
     pairs = [line.split(":")[0].strip() for line in str(many).splitlines() if " with " in line]
     assert len(pairs) == 10
-    assert pairs[0] == "e with f"
-    assert pairs[-1] == "b with c"
+    assert (pairs[0], pairs[-1]) == ("e with f", "b with c")
     few = dataclasses.replace(many, second_confidence=np.full((1, d, d), 0.13))
     assert [line.split(":")[0].strip() for line in str(few).splitlines() if " with " in line] == ["e with f"]
 
@@ -449,8 +446,7 @@ def test_distributions_in_salibs_words():
     assert (name, sigma) == ("lognorm", 0.2)
     assert log == pytest.approx(np.log(3.0))
     assert told(LogNormal(sigma=0.2))[0][1][0] == pytest.approx(np.log(2.0))
-    assert told(LogNormal(sigma=0.2), -2.0) == [None]
-    assert told(Choice([1.0, 2.0])) == [None]
+    assert (told(LogNormal(sigma=0.2), -2.0), told(Choice([1.0, 2.0]))) == ([None], [None])
 
 
 def test_a_model_describes_its_columns(monkeypatch):
@@ -465,8 +461,7 @@ def test_a_model_describes_its_columns(monkeypatch):
                              "dists": ["norm", "unif", "unif", "unif"]}  # fmt: skip
     u = np.array([[0.25, 0.5], [0.75, 1.0]])
     ends = [distribution.ppf(u) for distribution in model.distributions]
-    assert ends[0].shape == (2, 2)
-    assert ends[0][0, 1] == 1.0
+    assert (ends[0].shape, ends[0][0, 1]) == ((2, 2), 1.0)
     assert np.isfinite(ends[0]).all()
     for i, width in enumerate((1.0, 2.0, 3.0)):
         np.testing.assert_allclose(ends[i + 1], width * (2.0 * u - 1.0), atol=1e-12)

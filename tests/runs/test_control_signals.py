@@ -277,8 +277,7 @@ def test_a_tick_sees_both_parts_of_compensated_sums():
     # Without events the lead of the next step is merged with the end of this one, and undone for a tick.
     result = lw.solve(fleet(events=False), "psi_s", dtype="float32_compensated", **SETTINGS)
     well = free(result)
-    assert result.position.dtype == np.float64
-    assert result.measured_position.dtype == np.float32
+    assert (result.position.dtype, result.measured_position.dtype) == (np.float64, np.float32)
     for name in ("position", "attitude", "velocity", "angular_velocity"):
         # Half a step at these speeds moves a body by 1e-2 m.
         here, there = getattr(result, name)[looked()][:, well], getattr(result, f"measured_{name}")[:, well]

@@ -10,9 +10,7 @@ from lgvi_warp.methods.saveat import time_grid
 
 def test_a_step_that_fits_is_kept():
     grid = time_grid(0.01, 150.0, lw.SaveAt(every=1.0))
-    assert grid.h == 0.01
-    assert grid.steps == 15_000
-    assert grid.messages == ()
+    assert (grid.h, grid.steps, grid.messages) == (0.01, 15_000, ())
     np.testing.assert_array_equal(grid.sample_steps, np.arange(0, 15_001, 100))
     np.testing.assert_array_equal(grid.times, np.arange(151.0))
 
@@ -37,8 +35,7 @@ def test_a_step_that_does_not_fit_is_shortened_with_a_message(h, t1, save, step)
 
 def test_decimals_are_taken_as_meant():
     grid = time_grid(0.1, 0.1 + 0.2, lw.SaveAt())
-    assert grid.steps == 3
-    assert grid.h == 0.1
+    assert (grid.steps, grid.h) == (3, 0.1)
     assert time_grid(1.0 / 3.0, 2.0, lw.SaveAt()).steps == 6
     assert time_grid(1e-12, 1e-9, lw.SaveAt(every=1e-10)).steps == 1000
     assert time_grid(1e6, 1e8, lw.SaveAt()).steps == 100

@@ -11,7 +11,7 @@ from lgvi_warp.distributions import LogNormal, Normal, TruncatedNormal, Uniform
 from lgvi_warp.physics import notation
 from lgvi_warp.results.result import DrawnParameters
 from lgvi_warp.scene import draws
-from tests.support.refusals import faults
+from tests.support.refusals import faults, says
 
 FULL = np.array([[5.0, 0.3, 0.1], [0.3, 6.0, -0.2], [0.1, -0.2, 7.0]])
 EVERYTHING = {"vehicle.mass": Normal(relative=0.01),
@@ -227,8 +227,7 @@ def test_given_attitudes_must_be_rotations(scene):
     R[4] *= 1.001
     R[0] = np.nan
     (fault,) = faults(lw.Ensemble.from_states, scene, b, R, nu, Om)
-    assert "member 3" in fault
-    assert "2 of 5" in fault
+    says(fault, "member 3", "2 of 5")
 
 
 def test_bad_parameters_are_refused(scene):
@@ -323,8 +322,7 @@ def test_all_bad_laws_come_in_one_message(scene):
 def test_unphysical_draws_are_counted_and_shown(scene, name, law, key):
     (fault,) = faults(lw.Ensemble, scene, 200, 0, {name: law})
     assert fault.startswith(f"{key} of member ")
-    assert " of 200 members)" in fault
-    assert "TruncatedNormal" in fault
+    says(fault, " of 200 members)", "TruncatedNormal")
     # At one standard deviation per mean 16 % of 200 are negative: 32 +- 5 standard errors of 5.2.
     if "relative=1.0" in str(law) and name == "vehicle.mass":
         assert 6 <= int(fault.split("(")[1].split()[0]) <= 58, fault

@@ -14,6 +14,7 @@ from lgvi_warp.distributions import Choice, Normal, Uniform
 from lgvi_warp.scene import plausibility, slices
 from lgvi_warp.scene.plausibility import LIMITS
 from tests.conftest import ROOT
+from tests.support.refusals import says
 
 BODY = {"mass": 30.0, "inertia": [0.2, 3.0, 3.0], "buoyancy": 290.0}
 POINT, AHEAD, ACROSS = [[-0.6, 0.0, 0.0]], [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]
@@ -162,8 +163,7 @@ def test_members_are_counted_and_the_first_is_named(monkeypatch):
     states[0][-1, 2] = -4.0
     fleet = lw.Ensemble.from_states(scene(), *states, {"vehicle.buoyancy": buoyancy})
     expected = said(fleet)
-    assert "812 of 1,000 members; first: member 5)" in expected[0]
-    assert "291.2 N" in expected[0]
+    says(expected[0], "812 of 1,000 members; first: member 5)", "291.2 N")
     assert "(1 of 1,000 members; first: member 999)" in expected[1]
     for at_once in (7, 111, 1000):  # the last of them alone, too
         monkeypatch.setattr(slices, "AT_ONCE", at_once)
@@ -199,8 +199,7 @@ def test_what_becomes_odd_on_the_way_is_said():
     # Members that begin at the surface, or above it as is said already, say nothing of where they mean it to be.
     assert len(found) == 2
     assert "31 m/s" in found[0]
-    assert "rises 0.5 m" in found[1]
-    assert "lw.events.Surface()" in found[1]
+    says(found[1], "rises 0.5 m", "lw.events.Surface()")
     assert all("(1 of 3 members; first: member 0)" in text for text in found)
     assert len(plausibility.on_the_way(scene(events=[{"type": "surface"}]), samples(position=z)).messages(3)) == 0
     assert plausibility.on_the_way(scene(), samples(position=z)).messages(3) == found[1:]

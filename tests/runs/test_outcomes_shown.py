@@ -7,7 +7,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from matplotlib.image import imread
 from rerun.chunk import RrdReader
 
 import lgvi_warp as lw
@@ -20,7 +19,7 @@ from lgvi_warp.results import outcomes
 from lgvi_warp.views import fleet as looks
 from tests.laws import cases
 from tests.support.refusals import says
-from tests.unit.views.test_recording import rows, text_of
+from tests.unit.views.test_recording import rows
 
 GRAVITY = 10.0
 # Neutrally buoyant with M = m I: each goes straight on at its speed, as in test_events, whose kernel this is.
@@ -125,12 +124,6 @@ def test_the_first_in_time_is_named(mixed):
     said = outcomes.failure_text(two).splitlines()
     assert len(said) == 1
     assert said[0].startswith("step_too_large, 2 of 7 members (first: member 2 at 2 s, value 1): the step")
-
-
-def test_a_run_that_all_sink_is_drawn(sunk, tmp_path):
-    lw.plots.summary(sunk, path=tmp_path / "fleet.png")
-    picture = imread(tmp_path / "fleet.png")
-    assert all(third.std() > 0.05 for third in np.array_split(picture[..., :3], 3, axis=1))
 
 
 def test_the_fan_is_of_those_under_way(mixed):
@@ -316,23 +309,6 @@ def test_a_recording_shows_each_member_by_its_outcome_from_then_on(mixed, tmp_pa
     assert all(np.isfinite(pose).all() for frames in seen.values() for pose in frames.values())
 
 
-def test_the_curves_of_a_recording_are_of_those_under_way(sunk, mixed, tmp_path):
-    path = lw.record(sunk, tmp_path / "sunk.rrd")
-    median = rows(path, "/curves/height/median", "scalars")
-    assert median[2.0][0] == pytest.approx(-5.0 - 0.65 * 2.0)
-    assert np.isnan(median[15.0][0])
-    middle, variance = (rows(path, "/curves/height/all", ending)[2.0][0] for ending in (":values", "variances"))
-    assert middle - np.sqrt(variance) == pytest.approx(-7.0)
-    assert middle + np.sqrt(variance) == pytest.approx(-5.6)
-    shares = [rows(path, f"/members/{name}", "scalars") for name in ("floor", "under_way")]
-    assert (shares[0][20.0], shares[1][0.0]) == ([100.0], [100.0])
-    assert rows(path, "/curves/energy/median", "scalars")
-    driven = lw.record(acted_on(mixed, ACTING["thrust"][0]), tmp_path / "driven.rrd")
-    said = [text_of(one, "/run/summary") for one in (path, driven)]
-    assert "| energy | drift " in said[0]
-    assert "| energy | not conserved: wrench do work |" in said[1]
-
-
 def test_a_stored_run_is_recorded_in_pieces_as_one_in_memory(mixed, tmp_path, monkeypatch):
     from lgvi_warp.views import choice
 
@@ -365,15 +341,6 @@ def test_statistics_of_all_make_the_fan_where_few_members_were_kept(mixed):
     assert between.all()
     assert (run.text, run.members.tolist()) == ("2 of 7 members", [0, 3])
     assert run.shares[Status.FLOOR][-1] == pytest.approx(3 / 7)
-
-
-def test_a_recording_says_what_became_of_the_members(mixed, tmp_path):
-    path = lw.record(mixed, tmp_path / "fleet.rrd")
-    counts = ", ".join(f"{name} {number}" for name, number in mixed.status.counts().items())
-    assert f"| outcome | {counts} |" in text_of(path, "/run/summary")
-    said = text_of(path, "/log")
-    for line in ("floor, 3 of 7 members (first: member 0 at 3 s)", "ok, 2 of 7 members", "first: member 6 at 5 s"):
-        assert line in said
 
 
 SCENE = """

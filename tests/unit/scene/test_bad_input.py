@@ -391,7 +391,7 @@ ONE_FAULT = [
     (lambda values: lw.Start(**values), STARTS),
     (lambda given: lw.vehicles.from_fossen(given, **BODY), FOSSEN),
     (lambda given: from_dict(lw.vehicles.from_fossen(given, **BODY)), ENERGY),
-    (lw.vehicles.from_yaml, YAML),
+    (lambda text: pytest.importorskip("yaml") and lw.vehicles.from_yaml(text), YAML),
     (lw.Scene.load, PATHS),
     (varied, [((*row, FAR, 50), row[1], "unphysical", "of 50 members", "smaller spread") for row in VARIED]),
     (

@@ -20,8 +20,8 @@ from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.statistics import Mean, Quantiles
 from lgvi_warp.store.folder import Folder
-from tests.runs.test_outcomes_shown import rows
 from tests.support.stores import differing
+from tests.unit.views.test_recording import rows
 
 H, EVERY, STEPS, MEMBERS = 0.01, 5, 60, 600
 LIMIT, LAG, DELAY = 0.4, 0.1, 2

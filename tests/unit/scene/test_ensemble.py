@@ -306,19 +306,16 @@ def test_all_bad_laws_come_in_one_message(scene):
     assert len(faults(lw.Ensemble, scene, 4, 0, vary)) == 3
 
 
-@pytest.mark.parametrize(
-    "name, law, key",
-    [
-        ("vehicle.mass", Normal(relative=1.0), "vehicle.mass"),
-        ("vehicle.inertia", Normal(relative=1.0), "vehicle.inertia"),
-        ("vehicle.added_mass", Normal(std=300.0), "vehicle.mass + vehicle.added_mass"),
-        ("vehicle.buoyancy", Normal(relative=1.0), "vehicle.buoyancy"),
-        ("environment.gravity", Normal(relative=1.0), "environment.gravity"),
-        ("vehicle.mass", LogNormal(sigma=1e5), "vehicle.mass"),  # 0 or infinite
-        ("vehicle.buoyancy", LogNormal(sigma=1e5), "vehicle.buoyancy"),
-        ("vehicle.inertia", LogNormal(sigma=1e5), "vehicle.inertia[0,0]"),
-    ],
-)
+@pytest.mark.parametrize("name, law, key", [
+    ("vehicle.mass", Normal(relative=1.0), "vehicle.mass"),
+    ("vehicle.inertia", Normal(relative=1.0), "vehicle.inertia"),
+    ("vehicle.added_mass", Normal(std=300.0), "vehicle.mass + vehicle.added_mass"),
+    ("vehicle.buoyancy", Normal(relative=1.0), "vehicle.buoyancy"),
+    ("environment.gravity", Normal(relative=1.0), "environment.gravity"),
+    ("vehicle.mass", LogNormal(sigma=1e5), "vehicle.mass"),  # 0 or infinite
+    ("vehicle.buoyancy", LogNormal(sigma=1e5), "vehicle.buoyancy"),
+    ("vehicle.inertia", LogNormal(sigma=1e5), "vehicle.inertia[0,0]"),
+])  # fmt: skip
 def test_unphysical_draws_are_counted_and_shown(scene, name, law, key):
     (fault,) = faults(lw.Ensemble, scene, 200, 0, {name: law})
     assert fault.startswith(f"{key} of member ")

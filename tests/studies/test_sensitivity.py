@@ -376,9 +376,11 @@ def test_quantities_of_a_path(scene):
 
 
 def test_a_quantity_of_the_users_sees_what_members_start_from(sinking):
-    fallen = lw.statistics.Quantity("fallen", lambda samples,
-                                    members: samples["position"][..., 2] - members.position[None, :, 2],
-                         fields=("position",))  # fmt: skip
+    fallen = lw.statistics.Quantity(
+        "fallen",
+        lambda samples, members: samples["position"][..., 2] - members.position[None, :, 2],
+        fields=("position",),
+    )
     vary = {"start.position[2]": Uniform(half_width=5.0), "start.velocity[2]": Normal(std=0.01)}
     X = np.array([[3.0, 0.1], [9.0, 0.2]])
     f = uq.model(sinking, vary, [fallen, "depth"], **SINK)

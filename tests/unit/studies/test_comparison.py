@@ -836,8 +836,8 @@ def test_a_reference_says_how_much_time_would_do(scene):
 
 
 @pytest.mark.parametrize("law", [
-    lambda rng, n: np.abs(rng.normal(size=n)) ** 4, lambda rng, n: np.exp(rng.normal(size=n)), lambda rng,
-    n: np.abs(1.0 + 0.1 * rng.normal(size=n)) ** 9, lambda rng, n: rng.uniform(size=n) ** 5,
+    lambda rng, n: np.abs(rng.normal(size=n)) ** 4, lambda rng, n: np.exp(rng.normal(size=n)),
+    lambda rng, n: np.abs(1.0 + 0.1 * rng.normal(size=n)) ** 9, lambda rng, n: rng.uniform(size=n) ** 5,
 ])  # fmt: skip
 @pytest.mark.parametrize("members", [1024, 20_000])
 def test_the_largest_error_of_a_fresh_fleet_is_foreseen(law, members):

@@ -21,14 +21,10 @@ LAST = {
     "vehicle.center_of_buoyancy": (0.0, 0.0, -0.01),
 }
 OTHERS = {
-    "wrench.force": NONE,
-    "vehicle.buoyancy": MASS * GRAVITY,
-    "vehicle.center_of_buoyancy": NONE,
-    "control_wrench.limit": FAR,
-    "heading_pid.kp": 0.0,
-    "heading_pid.kd": 0.0,
+    "wrench.force": NONE, "vehicle.buoyancy": MASS * GRAVITY, "vehicle.center_of_buoyancy": NONE,
+    "control_wrench.limit": FAR, "heading_pid.kp": 0.0, "heading_pid.kd": 0.0,
     **{f"pose_pid.{name}": NONE for name in ("kp", "ki", "kd", "kr", "kw")},
-}
+}  # fmt: skip
 
 
 def scene(period=PERIOD, position=NONE, heading=0.0, **words):

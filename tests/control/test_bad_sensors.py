@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sensors, estimators and faults that are wrong get a sentence with key, value and remedy."""
 
-import re
 import tomllib
 
 import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from tests.conftest import ROOT
 from tests.control.bench import scene
-from tests.support.refusals import refused
+from tests.support.pages import blocks
+from tests.support.refusals import refused, says
 
 CONTROLLER = {
     "period": 0.1,
@@ -71,8 +70,8 @@ def test_a_wrong_part(section, table, words):
 
 
 def test_the_examples_of_the_pages():
-    pages = [(ROOT / "docs" / "controllers" / name).read_text() for name in ("sensors.md", "faults.md")]
-    text = "\n".join(block for page in pages for block in re.findall(r"```toml\n(.*?)```", page, re.DOTALL))
+    pages = ("docs/controllers/sensors.md", "docs/controllers/faults.md")
+    text = "\n".join(block for page in pages for block in blocks(page, "toml"))
     tables = tomllib.loads(text)["controller"]
     matrix = [[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]]
     controller = CONTROLLER | {"allocation": [{"type": "matrix", "to": "control_fins", "matrix": matrix}]} | tables
@@ -84,8 +83,7 @@ def test_the_examples_of_the_pages():
 def test_two_faults_without_names_are_told_to_have_some():
     faults = [{"of": "cell", "time": 1.0}, {"of": "control_wrench", "time": 2.0}]
     text = refused(of_table, sensors=[CELL], faults=faults)
-    assert "'fault': is the name of two parts" in text
-    assert 'name = "fault_2"' in text
+    says(text, "'fault': is the name of two parts", 'name = "fault_2"')
 
 
 def test_a_part_and_a_term_of_one_name_are_told_apart():

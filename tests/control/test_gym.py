@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 import lgvi_warp as lw
 from lgvi_warp.calls.observations import OBSERVATIONS
+from lgvi_warp.control import Callback, CallbackInput, HeadingPID, LowPass, Sensor, SetPoint
 from lgvi_warp.control.policy import INPUTS
 from lgvi_warp.reference.control import Measurement, Reference
 from lgvi_warp.reference.control.policy import Policy as PolicyTwin
@@ -21,7 +22,7 @@ from tests.conftest import ROOT
 from tests.control.test_callback import GAINS, ODD, H, heading, scene
 
 N, PERIOD = 20, 5 * H
-LAW = [lw.control.HeadingPID(**GAINS)]
+LAW = [HeadingPID(**GAINS)]
 SETTINGS = dict(method="psi_s", h=H, instead_of="heading_pid")
 
 
@@ -61,7 +62,7 @@ def test_the_bits_of_a_run(env):
     assert env.time == 0.0
     observed = steer(env, observed, 50)[0]
     assert np.isclose(env.time, 50 * PERIOD)
-    assert np.array_equal(observed[:, 1:], solved(scene([lw.control.Callback(heading)]), 50))
+    assert np.array_equal(observed[:, 1:], solved(scene([Callback(heading)]), 50))
 
 
 @pytest.mark.parametrize("odd, words", ODD.values(), ids=ODD)
@@ -94,7 +95,7 @@ def test_members_that_come_again_have_other_noise():
     assert members == [0, 1, 2] * 4
     assert len({end.tobytes() for end in ends}) == 12
     run = lw.solve(fleet.in_scene(replace(fleet.scene,
-                                          controller=scene([lw.control.Callback(heading)]).scene.controller)), "psi_s",
+                                          controller=scene([Callback(heading)]).scene.controller)), "psi_s",
                    h=H, t1=3 * PERIOD, save=lw.SaveAt())  # fmt: skip
     np.testing.assert_array_equal([end[1:4] for end in ends[:3]], run.position[-1])
 
@@ -117,7 +118,7 @@ def test_members_that_start_while_others_go_on():
     assert np.array_equal(both[~mask], later[~mask])
     assert env.members[[0, 1, 9, 19]].tolist() == [20, 1, 29, 39]
     last = steer(env, both, 30)[0][:, 1:]
-    drawn = varied(lw.control.Callback(heading)).with_seed(7, 2 * N)
+    drawn = varied(Callback(heading)).with_seed(7, 2 * N)
     assert np.array_equal(last[~mask], solved(drawn.subset(np.flatnonzero(~mask)), 40))
     assert np.array_equal(last[mask], solved(drawn.subset(env.members[mask]), 30))
 
@@ -240,12 +241,8 @@ def test_named_numbers_are_those_of_a_policy():
     R = Rotation.random(2 * N, rng=rng).as_matrix()
     vectors = iter(rng.normal(size=(7, N, 3)))
     heading = np.arctan2(R[:, 1, 0], R[:, 0, 0])
-    y = lw.control.CallbackInput(
-        next(vectors), R[:N], next(vectors), next(vectors), heading[:N], water_velocity=next(vectors)
-    )
-    r = lw.control.CallbackInput(
-        next(vectors), R[N:], next(vectors), next(vectors), heading[N:], speed=rng.normal(size=N)
-    )
+    y = CallbackInput(next(vectors), R[:N], next(vectors), next(vectors), heading[:N], water_velocity=next(vectors))
+    r = CallbackInput(next(vectors), R[N:], next(vectors), next(vectors), heading[N:], speed=rng.normal(size=N))
     assert {name: OBSERVATIONS[name][:2] for name in INPUTS} == INPUTS
     for name in INPUTS:
         seen = np.reshape(OBSERVATIONS[name].of(y, r), (N, -1))
@@ -319,11 +316,8 @@ def falling():
     controller = lw.Controller(
         period=PERIOD,
         delay=0.04,
-        sensors=[
-            lw.control.Sensor(of="depth", latency=2, noise=0.0),
-            lw.control.LowPass(of="velocity", time_constant=1.0),
-        ],
-        guidance=[lw.control.SetPoint(heading=0.8)],
+        sensors=[Sensor(of="depth", latency=2, noise=0.0), LowPass(of="velocity", time_constant=1.0)],
+        guidance=[SetPoint(heading=0.8)],
         laws=LAW,
     )
     terms = [lw.terms.ControlWrench(limit=2.0, time_constant=0.1)]

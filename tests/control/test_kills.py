@@ -2,13 +2,12 @@
 """A closed loop that is killed (SIGKILL) goes on and leaves the bytes of one that was not."""
 
 import random
-import time
 
 import pytest
 
 import lgvi_warp as lw
 from tests.conftest import ROOT
-from tests.support.stores import differing, forked
+from tests.support.stores import differing, finished, killed_after
 
 MEMBERS, BLOCKS = 2048, 8
 SCENE = ROOT / "examples" / "scenes" / "remus_100_autopilot.toml"
@@ -23,29 +22,13 @@ def run(path):
     lw.solve(fleet, "psi_x", h=0.01, t1=60.0, save=save, threads=1, store=store)
 
 
-def finished(path):
-    """Blocks that are marked."""
-    return len(list((path / "blocks").glob("*.json"))) if path.exists() else 0
-
-
-def killed_after(path, blocks, delay):
-    """Start the run, or go on with it, and kill it a moment after so many blocks are marked. Whether it was hit."""
-    process = forked(run, path)
-    while finished(path) < blocks and process.is_alive():
-        time.sleep(0.002)
-    time.sleep(delay)
-    process.kill()
-    process.join()
-    return process.exitcode != 0
-
-
 @pytest.mark.slow
 def test_a_closed_loop_is_killed_and_goes_on(tmp_path):
     whole, path, dice = tmp_path / "whole.zarr", tmp_path / "run.zarr", random.Random(5)
     run(whole)
     assert finished(whole) == BLOCKS
     # Once by resuming with the same call again and again, which is killed as well; the last time by lw.resume.
-    hits = [killed_after(path, blocks, dice.uniform(0.0, 0.05)) for blocks in (1, 3, 5)]
+    hits = [killed_after(path, blocks, dice.uniform(0.0, 0.05), run) for blocks in (1, 3, 5)]
     assert any(hits)
     assert 0 < finished(path) < BLOCKS
     lw.resume(path)

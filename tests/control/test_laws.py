@@ -34,19 +34,12 @@ ACTING = {
                        + 0.05 * rng.normal(size=(6, 12))},
     "policy": {"scale": (10.0, 1.5, 2.0)},
 }  # fmt: skip
-ZERO = (0.0, 0.0, 0.0)
-# An infinite gain of Nomoto's model demands nothing.
 IDLE = {
-    "heading_pid": {"kp": 0.0, "ki": 0.0, "kd": 0.0, "integral_limit": 0.8},
-    "depth_pid": dict.fromkeys(("kp", "ki", "kp_pitch", "ki_pitch", "kd_pitch"), 0.0),
-    "heave_pid": {"kp": 0.0, "ki": 0.0, "kd": 0.0, "integral_limit": 1.5},
-    "speed_pid": dict.fromkeys(("kp", "ki", "drag"), 0.0),
-    "pose_pid": dict.fromkeys(("kp", "ki", "kd", "kr", "ki_r", "kw"), ZERO) | {"integral_limit": (1.0, 0.5)},
-    "pose_smc": dict.fromkeys(("k_sigma", "k_d", "k_sigma_r", "k_d_r"), ZERO),
-    "heading_smc": {"k_sigma": 0.0, "k_d": 0.0, "nomoto_gain": 1e300, "nomoto_time": 0.0},
-    "state_feedback": {"K": np.zeros((6, 12))},
-    "policy": {"scale": ZERO},
+    law: {name: value if name == "integral_limit" else 0.0 * np.array(value) for name, value in numbers.items()}
+    for law, numbers in ACTING.items()
 }
+# An infinite gain of Nomoto's model demands nothing.
+IDLE["heading_smc"]["nomoto_gain"] = 1e300
 NAMES = tuple(ACTING)
 
 

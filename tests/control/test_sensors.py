@@ -167,13 +167,10 @@ def readings():
     """Errors of the readings of many members at rest, (ticks, members, FIELDS): gyro walks, log is noisy and lossy."""
     # The estimators do not touch velocities and rates.
     varied = {
-        "gyro.noise": np.full((MANY, 3), 1e-30),
-        "gyro.bias": np.full((MANY, 3), 1e-30),
-        "gyro.drift": np.full((MANY, 3), 0.3),
-        "log.noise": np.full((MANY, 3), 0.2),
-        "log.dropout": np.full(MANY, 0.3),
-        "weak.time": np.full(MANY, np.inf),
-    }
+        "gyro.noise": np.full((MANY, 3), 1e-30), "gyro.bias": np.full((MANY, 3), 1e-30),
+        "gyro.drift": np.full((MANY, 3), 0.3), "log.noise": np.full((MANY, 3), 0.2),
+        "log.dropout": np.full(MANY, 0.3), "weak.time": np.full(MANY, np.inf),
+    }  # fmt: skip
     truth = np.zeros((TICKS, 1, 21))
     truth[..., 3:12] = np.eye(3).reshape(-1)
     return measured(one(chain("all"), parameters=varied), truth, H)

@@ -31,6 +31,7 @@ from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene import settings
 from lgvi_warp.scene.scene import SECTIONS
+from tests.support.pages import blocks
 
 ROOT = Path(__file__).parents[2]
 
@@ -76,9 +77,7 @@ def sources():
     run = '[run]\nmethod = "psi_s"\nstep = 0.05\nduration = 0.5\nsave_every = 0.1\n'
     laws = []
     for page in sorted((ROOT / "docs" / "guide" / "terms").glob("*.md")):
-        laws += [
-            block for block in re.findall(r"```toml\n(.*?)```", page.read_text(), re.DOTALL) if "[[terms]]" in block
-        ]
+        laws += [block for block in blocks(page, "toml") if "[[terms]]" in block]
     stops = "".join(
         f"[[events]]\n{text}\n"
         for text in ('type = "surface"', 'type = "floor"\ndepth = 50.0', 'type = "time"\nat = 3.0',

@@ -14,12 +14,8 @@ SLOW = pytest.mark.slow
 
 
 @pytest.mark.parametrize(("kind", "cases", "kernels"), [
-    ("files", 300, 0),
-    ("set", 50, 0),
-    ("controllers", 150, 0),
-    pytest.param("files", 10_000, 4, marks=SLOW),
-    pytest.param("set", 4000, 4, marks=SLOW),
-    pytest.param("controllers", 5000, 4, marks=SLOW),
+    ("files", 300, 0), ("set", 50, 0), ("controllers", 150, 0), pytest.param("files", 10_000, 4, marks=SLOW),
+    pytest.param("set", 4000, 4, marks=SLOW), pytest.param("controllers", 5000, 4, marks=SLOW),
 ])  # fmt: skip
 def test_broken_input(kind, cases, kernels):
     # The long run draws cases of its own, beyond those of the short one.

@@ -72,22 +72,11 @@ def with_sick(fleet, parameters, sick):
 LOW = ("psi_s", "psi_x", "psi", "psi_1", "psi_w")
 
 SETTINGS = [
-    ("psi_s", {"dragged": True}, ()),
-    ("psi_x", {"dragged": True}, SLOW),
-    ("psi", {}, ()),
-    ("psi_1", {}, SLOW),
-    ("psi_x", {}, ()),
-    ("psi_s", {"laws": (LAGGING,)}, SLOW),
-    ("psi_x", {"laws": (LAGGING,)}, SLOW),
-    ("su4(psi_s)", {}, SLOW),
-    ("kl6(psi_x)", {}, SLOW),
-    ("bm4(psi_x)", {}, SLOW),
-    ("rkn4_6", {}, SLOW),
-    ("gauss4", {}, SLOW),
-    ("psi_w", {}, SLOW),
-    ("rk8", {}, SLOW),
-    ("rkmk4", {}, SLOW),
-]
+    ("psi_s", {"dragged": True}, ()), ("psi_x", {"dragged": True}, SLOW), ("psi", {}, ()), ("psi_1", {}, SLOW),
+    ("psi_x", {}, ()), ("psi_s", {"laws": (LAGGING,)}, SLOW), ("psi_x", {"laws": (LAGGING,)}, SLOW),
+    ("su4(psi_s)", {}, SLOW), ("kl6(psi_x)", {}, SLOW), ("bm4(psi_x)", {}, SLOW), ("rkn4_6", {}, SLOW),
+    ("gauss4", {}, SLOW), ("psi_w", {}, SLOW), ("rk8", {}, SLOW), ("rkmk4", {}, SLOW),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("dtype", ["float64", pytest.param("float32", marks=SLOW)])

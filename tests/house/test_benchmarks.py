@@ -71,9 +71,7 @@ def test_a_text_goes_between_its_marks(tmp_path):
 
 
 @pytest.mark.parametrize(("text", "message"), [
-    (None, "is missing"),
-    (TEXT.replace("method", "drift"), "needs the lines"),
-    (TEXT + TEXT, "needs the lines"),
+    (None, "is missing"), (TEXT.replace("method", "drift"), "needs the lines"), (TEXT + TEXT, "needs the lines"),
     (TEXT.replace("begin", "x").replace("end", "begin").replace("x", "end"), "needs the lines"),
 ])  # fmt: skip
 def test_a_page_without_its_marks_is_refused(tmp_path, text, message):

@@ -9,12 +9,7 @@ from lgvi_warp.methods import limits, method
 from lgvi_warp.sampling.designs.base import Sampling
 from lgvi_warp.statistics import base
 from tests.conftest import ROOT
-
-
-def example(page):
-    """The one Python example of a page below docs/develop."""
-    (text,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "develop" / page).read_text(), re.DOTALL)
-    return text
+from tests.support.pages import blocks
 
 
 @pytest.mark.parametrize("page", ["add_a_method.md", "add_a_statistic.md", "add_a_sampling.md"])
@@ -23,7 +18,8 @@ def test_example(page, scene, monkeypatch):
         monkeypatch.setitem(table, "psi_k", None)  # what the example of a method adds goes with the test
     for owner, name in ((base, "TYPES"), (Sampling, "kinds")):
         monkeypatch.setattr(owner, name, dict(getattr(owner, name)))
-    exec(example(page), names := {"scene": scene})
+    (example,) = blocks(f"docs/develop/{page}", "python")
+    exec(example, names := {"scene": scene})
     assert len(names) > 4, "the example defines what the page adds"
 
 

@@ -15,23 +15,22 @@ import scipy.stats
 import lgvi_warp as lw
 from lgvi_warp.statistics.base import TYPES as STATISTICS
 from tests.conftest import ROOT
+from tests.support.pages import blocks, snippets
 
 matplotlib.use("Agg")
 
 
-def snippets(language, *names):
-    """(page and line, text) of every fenced snippet of a language; those with events, kernels of their own, are slow."""
-    found = []
-    for name in names:
-        text = (ROOT / "docs" / "guide" / name).read_text()
-        for match in re.finditer(rf"```{language}\n(.*?)```", text, re.DOTALL):
-            marks = [pytest.mark.slow] if "events=" in match[1] else []
-            found.append(pytest.param(match[1], id=f"{name}:{text[: match.start()].count(chr(10)) + 1}", marks=marks))
-    return found
+def cases(language, *names):
+    """Every fenced snippet of a language, by page and line; those with events, kernels of their own, are slow."""
+    return [
+        pytest.param(code, id=f"{name}:{line}", marks=[pytest.mark.slow] if "events=" in code else [])
+        for name in names
+        for line, code, _ in snippets(f"docs/guide/{name}", language)
+    ]
 
 
-TOML = snippets("toml", "sampling.md", "sensitivity.md")
-PYTHON = snippets("python", "sampling.md", "sensitivity.md", "statistics.md")
+TOML = cases("toml", "sampling.md", "sensitivity.md")
+PYTHON = cases("python", "sampling.md", "sensitivity.md", "statistics.md")
 
 
 @pytest.mark.parametrize("text", TOML)
@@ -54,7 +53,7 @@ def test_python(text, scene, tmp_path, monkeypatch, capsys):
 def test_there_are_snippets():
     assert len(TOML) >= 6
     assert len(PYTHON) >= 12
-    assert len(blocks("guide/statistics.md", "python")) == 6
+    assert len(blocks("docs/guide/statistics.md", "python")) == 6
 
 
 REMUS = '[vehicle]\nname = "remus_100"\n'
@@ -66,16 +65,9 @@ laws = [{ type = "heading_pid", kp = 1.0 }]
 """
 # Page -> what stands before each of its snippets in a scene file.
 BEFORE = {
-    "controllers/README.md": [REMUS],
-    "controllers/actuators.md": [REMUS],
-    "controllers/allocation.md": [REMUS + LAW, ROV + LAW],
-    "guide/events.md": [REMUS],
-}
-
-
-def blocks(page, language):
-    """The fenced snippets of a page."""
-    return re.findall(rf"```{language}\n(.*?)```", (ROOT / "docs" / page).read_text(), re.DOTALL)
+    "docs/controllers/README.md": [REMUS], "docs/controllers/actuators.md": [REMUS],
+    "docs/controllers/allocation.md": [REMUS + LAW, ROV + LAW], "docs/guide/events.md": [REMUS],
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("page", BEFORE)
@@ -90,25 +82,24 @@ def test_a_vehicle_from_a_file(tmp_path, monkeypatch):
     shutil.copy(ROOT / "tests" / "data" / "vehicles" / "frame_rov.sdf", "model.sdf")
     world = '<sdf version="1.9"><world name="ocean"><gravity>0 0 -9.7</gravity></world></sdf>'
     (tmp_path / "ocean.world").write_text(world)
-    (text,) = blocks("guide/vehicles.md", "python")
+    (text,) = blocks("docs/guide/vehicles.md", "python")
     exec(text, names := {"lw": lw})
-    assert names["scene"].environment.gravity == 9.7
-    assert names["scene"].start.position[2] == 5.0
+    assert (names["scene"].environment.gravity, names["scene"].start.position[2]) == (9.7, 5.0)
 
 
 @pytest.mark.slow
 def test_failed_members(monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
-    page = "guide/failed_members.md"
+    page = "docs/guide/failed_members.md"
     exec(blocks(page, "python")[0], {})
     printed = "".join(f"    {line}\n" for line in capsys.readouterr().out.splitlines())
-    assert f"```\n\n{printed}\n1." in (ROOT / "docs" / page).read_text()
+    assert f"```\n\n{printed}\n1." in (ROOT / page).read_text()
 
 
 @pytest.mark.slow
 def test_many_calls(monkeypatch):
     monkeypatch.chdir(ROOT)
-    text, noise = blocks("guide/many_calls.md", "python")
+    text, noise = blocks("docs/guide/many_calls.md", "python")
     exec(text, names := {})
     assert names["depths"].shape == (2,)
     assert np.all(names["depths"] > 9.0)
@@ -121,25 +112,24 @@ def test_many_calls(monkeypatch):
 
 @pytest.mark.slow
 def test_a_controller_in_python_and_its_signals():
-    (text,) = blocks("controllers/callback.md", "python")
+    (text,) = blocks("docs/controllers/callback.md", "python")
     exec(text, names := {"lw": lw, "np": np})
     sections = {"vehicle": {"mass": 20.0, "inertia": [5.0, 8.0, 11.0]}, "run": {"step": 0.05, "duration": 20.0}}
     terms = {"terms": [{"type": "control_wrench"}], "controller": names["controller"]}
     scene = lw.Scene.from_dict(sections | terms)
-    (text,) = blocks("controllers/signals.md", "python")
+    (text,) = blocks("docs/controllers/signals.md", "python")
     exec(text, names := {"lw": lw, "scene": scene})
-    assert names["result"].command.shape == (21, 1, 6)
-    assert names["result"].status.counts() == {"ok": 1}
+    assert (names["result"].command.shape, names["result"].status.counts()) == ((21, 1, 6), {"ok": 1})
 
 
 def test_statistics_in_a_scene_file(tmp_path):
-    (text,) = blocks("guide/statistics.md", "toml")
+    (text,) = blocks("docs/guide/statistics.md", "toml")
     (tmp_path / "scene.toml").write_text((ROOT / "examples" / "paper.toml").read_text() + text)
     assert len(lw.Scene.load(tmp_path / "scene.toml").run.statistics) == 4
 
 
 def test_shapes_of_statistics_are_those_of_the_page(scene):
-    exec(blocks("guide/statistics.md", "python")[0], names := {"lw": lw, "np": np, "scene": scene})
+    exec(blocks("docs/guide/statistics.md", "python")[0], names := {"lw": lw, "np": np, "scene": scene})
     depth = names["depth"]
     assert depth.time.shape == depth.count.shape == (6,)
     assert depth.value.shape == depth.lower.shape == (6, 3, 1)

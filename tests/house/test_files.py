@@ -73,12 +73,9 @@ def opened(source):
 
 @pytest.mark.parametrize(("source", "expected"), [
     ("json.loads(Path(p).read_text())", {"json.loads", "read_text"}),
-    ("import numpy as np\nx = np.load(p)", {"np.load"}),
-    ("with path.open('rb') as file: pass", {"open"}),
-    ("with open(path) as file: pass", {"open"}),
-    ("with path.open() as file: pass", {"open"}),
-    ("from json import dumps, loads", {"json.loads"}),
-    ("from numpy import load as read", {"np.load"}),
+    ("import numpy as np\nx = np.load(p)", {"np.load"}), ("with path.open('rb') as file: pass", {"open"}),
+    ("with open(path) as file: pass", {"open"}), ("with path.open() as file: pass", {"open"}),
+    ("from json import dumps, loads", {"json.loads"}), ("from numpy import load as read", {"np.load"}),
     ("import numpy as numbers, json, os", {"numpy as numbers"}),
     ("statistic.open(time, 3); webbrowser.open(uri); text.replace('a', 'b')", set()),
 ])  # fmt: skip

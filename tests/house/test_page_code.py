@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every fenced snippet of README and docs is run by a test: here, or in the file that the table names."""
 
-import re
 import shutil
 import tomllib
 
@@ -11,10 +10,10 @@ import pytest
 
 import lgvi_warp as lw
 from tests.conftest import ROOT
+from tests.support.pages import FENCE, blocks, snippets
 
 matplotlib.use("Agg")
 DOCS = ROOT / "docs"
-FENCE = re.compile(r"^```(\w+)\n(.*?)^```\n(?:\n((?:    [^\n]*\n)+))?", re.DOTALL | re.MULTILINE)
 # A test -> the pages whose snippets it runs. The pages of terms and those below are run here.
 OF_TESTS = {
     "house/test_readme.py": "README.md docs/guide/methods.md",
@@ -40,15 +39,6 @@ SCRIPT_NAMES = "choose_method_and_step compare_with_your_simulator current noteb
 SCRIPTS = [f"docs/guide/{name}.md" for name in SCRIPT_NAMES.split()]
 
 
-def snippets(page, language):
-    """(code, what the page says it prints, or "") of each snippet of a page in a language."""
-    return [
-        (code, re.sub(r"^    ", "", printed, flags=re.MULTILINE))
-        for kind, code, printed in FENCE.findall((ROOT / page).read_text())
-        if kind == language
-    ]
-
-
 def test_each_page_with_code_has_its_test():
     pages = [ROOT / "README.md", *(page for page in DOCS.rglob("*.md") if page.parent.name != "built")]
     with_code = {str(page.relative_to(ROOT)) for page in pages if FENCE.search(page.read_text())}
@@ -62,7 +52,7 @@ def test_each_page_with_code_has_its_test():
 @pytest.mark.parametrize("page", TERMS)
 def test_tables_of_terms_are_parts_of_scenes(page):
     body = {"mass": 123.8, "inertia": [5.0, 6.0, 7.0]}
-    found = [tomllib.loads(code) for code, _ in snippets(page, "toml")]
+    found = [tomllib.loads(code) for code in blocks(page, "toml")]
     assert found
     for tables in found:
         scene = lw.Scene.from_dict(tables | {"vehicle": body | tables.get("vehicle", {})})
@@ -74,7 +64,7 @@ def test_parts_of_controllers_fit_a_vehicle(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shapes = {"weights_0": (4, 2), "biases_0": (4,), "weights_1": (1, 4), "biases_1": (1,)}
     np.savez("policy.npz", **{name: np.zeros(shape) for name, shape in shapes.items()})
-    found = [tomllib.loads(code)["controller"] for code, _ in snippets(page, "toml")]
+    found = [tomllib.loads(code)["controller"] for code in blocks(page, "toml")]
     assert len(found) >= 4
     everything = {"type": "set_point", "heading": 0.0, "speed": 0.5, "position": [0.0, 0.0, 5.0]}
     held = {"type": "heading_pid", "kp": 1.0}
@@ -92,7 +82,7 @@ def test_a_script_prints_what_its_page_says(page, tmp_path, monkeypatch, capsys)
     monkeypatch.chdir(tmp_path)
     (tmp_path / "examples").mkdir()
     shutil.copy(ROOT / "examples" / "paper.toml", tmp_path / "examples")
-    ((code, expected),) = snippets(page, "python")
+    ((_, code, expected),) = snippets(page, "python")
     exec(code, {"__name__": "__main__"})
     assert capsys.readouterr().out == expected
 
@@ -109,7 +99,7 @@ def test_pictures_and_recordings_of_a_result(scene, tmp_path, monkeypatch):
     names = {"lw": lw, "fleet": fleet, "result": lw.solve(fleet, h=0.1, t1=2.0, save=lw.SaveAt(every=0.5))}
     names |= {"a": names["result"], "b": names["result"]}
     for page in OF_A_RESULT:
-        for code, _ in snippets(page, "python"):
+        for code in blocks(page, "python"):
             exec(code, names)
     written = {path.name for path in tmp_path.iterdir()}
     assert {"speed.pdf", "fleet.svg", "fleet.rrd", "both.rrd"} <= written

@@ -1,27 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """The examples of README and of the first pages print what the pages say."""
 
-import re
 import runpy
 
 import matplotlib
 
 import lgvi_warp as lw
 from tests.conftest import ROOT
+from tests.support.pages import blocks, snippets
 
 matplotlib.use("Agg")
 
 
-def code_and_output(page):
-    """The first Python snippet of a page, and the indented block that follows it: what it prints."""
-    text = (ROOT / page).read_text()
-    match = re.search(r"```python\n(.*?)```\n(?:\n((?:    [^\n]*\n)+))?", text, re.DOTALL)
-    return match[1], re.sub(r"^    ", "", match[2] or "", flags=re.MULTILINE)
-
-
 def test_readme(monkeypatch, capsys):
     monkeypatch.chdir(ROOT)
-    code, output = code_and_output("README.md")
+    _, code, output = snippets("README.md", "python")[0]
     exec(code, {})
     assert capsys.readouterr().out == output
     assert output.count("\n") == 3
@@ -47,7 +40,7 @@ def test_the_first_example(tmp_path, monkeypatch, capsys):
 
 
 def test_the_methods_of_the_guide():
-    code, _ = code_and_output("docs/guide/methods.md")
+    code = blocks("docs/guide/methods.md", "python")[0]
     methods = [eval(line, {"lw": lw}) for line in code.splitlines()]
     assert [method.name for method in methods] == ["psi_s", "psi", "rk8"]
     assert methods[2].adaptive

@@ -26,15 +26,10 @@ from tests.conftest import ROOT
 PAGE = (ROOT / "docs" / "start" / "scene_file.md").read_text()
 # Heading of each table of keys -> the class whose fields they are.
 KEYS = {
-    "`[vehicle]`": lw.Vehicle,
-    "`[environment]`": lw.Environment,
-    "`[start]`": lw.Start,
-    "`[ensemble]`": EnsembleSettings,
-    "`[run]`": RunSettings,
-    "`[[run.statistics]]`": Statistic,
-    "`[run.until]`": lw.Until,
-    "Not in the file: the store": lw.Store,
-}
+    "`[vehicle]`": lw.Vehicle, "`[environment]`": lw.Environment, "`[start]`": lw.Start,
+    "`[ensemble]`": EnsembleSettings, "`[run]`": RunSettings, "`[[run.statistics]]`": Statistic,
+    "`[run.until]`": lw.Until, "Not in the file: the store": lw.Store,
+}  # fmt: skip
 # Introduction of each table of types -> its classes by type, and the class whose fields they share.
 KINDS = {
     "`[[terms]]`": (terms.TYPES, lw.laws.Term),

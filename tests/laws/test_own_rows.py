@@ -156,7 +156,7 @@ def indexed_wildly(draws, shared, dtype, seed):
 
 @pytest.mark.parametrize(("shared", "dtype"), [(False, "float64"), (True, "float32")])
 def test_laws_that_index_wildly_see_their_own_rows(shared, dtype):
-    indexed_wildly(40, shared, dtype, 3)
+    indexed_wildly(16, shared, dtype, 3)
 
 
 @pytest.mark.slow
@@ -264,11 +264,8 @@ OTHERS += [(40, 9, "float32", True, None), (40, 5000, "float32", False, 1), (40,
 
 
 @pytest.mark.parametrize(("members", "rows", "dtype", "varied", "width"), [
-    (1, 9, "float64", False, None),
-    (40, 9, "float64", True, None),
-    (40, 5000, "float64", False, None),
-    (40, 5000, "float32", False, None),
-    *(pytest.param(*other, marks=pytest.mark.slow) for other in OTHERS),
+    (1, 9, "float64", False, None), (40, 9, "float64", True, None), (40, 5000, "float64", False, None),
+    (40, 5000, "float32", False, None), *(pytest.param(*other, marks=pytest.mark.slow) for other in OTHERS),
 ])  # fmt: skip
 def test_a_gather_reads_each_lane_at_its_own_index(members, rows, dtype, varied, width):
     rng = np.random.default_rng(members)

@@ -126,10 +126,8 @@ def test_a_spheroid_in_strained_water_goes_where_the_pressure_pushes_it(method, 
 
 # dv/dt by pressure in a strain of 0.05 1/s across the body's axes, of a neutral spheroid at (0.3, 0, -0.7) m.
 KNOWN = {
-    (1.5, 0.0, 0.0): (0.00142, 0.03438),
-    (1.5, 0.0, 0.3): (-0.01192, 0.03438),
-    (0.0, 0.0, 1.0): (-0.04306, -0.00093),
-}
+    (1.5, 0.0, 0.0): (0.00142, 0.03438), (1.5, 0.0, 0.3): (-0.01192, 0.03438), (0.0, 0.0, 1.0): (-0.04306, -0.00093),
+}  # fmt: skip
 SLENDER = Spheroid(0.8, 0.1)
 
 

@@ -405,10 +405,8 @@ def test_the_rotation_refuses_large_steps():
 # Equation (24) by a Riccati equation.
 
 SHAPES = {
-    "paper": np.diag([5.46, 5.29, 5.72]),
-    "general": TURN @ J @ TURN.T,
-    "near sphere": np.diag([1.0, 1.001, 1.002]),
-}
+    "paper": np.diag([5.46, 5.29, 5.72]), "general": TURN @ J @ TURN.T, "near sphere": np.diag([1.0, 1.001, 1.002]),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("fraction", [1e-6, 0.01, 0.5, 0.9, 0.999])

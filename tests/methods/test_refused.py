@@ -15,12 +15,9 @@ ESTIMATES_NONE = "estimates no error; use rk5 or rk8, or leave them out"
 
 
 @pytest.mark.parametrize(("words", "said"), [
-    ({"name": "kl8(rk8)"}, "not symmetric"),
-    ({"name": "su4(rkw3)"}, "not symmetric"),
-    ({"name": "bm6(phi)"}, "not symmetric"),
-    ({"name": "bm4(psi_1)"}, "divide D"),
-    ({"name": "kl6(rkn4_6)"}, "not of order 2"),
-    ({"name": "bm5(psi_x)"}, "did you mean 'bm"),
+    ({"name": "kl8(rk8)"}, "not symmetric"), ({"name": "su4(rkw3)"}, "not symmetric"),
+    ({"name": "bm6(phi)"}, "not symmetric"), ({"name": "bm4(psi_1)"}, "divide D"),
+    ({"name": "kl6(rkn4_6)"}, "not of order 2"), ({"name": "bm5(psi_x)"}, "did you mean 'bm"),
     ({"name": "rk6"}, "rk"),
     *(({"name": name} | TOLERANCES, ESTIMATES_NONE) for name in ("rk4", "rkw3", "psi_s", "psi_x")),
     ({"name": "rk8", "rtol": 1e-8}, "is given alone"),

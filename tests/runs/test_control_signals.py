@@ -11,15 +11,17 @@ import warp as wp
 import lgvi_warp as lw
 from lgvi_kernels.law import div, mul, neg, ones, positive, sub, vec3  # noqa: F401
 from lgvi_warp.common.status import Status, under_way
+from lgvi_warp.control import Callback, HeadingPID, PseudoInverse, SetPoint
 from lgvi_warp.control.base import ControlLaw
 from lgvi_warp.control.signals import SAVED, SIGNALS
 from lgvi_warp.engine import launches
 from lgvi_warp.physics import energy as invariants
 from lgvi_warp.physics.fields import FIELDS
 from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.statistics import Mean, Quantiles
 from lgvi_warp.store.folder import Folder
-from tests.runs.test_outcomes_shown import rows
 from tests.support.stores import differing
+from tests.unit.views.test_recording import rows
 
 H, EVERY, STEPS, MEMBERS = 0.01, 5, 60, 600
 LIMIT, LAG, DELAY = 0.4, 0.1, 2
@@ -275,8 +277,7 @@ def test_a_tick_sees_both_parts_of_compensated_sums():
     # Without events the lead of the next step is merged with the end of this one, and undone for a tick.
     result = lw.solve(fleet(events=False), "psi_s", dtype="float32_compensated", **SETTINGS)
     well = free(result)
-    assert result.position.dtype == np.float64
-    assert result.measured_position.dtype == np.float32
+    assert (result.position.dtype, result.measured_position.dtype) == (np.float64, np.float32)
     for name in ("position", "attitude", "velocity", "angular_velocity"):
         # Half a step at these speeds moves a body by 1e-2 m.
         here, there = getattr(result, name)[looked()][:, well], getattr(result, f"measured_{name}")[:, well]
@@ -304,15 +305,12 @@ def test_a_store_holds_them_and_goes_on(whole, tmp_path):
 
 @pytest.mark.slow_for("laws1")
 @pytest.mark.parametrize(
-    "laws",
-    [[lw.control.HeadingPID(kp=KP)], [lw.control.Callback(lambda t, y, r, members: np.zeros((len(members), 6)))]],
+    "laws", [[HeadingPID(kp=KP)], [Callback(lambda t, y, r, members: np.zeros((len(members), 6)))]]
 )
 def test_a_file_knows_which_terms_the_controller_drives(laws, tmp_path):
     """Fins that are driven have no command of their own: energies and pictures of a file must not ask for it."""
-    wanted = lw.control.SetPoint(heading=0.5)
-    loop = lw.Controller(
-        period=0.1, guidance=[wanted], laws=laws, allocation=[lw.control.PseudoInverse(to="control_fins")]
-    )
+    wanted = SetPoint(heading=0.5)
+    loop = lw.Controller(period=0.1, guidance=[wanted], laws=laws, allocation=[PseudoInverse(to="control_fins")])
     (fins,) = (term for term in lw.Scene.named("remus_100", controller=loop).terms if term.type == "control_fins")
     start = lw.Start(velocity=[1.54, 0.0, 0.0])
     driven = lw.Scene(lw.Vehicle(30.0, inertia=(0.2, 3.0, 3.0)), terms=[fins], start=start, controller=loop)
@@ -345,12 +343,8 @@ def test_a_recording_shows_commands_and_actuators(whole, tmp_path):
 
 @pytest.mark.slow
 def test_statistics_and_quantities_of_interest(whole):
-    statistics = [
-        lw.statistics.Mean("command[5]"),
-        lw.statistics.Mean("measured_depth"),
-        lw.statistics.Mean("max(norm(demand))"),
-    ]
-    statistics += [lw.statistics.Quantiles("actuator[2]"), lw.statistics.Mean("reference_speed")]
+    statistics = [Mean("command[5]"), Mean("measured_depth"), Mean("max(norm(demand))")]
+    statistics += [Quantiles("actuator[2]"), Mean("reference_speed")]
     lean = lw.solve(fleet(), "psi_s", **SETTINGS, statistics=statistics, keep="none")
     found = lean.statistics
     np.testing.assert_allclose(found["mean command[5]"].value[:, 0], whole.command[..., 5].mean(axis=1), rtol=1e-12)
@@ -365,7 +359,7 @@ def test_statistics_and_quantities_of_interest(whole):
 
 @pytest.mark.parametrize(("asked", "text"), [
     ({"save": lw.SaveAt(fields=("position", "demand"))}, "save.fields = 'demand'"),
-    ({"statistics": [lw.statistics.Mean("command[0]")]}, "statistics = 'command'"),
+    ({"statistics": [Mean("command[0]")]}, "statistics = 'command'"),
 ])  # fmt: skip
 def test_a_scene_without_a_controller_has_none(asked, text):
     why = r": is a signal of a controller, which this scene has not; give \[controller\]"
@@ -377,8 +371,8 @@ def test_names_that_are_not_known():
     with pytest.raises(lw.SceneError, match=r"save.fields = 'commands': is not known; did you mean 'command'\?"):
         lw.SaveAt(fields=("commands",))
     with pytest.raises(lw.SceneError, match=r"is not one channel of command; give one: 'command\[0\]'"):
-        lw.statistics.Mean("command")
+        Mean("command")
     with pytest.raises(lw.SceneError, match=r"demand has the components demand\[0\]"):
-        lw.statistics.Mean("demand[6]")
+        Mean("demand[6]")
     with pytest.raises(lw.SceneError, match=r"is beyond the 6 channels .*; give 'command\[0\]' to 'command\[5\]'"):
-        lw.solve(fleet(), "psi_s", **SETTINGS, statistics=[lw.statistics.Mean("command[6]")])
+        lw.solve(fleet(), "psi_s", **SETTINGS, statistics=[Mean("command[6]")])

@@ -371,8 +371,7 @@ def test_folders_are_exchanged_in_one_step(tmp_path):
         (tmp_path / name / name).touch()
     if not durable.exchanged(tmp_path / "a", tmp_path / "b"):
         pytest.skip("this system cannot")
-    assert os.listdir(tmp_path / "a") == ["b"]
-    assert os.listdir(tmp_path / "b") == ["a"]
+    assert (os.listdir(tmp_path / "a"), os.listdir(tmp_path / "b")) == (["b"], ["a"])
 
 
 def test_nobody_elses_folder_beside_a_run_is_removed(whole, tmp_path):

@@ -269,20 +269,8 @@ def test_a_hostile_result_is_refused_in_a_line(name, theirs, home):
 # Any value of the metadata may be another -------------------------------------------------------------------------------
 
 STRANGE = (
-    None,
-    True,
-    -1,
-    10**18,
-    float("nan"),
-    "",
-    "../../x",
-    "evil_module.run",
-    [],
-    {},
-    [[]],
-    "\x1b[31m",
-    [3, 299, 4000],
-)
+    None, True, -1, 10**18, float("nan"), "", "../../x", "evil_module.run", [], {}, [[]], "\x1b[31m", [3, 299, 4000],
+)  # fmt: skip
 
 
 def leaves(value, path=()):

@@ -104,9 +104,7 @@ def test_a_part_is_sent_as_what_it_is():
     part = plan.subplan([1], ("position",))
     assert part.spec.mass == plan.spec.mass != make_plan(own.subset([1]), **SETTINGS).spec.mass
     again = pickle.loads(pickle.dumps(part))
-    assert again.spec == part.spec
-    assert again.fields == ("position",)
-    assert again.ensemble.members == 1
+    assert (again.spec, again.fields, again.ensemble.members) == (part.spec, ("position",), 1)
 
 
 def test_no_failures_leave_no_group(tmp_path):
@@ -183,8 +181,7 @@ def test_a_run_is_complete_only_with_them(whole, tmp_path, capsys):
 def test_other_members_than_those_that_failed_are_run_anew(whole, tmp_path):
     path = interrupted(tmp_path / "run.zarr", whole)
     other = lw.solve(failing(), **SETTINGS, keep=[3, 5], store=tmp_path / "other.zarr")
-    assert list(other.kept_members) == [3, 5]
-    assert other.kept.members == 2
+    assert (list(other.kept_members), other.kept.members) == ([3, 5], 2)
     shutil.copytree(tmp_path / "other.zarr" / "kept", path / "kept")
     lw.resume(path)
     assert differing(whole, path) == []
@@ -218,8 +215,7 @@ def test_with_statistics_until_and_fewer_fields(tmp_path):
     save = lw.SaveAt(every=0.1, fields=("position", "attitude"))
     result = lw.solve(failing(), **SETTINGS | {"save": save}, **own, store=chosen)
     every = lw.solve(failing(), **SETTINGS)
-    assert result.members == 512
-    assert list(result.kept.samples) == ["position"]
+    assert (result.members, list(result.kept.samples)) == (512, ["position"])
     np.testing.assert_array_equal(result.kept_members, np.flatnonzero(every.status[:512]))
     assert result.kept.position.dtype == np.float32
     np.testing.assert_array_equal(result.kept.position, every.position[:, result.kept_members].astype(np.float32))
@@ -237,11 +233,9 @@ def test_members_that_share_their_steps_lie_beside_those_that_are_kept(tmp_path)
     every = lw.solve(fleet(30), **settings)
     result = lw.solve(fleet(30), **settings, keep=[5, 6, 29], store=tmp_path / "run.zarr")
     group = stored.Folder(tmp_path / "run.zarr" / "kept").group()
-    assert list(group["member"][:]) == [4, 5, 6, 7, 28, 29]
-    assert list(group["chosen"][:]) == [0, 1, 1, 0, 0, 1]
+    assert (list(group["member"][:]), list(group["chosen"][:])) == ([4, 5, 6, 7, 28, 29], [0, 1, 1, 0, 0, 1])
     for one in (result, lw.open_run(tmp_path)):
-        assert list(one.kept_members) == [5, 6, 29]
-        assert one.kept.members == 3
+        assert (list(one.kept_members), one.kept.members) == ([5, 6, 29], 3)
         assert one.kept.position.tobytes() == every.position[:, [5, 6, 29]].tobytes()
         assert one.kept.dataset.realization.values.tolist() == [5, 6, 29]
         assert one.kept.provenance["ensemble"]["indices"] == [5, 6, 29]
@@ -296,8 +290,7 @@ def test_netcdf_has_them_in_a_group(whole, memory, tmp_path):
     with xarray.open_dataset(path, group="kept", engine="netcdf4") as group:
         np.testing.assert_array_equal(group.member.values, failed)
         np.testing.assert_array_equal(group.attitude.values, memory.attitude[:, failed])
-        assert group.position.attrs["units"] == "m"
-        assert group.attrs["Conventions"] == "CF-1.11"
+        assert (group.position.attrs["units"], group.attrs["Conventions"]) == ("m", "CF-1.11")
     with xarray.open_datatree(path, engine="netcdf4") as tree:
         assert tree.sizes["realization"] == MEMBERS
         assert tree["kept"].sizes["member"] == len(failed)

@@ -7,16 +7,18 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.distributions import Normal, Uniform
+from lgvi_warp.events import Box, Floor, StopTime, Surface
 from lgvi_warp.physics.terms import events
 from lgvi_warp.results.quantities import quantities
+from lgvi_warp.statistics import EndTime, Exceedance, Extremes, FirstPassage, Mean, Outcome, PathMaximum
 from tests.conftest import ROOT
+from tests.support.refusals import says
 from tests.support.stops import FarAway, stops
 
 STATISTICS = [
-    lw.statistics.Outcome("floor"), lw.statistics.EndTime("floor"), lw.statistics.Exceedance("depth", above=26.0),
-    lw.statistics.FirstPassage("depth", above=26.0),
-    lw.statistics.Mean("position", at="floor"), lw.statistics.Extremes("depth", at="floor"),
-    lw.statistics.PathMaximum("depth", lw.statistics.Exceedance(above=26.0)),
+    Outcome("floor"), EndTime("floor"), Exceedance("depth", above=26.0), FirstPassage("depth", above=26.0),
+    Mean("position", at="floor"), Extremes("depth", at="floor"), PathMaximum("depth", Exceedance(above=26.0)),
 ]  # fmt: skip
 SETTINGS = {"method": "psi_s", "h": 0.04, "t1": 40.0, "save": lw.SaveAt(every=4.0), "statistics": STATISTICS}
 
@@ -25,10 +27,7 @@ def fleet(members, ends=None, more=(), **ensemble):
     """The paper's vehicle a little too heavy or too light, from a depth of 20 m."""
     scene = lw.Scene.named("nordkvist_sanyal", start={"position": [0, 0, 20.0], "velocity": [0.1, 0, 0]},
                            vehicle={"buoyancy": 1212.0}, events=ends or stops(floor=26.0))  # fmt: skip
-    vary = {
-        "vehicle.buoyancy": lw.distributions.Normal(std=3.0),
-        "start.angular_velocity": lw.distributions.Normal(std=(0.02, 0.05, 0.02)),
-    }
+    vary = {"vehicle.buoyancy": Normal(std=3.0), "start.angular_velocity": Normal(std=(0.02, 0.05, 0.02))}
     return lw.Ensemble(scene, members, 1, vary | dict(more), **ensemble)
 
 
@@ -101,12 +100,7 @@ def test_processes_give_the_same(tmp_path):
 def test_several_events_by_their_names():
     surface, floor, *others = stops(surface=17.0, floor=26.0)
     ends = [surface, dataclasses.replace(floor, name="sea floor"), *others]
-    asked = [
-        lw.statistics.Outcome("sea floor"),
-        lw.statistics.Outcome("surface"),
-        lw.statistics.Outcome("stopped"),
-        lw.statistics.Mean("depth", at="surface"),
-    ]
+    asked = [Outcome("sea floor"), Outcome("surface"), Outcome("stopped"), Mean("depth", at="surface")]
     result = lw.solve(fleet(1000, ends), **SETTINGS | {"statistics": asked})
     counts, s = result.status.counts(), result.statistics
     assert s["outcome sea floor"]["ended"][-1] == counts["floor"]
@@ -125,11 +119,9 @@ def test_an_own_monte_carlo_with_three_competing_events():
     depth, surface, floor, t1, n, many = 20.0, 17.0, 26.0, 40.0, 2000, 400_000
     scene = lw.Scene.named("nordkvist_sanyal", start={"position": [0, 0, depth]}, vehicle={"buoyancy": 1212.5},
                            events=stops(floor=floor, surface=surface, at=20.0))  # fmt: skip
-    vary = {"vehicle.buoyancy": lw.distributions.Normal(std=3.0), "start.velocity[2]": lw.distributions.Normal(std=0.1),
-            "time.at": lw.distributions.Uniform(low=2.0, high=80.0)}  # fmt: skip
-    asked = [lw.statistics.Outcome(name) for name in ("floor", "surface", "time", "ok")] + [
-        lw.statistics.FirstPassage("depth", above=floor)
-    ]
+    vary = {"vehicle.buoyancy": Normal(std=3.0), "start.velocity[2]": Normal(std=0.1),
+            "time.at": Uniform(low=2.0, high=80.0)}  # fmt: skip
+    asked = [Outcome(name) for name in ("floor", "surface", "time", "ok")] + [FirstPassage("depth", above=floor)]
     result = lw.solve(lw.Ensemble(scene, n, 1, vary), **SETTINGS | {"statistics": asked})
 
     rng = np.random.default_rng(5)
@@ -168,15 +160,12 @@ def named(name, vary, ends, **start):
 
 BOTH = {"floor": 26.0, "surface": 17.0}
 ALL = {"floor": 24.0, "surface": 17.0, "lower": (-1e6, -1e6, 0.0), "upper": (2.0, 1e6, 30.0), "radius": 1.5, "at": 30.0}
-FAST = {"start.angular_velocity": lw.distributions.Normal(std=(40.0, 5.0, 0.02))}
-HEAVE = {
-    "vehicle.buoyancy": lw.distributions.Normal(relative=0.02),
-    "start.velocity[2]": lw.distributions.Normal(std=0.3),
-}
-NEAR = [lw.events.Floor(depth=11.0), lw.events.Surface(depth=9.0)]
-WALLS = [lw.events.Box(lower=(-0.3, -9.0, 0.0), upper=(1e3, 9.0, 99.0), name="astern"),
-         lw.events.Box(lower=(-1e3, -9.0, 0.0), upper=(0.3, 9.0, 99.0), name="ahead"),
-         lw.events.Surface(depth=9.5)]  # fmt: skip
+FAST = {"start.angular_velocity": Normal(std=(40.0, 5.0, 0.02))}
+HEAVE = {"vehicle.buoyancy": Normal(relative=0.02), "start.velocity[2]": Normal(std=0.3)}
+NEAR = [Floor(depth=11.0), Surface(depth=9.0)]
+WALLS = [Box(lower=(-0.3, -9.0, 0.0), upper=(1e3, 9.0, 99.0), name="astern"),
+         Box(lower=(-1e3, -9.0, 0.0), upper=(0.3, 9.0, 99.0), name="ahead"),
+         Surface(depth=9.5)]  # fmt: skip
 # Members, with settings of the run beside those of SETTINGS.
 TEN = {
     "nobody ends": (lambda: fleet(256, stops()), {}),
@@ -187,10 +176,10 @@ TEN = {
     "replicates, some fail": (lambda: fleet(256, stops(**BOTH), more=FAST, sampling=lw.designs.Sobol(replicates=4)), {}),
     "until": (lambda: fleet(4000, stops(**BOTH)), {"until": lw.Until("outcome floor", 0.05, members=256)}),
     "remus_100": (lambda: named("remus_100", HEAVE, NEAR, velocity=[1.5, 0, 0]), {"method": "psi_x", "t1": 12.0}),
-    "bluerov2_heavy": (lambda: named("bluerov2_heavy", HEAVE | {"start.velocity[0]": lw.distributions.Normal(std=0.5)}, WALLS),
+    "bluerov2_heavy": (lambda: named("bluerov2_heavy", HEAVE | {"start.velocity[0]": Normal(std=0.5)}, WALLS),
                        {"method": "rk4", "dtype": "float32", "t1": 8.0}),
     "bluerov2_dead_thruster": (lambda: named("bluerov2_dead_thruster", HEAVE,
-                                             [lw.events.Floor(depth=4.0), lw.events.StopTime(at=6.0)]),
+                                             [Floor(depth=4.0), StopTime(at=6.0)]),
                                {"method": None, "h": 0.05, "t1": 8.0}),
 }  # fmt: skip
 
@@ -202,7 +191,7 @@ def test_the_sum_over_outcomes_and_ok_is_1_over_ten_scenes(name, stored, monkeyp
     make, more = TEN[name]
     one = make()
     ends = one.scene.events
-    asked = [lw.statistics.Outcome(kind) for kind in (*(end.key for end in ends), "ok", "stopped", "failed")]
+    asked = [Outcome(kind) for kind in (*(end.key for end in ends), "ok", "stopped", "failed")]
     how = SETTINGS | {"save": lw.SaveAt(every=2.0)} | more | {"statistics": asked}
     if stored:
         lw.solve(one, **how, store=tmp_path / "run.zarr")
@@ -268,9 +257,9 @@ def test_quantities_of_outcomes_and_times():
 
 def test_quantities_of_two_events_of_one_status():
     """Two shelves end a drift to the north and one to the south: by hand, since it goes straight on at its first velocity."""
-    shelves = [lw.events.Box(lower=(-1e6,) * 3, upper=(4.0, 1e6, 1e6), name="north"),
-               lw.events.Box(lower=(-2.0, -1e6, -1e6), upper=(1e6,) * 3, name="south"),
-               lw.events.Floor(depth=1e6)]  # fmt: skip
+    shelves = [Box(lower=(-1e6,) * 3, upper=(4.0, 1e6, 1e6), name="north"),
+               Box(lower=(-2.0, -1e6, -1e6), upper=(1e6,) * 3, name="south"),
+               Floor(depth=1e6)]  # fmt: skip
     scene = lw.Scene.named("sphere", start={"position": [0, 0, 20.0]}, events=shelves)
     u, t1 = np.array([0.5, -0.5, 0.3, -0.1, 0.2]), 10.0
     of = ["outcome north", "outcome south", "outcome box", "outcome floor", "end_time south", "position[0] at north"]
@@ -284,7 +273,7 @@ def test_quantities_of_two_events_of_one_status():
     np.testing.assert_allclose(ends, np.where(u < -0.2, -2.0 / u, np.nan), atol=1e-9)
     there = lw.uq.model(scene, ["start.velocity[0]"], "position[0] at north", **how, failed="nan")(u[:, None])
     np.testing.assert_allclose(there, np.where(u > 0.4, 4.0, np.nan), atol=1e-9)
-    vary = {"start.velocity[0]": lw.distributions.Uniform(low=-0.6, high=0.6)}
+    vary = {"start.velocity[0]": Uniform(low=-0.6, high=0.6)}
     share = lw.uq.sobol(scene, of[:2], vary=vary, samples=256, second_order=False, **how).mean
     assert share == pytest.approx([1.0 / 6.0, 1.0 / 3.0], abs=0.02)
     result = lw.solve(lw.Ensemble(scene, 4, 1, vary), **how)
@@ -294,17 +283,14 @@ def test_quantities_of_two_events_of_one_status():
 
 def test_an_outcome_that_no_member_can_have_is_refused():
     with pytest.raises(lw.SceneError) as error:
-        lw.solve(fleet(10, [lw.events.Floor(depth=26.0)]), "psi_s", h=0.04, t1=1.0,
-                 statistics=[lw.statistics.Outcome("surface"), lw.statistics.Mean("depth", at="flor")])  # fmt: skip
+        lw.solve(fleet(10, [Floor(depth=26.0)]), "psi_s", h=0.04, t1=1.0,
+                 statistics=[Outcome("surface"), Mean("depth", at="flor")])  # fmt: skip
     text = str(error.value)
-    assert "outcome.of = 'surface': is no outcome of this scene" in text
-    assert "did you mean 'floor'" in text
+    says(text, "outcome.of = 'surface': is no outcome of this scene", "did you mean 'floor'")
 
 
 def test_until_an_outcome_is_sure_enough():
-    asked = SETTINGS | {
-        "statistics": [lw.statistics.Outcome("floor"), lw.statistics.EndTime("floor", lw.statistics.Mean())]
-    }
+    asked = SETTINGS | {"statistics": [Outcome("floor"), EndTime("floor", Mean())]}
     for watched, half in (("outcome floor", 0.03), ("mean end_time floor", 1.0)):
         result = lw.solve(fleet(4000), **asked, until=lw.Until(watched, half, members=512))
         assert len(result.status) < 4000

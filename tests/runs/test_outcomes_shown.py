@@ -7,7 +7,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from matplotlib.image import imread
 from rerun.chunk import RrdReader
 
 import lgvi_warp as lw
@@ -19,6 +18,8 @@ from lgvi_warp.physics import energy as invariants
 from lgvi_warp.results import outcomes
 from lgvi_warp.views import fleet as looks
 from tests.laws import cases
+from tests.support.refusals import says
+from tests.unit.views.test_recording import rows
 
 GRAVITY = 10.0
 # Neutrally buoyant with M = m I: each goes straight on at its speed, as in test_events, whose kernel this is.
@@ -123,12 +124,6 @@ def test_the_first_in_time_is_named(mixed):
     said = outcomes.failure_text(two).splitlines()
     assert len(said) == 1
     assert said[0].startswith("step_too_large, 2 of 7 members (first: member 2 at 2 s, value 1): the step")
-
-
-def test_a_run_that_all_sink_is_drawn(sunk, tmp_path):
-    lw.plots.summary(sunk, path=tmp_path / "fleet.png")
-    picture = imread(tmp_path / "fleet.png")
-    assert all(third.std() > 0.05 for third in np.array_split(picture[..., :3], 3, axis=1))
 
 
 def test_the_fan_is_of_those_under_way(mixed):
@@ -273,18 +268,6 @@ def entry_of(path):
     return RrdReader(path).recordings()[0]
 
 
-def rows(path, entity, ending):
-    """Time -> value of a component of an entity, frame by frame."""
-    found = {}
-    for chunk in RrdReader(path).stream().filter(content=entity):
-        batch = chunk.to_record_batch()
-        column = next((name for name in batch.schema.names if name.endswith(ending)), None)
-        if column and "sim_time" in batch.schema.names:
-            times = batch.column("sim_time").cast("int64").to_numpy() / 1e9
-            found |= dict(zip(times.tolist(), batch.column(column).to_pylist(), strict=True))
-    return found
-
-
 def test_every_run_has_ids_of_its_own(mixed, sunk, tmp_path):
     again = lw.solve(divers(SPEEDS), h=0.1, t1=20.0, save=lw.SaveAt(every=1.0))
     part = mixed.part(np.array([0, 1]))
@@ -326,24 +309,6 @@ def test_a_recording_shows_each_member_by_its_outcome_from_then_on(mixed, tmp_pa
     assert all(np.isfinite(pose).all() for frames in seen.values() for pose in frames.values())
 
 
-def test_the_curves_of_a_recording_are_of_those_under_way(sunk, mixed, tmp_path):
-    path = lw.record(sunk, tmp_path / "sunk.rrd")
-    median = rows(path, "/curves/height/median", "scalars")
-    assert median[2.0][0] == pytest.approx(-5.0 - 0.65 * 2.0)
-    assert np.isnan(median[15.0][0])
-    middle, variance = (rows(path, "/curves/height/all", ending)[2.0][0] for ending in (":values", "variances"))
-    assert middle - np.sqrt(variance) == pytest.approx(-7.0)
-    assert middle + np.sqrt(variance) == pytest.approx(-5.6)
-    shares = [rows(path, f"/members/{name}", "scalars") for name in ("floor", "under_way")]
-    assert shares[0][20.0] == [100.0]
-    assert shares[1][0.0] == [100.0]
-    assert rows(path, "/curves/energy/median", "scalars")
-    driven = lw.record(acted_on(mixed, ACTING["thrust"][0]), tmp_path / "driven.rrd")
-    said = [text_of(one, "/run/summary") for one in (path, driven)]
-    assert "| energy | drift " in said[0]
-    assert "| energy | not conserved: wrench do work |" in said[1]
-
-
 def test_a_stored_run_is_recorded_in_pieces_as_one_in_memory(mixed, tmp_path, monkeypatch):
     from lgvi_warp.views import choice
 
@@ -374,28 +339,8 @@ def test_statistics_of_all_make_the_fan_where_few_members_were_kept(mixed):
     np.testing.assert_allclose(run.fans[0].levels[[0, -1]], expected[[0, -1]], rtol=1e-6)
     between = (run.fans[0].levels[1:-1] >= expected[0] - 1e-6) & (run.fans[0].levels[1:-1] <= expected[-1] + 1e-6)
     assert between.all()
-    assert run.text == "2 of 7 members"
-    assert run.members.tolist() == [0, 3]
+    assert (run.text, run.members.tolist()) == ("2 of 7 members", [0, 3])
     assert run.shares[Status.FLOOR][-1] == pytest.approx(3 / 7)
-
-
-def text_of(path, entity):
-    """All text of an entity."""
-    return " ".join(
-        str(text)
-        for chunk in RrdReader(path).stream().filter(content=entity)
-        for column in chunk.to_record_batch().columns
-        for text in column.to_pylist()
-    )
-
-
-def test_a_recording_says_what_became_of_the_members(mixed, tmp_path):
-    path = lw.record(mixed, tmp_path / "fleet.rrd")
-    counts = ", ".join(f"{name} {number}" for name, number in mixed.status.counts().items())
-    assert f"| outcome | {counts} |" in text_of(path, "/run/summary")
-    said = text_of(path, "/log")
-    for line in ("floor, 3 of 7 members (first: member 0 at 3 s)", "ok, 2 of 7 members", "first: member 6 at 5 s"):
-        assert line in said
 
 
 SCENE = """
@@ -446,9 +391,7 @@ def test_a_run_that_all_sink_exits_with_0_and_has_its_pictures(scene_file, capsy
     assert "not written" not in errors
     files = sorted(path.name for path in (scene_file.parent / "out").iterdir())
     assert files == ["fleet.png", "fleet.rrd", "result.npz"]
-    assert "status      floor 4" in said
-    assert "drift       energy " in said
-    assert "floor, 4 of 4 members (first: member" in said
+    says(said, "status      floor 4", "drift       energy ", "floor, 4 of 4 members (first: member")
 
 
 def test_members_that_are_kept_since_they_failed_are_drawn(mixed, tmp_path):

@@ -19,6 +19,7 @@ from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.store.block_files import BlockFiles
 from lgvi_warp.store.folder import Folder
 from tests.conftest import ROOT
+from tests.support.refusals import says
 from tests.support.stores import SETTINGS, STATISTICS, fleet, tree
 
 
@@ -102,10 +103,7 @@ def test_the_command(tmp_path, capsys):
 def test_too_little_room_is_said():
     given = dict(members=1, steps=1, blocks=1, threads=1, compile=0.0, set_up=1.0, advance=7300.0, write=10.0)
     text = str(prediction.Prediction(**given, memory=10**10, disk=10**12, free_memory=10**10, free_disk=10**11))
-    assert "2.0 h" in text
-    assert "100% of the memory" in text
-    assert "use --store zarr" in text
-    assert "more than the disk holds" in text
+    says(text, "2.0 h", "100% of the memory", "use --store zarr", "more than the disk holds")
 
 
 def test_statistics_without_samples_take_little(tmp_path):

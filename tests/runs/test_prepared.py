@@ -14,12 +14,15 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.calls import predict, prepared
 from lgvi_warp.calls.prepared import FailedMembers
+from lgvi_warp.designs import Grid, Table, UnitCubePoints
+from lgvi_warp.distributions import Normal, RotationNormal, Uniform
 from lgvi_warp.engine import plan as plans
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.shared import SharedResultsCache
 from lgvi_warp.runs.run import run_plan
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene import ensemble as ensembles
+from lgvi_warp.terms import Current, DragMatrix, Thrusters
 
 pytestmark = pytest.mark.kernel
 
@@ -41,7 +44,7 @@ def numbers(n, seed=0):
 
 def solved(scene, names, X, **settings):
     """The result of solve for the same members."""
-    fleet = lw.Ensemble(scene, None, 0, None, lw.designs.Table(values=dict(zip(names, np.asarray(X).T, strict=True))))
+    fleet = lw.Ensemble(scene, None, 0, None, Table(values=dict(zip(names, np.asarray(X).T, strict=True))))
     return lw.solve(fleet, **settings)
 
 
@@ -76,10 +79,7 @@ def test_columns_may_have_names(paper):
 
 
 def test_members_may_be_drawn(paper):
-    vary = {
-        "vehicle.mass": lw.distributions.Normal(relative=0.01),
-        "start.angular_velocity": lw.distributions.Normal(std=0.1),
-    }
+    vary = {"vehicle.mass": Normal(relative=0.01), "start.angular_velocity": Normal(std=0.1)}
     run = lw.prepare(lw.Ensemble(paper, 40, 7, vary), of="position", **SETTINGS)
     for seed, members in ((None, None), (8, None), (8, 5), (7, 40)):
         fleet = lw.Ensemble(paper, members or 40, 7 if seed is None else seed, vary)
@@ -93,7 +93,7 @@ def test_members_may_be_drawn(paper):
 
 
 def test_another_seed_draws_the_same_members_anew(paper):
-    vary = {"vehicle.mass": lw.distributions.Normal(relative=0.01)}
+    vary = {"vehicle.mass": Normal(relative=0.01)}
     run = lw.prepare(lw.Ensemble(paper, 40, 7, vary).subset([3, 30]), of="position", **SETTINGS)
     for seed in (7, np.int64(8)):
         expected = lw.solve(lw.Ensemble(paper, 40, seed, vary).subset([3, 30]), **SETTINGS).position[-1]
@@ -103,7 +103,7 @@ def test_another_seed_draws_the_same_members_anew(paper):
 
 
 def test_common_noise_leaves_the_ensemble_as_it_is(paper):
-    fleet = lw.Ensemble(paper, 3, 0, {"vehicle.mass": lw.distributions.Normal(relative=0.01)})
+    fleet = lw.Ensemble(paper, 3, 0, {"vehicle.mass": Normal(relative=0.01)})
     lw.prepare(fleet, of="position", common_noise=True, **SETTINGS)()
     np.testing.assert_array_equal(fleet.indices, [0, 1, 2])
 
@@ -118,11 +118,8 @@ def test_given_states_are_not_drawn(paper):
 
 
 def test_columns_that_a_sampling_has_are_not_dropped(paper):
-    vary = {"vehicle.buoyancy": lw.distributions.Normal(relative=0.01)}
-    for sampling in (
-        lw.designs.Table(values={"vehicle.mass": np.full(4, 120.0)}),
-        lw.designs.Grid({"vehicle.mass": [120.0, 121.0]}),
-    ):
+    vary = {"vehicle.buoyancy": Normal(relative=0.01)}
+    for sampling in (Table(values={"vehicle.mass": np.full(4, 120.0)}), Grid({"vehicle.mass": [120.0, 121.0]})):
         run = lw.prepare(lw.Ensemble(paper, None, 0, vary, sampling), of="position", **SETTINGS)
         assert len(run()) in (2, 4)
         with pytest.raises(lw.SceneError, match=r"X: .*vehicle\.mass"):
@@ -130,10 +127,7 @@ def test_columns_that_a_sampling_has_are_not_dropped(paper):
 
 
 def test_levels_stand_for_distributions(paper):
-    vary = {
-        "vehicle.mass": lw.distributions.Normal(relative=0.01),
-        "start.attitude": lw.distributions.RotationNormal(std=0.1),
-    }
+    vary = {"vehicle.mass": Normal(relative=0.01), "start.attitude": RotationNormal(std=0.1)}
     run = lw.prepare(paper, vary, of="position", levels=True, **SETTINGS)
     X = np.random.default_rng(0).random((6, len(run.names)))
     space = lw.Ensemble(paper, 1, 0, vary).space
@@ -142,7 +136,7 @@ def test_levels_stand_for_distributions(paper):
         f"{label} {i}" if len(columns) > 1 else label for label, columns in space.factors for i in range(len(columns))
     ]
     cube[:, [order.index(name) for name in run.names]] = X
-    fleet = lw.Ensemble(paper, None, 0, vary, lw.designs.UnitCubePoints(cube))
+    fleet = lw.Ensemble(paper, None, 0, vary, UnitCubePoints(cube))
     np.testing.assert_array_equal(run(X), lw.solve(fleet, **SETTINGS).position[-1])
     with pytest.raises(lw.SceneError, match="level"):
         run(X + 1.0)
@@ -192,19 +186,17 @@ def test_unphysical_numbers_are_refused(paper):
 
 def test_whole_numbers_are_refused_with_the_name_of_an_entry(paper):
     for name, entry in (("start.position", "start.position[0]"), ("drag_matrix.linear", "drag_matrix.linear[0,0]")):
-        scene = lw.Scene(
-            paper.vehicle, paper.environment, terms=[lw.terms.DragMatrix(linear=np.eye(6))], start=paper.start
-        )
+        scene = lw.Scene(paper.vehicle, paper.environment, terms=[DragMatrix(linear=np.eye(6))], start=paper.start)
         with pytest.raises(lw.SceneError, match=rf'such as "{re.escape(entry)}"'):
             lw.prepare(scene, [name], of="depth", **SETTINGS)
-        lw.Ensemble(scene, 1, 0, {entry: lw.distributions.Uniform(1.0, 2.0)})
+        lw.Ensemble(scene, 1, 0, {entry: Uniform(1.0, 2.0)})
 
 
 def test_other_members_may_need_another_kernel():
     """A term that no member feels is in no kernel, and an isotropic mass matrix has code of its own."""
     scene = lw.Scene(lw.Vehicle(mass=10.0, added_mass=[0.0, 0.0, 0.0], inertia=[1.0, 2.0, 3.0]),
                      start=lw.Start(velocity=[1.0, 0.2, 0.1], angular_velocity=[0.1, 0.2, 0.3]),
-                     terms=[lw.terms.Current(velocity=[0.0, 0.0, 0.0])])  # fmt: skip
+                     terms=[Current(velocity=[0.0, 0.0, 0.0])])  # fmt: skip
     names = ["current.velocity[0]", "vehicle.added_mass[1,1]"]
     run = lw.prepare(scene, names, of="position", **SHORT)
     for X in ([[0.0, 0.0]], [[0.5, 0.0]], [[0.0, 3.0]], [[0.0, 0.0], [0.5, 3.0]], [[0.0, 0.0]]):
@@ -320,15 +312,11 @@ def test_packets_take_members_whose_laws_have_other_rows(columns):
     """Turned axes: a drag matrix has as many rows as some member has columns, and the thrusters' rows come after them."""
     inertia = [[1.0, 0.1, 0.0], [0.1, 2.0, 0.2], [0.0, 0.2, 2.5]]
     vehicle = lw.Vehicle(mass=10.0, added_mass=[1.0, 2.0, 3.0], inertia=inertia)
-    thrusters = lw.terms.Thrusters(
-        position=[[-0.5, 0.2, 0.0]], direction=[[1.0, 0.0, 0.0]], coefficient=[20.0], command=[0.5]
-    )
-    drag = lw.terms.DragMatrix(linear=np.eye(6), quadratic=np.diag([10.0, 20.0, 0.0, 1.0, 2.0, 0.0]))
+    thrusters = Thrusters(position=[[-0.5, 0.2, 0.0]], direction=[[1.0, 0.0, 0.0]], coefficient=[20.0], command=[0.5])
+    drag = DragMatrix(linear=np.eye(6), quadratic=np.diag([10.0, 20.0, 0.0, 1.0, 2.0, 0.0]))
     scene = lw.Scene(vehicle, terms=[drag, thrusters], start=lw.Start(velocity=[1.0, 0.2, 0.1]))
     names = ["drag_matrix.quadratic[2,2]", "drag_matrix.quadratic[5,5]"]
-    fleet = lw.Ensemble(
-        scene, None, 0, None, lw.designs.Table(values={name: np.linspace(0.0, 5.0, 6) for name in names})
-    )
+    fleet = lw.Ensemble(scene, None, 0, None, Table(values={name: np.linspace(0.0, 5.0, 6) for name in names}))
     plan = make_plan(fleet, "psi_x", **SHORT)
     few, more = [np.zeros((6, 2)) for _ in range(2)]
     more[:, [names.index(f"drag_matrix.quadratic[{j},{j}]") for j in columns]] = 3.0
@@ -353,13 +341,7 @@ def late(scene, members, odd, values):
                     found[name] = column
             return found
 
-    return Late(
-        scene,
-        members,
-        0,
-        {"vehicle.mass": lw.distributions.Normal(std=1e-3)}
-        | {name: lw.distributions.Normal(std=0.0) for name in values},
-    )
+    return Late(scene, members, 0, {"vehicle.mass": Normal(std=1e-3)} | {name: Normal(std=0.0) for name in values})
 
 
 @pytest.fixture
@@ -372,7 +354,7 @@ def surveyed(monkeypatch):
 def drifting():
     """Members of which one alone, the 500th, has a current."""
     scene = lw.Scene(lw.Vehicle(mass=10.0, added_mass=[0.0, 1.0, 2.0], inertia=[1.0, 2.0, 3.0]),
-                     start=lw.Start(velocity=[1.0, 0.2, 0.1]), terms=[lw.terms.Current(velocity=[0.0, 0.0, 0.0])])  # fmt: skip
+                     start=lw.Start(velocity=[1.0, 0.2, 0.1]), terms=[Current(velocity=[0.0, 0.0, 0.0])])  # fmt: skip
     return late(scene, 600, 500, {"current.velocity": [0.5, 0.0, 0.0]})
 
 
@@ -423,7 +405,7 @@ def test_a_late_member_that_is_unphysical_is_named(paper, surveyed):
 
 def test_late_members_of_a_scene_file_are_looked_at(paper, surveyed):
     """A file's ensemble is checked when it is read and not again; but its late members as the run comes to them."""
-    vary = {"vehicle.buoyancy": lw.distributions.Normal(mean=1215.8, std=390.0).to_dict()}
+    vary = {"vehicle.buoyancy": Normal(mean=1215.8, std=390.0).to_dict()}
     for seed in range(50):
         ensemble = {"members": 600, "seed": seed, "vary": vary}
         try:
@@ -439,14 +421,14 @@ def test_late_members_of_a_scene_file_are_looked_at(paper, surveyed):
 
 def test_an_early_member_that_is_unphysical_is_counted_among_those_looked_at(paper, surveyed):
     with pytest.raises(lw.SceneError, match=r"of the 256 members that were looked at"):
-        lw.Ensemble(paper, 600, 0, {"vehicle.mass": lw.distributions.Normal(std=100.0)})
+        lw.Ensemble(paper, 600, 0, {"vehicle.mass": Normal(std=100.0)})
 
 
 def test_a_hundred_million_members_are_planned_at_once(paper):
     """Nothing has as many entries as there are members: 800 MB each in float64."""
     tracemalloc.start()
     try:
-        fleet = lw.Ensemble(paper, 10**8, 1, {"vehicle.mass": lw.distributions.Normal(relative=0.001)})
+        fleet = lw.Ensemble(paper, 10**8, 1, {"vehicle.mass": Normal(relative=0.001)})
         make_plan(fleet, h=0.01, t1=0.2, survey_all=False)
         assert tracemalloc.get_traced_memory()[1] < 100e6
     finally:

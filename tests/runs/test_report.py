@@ -12,6 +12,7 @@ import pytest
 import lgvi_warp as lw
 from lgvi_warp.cli.command import main
 from tests.conftest import ROOT
+from tests.support.refusals import says
 
 DEPTH = 101.0
 
@@ -96,9 +97,7 @@ def test_of_a_study(tmp_path):
     page = Page(text)
     assert page.loads == ["data:image/png;base64,iVBORw=="]
     assert text.count("<tr>") == 201
-    assert "The first 200 of 300 rows" in text
-    assert "ns &lt;&amp;&gt;" in text
-    assert "&quot;seed&quot;: 3" in text
+    says(text, "The first 200 of 300 rows", "ns &lt;&amp;&gt;", "&quot;seed&quot;: 3")
 
 
 def test_what_is_no_run(tmp_path, capsys):

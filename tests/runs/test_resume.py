@@ -8,7 +8,7 @@ import time
 import pytest
 
 import lgvi_warp as lw
-from tests.support.stores import differing, fleet, forked
+from tests.support.stores import differing, finished, fleet, forked, killed_after
 
 
 # Blocks on one thread, chunks of about 50 samples: long enough to be hit in the middle of all that happens.
@@ -61,11 +61,6 @@ def killed(path, seconds):
     return process.exitcode != 0
 
 
-def finished(path):
-    """Blocks that are marked."""
-    return len(list((path / "blocks").glob("*.json"))) if path.exists() else 0
-
-
 def goes_on(path, whole, members=4096):
     """Finish a run by lw.resume, or start it again where it had not begun; compare all files."""
     if path.exists():
@@ -79,23 +74,12 @@ def goes_on(path, whole, members=4096):
     shutil.rmtree(path)
 
 
-def killed_after(path, blocks, delay, members):
-    """Start the run and kill it a moment after so many blocks are marked. Whether it was hit before its end."""
-    process = start(path, members=members)
-    while finished(path) < blocks and process.is_alive():
-        time.sleep(0.002)
-    time.sleep(delay)
-    process.kill()
-    process.join()
-    return process.exitcode != 0
-
-
 def test_three_kills(short, tmp_path):
     path, dice = tmp_path / "run.zarr", random.Random(3)
     for blocks in (1, 2, 4):
         # Blocks are marked in groups: on a busy machine the last of them may be marked before the kill arrives.
         for _ in range(5):
-            hit = killed_after(path, blocks, dice.uniform(0.0, 0.02), 2048)
+            hit = killed_after(path, blocks, dice.uniform(0.0, 0.02), run, 1, 2048)
             if in_middle := hit and 0 < finished(path) < 8:
                 break
             shutil.rmtree(path)
@@ -116,7 +100,7 @@ def test_twenty_kills_at_random_moments(whole, tmp_path):
         if i < 10:
             hit = killed(tmp_path / "run.zarr", dice.uniform(0.0, 1.05 * (before + after)))
         else:
-            hit = killed_after(tmp_path / "run.zarr", dice.randrange(15), dice.uniform(0.0, 0.1), 4096)
+            hit = killed_after(tmp_path / "run.zarr", dice.randrange(15), dice.uniform(0.0, 0.1), run, 1, 4096)
         found.append((hit, finished(tmp_path / "run.zarr")))
         goes_on(tmp_path / "run.zarr", path)
     assert sum(hit and 0 < count < 16 for hit, count in found) >= 5
@@ -126,7 +110,7 @@ def test_twenty_kills_at_random_moments(whole, tmp_path):
 def test_killed_again_and_again(whole, tmp_path):
     """Each attempt is killed after two more blocks or a few more; the run still ends, with the same bytes."""
     here, kills = tmp_path / "run.zarr", 0
-    while killed_after(here, finished(here) + 2, 0.0, 4096):
+    while killed_after(here, finished(here) + 2, 0.0, run, 1, 4096):
         kills += 1
         assert kills < 10
     assert kills >= 3

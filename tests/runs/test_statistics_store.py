@@ -18,6 +18,7 @@ from lgvi_warp.store.folder import Folder
 from lgvi_warp.store.solve import request_of
 from lgvi_warp.store.state import state
 from tests.conftest import ROOT
+from tests.support.refusals import says
 from tests.support.stores import SETTINGS, STATISTICS, UNTIL, bits, differing, fleet, forked, markers, tree
 
 
@@ -138,8 +139,7 @@ def test_until_stops_a_store_at_the_same_block(stopped, tmp_path):
     for one in (stored, lw.open_run(stopped)):
         assert one.members == memory.members
         assert bits(one) == bits(memory)
-        assert one.messages == memory.messages
-        assert one.provenance["members"] == memory.members
+        assert (one.messages, one.provenance["members"]) == (memory.messages, memory.members)
         assert one.position.tobytes() == memory.position.tobytes()
     assert lw.open_run(stopped).dataset.sizes["realization"] == memory.members
     with pytest.raises(IndexError, match=f"of {memory.members}"):
@@ -185,19 +185,16 @@ def test_the_command_restores_the_statistics_of_the_scene(tmp_path, capsys):
     options = ["--members", "1003", "--duration", "1", "--store", "zarr", "--out", str(tmp_path)]
     assert cli.main(["run", str(tmp_path / "scene.toml"), *options]) == 0
     before, said = tree(tmp_path / "run.zarr"), capsys.readouterr().out
-    assert "mean position" in said
-    assert "reached with 256 members" in said
+    says(said, "mean position", "reached with 256 members")
     (tmp_path / "run.zarr/blocks/000000000.json").unlink()
     (tmp_path / "statistics.png").unlink()
     assert cli.main(["resume", str(tmp_path)]) == 0
     said = capsys.readouterr().out
-    assert "mean position" in said
-    assert "reached with 256 members" in said
+    says(said, "mean position", "reached with 256 members")
     assert (tmp_path / "statistics.png").exists()
     assert tree(tmp_path / "run.zarr") == before
     assert cli.main(["info", str(tmp_path)]) == 0
-    assert "statistics of each block" in (said := capsys.readouterr().out)
-    assert "1 of 1 finished; complete" in said
+    says(capsys.readouterr().out, "statistics of each block", "1 of 1 finished; complete")
 
 
 def shallow(samples, members):
@@ -285,8 +282,7 @@ def test_the_plan_of_a_store_is_the_plan_of_the_run(vary, sampling, chosen, tmp_
     create(lw.Store(tmp_path / "run.zarr"), plan, provenance(plan), messages(plan))
     for again in (request_of(Folder(tmp_path / "run.zarr")).plan(), pickle.loads(pickle.dumps(plan))):
         assert known(again) == known(plan)
-        assert again.method == plan.method
-        assert again.spec == plan.spec
+        assert (again.method, again.spec) == (plan.method, plan.spec)
         one, other = again.ensemble.select(0, members.members), members.select(0, members.members)
         for name in ("position", "attitude", "velocity", "angular_velocity", "indices"):
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name))

@@ -31,6 +31,7 @@ from lgvi_warp.store.run import StoredRun
 from lgvi_warp.store.state import state
 from tests.conftest import ROOT
 from tests.support.disks import Disk, full, refused
+from tests.support.refusals import says
 from tests.support.stores import MEMBERS, SETTINGS, differing, fleet, markers, tree
 
 FIELDS = ("position", "attitude", "velocity", "angular_velocity")
@@ -181,8 +182,7 @@ def test_time_chunks_come_together(tmp_path, memory):
 def test_float32_and_fewer_fields(tmp_path, memory):
     chosen = lw.Store(tmp_path / "run.zarr", dtype="float32", fields=("position",))
     result = lw.solve(fleet(), **SETTINGS, store=chosen)
-    assert list(result.samples) == ["position"]
-    assert result.position.dtype == np.float32
+    assert (list(result.samples), result.position.dtype) == (["position"], np.float32)
     np.testing.assert_array_equal(result.position, memory.position.astype(np.float32))
     with pytest.raises(AttributeError, match="velocity was not kept"):
         _ = result.velocity
@@ -236,11 +236,7 @@ def test_bad_settings_are_refused_at_once(tmp_path):
     with pytest.raises(lw.SceneError) as refused:
         lw.Store(tmp_path / "run", dtype="float16", fields=("speed",), existing="keep")
     text = str(refused.value)
-    assert "4 faults" in text
-    assert ".zarr" in text
-    assert "float16" in text
-    assert "speed" in text
-    assert "keep" in text
+    says(text, "4 faults", ".zarr", "float16", "speed", "keep")
 
 
 def test_a_run_in_use_is_left_alone(copy):
@@ -639,8 +635,7 @@ def test_a_file_that_may_not_grow_is_told_as_a_full_disk(tmp_path, capsys):
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     text = capsys.readouterr().err
-    assert "File too large: the blocks that were finished are kept" in text
-    assert "run.zarr" in text
+    says(text, "File too large: the blocks that were finished are kept", "run.zarr")
 
 
 def test_too_small_a_disk_is_refused_before_the_run(tmp_path, monkeypatch):
@@ -727,8 +722,7 @@ def test_keepers_that_cannot_be_stored_are_refused(tmp_path):
     named = [DepthSum(plan), DepthSum(plan), object()]
     with pytest.raises(lw.SceneError) as refused:
         StoredRun(plan, lw.Store(tmp_path / "a.zarr"), {}, (), tuple(named)).run(Threads(1))
-    assert "to_arrays" in str(refused.value)
-    assert "'depth sum'" in str(refused.value)
+    says(str(refused.value), "to_arrays", "'depth sum'")
 
 
 @pytest.mark.filterwarnings("ignore:numpy.ndarray size changed")
@@ -738,8 +732,7 @@ def test_netcdf(whole, memory, tmp_path):
     path = lw.export(whole, "netcdf", tmp_path / "run.nc")
     with xarray.open_dataset(path, engine="netcdf4") as dataset:
         np.testing.assert_array_equal(dataset.attitude.values, memory.attitude)
-        assert dataset.position.attrs["units"] == "m"
-        assert dataset.attrs["Conventions"] == "CF-1.11"
+        assert (dataset.position.attrs["units"], dataset.attrs["Conventions"]) == ("m", "CF-1.11")
         assert dataset.status.values.dtype == np.uint8
         assert json.loads(dataset.attrs["provenance"])["steps"] == 300
     assert [one.name for one in tmp_path.iterdir()] == ["run.nc"]

@@ -168,9 +168,7 @@ def shrunk(z, steps):
 
 
 @pytest.mark.parametrize("kept", [
-    {},
-    {"keep": "none", "statistics": [lw.statistics.Mean("position")]},
-    {"keep": [1]},
+    {}, {"keep": "none", "statistics": [lw.statistics.Mean("position")]}, {"keep": [1]},
     {"save": lw.SaveAt(every=12.8)},
 ])  # fmt: skip
 def test_an_attitude_that_is_no_rotation_is_told_by_default(kept):

@@ -155,8 +155,7 @@ def test_a_part_and_a_state_space():
     surge = linear.part(("position[0]", "velocity[0]", "control_wrench.place[0]"), ("control_wrench[0]",))
     system = surge.state_space()
     assert isinstance(system, control.StateSpace)
-    assert system.dt == PERIOD
-    assert system.nstates == 3
+    assert (system.dt, system.nstates) == (PERIOD, 3)
     np.testing.assert_array_equal(system.A, surge.A)
     assert linear.part(("velocity",)).states == ("velocity[0]", "velocity[1]", "velocity[2]")
     with pytest.raises(lw.SceneError, match="velocities"):

@@ -2,18 +2,21 @@
 """Margins of loops: beside those of the sampled system written by hand, and by runs in lanes; one kernel."""
 
 import dataclasses
-import re
 
 import numpy as np
 import pytest
 
 import lgvi_warp as lw
+from lgvi_warp.control import AllocationMatrix, DepthPID, HeadingPID, Sensor, SetPoint, SpeedPID
 from lgvi_warp.control.loop_gain import FACTOR
+from lgvi_warp.distributions import Choice, Uniform
 from lgvi_warp.scene.settings import RunSettings
 from lgvi_warp.studies.linear import loops as study
 from lgvi_warp.studies.linear.edges import edges
 from lgvi_warp.studies.linear.sampled_loop import DELAY, SampledLoop
-from tests.conftest import ROOT
+from lgvi_warp.terms import ControlWrench, Drag, Thrusters
+from tests.support.pages import blocks
+from tests.support.refusals import says
 from tests.support.unsettled_loops import LOOPS, STEP, fleet_of
 
 J, PERIOD, H, EVERY = 11.0, 0.1, 0.02, 5
@@ -22,22 +25,22 @@ MEMBERS = 6
 
 def scene(delay=0.0, laws=(), **gains):
     """A neutral body that turns its head."""
-    law = lw.control.HeadingPID(**{"kp": 6.0, "ki": 0.8, "kd": 9.0} | gains)
+    law = HeadingPID(**{"kp": 6.0, "ki": 0.8, "kd": 9.0} | gains)
     controller = lw.Controller(
-        period=PERIOD, delay=delay, guidance=[lw.control.SetPoint(heading=0.0)], laws=[law, *laws],
-        allocation=[lw.control.AllocationMatrix(to="control_wrench", matrix=np.eye(6))])  # fmt: skip
+        period=PERIOD, delay=delay, guidance=[SetPoint(heading=0.0)], laws=[law, *laws],
+        allocation=[AllocationMatrix(to="control_wrench", matrix=np.eye(6))])  # fmt: skip
     vehicle = lw.Vehicle(
         20.0, inertia=(5.0, 8.0, J), added_mass=(0.0, 0.0, 0.0), buoyancy=200.0, center_of_buoyancy=(0.0, 0.0, 0.0)
     )
-    return lw.Scene(vehicle, lw.Environment(10.0), [lw.terms.ControlWrench()], controller=controller)
+    return lw.Scene(vehicle, lw.Environment(10.0), [ControlWrench()], controller=controller)
 
 
 @pytest.fixture(scope="module")
 def fleet():
     vary = {
-        "heading_pid.kp": lw.distributions.Uniform(4.0, 8.0), "heading_pid.kd": lw.distributions.Uniform(7.0, 12.0),
-        "heading_pid.ki": lw.distributions.Uniform(0.4, 1.2),
-        "controller.delay": lw.distributions.Choice([0.0, 0.06, 0.12])}  # fmt: skip
+        "heading_pid.kp": Uniform(4.0, 8.0), "heading_pid.kd": Uniform(7.0, 12.0),
+        "heading_pid.ki": Uniform(0.4, 1.2),
+        "controller.delay": Choice([0.0, 0.06, 0.12])}  # fmt: skip
     return lw.Ensemble(scene(delay=0.06), MEMBERS, 5, vary)
 
 
@@ -136,8 +139,7 @@ def test_a_distribution(found):
     assert found.members == MEMBERS
     assert found.worst(1)[0] == np.argmin(found.values["gain_upper"])
     assert found.worst(1, "gain_lower")[0] == np.argmax(found.values["gain_lower"])
-    assert "gain_upper" in str(found)
-    assert "delay s" in str(found)
+    says(str(found), "gain_upper", "delay s")
 
 
 def test_a_loop_that_does_not_settle_has_no_margins():
@@ -145,8 +147,7 @@ def test_a_loop_that_does_not_settle_has_no_margins():
         scene(delay=0.06), np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), np.zeros((2, 3)), np.zeros((2, 3)),
         {"heading_pid.kd": np.array([9.0, 2.1 * J / PERIOD])})  # fmt: skip
     found = lw.linear.margins(loops, None, "gain", about=1.0, method="psi_s", h=H)
-    assert found.steady.tolist() == [True, False]
-    assert found.loop == "all laws"
+    assert (found.steady.tolist(), found.loop) == ([True, False], "all laws")
     assert np.isnan(found.values["gain_upper"][1])
     assert np.isfinite(found.values["gain_upper"][0])
     assert found.why.tolist() == ["", "does not settle"]
@@ -174,9 +175,7 @@ def test_edges_beside_known_ones():
     found = edges(holds, start, last, guess, 1e-3)
     middle = np.sqrt(found[4:, 0] * found[4:, 1])
     np.testing.assert_allclose(middle, true[4:], rtol=1e-3)
-    assert found[0, 1] == np.inf
-    assert found[1, 1] == 0.0
-    assert found[2, 1] == np.inf
+    assert (found[0, 1], found[1, 1], found[2, 1]) == (np.inf, 0.0, np.inf)
     assert np.isnan(found[3]).all()
     counts = rng.integers(0, 100, 50).astype(float)
     inside = edges(
@@ -221,7 +220,7 @@ def test_scenes_without_margins():
     with pytest.raises(lw.SceneError, match="has no controller"):
         lw.linear.margins(dataclasses.replace(scene(), controller=None), h=H)
     whole = scene()
-    noisy = dataclasses.replace(whole.controller, sensors=[lw.control.Sensor(of="heading", noise=0.1)])
+    noisy = dataclasses.replace(whole.controller, sensors=[Sensor(of="heading", noise=0.1)])
     with pytest.raises(lw.SceneError, match=r"sensor\.noise.*has no linear model"):
         lw.linear.margins(dataclasses.replace(whole, controller=noisy), h=H)
 
@@ -230,10 +229,10 @@ def autopilot():
     """REMUS 100, ballasted, on a straight way."""
     start = lw.Start(velocity=(1.54, 0.0, 0.0))
     controller = lw.Controller(
-        period=0.1, guidance=[lw.control.SetPoint(heading=0.0, depth=0.0)],
-        laws=[lw.control.HeadingPID(kp=1.0, kd=2.0, ki=0.02),
-              lw.control.DepthPID(kp=0.1, ki=0.001, kp_pitch=5.0, ki_pitch=0.3, kd_pitch=2.0, pitch_limit=0.5)],
-        allocation=[lw.control.AllocationMatrix(to="control_fins",
+        period=0.1, guidance=[SetPoint(heading=0.0, depth=0.0)],
+        laws=[HeadingPID(kp=1.0, kd=2.0, ki=0.02),
+              DepthPID(kp=0.1, ki=0.001, kp_pitch=5.0, ki_pitch=0.3, kd_pitch=2.0, pitch_limit=0.5)],
+        allocation=[AllocationMatrix(to="control_fins",
                                                 matrix=[[0, 0, 0, 0, 0, -1], [0, 0, 0, 0, -1, 0]])])  # fmt: skip
     run = RunSettings(method="psi_x", step=0.01, duration=20.0, save_every=1.0)
     return lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0}, start=start, controller=controller, run=run)
@@ -244,12 +243,7 @@ def autopilot():
 def test_a_factor_of_1_changes_nothing(loop):
     """Laws with integrals of their own, whose demands are added: the factor is that of one, or of both."""
     scene = dataclasses.replace(autopilot(), start=lw.Start(velocity=(1.54, 0.0, 0.0), position=(0.0, 0.0, 1.0)))
-    fleet = lw.Ensemble(
-        scene,
-        3,
-        1,
-        {"heading_pid.ki": lw.distributions.Uniform(0.1, 0.3), "depth_pid.ki": lw.distributions.Uniform(0.01, 0.03)},
-    )
+    fleet = lw.Ensemble(scene, 3, 1, {"heading_pid.ki": Uniform(0.1, 0.3), "depth_pid.ki": Uniform(0.01, 0.03)})
     members = study.Study(fleet, loop, 20.0, 20.0, 10.0, 1e-3, None, 0.01)
     numbers = {FACTOR: np.ones(3), DELAY: np.zeros(3)}
     motion = members.bench.run(np.arange(3), None, 0, members.begin, numbers)
@@ -261,7 +255,7 @@ def test_a_factor_of_1_changes_nothing(loop):
 
 @pytest.mark.slow
 def test_the_heading_loop_of_remus():
-    vary = {"heading_pid.kp": lw.distributions.Uniform(0.7, 1.3), "heading_pid.kd": lw.distributions.Uniform(1.5, 3.0)}
+    vary = {"heading_pid.kp": Uniform(0.7, 1.3), "heading_pid.kd": Uniform(1.5, 3.0)}
     found = lw.linear.margins(lw.Ensemble(autopilot(), 64, 1, vary), "heading_pid", by=("eigenvalues", "runs"))
     assert found.steady.all()
     for name in ("gain_lower", "gain_upper"):
@@ -270,14 +264,14 @@ def test_the_heading_loop_of_remus():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", ["controllers/margins.md", "guide/worst_case.md"])
+@pytest.mark.parametrize("page", ["docs/controllers/margins.md", "docs/guide/worst_case.md"])
 def test_the_snippets_of_a_page(page, tmp_path, monkeypatch):
     pytest.importorskip("control")
     monkeypatch.chdir(tmp_path)
     names = {"lw": lw, "autopilot": autopilot(), "scene": autopilot()}
     # In a page's ensembles are more members, and budgets are larger, than a test needs.
     short = {"256": "8", "200": "4", "20_000": "200", "save=lw": "budget=300, save=lw"}
-    for text in re.findall(r"```python\n(.*?)```", (ROOT / "docs" / page).read_text(), re.DOTALL):
+    for text in blocks(page, "python"):
         for long, brief in short.items():
             text = text.replace(long, brief)
         exec(text, names)
@@ -321,10 +315,11 @@ def test_loops_that_settle_have_margins(vehicle):
 def sampled(limit=49.85, heading=0.0, most=1e6, **gains):
     """A heading loop of 0.05 s whose gain limit is known: of a double integrator with kp, kd it is 2 J / (T kd)."""
     one = scene(kp=6.0, ki=0.0, kd=2.0 * J / (0.05 * limit), **gains)
-    controller = dataclasses.replace(one.controller, period=0.05, guidance=[lw.control.SetPoint(heading=heading)])
-    return dataclasses.replace(one, controller=controller, terms=[lw.terms.ControlWrench(limit=[most] * 6)])
+    controller = dataclasses.replace(one.controller, period=0.05, guidance=[SetPoint(heading=heading)])
+    return dataclasses.replace(one, controller=controller, terms=[ControlWrench(limit=[most] * 6)])
 
 
+@pytest.mark.slow_for("240.0-1e-05-*", "900.0-*")
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize(("seconds", "tilt", "heading", "most"), [
     (60.0, 1e-3, 0.0, 1e6), (240.0, 1e-3, 0.8, 5.0), (240.0, 1e-5, 0.0, 1e6), (900.0, 1e-3, 0.8, 1e6),
@@ -345,9 +340,7 @@ def test_a_gain_limit_that_is_known_for_any_length_of_runs_heading_and_limit(sec
 
 def test_runs_judge_swings_by_angles_and_not_by_parts_of_limits():
     """A demand of 60 N m/rad at factors up to 5 is 60 tilts of a limit of 5 N m: small all the same, since it shrinks."""
-    one = dataclasses.replace(
-        scene(delay=0.06, kp=60.0, ki=0.0, kd=20.0), terms=[lw.terms.ControlWrench(limit=[5.0] * 6)]
-    )
+    one = dataclasses.replace(scene(delay=0.06, kp=60.0, ki=0.0, kd=20.0), terms=[ControlWrench(limit=[5.0] * 6)])
     expected = edge(lambda g: radius(60.0, 0.0, 20.0, g, 3) < study.SHRINKS ** (PERIOD / 80.0), 1.0, 100.0)
     for seconds in (240.0, 900.0):
         found = lw.linear.margins(one, None, "gain", by="runs", seconds=seconds, method="psi_s", h=H)
@@ -355,6 +348,7 @@ def test_runs_judge_swings_by_angles_and_not_by_parts_of_limits():
         assert found.by_runs["gain_upper"][0] == pytest.approx(expected, rel=3e-3 if seconds == 240.0 else 1e-2)
 
 
+@pytest.mark.slow_for("0.3076565-*")
 @pytest.mark.parametrize(("kp", "ki", "kd", "drag", "steps", "most", "tilt"), [
     # Beyond the limit a swing that starts from 1e-5 rad wraps around, where its last third is by chance below its second.
     (5.1206017, 0.0, 1.5507809, 1.4798703, 13, 7920.0, 1e-5),
@@ -365,7 +359,7 @@ def test_runs_judge_swings_by_angles_and_not_by_parts_of_limits():
 def test_swings_that_wrap_and_slow_integrals(kp, ki, kd, drag, steps, most, tilt):
     assert radius(kp, ki, kd, 49.84, steps, 0.05, drag) < 1.0 < radius(kp, ki, kd, 49.86, steps, 0.05, drag)
     one = scene(delay=0.01 * steps, kp=kp, ki=ki, kd=kd)
-    acting = [lw.terms.ControlWrench(limit=[most] * 6), lw.terms.Drag(linear=[drag] * 6)]
+    acting = [ControlWrench(limit=[most] * 6), Drag(linear=[drag] * 6)]
     one = dataclasses.replace(one, controller=dataclasses.replace(one.controller, period=0.05), terms=acting)
     found = lw.linear.margins(one, "heading_pid", "gain", by=("eigenvalues",), tilt=tilt, method="rk4", h=0.01)
     by_runs = lw.linear.margins(one, "heading_pid", "gain", by="runs", tilt=tilt, method="rk4", h=0.01).by_runs
@@ -382,7 +376,7 @@ def test_saturated_members_whose_sampled_loop_grows_are_never_steady():
     radii = np.array([radius(*each, 1.0, 0) for each in zip(gains["kp"], gains["ki"], gains["kd"], strict=True)])
     spins, eye, zero = rng.normal(0.0, 0.1, (n, 3)), np.tile(np.eye(3), (n, 1, 1)), np.zeros((n, 3))
     numbers = {f"heading_pid.{name}": values for name, values in gains.items()}
-    one = dataclasses.replace(scene(), terms=[lw.terms.ControlWrench(limit=[2.0] * 6)])
+    one = dataclasses.replace(scene(), terms=[ControlWrench(limit=[2.0] * 6)])
     fleet = lw.Ensemble.from_states(one, zero, eye, zero, spins * [0.0, 0.0, 1.0], numbers)
     assert (radii > 1.0).sum() > n / 4
     assert (radii < 0.99).any()
@@ -395,21 +389,16 @@ def test_saturated_members_whose_sampled_loop_grows_are_never_steady():
 
 
 def turning(terms, allocation, laws=(), **wanted):
-    guidance = [lw.control.SetPoint(heading=0.3, **wanted)]
-    law = lw.control.HeadingPID(kp=6.0, kd=9.0)
+    guidance = [SetPoint(heading=0.3, **wanted)]
+    law = HeadingPID(kp=6.0, kd=9.0)
     controller = lw.Controller(period=PERIOD, guidance=guidance, laws=[law, *laws], allocation=[allocation])
     return dataclasses.replace(scene(), terms=terms, controller=controller)
 
 
 def test_members_at_a_limit_and_members_that_fail_are_named():
     """A speed that drag does not allow: 1 N against 10 N s/m makes 0.1 m/s."""
-    acting = [lw.terms.ControlWrench(limit=[1.0] * 5 + [50.0]), lw.terms.Drag(linear=[10.0] * 3 + [1.0] * 3)]
-    one = turning(
-        acting,
-        lw.control.AllocationMatrix(to="control_wrench", matrix=np.eye(6)),
-        [lw.control.SpeedPID(kp=20.0)],
-        speed=0.5,
-    )
+    acting = [ControlWrench(limit=[1.0] * 5 + [50.0]), Drag(linear=[10.0] * 3 + [1.0] * 3)]
+    one = turning(acting, AllocationMatrix(to="control_wrench", matrix=np.eye(6)), [SpeedPID(kp=20.0)], speed=0.5)
     zero, eye = np.zeros((3, 3)), np.tile(np.eye(3), (3, 1, 1))
     spins = zero.copy()
     spins[2] = 5.0 / H
@@ -423,13 +412,10 @@ def test_members_at_a_limit_and_members_that_fail_are_named():
 
 
 def test_a_loop_within_a_dead_band_moves_nothing():
-    pushes = lw.terms.Thrusters(position=[[0.0, 0.3, 0.0], [0.0, -0.3, 0.0]], direction=[[1.0, 0.0, 0.0]] * 2,
+    pushes = Thrusters(position=[[0.0, 0.3, 0.0], [0.0, -0.3, 0.0]], direction=[[1.0, 0.0, 0.0]] * 2,
                           coefficient=[40.0] * 2, dead_band=[0.1] * 2, limit=[1.0] * 2)  # fmt: skip
     matrix = [[0, 0, 0, 0, 0, -0.1], [0, 0, 0, 0, 0, 0.1]]
-    one = turning(
-        [pushes, lw.terms.Drag(linear=[10.0] * 3 + [1.0] * 3)],
-        lw.control.AllocationMatrix(to="thrusters", matrix=matrix),
-    )
+    one = turning([pushes, Drag(linear=[10.0] * 3 + [1.0] * 3)], AllocationMatrix(to="thrusters", matrix=matrix))
     one = dataclasses.replace(one, start=lw.Start(euler_deg=[0.0, 0.0, np.rad2deg(0.3)]))
     found = lw.linear.margins(one, None, "gain", method="psi_s", h=0.03)
     assert "step shortened from 0.03 s to 0.025 s" in str(found)
@@ -441,6 +427,6 @@ def test_a_loop_within_a_dead_band_moves_nothing():
 def test_noise_lets_no_motion_be_steady():
     whole = scene()
     for words in ({"noise": 0.1}, {"drift": 0.1}):
-        noisy = dataclasses.replace(whole.controller, sensors=[lw.control.Sensor(of="heading", **words)])
+        noisy = dataclasses.replace(whole.controller, sensors=[Sensor(of="heading", **words)])
         with pytest.raises(lw.SceneError, match="lets no motion be steady, as margins need it"):
             lw.linear.margins(dataclasses.replace(whole, controller=noisy), by="runs", h=H)

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 import lgvi_warp as lw
-from lgvi_warp.common.errors import Faults
-from lgvi_warp.studies.search.box import SearchBox, search
-from lgvi_warp.studies.search.risk import risk_of
+from lgvi_warp.studies.search.box import search
 from tests.studies.test_linear import PERIOD, cost, regulated, regulator  # noqa: F401  (a fixture)
+from tests.support.refusals import says
 
 RUN = {"method": "psi_s", "h": PERIOD, "t1": 20.0}
 
@@ -55,43 +54,6 @@ def test_infinite_costs_do_not_stop_a_search():
     np.testing.assert_allclose(found.at, (0.7, 0.0), atol=1e-4)
 
 
-def test_bounds():
-    box = SearchBox.of("over", {"vehicle.mass": (10.0, 20.0), "start.position[2]": (1.0, 100.0, "log")}, regulated())
-    np.testing.assert_allclose(box.values(np.array([[0.0, 0.5], [1.0, 1.0]])), [[10.0, 10.0], [20.0, 100.0]])
-    assert box.values(np.ones((1, 2))).tolist() == [[20.0, 100.0]]
-    bad = {"vehicle.mas": (1.0, 2.0), "vehicle.buoyancy": (2.0, 1.0), "vehicle.mass": (0.0, 1.0, "log"), "x": 3}
-    with pytest.raises(lw.SceneError) as caught:
-        SearchBox.of("within", bad, regulated())
-    for part in ("vehicle.mas", "does not rise", "has no logarithm", '"x"'):
-        assert part in str(caught.value)
-    with pytest.raises(lw.SceneError, match="maps no names to bounds"):
-        SearchBox.of("within", [], regulated())
-
-
-def test_risks():
-    costs = np.array([[3.0, 1.0, 2.0, 4.0, 5.0], [1.0, 1.0, 1.0, 1.0, np.inf]])
-    # The worst 30 % of five members are one and a half.
-    assert lw.metrics.CVaR(0.3)(costs[:1])[0] == pytest.approx((5.0 + 0.5 * 4.0) / 1.5)
-    assert lw.metrics.CVaR(1.0)(costs[:1])[0] == pytest.approx(3.0)
-    assert lw.metrics.CVaR(0.2)(costs).tolist() == [5.0, np.inf]
-    faults = Faults()
-    mean, quantile = risk_of(faults, "mean"), risk_of(faults, 0.8)
-    assert not faults
-    assert mean(costs[:1])[0] == 3.0
-    assert quantile(costs).tolist() == [4.0, 1.0]
-    assert [str(risk) for risk in (lw.metrics.CVaR(0.05), mean, quantile)] == [
-        "mean of the worst 5 %",
-        "mean",
-        "80 % quantile",
-    ]
-    for wrong in ("median", 2.0, None):
-        with pytest.raises(lw.SceneError, match="is no risk"):
-            risk_of(faults := Faults(), wrong)
-            faults.raise_if_any()
-    with pytest.raises(lw.SceneError, match="is no part"):
-        lw.metrics.CVaR(0.0)
-
-
 def test_a_known_worst_corner():
     """A free body goes straight on, along its stable axis: the farther of two corners, both worse than what is beside them."""
     within = {"start.velocity[2]": (-2.0, 1.5), "start.position[2]": (-1.0, 2.0)}
@@ -106,8 +68,7 @@ def test_a_known_worst_corner():
     assert told[-1] <= 1.0
     again = lw.solve(found.fleet, "psi_s", h=PERIOD, t1=20.0)
     assert np.linalg.norm(again.position[-1, 0]) == pytest.approx(found.value, abs=1e-10)
-    assert "a lower bound of the largest" in str(found)
-    assert "(low)" in str(found)
+    says(str(found), "a lower bound of the largest", "(low)")
     least = lw.worst_case(scene, within, "norm(position)", worst="smallest", budget=600, **RUN)
     assert 0.0 <= least.value < 1e-2
     assert "an upper bound of the smallest" in str(least)
@@ -155,8 +116,7 @@ def test_tuned_gains_are_those_of_the_regulator(regulator, risk):  # noqa: F811
     assert abs(found.cost / expected - 1.0) < 1e-5
     # Near the least a cost that is 1e-6 larger is that of gains 1e-3 beside.
     np.testing.assert_allclose(list(found.parameters.values()), best, rtol=1e-2)
-    assert found.members == 12
-    assert found.fresh == 24
+    assert (found.members, found.fresh) == (12, 24)
     assert found.fresh_before > found.fresh_cost
     assert found.optimism == found.fresh_cost - found.cost
     assert not found.at_bounds

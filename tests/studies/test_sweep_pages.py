@@ -2,7 +2,6 @@
 """The snippets of the pages on metrics and sweeps run as they stand, and so do the examples of sweeps, with fewer members."""
 
 import random
-import re
 
 import numpy as np
 import pytest
@@ -12,37 +11,33 @@ from lgvi_warp.studies.sweeps.file import arguments_of_file
 from lgvi_warp.studies.sweeps.setup import setup_of
 from lgvi_warp.studies.sweeps.success import success_of
 from tests.conftest import ROOT
+from tests.support.pages import blocks
 
 pytestmark = pytest.mark.kernel
 
 SCENE = ROOT / "examples" / "scenes" / "remus_100_autopilot.toml"
-PAGES = {"metrics": ROOT / "docs" / "controllers" / "metrics.md",
-         "guide": ROOT / "docs" / "guide" / "is_my_controller_robust.md"}  # fmt: skip
-
-
-def snippets(page, language):
-    return re.findall(rf"```{language}\n(.*?)```", PAGES[page].read_text(), re.DOTALL)
+METRICS, GUIDE = "docs/controllers/metrics.md", "docs/guide/is_my_controller_robust.md"
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.parametrize("page", [METRICS, GUIDE])
 def test_python(page):
     scene = lw.Scene.load(SCENE)
     fleet = lw.Ensemble(scene, 50, seed=1, vary=scene.ensemble_settings.vary)
     names = {"lw": lw, "np": np, "scene": scene, "fleet": fleet}
-    for text in snippets(page, "python"):
+    for text in blocks(page, "python"):
         exec(text, names)
     assert "found" in names or names["metric"].unit == "rad"
 
 
 def test_toml(tmp_path):
-    (text,) = snippets("guide", "toml")
+    (text,) = blocks(GUIDE, "toml")
     (tmp_path / "sweep.toml").write_text(text)
     (tmp_path / "remus_100_autopilot.toml").write_text(SCENE.read_text())
     arguments = arguments_of_file(tmp_path / "sweep.toml")
     assert [case["name"] for case in arguments["cases"]] == ["pid", "stiff"]
     assert arguments["t1"] == 60.0
-    (text,) = snippets("metrics", "toml")
+    (text,) = blocks(METRICS, "toml")
     (tmp_path / "scene.toml").write_text(SCENE.read_text() + text)
     assert lw.Scene.load(tmp_path / "scene.toml").run.statistics[0].key == "settling_time depth"
 

@@ -253,10 +253,8 @@ PICTURES = (*OF_A_RUN, "drift", "summary of members kept", "statistics", "fan of
 
 
 PROVENANCE = {
-    "checks": "safe",
-    "machine": {"threads": 2, "cpu": "a processor", "simd": "avx2"},
-    "versions": {"numpy": "2"},
-}
+    "checks": "safe", "machine": {"threads": 2, "cpu": "a processor", "simd": "avx2"}, "versions": {"numpy": "2"},
+}  # fmt: skip
 
 
 def ran(result, provenance=None, **values):

@@ -24,12 +24,9 @@ from tests.support.stores import fleet, tree
 
 # Enough files that the parent's threads which wait for the disk are as many as there may be.
 SETTINGS = {
-    "method": "psi_s",
-    "h": 0.01,
-    "t1": 0.1,
-    "save": lw.SaveAt(every=0.05),
+    "method": "psi_s", "h": 0.01, "t1": 0.1, "save": lw.SaveAt(every=0.05),
     "statistics": [lw.statistics.Mean("position")],
-}
+}  # fmt: skip
 CHILDREN, MEMBERS = 2, 4096
 
 
@@ -187,18 +184,12 @@ def refusals():
 
 
 WAYS = {
-    "fork": fork,
-    "fork_within": fork_within,
-    "fork_beside": fork_beside,
-    "pool_fork": functools.partial(pool, kind="fork"),
-    "pool_spawn": functools.partial(pool, kind="spawn"),
+    "fork": fork, "fork_within": fork_within, "fork_beside": fork_beside,
+    "pool_fork": functools.partial(pool, kind="fork"), "pool_spawn": functools.partial(pool, kind="spawn"),
     "pool_forkserver": functools.partial(pool, kind="forkserver"),
     "futures_fork": functools.partial(futures, kind="fork"),
-    "futures_spawn": functools.partial(futures, kind="spawn"),
-    "loky": loky,
-    "celery": celery,
-    "refused": refused,
-}
+    "futures_spawn": functools.partial(futures, kind="spawn"), "loky": loky, "celery": celery, "refused": refused,
+}  # fmt: skip
 
 
 def main(folder, *ways):

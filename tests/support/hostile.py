@@ -116,14 +116,10 @@ def nested(depth):
 
 # What lies in the place of a file that a verb writes; none of it is replaced.
 PLACES = {
-    "a link to the user's file": link("notes.txt"),
-    "a link to nothing of the user's": link("new.txt"),
-    "a link to a device": link("/dev/null"),
-    "a link to a pipe": link("pipe"),
-    "a pipe": pipe,
-    "a socket": bound,
+    "a link to the user's file": link("notes.txt"), "a link to nothing of the user's": link("new.txt"),
+    "a link to a device": link("/dev/null"), "a link to a pipe": link("pipe"), "a pipe": pipe, "a socket": bound,
     "a folder": folder,
-}
+}  # fmt: skip
 
 # Arrays in NumPy's format -----------------------------------------------------------------------------------------------
 

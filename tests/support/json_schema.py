@@ -43,9 +43,7 @@ def faults(value, schema, where=""):
     if is_a(value, "number"):
         low, above, high = (schema.get(name) for name in ("minimum", "exclusiveMinimum", "maximum"))
         wrong = (
-            low is not None and value < low,
-            above is not None and value <= above,
-            high is not None and value > high,
-        )
+            low is not None and value < low, above is not None and value <= above, high is not None and value > high,
+        )  # fmt: skip
         found += [f"{where}: {value!r} is out of bounds"] * any(wrong)
     return found

@@ -21,11 +21,9 @@ def made(position, time=None, *, status=None, end=None, attitude=None, scene=Non
     level = np.broadcast_to(np.eye(3), (k, n, 3, 3)) if attitude is None else attitude
     velocity = np.gradient(position, time, axis=0) if k > 1 else np.zeros_like(position)
     samples = {
-        "position": position,
-        "attitude": level,
-        "velocity": np.einsum("knji,knj->kni", level, velocity),
+        "position": position, "attitude": level, "velocity": np.einsum("knji,knj->kni", level, velocity),
         "angular_velocity": np.zeros_like(position),
-    }
+    }  # fmt: skip
     provenance = {
         "scene": scene.to_dict(),
         "ensemble": {"members": n, "seed": seed},

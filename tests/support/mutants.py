@@ -105,14 +105,9 @@ def record(arguments):
     environment["MUTANTS_RECORD"] = str(folder)
     environment["PYTHONPATH"] = f"{SITES}{os.pathsep}{environment['PYTHONPATH']}"
     command = [
-        sys.executable,
-        "-m",
-        "pytest",
-        *PYTEST,
-        "-m",
-        "not slow",
+        sys.executable, "-m", "pytest", *PYTEST, "-m", "not slow",
         *(arguments or ["-n", "2", "--dist", "worksteal", "tests"]),
-    ]
+    ]  # fmt: skip
     code = subprocess.run(command, cwd=tree, env=environment).returncode
     shutil.rmtree(folder / "tmp", ignore_errors=True)
     combine(folder)

@@ -109,13 +109,10 @@ class Recorder:
             del os.environ["MUTANTS_TEST"]
             measured.switch_context("")
             line = {
-                "test": key_of(item),
-                "path": item.nodeid.split("::")[0],
-                "time": time.perf_counter() - start - self.load_time,
-                "load": self.load_time,
-                "failed": self.failed,
+                "test": key_of(item), "path": item.nodeid.split("::")[0],
+                "time": time.perf_counter() - start - self.load_time, "load": self.load_time, "failed": self.failed,
                 "kernels": sorted(self.kernels),
-            }
+            }  # fmt: skip
             with self.path.open("a") as file:
                 file.write(json.dumps(line) + "\n")
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a user reads where a call is refused."""
+"""What a user reads, above all where a call is refused."""
 
 import pytest
 
@@ -18,3 +18,9 @@ def refused(make, *arguments, **named):
     with pytest.raises(lw.SceneError) as caught:
         make(*arguments, **named)
     return str(caught.value)
+
+
+def says(text, *parts):
+    """Check that a text has all these parts, or a table these names; a failure names those that it lacks."""
+    missing = [part for part in parts if part not in text]
+    assert not missing, f"{missing} are not in {text!r}"

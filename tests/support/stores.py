@@ -3,6 +3,7 @@
 
 import contextlib
 import multiprocessing
+import time
 from pathlib import Path
 
 import lgvi_warp as lw
@@ -57,3 +58,19 @@ def forked(work, *arguments):
     process = multiprocessing.get_context("fork").Process(target=work, args=arguments)
     process.start()
     return process
+
+
+def finished(path):
+    """How many blocks are marked."""
+    return len(markers(path))
+
+
+def killed_after(path, blocks, delay, work, *arguments):
+    """Start a run by this work, or go on with it, and kill it a moment after so many blocks are marked. Whether it was hit."""
+    process = forked(work, path, *arguments)
+    while finished(path) < blocks and process.is_alive():
+        time.sleep(0.002)
+    time.sleep(delay)
+    process.kill()
+    process.join()
+    return process.exitcode != 0

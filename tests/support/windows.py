@@ -27,11 +27,8 @@ MISSING = ("O_NOFOLLOW", "O_DIRECTORY", "O_NONBLOCK", "O_CLOEXEC", "statvfs", "s
 
 real_open, real_fsync, real_listdir, real_replace, real_unlink = os.open, os.fsync, os.listdir, os.replace, os.unlink
 real_set_blocking, real_set_wakeup, real_statvfs, real_library = (
-    os.set_blocking,
-    signal.set_wakeup_fd,
-    os.statvfs,
-    ctypes.CDLL,
-)
+    os.set_blocking, signal.set_wakeup_fd, os.statvfs, ctypes.CDLL,
+)  # fmt: skip
 WRITES, TEMPORARY = os.O_WRONLY | os.O_RDWR, tempfile.gettempdir()
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from lgvi_warp.calls.predict import Prediction
 from lgvi_warp.common import container, machine
+from tests.support.refusals import says
 
 NONE_V1 = 9223372036854771712
 
@@ -105,5 +106,4 @@ def test_a_prediction_tells_what_a_container_does_not_hold():
     told = str(
         Prediction(20, 200, 1, 1, 0.0, 0.0, 0.0, 0.0, memory=9 * 10**6, disk=0, free_memory=10**7, free_disk=None)
     )
-    assert "1 threads" in told
-    assert "more than the memory holds" in told
+    says(told, "1 threads", "more than the memory holds")

@@ -9,6 +9,7 @@ from lgvi_warp.common.errors import one_line
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.scene import from_dict
 from lgvi_warp.store.layout import columns
+from tests.support.refusals import says
 
 BODY = {"mass": 10.0, "inertia": [1.0, 2.0, 2.5], "buoyancy": 98.0}
 DRAG = {"type": "drag", "linear": [1.0] * 6}
@@ -33,8 +34,7 @@ def test_a_name_that_is_no_folder_everywhere_is_refused(name, words, section):
         from_dict({"vehicle": BODY, section: [table | {"name": name}]})
     (fault,) = caught.value.faults
     assert fault.isprintable()
-    assert ".name = " in fault
-    assert "; " in fault
+    says(fault, ".name = ", "; ")
     assert one_line(words) in fault
 
 

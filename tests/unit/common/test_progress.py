@@ -14,6 +14,7 @@ import lgvi_warp as lw
 from lgvi_warp.cli.progress import progress_bar
 from lgvi_warp.common import progress as module
 from lgvi_warp.common.progress import Progress, callback, shows_progress
+from tests.support.refusals import says
 
 
 class Terminal(io.StringIO):
@@ -180,8 +181,7 @@ def test_the_real_bar_of_tqdm_takes_the_same_calls():
     bar(0.5)
     bar(1.0)
     bar.close()
-    assert "100%" in stream.getvalue()
-    assert "running" in stream.getvalue()
+    says(stream.getvalue(), "100%", "running")
 
 
 @pytest.mark.parametrize(

@@ -153,14 +153,10 @@ def test_kernel_and_twin(width, name, step, channel, seed0, seed1):
 
 
 @pytest.mark.kernel
-@pytest.mark.parametrize(
-    ("name", "widths"),
-    [
-        ("float64", (1, 8)),
-        ("float32", (1, 16)),
-        *(pytest.param(name, WIDTHS, marks=pytest.mark.slow) for name in FORMATS),
-    ],
-)
+@pytest.mark.parametrize(("name", "widths"), [
+    ("float64", (1, 8)), ("float32", (1, 16)),
+    *(pytest.param(name, WIDTHS, marks=pytest.mark.slow) for name in FORMATS),
+])  # fmt: skip
 def test_every_width_gives_the_same_bits(name, widths):
     member = np.arange(1024) * 7919
     first, *others = (drawn(width, name, member, 5, 1, 2, 3) for width in widths)

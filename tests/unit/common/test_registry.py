@@ -52,12 +52,9 @@ def test_a_class_without_a_word_is_not_added(word):
 def test_each_family_knows_its_classes():
     tables = (lw.laws.Term.kinds, events.TYPES, STATISTICS, SAMPLINGS, DISTRIBUTIONS)
     some = (
-        lw.terms.Waves,
-        lw.events.StopTime,
-        lw.statistics.PathTime,
-        lw.designs.UnitCubePoints,
+        lw.terms.Waves, lw.events.StopTime, lw.statistics.PathTime, lw.designs.UnitCubePoints,
         lw.distributions.PhysicalInertia,
-    )
+    )  # fmt: skip
     assert all(one in known.values() for known, one in zip(tables, some, strict=True))
 
 

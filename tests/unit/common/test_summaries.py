@@ -17,6 +17,7 @@ from lgvi_warp.results.quantities import samples_of
 from lgvi_warp.statistics.estimates.estimate import Estimate, Estimates
 from lgvi_warp.statistics.values.quantity import KNOWN
 from tests.conftest import ROOT
+from tests.support.refusals import says
 
 
 def estimate(name, unit="m"):
@@ -88,8 +89,7 @@ def test_units_and_values_are_shown():
     for words in (r"vehicle.weight +299 N", r"start.velocity +\[1.54, 0, 0\] m/s", "gravity 9.81 m/s2", "control_fins",
                   r"controller +every 0.1 s: depth_cell", "members 10000, varied: vehicle.buoyancy", "step 0.01"):  # fmt: skip
         assert re.search(words, text), words
-    assert "Ensemble of 10,000 members" in repr(OBJECTS["ensemble"])
-    assert "heading_pid.kp" in repr(OBJECTS["ensemble"])
+    says(repr(OBJECTS["ensemble"]), "Ensemble of 10,000 members", "heading_pid.kp")
     shown = repr(result(6, statuses=(0, 0, 17)))
     assert shown.startswith("Result of 6 members at 4 times, 0 to 3 s\n")
     for words in (f"ok 4, {Status(17).name.lower()} 2", "psi_s, float64, step 0.1 s, 10 steps", "position [m]",
@@ -113,8 +113,7 @@ def test_texts_are_escaped_and_cut():
             return "<b>", [("<i>", "a & b"), ("two\nlines", "y" * 5000)]
 
     assert "<i>" not in Odd()._repr_html_()
-    assert "&lt;i&gt;" in Odd()._repr_html_()
-    assert "a &amp; b" in Odd()._repr_html_()
+    says(Odd()._repr_html_(), "&lt;i&gt;", "a &amp; b")
     first, *lines = repr(Odd()).splitlines()
     assert first == "<b>"
     assert len(lines) == 2

@@ -6,13 +6,10 @@ import pytest
 from lgvi_warp.engine.block import Block, block_size, blocks
 
 
-@pytest.mark.parametrize(
-    ("members", "size"),
-    [
-        (1, 256), (256, 256), (16_383, 256), (16_384, 512), (32_767, 512), (32_768, 1024), (65_535, 1024),
-        (65_536, 2048), (131_071, 2048), (131_072, 4096), (10_000_000, 4096),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("members", "size"), [
+    (1, 256), (256, 256), (16_383, 256), (16_384, 512), (32_767, 512), (32_768, 1024), (65_535, 1024), (65_536, 2048),
+    (131_071, 2048), (131_072, 4096), (10_000_000, 4096),
+])  # fmt: skip
 def test_the_size_at_its_borders(members, size):
     assert block_size(members) == size
 

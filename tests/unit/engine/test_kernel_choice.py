@@ -34,15 +34,10 @@ def test_steady_water_needs_no_gravity():
 
 
 @pytest.mark.parametrize(("names", "timed", "memory", "flow"), [
-    ((), False, False, "none"),
-    (("drag",), False, False, "none"),
-    (("tether",), False, False, "none"),
-    (("drag", "current"), False, False, "steady"),
-    (("tether", "wrench schedule"), True, False, "none"),
-    (("current harmonics", "drag"), True, False, "uniform"),
-    (("drag", "waves"), True, False, "varying"),
-    (("tether", "thrusters"), True, True, "none"),
-    (("Gauss-Markov current", "tether"), True, True, "uniform"),
+    ((), False, False, "none"), (("drag",), False, False, "none"), (("tether",), False, False, "none"),
+    (("drag", "current"), False, False, "steady"), (("tether", "wrench schedule"), True, False, "none"),
+    (("current harmonics", "drag"), True, False, "uniform"), (("drag", "waves"), True, False, "varying"),
+    (("tether", "thrusters"), True, True, "none"), (("Gauss-Markov current", "tether"), True, True, "uniform"),
 ])  # fmt: skip
 def test_a_kernel_has_what_any_of_its_terms_needs(names, timed, memory, flow):
     acting = sum((CASES[name].terms for name in names), ())

@@ -11,19 +11,12 @@ from lgvi_warp.scene.draws import KEPT
 
 NUMBERS = {"a.x": np.ones((1, 3)), "b.y": np.zeros(5)}
 WAYS = {
-    "an item": lambda n: n["b.y"],
-    "get": lambda n: n.get("b.y"),
-    "a loop": lambda n: [name for name in n],
-    "keys": lambda n: list(n.keys()),
-    "values": lambda n: list(n.values()),
-    "items": lambda n: list(n.items()),
-    "a dict": lambda n: dict(n)["b.y"],
-    "unpacked": lambda n: {**n}["b.y"],
-    "a copy": lambda n: n.copy()["b.y"],
-    "joined": lambda n: (n | {})["b.y"],
-    "joined from the right": lambda n: ({} | n)["b.y"],
+    "an item": lambda n: n["b.y"], "get": lambda n: n.get("b.y"), "a loop": lambda n: [name for name in n],
+    "keys": lambda n: list(n.keys()), "values": lambda n: list(n.values()), "items": lambda n: list(n.items()),
+    "a dict": lambda n: dict(n)["b.y"], "unpacked": lambda n: {**n}["b.y"], "a copy": lambda n: n.copy()["b.y"],
+    "joined": lambda n: (n | {})["b.y"], "joined from the right": lambda n: ({} | n)["b.y"],
     "a copy of the module": lambda n: copy.copy(dict(n))["b.y"],
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("way", WAYS)

@@ -97,8 +97,7 @@ def test_laws_that_one_member_feels(at_once):
     )
     assert not seen(fleet(scene)).felt
     one = seen(fleet(scene, drag__linear=(0.0, 0.0, 0.0, 0.0, 1.0, 0.0)))
-    assert one.felt == {"drag"}
-    assert one.drag == {"linear_torque"}
+    assert (one.felt, one.drag) == ({"drag"}, {"linear_torque"})
     level, rising = (seen(fleet(scene, current__velocity=v)) for v in ((0.1, 0.0, 0.0), (0.1, 0.0, 0.2)))
     assert level.felt == rising.felt == {"current"}
     assert not level.rising

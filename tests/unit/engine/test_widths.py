@@ -42,8 +42,7 @@ def test_kernels_have_these_widths():
 
 
 def test_kept_widths_count_on_this_machine_alone(file):
-    assert widths.tuned() == {}
-    assert widths.keep({"plain float64": 4}) == file
+    assert (widths.tuned(), widths.keep({"plain float64": 4})) == ({}, file)
     assert widths.default_width("plain", "float64") == (4, "tuned")
     assert widths.default_width("plain", "float32").source.startswith("table")
     widths.keep({"plain float64": 8, "float32_compensated": 32}, of=f"another {widths.this_machine()}")

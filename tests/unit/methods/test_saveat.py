@@ -10,9 +10,7 @@ from lgvi_warp.methods.saveat import time_grid
 
 def test_a_step_that_fits_is_kept():
     grid = time_grid(0.01, 150.0, lw.SaveAt(every=1.0))
-    assert grid.h == 0.01
-    assert grid.steps == 15_000
-    assert grid.messages == ()
+    assert (grid.h, grid.steps, grid.messages) == (0.01, 15_000, ())
     np.testing.assert_array_equal(grid.sample_steps, np.arange(0, 15_001, 100))
     np.testing.assert_array_equal(grid.times, np.arange(151.0))
 
@@ -24,10 +22,8 @@ def test_start_and_end_are_always_kept():
 
 
 @pytest.mark.parametrize(("h", "t1", "save", "step"), [
-    (0.03, 1.0, lw.SaveAt(every=0.1), 0.025),
-    (0.4, 1.0, lw.SaveAt(), 1.0 / 3.0),
-    (0.3, 1.0, lw.SaveAt(at=[0.25]), 0.25),
-    (10.0, 1.0, lw.SaveAt(), 1.0),
+    (0.03, 1.0, lw.SaveAt(every=0.1), 0.025), (0.4, 1.0, lw.SaveAt(), 1.0 / 3.0),
+    (0.3, 1.0, lw.SaveAt(at=[0.25]), 0.25), (10.0, 1.0, lw.SaveAt(), 1.0),
 ])  # fmt: skip
 def test_a_step_that_does_not_fit_is_shortened_with_a_message(h, t1, save, step):
     grid = time_grid(h, t1, save)
@@ -39,8 +35,7 @@ def test_a_step_that_does_not_fit_is_shortened_with_a_message(h, t1, save, step)
 
 def test_decimals_are_taken_as_meant():
     grid = time_grid(0.1, 0.1 + 0.2, lw.SaveAt())
-    assert grid.steps == 3
-    assert grid.h == 0.1
+    assert (grid.steps, grid.h) == (3, 0.1)
     assert time_grid(1.0 / 3.0, 2.0, lw.SaveAt()).steps == 6
     assert time_grid(1e-12, 1e-9, lw.SaveAt(every=1e-10)).steps == 1000
     assert time_grid(1e6, 1e8, lw.SaveAt()).steps == 100
@@ -61,14 +56,10 @@ def test_the_message_reaches_the_result(scene):
 
 
 @pytest.mark.parametrize(("h", "t1", "save", "text"), [
-    (0.0, 1.0, lw.SaveAt(), "step = 0"),
-    (-1.0, -1.0, lw.SaveAt(), "2 faults"),
-    (0.1, 1.0, lw.SaveAt(at=[1.5]), "beyond"),
-    (0.1, 1.0, lw.SaveAt(every=3.0), "longer"),
-    (0.1, 1.0, lw.SaveAt(at=[0.123456]), "shrink"),
-    (1e-9, 1e3, lw.SaveAt(), "steps"),
-    (1e-12, 1.0, lw.SaveAt(), "steps"),
-    (1e-320, 1.0, lw.SaveAt(), "steps"),
+    (0.0, 1.0, lw.SaveAt(), "step = 0"), (-1.0, -1.0, lw.SaveAt(), "2 faults"),
+    (0.1, 1.0, lw.SaveAt(at=[1.5]), "beyond"), (0.1, 1.0, lw.SaveAt(every=3.0), "longer"),
+    (0.1, 1.0, lw.SaveAt(at=[0.123456]), "shrink"), (1e-9, 1e3, lw.SaveAt(), "steps"),
+    (1e-12, 1.0, lw.SaveAt(), "steps"), (1e-320, 1.0, lw.SaveAt(), "steps"),
     (float("inf"), 1.0, lw.SaveAt(), "finite"),
 ])  # fmt: skip
 def test_what_cannot_be_met_is_refused(h, t1, save, text):
@@ -77,12 +68,8 @@ def test_what_cannot_be_met_is_refused(h, t1, save, text):
 
 
 @pytest.mark.parametrize(("named", "text"), [
-    ({"every": 0.0}, "every"),
-    ({"every": -1.0}, "every"),
-    ({"every": 1.0, "at": [1.0]}, "both"),
-    ({"at": [2.0, 1.0]}, "rising"),
-    ({"at": [-1.0]}, "rising"),
-    ({"at": ["a"]}, "numeric"),
+    ({"every": 0.0}, "every"), ({"every": -1.0}, "every"), ({"every": 1.0, "at": [1.0]}, "both"),
+    ({"at": [2.0, 1.0]}, "rising"), ({"at": [-1.0]}, "rising"), ({"at": ["a"]}, "numeric"),
     ({"fields": ("positon",)}, "did you mean 'position'"),
 ])  # fmt: skip
 def test_faults_of_save_at(named, text):

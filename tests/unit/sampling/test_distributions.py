@@ -11,6 +11,17 @@ from scipy import stats
 
 import lgvi_warp as lw
 from lgvi_warp.common.random import uniforms
+from lgvi_warp.distributions import (
+    Choice,
+    CorrelatedNormal,
+    LogNormal,
+    Normal,
+    PositiveDefinite,
+    RotationNormal,
+    ScipyDistribution,
+    TruncatedNormal,
+    Uniform,
+)
 from lgvi_warp.sampling.distributions.named import as_distribution, from_dict
 from tests.support.refusals import refused
 
@@ -71,20 +82,18 @@ def test_uniforms_are_uniform_and_their_components_independent():
 
 
 @pytest.mark.parametrize("law, exact", [
-    (lw.distributions.Normal(std=0.5), stats.norm(10.0, 0.5)), (lw.distributions.Normal(relative=0.02), stats.norm(10.0, 0.2)),
-    (lw.distributions.Normal(mean=-1.0, std=2.0), stats.norm(-1.0, 2.0)),
-    (lw.distributions.Uniform(low=-1.0, high=3.0), stats.uniform(-1.0, 4.0)),
-    (lw.distributions.Uniform(half_width=2.0), stats.uniform(8.0, 4.0)),
-    (lw.distributions.Uniform(relative=0.1), stats.uniform(9.0, 2.0)),
-    (lw.distributions.LogNormal(sigma=0.3), stats.lognorm(0.3, scale=10.0)),
-    (lw.distributions.LogNormal(sigma=0.3, median=2.0), stats.lognorm(0.3, scale=2.0)),
-    (lw.distributions.TruncatedNormal(std=2.0), stats.truncnorm(-3.0, 3.0, 10.0, 2.0)),
-    (lw.distributions.TruncatedNormal(relative=0.2, width=1.5), stats.truncnorm(-1.5, 1.5, 10.0, 2.0)),
-    (lw.distributions.TruncatedNormal(std=2.0, low=9.0, high=13.0), stats.truncnorm(-0.5, 1.5, 10.0, 2.0)),
-    (lw.distributions.TruncatedNormal(std=2.0, low=9.0), stats.truncnorm(-0.5, np.inf, 10.0, 2.0)),
-    (lw.distributions.TruncatedNormal(std=2.0, high=9.0), stats.truncnorm(-np.inf, -0.5, 10.0, 2.0)),
-    (lw.distributions.TruncatedNormal(std=1.0, mean=0.0, low=12.0), stats.truncnorm(12.0, np.inf, 0.0, 1.0)),
-    (lw.distributions.TruncatedNormal(std=1.0, mean=0.0, high=-12.0), stats.truncnorm(-np.inf, -12.0, 0.0, 1.0)),
+    (Normal(std=0.5), stats.norm(10.0, 0.5)), (Normal(relative=0.02), stats.norm(10.0, 0.2)),
+    (Normal(mean=-1.0, std=2.0), stats.norm(-1.0, 2.0)), (Uniform(low=-1.0, high=3.0), stats.uniform(-1.0, 4.0)),
+    (Uniform(half_width=2.0), stats.uniform(8.0, 4.0)), (Uniform(relative=0.1), stats.uniform(9.0, 2.0)),
+    (LogNormal(sigma=0.3), stats.lognorm(0.3, scale=10.0)),
+    (LogNormal(sigma=0.3, median=2.0), stats.lognorm(0.3, scale=2.0)),
+    (TruncatedNormal(std=2.0), stats.truncnorm(-3.0, 3.0, 10.0, 2.0)),
+    (TruncatedNormal(relative=0.2, width=1.5), stats.truncnorm(-1.5, 1.5, 10.0, 2.0)),
+    (TruncatedNormal(std=2.0, low=9.0, high=13.0), stats.truncnorm(-0.5, 1.5, 10.0, 2.0)),
+    (TruncatedNormal(std=2.0, low=9.0), stats.truncnorm(-0.5, np.inf, 10.0, 2.0)),
+    (TruncatedNormal(std=2.0, high=9.0), stats.truncnorm(-np.inf, -0.5, 10.0, 2.0)),
+    (TruncatedNormal(std=1.0, mean=0.0, low=12.0), stats.truncnorm(12.0, np.inf, 0.0, 1.0)),
+    (TruncatedNormal(std=1.0, mean=0.0, high=-12.0), stats.truncnorm(-np.inf, -12.0, 0.0, 1.0)),
 ])  # fmt: skip
 def test_quantiles(law, exact):
     # ndtri is good to some 1e-15 of its argument; its own condition at 1 - 1e-9 is 1e9 * 1e-16 * 0.2 = 2e-8.
@@ -96,10 +105,10 @@ def test_quantiles(law, exact):
 
 
 @pytest.mark.parametrize("law, exact", [
-    (lw.distributions.Normal(std=0.5), stats.norm(10.0, 0.5)),
-    (lw.distributions.Uniform(half_width=2.0), stats.uniform(8.0, 4.0)),
-    (lw.distributions.LogNormal(sigma=0.3), stats.lognorm(0.3, scale=10.0)),
-    (lw.distributions.TruncatedNormal(std=2.0, low=9.0, high=13.0), stats.truncnorm(-0.5, 1.5, 10.0, 2.0)),
+    (Normal(std=0.5), stats.norm(10.0, 0.5)),
+    (Uniform(half_width=2.0), stats.uniform(8.0, 4.0)),
+    (LogNormal(sigma=0.3), stats.lognorm(0.3, scale=10.0)),
+    (TruncatedNormal(std=2.0, low=9.0, high=13.0), stats.truncnorm(-0.5, 1.5, 10.0, 2.0)),
 ])  # fmt: skip
 def test_sampled_moments(law, exact):
     x = law.quantile(uniforms(5, law.kind, 0, N, 1)[:, 0], np.array(10.0))
@@ -112,27 +121,22 @@ def test_sampled_moments(law, exact):
 def test_components_have_their_own_spread_about_their_own_value():
     base = np.array([0.3, 0.2, 0.0])
     u = np.tile(stats.norm.cdf([[1.0], [-2.0]]), 3)
-    got = lw.distributions.Normal(std=(0.03, 0.02, 0.01)).quantile(u, base)
+    got = Normal(std=(0.03, 0.02, 0.01)).quantile(u, base)
     np.testing.assert_allclose(got, [[0.33, 0.22, 0.01], [0.24, 0.16, -0.02]], rtol=0, atol=1e-15)
     # A fraction of zero is zero; of a negative value it widens the same way.
-    got = lw.distributions.Normal(relative=0.1).quantile(u, np.array([1.0, -1.0, 0.0]))
+    got = Normal(relative=0.1).quantile(u, np.array([1.0, -1.0, 0.0]))
     np.testing.assert_allclose(got, [[1.1, -0.9, 0.0], [0.8, -1.2, 0.0]], rtol=0, atol=1e-15)
 
 
 def test_a_spread_of_zero_is_the_value_itself():
     u = np.array([0.01, 0.5, 0.9])
-    for law in (
-        lw.distributions.Normal(std=0.0),
-        lw.distributions.Uniform(half_width=0.0),
-        lw.distributions.LogNormal(sigma=0.0),
-        lw.distributions.TruncatedNormal(std=0.0),
-    ):
+    for law in (Normal(std=0.0), Uniform(half_width=0.0), LogNormal(sigma=0.0), TruncatedNormal(std=0.0)):
         np.testing.assert_array_equal(law.quantile(u, np.array(10.0)), [10.0, 10.0, 10.0])
 
 
 def test_truncated_values_stay_within_their_bounds():
     extremes = np.array([2.0**-54, 1.0 - 2.0**-53])
-    got = lw.distributions.TruncatedNormal(std=1.0, low=0.1, high=0.3).quantile(extremes, np.array(0.0))
+    got = TruncatedNormal(std=1.0, low=0.1, high=0.3).quantile(extremes, np.array(0.0))
     assert (got >= 0.1).all()
     assert (got <= 0.3).all()
 
@@ -142,34 +146,28 @@ def test_far_tails_against_scipy(bound):
     u = np.array([0.01, 0.5, 0.99])
     for sign in (1.0, -1.0):
         limits = {"low": bound} if sign > 0.0 else {"high": -bound}
-        got = lw.distributions.TruncatedNormal(std=1.0, **limits).quantile(u if sign > 0.0 else 1.0 - u, np.array(0.0))
+        got = TruncatedNormal(std=1.0, **limits).quantile(u if sign > 0.0 else 1.0 - u, np.array(0.0))
         # The tail beyond b falls like exp(-b z): scipy's truncnorm has the same to its own 1e-10 or so of the distance.
         exact = stats.truncnorm(bound, np.inf).ppf(u)
         np.testing.assert_allclose(sign * got - bound, exact - bound, rtol=1e-6, atol=0)
-    both = lw.distributions.TruncatedNormal(std=1.0, low=bound, high=bound + 0.5).quantile(u, np.array(0.0))
+    both = TruncatedNormal(std=1.0, low=bound, high=bound + 0.5).quantile(u, np.array(0.0))
     assert (np.diff(both) > 0.0).all()
     assert both.min() > bound
     assert both.max() < bound + 0.5
 
 
 def test_a_law_relative_to_nothing_is_refused(scene):
-    for law in (
-        lw.distributions.Normal(relative=0.1),
-        lw.distributions.Uniform(relative=0.1),
-        lw.distributions.LogNormal(sigma=0.1),
-    ):
+    for law in (Normal(relative=0.1), Uniform(relative=0.1), LogNormal(sigma=0.1)):
         with pytest.raises(lw.SceneError, match=r"0, so that its \w+ varies nothing; give an absolute spread"):
             lw.Ensemble(scene, 4, vary={"vehicle.center_of_buoyancy[0]": law})
-    lw.Ensemble(
-        scene, 4, vary={"vehicle.center_of_buoyancy": lw.distributions.Normal(relative=0.1)}
-    )  # one entry is not 0
-    lw.Ensemble(scene, 4, vary={"vehicle.center_of_buoyancy[0]": lw.distributions.Normal(relative=0.0)})
-    lw.Ensemble(scene, 4, vary={"vehicle.center_of_buoyancy[0]": lw.distributions.LogNormal(sigma=0.1, median=0.01)})
+    lw.Ensemble(scene, 4, vary={"vehicle.center_of_buoyancy": Normal(relative=0.1)})  # one entry is not 0
+    lw.Ensemble(scene, 4, vary={"vehicle.center_of_buoyancy[0]": Normal(relative=0.0)})
+    lw.Ensemble(scene, 4, vary={"vehicle.center_of_buoyancy[0]": LogNormal(sigma=0.1, median=0.01)})
 
 
 def test_tables_are_laws_in_code_too(scene):
     fleet = lw.Ensemble(scene, 4, 1, {"vehicle.mass": {"normal": {"relative": 0.01}}})
-    assert fleet.vary == {"vehicle.mass": lw.distributions.Normal(relative=0.01)}
+    assert fleet.vary == {"vehicle.mass": Normal(relative=0.01)}
     again = lw.Ensemble(scene, **fleet.to_dict())
     np.testing.assert_array_equal(again.parameters(0, 4)["vehicle.mass"], fleet.parameters(0, 4)["vehicle.mass"])
     with pytest.raises(lw.SceneError, match=r'vary."vehicle.mass".*did you mean .normal.'):
@@ -179,71 +177,60 @@ def test_tables_are_laws_in_code_too(scene):
 # What is refused ---------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "kind, values, key",
-    [
-        (lw.distributions.Normal, {}, "width"),
-        (lw.distributions.Normal, {"std": -1.0}, "normal.std"),
-        (lw.distributions.Normal, {"std": (1.0, -1.0, 1.0)}, "normal.std"),
-        (lw.distributions.Normal, {"std": np.nan}, "normal.std"),
-        (lw.distributions.Normal, {"std": "wide"}, "normal.std"),
-        (lw.distributions.Normal, {"std": True}, "normal.std"),
-        (lw.distributions.Normal, {"std": 1.0, "relative": 0.1}, "normal.std and relative"),
-        (lw.distributions.Normal, {"std": 1.0, "mean": np.inf}, "normal.mean"),
-        (lw.distributions.Normal, {"relative": -0.1}, "normal.relative"),
-        (lw.distributions.Uniform, {"low": 1.0, "high": 1.0}, "uniform.low and high"),
-        (lw.distributions.Uniform, {"low": (0.0, 2.0), "high": (1.0, 1.0)}, "uniform.low and high"),
-        (lw.distributions.Uniform, {"low": (0.0, 2.0), "high": (1.0, 1.0, 1.0)}, "uniform.low and high"),
-        (lw.distributions.Uniform, {"high": 1.0}, "uniform.high"),
-        (lw.distributions.Uniform, {"half_width": 1.0, "low": 0.0}, "uniform.low"),
-        (lw.distributions.Uniform, {"half_width": -1.0}, "uniform.half_width"),
-        (lw.distributions.Uniform, {"half_width": 1.0, "relative": 0.1}, "uniform.half_width and relative"),
-        (lw.distributions.LogNormal, {}, "lognormal."),
-        (lw.distributions.LogNormal, {"sigma": -0.1}, "lognormal.sigma"),
-        (lw.distributions.TruncatedNormal, {"low": 0.0}, "truncated_normal."),
-        (lw.distributions.TruncatedNormal, {"std": 1.0, "low": 2.0, "high": 1.0}, "truncated_normal.low and high"),
-        (lw.distributions.TruncatedNormal, {"std": 1.0, "low": 2.0, "width": 1.0}, "truncated_normal.width"),
-        (lw.distributions.TruncatedNormal, {"std": 1.0, "width": -1.0}, "truncated_normal.width"),
-        (lw.distributions.CorrelatedNormal, {}, "nothing given"),
-        (lw.distributions.CorrelatedNormal, {"covariance": np.eye(2), "std": 1.0}, "covariance and std given"),
-        (lw.distributions.CorrelatedNormal, {"correlation": np.eye(2)}, "correlation given"),
-        (lw.distributions.CorrelatedNormal, {"covariance": [[1.0, 2.0], [2.0, 1.0]]}, "positive semidefinite"),
-        (lw.distributions.CorrelatedNormal, {"covariance": [[1.0, 0.5], [0.2, 1.0]]}, "no symmetric matrix"),
-        (lw.distributions.CorrelatedNormal, {"covariance": [1.0, 2.0]}, "no symmetric matrix"),
-        (lw.distributions.CorrelatedNormal, {"covariance": [[np.nan]]}, "not finite"),
-        (lw.distributions.CorrelatedNormal, {"covariance": "wide"}, "not numeric"),
-        (lw.distributions.CorrelatedNormal, {"std": (1.0, -1.0)}, "negative"),
-        (lw.distributions.CorrelatedNormal, {"std": (1.0, 1.0, 1.0), "correlation": np.eye(2)}, "does not fit 2"),
-        (lw.distributions.CorrelatedNormal, {"std": 1.0, "correlation": 2.0 * np.eye(2)}, "diagonal that is not 1"),
-        # Metres beside newtons: the sizes of the entries say nothing about whether they can go together.
-        (
-            lw.distributions.CorrelatedNormal,
-            {"std": (1e-3, 1e3), "correlation": [[1.0, 1.2], [1.2, 1.0]]},
-            "positive semidefinite",
-        ),
-        (
-            lw.distributions.CorrelatedNormal,
-            {"covariance": [[1e-10, 50.0 * 1e-2], [50.0 * 1e-2, 1e6]]},
-            "positive semidefinite",
-        ),
-        (lw.distributions.CorrelatedNormal, {"covariance": [[0.0, 0.1], [0.1, 1.0]]}, "positive semidefinite"),
-        (lw.distributions.CorrelatedNormal, {"covariance": [[-1.0, 0.0], [0.0, 1.0]]}, "negative variance"),
-        (lw.distributions.RotationNormal, {}, "nothing given"),
-        (lw.distributions.RotationNormal, {"std": (0.1, 0.2)}, "does not fit 3"),
-        (lw.distributions.RotationNormal, {"covariance": np.eye(2)}, "not 3 x 3"),
-        (lw.distributions.RotationNormal, {"std": -0.1}, "negative"),
-        (lw.distributions.RotationNormal, {"std": np.inf}, "not finite"),
-        (lw.distributions.PositiveDefinite, {}, "width"),
-        (lw.distributions.PositiveDefinite, {"sigma": -0.1}, "negative"),
-        (lw.distributions.PositiveDefinite, {"sigma": 0.1, "off_diagonal": (0.1, 0.2)}, "not one number"),
-        (lw.distributions.Choice, {}, "no list of values"),
-        (lw.distributions.Choice, {"values": ("a",)}, "not numeric"),
-        (lw.distributions.Choice, {"values": (1.0, 2.0), "weights": (1.0,)}, "weigh 2 values"),
-        (lw.distributions.Choice, {"values": (1.0, 2.0), "weights": (2.0, -1.0)}, "negative"),
-        (lw.distributions.ScipyDistribution, {"distribution": stats.gamma}, "no frozen distribution"),
-        (lw.distributions.ScipyDistribution, {"distribution": stats.gamma(-1.0)}, "scipy.stats refuses"),
-    ],
-)
+@pytest.mark.parametrize("kind, values, key", [
+    (Normal, {}, "width"),
+    (Normal, {"std": -1.0}, "normal.std"),
+    (Normal, {"std": (1.0, -1.0, 1.0)}, "normal.std"),
+    (Normal, {"std": np.nan}, "normal.std"),
+    (Normal, {"std": "wide"}, "normal.std"),
+    (Normal, {"std": True}, "normal.std"),
+    (Normal, {"std": 1.0, "relative": 0.1}, "normal.std and relative"),
+    (Normal, {"std": 1.0, "mean": np.inf}, "normal.mean"),
+    (Normal, {"relative": -0.1}, "normal.relative"),
+    (Uniform, {"low": 1.0, "high": 1.0}, "uniform.low and high"),
+    (Uniform, {"low": (0.0, 2.0), "high": (1.0, 1.0)}, "uniform.low and high"),
+    (Uniform, {"low": (0.0, 2.0), "high": (1.0, 1.0, 1.0)}, "uniform.low and high"),
+    (Uniform, {"high": 1.0}, "uniform.high"),
+    (Uniform, {"half_width": 1.0, "low": 0.0}, "uniform.low"),
+    (Uniform, {"half_width": -1.0}, "uniform.half_width"),
+    (Uniform, {"half_width": 1.0, "relative": 0.1}, "uniform.half_width and relative"),
+    (LogNormal, {}, "lognormal."),
+    (LogNormal, {"sigma": -0.1}, "lognormal.sigma"),
+    (TruncatedNormal, {"low": 0.0}, "truncated_normal."),
+    (TruncatedNormal, {"std": 1.0, "low": 2.0, "high": 1.0}, "truncated_normal.low and high"),
+    (TruncatedNormal, {"std": 1.0, "low": 2.0, "width": 1.0}, "truncated_normal.width"),
+    (TruncatedNormal, {"std": 1.0, "width": -1.0}, "truncated_normal.width"),
+    (CorrelatedNormal, {}, "nothing given"),
+    (CorrelatedNormal, {"covariance": np.eye(2), "std": 1.0}, "covariance and std given"),
+    (CorrelatedNormal, {"correlation": np.eye(2)}, "correlation given"),
+    (CorrelatedNormal, {"covariance": [[1.0, 2.0], [2.0, 1.0]]}, "positive semidefinite"),
+    (CorrelatedNormal, {"covariance": [[1.0, 0.5], [0.2, 1.0]]}, "no symmetric matrix"),
+    (CorrelatedNormal, {"covariance": [1.0, 2.0]}, "no symmetric matrix"),
+    (CorrelatedNormal, {"covariance": [[np.nan]]}, "not finite"),
+    (CorrelatedNormal, {"covariance": "wide"}, "not numeric"),
+    (CorrelatedNormal, {"std": (1.0, -1.0)}, "negative"),
+    (CorrelatedNormal, {"std": (1.0, 1.0, 1.0), "correlation": np.eye(2)}, "does not fit 2"),
+    (CorrelatedNormal, {"std": 1.0, "correlation": 2.0 * np.eye(2)}, "diagonal that is not 1"),
+    # Metres beside newtons: the sizes of the entries say nothing about whether they can go together.
+    (CorrelatedNormal, {"std": (1e-3, 1e3), "correlation": [[1.0, 1.2], [1.2, 1.0]]}, "positive semidefinite"),
+    (CorrelatedNormal, {"covariance": [[1e-10, 50.0 * 1e-2], [50.0 * 1e-2, 1e6]]}, "positive semidefinite"),
+    (CorrelatedNormal, {"covariance": [[0.0, 0.1], [0.1, 1.0]]}, "positive semidefinite"),
+    (CorrelatedNormal, {"covariance": [[-1.0, 0.0], [0.0, 1.0]]}, "negative variance"),
+    (RotationNormal, {}, "nothing given"),
+    (RotationNormal, {"std": (0.1, 0.2)}, "does not fit 3"),
+    (RotationNormal, {"covariance": np.eye(2)}, "not 3 x 3"),
+    (RotationNormal, {"std": -0.1}, "negative"),
+    (RotationNormal, {"std": np.inf}, "not finite"),
+    (PositiveDefinite, {}, "width"),
+    (PositiveDefinite, {"sigma": -0.1}, "negative"),
+    (PositiveDefinite, {"sigma": 0.1, "off_diagonal": (0.1, 0.2)}, "not one number"),
+    (Choice, {}, "no list of values"),
+    (Choice, {"values": ("a",)}, "not numeric"),
+    (Choice, {"values": (1.0, 2.0), "weights": (1.0,)}, "weigh 2 values"),
+    (Choice, {"values": (1.0, 2.0), "weights": (2.0, -1.0)}, "negative"),
+    (ScipyDistribution, {"distribution": stats.gamma}, "no frozen distribution"),
+    (ScipyDistribution, {"distribution": stats.gamma(-1.0)}, "scipy.stats refuses"),
+])  # fmt: skip
 def test_bad_numbers(kind, values, key):
     message = refused(kind, **values)
     assert key in message
@@ -251,15 +238,15 @@ def test_bad_numbers(kind, values, key):
 
 
 def test_all_faults_of_a_law_come_at_once():
-    message = refused(lw.distributions.TruncatedNormal, std="no", relative=-1.0, mean=np.nan, low="a", high=1.0)
+    message = refused(TruncatedNormal, std="no", relative=-1.0, mean=np.nan, low="a", high=1.0)
     for key in ("std and relative", "truncated_normal.std =", "relative = -1.0", "mean = nan", "low = 'a'"):
         assert key in message
 
 
 @pytest.mark.parametrize("law", [
-    lw.distributions.Normal(std=[0.03, 0.02, 0.01]), lw.distributions.Uniform(low=0.0, high=1.0),
-    lw.distributions.LogNormal(sigma=0.1),
-    lw.distributions.TruncatedNormal(relative=0.1, width=2.0),
+    Normal(std=[0.03, 0.02, 0.01]), Uniform(low=0.0, high=1.0),
+    LogNormal(sigma=0.1),
+    TruncatedNormal(relative=0.1, width=2.0),
 ])  # fmt: skip
 def test_there_and_back(law):
     assert from_dict("key", law.to_dict()) == law

@@ -12,22 +12,34 @@ from scipy import stats
 from scipy.stats import qmc
 
 import lgvi_warp as lw
+from lgvi_warp.designs import Grid, Halton, LatinHypercube, Morris, Sobol, Table, UnitCubePoints
+from lgvi_warp.distributions import (
+    Choice,
+    CorrelatedNormal,
+    Normal,
+    PhysicalInertia,
+    PositiveDefinite,
+    RotationNormal,
+    Uniform,
+    UniformRotation,
+)
 from lgvi_warp.sampling import designs as sampling
 from lgvi_warp.sampling.designs.sequences import sobol_points
 from lgvi_warp.sampling.designs.space import Space
 from lgvi_warp.scene import draws
 from lgvi_warp.scene.settings import MOST_MEMBERS
 from lgvi_warp.scene.variations import targets
+from tests.support.refusals import says
 from tests.unit.scene.test_ensemble import assert_same, faults
 
 KOLMOGOROV = 2.5
 VARY = {
-    "vehicle.mass": lw.distributions.Normal(relative=0.01),
-    "vehicle.inertia": lw.distributions.PhysicalInertia(sigma=0.1, off_diagonal=0.05),
+    "vehicle.mass": Normal(relative=0.01),
+    "vehicle.inertia": PhysicalInertia(sigma=0.1, off_diagonal=0.05),
     "vehicle.buoyancy": stats.gamma(100.0, scale=10.0),
-    "start.attitude": lw.distributions.RotationNormal(std=0.2),
-    "start.position[2]": lw.distributions.Uniform(low=5.0, high=15.0),
-    "start.velocity_inertial[0], start.angular_velocity": lw.distributions.CorrelatedNormal(
+    "start.attitude": RotationNormal(std=0.2),
+    "start.position[2]": Uniform(low=5.0, high=15.0),
+    "start.velocity_inertial[0], start.angular_velocity": CorrelatedNormal(
         covariance=0.01 * (np.eye(4) + 0.5 * (np.ones((4, 4)) - np.eye(4)))
     ),
 }
@@ -71,21 +83,16 @@ def test_blocks_subsets_and_longer_ensembles_have_the_same_members(scene, conten
     assert_same(longer.select(0, n), whole, slice(0, n))
 
 
-@pytest.mark.parametrize("kind", [lw.designs.Table, lw.designs.UnitCubePoints])
+@pytest.mark.parametrize("kind", [Table, UnitCubePoints])
 def test_lines_may_be_added(scene, kind):
     """Members of the lines that were there stay as they are, and so do the numbers drawn beside a table."""
     lines = np.random.default_rng(2).uniform(0.1, 0.9, (50, 2))
-    vary = {
-        "vehicle.buoyancy": lw.distributions.Uniform(half_width=1.0),
-        "start.position[2]": lw.distributions.Normal(std=1.0),
-    }
+    vary = {"vehicle.buoyancy": Uniform(half_width=1.0), "start.position[2]": Normal(std=1.0)}
 
     def of(rows):
-        if kind is lw.designs.UnitCubePoints:
-            return lw.Ensemble(scene, None, 3, vary, lw.designs.UnitCubePoints(rows))
-        return lw.Ensemble(
-            scene, None, 3, vary, lw.designs.Table({"vehicle.mass": rows[:, 0], "start.position[0]": rows[:, 1]})
-        )
+        if kind is UnitCubePoints:
+            return lw.Ensemble(scene, None, 3, vary, UnitCubePoints(rows))
+        return lw.Ensemble(scene, None, 3, vary, Table({"vehicle.mass": rows[:, 0], "start.position[0]": rows[:, 1]}))
 
     fewer, more = of(lines[:20]), of(lines)
     assert_same(more.select(0, 20), fewer.select(0, 20), slice(0, 20))
@@ -102,7 +109,7 @@ def test_far_members(content):
 @pytest.mark.parametrize("content", ["random", pytest.param("sobol", marks=pytest.mark.slow), *SEQUENCES[2:]], ids=str)
 def test_the_last_members_there_can_be(scene, content):
     """The first words of Sobol's basis for the last points take 2^31 steps of scipy's."""
-    vary = {"start.position": lw.distributions.Normal(std=1.0)}
+    vary = {"start.position": Normal(std=1.0)}
     n = MOST_MEMBERS - (MOST_MEMBERS % 40 if isinstance(content, dict) else 0)
     fleet = lw.Ensemble(scene, n, 3, vary, content)
     last = fleet.select(n - 50, n)
@@ -116,9 +123,8 @@ def test_the_last_members_there_can_be(scene, content):
 def test_no_sampling_has_more_members_than_there_can_be(scene):
     for content in ("random", "sobol", {"sobol": {"replicates": 64}}, "halton"):
         (fault,) = faults(lw.Ensemble, scene, MOST_MEMBERS + 64, 0, None, content)
-        assert "ensemble.members = 2147483712: are more members than the 2147483648" in fault
-        assert "or less" in fault
-    uniform = lw.distributions.Uniform(low=0.0, high=1.0)
+        says(fault, "ensemble.members = 2147483712: are more members than the 2147483648", "or less")
+    uniform = Uniform(low=0.0, high=1.0)
     names = ("start.position", "start.angular_velocity")
     grid = {"grid": dict.fromkeys(names, 3000)}
     content = scene.to_dict() | {"ensemble": {"vary": dict.fromkeys(names, uniform.to_dict()), "sampling": grid}}
@@ -126,11 +132,8 @@ def test_no_sampling_has_more_members_than_there_can_be(scene):
     assert f"ensemble.sampling.grid = {3000**6}: are more members" in fault
     assert "fewer values" in fault
     # Beyond whole numbers of 64 bits.
-    assert (
-        "more members"
-        in faults(lw.Ensemble, scene, None, 0, {names[0]: uniform}, lw.designs.Grid({names[0]: 10**30}))[0]
-    )
-    fleet = lw.Ensemble(scene, None, 0, {names[0]: uniform}, lw.designs.Grid({names[0]: 2**10}))
+    assert "more members" in faults(lw.Ensemble, scene, None, 0, {names[0]: uniform}, Grid({names[0]: 10**30}))[0]
+    fleet = lw.Ensemble(scene, None, 0, {names[0]: uniform}, Grid({names[0]: 2**10}))
     assert fleet.members == 2**30
     assert len(fleet.select(2**30 - 3, 2**30).position) == 3
 
@@ -239,22 +242,19 @@ def test_replicates_are_told_and_read(scene, content):
     assert_same(lw.Ensemble.from_scene(again).select(0, 80), fleet.select(0, 80), slice(0, 80))
     assert fleet.subset(range(40)).replicates == fleet.member(3).replicates == 1
     assert lw.Ensemble(scene, 80, 3, VARY, "sobol").replicates == lw.Ensemble(scene, 80).replicates == 1
-    assert lw.designs.Sobol(replicates=1).to_dict() == "sobol"
+    assert Sobol(replicates=1).to_dict() == "sobol"
 
 
 def test_whole_numbers_of_numpy(scene):
     """They are as good as Python's, in provenance as well."""
     import json
 
-    pairs = [(lw.designs.LatinHypercube(np.int64(10), replicates=np.int32(2)), lw.designs.LatinHypercube(10, replicates=2)),
-             (lw.designs.Sobol(replicates=np.uint8(4)), lw.designs.Sobol(replicates=4)),
-             (lw.designs.Halton(replicates=np.int16(4)), lw.designs.Halton(replicates=4)),
-             (lw.designs.Morris(np.int64(6)), lw.designs.Morris(6)),
-             (lw.designs.Grid({"vehicle.buoyancy": np.int64(4)}), lw.designs.Grid({"vehicle.buoyancy": 4}))]  # fmt: skip
-    vary = {
-        "vehicle.buoyancy": lw.distributions.Uniform(half_width=1.0),
-        "start.position[2]": lw.distributions.Normal(std=1.0),
-    }
+    pairs = [(LatinHypercube(np.int64(10), replicates=np.int32(2)), LatinHypercube(10, replicates=2)),
+             (Sobol(replicates=np.uint8(4)), Sobol(replicates=4)),
+             (Halton(replicates=np.int16(4)), Halton(replicates=4)),
+             (Morris(np.int64(6)), Morris(6)),
+             (Grid({"vehicle.buoyancy": np.int64(4)}), Grid({"vehicle.buoyancy": 4}))]  # fmt: skip
+    vary = {"vehicle.buoyancy": Uniform(half_width=1.0), "start.position[2]": Normal(std=1.0)}
     for ours, theirs in pairs:
         n = {"grid": 4, "morris": 60}.get(ours.kind, 80)
         fleets = [lw.Ensemble(scene, kind(n), kind(3), vary, one) for kind, one in ((np.int64, ours), (int, theirs))]
@@ -306,12 +306,9 @@ def test_a_path_moves_one_factor_at_a_time_by_half_the_levels():
 
 
 def test_a_grid_is_every_combination(scene):
-    grid = lw.designs.Grid({"vehicle.mass": [120.0, 121.0, 125.0], "start.position[2]": [5.0, 6.0], "vehicle.buoyancy": 4,
+    grid = Grid({"vehicle.mass": [120.0, 121.0, 125.0], "start.position[2]": [5.0, 6.0], "vehicle.buoyancy": 4,
                     "start.angular_velocity": [[0.0, 0.0, 0.1], [0.0, 0.2, 0.0]]})  # fmt: skip
-    vary = {
-        "vehicle.buoyancy": lw.distributions.Uniform(low=1000.0, high=1400.0),
-        "environment.gravity": lw.distributions.Normal(std=0.001),
-    }
+    vary = {"vehicle.buoyancy": Uniform(low=1000.0, high=1400.0), "environment.gravity": Normal(std=0.001)}
     fleet = lw.Ensemble(scene, None, 1, vary, grid)
     assert fleet.members == 2 * 2 * 4 * 3
     m = fleet.select(0, 48)
@@ -331,9 +328,7 @@ def test_a_table_of_arrays(scene):
     R = stats.special_ortho_group(3, seed=1).rvs(6)
     values = {"vehicle.mass": rng.uniform(100, 150, 6), "start.position[1]": np.arange(6.0), "vehicle.inertia": J,
               "start.attitude": R, "vehicle.added_mass[0,1]": np.arange(6.0)}  # fmt: skip
-    fleet = lw.Ensemble(
-        scene, sampling=lw.designs.Table(values), vary={"environment.gravity": lw.distributions.Normal(std=0.001)}
-    )
+    fleet = lw.Ensemble(scene, sampling=Table(values), vary={"environment.gravity": Normal(std=0.001)})
     m = fleet.select(0, 6)
     np.testing.assert_array_equal(m.parameters["vehicle.mass"], values["vehicle.mass"])
     np.testing.assert_array_equal(m.position, [[0.0, i, 10.0] for i in range(6)])
@@ -383,7 +378,7 @@ PLAIN = "vehicle.mass,start.position[2]\n120.5,7\n121,8.25\n"
 )
 def test_files_as_programs_write_them(tmp_path, text):
     (tmp_path / "members.csv").write_bytes(text.encode())
-    found = lw.designs.Table(tmp_path / "members.csv").own_values()
+    found = Table(tmp_path / "members.csv").own_values()
     np.testing.assert_array_equal(found["vehicle.mass"], [120.5, 121.0])
     np.testing.assert_array_equal(found["start.position[2]"], [7.0, 8.25])
 
@@ -393,7 +388,7 @@ def test_numbers_of_a_file_have_all_their_digits(tmp_path):
     numbers = rng.standard_normal((50, 2)) * 10.0 ** rng.integers(-300, 300, (50, 2))
     numbers[0] = np.finfo(float).max, np.finfo(float).max  # whose sum is not finite
     np.savetxt(tmp_path / "a.csv", numbers, fmt="%.17g", delimiter=",", header="x,y", comments="")
-    found = lw.designs.Table(tmp_path / "a.csv").own_values()
+    found = Table(tmp_path / "a.csv").own_values()
     np.testing.assert_array_equal(np.stack([found["x"], found["y"]], axis=1), numbers)
 
 
@@ -403,12 +398,12 @@ def test_columns_that_no_scene_has_are_left_out(scene, tmp_path):
     frame = pandas.DataFrame({"id": ["a", "b"], "vehicle.mass": [120, 121], "start.position[2]": [7.0, 8.25]})
     path = tmp_path / "members.csv"
     frame.to_csv(path)
-    found = faults(lw.designs.Table, path, columns=["vehicle.mass", "id"])
+    found = faults(Table, path, columns=["vehicle.mass", "id"])
     assert len(found) == 2
     assert all('leave the column out: ignore = ["id"]' in fault for fault in found)
-    tables = [lw.designs.Table(path, ignore=["", "id"]), lw.designs.Table(path, columns=("start.position[2]", "vehicle.mass")),
-              lw.designs.Table(frame, ignore=["id"]),
-              lw.designs.Table(values=frame, columns=["vehicle.mass", "start.position[2]"])]  # fmt: skip
+    tables = [Table(path, ignore=["", "id"]), Table(path, columns=("start.position[2]", "vehicle.mass")),
+              Table(frame, ignore=["id"]),
+              Table(values=frame, columns=["vehicle.mass", "start.position[2]"])]  # fmt: skip
     for table in tables:
         assert sorted(table.own_values()) == ["start.position[2]", "vehicle.mass"]
         fleet = lw.Ensemble(scene, sampling=table)
@@ -420,12 +415,8 @@ def test_columns_that_no_scene_has_are_left_out(scene, tmp_path):
 @pytest.mark.parametrize("kind", ["table", "levels"])
 def test_the_first_lines_alone(scene, kind):
     lines = np.random.default_rng(4).uniform(0.1, 0.9, (30, 1))
-    vary = {"start.position[2]": lw.distributions.Normal(std=1.0)}
-    design = (
-        lw.designs.UnitCubePoints(lines)
-        if kind == "levels"
-        else lw.designs.Table({"vehicle.mass": 120.0 + lines[:, 0]})
-    )
+    vary = {"start.position[2]": Normal(std=1.0)}
+    design = UnitCubePoints(lines) if kind == "levels" else Table({"vehicle.mass": 120.0 + lines[:, 0]})
     whole, part = (lw.Ensemble(scene, members, 3, vary, design) for members in (None, 20))
     assert (whole.members, part.members) == (30, 20)
     assert_same(part.select(0, 20), whole.select(0, 30), slice(0, 20))
@@ -437,11 +428,8 @@ def test_the_first_lines_alone(scene, kind):
 
 def test_a_design_of_ones_own(scene):
     u = np.random.default_rng(1).random((20, 2))
-    vary = {
-        "vehicle.mass": lw.distributions.Uniform(low=100.0, high=110.0),
-        "environment.gravity": lw.distributions.Uniform(low=9.0, high=10.0),
-    }
-    fleet = lw.Ensemble(scene, None, 0, vary, lw.designs.UnitCubePoints(u))
+    vary = {"vehicle.mass": Uniform(low=100.0, high=110.0), "environment.gravity": Uniform(low=9.0, high=10.0)}
+    fleet = lw.Ensemble(scene, None, 0, vary, UnitCubePoints(u))
     assert fleet.space.keys == ("environment.gravity", "vehicle.mass")
     np.testing.assert_allclose(fleet.parameters(0, 20)["environment.gravity"], 9.0 + u[:, 0], rtol=1e-15)
     np.testing.assert_allclose(fleet.parameters(3, 9)["vehicle.mass"], 100.0 + 10.0 * u[3:9, 1], rtol=1e-15)
@@ -596,7 +584,7 @@ BAD_FILES = {
 def test_bad_files(tmp_path, text):
     path = tmp_path / "members.csv"
     path.write_text(text)
-    found = faults(lw.designs.Table, str(path))
+    found = faults(Table, str(path))
     assert len(found) == len(BAD_FILES[text]), found
     for fault, expected in zip(found, BAD_FILES[text], strict=True):
         assert all(words in fault for words in expected.split("|")), fault
@@ -604,24 +592,23 @@ def test_bad_files(tmp_path, text):
 
 def test_files_that_are_none(scene, tmp_path):
     path = tmp_path / "members.csv"
-    assert "No such file" in faults(lw.designs.Table, path)[0]
+    assert "No such file" in faults(Table, path)[0]
     path.write_bytes(b"x\n120\xb0\n")
-    assert "no text in UTF-8" in faults(lw.designs.Table, path)[0]
+    assert "no text in UTF-8" in faults(Table, path)[0]
     path.write_text("vehicle.mass [kg],vehicle.buoyancy\n120,1000\n")
-    (fault,) = faults(lw.Ensemble, scene, sampling=lw.designs.Table(path))
-    assert '"vehicle.mass [kg]"' in fault
-    assert "did you mean 'vehicle.mass'?" in fault
+    (fault,) = faults(lw.Ensemble, scene, sampling=Table(path))
+    says(fault, '"vehicle.mass [kg]"', "did you mean 'vehicle.mass'?")
 
 
 def test_bad_names_and_laws_come_in_one_message(scene):
-    vary = {"vehicle.mass, vehicle.buoyancy": lw.distributions.Normal(std=1.0),
-            "vehicle.inertia[0,5]": lw.distributions.Normal(std=1.0),
-            "vehicle.mass[0]": lw.distributions.Normal(std=1.0), "start.position": lw.distributions.Normal(std=1.0),
-            "start.position[1]": lw.distributions.Normal(std=1.0),
-            "vehicle.added_mass": lw.distributions.RotationNormal(std=0.1),
-            "vehicle.center_of_buoyancy": lw.distributions.PositiveDefinite(sigma=0.1),
-            "environment.gravity, environment.water_density": lw.distributions.CorrelatedNormal(covariance=np.eye(3)),
-            "vehicle.inertia": lw.distributions.PositiveDefinite(sigma=(0.1, 0.2)),
+    vary = {"vehicle.mass, vehicle.buoyancy": Normal(std=1.0),
+            "vehicle.inertia[0,5]": Normal(std=1.0),
+            "vehicle.mass[0]": Normal(std=1.0), "start.position": Normal(std=1.0),
+            "start.position[1]": Normal(std=1.0),
+            "vehicle.added_mass": RotationNormal(std=0.1),
+            "vehicle.center_of_buoyancy": PositiveDefinite(sigma=0.1),
+            "environment.gravity, environment.water_density": CorrelatedNormal(covariance=np.eye(3)),
+            "vehicle.inertia": PositiveDefinite(sigma=(0.1, 0.2)),
             "vehicle.nothing": stats.gamma(2.0)}  # fmt: skip
     found = faults(lw.Ensemble, scene, 4, 0, vary)
     assert len(found) == 9
@@ -643,20 +630,20 @@ def test_every_fault_of_a_section_comes_at_once(scene):
 def test_whole_matrices_of_a_grid(scene):
     J = np.diag([5.0, 5.5, 6.0])
     skew = J + np.array([[0.0, 0.1, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    fleet = lw.Ensemble(scene, sampling=lw.designs.Grid({"vehicle.inertia": [J, 1.1 * J]}))
+    fleet = lw.Ensemble(scene, sampling=Grid({"vehicle.inertia": [J, 1.1 * J]}))
     np.testing.assert_array_equal(fleet.parameters(0, 2)["vehicle.inertia"], [J, 1.1 * J])
-    assert "not symmetric" in faults(lw.Ensemble, scene, sampling=lw.designs.Grid({"vehicle.inertia": [J, skew]}))[0]
+    assert "not symmetric" in faults(lw.Ensemble, scene, sampling=Grid({"vehicle.inertia": [J, skew]}))[0]
 
 
 def test_attitudes_of_a_list(scene):
     """Chosen from a grid, a law and a table alike; the scene's own is a rotation vector."""
     R = stats.special_ortho_group(3, seed=1).rvs(4)
-    grid = lw.Ensemble(scene, sampling=lw.designs.Grid({"start.attitude": R, "vehicle.mass": [120.0, 121.0]}))
+    grid = lw.Ensemble(scene, sampling=Grid({"start.attitude": R, "vehicle.mass": [120.0, 121.0]}))
     m = grid.select(0, 8)
     np.testing.assert_array_equal(m.attitude, np.repeat(R, 2, axis=0))
     np.testing.assert_array_equal(m.parameters["vehicle.mass"], [120.0, 121.0] * 4)
     assert_same(grid.member(5).select(0, 1), m, [5])
-    law = lw.distributions.Choice(R, weights=[1, 1, 1, 0])
+    law = Choice(R, weights=[1, 1, 1, 0])
     drawn = lw.Ensemble(scene, 100, 0, {"start.attitude": law})
     which = np.abs(drawn.select(0, 100).attitude[:, None] - R).max(axis=(2, 3)).argmin(axis=1)
     np.testing.assert_array_equal(drawn.select(0, 100).attitude, R[which])
@@ -669,29 +656,17 @@ def test_attitudes_of_a_list(scene):
 def test_attitudes_that_are_no_rotations(scene):
     R = stats.special_ortho_group(3, seed=1).rvs(4)
     R[2, 0] *= -1.0
-    for sampling_, vary in (
-        (lw.designs.Grid({"start.attitude": R}), None),
-        ("random", {"start.attitude": lw.distributions.Choice(R)}),
-    ):
+    for sampling_, vary in ((Grid({"start.attitude": R}), None), ("random", {"start.attitude": Choice(R)})):
         (fault,) = faults(lw.Ensemble, scene, None, 0, vary, sampling_)
-        assert 'vary."start.attitude"' in fault
-        assert "no rotation to 1e-9 (number 3)" in fault
-    assert "by entry" in faults(lw.Ensemble, scene, 4, 0, {"start.attitude": lw.distributions.Choice([0.0, 1.0])})[0]
-    assert (
-        "shape (2, 2)" in faults(lw.Ensemble, scene, 4, 0, {"start.attitude": lw.distributions.Choice([np.eye(2)])})[0]
-    )
+        says(fault, 'vary."start.attitude"', "no rotation to 1e-9 (number 3)")
+    assert "by entry" in faults(lw.Ensemble, scene, 4, 0, {"start.attitude": Choice([0.0, 1.0])})[0]
+    assert "shape (2, 2)" in faults(lw.Ensemble, scene, 4, 0, {"start.attitude": Choice([np.eye(2)])})[0]
 
 
 def test_the_attitude_varies_in_one_way_only(scene):
-    vary = {
-        "start.attitude": lw.distributions.UniformRotation(),
-        "start.rotation_vector": lw.distributions.Normal(std=0.1),
-    }
+    vary = {"start.attitude": UniformRotation(), "start.rotation_vector": Normal(std=0.1)}
     assert "keep one of them" in faults(lw.Ensemble, scene, 4, 0, vary)[0]
-    assert (
-        "RotationNormal"
-        in faults(lw.Ensemble, scene, 4, 0, {"start.attitude[0,0]": lw.distributions.Normal(std=0.1)})[0]
-    )
+    assert "RotationNormal" in faults(lw.Ensemble, scene, 4, 0, {"start.attitude[0,0]": Normal(std=0.1)})[0]
 
 
 def test_indices_that_are_not_there(scene):
@@ -712,10 +687,7 @@ def test_names_and_entries():
 
 
 def test_an_entry_varies_alone(scene):
-    vary = {
-        "start.position[2]": lw.distributions.Normal(std=1.0),
-        "vehicle.inertia[0,1]": lw.distributions.Normal(std=0.01),
-    }
+    vary = {"start.position[2]": Normal(std=1.0), "vehicle.inertia[0,1]": Normal(std=0.01)}
     m = lw.Ensemble(scene, 30, 0, vary).select(0, 30)
     np.testing.assert_array_equal(m.position[:, :2], 0.0)
     J = m.parameters["vehicle.inertia"]
@@ -729,7 +701,7 @@ def test_many_members_take_little_memory(scene):
     import tracemalloc
 
     tracemalloc.start()
-    fleet = lw.Ensemble(scene, 300_000, 0, {"vehicle.mass": lw.distributions.Normal(relative=0.001)}, "sobol")
+    fleet = lw.Ensemble(scene, 300_000, 0, {"vehicle.mass": Normal(relative=0.001)}, "sobol")
     fleet.select(299_000, 300_000)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
@@ -741,22 +713,18 @@ def test_many_members_take_little_memory(scene):
 @pytest.mark.parametrize("axes", [None, {}, [1.0], "vehicle.mass", 3])
 def test_a_grid_names_what_it_is_a_grid_of(axes):
     """What is no table of axes is one fault, and no error of Python's follows."""
-    (fault,) = faults(lw.designs.Grid, axes)
+    (fault,) = faults(Grid, axes)
     assert fault.startswith("ensemble.sampling.grid.axes = ")
     assert "names nothing" in fault
 
 
 def test_a_hypercube_without_its_group_is_told_so():
-    for make in (
-        lw.designs.LatinHypercube,
-        lambda: sampling.sampling_of("latin_hypercube"),
-        lambda: lw.designs.LatinHypercube(replicates=2),
-    ):
+    for make in (LatinHypercube, lambda: sampling.sampling_of("latin_hypercube"), lambda: LatinHypercube(replicates=2)):
         (fault,) = faults(make)
         assert fault == (
             "ensemble.sampling.latin_hypercube.group = None: is missing; give how many members make a hypercube: group = 256"
         )
-    assert "is not a whole number from 2" in faults(lw.designs.LatinHypercube, 0)[0]
+    assert "is not a whole number from 2" in faults(LatinHypercube, 0)[0]
 
 
 def test_a_posterior_by_chain_and_draw_is_a_table_of_all_draws():
@@ -766,18 +734,16 @@ def test_a_posterior_by_chain_and_draw_is_a_table_of_all_draws():
     buoyancy, start = np.arange(6.0).reshape(2, 3), np.arange(18.0).reshape(2, 3, 3)
     each = {"vehicle.buoyancy": (("chain", "draw"), buoyancy), "start.position": (("chain", "draw", "axis"), start)}
     posterior = xr.Dataset(each, {"chain": [0, 1], "draw": [0, 1, 2]})
-    table = lw.designs.Table(posterior)
+    table = Table(posterior)
     np.testing.assert_array_equal(table.own_values()["vehicle.buoyancy"], np.arange(6.0))
     np.testing.assert_array_equal(table.own_values()["start.position"], np.arange(18.0).reshape(6, 3))
     # One chain is as good, and what has other dimensions is read as before.
-    np.testing.assert_array_equal(
-        lw.designs.Table(posterior.isel(chain=0)).own_values()["vehicle.buoyancy"], [0.0, 1.0, 2.0]
-    )
+    np.testing.assert_array_equal(Table(posterior.isel(chain=0)).own_values()["vehicle.buoyancy"], [0.0, 1.0, 2.0])
     for other in (
         posterior.transpose("axis", "draw", "chain"),
         xr.DataTree.from_dict({"posterior": posterior})["posterior"],
     ):
-        again = lw.designs.Table(other).own_values()
+        again = Table(other).own_values()
         assert again.keys() == table.own_values().keys()
         for name, values in table.own_values().items():
             np.testing.assert_array_equal(again[name], values)

@@ -18,7 +18,8 @@ from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene import scene as scenes
 from lgvi_warp.scene.scene import from_dict
 from lgvi_warp.scene.settings import EnsembleSettings, RunSettings
-from tests.support.refusals import faults
+from lgvi_warp.terms import Current, Drag, Weight
+from tests.support.refusals import faults, says
 
 NAN, INF = float("nan"), float("inf")
 BODY = {"mass": 10.0, "inertia": [1.0, 2.0, 2.5]}
@@ -136,32 +137,15 @@ EVENTS = [
 ]
 
 
-@pytest.mark.parametrize(("table", "words"), [(row[0], row[1:]) for row in EVENTS])
-def test_an_event(table, words):
-    (fault,) = faults(from_table, table, "events")
-    assert all(word in fault for word in words), fault
-
-
 LISTS = [
-    ([lw.terms.Drag(), lw.terms.Drag()], "terms = 'drag'", "name of 2 terms", 'name = "drag_2"'),
-    (
-        [lw.terms.Drag(name="current"), lw.terms.Current(velocity=[1, 0, 0])],
-        "terms = 'current'",
-        "name of 2 terms",
-        "current_2",
-    ),
-    ([lw.terms.Current(velocity=[1, 0, 0], name="environment")], "terms = 'environment'", "environment_term"),
+    ([Drag(), Drag()], "terms = 'drag'", "name of 2 terms", 'name = "drag_2"'),
+    ([Drag(name="current"), Current(velocity=[1, 0, 0])], "terms = 'current'", "name of 2 terms", "current_2"),
+    ([Current(velocity=[1, 0, 0], name="environment")], "terms = 'environment'", "environment_term"),
     ([lw.events.Surface()], "terms[0] = 'surface'", "is an event", "events=[...]"),
-    ([lw.terms.Weight()], "terms[0] = 'weight'", "acts already", "leave it out"),
-    ([lw.terms.Drag], "terms[0] = <class", "is no term", "lw.terms.Drag(quadratic=...)"),
-    (lw.terms.Drag(), "terms = Drag", "is no list", "terms=[lw.terms.Drag(...)]"),
+    ([Weight()], "terms[0] = 'weight'", "acts already", "leave it out"),
+    ([Drag], "terms[0] = <class", "is no term", "lw.terms.Drag(quadratic=...)"),
+    (Drag(), "terms = Drag", "is no list", "terms=[lw.terms.Drag(...)]"),
 ]
-
-
-@pytest.mark.parametrize(("terms", "words"), [(row[0], row[1:]) for row in LISTS])
-def test_a_list_of_terms(terms, words):
-    (fault,) = faults(lw.Scene, lw.Vehicle(**BODY), terms=terms)
-    assert all(word in fault for word in words), fault
 
 
 # Key, values of it that are refused, and words of what is said of each, the remedy among them.
@@ -219,15 +203,18 @@ def test_a_setting_of_a_section(key, value, words):
     assert all(word in fault for word in words), fault
 
 
-PAIRS = [({"velocity": (1, 0, 0), "velocity_inertial": (1, 0, 0)}, "start.velocity and velocity_inertial = "),
-         ({"rotation_vector": (1, 0, 0), "euler_deg": (1, 0, 0)}, "start.rotation_vector and euler_deg = ")]  # fmt: skip
-
-
-@pytest.mark.parametrize(("values", "start"), PAIRS)
-def test_a_start_that_says_the_same_twice(values, start):
-    (fault,) = faults(lw.Start, **values)
-    assert fault.startswith(start)
-    assert "keep one of them" in fault
+STARTS = [
+    (
+        {"velocity": (1, 0, 0), "velocity_inertial": (1, 0, 0)},
+        "start.velocity and velocity_inertial = ",
+        "keep one of them",
+    ),
+    (
+        {"rotation_vector": (1, 0, 0), "euler_deg": (1, 0, 0)},
+        "start.rotation_vector and euler_deg = ",
+        "keep one of them",
+    ),
+]
 
 
 def full(rigid=DIAGONAL, **more):
@@ -271,20 +258,7 @@ FOSSEN = [
     ([1.0], "coefficients = [1.0]", "not a map", "X_udot"),
     ({"X_qdot": -1e3}, "total mass matrix", "not positive definite", "check mass"),
 ]
-
-
-@pytest.mark.parametrize(("given", "words"), [(row[0], row[1:]) for row in FOSSEN])
-def test_fossens_coefficients(given, words):
-    (fault,) = faults(lw.vehicles.from_fossen, given, **BODY)
-    assert all(word in fault for word in words), fault
-
-
-def test_fossens_drag_that_creates_energy():
-    made = lw.vehicles.from_fossen({"X_u": -1.0, "X_v": -100.0, "Y_v": -1.0}, **BODY)
-    (fault,) = faults(from_dict, made)
-    assert "drag_matrix.linear" in fault
-    assert "creates energy" in fault
-    assert "minus Fossen's" in fault
+ENERGY = [({"X_u": -1.0, "X_v": -100.0, "Y_v": -1.0}, "drag_matrix.linear", "creates energy", "minus Fossen's")]
 
 
 LINK = ("<sdf><model name='m'><link name='b'><inertial><mass>10</mass><inertia><ixx>1</ixx><iyy>2</iyy><izz>2.5</izz>"
@@ -326,13 +300,6 @@ YAML = [
 ]
 
 
-@pytest.mark.parametrize(("text", "words"), [(row[0], row[1:]) for row in YAML])
-def test_yaml(text, words):
-    pytest.importorskip("yaml")
-    (fault,) = faults(lw.vehicles.from_yaml, text)
-    assert all(word in fault for word in words), fault
-
-
 def test_all_faults_of_a_scene_file_at_once():
     text = """
     [vehicle]
@@ -357,40 +324,17 @@ def test_all_faults_of_a_scene_file_at_once():
     assert all(any(one.startswith(key) for one in found) for key in keys)
 
 
-@pytest.mark.parametrize("path", ["missing.toml", None])
-def test_a_scene_file_that_is_not_there(path):
-    (fault,) = faults(lw.Scene.load, path)
-    assert str(path) in fault
-    assert "give the path of a TOML file" in fault
-
-
-FAR = lw.distributions.Normal(std=100.0)
-VARIED = [(PROFILE, "current_profile.depths", FAR), (SCHEDULE, "wrench_schedule.times", FAR),
-          (THRUSTER | {"times": [0.0, 1.0], "command_schedule": [[0.0], [1.0]]}, "thrusters.times", FAR),
-          (HULL, "cross_flow.stations", FAR), (THRUSTER, "thrusters.coefficient", FAR),
-          ({"type": "drag_matrix", "linear": np.eye(6).tolist()}, "drag_matrix.linear", FAR),
-          (WAVES, "waves.periods", FAR)]  # fmt: skip
-
-
-@pytest.mark.parametrize(("table", "name", "law"), VARIED)
-def test_members_that_would_be_unphysical(table, name, law):
-    (fault,) = faults(lw.Ensemble, from_table(table), 50, 0, {name: law})
-    assert name in fault
-    assert "unphysical" in fault
-    assert "of 50 members" in fault
-    assert "smaller spread" in fault
+PATHS = [(path, str(path), "give the path of a TOML file") for path in ("missing.toml", None)]
+FAR, NEAR = lw.distributions.Normal(std=100.0), lw.distributions.Uniform(0.1, 0.2)
+VARIED = [(PROFILE, "current_profile.depths"), (SCHEDULE, "wrench_schedule.times"),
+          (THRUSTER | {"times": [0.0, 1.0], "command_schedule": [[0.0], [1.0]]}, "thrusters.times"),
+          (HULL, "cross_flow.stations"), (THRUSTER, "thrusters.coefficient"),
+          ({"type": "drag_matrix", "linear": np.eye(6).tolist()}, "drag_matrix.linear"),
+          (WAVES, "waves.periods")]  # fmt: skip
 
 
 NAMES = [({"type": "drag"}, "drag.quadrtic", "did you mean 'drag.quadratic'?"),
          ({"type": "drag", "name": "hull"}, "drag.quadratic", "did you mean 'hull.quadratic'?")]  # fmt: skip
-
-
-@pytest.mark.parametrize(("table", "name", "remedy"), NAMES)
-def test_what_cannot_vary(table, name, remedy):
-    (fault,) = faults(lw.Ensemble, from_table(table), 5, 0, {name: lw.distributions.Normal(std=1.0)})
-    assert f'ensemble.vary."{name}"' in fault
-    assert "does not name what the scene has" in fault
-    assert remedy in fault
 
 
 SCHEDULED = THRUSTER | {"times": [0.0, 1.0], "command_schedule": [[0.0], [1.0]]}
@@ -403,14 +347,6 @@ IDLE = [
     (STEERED, "control_fins.times", "vary control_fins.command"),
     (STEERED, "control_fins.rate_limit", "give control_fins.rate_limit below 1e+06 rad/s in the scene"),
 ]
-
-
-@pytest.mark.parametrize(("table", "name", "remedy"), IDLE)
-def test_numbers_that_would_do_nothing(table, name, remedy):
-    (fault,) = faults(lw.Ensemble, from_table(table), 5, 0, {name: lw.distributions.Uniform(0.1, 0.2)})
-    assert name in fault
-    assert "does not act: the scene has" in fault
-    assert remedy in fault
 
 
 NOISE = {"type": "wrench_noise", "force": [1.0, 1.0, 1.0]}
@@ -434,10 +370,47 @@ RUNS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("table", "settings", "words"), [(row[0], row[1], row[2:]) for row in RUNS])
-def test_a_method_that_cannot_do_it(table, settings, words):
-    (fault,) = faults(make_plan, lw.Ensemble(from_table(table)), **({"h": 0.01, "t1": 0.1} | settings))
-    assert all(word in fault for word in words), fault
+def of_terms(terms):
+    return lw.Scene(lw.Vehicle(**BODY), terms=terms)
+
+
+def varied(given):
+    """Members of the scene with a term of this table, of which one number has this distribution."""
+    table, name, law, members = given
+    return lw.Ensemble(from_table(table), members, 0, {name: law})
+
+
+def planned(given):
+    return make_plan(lw.Ensemble(from_table(given[0])), **({"h": 0.01, "t1": 0.1} | given[1]))
+
+
+# What is given wrongly, and how: rows of what is given, and words of the one fault that is said.
+ONE_FAULT = [
+    (lambda table: from_table(table, "events"), EVENTS),
+    (of_terms, LISTS + [(one, "terms = ", "is no list") for one in ("drag", 3, None, {"type": "drag"})]),
+    (lambda values: lw.Start(**values), STARTS),
+    (lambda given: lw.vehicles.from_fossen(given, **BODY), FOSSEN),
+    (lambda given: from_dict(lw.vehicles.from_fossen(given, **BODY)), ENERGY),
+    (lambda text: pytest.importorskip("yaml") and lw.vehicles.from_yaml(text), YAML),
+    (lw.Scene.load, PATHS),
+    (varied, [((*row, FAR, 50), row[1], "unphysical", "of 50 members", "smaller spread") for row in VARIED]),
+    (
+        varied,
+        [
+            ((*row[:2], NEAR, 5), f'ensemble.vary."{row[1]}"', "does not name what the scene has", row[2])
+            for row in NAMES
+        ],
+    ),
+    (varied, [((*row[:2], NEAR, 5), row[1], "does not act: the scene has", row[2]) for row in IDLE]),
+    (planned, [(row[:2], *row[2:]) for row in RUNS]),
+]
+
+
+@pytest.mark.parametrize(
+    ("make", "given", "words"), [(make, row[0], row[1:]) for make, rows in ONE_FAULT for row in rows]
+)
+def test_what_is_wrong_is_one_fault(make, given, words):
+    says(*faults(make, given), *words)
 
 
 # A user's law.
@@ -520,9 +493,7 @@ def test_a_law_without_a_struct_whose_numbers_make_none():
 def test_a_law_that_returns_nothing():
     term = type("Bad", (Packs,), {"device": device(law=pull_silent), "__annotations__": {}})(k=1.0)
     (fault,) = faults(lw.laws.check_law, term)
-    assert "pull.device" in fault
-    assert "does not compile" in fault
-    assert "return what the role adds to" in fault
+    says(fault, "pull.device", "does not compile", "return what the role adds to")
 
 
 @pytest.mark.kernel
@@ -530,8 +501,7 @@ def test_a_law_that_returns_nothing():
 def test_packed_that_returns_something_else(given):
     report = lw.laws.check_law(type("Bad", (Packs,), {"what": given, "__annotations__": {}})(k=1.0))
     assert not report.ok
-    assert "packed() returns" in str(report)
-    assert "lw.laws.Packed({name: numbers})" in str(report)
+    says(str(report), "packed() returns", "lw.laws.Packed({name: numbers})")
 
 
 @pytest.mark.kernel
@@ -540,8 +510,7 @@ def test_packed_left_out():
     assert next(check for check in lw.laws.check_law(Pull(k=1.0)).checks if check.name == "numbers").ok
     report = lw.laws.check_law(Wide(k=1.0))
     assert not report.ok
-    assert "NotImplementedError" in str(report)
-    assert "write packed(self, numbers, context)" in str(report)
+    says(str(report), "NotImplementedError", "write packed(self, numbers, context)")
 
 
 @pytest.mark.kernel
@@ -549,8 +518,7 @@ def test_numbers_of_the_wrong_shape():
     wrong = type("Bad", (Packs,), {"what": lw.laws.Packed({"k": np.ones((1, 3))}), "__annotations__": {}})
     report = lw.laws.check_law(wrong(k=1.0))
     assert not report.ok
-    assert "packed() fails" in str(report)
-    assert "give arrays (1,), (1, 3)" in str(report)
+    says(str(report), "packed() fails", "give arrays (1,), (1, 3)")
 
 
 def test_what_is_no_fleet():
@@ -558,15 +526,13 @@ def test_what_is_no_fleet():
         (fault,) = faults(make, lw.Vehicle(1.0, inertia=1.0 * np.ones(3), added_mass=np.ones(3), buoyancy=0.0))
         assert "give lw.Scene(" in fault
     (fault,) = faults(lw.Ensemble, from_table(MATRIX), 5, 0, [1])
-    assert "vary = [1]" in fault
-    assert "lw.distributions.Normal" in fault
+    says(fault, "vary = [1]", "lw.distributions.Normal")
 
 
 def test_two_events_of_one_name():
     events = [lw.events.Floor(depth=1.0), lw.events.Floor(depth=2.0)]
     (fault,) = faults(lw.Scene, from_table(MATRIX).vehicle, events=events)
-    assert "events = 'floor'" in fault
-    assert 'name = "floor_2"' in fault
+    says(fault, "events = 'floor'", 'name = "floor_2"')
     second = lw.events.Floor(depth=2.0, name="lower")
     assert len(lw.Scene(from_table(MATRIX).vehicle, events=[events[0], second]).events) == 2
 
@@ -574,8 +540,7 @@ def test_two_events_of_one_name():
 def test_a_quadratic_matrix_of_members_that_creates_energy():
     scene = from_table({"type": "drag_matrix", "quadratic": np.eye(6).tolist()})
     (fault,) = faults(lw.Ensemble, scene, 2000, 0, {"drag_matrix.quadratic": lw.distributions.Normal(std=1.0)})
-    assert "drag_matrix.quadratic of member" in fault
-    assert "unphysical" in fault
+    says(fault, "drag_matrix.quadratic of member", "unphysical")
     lw.Ensemble(scene, 2000, 0, {"drag_matrix.quadratic": lw.distributions.Uniform(relative=0.3)})
 
 
@@ -587,8 +552,7 @@ def test_a_broken_law_in_solve():
         lw.solve(lw.Scene(from_table(MATRIX).vehicle, terms=[Broken(k=1.0)]), h=0.01, t1=0.1)
     wavy = type("Wavy", (Pull,), {"device": device(law=pull_law, FLOW="wavy")})
     (fault,) = faults(lw.solve, lw.Scene(from_table(MATRIX).vehicle, terms=[wavy(k=1.0)]), h=0.01, t1=0.1)
-    assert "pull.FLOW = 'wavy'" in fault
-    assert "varying" in fault
+    says(fault, "pull.FLOW = 'wavy'", "varying")
 
 
 NOTEBOOK_CELL = """
@@ -623,9 +587,3 @@ def test_a_law_defined_twice_as_in_a_notebook(tmp_path):
         )
         results.append(lw.solve(lw.Scene(from_table(MATRIX).vehicle, terms=[Lift(k=1.0)]), h=0.01, t1=0.1).position)
     assert np.array_equal(*results)
-
-
-@pytest.mark.parametrize("given", ["drag", 3, None, {"type": "drag"}])
-def test_terms_that_are_no_list_are_refused_as_such(given):
-    with pytest.raises(lw.SceneError, match=r"terms = .*is no list"):
-        lw.Scene(lw.Vehicle(20.0, inertia=(1.0, 1.2, 1.4)), terms=given)

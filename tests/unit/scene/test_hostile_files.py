@@ -334,16 +334,14 @@ def test_an_argument_is_refused(arguments, words, tmp_path, monkeypatch, capsys)
 
 def test_a_list_over_many_lines_is_one_value(tmp_path):
     scene = lw.Scene.load(PAPER, {"start.position": "[1.0,\n 2.0,\n 3.0]\n", "vehicle.mass": "120 # kg"})
-    assert scene.start.position.tolist() == [1.0, 2.0, 3.0]
-    assert scene.vehicle.mass == 120
+    assert (scene.start.position.tolist(), scene.vehicle.mass) == ([1.0, 2.0, 3.0], 120)
 
 
 def test_a_scene_whose_name_means_another_folder_writes_below_runs():
     class Chosen:
         out, scene = None, "...toml"
 
-    assert str(out_of(Chosen())) == "runs/scene"
-    assert str(out_of(Chosen(), "_x")) == "runs/scene_x"
+    assert (str(out_of(Chosen())), str(out_of(Chosen(), "_x"))) == ("runs/scene", "runs/scene_x")
 
 
 # The command, here and as a process: exit code, a line, no traceback.

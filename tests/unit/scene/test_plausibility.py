@@ -10,9 +10,11 @@ import pytest
 import lgvi_warp as lw
 from benchmarks import problems
 from lgvi_warp.cli import main
+from lgvi_warp.distributions import Choice, Normal, Uniform
 from lgvi_warp.scene import plausibility, slices
 from lgvi_warp.scene.plausibility import LIMITS
 from tests.conftest import ROOT
+from tests.support.refusals import says
 
 BODY = {"mass": 30.0, "inertia": [0.2, 3.0, 3.0], "buoyancy": 290.0}
 POINT, AHEAD, ACROSS = [[-0.6, 0.0, 0.0]], [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]]
@@ -124,22 +126,16 @@ def test_a_number_that_is_set_or_varies_is_seen_as_the_one_in_a_scene(name):
     assert said(usual.with_numbers(numbers)) == said(odd)
     if "euler" in "".join(numbers):  # Attitudes are drawn by laws of their own.
         return
-    (message,) = said(
-        lw.Ensemble(usual, 3, 1, {key: lw.distributions.Choice([value.tolist()]) for key, value in numbers.items()})
-    )
+    (message,) = said(lw.Ensemble(usual, 3, 1, {key: Choice([value.tolist()]) for key, value in numbers.items()}))
     assert message == f"{said(odd)[0]} (all 3 members)"
 
 
 def test_a_command_of_a_shipped_vehicle_that_varies_in_radians_or_in_degrees():
     remus = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.0})
-    (message,) = said(
-        lw.Ensemble(remus, 50, 1, {"control_fins.command[1]": lw.distributions.Uniform(low=4.0, high=20.0)})
-    )
+    (message,) = said(lw.Ensemble(remus, 50, 1, {"control_fins.command[1]": Uniform(low=4.0, high=20.0)}))
     assert message.startswith("control_fins.command: an angle of")
     assert "all 50 members" in message
-    assert (
-        said(lw.Ensemble(remus, 50, 1, {"control_fins.command[1]": lw.distributions.Uniform(low=-0.3, high=0.3)})) == ()
-    )
+    assert said(lw.Ensemble(remus, 50, 1, {"control_fins.command[1]": Uniform(low=-0.3, high=0.3)})) == ()
 
 
 def test_without_a_stated_length_any_inertia_is_possible():
@@ -167,8 +163,7 @@ def test_members_are_counted_and_the_first_is_named(monkeypatch):
     states[0][-1, 2] = -4.0
     fleet = lw.Ensemble.from_states(scene(), *states, {"vehicle.buoyancy": buoyancy})
     expected = said(fleet)
-    assert "812 of 1,000 members; first: member 5)" in expected[0]
-    assert "291.2 N" in expected[0]
+    says(expected[0], "812 of 1,000 members; first: member 5)", "291.2 N")
     assert "(1 of 1,000 members; first: member 999)" in expected[1]
     for at_once in (7, 111, 1000):  # the last of them alone, too
         monkeypatch.setattr(slices, "AT_ONCE", at_once)
@@ -176,9 +171,7 @@ def test_members_are_counted_and_the_first_is_named(monkeypatch):
 
 
 def test_what_all_share_is_said_of_all():
-    fleet = lw.Ensemble(
-        scene(environment={"water_density": 1.025}), 1000, 1, {"vehicle.mass": lw.distributions.Normal(relative=1e-3)}
-    )
+    fleet = lw.Ensemble(scene(environment={"water_density": 1.025}), 1000, 1, {"vehicle.mass": Normal(relative=1e-3)})
     (message,) = said(fleet)
     assert message.endswith("(all 1,000 members)")
 
@@ -206,8 +199,7 @@ def test_what_becomes_odd_on_the_way_is_said():
     # Members that begin at the surface, or above it as is said already, say nothing of where they mean it to be.
     assert len(found) == 2
     assert "31 m/s" in found[0]
-    assert "rises 0.5 m" in found[1]
-    assert "lw.events.Surface()" in found[1]
+    says(found[1], "rises 0.5 m", "lw.events.Surface()")
     assert all("(1 of 3 members; first: member 0)" in text for text in found)
     assert len(plausibility.on_the_way(scene(events=[{"type": "surface"}]), samples(position=z)).messages(3)) == 0
     assert plausibility.on_the_way(scene(), samples(position=z)).messages(3) == found[1:]
@@ -226,7 +218,7 @@ def test_a_result_says_what_is_odd():
     fleet = lw.Ensemble(
         lw.Scene(lw.Vehicle(10.0, inertia=[1.0, 2.0, 2.5], buoyancy=200.0), start=lw.Start([0.0, 0.0, 1.0])),
         20,
-        vary={"start.velocity": lw.distributions.Uniform(low=[0.0, 0.0, 0.0], high=[60.0, 0.1, 0.1])},
+        vary={"start.velocity": Uniform(low=[0.0, 0.0, 0.0], high=[60.0, 0.1, 0.1])},
     )
     texts = lw.solve(fleet, h=0.01, t1=1.0).messages
     assert [text.split(":")[0] for text in texts] == ["vehicle.buoyancy", "start.velocity", "position"]

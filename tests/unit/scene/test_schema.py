@@ -39,29 +39,26 @@ def test_what_a_scene_writes_of_itself_fits(name):
     assert faults(scene.to_dict(), SCHEMA) == []
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "place"),
-    [
-        ("vehicle.mas", 1.0, ".vehicle.mas: unknown"),
-        ("vehicle.mass", "heavy", ".vehicle.mass: 'heavy' is no number"),
-        ("start.position", [0.0, 0.0], ".start.position: 2 entries"),
-        ("start.position", [0.0, 0.0, "deep"], ".start.position[2]: 'deep' is no number"),
-        ("environment.gravity", True, ".environment.gravity: True is no number"),
-        ("run.step", [0.1], ".run.step: [0.1] is no number"),
-        ("run.until", {"statistic": "mean depth"}, ".run.until.half_width: missing"),
-        ("terms", [{"type": "current"}], ".terms[0].velocity: missing"),
-        (
-            "terms",
-            [{"type": "tether", "anchor": [0, 0, 0], "stiffness": -1.0}],
-            ".terms[0].stiffness: -1.0 is out of bounds",
-        ),
-        ("events", [{"type": "floor", "deph": 1.0, "depth": 2.0}], ".events[0].deph: unknown"),
-        ("controller", {"laws": []}, ".controller.period: missing"),
-        ("ensemble.sampling", {"sobol": {"replicas": 2}}, ".ensemble.sampling.sobol.replicas: unknown"),
-        ("ensemble.vary", {"vehicle.mass": {"norml": {}}}, ".ensemble.vary.vehicle.mass.norml: unknown"),
-        ("boat", {}, ".boat: unknown"),
-    ],
-)
+@pytest.mark.parametrize(("key", "value", "place"), [
+    ("vehicle.mas", 1.0, ".vehicle.mas: unknown"),
+    ("vehicle.mass", "heavy", ".vehicle.mass: 'heavy' is no number"),
+    ("start.position", [0.0, 0.0], ".start.position: 2 entries"),
+    ("start.position", [0.0, 0.0, "deep"], ".start.position[2]: 'deep' is no number"),
+    ("environment.gravity", True, ".environment.gravity: True is no number"),
+    ("run.step", [0.1], ".run.step: [0.1] is no number"),
+    ("run.until", {"statistic": "mean depth"}, ".run.until.half_width: missing"),
+    ("terms", [{"type": "current"}], ".terms[0].velocity: missing"),
+    (
+        "terms",
+        [{"type": "tether", "anchor": [0, 0, 0], "stiffness": -1.0}],
+        ".terms[0].stiffness: -1.0 is out of bounds",
+    ),
+    ("events", [{"type": "floor", "deph": 1.0, "depth": 2.0}], ".events[0].deph: unknown"),
+    ("controller", {"laws": []}, ".controller.period: missing"),
+    ("ensemble.sampling", {"sobol": {"replicas": 2}}, ".ensemble.sampling.sobol.replicas: unknown"),
+    ("ensemble.vary", {"vehicle.mass": {"norml": {}}}, ".ensemble.vary.vehicle.mass.norml: unknown"),
+    ("boat", {}, ".boat: unknown"),
+])  # fmt: skip
 def test_what_the_loader_refuses_does_not_fit(key, value, place):
     content = copy.deepcopy(PAPER)
     section, dot, name = key.partition(".")

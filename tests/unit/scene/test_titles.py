@@ -8,6 +8,7 @@ import pickle
 import pytest
 
 import lgvi_warp as lw
+from tests.support.refusals import says
 
 TEXT = """# A heavy REMUS.
 [vehicle]
@@ -30,8 +31,7 @@ def test_a_scene_names_its_vehicle(path):
     for scene in (lw.Scene.named("remus_100"), lw.Scene.load(path), lw.Scene.from_dict(lw.Scene.load(path).to_dict())):
         assert scene.vehicle.title == "remus_100"
         assert scene.to_dict()["vehicle"]["title"] == "remus_100"
-        assert "  vehicle  " in repr(scene)
-        assert "remus_100" in repr(scene)
+        says(repr(scene), "  vehicle  ", "remus_100")
         assert "remus_100" in repr(scene.vehicle)
     moved = dataclasses.replace(lw.Scene.named("sphere"), start=lw.Start([0.0, 0.0, 5.0]))
     assert moved.vehicle.title == "sphere"

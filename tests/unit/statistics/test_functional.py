@@ -122,8 +122,7 @@ def test_an_expression_over_the_path_has_the_bits_of_the_statistic_of_paths(resu
 
 def test_names_and_labels_of_paths(result):
     covariance = estimated(lw.statistics.Covariance("max(velocity)", stopped="left_out", confidence=0.5), result)
-    assert covariance.name == "covariance max(velocity)"
-    assert covariance.unit == "(m/s)^2"
+    assert (covariance.name, covariance.unit) == ("covariance max(velocity)", "(m/s)^2")
     assert covariance.confidence == 0.5
     assert covariance.coordinates["component"].tolist() == [f"max(velocity)[{i}]" for i in range(3)]
     settings = {"type": "covariance", "of": "max(velocity)", "stopped": "left_out", "confidence": 0.5}
@@ -224,5 +223,4 @@ def test_the_table_of_fields_is_the_only_one():
     files = [file for file in (ROOT / "lgvi_warp").rglob("*.py") if "reference" not in file.parts]
     assert [file.name for file in files if pattern.search(file.read_text())] == ["fields.py"]
     assert TABLE["angular_velocity"].attributes == {"units": "rad s-1", "long_name": "angular velocity in body axes"}
-    assert TABLE["attitude"].labels[5] == "attitude[1, 2]"
-    assert TABLE["energy"].labels == ("energy",)
+    assert (TABLE["attitude"].labels[5], TABLE["energy"].labels) == ("attitude[1, 2]", ("energy",))

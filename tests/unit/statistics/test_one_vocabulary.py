@@ -12,7 +12,7 @@ from lgvi_warp.results.quantities import quantities
 from lgvi_warp.statistics.values.functional import functional, quantity
 from lgvi_warp.statistics.values.quantity import KNOWN
 from lgvi_warp.studies.distance import QUANTITIES, compared_in
-from tests.support.refusals import refused
+from tests.support.refusals import refused, says
 
 K, N = 4, 3
 AT_EACH_TIME = [*KNOWN, "position[2]", "attitude[0,1]", "attitude[0, 1]", "norm(velocity)", "norm(position)",
@@ -60,8 +60,7 @@ def test_what_looks_over_the_path(result, text):
     assert found.over_path
     assert len(found.values(result)) == N
     message = refused(compared_in, text)
-    assert "looks over the path" in message
-    assert "largest error over the path" in message
+    says(message, "looks over the path", "largest error over the path")
     assert lw.statistics.Mean(text).key == f"mean {text}"
 
 

@@ -38,9 +38,7 @@ def read(found, groups=("explicit",), members=MEMBERS):
 def test_what_is_written_is_read():
     found = arrays()
     layout = read(found)
-    assert layout.arrays == found
-    assert layout.times == TIMES
-    assert layout.groups == ("explicit",)
+    assert (layout.arrays, layout.times, layout.groups) == (found, TIMES, ("explicit",))
     columns = {column.name: column for column in layout.columns}
     assert set(columns) == set(found) - {"time", "step", "chosen", "explicit/vehicle.mass"}
     for name, column in columns.items():

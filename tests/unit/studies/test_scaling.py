@@ -51,11 +51,8 @@ def test_members_and_threads_by_default():
     sizes, counts = scaling.members_and_threads(speed.fleet(64), None, None)
     assert sizes == [1, 10, 64]
     assert counts == scaling.rising(2, machine.thread_count())
-    assert scaling.rising(2, 6) == [1, 2, 4, 6]
-    assert scaling.rising(10, 1) == [1]
-    assert scaling.rising(10, 10) == [1, 10]
-    assert scaling.rising(10, 100) == [1, 10, 100]
-    assert scaling.rising(2, 9) == [1, 2, 4, 8, 9]
+    assert (scaling.rising(2, 6), scaling.rising(10, 1), scaling.rising(10, 10)) == ([1, 2, 4, 6], [1], [1, 10])
+    assert (scaling.rising(10, 100), scaling.rising(2, 9)) == ([1, 10, 100], [1, 2, 4, 8, 9])
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
@@ -260,8 +257,7 @@ def test_a_study_writes_two_files(tmp_path):
         "new/folder/example.json",
         "new/folder/example.csv",
     ]
-    assert paths[0].read_text() == '{\n "x": 1.5\n}'
-    assert paths[1].read_text().split() == ["x,y", "1.5,a"]
+    assert (paths[0].read_text(), paths[1].read_text().split()) == ('{\n "x": 1.5\n}', ["x,y", "1.5,a"])
     named = Study().save(tmp_path, "other")
     assert [path.name for path in named] == ["other.json", "other.csv"]
     assert json.loads(named[0].read_text()) == {"x": 1.5}
@@ -303,11 +299,9 @@ def test_speeds_beside_the_peak_of_the_core():
     assert other["operations"] is None
     assert other["part_of_peak"] is None
     assert speed.operations("phi") == 133 + 8
-    assert speed.operations("psi_x", 5) == 171
-    assert speed.operations("psi_s", 0) == 239
+    assert (speed.operations("psi_x", 5), speed.operations("psi_s", 0)) == (171, 239)
     example = speed.fleet(5, lw.terms.Drag(linear=[1.0] * 6))
-    assert example.members == 5
-    assert example.seed == 1
+    assert (example.members, example.seed) == (5, 1)
     assert [term.key for term in example.scene.terms] == ["drag"]
     assert example.vary["start.angular_velocity"].relative == 0.1
     assert example.scene.vehicle.mass == 123.8

@@ -40,8 +40,7 @@ def test_a_search_spends_its_budget_in_generations_corners_and_a_walk():
     assert len(found.restarts) == 3
     assert sum(asked) == found.runs <= 640
     assert asked[:27] == [16] * 27
-    assert asked[27] == 4
-    assert set(asked[28:]) == {4}
+    assert (asked[27], set(asked[28:])) == (4, {4})
     assert np.abs(found.at - (0.3, 0.8)).max() < 1e-4
     assert found.cost == np.abs(found.at - (0.3, 0.8)).sum()
     assert found.cost <= found.restarts.min()
@@ -80,7 +79,8 @@ def test_places_of_the_cube_are_numbers_of_the_box():
     ({"vehicle.mass": (2.0, 2.0)}, 'over."vehicle.mass" = (2.0, 2.0): does not rise; give (low, high)'),
     ({"vehicle.mass": (0.0, 2.0, "log")}, "has no logarithm; give bounds above 0"),
     ({"vehicle.mass": (1.0, 2.0, "lin")}, 'over."vehicle.mass"'), ({"vehicle.mass": (1.0,)}, 'over."vehicle.mass"'),
-    ({}, 'over = {}: maps no names to bounds; give {"heading_pid.kp": (0.5, 5.0)}'),
+    ({"vehicle.mas": (1.0, 2.0)}, "vehicle.mas"), ({"x": 3}, '"x"'),
+    ({}, 'over = {}: maps no names to bounds; give {"heading_pid.kp": (0.5, 5.0)}'), ([], "maps no names to bounds"),
 ])  # fmt: skip
 def test_bounds_that_are_none(bounds, words):
     with pytest.raises(lw.SceneError) as caught:
@@ -94,11 +94,14 @@ def test_risks_at_their_ends():
     assert lw.metrics.CVaR(0.5)(costs).tolist() == [3.5]
     assert lw.metrics.CVaR()(costs).tolist() == [4.0]
     assert lw.metrics.CVaR(0.375)(costs)[0] == pytest.approx((4.0 + 0.5 * 3.0) / 1.5)
-    assert lw.metrics.CVaR(1.0)(costs)[0] == 2.5
-    assert lw.metrics.CVaR().share == 0.05
+    assert (lw.metrics.CVaR(1.0)(costs)[0], lw.metrics.CVaR().share) == (2.5, 0.05)
     assert str(lw.metrics.CVaR(0.125)) == "mean of the worst 12.5 %"
     assert risk.risk_of(Faults(), 0.25)(costs).tolist() == [1.0]
     assert risk.risk_of(Faults(), 0.26)(costs).tolist() == [2.0]
+    assert risk.risk_of(Faults(), "mean")(costs).tolist() == [2.5]
+    assert str(risk.risk_of(Faults(), 0.8)) == "80 % quantile"
+    lost = np.array([[1.0, 1.0, 1.0, 1.0, np.inf]])
+    assert (lw.metrics.CVaR(0.2)(lost)[0], risk.risk_of(Faults(), 0.8)(lost)[0]) == (np.inf, 1.0)
     for wrong in (0.0, 1.0, 1, "means"):
         faults = Faults()
         assert str(risk.risk_of(faults, wrong)) == "mean"
@@ -151,8 +154,7 @@ def test_numbers_of_quantities_and_of_metrics(monkeypatch):
         assert (metric.label, metric.of_metric) == ("iae depth", True)
         ((arguments, settings),) = told.asked
         assert arguments == (SCENE, None, None)
-        assert settings["h"] == 0.1
-        assert settings["save"].fields == ("position",)
+        assert (settings["h"], settings["save"].fields) == (0.1, ("position",))
         assert [one.key for one in settings["statistics"]] == ["iae depth"]
         each = SimpleNamespace(value=np.array([[[1.0, 2.0, np.inf]]]))
         status = np.array([0, lw.Status.NON_FINITE, lw.Status.FLOOR], np.uint8)
@@ -304,8 +306,7 @@ def test_margins_in_words_and_by_member():
     assert share == pytest.approx([1 / 3, 2 / 3, 1.0])
     assert found.curve("delay", "runs")[0].tolist() == [1.0, 2.0, 3.0]
     assert found.curve("delay", "eigenvalues")[0][0] == 0.1
-    assert found.worst().tolist() == [2, 0, 3, 1]
-    assert found.worst(2, "delay").tolist() == [2, 1]
+    assert (found.worst().tolist(), found.worst(2, "delay").tolist()) == ([2, 0, 3, 1], [2, 1])
     assert found.worst(name="gain_lower").tolist() == [2, 0, 1, 3]
     runs = Margins("all laws", {}, {"delay": np.array([0.2, np.inf])}, np.array(["", ""], dtype=object), 0.01)
     assert runs.worst(1).tolist() == [0]

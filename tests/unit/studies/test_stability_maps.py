@@ -188,9 +188,7 @@ def test_linear_theory():
 def test_composed_limits_are_of_their_longest_stage():
     g = 1.0 / (2.0 - 2.0 ** (1.0 / 3.0))
     assert math.isclose(rotation_limit("tj4(psi_s)"), 2.0 / abs(1.0 - 2.0 * g))
-    assert rotation_limit("psi_s") == 2.0
-    assert rotation_limit("psi_1") == 1.0
-    assert rotation_limit("rkmk4") == math.inf
+    assert (rotation_limit("psi_s"), rotation_limit("psi_1"), rotation_limit("rkmk4")) == (2.0, 1.0, math.inf)
     assert rotation_limit("psi_x") == rotation_limit("psi_x8") == 4.0
     assert math.isclose(rotation_limit("tj4(psi_x)"), 4.0 / abs(1.0 - 2.0 * g))
     # One step of the triple jump as the product of three leapfrogs, at the limit: a trace of 2.
@@ -339,13 +337,10 @@ def test_a_map_as_content_and_records():
     assert content["errors"]["psi_s"] == [[0.1, None, 0.2], [0.3] * 3]
     assert content["x"]["values"] == [1.0, 2.0, 4.0]
     again = StabilityMap.from_dict(content)
-    assert again.refused == {"rk4": "why"}
-    assert again.messages == ("a",)
-    assert again.unit == "deg"
+    assert (again.refused, again.messages, again.unit) == ({"rk4": "why"}, ("a",), "deg")
     assert again.methods == ("psi_s",)
     assert again.ratios["psi_s"]["rotation"].dtype == np.float64
-    assert again.errors["psi_s"][0, 1] == np.inf
-    assert again.x.values.dtype == np.float64
+    assert (again.errors["psi_s"][0, 1], again.x.values.dtype) == (np.inf, np.float64)
     assert again.x.log
     assert again.y.unit == "rad/s"
     assert made_map([[0, 1, 2], [2, 0, 4]]).unit == "rad"
@@ -455,8 +450,7 @@ def test_units_and_labels_of_lines(scene):
     assert y.unit == "m/s"
     linear = grid_of(scene, Axis("vehicle.mass", 1.0, 2.0, log=False), "h").lines[0]
     assert not linear.log
-    assert linear.values.tolist() == [1.0, 1.5, 2.0]
-    assert linear.to_dict()["values"] == [1.0, 1.5, 2.0]
+    assert (linear.values.tolist(), linear.to_dict()["values"]) == ([1.0, 1.5, 2.0], [1.0, 1.5, 2.0])
     assert Line.from_dict(linear.to_dict()).values.tolist() == [1.0, 1.5, 2.0]
 
 
@@ -474,11 +468,9 @@ def test_columns_hold_both_times_in_whole_steps():
     assert least.error_steps.tolist() == [0, 2, 4, 6, 8, 10, 12, 14, 16]
     assert least.steps.tolist() == list(range(17))
     finer, whole = one.grid(4, to_the_end=False), one.grid()
-    assert finer.h == 0.025
-    assert finer.steps == 40
+    assert (finer.h, finer.steps) == (0.025, 40)
     assert finer.times == pytest.approx(0.1 * one.error_steps)
-    assert whole.h == 0.1
-    assert whole.steps == 100
+    assert (whole.h, whole.steps) == (0.1, 100)
     assert whole.times == pytest.approx(0.1 * one.steps)
 
 
@@ -636,10 +628,8 @@ def test_a_map_of_runs_made_by_hand(scene):
     assert found.errors["rk4"][0, 2] == np.inf
     assert (found.of, found.unit, found.error_bound, found.error_time, found.t1) == ("position", "m", 0.1, 1.0, 3.0)
     assert (found.directions, found.judged, found.unverified, found.messages) == (2, "dissipative", 0, ())
-    assert found.provenance["methods"] == ["psi_s", "rk4"]
-    assert found.provenance["seed"] == 5
-    assert found.provenance["dtype"] == "float32"
-    assert found.provenance["energy_bound"] == 4.0
+    assert (found.provenance["methods"], found.provenance["seed"]) == (["psi_s", "rk4"], 5)
+    assert (found.provenance["dtype"], found.provenance["energy_bound"]) == ("float32", 4.0)
     assert found.provenance["axes"]["x"]["low"] == 0.1
     assert set(found.provenance) >= {"scene", "versions", "machine", "checks"}
     assert {dtype for name, _, dtype, *_ in asked if name in ("psi_s", "rk4")} == {"float32"}
@@ -684,6 +674,7 @@ def test_what_drives_a_scene_by_kind(scene):
     assert [kind(), kind(drag), kind(current), kind(drag, current)] == [
         "conservative", "dissipative", "conservative", "dissipative"]  # fmt: skip
     assert kind(lw.terms.Current(velocity=[0.0, 0.0, 0.1])) == kind(lw.terms.Wrench(force=[1.0, 0.0, 0.0])) == "driven"
+    assert kind(current, lw.terms.Tether(anchor=[0.0, 0.0, 0.0], stiffness=5.0)) == "driven"
     with pytest.raises(lw.SceneError, match="terms: noise acts, whose path differs from step to step"):
         kind(lw.terms.WrenchNoise(force=[1.0, 0.0, 0.0]))
 

@@ -12,6 +12,7 @@ from scipy import stats
 
 import lgvi_warp as lw
 from lgvi_warp.common.status import Status
+from lgvi_warp.distributions import Normal, Uniform
 from lgvi_warp.statistics.estimates import paired
 from lgvi_warp.statistics.estimates.given_data import explained
 from lgvi_warp.studies.sweeps import cases, output, setup, success, sweep
@@ -36,10 +37,7 @@ TABLES = {
 }
 SCENE = lw.Scene.from_dict(TABLES)
 BARE = replace(SCENE, controller=None)
-VARY = {
-    "start.position": lw.distributions.Normal(std=0.8),
-    "vehicle.mass": lw.distributions.Uniform(low=45.0, high=55.0),
-}
+VARY = {"start.position": Normal(std=0.8), "vehicle.mass": Uniform(low=45.0, high=55.0)}
 METRICS = ["overshoot heading", "iae heading"]
 CASES = [{"name": "soft"}, {"name": "stiff", "set": {"heading_pid.kp": 8.0}},
          {"name": "unknown", "set": {"heading_pid.kq": 1.0}}]  # fmt: skip
@@ -309,8 +307,7 @@ def test_members_that_pass_and_that_do_not(found):
     ends = stats.binomtest(28, N).proportion_ci(0.9, "exact")
     assert exact.success("soft") == pytest.approx((0.7, *ends))
     assert repr(found) == "Sweep(3 cases, 1 points, 40 members)"
-    assert found.unit("iae heading") == "rad s"
-    assert found.unit("time_to_failure") == "s"
+    assert (found.unit("iae heading"), found.unit("time_to_failure")) == ("rad s", "s")
 
 
 @pytest.mark.parametrize(("ask", "words"), [
@@ -449,8 +446,7 @@ def test_files_hold_the_tables(found, tmp_path):
     assert {name: content[name] for name in ("baseline", "confidence", "interval", "settings", "success")} == {
         "baseline": "soft", "confidence": 0.95, "interval": "wilson", "settings": {},
         "success": {"status": "ok", "overshoot heading": {"below": 1.5}}}  # fmt: skip
-    assert content["ensemble"]["members"] == N
-    assert content["ensemble"]["seed"] == 3
+    assert (content["ensemble"]["members"], content["ensemble"]["seed"]) == (N, 3)
     assert content["scene"]["vehicle"]["mass"] == 50.0
     assert "ensemble" not in content["scene"]
     assert content["metrics"]["iae heading"]["unit"] == "rad s"
@@ -507,17 +503,12 @@ def test_a_case_changes_numbers_lists_vehicle_and_scene():
     numbers = {"heading_pid.kp": 8.0, "controller.period": 0.2, "run.step": 0.01, "start.position[2]": 4.0,
                "drag.quadratic[5]": 3.0, "drag.quadratic[0]": 1.0, "environment.gravity": 9.7}  # fmt: skip
     changed = cases.Case("a", numbers).of(SCENE)
-    assert changed.controller.laws[0].kp == 8.0
-    assert changed.controller.laws[0].kd == 4.0
-    assert changed.controller.period == 0.2
-    assert changed.controller.delay == 0.02
-    assert changed.run.step == 0.01
-    assert changed.run.duration == 8.0
-    assert changed.environment.gravity == 9.7
+    assert (changed.controller.laws[0].kp, changed.controller.laws[0].kd) == (8.0, 4.0)
+    assert (changed.controller.period, changed.controller.delay, changed.run.step) == (0.2, 0.02, 0.01)
+    assert (changed.run.duration, changed.environment.gravity) == (8.0, 9.7)
     assert list(changed.start.position) == [0.0, 0.0, 4.0]
     drag = {term.key: term for term in changed.terms}["drag"]
-    assert list(drag.quadratic) == [1.0, 0, 0, 0, 0, 3.0]
-    assert list(drag.linear) == [0, 0, 0, 2.0, 2.0, 2.0]
+    assert (list(drag.quadratic), list(drag.linear)) == ([1.0, 0, 0, 0, 0, 3.0], [0, 0, 0, 2.0, 2.0, 2.0])
     assert SCENE.with_numbers({}) is SCENE
     with pytest.raises(lw.SceneError, match="vehicle = 3: is no Vehicle; give"):
         cases.Case("a", vehicle=3).of(SCENE)
@@ -577,7 +568,7 @@ def test_points_go_through_the_last_axis_first():
 
 
 def test_what_a_case_sets_does_not_vary_in_it():
-    vary = VARY | {"heading_pid.kp": lw.distributions.Uniform(low=1.0, high=2.0)}
+    vary = VARY | {"heading_pid.kp": Uniform(low=1.0, high=2.0)}
     like = lw.Ensemble(SCENE, 5, 3, vary)
     fleet, dropped = cases.ensemble_of(SCENE, {"heading_pid.kp": 2.0}, vary, like)
     assert dropped == ["heading_pid.kp"]
@@ -597,13 +588,13 @@ def test_numbers_that_only_a_case_has_vary_in_it():
     law = {"type": "heave_pid", "kp": 2.0}
     names = [{"name": "plain"},
              {"name": "deep", "replace": {"laws": [law], "guidance": [{"type": "set_point", "depth": 1.0}]}}]  # fmt: skip
-    found = swept([record(), record()], names, vary=VARY | {"heave_pid.kp": lw.distributions.Uniform(low=1.0, high=3.0)},
+    found = swept([record(), record()], names, vary=VARY | {"heave_pid.kp": Uniform(low=1.0, high=3.0)},
                   metrics=METRICS)  # fmt: skip
     assert [cell.fixed for cell in found.cells] == [("heave_pid.kp",), ()]
     assert "heave_pid.kp" in found.inputs(found.cells[1])
     assert "heave_pid.kp" not in found.setup.members.vary
     with pytest.raises(lw.SceneError, match=r"heave_pid\.kq"):
-        swept([], names, vary={"heave_pid.kq": lw.distributions.Uniform(low=1.0, high=3.0)})
+        swept([], names, vary={"heave_pid.kq": Uniform(low=1.0, high=3.0)})
 
 
 # Success
@@ -718,8 +709,7 @@ def test_records_are_kept_in_files_and_refusals_in_memory(tmp_path):
     again = Records(tmp_path, list(shown.numbers), len(shown.status))
     again.check()
     read = again["a"]
-    assert read.messages == ("slow", "late")
-    assert read.refused == ""
+    assert (read.messages, read.refused) == (("slow", "late"), "")
     assert list(read.numbers) == list(shown.numbers)
     np.testing.assert_array_equal(read.status, shown.status)
     for name, values in shown.numbers.items():
@@ -751,9 +741,7 @@ def test_progress_is_that_of_all_cells():
 
 def test_the_sweep_keeps_what_the_ensemble_says_unless_it_is_asked():
     base = lw.Ensemble(SCENE, 6, 7, VARY, "sobol")
-    one = setup.setup_of(
-        base, None, None, {"vehicle.mass": lw.distributions.Uniform(low=1.0, high=2.0)}, None, None, None, [], {}
-    )
+    one = setup.setup_of(base, None, None, {"vehicle.mass": Uniform(low=1.0, high=2.0)}, None, None, None, [], {})
     assert (one.members.members, one.members.seed, one.members.sampling.kind) == (6, 7, "sobol")
     assert set(one.vary) == set(VARY)
     assert one.members.vary["vehicle.mass"].high == 2.0
@@ -805,11 +793,8 @@ def test_a_plan_in_words():
                      "time        about 30 s, and 2.5 s for each kernel", "memory      3 MB",
                      "disk        0.3 MB"]  # fmt: skip
     (fleet,), asked = predict.call_args
-    assert asked["threads"] == 2
-    assert asked["h"] == 0.01
-    assert asked["keep"] == "none"
-    assert fleet.scene.controller.delay == 0.02
-    assert fleet.members == 2000
+    assert (asked["threads"], asked["h"], asked["keep"]) == (2, 0.01, "none")
+    assert (fleet.scene.controller.delay, fleet.members) == (0.02, 2000)
     durations = [setup.duration_text(seconds) for seconds in (119.0, 120.0, 7200.0, 3 * 86400.0, 6.3e7, 6.2e7)]
     assert durations == ["1.2e+02 s", "2 minutes", "2 hours", "3 days", "2 years", "7.2e+02 days"]
     assert (
@@ -865,8 +850,7 @@ vehicle = { mass = 52.0 }
     assert (read["method"], read["h"], read["t1"], read["dtype"]) == ("rk4", 0.01, 3.0, "float32")
     assert read["success"] == {"max(depth)": {"below": 1.0}}
     assert read["grid"] == {"environment.gravity": [9.7, 9.8]}
-    assert read["vary"]["vehicle.mass"].high == 55.0
-    assert read["scene"].vehicle.mass == 50.0
+    assert (read["vary"]["vehicle.mass"].high, read["scene"].vehicle.mass) == (55.0, 50.0)
     a, b, c, d = read["cases"]
     assert a == {"name": "a", "set": {"vehicle.mass": 51.0}}
     assert b["scene"].vehicle.mass == 60.0

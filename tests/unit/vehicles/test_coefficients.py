@@ -10,6 +10,7 @@ import lgvi_warp as lw
 from lgvi_warp.vehicles import fossen as co
 from lgvi_warp.vehicles import from_fossen, from_sdf, from_yaml
 from lgvi_warp.vehicles import poses as coefficients_poses
+from tests.support.refusals import says
 
 DIAGONAL = {"X_udot": -0.93, "Y_vdot": -35.5, "Z_wdot": -35.5, "K_pdot": -0.0704, "M_qdot": -4.88, "N_rdot": -4.88}
 PAIRS = {"Y_rdot": 1.93, "N_vdot": 1.93, "Z_qdot": -1.93, "M_wdot": -1.93}
@@ -106,11 +107,8 @@ def test_cross_terms_become_matrices():
     (term,) = from_fossen({"Y_v|v|": -1310.0, "Y_rr": 0.632, "N_r": -2.0, "M_ww": 3.18}, **BODY)["terms"]
     assert term["type"] == "drag_matrix"
     quadratic = np.array(term["quadratic"])
-    assert quadratic[1, 1] == 1310.0
-    assert quadratic[1, 5] == -0.632
-    assert quadratic[4, 2] == -3.18
-    assert np.array(term["linear"])[5, 5] == 2.0
-    assert np.count_nonzero(quadratic) == 3
+    assert (quadratic[1, 1], quadratic[1, 5], quadratic[4, 2]) == (1310.0, -0.632, -3.18)
+    assert (np.array(term["linear"])[5, 5], np.count_nonzero(quadratic)) == (2.0, 3)
 
 
 def test_without_drag_there_is_no_term():
@@ -221,14 +219,12 @@ def test_sdf_buoyancy():
     text = sdf(coefficients="<xU>-1</xU><water_density>1025</water_density>")
     assert from_sdf(text, volume=0.02)["vehicle"]["buoyancy"] == pytest.approx(0.02 * 1025.0 * 9.80665)
     made = from_sdf(sdf(), buoyancy=200.0, center_of_buoyancy=(0.0, 0.1, 0.2))["vehicle"]
-    assert made["buoyancy"] == 200.0
-    assert made["center_of_buoyancy"] == [0.0, -0.1, -0.2]
+    assert (made["buoyancy"], made["center_of_buoyancy"]) == (200.0, [0.0, -0.1, -0.2])
 
 
 def test_sdf_faults():
     message = refused(from_sdf, sdf("0 0", "<fluid_added_mass><xx>-1</xx></fluid_added_mass>"), count=2)
-    assert "<pose>" in message
-    assert "<fluid_added_mass>" in message
+    says(message, "<pose>", "<fluid_added_mass>")
 
 
 def test_sdf_from_a_file_and_by_the_name_of_the_link(tmp_path):
@@ -261,8 +257,7 @@ def yaml():
 def test_yaml_positions_are_flu_and_matrices_frd(yaml):
     made = from_yaml(UUV)
     vehicle, (term,) = made["vehicle"], made["terms"]
-    assert vehicle["center_of_gravity"] == [0.1, -0.2, -0.3]
-    assert vehicle["center_of_buoyancy"] == [0.0, 0.0, -0.4]
+    assert (vehicle["center_of_gravity"], vehicle["center_of_buoyancy"]) == ([0.1, -0.2, -0.3], [0.0, 0.0, -0.4])
     assert np.array(vehicle["added_mass_matrix"])[1, 5] == -1.5
     assert np.array(vehicle["added_mass_matrix"])[2, 4] == 2.0
     assert vehicle["buoyancy"] == pytest.approx(0.02 * 1000.0 * 9.80665)

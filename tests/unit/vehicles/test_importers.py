@@ -18,7 +18,7 @@ from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.vehicles import from_fossen, from_sdf, from_yaml
 from lgvi_warp.vehicles import robot_xml as coefficients_xml
 from tests.support import righting
-from tests.support.refusals import refused
+from tests.support.refusals import refused, says
 from tests.support.tools import one
 
 FILES = Path(__file__).parents[2] / "data" / "vehicles"
@@ -260,8 +260,7 @@ def test_volumes_of_shapes(shape):
 def test_shapes_in_other_files_need_a_volume():
     mesh = "<mesh><uri>model://hull.dae</uri></mesh>"
     message = refused(from_sdf, link(mesh))
-    assert "hull <collision> = 'shape'" in message
-    assert "give volume=" in message
+    says(message, "hull <collision> = 'shape'", "give volume=")
     tables = from_sdf(link(mesh), volume=0.02, center_of_buoyancy=(0.0, 0.0, 0.1))
     assert tables["vehicle"]["buoyancy"] == pytest.approx(0.02 * 1000.0 * 9.80665)
     assert from_sdf(link(mesh), buoyancy=200.0)["vehicle"]["buoyancy"] == 200.0
@@ -417,8 +416,7 @@ def test_the_limits_are_above_real_files():
 
 def test_a_heavy_top_is_a_warning():
     tables = from_sdf(link().replace("0.1 0.2 0.3 0.4", "0 0 -0.3 0.4"))
-    assert "turns upside down" in warnings_of(tables)
-    assert "0.3 m above" in warnings_of(tables)
+    says(warnings_of(tables), "turns upside down", "0.3 m above")
     fossen = from_fossen({}, mass=1.0, inertia=(1.0, 1.0, 1.0), center_of_gravity=(0.0, 0.0, -0.02))
     assert "0.02 m above" in warnings_of(fossen)
     assert "upside" not in warnings_of(from_sdf(link()))
@@ -426,8 +424,7 @@ def test_a_heavy_top_is_a_warning():
 
 def test_moving_links_and_plugins_not_read_are_named():
     told = warnings_of(from_sdf(FILES / "frame_rov.sdf"))
-    assert "links that can move are held where the file has them: propeller" in told
-    assert "thruster (1)" in told
+    says(told, "links that can move are held where the file has them: propeller", "thruster (1)")
     told = warnings_of(from_sdf(FILES / "long_auv.sdf"))
     assert "tray::battery" in told
     assert "weight" not in told
@@ -437,8 +434,7 @@ def test_moving_links_and_plugins_not_read_are_named():
 def test_warnings_are_messages_of_the_run():
     scene = lw.Scene.from_dict(from_sdf(FILES / "frame_rov.sdf"))
     told = " ".join(messages(make_plan(one(scene), "psi_x", h=0.01, t1=0.1)))
-    assert "propeller" in told
-    assert "thruster" in told
+    says(told, "propeller", "thruster")
     assert lw.Scene.from_dict(scene.to_dict()).vehicle.warnings == scene.vehicle.warnings
 
 
@@ -460,8 +456,7 @@ def test_inertia_that_misses_the_triangle_is_taken_from_a_file():
     inertia = np.array([0.6, 30.0, 35.0])
     rigid = np.diag([*[69.7] * 3, *inertia])
     message = refused(lw.Vehicle, rigid_body_mass_matrix=rigid)
-    assert "two of which sum to less than the third" in message
-    assert "inertia_tolerance = 0.13" in message
+    says(message, "two of which sum to less than the third", "inertia_tolerance = 0.13")
     scene = lw.Scene.from_dict(from_fossen({}, mass=69.7, inertia=inertia))
     assert "by 13 % of it" in scene.vehicle.warnings[0]
     assert lw.Scene.from_dict(scene.to_dict()).vehicle.warnings == scene.vehicle.warnings

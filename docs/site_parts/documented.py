@@ -69,7 +69,9 @@ def described(subject: Any) -> dict[str, str]:
     """Name -> text of all parameters that a docstring describes: that of a class, together with those of its bases."""
     texts: dict[str, str] = {}
     for owner in reversed(inspect.getmro(subject)) if inspect.isclass(subject) else [subject]:
-        _, found = sections(inspect.cleandoc(owner.__doc__ or ""))
+        # An override inherits the docstring of the method.
+        text = inspect.cleandoc(owner.__doc__ or "") if inspect.isclass(owner) else inspect.getdoc(owner) or ""
+        _, found = sections(text)
         for name, text in {**entries(found.get("Args", "")), **entries(found.get("Attributes", ""))}.items():
             of_base = AS_OF.match(text) if name in texts else None
             texts[name] = texts[name].rstrip(".") + text[of_base.end() :] if of_base else text

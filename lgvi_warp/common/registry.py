@@ -13,16 +13,26 @@ from typing import Any
 class Kinds(MutableMapping[str, Any]):
     """Classes by their word. Those of a package are imported when their word is looked up: a scene names few of them.
 
-    modules: the package's modules, and the words of the classes that each defines.
+    modules: modules of the package, and the words of the classes that each defines. They come first in lists. For a word
+        that is not among them all modules are imported.
     """
 
     def __init__(self, package: str, modules: Mapping[str, Sequence[str]]):
+        self.package = package
         self.homes = {word: f"{package}.{module}" for module, words in modules.items() for word in words}
-        self._classes = dict[str, Any]()
+        self._classes, self._all = dict[str, Any](), False
+
+    def _import(self, word: object = None) -> None:
+        """Import the module of a word; without one, or of another word, all modules."""
+        if isinstance(word, str) and word in self.homes:
+            import_module(self.homes[word])
+        elif not self._all:
+            self._all = True
+            load_modules(import_module(self.package))
 
     def __getitem__(self, word: str) -> Any:
-        if word not in self._classes and word in self.homes:
-            import_module(self.homes[word])
+        if word not in self._classes:
+            self._import(word)
         return self._classes[word]
 
     def __setitem__(self, word: str, kind: Any) -> None:
@@ -32,12 +42,16 @@ class Kinds(MutableMapping[str, Any]):
         del self._classes[word]
 
     def __contains__(self, word: object) -> bool:
+        if word not in self.homes and word not in self._classes:
+            self._import(word)
         return word in self.homes or word in self._classes
 
     def __iter__(self) -> Iterator[str]:
+        self._import()
         return iter(self.homes | self._classes)
 
     def __len__(self) -> int:
+        self._import()
         return len(self.homes | self._classes)
 
 

@@ -105,18 +105,40 @@ class Part(Term):
         return 0
 
     def features(self, numbers: Numbers) -> tuple[str, ...]:
-        """What its device code must have by members' numbers (n, ...), in words that the part knows; by default nothing."""
+        """Say what its device code must have for these numbers.
+
+        Args:
+            numbers: Numbers of its fields by name, of all members, each (n, ...).
+
+        Returns:
+            Words among `every_feature`; by default none.
+        """
         return ()
 
     def with_features(self, known: frozenset[str]) -> Any:
-        """A copy with the device code for what some member of a run needs, in words "key.feature" of all parts."""
+        """Choose the device code for what some member of a run needs.
+
+        Args:
+            known: Words "key.feature" of all parts.
+
+        Returns:
+            A copy.
+        """
         part = copy.copy(self)
         chosen = tuple(word for word in self.every_feature if f"{self.key}.{word}" in known)
         object.__setattr__(part, "chosen", chosen)
         return part
 
     def wired(self, bus: Bus, others: Mapping[str, Term]) -> Any:
-        """A copy that knows where it finds what others write: the bus, and terms that take commands and sensors by key."""
+        """Tell the part where it finds what others write.
+
+        Args:
+            bus: Rows of the controller's memory.
+            others: Terms that take commands, and sensors, by key.
+
+        Returns:
+            A copy.
+        """
         part = copy.copy(self)
         object.__setattr__(part, "bus", bus)
         return part

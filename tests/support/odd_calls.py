@@ -23,7 +23,7 @@ UNCALLED = {
     "Interrupted", "MembersFailed", "Status", "Warnings", "CallbackInput", "Allocation", "ControlLaw", "Guidance",
     "MeasuringPart", "Packed", "PackingContext", "Term", "Event", "NoisyTerm", "Prepared", "Result", "LinearModel",
     "Regulator", "Margins", "Trim", "Tuned", "WorstCase", "StabilityMap", "Sweep", "Prediction", "SceneError", "show",
-    "register", "number",
+    "register", "number", "Cell",
 }  # fmt: skip
 
 

@@ -59,7 +59,7 @@ def test_each_family_knows_its_classes():
 
 
 def test_a_built_in_class_is_imported_when_its_word_is_looked_up():
-    modules = modules_after("from lgvi_warp.statistics.base import TYPES; list(TYPES), TYPES['each']")
+    modules = modules_after("from lgvi_warp.statistics.base import TYPES; TYPES['each']")
     assert "lgvi_warp.statistics.paths.member_values" in modules
     assert "lgvi_warp.statistics.metrics.tracking_metrics" not in modules
 
@@ -68,11 +68,30 @@ def test_the_tables_of_built_in_words_are_true():
     for table, attribute in TABLES:
         assert isinstance(table, registry.Kinds)
         assert all(vars(kind)[attribute] == word for word, kind in table.items())
-    for room in ("statistics", "control", "sampling.designs"):
-        registry.load_modules(import_module(f"lgvi_warp.{room}"))
-    for table, _ in TABLES:
-        ours = {word for word, kind in table.items() if kind.__module__.startswith("lgvi_warp.")}
-        assert ours == set(table.homes)
+
+
+CROWD = """
+from tests.unit.common.test_registry import registry
+KINDS = registry.Kinds("{name}", {{"one": ["first"]}})
+class Base:
+    def __init_subclass__(cls):
+        registry.add(KINDS, cls)
+"""
+
+
+def test_a_class_that_no_table_names_is_found_too(tmp_path, monkeypatch):
+    (tmp_path / "listed").mkdir()
+    (tmp_path / "listed" / "__init__.py").write_text(CROWD.format(name="listed"))
+    for name, word in (("one", "first"), ("two", "second")):
+        text = f"from listed import Base\nclass {name.title()}(Base):\n    type = {word!r}\n"
+        (tmp_path / "listed" / f"{name}.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    kinds = import_module("listed").KINDS
+    assert kinds["first"].__name__ == "One"
+    assert "listed.two" not in sys.modules
+    assert kinds["second"].__name__ == "Two"
+    assert list(kinds) == ["first", "second"]
+    assert "third" not in kinds
 
 
 def test_all_modules_of_a_package_are_imported(tmp_path, monkeypatch):

@@ -9,7 +9,7 @@ from lgvi_warp.cli import arguments, parser
 from tests.conftest import ROOT
 
 PAGE = (ROOT / "docs" / "start" / "cli.md").read_text()
-SECTIONS = dict(re.findall(r"^## ([\w ]+)\n(.*?)(?=^## |\Z)", PAGE, re.DOTALL | re.MULTILINE))
+SECTIONS = dict(re.findall(r"^## ([\w -]+)\n(.*?)(?=^## |\Z)", PAGE, re.DOTALL | re.MULTILINE))
 COMMON = SECTIONS.pop("Options of every verb")
 VERBS = parser().verbs
 OF_EVERY = {name for names in arguments.COMMON for name in names}
@@ -19,6 +19,7 @@ OLD = {"plan": "predict"}
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_every_verb_has_its_options(verb):
+    assert OLD.get(verb, verb) in SECTIONS, f"write its section, ## {verb}, into docs/start/cli.md"
     section = SECTIONS[OLD.get(verb, verb)]
     assert verb not in OLD or f"`{verb}`" in section
     options = {name for action in VERBS[verb]._actions for name in action.option_strings} - {"-h", "--help"} - OF_EVERY

@@ -103,7 +103,7 @@ def test_keys_and_defaults(heading):
 
 @pytest.mark.parametrize("start", KINDS)
 def test_types_and_their_keys(start):
-    assert rows(start) == table(*KINDS[start])
+    assert rows(start) == table(*KINDS[start]), "run: python -m tests.house.test_scene_file_page"
 
 
 def test_every_section_and_every_distribution_of_scipy():

@@ -24,15 +24,11 @@ from lgvi_warp.scene.scene import from_dict
 from lgvi_warp.statistics import (
     CircularMean,
     Covariance,
-    EndTime,
     Exceedance,
     Extremes,
     FirstPassage,
-    Histogram,
     Mean,
     MeanAttitude,
-    MemberValues,
-    Outcome,
     PathMaximum,
     PathMean,
     PathMinimum,
@@ -46,16 +42,7 @@ from lgvi_warp.statistics.base import TYPES
 from tests.conftest import ROOT
 from tests.support.stops import stops
 from tests.support.tools import one, random_states, scene_of
-
-EVERY = [
-    Mean("position"), Covariance(["position", "speed"]), Quantiles("depth", (0.05, 0.5, 0.95), size=64),
-    Extremes("velocity"), Histogram("depth", bins=10, limits=(-3.0, 3.0)), Exceedance("depth", above=0.5),
-    FirstPassage("depth", above=1.0), CircularMean("euler[2]"), MeanAttitude(), Mean("energy"),
-    PathMaximum("speed", then=[Mean(), Quantiles(levels=(0.5, 0.99), size=64)]), PathMinimum("depth"),
-    PathMean("depth", then=[Mean(), Extremes()]), PathRms("speed"), PathRange("position"),
-    PathTime("depth", above=-0.5, below=0.5), PathTime("depth", above=0.25, then=[Exceedance(above=0.3)]),
-    Outcome("failed"), EndTime("failed"), Mean("depth", at="failed"), MemberValues("depth"),
-]  # fmt: skip
+from tests.unit.statistics.test_statistics import EVERY
 
 
 @pytest.fixture(scope="module")

@@ -78,7 +78,12 @@ def odd_calls(scene, fleet, result, folder):
             for p in inspect.signature(function).parameters.values()
             if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)
         ]
-        required = {p.name: by_name[p.name] for p in known if p.default is p.empty and p.name in by_name}
+        fields = function.number_fields() if hasattr(function, "number_fields") else ()
+        by_shape = {
+            item.name: np.ones([n if isinstance(n, int) else 1 for n in item.metadata["shape"]]) for item in fields
+        }
+        numbers = by_shape | by_name
+        required = {p.name: numbers[p.name] for p in known if p.default is p.empty and p.name in numbers}
         given = {**required, **own.get(name, {})}
         for parameter in known:
             for i, odd in enumerate(ODD):

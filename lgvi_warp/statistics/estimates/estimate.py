@@ -115,8 +115,9 @@ class Estimate(Summarized):
         ]
 
     def with_interval(self, interval: str, arrays: Mapping[str, np.ndarray]) -> Estimate:
-        """Return the same estimate with another interval: how it was formed, and the arrays that it replaces."""
-        return replace(self, interval=interval, arrays=self.arrays | dict(arrays))
+        """Return the same estimate with another interval: how it was formed, and its arrays, each as the value if new."""
+        dims = {name: self.dims["value"] for name in arrays} | dict(self.dims)
+        return replace(self, interval=interval, dims=dims, arrays=self.arrays | dict(arrays))
 
     @functools.cached_property
     def dataset(self) -> xarray.Dataset:

@@ -8,6 +8,7 @@ import lgvi_warp as lw
 from lgvi_warp.statistics import (
     CircularMean,
     Covariance,
+    EndTime,
     Exceedance,
     Extremes,
     FirstPassage,
@@ -15,6 +16,7 @@ from lgvi_warp.statistics import (
     Mean,
     MeanAttitude,
     MemberValues,
+    Outcome,
     PathMaximum,
     PathMean,
     PathMinimum,
@@ -523,6 +525,16 @@ OF_EVERY_KIND = {one.type: one for one in (
     PathRange(scalar(3)), PathMean(scalar(3), [Mean(), Quantiles(size=64)]), PathRms(scalar(3)),
     MemberValues(scalar(3)), PathTime(scalar(3), above=(999.0, -1.0, -6.0), below=(1001.0, 1.0, -4.0)),
 )}  # fmt: skip
+# Of samples of a run: tests/runs/test_statistics_run.py.
+EVERY = [
+    Mean("position"), Covariance(["position", "speed"]), Quantiles("depth", (0.05, 0.5, 0.95), size=64),
+    Extremes("velocity"), Histogram("depth", bins=10, limits=(-3.0, 3.0)), Exceedance("depth", above=0.5),
+    FirstPassage("depth", above=1.0), CircularMean("euler[2]"), MeanAttitude(), Mean("energy"),
+    PathMaximum("speed", then=[Mean(), Quantiles(levels=(0.5, 0.99), size=64)]), PathMinimum("depth"),
+    PathMean("depth", then=[Mean(), Extremes()]), PathRms("speed"), PathRange("position"),
+    PathTime("depth", above=-0.5, below=0.5), PathTime("depth", above=0.25, then=[Exceedance(above=0.3)]),
+    Outcome("failed"), EndTime("failed"), Mean("depth", at="failed"), MemberValues("depth"),
+]  # fmt: skip
 of_every_kind = pytest.mark.parametrize("kind", [name for name, one in TYPES.items() if not (one.of_ends or one.ticks)])
 
 
@@ -932,3 +944,13 @@ def test_two_statistics_have_two_names():
     assert len(from_list([Mean("depth"), {"type": "mean", "of": "depth", "name": "other"}])) == 2
     # What is not of anything yet has no name to differ by.
     assert len(from_list(twice, unique_names=False)) == 2
+
+
+def test_an_interval_of_replicates_has_the_dimensions_of_its_value():
+    # A statistic of a user's own names the dimensions of its value alone.
+    arrays, time = {"value": np.zeros((2, 3))}, {"time": np.arange(2.0)}
+    one = Estimate("middle x", {}, "m", 0.95, "", {"value": ("time", "x")}, arrays, time)
+    found = one.with_interval("of replicates", {"lower": np.ones((2, 3)), "upper": np.ones((2, 3))})
+    assert {name: values.dims for name, values in found.dataset.items()} == dict.fromkeys(
+        ("value", "lower", "upper"), ("time", "x")
+    )

@@ -26,7 +26,8 @@ class DepthPID(IntegralLaw):
         kd_pitch: Gain of the pitch rate q [N m s/rad]; 0 by default.
         k_heave: Gain of the heave velocity w [N s]; 0 by default.
         integral_limit: Largest sizes of both integrals, (2,) [m s, rad s]; 1e6 by default.
-        anti_windup: As of `IntegralLaw`; the depth's integral waits while the wanted pitch is at its limit.
+        anti_windup: "conditional", the default: an integral waits while the actuators do not deliver the demand and its error
+            would make this worse; or "none". The depth's integral waits while the wanted pitch is at its limit.
 
     Examples:
         >>> import lgvi_warp as lw

@@ -26,7 +26,8 @@ class HeadingSMC(IntegralLaw):
         nomoto_gain: K of Nomoto's model T dr/dt + r = K N [rad/(s N m)].
         nomoto_time: T of Nomoto's model [s]; 0 by default.
         integral_limit: Largest size of I [rad s]; 1e6 by default.
-        anti_windup: As of `IntegralLaw`.
+        anti_windup: "conditional", the default: an integral waits while the actuators do not deliver the demand and its error
+            would make this worse; or "none".
     """
 
     type: ClassVar[str] = "heading_smc"

@@ -28,8 +28,11 @@ class PoseSMC(PoseLaw):
         k_sigma_r: The same as k_sigma, of the attitude (3,) [N m].
         k_d_r: The same as k_d, of the attitude (3,) [N m s].
         integral_limit: Largest sizes of each number of I and of I_R, (2,) [m s, s]; 1e6 by default.
-        feedforward: As of `PoseLaw`.
-        anti_windup: As of `PosePID`.
+        feedforward: "restoring": what balances weight, buoyancy and their moment at the measured attitude, by the numbers of
+            the scene, whatever a member's are; or "none", the default.
+        anti_windup: "conditional", the default: an integral waits while the actuators do not deliver the demand and its error
+            would make this worse; or "none". The error of the position waits along the body's axes, along which actuators
+            push.
     """
 
     type: ClassVar[str] = "pose_smc"

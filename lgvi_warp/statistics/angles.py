@@ -39,7 +39,12 @@ class CircularMean(Statistic):
     * standard_error (k, d) [rad]: of the mean direction.
 
     Args:
-        of: a quantity in rad; see `Statistic`, also for name, confidence, stopped and at.
+        of: A quantity in rad, such as "euler[2]" (see lw.statistics.Quantity).
+        name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
+        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
+        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
+        at: An outcome, such as "floor": the statistic is over the members that ended so, in their final state.
+            By default None: all sample times.
     """
 
     type: ClassVar[str] = "circular_mean"
@@ -131,7 +136,12 @@ class MeanAttitude(Statistic):
     * standard_error (k, 3) [rad]: of the mean about each body axis.
 
     Args:
-        of: "attitude", the default; see `Statistic` for name, confidence, stopped and at.
+        of: "attitude", the default.
+        name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
+        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
+        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
+        at: An outcome, such as "floor": the statistic is over the members that ended so, in their final state.
+            By default None: all sample times.
     """
 
     type: ClassVar[str] = "mean_attitude"

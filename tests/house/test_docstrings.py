@@ -4,9 +4,11 @@
 import importlib
 import inspect
 import pkgutil
+import re
 from types import ModuleType
 
 import lgvi_warp
+from tests.support.public import NAMED
 
 
 def classes(module: ModuleType) -> list[type]:
@@ -55,3 +57,12 @@ def test_every_public_method_has_a_docstring_or_inherits_one():
     public = [kind for module in modules for kind in classes(module) if not kind.__name__.startswith("_")]
     faults = [fault for kind in public for fault in silent(kind)]
     assert not faults, "\n".join(faults)
+
+
+def test_public_docstrings_send_no_reader_to_what_is_not_public():
+    sent = {
+        (name, word)
+        for name, thing in NAMED.items()
+        for word in re.findall(r"(?:[Ss]ee|As of) `([A-Z]\w+)`", inspect.getdoc(thing) or "")
+    }
+    assert [(name, word) for name, word in sent if word not in NAMED] == []

@@ -13,7 +13,7 @@ TABLES = {
         for keys, kind in re.findall(r"^\| (`.*?`) \| (.*?) \|", section, re.MULTILINE)
         for key in re.findall(r"`(\w+)`", keys)
     }
-    for names, section in re.findall(r"^##+ ([\w, ]+)\n(.*?)(?=^##|\Z)", TEXT, re.DOTALL | re.MULTILINE)
+    for names, section in re.findall(r"^##+ ([\w, -]+)\n(.*?)(?=^##|\Z)", TEXT, re.DOTALL | re.MULTILINE)
     for name in names.split(",")
 }
 PLAIN = {

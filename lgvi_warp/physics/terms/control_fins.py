@@ -36,8 +36,14 @@ class ControlFins(Commanded, Fins):
     faster than `rate_limit`, and after a first-order lag; at t = 0 it equals the command. One number stands for n equal ones.
 
     Args:
-        position, chord, normal, area, drag, drag_normal: As of `Fins`.
-        lift_slope: As of `Fins`; where a table of lift is given, the factor of its coefficients, 1 by default.
+        position: Where each fin's force acts, (n, 3) [m] from the body's origin.
+        chord: Direction from trailing to leading edge, (n, 3), of any length but 0.
+        normal: Direction of lift, (n, 3), of any length but 0; it is made orthogonal to the chord.
+        area: Area A, (n,) [m2].
+        drag: Drag coefficient along the flow, (n,).
+        drag_normal: Drag coefficient that grows with sin^2 a, (n,); 0 by default.
+        lift_slope: Slope of the lift coefficient, (n,) [1/rad]; where a table of lift is given, the factor of its
+            coefficients, 1 by default.
         lift_angles: Angles of attack of a table of lift, (k,) [rad], rising from 0; none by default.
         lift_coefficients: Lift coefficients at these angles, (k,) [1]; of negative angles they have the other sign. Between
             the angles they are linear, beyond the last one constant.

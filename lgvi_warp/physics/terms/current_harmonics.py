@@ -40,7 +40,8 @@ class CurrentHarmonics(Harmonics):
 
     Args:
         amplitudes: Amplitudes, (k, 3) [m/s], in inertial axes.
-        periods, phases: As of `Harmonics`.
+        periods: Periods, (k,) [s], above 0.
+        phases: Phases at t = 0, (k,) [rad]; 0 by default.
 
     Raises:
         SceneError: Where a period is not above 0, and as `Term`.

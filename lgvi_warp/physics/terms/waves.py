@@ -19,7 +19,8 @@ class Waves(Harmonics):
 
     Args:
         amplitudes: Amplitudes of the surface, (k,) [m].
-        periods, phases: As of `Harmonics`, the phases at the inertial origin.
+        periods: Periods, (k,) [s], above 0.
+        phases: Phases at t = 0 at the inertial origin, (k,) [rad]; 0 by default.
         headings_deg: Directions in which the waves travel, (k,) [deg] from north.
 
     Raises:

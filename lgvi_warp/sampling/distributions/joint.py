@@ -336,7 +336,7 @@ class PhysicalInertia(PositiveDefinite):
 
     Args:
         sigma: Standard deviation of the logarithm of the principal second moments, one or (3,).
-        off_diagonal: As of `PositiveDefinite`, for S; 0 by default.
+        off_diagonal: Standard deviation of the entries below the diagonal of the factor of S; 0 by default.
         mass_sigma: Standard deviation of the logarithm of the mass, for a 6x6 matrix; 0 by default.
 
     Examples:

@@ -81,7 +81,7 @@ class Effort(OfChannels):
 
     Args:
         of: "command" (the default), "actuator", or one channel, "command[2]".
-        then: see `Metric`.
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
     """
 
     type: ClassVar[str] = "effort"
@@ -99,7 +99,7 @@ class Travel(OfChannels):
 
     Args:
         of: "actuator" (the default: where they are, after delay, fault, limit and lag), "command", or one channel.
-        then: see `Metric`.
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
     """
 
     type: ClassVar[str] = "travel"
@@ -127,7 +127,7 @@ class SaturationShare(OfChannels):
 
     Args:
         of: "command", the default.
-        then: see `Metric`.
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
     """
 
     type: ClassVar[str] = "saturation_share"
@@ -167,7 +167,7 @@ class ActuatorEnergy(OfChannels):
 
     Args:
         of: "demand", the default.
-        then: see `Metric`.
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
     """
 
     type: ClassVar[str] = "energy"
@@ -238,7 +238,7 @@ class CustomMetric(Metric):
 
     Args:
         of: the function; its name is the metric's.
-        then: see `Metric`.
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
         fields: names of the samples that the function reads, as for lw.SaveAt.
         last: function of the last state that returns the metric (n,); by default the state itself.
         unit_of: unit of the metric, a text; by default "1".

@@ -93,8 +93,10 @@ class Overshoot(OfStep):
     """How far each member goes beyond its goal at most [unit, or % of the step], 0 if it never does; then statistics of it.
 
     Args:
-        of: "depth", "heading", "speed", "north" or "east"; see `OfCourse` for goal and step.
-        then: see `Metric`, also for measured.
+        of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; where other
+            guidance leads, what is wanted at the first tick. The step leads from the first actual number to it.
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
         percent: whether in percent of the step; by default False.
 
     Examples:
@@ -130,8 +132,10 @@ class Undershoot(OfStep):
     """How far each member goes the wrong way from its start at most [unit, or % of the step]; then statistics of it.
 
     Args:
-        of: "depth", "heading", "speed", "north" or "east"; see `OfCourse` for goal and step.
-        then: see `Metric`, also for measured.
+        of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; where other
+            guidance leads, what is wanted at the first tick. The step leads from the first actual number to it.
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
         percent: whether in percent of the step; by default False.
     """
 
@@ -154,8 +158,10 @@ class PeakTime(OfCourse):
     """When each member is farthest in the direction of its step [s], the first such tick; then statistics of it.
 
     Args:
-        of: "depth", "heading", "speed", "north" or "east"; see `OfCourse` for goal and step.
-        then: see `Metric`, also for measured.
+        of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; where other
+            guidance leads, what is wanted at the first tick. The step leads from the first actual number to it.
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
     """
 
     type: ClassVar[str] = "peak_time"
@@ -183,8 +189,10 @@ class Peak(Overshoot):
     That of a heading is not wrapped: it lies within pi of the goal. It is step_info's Peak for a step from 0.
 
     Args:
-        of: "depth", "heading", "speed", "north" or "east"; see `OfCourse` for goal and step.
-        then: see `Metric`, also for measured.
+        of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; where other
+            guidance leads, what is wanted at the first tick. The step leads from the first actual number to it.
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
     """
 
     type: ClassVar[str] = "peak"
@@ -201,8 +209,10 @@ class RiseTime(OfCourse):
     gets there.
 
     Args:
-        of: "depth", "heading", "speed", "north" or "east"; see `OfCourse` for goal and step.
-        then: see `Metric`, also for measured.
+        of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; where other
+            guidance leads, what is wanted at the first tick. The step leads from the first actual number to it.
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
         limits: the two parts of the step; by default (0.1, 0.9).
     """
 
@@ -243,8 +253,10 @@ class SettlingTime(OfCourse):
     at the last one.
 
     Args:
-        of: "depth", "heading", "speed", "north" or "east"; see `OfCourse` for goal and step.
-        then: see `Metric`, also for measured.
+        of: "depth", "heading", "speed", "north" or "east". The goal is the set point, before any reference model; where other
+            guidance leads, what is wanted at the first tick. The step leads from the first actual number to it.
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
         within: half the width of the band, in the unit of what it is of; by default 2 % of each member's step.
     """
 
@@ -281,8 +293,10 @@ class SteadyStateError(OfTracking):
     NaN for members that stopped or failed before the last tick.
 
     Args:
-        of: see `OfTracking`.
-        then: see `Metric`, also for measured.
+        of: "depth", "heading" (differences wrapped to within pi), "speed" (ahead through the water, as measured), "north",
+            "east"; or a distance from what is wanted: "position", "attitude" (angle), "cross_track".
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
         share: the part of the run's time, above 0 to 1; by default 0.1.
     """
 
@@ -313,8 +327,10 @@ class MaxError(OfTracking):
     """The largest |e| of each member [unit]; then statistics of it.
 
     Args:
-        of: see `OfTracking`.
-        then: see `Metric`, also for measured.
+        of: "depth", "heading" (differences wrapped to within pi), "speed" (ahead through the water, as measured), "north",
+            "east"; or a distance from what is wanted: "position", "attitude" (angle), "cross_track".
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
     """
 
     type: ClassVar[str] = "max_error"
@@ -338,7 +354,8 @@ class CrossTrack(MaxError):  # noqa: N818  (no exception)
 
     Args:
         of: "cross_track", the default.
-        then: see `Metric`, also for measured.
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
     """
 
     type: ClassVar[str] = "cross_track"
@@ -370,8 +387,10 @@ class IAE(OverTime):
     """The integral of |e| over time [unit s]; then statistics of it.
 
     Args:
-        of: see `OfTracking`.
-        then: see `Metric`, also for measured.
+        of: "depth", "heading" (differences wrapped to within pi), "speed" (ahead through the water, as measured), "north",
+            "east"; or a distance from what is wanted: "position", "attitude" (angle), "cross_track".
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
 
     Examples:
         >>> import lgvi_warp as lw
@@ -399,8 +418,10 @@ class ISE(OverTime):
     """The integral of e^2 over time [unit^2 s]; then statistics of it.
 
     Args:
-        of: see `OfTracking`.
-        then: see `Metric`, also for measured.
+        of: "depth", "heading" (differences wrapped to within pi), "speed" (ahead through the water, as measured), "north",
+            "east"; or a distance from what is wanted: "position", "attitude" (angle), "cross_track".
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
     """
 
     type: ClassVar[str] = "ise"
@@ -415,8 +436,10 @@ class ITAE(OverTime):
     """The integral of t |e| over time [unit s^2]; then statistics of it.
 
     Args:
-        of: see `OfTracking`.
-        then: see `Metric`, also for measured.
+        of: "depth", "heading" (differences wrapped to within pi), "speed" (ahead through the water, as measured), "north",
+            "east"; or a distance from what is wanted: "position", "attitude" (angle), "cross_track".
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
     """
 
     type: ClassVar[str] = "itae"
@@ -431,8 +454,10 @@ class RMSError(ISE):
     """The root of the mean of e^2 over the time under way [unit]; then statistics of it. |e| where that time is 0.
 
     Args:
-        of: see `OfTracking`.
-        then: see `Metric`, also for measured.
+        of: "depth", "heading" (differences wrapped to within pi), "speed" (ahead through the water, as measured), "north",
+            "east"; or a distance from what is wanted: "position", "attitude" (angle), "cross_track".
+        then: A statistic, or a list, without `of`: lw.statistics.Mean(), the default, lw.statistics.Quantiles(), ...
+        measured: Whether the actual number is what sensors measure, in place of the truth; by default False.
     """
 
     type: ClassVar[str] = "rms"

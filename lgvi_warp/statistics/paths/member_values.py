@@ -30,7 +30,10 @@ class MemberValues(Statistic):
     * count (k,): number of members that have numbers, infinite ones among them.
 
     Args:
-        of: a quantity; see `Statistic`, also for name and stopped.
+        of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
+            (see lw.statistics.Quantity).
+        name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
+        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
 
     Examples:
         >>> import lgvi_warp as lw

@@ -64,7 +64,11 @@ class OfPath(MemberStatistic):
     path_maximum speed". Its one row is at the time of the end.
 
     Args:
-        of: a quantity; see `Statistic`, also for name, confidence and stopped.
+        of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
+            (see lw.statistics.Quantity).
+        name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
+        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
+        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
         then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5,
             0.99)), lw.statistics.Exceedance(above=2.0).
     """
@@ -89,7 +93,11 @@ class PathMaximum(OfPath):
     path_maximum speed". Its one row is at the time of the end.
 
     Args:
-        of: a quantity; see `Statistic`, also for name, confidence and stopped.
+        of: A quantity, such as "depth" or "position[2]", a function of (samples, members), or a list of these
+            (see lw.statistics.Quantity).
+        name: Key of the estimate in the result; by default the type and the quantity, as in "mean position".
+        confidence: Confidence level of the intervals, between 0 and 1; by default 0.95.
+        stopped: Whether a member that an event stopped counts on in its last state, "held", or not, "left_out".
         then: a statistic, or a list, without `of`: lw.statistics.Mean() (the default), lw.statistics.Quantiles(levels=(0.5,
             0.99)), lw.statistics.Exceedance(above=2.0).
 

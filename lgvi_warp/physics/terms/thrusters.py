@@ -101,7 +101,8 @@ class Thrusters(Commanded):
         for name, value in (("polynomial", SQUARE), ("polynomial_astern", self.polynomial)):
             if getattr(self, name) is None:
                 object.__setattr__(self, name, SQUARE if value is None else value)
-        n = rows_of(self.coefficient)
+        n = rows_of(self.position)
+        self.repeat(n, "coefficient")
         if self.advance_loss is None and self.advance_loss_astern is not None:
             object.__setattr__(self, "advance_loss", np.zeros(n))
         if self.advance_loss_astern is None and self.advance_loss is not None:

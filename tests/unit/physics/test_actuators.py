@@ -177,3 +177,11 @@ def test_members_bring_in_no_lag_or_limit_that_the_scene_has_not(has, varied):
     looped = scene([lw.terms.ControlWrench(**has)], laws=[HEADING])
     with pytest.raises(SceneError, match=f"control_wrench.{varied} = .*: does not act: the scene has none; give"):
         lw.Ensemble(looped, 4, 1, {f"control_wrench.{varied}": lw.distributions.Uniform(low=1.0, high=2.0)})
+
+
+def test_one_number_stands_for_thrusters_alike():
+    place = {"position": ((0.0, 0.2, 0.0), (0.0, -0.2, 0.0)), "direction": ((1.0, 0.0, 0.0),) * 2, "command": 1.0}
+    alike, each = lw.terms.Thrusters(**place, coefficient=9.0), lw.terms.Thrusters(**place, coefficient=(9.0, 9.0))
+    assert alike.to_dict() == each.to_dict()
+    with pytest.raises(lw.SceneError, match=r"^thrusters.coefficient = .*: has shape \(3,\); give 2 numbers"):
+        lw.terms.Thrusters(**place, coefficient=(9.0, 9.0, 9.0), coefficient_astern=1.0)

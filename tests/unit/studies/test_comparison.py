@@ -783,6 +783,7 @@ def test_a_sweep_without_time_tries_what_was_asked_for_by_name(scene):
     assert all(trial.errors == {} for trial in statistics)
 
 
+@pytest.mark.slow_but("suggest")
 @pytest.mark.parametrize("study", ["tradeoff", "suggest"])
 def test_time_that_other_programs_take_does_not_end_a_search(scene, study):
     """Every run waits as on a busy machine, longer than the search may last."""

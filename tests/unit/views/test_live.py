@@ -138,6 +138,7 @@ def test_a_viewer_that_is_closed_ends_the_view_and_not_the_run(tmp_path):
     live.add(third)
 
 
+@pytest.mark.slow
 def test_a_viewer_that_ends_before_it_has_a_recording_leaves_the_file(tmp_path):
     path = tmp_path / "fleet.rrd"
     told = r"the viewer ended before it had the recording, which is in .*fleet.rrd"

@@ -15,7 +15,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.control.base import Part
 from lgvi_warp.control.controller import Controller
-from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey
+from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey, works_in_user_axes
 from lgvi_warp.methods.method import FORCED, Method, Program, divided, merged, simplified, with_hops
 from lgvi_warp.physics import terms, vehicle
 from lgvi_warp.physics.terms.base import Term
@@ -37,6 +37,8 @@ class KernelChoice:
     drag: tuple[str, ...]  # parts of drag that are treated by its exact flow
     flow: str  # how the water moves, one of FLOWS
     parts: tuple[str, ...]  # what the inertia holds besides mass and moments of inertia
+    inverse: tuple[tuple[int, int], ...]  # entries of the inverse inertia that are not zero; none where it is diagonal
+    user_axes: bool  # the kernel's axes and origin are the user's (see `works_in_user_axes`)
     coupling: tuple[bool, ...]  # (6,), which of U12, U13, U23 and of the three pitches some member has
     timed: bool  # a law or an event depends on the time
     memory: bool  # a law or the method remembers numbers from step to step
@@ -60,17 +62,18 @@ def choose_kernel(
     method: Method,
     facts: Survey,
     built_in: Callable[[str, str], Any],
-    checked: bool = True,
+    checks: str = "safe",
 ) -> KernelChoice:
     """Choose what the kernel of a run must contain.
 
     built_in: (folder, name) -> module of built-in device code in the folder "laws" or "stops", None where there is none.
     """
     explicit = method.tableau is not None
+    user_axes = works_in_user_axes(method, ensemble.scene)
     controller = _controller(ensemble, facts)
     parts = [part.with_features(facts.features) for part in controller.acting_parts] if controller else []
     control = tuple((part, device_module(part, part.device_in(not facts.turned), built_in)) for part in parts)
-    acting = _acting(ensemble, facts, built_in, controller)
+    acting = _acting(ensemble, facts, built_in, controller, user_axes)
     events = tuple((event, device_module(event, event.device, built_in)) for event in ensemble.scene.events)
     damping = any(hasattr(module, "damping") for term, module in acting if not term.exact_flow)
     flow = _flow(acting)
@@ -89,20 +92,23 @@ def choose_kernel(
         module = built_in("laws", term.exact_flow[facts.bent])
         acting = [(term, module), *((t, m) for t, m in acting if t is not term)]
     dense = damping or (bool(drags) and not exact) or flow == "varying"
+    # An explicit method adds wrenches; a warning about strong drag still compares a matrix with the inertia.
+    whole = dense and (not explicit or method.linearly_implicit or checks == "all")
     memory = any(term.memory for term, _ in acting)
     _check(method, facts, dense=dense, flow=flow, memory=memory, acting=acting)
-    mass, coupled = SHAPES_OF_MASS[facts.mass], facts.coupled
+    mass, coupled = SHAPES_OF_MASS[facts.mass], facts.coupled and not user_axes
+    inverse = tuple(sorted(facts.inverse | {(i, i) for i in range(6)})) if facts.inverse else ()
     program = FORCED[method.base] if forced else simplified(method.program, mass == "isotropic" and not coupled)
     # Events, and the host between launches, read states, which must not be those in the middle of a lead.
     states_read = bool(events) or (controller is not None and controller.callback is not None)
     halved = method.halved and (bool(drag) or flow != "none")
     lead, maps = _merged_program(method, program, acting, coupled, halved, states_read)
-    conservative = checked and _conservative(facts, acting)
+    conservative = checks != "none" and _conservative(facts, acting)
     # Events, water and the potential are evaluated at the user's origin, or at that of the forces.
     elsewhere = controller is not None or bool(events) or flow != "none" or (conservative and facts.apart)
-    contents = {"rates": explicit,
+    contents = {"rates": explicit and not inverse, "inverse": bool(inverse),
                 "turns": method.turns, "x": method.turns and coupled, "w": method.base == "psi_w", "coupled": coupled,
-                "modified": method.two_part, "dense": dense, "water": flow in ("uniform", "varying"),
+                "modified": method.two_part, "dense": whole, "water": flow in ("uniform", "varying"),
                 "shear": flow == "varying", "lever": flow == "varying" and facts.lever,
                 "origin": bool(elsewhere and (facts.moved or facts.forces_moved)),
                 "axes": controller is not None and facts.turned_axes}  # fmt: skip
@@ -114,6 +120,8 @@ def choose_kernel(
         mass="full" if coupled and mass == "isotropic" else mass,
         drag=drag,
         flow=flow,
+        inverse=inverse,
+        user_axes=user_axes,
         parts=tuple(name for name, wanted in contents.items() if wanted),
         coupling=tuple(i in facts.couplings for i in range(len(COUPLINGS))),
         timed=any(term.timed for term, _ in (*acting, *events)) or facts.delayed,
@@ -178,7 +186,7 @@ def _conservative(facts: Survey, acting: list[tuple[Term, Any]]) -> bool:
             passive = not anchored and term.key not in facts.rising
         else:
             dissipates = term.dissipative or not hasattr(module, "damping")
-            bounded = hasattr(module, "supply") or hasattr(module, "push")
+            bounded = hasattr(module, "supply") or hasattr(module, "steady_size")
             known_potential = getattr(module, "POTENTIAL", False) and hasattr(module, "energy") and bounded
             passive = not hasattr(module, "flow") and dissipates and (known_potential or not hasattr(module, "law"))
         if not passive:
@@ -237,6 +245,8 @@ def device_module(term: Term, device: Any, built_in: Callable[[str, str], Any]) 
             _check_signature(faults, term, module, role)
         if hasattr(module, "follow") and not hasattr(module, "evolve"):
             faults.add(f"{term.key}.device", module, "has follow and no evolve", page)
+        if hasattr(module, "push") and not hasattr(module, "damping"):
+            faults.add(f"{term.key}.device", module, "has push and no damping, which splittings need", page)
         if isinstance(term, NoisyTerm) and not getattr(module, "NOISE", False):
             faults.add(f"{term.key}.device", module, "does not say that it is noise", "write NOISE = True")
         flow = getattr(module, "FLOW", "none")
@@ -288,7 +298,7 @@ def _check_signature(faults: Faults, term: Term, module: Any, role: str) -> None
         faults.add(f"{term.key}.{role}", f"({', '.join(names)})", f"takes {len(names)} arguments", remedy)
 
 
-ROLES = ("law", "damping", "flow", "evolve", "follow")
+ROLES = ("law", "damping", "push", "flow", "evolve", "follow")
 # Roles of a controller's parts, with their arguments.
 ARGUMENTS = {"measure": "y, p", "guide": "r, y, p", "control": "w, r, y, p", "allocate": "w, y, p", "send": "y, p"}
 # How water may move, the most special first.
@@ -296,12 +306,23 @@ FLOWS = ("none", "steady", "uniform", "varying")
 
 
 def _acting(
-    ensemble: Ensemble, facts: Survey, built_in: Callable[[str, str], Any], controller: Controller | None
+    ensemble: Ensemble,
+    facts: Survey,
+    built_in: Callable[[str, str], Any],
+    controller: Controller | None,
+    user_axes: bool,
 ) -> list[tuple[Term, Any]]:
     """Terms that affect at least one member, with their device code, in a fixed order."""
+
+    def device_of(term: Term) -> Any:
+        entries = [word.removeprefix(f"{term.key}.") for word in facts.features if word.startswith(f"{term.key}.")]
+        if user_axes and term.pattern_device and entries:
+            return f"{term.pattern_device}:{','.join(sorted(entries))}"
+        return term.device_in(not facts.turned)
+
     acting = [(term, built_in("laws", term.device)) for term in terms.IMPLIED]
     listed = [term.driven_by(controller.bus) if term.driver and controller else term for term in ensemble.scene.terms]
-    acting += [(term, device_module(term, term.device_in(not facts.turned), built_in)) for term in listed]
+    acting += [(term, device_module(term, device_of(term), built_in)) for term in listed]
     return [(term, module) for term, module in acting if term.key in facts.felt]
 
 

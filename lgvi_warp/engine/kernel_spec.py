@@ -39,6 +39,7 @@ def spec_of(
         events=tuple(module for _, module in choice.events),
         drag=choice.drag,
         parts=choice.parts,
+        inverse=choice.inverse,
         coupling=choice.coupling,
         flow=choice.flow,
         timed=choice.timed,

@@ -41,7 +41,7 @@ class Packing:
 
     def __init__(self, plan: Plan, members: Members):
         self.plan, self.members = plan, members
-        self.numbers: Any = framed(plan.method, members.parameters, plan.shared)
+        self.numbers: Any = framed(plan.method, members.parameters, plan.shared, plan.kernel_choice.user_axes)
         self.frame, self.U, _ = self.numbers[FRAME]
         self.scale = self._shared("scale", lambda numbers: self._scale(numbers[AXES][0]))
 
@@ -82,6 +82,9 @@ class Packing:
             fields["anisotropy"] = deviation
         if "rates" in parts:
             fields["inverse_J"] = scale[:, None] / frame.J
+        if "inverse" in parts:
+            A, B, C = inertia.blocks(frame.inverse * scale[:, None, None])
+            fields |= {"inverse_mass": A, "inverse_coupling": B, "inverse_inertia": C}
         if "turns" in parts:
             fields["half_over_J"] = 0.5 * scale[:, None] / frame.J
         if "x" in parts:
@@ -232,7 +235,7 @@ def _diagonal(matrices: np.ndarray) -> np.ndarray | None:
 
 def _diagonal_mass(frame: Frame) -> np.ndarray | None:
     """Diagonals (n, 3) of the mass matrices, if momenta are products of these and velocities alone; else None."""
-    return None if np.any(frame.E) else _diagonal(frame.M)
+    return None if frame.whole is not None or np.any(frame.E) else _diagonal(frame.M)
 
 
 def _water(numbers: Any, frame: Frame) -> Fields:

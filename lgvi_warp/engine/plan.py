@@ -164,7 +164,7 @@ def choose_plan(
     faults.raise_if_any()
     shared = _shared(ensemble)
     facts = survey(ensemble, method, shared, most=None if survey_all else SURVEYED)
-    choice = choose_kernel(ensemble, method, facts, built_in, checks != "none")
+    choice = choose_kernel(ensemble, method, facts, built_in, checks)
     check_backward_drag(ensemble, choice, method, grid.h)
     if on_failure == "substep":
         check_substep(choice, method)

@@ -180,7 +180,8 @@ def at_start(
         return bits, value
     coarse = COARSE / longest_stage(method)
     munk = h * np.sqrt(munk_factor(frame)) * _size(momentum)
-    arm = hydrostatics.moment(members.parameters) + hydrostatics.net(members.parameters)[:, None] * frame.forces
+    center = frame.forces if frame.center is None else frame.center
+    arm = hydrostatics.moment(members.parameters) + hydrostatics.net(members.parameters)[:, None] * center
     swing = h * np.sqrt(_size(arm) / frame.J.min(axis=1))
     note(Warnings.MUNK_COARSE, munk, coarse)
     note(Warnings.RESTORING_COARSE, swing, coarse)

@@ -8,7 +8,7 @@ all members) or n. A shift of the origin by d (body axes) leaves M and Js unchan
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -90,6 +90,8 @@ class Frame:
     origin, forces: Origins of the state and of the forces, (., 3) [m], from the user's in his axes.
     M, J: Mass matrix (., 3, 3) [kg] and diagonal (Schur) inertia (., 3) [kg m2] in the axes Q.
     E, E_forces: M^-1 C at the origin of the state and at that of the forces, (., 3, 3) [m]; 0 without coupling.
+    whole: the 6x6 inertia (n, 6, 6) in the user's axes, where M and J are no diagonals there or couple; then J are principal
+        moments about `center`, the origin where coupling is least, (n, 3) [m].
     """
 
     Q: np.ndarray
@@ -99,6 +101,8 @@ class Frame:
     J: np.ndarray
     E: np.ndarray
     E_forces: np.ndarray
+    whole: np.ndarray | None = None
+    center: np.ndarray | None = None
 
     @functools.cached_property
     def turned(self) -> bool:
@@ -115,12 +119,17 @@ class Frame:
         """Whether the user's axes are principal axes of M and J, in any order, about the same origin."""
         off = np.abs(self.M[:, ~np.eye(3, dtype=bool)]).max(axis=1)
         diagonal = off <= DIAGONAL * np.abs(np.einsum("nii->ni", self.M)).max(axis=1)
-        return bool(np.all(diagonal) and self.aligned and not self.coupled)
+        return bool(np.all(diagonal) and self.aligned and not self.coupled and self.whole is None)
 
     @functools.cached_property
     def from_forces(self) -> np.ndarray:
         """Matrices (., 6, 6) that give the user's velocities from those at the origin of the forces, in these axes."""
         return motion_from(self.forces, self.Q)
+
+    @functools.cached_property
+    def inverse(self) -> np.ndarray:
+        """The inverse (n, 6, 6) of the whole inertia."""
+        return np.asarray(np.linalg.inv(self.inertia_at(self.E) if self.whole is None else self.whole))
 
     @property
     def aligned(self) -> bool:
@@ -135,6 +144,8 @@ class Frame:
 
     def inertia_at(self, E: np.ndarray) -> np.ndarray:
         """Mass matrix (n, 6, 6) in these axes, where M^-1 C is E (n, 3, 3) [m]: J = Js + E^T M E."""
+        if self.whole is not None:
+            return self.whole
         J = self.J[:, :, None] * np.eye(3)
         return joined(self.M + 0.0 * E, self.M @ E, J + np.swapaxes(E, -1, -2) @ self.M @ E)
 
@@ -194,6 +205,27 @@ def uncoupled_frame(body: Blocks) -> tuple[Frame, np.ndarray]:
     zero = np.zeros_like(E)
     # Mass does not depend on the origin.
     return Frame(Q, origin, origin, in_axes(Q, M), J, zero, zero), remaining
+
+
+def user_frame(body: Blocks) -> Frame:
+    """The frame of the user's axes and origin. Entries below round-off count as zero."""
+    M, E, Js = schur(body)
+    Q, J = notation.principal_axes(Js)
+    n, zero = len(E), np.zeros((1, 3))
+    whole = joined(*body)
+    size = np.sqrt(np.einsum("nii->ni", whole))
+    beside = ~np.eye(6, dtype=bool)
+    if not np.any((np.abs(whole) > DIAGONAL * size[:, :, None] * size[:, None, :])[:, beside]):
+        return Frame(np.eye(3)[None], zero, zero, M, J, np.zeros_like(E), np.zeros_like(E))
+    return Frame(np.eye(3)[None], zero, zero, M, J, E, E, whole, np.broadcast_to(-vee(E), (n, 3)))
+
+
+def user_frame_with_mass(frame: Frame, M: np.ndarray, J: np.ndarray) -> Frame:
+    """The frame of the user's axes for another mass matrix (n, 3, 3) [kg]. J: the inertia (n, 3, 3) that the frame is of."""
+    if frame.whole is None and not notation.off_diagonal(M).any():
+        return replace(frame, M=M)
+    n = max(len(M), len(J))
+    return replace(frame, M=M, whole=joined(M, np.zeros((n, 3, 3)), J), center=np.zeros((n, 3)))
 
 
 def ascending(Q: np.ndarray, J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -15,6 +15,7 @@ from lgvi_kernels.maps import turns
 from lgvi_kernels.maps.collocation import make_G
 from lgvi_kernels.maps.compose import superpose
 from lgvi_kernels.maps.coupled import make_W
+from lgvi_kernels.maps.dense_inertia import make_dense_velocities
 from lgvi_kernels.maps.dissipation import make_V
 from lgvi_kernels.maps.explicit import make_explicit
 from lgvi_kernels.maps.forces import make_forces
@@ -169,6 +170,8 @@ def make_method(spec):
         velocity = direct_velocity
     turning = multiplied if spec.explicit else divided
     velocities, velocities_of_forces = make_velocities(velocity, turning, coupled)
+    if spec.inverse:
+        velocities = velocities_of_forces = make_dense_velocities(spec.inverse)
     laws = spec.laws
     law, laws_damping, flow, evolve = (superpose(laws, role) for role in ("law", "damping", "flow", "evolve"))
     varies, lever = spec.flow in ("uniform", "varying"), "lever" in spec.parts
@@ -187,7 +190,8 @@ def make_method(spec):
         return to_body(view, flow(Flow(), view, c.params).velocity)
 
     if spec.explicit is not None:
-        acting = (View, Wrench, Flow, Damping, law, laws_damping, damping, flow, water_wrench, shifted, velocities)
+        wrenches = superpose(laws, "push"), superpose(laws, "matrix")
+        acting = (View, Wrench, Flow, Damping, law, *wrenches, damping, flow, water_wrench, shifted, velocities)
         everything, _, _, slope = make_forces(*acting)
         step = make_explicit(spec, everything, velocities, slope)
         momentum = in_body if spec.inertial else None
@@ -220,7 +224,7 @@ def make_method(spec):
             letters[letter] = turns.make_hop(int(letter[1]) - 1, int(letter[2]) - 1, U12, U13, U23, spec.compensated)
     if spec.averages is not None:
         force, potential = superpose(laws, "force"), superpose(laws, "potential")
-        acting = (View, Wrench, Flow, Damping, force, laws_damping, damping, flow, water_wrench, shifted, velocities)
+        acting = (View, Wrench, Flow, Damping, force, None, laws_damping, damping, flow, water_wrench, shifted, velocities)
         _, forces, current, _ = make_forces(*acting)
         maps = (letters["Ab"], None if spec.mass == "isotropic" else Ap, letters["D"])
         functions = (View, Wrench, potential, forces, current, evolve, velocities)

@@ -210,7 +210,7 @@ def make_energy(laws, real, View, velocities, shifted):
 
     shifted: the forces have another origin than the state.
     """
-    potential, supply, push = (superpose(laws, role) for role in ("energy", "supply", "push"))
+    potential, supply, steady_size = (superpose(laws, role) for role in ("energy", "supply", "steady_size"))
 
     @wp.func
     def energies(x: Any, c: Any):
@@ -241,8 +241,8 @@ def make_energy(laws, real, View, velocities, shifted):
         """
         T, U = energies(x, c)
         S = S0 + real(wp.static(ROUND_OFF * EPSILON[real])) * (absolute(U) + absolute(U0))
-        if wp.static(push is not None):
-            impulse = t * (c.inertia.inverse_scale * push(T - T, look(View(), x, c, real(0.0)), c.params))
+        if wp.static(steady_size is not None):
+            impulse = t * (c.inertia.inverse_scale * steady_size(T - T, look(View(), x, c, real(0.0)), c.params))
             S = S + real(1.5) * (c.inertia.mean * impulse * impulse)
         return ((T - T0) + (U - U0)) / S
 

@@ -57,6 +57,7 @@ class Spec(NamedTuple):
     gauss: tuple = ()  # numbers of a collocation method
     lead_time: float = 0.0  # the part of a step for which the lead drifts
     explicit: Any = None  # an explicit method, which has no maps
+    inverse: tuple = ()  # entries (i, j) that are not zero of the inverse inertia, where it is no product of M^-1 and J^-1
     compensated: bool = False  # sums of two float32 (see sums)
     warning_rows: tuple = ()  # see monitor
     energy: bool = False  # its growth is a failure

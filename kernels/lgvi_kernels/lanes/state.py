@@ -118,6 +118,7 @@ def inertia_struct(width, real, mass, parts=()):
     "rates": 1 / J, for methods that ask for rates many times a step;
     "x": coupling of the turns, the pitches k and the hops U12, U13, U23 (coupled_inertia);
     "w": S, the symmetric coupling of the coupled Moser-Veselov step;
+    "inverse": blocks of the inverse of the 6x6 inertia in the user's axes: upper left, upper right, lower right, 3x3;
     "coupled": E = M^-1 C at the origin of the state and at that of the forces, 3x3;
     "dense": the inertia at the origin of the forces as M and J (and C where coupled), for velocity-dependent laws;
     "origin": the user's origin from that of the state, and from that of the forces, where events and water are taken;
@@ -134,6 +135,8 @@ def inertia_struct(width, real, mass, parts=()):
         fields["anisotropy"] = {"diagonal": Lane3, "full": Symmetric3}[mass]
     if "rates" in parts:
         fields["inverse_J"] = Lane3
+    if "inverse" in parts:
+        fields |= dict.fromkeys(("inverse_mass", "inverse_coupling", "inverse_inertia"), Matrix3)
     if "turns" in parts:
         fields["half_over_J"] = Lane3
     if "x" in parts:

@@ -3,9 +3,10 @@
 
 law(w, view, p): force [N] and torque [N m] that depend on position, attitude and time;
 damping(D, view, p): the matrix D of a force and torque -D (nu; Om); D may depend on velocities as well;
+push(w, view, p): that force and torque themselves, for methods that need no matrix (without it, they multiply D);
 steady_force(w, view, p): the force of `law` in inertial axes, if it never changes there;
 energy(u, view, p): the potential [J] of `law`, for the check of energy, with one of two bounds of what it can give:
-    supply(s, view, p): the potential less its least value [J]; push(s, view, p): the size of a steady force [N];
+    supply(s, view, p): the potential less its least value [J]; steady_size(s, view, p): the size of a steady force [N];
 flow(f, view, p): velocity and slopes of the water;
 evolve(state, view, p): advances what the law remembers by half a kick, and returns its first argument;
 follow(state, view, p): advances what the law remembers to view.t from view.h before, exactly, if that depends on the time and

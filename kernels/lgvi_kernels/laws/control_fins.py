@@ -8,7 +8,7 @@ import warp as wp
 
 from lgvi_kernels.law import *
 from lgvi_kernels.laws import fins
-from lgvi_kernels.laws.fins import add_fins, note_lift_and_drag, speed_along
+from lgvi_kernels.laws.fins import add_fins, lift_and_drag, note_lift_and_drag, push_fin, speed_along
 from lgvi_kernels.laws.scheduled import make_commanded
 
 # Rows of one fin: those of fins.ROWS, limit, and limit of the rate.
@@ -79,6 +79,17 @@ follow = turn_to_command
 
 
 @wp.func
+def angle_of(view: Any, p: Any, i: int):
+    """The deflection of fin i."""
+    angle = ones(view.b.x) - ones(view.b.x)
+    if p.limited > 0:
+        angle = remembered(view, p.memory + i)
+    else:
+        angle = commanded(view, p, i, view.t)
+    return angle
+
+
+@wp.func
 def damping(D: Any, view: Any, p: Any):
     """D = sum over fins, each seen from its turned axes c' = cos c + sin n, n' = cos n - sin c.
 
@@ -87,14 +98,25 @@ def damping(D: Any, view: Any, p: Any):
     """
     for i in range(p.count):
         at = p.first + wp.static(ROWS) * i
-        angle = ones(view.b.x) - ones(view.b.x)
-        if p.limited > 0:
-            angle = remembered(view, p.memory + i)
-        else:
-            angle = commanded(view, p, i, view.t)
+        angle = angle_of(view, p, i)
         c = cosine(angle)
         s = sine(angle)
         along = speed_along(view, at)
         across = speed_along(view, at + 6)
         note_lift_and_drag(view, at, c * along + s * across, c * across - s * along, p.work + 2 * i)
     return add_fins(D, view, p.first, wp.static(ROWS), p.count, p.work)
+
+
+@wp.func
+def push(w: Any, view: Any, p: Any):
+    """w and the wrench of each fin, its lift and drag those of its turned axes."""
+    for i in range(p.count):
+        at = p.first + wp.static(ROWS) * i
+        angle = angle_of(view, p, i)
+        c = cosine(angle)
+        s = sine(angle)
+        along = speed_along(view, at)
+        across = speed_along(view, at + 6)
+        lift, drag = lift_and_drag(view, at, c * along + s * across, c * across - s * along)
+        w = push_fin(w, view, at, along, across, lift, drag)
+    return w

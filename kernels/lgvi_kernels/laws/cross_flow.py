@@ -50,3 +50,31 @@ def damping(D: Any, view: Any, p: Any):
         S2 = S2 + (s * x) * x
     D = add_across(D, p.a, p.a_arm, p.b, S0, S1, S2)
     return add_across(D, p.b, p.b_arm, p.a, S0, -S1, S2)
+
+
+@wp.func
+def push(w: Any, view: Any, p: Any):
+    """w less the drag of each strip: c |w| w at its station."""
+    along_a = dot(p.a, view.nu) + dot(p.a_arm, view.Om)
+    along_b = dot(p.b, view.nu) + dot(p.b_arm, view.Om)
+    a_by_station = dot(p.b, view.Om)
+    b_by_station = -dot(p.a, view.Om)
+    # The sums over strips of the drag along a and b, and of these times the station.
+    Fa = ones(along_a) - ones(along_a)
+    Fb = Fa
+    Ma = Fa
+    Mb = Fa
+    for i in range(p.count):
+        x = row1(view, p.first + 2 * i)
+        v_a = along_a + x * a_by_station
+        v_b = along_b + x * b_by_station
+        s = row1(view, p.first + 2 * i + 1) * root(v_a * v_a + v_b * v_b)
+        f_a = s * v_a
+        f_b = s * v_b
+        Fa = Fa + f_a
+        Fb = Fb + f_b
+        Ma = Ma + x * f_a
+        Mb = Mb + x * f_b
+    w.force = w.force - Fa * p.a - Fb * p.b
+    w.torque = w.torque - Fa * p.a_arm - Fb * p.b_arm - Ma * p.b + Mb * p.a
+    return w

@@ -7,6 +7,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.law import *
+from lgvi_kernels.laws.patterns import less_whole, squares
 
 
 @functools.cache
@@ -49,3 +50,13 @@ def damping(D: Any, view: Any, p: Any):
         D.torque_velocity = add_columns(D.torque_velocity, view, p.first + 54, speeds)
         D.torque_rate = add_columns(D.torque_rate, view, p.first + 57, rates)
     return D
+
+
+@wp.func
+def push(w: Any, view: Any, p: Any):
+    """w - linear (nu; Om) - quadratic (nu |nu|; Om |Om|)."""
+    if p.constant > 0:
+        w = less_whole(w, view, p.first, view.nu, view.Om)
+    if p.quadratic > 0:
+        w = less_whole(w, view, p.first + 36, squares(view.nu), squares(view.Om))
+    return w

@@ -8,6 +8,7 @@ import warp as wp
 
 from lgvi_kernels.law import *
 from lgvi_kernels.laws.drag_matrix import add_three
+from lgvi_kernels.laws.patterns import less_whole
 
 
 @functools.cache
@@ -34,3 +35,17 @@ def damping(D: Any, view: Any, p: Any):
         size = absolute(dot(velocity, view.nu) + dot(rate, view.Om))
         D = add_outer(D, size * row3(view, at + 6), size * row3(view, at + 9), velocity, rate)
     return D
+
+
+@wp.func
+def push(w: Any, view: Any, p: Any):
+    """w - linear (nu; Om) - sum over columns of v |v| times the column, v its velocity."""
+    if p.constant > 0:
+        w = less_whole(w, view, p.first, view.nu, view.Om)
+    for j in range(p.count):
+        at = p.first + 36 + 12 * j
+        v = dot(row3(view, at), view.nu) + dot(row3(view, at + 3), view.Om)
+        size = absolute(v) * v
+        w.force = w.force - size * row3(view, at + 6)
+        w.torque = w.torque - size * row3(view, at + 9)
+    return w

@@ -32,16 +32,32 @@ def speed_along(view: Any, row: int):
 
 
 @wp.func
-def note_lift_and_drag(view: Any, at: int, along: Any, across: Any, noted: int):
-    """Note l and d of a fin whose wrench is -l (along n - across c) - d (along c + across n), for add_fins.
+def lift_and_drag(view: Any, at: int, along: Any, across: Any):
+    """(l, d) of a fin whose wrench is -l (along n - across c) - d (along c + across n).
 
     l = kl along across / V, d = kd V + kn across^2 / V; along and across are the flow along its chord c and normal n.
-    They are noted in rows of work, since add_fins goes through all fins once for each block.
     """
     speed = root(along * along + across * across)
     over = across / greatest(speed, view.h.dtype(wp.static(STILL)) * ones(speed))
-    remember(view, noted, row1(view, at + 12) * (along * over))
-    remember(view, noted + 1, row1(view, at + 13) * speed + row1(view, at + 14) * (across * over))
+    return row1(view, at + 12) * (along * over), row1(view, at + 13) * speed + row1(view, at + 14) * (across * over)
+
+
+@wp.func
+def note_lift_and_drag(view: Any, at: int, along: Any, across: Any, noted: int):
+    """Note l and d in rows of work, since add_fins goes through all fins once for each block."""
+    lift, drag = lift_and_drag(view, at, along, across)
+    remember(view, noted, lift)
+    remember(view, noted + 1, drag)
+
+
+@wp.func
+def push_fin(w: Any, view: Any, at: int, along: Any, across: Any, lift: Any, drag: Any):
+    """w and the wrench of one fin; along and across: the flow along its chord and its normal where it is not turned."""
+    chordwise = lift * across - drag * along
+    normal = -(lift * along) - drag * across
+    w.force = w.force + chordwise * row3(view, at) + normal * row3(view, at + 6)
+    w.torque = w.torque + chordwise * row3(view, at + 3) + normal * row3(view, at + 9)
+    return w
 
 
 @wp.func
@@ -113,3 +129,15 @@ def damping(D: Any, view: Any, p: Any):
         at = p.first + wp.static(ROWS) * i
         note_lift_and_drag(view, at, speed_along(view, at), speed_along(view, at + 6), p.work + 2 * i)
     return add_fins(D, view, p.first, wp.static(ROWS), p.count, p.work)
+
+
+@wp.func
+def push(w: Any, view: Any, p: Any):
+    """w and the wrench of each fin."""
+    for i in range(p.count):
+        at = p.first + wp.static(ROWS) * i
+        along = speed_along(view, at)
+        across = speed_along(view, at + 6)
+        lift, drag = lift_and_drag(view, at, along, across)
+        w = push_fin(w, view, at, along, across, lift, drag)
+    return w

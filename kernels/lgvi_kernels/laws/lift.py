@@ -7,6 +7,7 @@ from typing import Any
 import warp as wp
 
 from lgvi_kernels.law import *
+from lgvi_kernels.laws.patterns import less_whole
 
 
 @functools.cache
@@ -33,3 +34,10 @@ def damping(D: Any, view: Any, p: Any):
     D.torque_velocity = add_three(D.torque_velocity, view, p.first + 24, u)
     D.torque_rate = add_three(D.torque_rate, view, p.first + 27, u)
     return D
+
+
+@wp.func
+def push(w: Any, view: Any, p: Any):
+    """w - u matrix (nu; Om)."""
+    u = dot(row3(view, p.first), view.nu) + dot(row3(view, p.first + 3), view.Om)
+    return less_whole(w, view, p.first + 6, u * view.nu, u * view.Om)

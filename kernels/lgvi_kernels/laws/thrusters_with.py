@@ -62,6 +62,21 @@ def made(features):
             D = add_outer(D, thrust * along, thrust * about + torque * row3(view, at + 9), along, about)
         return D
 
+    @wp.func
+    def thruster_push(w: Any, view: Any, p: Any):
+        """The same loss of thrust and of torque."""
+        for i in range(p.count):
+            at = p.first + wp.static(rows) * i
+            n = beyond(place(view, p, i), row1(view, at + 8))
+            along = row3(view, at)
+            about = row3(view, at + 3)
+            speed = absolute(n) * (dot(along, view.nu) + dot(about, view.Om))
+            thrust = speed * positive(n, row1(view, at + 12), row1(view, at + 13))
+            w.force = w.force - thrust * along
+            w.torque = w.torque - thrust * about - (speed * row1(view, at + 15)) * row3(view, at + 9)
+        return w
+
     roles = {"evolve": following.evolve, "follow": following.follow, "report": following.report}
-    damping = thruster_damping if propeller else None
-    return device(__name__, features, params=following.params, law=thruster_law, damping=damping, **roles)
+    if propeller:
+        roles |= {"damping": thruster_damping, "push": thruster_push}
+    return device(__name__, features, params=following.params, law=thruster_law, **roles)

@@ -45,6 +45,6 @@ def steady_force(w: Any, view: Any, p: Any):
 
 
 @wp.func
-def push(s: Any, view: Any, p: Any):
+def steady_size(s: Any, view: Any, p: Any):
     """s plus |net|: the potential of a steady force has no least value, so its size bounds the energy that it gives."""
     return s + absolute(p.net)

@@ -17,8 +17,10 @@ def plays(law, role):
     """The function of a law's module for this role, or None.
 
     A role is the name of a function: "law", "damping", "flow", "evolve", "distance". "potential" and "force" are those of
-    "law" that follow from a potential, and those that do not.
+    "law" that follow from a potential, and those that do not; "matrix" is "damping" of a law that has no "push".
     """
+    if role == "matrix":
+        return None if hasattr(law, "push") else getattr(law, "damping", None)
     if role in ("potential", "force"):
         wanted = getattr(law, "POTENTIAL", False) == (role == "potential")
         return getattr(law, "law", None) if wanted else None

@@ -280,7 +280,7 @@ def make_explicit(spec, everything, velocities, slope):
     move, complete = moves.get(method.kind, (make_act(turned), None))
     View = view_struct(width, real, spec.shared_rows)
     push = make_push(Wrench, View, spec.laws) if method.kind == "inertial" else None
-    shape = (spec.mass, "coupled" in spec.parts, spec.flow != "none", spec.scaled)
+    shape = (spec.mass, "coupled" in spec.parts or bool(spec.inverse), spec.flow != "none", spec.scaled)
     drag = make_resistance(spec.drag) if spec.drag else None
     rates = make_rates(Rates, Wrench, everything, velocities, method.kind, *shape, drag)
     follow = superpose(spec.laws, "follow") if spec.memory else None

@@ -11,10 +11,11 @@ from lgvi_kernels.maps.dissipation import damped_force, damped_torque
 from lgvi_kernels.maps.submaps import look, make_at_user_origin
 
 
-def make_forces(View, Wrench, Flow, Damping, force, laws_damping, damping, flow, water_wrench, shifted, velocities):
+def make_forces(View, Wrench, Flow, Damping, force, push, matrix, damping, flow, water_wrench, shifted, velocities):
     """(everything, forces, current, slope) of these laws; an argument is None where a scene has no such law (see make_K).
 
-    laws_damping: that of the laws alone; damping: that of water that varies in space, too, which is in `water_wrench` as well.
+    push: the wrench of damping laws that give it; matrix: the damping of the others; damping: that of all laws, and of water
+    that varies in space, which is in `water_wrench` as well.
     """
     at_user_origin = make_at_user_origin(shifted)
 
@@ -36,8 +37,10 @@ def make_forces(View, Wrench, Flow, Damping, force, laws_damping, damping, flow,
             w = force(w, view, c.params)
         if wp.static(water_wrench is not None):
             w = water_wrench(w, view, c.inertia, water)
-        if wp.static(laws_damping is not None):
-            D = laws_damping(Damping(), view, c.params)
+        if wp.static(push is not None):
+            w = push(w, view, c.params)
+        if wp.static(matrix is not None):
+            D = matrix(Damping(), view, c.params)
             w.force = w.force - damped_force(D, nu, Om)
             w.torque = w.torque - damped_torque(D, nu, Om)
         return w, water.velocity

@@ -166,6 +166,8 @@ class Term:
     # Device code of its exact flow, a sub-map of its own: for axes that are principal ones, and for any, one after the other.
     # None named: it has none. `Drag` has the methods that go with it.
     exact_flow: ClassVar[tuple[str, ...]] = ()
+    # Device code that is made for the entries of the term's matrices that are not zero (see `entries`): in the user's axes.
+    pattern_device: ClassVar[str] = ""
     # The bus of a controller that drives it (see lgvi_warp/control), and the numbers that then do not act.
     driver: ClassVar[Any] = None
     driven_fields: ClassVar[tuple[str, ...]] = ()
@@ -347,6 +349,17 @@ class Term:
         follows = getattr(device, "POTENTIAL", False) and type(self).potential is not Term.potential
         more = self.timed or self.memory or any(hasattr(device, role) for role in ("damping", "flow", "evolve"))
         return frozenset({"energy"} if follows and not more else ())
+
+    def entries(self, numbers: Numbers) -> tuple[str, ...]:
+        """The entries of the term's matrices that some member has, for a term with a `pattern_device`.
+
+        Args:
+            numbers: The term's numbers by field, each of shape (n, ...).
+
+        Returns:
+            Words of the device code: "q01" for row 0 and column 1 of the matrix q. By default none.
+        """
+        return ()
 
     def device_in(self, aligned: bool) -> Any:
         """The device code for the axes of this run.

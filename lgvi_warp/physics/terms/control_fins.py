@@ -21,7 +21,7 @@ from lgvi_warp.physics.terms.actuators import (
     refuse_unread,
 )
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, rows_of, side_by_side
-from lgvi_warp.physics.terms.fins import Fins, fin_rows
+from lgvi_warp.physics.terms.fins import Fins, fin_rows, unit_directions
 from lgvi_warp.physics.terms.wrench import at_start, commands
 
 # Rows of one fin that its forces need where the flow has no angle: those before the matrices of `fin_rows`.
@@ -111,9 +111,7 @@ class ControlFins(Commanded, Fins):
     def effect(self, numbers: Numbers, parameters: Numbers, speed: np.ndarray) -> np.ndarray:
         # The wrench of each fin's lift by its deflection [1/rad] at a speed ahead, about the body's origin.
         position, chord, normal = repeated(numbers["position"], numbers["chord"], numbers["normal"])
-        chord = chord / np.linalg.norm(chord, axis=-1, keepdims=True)
-        normal = normal - np.sum(normal * chord, axis=-1, keepdims=True) * chord
-        normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+        chord, normal = unit_directions({"chord": chord, "normal": normal})
         density = parameters["environment.water_density"]
         size = 0.5 * (density * speed**2)[:, None] * numbers["area"] * numbers["lift_slope"]
         if self.lift_angles is not None:
@@ -133,6 +131,8 @@ class ControlFins(Commanded, Fins):
             }
         )
         chosen = [name for name, present in features.items() if present]
+        if self.stands and not (features["lift"] or features["straight"]):
+            return "fins"
         return f"control_fins_with:{','.join(chosen)}" if chosen else "control_fins"
 
     def unphysical(self, numbers: Numbers) -> dict[str, np.ndarray]:
@@ -148,12 +148,30 @@ class ControlFins(Commanded, Fins):
         return bad
 
     @property
+    def stands(self) -> bool:
+        """Whether every fin stands where it starts: its command is held, and it starts there."""
+        return self.driver is None and self.holds
+
+    @property
+    def timed(self) -> bool:  # type: ignore[override]  # of an instance
+        return not self.stands
+
+    @property
     def memory(self) -> bool:
-        # Whether fins lag, or the rate of one is limited.
-        return bool(self.time_constant is not None or np.any(self.rate_limit < UNLIMITED))
+        # Whether fins that move lag, or the rate of one is limited.
+        return not self.stands and bool(self.time_constant is not None or np.any(self.rate_limit < UNLIMITED))
+
+    def _turned(self, numbers: Numbers) -> Numbers:
+        """The numbers of fins that stand: fixed fins, whose chords and normals are turned by the commands."""
+        chord, normal = unit_directions(numbers)
+        angle = np.clip(numbers["command"], -numbers["limit"], numbers["limit"])[..., None]
+        c, s = np.cos(angle), np.sin(angle)
+        return {**numbers, "chord": c * chord + s * normal, "normal": c * normal - s * chord}
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # The device rows: those of each fin, then the command table of each fin.
+        if self.device_in(context.aligned) == "fins":
+            return super().packed(self._turned(numbers), context)
         if self.device_in(context.aligned) != "control_fins":
             blocks = fin_rows(numbers, context)
             blocks = blocks if self.flow_angle else blocks[..., :STRAIGHT_ROWS]

@@ -45,6 +45,7 @@ class Drag(Term):
     device: ClassVar[str] = "drag_matrix"
     strengths: ClassVar[tuple[str, ...]] = ("linear", "quadratic")
     exact_flow: ClassVar[tuple[str, ...]] = ("drag", "drag_directions")
+    pattern_device: ClassVar[str] = "drag_matrix_pattern"
 
     linear: Any = number((6,), "N s/m, N m s", ZEROS, least=0.0)
     quadratic: Any = number((6,), "N s2/m2, N m s2", ZEROS, least=0.0)
@@ -59,6 +60,11 @@ class Drag(Term):
             Names of `PARTS`: "linear_force" and so on.
         """
         return tuple(part for part, (kind, half) in PARTS.items() if np.any(numbers[kind][:, half]))
+
+    def entries(self, numbers: Numbers) -> tuple[str, ...]:
+        # Those of the diagonals.
+        matrices = {kind: numbers[kind][:, :, None] * np.eye(6) for kind in ("linear", "quadratic")}
+        return entries_of(l=matrices["linear"], q=matrices["quadratic"])
 
     def packed_exact(self, numbers: Numbers, frame: Frame, scale: np.ndarray) -> Packed:
         """The numbers for the exact flow of drag, which acts on each momentum by itself.
@@ -154,6 +160,7 @@ class DragMatrix(Term):
 
     type: ClassVar[str] = "drag_matrix"
     strengths: ClassVar[tuple[str, ...]] = ("linear", "quadratic")
+    pattern_device: ClassVar[str] = "drag_matrix_pattern"
 
     linear: Any = number((6, 6), "N s/m, N s, N m s", ((0.0,) * 6,) * 6)
     quadratic: Any = number((6, 6), "N s2/m2, N s2, N m s2", ((0.0,) * 6,) * 6)
@@ -175,6 +182,9 @@ class DragMatrix(Term):
             matrices = np.nan_to_num(numbers[kind]) if bad[kind].any() else numbers[kind]
             bad[kind] = bad[kind] | _creates_energy(matrices, kind == "quadratic")[0]
         return bad
+
+    def entries(self, numbers: Numbers) -> tuple[str, ...]:
+        return entries_of(l=numbers["linear"], q=numbers["quadratic"])
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # The matrices in the axes and about the origin of the forces.
@@ -250,6 +260,12 @@ def _searched(matrices: np.ndarray, quadratic: bool) -> tuple[np.ndarray, np.nda
         lowest = power.argmin(axis=0)
         bad[chunk], worst[chunk] = power.min(axis=0) < limit[chunk], directions[lowest]
     return bad, worst
+
+
+def entries_of(**matrices: np.ndarray) -> tuple[str, ...]:
+    """The entries that are not zero for some member, as words such as "q01"; matrices (n, 6, 6) by their letter."""
+    found = {letter: np.argwhere((matrix != 0.0).any(axis=0)) for letter, matrix in matrices.items()}
+    return tuple(f"{letter}{i}{j}" for letter, places in found.items() for i, j in places.tolist())
 
 
 def packed_matrix(linear: np.ndarray, quadratic: np.ndarray, context: PackingContext) -> Packed:

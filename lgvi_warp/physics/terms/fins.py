@@ -89,14 +89,19 @@ def _degenerate(chord: np.ndarray, normal: np.ndarray) -> Any:
     return np.linalg.norm(np.cross(chord, normal), axis=-1) <= PARALLEL * size
 
 
+def unit_directions(numbers: Numbers) -> tuple[np.ndarray, np.ndarray]:
+    """Chords and normals (members, fins, 3) of length 1, the normals orthogonal to the chords."""
+    chord = numbers["chord"] / np.linalg.norm(numbers["chord"], axis=-1, keepdims=True)
+    normal = numbers["normal"] - np.sum(numbers["normal"] * chord, axis=-1, keepdims=True) * chord
+    return chord, normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+
+
 def fin_rows(numbers: Numbers, context: PackingContext) -> np.ndarray:
     """Device rows (members, fins, 51) of fins: their twists c and n, rho A/2 times the three coefficients, and S and W.
 
     S = c c^T + n n^T and W = n c^T - c n^T, block by block (lgvi_kernels/laws/fins.py).
     """
-    chord = numbers["chord"] / np.linalg.norm(numbers["chord"], axis=-1, keepdims=True)
-    normal = numbers["normal"] - np.sum(numbers["normal"] * chord, axis=-1, keepdims=True) * chord
-    normal = normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    chord, normal = unit_directions(numbers)
     half = 0.5 * context.parameters["environment.water_density"][:, None] * numbers["area"]
     sizes = [half * numbers[name] for name in ("lift_slope", "drag", "drag_normal")]
     c, n = (twist(context.frame, numbers["position"], direction) for direction in (chord, normal))

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, Term, number
+from lgvi_warp.physics.terms.drag import entries_of
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -26,6 +27,7 @@ class BodyLift(Term):
     device: ClassVar[str] = "lift"
     strengths: ClassVar[tuple[str, ...]] = ("matrix",)
     dissipative: ClassVar[bool] = False
+    pattern_device: ClassVar[str] = "lift_pattern"
 
     matrix: Any = number((6, 6), "kg/m, kg, kg m")
 
@@ -33,6 +35,9 @@ class BodyLift(Term):
         # The matrix at the speed ahead; and by that speed itself the sizes of what it multiplies.
         ahead = np.eye(6)[0] * (np.abs(numbers["matrix"]) @ speeds[:, :, None])
         return np.asarray(numbers["matrix"] * speeds[:, :1, None] + ahead)
+
+    def entries(self, numbers: Numbers) -> tuple[str, ...]:
+        return entries_of(m=numbers["matrix"])
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
         # Rows that measure u (6), and the matrix (36), in the axes and about the origin of the forces.

@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Products of 6x6 matrices of a law's table with the velocities, of which only the entries that are not zero make code."""
+
+from typing import Any
+
+import warp as wp
+
+from lgvi_kernels.law import *
+
+
+def entries_of(words, kind):
+    """The entries (i, j) that words such as "q15" name: the kind of the matrix, its row, its column."""
+    return tuple((int(word[1]), int(word[2])) for word in words if word[0] == kind)
+
+
+def make_row(columns):
+    """(total, view, row, nu, Om) -> total less the row's product with (nu; Om), whose other columns are zero."""
+
+    @wp.func
+    def less_row(total: Any, view: Any, row: int, nu: Any, Om: Any):
+        if wp.static(0 in columns):
+            total = total - row1(view, row) * nu.x
+        if wp.static(1 in columns):
+            total = total - row1(view, row + 1) * nu.y
+        if wp.static(2 in columns):
+            total = total - row1(view, row + 2) * nu.z
+        if wp.static(3 in columns):
+            total = total - row1(view, row + 3) * Om.x
+        if wp.static(4 in columns):
+            total = total - row1(view, row + 4) * Om.y
+        if wp.static(5 in columns):
+            total = total - row1(view, row + 5) * Om.z
+        return total
+
+    return less_row
+
+
+def make_less(entries):
+    """(w, view, first, nu, Om) -> the wrench w less a matrix times (nu; Om); entries: (i, j) of those that are not zero."""
+    rows = [make_row(frozenset(j for k, j in entries if k == i)) for i in range(6)]
+    fx, fy, fz, tx, ty, tz = rows
+
+    @wp.func
+    def less(w: Any, view: Any, first: int, nu: Any, Om: Any):
+        f = w.force
+        t = w.torque
+        w.force = vec3(
+            fx(f.x, view, first, nu, Om), fy(f.y, view, first + 6, nu, Om), fz(f.z, view, first + 12, nu, Om)
+        )
+        w.torque = vec3(
+            tx(t.x, view, first + 18, nu, Om), ty(t.y, view, first + 24, nu, Om), tz(t.z, view, first + 30, nu, Om)
+        )
+        return w
+
+    return less
+
+
+# Every entry of a matrix.
+FULL = tuple((i, j) for i in range(6) for j in range(6))
+less_whole = make_less(FULL)
+
+
+@wp.func
+def squares(v: Any):
+    """v |v|, component by component."""
+    return vec3(absolute(v.x) * v.x, absolute(v.y) * v.y, absolute(v.z) * v.z)

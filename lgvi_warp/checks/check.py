@@ -50,6 +50,7 @@ def check_law(
     * `law`: independent of velocities, and of the time unless `timed`. With POTENTIAL, force and torque are the
       derivatives of `potential`, and `energy` adds the same potential.
     * `damping`: nu . D nu >= 0. With `dissipative = False` the least power is reported and is no fault.
+    * `push`: the force and torque of `damping`.
     * `follow`: what it leaves in the memory depends on the time alone, and is the same by two parts of the time as at once.
     * `distance`: the same in all body axes.
     * `flow`: rate and gradient are the derivatives of the velocity, `water` gives the same velocity, and FLOW fits it.
@@ -80,7 +81,7 @@ def check_law(
     packets = -(-whole_number("samples", samples, 1, MOST_SAMPLES) // register_width("float64"))
     bench = Bench(term, module, of_scene(scene), packets, whole_number("seed", seed, 0))
     checks: list[Check] = []
-    for examine in (_numbers, _finite, _of_every_law, _potential, _damping, _flow, _follow):
+    for examine in (_numbers, _finite, _of_every_law, _potential, _damping, _push, _flow, _follow):
         with np.errstate(all="ignore"):  # what is not finite is found by its check
             checks += examine(bench, step)
         if examine in (_numbers, _finite) and not all(check.ok for check in checks):
@@ -127,8 +128,8 @@ def _of_every_law(bench: Bench, step: float) -> Iterator[Check]:
     faster = bench.at(replace(views, velocity=2.0 * views.velocity + 1.0, rate=1.0 - views.rate))
     later = bench.at(replace(views, time=views.time + 3.7))
     for role, value in here.items():
-        if role != "damping":
-            remedy = "only damping(D, view, p) may look at view.nu and view.Om"
+        if role not in ("damping", "push"):
+            remedy = "only damping(D, view, p) and push(w, view, p) may look at view.nu and view.Om"
             yield judged(f"{role}: blind to velocity", faster[role] - value, 0.0, views, remedy)
         if not bench.term.timed and not bench.noisy:
             remedy = f"write timed = True in {kind}, or it gets no time"
@@ -176,7 +177,7 @@ def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
     """The same wrench from a frame with other axes and origin."""
     views, turned_views = bench.views, bench.views.elsewhere()
     turned = _tried(bench, bench.context(bench.parameters, True), turned_views, "in other axes of the body")
-    for role in [role for role in ("law", "damping") if role in here]:
+    for role in [role for role in ("law", "damping", "push") if role in here]:
         if isinstance(turned, str):
             yield judged(f"{role}: any axes", turned, 0.0, views, "")
             continue
@@ -193,7 +194,7 @@ def _axes(bench: Bench, here: dict[str, np.ndarray]) -> Iterator[Check]:
 
 def _wrench(role: str, value: np.ndarray, views: Views) -> np.ndarray:
     """(force; torque) (k, 6) of a law, or of a damping matrix at the views' velocities."""
-    if role == "law":
+    if role != "damping":
         return value
     twist = np.concatenate([views.velocity, views.rate], axis=1)
     return np.asarray(-np.einsum("kij,kj->ki", value.reshape(-1, 6, 6), twist))
@@ -272,6 +273,18 @@ def _damping(bench: Bench, step: float) -> Iterator[Check]:
     good = bool(np.all(power >= -allowed))
     text = where if good else f"{where}; D creates energy: write dissipative = False if it may"
     yield Check("damping: power >= 0", max(0.0, -least), limit, good, text)
+
+
+def _push(bench: Bench, step: float) -> Iterator[Check]:
+    """push is what damping says: w - D (nu; Om)."""
+    if "push" not in bench.roles:
+        return
+    views, here = bench.views, bench.at(bench.views)
+    D = np.abs(here["damping"]).reshape(-1, 6, 6)
+    twist = np.abs(np.concatenate([views.velocity, views.rate], axis=1))
+    limit = 100.0 * ROUND_OFF * np.einsum("kij,kj->ki", D, twist).max()
+    remedy = "is it w less the matrix of damping() times (nu; Om)?"
+    yield judged("push: as damping", here["push"] - _wrench("damping", here["damping"], views), limit, views, remedy)
 
 
 def _power(bench: Bench, views: Views) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -38,9 +38,9 @@ ALONE["prompt thrusters"] = Case(
 )
 
 
-def bench_of(term, folder, aligned=False):
-    """The law at views in the time of the cases' schedules."""
-    bench = Bench(term, built_in(folder, term.device_in(aligned)), SCENE, PACKETS, SEED)
+def bench_of(term, folder, aligned=False, device=None):
+    """The law at views in the time of the cases' schedules; device: other device code than that of these axes."""
+    bench = Bench(term, built_in(folder, device or term.device_in(aligned)), SCENE, PACKETS, SEED)
     bench.views = replace(bench.views, time=np.repeat(np.linspace(0.05, 1.6, PACKETS), bench.width))
     return bench
 
@@ -62,7 +62,7 @@ def measured(bench, elsewhere):
         values["damping"] = -np.einsum("kij,kj->ki", values["damping"].reshape(-1, 6, 6), twist)
     if elsewhere:
         # Water and potentials are asked for at the user's origin only.
-        values = {role: value for role, value in values.items() if role in ("law", "damping")}
+        values = {role: value for role, value in values.items() if role in ("law", "damping", "push")}
         for role, value in values.items():
             force, torque = value[:, :3] @ TURN.T, value[:, 3:] @ TURN.T
             values[role] = np.concatenate([force, torque + np.cross(ORIGIN, force)], axis=1)
@@ -104,9 +104,28 @@ def expected(law, views):
 def test_a_law_gives_what_its_twin_gives(name, elsewhere):
     (term,), (law,) = ALONE[name].terms, ALONE[name].laws
     bench = bench_of(term, "laws", aligned=not elsewhere)
+    assert hasattr(bench.module, "push") == hasattr(bench.module, "damping")
+    compare(bench, law, elsewhere)
+
+
+PATTERNED = [name for name, case in ALONE.items() if case.terms[0].pattern_device]
+
+
+@pytest.mark.parametrize("name", PATTERNED)
+def test_a_law_in_the_users_axes_gives_what_its_twin_gives(name):
+    (term,), (law,) = ALONE[name].terms, ALONE[name].laws
+    numbers = {key: value[None] for key, value in term.parameters().items()}
+    bench = bench_of(term, "laws", True, f"{term.pattern_device}:{','.join(term.entries(numbers))}")
+    assert hasattr(bench.module, "push")
+    compare(bench, law, False)
+
+
+def compare(bench, law, elsewhere):
+    """All that device code gives beside what its twin gives."""
     (values, kept), (twin_values, twin_kept) = measured(bench, elsewhere), expected(law, bench.views)
+    twin_values["push"] = twin_values["damping"]
     if not elsewhere:
-        assert {role for role, value in twin_values.items() if np.any(value)} - {"energy"} <= values.keys()
+        assert {role for role, value in twin_values.items() if np.any(value)} - {"energy"} <= values.keys() | {"push"}
     if "energy" in values:
         # Constants of the potential are left out.
         values["energy"], twin_values["energy"] = (x["energy"] - x["energy"][0] for x in (values, twin_values))

@@ -96,9 +96,12 @@ def device_of(bench, commands, first, elsewhere):
 
 def wrench_of(values, views):
     """(k, 6): what `law` and `damping` push together."""
+    if "damping" not in values:
+        return values["law"]
     twist = np.concatenate([views.velocity, views.rate], axis=1)
-    push = -np.einsum("kij,kj->ki", values["damping"].reshape(-1, 6, 6), twist) if "damping" in values else 0.0
-    return values.get("law", 0.0) + push
+    braked = -np.einsum("kij,kj->ki", values["damping"].reshape(-1, 6, 6), twist)
+    assert_close(values["push"], braked, np.abs(braked).max())
+    return values.get("law", 0.0) + braked
 
 
 def assert_close(actual, desired, size):

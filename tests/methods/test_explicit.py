@@ -29,7 +29,7 @@ def advanced(scene, body, method, h, steps, at):
     """The twin's state after so many steps, with b, p and pi where the kernel has them."""
     fleet = lw.Ensemble.from_scene(scene)
     plan = make_plan(fleet, method, h=h, t1=steps * h)
-    origin = frame_of(plan.method, fleet.parameters(0, 1))[0].origin[0]
+    origin = frame_of(plan.method, fleet.parameters(0, 1), plan.kernel_choice.user_axes)[0].origin[0]
     if plan.spec.inertial:
         return explicit.advance_steady(TABLEAUX[method], begun(body, at), body, h, steps, origin)
     if method in TABLEAUX:

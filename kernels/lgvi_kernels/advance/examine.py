@@ -13,8 +13,8 @@ from lgvi_kernels.maps.bounded import bounded_law
 from lgvi_kernels.maps.compose import params_of, plays, superpose
 
 # Role of the law -> its columns of `out`, as (first, count); a role that the law does not have leaves zeros.
-COLUMNS = {"law": (0, 6), "damping": (6, 36), "flow": (42, 15), "distance": (57, 1), "energy": (58, 1)}
-OUT_FIELDS = 59
+COLUMNS = {"law": (0, 6), "damping": (6, 36), "push": (59, 6), "flow": (42, 15), "distance": (57, 1), "energy": (58, 1)}
+OUT_FIELDS = 65
 
 
 class Examine(NamedTuple):
@@ -31,8 +31,8 @@ def make_examine(module, numbers, width, real):
     module = bounded_law(module, width, real)
     Lane, View, Params = lane(width, real), view_struct(width, real), params_of((module,), (numbers,), width, real)
     Wrench, Damping, Flow = (make(width, real) for make in (wrench_struct, damping_struct, flow_struct))
-    law, damping, flow, evolve = (superpose((module,), role) for role in ("law", "damping", "flow", "evolve"))
-    follow = superpose((module,), "follow")
+    roles = ("law", "damping", "push", "flow", "evolve", "follow")
+    law, damping, push, flow, evolve, follow = (superpose((module,), role) for role in roles)
     distance, energy = plays(module, "distance"), superpose((module,), "energy")
 
     @wp.func
@@ -92,6 +92,10 @@ def make_examine(module, numbers, width, real):
                 put_rows(out, i, 9, D.force_rate)
                 put_rows(out, i, 24, D.torque_velocity)
                 put_rows(out, i, 27, D.torque_rate)
+            if wp.static(push is not None):
+                w_push = push(Wrench(), view, p)
+                put(out, i, 59, w_push.force)
+                put(out, i, 62, w_push.torque)
             if wp.static(flow is not None):
                 f = flow(Flow(), view, p)
                 put(out, i, 42, f.velocity)

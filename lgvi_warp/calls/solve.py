@@ -11,9 +11,11 @@ from lgvi_warp.common.arguments import function_of
 from lgvi_warp.common.errors import Faults
 from lgvi_warp.common.progress import callback, shows_progress
 from lgvi_warp.engine.executors.base import Executor
+from lgvi_warp.engine.executors.threads import Threads
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.results.result import Result
+from lgvi_warp.runs.measured_width import with_best_width
 from lgvi_warp.runs.request import Request, ensemble_of
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
@@ -116,6 +118,9 @@ def solve(
         faults.add("only", only, "runs in parts, where until looks at the whole", "leave out one of them")
     faults.raise_if_any()
     plan = request.plan(survey_all=store is not None)
+    # Parts of a run, and other processes and machines, must agree on a width.
+    if only is None and isinstance(request.executor, Threads):
+        plan = with_best_width(plan, request.count)
     try:
         if store is None:
             return request.run(plan, progress=callback(progress), partial=True, on_block=on_block)

@@ -4,14 +4,16 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from lgvi_warp.cli.folders import info_of_folder
 from lgvi_warp.cli.output import Part, say, tell
 from lgvi_warp.cli.progress import progress_bar
-from lgvi_warp.cli.verb import as_verb
+from lgvi_warp.cli.settings import load_scene, overrides
+from lgvi_warp.cli.verb import add_shared, as_verb
+from lgvi_warp.common.errors import SceneError
 from lgvi_warp.common.safe_files import parsed
 from lgvi_warp.engine import widths
 from lgvi_warp.engine.peak import fma_peak
@@ -92,20 +94,47 @@ def bench(chosen: argparse.Namespace, *, measure: Part = None) -> int:
     return 0
 
 
+def calibrate_arguments(verb: Any) -> None:
+    """Add the arguments of the verb calibrate."""
+    verb.add_argument("scene", nargs="?", metavar="SCENE", help="a scene file: measure the kernel of its run alone")
+    add_shared(verb, "--method --dtype --step --duration --members --set")
+
+
 @as_verb(
-    "calibrate", "measure how many vehicles a packet should hold on this machine, for runs from now on", reads=True
+    "calibrate",
+    "measure how many vehicles a packet should hold on this machine, for runs from now on",
+    calibrate_arguments,
+    reads=True,
 )
 def calibrate(chosen: argparse.Namespace, *, measure: Part = None) -> int:
     """Run the verb calibrate: measure the widths of packets on this machine, and keep the best ones for later runs."""
+    from lgvi_warp.runs.request import Request
+    from lgvi_warp.scene.ensemble import Ensemble
     from lgvi_warp.studies import packet_width as tuning
 
+    if chosen.scene is not None:
+        plan = Request(Ensemble.from_scene(load_scene(chosen))).plan()
+        return _told(chosen, [(measure or tuning.calibrate_scene)(plan)], lambda kernels: widths.path())
+    if given := overrides(chosen):
+        raise SceneError(
+            [f"calibrate: {', '.join(given)} is of a scene, and none is given; write calibrate SCENE.toml"]
+        )
+    return _told(
+        chosen,
+        (measure or tuning.calibrate)(),
+        lambda kernels: widths.keep({kernel: result["best"] for kernel, result in kernels.items()}),
+    )
+
+
+def _told(chosen: argparse.Namespace, readings: Iterable[Any], keep: Callable[[dict[str, Any]], Path]) -> int:
+    """Print the speeds of kernels, and where the best widths are kept."""
     kernels: dict[str, dict[str, Any]] = {}
-    for kernel, ns, of_table, fastest in (measure or tuning.calibrate)():
+    for kernel, ns, of_table, fastest in readings:
         speeds = ", ".join(f"{width}: {result:.2f} ns" for width, result in ns.items())
         remark = "as by the table" if fastest == of_table else f"{of_table} by the table"
         say(chosen, f"{kernel:19} {speeds}: {fastest}, {remark}")
         kernels[kernel] = {"ns": ns, "table": of_table, "best": fastest}
-    path = widths.keep({kernel: result["best"] for kernel, result in kernels.items()})
+    path = keep(kernels)
     tell(chosen, lambda: {"kernels": kernels, "file": path},
          lambda: f"kept in {path}, for runs from now on; without that file the table counts")  # fmt: skip
     return 0

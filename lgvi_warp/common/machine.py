@@ -7,6 +7,7 @@ import functools
 import math
 import os
 import platform
+import time
 from pathlib import Path
 from typing import Any
 
@@ -110,3 +111,11 @@ def kind() -> dict[str, str]:
 def describe() -> dict[str, Any]:
     """Describe the machine for a result's provenance."""
     return {"cpu": cpu_name(), "simd": simd(), "threads": thread_count(), "system": platform.system()}
+
+
+def thread_seconds() -> float:
+    """The CPU time of this thread [s], which other programs do not add to, and in which kernels on the CPU run.
+
+    Windows counts it in ticks of 16 ms, too coarse for a launch: there time.perf_counter is read.
+    """
+    return time.perf_counter() if os.name == "nt" else time.thread_time()

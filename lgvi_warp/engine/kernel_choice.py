@@ -15,7 +15,7 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, closest
 from lgvi_warp.control.base import Part
 from lgvi_warp.control.controller import Controller
-from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey, works_in_user_axes
+from lgvi_warp.engine.survey import COUPLINGS, SHAPES_OF_MASS, UNCOUPLED, Survey
 from lgvi_warp.methods.method import FORCED, Method, Program, divided, merged, simplified, with_hops
 from lgvi_warp.physics import terms, vehicle
 from lgvi_warp.physics.terms.base import Term
@@ -38,7 +38,7 @@ class KernelChoice:
     flow: str  # how the water moves, one of FLOWS
     parts: tuple[str, ...]  # what the inertia holds besides mass and moments of inertia
     inverse: tuple[tuple[int, int], ...]  # entries of the inverse inertia that are not zero; none where it is diagonal
-    user_axes: bool  # the kernel's axes and origin are the user's (see `works_in_user_axes`)
+    user_axes: bool  # the kernel's axes and origin are the user's (see SharedResultsCache)
     coupling: tuple[bool, ...]  # (6,), which of U12, U13, U23 and of the three pitches some member has
     timed: bool  # a law or an event depends on the time
     memory: bool  # a law or the method remembers numbers from step to step
@@ -63,13 +63,13 @@ def choose_kernel(
     facts: Survey,
     built_in: Callable[[str, str], Any],
     checks: str = "safe",
+    user_axes: bool = False,
 ) -> KernelChoice:
     """Choose what the kernel of a run must contain.
 
     built_in: (folder, name) -> module of built-in device code in the folder "laws" or "stops", None where there is none.
     """
     explicit = method.tableau is not None
-    user_axes = works_in_user_axes(method, ensemble.scene)
     controller = _controller(ensemble, facts)
     parts = [part.with_features(facts.features) for part in controller.acting_parts] if controller else []
     control = tuple((part, device_module(part, part.device_in(not facts.turned), built_in)) for part in parts)

@@ -70,7 +70,10 @@ def kind_of(method: Method, choice: KernelChoice) -> str:
         return "dense"
     if method.tableau or method.gauss:
         return "explicit"
-    return "chained" if method.turns else "plain"
+    if method.base == "psi_1":
+        return "single"
+    # psi_w iterates, one product after the other.
+    return "chained" if method.turns or method.base == "psi_w" else "plain"
 
 
 def _control(choice: KernelChoice, signals: tuple[str, ...]) -> Control | None:

@@ -41,7 +41,7 @@ class Packing:
 
     def __init__(self, plan: Plan, members: Members):
         self.plan, self.members = plan, members
-        self.numbers: Any = framed(plan.method, members.parameters, plan.shared, plan.kernel_choice.user_axes)
+        self.numbers: Any = framed(plan.method, members.parameters, plan.shared)
         self.frame, self.U, _ = self.numbers[FRAME]
         self.scale = self._shared("scale", lambda numbers: self._scale(numbers[AXES][0]))
 

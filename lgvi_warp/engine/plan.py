@@ -27,7 +27,7 @@ from lgvi_warp.engine.plan_checks import check_noise_steps, check_settings, chec
 from lgvi_warp.engine.sample_layout import SampleLayout
 from lgvi_warp.engine.shared import MEMBERS, SEED, SharedResultsCache
 from lgvi_warp.engine.survey import Survey, survey, survey_of
-from lgvi_warp.engine.widths import default_width
+from lgvi_warp.engine.widths import default_width, measured
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import TimeGrid
 from lgvi_warp.physics.terms.base import Term
@@ -79,6 +79,12 @@ class Plan:
         """Plan the run from the beginning with other settings, those of `choose_plan`, and the same width."""
         return choose_plan(**{**self._settings(), **changes})
 
+    def of_width(self, width: int, source: str) -> Plan:
+        """The same plan with packets of another width. source: what says so (see widths.Width)."""
+        if width == self.spec.width:
+            return replace(self, width_source=source)
+        return choose_plan(**(self._settings() | {"width": width}), width_source=source)
+
     def _settings(self) -> dict[str, Any]:
         named = ("ensemble", "method", "grid", "fields", "dtype", "checks", "on_failure")
         of_ticks = {"ticks": self.launches.ticks, "read_at_ticks": self.layout.read_at_ticks}
@@ -109,7 +115,7 @@ class Plan:
             fields=layout.fields,
             layout=layout,
             launches=_launches(self.grid, self.method, self.spec, layout, False),
-            shared=_shared(self.ensemble),
+            shared=_shared(self.ensemble, self.shared.user_axes),
             free_packets=[],
             parent=(self, indices, fields),
         )
@@ -162,14 +168,15 @@ def choose_plan(
     # Those of `save` are checked before: these are of statistics.
     check_signals(faults, "statistics", fields, scene.controller)
     faults.raise_if_any()
-    shared = _shared(ensemble)
+    shared = _shared(ensemble, _adds_forces(method) and bool(damping_terms(scene.terms)))
     facts = survey(ensemble, method, shared, most=None if survey_all else SURVEYED)
-    choice = choose_kernel(ensemble, method, facts, built_in, checks)
+    choice = choose_kernel(ensemble, method, facts, built_in, checks, shared.user_axes)
     check_backward_drag(ensemble, choice, method, grid.h)
     if on_failure == "substep":
         check_substep(choice, method)
     check_noise_steps(choice, grid)
     check_ticks(choice, grid.h)
+    chosen = width is None
     if width is None:
         width, width_source = default_width(kind_of(method, choice), dtype)
     layout = SampleLayout(choice, ordered(fields), dtype == COMPENSATED, read_at_ticks)
@@ -192,14 +199,21 @@ def choose_plan(
         facts=facts,
         shared=shared,
     )
-    if not rows_shared(plan):
-        return plan
-    spec = spec._replace(shared_rows=True)
-    return replace(plan, spec=spec, kernel=Kernel(spec, choice))
+    if rows_shared(plan):
+        spec = spec._replace(shared_rows=True)
+        plan = replace(plan, spec=spec, kernel=Kernel(spec, choice))
+    # A kernel's hash takes its source: only where some kernel was measured here.
+    best = measured().get(plan.kernel.hash) if chosen and measured() else None
+    return plan if best is None else plan.of_width(best, "measured")
 
 
-def _shared(ensemble: Ensemble) -> SharedResultsCache:
-    return SharedResultsCache({*ensemble.varied_names, MEMBERS, SEED})
+def _shared(ensemble: Ensemble, user_axes: bool) -> SharedResultsCache:
+    return SharedResultsCache({*ensemble.varied_names, MEMBERS, SEED}, user_axes)
+
+
+def _adds_forces(method: Method) -> bool:
+    """Whether a method adds the forces of damping, and forms no matrix."""
+    return method.tableau is not None and not method.linearly_implicit
 
 
 def _launches(grid: TimeGrid, method: Method, spec: Spec, layout: SampleLayout, ticks: bool) -> Launches:

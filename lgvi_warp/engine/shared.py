@@ -98,9 +98,13 @@ class SharedResultsCache:
 
     What a computation reads is seen when it runs first, so nothing has to list it. Which numbers it reads must depend on
     numbers that it read before only, as is so for any function of them.
+
+    user_axes: whether the kernel's axes and origin are the user's. An explicit method adds forces there, where a drag matrix
+        keeps its zeros; other axes are better where a method multiplies matrices, and where nothing depends on velocities.
     """
 
     varied: set[str]
+    user_axes: bool = False
     _kept: dict[Any, Any] = field(default_factory=dict)
     _varying: dict[Any, bool] = field(default_factory=dict)
     _last: _Few | None = None

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_kernels import built_in
 from lgvi_warp.engine.block import Block
 from lgvi_warp.engine.shared import AXES, FRAME, MEMBERS, SharedResultsCache, context
 from lgvi_warp.methods.method import Method, middle_axis
@@ -21,7 +20,6 @@ from lgvi_warp.physics.terms.base import Term
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.oddities import Oddities
 from lgvi_warp.scene.plausibility import of_numbers
-from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.slices import over_members
 
 Parameters = Mapping[str, np.ndarray]
@@ -45,24 +43,8 @@ def shape_of_mass(M: np.ndarray) -> str:
     return "isotropic" if (diagonal == diagonal[:, :1]).all() else "diagonal"
 
 
-def works_in_user_axes(method: Method, scene: Scene) -> bool:
-    """Whether a method adds forces in the user's axes: there a drag matrix keeps its zeros.
-
-    Other axes are better where the method multiplies matrices, and where nothing depends on velocities.
-    """
-    if method.tableau is None or method.linearly_implicit:
-        return False
-    return any(term.exact_flow or hasattr(_device(term), "damping") for term in scene.terms)
-
-
-def _device(term: Term) -> Any:
-    return built_in("laws", term.device) if isinstance(term.device, str) else term.device
-
-
-def frame_of(
-    method: Method, parameters: Parameters, user_axes: bool = False
-) -> tuple[Frame, np.ndarray, np.ndarray]:
-    """The axes and origins that a method works in. user_axes: whether they are the user's (see `works_in_user_axes`).
+def frame_of(method: Method, parameters: Parameters, user_axes: bool = False) -> tuple[Frame, np.ndarray, np.ndarray]:
+    """The axes and origins that a method works in. user_axes: whether they are the user's (see SharedResultsCache).
 
     Returns: (frame, U, coupling): U (n, 3, 3) of the turns of psi_x, zero for other methods; and the coupling norm (n,)
         that is left in this frame and that the method cannot treat.
@@ -115,7 +97,9 @@ class Survey:
     delayed: bool = False  # the commands of a controller are delayed
     turned_axes: bool = False  # axes other than the user's, even if only in their order or sense
     features: frozenset[str] = frozenset()  # what the device code of a controller's parts must have, as "key.feature"
-    inverse: frozenset[tuple[int, int]] = frozenset()  # entries of the inverse inertia beside the diagonal, in the user's axes
+    inverse: frozenset[tuple[int, int]] = (
+        frozenset()
+    )  # entries of the inverse inertia beside the diagonal, in the user's axes
     lever: bool = False  # the dry body's centre is off the user's origin, or added mass couples there
 
     @property
@@ -160,18 +144,19 @@ def survey_of(
     return _survey_of_slice(parameters, ensemble, method, shared, False, block.first, block.stop)
 
 
-def framed(
-    method: Method, parameters: Parameters, shared: SharedResultsCache, user_axes: bool = False
-) -> dict[str, Any]:
+def framed(method: Method, parameters: Parameters, shared: SharedResultsCache) -> dict[str, Any]:
     """Parameters with the frame of `frame_of` under the name FRAME, and under AXES the same but any mass matrix in it."""
     completed: dict[str, Any] | None = shared.completed(parameters)
     if completed is not None:
         return completed
     p: dict[str, Any] = dict(parameters)
+    user_axes = shared.user_axes
     if "vehicle.mass" in p:
         # Without coupling the axes do not depend on the mass.
         nothing = np.eye(3)[None], np.zeros((1, 3, 3))
-        p[AXES] = shared(AXES, p, lambda n: _frame_of(method, user_axes, inertia.Blocks(*nothing, n["vehicle.inertia"])))
+        p[AXES] = shared(
+            AXES, p, lambda n: _frame_of(method, user_axes, inertia.Blocks(*nothing, n["vehicle.inertia"]))
+        )
         if not shared.keeps(AXES):
             shared.varied.add(AXES)
         mass = shared("mass", p, lambda n: inertia.in_axes(n[AXES][0].Q, vehicle.mass_matrix(n)))
@@ -198,8 +183,7 @@ def _survey_of_slice(
     first: int,
     stop: int,
 ) -> Survey:
-    user_axes = works_in_user_axes(method, ensemble.scene)
-    p = framed(method, parameters, shared, user_axes)
+    p = framed(method, parameters, shared)
     frame, scene, numbers_of = p[FRAME][0], ensemble.scene, ensemble.own
     aligned = shared("aligned", p, lambda numbers: numbers[AXES][0].aligned)
     # Weight and buoyancy do not depend on the step.
@@ -227,7 +211,7 @@ def _survey_of_slice(
     rising = of_each("rises", rises, (term for term in scene.terms if term.carries))
     parts_of_control = scene.controller.parts if scene.controller else ()
     features = of_each("features", lambda part, numbers: part.features(numbers_of(part, numbers)), parts_of_control)
-    if user_axes:
+    if shared.user_axes:
         matrices = (term for term in scene.terms if term.pattern_device)
         features |= of_each("entries", lambda term, numbers: term.entries(numbers_of(term, numbers)), matrices)
     of_axes = shared("facts of axes", p, lambda numbers: _facts(*numbers[AXES]))

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How many vehicles a packet holds: by a table for each kind of processor, or as `lgvi-warp calibrate` measured here.
+"""How many vehicles a packet holds: by a table for each kind of processor, or as it was measured on this machine.
 
-What was measured is kept beside Warp's kernel caches, in CACHE/lgvi_warp_widths.json: machine and versions -> kernel -> width.
+What was measured is kept beside Warp's kernel caches, in CACHE/lgvi_warp_widths.json: machine and versions -> kind of kernel ->
+width, and under HASHES the hash of one kernel -> its width.
 """
 
 from __future__ import annotations
@@ -10,34 +11,41 @@ import contextlib
 import functools
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from lgvi_warp.common import files, machine, safe_files
 from lgvi_warp.common.errors import SceneError
 
 # Widths that kernels have, as lgvi_kernels knows them.
 WIDTHS = (1, 2, 4, 8, 16, 32)
-# Kinds of kernels. plain: sub-maps, of which each has independent operations; chained: turns, of which each waits for the one
-# before; dense: damping laws with their implicit step V; explicit: stages of explicit and collocation methods.
-KINDS = ("plain", "chained", "dense", "explicit")
+# Kinds of kernels. plain: sub-maps, of which each has independent operations; single: psi_1, with one free rotation a step;
+# chained: turns and iterations, of which each waits for the one before; dense: damping laws with their implicit step V;
+# explicit: stages of explicit and collocation methods.
+KINDS = ("plain", "single", "chained", "dense", "explicit")
 # Compensated kernels are of one kind, whatever the method: their sums fill the registers by themselves.
 KERNELS = (*(f"{kind} {real}" for kind in KINDS for real in ("float64", "float32")), "float32_compensated")
 
-# Kind of processor -> SIMD registers that one number of a packet fills, by kind of kernel; otherwise one. With two, one
-# vehicle's operation runs while another's waits, where registers abound. AMD: `python -m benchmarks run methods` on an EPYC.
+# Kind of processor -> SIMD registers that one number of a packet fills, by kernel; otherwise one. With two, one vehicle's
+# operation runs while another's waits, where registers abound. AMD: `python -m benchmarks run widths` on an EPYC.
 # Intel: psi_s, a server core of two 512-bit units: float64 22.0 ns at 8 lanes and 16.0 at 16, float32 9.9 at 16 and 7.4 at 32.
+CHAINED = {"chained float64": 2, "chained float32": 2}
 REGISTERS = {
-    "Intel, avx512": {"plain": 2, "chained": 2},
-    "avx512": {"chained": 2},
+    "Intel, avx512": dict.fromkeys(("plain float64", "plain float32", "single float64", "single float32"), 2) | CHAINED,
+    "avx512": {"plain float64": 2} | CHAINED,
 }
 
-FILE, MOST_BYTES = "lgvi_warp_widths.json", 1_000_000
+FILE, MOST_BYTES, HASHES = "lgvi_warp_widths.json", 1_000_000, "kernels"
+# Single kernels of one machine that the file keeps.
+MOST_HASHES = 1_000
 
 
 class Width(NamedTuple):
-    """Vehicles in a packet, and what says so: "asked for", "tuned", or "table" and the kind of processor."""
+    """Vehicles in a packet, and what says so: "asked for", "measured", "tuned", or "table" and the kind of processor.
+
+    measured: for this very kernel; tuned: for its kind.
+    """
 
     lanes: int
     source: str
@@ -65,7 +73,7 @@ def of_table(kind: str, dtype: str, *, cpu: str | None = None, simd: str | None 
     simd = simd or machine.simd()
     processor = f"Intel, {simd}" if "Intel" in (cpu or machine.cpu_name()) else simd
     processor = processor if processor in REGISTERS else simd
-    registers = 1 if dtype == "float32_compensated" else REGISTERS.get(processor, {}).get(kind, 1)
+    registers = REGISTERS.get(processor, {}).get(kernel_kind(kind, dtype), 1)
     return Width(registers * machine.register_width(dtype, simd), f"table: {processor}")
 
 
@@ -86,23 +94,63 @@ def tuned() -> dict[str, int]:
     return read(path())
 
 
+def measured() -> dict[str, int]:
+    """Read the widths that were measured for single kernels on this machine, by the kernel's hash."""
+    return read_hashes(path())
+
+
 @functools.cache
 def read(file: Path) -> dict[str, int]:
     """Read a file of tuned widths once in a process."""
-    known = _content(file).get(this_machine())
-    known = known if isinstance(known, dict) else {}
-    return {name: known[name] for name in KERNELS if type(known.get(name)) is int and known[name] in WIDTHS}
+    return {name: width for name, width in _of_this_machine(file).items() if name in KERNELS and _is_width(width)}
+
+
+@functools.cache
+def read_hashes(file: Path) -> dict[str, int]:
+    """Read the widths of single kernels in a file once in a process."""
+    known = _of_this_machine(file).get(HASHES)
+    return {name: width for name, width in known.items() if _is_width(width)} if isinstance(known, dict) else {}
 
 
 def keep(widths: Mapping[str, int], *, of: str | None = None) -> Path:
-    """Keep widths for this machine and these versions, or others that `of` names, beside those of the rest."""
+    """Keep widths of kinds for this machine and these versions, or others that `of` names, in place of those it had."""
+    machine_kept = of or this_machine()
+    return _change(machine_kept, lambda known: dict(widths) | {key: known[key] for key in known if key == HASHES})
+
+
+def keep_measured(kernel: str, width: int) -> Path:
+    """Keep the width of one kernel, given by its hash, for this machine and these versions, beside those of others."""
+
+    def changed(known: dict[str, object]) -> dict[str, object]:
+        hashes = known.get(HASHES)
+        # The newest last: of a full file the oldest go.
+        others = {key: value for key, value in hashes.items() if key != kernel} if isinstance(hashes, dict) else {}
+        kept = list(others.items())[1 - MOST_HASHES :]
+        return known | {HASHES: dict([*kept, (kernel, width)])}
+
+    return _change(this_machine(), changed)
+
+
+def _change(machine_kept: str, changed: Callable[[dict[str, object]], dict[str, object]]) -> Path:
     file = path()
     file.parent.mkdir(parents=True, exist_ok=True)
     with files.locked(file.parent, wait=True):
-        content = _content(file) | {of or this_machine(): dict(widths)}
+        content = _content(file)
+        known = content.get(machine_kept)
+        content[machine_kept] = changed(known if isinstance(known, dict) else {})
         files.write_whole(file, json.dumps(content, indent=1).encode())
     read.cache_clear()
+    read_hashes.cache_clear()
     return file
+
+
+def _is_width(value: object) -> bool:
+    return type(value) is int and value in WIDTHS
+
+
+def _of_this_machine(file: Path) -> dict[str, Any]:
+    known = _content(file).get(this_machine())
+    return known if isinstance(known, dict) else {}
 
 
 def this_machine() -> str:

@@ -5,13 +5,13 @@ from __future__ import annotations
 
 import functools
 import math
-import os
 import time
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from lgvi_warp.common.machine import thread_seconds
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.plan import Plan
 from lgvi_warp.physics.terms.noisy import NoisyTerm
@@ -26,14 +26,6 @@ NEAR = 0.05
 MORE = 3
 # Largest number of settings that a message names.
 MOST_TOLD = 6
-
-
-def thread_seconds() -> float:
-    """The CPU time of this thread [s], which other programs do not add to, and in which kernels on the CPU run.
-
-    Windows counts it in ticks of 16 ms, too coarse for a launch: there time.perf_counter is read.
-    """
-    return time.perf_counter() if os.name == "nt" else time.thread_time()
 
 
 @dataclass(frozen=True)

@@ -224,7 +224,20 @@ def make_method(spec):
             letters[letter] = turns.make_hop(int(letter[1]) - 1, int(letter[2]) - 1, U12, U13, U23, spec.compensated)
     if spec.averages is not None:
         force, potential = superpose(laws, "force"), superpose(laws, "potential")
-        acting = (View, Wrench, Flow, Damping, force, None, laws_damping, damping, flow, water_wrench, shifted, velocities)
+        acting = (
+            View,
+            Wrench,
+            Flow,
+            Damping,
+            force,
+            None,
+            laws_damping,
+            damping,
+            flow,
+            water_wrench,
+            shifted,
+            velocities,
+        )
         _, forces, current, _ = make_forces(*acting)
         maps = (letters["Ab"], None if spec.mass == "isotropic" else Ap, letters["D"])
         functions = (View, Wrench, potential, forces, current, evolve, velocities)

@@ -109,5 +109,9 @@ def made(features):
         return w
 
     roles = {"evolve": following.evolve, "follow": following.follow, "report": following.report}
-    roles |= {"damping": straight_damping, "push": straight_push} if straight else {"damping": turned_damping, "push": turned_push}
+    roles |= (
+        {"damping": straight_damping, "push": straight_push}
+        if straight
+        else {"damping": turned_damping, "push": turned_push}
+    )
     return device(__name__, features, params=following.params, **roles)

@@ -11,7 +11,19 @@ from lgvi_kernels.lanes.state import struct, view_struct
 
 # Where a law's own rows lie: in the table, in the memory, and how many rows of the memory's bus all laws see.
 BOUNDS = ("first_row", "last_row", "first_memory", "last_memory", "bus")
-ROLES = ("law", "damping", "push", "flow", "evolve", "follow", "steady_force", "energy", "supply", "steady_size", "report")
+ROLES = (
+    "law",
+    "damping",
+    "push",
+    "flow",
+    "evolve",
+    "follow",
+    "steady_force",
+    "energy",
+    "supply",
+    "steady_size",
+    "report",
+)
 
 
 def written_here(law):

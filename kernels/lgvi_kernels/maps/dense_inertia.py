@@ -44,7 +44,9 @@ def make_dense_velocities(entries):
         B1 = vec3(B.row0.y, B.row1.y, B.row2.y)
         B2 = vec3(B.row0.z, B.row1.z, B.row2.z)
         nu = vec3(
-            ao(ap(zero, A.row0, p), B.row0, pi), bo(bp(zero, A.row1, p), B.row1, pi), co(cp(zero, A.row2, p), B.row2, pi)
+            ao(ap(zero, A.row0, p), B.row0, pi),
+            bo(bp(zero, A.row1, p), B.row1, pi),
+            co(cp(zero, A.row2, p), B.row2, pi),
         )
         Om = vec3(do(dp(zero, B0, p), C.row0, pi), eo(ep(zero, B1, p), C.row1, pi), fo(fp(zero, B2, p), C.row2, pi))
         return nu, Om

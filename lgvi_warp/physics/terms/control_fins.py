@@ -153,7 +153,8 @@ class ControlFins(Commanded, Fins):
         return self.driver is None and self.holds
 
     @property
-    def timed(self) -> bool:  # type: ignore[override]  # of an instance
+    def timed(self) -> bool:  # type: ignore[override]
+        """Whether its forces depend on the time."""
         return not self.stands
 
     @property

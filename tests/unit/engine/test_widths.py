@@ -26,7 +26,8 @@ def file(tuned_widths):
 
 @pytest.mark.parametrize(
     ("cpu", "simd", "kind", "lanes"),
-    [(EPYC, "avx512", "plain", (8, 16, 16)), (EPYC, "avx512", "chained", (16, 32, 16)), (EPYC, "avx512", "dense", (8, 16, 16)),
+    [(EPYC, "avx512", "plain", (16, 16, 16)), (EPYC, "avx512", "chained", (16, 32, 16)),
+     (EPYC, "avx512", "dense", (8, 16, 16)), (EPYC, "avx512", "single", (8, 16, 16)), (XEON, "avx512", "single", (16, 32, 16)),
      (XEON, "avx512", "plain", (16, 32, 16)), (XEON, "avx512", "chained", (16, 32, 16)),
      (XEON, "avx512", "explicit", (8, 16, 16)), (XEON, "avx2", "chained", (4, 8, 8)), ("Cortex", "other", "plain", (2, 4, 4))],
 )  # fmt: skip
@@ -53,11 +54,34 @@ def test_kept_widths_count_on_this_machine_alone(file):
     assert len(json.loads(file.read_bytes())) == 2
 
 
+def test_the_width_of_one_kernel_counts_for_that_kernel_alone(file):
+    plan = make_plan(speed.fleet(2), "psi_s", h=0.01, t1=0.1)
+    widths.keep_measured("0" * 64, 4)
+    assert make_plan(speed.fleet(2), "psi_s", h=0.01, t1=0.1).spec.width == plan.spec.width
+    widths.keep_measured(plan.kernel.hash, 4)
+    chosen = make_plan(speed.fleet(2), "psi_s", h=0.01, t1=0.1)
+    assert (chosen.spec.width, chosen.width_source) == (4, "measured")
+    assert make_plan(speed.fleet(2), "psi_s", h=0.01, t1=0.1, width=2).spec.width == 2
+    assert make_plan(speed.fleet(2), "psi_x", h=0.01, t1=0.1).width_source.startswith("table")
+    # Widths of kinds come and go beside it.
+    widths.keep({"plain float64": 8})
+    assert widths.measured()[plan.kernel.hash] == 4
+    assert widths.tuned() == {"plain float64": 8}
+
+
+def test_a_full_file_loses_the_oldest_kernel(file, monkeypatch):
+    monkeypatch.setattr(widths, "MOST_HASHES", 3)
+    for kernel in "abcda":
+        widths.keep_measured(kernel, 8)
+    assert list(widths.measured()) == ["c", "d", "a"]
+
+
 def contents():
     """Contents of a file that are no widths, or none of this machine's."""
     key = widths.this_machine()
     odd = [{"plain float64": width} for width in (3, 0, -8, True, 8.0, "8", None, [8], 2**70)]
     odd += [{"other float64": 8}, [8], 8, None, "plain float64"]
+    odd += [{widths.HASHES: kernels} for kernels in ({"a": 3}, {"a": "8"}, [8], 8, None, "a")]
     texts = [json.dumps({key: one}) for one in odd] + [json.dumps({"another": {"plain float64": 4}})]
     return [
         *map(str.encode, texts), b"", b"[]", b"8", b"{", b"\xff\xfe", b"[" * 100_000, b" " * (widths.MOST_BYTES + 1),
@@ -68,7 +92,8 @@ def test_foreign_files_are_ignored(file):
     for content in contents():
         file.write_bytes(content)
         widths.read.cache_clear()
-        assert widths.tuned() == {}, content[:100]
+        widths.read_hashes.cache_clear()
+        assert (widths.tuned(), widths.measured()) == ({}, {}), content[:100]
     # What is whole beside them counts, and what is kept replaces all.
     file.write_text(json.dumps({widths.this_machine(): {"plain float64": 3, "dense float32": 8}}))
     widths.read.cache_clear()

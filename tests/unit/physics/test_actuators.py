@@ -163,7 +163,7 @@ def test_effect_of_a_table_of_lift():
 
 def test_absent_numbers_are_no_parameters():
     # A scene without the new numbers has the same parameters, file and device code as before there were any.
-    for term, device in ((thrusters(), "thrusters"), (fins(), "control_fins")):
+    for term, device in ((thrusters(), "thrusters"), (fins(), "fins")):
         assert term.device_in(True) == device
         new = ("table", "advance", "torque", "lift_a", "lift_c", "flow", "rate_limit", "time_constant")
         given = {key for key in term.to_dict() if key.startswith(new)}

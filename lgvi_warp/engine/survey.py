@@ -235,7 +235,7 @@ def _survey_of_slice(
 
 
 def _entries_beside(frame: Frame) -> frozenset[tuple[int, int]]:
-    """Entries (i, j) beside the diagonal of the inverse inertia that are not zero for some member; none without a whole one."""
+    """Entries (i, j) of the inverse of a whole inertia, beside its diagonal, that are not zero for some member."""
     if frame.whole is None:
         return frozenset()
     size = np.sqrt(np.abs(np.einsum("nii->ni", frame.inverse)))

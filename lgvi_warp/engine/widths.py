@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How many vehicles a packet holds: by a table for each kind of processor, or as it was measured on this machine.
 
-What was measured is kept beside Warp's kernel caches, in CACHE/lgvi_warp_widths.json: machine and versions -> kind of kernel ->
-width, and under HASHES the hash of one kernel -> its width.
+What was measured is kept beside Warp's kernel caches, in CACHE/lgvi_warp_widths.json: machine and versions -> kind of kernel
+-> width, and under HASHES the hash of one kernel -> its width.
 """
 
 from __future__ import annotations

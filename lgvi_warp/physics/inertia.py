@@ -210,7 +210,7 @@ def uncoupled_frame(body: Blocks) -> tuple[Frame, np.ndarray]:
 def user_frame(body: Blocks) -> Frame:
     """The frame of the user's axes and origin. Entries below round-off count as zero."""
     M, E, Js = schur(body)
-    Q, J = notation.principal_axes(Js)
+    _, J = notation.principal_axes(Js)
     n, zero = len(E), np.zeros((1, 3))
     whole = joined(*body)
     size = np.sqrt(np.einsum("nii->ni", whole))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Explicit methods of damped vehicles work in the user's axes: what holds whatever these axes are, and for members that differ."""
+"""Explicit methods of damped vehicles work in the user's axes: whatever these are, and for members that differ."""
 
 from dataclasses import replace
 
@@ -26,7 +26,8 @@ def described(Q, origin):
     """The general body with linear drag and a wrench, in axes Q and about an origin of the body: its scene and its start."""
     X = motion_from(origin[None], Q[None])[0]
     vehicle = lw.Vehicle(
-        rigid_body_mass_matrix=X.T @ RIGID @ X, added_mass_matrix=X.T @ (INERTIA - RIGID) @ X, weight=WEIGHT, buoyancy=BUOYANCY,
+        rigid_body_mass_matrix=X.T @ RIGID @ X, added_mass_matrix=X.T @ (INERTIA - RIGID) @ X,
+        weight=WEIGHT, buoyancy=BUOYANCY,
         center_of_gravity=Q.T @ (CENTER - origin), center_of_buoyancy=Q.T @ (LIFT - origin),
     )  # fmt: skip
     wrench = X.T @ WRENCH

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import warp as wp
 
+from lgvi_kernels.advance.spec import make_types
 from lgvi_kernels.lanes.arithmetic import add, div, mul, sub, vec3  # noqa: F401
 from lgvi_kernels.lanes.matrix3 import apply, factor_struct, transpose_times
 from lgvi_kernels.lanes.rotations import rotation_struct
@@ -193,7 +194,7 @@ def make_method(spec):
         wrenches = superpose(laws, "push"), superpose(laws, "matrix")
         acting = (View, Wrench, Flow, Damping, law, *wrenches, damping, flow, water_wrench, shifted, velocities)
         everything, _, _, slope = make_forces(*acting)
-        step = make_explicit(spec, everything, velocities, slope)
+        step = make_explicit(spec, make_types(spec), everything, velocities, slope)
         momentum = in_body if spec.inertial else None
         return Step(step, step, velocities, prepare, water_velocity, velocities_of_forces, momentum)
     V = None

@@ -17,7 +17,7 @@ from lgvi_kernels.lanes.matrix3 import factor_struct
 from lgvi_kernels.lanes.rotations import rotation_struct
 from lgvi_kernels.lanes.state import damping_struct, struct, view_struct, wrench_struct
 from lgvi_kernels.laws.drag import make_resistance
-from lgvi_kernels.maps.compose import superpose
+from lgvi_kernels.maps.compose import plays, superpose
 from lgvi_kernels.maps.dissipation import make_implicit
 from lgvi_kernels.maps.linearly_implicit import make_damped, make_damped_stages, make_factor
 from lgvi_kernels.maps.munthe_kaas import make_act, make_munthe_kaas, make_turned
@@ -270,8 +270,30 @@ def make_implicit_stages(spec, rates, states, velocities, slope):
     return make_damped_stages(slopes_struct(Rates, len(damped)), rates, states, damped, factor)
 
 
-def make_explicit(spec, everything, velocities, slope):
-    """The step of a Runge-Kutta method for this Spec, with all the laws in `everything`; slope: see make_implicit_stages."""
+# Roles of laws, over all stages, beyond which their code is compiled once and called: inlined for each stage, it would take
+# the compiler longer than all the rest.
+MOST_INLINED = 100
+
+
+def make_called(rates, State, Constants, real):
+    """The same rates by a call at each stage, which takes a tenth longer than code for each."""
+
+    @wp.func(inline=False)
+    def at(x: wp.ref[State], c: wp.ref[Constants], h: real):
+        return rates(x, c, h)
+
+    @wp.func
+    def called(x: Any, c: Any, h: Any):
+        return at(x, c, h)
+
+    return called
+
+
+def make_explicit(spec, types, everything, velocities, slope):
+    """The step of a Runge-Kutta method for this Spec, with all the laws in `everything`; slope: see make_implicit_stages.
+
+    types: of the kernel's state and constants (see advance/spec.py).
+    """
     method, width, real, timed = spec.explicit, spec.width, spec.real, spec.timed
     Wrench = wrench_struct(width, real)
     Rates = rates_struct(width, real, method.kind)
@@ -283,6 +305,9 @@ def make_explicit(spec, everything, velocities, slope):
     shape = (spec.mass, "coupled" in spec.parts or bool(spec.inverse), spec.flow != "none", spec.scaled)
     drag = make_resistance(spec.drag) if spec.drag else None
     rates = make_rates(Rates, Wrench, everything, velocities, method.kind, *shape, drag)
+    roles = sum(plays(law, role) is not None for law in spec.laws for role in ("law", "push", "matrix", "flow"))
+    if roles * len(method.b) > MOST_INLINED:
+        rates = make_called(rates, types.State, types.Constants, real)
     follow = superpose(spec.laws, "follow") if spec.memory else None
     if method.kind == "munthe_kaas":
         return make_munthe_kaas(rates, move, turned, timed, make_recall(View, follow, 0.0, 0.5))

@@ -10,7 +10,7 @@ import warp as wp
 
 import lgvi_warp as lw
 from lgvi_kernels.law import add, div, lane, mul, neg, ones, positive, remember, struct, sub  # noqa: F401
-from lgvi_warp.reference.control import heading_pid, matrix, set_point
+from lgvi_warp.reference.control import fault, heading_pid, matrix, set_point
 from lgvi_warp.scene import scene as scenes
 from tests.conftest import ROOT
 from tests.laws.test_user_law import load
@@ -173,6 +173,8 @@ PARTS = {
     "low-pass": (lw.control.LowPass(of="attitude", time_constant=0.5), None),
     "complementary": (lw.control.ComplementaryFilter(time_constant=2.0), None),
     "set-point": (lw.control.SetPoint(depth=3.0, speed=1.0), set_point.SetPoint(depth=3.0, speed=1.0)),
+    "place": (lw.control.SetPoint(position=(1.0, -2.0, 3.0), heading=0.4),
+              set_point.SetPoint(position=(1.0, -2.0, 3.0), heading=0.4)),
     "waypoints": (lw.control.Waypoints(points=[(0, 0, 5), (9, 0, 5), (9, 9, 6)], speed=1.0, look_ahead=3.0, radius=1.0), None),
     "trajectory": (lw.control.Trajectory(times=(0.1, 0.2, 0.3), positions=[(0, 0, 3), (2, 1, 4), (5, -2, 6)]), None),
     "reference model": (lw.control.ReferenceModel(natural_frequency=(1, 1.2, 0.8, 1.5), damping_ratio=(1, 0.8, 1.2, 1)), None),
@@ -191,10 +193,23 @@ PARTS = {
 }  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.slow_but("place")
 @pytest.mark.parametrize("name", PARTS)
 def test_the_parts_of_the_package_are_right(name):
     part, twin = PARTS[name]
     report = lw.laws.check_controller(part, twin=twin)
+    assert report.ok, str(report)
+    assert not any("note: changes nothing" in check.text for check in report.checks), str(report)
+
+
+@pytest.mark.slow_but("2")
+@pytest.mark.parametrize("channel", [0, 1, 2])
+def test_a_fault_of_a_sensor_is_its_twin(channel):
+    numbers = {"channel": channel, "gain": 0.5, "offset": 0.3}
+    sensed = lw.Controller(period=0.1, sensors=[lw.control.Sensor(of="velocity")], laws=[lw.control.SpeedPID(kp=1.0)],
+                           guidance=[lw.control.SetPoint(speed=1.0)])  # fmt: skip
+    scene = lw.Scene.named("torpedo", terms=[lw.terms.ControlWrench()], controller=sensed)
+    twin = fault.SensorFault(**numbers, of="velocity", time=0.0)
+    report = lw.laws.check_controller(lw.control.Fault(of="sensor", **numbers), scene=scene, twin=twin)
     assert report.ok, str(report)
     assert not any("note: changes nothing" in check.text for check in report.checks), str(report)

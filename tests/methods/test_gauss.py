@@ -93,6 +93,16 @@ def test_a_fixed_number_of_iterations(scene, example):
     assert 1e-10 < difference(last(loose), last(exact)) < 1e-3
 
 
+def test_each_iteration_gains_an_order(scene):
+    # The first step begins with the slopes at the start: after n iterations a step is wrong by h^(n + 1).
+    method = lw.Method("gauss6", iterations=2, tolerance=0.99)
+    errors = []
+    for h in (0.1, 0.05):
+        ends = [last(lw.solve(scene, name, h=h, t1=h)) for name in (method, "gauss6")]
+        errors.append(difference(*ends))
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(3.0, abs=0.1)
+
+
 def test_steps_that_do_not_contract(scene):
     # One member spins so fast that its iteration diverges; the other's bits do not change.
     spins = np.array([[0.3, 0.2, 0.1], [30.0, 20.0, 10.0]])

@@ -39,6 +39,21 @@ class Commanded(Term):
             object.__setattr__(self, "command_schedule", [self.command])
             object.__setattr__(self, "times", [0.0] if self.times is None else self.times)
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        # What is held does not look at the time.
+        object.__setattr__(self, "timed", not self.holds)
+
+    @property
+    def slow(self) -> bool:
+        """Whether some channel follows its command with a lag, or no faster than a rate."""
+        raise NotImplementedError
+
+    @property
+    def memory(self) -> bool:
+        # A slow channel that begins at a command that is held stays there: nothing is to be remembered.
+        return self.slow and (self.driver is not None or not self.holds)
+
     @property
     def holds(self: Any) -> bool:
         """Whether its commands are held, so that of its fields `command` acts, and else the schedule."""
@@ -142,7 +157,7 @@ def refuse_idle(term: Any, numbers: Numbers, rate: str, remembers: np.ndarray, r
         acts = "command" if term.holds else "command_schedule"
         unread = {name: (numbers[name] != getattr(term, name), f"a {acts}", f"vary {term.key}.{acts}")
                   for name in term.idle_fields}  # fmt: skip
-    if not term.memory:
+    if not term.slow:
         unread[rate] = (remembers, "none", remedy)
     for name, (bad, alternative, what_to_do) in unread.items():
         if np.any(bad):

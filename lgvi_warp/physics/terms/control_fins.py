@@ -148,7 +148,7 @@ class ControlFins(Commanded, Fins):
         return bad
 
     @property
-    def memory(self) -> bool:
+    def slow(self) -> bool:
         # Whether fins lag, or the rate of one is limited.
         return bool(self.time_constant is not None or np.any(self.rate_limit < UNLIMITED))
 

@@ -21,6 +21,16 @@ def polynomial_values(polynomial: np.ndarray, w: np.ndarray) -> np.ndarray:
     return value
 
 
+def parted(curves: np.ndarray) -> tuple[np.ndarray, bool]:
+    """Polynomials ahead and astern (1 or n, 2 powers) as lgvi_kernels.laws.thrust_curves reads them.
+
+    Returns: Of either side the odd powers, then the even ones; and whether both sides are one odd curve.
+    """
+    ahead, astern = np.split(curves, 2, axis=1)
+    rows = [side[:, first::2] for side in (ahead, astern) for first in (0, 1)]
+    return np.concatenate(rows, axis=1), not (np.any(ahead != astern) or np.any(rows[1]))
+
+
 def table_values(at: np.ndarray, values: np.ndarray, w: np.ndarray) -> np.ndarray:
     """Tables with knots at (1 or n, t) and values (1 or n, t, channels), at w (1 or n, channels)."""
     value = values[:, 0] + np.zeros_like(w)

@@ -11,7 +11,6 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.actuators import (
-    FAST,
     Commanded,
     motion,
     packed_following,
@@ -21,13 +20,13 @@ from lgvi_warp.physics.terms.actuators import (
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, rows_of, side_by_side
 from lgvi_warp.physics.terms.thrust_curves import (
     SQUARE,
+    parted,
     polynomial_values,
     side_of_table,
     solve,
     table_values,
     unfit,
 )
-from lgvi_warp.physics.terms.wrench import at_start, commands
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -170,18 +169,20 @@ class Thrusters(Commanded):
         if self.pushes_steadily:
             return "thrusters_held"
         driven = self.driver is not None
+        # Members may bring in a lag where the scene has a limited rate.
+        motions = motion(self) if driven else {"lag": self.slow, "rate": self.rate_limit is not None}
         features = (
-            {"driven": driven}
-            | (motion(self) if driven else {"rate": self.rate_limit is not None})
-            | {
-                self.shape: self.shape != "square",
-                "propeller": self.propels,
-            }
+            {"driven": driven, "scheduled": not driven}
+            | {name: acts and self.memory for name, acts in motions.items()}
+            | {"table": self.shape == "table", f"powers{self.powers}": self.shape == "polynomial"}
+            | {"propeller": self.propels}
         )
-        chosen = [name for name, present in features.items() if present]
-        if chosen in ([], ["polynomial"]):
-            return "thrusters_polynomial" if chosen else "thrusters"
-        return f"thrusters_with:{','.join(chosen)}"
+        return f"thrusters_with:{','.join(name for name, present in features.items() if present)}"
+
+    @property
+    def powers(self) -> int:
+        """Number of powers that the longer of both polynomials has."""
+        return max(len(self.polynomial), len(self.polynomial_astern))
 
     def to_dict(self) -> dict[str, Any]:
         # The term as a table of a scene file: of its commands what acts; polynomials only where they are not w^2.
@@ -302,29 +303,18 @@ class Thrusters(Commanded):
         if self.pushes_steadily:
             return self._packed_push(numbers, context, direction, arms)
         force, torque = context.frame.vector(direction), context.frame.torque(arms, direction + 0.0 * arms)
-        if self.device_in(context.aligned) not in ("thrusters", "thrusters_polynomial"):
-            curves = [numbers[key][..., None] for key in ("coefficient", "coefficient_astern", "dead_band")]
-            if self.propels:
-                none = np.zeros_like(numbers["coefficient"])
-                losses = (numbers.get(key, none)[..., None] for key in PROPELLER)
-                curves += [context.frame.vector(direction), *losses]
-            return packed_following(self, numbers, side_by_side(force, torque, *curves), *self.curve_rows(numbers))
-        with np.errstate(divide="ignore"):
-            rate = np.where(numbers["time_constant"] > 0.0, 1.0 / numbers["time_constant"], FAST)
-        settings = [numbers[key] for key in ("coefficient", "coefficient_astern", "dead_band", "limit")]
-        blocks = [force, torque, *(x[..., None] for x in (*settings, rate))]
-        times, schedule = commands(numbers)
-        thrusters, count = side_by_side(*blocks), schedule.shape[2]
-        rows = [thrusters.reshape(len(thrusters), -1)]
-        rows += [knots(times, schedule[:, :, i : i + 1]) for i in range(count)]
-        values = {"count": count, "knots": times.shape[1] - 1, "lagged": int(self.memory)}
-        if not self.is_square:
-            polynomials, values["powers"] = self.curve_rows(numbers)
-            rows.append(polynomials)
-        if not self.memory:
-            return Packed(values | {"memory": 0}, side_by_side(*rows))
-        start = np.clip(at_start(times, schedule), -numbers["limit"], numbers["limit"])
-        return Packed(values, side_by_side(*rows), start)
+        blocks = [numbers[key][..., None] for key in ("coefficient", "coefficient_astern", "dead_band")]
+        if self.propels:
+            none = np.zeros_like(numbers["coefficient"])
+            losses = (numbers.get(key, none)[..., None] for key in PROPELLER)
+            blocks += [context.frame.vector(direction), *losses]
+        curves, size = self.curve_rows(numbers)
+        odd = True
+        if self.shape == "polynomial":
+            curves, odd = parted(curves)
+        alike = np.all(numbers["coefficient"] == numbers["coefficient_astern"]) and not np.any(numbers["dead_band"])
+        words = {"plain": int(odd and alike)}
+        return packed_following(self, numbers, side_by_side(force, torque, *blocks), curves, size, words=words)
 
     def _packed_push(
         self, numbers: Numbers, context: PackingContext, direction: np.ndarray, arms: np.ndarray
@@ -341,7 +331,7 @@ class Thrusters(Commanded):
             return Packed({"force": context.frame.vector(force), "torque": context.frame.torque(torque, force)})
 
     def curve_rows(self, numbers: Numbers) -> tuple[np.ndarray, int]:
-        """The curves as lgvi_kernels.laws.thrust_curves reads them.
+        """The curves as an allocation reads them.
 
         Args:
             numbers: The term's numbers by field.
@@ -357,9 +347,8 @@ class Thrusters(Commanded):
             tables = [knots(at, values[:, :, i : i + 1]) for i in range(self.channels)]
             return side_by_side(*tables), at.shape[1] - 1
         ahead, astern = numbers["polynomial"], numbers["polynomial_astern"]
-        powers = max(ahead.shape[1], astern.shape[1])
-        padded = [np.pad(curve, ((0, 0), (0, powers - curve.shape[1]))) for curve in (ahead, astern)]
-        return side_by_side(*padded), powers
+        padded = [np.pad(curve, ((0, 0), (0, self.powers - curve.shape[1]))) for curve in (ahead, astern)]
+        return side_by_side(*padded), self.powers
 
 
 # Numbers of propellers in the order of their rows, and all that may be absent with one number for each thruster.

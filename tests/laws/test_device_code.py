@@ -59,7 +59,9 @@ ALONE["thrusters with an odd curve"] = Case(
 HELD = (0.7, -0.95, 0.04)
 TABLE = dict(zip(("table_commands", "table_thrusts"), TABLE_OF_THRUST, strict=True))
 ALONE["held thrusters"] = held()
-ALONE["held thrusters with polynomials"] = held(polynomial=(3.0, 0.5, 8.0, -2.0, 1.0), polynomial_astern=(2.0, 7.0, -1.5))
+ALONE["held thrusters with polynomials"] = held(
+    polynomial=(3.0, 0.5, 8.0, -2.0, 1.0), polynomial_astern=(2.0, 7.0, -1.5)
+)
 ALONE["held thrusters with a table"] = held(**TABLE, rate_limit=None)
 # Thrust that falls with the speed follows from the velocities, whatever is held.
 ALONE["held propellers"] = held(**PROPELLERS)

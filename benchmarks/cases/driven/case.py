@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""ns per vehicle and step of driven vehicles, REMUS 100 and BlueROV2 heavy: whole, without each term, with schedules, with a loop.
+"""ns per vehicle and step of driven vehicles, REMUS 100 and BlueROV2: whole, without each term, by schedules, by a loop.
 
 The scenes of one vehicle, method and precision take turns, and each figure is the least processor time of all rounds.
 `peak_fmas` is how many fused multiply-adds the core makes in that time at its peak, which is measured in the same run: a
@@ -41,7 +41,8 @@ def lessened(scene):
     terms = list(scene.terms)
     each = {f"without {term.key}": [other for other in terms if other is not term] for term in terms}
     return {
-        name: dataclasses.replace(scene, terms=rest, controller=None) for name, rest in (each | {"no terms": []}).items()
+        name: dataclasses.replace(scene, terms=rest, controller=None)
+        for name, rest in (each | {"no terms": []}).items()
     }
 
 

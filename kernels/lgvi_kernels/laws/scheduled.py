@@ -2,7 +2,8 @@
 """Actuators that follow a schedule, with a lag and at a limited rate.
 
 The schedule of all channels is one table of pieces, over which all commands go straight: piece by piece, not channel by
-channel, so that what depends on the time alone is calculated once. The host has cut commands at their limits, which adds pieces.
+channel, so that what depends on the time alone is calculated once. The host has cut commands at their limits, which adds
+pieces.
 """
 
 from typing import Any
@@ -45,7 +46,6 @@ def chased(n: Any, start: Any, end: Any, length: Any, pace: Any):
     gap = exponential(-x) * gap + slope * (within * decay(x))
     gap = gap + (time_left - within) * (slope - side * rate)
     return end - gap
-
 
 
 @wp.func

@@ -71,8 +71,8 @@ def make_horner(count, sided):
 def make_polynomial_curve(powers, odd):
     """f(w) ahead and -f(-w) astern, f = p1 w + p2 w^2 + ... with so many powers, and another f astern.
 
-    f is w times a polynomial in w^2, and |w| w times another one: rows of the odd powers, of the even ones, and the same astern.
-    odd: whether the even ones are 0 and both sides the same. What is left out then adds exactly 0.
+    f is w times a polynomial in w^2, and |w| w times another one: rows of the odd powers, of the even ones, and the same
+    astern. odd: whether the even ones are 0 and both sides the same. What is left out then adds exactly 0.
     """
     half = powers - powers // 2
     of_odd, of_even = make_horner(half, not odd), make_horner(powers // 2, not odd)

@@ -23,8 +23,8 @@ PROPELLER_ROWS = 16
 def made(features):
     """The law of thrusters with these features: "scheduled" or "driven", "lag", "rate", a curve, "propeller".
 
-    The curve is "table", "powers9" of a polynomial with nine powers, and else the square. p.plain: whether in all members there
-    is no dead band, and both sides are alike: one coefficient, and one odd curve. What is left out then adds exactly 0.
+    The curve is "table", "powers9" of a polynomial with nine powers, and else the square. p.plain: whether in all members
+    there is no dead band, and both sides are alike: one coefficient, and one odd curve. What is left out then adds exactly 0.
     """
     propeller, tables = "propeller" in features, "table" in features
     powers = sum(int(word.removeprefix("powers")) for word in features if word.startswith("powers"))

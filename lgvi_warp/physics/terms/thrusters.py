@@ -213,7 +213,9 @@ class Thrusters(Commanded):
             f = table_values(numbers["table_commands"], numbers["table_thrusts"], w)
         else:
             ahead, astern = np.maximum(w, 0.0), np.maximum(-w, 0.0)
-            f = polynomial_values(numbers["polynomial"], ahead) - polynomial_values(numbers["polynomial_astern"], astern)
+            f = polynomial_values(numbers["polynomial"], ahead) - polynomial_values(
+                numbers["polynomial_astern"], astern
+            )
         return np.asarray(np.where(w > 0.0, numbers["coefficient"], numbers["coefficient_astern"]) * f)
 
     def drive(self) -> np.ndarray:

@@ -13,6 +13,7 @@ class Driven(NamedTuple):
     """Functions of an actuator.
 
     params: the struct of its numbers; place: (view, p, i) -> where channel i is; evolve, follow, report: roles of its law.
+    look_up, found: (view, p), then (view, p, i) as place, for a law that needs all channels; None where place costs no more.
     """
 
     params: Any
@@ -20,6 +21,8 @@ class Driven(NamedTuple):
     evolve: Any
     follow: Any
     report: Any
+    look_up: Any = None
+    found: Any = None
 
 
 @wp.func

@@ -122,11 +122,14 @@ def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words
 
     @wp.func(inline=outline)
     def approach(table: Any, entry: int, memory: Any, packet: int, p: Any, t: Any, time: Any):
-        """Let all channels go towards their commands of the time t for a time."""
+        """Let all channels go towards their commands of the time t for a time; those that do not lag are there at once."""
         unity = ones(time)
         zero = unity - unity
-        left = time
-        if wp.static(not limited):
+        left = zero
+        places = p.work
+        if wp.static(moves):
+            places = p.memory
+        if wp.static(lags and not limited):
             left = left_after(time, entry_of(time, table, entry, p.first + wp.static(lag), 0))
         row = p.first + wp.static(rows) * p.count
         since = zero
@@ -141,16 +144,16 @@ def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words
                     at = p.first + wp.static(rows) * i
                     value = row + wp.static(PIECE) + 2 * i
                     u = fused(part, entry_of(time, table, entry, value, 1), entry_of(time, table, entry, value, 0))
-                    n = element(memory, packet, p.memory + i, 0)
-                    after = n
-                    lag_here = entry_of(time, table, entry, at, wp.static(lag))
+                    n = element(memory, packet, places + i, 0)
+                    after = u
                     if wp.static(limited):
+                        lag_here = entry_of(time, table, entry, at, wp.static(lag))
                         after = approached(n, u, time, lag_here, entry_of(time, table, entry, at, wp.static(rate)))
-                    else:
+                    elif wp.static(lags):
                         if p.alike == 0:
-                            left = left_after(time, lag_here)
+                            left = left_after(time, entry_of(time, table, entry, at, wp.static(lag)))
                         after = fused(left, n - u, u)
-                    set_element(memory, packet, p.memory + i, 0, positive(here, after, n))
+                    set_element(memory, packet, places + i, 0, positive(here, after, n))
             waiting = waiting - here
             since = ended
             row += wp.static(PIECE) + 2 * p.count
@@ -216,4 +219,15 @@ def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words
                 walk(view.table, view.entry, view.memory, view.packet, p, view.t, view.h * ones(view.b.x))
         return state
 
-    return Driven(params, place, evolve, follow, None)
+    @wp.func
+    def look_up(view: Any, p: Any):
+        """Let `found` know the commands of all channels at view.t."""
+        approach(view.table, view.entry, view.memory, view.packet, p, view.t, ones(view.b.x))
+
+    @wp.func
+    def found(view: Any, p: Any, i: int):
+        return remembered(view, p.work + i)
+
+    if moves:
+        return Driven(params, place, evolve, follow, None)
+    return Driven(params, place, None, None, None, look_up, found)

@@ -33,7 +33,8 @@ def made(features):
     name, places = f"Thrusters_{'_'.join(features)}", (rows, first_of_motion, first_of_motion + 1, first_of_motion + 2)
     make = make_driven if "driven" in features else make_scheduled
     following = make(name, *places, features, ("plain",))
-    place = following.place
+    place, look_up = following.place, following.look_up
+    found = following.found or place
 
     def make_law(plain):
         """The sum over the thrusters, which are plain or not."""
@@ -44,7 +45,7 @@ def made(features):
         def summed(w: Any, view: Any, p: Any):
             for i in range(p.count):
                 at = p.first + wp.static(rows) * i
-                n = place(view, p, i)
+                n = found(view, p, i)
                 factor = row1(view, at + 6)
                 if wp.static(not plain):
                     n = beyond(n, row1(view, at + 8))
@@ -66,6 +67,8 @@ def made(features):
     @wp.func
     def thruster_law(w: Any, view: Any, p: Any):
         """Thrust = c f(n beyond the dead band) along each thruster, and the torque about its axis."""
+        if wp.static(look_up is not None):
+            look_up(view, p)
         if p.plain > 0:
             w = of_plain(w, view, p)
         else:

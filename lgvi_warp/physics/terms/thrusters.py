@@ -316,7 +316,9 @@ class Thrusters(Commanded):
             curves, odd = parted(curves)
         alike = np.all(numbers["coefficient"] == numbers["coefficient_astern"]) and not np.any(numbers["dead_band"])
         words = {"plain": int(odd and alike)}
-        return packed_following(self, numbers, side_by_side(force, torque, *blocks), curves, size, words=words)
+        # Where nothing is remembered, commands are looked up in rows to work with.
+        work = 0 if self.memory or self.driver is not None else self.channels
+        return packed_following(self, numbers, side_by_side(force, torque, *blocks), curves, size, work, words)
 
     def _packed_push(
         self, numbers: Numbers, context: PackingContext, direction: np.ndarray, arms: np.ndarray

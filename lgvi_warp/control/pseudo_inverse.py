@@ -14,7 +14,7 @@ from lgvi_warp.control.base import Allocation, rest_rows
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.actuators import UNLIMITED
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, number, side_by_side
-from lgvi_warp.physics.terms.thrusters import side_of_table
+from lgvi_warp.physics.terms.thrust_curves import polynomial_values, side_of_table, table_values
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -107,11 +107,13 @@ class PseudoInverse(Allocation):
         reach = np.maximum(reach, 0.0)
         if self.shape == "table":
             at, values = numbers["table_commands"], numbers["table_thrusts"]
-            return tuple(side * _at(at, values, side * reach) for side in (1.0, -1.0))
+            return tuple(side * table_values(at, values, side * reach) for side in (1.0, -1.0))
         if self.shape == "polynomial":
             curves = _polynomials(numbers)
             turns = (highest(curve, np.max(reach, axis=-1))[:, None] for curve in curves)
-            return tuple(_values(curve, np.minimum(reach, turn)) for curve, turn in zip(curves, turns, strict=True))
+            return tuple(
+                polynomial_values(curve, np.minimum(reach, turn)) for curve, turn in zip(curves, turns, strict=True)
+            )
         return (reach if self.shape == "linear" else reach**2,) * 2
 
     def _curves(self, numbers: Numbers) -> tuple[np.ndarray, int]:
@@ -174,9 +176,11 @@ def inverse_rows(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
     """
     polynomial, reach = repeated(polynomial, reach)
     top = highest(polynomial, reach)
-    most = _values(polynomial, top[:, None])[:, 0]
+    most = polynomial_values(polynomial, top[:, None])[:, 0]
     wanted = most[:, None] * (1.0 - (1.0 - (0.5 * (POINTS_OF_START + 1.0)) ** 2) ** 2)
-    inverses = _last(lambda w: _values(polynomial, w) < wanted, np.zeros_like(wanted), top[:, None] + 0.0 * wanted)
+    inverses = _last(
+        lambda w: polynomial_values(polynomial, w) < wanted, np.zeros_like(wanted), top[:, None] + 0.0 * wanted
+    )
     acts = most > 0.0
     inverse = np.divide(1.0, most, out=np.zeros_like(most), where=acts)
     slope = np.where(acts, 1e-3 * most / np.where(acts, top, 1.0), 1.0)
@@ -187,21 +191,15 @@ def highest(polynomial: np.ndarray, reach: np.ndarray) -> np.ndarray:
     """Where polynomials (1 or n, powers) from the first power up cease to rise first, (1 or n,), or their reach."""
     polynomial, reach = repeated(polynomial, reach)
     points = reach[:, None] * np.linspace(0.0, 1.0, POINTS)
-    values = _values(polynomial, points)
+    values = polynomial_values(polynomial, points)
     falls = np.diff(values, axis=1) <= 0.0
     turns = falls.any(axis=1)
     turn = np.where(turns, falls.argmax(axis=1), POINTS - 1)
     # The slope changes its sign within one of the two intervals beside that point.
     row, slopes = np.arange(len(points)), polynomial * np.arange(1, polynomial.shape[1] + 1)
     before, after = points[row, np.maximum(turn - 1, 0)], points[row, np.minimum(turn + 1, POINTS - 1)]
-    peak = _last(lambda w: _values(slopes, w) > 0.0, before[:, None], after[:, None])[:, 0]
+    peak = _last(lambda w: polynomial_values(slopes, w) > 0.0, before[:, None], after[:, None])[:, 0]
     return np.where(turns, np.where(turn > 0, peak, 0.0), reach)
-
-
-def _at(at: np.ndarray, values: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Tables with knots at (1 or n, t) and values (1 or n, t, channels), at w (1 or n, channels)."""
-    share = np.clip((w[:, None] - at[:, :-1, None]) / np.diff(at, axis=1)[..., None], 0.0, 1.0)
-    return np.asarray(values[:, 0] + np.sum(share * np.diff(values, axis=1), axis=1))
 
 
 def _last(holds: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -211,11 +209,3 @@ def _last(holds: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.n
         inside = holds(middle)
         low, high = np.where(inside, middle, low), np.where(inside, high, middle)
     return high
-
-
-def _values(polynomial: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """p_1 w + p_2 w^2 + ... of each member's polynomial (n, powers) at w (n, k)."""
-    value = np.zeros_like(w)
-    for coefficient in polynomial.T[::-1]:
-        value = (value + coefficient[:, None]) * w
-    return value

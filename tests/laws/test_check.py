@@ -64,8 +64,8 @@ def test_a_law_may_remember_a_single_number():
     wing = dict(
         position=[[-0.5, 0.0, 0.0]], chord=[[1.0, 0.0, 0.0]], normal=[[0.0, 0.0, -1.0]], area=0.01, lift_slope=3.0
     )
-    schedule = {"times": [0.0, 1.0], "command_schedule": [[0.1], [0.2]]}
-    fin = lw.terms.ControlFins(**wing, **schedule, rate_limit=0.5, drag=0.0)
+    turning = dict(times=[0.0, 1.0], command_schedule=[[0.1], [-0.2]])
+    fin = lw.terms.ControlFins(**wing, **turning, rate_limit=0.5, drag=0.0)
     assert fin.memory
     assert lw.laws.check_law(fin).ok
 

@@ -14,9 +14,10 @@ from lgvi_kernels import built_in
 from lgvi_warp.checks.bench import KICK, ORIGIN, STEP, TURN, Bank, Bench
 from lgvi_warp.reference.terms import View
 from lgvi_warp.reference.terms.restoring import Restoring
+from lgvi_warp.reference.terms.thrusters import Thrusters
 from lgvi_warp.reference.terms.weight import Weight
 from tests.laws.case import Case
-from tests.laws.cases import CASES
+from tests.laws.cases import CASES, PROPELLERS, TABLE_OF_THRUST, THRUSTERS
 from tests.laws.test_parity import GRAVITY, STATE, VEHICLE
 
 # Long enough for several turns of a command.
@@ -36,6 +37,34 @@ ALONE = IMPLIED | {name: case for name, case in CASES.items() if len(case.terms)
 ALONE["prompt thrusters"] = Case(
     (replace(LAGGING, time_constant=0.0),), (type(LAGGING_TWIN)(**vars(LAGGING_TWIN) | {"time_constant": np.zeros(3)}),)
 )
+
+
+def held(**numbers):
+    """Thrusters whose commands are held, some beyond their limit or within the dead band, beside their twin."""
+    given = THRUSTERS | PROPELLERS | {"advance_loss": None, "advance_loss_astern": None, "torque_loss": None} | numbers
+    sides = dict(coefficient=(2.0, 3.0, 1.0), coefficient_astern=(1.5, 2.5, 0.5))
+    known = {key: np.array(value) for key, value in given.items() if value is not None}
+    twin = Thrusters(**known, forward=np.array(sides["coefficient"]), backward=np.array(sides["coefficient_astern"]))
+    twin.times, twin.command = np.zeros(1), np.array([HELD])
+    return Case((lw.terms.Thrusters(**given, **sides, command=HELD),), (twin,))
+
+
+# The same ahead as astern, without a dead band: the twin sums its powers one by one.
+ODD = dict(polynomial=(3.0, 0.0, 8.0, 0.0, -2.0), dead_band=(0.0, 0.0, 0.0))
+ALONE["thrusters with an odd curve"] = Case(
+    (replace(LAGGING, **ODD, polynomial_astern=ODD["polynomial"], coefficient_astern=LAGGING.coefficient),),
+    (type(LAGGING_TWIN)(**vars(LAGGING_TWIN) | ODD | {"polynomial_astern": ODD["polynomial"], "backward": LAGGING_TWIN.forward,
+                                                      "dead_band": np.zeros(3)}),),
+)  # fmt: skip
+HELD = (0.7, -0.95, 0.04)
+TABLE = dict(zip(("table_commands", "table_thrusts"), TABLE_OF_THRUST, strict=True))
+ALONE["held thrusters"] = held()
+ALONE["held thrusters with polynomials"] = held(
+    polynomial=(3.0, 0.5, 8.0, -2.0, 1.0), polynomial_astern=(2.0, 7.0, -1.5)
+)
+ALONE["held thrusters with a table"] = held(**TABLE, rate_limit=None)
+# Thrust that falls with the speed follows from the velocities, whatever is held.
+ALONE["held propellers"] = held(**PROPELLERS)
 
 
 def bench_of(term, folder, aligned=False, device=None):

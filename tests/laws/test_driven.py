@@ -25,6 +25,9 @@ WRENCH = dict(
 )
 POLYNOMIAL = dict(polynomial=(3.0, 0.5, 8.0, -2.0, 1.0), polynomial_astern=(2.0, 7.0, -1.5))
 COEFFICIENTS = dict(coefficient=(2.0, 3.0, 1.0), coefficient_astern=(1.5, 2.5, 0.5))
+# One lag, no dead band, and one odd curve ahead and astern.
+PLAIN = {key: value for key, value in THRUSTERS.items() if key != "dead_band"} | {"time_constant": (0.2, 0.2, 0.2)}
+ODD = dict(polynomial=(3.0, 0.0, 8.0, 0.0, -2.0))
 LAGGED = dict(limit=(0.35, 0.2, 0.5), rate_limit=RATES, time_constant=(0.1, 0.3, 0.0))
 ACTUATORS = {
     "control wrench": (lw.terms.ControlWrench(**WRENCH), ControlWrench(**arrays(WRENCH))),
@@ -36,6 +39,11 @@ ACTUATORS = {
             forward=np.array(COEFFICIENTS["coefficient"]),
             backward=np.array(COEFFICIENTS["coefficient_astern"]),
         ),
+    ),
+    "plain thrusters": (
+        lw.terms.Thrusters(**PLAIN, **ODD, coefficient=(2.0, 3.0, 1.0)),
+        Thrusters(**arrays(PLAIN), **ODD, polynomial_astern=ODD["polynomial"], dead_band=np.zeros(3),
+                  forward=np.array((2.0, 3.0, 1.0)), backward=np.array((2.0, 3.0, 1.0))),
     ),
     "control fins without flow angle": (
         lw.terms.ControlFins(**FINS, **LAGGED, **STALL, flow_angle=False),

@@ -180,7 +180,7 @@ def test_times_of_laws_pass_in_divided_steps():
     ("psi_x", [], "solves nothing"), ("rk8", [], "solves nothing"), ("gauss4", [], "stages of the last"),
     ("psi_s", [terms.WrenchNoise(force=[1.0, 0.0, 0.0], torque=[0.0] * 3)], "draws its noise once a step"),
     ("psi_s", [terms.Thrusters(position=[[0.0] * 3], direction=[[1.0, 0.0, 0.0]], coefficient=[1.0], time_constant=[1.0],
-                               times=[0.0], command_schedule=[[1.0]])], "remembers"),
+                               times=[0.0, 1.0], command_schedule=[[1.0], [1.0]])], "remembers"),
 ])  # fmt: skip
 def test_what_cannot_be_divided_is_refused(method, laws, text):
     base = scene_of((2.0, 2.0, 2.0))

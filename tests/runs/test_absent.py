@@ -19,7 +19,7 @@ from tests.support.tools import generated, one
 MARKS = {
     "drag": r"make_E__locals__slowed", "drag matrix": r"add_three",
     "current": rf"\b{current.flow.native_func}\(", "tether": r"rest_length",
-    "wrench": r"numbers_wrench", "thrusters": r"commanded", "waves": r"Waves", "fins": r"Fins",
+    "wrench": r"numbers_wrench", "thrusters": r"Thrusters_", "waves": r"Waves", "fins": r"Fins",
 }  # fmt: skip
 # Functions that some scenes need, and a bare one does not.
 NOT_THERE = ("kicked", "look", "factorise", "exponential", r"(?<!sub)normals", "passage", "R_i", "back_up", "decay3",
@@ -61,12 +61,13 @@ def test_memory_in_stages_is_there_only_where_it_is_followed(tmp_path):
     # A method that goes back in time keeps a copy of the memory; a splitting follows nothing.
     lagging = scene_of(CASES["thrusters"])
     held = terms.Thrusters(position=[(0.0, 0.0, 0.0)], direction=[(1.0, 0.0, 0.0)], coefficient=[5.0], command=[0.5])
-    cases = (("rk4", lagging, {"walked"}), ("rk8", lagging, {"walked", "copy_memory"}), ("psi_s", lagging, set()),
+    walk = "make_scheduled__locals__walk"
+    cases = (("rk4", lagging, {walk}), ("rk8", lagging, {walk, "copy_memory"}), ("psi_s", lagging, set()),
              ("rk8", lw.Scene(VEHICLE, lw.Environment(gravity=9.8), terms=[held]), set()))  # fmt: skip
     for i, (method, scene, marks) in enumerate(cases):
         (tmp_path / str(i)).mkdir()
         text = source(scene, tmp_path / str(i), method)
-        assert {mark for mark in ("walked", "copy_memory") if mark in text} == marks, (method, marks)
+        assert {mark for mark in (walk, "copy_memory") if mark in text} == marks, (method, marks)
 
 
 # Functions of the kernel that a level of checks, or a fallback, brings with it.
@@ -147,7 +148,7 @@ def test_a_polynomial_is_there_only_if_asked_for(tmp_path):
     assert plans["none"].kernel.advance is plans["square"].kernel.advance
     for name in ("none", "cubic"):
         (tmp_path / name).mkdir()
-        assert ("polynomial_law" in source(scenes[name], tmp_path / name)) == (name == "cubic")
+        assert ("polynomial_curve" in source(scenes[name], tmp_path / name)) == (name == "cubic")
     assert "polynomial" not in plain.to_dict()
 
 

@@ -13,6 +13,7 @@ class Driven(NamedTuple):
     """Functions of an actuator.
 
     params: the struct of its numbers; place: (view, p, i) -> where channel i is; evolve, follow, report: roles of its law.
+    look_up, found: (view, p), then (view, p, i) as place, for a law that needs all channels; None where place costs no more.
     """
 
     params: Any
@@ -20,13 +21,18 @@ class Driven(NamedTuple):
     evolve: Any
     follow: Any
     report: Any
+    look_up: Any = None
+    found: Any = None
 
 
-# Not inlined: an actuator whose channels all have one lag computes it once, with the same bits.
-@wp.func(inline=False)
+@wp.func
 def left_after(length: Any, lag: Any):
-    """The part of a gap that is left after a time."""
-    return exponential(-(length * lag))
+    """The part of a gap that is left after a time.
+
+    The product is rounded by itself, whatever comes after it: an actuator whose channels all have one lag computes this once,
+    with the same bits.
+    """
+    return exponential(-fused(length, lag, length - length))
 
 
 @wp.func
@@ -44,20 +50,21 @@ def approached(n: Any, u: Any, length: Any, lag: Any, rate: Any):
     return u - positive(gap, gap_left, -gap_left)
 
 
-def make_driven(name, rows, limit, lag, rate, features):
+def make_driven(name, rows, limit, lag, rate, features, words=()):
     """The functions of an actuator with `rows` rows a channel; limit, lag and rate: places of 1 / lag and of two limits.
 
     features: "lag" where some channel lags, "rate" where the rate of some is limited; with neither it is where it is
     commanded. Rows that all channels share follow from `first + shared` on; `size` says how many there are of a kind.
+    words: further whole numbers that the actuator's law reads.
     """
     lags, limited = "lag" in features, "rate" in features
     moves = lags or limited
 
     def params(width, real, commands):
         """Params: commands, see lanes/tick.py; first rows of the table, the memory, the report; count; alike: one lag."""
-        words = {"first": wp.int32, "memory": wp.int32, "work": wp.int32, "report": wp.int32}
-        words |= dict.fromkeys(("count", "moving", "alike", "shared", "size"), wp.int32)
-        return struct(name, commands=commands, **words)
+        places = {"first": wp.int32, "memory": wp.int32, "work": wp.int32, "report": wp.int32}
+        places |= dict.fromkeys(("count", "moving", "alike", "shared", "size", *words), wp.int32)
+        return struct(name, commands=commands, **places)
 
     @wp.func
     def wanted(view: Any, p: Any, i: int):

@@ -1,12 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Actuators that follow a schedule with a lag and at a limited rate, both at once."""
+"""Actuators that follow a schedule, with a lag and at a limited rate.
+
+The schedule of all channels is one table of pieces, over which all commands go straight: piece by piece, not channel by
+channel, so that what depends on the time alone is calculated once. The host has cut commands at their limits, which adds
+pieces.
+"""
 
 from typing import Any
 
 import warp as wp
 
+from lgvi_kernels.lanes.arithmetic import any_positive, element, entry_of, set_element
 from lgvi_kernels.law import *
-from lgvi_kernels.laws.driven import Driven, approached
+from lgvi_kernels.laws.driven import Driven, approached, left_after
 
 
 @wp.func
@@ -42,7 +48,12 @@ def chased(n: Any, start: Any, end: Any, length: Any, pace: Any):
     return end - gap
 
 
-chasing = make_pursuit(chased)
+@wp.func
+def left_along(length: Any, lag: Any):
+    """The mean part of a gap that is left over a time, and the part at its end; as left_after, whatever comes after it."""
+    x = fused(length, lag, length - length)
+    mean = decay(x)
+    return mean, fused(-x, mean, ones(x))
 
 
 def make_commanded(rows, limit):
@@ -63,49 +74,160 @@ def make_commanded(rows, limit):
     return schedule, commanded
 
 
-def make_scheduled(name, rows, limit, lag, rate):
-    """As make_driven, for an actuator with a table of commands over time for each channel, behind the rows of all channels."""
-    schedule, commanded = make_commanded(rows, limit)
+# Rows of one piece: the time at which it ends, 1 / its length, and for each channel its command at the begin, and the change.
+# The first piece lasts until the first time of the schedule and the last one for ever, and nothing changes in them.
+PIECE = 2
+
+
+def make_scheduled(name, rows, limit, lag, rate, features=("lag", "rate"), words=()):
+    """As make_driven, for an actuator whose commands are a table of pieces, behind the rows of all channels.
+
+    `knots` counts the times of the schedule but for the first, so that there are knots + 2 pieces.
+    """
+    lags, limited = "lag" in features, "rate" in features
+    moves = lags or limited
+    # Not inlined where it is long, for the sake of the compiler: a method calls it at each stage.
+    outline = False if limited else None
 
     def params(width, real):
-        """Params: first row of the table, of the memory if `moving`; count of channels and of knots of their commands."""
-        words = ("first", "memory", "work", "count", "moving", "knots", "shared", "size")
-        return struct(name, **dict.fromkeys(words, wp.int32))
+        """Params: first row of the table, of the memory if `moving`; count of channels and of knots; alike: one lag."""
+        fields = ("first", "memory", "work", "count", "moving", "alike", "knots", "shared", "size", *words)
+        return struct(name, **dict.fromkeys(fields, wp.int32))
+
+    @wp.func
+    def commanded(view: Any, p: Any, i: int, t: Any):
+        """The command of channel i: a sum over all pieces, of which each lane may be in one of its own."""
+        row = p.first + wp.static(rows) * p.count
+        u = row1(view, row + wp.static(PIECE) + 2 * i)
+        unity = ones(u)
+        for j in range(p.knots):
+            begin = row1(view, row)
+            row += wp.static(PIECE) + 2 * p.count
+            part = clamp((t * unity - begin) * row1(view, row + 1), unity - unity, unity)
+            u = fused(part, row1(view, row + wp.static(PIECE) + 2 * i + 1), u)
+        most = row1(view, p.first + wp.static(rows) * i + wp.static(limit))
+        return clamp(u, -most, most)
 
     @wp.func
     def place(view: Any, p: Any, i: int):
         n = ones(view.b.x)
-        if p.moving > 0:
-            n = remembered(view, p.memory + i)
+        if wp.static(moves):
+            if p.moving > 0:
+                n = remembered(view, p.memory + i)
+            else:
+                n = commanded(view, p, i, view.t)
         else:
             n = commanded(view, p, i, view.t)
         return n
 
+    @wp.func(inline=outline)
+    def approach(table: Any, entry: int, memory: Any, packet: int, p: Any, t: Any, time: Any):
+        """Let all channels go towards their commands of the time t for a time; those that do not lag are there at once."""
+        unity = ones(time)
+        zero = unity - unity
+        left = zero
+        places = p.work
+        if wp.static(moves):
+            places = p.memory
+        if wp.static(lags and not limited):
+            left = left_after(time, entry_of(time, table, entry, p.first + wp.static(lag), 0))
+        row = p.first + wp.static(rows) * p.count
+        since = zero
+        waiting = unity
+        for j in range(p.knots + 2):
+            ended = t * unity - entry_of(time, table, entry, row, 0)
+            # Above 0 in those lanes that are in this piece.
+            here = positive(-ended, waiting, zero)
+            if any_positive(here):
+                part = clamp(since * entry_of(time, table, entry, row, 1), zero, unity)
+                for i in range(p.count):
+                    at = p.first + wp.static(rows) * i
+                    value = row + wp.static(PIECE) + 2 * i
+                    u = fused(part, entry_of(time, table, entry, value, 1), entry_of(time, table, entry, value, 0))
+                    n = element(memory, packet, places + i, 0)
+                    after = u
+                    if wp.static(limited):
+                        lag_here = entry_of(time, table, entry, at, wp.static(lag))
+                        after = approached(n, u, time, lag_here, entry_of(time, table, entry, at, wp.static(rate)))
+                    elif wp.static(lags):
+                        if p.alike == 0:
+                            left = left_after(time, entry_of(time, table, entry, at, wp.static(lag)))
+                        after = fused(left, n - u, u)
+                    set_element(memory, packet, places + i, 0, positive(here, after, n))
+            waiting = waiting - here
+            since = ended
+            row += wp.static(PIECE) + 2 * p.count
+
+    @wp.func(inline=outline)
+    def walk(table: Any, entry: int, memory: Any, packet: int, p: Any, t: Any, time: Any):
+        """Let all channels follow their commands, exactly, over a time that ends at t."""
+        unity = ones(time)
+        zero = unity - unity
+        # Times count back from t: within one piece its length is then the whole time, to the last digit.
+        time_left = time
+        row = p.first + wp.static(rows) * p.count
+        since = zero
+        for j in range(p.knots + 2):
+            ended = t * unity - entry_of(time, table, entry, row, 0)
+            end = clamp(ended, zero, time_left)
+            length = time_left - end
+            if any_positive(length):
+                steepness = entry_of(time, table, entry, row, 1)
+                first_part = clamp((since - time_left) * steepness, zero, unity)
+                last_part = clamp((since - end) * steepness, zero, unity)
+                mean = length
+                left = length
+                if wp.static(not limited):
+                    mean, left = left_along(length, entry_of(time, table, entry, p.first + wp.static(lag), 0))
+                for i in range(p.count):
+                    at = p.first + wp.static(rows) * i
+                    value = entry_of(time, table, entry, row + wp.static(PIECE) + 2 * i, 0)
+                    change = entry_of(time, table, entry, row + wp.static(PIECE) + 2 * i, 1)
+                    start = fused(first_part, change, value)
+                    stop = fused(last_part, change, value)
+                    lag_here = entry_of(time, table, entry, at, wp.static(lag))
+                    n = element(memory, packet, p.memory + i, 0)
+                    after = n
+                    if wp.static(limited):
+                        pace = vec3(lag_here, entry_of(time, table, entry, at, wp.static(rate)), lag_here)
+                        after = chased(n, start, stop, length, pace)
+                    else:
+                        # n less the command decays, and falls behind its slope.
+                        if p.alike == 0:
+                            mean, left = left_along(length, lag_here)
+                        after = fused(left, n - start, fused(-mean, stop - start, stop))
+                    # Lanes without this piece keep their bits, whatever their neighbours have.
+                    set_element(memory, packet, p.memory + i, 0, positive(length, after, n))
+            since = ended
+            time_left = end
+            row += wp.static(PIECE) + 2 * p.count
+
     @wp.func
     def evolve(state: Any, view: Any, p: Any):
         """Over half a kick, towards the command of the middle of that half."""
-        if p.moving > 0:
-            t = middle_of_half(view)
-            for i in range(p.count):
-                at = p.first + wp.static(rows) * i
-                n = remembered(view, p.memory + i)
-                half = view.h.dtype(0.5) * view.h * ones(n)
-                lag_here = row1(view, at + wp.static(lag))
-                n = approached(n, commanded(view, p, i, t), half, lag_here, row1(view, at + wp.static(rate)))
-                remember(view, p.memory + i, n)
+        if wp.static(moves):
+            if p.moving > 0:
+                half = view.h.dtype(0.5) * view.h * ones(view.b.x)
+                approach(view.table, view.entry, view.memory, view.packet, p, middle_of_half(view), half)
         return state
 
     @wp.func
     def follow(state: Any, view: Any, p: Any):
-        """Exactly, piece by piece of the command, from view.h before to view.t."""
-        if p.moving > 0:
-            for i in range(p.count):
-                at = p.first + wp.static(rows) * i
-                n = remembered(view, p.memory + i)
-                lag_here = row1(view, at + wp.static(lag))
-                pace = vec3(lag_here, row1(view, at + wp.static(rate)), lag_here)
-                most = row1(view, at + wp.static(limit))
-                remember(view, p.memory + i, chasing(view, n, schedule(p, i), p.knots, most, pace))
+        """Exactly, piece by piece of the commands, from view.h before to view.t."""
+        if wp.static(moves):
+            if p.moving > 0:
+                walk(view.table, view.entry, view.memory, view.packet, p, view.t, view.h * ones(view.b.x))
         return state
 
-    return Driven(params, place, evolve, follow, None)
+    @wp.func
+    def look_up(view: Any, p: Any):
+        """Let `found` know the commands of all channels at view.t."""
+        approach(view.table, view.entry, view.memory, view.packet, p, view.t, ones(view.b.x))
+
+    @wp.func
+    def found(view: Any, p: Any, i: int):
+        return remembered(view, p.work + i)
+
+    if moves:
+        return Driven(params, place, evolve, follow, None)
+    return Driven(params, place, None, None, None, look_up, found)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """How thrust follows from a command: its square, a polynomial or a table, and the inverse of each.
 
-Each curve takes (view, first, size, w): the row where its numbers begin, how many there are of a kind, and the command less
-the dead band. Inverses take the thrust ahead or astern, without its sign, and the same of one side.
+Each curve takes (view, p, first, w): the law's numbers, the row where those of the curve begin, and the command less the dead
+band. Inverses take the thrust ahead or astern, without its sign, and the same of one side.
 """
 
+import functools
 from typing import Any
 
 import warp as wp
@@ -21,37 +22,19 @@ NEWTON_STEPS = 2
 @wp.func
 def beyond(n: Any, band: Any):
     """The command less the dead band, on either side."""
-    zero = ones(n) - ones(n)
-    return greatest(n - band, zero) - greatest(-n - band, zero)
+    return n - clamp(n, -band, band)
 
 
 @wp.func
-def square_curve(view: Any, first: int, size: int, w: Any):
+def square_curve(view: Any, p: Any, first: int, w: Any):
     """w |w|."""
     return w * absolute(w)
 
 
 @wp.func
-def powers_of(view: Any, first: int, size: int, w: Any):
-    """p1 w + p2 w^2 + ..., by Horner's rule."""
-    value = w - w
-    for i in range(size):
-        value = (value + row1(view, first + size - 1 - i)) * w
-    return value
-
-
-@wp.func
-def polynomial_curve(view: Any, first: int, size: int, w: Any):
-    """One polynomial ahead and one astern."""
-    zero = ones(w) - ones(w)
-    ahead = powers_of(view, first, size, greatest(w, zero))
-    return ahead - powers_of(view, first + size, size, greatest(-w, zero))
-
-
-@wp.func
-def table_curve(view: Any, first: int, size: int, w: Any):
+def table_curve(view: Any, p: Any, first: int, w: Any):
     """Linear between the knots, constant outside."""
-    return table1(view, first, size, w)
+    return table1(view, first, p.size, w)
 
 
 @wp.func
@@ -61,6 +44,48 @@ def row_of_side(view: Any, row: int, astern: int, side: Any):
     if astern > 0:
         value = positive(side, value, row1(view, row + astern))
     return value
+
+
+def make_horner(count, sided):
+    """(view, row, astern, side, z) -> c1 + c2 z + ... with so many coefficients, by Horner's rule.
+
+    sided: whether those astern are others, `astern` rows behind.
+    """
+
+    @wp.func
+    def horner(view: Any, row: int, astern: int, side: Any, z: Any):
+        value = row1(view, row + wp.static(count - 1))
+        if wp.static(sided):
+            value = positive(side, value, row1(view, row + astern + wp.static(count - 1)))
+        for k in range(wp.static(count - 1)):
+            c = row1(view, row + wp.static(count - 2) - k)
+            if wp.static(sided):
+                c = positive(side, c, row1(view, row + astern + wp.static(count - 2) - k))
+            value = fused(value, z, c)
+        return value
+
+    return horner
+
+
+@functools.cache
+def make_polynomial_curve(powers, odd):
+    """f(w) ahead and -f(-w) astern, f = p1 w + p2 w^2 + ... with so many powers, and another f astern.
+
+    f is w times a polynomial in w^2, and |w| w times another one: rows of the odd powers, of the even ones, and the same
+    astern. odd: whether the even ones are 0 and both sides the same. What is left out then adds exactly 0.
+    """
+    half = powers - powers // 2
+    of_odd, of_even = make_horner(half, not odd), make_horner(powers // 2, not odd)
+
+    @wp.func
+    def polynomial_curve(view: Any, p: Any, first: int, w: Any):
+        z = w * w
+        value = of_odd(view, first, wp.static(powers), w, z)
+        if wp.static(powers > 1 and not odd):
+            value = fused(absolute(w), of_even(view, first + wp.static(half), wp.static(powers), w, z), value)
+        return value * w
+
+    return polynomial_curve
 
 
 # A polynomial by Estrin's scheme, whose sums need not wait for each other.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Thrusters with more than thrusters.py has: a driver, a limited rate, other curves, loss by the speed, torque."""
+"""Thrusters along a schedule or behind a controller: curves, dead band, lag, limited rate, loss by the speed, torque."""
 
 import functools
 from typing import Any
@@ -21,31 +21,58 @@ PROPELLER_ROWS = 16
 
 @functools.cache
 def made(features):
-    """The law of thrusters with these features: "driven", "lag", "rate", "polynomial" or "table", "propeller"."""
-    propeller, driven = "propeller" in features, "driven" in features
-    tables = "table" in features
-    shape = "table" if tables else "polynomial" if "polynomial" in features else "square"
-    curve = getattr(thrust_curves, f"{shape}_curve")
+    """The law of thrusters with these features: "scheduled" or "driven", "lag", "rate", a curve, "propeller".
+
+    The curve is "table", "powers9" of a polynomial with nine powers, and else the square. p.plain: whether in all members
+    there is no dead band, and both sides are alike: one coefficient, and one odd curve. What is left out then adds exactly 0.
+    """
+    propeller, tables = "propeller" in features, "table" in features
+    powers = sum(int(word.removeprefix("powers")) for word in features if word.startswith("powers"))
     first_of_motion = PROPELLER_ROWS if propeller else ROWS
     rows = first_of_motion + 3
     name, places = f"Thrusters_{'_'.join(features)}", (rows, first_of_motion, first_of_motion + 1, first_of_motion + 2)
-    following = make_driven(name, *places, features) if driven else make_scheduled(name, *places)
-    place = following.place
+    make = make_driven if "driven" in features else make_scheduled
+    following = make(name, *places, features, ("plain",))
+    place, look_up = following.place, following.look_up
+    found = following.found or place
+
+    def make_law(plain):
+        """The sum over the thrusters, which are plain or not."""
+        curve = thrust_curves.table_curve if tables else thrust_curves.square_curve
+        curve = thrust_curves.make_polynomial_curve(powers, plain) if powers else curve
+
+        @wp.func
+        def summed(w: Any, view: Any, p: Any):
+            for i in range(p.count):
+                at = p.first + wp.static(rows) * i
+                n = found(view, p, i)
+                factor = row1(view, at + 6)
+                if wp.static(not plain):
+                    n = beyond(n, row1(view, at + 8))
+                    factor = positive(n, factor, row1(view, at + 7))
+                first = p.first + p.shared
+                if wp.static(tables):
+                    first += i * (1 + 3 * p.size)
+                thrust = factor * curve(view, p, first, n)
+                w.force = w.force + thrust * row3(view, at)
+                w.torque = w.torque + thrust * row3(view, at + 3)
+                if wp.static(propeller):
+                    w.torque = w.torque + (row1(view, at + 14) * (n * absolute(n))) * row3(view, at + 9)
+            return w
+
+        return summed
+
+    of_any, of_plain = make_law(False), make_law(True)
 
     @wp.func
     def thruster_law(w: Any, view: Any, p: Any):
         """Thrust = c f(n beyond the dead band) along each thruster, and the torque about its axis."""
-        for i in range(p.count):
-            at = p.first + wp.static(rows) * i
-            n = beyond(place(view, p, i), row1(view, at + 8))
-            first = p.first + p.shared
-            if wp.static(tables):
-                first += i * (1 + 3 * p.size)
-            thrust = positive(n, row1(view, at + 6), row1(view, at + 7)) * curve(view, first, p.size, n)
-            w.force = w.force + thrust * row3(view, at)
-            w.torque = w.torque + thrust * row3(view, at + 3)
-            if wp.static(propeller):
-                w.torque = w.torque + (row1(view, at + 14) * (n * absolute(n))) * row3(view, at + 9)
+        if wp.static(look_up is not None):
+            look_up(view, p)
+        if p.plain > 0:
+            w = of_plain(w, view, p)
+        else:
+            w = of_any(w, view, p)
         return w
 
     @wp.func

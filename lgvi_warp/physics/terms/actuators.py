@@ -10,11 +10,14 @@ from typing import Any, ClassVar
 import numpy as np
 
 from lgvi_warp.common.errors import Faults
-from lgvi_warp.physics.terms.base import Numbers, Packed, Term, knots, side_by_side
+from lgvi_warp.physics.notation import repeated
+from lgvi_warp.physics.terms.base import STEEP, Numbers, Packed, Term, side_by_side
 from lgvi_warp.physics.terms.wrench import at_start, commands
 
 # 1 / time constant of a channel without lag: faster than any step, and within float32. A limit of a rate that counts as none.
 FAST, UNLIMITED = 1e20, 1e6
+# A time [s] after all others, and within float32.
+FOREVER = 1e30
 # Fields of a schedule of commands, which stands in place of `command`.
 SCHEDULE = ("times", "command_schedule")
 
@@ -38,6 +41,21 @@ class Commanded(Term):
             object.__setattr__(self, "following", SCHEDULE if self.times is None else ())
             object.__setattr__(self, "command_schedule", [self.command])
             object.__setattr__(self, "times", [0.0] if self.times is None else self.times)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        # What is held does not look at the time.
+        object.__setattr__(self, "timed", not self.holds)
+
+    @property
+    def slow(self) -> bool:
+        """Whether some channel follows its command with a lag, or no faster than a rate."""
+        raise NotImplementedError
+
+    @property
+    def memory(self) -> bool:
+        # A slow channel that begins at a command that is held stays there: nothing is to be remembered.
+        return self.slow and (self.driver is not None or not self.holds)
 
     @property
     def holds(self: Any) -> bool:
@@ -88,12 +106,14 @@ def refuse_unread(term: Any, numbers: Numbers) -> None:
 
 
 def packed_following(
-    term: Any, numbers: Numbers, blocks: np.ndarray, shared: np.ndarray | None = None, size: int = 0, work: int = 0
-) -> Packed:
+    term: Any, numbers: Numbers, blocks: np.ndarray, shared: np.ndarray | None = None, size: int = 0, work: int = 0,
+    words: Mapping[str, int] | None = None,
+) -> Packed:  # fmt: skip
     """Pack an actuator whose device code is made by lgvi_kernels.laws.driven or .scheduled.
 
     numbers: (m, ...) by field: `limit`, where it has them `time_constant` and `rate_limit`, and if not driven the schedule.
     blocks: Other rows of each channel, (m, channels, rows). shared: Rows behind those of all channels, (m, rows).
+    words: Further whole numbers of the device struct.
     Returns: Rows of each channel: the blocks, limit, 1 / lag and limit of the rate; its schedule; the shared rows; and the
         memory of places, where they move: 0 of a driven actuator, else the command at the start.
     """
@@ -106,20 +126,60 @@ def packed_following(
     channels = side_by_side(blocks, *(value[..., None] for value in (limit, lag, rate)))
     count = channels.shape[1]
     rows = [channels.reshape(len(channels), -1)]
-    values = {"count": count, "moving": int(term.memory)} | ({} if work else {"work": 0})
+    values = {"count": count, "moving": int(term.memory), "alike": int(np.all(lag == lag[:, :1])), **(words or {})}
+    values |= {} if work else {"work": 0}
     start = np.zeros((1, count))
     if term.driver is not None:
-        values |= term.driver.values_of(term.key) | {"alike": int(np.all(lag == lag[:, :1]))}
+        values |= term.driver.values_of(term.key)
     else:
         times, schedule = commands(numbers)
-        rows += [knots(times, schedule[:, :, i : i + 1]) for i in range(count)]
-        values |= {"knots": times.shape[1] - 1}
         start = np.clip(at_start(times, schedule), -limit, limit)
+        times, schedule = within_limits(times, schedule, limit)
+        rows.append(pieces(times, schedule))
+        values |= {"knots": times.shape[1] - 1}
     values |= {"shared": sum(part.shape[1] for part in rows), "size": size}
     rows += [] if shared is None else [shared]
     if not term.memory:
         return Packed(values | {"memory": 0}, side_by_side(*rows), work=work)
     return Packed(values, side_by_side(*rows), start, work)
+
+
+def within_limits(times: np.ndarray, schedule: np.ndarray, limit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Schedules (1 or n, k, units) kept within limits (1 or n, units), with the times (1 or n, k) at which they reach them.
+
+    Returns: Times and commands; a member whose command does not reach its limit where another's does has one time twice.
+    """
+    if np.all(np.abs(schedule) <= limit[:, None]):
+        return times, schedule
+    times, schedule, limit = repeated(times, schedule, limit[:, None])
+    change, span = np.diff(schedule, axis=1), np.diff(times, axis=1)[..., None]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        reached = np.concatenate([(side * limit - schedule[:, :-1]) / change for side in (-1.0, 1.0)], axis=2)
+    # Where the parts between two times at which some member's command reaches a limit begin: (n, crossings).
+    inside = (reached > 0.0) & (reached < 1.0)
+    interval, column = np.nonzero(inside.any(axis=0))
+    part = np.where(inside, reached, 0.0)[:, interval, column]
+    times = np.concatenate([times, times[:, interval] + part * span[:, interval, 0]], axis=1)
+    crossed = schedule[:, interval] + part[..., None] * change[:, interval]
+    schedule = np.clip(np.concatenate([schedule, crossed], axis=1), -limit, limit)
+    order = np.argsort(times, axis=1, kind="stable")
+    return np.take_along_axis(times, order, axis=1), np.take_along_axis(schedule, order[..., None], axis=1)
+
+
+def pieces(times: np.ndarray, schedule: np.ndarray) -> np.ndarray:
+    """Rows of schedules (1 or n, k, units) as lgvi_kernels.laws.scheduled reads them: see there.
+
+    times: (1 or n, k) [s]; equal ones are a jump.
+    """
+    times, schedule = repeated(times, schedule)
+    span = np.diff(times, axis=1)
+    steepness = np.divide(1.0, span, out=np.full_like(span, STEEP), where=span > 0.0)
+    ends = np.pad(times, ((0, 0), (0, 1)), constant_values=FOREVER)
+    values = np.concatenate([schedule[:, :1], schedule], axis=1)
+    changes = np.pad(np.diff(schedule, axis=1), ((0, 0), (1, 1), (0, 0)))
+    commands = np.stack([values, changes], axis=-1).reshape(*ends.shape, -1)
+    each = np.concatenate([ends[..., None], np.pad(steepness, ((0, 0), (1, 1)))[..., None], commands], axis=-1)
+    return each.reshape(len(each), -1)
 
 
 def first_row(schedule: Any) -> Any:
@@ -142,7 +202,7 @@ def refuse_idle(term: Any, numbers: Numbers, rate: str, remembers: np.ndarray, r
         acts = "command" if term.holds else "command_schedule"
         unread = {name: (numbers[name] != getattr(term, name), f"a {acts}", f"vary {term.key}.{acts}")
                   for name in term.idle_fields}  # fmt: skip
-    if not term.memory:
+    if not term.slow:
         unread[rate] = (remembers, "none", remedy)
     for name, (bad, alternative, what_to_do) in unread.items():
         if np.any(bad):

@@ -153,14 +153,9 @@ class ControlFins(Commanded, Fins):
         return self.driver is None and self.holds
 
     @property
-    def timed(self) -> bool:  # type: ignore[override]
-        """Whether its forces depend on the time."""
-        return not self.stands
-
-    @property
-    def memory(self) -> bool:
-        # Whether fins that move lag, or the rate of one is limited.
-        return not self.stands and bool(self.time_constant is not None or np.any(self.rate_limit < UNLIMITED))
+    def slow(self) -> bool:
+        # Whether fins lag, or the rate of one is limited.
+        return bool(self.time_constant is not None or np.any(self.rate_limit < UNLIMITED))
 
     def _turned(self, numbers: Numbers) -> Numbers:
         """The numbers of fins that stand: fixed fins, whose chords and normals are turned by the commands."""

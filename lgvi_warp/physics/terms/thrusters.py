@@ -11,7 +11,6 @@ import numpy as np
 from lgvi_warp.common.errors import Faults, refusal
 from lgvi_warp.physics.notation import repeated
 from lgvi_warp.physics.terms.actuators import (
-    FAST,
     Commanded,
     motion,
     packed_following,
@@ -19,7 +18,15 @@ from lgvi_warp.physics.terms.actuators import (
     refuse_unread,
 )
 from lgvi_warp.physics.terms.base import Numbers, Packed, PackingContext, knots, number, rows_of, side_by_side
-from lgvi_warp.physics.terms.wrench import at_start, commands
+from lgvi_warp.physics.terms.thrust_curves import (
+    SQUARE,
+    parted,
+    polynomial_values,
+    side_of_table,
+    solve,
+    table_values,
+    unfit,
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -152,20 +159,30 @@ class Thrusters(Commanded):
         wrench = np.concatenate([direction, np.cross(position, direction)], axis=-1)
         return np.swapaxes(wrench, -1, -2)
 
+    @property
+    def pushes_steadily(self) -> bool:
+        """Whether its force and torque never change in body axes: commands are held, and no thrust falls with the speed."""
+        lossless = self.advance_loss is None and self.torque_loss is None
+        return self.driver is None and self.holds and lossless
+
     def device_in(self, aligned: bool) -> str:
+        if self.pushes_steadily:
+            return "thrusters_held"
         driven = self.driver is not None
+        # Members may bring in a lag where the scene has a limited rate.
+        motions = motion(self) if driven else {"lag": self.slow, "rate": self.rate_limit is not None}
         features = (
-            {"driven": driven}
-            | (motion(self) if driven else {"rate": self.rate_limit is not None})
-            | {
-                self.shape: self.shape != "square",
-                "propeller": self.propels,
-            }
+            {"driven": driven, "scheduled": not driven}
+            | {name: acts and self.memory for name, acts in motions.items()}
+            | {"table": self.shape == "table", f"powers{self.powers}": self.shape == "polynomial"}
+            | {"propeller": self.propels}
         )
-        chosen = [name for name, present in features.items() if present]
-        if chosen in ([], ["polynomial"]):
-            return "thrusters_polynomial" if chosen else "thrusters"
-        return f"thrusters_with:{','.join(chosen)}"
+        return f"thrusters_with:{','.join(name for name, present in features.items() if present)}"
+
+    @property
+    def powers(self) -> int:
+        """Number of powers that the longer of both polynomials has."""
+        return max(len(self.polynomial), len(self.polynomial_astern))
 
     def to_dict(self) -> dict[str, Any]:
         # The term as a table of a scene file: of its commands what acts; polynomials only where they are not w^2.
@@ -181,15 +198,25 @@ class Thrusters(Commanded):
         Returns:
             Thrust (n,) or (k, n) [N] along each direction.
         """
-        u = np.clip(np.asarray(command, dtype=np.float64), -self.limit, self.limit)
+        command = np.asarray(command, dtype=np.float64)
+        numbers = {name: value[None] for name, value in self.parameters().items()}
+        return self._thrusts(numbers, self._beyond(numbers, np.atleast_2d(command))).reshape(command.shape)
+
+    def _beyond(self, numbers: Numbers, command: np.ndarray) -> np.ndarray:
+        """Commands (n, units) within their limits, less the dead band."""
+        u = np.clip(command, -numbers["limit"], numbers["limit"])
+        return np.asarray(np.sign(u) * np.maximum(np.abs(u) - numbers["dead_band"], 0.0))
+
+    def _thrusts(self, numbers: Numbers, w: np.ndarray) -> np.ndarray:
+        """Thrusts (n, units) [N] at rest, of places w (n, units) less the dead band."""
         if self.shape == "table":
-            w = np.sign(u) * np.maximum(np.abs(u) - self.dead_band, 0.0)
-            columns = zip(np.moveaxis(w, -1, 0), self.table_thrusts.T, strict=True)
-            f = np.stack([np.interp(x, self.table_commands, values) for x, values in columns], axis=-1)
-            return np.asarray(np.where(w > 0.0, self.coefficient, self.coefficient_astern) * f)
-        ahead = evaluate(self.polynomial, np.maximum(u - self.dead_band, 0.0))
-        astern = evaluate(self.polynomial_astern, np.maximum(-u - self.dead_band, 0.0))
-        return np.asarray(self.coefficient * ahead - self.coefficient_astern * astern)
+            f = table_values(numbers["table_commands"], numbers["table_thrusts"], w)
+        else:
+            ahead, astern = np.maximum(w, 0.0), np.maximum(-w, 0.0)
+            f = polynomial_values(numbers["polynomial"], ahead) - polynomial_values(
+                numbers["polynomial_astern"], astern
+            )
+        return np.asarray(np.where(w > 0.0, numbers["coefficient"], numbers["coefficient_astern"]) * f)
 
     def drive(self) -> np.ndarray:
         # The largest force and torque of all thrusters together, over the times of the schedule.
@@ -232,7 +259,7 @@ class Thrusters(Commanded):
         elif self.table_commands is not None:
             if not self.is_square:
                 faults.add("polynomial", self.polynomial, "is given beside a table", "keep one of them")
-            if _unfit(self.table_commands[None], self.table_thrusts[None])[0]:
+            if unfit(self.table_commands[None], self.table_thrusts[None])[0]:
                 fault = "does not rise from below 0 through 0 at the command 0"
                 faults.add(
                     "table_thrusts", self.table_thrusts, fault, "sort it, and count commands from the neutral one"
@@ -248,7 +275,7 @@ class Thrusters(Commanded):
         bad["direction"] = bad["direction"] | np.any(~np.any(numbers["direction"], axis=-1), axis=-1)
         remedy = f"give {self.key}.time_constant above 0 [s] in the scene as well"
         if "table_commands" in numbers:
-            bad["table_thrusts"] = bad["table_thrusts"] | _unfit(numbers["table_commands"], numbers["table_thrusts"])
+            bad["table_thrusts"] = bad["table_thrusts"] | unfit(numbers["table_commands"], numbers["table_thrusts"])
         refuse_idle(self, numbers, "time_constant", numbers["time_constant"] > 0.0, remedy)
         self._refuse_idle_polynomial(numbers)
         if self.driver is not None:
@@ -265,43 +292,50 @@ class Thrusters(Commanded):
         faults.raise_if_any()
 
     @property
-    def memory(self) -> bool:
+    def slow(self) -> bool:
         # Whether thrusters have a limited rate, or one of them a lag.
         if self.driver is not None:
             return any(motion(self).values())
         return bool(self.rate_limit is not None or np.any(self.time_constant > 0.0))
 
     def packed(self, numbers: Numbers, context: PackingContext) -> Packed:
-        # The device rows: those of each thruster, then the command table of each thruster.
+        # The device rows: those of each thruster, then the command table of each thruster; or the sum of all that they push.
         direction = numbers["direction"] / np.linalg.norm(numbers["direction"], axis=-1, keepdims=True)
         arms = np.cross(numbers["position"] + 0.0 * direction, direction + 0.0 * numbers["position"])
+        if self.pushes_steadily:
+            return self._packed_push(numbers, context, direction, arms)
         force, torque = context.frame.vector(direction), context.frame.torque(arms, direction + 0.0 * arms)
-        if self.device_in(context.aligned) not in ("thrusters", "thrusters_polynomial"):
-            curves = [numbers[key][..., None] for key in ("coefficient", "coefficient_astern", "dead_band")]
-            if self.propels:
-                none = np.zeros_like(numbers["coefficient"])
-                losses = (numbers.get(key, none)[..., None] for key in PROPELLER)
-                curves += [context.frame.vector(direction), *losses]
-            return packed_following(self, numbers, side_by_side(force, torque, *curves), *self.curve_rows(numbers))
-        with np.errstate(divide="ignore"):
-            rate = np.where(numbers["time_constant"] > 0.0, 1.0 / numbers["time_constant"], FAST)
-        settings = [numbers[key] for key in ("coefficient", "coefficient_astern", "dead_band", "limit")]
-        blocks = [force, torque, *(x[..., None] for x in (*settings, rate))]
-        times, schedule = commands(numbers)
-        thrusters, count = side_by_side(*blocks), schedule.shape[2]
-        rows = [thrusters.reshape(len(thrusters), -1)]
-        rows += [knots(times, schedule[:, :, i : i + 1]) for i in range(count)]
-        values = {"count": count, "knots": times.shape[1] - 1, "lagged": int(self.memory)}
-        if not self.is_square:
-            polynomials, values["powers"] = self.curve_rows(numbers)
-            rows.append(polynomials)
-        if not self.memory:
-            return Packed(values | {"memory": 0}, side_by_side(*rows))
-        start = np.clip(at_start(times, schedule), -numbers["limit"], numbers["limit"])
-        return Packed(values, side_by_side(*rows), start)
+        blocks = [numbers[key][..., None] for key in ("coefficient", "coefficient_astern", "dead_band")]
+        if self.propels:
+            none = np.zeros_like(numbers["coefficient"])
+            losses = (numbers.get(key, none)[..., None] for key in PROPELLER)
+            blocks += [context.frame.vector(direction), *losses]
+        curves, size = self.curve_rows(numbers)
+        odd = True
+        if self.shape == "polynomial":
+            curves, odd = parted(curves)
+        alike = np.all(numbers["coefficient"] == numbers["coefficient_astern"]) and not np.any(numbers["dead_band"])
+        words = {"plain": int(odd and alike)}
+        # Where nothing is remembered, commands are looked up in rows to work with.
+        work = 0 if self.memory or self.driver is not None else self.channels
+        return packed_following(self, numbers, side_by_side(force, torque, *blocks), curves, size, work, words)
+
+    def _packed_push(
+        self, numbers: Numbers, context: PackingContext, direction: np.ndarray, arms: np.ndarray
+    ) -> Packed:
+        """The force and the torque of held commands; direction, arms: force and torque of a unit of thrust, (n, units, 3)."""
+        # Members whose numbers overflow fail in their first step.
+        with np.errstate(over="ignore", invalid="ignore"):
+            w = self._beyond(numbers, numbers["command"])
+            thrust = self._thrusts(numbers, w)
+            force, torque = _summed(thrust, direction), _summed(thrust, arms)
+            if self.torque_coefficient is not None:
+                torque = torque + _summed(numbers["torque_coefficient"] * w * np.abs(w), direction)
+            force, torque = repeated(force, torque)
+            return Packed({"force": context.frame.vector(force), "torque": context.frame.torque(torque, force)})
 
     def curve_rows(self, numbers: Numbers) -> tuple[np.ndarray, int]:
-        """The curves as lgvi_kernels.laws.thrust_curves reads them.
+        """The curves as an allocation reads them.
 
         Args:
             numbers: The term's numbers by field.
@@ -317,97 +351,18 @@ class Thrusters(Commanded):
             tables = [knots(at, values[:, :, i : i + 1]) for i in range(self.channels)]
             return side_by_side(*tables), at.shape[1] - 1
         ahead, astern = numbers["polynomial"], numbers["polynomial_astern"]
-        powers = max(ahead.shape[1], astern.shape[1])
-        padded = [np.pad(curve, ((0, 0), (0, powers - curve.shape[1]))) for curve in (ahead, astern)]
-        return side_by_side(*padded), powers
+        padded = [np.pad(curve, ((0, 0), (0, self.powers - curve.shape[1]))) for curve in (ahead, astern)]
+        return side_by_side(*padded), self.powers
 
 
 # Numbers of propellers in the order of their rows, and all that may be absent with one number for each thruster.
 PROPELLER = ("advance_loss", "advance_loss_astern", "torque_coefficient", "torque_loss")
 OPTIONAL = (*PROPELLER, "rate_limit")
-# A table's thrust at the command 0 counts as 0 below this part of its largest.
-NEUTRAL = 1e-9
 
 
-def _unfit(at: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Mask (n,) of the members whose tables (n, t), (n, t, units) fall or stand elsewhere than at 0, or give thrust at 0."""
-    at, values = repeated(at, values)
-    change = np.diff(values, axis=1)
-    idle = (values[:, 1:] == 0.0) & (values[:, :-1] == 0.0)
-    falls = np.any((change <= 0.0) & ~idle, axis=(1, 2))
-    neutral = np.array([[np.interp(0.0, x, y) for y in columns.T] for x, columns in zip(at, values, strict=True)])
-    return np.asarray(falls | np.any(np.abs(neutral) > NEUTRAL * np.abs(values).max(axis=1), axis=1))
-
-
-def side_of_table(at: np.ndarray, values: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
-    """One side of tables of thrust (n, t) at commands (n, t), by size: from the command at which thrust begins on.
-
-    Returns: Sizes of commands (n, t) and of thrusts (n, t), from (begin, 0) up; points of the other side are at the begin.
-    """
-    if side < 0.0:
-        at, values = -at[:, ::-1], -values[:, ::-1]
-    at, values = repeated(at, values)
-    acts = values > 0.0
-    # The last command without thrust, or where the line to the next one is 0.
-    i = np.clip(np.argmax(acts, axis=1), 1, None) - 1
-    row = np.arange(len(at))
-    low, high = values[row, i], values[row, i + 1]
-    begin = at[row, i] - low / np.where(high > low, high - low, 1.0) * (at[row, i + 1] - at[row, i])
-    begin = np.where(acts.any(axis=1), begin, 0.0)
-    return np.where(acts, at, begin[:, None]), np.where(acts, values, 0.0)
-
-
-# The curve w^2, coefficients from the first power up.
-SQUARE = (0.0, 1.0)
-
-
-def evaluate(polynomial: np.ndarray, w: np.ndarray) -> np.ndarray:
-    """Value of a polynomial without a constant, p_1 w + p_2 w^2 + ...
-
-    Args:
-        polynomial: Coefficients from the first power up.
-        w: Arguments, of any shape.
-
-    Returns:
-        Values in the shape of `w`.
-    """
-    value = np.zeros_like(w)
-    for coefficient in polynomial[::-1]:
-        value = (value + coefficient) * w
-    return value
-
-
-def solve(polynomial: np.ndarray, wanted: float, reach: float) -> float:
-    """The smallest w in [0, reach] at which a polynomial without a constant has a given value.
-
-    Args:
-        polynomial: Coefficients from the first power up.
-        wanted: The value, above 0.
-        reach: Upper end of the interval.
-
-    Returns:
-        That w; where the polynomial does not reach the value, the w of its largest value.
-    """
-    powers = np.concatenate([[-wanted], polynomial])
-    slope = np.polynomial.polynomial.polyder(powers)
-    turns = _within(np.polynomial.polynomial.polyroots(slope), reach)
-    places = np.array([0.0, *turns, reach])
-    values = evaluate(polynomial, places)
-    if values.max() <= wanted:
-        return float(places[values.argmax()])
-    # The polynomial is monotonic between its turns: the first interval at whose end it reaches the value has the root.
-    i = int((values >= wanted).argmax())
-    low, high = places[i - 1], places[i]
-    for _ in range(200):
-        middle = 0.5 * (low + high)
-        if evaluate(polynomial, np.array(middle)) < wanted:
-            low = middle
-        else:
-            high = middle
-    return float(high)
-
-
-def _within(roots: np.ndarray, reach: float) -> np.ndarray:
-    """The real roots strictly between 0 and reach, sorted."""
-    real = roots.real[np.abs(roots.imag) <= 1e-9 * (1.0 + np.abs(roots))]
-    return np.sort(real[(real > 0.0) & (real < reach)])
+def _summed(sizes: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """The sum of vectors (n, units, 3) times sizes (n, units), one after the other: whatever n is, with the same bits."""
+    total = np.zeros((1, 3))
+    for i in range(vectors.shape[1]):
+        total = total + sizes[:, i, None] * vectors[:, i]
+    return total

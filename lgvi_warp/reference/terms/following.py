@@ -22,8 +22,9 @@ class Following(Law):
 
     @property
     def moves(self) -> bool:
-        """Whether some channel has a lag or a limited rate: then all remember."""
-        return bool(np.any(np.greater(self.time_constant, 0.0)) or np.any(np.isfinite(self.rate_limit)))
+        """Whether some channel has a lag or a limited rate, and commands change: then all remember."""
+        slow = np.any(np.greater(self.time_constant, 0.0)) or np.any(np.isfinite(self.rate_limit))
+        return bool(slow and (self.driven or len(self.times) > 1))
 
     def commanded(self, t: float) -> Array:
         """Commands (n,) at t, within their limits."""

@@ -9,7 +9,7 @@ from lgvi_kernels.laws.thrust_curves import NEWTON_STEPS, START_SIZE
 from lgvi_warp.common.errors import SceneError
 from lgvi_warp.control import pseudo_inverse
 from lgvi_warp.control.pseudo_inverse import inverse_rows
-from lgvi_warp.physics.terms.thrusters import side_of_table
+from lgvi_warp.physics.terms.thrust_curves import side_of_table
 from lgvi_warp.scene import plausibility
 
 PAIR = dict(position=((-0.5, 0.2, 0.0), (-0.5, -0.2, 0.0)), direction=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
@@ -163,11 +163,12 @@ def test_effect_of_a_table_of_lift():
 
 def test_absent_numbers_are_no_parameters():
     # A scene without the new numbers has the same parameters, file and device code as before there were any.
-    for term, device in ((thrusters(), "thrusters"), (fins(), "fins")):
+    schedule = dict(times=(0.0, 1.0), command_schedule=((0.0, 0.0), (1.0, 1.0)))
+    for term, device in ((thrusters(**schedule), "thrusters_with:scheduled"), (fins(), "fins")):
         assert term.device_in(True) == device
         new = ("table", "advance", "torque", "lift_a", "lift_c", "flow", "rate_limit", "time_constant")
         given = {key for key in term.to_dict() if key.startswith(new)}
-        assert given == ({"time_constant"} if device == "thrusters" else {"rate_limit"})
+        assert given == ({"rate_limit"} if device == "control_fins" else {"time_constant"})
 
 
 @pytest.mark.parametrize(

@@ -109,13 +109,18 @@ def test_halved_steps_meet_the_reference_by_their_order(name):
     assert np.log2(coarse / fine) > 3.5
 
 
+def compiler_or_skip(module):
+    """Skip the test where a peer wants a compiler and there is none."""
+    try:
+        getattr(module, "ready", list)()
+    except ModuleNotFoundError as error:
+        pytest.skip(str(error))
+
+
 def by_hand(one, method, dtype, *rates):
     """Position and attitude of lanes by hand, for each number of steps a second."""
     module = importlib.import_module("benchmarks.peers.peer_hand_lanes")
-    try:
-        module.ready()
-    except ModuleNotFoundError:
-        pytest.skip("no C++ compiler")
+    compiler_or_skip(module)
     ends = []
     lanes = module.Lanes(one, method, dtype, module.LANES[dtype][0])
     for rate in rates:
@@ -162,3 +167,23 @@ def test_the_reference_of_a_driven_vehicle_is_of_its_first_members(name):
     b, R = reference.solve(one)
     assert np.abs(b - one.b - 0.02 * np.einsum("nij,nj->ni", one.R, one.nu)).max() < 1e-3
     assert problem.error((b, R), (b[:2], R[:2]))["error_max"] == 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", problem.DRIVEN)
+@pytest.mark.parametrize(("peer", "package"), [
+    ("hand_lanes", None), ("numba_simd", "numba"), ("heyoka", "heyoka"), ("diffrax", "diffrax"),
+])  # fmt: skip
+def test_a_peer_drives_the_vehicle(peer, package, name):
+    if package is not None:
+        pytest.importorskip(package)
+    module = importlib.import_module(f"benchmarks.peers.peer_{peer}")
+    compiler_or_skip(module)
+    one = problem.make_problem(9, 0.5, name)
+    truth, methods = reference.solve(one), {}
+    for run in module.runs(one, threads=1):
+        run.call()
+        methods.setdefault((run.method, run.dtype), []).append(problem.error(run.end(), truth)["error_max"])
+    # |v| v has a kink where v changes its sign: there a step of 1/128 s leaves out some 1e-7.
+    for (_, dtype), errors in methods.items():
+        assert min(errors) < (1e-6 if dtype == "float64" else 1e-4)

@@ -29,12 +29,13 @@ class Fin:
 
 @dataclass(frozen=True, eq=False)
 class Thrusters:
-    """Wrenches (n, 6) of a unit thrust, curves (n, p) ahead and astern from the first power up, and limits (n,)."""
+    """Wrenches (n, 6) of a unit thrust, curves (n, p) ahead and astern from the first power up, limits and lags [s] (n,)."""
 
     wrenches: np.ndarray
     ahead: np.ndarray
     astern: np.ndarray
     limit: np.ndarray
+    lag: np.ndarray
     command: np.ndarray
 
     def thrust(self, command: Any) -> Any:
@@ -136,7 +137,7 @@ def _thrusters(body: Body, term: Any, scene: Scene) -> Body:
     wrenches = np.array([_twist(r, d / np.linalg.norm(d)) for r, d in zip(term.position, term.direction, strict=True)])
     ahead = np.outer(term.coefficient, term.polynomial)
     astern = np.outer(term.coefficient_astern, term.polynomial_astern)
-    return replace(body, thrusters=Thrusters(wrenches, ahead, astern, term.limit, term.command))
+    return replace(body, thrusters=Thrusters(wrenches, ahead, astern, term.limit, term.time_constant, term.command))
 
 
 def _twist(point: np.ndarray, direction: np.ndarray) -> np.ndarray:

@@ -52,15 +52,27 @@ static inline __attribute__((always_inline)) void thrusts(const Lane *command, L
 THRUSTS
 }
 
+// Where thrusters are some time after `place`, on their way to their commands, and their wrench there.
+template <class real, int lanes, class Lane>
+static inline __attribute__((always_inline)) void lagged(const Lane *command, const Lane *place, real fade, Lane *wrench) {
+    Lane later[THRUSTERS + 1];
+    for (int i = 0; i < THRUSTERS; ++i) later[i] = command[i] + fade * (place[i] - command[i]);
+    thrusts<real, lanes, Lane>(later, wrench);
+}
+
 template <class real, int lanes>
 static void advance(const real *start, real *end, double step, long steps, long packets) {
     typedef typename Types<real, lanes>::Lane Lane;
     const real h = real(step);
+FADES
     for (long i = 0; i < packets; ++i) {
         Lane row[ROW], y[NUMBERS], wrench[6] = {};
         std::memcpy(row, start + i * ROW * lanes, sizeof row);
         for (int j = 0; j < NUMBERS; ++j) y[j] = row[j];
-        thrusts<real, lanes, Lane>(row + NUMBERS, wrench);
+        const Lane *command = row + NUMBERS;
+        Lane *place = row + NUMBERS + THRUSTERS;
+        (void)command, (void)place;
+        thrusts<real, lanes, Lane>(command, wrench);
         for (long k = 0; k < steps; ++k) {
 STEP
         }

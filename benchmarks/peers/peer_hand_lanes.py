@@ -2,14 +2,16 @@
 """Lanes written by hand in C++ for one vehicle, compiled when it runs: what the other figures may hope for.
 
 The state of a packet is 15 numbers: b, the first and the last row of R, nu, Om. The vehicle's numbers are constants of the
-code, the commands of thrusters a member's own; there are no checks, no samples and no other force. CXX names the compiler,
-else clang++ or g++; without any the peer is missing.
+code, the commands of thrusters a member's own; there are no checks, no samples and no other force. Thrusts are evaluated
+once where commands are held; "lagged" follows each thruster on its way to its command, as commands that change need.
+CXX names the compiler, else clang++ or g++; without any the peer is missing.
 """
 
 from __future__ import annotations
 
 import ctypes
 import functools
+import itertools
 import os
 import shutil
 import subprocess
@@ -62,14 +64,17 @@ def cpp_number(x: float) -> str:
     return f"real({float(x)!r})"
 
 
-def source(problem: Problem, tableau: Tableau, dtype: str, lanes: int) -> str:
+def source(problem: Problem, tableau: Tableau, dtype: str, lanes: int, lagged: bool = False) -> str:
     """The text of an advance of packets."""
     thrusters = problem.body.thrusters
+    count = 0 if thrusters is None else len(thrusters.command)
     words = {
         "RATES": indented(rate_lines(problem), 4),
         "THRUSTS": indented([] if thrusters is None else thrust_lines(thrusters), 4),
-        "STEP": indented(step_lines(tableau), 12),
-        "ROW": str(SIZE + (0 if thrusters is None else len(thrusters.command))),
+        "FADES": indented(fade_lines(thrusters, tableau) if lagged else [], 4),
+        "STEP": indented(step_lines(tableau, lagged), 12),
+        "THRUSTERS": str(count),
+        "ROW": str(SIZE + 2 * count),
         "NUMBERS": str(SIZE),
         "REAL": TYPES[dtype][0],
         "LANES": str(lanes),
@@ -114,15 +119,41 @@ def thrust_lines(thrusters: Thrusters) -> list[str]:
     return lines
 
 
-def step_lines(tableau: Tableau) -> list[str]:
+def nodes(tableau: Tableau) -> list[float]:
+    """The times of the stages in steps."""
+    return [0.0, *(round(sum(row), 12) for row in tableau[0])]
+
+
+def fade_lines(thrusters: Thrusters, tableau: Tableau) -> list[str]:
+    """C++ of what is left of a thruster's way to its command at each time of a stage."""
+    assert np.ptp(thrusters.lag) == 0.0
+    assert max(nodes(tableau)) == 1.0
+    times = sorted(set(nodes(tableau)) - {0.0})
+    return [
+        f"const real fade{i} = real(std::exp(step * {float(-c / thrusters.lag[0])!r}));" for i, c in enumerate(times)
+    ]
+
+
+def step_lines(tableau: Tableau, lagged: bool) -> list[str]:
     """C++ of one step of y: stage after stage, number after number."""
     rows, last = tableau
+    times = sorted(set(nodes(tableau)) - {0.0}) if lagged else []
     lines = ["Lane s[NUMBERS];"]
-    for stage, row in enumerate([[], *rows]):
+    for i in range(len(times)):
+        lines += [f"Lane w{i}[6] = {{}};", f"lagged<real, lanes, Lane>(command, place, fade{i}, w{i});"]
+    for stage, (row, c) in enumerate(zip([[], *rows], nodes(tableau), strict=True)):
         lines += [f"s[{i}] = {_moved(i, row)};" for i in range(SIZE)] if row else []
         lines.append(f"Lane k{stage}[NUMBERS];")
-        lines.append(f"rates<real, lanes, Lane>({'s' if row else 'y'}, wrench, k{stage});")
-    return lines + [f"y[{i}] = {_moved(i, last)};" for i in range(SIZE)]
+        wrench = f"w{times.index(c)}" if lagged and c else "wrench"
+        lines.append(f"rates<real, lanes, Lane>({'s' if row else 'y'}, {wrench}, k{stage});")
+    lines += [f"y[{i}] = {_moved(i, last)};" for i in range(SIZE)]
+    if lagged:
+        end = len(times) - 1
+        lines.append(
+            f"for (int i = 0; i < THRUSTERS; ++i) place[i] = command[i] + fade{end} * (place[i] - command[i]);"
+        )
+        lines.append(f"for (int i = 0; i < 6; ++i) wrench[i] = w{end}[i];")
+    return lines
 
 
 def _moved(i: int, weights: list[float]) -> str:
@@ -152,9 +183,9 @@ def compiled(text: str, dtype: str) -> Advance:
 class Lanes:
     """The members of a problem in packets of so many lanes, and an advance of them."""
 
-    def __init__(self, problem: Problem, method: str, dtype: str, lanes: int):
+    def __init__(self, problem: Problem, method: str, dtype: str, lanes: int, lagged: bool = False):
         self.members, self.lanes = problem.members, lanes
-        self.advance = compiled(source(problem, TABLEAUS[METHODS[method]], dtype, lanes), dtype)
+        self.advance = compiled(source(problem, TABLEAUS[METHODS[method]], dtype, lanes, lagged), dtype)
         self.start = packed(row_state(problem), lanes).astype(dtype)
 
     def run(self, problem: Problem, method: str, dtype: str, rate: float, threads: int, pool: Any) -> Run:
@@ -178,10 +209,10 @@ class Lanes:
 
 
 def row_state(problem: Problem) -> np.ndarray:
-    """The start as (members, 15), and behind it the commands of thrusters."""
+    """The start as (members, 15), and behind it the commands of thrusters and where these are."""
     columns, thrusters = [problem.b, problem.R[:, 0], problem.R[:, 2], problem.nu, problem.Om], problem.body.thrusters
     if thrusters is not None:
-        columns.append(np.tile(thrusters.command, (problem.members, 1)))
+        columns.append(np.tile(thrusters.command, (problem.members, 2)))
     return np.concatenate(columns, axis=1)
 
 
@@ -192,12 +223,12 @@ def packed(states: np.ndarray, lanes: int) -> np.ndarray:
     return np.ascontiguousarray(padded.reshape(packets, lanes, -1).transpose(0, 2, 1))
 
 
-def best(problem: Problem, method: str, dtype: str) -> Lanes:
+def best(problem: Problem, method: str, dtype: str, lagged: bool) -> Lanes:
     """The number of lanes that is faster here."""
     from benchmarks.timing import least
 
     part = problem.first(TRIAL_MEMBERS)
-    tried = [Lanes(part, method, dtype, lanes) for lanes in LANES[dtype]]
+    tried = [Lanes(part, method, dtype, lanes, lagged) for lanes in LANES[dtype]]
     calls = [functools.partial(one.advance, one.start, np.empty_like(one.start), 1e-3, TRIAL_STEPS) for one in tried]
     chosen = tried[int(np.argmin(least(calls, 7)))]
     chosen.members, chosen.start = problem.members, packed(row_state(problem), chosen.lanes).astype(dtype)
@@ -207,8 +238,8 @@ def best(problem: Problem, method: str, dtype: str) -> Lanes:
 def runs(problem: Problem, threads: int) -> Runs:
     """By steps a second."""
     pool = ThreadPoolExecutor(threads) if threads > 1 else None
-    for method in METHODS:
-        for dtype in LANES:
-            lanes = best(problem, method, dtype)
-            for rate in problem.rates(ORDERS[METHODS[method]]):
-                yield lanes.run(problem, method, dtype, rate, threads, pool)
+    ways = (False,) if problem.body.thrusters is None else (False, True)
+    for method, dtype, lagged in itertools.product(METHODS, LANES, ways):
+        lanes, name = best(problem, method, dtype, lagged), f"{method}, lagged" if lagged else method
+        for rate in problem.rates(ORDERS[METHODS[method]]):
+            yield lanes.run(problem, name, dtype, rate, threads, pool)

@@ -11,19 +11,16 @@ from functools import partial
 from typing import Any
 
 from benchmarks.peers.peer_jax import Blocks  # first: it sets the flags of JAX
-from benchmarks.peers.problem import Problem, Runs, make_rates
+from benchmarks.peers.problem import DRIVEN, Problem, Runs, make_rates
 
 # isort: split
 import diffrax
 import jax
 import jax.numpy as jnp
 
+PROBLEMS = ("vehicle", *DRIVEN)
 SOLVERS = {"tsit5": diffrax.Tsit5, "dopri5": diffrax.Dopri5, "dopri8": diffrax.Dopri8}
-STEPS = {  # a second
-    "tsit5": (1, 2, 4, 8, 16, 32, 64, 128),
-    "dopri5": (2, 8, 32, 128),
-    "dopri8": (1, 2, 4, 8, 16, 32),
-}
+ORDERS = {"tsit5": 5, "dopri5": 5, "dopri8": 8}
 TOLERANCES = {"tsit5": (1e-3, 1e-5, 1e-7, 1e-9), "dopri8": (1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13)}
 VMAP = (1e-5, 1e-9)
 VMAP_MEMBERS = 512
@@ -32,7 +29,7 @@ FIRST_STEP = 0.01
 
 def solve(problem: Problem, solver: Any, adaptive: bool, y: Any, setting: Any, _: Any = None) -> Any:
     """The state at t1, from a state (13,) or (13, block). setting: the step [s], or the tolerance."""
-    rates = make_rates(problem)
+    rates = make_rates(problem, absolute=jnp.abs, root=jnp.sqrt)
     controller = diffrax.PIDController(rtol=setting, atol=setting) if adaptive else diffrax.ConstantStepSize()
     found = diffrax.diffeqsolve(
         diffrax.ODETerm(lambda t, y, args: jnp.stack(rates(y))),
@@ -53,8 +50,9 @@ def runs(problem: Problem, threads: int) -> Runs:
     """By steps a second, and by tolerance."""
     for name, solver in SOLVERS.items():
         fixed = Blocks(partial(solve, problem, solver(), False), problem, threads)
-        for rate in STEPS[name]:
-            yield fixed.run(name, f"h={1.0 / rate:g}", 1.0 / rate)
+        for rate in problem.rates(ORDERS[name])[:: 3 if name == "dopri5" else 1]:
+            h, _ = problem.steps(rate)
+            yield fixed.run(name, f"h={h:g}", h)
         adaptive = Blocks(partial(solve, problem, solver(), True), problem, threads)
         for tolerance in TOLERANCES.get(name, ()):
             yield adaptive.run(f"{name} adaptive", f"tol={tolerance:g}", tolerance)

@@ -14,8 +14,9 @@ from typing import Any
 import heyoka as hy
 import numpy as np
 
-from benchmarks.peers.problem import End, Problem, Run, Runs, make_matrix_rates, matrix_end_of
+from benchmarks.peers.problem import DRIVEN, End, Problem, Run, Runs, make_matrix_rates, matrix_end_of
 
+PROBLEMS = ("vehicle", *DRIVEN)
 TOLERANCES = (1e-1, 1e-3, 1e-5, 1e-7, 1e-9, 1e-11, 1e-13, 1e-15)
 ENSEMBLE = (1e-5, 1e-9, 1e-15)
 SIZE = 18
@@ -24,7 +25,12 @@ SIZE = 18
 def system(problem: Problem) -> list[tuple[Any, Any]]:
     """The equations of motion as heyoka's expressions, with the matrix R: faster here than with a quaternion."""
     variables = hy.make_vars(*(f"x{i:02d}" for i in range(SIZE)))
-    return list(zip(variables, make_matrix_rates(problem)(variables), strict=True))
+    return list(zip(variables, make_matrix_rates(problem, absolute, hy.sqrt)(variables), strict=True))
+
+
+def absolute(x: Any) -> Any:
+    """|x|, whose series changes where x changes its sign."""
+    return hy.relu(x) + hy.relu(-x)
 
 
 def integrator(problem: Problem, tolerance: float) -> Any:

@@ -23,7 +23,10 @@ from benchmarks.peers.problem import SIZE, End, Problem, Run, Runs, end_of, make
 jax.config.update("jax_enable_x64", True)
 
 BLOCK = 256
-STEPS = {"rk4": (1, 2, 4, 8, 16, 32, 64, 128), "dop853": (1, 2, 4, 8, 16, 32)}  # a second
+STEPS = {  # a second
+    "rk4": (1, 1.5, 2, 3, 4, 6, 8, 12, 16, 32, 64, 128),
+    "dop853": (0.5, 0.75, 1, 1.5, 2, 3, 4, 6, 8, 12, 16, 32),
+}
 # From a state (13, block), a step [s] or a tolerance, and a number of steps to the state at t1.
 Advance = Callable[[Any, Any, Any], Any]
 
@@ -89,4 +92,5 @@ def runs(problem: Problem, threads: int) -> Runs:
     for name, advance in (("rk4", rk4), ("dop853", dop853)):
         blocks = Blocks(partial(advance, problem), problem, threads)
         for rate in STEPS[name]:
-            yield blocks.run(name, f"h={1.0 / rate:g}", 1.0 / rate, round(problem.t1 * rate))
+            h, steps = problem.steps(rate)
+            yield blocks.run(name, f"h={h:g}", h, steps)

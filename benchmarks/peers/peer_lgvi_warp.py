@@ -4,21 +4,24 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 import numpy as np
 import warp as wp
 
-from benchmarks.peers.problem import End, Problem, Run, Runs
+from benchmarks.peers.problem import DRIVEN, End, Problem, Run, Runs
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.work import unpacked
 from lgvi_warp.methods.method import Method
 from lgvi_warp.methods.saveat import SaveAt
 from lgvi_warp.runs.settle import make_plan
 
+PROBLEMS = ("vehicle", "rigid", *DRIVEN)
 # What is measured: a method, its precision, and its steps a second.
-METHODS: tuple[tuple[str | Method, str, tuple[float, ...]], ...] = (
+Setting = tuple[str | Method, str, tuple[float, ...]]
+METHODS: tuple[Setting, ...] = (
     ("psi_s", "float64", (2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)),
     ("psi_x", "float64", (2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)),
     ("psi_1", "float64", (2, 4, 8, 16, 32, 64, 128, 256, 512, 1024)),
@@ -31,20 +34,31 @@ METHODS: tuple[tuple[str | Method, str, tuple[float, ...]], ...] = (
     ("kl8(psi_s)", "float64", (1, 2, 4, 8, 16, 32)),
     ("kl8(psi_1)", "float64", (1, 2, 4, 8, 16, 32)),
     ("kl8(psi_x)", "float64", (1, 2, 4, 8, 16, 32)),
-    ("rk4", "float64", (1, 2, 4, 8, 16, 32, 64)),
-    ("rk5", "float64", (1, 2, 4, 8, 16, 32, 64, 128)),
-    ("rk8", "float64", (0.5, 1, 2, 4, 8, 16, 32)),
     ("bm6(psi_x)", "float64", (1, 2, 4, 8, 16)),
     ("rkn6_14", "float64", (2, 4, 8, 16)),
-    ("rk4", "float32", (1, 2, 4, 8)),
-    ("rk5", "float32", (1, 2, 4, 8, 16)),
-    ("rk8", "float32", (0.5, 1, 2, 4)),
     ("su4(psi_x)", "float32", (1, 2, 4)),
     ("bm4(psi_x)", "float32", (1, 2, 4)),
     ("psi_s", "float32", (2, 4, 8, 16, 32, 64)),
     ("psi_x", "float32", (2, 4, 8, 16, 32, 64)),
     ("kl6(psi_x)", "float32", (1, 2, 4, 8)),
 )
+# By their order's steps a second, those of float32 as far as its digits go.
+EXPLICIT = {"rk4": 4, "rk5": 5, "rk8": 8}
+ENOUGH = {4: 64, 5: 128, 8: 32}, {4: 12, 5: 12, 8: 4}
+DRIVEN_METHODS: tuple[Setting, ...] = (
+    ("psi_x", "float64", (8, 16, 32, 64, 128, 256, 512)),
+    ("psi_x", "float32", (8, 16, 32, 64, 128)),
+    ("rkw3", "float64", (4, 8, 16, 32, 64, 128)),
+)
+
+
+def methods_of(problem: Problem) -> Iterator[Setting]:
+    """What is measured for a problem."""
+    yield from DRIVEN_METHODS if problem.driven else METHODS
+    for dtype, enough in zip(("float64", "float32"), ENOUGH, strict=True):
+        for method, order in EXPLICIT.items():
+            most = enough[order] * (8 if problem.driven else 1)
+            yield method, dtype, tuple(rate for rate in problem.rates(order) if rate <= most)
 
 
 # At the end, and what errors are of.
@@ -61,7 +75,8 @@ class Fleet:
     """The members of a plan, in as many parts as threads, and their ends."""
 
     def __init__(self, problem: Problem, method: str | Method, dtype: str, rate: float, threads: int):
-        self.plan = make_plan(problem.ensemble, method, h=1.0 / rate, t1=problem.t1, save=SAVE, dtype=dtype)
+        h, _ = problem.steps(rate)
+        self.plan = make_plan(problem.ensemble, method, h=h, t1=problem.t1, save=SAVE, dtype=dtype)
         self.plan.compile()
         edges = np.linspace(0, problem.members, threads + 1).astype(int)
         self.parts = [Packets(self.plan, problem.ensemble.select(a, b)) for a, b in pairwise(edges)]
@@ -92,8 +107,8 @@ class Fleet:
 
 def runs(problem: Problem, threads: int) -> Runs:
     """By steps a second."""
-    for method, dtype, rates in METHODS:
+    for method, dtype, rates in methods_of(problem):
         for rate in rates:
             fleet = Fleet(problem, method, dtype, rate, threads)
             name = fleet.plan.method.name
-            yield Run(name, f"h={1.0 / rate:g}", problem.members, fleet.advance, fleet.end, dtype)
+            yield Run(name, f"h={problem.steps(rate)[0]:g}", problem.members, fleet.advance, fleet.end, dtype)

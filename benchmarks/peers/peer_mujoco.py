@@ -9,7 +9,7 @@ from mujoco.rollout import Rollout
 
 from benchmarks.peers.problem import End, Problem, Run, Runs, end_of
 
-PROBLEM = "rigid"
+PROBLEMS = ("rigid",)
 MEMBERS = 64
 STEPS = {"RK4": (0.5, 1, 2, 4, 8, 16, 32, 64, 128), "implicitfast": (2, 8, 32, 128, 512), "Euler": (2, 8, 32, 128, 512)}
 CHUNK = 64  # steps a call: every one of its states is returned
@@ -47,9 +47,9 @@ def start_of(problem: Problem) -> np.ndarray:
 
 def make_run(problem: Problem, threads: int, integrator: str, rate: float) -> Run:
     """One setting."""
-    model, start = make_model(problem, integrator, 1.0 / rate), start_of(problem)
+    model, start = make_model(problem, integrator, problem.steps(rate)[0]), start_of(problem)
     datas, pool = [mujoco.MjData(model) for _ in range(threads)], Rollout(nthread=threads)
-    steps = round(problem.t1 * rate)
+    h, steps = problem.steps(rate)
     ends = [start]
 
     def call() -> None:
@@ -62,7 +62,7 @@ def make_run(problem: Problem, threads: int, integrator: str, rate: float) -> Ru
     def end() -> End:
         return end_of(ends[0][:, 1:])
 
-    return Run(integrator, f"h={1.0 / rate:g}", problem.members, call, end)
+    return Run(integrator, f"h={h:g}", problem.members, call, end)
 
 
 def runs(problem: Problem, threads: int) -> Runs:

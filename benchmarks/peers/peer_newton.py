@@ -14,7 +14,7 @@ import warp as wp
 
 from benchmarks.peers.problem import End, Problem, Run, Runs, end_of
 
-PROBLEM = "rigid"
+PROBLEMS = ("rigid",)
 STEPS = (2, 8, 32, 128)  # a second
 SOLVERS = {
     "semi-implicit": lambda model: newton.solvers.SolverSemiImplicit(model, angular_damping=0.0),

@@ -15,7 +15,7 @@ import numpy as np
 
 from benchmarks.peers.problem import End, Problem, Run, Runs, end_of, make_rates, matrix_end_of
 
-RK4_STEPS = (1, 2, 4, 8, 16, 32, 64, 128, 256)  # a second
+RK4_STEPS = (1, 1.5, 2, 3, 4, 6, 8, 12, 16, 32, 64, 128, 256)  # a second
 PSI_STEPS = (2, 4, 8, 16, 32, 64, 128, 256)
 Kernel = Callable[[np.ndarray, np.ndarray, float, int], None]
 
@@ -160,8 +160,8 @@ def runs(problem: Problem, threads: int) -> Runs:
 
 
 def make_run(
-    problem: Problem, name: str, kernel: Kernel, start: np.ndarray, converted: Callable[[np.ndarray], End], rate: int
+    problem: Problem, name: str, kernel: Kernel, start: np.ndarray, converted: Callable[[np.ndarray], End], rate: float
 ) -> Run:
     """One setting."""
-    end, h, steps = np.empty_like(start), 1.0 / rate, round(problem.t1 * rate)
+    end, (h, steps) = np.empty_like(start), problem.steps(rate)
     return Run(name, f"h={h:g}", problem.members, lambda: kernel(start, end, h, steps), lambda: converted(end))

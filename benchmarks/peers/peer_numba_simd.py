@@ -8,21 +8,18 @@ own code (inlined by LLVM, the loop is not vectorised: five times slower).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 import numba as nb
 import numpy as np
 
-from benchmarks.peers.problem import SIZE, End, Problem, Run, Runs, end_of, make_rates
-from benchmarks.peers.tableaus import TABLEAUS, Tableau
+from benchmarks.peers.problem import DRIVEN, SIZE, End, Problem, Run, Runs, end_of, make_rates
+from benchmarks.peers.tableaus import ORDERS, TABLEAUS, Tableau
 
+PROBLEMS = ("vehicle", *DRIVEN)
 LANES = 8
-STEPS = {  # a second
-    "rk4": (1, 2, 4, 8, 16, 32, 64, 128, 256, 512),
-    "dp5": (1, 2, 4, 8, 16, 32, 64, 128, 256),
-    "dop853": (0.5, 1, 2, 4, 8, 16, 32),
-}
 Kernel = Callable[[np.ndarray, np.ndarray, float, int], None]
 
 TEMPLATE = """
@@ -53,7 +50,7 @@ def _moved(i: int, weights: list[float]) -> str:
 
 def make_kernel(problem: Problem, method: str) -> Kernel:
     """(start, end, h, steps): rows (packets, 13 * lanes)."""
-    scope: dict[str, Any] = {"rates": nb.njit(fastmath=True, inline="always")(make_rates(problem))}
+    scope: dict[str, Any] = {"rates": nb.njit(fastmath=True, inline="always")(make_rates(problem, root=math.sqrt))}
     exec(source(TABLEAUS[method]), scope)
     advance = nb.njit(fastmath=True)(scope["advance"])
 
@@ -80,16 +77,16 @@ def unpacked(problem: Problem, end: np.ndarray) -> End:
 def runs(problem: Problem, threads: int) -> Runs:
     """By steps a second."""
     nb.set_num_threads(threads)
-    for name, rates in STEPS.items():
+    for name, order in ORDERS.items():
         kernel = make_kernel(problem, name)
-        for rate in rates:
+        for rate in problem.rates(order):
             yield make_run(problem, name, kernel, rate)
 
 
 def make_run(problem: Problem, name: str, kernel: Kernel, rate: float) -> Run:
     """One setting."""
     start = packed(problem)
-    end, h, steps = np.empty_like(start), 1.0 / rate, round(problem.t1 * rate)
+    end, (h, steps) = np.empty_like(start), problem.steps(rate)
     return Run(
         name,
         f"h={h:g}",

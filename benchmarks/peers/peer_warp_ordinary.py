@@ -29,7 +29,7 @@ def runs(problem: Problem, threads: int) -> Runs:
 def make_run(problem: Problem, method: str, rate: float) -> Run:
     """One setting."""
     states = (problem.b, problem.R, problem.nu, problem.Om)
-    M, J, h, steps = np.diag(problem.M), np.diag(problem.J), 1.0 / rate, round(problem.t1 * rate)
+    M, J, (h, steps) = np.diag(problem.M), np.diag(problem.J), problem.steps(rate)
     arrays, launch = command(states, M, J, problem.net, problem.d, h, steps, method)
     starts = [wp.clone(x) for x in arrays]
 

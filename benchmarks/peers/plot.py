@@ -14,7 +14,10 @@ HOME = "lgvi_warp"
 TITLES = {
     "vehicle": "the paper's vehicle",
     "rigid": "its rigid body alone: no added mass, no restoring moment",
+    "remus_100": "REMUS 100 as shipped: drag, lift, fins, thrust",
+    "bluerov2_heavy": "BlueROV2 heavy as shipped: drag, eight thrusters",
 }
+DRIVEN = ("remus_100", "bluerov2_heavy")
 
 
 def curves(records: list[Record], problem: str) -> dict[tuple[str, str], list[tuple[float, float]]]:

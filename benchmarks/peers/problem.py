@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The problem that every peer solves: the vehicle of Nordkvist & Sanyal (2010), many members, from 0 to t1.
+"""The problems that peers solve, many members from 0 to t1: the vehicle of Nordkvist & Sanyal (2010), and driven ones.
 
 R' = R hat(Om), b' = R nu, M nu' = M nu x Om + net z, J Om' = J Om x Om + M nu x nu - d x z with z = R^T e3 and d = B r.
 The state of the peers without a rotation of their own is 13 numbers: b, a unit quaternion (scalar first, body to
-inertial), nu, Om. `make_rates` writes its equations once, for any numbers: arrays, JAX's, heyoka's, numba's tuples.
+inertial), nu, Om. `make_rates` writes its equations once, for any numbers: arrays, JAX's, heyoka's, numba's tuples; those
+of driven, damped vehicles are in equations.py.
 """
 
 from __future__ import annotations
@@ -14,8 +15,12 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.peers import equations
+from benchmarks.peers.body import Body, body_of
+from benchmarks.peers.plot import DRIVEN
 from lgvi_warp.physics import notation
 from lgvi_warp.physics.vehicle import Vehicle
+from lgvi_warp.sampling.distributions.basic import Normal
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
 from lgvi_warp.scene.start import Environment
@@ -23,22 +28,35 @@ from lgvi_warp.studies import speed
 
 SIZE = 13
 GRAVITY = 9.8
+# How the driven vehicles start.
+VELOCITIES = {"remus_100": (1.54, 0.1, 0.05), "bluerov2_heavy": (0.5, 0.1, 0.05)}
+ANGULAR_VELOCITY, POSITION = (0.02, 0.01, 0.03), (0.0, 0.0, 10.0)
+# Steps a second by the order of a method. Rates stand between those that double: an error between two settings is the
+# time of the finer one, or nearly so, and each peer's steps that just keep it are among them.
+RATES = {
+    4: (1, 1.5, 2, 3, 4, 6, 8, 12, 16, 24, 32, 64, 128, 256, 512),
+    5: (1, 1.5, 2, 3, 4, 5, 6, 8, 12, 16, 24, 32, 64, 128, 256),
+    8: (0.5, 0.75, 1, 1.5, 2, 3, 4, 6, 8, 12, 16, 32),
+}
+# Where |v| v is not smooth, and drag is stiff.
+DRIVEN_RATES = {
+    4: (4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 256, 512),
+    5: (3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 128, 256),
+    8: (2, 3, 4, 6, 8, 12, 16, 24, 32, 64, 128, 256),
+}
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """Diagonals of M and J, net = weight - buoyancy [N], d = buoyancy x its lever [N m], and the members' start.
+    """A body and its members' start.
 
     name: "vehicle", or "rigid" for the vehicle without added mass and without restoring moment, which engines for
-    rigid bodies can do. ensemble: the same as lgvi_warp takes it.
+    rigid bodies can do, or one of DRIVEN. ensemble: the same as lgvi_warp takes it.
     """
 
     name: str
     ensemble: Ensemble
-    M: np.ndarray
-    J: np.ndarray
-    net: float
-    d: np.ndarray
+    body: Body
     t1: float
     b: np.ndarray
     R: np.ndarray
@@ -49,6 +67,40 @@ class Problem:
     def members(self) -> int:
         """How many."""
         return len(self.b)
+
+    @property
+    def driven(self) -> bool:
+        """Whether there are forces other than weight, buoyancy and restoring moment."""
+        return self.name in DRIVEN
+
+    @property
+    def M(self) -> np.ndarray:
+        """The diagonal of the mass (3,) [kg]."""
+        return np.diag(self.body.mass_matrix)[:3]
+
+    @property
+    def J(self) -> np.ndarray:
+        """The diagonal of the inertia (3,) [kg m2]."""
+        return np.diag(self.body.mass_matrix)[3:]
+
+    @property
+    def net(self) -> float:
+        """Weight - buoyancy [N]."""
+        return self.body.net
+
+    @property
+    def d(self) -> np.ndarray:
+        """Buoyancy times its lever (3,) [N m]."""
+        return self.body.moment
+
+    def rates(self, order: int) -> tuple[float, ...]:
+        """Steps a second for a method of this order."""
+        return (DRIVEN_RATES if self.driven else RATES)[order]
+
+    def steps(self, rate: float) -> tuple[float, int]:
+        """The step [s] and how many, of a rate [1/s] or a little beside it where steps end elsewhere than at t1."""
+        count = max(1, round(self.t1 * rate))
+        return self.t1 / count, count
 
     def state(self) -> np.ndarray:
         """The start as (members, 13)."""
@@ -67,10 +119,15 @@ class Problem:
 
 
 def make_problem(members: int, t1: float, name: str = "vehicle") -> Problem:
-    """The paper's vehicle, or its rigid body alone, members 10 % apart in rate."""
+    """The paper's vehicle, its rigid body alone, or a driven one: members 10 % apart in rate."""
+    if name in DRIVEN:
+        fleet = Ensemble(driven_scene(name), members, 1, {"start.angular_velocity": Normal(relative=0.1)})
+        start = fleet.select(0, members)
+        states = (start.position, start.attitude, start.velocity, start.angular_velocity)
+        return of_states(name, fleet.scene, t1, *states)
     fleet = speed.fleet(members)
     start, vehicle = fleet.select(0, members), fleet.scene.vehicle
-    buoyancy, lever = vehicle.buoyancy, vehicle.center_of_buoyancy
+    buoyancy = vehicle.buoyancy
     if name == "rigid":
         vehicle = Vehicle(
             vehicle.mass,
@@ -79,15 +136,31 @@ def make_problem(members: int, t1: float, name: str = "vehicle") -> Problem:
             buoyancy=buoyancy,
             center_of_buoyancy=[0.0, 0.0, 0.0],
         )
-        lever = np.zeros(3)
     states = (start.position, start.attitude, start.velocity, start.angular_velocity)
-    ensemble = Ensemble.from_states(Scene(vehicle, Environment(gravity=GRAVITY), start=fleet.scene.start), *states)
-    M, J = np.diag(vehicle.mass_matrix), np.diag(vehicle.inertia)
-    return Problem(name, ensemble, M, J, vehicle.mass * GRAVITY - buoyancy, buoyancy * lever, t1, *states)
+    scene = Scene(vehicle, Environment(gravity=GRAVITY), start=fleet.scene.start)
+    return of_states(name, scene, t1, *states)
 
 
-def make_rates(problem: Problem, number: Callable[[float], Any] = float) -> Callable[[Any], tuple[Any, ...]]:
-    """The rates of 13 numbers as a function of them, its constants folded. number: their type."""
+def driven_scene(name: str) -> Scene:
+    """A shipped vehicle under way, with its terms and commands as shipped."""
+    start = {"position": POSITION, "velocity": VELOCITIES[name], "angular_velocity": ANGULAR_VELOCITY}
+    return Scene.named(name, start=start)
+
+
+def of_states(name: str, scene: Scene, t1: float, *states: np.ndarray) -> Problem:
+    """The problem of a scene and its members' b, R, nu, Om."""
+    return Problem(name, Ensemble.from_states(scene, *states), body_of(scene), t1, *states)
+
+
+def make_rates(
+    problem: Problem, number: Callable[[float], Any] = float, absolute: Any = np.abs, root: Any = np.sqrt
+) -> Callable[[Any], tuple[Any, ...]]:
+    """The rates of 13 numbers as a function of them, its constants folded.
+
+    number: The type of constants, where they are not float64 anyway. absolute, root: |x| and its root, for such numbers.
+    """
+    if problem.driven:
+        return equations.python_rates(problem.body.held(), "quaternion", absolute, root)
     M1, M2, M3 = (number(x) for x in problem.M)
     J1, J2, J3 = (number(x) for x in problem.J)
     d1, d2, d3 = (number(x) for x in problem.d)
@@ -126,8 +199,12 @@ def make_rates(problem: Problem, number: Callable[[float], Any] = float) -> Call
     return rates
 
 
-def make_matrix_rates(problem: Problem) -> Callable[[Any], tuple[Any, ...]]:
+def make_matrix_rates(
+    problem: Problem, absolute: Any = np.abs, root: Any = np.sqrt
+) -> Callable[[Any], tuple[Any, ...]]:
     """The same of 18 numbers: b, the rows of R, nu, Om."""
+    if problem.driven:
+        return equations.python_rates(problem.body.held(), "xyz", absolute, root)
     M, J, d = ([float(x) for x in values] for values in (problem.M, problem.J, problem.d))
     net = float(problem.net)
 
@@ -183,10 +260,13 @@ Runs = Iterator[Run]
 
 
 def error(end: End, reference: End) -> dict[str, float]:
-    """Position [m] and attitude |R - R_ref|_F at the end, largest and rms over the members, and the larger of the two."""
-    n = len(end[0])
-    position = np.linalg.norm(end[0] - reference[0][:n], axis=1)
-    attitude = np.linalg.norm((end[1] - reference[1][:n]).reshape(n, 9), axis=1)
+    """Position [m] and attitude |R - R_ref|_F at the end, largest and rms over the members, and the larger of the two.
+
+    The members are the first ones that both have.
+    """
+    n = min(len(end[0]), len(reference[0]))
+    position = np.linalg.norm(end[0][:n] - reference[0][:n], axis=1)
+    attitude = np.linalg.norm((end[1][:n] - reference[1][:n]).reshape(n, 9), axis=1)
     rms = [float(np.sqrt(np.mean(x * x))) for x in (position, attitude)]
     most = [float(x.max()) for x in (position, attitude)]
     return {

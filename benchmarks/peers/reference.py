@@ -11,12 +11,15 @@ import lgvi_warp as lw
 from benchmarks.peers import tableaus
 from benchmarks.peers.problem import End, Problem, error, make_rates, matrix_end_of
 
-STEP = 0.025
+STEP, DRIVEN_STEP = 0.025, 0.004
+# Of driven vehicles, whose reference takes minutes, errors are those of so many members.
+DRIVEN_MEMBERS = 128
 
 
 def solve(problem: Problem) -> End:
-    """DOP853 in extended precision, all members at once, with attitudes of unit quaternions."""
-    steps = round(problem.t1 / STEP)
+    """DOP853 in extended precision, all members at once, with attitudes of unit quaternions; of driven vehicles the first."""
+    problem = problem.first(DRIVEN_MEMBERS) if problem.driven else problem
+    steps = round(problem.t1 / (DRIVEN_STEP if problem.driven else STEP))
     h = np.longdouble(problem.t1) / steps
     rates, y = make_rates(problem, np.longdouble), tuple(problem.state().T.astype(np.longdouble))
     for _ in range(steps):
@@ -47,10 +50,18 @@ def composition(problem: Problem, h: float) -> End:
     return result.position[-1], result.attitude[-1]
 
 
+def explicit(problem: Problem, h: float) -> End:
+    """lgvi_warp's rk8 in double precision."""
+    result = lw.solve(problem.ensemble, "rk8", h=h, t1=problem.t1, threads=1)
+    return result.position[-1], result.attitude[-1]
+
+
 def agreement(problem: Problem, reference: End, members: int = 256) -> dict[str, float]:
     """Largest difference of the reference from others that share nothing with it, over the first members."""
-    part = problem.first(members)
-    found = {f"kl8(psi_s), h = {h:g} s": error(composition(part, h), reference)["error_max"] for h in (0.1, 0.05)}
+    part, name, ours, steps = problem.first(members), "kl8(psi_s)", composition, (0.1, 0.05)
+    if problem.driven:
+        part, name, ours, steps = problem.first(DRIVEN_MEMBERS), "rk8", explicit, (0.004, 0.002)
+    found = {f"{name}, h = {h:g} s": error(ours(part, h), reference)["error_max"] for h in steps}
     if importlib.util.find_spec("heyoka"):
         found["heyoka, extended precision"] = error(taylor(part), reference)["error_max"]
     return found

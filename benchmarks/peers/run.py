@@ -18,13 +18,17 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.pages import read, show
+from benchmarks.peers.plot import TITLES
 
-PEERS = ("lgvi_warp", "heyoka", "numba", "numba_simd", "jax", "diffrax", "warp_ordinary", "mujoco", "newton")
+PEERS = (
+    "lgvi_warp", "hand_lanes", "heyoka", "numba", "numba_simd", "jax", "diffrax", "warp_ordinary", "mujoco", "newton",
+)  # fmt: skip
 RIGID_MEMBERS = 1024
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--quick", action="store_true", help="512 members and 5 s: to see that it runs")
+    parser.add_argument("--problems", default=",".join(TITLES), help=f"of {', '.join(TITLES)}")
     parser.add_argument("--peers", default=",".join(PEERS), help=f"of {', '.join(PEERS)}")
     parser.add_argument("--threads", type=int, default=1, help="for every peer (default 1)")
     parser.add_argument("--rounds", type=int, default=3, help="of all settings in turn; times are medians")
@@ -32,14 +36,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--draw", type=Path, metavar="DIR", help="measure nothing: draw the lines of an earlier --out")
 
 
-def main(peers: str, quick: bool, threads: int, rounds: int, out: Path | None, draw: Path | None) -> None:
+def main(
+    problems: str, peers: str, quick: bool, threads: int, rounds: int, out: Path | None, draw: Path | None
+) -> None:
     if draw:
         return picture(draw)
-    names = peers.split(",")
-    if unknown := set(names) - set(PEERS):
-        raise SystemExit(f"no peers: {', '.join(sorted(unknown))}; --peers takes some of {', '.join(PEERS)}")
+    names, chosen = peers.split(","), problems.split(",")
+    for option, given, known in (("peers", names, PEERS), ("problems", chosen, TITLES)):
+        if unknown := set(given) - set(known):
+            raise SystemExit(f"no {option}: {', '.join(sorted(unknown))}; --{option} takes some of {', '.join(known)}")
     keep_to_cores(threads)
-    lines = [show(record) for record in measure(names, quick, threads, rounds)]
+    lines = [show(record) for record in measure(names, chosen, quick, threads, rounds)]
     if out:
         out.mkdir(parents=True, exist_ok=True)
         (out / "peers.jsonl").write_text("\n".join(lines) + "\n")
@@ -69,7 +76,7 @@ def note(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
 
 
-def measure(names: list[str], quick: bool, threads: int, rounds: int) -> Iterator[dict[str, Any]]:
+def measure(names: list[str], chosen: list[str], quick: bool, threads: int, rounds: int) -> Iterator[dict[str, Any]]:
     """One record for the machine, each problem's reference, each peer that is missing, and each setting."""
     from benchmarks.peers import problem as problems
     from benchmarks.peers import reference
@@ -81,21 +88,30 @@ def measure(names: list[str], quick: bool, threads: int, rounds: int) -> Iterato
     modules = {}
     for name in names:
         try:
-            modules[name] = importlib.import_module(f"benchmarks.peers.peer_{name}")
+            module = importlib.import_module(f"benchmarks.peers.peer_{name}")
+            if hasattr(module, "ready"):
+                module.ready()
+            modules[name] = module
         except ModuleNotFoundError as error:
             yield {"peer": name, "missing": error.name}
     members, t1 = (512, 5.0) if quick else (4096, 20.0)
     records, calls, closest = [], [], {}
-    for kind in ("vehicle", "rigid"):
-        taking = [name for name, module in modules.items() if kind in kinds(name, module)]
+    for kind in chosen:
+        taking = [name for name, module in modules.items() if kind in getattr(module, "PROBLEMS", ("vehicle",))]
         if taking in ([], ["lgvi_warp"]) and kind == "rigid":
             continue
-        problem = problems.make_problem(members if kind == "vehicle" else min(members, RIGID_MEMBERS), t1, kind)
+        problem = problems.make_problem(min(members, RIGID_MEMBERS) if kind == "rigid" else members, t1, kind)
         note(f"reference of {kind}")
         truth = reference.solve(problem)
         agreement = reference.agreement(problem, truth)
         closest[kind] = min(agreement.values())
-        yield {"problem": kind, "members": problem.members, "t1": t1, "reference_agrees_to": agreement}
+        yield {
+            "problem": kind,
+            "members": problem.members,
+            "judged": len(truth[0]),
+            "t1": t1,
+            "reference_agrees_to": agreement,
+        }
         for name in taking:
             for run in modules[name].runs(problem, threads):
                 run.call()
@@ -111,8 +127,3 @@ def measure(names: list[str], quick: bool, threads: int, rounds: int) -> Iterato
     note(f"{rounds} rounds of {len(calls)} settings")
     for (about, work, found), seconds in zip(records, speed.interleaved(calls, rounds), strict=True):
         yield about | {"us_per_vehicle_second": float(f"{1e6 * seconds / work:.4g}")} | found
-
-
-def kinds(name: str, module: Any) -> tuple[str, ...]:
-    """The problems that a peer takes."""
-    return ("vehicle", "rigid") if name == "lgvi_warp" else (getattr(module, "PROBLEM", "vehicle"),)

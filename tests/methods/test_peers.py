@@ -2,6 +2,7 @@
 """Every peer of benchmarks/peers solves the problem that lgvi_warp solves: rates and short runs against the NumPy twin."""
 
 import importlib
+import shutil
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from lgvi_warp.reference.terms.weight import Weight
 MEMBERS, T1 = 9, 2.0
 NEEDS = {
     "lgvi_warp": (), "warp_ordinary": (), "heyoka": ("heyoka",), "numba": ("numba",), "numba_simd": ("numba",),
-    "jax": ("jax",), "diffrax": ("jax", "diffrax"), "mujoco": ("mujoco",), "newton": ("newton",),
+    "hand_lanes": (), "jax": ("jax",), "diffrax": ("jax", "diffrax"), "mujoco": ("mujoco",), "newton": ("newton",),
 }  # fmt: skip
 # Largest error of the best setting over 2 s: round-off for high orders, else the truncation of the finest step: of order 4
 # and of order 2 at 1/256 s, of order 1 at 1/128 s.
@@ -88,7 +89,9 @@ def test_short_run(truth, name):
     for package in NEEDS[name]:
         pytest.importorskip(package)
     module = importlib.import_module(f"benchmarks.peers.peer_{name}")
-    kind = getattr(module, "PROBLEM", "vehicle")
+    if name == "hand_lanes" and not shutil.which("g++") and not shutil.which("clang++"):
+        pytest.skip("no C++ compiler")
+    kind = getattr(module, "PROBLEMS", ("vehicle",))[0]
     best, methods = np.inf, {}
     for run in module.runs(problem.make_problem(MEMBERS, T1, kind), threads=1):
         run.call()

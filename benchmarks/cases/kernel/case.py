@@ -7,14 +7,18 @@ from lgvi_warp.methods.method import PROGRAMS
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.studies import speed
 
+# Methods and widths that are measured quickly.
+QUICK = ("psi_s", "psi_x"), (8,)
+
 
 def run(quick):
     members, steps = (512, 100) if quick else (4096, 400)
     for dtype in ("float64", "float32"):
         peak = fma_peak(dtype)
-        for width in WIDTHS if dtype == "float32" else WIDTHS[:-1]:
+        for width in QUICK[1] if quick else WIDTHS if dtype == "float32" else WIDTHS[:-1]:
             fleet = speed.fleet(members)
-            plans = [make_plan(fleet, name, h=0.01, t1=0.01 * steps, dtype=dtype, width=width) for name in PROGRAMS]
+            names = QUICK[0] if quick else PROGRAMS
+            plans = [make_plan(fleet, name, h=0.01, t1=0.01 * steps, dtype=dtype, width=width) for name in names]
             seconds = speed.interleaved([speed.stepper(plan) for plan in plans])
             for plan, one in zip(plans, seconds, strict=True):
                 yield speed.record(plan.method, dtype, width, one / (members * steps), peak)

@@ -18,7 +18,7 @@ METHODS = (
     "bm4(psi_x)", "kl6(psi_s)", "bm6(psi_x)", "kl8(psi_s)", "kl8(psi_x)", "ss8_21(psi_x)", "rkn4_6", "rkn6_11", "rkn6_14",
     "gauss4", "gauss6", "gauss8", "gauss10", "gauss12", "cg3", "rkmk4", "rk4", "rk5", "rk8", "rk5 chosen", "rk8 chosen",
 )  # fmt: skip
-QUICK = ("psi_s", "psi_x", "rk8")
+QUICK = ("psi_x",)
 DTYPES = ("float64", "float32", "float32_compensated")
 
 

@@ -28,8 +28,10 @@ NUMPY = {"riccati": riccati.sign, "riccati, eigenvectors": rotation.riccati, "mo
          "newton": rotation.newton, "quartic": rotation.quartic}  # fmt: skip
 
 
-def methods(base="psi_s"):
-    """Every solver with every number of steps."""
+def methods(base, quick):
+    """Every solver with every number of steps; quick: the first two, to the tolerance."""
+    if quick:
+        return [Method(base, name) for name in SOLVERS[:2]]
     return [Method(base, name, k, None if k is None else 0.5) for name in SOLVERS for k in (None, *FIXED[name])]
 
 
@@ -99,9 +101,9 @@ def steps(quick):
     members, count = (512, 100) if quick else (4096, 400)
     fleet = speed.fleet(members)
     for dtype in ("float64", "float32"):
-        plans = [make_plan(fleet, method, h=0.01, t1=0.01 * count, dtype=dtype) for method in methods()]
+        plans = [make_plan(fleet, method, h=0.01, t1=0.01 * count, dtype=dtype) for method in methods("psi_s", quick)]
         seconds = speed.interleaved([speed.stepper(plan) for plan in plans])
-        for method, one in zip(methods(), seconds, strict=True):
+        for method, one in zip(methods("psi_s", quick), seconds, strict=True):
             yield {
                 "solver": method.solver,
                 "iterations": method.iterations,
@@ -118,9 +120,9 @@ def single_solves(quick):
     spin = spinning(J, 0.003 / 0.01 * directions(members))
     shapes = ("paper",) if quick else tuple(SHAPES)
     for dtype in ("float64", "float32"):
-        plans = [make_plan(spin, method, h=0.01, t1=0.01 * count, dtype=dtype) for method in methods("psi_1")]
+        plans = [make_plan(spin, method, h=0.01, t1=0.01 * count, dtype=dtype) for method in methods("psi_1", quick)]
         seconds = speed.interleaved([speed.stepper(plan) for plan in plans])
-        for method, one in zip(methods("psi_1"), seconds, strict=True):
+        for method, one in zip(methods("psi_1", quick), seconds, strict=True):
             for shape in shapes:
                 found = qualities(partial(by_kernel, method, dtype), shape, dtype, 16)
                 yield {

@@ -82,7 +82,7 @@ def into_store(plan, folder, threads, samples):
         for first in range(0, k, 10):
             when = slice(first, min(first + 10, k))
             writer.take(when, {name: values[when, : block.count] for name, values in samples.items()})
-        block_files.finish(block, writer.close(MemberStatus.clear(block.count)), (), ())
+        block_files.finish(block, writer.close(MemberStatus.clear(block.count, 0)), (), ())
 
     start = time.perf_counter()
     with block_files.commits, ThreadPoolExecutor(threads) as pool:

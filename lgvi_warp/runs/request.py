@@ -24,6 +24,7 @@ from lgvi_warp.runs.default_method import planned
 from lgvi_warp.runs.run import refuse_failed, run_plan
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
+from lgvi_warp.scene.settings import check_device
 
 # With more Newton steps than this, a fixed number gains nothing over iterating to the tolerance.
 MOST_FIXED = 4
@@ -70,6 +71,7 @@ class Request:
         executor: Any = "threads",
         threads: int | None = None,
         scheduler: str | None = None,
+        device: str | None = None,
         **settings: Any,
     ) -> Request:
         """The run that the arguments of `solve` ask for; what is wrong with those named here is added to the faults."""
@@ -78,6 +80,8 @@ class Request:
             observed = observe(fleet, statistics, keep, until)
         with faults.including():
             runner = executor_of(executor, threads, scheduler)
+        if device is not None:
+            check_device(faults, device)
         return cls(fleet, **settings, observed=observed, threads=threads, executor=runner)
 
     @property

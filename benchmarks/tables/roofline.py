@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Measure how much of the core's peak each method makes use of, for the paper's vehicle, REMUS 100, BlueROV2 and each term alone.
+
+Operations do not depend on the machine: they stay in benchmarks/rows/operations.json, and kernels that have changed since are
+counted anew (`python -m benchmarks run operations`). Times are those of this machine, one core, beside its peak.
+"""
+
+import json
+import time
+
+from benchmarks.cases.operations import case
+from benchmarks.pages import ROOT, markdown, show, stamp
+from lgvi_warp.common.errors import SceneError
+from lgvi_warp.engine.peak import fma_peak
+from lgvi_warp.runs.settle import make_plan
+from lgvi_warp.scene.ensemble import Ensemble
+from lgvi_warp.sampling.distributions.basic import Normal
+from lgvi_warp.studies import speed
+
+ROWS = ROOT / "benchmarks" / "rows" / "operations.json"
+MEMBERS, STEPS, ROUNDS = 1024, 128, 11
+SPREAD = {"start.angular_velocity": Normal(relative=0.1)}
+
+TEXT = """{stamp}
+
+One core, float64, default widths, {members} vehicles and {steps} steps, the least of {rounds} readings of processor time. The peak of this
+core is {peak:.1f} thousand million fused multiply-adds a second in the same run, so {flops:.0f} GFLOP/s.
+
+**The paper's vehicle**, every method of `lgvi-warp list methods`:
+
+{paper}
+
+**REMUS 100 and BlueROV2 Heavy** as shipped, under way:
+
+{vehicles}
+
+**Each term alone** on the paper's vehicle, with weight, buoyancy and restoring moment:
+
+{terms}
+"""
+HEAD = ["operations", "fused as one", "slow", "ns", "GFLOP/s", "of the peak", "of the instructions"]
+
+
+def add_options(parser):
+    parser.add_argument("--quick", action="store_true", help="one reading of few steps: to see that it runs")
+
+
+def counted():
+    """(scene, method) -> the record of its operations; those that changed are counted, and all are kept in the file."""
+    known = json.loads(ROWS.read_text()) if ROWS.exists() else []
+    records = []
+    for record in case.run(False, known):
+        if "scene" not in record:
+            raise SystemExit(f"table roofline: {record['operations']}")
+        if record not in known:
+            show(record)
+        records.append(record)
+    ROWS.write_text("[\n" + ",\n".join(json.dumps(record) for record in records) + "\n]\n")
+    return {(record["scene"], record["method"]): record for record in records}
+
+
+def timed(chosen, quick):
+    """[(scene's name, method, ns)] of scenes that take turns."""
+    members, steps, rounds = (256, 16, 1) if quick else (MEMBERS, STEPS, ROUNDS)
+    plans = {}
+    for name, scene, method, h in chosen:
+        try:
+            plans[name, method] = make_plan(Ensemble(scene, members, 1, SPREAD), method, h=h, t1=h * steps)
+        except SceneError:
+            continue
+    calls = [speed.stepper(plan) for plan in plans.values()]
+    seconds = speed.least(calls, rounds, clock=time.thread_time)
+    return [(*key, 1e9 * one / (members * steps)) for key, one in zip(plans, seconds, strict=True)]
+
+
+def cells(record, ns, peak):
+    """A line's numbers: what is counted, the time, and its parts of the peak [fused multiply-adds a second]."""
+    rate = record["operations"] / ns
+    return [
+        f"{record['operations']:.0f}",
+        f"{record['instructions']:.0f}",
+        f"{record['slow']:.0f}",
+        f"{ns:.1f}",
+        f"{rate:.1f}",
+        f"{50 * rate / (peak * 1e-9):.0f} %",
+        f"{100 * record['instructions'] / ns / (peak * 1e-9):.0f} %",
+    ]
+
+
+def main(quick=False):
+    operations = counted()
+    groups = {"paper": [], "vehicles": [], "terms": []}
+    for entry in case.entries(False):
+        kind = {"paper": "paper", "remus_100": "vehicles", "bluerov2_heavy": "vehicles"}.get(entry[0], "terms")
+        groups[kind].append(entry)
+    peak, tables = fma_peak("float64"), {}
+    for kind, chosen in groups.items():
+        found = timed(chosen, quick)
+        peak = max(peak, fma_peak("float64"))
+        tables[kind] = found
+    head = ["scene", "method", *HEAD]
+    texts = {
+        kind: markdown(head, [[name, f"`{method}`", *cells(operations[name, method], ns, peak)] for name, method, ns in found],
+                       "llrrrrrrr")
+        for kind, found in tables.items()
+    }  # fmt: skip
+    return TEXT.format(
+        stamp=stamp("roofline"), members=MEMBERS, steps=STEPS, rounds=ROUNDS, peak=peak * 1e-9, flops=2e-9 * peak, **texts
+    )

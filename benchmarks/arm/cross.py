@@ -14,6 +14,7 @@ import warp as wp
 from lgvi_warp.engine.kernel_cache import BLOCK_DIM
 
 NEEDED = ("ziglang", "unicorn", "capstone")
+REMEDY = "pip install 'lgvi-warp[arm]'"
 PROCESSORS = ("neoverse_n1", "neoverse_v2", "apple_m1")
 # What Clang takes by default where Warp calls it, and not where a user does; the folder of Warp's headers is put in front.
 AS_WARP = (

@@ -11,14 +11,14 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.sampling.distributions.basic import Normal
 
 PROCESSOR = "neoverse_n1"
-# Two 128-bit registers of each number.
-WIDTHS = {"float64": 4, "float32": 8}
+# What one 128-bit register holds.
+WIDTHS = {"float64": 2, "float32": 4}
 SPREAD = {"start.angular_velocity": Normal(relative=0.1)}
 
 
-def plan_of(scene, method, h, dtype="float64"):
-    """One packet of a scene's vehicles through the steps that `of_a_step` makes."""
-    width = WIDTHS[dtype]
+def plan_of(scene, method, h, dtype="float64", registers=1):
+    """One packet of a scene's vehicles through the steps that `of_a_step` makes; registers: that each number fills."""
+    width = registers * WIDTHS[dtype]
     fleet = Ensemble(scene, width, 1, SPREAD)
     return make_plan(fleet, method, h=h, t1=5 * CHUNK * h, dtype=dtype, width=width)
 

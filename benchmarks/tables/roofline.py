@@ -11,6 +11,7 @@ import time
 from benchmarks.cases.operations import case
 from benchmarks.pages import ROOT, markdown, show, stamp
 from lgvi_warp.common.errors import SceneError
+from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.peak import fma_peak
 from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.scene.ensemble import Ensemble
@@ -24,7 +25,8 @@ SPREAD = {"start.angular_velocity": Normal(relative=0.1)}
 TEXT = """{stamp}
 
 One core, float64, default widths, {members} vehicles and {steps} steps, the least of {rounds} readings of processor time. The peak of this
-core is {peak:.1f} thousand million fused multiply-adds a second in the same run, so {flops:.0f} GFLOP/s.
+core is {peak:.1f} thousand million fused multiply-adds a second in the same run, so {flops:.0f} GFLOP/s. The arrays of a launch hold {least} to
+{most} bytes a vehicle.
 
 **The paper's vehicle**, every method of `lgvi-warp list methods`:
 
@@ -42,25 +44,40 @@ HEAD = ["operations", "fused as one", "slow", "ns", "GFLOP/s", "of the peak", "o
 
 
 def add_options(parser):
+    parser.add_argument("--count", action="store_true", help="count what has changed and keep it; measure nothing")
     parser.add_argument("--quick", action="store_true", help="one reading of few steps: to see that it runs")
 
 
 def counted():
     """(scene, method) -> the record of its operations; those that changed are counted, and all are kept in the file."""
     known = json.loads(ROWS.read_text()) if ROWS.exists() else []
-    records = []
+    records = {}
     for record in case.run(False, known):
         if "scene" not in record:
             raise SystemExit(f"table roofline: {record['operations']}")
+        records[record["scene"], record["method"]] = record
         if record not in known:
             show(record)
-        records.append(record)
-    ROWS.write_text("[\n" + ",\n".join(json.dumps(record) for record in records) + "\n]\n")
-    return {(record["scene"], record["method"]): record for record in records}
+            # At once: to count all takes long.
+            keep({(one["scene"], one["method"]): one for one in known} | records)
+    keep(records)
+    return records
+
+
+def keep(records):
+    """Write the records of operations into their file."""
+    ROWS.write_text("[\n" + ",\n".join(json.dumps(record) for record in records.values()) + "\n]\n")
+
+
+def held(packets):
+    """Bytes of a launch's arrays by vehicle."""
+    laws = packets.laws
+    arrays = [packets.state, packets.memory, packets.inertia.array, laws.table.array, *(one.array for one in laws.structs)]
+    return sum(array.capacity for array in arrays) / packets.members.count
 
 
 def timed(chosen, quick):
-    """[(scene's name, method, ns)] of scenes that take turns."""
+    """[(scene's name, method, ns, bytes a vehicle)] of scenes that take turns."""
     members, steps, rounds = (256, 16, 1) if quick else (MEMBERS, STEPS, ROUNDS)
     plans = {}
     for name, scene, method, h in chosen:
@@ -68,9 +85,16 @@ def timed(chosen, quick):
             plans[name, method] = make_plan(Ensemble(scene, members, 1, SPREAD), method, h=h, t1=h * steps)
         except SceneError:
             continue
-    calls = [speed.stepper(plan) for plan in plans.values()]
+    fleets = []
+
+    def packets_of(*arguments):
+        fleets.append(Packets(*arguments))
+        return fleets[-1]
+
+    calls = [speed.stepper(plan, make=packets_of) for plan in plans.values()]
     seconds = speed.least(calls, rounds, clock=time.thread_time)
-    return [(*key, 1e9 * one / (members * steps)) for key, one in zip(plans, seconds, strict=True)]
+    return [(*key, 1e9 * one / (members * steps), held(packets))
+            for key, one, packets in zip(plans, seconds, fleets, strict=True)]  # fmt: skip
 
 
 def cells(record, ns, peak):
@@ -87,8 +111,10 @@ def cells(record, ns, peak):
     ]
 
 
-def main(quick=False):
+def main(count=False, quick=False):
     operations = counted()
+    if count:
+        return None
     groups = {"paper": [], "vehicles": [], "terms": []}
     for entry in case.entries(False):
         kind = {"paper": "paper", "remus_100": "vehicles", "bluerov2_heavy": "vehicles"}.get(entry[0], "terms")
@@ -100,10 +126,12 @@ def main(quick=False):
         tables[kind] = found
     head = ["scene", "method", *HEAD]
     texts = {
-        kind: markdown(head, [[name, f"`{method}`", *cells(operations[name, method], ns, peak)] for name, method, ns in found],
+        kind: markdown(head, [[name, f"`{method}`", *cells(operations[name, method], ns, peak)] for name, method, ns, _ in found],
                        "llrrrrrrr")
         for kind, found in tables.items()
     }  # fmt: skip
+    sizes = [size for found in tables.values() for *_, size in found]
     return TEXT.format(
-        stamp=stamp("roofline"), members=MEMBERS, steps=STEPS, rounds=ROUNDS, peak=peak * 1e-9, flops=2e-9 * peak, **texts
-    )
+        stamp=stamp("roofline"), members=MEMBERS, steps=STEPS, rounds=ROUNDS, peak=peak * 1e-9, flops=2e-9 * peak,
+        least=round(min(sizes)), most=round(max(sizes)), **texts,
+    )  # fmt: skip

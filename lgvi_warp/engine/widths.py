@@ -31,6 +31,9 @@ KERNELS = (*(f"{kind} {real}" for kind in KINDS for real in ("float64", "float32
 REGISTERS = {
     "Intel, avx512": {"plain": 2, "chained": 2},
     "avx512": {"chained": 2},
+    # 64-bit ARM, not measured: cores have up to four units for fused multiply-adds, and a register holds two float64. One
+    # register a number leaves too few independent operations to keep four units at work.
+    "neon": dict.fromkeys(KINDS, 2),
 }
 
 FILE, MOST_BYTES = "lgvi_warp_widths.json", 1_000_000

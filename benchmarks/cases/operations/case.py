@@ -2,8 +2,8 @@
 """Operations of a step by scene and method, counted on an emulated ARM core: no figure depends on this machine.
 
 `operations` are additions and multiplications in float64, two for a fused pair; `instructions` counts such a pair as one;
-`slow` are divisions and square roots. Those of the steps of one vehicle, with their part of the checks. It needs the packages
-ziglang, unicorn and capstone (extra dev), and some seconds a kernel.
+`slow` are divisions and square roots. Those of the steps of one vehicle, with their part of the checks. It needs the extra
+arm, and some seconds a kernel.
 """
 
 import tempfile
@@ -52,8 +52,8 @@ def entries(quick):
 
 def run(quick, known=()):
     """known: records of earlier runs, which are taken for the kernels that have not changed."""
-    if missing := cross.missing():
-        yield {"operations": f"not counted: pip install {' '.join(missing)}"}
+    if cross.missing():
+        yield {"operations": f"not counted: {cross.REMEDY}"}
         return
     kept = {(one["scene"], one["method"], one["kernel"]): one for one in known}
     with tempfile.TemporaryDirectory() as folder:

@@ -92,7 +92,18 @@ def linked(source, options, folder):
     copies, code, found = folder / "copies.c", folder / "kernel.o", folder / "kernel"
     copies.write_text(COPIES)
     tool(folder, "c++", *options, "-I", headers, "-c", source, "-o", code)
-    tool(folder, "cc", "-target", "aarch64-linux-musl", "-O1", "-fno-builtin", "-c", copies, "-o", copies.with_suffix(".o"))
+    tool(
+        folder,
+        "cc",
+        "-target",
+        "aarch64-linux-musl",
+        "-O1",
+        "-fno-builtin",
+        "-c",
+        copies,
+        "-o",
+        copies.with_suffix(".o"),
+    )
     tool(folder, "ld.lld", "-static", "-e", entry, f"--image-base={BASE}", "--gc-sections", code, copies.with_suffix(".o"),
          "-o", found)  # fmt: skip
     return found

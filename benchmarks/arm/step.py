@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Operations of one step of one vehicle: what a run of some hundred steps makes more than a shorter one, by an emulated core."""
+"""Operations of one step of one vehicle: what more steps make more, on an emulated core."""
 
 from benchmarks.arm.core import Core, in_place_of_this_machine
 from benchmarks.arm.cross import image
@@ -7,8 +7,8 @@ from benchmarks.arm.tally import of_visits
 from lgvi_kernels.advance.spec import CHUNK
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.sampling.distributions.basic import Normal
+from lgvi_warp.scene.ensemble import Ensemble
 
 PROCESSOR = "neoverse_n1"
 # What one 128-bit register holds.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measure how much of the core's peak each method makes use of, for the paper's vehicle, REMUS 100, BlueROV2 and each term alone.
+"""Measure how much of the core's peak each method makes use of: paper's vehicle, REMUS 100, BlueROV2, each term alone.
 
 Operations do not depend on the machine: they stay in benchmarks/rows/operations.json, and kernels that have changed since are
 counted anew (`python -m benchmarks run operations`). Times are those of this machine, one core, beside its peak.
@@ -14,8 +14,8 @@ from lgvi_warp.common.errors import SceneError
 from lgvi_warp.engine.packets import Packets
 from lgvi_warp.engine.peak import fma_peak
 from lgvi_warp.runs.settle import make_plan
-from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.sampling.distributions.basic import Normal
+from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.studies import speed
 
 ROWS = ROOT / "benchmarks" / "rows" / "operations.json"
@@ -24,9 +24,9 @@ SPREAD = {"start.angular_velocity": Normal(relative=0.1)}
 
 TEXT = """{stamp}
 
-One core, float64, default widths, {members} vehicles and {steps} steps, the least of {rounds} readings of processor time. The peak of this
-core is {peak:.1f} thousand million fused multiply-adds a second in the same run, so {flops:.0f} GFLOP/s. The arrays of a launch hold {least} to
-{most} bytes a vehicle.
+One core, float64, default widths, {members} vehicles and {steps} steps, the least of {rounds} readings of processor
+time. The peak of this core is {peak:.1f} thousand million fused multiply-adds a second in the same run, so {flops:.0f} GFLOP/s.
+The arrays of a launch hold {least} to {most} bytes a vehicle.
 
 **The paper's vehicle**, every method of `lgvi-warp list methods`:
 
@@ -45,13 +45,18 @@ HEAD = ["operations", "fused as one", "slow", "ns", "GFLOP/s", "of the peak", "o
 
 def add_options(parser):
     parser.add_argument("--count", action="store_true", help="count what has changed and keep it; measure nothing")
+    parser.add_argument("--kept", dest="kept_alone", action="store_true", help="count nothing, leave out the rest")
     parser.add_argument("--quick", action="store_true", help="one reading of few steps: to see that it runs")
+
+
+def kept():
+    """The records of operations in their file."""
+    return json.loads(ROWS.read_text()) if ROWS.exists() else []
 
 
 def counted():
     """(scene, method) -> the record of its operations; those that changed are counted, and all are kept in the file."""
-    known = json.loads(ROWS.read_text()) if ROWS.exists() else []
-    records = {}
+    known, records = kept(), {}
     for record in case.run(False, known):
         if "scene" not in record:
             raise SystemExit(f"table roofline: {record['operations']}")
@@ -72,7 +77,13 @@ def keep(records):
 def held(packets):
     """Bytes of a launch's arrays by vehicle."""
     laws = packets.laws
-    arrays = [packets.state, packets.memory, packets.inertia.array, laws.table.array, *(one.array for one in laws.structs)]
+    arrays = [
+        packets.state,
+        packets.memory,
+        packets.inertia.array,
+        laws.table.array,
+        *(one.array for one in laws.structs),
+    ]
     return sum(array.capacity for array in arrays) / packets.members.count
 
 
@@ -111,25 +122,28 @@ def cells(record, ns, peak):
     ]
 
 
-def main(count=False, quick=False):
-    operations = counted()
+def grouped(operations):
+    """Table -> what is timed for it, where operations were counted."""
+    groups = {"paper": [], "vehicles": [], "terms": []}
+    for name, scene, method, h in case.entries(False):
+        if (name, method) in operations:
+            kind = {"paper": "paper", "remus_100": "vehicles", "bluerov2_heavy": "vehicles"}.get(name, "terms")
+            groups[kind].append((name, scene, method, h))
+    return groups
+
+
+def main(count=False, kept_alone=False, quick=False):
+    operations = {(one["scene"], one["method"]): one for one in kept()} if kept_alone else counted()
     if count:
         return None
-    groups = {"paper": [], "vehicles": [], "terms": []}
-    for entry in case.entries(False):
-        kind = {"paper": "paper", "remus_100": "vehicles", "bluerov2_heavy": "vehicles"}.get(entry[0], "terms")
-        groups[kind].append(entry)
     peak, tables = fma_peak("float64"), {}
-    for kind, chosen in groups.items():
-        found = timed(chosen, quick)
+    for kind, chosen in grouped(operations).items():
+        tables[kind] = timed(chosen, quick)
         peak = max(peak, fma_peak("float64"))
-        tables[kind] = found
-    head = ["scene", "method", *HEAD]
-    texts = {
-        kind: markdown(head, [[name, f"`{method}`", *cells(operations[name, method], ns, peak)] for name, method, ns, _ in found],
-                       "llrrrrrrr")
-        for kind, found in tables.items()
-    }  # fmt: skip
+    texts = {}
+    for kind, found in tables.items():
+        lines = [[name, f"`{method}`", *cells(operations[name, method], ns, peak)] for name, method, ns, _ in found]
+        texts[kind] = markdown(["scene", "method", *HEAD], lines, "llrrrrrrr")
     sizes = [size for found in tables.values() for *_, size in found]
     return TEXT.format(
         stamp=stamp("roofline"), members=MEMBERS, steps=STEPS, rounds=ROUNDS, peak=peak * 1e-9, flops=2e-9 * peak,

@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """What benchmarks read of the machine: energy counters, nodes of memory, and the operations of instructions."""
 
+import json
 import os
 
 import pytest
 
 from benchmarks.arm.tally import Tally, of_one
 from benchmarks.cases.energy import case as energy
+from benchmarks.cases.operations import case as operations
 from benchmarks.cases.threads import case as threads
+from benchmarks.tables import roofline
+from lgvi_warp.studies import speed
 
 
 def counter(folder, name, micro_joules, span=1_000_000):
@@ -81,6 +85,15 @@ def test_placements_of_threads():
 ])  # fmt: skip
 def test_operations_of_an_instruction(mnemonic, operands, tally):
     assert of_one(mnemonic, operands) == tally
+
+
+def test_the_product_knows_the_operations_that_were_counted():
+    """Of compositions it takes the sum of their steps, without what joining two saves or adds."""
+    rows = [one for one in json.loads(roofline.ROWS.read_text()) if one["scene"] == "paper"]
+    counted = {one["method"]: one["operations"] for one in rows}
+    assert set(counted) == set(operations.METHODS)
+    for name, count in counted.items():
+        assert speed.operations(name) == pytest.approx(count, rel=0.02 if "(" in name else 0.002), name
 
 
 def test_tallies_add_up():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Kernels compiled for processors that are not here: CUDA, which no run uses so far, and 64-bit ARM, run by an emulated core."""
+"""Kernels compiled for processors that are not here: CUDA, which no run uses, and 64-bit ARM, on an emulated core."""
 
 import json
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Joules per vehicle-second, all cores at work, as the processor's own counters tell them (Linux powercap, usually for root).
 
-`joules` is what the packages of the processors took during a run, `joules_idle` what they take in as long a time without it, and
-`joules_per_vehicle_second` their difference over the vehicles and the seconds that were simulated. The counters cover the whole
-processor: other work counts too, so the machine should do nothing else.
+`joules` is what the packages of the processors took during a run, `joules_idle` what they take in as long a time without it,
+and `joules_per_vehicle_second` their difference over the vehicles and the seconds that were simulated. The counters cover the
+whole processor: other work counts too, so the machine should do nothing else.
 """
 
 import time
@@ -52,7 +52,10 @@ def scenes(members):
     start = {"velocity": [1.5, 0.0, 0.0]}
     vary = {"start.angular_velocity": lw.distributions.Normal(std=0.01)}
     remus = lw.Scene.named("remus_100", vehicle={"buoyancy": 299.5}, start=start)
-    return {"paper": (speed.fleet(members), "psi_s", 0.01), "remus_100": (lw.Ensemble(remus, members, 1, vary), "rk4", 0.02)}
+    return {
+        "paper": (speed.fleet(members), "psi_s", 0.01),
+        "remus_100": (lw.Ensemble(remus, members, 1, vary), "rk4", 0.02),
+    }
 
 
 def run(quick, meter=None):

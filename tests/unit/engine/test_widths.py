@@ -30,7 +30,8 @@ def file(tuned_widths):
     [(EPYC, "avx512", "plain", (8, 16, 16)), (EPYC, "avx512", "chained", (16, 32, 16)), (EPYC, "avx512", "dense", (8, 16, 16)),
      (XEON, "avx512", "plain", (16, 32, 16)), (XEON, "avx512", "chained", (16, 32, 16)),
      (XEON, "avx512", "explicit", (8, 16, 16)), (XEON, "avx2", "chained", (4, 8, 8)),
-     ("Neoverse", "neon", "plain", (4, 8, 4)), ("Neoverse", "neon", "explicit", (4, 8, 4)), ("Power", "other", "plain", (2, 4, 4))],
+     ("Neoverse", "neon", "plain", (4, 8, 4)), ("Neoverse", "neon", "explicit", (4, 8, 4)),
+     ("Power", "other", "plain", (2, 4, 4))],
 )  # fmt: skip
 def test_the_table(cpu, simd, kind, lanes):
     chosen = [widths.of_table(kind, dtype, cpu=cpu, simd=simd) for dtype in DTYPES]

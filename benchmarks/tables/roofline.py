@@ -19,13 +19,13 @@ from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.studies import speed
 
 ROWS = ROOT / "benchmarks" / "rows" / "operations.json"
-MEMBERS, STEPS, ROUNDS = 1024, 128, 11
+MEMBERS, STEPS, ROUNDS = 1024, 512, 11
 SPREAD = {"start.angular_velocity": Normal(relative=0.1)}
 
 TEXT = """{stamp}
 
 One core, float64, default widths, {members} vehicles and {steps} steps, the least of {rounds} readings of processor
-time. The peak of this core is {peak:.1f} thousand million fused multiply-adds a second in the same run, so {flops:.0f} GFLOP/s.
+time. The peak of this core is {peak:.1f} thousand million fused multiply-adds a second in the same run: {flops:.0f} GFLOP/s.
 The arrays of a launch hold {least} to {most} bytes a vehicle.
 
 **The paper's vehicle**, every method of `lgvi-warp list methods`:

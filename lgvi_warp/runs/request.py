@@ -54,6 +54,7 @@ class Request:
     width: int | None = None
     checks: str | None = None
     on_failure: str | None = None
+    device: str | None = None
     observed: Observation = ALL_SAMPLES
     threads: int | None = None
     executor: Executor | None = None
@@ -71,7 +72,6 @@ class Request:
         executor: Any = "threads",
         threads: int | None = None,
         scheduler: str | None = None,
-        device: str | None = None,
         **settings: Any,
     ) -> Request:
         """The run that the arguments of `solve` ask for; what is wrong with those named here is added to the faults."""
@@ -80,8 +80,6 @@ class Request:
             observed = observe(fleet, statistics, keep, until)
         with faults.including():
             runner = executor_of(executor, threads, scheduler)
-        if device is not None:
-            check_device(faults, device)
         return cls(fleet, **settings, observed=observed, threads=threads, executor=runner)
 
     @property
@@ -127,6 +125,8 @@ class Request:
 
         survey_all: as of `choose_plan`.
         """
+        if self.device is not None:
+            check_device(self.device)
         grid, run = self.grid(), self.fleet.scene.run
         dtype = run.dtype if self.dtype is None else self.dtype
         checks = run.checks if self.checks is None else self.checks

@@ -29,10 +29,12 @@ DEVICES = ("cpu",)
 NO_DEVICE = "is no device of a run: runs are on CPU cores", 'leave it out, or give "cpu"'
 
 
-def check_device(faults: Faults, device: Any) -> None:
-    """Check where a run is to be; note what is wrong."""
+def check_device(device: Any) -> None:
+    """Refuse a place where no run can be."""
+    faults = Faults()
     if not among(device, DEVICES):
         faults.add("device", device, *NO_DEVICE)
+    faults.raise_if_any()
 
 
 def check_keep(faults: Faults, key: str, keep: Any, members: int | None = None) -> None:

@@ -98,6 +98,10 @@ class Core:
             self._core.reg_write(getattr(names, f"UC_ARM64_REG_{name}"), value)
         self._core.emu_start(self._entry, RETURN)
 
+    def mode(self):
+        """The register that says how numbers are rounded, and whether subnormal ones are taken as zero."""
+        return self._core.reg_read(self._names.UC_ARM64_REG_FPCR)
+
     def read(self, address, size):
         """Bytes of the image."""
         return bytes(self._core.mem_read(address, size))

@@ -118,7 +118,8 @@ def measure(
 
 def record(method: Method, dtype: str, width: int, seconds: float, peak: float) -> dict[str, Any]:
     """Describe one measurement of a kernel, `seconds` a vehicle and step, next to the core's peak [1/s]."""
-    count = None if method.adaptive else operations(method.name, method.iterations and int(method.iterations))
+    iterations = None if method.iterations is None else int(method.iterations)
+    count = None if method.adaptive else operations(method.name, iterations)
     return {
         "method": method.name,
         "dtype": dtype,

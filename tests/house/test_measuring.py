@@ -26,12 +26,14 @@ def test_joules_are_those_of_all_packages_and_counters_begin_again(tmp_path):
     counter(tmp_path / "intel-rapl:0", "package-0", 100_000)
     counter(tmp_path / "intel-rapl:1", "package-1", 900_000)
     counter(tmp_path / "intel-rapl:0:0", "core", 0)  # a part of the first
+    counter(tmp_path / "intel-rapl-mmio:0", "package-0", 100_000)  # the first, another way
     meter = energy.Meter(tmp_path)
 
     def work():
         counter(tmp_path / "intel-rapl:0", "package-0", 350_000)
         counter(tmp_path / "intel-rapl:1", "package-1", 400_000)
         counter(tmp_path / "intel-rapl:0:0", "core", 70_000)
+        counter(tmp_path / "intel-rapl-mmio:0", "package-0", 350_000)
 
     clock = iter([3.0, 5.0])
     joules, seconds = meter.joules(work, clock=lambda: next(clock))

@@ -16,6 +16,8 @@ from lgvi_warp.runs.settle import make_plan
 from lgvi_warp.studies import speed
 
 COUNTERS = Path("/sys/class/powercap")
+# AMD's too; "intel-rapl-mmio:0" counts a package a second time.
+ZONES = "intel-rapl:*"
 UNTOLD = "not told by this processor"
 
 
@@ -23,7 +25,7 @@ class Meter:
     """The energy counters of the packages of a machine's processors; none where they cannot be read."""
 
     def __init__(self, folder=COUNTERS):
-        self.packages = [path for path in sorted(folder.glob("*")) if is_package(path)]
+        self.packages = [path for path in sorted(folder.glob(ZONES)) if is_package(path)]
 
     def read(self):
         """Joules that each package has taken so far, and the number at which its counter begins again."""

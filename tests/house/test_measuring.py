@@ -52,6 +52,25 @@ def test_a_processor_that_tells_no_energy_is_said_so(tmp_path):
     assert {one["joules_per_vehicle_second"] for one in records} == {"not told by this processor"}
 
 
+@pytest.mark.slow
+def test_energy_is_what_a_run_takes_beyond_idling(tmp_path):
+    """A counter that rises by 10 J in the run and by 4 J in as long a time after it, at each reading."""
+    counter(tmp_path / "intel-rapl:0", "package-0", 0, span=10**9)
+
+    class Rising(energy.Meter):
+        def joules(self, call, clock=None):
+            _, seconds = super().joules(call)
+            self.readings = [*getattr(self, "readings", []), seconds]
+            return (10.0, 4.0)[(len(self.readings) - 1) % 2], 2.0
+
+    meter = Rising(tmp_path)
+    records = list(energy.run(True, meter))
+    assert len(meter.readings) == 4
+    for record in records:
+        assert (record["joules"], record["joules_idle"], record["seconds"]) == (10.0, 4.0, 2.0)
+        assert record["joules_per_vehicle_second"] == pytest.approx(6.0 / (record["members"] * record["t1"]), rel=2e-3)
+
+
 def test_cores_of_a_list():
     assert threads.cores_of("0-3,8,10-11\n") == [0, 1, 2, 3, 8, 10, 11]
     assert threads.cores_of("\n") == []

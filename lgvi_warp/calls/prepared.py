@@ -257,6 +257,7 @@ def prepare(
     width: int | None = None,
     checks: str | None = None,
     on_failure: str | None = None,
+    device: str | None = None,
     executor: Any = "threads",
     scheduler: str | None = None,
 ) -> Prepared:
@@ -277,7 +278,7 @@ def prepare(
         of: One or several quantities of interest: "position[2]", "max(depth)", a Quantity, a function of a Result. Default
             None: calls return results.
         method: As of `lw.solve`, but where it is left out, chosen once, for `fleet`. What else is left out, of h, t1, dtype,
-            width, checks, on_failure, threads, executor and scheduler, is taken from the scene's [run].
+            width, checks, on_failure, device, threads, executor and scheduler, is taken from the scene's [run].
         h: Step [s].
         t1: End of the run [s].
         save: Samples to keep, as of `lw.solve`; default with `of`: those that the quantities need.
@@ -291,6 +292,7 @@ def prepare(
         width: Vehicles per packet; default from the CPU.
         checks: "safe", "all" or "none".
         on_failure: "freeze", "raise" or "substep".
+        device: "cpu", the only one.
         executor: "threads" (default), "processes" or "dask", or an object that runs blocks.
         scheduler: Address of Dask's scheduler.
 
@@ -330,8 +332,9 @@ def prepare(
     gathered = statistics_for(scene, interests)
     save = samples_for(scene, interests, save)
     settings = dict(
-        method=method, h=h, t1=t1, save=save, dtype=dtype, width=width, checks=checks, on_failure=on_failure
-    )
+        method=method, h=h, t1=t1, save=save, dtype=dtype, width=width, checks=checks, on_failure=on_failure,
+        device=device,
+    )  # fmt: skip
     first = full if isinstance(table, str) else table
     how = dict(threads=threads, executor=executor, scheduler=scheduler)
     runner = Runner(first, [*statistics, *gathered] if gathered else statistics, **settings, **how)

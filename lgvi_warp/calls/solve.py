@@ -36,6 +36,7 @@ def solve(
     width: int | None = None,
     checks: str | None = None,
     on_failure: str | None = None,
+    device: str | None = None,
     progress: Callable[[float], None] | bool | None = None,
     statistics: Sequence[Any] | None = None,
     keep: str | Sequence[int] | None = None,
@@ -66,6 +67,7 @@ def solve(
         on_failure: "freeze" (default) keeps a member that fails at its last good state. "raise" raises MembersFailed after
             the run. "substep" repeats a step that has no solution in 2, 4, ... 1024 parts, for that member alone: order and
             the symmetry of each step are kept, symplecticity is not.
+        device: "cpu" (default): runs are on CPU cores. Any other device, such as "cuda", is refused.
         progress: True shows a bar on a terminal and in a notebook, lines elsewhere, on stderr; a function is called with the
             fraction of the work that is done, in [0, 1], from the threads that do it. Default: nothing is shown.
         statistics: Statistics gathered over the members at every sample time during the run, such as
@@ -108,7 +110,7 @@ def solve(
     request = Request.of(
         faults, ensemble_of(fleet), statistics=statistics, keep=keep, until=until, executor=executor, threads=threads,
         scheduler=scheduler, method=method, h=h, t1=t1, save=save, dtype=dtype, width=width, checks=checks,
-        on_failure=on_failure,
+        on_failure=on_failure, device=device,
     )  # fmt: skip
     with faults.including():
         function_of("on_block", on_block)

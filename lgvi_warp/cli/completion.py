@@ -30,7 +30,7 @@ def values() -> dict[str, tuple[str, ...]]:
     from lgvi_warp.engine.executors import NAMES
     from lgvi_warp.methods import method
     from lgvi_warp.physics.fields import TABLE
-    from lgvi_warp.scene.settings import KEEP
+    from lgvi_warp.scene.settings import DEVICES, KEEP
     from lgvi_warp.store.export import FORMATS
     from lgvi_warp.vehicles.fossen import vehicle_names
 
@@ -40,8 +40,8 @@ def values() -> dict[str, tuple[str, ...]]:
     return {
         "--method": methods, "--methods": methods, "--dtype": tuple(DTYPES), "--dtypes": tuple(DTYPES),
         "--store-dtype": ("float32", "float64"), "--solver": method.SOLVERS, "--iterations": ("auto",), "--checks": CHECKS,
-        "--on-failure": ON_FAILURE, "--keep": KEEP, "--executor": NAMES, "--of": tuple(TABLE), "--to": tuple(FORMATS),
-        "--vehicle": tuple(vehicle_names()),
+        "--on-failure": ON_FAILURE, "--keep": KEEP, "--device": DEVICES, "--executor": NAMES, "--of": tuple(TABLE),
+        "--to": tuple(FORMATS), "--vehicle": tuple(vehicle_names()),
     }  # fmt: skip
 
 

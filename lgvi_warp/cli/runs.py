@@ -44,6 +44,7 @@ def run_arguments(verb: Any) -> None:
     machine = verb.add_argument_group("the machine")
     add_shared(machine, EXECUTOR, threads=WORKERS)
     machine.add_argument("--width", metavar="W", type=int, help="vehicles per SIMD packet (default: from the CPU)")
+    machine.add_argument("--device", metavar="D", help="where kernels run: cpu (default), the only one")
 
 
 def _how(group: Any) -> None:

@@ -20,7 +20,7 @@ RUN = "run.zarr"
 OPTIONS = {
     name: f"run.{name}"
     for name in ("method", "step", "duration", "dtype", "solver", "iterations", "tolerance", "rtol", "atol", "checks",
-                 "on_failure", "keep")
+                 "on_failure", "device", "keep")
 } | {name: f"ensemble.{name}" for name in ("members", "seed")}  # fmt: skip
 
 

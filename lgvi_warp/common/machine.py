@@ -18,16 +18,16 @@ from lgvi_warp.common import container
 # A run's dtype -> type of the kernel's numbers. Compensated: each number of the state is a sum of two.
 DTYPES = {"float64": "float64", "float32": "float32", "float32_compensated": "float32"}
 
-REGISTER_BYTES = {"avx512": 64, "avx2": 32, "other": 16}
+# SIMD extension, the widest first -> what NumPy calls it.
+FEATURES = {"avx512": "AVX512F", "avx2": "AVX2", "neon": "ASIMD"}
+REGISTER_BYTES = {"avx512": 64, "avx2": 32, "neon": 16, "other": 16}
 
 
 def simd() -> str:
     """Widest SIMD extension of the processor."""
     from numpy._core._multiarray_umath import __cpu_features__ as features
 
-    if features.get("AVX512F"):
-        return "avx512"
-    return "avx2" if features.get("AVX2") else "other"
+    return next((name for name, feature in FEATURES.items() if features.get(feature)), "other")
 
 
 def register_width(dtype: str, extension: str | None = None) -> int:

@@ -34,6 +34,9 @@ CHAINED = {"chained float64": 2, "chained float32": 2}
 REGISTERS = {
     "Intel, avx512": dict.fromkeys(("plain float64", "plain float32", "single float64", "single float32"), 2) | CHAINED,
     "avx512": {"plain float64": 2} | CHAINED,
+    # 64-bit ARM, not measured: cores have up to four units for fused multiply-adds, and a register holds two float64. One
+    # register a number leaves too few independent operations to keep four units at work.
+    "neon": dict.fromkeys((kernel for kernel in KERNELS if kernel != "float32_compensated"), 2),
 }
 
 FILE, MOST_BYTES, HASHES = "lgvi_warp_widths.json", 1_000_000, "kernels"

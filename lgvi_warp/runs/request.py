@@ -24,6 +24,7 @@ from lgvi_warp.runs.default_method import planned
 from lgvi_warp.runs.run import refuse_failed, run_plan
 from lgvi_warp.scene.ensemble import Ensemble
 from lgvi_warp.scene.scene import Scene
+from lgvi_warp.scene.settings import check_device
 
 # With more Newton steps than this, a fixed number gains nothing over iterating to the tolerance.
 MOST_FIXED = 4
@@ -53,6 +54,7 @@ class Request:
     width: int | None = None
     checks: str | None = None
     on_failure: str | None = None
+    device: str | None = None
     observed: Observation = ALL_SAMPLES
     threads: int | None = None
     executor: Executor | None = None
@@ -123,6 +125,8 @@ class Request:
 
         survey_all: as of `choose_plan`.
         """
+        if self.device is not None:
+            check_device(self.device)
         grid, run = self.grid(), self.fleet.scene.run
         dtype = run.dtype if self.dtype is None else self.dtype
         checks = run.checks if self.checks is None else self.checks

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from lgvi_warp.common.declared import positive, read, text, whole, word
+from lgvi_warp.common.declared import checked, positive, read, text, whole, word
 from lgvi_warp.common.errors import Faults, SceneError, among, ragged
 from lgvi_warp.common.machine import DTYPES
 from lgvi_warp.common.real_numbers import holds_words
@@ -24,6 +24,17 @@ MOST_MEMBERS = 2**31
 
 
 KEEP = ("all", "none", "failed")
+# Where kernels run, and what is said of any other place.
+DEVICES = ("cpu",)
+NO_DEVICE = "is no device of a run: runs are on CPU cores", 'leave it out, or give "cpu"'
+
+
+def check_device(device: Any) -> None:
+    """Refuse a place where no run can be."""
+    faults = Faults()
+    if not among(device, DEVICES):
+        faults.add("device", device, *NO_DEVICE)
+    faults.raise_if_any()
 
 
 def check_keep(faults: Faults, key: str, keep: Any, members: int | None = None) -> None:
@@ -59,6 +70,7 @@ class RunSettings:
         atol: As in Method.
         checks: As in solve; by default "safe".
         on_failure: As in solve; by default "freeze".
+        device: As in solve; by default "cpu", the only one.
         keep: Members whose samples are kept: "all" (default), "none", "failed", or a list of indices.
         statistics: Tables as in [[run.statistics]], or Statistic objects; by default none.
         until: A table as in [run.until], or an Until; None for a fixed number of members (default).
@@ -80,6 +92,7 @@ class RunSettings:
     atol: float | None = None
     checks: str = word("safe", known=CHECKS)
     on_failure: str = word("freeze", known=ON_FAILURE)
+    device: str = checked(lambda value: among(value, DEVICES), *NO_DEVICE, "cpu")
     keep: Any = "all"
     statistics: Sequence[Any] = ()
     until: Any = None

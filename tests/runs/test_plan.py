@@ -7,7 +7,6 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-import warp as wp
 
 import lgvi_warp as lw
 from lgvi_kernels.advance.kernel import make_advance
@@ -219,16 +218,6 @@ def test_method_is_data():
         stages = Method(f"{name}(psi_s)").stages
         assert sum(stages) == pytest.approx(1.0, abs=1e-14)
         assert stages == stages[::-1]
-
-
-@pytest.mark.slow
-def test_kernels_compile_for_cuda(tmp_path):
-    # sm_90, without a GPU: the same code, one vehicle a packet.
-    scene = scene_of(TURN @ np.diag((1.0, 2.0, 3.0)) @ TURN.T, net=1.0, moment=(0.0, 0.0, 1.0))
-    for dtype in ("float64", "float32"):
-        plan = plan_of(scene, width=1, dtype=dtype)
-        wp.compile_aot_module(plan.kernel.advance.kernel.module, arch=90, module_dir=str(tmp_path / dtype))
-        assert any(path.suffix == ".cubin" for path in (tmp_path / dtype).iterdir())
 
 
 @pytest.mark.slow_for("cayley*")

@@ -117,12 +117,21 @@ def test_four_thousand_odd_calls(given):
 
 
 @pytest.mark.parametrize(
-    "name", ["method", "dtype", "checks", "on_failure", "executor", "save", "statistics", "on_block"]
+    "name", ["method", "dtype", "checks", "on_failure", "device", "executor", "save", "statistics", "on_block"]
 )
 def test_arrays_are_refused_where_a_word_is_meant(name):
     fleet = lw.Ensemble(lw.Scene(lw.Vehicle(**odd_calls.BODY)), 4)
     with pytest.raises(lw.SceneError, match=name):
         lw.solve(fleet, h=0.1, t1=0.2, **{name: np.zeros(3)})
+
+
+@pytest.mark.parametrize("call", [lw.solve, lw.prepare, lw.predict])
+def test_a_device_other_than_the_cpu_is_refused(call):
+    scene = lw.Scene(lw.Vehicle(**odd_calls.BODY))
+    with pytest.raises(
+        lw.SceneError, match=r"^device = 'cuda:0': .* runs are on CPU cores; leave it out, or give \"cpu\"$"
+    ):
+        call(scene, h=0.1, t1=0.2, device="cuda:0")
 
 
 def test_inertia_and_added_mass_are_given_by_name():

@@ -19,7 +19,7 @@ def chosen(*words):
 def test_every_option_of_a_run_replaces_its_key():
     words = {"method": "rk4", "step": "0.5", "duration": "7", "dtype": "float32", "solver": "newton", "iterations": "3",
              "tolerance": "1e-9", "rtol": "1e-5", "atol": "1e-6", "checks": "all", "on_failure": "raise",
-             "keep": "none"}  # fmt: skip
+             "device": "cpu", "keep": "none"}  # fmt: skip
     options = [word for name, text in words.items() for word in (f"--{name.replace('_', '-')}", text)]
     expected = {f"run.{name}": text for name, text in words.items()}
     assert settings.overrides(chosen(*options)) == expected

@@ -7,6 +7,7 @@ import os
 import pytest
 
 from lgvi_kernels.lanes.arithmetic import WIDTHS
+from lgvi_warp.common import machine
 from lgvi_warp.engine import widths
 from lgvi_warp.engine.widths import path as path_of_users
 from lgvi_warp.results.provenance import provenance
@@ -29,13 +30,23 @@ def file(tuned_widths):
     [(EPYC, "avx512", "plain", (16, 16, 16)), (EPYC, "avx512", "chained", (16, 32, 16)),
      (EPYC, "avx512", "dense", (8, 16, 16)), (EPYC, "avx512", "single", (8, 16, 16)), (XEON, "avx512", "single", (16, 32, 16)),
      (XEON, "avx512", "plain", (16, 32, 16)), (XEON, "avx512", "chained", (16, 32, 16)),
-     (XEON, "avx512", "explicit", (8, 16, 16)), (XEON, "avx2", "chained", (4, 8, 8)), ("Cortex", "other", "plain", (2, 4, 4))],
+     (XEON, "avx512", "explicit", (8, 16, 16)), (XEON, "avx2", "chained", (4, 8, 8)),
+     ("Neoverse", "neon", "plain", (4, 8, 4)), ("Neoverse", "neon", "explicit", (4, 8, 4)),
+     ("Power", "other", "plain", (2, 4, 4))],
 )  # fmt: skip
 def test_the_table(cpu, simd, kind, lanes):
     chosen = [widths.of_table(kind, dtype, cpu=cpu, simd=simd) for dtype in DTYPES]
     assert tuple(width.lanes for width in chosen) == lanes
     assert all(width.source.startswith("table: ") and width.source.endswith(simd) for width in chosen)
     assert all("Intel" not in width.source or cpu == XEON for width in chosen)
+
+
+def test_every_extension_is_one_that_is_looked_for():
+    from numpy._core._multiarray_umath import __cpu_features__ as known
+
+    assert set(machine.FEATURES.values()) <= set(known)
+    assert machine.REGISTER_BYTES.keys() == {*machine.FEATURES, "other"}
+    assert machine.simd() in machine.REGISTER_BYTES
 
 
 def test_kernels_have_these_widths():

@@ -168,7 +168,7 @@ def test_absent_numbers_are_no_parameters():
         assert term.device_in(True) == device
         new = ("table", "advance", "torque", "lift_a", "lift_c", "flow", "rate_limit", "time_constant")
         given = {key for key in term.to_dict() if key.startswith(new)}
-        assert given == ({"rate_limit"} if device == "control_fins" else {"time_constant"})
+        assert given == ({"rate_limit"} if device == "fins" else {"time_constant"})
 
 
 @pytest.mark.parametrize(

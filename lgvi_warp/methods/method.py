@@ -230,8 +230,8 @@ class Method(Summarized):
         if len(tolerances) == 1:
             faults.add(*tolerances.popitem(), "is given alone", "give both rtol and atol, or none for a fixed step")
         elif tolerances and self.name in ORDERS and not (self.tableau and self.tableau.errors):
-            able = " or ".join(name for name, tableau in EXPLICIT.items() if tableau.errors)
-            faults.add("rtol, atol", self.name, "estimates no error", f"use {able}, or leave them out")
+            able = ", ".join(name for name, tableau in EXPLICIT.items() if tableau.errors)
+            faults.add("rtol, atol", self.name, "estimates no error", f"use one of {able}, or leave them out")
 
     @property
     def base(self) -> str:

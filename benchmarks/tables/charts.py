@@ -38,7 +38,7 @@ TABLEAUX = {
 }  # fmt: skip
 
 TEXT = f"""Evaluations of the right-hand side in a simulated second for an error of position or attitude after {T1:g} s, the
-largest of {MEMBERS} members of the paper's vehicle, in NumPy. Rows: two rows of R, as `rk4`, `rk5`, `rk5_ck` and `rk8` have them;
+largest of {MEMBERS} members of the paper's vehicle, in NumPy. Rows: two rows of R, as explicit methods have them;
 rotation vector: R exp(v) from step to step, v from 0. The number of stages is that of a step.
 An empty cell: not among the steps tried."""
 

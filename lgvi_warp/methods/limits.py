@@ -95,7 +95,7 @@ def first_unstable(numbers: np.ndarray, growth: np.ndarray) -> float:
 
 @functools.cache
 def spin_limit(name: str) -> float:
-    """Largest h |Omega| [rad] of a steady spin by an explicit method: where R, its stability polynomial, grows at i h |Omega|."""
+    """Largest h |Omega| [rad] of a steady spin by an explicit method: where its polynomial grows at i h |Omega|."""
     tableau = Method(name).tableau
     assert tableau is not None
     numbers = np.arange(STEP, MOST, STEP)

@@ -48,7 +48,8 @@ NO_POTENTIAL = "needs potentials of position plus those of attitude; {} has none
     *((method, [term], "noise more than once|undoes one of h")
       for method in ("psi", "psi_1", "tj4(psi_s)") for term in (NOISE, WANDERING)),
     *((lw.Method(name, **TOLERANCES), [NOISE],
-       "cannot choose its steps where noise is drawn once a step; leave out rtol and atol") for name in ("rk5", "rk5_ck", "rk8")),
+       "cannot choose its steps where noise is drawn once a step; leave out rtol and atol")
+      for name in ("rk5", "rk5_ck", "rk8")),
     ("cg3", ROUGH, "before the step's start, where it is not known what thrusters remembers; use rkmk4"),
     ("kl6(psi_x)", ROUGH, "use psi_x"),
 ])  # fmt: skip

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.integrate import DOP853, RK45
 
+from lgvi_warp.methods.tableaux import CASH_KARP
+
 # Rows of A without the first, empty one, then b.
 Tableau = tuple[list[list[float]], list[float]]
 
@@ -20,9 +22,10 @@ def _lists(A: np.ndarray, B: np.ndarray, stages: int) -> Tableau:
 TABLEAUS: dict[str, Tableau] = {
     "rk4": ([[0.5], [0.0, 0.5], [0.0, 0.0, 1.0]], [1 / 6, 1 / 3, 1 / 3, 1 / 6]),
     "dp5": _lists(RK45.A, RK45.B, RK45.n_stages),
+    "ck5": ([list(row) for row in CASH_KARP.a[1:]], list(CASH_KARP.b)),
     "dop853": _lists(DOP853.A, DOP853.B, DOP853.n_stages),
 }
-ORDERS = {"rk4": 4, "dp5": 5, "dop853": 8}
+ORDERS = {"rk4": 4, "dp5": 5, "ck5": 5, "dop853": 8}
 
 
 def combined(y: Sequence[Any], h: Any, weights: Sequence[float], k: Sequence[Sequence[Any]]) -> tuple[Any, ...]:

@@ -18,9 +18,9 @@ from lgvi_warp.studies.stability.limits import LIMITS
 METHODS = (
     "phi", "psi", "psi_s", "psi_1", "psi_x", "psi_x8", "psi_w", "tj4(psi_s)", "su4(psi_s)", "kl6(psi_s)", "kl8(psi_s)",
     "su4(psi_x)", "kl6(psi_x)", "kl8(psi_x)", "ss6_13(psi_x)", "bm4(psi_x)", "bm6(psi_x)", "rkn4_6", "rkn6_11", "rkn6_14",
-    "gauss4", "gauss6", "gauss8", "cg3", "rkmk4", "rk4", "rk5", "rk8",
+    "gauss4", "gauss6", "gauss8", "cg3", "rkmk4", "rk4", "rk5", "rk5_ck", "rk8",
 )  # fmt: skip
-EXPLICIT_DRAG = ("phi", "psi", "cg3", "rkmk4", "rk4", "rk5", "rk8")
+EXPLICIT_DRAG = ("phi", "psi", "cg3", "rkmk4", "rk4", "rk5", "rk5_ck", "rk8")
 SMALL, LARGE = 1e-3, 0.3
 # An oscillation is lost beyond so many times the angle that it was released at.
 WITHIN = {SMALL: 10.0, LARGE: 2.0}

@@ -59,7 +59,7 @@ def _how(group: Any) -> None:
     add("--error", metavar="E", type=float,
         help="choose the cheapest method, step and precision that keep this error, and check it after the run")  # fmt: skip
     add("--of", help=f"what --error is of (default: position [m]); {OF}")
-    add("--rtol", metavar="R", help="with --atol, rk5 and rk8 choose their own steps: relative error of each")
+    add("--rtol", metavar="R", help="with --atol, rk5, rk5_ck and rk8 choose their own steps: relative error of each")
     add("--atol", metavar="A", help="with --rtol: absolute error of each step")
 
 

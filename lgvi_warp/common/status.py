@@ -164,7 +164,7 @@ _WARNING_TEXT = {
     Warnings.PRECISION_LOSS: "the position loses what a step adds to it: eps |b| > 0.05 h |v|; use float64 or "
     "float32_compensated, or an origin nearer to the vehicle",
     Warnings.ORTHOGONALITY: "the attitude left the rotations: |R^T R - I| > 1e-10 (float64) or 1e-4 (float32), of rk4, rk5, "
-    "rk8 and rkw3 1e-3; shorten the step, or use a method that stays on the group (psi_s, psi_x)",
+    "rk5_ck, rk8 and rkw3 1e-3; shorten the step, or use a method that stays on the group (psi_s, psi_x)",
     Warnings.MUNK_COARSE: "the Munk moment's oscillation is coarsely resolved: h w > 0.5 in a stage; shorten the step, or do "
     "not trust attitudes",
     Warnings.RESTORING_COARSE: "the restoring moment's oscillation is coarsely resolved: h sqrt(B|r|/J) > 0.5 in a stage; "

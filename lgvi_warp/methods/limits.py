@@ -57,25 +57,13 @@ def oscillation_limit(method: Method, table: Mapping[str, float]) -> float:
     return table.get(method.name, table[match[2]] / longest_stage(method))
 
 
-@functools.cache
-def imaginary_limit(name: str) -> float:
-    """Largest y [rad] with |R(iy)| <= 1, R the stability function of an explicit method: h |Omega| of a steady spin."""
-    tableau = Method(name).tableau
-    assert tableau is not None
-    n = len(tableau.b)
-    A = np.array([(*row[:n], *(0.0,) * (n - len(row))) for row in tableau.a[:n]])
-    y = 1j * np.linspace(0.001, 12.0, 12_000)
-    stages = np.linalg.solve(np.eye(n) - y[:, None, None] * A, np.ones((len(y), n, 1)))[..., 0]
-    return float(abs(y[np.argmax(np.abs(1.0 + y * (stages @ np.array(tableau.b))) > 1.0 + 1e-9)]))
-
-
 def rotation_limit(method: Method) -> float:
     """Largest h |Omega| [rad] of a method; inf for one whose status reports a step that is too large."""
     if method.adaptive:
         return np.inf
     if method.turns:
         return TURNS / longest_stage(method)
-    return imaginary_limit(method.name) if method.tableau else np.inf
+    return spin_limit(method.name) if method.tableau else np.inf
 
 
 def too_large(method: Method) -> str:
@@ -103,6 +91,15 @@ def first_unstable(numbers: np.ndarray, growth: np.ndarray) -> float:
     """The largest number h w (n,), rising by STEP [rad], up to which a motion with this growth (n,) in a step stays small."""
     beyond = growth > 1.0 + GROWTH
     return float(numbers[np.argmax(beyond)] - STEP) if beyond.any() else math.inf
+
+
+@functools.cache
+def spin_limit(name: str) -> float:
+    """Largest h |Omega| [rad] of a steady spin by an explicit method: where its polynomial grows at i h |Omega|."""
+    tableau = Method(name).tableau
+    assert tableau is not None
+    numbers = np.arange(STEP, MOST, STEP)
+    return first_unstable(numbers, np.abs(stability_polynomial(tableau, 1j * numbers)))
 
 
 @functools.cache

@@ -16,7 +16,7 @@ from lgvi_warp.common import summaries
 from lgvi_warp.common.declared import checked, read, word
 from lgvi_warp.common.errors import Faults, among
 from lgvi_warp.common.summaries import Summarized
-from lgvi_warp.methods.tableaux import CG3, DOP853, DOPRI5, RK4, RKW3, Tableau
+from lgvi_warp.methods.tableaux import CASH_KARP, CG3, DOP853, DOPRI5, RK4, RKW3, Tableau
 
 Program = tuple[tuple[str, float], ...]
 
@@ -44,7 +44,9 @@ FORCED: dict[str, Program] = {
     "psi": (("Phi", 0.5), ("Phi*", 0.5)),
 }
 # Runge-Kutta methods have no sub-maps. KINDS: those that keep R on the group (see lgvi_kernels.maps.explicit).
-EXPLICIT: dict[str, Tableau] = {"rk4": RK4, "rk5": DOPRI5, "rk8": DOP853, "cg3": CG3, "rkmk4": RK4}
+EXPLICIT: dict[str, Tableau] = {
+    "rk4": RK4, "rk5": DOPRI5, "rk5_ck": CASH_KARP, "rk8": DOP853, "cg3": CG3, "rkmk4": RK4,
+}  # fmt: skip
 LINEARLY_IMPLICIT: dict[str, Tableau] = {"rkw3": RKW3}
 RUNGE_KUTTA = EXPLICIT | LINEARLY_IMPLICIT
 KINDS = {"cg3": "group", "rkmk4": "munthe_kaas"}
@@ -155,8 +157,8 @@ class Method(Summarized):
               "bm4(psi_x)", "bm6(psi_x)" of its two halves;
             * "rkn4_6", "rkn6_11", "rkn6_14": two parts, for weight and restoring moment;
             * "gauss4" to "gauss12": Gauss collocation by fixed-point iteration, for forces of position and time;
-            * explicit methods: "rk4", "rk5" (Dormand & Prince), "rk8" (DOP853's) with R as two rows; "cg3" (Crouch &
-              Grossman) and "rkmk4" (Munthe-Kaas) on the rotation group;
+            * explicit methods: "rk4", "rk5" (Dormand & Prince), "rk5_ck" (Cash & Karp), "rk8" (DOP853's) with R as two
+              rows; "cg3" (Crouch & Grossman) and "rkmk4" (Munthe-Kaas) on the rotation group;
             * "rkw3": linearly implicit in the damping, for strong damping and steady motion; without damping it is "rk4".
         solver: Solver of equation (24): "quartic" (default), "cayley", "newton" (the paper's, on the exponential map) or
             "moser_veselov" (explicit).
@@ -168,10 +170,10 @@ class Method(Summarized):
         alpha: Weight of the old configuration in the average of nonconservative forces, equation (15), 0 to 1; default 0.5.
             It acts in phi, phi_adjoint and psi only.
         beta: The same for nonconservative torques, equation (16).
-        rtol: Relative tolerance of the step control of rk5 and rk8; default None, a fixed step. The error estimated for each
-            step stays below atol + rtol |y|, in the mean square over y = (b, R, p, pi), momenta divided by the largest J. The
-            worst vehicle of a packet decides. The run's step is then the longest one, and the grid of samples, events and
-            statuses.
+        rtol: Relative tolerance of the step control of rk5, rk5_ck and rk8; default None, a fixed step. The error estimated
+            for each step stays below atol + rtol |y|, in the mean square over y = (b, R, p, pi), momenta divided by the
+            largest J. The worst vehicle of a packet decides. The run's step is then the longest one, and the grid of samples,
+            events and statuses.
         atol: Absolute tolerance of the step control; give both or none.
         reason: Why it was chosen where no one named it; for the summary and the provenance. Default "".
 
@@ -228,8 +230,8 @@ class Method(Summarized):
         if len(tolerances) == 1:
             faults.add(*tolerances.popitem(), "is given alone", "give both rtol and atol, or none for a fixed step")
         elif tolerances and self.name in ORDERS and not (self.tableau and self.tableau.errors):
-            able = " or ".join(name for name, tableau in EXPLICIT.items() if tableau.errors)
-            faults.add("rtol, atol", self.name, "estimates no error", f"use {able}, or leave them out")
+            able = ", ".join(name for name, tableau in EXPLICIT.items() if tableau.errors)
+            faults.add("rtol, atol", self.name, "estimates no error", f"use one of {able}, or leave them out")
 
     @property
     def base(self) -> str:

@@ -69,6 +69,23 @@ DOPRI5 = Tableau(
     estimate=5,
 )
 
+# Cash & Karp (1990), ACM Transactions on Mathematical Software 16, 201, the first of its methods: 5(4), six stages.
+CASH_KARP = Tableau(
+    order=5,
+    a=(
+        (),
+        (1 / 5,),
+        (3 / 40, 9 / 40),
+        (3 / 10, -9 / 10, 6 / 5),
+        (-11 / 54, 5 / 2, -70 / 27, 35 / 27),
+        (1631 / 55296, 175 / 512, 575 / 13824, 44275 / 110592, 253 / 4096),
+    ),
+    b=(37 / 378, 0.0, 250 / 621, 125 / 594, 0.0, 512 / 1771),
+    c=(0.0, 1 / 5, 3 / 10, 3 / 5, 1.0, 7 / 8),
+    errors=((-277 / 64512, 0.0, 6925 / 370944, -6925 / 202752, -277 / 14336, 277 / 7084),),
+    estimate=5,
+)
+
 # Crouch & Grossman (1993), order 3, on a Lie group: the moves by the stages follow one another, the last with `b`.
 # Hairer, Lubich & Wanner, Geometric Numerical Integration, IV.8.
 CG3 = Tableau(

@@ -30,8 +30,8 @@ from lgvi_warp.studies.trials import TRUST, Trial, trials_of, tried
 
 # Tried in this order; those that a scene refuses are left out.
 CANDIDATES = ("kl8(psi_x)", "psi_x", "psi_s", "su4(psi_x)", "kl6(psi_x)", "rk8", "su8_15(psi_x)", "ss6_13(psi_x)",
-              "rkn6_11", "rkn6_14", "bm6(psi_x)", "bm4(psi_x)", "rk5", "rk4", "rkw3", "psi_1", "psi", "psi_w", "kl8(psi_s)",
-              "kl6(psi_s)", "su4(psi_s)", "phi")  # fmt: skip
+              "rkn6_11", "rkn6_14", "bm6(psi_x)", "bm4(psi_x)", "rk5", "rk5_ck", "rk4", "rkw3", "psi_1", "psi", "psi_w",
+              "kl8(psi_s)", "kl6(psi_s)", "su4(psi_s)", "phi")  # fmt: skip
 # Part of a trade-off's time that its reference gets.
 SHARE = 0.3
 # How errors of members are reduced to a number.

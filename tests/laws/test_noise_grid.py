@@ -228,7 +228,7 @@ def test_check_law_takes_it_and_a_device_that_hides_its_noise_is_refused():
 
 
 SPLIT = ("psi_s", "psi_x", "psi_x8", "psi_w", "phi", "phi_adjoint")
-EXPLICIT = ("rk4", "rk5", "rk8", "rkw3", "cg3", "rkmk4")
+EXPLICIT = ("rk4", "rk5", "rk5_ck", "rk8", "rkw3", "cg3", "rkmk4")
 ORDERS = [*(("white", method) for method in (*SPLIT, *EXPLICIT)), *(("Gauss-Markov", method) for method in SPLIT)]
 
 

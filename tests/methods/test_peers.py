@@ -61,7 +61,7 @@ def test_quaternion_rates_turn_the_matrix(small):
     assert np.abs((after - before) / 2e-6 - expected).max() < 1e-9
 
 
-@pytest.mark.parametrize("method, rate", [("rk4", 8), ("dp5", 8), ("dop853", 4)])
+@pytest.mark.parametrize("method, rate", [("rk4", 8), ("dp5", 8), ("ck5", 8), ("dop853", 4)])
 def test_tableaus_have_their_orders(truth, method, rate):
     # With half the step the error falls by 2^order, up to what the next order adds.
     one, errors = problem.make_problem(MEMBERS, T1), []

@@ -3,6 +3,7 @@
 
 import math
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -33,7 +34,9 @@ DISSIPATIVE = (
     Drag(linear=np.array([0.3, 0.2, 0.4, 0.1, 0.2, 0.3]), quadratic=np.zeros(6)),
     Wrench(force=np.array([0.5, -0.3, 0.2]), torque=np.array([0.1, 0.2, -0.1])),
 )
-EXPLICIT = {"rk4": tableaux.RK4, "rk5": tableaux.DOPRI5, "rk8": tableaux.DOP853}
+EXPLICIT = {
+    "rk4": tableaux.RK4, "rk5": tableaux.DOPRI5, "rk5_ck": tableaux.CASH_KARP, "rk8": tableaux.DOP853,
+}  # fmt: skip
 
 
 def body_of(*terms, excess=0.0):
@@ -115,6 +118,35 @@ def test_embedded_methods():
     assert [order_of(a, b - np.array(e)) for e in tableaux.DOP853.errors] == [5, 3]
 
 
+def exactly(numbers):
+    """The fractions that these numbers are, of six digits at most; none other is as near."""
+    found = [Fraction(number).limit_denominator(10**6) for number in numbers]
+    assert [float(fraction) for fraction in found] == list(numbers)
+    return found
+
+
+def test_the_coefficients_of_cash_and_karp_are_exact():
+    """Each as a fraction: row sums, every condition up to order 5 and, of b - e, up to 4, with no remainder at all."""
+    tableau = tableaux.CASH_KARP
+    a = [exactly(row) for row in tableau.a]
+    b, c, e = (exactly(row) for row in (tableau.b, tableau.c, tableau.errors[0]))
+
+    def elementary(tree):
+        branches = [elementary(branch) for branch in tree]
+        inner = [[sum(a_ij * phi_j for a_ij, phi_j in zip(row, phi)) for row in a] for phi in branches]
+        return [math.prod((column[i] for column in inner), start=Fraction(1)) for i in range(len(a))]
+
+    def met(weights, order):
+        """Whether all the conditions of this order hold."""
+        left = [sum(w * phi for w, phi in zip(weights, elementary(tree), strict=True)) for tree in trees(order)]
+        return left == [Fraction(1, density(tree)[1]) for tree in trees(order)]
+
+    assert [sum(row) for row in a] == c
+    assert [met(b, order) for order in range(1, 7)] == [True] * 5 + [False]
+    embedded = [w - error for w, error in zip(b, e, strict=True)]
+    assert [met(embedded, order) for order in range(1, 6)] == [True] * 4 + [False]
+
+
 @pytest.mark.parametrize("s", range(1, 7))
 def test_gauss_coefficients(s):
     # B(2s), C(s), symmetry, and b_i a_ij + b_j a_ji = b_i b_j: quadratic invariants are kept.
@@ -131,6 +163,7 @@ def test_gauss_coefficients(s):
 STEPS = {
     "rk4": (explicit.stepper(tableaux.RK4), 4, (0.05, 0.025, 0.0125)),
     "rk5": (explicit.stepper(tableaux.DOPRI5), 5, (0.125, 0.1, 0.0625, 0.05)),
+    "rk5_ck": (explicit.stepper(tableaux.CASH_KARP), 5, (0.125, 0.1, 0.0625, 0.05)),
     "rk8": (explicit.stepper(tableaux.DOP853), 8, (0.2, 0.125, 0.1)),
     "rkmk4": (munthe_kaas.rkmk4, 4, (0.1, 0.05, 0.025)),
     "cg3": (munthe_kaas.cg3, 3, (0.05, 0.025, 0.0125)),
@@ -244,7 +277,7 @@ def test_lie_group_methods_stay_on_the_group(body, start):
     assert np.abs(x.R.T @ x.R - np.eye(3)).max() > 1e-8
 
 
-@pytest.mark.parametrize("name", ["rk5", "rk8"])
+@pytest.mark.parametrize("name", ["rk5", "rk5_ck", "rk8"])
 def test_adaptive(name, body, start, example):
     # The states are those at the times, the error follows the tolerance, and so does the number of steps.
     truth, tolerances, times = expected(example["truth"]["5"]), (1e-6, 1e-8, 1e-10), [0.0, 1.0, 2.5, 5.0]

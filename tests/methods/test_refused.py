@@ -11,7 +11,7 @@ from tests.laws.test_parity import VEHICLE
 from tests.methods.test_coupled import scene_of as coupled_scene_of
 
 TOLERANCES = {"rtol": 1e-8, "atol": 1e-8}
-ESTIMATES_NONE = "estimates no error; use rk5 or rk8, or leave them out"
+ESTIMATES_NONE = "estimates no error; use one of rk5, rk5_ck, rk8, or leave them out"
 
 
 @pytest.mark.parametrize(("words", "said"), [
@@ -48,7 +48,8 @@ NO_POTENTIAL = "needs potentials of position plus those of attitude; {} has none
     *((method, [term], "noise more than once|undoes one of h")
       for method in ("psi", "psi_1", "tj4(psi_s)") for term in (NOISE, WANDERING)),
     *((lw.Method(name, **TOLERANCES), [NOISE],
-       "cannot choose its steps where noise is drawn once a step; leave out rtol and atol") for name in ("rk5", "rk8")),
+       "cannot choose its steps where noise is drawn once a step; leave out rtol and atol")
+      for name in ("rk5", "rk5_ck", "rk8")),
     ("cg3", ROUGH, "before the step's start, where it is not known what thrusters remembers; use rkmk4"),
     ("kl6(psi_x)", ROUGH, "use psi_x"),
 ])  # fmt: skip

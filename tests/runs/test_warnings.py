@@ -101,7 +101,7 @@ def test_rotation(method):
 def test_explicit_methods_have_their_limits_on_the_imaginary_axis():
     # Orders 3 and 4 with as many stages have the exponential's series: sqrt(3) and 2 sqrt(2).
     known = {"cg3": np.sqrt(3.0), "rk4": 2.0 * np.sqrt(2.0), "rkmk4": 2.0 * np.sqrt(2.0)}
-    assert {name: limits.imaginary_limit(name) for name in known} == pytest.approx(known, abs=2e-3)
+    assert {name: limits.spin_limit(name) for name in known} == pytest.approx(known, abs=2e-3)
 
 
 @pytest.mark.slow

@@ -16,7 +16,8 @@ from lgvi_warp.studies import speed
 METHODS = (
     "phi", "phi_adjoint", "psi", "psi_s", "psi_1", "psi_x", "psi_x8", "psi_w", "tj4(psi_s)", "su4(psi_s)", "su4(psi_x)",
     "bm4(psi_x)", "kl6(psi_s)", "bm6(psi_x)", "kl8(psi_s)", "kl8(psi_x)", "ss8_21(psi_x)", "rkn4_6", "rkn6_11", "rkn6_14",
-    "gauss4", "gauss6", "gauss8", "gauss10", "gauss12", "cg3", "rkmk4", "rk4", "rk5", "rk8", "rk5 chosen", "rk8 chosen",
+    "gauss4", "gauss6", "gauss8", "gauss10", "gauss12", "cg3", "rkmk4", "rk4", "rk5", "rk5_ck", "rk8", "rk5 chosen",
+    "rk8 chosen",
 )  # fmt: skip
 QUICK = ("psi_x",)
 DTYPES = ("float64", "float32", "float32_compensated")

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from lgvi_warp.methods.limits import MOST, STEP, drag_limit, first_unstable, stability_polynomial
+from lgvi_warp.methods.limits import MOST, STEP, drag_limit, first_unstable, spin_limit
 from lgvi_warp.methods.method import Method
 
 # Letters of programs: sub-maps that turn the body, and those that change its momentum in each oscillation. Turns about
@@ -48,16 +48,14 @@ def oscillation_limit(name: str, kind: str = "munk") -> float:
     if method.gauss:
         return math.nan
     if method.tableau:
-        growth = np.abs(stability_polynomial(method.tableau, 1j * numbers))
-    else:
-        step = np.broadcast_to(np.eye(2), (len(numbers), 2, 2)).copy()
-        for angle, c in _oscillator(method, MOMENTS[kind]):
-            row, source, sign = (0, 1, 1.0) if angle else (1, 0, -1.0)
-            step[:, row] += (sign * c * numbers)[:, None] * step[:, source]
-        # Determinant 1: both eigenvalues lie on the unit circle up to a trace of 2.
-        half = 0.5 * np.abs(step[:, 0, 0] + step[:, 1, 1])
-        growth = half + np.sqrt(np.maximum(half**2 - 1.0, 0.0))
-    return first_unstable(numbers, growth)
+        return spin_limit(name)
+    step = np.broadcast_to(np.eye(2), (len(numbers), 2, 2)).copy()
+    for angle, c in _oscillator(method, MOMENTS[kind]):
+        row, source, sign = (0, 1, 1.0) if angle else (1, 0, -1.0)
+        step[:, row] += (sign * c * numbers)[:, None] * step[:, source]
+    # Determinant 1: both eigenvalues lie on the unit circle up to a trace of 2.
+    half = 0.5 * np.abs(step[:, 0, 0] + step[:, 1, 1])
+    return first_unstable(numbers, half + np.sqrt(np.maximum(half**2 - 1.0, 0.0)))
 
 
 @functools.cache
@@ -69,7 +67,7 @@ def rotation_limit(name: str) -> float:
     """
     method = Method(name)
     if method.tableau:
-        return math.inf if name in ("cg3", "rkmk4") else oscillation_limit(name)
+        return math.inf if name in ("cg3", "rkmk4") else spin_limit(name)
     if method.gauss:
         return math.nan
     if method.two_part:

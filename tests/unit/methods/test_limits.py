@@ -18,6 +18,12 @@ from lgvi_warp.studies.stability import limits as theory
 TABLES = {"munk": limits.MUNK, "restoring": limits.RESTORING}
 
 
+def square(tableau):
+    """(A (s, s), b (s,)) of a Runge-Kutta method."""
+    s = len(tableau.b)
+    return np.array([[*row, *[0.0] * (s - len(row))] for row in tableau.a]), np.array(tableau.b)
+
+
 @pytest.mark.parametrize("motion", TABLES)
 def test_the_tables_are_near_linear_theory(motion):
     table = TABLES[motion]
@@ -34,8 +40,21 @@ def test_the_tables_are_near_linear_theory(motion):
 )
 def test_a_steady_spin_ends_where_the_stability_function_does(name, exact):
     """|R(iy)| <= 1 up to 2 sqrt 2 of the classical method of order 4, up to sqrt 3 of order 3."""
-    assert limits.imaginary_limit(name) == pytest.approx(exact, abs=1e-3)
-    assert limits.rotation_limit(Method(name)) == limits.imaginary_limit(name)
+    assert limits.spin_limit(name) == pytest.approx(exact, abs=1e-3)
+    assert limits.rotation_limit(Method(name)) == limits.spin_limit(name)
+
+
+@pytest.mark.parametrize(("name", "last"), [("rk5", 1 / 600), ("rk5_ck", 1 / 800)])
+def test_a_steady_spin_by_six_stages_of_order_five(name, last):
+    """R(z) is the exponential's series to z^5, then last z^6: the spin ends where it grows tenfold in 4000 steps."""
+    A, b = square(Method(name).tableau)
+    assert b @ np.linalg.matrix_power(A, 5) @ np.ones(6) == pytest.approx(last, rel=1e-12)
+
+    def growth(y):
+        return abs(sum((1j * y) ** k / math.factorial(k) for k in range(6)) - last * y**6)
+
+    limit = limits.spin_limit(name)
+    assert growth(limit - 1e-3) ** 4000 < 10.0 < growth(limit + 2e-3) ** 4000
 
 
 def test_a_composition_bears_its_base_over_its_longest_stage():
@@ -67,14 +86,12 @@ def test_the_iteration_for_the_forces_ends_in_sixty_rounds(name, halves):
     assert left(0.98 * x) < 1e-14 < left(1.02 * x)
 
 
-@pytest.mark.parametrize("name", ["rk4", "rk8", "cg3"])
+@pytest.mark.parametrize("name", ["rk4", "rk5_ck", "rk8", "cg3"])
 def test_explicit_drag_ends_where_it_grows(name):
     """h l / I at which one step of v' = -l v, by the method's own stages, no longer damps."""
-    tableau, limit = Method(name).tableau, theory.drag_limit(name)
-    n = len(tableau.b)
+    (A, b), limit = square(Method(name).tableau), theory.drag_limit(name)
 
     def growth(x):
-        A = np.array([[*row[:n], *[0.0] * (n - len(row[:n]))] for row in tableau.a[:n]])
-        return abs(1.0 - x * np.array(tableau.b) @ np.linalg.solve(np.eye(n) + x * A, np.ones(n)))
+        return abs(1.0 - x * b @ np.linalg.solve(np.eye(len(b)) + x * A, np.ones(len(b))))
 
     assert growth(limit - 2e-3) <= 1.0 < growth(limit + 2e-3)

@@ -77,9 +77,11 @@ def make_advance(spec):
         if wp.static(not composed):
             # Computed from first_h, the compiler keeps one number in a register for the stage and its leads.
             opening = real(wp.static(lead_coefficient)) * first_h
-        x, kept, frozen = begun(read(state, i), c, monitor, k0, k1, h, opening, status, failed_step)
-        x = chunks(x, kept, frozen, c, monitor, k0, k1, s0, sample_step, h, stage_h, lead_h, first_h, opening, status,
-                   failed_step, failed_size, numbers, columns, out)  # fmt: skip
+        x = read(state, i)
+        frozen = Lane()
+        begun(x, frozen, c, monitor, k0, k1, h, opening, state, status, failed_step)
+        chunks(x, frozen, c, monitor, k0, k1, s0, sample_step, h, stage_h, lead_h, first_h, opening, state, status,
+               failed_step, failed_size, numbers, columns, out)  # fmt: skip
         write(state, i, x)
         put_back(mode)
 

@@ -5,6 +5,7 @@ Alarms are rare. What follows is apart from the loop over chunks and takes refer
 trace of it: neither copies of states nor registers.
 """
 
+import functools
 from typing import Any
 
 import warp as wp
@@ -60,6 +61,7 @@ def make_fail(width):
     return fail
 
 
+@functools.cache
 def make_resting(spec):
     """Functions (keep, show, rest) of frozen lanes, whose last good states are kept in the kernel's array of states.
 

@@ -149,11 +149,11 @@ def make_trial(real):
 
 def make_water_around(types, water_velocity, part_step, real):
     """(good, x, c, k, h, stage_h, lead_h, opening) -> R^T u at the start and at the end of a step, zero for water at rest."""
-    State, Constants, moving = types.State, types.Constants, water_velocity is not None
+    State, Constants, Lane, moving = types.State, types.Constants, types.Lane, water_velocity is not None
 
     @wp.func(inline=True)
-    def water_around(good: wp.ref[State], x: wp.ref[State], c: wp.ref[Constants], k: int, h: wp.float64, stage_h: Any,
-                     lead_h: Any, opening: real, zero: Any):  # fmt: skip
+    def water_around(good: wp.ref[State], x: wp.ref[State], c: wp.ref[Constants], k: int, h: wp.float64,
+                     stage_h: wp.array(dtype=real), lead_h: wp.array(dtype=real), opening: real, zero: Lane):  # fmt: skip
         still = vec3(zero, zero, zero)
         end_still = still
         if wp.static(moving):

@@ -160,11 +160,14 @@ def make_seen(spec, types, method, truth, at_step, opened):
 def make_acted(spec, types):
     """(x, y, r, c, monitor): control, allocate and send; x gets the alarm of lanes whose commands are no numbers."""
     State, Constants, Monitor, real, checked = types.State, types.Constants, types.Monitor, spec.real, spec.checked
-    Wrench = wrench_struct(spec.width, real)
+    Wrench, Reference = wrench_struct(spec.width, real), reference_struct(spec.width, real)
+    Measurement = measurement_struct(spec.width, real, spec.shared_rows)
     act, allocate, send = (in_turn(spec.control.parts, role) for role in ("control", "allocate", "send"))
 
     @wp.func
-    def acted(x: wp.ref[State], y: Any, r: Any, c: wp.ref[Constants], monitor: wp.ref[Monitor]):
+    def acted(
+        x: wp.ref[State], y: Measurement, r: Reference, c: wp.ref[Constants], monitor: wp.ref[Monitor]
+    ):
         w = Wrench()
         if wp.static(act is not None):
             w = act(w, r, y, c.loop)

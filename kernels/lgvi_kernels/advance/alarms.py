@@ -74,11 +74,15 @@ def make_resting(spec):
 
     @wp.func(inline=False)
     def keep(x: wp.ref[State], c: wp.ref[Constants], code: Lane, state: wp.array2d(dtype=Lane)):
-        write(state, c.packet, choose(code, x, read(state, c.packet)))
+        before = State()
+        read(before, state, c.packet)
+        write(state, c.packet, choose(code, x, before))
 
     @wp.func(inline=False)
     def show(x: wp.ref[State], c: wp.ref[Constants], frozen: Lane, state: wp.array2d(dtype=Lane)):
-        x = choose(frozen, read(state, c.packet), x)
+        kept = State()
+        read(kept, state, c.packet)
+        x = choose(frozen, kept, x)
 
     @wp.func(inline=False)
     def rest(x: wp.ref[State], frozen: Lane):

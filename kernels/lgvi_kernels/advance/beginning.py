@@ -13,7 +13,7 @@ from lgvi_kernels.lanes.packet import failures
 
 
 def make_constants(spec):
-    """The function that puts together what is the same in every step of packet i."""
+    """The function that puts together in c what is the same in every step of packet i."""
     types, stepping = make_types(spec), make_stepping(spec)
     Constants, DragFlow, Inertia, Params, Events = (
         types.Constants, types.DragFlow, types.Inertia, types.Params, types.Events
@@ -22,10 +22,9 @@ def make_constants(spec):
     watched, dragged, controlled = spec.watched, spec.dragged, spec.control is not None
 
     @wp.func(inline=True)
-    def constants(i: int, inertia: wp.array(dtype=Inertia), params: wp.array(dtype=Params), events: wp.array(dtype=Events),
-                  table: wp.array2d(dtype=Number), memory: wp.array2d(dtype=Lane), tolerance: real, force_tolerance: real,
-                  monitor: Monitor, h: wp.float64):  # fmt: skip
-        c = Constants()
+    def constants(c: wp.ref[Constants], i: int, inertia: wp.array(dtype=Inertia), params: wp.array(dtype=Params),
+                  events: wp.array(dtype=Events), table: wp.array2d(dtype=Number), memory: wp.array2d(dtype=Lane),
+                  tolerance: real, force_tolerance: real, monitor: wp.ref[Monitor], h: wp.float64):  # fmt: skip
         c.inertia = inertia[i % inertia.shape[0]]
         c.params = params[i % params.shape[0]]
         c.tolerance = tolerance
@@ -40,7 +39,6 @@ def make_constants(spec):
             c.loop = monitor.loop[i % monitor.loop.shape[0]]
         if wp.static(dragged):
             c.drag = prepare(DragFlow(), c.params.own, real(h))
-        return c
 
     return constants
 

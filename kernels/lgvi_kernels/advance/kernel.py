@@ -32,7 +32,7 @@ def make_advance(spec):
     spec = bounded_spec(spec)
     types, real = make_types(spec), spec.real
     Lane, Number, Ints, Monitor = types.Lane, types.Number, types.Ints, types.Monitor
-    Inertia, Params, Events = types.Inertia, types.Params, types.Events
+    State, Constants, Inertia, Params, Events = types.State, types.Constants, types.Inertia, types.Params, types.Events
     constants, begun, chunks = make_constants(spec), make_begun(spec), make_chunks(spec)
     read, write, _ = make_rows(Lane, types.State, spec.paced, spec.compensated)
     composed, lead_coefficient = spec.composed, spec.lead[1] if spec.lead is not None else 0.0
@@ -70,14 +70,16 @@ def make_advance(spec):
     ):
         mode = flush_subnormals()
         i = wp.tid()
-        c = constants(i, inertia, params, events, table, memory, tolerance, force_tolerance, monitor, h)
+        c = Constants()
+        constants(c, i, inertia, params, events, table, memory, tolerance, force_tolerance, monitor, h)
         # Times 1: a plain assignment would be a reference into the array, read anew in each step.
         first_h = real(1.0) * stage_h[0]
         opening = real(1.0) * lead_h[lead_h.shape[0] - 1]
         if wp.static(not composed):
             # Computed from first_h, the compiler keeps one number in a register for the stage and its leads.
             opening = real(wp.static(lead_coefficient)) * first_h
-        x = read(state, i)
+        x = State()
+        read(x, state, i)
         frozen = Lane()
         begun(x, frozen, c, monitor, k0, k1, h, opening, state, status, failed_step)
         chunks(x, frozen, c, monitor, k0, k1, s0, sample_step, h, stage_h, lead_h, first_h, opening, state, status,

@@ -64,16 +64,50 @@ def make_sampled(spec):
     return sampled
 
 
+def make_chunk(spec):
+    """The function that makes the steps k to k + n; it returns how many of them are made, 0 where they are to be made again."""
+    types, stepping, real = make_types(spec), make_stepping(spec), spec.real
+    State, Constants, Monitor, Lane, Ints = types.State, types.Constants, types.Monitor, types.Lane, types.Ints
+    Alarm, steps = types.Alarm, stepping.held if spec.control is not None else stepping.stepped
+    examined, failed, (_, _, rest) = make_examined(spec), make_failed(spec), make_resting(spec)
+    _, _, back_up = make_rows(Lane, State, spec.paced, spec.compensated)
+
+    @wp.func(inline=True)
+    def chunk(x: wp.ref[State], frozen: wp.ref[Lane], suspects: wp.ref[Lane], c: wp.ref[Constants], monitor: wp.ref[Monitor],
+              k: int, n: int, singles: wp.ref[int], last: int, h: wp.float64, stage_h: wp.array(dtype=real),
+              lead_h: wp.array(dtype=real), first_h: real, opening: real, state: wp.array2d(dtype=Lane),
+              status: wp.array(dtype=Ints), failed_step: wp.array(dtype=Ints), failed_size: wp.array(dtype=Lane)):  # fmt: skip
+        """singles: steps still to be made one at a time, after an alarm of these lanes, `suspects`."""
+        good = x
+        if wp.static(spec.memory and spec.checked):
+            back_up(c.memory, c.packet, 0, 1)
+        x.alarm = Alarm()
+        if wp.static(spec.paced):
+            # A lane with a code does not count when the packet chooses its step.
+            x.alarm.code = frozen
+        steps(x, c, monitor, k, n, h, stage_h, lead_h, first_h, opening)
+        again = int(0)
+        if wp.static(spec.checked):
+            codes = examined(x, c, monitor, k, n, singles, last, h, opening, frozen, suspects)
+            if any_positive(codes):
+                again = failed(good, x, frozen, suspects, codes, c, monitor, k, n, h, stage_h, lead_h, first_h, opening,
+                               state, status, failed_step, failed_size)  # fmt: skip
+        if wp.static(spec.checked or spec.watched):
+            if any_positive(frozen):
+                rest(x, frozen)
+        singles = wp.where(again > 0, again, wp.max(singles - 1, 0))
+        return wp.where(again > 0, 0, n)
+
+    return chunk
+
+
 def make_chunks(spec):
     """The function that makes the steps k0 to k1. Frozen lanes rest at the origin, without alarms, and end as they froze."""
     types, stepping, real = make_types(spec), make_stepping(spec), spec.real
     State, Constants, Monitor, Lane, Ints = types.State, types.Constants, types.Monitor, types.Lane, types.Ints
-    Alarm, controlled, freezes = types.Alarm, spec.control is not None, spec.checked or spec.watched
-    steps = stepping.held if controlled else stepping.stepped
-    examined, failed, (_, show, rest) = make_examined(spec), make_failed(spec), make_resting(spec)
-    inspected, sampled = make_inspected(spec), make_sampled(spec)
-    note_actuators = make_note_actuators(spec, types, stepping.at_step)
-    _, _, back_up = make_rows(Lane, State, spec.paced, spec.compensated)
+    chunk, inspected, sampled, freezes = make_chunk(spec), make_inspected(spec), make_sampled(spec), spec.checked or spec.watched
+    reports = spec.control is not None and spec.checked and spec.control.reports
+    note_actuators, (_, show, rest) = make_note_actuators(spec, types, stepping.at_step), make_resting(spec)
 
     @wp.func(inline=True)
     def chunks(x: wp.ref[State], frozen: wp.ref[Lane], c: wp.ref[Constants], monitor: wp.ref[Monitor], k0: int, k1: int,
@@ -84,42 +118,23 @@ def make_chunks(spec):
         k = k0
         s = s0
         suspects = ones(frozen) - ones(frozen)
+        singles = int(0)
         last = int(0)
         if wp.static(bool(spec.warning_rows) or spec.energy):
             # sample_step ends with a step that no run reaches, which saves a test for its end.
             last = sample_step[sample_step.shape[0] - 2]
-        # singles: steps still to be made one at a time, after an alarm.
-        singles = int(0)
         while k < k1:
             # Chunks end at multiples of CHUNK whatever the launches are: looks and renormalisation do not depend on them.
             n = wp.min(wp.static(CHUNK) - k % wp.static(CHUNK), wp.min(k1, sample_step[s]) - k)
             if singles > 0:
                 n = 1
-                if wp.static(controlled and spec.checked and spec.control.reports):
+                if wp.static(reports):
                     # Where a lane fails in this step, its actuators are those of the step's start.
                     note_actuators(x, c, h, k)
-            good = x
-            if wp.static(spec.memory and spec.checked):
-                back_up(c.memory, c.packet, 0, 1)
-            x.alarm = Alarm()
-            if wp.static(spec.paced):
-                # A lane with a code does not count when the packet chooses its step.
-                x.alarm.code = frozen
-            steps(x, c, monitor, k, n, h, stage_h, lead_h, first_h, opening)
-            again = int(0)
-            if wp.static(spec.checked):
-                codes = examined(x, c, monitor, k, n, singles, last, h, opening, frozen, suspects)
-                if any_positive(codes):
-                    again = failed(good, x, frozen, suspects, codes, c, monitor, k, n, h, stage_h, lead_h, first_h,
-                                   opening, state, status, failed_step, failed_size)  # fmt: skip
-            if wp.static(freezes):
-                if any_positive(frozen):
-                    rest(x, frozen)
-            if again > 0:
-                singles = again
-            else:
-                k += n
-                singles = wp.max(singles - 1, 0)
+            n = chunk(x, frozen, suspects, c, monitor, k, n, singles, last, h, stage_h, lead_h, first_h, opening, state,
+                      status, failed_step, failed_size)  # fmt: skip
+            k += n
+            if n > 0:
                 inspected(x, c, monitor, k, last, h, opening, frozen)
                 if k == sample_step[s]:
                     if wp.static(freezes):

@@ -9,6 +9,7 @@ All others are functions of their own that take references: Warp passes a struct
 import warp as wp
 
 from lgvi_kernels.advance.alarms import make_examined, make_failed, make_resting
+from lgvi_kernels.advance.beginning import make_begun
 from lgvi_kernels.advance.gathering import make_note_actuators, make_signals
 from lgvi_kernels.advance.rows import make_rows, make_sample
 from lgvi_kernels.advance.spec import CHUNK, make_types
@@ -102,19 +103,26 @@ def make_chunk(spec):
 
 
 def make_chunks(spec):
-    """The function that makes the steps k0 to k1. Frozen lanes rest at the origin, without alarms, and end as they froze."""
+    """The function that makes the steps k0 to k1 of a packet, from its state to its state.
+
+    Frozen lanes rest at the origin, without alarms, and end as they froze.
+    """
     types, stepping, real = make_types(spec), make_stepping(spec), spec.real
     State, Constants, Monitor, Lane, Ints = types.State, types.Constants, types.Monitor, types.Lane, types.Ints
     chunk, inspected, sampled, freezes = make_chunk(spec), make_inspected(spec), make_sampled(spec), spec.checked or spec.watched
     reports = spec.control is not None and spec.checked and spec.control.reports
     note_actuators, (_, show, rest) = make_note_actuators(spec, types, stepping.at_step), make_resting(spec)
+    begun, (read, write, _) = make_begun(spec), make_rows(Lane, State, spec.paced, spec.compensated)
 
     @wp.func(inline=True)
-    def chunks(x: wp.ref[State], frozen: wp.ref[Lane], c: wp.ref[Constants], monitor: wp.ref[Monitor], k0: int, k1: int,
-               s0: int, sample_step: wp.array(dtype=int), h: wp.float64, stage_h: wp.array(dtype=real),
-               lead_h: wp.array(dtype=real), first_h: real, opening: real, state: wp.array2d(dtype=Lane),
-               status: wp.array(dtype=Ints), failed_step: wp.array(dtype=Ints), failed_size: wp.array(dtype=Lane),
-               numbers: int, columns: wp.vec4i, out: wp.array2d(dtype=Lane)):  # fmt: skip
+    def chunks(c: wp.ref[Constants], monitor: wp.ref[Monitor], k0: int, k1: int, s0: int, sample_step: wp.array(dtype=int),
+               h: wp.float64, stage_h: wp.array(dtype=real), lead_h: wp.array(dtype=real), first_h: real, opening: real,
+               state: wp.array2d(dtype=Lane), status: wp.array(dtype=Ints), failed_step: wp.array(dtype=Ints),
+               failed_size: wp.array(dtype=Lane), numbers: int, columns: wp.vec4i, out: wp.array2d(dtype=Lane)):  # fmt: skip
+        x = State()
+        read(x, state, c.packet)
+        frozen = Lane()
+        begun(x, frozen, c, monitor, k0, k1, h, opening, state, status, failed_step)
         k = k0
         s = s0
         suspects = ones(frozen) - ones(frozen)
@@ -148,5 +156,6 @@ def make_chunks(spec):
         if wp.static(freezes):
             if any_positive(frozen):
                 show(x, c, frozen, state)
+        write(state, c.packet, x)
 
     return chunks

@@ -65,8 +65,8 @@ def make_fail(width):
 def make_resting(spec):
     """Functions (keep, show, rest) of frozen lanes, whose last good states are kept in the kernel's array of states.
 
-    keep: (x, c, code, state), of the lanes with a code; show: (x, c, frozen, state) -> these states in place of the resting ones;
-    rest: (x, frozen) -> frozen lanes at the origin, where they raise no alarms.
+    keep: (x, c, code, state), those of lanes with a code; show: (x, c, frozen, state) puts them in place of the resting ones;
+    rest: (x, frozen) puts frozen lanes to the origin, where they raise no alarms.
     """
     types = make_types(spec)
     State, Constants, Lane = types.State, types.Constants, types.Lane
@@ -150,13 +150,14 @@ def make_failed(spec):
     def failed(good: wp.ref[State], x: wp.ref[State], frozen: wp.ref[Lane], suspects: wp.ref[Lane], codes: Lane,
                c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, n: int, h: wp.float64, stage_h: wp.array(dtype=real),
                lead_h: wp.array(dtype=real), first_h: real, opening: real, state: wp.array2d(dtype=Lane),
-               status: wp.array(dtype=Ints), failed_step: wp.array(dtype=Ints), failed_size: wp.array(dtype=Lane)):  # fmt: skip
+               status: wp.array(dtype=Ints), failed_step: wp.array(dtype=Ints),
+               failed_size: wp.array(dtype=Lane)):  # fmt: skip
         """good, x: before and after the steps k to k + n; codes: why lanes fail in them. A single step may be divided."""
         code = codes
         again = int(0)
         if n > 1:
             again = n
-            suspects = code
+            suspects = code  # noqa: F841 (what a reference refers to)
             x = good
             if wp.static(spec.memory):
                 back_up(c.memory, c.packet, 1, 0)

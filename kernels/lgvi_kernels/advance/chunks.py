@@ -66,7 +66,7 @@ def make_sampled(spec):
 
 
 def make_chunk(spec):
-    """The function that makes the steps k to k + n; it returns how many of them are made, 0 where they are to be made again."""
+    """The function that makes the steps k to k + n; it returns n, or 0 where they are to be made again."""
     types, stepping, real = make_types(spec), make_stepping(spec), spec.real
     State, Constants, Monitor, Lane, Ints = types.State, types.Constants, types.Monitor, types.Lane, types.Ints
     Alarm, steps = types.Alarm, stepping.held if spec.control is not None else stepping.stepped
@@ -77,7 +77,8 @@ def make_chunk(spec):
     def chunk(x: wp.ref[State], frozen: wp.ref[Lane], suspects: wp.ref[Lane], c: wp.ref[Constants], monitor: wp.ref[Monitor],
               k: int, n: int, singles: wp.ref[int], last: int, h: wp.float64, stage_h: wp.array(dtype=real),
               lead_h: wp.array(dtype=real), first_h: real, opening: real, state: wp.array2d(dtype=Lane),
-              status: wp.array(dtype=Ints), failed_step: wp.array(dtype=Ints), failed_size: wp.array(dtype=Lane)):  # fmt: skip
+              status: wp.array(dtype=Ints), failed_step: wp.array(dtype=Ints),
+              failed_size: wp.array(dtype=Lane)):  # fmt: skip
         """singles: steps still to be made one at a time, after an alarm of these lanes, `suspects`."""
         good = x
         if wp.static(spec.memory and spec.checked):
@@ -109,7 +110,12 @@ def make_chunks(spec):
     """
     types, stepping, real = make_types(spec), make_stepping(spec), spec.real
     State, Constants, Monitor, Lane, Ints = types.State, types.Constants, types.Monitor, types.Lane, types.Ints
-    chunk, inspected, sampled, freezes = make_chunk(spec), make_inspected(spec), make_sampled(spec), spec.checked or spec.watched
+    chunk, inspected, sampled, freezes = (
+        make_chunk(spec),
+        make_inspected(spec),
+        make_sampled(spec),
+        spec.checked or spec.watched,
+    )
     reports = spec.control is not None and spec.checked and spec.control.reports
     note_actuators, (_, show, rest) = make_note_actuators(spec, types, stepping.at_step), make_resting(spec)
     begun, (read, write, _) = make_begun(spec), make_rows(Lane, State, spec.paced, spec.compensated)

@@ -178,7 +178,8 @@ def make_arrival(types, watch, part_step, choose, water_velocity, real, width, m
 
     @wp.func(inline=False)
     def arrival(good: wp.ref[State], x: wp.ref[State], stopped: wp.ref[State], code: wp.ref[Lane], c: wp.ref[Constants],
-                k: int, h: wp.float64, stage_h: wp.array(dtype=real), lead_h: wp.array(dtype=real), opening: real):  # fmt: skip
+                k: int, h: wp.float64, stage_h: wp.array(dtype=real), lead_h: wp.array(dtype=real),
+                opening: real):  # fmt: skip
         """(part, R^T u) where each lane stops: `part` of the step k from good, before it, to x.
 
         The states there go into `stopped`, and why they stop into `code`.

@@ -45,14 +45,18 @@ def make_feed(spec, types, method, at_step, opened):
     gather = make_gather(spec, types, at_step)
 
     @wp.func(inline=False)
-    def feed(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: spec.real):
+    def feed(
+        x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: spec.real
+    ):
         """Measure, guide, control, allocate, send."""
         y, r = seen(x, c, monitor, k, h, opening)
         acted(x, y, r, c, monitor)
         gather(x, c, monitor, k, h)
 
     @wp.func(inline=False)
-    def ask(x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: spec.real):
+    def ask(
+        x: wp.ref[State], c: wp.ref[Constants], monitor: wp.ref[Monitor], k: int, h: wp.float64, opening: spec.real
+    ):
         """Measure and guide."""
         y, r = seen(x, c, monitor, k, h, opening)
         gather(x, c, monitor, k, h)
@@ -165,9 +169,7 @@ def make_acted(spec, types):
     act, allocate, send = (in_turn(spec.control.parts, role) for role in ("control", "allocate", "send"))
 
     @wp.func
-    def acted(
-        x: wp.ref[State], y: Measurement, r: Reference, c: wp.ref[Constants], monitor: wp.ref[Monitor]
-    ):
+    def acted(x: wp.ref[State], y: Measurement, r: Reference, c: wp.ref[Constants], monitor: wp.ref[Monitor]):
         w = Wrench()
         if wp.static(act is not None):
             w = act(w, r, y, c.loop)

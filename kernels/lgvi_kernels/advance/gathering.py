@@ -95,7 +95,9 @@ def make_signals(types):
             c.memory[c.packet, monitor.kept + j] = positive(code, held, c.memory[c.packet, monitor.kept + j])
 
     @wp.func(inline=False)
-    def sample_signals(out: wp.array2d(dtype=Lane), end: int, c: wp.ref[Constants], monitor: wp.ref[Monitor], frozen: Lane):
+    def sample_signals(
+        out: wp.array2d(dtype=Lane), end: int, c: wp.ref[Constants], monitor: wp.ref[Monitor], frozen: Lane
+    ):
         """Write the signals as the last numbers of a sample, which ends before the column `end`."""
         count = monitor.signals.shape[0]
         for j in range(count):
